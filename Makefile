@@ -1,0 +1,30 @@
+# Everything is set up in .venv by itself; PYTHON chooses the interpreter.
+PYTHON ?= python3
+VENV := .venv
+RUN := $(VENV)/bin
+READY := $(VENV)/.ready
+
+.PHONY: map test lint samples clean
+
+map: $(READY)
+	mkdir -p out
+	$(RUN)/nscan-cli slam sample_logs/office.log.gz -o out/office.json --map out/office.png
+
+test: $(READY)
+	$(RUN)/python -m pytest -n 2
+
+lint: $(READY)
+	$(RUN)/ruff check
+	$(RUN)/ruff format --check
+	$(RUN)/mypy
+
+samples: $(READY)
+	$(RUN)/python -m tests.simulation.make_samples sample_logs
+
+$(READY): pyproject.toml
+	$(PYTHON) -m venv $(VENV)
+	$(RUN)/python -m pip install --quiet --disable-pip-version-check --editable '.[test]'
+	touch $@
+
+clean:
+	rm -rf $(VENV) out

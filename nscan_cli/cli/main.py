@@ -1,0 +1,94 @@
+"""The command `nscan-cli`: finds the subcommand, and turns every failure into a line and an exit code."""
+
+from __future__ import annotations
+
+import importlib
+import os
+import sys
+import traceback
+
+import click
+
+from nscan_cli import __version__
+from nscan_cli.errors import NscanError
+
+COMMANDS = {
+    "info": "What is in a log, and what the other commands will use of it.",
+    "match": "Match two scans of a log (NDT).",
+    "nscan": "Match n scans of a log jointly.",
+    "slam": "Turn a log into a pose graph and a map.",
+    "render": "Draw the map of a pose graph.",
+    "evaluate": "Measure a result against reference relations or a reference trajectory.",
+}
+INTERRUPTED, CLOSED_EARLY, INTERNAL_ERROR = 130, 141, 1
+
+
+class LazyGroup(click.Group):
+    """Subcommands are imported when they are called; the list of them needs no import."""
+
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        """The names in the order of a user's work, not of the alphabet."""
+        return list(COMMANDS)
+
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
+        """The command's module is `nscan_cli.cli.NAME`, the command in it `command`."""
+        if cmd_name not in COMMANDS:
+            return None
+        module = importlib.import_module(f"nscan_cli.cli.{cmd_name}")
+        command: click.Command = module.command
+        return command
+
+    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        """List the subcommands without importing them."""
+        with formatter.section("Commands"):
+            formatter.write_dl(list(COMMANDS.items()))
+
+
+@click.group(cls=LazyGroup, context_settings={"help_option_names": ["-h", "--help"]})
+@click.version_option(__version__, prog_name="nscan-cli")
+def cli() -> None:
+    """Turn 2D laser logs into globally consistent maps by nScan-Matching.
+
+    LOG is a path, or - for standard input; its kind is found from its content.
+    """
+
+
+def main() -> None:
+    """Entry point of the command; exits with the code of the outcome."""
+    code = run(sys.argv[1:])
+    if code == CLOSED_EARLY:
+        # Python would flush standard output once more at its end, and complain.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    sys.exit(code)
+
+
+def run(arguments: list[str]) -> int:
+    """Run the command line `arguments` and return its exit code."""
+    verbose = "-vv" in arguments or arguments.count("-v") > 1
+    try:
+        outcome = cli.main(arguments, prog_name="nscan-cli", standalone_mode=False)
+        sys.stdout.flush()
+        return outcome if isinstance(outcome, int) else 0
+    except click.exceptions.Exit as exit_:
+        return exit_.exit_code
+    except (click.Abort, KeyboardInterrupt):
+        return INTERRUPTED
+    except click.ClickException as error:
+        error.show()
+        return error.exit_code
+    except (BrokenPipeError, SystemExit):
+        # Without its standalone mode, a closed pipe is the one thing that click itself exits for.
+        return CLOSED_EARLY
+    except NscanError as error:
+        _say(str(error), verbose)
+        return error.exit_code
+    except Exception as error:
+        hint = "" if verbose else "; -vv shows where"
+        _say(f"internal error, please report it: {type(error).__name__}: {error}{hint}", verbose)
+        return INTERNAL_ERROR
+
+
+def _say(message: str, with_traceback: bool) -> None:
+    if with_traceback:
+        traceback.print_exc()
+    print(f"nscan-cli: {' '.join(message.split())}", file=sys.stderr)

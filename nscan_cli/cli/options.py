@@ -1,0 +1,176 @@
+"""Options that commands share, and where their values come from: flag > environment > TOML > default."""
+
+from __future__ import annotations
+
+import functools
+import math
+import tomllib
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import click
+
+from nscan_cli.errors import InputDataError, InputMissingError
+from nscan_cli.logs.options import ReadingOptions
+
+Command = Callable[..., Any]
+# One prefix for all commands: what is set once in a shell or a Makefile holds for each of them.
+CONTEXT = {"help_option_names": ["-h", "--help"], "auto_envvar_prefix": "NSCAN_CLI"}
+NOT_PARAMETERS = ("config", "dump_config", "quiet", "verbose")
+
+
+class PoseType(click.ParamType[Any]):
+    """X,Y,DEG on the command line, (x, y, θ) in m and rad inside."""
+
+    name = "X,Y,DEG"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        """Parse the three numbers; a wrong form is a usage error."""
+        if isinstance(value, (tuple, list)):
+            value = ",".join(str(part) for part in value)
+        try:
+            x, y, degrees = (float(part) for part in value.split(","))
+        except ValueError:
+            self.fail(f"{value!r} is not of the form X,Y,DEG, as in 0.1,0,90", param, ctx)
+        if not all(math.isfinite(part) for part in (x, y, degrees)):
+            self.fail(f"{value!r} has a part that is not finite", param, ctx)
+        return (x, y, math.radians(degrees))
+
+
+def common_options(command: Command) -> Command:
+    """-q, -v, --config and --dump-config; the command gets `quiet` and `verbose`."""
+
+    @functools.wraps(command)
+    def wrapped(*args: Any, **kwargs: Any) -> Any:
+        kwargs.pop("config")
+        if kwargs.pop("dump_config"):
+            click.echo(_as_toml(click.get_current_context()), nl=False)
+            return None
+        return command(*args, **kwargs)
+
+    for option in reversed(
+        [
+            click.option("-q", "--quiet", is_flag=True, help="Say nothing but errors."),
+            click.option("-v", "--verbose", count=True, help="Say more; -vv shows where an error arose."),
+            click.option(
+                "--config",
+                type=click.Path(),
+                is_eager=True,
+                callback=_read_config,
+                help="Read option values from a TOML file.",
+            ),
+            click.option("--dump-config", is_flag=True, help="Print the options in force as TOML, and stop."),
+        ]
+    ):
+        wrapped = option(wrapped)
+    return wrapped
+
+
+def reading_options(command: Command) -> Command:
+    """How a log is to be read; the command gets `reading`, a ReadingOptions."""
+    options = [
+        click.option("--laser", metavar="TAG", help="Laser record to use, such as FLASER or RLASER."),
+        click.option("--mount", type=PoseType(), help="Pose of the laser on the robot (m, degrees)."),
+        click.option("--flip", is_flag=True, help="The laser is mounted upside down."),
+        click.option("--min-range", type=click.FloatRange(0), metavar="M", help="Drop shorter beams."),
+        click.option("--max-range", type=click.FloatRange(0, min_open=True), metavar="M",
+                     help="Take longer beams for no return."),
+        click.option("--angle-min", type=float, metavar="DEG", help="Direction of the first beam."),
+        click.option("--angle-increment", type=float, metavar="DEG", help="Angle from beam to beam."),
+        click.option("--start", type=float, metavar="T", help="Leave out the first T seconds."),
+        click.option("--end", type=float, metavar="T", help="Stop T seconds after the first scan."),
+        click.option("--every", type=click.IntRange(1), default=1, show_default=True, metavar="N",
+                     help="Use every Nth scan."),
+        click.option("--no-odometry", is_flag=True, help="Do as if the log had no odometry."),
+        click.option("--strict", is_flag=True, help="A malformed record is an error, not a warning."),
+        click.option("--allow-corrected", is_flag=True,
+                     help="Accept a log whose poses a mapper has corrected already."),
+    ]  # fmt: skip
+
+    @functools.wraps(command)
+    def wrapped(*args: Any, **kwargs: Any) -> Any:
+        def radians(degrees: float | None) -> float | None:
+            return None if degrees is None else math.radians(degrees)
+
+        reading = ReadingOptions(
+            laser=kwargs.pop("laser"),
+            mount=kwargs.pop("mount"),
+            flip=kwargs.pop("flip"),
+            min_range=kwargs.pop("min_range"),
+            max_range=kwargs.pop("max_range"),
+            angle_min=radians(kwargs.pop("angle_min")),
+            angle_increment=radians(kwargs.pop("angle_increment")),
+            start=kwargs.pop("start"),
+            end=kwargs.pop("end"),
+            every=kwargs.pop("every"),
+            odometry=not kwargs.pop("no_odometry"),
+            strict=kwargs.pop("strict"),
+            allow_corrected=kwargs.pop("allow_corrected"),
+        )
+        return command(*args, reading=reading, **kwargs)
+
+    for option in reversed(options):
+        wrapped = option(wrapped)
+    return wrapped
+
+
+def _read_config(ctx: click.Context, _param: click.Parameter, value: str | None) -> str | None:
+    """Take a TOML file as the command's defaults.
+
+    Keys at the top and in the table of the command's name are the command's long options without
+    their dashes; tables of other commands are left alone.
+    """
+    if value is None:
+        return None
+    try:
+        with Path(value).open("rb") as file:
+            document = tomllib.load(file)
+    except OSError as error:
+        raise InputMissingError(f"{value}: {error.strerror}; --config takes a TOML file") from error
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise InputDataError(value, f"not TOML: {error}", "mend it, or leave out --config") from error
+    from nscan_cli.cli.main import COMMANDS
+
+    settings = {key: entry for key, entry in document.items() if key not in COMMANDS}
+    own = document.get(ctx.command.name or "", {})
+    settings.update(own if isinstance(own, dict) else {})
+    names = {_key(param): param.name for param in ctx.command.params if param.name not in NOT_PARAMETERS
+             and isinstance(param, click.Option)}  # fmt: skip
+    for key in settings:
+        if key not in names:
+            known = ", ".join(sorted(names))
+            raise InputDataError(value, f"{ctx.command.name} has no option {key!r}", f"known: {known}")
+    defaults = {names[key]: entry for key, entry in settings.items()}
+    ctx.default_map = {**(ctx.default_map or {}), **defaults}
+    return value
+
+
+def _key(param: click.Parameter) -> str:
+    return max(param.opts, key=len).lstrip("-")
+
+
+def _as_toml(ctx: click.Context) -> str:
+    """The command's options in force as a TOML table of its name, in the order of --help."""
+    lines = [f"[{ctx.command.name}]"]
+    for param in ctx.command.params:
+        if not isinstance(param, click.Option) or param.name in NOT_PARAMETERS:
+            continue
+        value = ctx.params.get(param.name or "")
+        if value is None or value == ():
+            continue
+        if isinstance(param.type, PoseType):
+            value = [value[0], value[1], math.degrees(value[2])]
+        lines.append(f"{_key(param)} = {_toml_value(value)}")
+    return "\n".join(lines) + "\n"
+
+
+def _toml_value(value: Any) -> str:
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, (int, float)):
+        return repr(value)
+    if isinstance(value, (tuple, list)):
+        return "[" + ", ".join(_toml_value(part) for part in value) + "]"
+    text = str(value).replace("\\", "\\\\").replace('"', '\\"')
+    return f'"{text}"'

@@ -1,0 +1,31 @@
+"""What a person sees while a command runs: a bar on a terminal, warnings and summaries; all on stderr."""
+
+from __future__ import annotations
+
+import contextlib
+import sys
+from collections.abc import Callable, Iterator
+
+Advance = Callable[[int, str], None]
+
+
+def say(message: str, quiet: bool = False) -> None:
+    """One line for people."""
+    if not quiet:
+        print(message, file=sys.stderr)
+
+
+@contextlib.contextmanager
+def progress(title: str, total: int, quiet: bool) -> Iterator[Advance]:
+    """A progress bar, only on a terminal. Yields advance(done, detail), cheap enough to call per scan."""
+    if quiet or not sys.stderr.isatty():
+        yield lambda _done, _detail: None
+        return
+    from rich.console import Console
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(),
+               TextColumn("{task.fields[detail]}"), TimeRemainingColumn())  # fmt: skip
+    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
+        task = bar.add_task(title, total=total, detail="")
+        yield lambda done, detail: bar.update(task, completed=done, detail=detail)

@@ -1,0 +1,1 @@
+"""Relations → consistent poses (paper, IV)."""

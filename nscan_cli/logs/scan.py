@@ -1,0 +1,100 @@
+"""What every reader of a log yields: the scans of one laser in order of time, as columns."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nscan_cli.errors import WrongUsageError
+from nscan_cli.poses import Array, compose, transform
+
+
+@dataclass(frozen=True)
+class Source:
+    """The file that the log was read from: base name, SHA-256 of its bytes as stored, size in bytes."""
+
+    name: str
+    sha256: str
+    bytes: int
+
+
+@dataclass(frozen=True)
+class LogReport:
+    """What the reader found and did; `info` prints it."""
+
+    records: dict[str, int] = field(default_factory=dict)
+    """Records by their tag."""
+    skipped: dict[str, tuple[int, int]] = field(default_factory=dict)
+    """Reason → (how many records were skipped for it, line of the first)."""
+    backward_stamps: int = 0
+    """Steps back in time in file order; the scans are sorted stably all the same."""
+    warnings: tuple[str, ...] = ()
+    """Whole sentences for the user."""
+
+
+@dataclass(frozen=True)
+class LaserLog:
+    """The scans of one laser, sorted stably by time; S scans of at most B beams.
+
+    A row is a scan. `numbers` are the scan numbers that users see: positions in order of time in the
+    whole log, so that they stay the same whatever `start`, `end` and `every` select.
+    """
+
+    source: Source
+    format: str
+    """Such as "CARMEN"."""
+    laser: str
+    """The record tag or topic that the scans come from, such as "FLASER"."""
+    numbers: NDArray[np.int64]
+    """(S,) scan numbers, increasing."""
+    stamps: tuple[str, ...]
+    """S time stamps as the source wrote them."""
+    times: Array
+    """(S,) seconds."""
+    ranges: NDArray[np.float32]
+    """(S, B) metres from the laser; inf where a beam met nothing, nan where it says nothing
+    (outside the range limits, an error code, or a beam that this scan does not have)."""
+    angle_min: Array
+    """(S,) direction of the first beam in the laser's frame, rad."""
+    angle_increment: Array
+    """(S,) rad from beam to beam."""
+    mount: Array
+    """(3,) pose of the laser in the robot's frame."""
+    odometry: Array | None
+    """(S, 3) pose of the robot in the odometry frame, or None."""
+    no_return: float | None
+    """The least value (m) that was taken for "no return", or None when the log has none."""
+    range_limits: tuple[float, float]
+    """The effective range limits (m): a beam counts when min < r < max."""
+    report: LogReport
+    truth_times: Array | None = None
+    """(T,) seconds of the true poses (TRUEPOS), or None."""
+    truth: Array | None = None
+    """(T, 3) true poses of the robot, or None."""
+
+    def __len__(self) -> int:
+        return len(self.stamps)
+
+    def row(self, number: int) -> int:
+        """The row of a scan number. Raises WrongUsageError when the log has no such scan."""
+        row = int(np.searchsorted(self.numbers, number))
+        if row == len(self) or self.numbers[row] != number:
+            first, last = (int(self.numbers[0]), int(self.numbers[-1]))
+            raise WrongUsageError(
+                f"{self.source.name}: no scan {number}; scans read go from {first} to {last}"
+            )
+        return row
+
+    def points(self, scan: int) -> Array:
+        """The usable beams' end points (m, 2) of one row in the robot's frame, in beam order."""
+        ranges = self.ranges[scan]
+        beams = np.flatnonzero(np.isfinite(ranges))
+        angles = self.angle_min[scan] + beams * self.angle_increment[scan]
+        r = ranges[beams].astype(np.float64)
+        return transform(self.mount, np.stack([r * np.cos(angles), r * np.sin(angles)], axis=-1))
+
+    def laser_pose(self, robot: Array) -> Array:
+        """Poses (…, 3) of the laser for poses (…, 3) of the robot."""
+        return compose(robot, self.mount)

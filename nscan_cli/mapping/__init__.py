@@ -1,0 +1,1 @@
+"""Poses and scans → maps and pictures."""

@@ -1,0 +1,1 @@
+"""Poses ← scans: pairwise and joint matching (paper, III)."""

@@ -1,0 +1,1 @@
+"""Scans → Gaussians: the normal distributions transform."""

@@ -1,0 +1,64 @@
+"""SE(2): poses (x, y, φ) in m and rad, their composition and relative poses (paper, III-A).
+
+All functions take and return float64 arrays whose last axis is (x, y, φ); leading axes broadcast.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+Array = NDArray[np.float64]
+
+
+def wrap(angle: ArrayLike) -> Array:
+    """The angle (rad) normalised to (−π, π]."""
+    a = np.asarray(angle, dtype=np.float64)
+    return a - 2 * np.pi * np.ceil((a - np.pi) / (2 * np.pi))
+
+
+def transform(pose: ArrayLike, points: ArrayLike) -> Array:
+    """Eq. (1): points (…, 2) of the pose's frame in the frame that the pose is given in."""
+    p, x = np.asarray(pose, dtype=np.float64), np.asarray(points, dtype=np.float64)
+    c, s = np.cos(p[..., 2]), np.sin(p[..., 2])
+    return np.stack(
+        [c * x[..., 0] - s * x[..., 1] + p[..., 0], s * x[..., 0] + c * x[..., 1] + p[..., 1]], axis=-1
+    )
+
+
+def compose(a: ArrayLike, b: ArrayLike) -> Array:
+    """a ⊕ b: pose b, given in the frame of a, in the frame that a is given in."""
+    a, b = np.asarray(a, dtype=np.float64), np.asarray(b, dtype=np.float64)
+    xy = transform(a, b[..., :2])
+    return np.concatenate([xy, wrap(a[..., 2] + b[..., 2])[..., None]], axis=-1)
+
+
+def relative(a: ArrayLike, b: ArrayLike) -> Array:
+    """Eq. (2): a ⊖ b, pose a seen from frame b; it maps points of frame a into frame b."""
+    a, b = np.asarray(a, dtype=np.float64), np.asarray(b, dtype=np.float64)
+    d = a - b
+    c, s = np.cos(b[..., 2]), np.sin(b[..., 2])
+    return np.stack([c * d[..., 0] + s * d[..., 1], -s * d[..., 0] + c * d[..., 1], wrap(d[..., 2])], axis=-1)
+
+
+def inverse(a: ArrayLike) -> Array:
+    """⊖a: the frame that a is given in, seen from a."""
+    a = np.asarray(a, dtype=np.float64)
+    return relative(np.zeros_like(a), a)
+
+
+def relative_jacobians(a: ArrayLike, b: ArrayLike) -> tuple[Array, Array]:
+    """Eq. (9): the derivatives (3, 3) of u = a ⊖ b with respect to a and to b; one pair of poses."""
+    u = relative(a, b)
+    c, s = np.cos(np.asarray(b)[2]), np.sin(np.asarray(b)[2])
+    by_a = np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
+    by_b = np.array([[-c, -s, u[1]], [s, -c, -u[0]], [0.0, 0.0, -1.0]])
+    return by_a, by_b
+
+
+def rotated_information(pose: ArrayLike, information: Array) -> Array:
+    """An information matrix (3, 3) of the frame of `pose` in the frame that the pose is given in."""
+    c, s = np.cos(np.asarray(pose)[2]), np.sin(np.asarray(pose)[2])
+    rotation = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+    rotated: Array = rotation @ information @ rotation.T
+    return rotated

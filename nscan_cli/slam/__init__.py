@@ -1,0 +1,1 @@
+"""The SLAM loop (paper, V)."""
