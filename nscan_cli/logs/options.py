@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
+
+from nscan_cli.errors import WrongUsageError
 
 
 @dataclass(frozen=True)
@@ -27,3 +30,15 @@ class ReadingOptions:
     odometry: bool = True
     strict: bool = False
     allow_corrected: bool = False
+
+    def __post_init__(self) -> None:
+        """Refuse values that no log fits. Raises WrongUsageError."""
+        given = (self.min_range, self.max_range, self.angle_min, self.angle_increment, self.start, self.end)
+        if not all(math.isfinite(value) for value in (*given, *(self.mount or ())) if value is not None):
+            raise WrongUsageError("a reading option is not a finite number; give one that is")
+        if self.max_range is not None and self.max_range <= (self.min_range or 0.0):
+            raise WrongUsageError("--max-range leaves no beam; it has to be above 0 and --min-range")
+        if self.angle_increment == 0:
+            raise WrongUsageError("--angle-increment is 0; beams need different directions")
+        if self.start is not None and self.end is not None and self.start > self.end:
+            raise WrongUsageError("--start is after --end; no scan lies between")

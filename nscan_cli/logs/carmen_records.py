@@ -1,0 +1,247 @@
+"""CARMEN text, line by line: which records there are, and the numbers in them.
+
+Source of the form: CARMEN, src/logger/writelog.c. A line is `TAG values… ipc_timestamp host
+logger_timestamp`; lines that begin with # are comments.
+"""
+
+from __future__ import annotations
+
+import re
+import warnings
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from nscan_cli.errors import InputDataError
+from nscan_cli.poses import Array
+
+TAG = re.compile(rb"[A-Z][A-Z0-9_]{2,31}\Z")
+OLD = re.compile(r"([FR]LASER|LASER[3-5])\Z")
+NEW = re.compile(r"(RAW|ROBOT)LASER\d\Z")
+TRAILER = 3
+CHUNK = 1024
+MAX_BEAMS = 16384
+LARGEST = 1e9
+"""m; no pose is beyond, whatever its coordinates."""
+
+
+@dataclass
+class Skips:
+    """Records that were left out, by reason; under `strict` the first one is an error."""
+
+    file: str
+    strict: bool
+    reasons: dict[str, tuple[int, int]] = field(default_factory=dict)
+
+    def add(self, reason: str, line: int) -> None:
+        """Count one record. Raises InputDataError under strict."""
+        if self.strict:
+            raise InputDataError(self.file, reason, "mend the line, or leave out --strict", line)
+        count, first = self.reasons.get(reason, (0, line))
+        self.reasons[reason] = (count + 1, min(first, line))
+
+
+@dataclass(frozen=True)
+class Record:
+    """One line: its number in the file (from 1), the values as text, and the trailer where there is one."""
+
+    line: int
+    values: bytes
+    count: int
+    """How many values."""
+    stamp: str
+    """The ipc timestamp as written; empty when the line has no trailer."""
+    host: bytes = b""
+
+
+@dataclass
+class Scans:
+    """The scans of one laser, in file order: S scans of at most B beams."""
+
+    ranges: NDArray[np.float32]
+    """(S, B) as written; nan beyond a scan's own beams."""
+    beams: NDArray[np.int64]
+    """(S,)"""
+    head: Array
+    """(S, 7) of new messages: type, start angle, fov, resolution, maximum, accuracy, mode; else (S, 0)."""
+    laser: Array
+    """(S, 3) pose of the laser in the odometry frame; (S, 0) when the message has none."""
+    robot: Array
+    """(S, 3) pose of the robot, likewise."""
+    stamps: list[str]
+    lines: list[int]
+    hosts: set[bytes]
+
+
+def lines_by_tag(data: bytes, skips: Skips) -> dict[str, list[tuple[int, bytes]]]:
+    """The lines of a log (number from 1, bytes without the tag), by their tag, in file order."""
+    by_tag: dict[bytes, list[tuple[int, bytes]]] = {}
+    for number, line in enumerate(data.split(b"\n"), 1):
+        text = line.strip()
+        if not text or text.startswith(b"#"):
+            continue
+        tag, _, rest = text.partition(b" ")
+        if b"\t" in tag:
+            tag, rest = [*text.split(None, 1), b""][:2]
+        known = by_tag.get(tag)
+        if known is None:
+            if not TAG.match(tag):
+                skips.add("not a CARMEN record", number)
+                continue
+            known = by_tag[tag] = []
+        known.append((number, rest))
+    return {tag.decode(): lines for tag, lines in by_tag.items()}
+
+
+def numbers(
+    lines: list[tuple[int, bytes]], count: int, skips: Skips, stamped: bool = True
+) -> tuple[Array, list[str], list[int]]:
+    """Rows (R, count) of a short record such as ODOM, with stamps and line numbers.
+
+    `stamped`: a line without trailer is of no use. Lines of another length or with a value out of
+    bounds are skipped.
+    """
+    rows, stamps, places = [], [], []
+    for number, text in lines:
+        tokens = text.split()
+        if len(tokens) not in ((count + TRAILER,) if stamped else (count + TRAILER, count)):
+            skips.add("wrong number of values", number)
+            continue
+        try:
+            row = [float(token) for token in tokens[:count]]
+        except ValueError:
+            skips.add("a value is not a number", number)
+            continue
+        if not _sound(row):
+            skips.add("a value is out of bounds", number)
+            continue
+        rows.append(row)
+        stamps.append(_text(tokens[count]) if len(tokens) > count else "")
+        places.append(number)
+    return np.array(rows, dtype=np.float64).reshape(-1, count), stamps, places
+
+
+def scans(tag: str, lines: list[tuple[int, bytes]], skips: Skips) -> Scans:
+    """The scans of all lines of one laser tag; malformed ones are skipped."""
+    head = 7 if NEW.match(tag) else 0
+    poses = 6 if tag in ("FLASER", "RLASER") or tag.startswith("ROBOT") else 0
+    tail = poses + (5 if tag.startswith("ROBOT") else 0)
+    records = [r for number, text in lines if (r := _record(number, text, head, tail, skips)) is not None]
+    widest = max((n for _, n in records), default=0)
+    size = len(records)
+    result = Scans(
+        ranges=np.full((size, widest), np.nan, dtype=np.float32),
+        beams=np.zeros(size, dtype=np.int64),
+        head=np.zeros((size, head)),
+        laser=np.zeros((size, poses // 2)),
+        robot=np.zeros((size, poses // 2)),
+        stamps=[],
+        lines=[],
+        hosts=set(),
+    )
+    row = 0
+    for record, beams, values in _parsed(records, skips):
+        problem = _problem(values, head, beams, poses, tail)
+        if problem:
+            skips.add(problem, record.line)
+            continue
+        with np.errstate(over="ignore"):
+            result.ranges[row, :beams] = values[head + 1 : head + 1 + beams]
+        result.beams[row] = beams
+        result.head[row] = values[:head]
+        if poses:
+            at = len(values) - tail
+            result.laser[row], result.robot[row] = values[at : at + 3], values[at + 3 : at + 6]
+        result.stamps.append(record.stamp)
+        result.lines.append(record.line)
+        result.hosts.add(record.host)
+        row += 1
+    if row < size:
+        for name in ("ranges", "beams", "head", "laser", "robot"):
+            setattr(result, name, getattr(result, name)[:row])
+    return result
+
+
+def _record(number: int, text: bytes, head: int, tail: int, skips: Skips) -> tuple[Record, int] | None:
+    """One laser line and its number of beams, or None when it is malformed.
+
+    The beam count is believed only as far as the line has that many values.
+    """
+    if b"  " in text or b"\t" in text:
+        text = b" ".join(text.split())
+    tokens = text.count(b" ") + 1
+    start = text.split(b" ", head + 1)
+    if not text or len(start) <= head:
+        skips.add("wrong number of values", number)
+        return None
+    try:
+        beams = int(start[head])
+    except ValueError:
+        skips.add("the beam count is not a number", number)
+        return None
+    if not 0 < beams <= MAX_BEAMS:
+        skips.add(f"the beam count is not in 1…{MAX_BEAMS}", number)
+        return None
+    least = head + 1 + beams + tail + (1 if head else 0)
+    if tokens == least and not head:
+        return Record(number, text, tokens, ""), beams
+    if tokens < least + TRAILER or (tokens > least + TRAILER and not head):
+        skips.add("wrong number of values", number)
+        return None
+    values, stamp, host, _ = text.rsplit(b" ", TRAILER)
+    return Record(number, values, tokens - TRAILER, _text(stamp), host), beams
+
+
+def _parsed(records: list[tuple[Record, int]], skips: Skips) -> Iterator[tuple[Record, int, Array]]:
+    """Each record with its numbers, parsed many lines at a time where all are well formed."""
+    for begin in range(0, len(records), CHUNK):
+        part = records[begin : begin + CHUNK]
+        values = _floats(b" ".join(record.values for record, _ in part))
+        if values is not None and values.size == sum(record.count for record, _ in part):
+            at = 0
+            for record, beams in part:
+                yield record, beams, values[at : at + record.count]
+                at += record.count
+            continue
+        for record, beams in part:
+            alone = _floats(record.values)
+            if alone is None or alone.size != record.count:
+                skips.add("a value is not a number", record.line)
+            else:
+                yield record, beams, alone
+
+
+def _floats(text: bytes) -> Array | None:
+    """All numbers of a text separated by blanks, or None when something else is among them."""
+    with warnings.catch_warnings():
+        # NumPy warns where it stops early; a later one raises ValueError.
+        warnings.simplefilter("error", DeprecationWarning)
+        try:
+            return np.fromstring(text, dtype=np.float64, sep=" ")
+        except (DeprecationWarning, ValueError):
+            return None
+
+
+def _problem(values: Array, head: int, beams: int, poses: int, tail: int) -> str:
+    """What is wrong with the numbers of a laser record; empty when nothing is."""
+    if head:
+        remissions = values[head + 1 + beams]
+        if remissions != len(values) - (head + 1 + beams + 1 + tail):
+            return "wrong number of values"
+        if not _sound(values[:head]) or np.abs(values[[1, 3]]).max() > 4 * np.pi:
+            return "an angle is out of bounds"
+    if poses:
+        at = len(values) - tail
+        if not _sound(values[at : at + poses]):
+            return "a pose is out of bounds"
+    return ""
+
+
+def _sound(values: ArrayLike) -> bool:
+    return bool((np.abs(values) < LARGEST).all())
+
+
+def _text(stamp: bytes) -> str:
+    return stamp.decode("ascii", "replace")

@@ -1,0 +1,55 @@
+"""Names for files that are not logs that can be read, so that the user learns what was given."""
+
+from __future__ import annotations
+
+import re
+
+MAGIC = (
+    (b"\x89MCAP0\r\n", "an MCAP recording"),
+    (b"#ROSBAG V", "a ROS 1 bag"),
+    (b"SQLite format 3\0", "an SQLite database, as a ROS 2 .db3 bag is"),
+    (b"\x89PNG\r\n\x1a\n", "a PNG picture"),
+    (b"\xff\xd8\xff", "a JPEG picture"),
+    (b"P5", "a PGM picture"),
+    (b"%PDF", "a PDF document"),
+    (b"PK\x03\x04", "a ZIP archive"),
+    (b"\xfd7zXZ\0", "compressed by xz"),
+    (b"BZh", "compressed by bzip2"),
+    (b"\x28\xb5\x2f\xfd", "compressed by zstd"),
+    (b"\x04\x22\x4d\x18", "compressed by lz4"),
+    (b"\x1f\x8b", "compressed by gzip twice"),
+    (b"\x7fELF", "a program"),
+)
+"""What the first bytes say."""
+
+TEXT = (
+    (rb"\[[\w.-]+\]\s*$", "TOML or INI text"),
+    (rb"[{\[]", "JSON text"),
+    (rb"<", "HTML or XML text"),
+    (rb"(VERTEX_SE2|EDGE_SE2|VERTEX2|EDGE2|VERTEX_SE3:QUAT|EDGE_SE3:QUAT)\s", "a pose graph (g2o or TORO)"),
+    (rb"(LASER_READING|GFS_\w+)\s", "a GMapping .gfs file"),
+    (rb"(POS|LASER-RANGE) \d+ \d+:", "a log in the .script form (cm and degrees)"),
+    (rb"\d+\.\d+ \S+ \d+ [a-z]\w* \d+ \d+\.\d+(\s|$)", "a Player log, version 1"),
+    (rb"\d+\.\d+ \S+ \d+ [a-z]\w* \d+ \d+ \d+(\s|$)", "a Player log, version 2"),
+    (rb"(image|resolution):", "a map's YAML file"),
+    (rb"([-+.\deE]+[ \t]+){7}[-+.\deE]+\s*$", "a list of eight numbers a line, as of poses or relations"),
+)
+"""What the first line says that is neither blank nor a comment."""
+
+FIRST_LINE = re.compile(rb"^[ \t]*([^\s#][^\r\n]*)", re.MULTILINE)
+
+
+def name_of(data: bytes) -> str:
+    """What `data` is, as the end of the sentence "the file is …"; "of an unknown kind" when in doubt."""
+    for magic, name in MAGIC:
+        if data.startswith(magic):
+            return name
+    if data[257:262] == b"ustar":
+        return "a tar archive"
+    if b"\0" in data[:4096]:
+        return "binary data of an unknown kind"
+    line = FIRST_LINE.search(data, 0, 1 << 16)
+    for pattern, name in TEXT:
+        if line and re.match(pattern, line.group(1)):
+            return name
+    return "of an unknown kind"

@@ -1,0 +1,18 @@
+"""The real logs that some tests read; they are no part of the repository."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import pytest
+
+BESIDE_THE_REPOSITORY = Path(__file__).resolve().parents[2] / "shared" / "data"
+
+
+def data_file(name: str) -> Path:
+    """The real log or graph `name`, from the folder NSCAN_DATA; the test is skipped where it is absent."""
+    path = Path(os.environ.get("NSCAN_DATA", BESIDE_THE_REPOSITORY)) / name
+    if not path.is_file():
+        pytest.skip(f"{name} is not there: set NSCAN_DATA to the folder of the real logs")
+    return path
