@@ -1,0 +1,102 @@
+"""`nscan-cli evaluate`: a result against reference relations or a reference trajectory."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import click
+
+from nscan_cli.cli.options import CONTEXT, common_options, reading_options
+from nscan_cli.cli.progress import say
+from nscan_cli.errors import CheckFailedError, WrongUsageError
+from nscan_cli.logs.options import ReadingOptions
+
+if TYPE_CHECKING:
+    from nscan_cli.evaluation.report import Evaluation
+
+
+@click.command("evaluate", context_settings=CONTEXT)
+@click.argument("result")
+@click.option("--relations", metavar="FILE", help="Relations of the Kümmerle et al. 2009 benchmark.")
+@click.option("--reference", metavar="FILE", help="A TUM trajectory, or a log with TRUEPOS: ATE and RPE.")
+@click.option("--worst", type=click.IntRange(0), default=0, metavar="N", help="List the N worst relations.")
+@click.option(
+    "--max-translation",
+    type=click.FloatRange(0),
+    metavar="M",
+    help="Exit 3 when the mean on relations or the RMSE of the ATE is above.",
+)
+@click.option("--max-rotation", type=click.FloatRange(0), metavar="DEG", help="The same for the rotation.")
+@click.option("--json", "as_json", is_flag=True, help="Print JSON.")
+@reading_options
+@common_options
+def command(
+    result: str,
+    relations: str | None,
+    reference: str | None,
+    worst: int,
+    max_translation: float | None,
+    max_rotation: float | None,
+    as_json: bool,
+    reading: ReadingOptions,
+    quiet: bool,
+    **_verbosity: int,
+) -> None:
+    """Measure RESULT: a graph, a TUM trajectory, or a CARMEN log with corrected poses.
+
+    With --relations, the relative poses of pairs of stamps are compared, and no common frame is
+    needed: translational and rotational error, mean ± sd, median, mean square and maximum. With
+    --reference, the trajectory is aligned first: absolute error (ATE), and relative error (RPE) per
+    metre of path. The options that say how to read a log hold where RESULT or the reference is one.
+    """
+    if relations is None and reference is None:
+        raise WrongUsageError("nothing to measure against; give --relations or --reference")
+    if [result, relations, reference].count("-") > 1:
+        raise WrongUsageError("standard input (-) can be one input only; give the others by their path")
+    import json
+
+    from nscan_cli.evaluation.report import as_document, as_text
+
+    evaluation = _evaluate(result, relations, reference, worst, reading)
+    if evaluation.relations and evaluation.relations[1].too_far:
+        table, errors = evaluation.relations
+        say(f"warning: {errors.too_far} of {len(table)} relations have a stamp far from every pose", quiet)
+    if as_json:
+        click.echo(json.dumps(as_document(evaluation), indent=2, allow_nan=False))
+    else:
+        click.echo(as_text(evaluation), nl=False)
+    _check(evaluation, max_translation, max_rotation)
+
+
+def _evaluate(
+    result: str, relations: str | None, reference: str | None, worst: int, reading: ReadingOptions
+) -> Evaluation:
+    from nscan_cli.evaluation.relations import read_relations, relation_errors
+    from nscan_cli.evaluation.report import Evaluation
+    from nscan_cli.evaluation.results import load_reference, load_trajectory
+    from nscan_cli.evaluation.trajectory import trajectory_errors
+    from nscan_cli.inputs import base_name, label
+
+    trajectory = load_trajectory(result, reading)
+    on_relations, on_reference = None, None
+    if relations is not None:
+        table = read_relations(relations)
+        on_relations = (table, relation_errors(trajectory, table, label(result)))
+    if reference is not None:
+        truth = load_reference(reference, reading)
+        on_reference = (
+            base_name(reference),
+            trajectory_errors(trajectory, truth, label(result), label(reference)),
+        )
+    return Evaluation(base_name(result), len(trajectory), on_relations, on_reference, worst)
+
+
+def _check(evaluation: Evaluation, max_translation: float | None, max_rotation: float | None) -> None:
+    above = []
+    for name, translation, rotation in evaluation.bounded():
+        if max_translation is not None and translation > max_translation:
+            above.append(f"{name}: {translation:.4f} m is above {max_translation:g} m")
+        if max_rotation is not None and rotation > max_rotation:
+            above.append(f"{name}: {rotation:.4f} degrees is above {max_rotation:g} degrees")
+    if above:
+        raise CheckFailedError(f"{evaluation.result}: " + "; ".join(above))

@@ -1,0 +1,43 @@
+"""Which poses of two trajectories belong together: those nearest in time."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nscan_cli.errors import InputDataError
+from nscan_cli.poses import Array
+
+TOLERANCE = 0.1
+"""Seconds by which a stamp may miss a pose, as in Kümmerle's metric."""
+
+
+def nearest(times: Array, wanted: Array) -> NDArray[np.int64]:
+    """The rows (M,) of `times` (N,), not decreasing, nearest to `wanted` (M,); the earlier of two as near."""
+    right = np.clip(np.searchsorted(times, wanted), 1, max(len(times) - 1, 1))
+    left = right - 1
+    right = np.minimum(right, len(times) - 1)
+    return np.where(wanted - times[left] <= times[right] - wanted, left, right).astype(np.int64)
+
+
+def mutual(times: Array, reference: Array) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Rows of `times` and of `reference`, pair by pair, that are each other's nearest within TOLERANCE.
+
+    Each row occurs once at most, whichever of the two is the denser. Both must not decrease.
+    """
+    rows = np.arange(len(times))
+    partner = nearest(reference, times)
+    back = nearest(times, reference)[partner]
+    pairs = (back == rows) & (np.abs(reference[partner] - times) <= TOLERANCE)
+    return rows[pairs], partner[pairs]
+
+
+def no_match(result: str, times: Array, reference: str, reference_times: Array) -> InputDataError:
+    """The error of a result that has no stamp in common with its reference; it shows both spans."""
+    a, b, c, d = times.min(), times.max(), reference_times.min(), reference_times.max()
+    problem = (
+        f"no stamp of {reference} lies within {TOLERANCE} s of it; "
+        f"the result spans {a:.3f} to {b:.3f} s ({len(times)} poses), "
+        f"the reference {c:.3f} to {d:.3f} s ({len(reference_times)} stamps), {c - a:+.3f} s off at the start"
+    )
+    return InputDataError(result, problem, "give the reference of this log, in the same clock")

@@ -1,0 +1,39 @@
+"""How errors are summed up."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from nscan_cli.poses import Array
+
+
+@dataclass(frozen=True)
+class Spread:
+    """Figures of a set of errors, in the unit of the errors."""
+
+    mean: float
+    sd: float
+    """Sample standard deviation (n − 1); 0 for a single error."""
+    median: float
+    mean_square: float
+    """In the unit squared."""
+    maximum: float
+
+    @classmethod
+    def of(cls, errors: Array) -> Spread:
+        """The figures of errors (n,), n ≥ 1."""
+        return cls(
+            mean=float(errors.mean()),
+            sd=float(errors.std(ddof=1)) if len(errors) > 1 else 0.0,
+            median=float(np.median(errors)),
+            mean_square=float((errors**2).mean()),
+            maximum=float(errors.max()),
+        )
+
+    @property
+    def rmse(self) -> float:
+        """Root of the mean square."""
+        return math.sqrt(self.mean_square)

@@ -1,0 +1,222 @@
+"""Pose graphs in g2o's text format: VERTEX_SE2, EDGE_SE2 and FIX; other tags are skipped and counted.
+
+    VERTEX_SE2 id x y θ
+    EDGE_SE2 i j dx dy dθ I11 I12 I13 I22 I23 I33
+    FIX id
+
+The error of an edge is z⁻¹ ∘ (x_i⁻¹ ∘ x_j) in g2o, so its translation stands in the frame of the
+measurement z; in eq. (16) it is (x̂_j ⊖ x̂_i) − z. The information is rotated by the angle of z between
+the two, which leaves the energy as it is.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections import Counter, deque
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from nscan_cli import __version__
+from nscan_cli.errors import InputDataError
+from nscan_cli.graph.model import Graph, NScan, Pairwise
+from nscan_cli.graph.triangles import from_upper_triangle, is_indefinite, upper_triangle
+from nscan_cli.inputs import base_name, label, read_bytes
+from nscan_cli.poses import Array, compose, inverse, relative, rotated_information
+
+REMEDY = "mend or remove the line"
+LARGEST_ID = 2**53
+
+
+@dataclass
+class _Content:
+    """The lines of a file by their kind; edges as (line, i, j, measurement, information)."""
+
+    vertices: dict[int, Array] = field(default_factory=dict)
+    edges: list[tuple[int, int, int, Array, Array]] = field(default_factory=list)
+    fixed: dict[int, int] = field(default_factory=dict)
+    """Vertex → line."""
+    skipped: Counter[str] = field(default_factory=Counter)
+
+
+def read_g2o(path: str) -> Graph:
+    """The graph of a g2o file; "-" reads standard input.
+
+    Nodes are the vertices in order of their ids, all of them keyframes; a node's scan number is the
+    vertex's id, its stamp its row. Edges between vertices that follow each other get the origin
+    odometry, the others loop. A file without vertices gets its poses from the edges: the fewest from
+    the vertex of the smallest id, which is at the origin. FIX only chooses the frame, which is free
+    here, so it is checked and dropped; one vertex may be fixed. How many lines of which tags were
+    skipped is in provenance["skipped"].
+
+    Raises InputMissingError when the file cannot be read, InputDataError on a malformed line.
+    """
+    data, name = read_bytes(path), label(path)
+    content = _Content()
+    for number, line in enumerate(data.decode("utf-8", errors="replace").split("\n"), start=1):
+        fields = line.split("#", 1)[0].split()
+        if not fields:
+            continue
+        try:
+            _take(content, number, fields)
+        except ValueError as error:
+            raise InputDataError(name, str(error), REMEDY, line=number) from error
+    if not content.vertices and not content.edges:
+        raise InputDataError(name, "no VERTEX_SE2 or EDGE_SE2 line", "give a 2D pose graph of g2o")
+    vertices = content.vertices or _chained(content, name)
+    graph = _graph(content, vertices, name)
+    graph.provenance = {
+        "tool": {"name": "nscan-cli", "version": __version__},
+        "inputs": [{"name": base_name(path), "sha256": hashlib.sha256(data).hexdigest(), "bytes": len(data)}],
+        "parameters": {},
+        "skipped": dict(sorted(content.skipped.items())),
+    }
+    return graph
+
+
+def write_g2o(graph: Graph) -> bytes:
+    """The keyframes and relations as g2o text; the first keyframe is fixed. A vertex's id is its scan number.
+
+    g2o has no form for an nScan relation: each is replaced by the marginals of its Hessian between pose
+    c and every other pose, as pairwise edges. This loses what the relation says about the other poses
+    among each other, and a graph optimised from the file differs from one that has the whole Hessian.
+    Nodes that are no keyframes are left out. Numbers have the digits that read back exactly.
+    """
+    keyframes = graph.keyframes.tolist()
+    names = graph.scans.tolist()
+    lines = [f"VERTEX_SE2 {names[node]} {_numbers(graph.poses[node])}" for node in keyframes]
+    lines += [f"FIX {names[node]}" for node in keyframes[:1]]
+    relations = list(graph.pairwise)
+    for nscan in graph.nscan:
+        relations += pairwise_marginals(nscan)
+    for relation in relations:
+        z = relation.measurement
+        information = upper_triangle(rotated_information(inverse(z), relation.information))
+        a, b = relation.nodes
+        lines.append(f"EDGE_SE2 {names[a]} {names[b]} {_numbers(z)} {_numbers(information)}")
+    return ("\n".join(lines) + "\n").encode()
+
+
+def pairwise_marginals(relation: NScan) -> list[Pairwise]:
+    """An nScan relation as pairwise relations from pose c to each of the others: a lossy replacement.
+
+    With pose c held fixed, the information on pose i alone is the Schur complement
+    H_ii − H_ir H_rr⁺ H_ri over all other poses r, turned from the relation's frame into that of pose c.
+    Directions that the relation does not hold get no information; the Hessian's negative eigenvalues
+    count as 0.
+    """
+    n, c = len(relation.nodes), relation.fixed
+    others = [index for index in range(n) if index != c]
+    free = np.concatenate([np.arange(3 * index, 3 * index + 3) for index in others])
+    eigenvalues, vectors = np.linalg.eigh(relation.hessian[np.ix_(free, free)])
+    H = (vectors * np.maximum(eigenvalues, 0)) @ vectors.T
+    to_frame_of_c = inverse(relation.poses[c])
+    result = []
+    for block, index in enumerate(others):
+        i = np.arange(3 * block, 3 * block + 3)
+        r = np.setdiff1d(np.arange(len(free)), i)
+        H_ir = H[np.ix_(i, r)]
+        information = H[np.ix_(i, i)] - H_ir @ np.linalg.pinv(H[np.ix_(r, r)], 1e-12, True) @ H_ir.T
+        result.append(
+            Pairwise(
+                nodes=(relation.nodes[c], relation.nodes[index]),
+                measurement=relative(relation.poses[index], relation.poses[c]),
+                information=rotated_information(to_frame_of_c, 0.5 * (information + information.T)),
+                origin=relation.origin,
+                score=relation.score,
+            )
+        )
+    return result
+
+
+def _numbers(values: Array) -> str:
+    return " ".join(repr(value + 0.0) for value in values.tolist())
+
+
+def _take(content: _Content, line: int, fields: list[str]) -> None:
+    """Put one line into the content. Raises ValueError saying what is wrong with it."""
+    tag = fields[0]
+    if tag == "VERTEX_SE2":
+        _check_length(fields, 5)
+        vertex = _id(fields[1])
+        if vertex in content.vertices:
+            raise ValueError(f"vertex {vertex} is there already")
+        content.vertices[vertex] = _finite(fields[2:])
+    elif tag == "EDGE_SE2":
+        _check_length(fields, 12)
+        i, j = _id(fields[1]), _id(fields[2])
+        if i == j:
+            raise ValueError(f"the edge joins vertex {i} with itself")
+        z, information = _finite(fields[3:6]), from_upper_triangle(_finite(fields[6:]), 3)
+        if is_indefinite(information):
+            raise ValueError("the information matrix has a negative eigenvalue")
+        content.edges.append((line, i, j, z, information))
+    elif tag == "FIX":
+        for text in fields[1:]:
+            content.fixed.setdefault(_id(text), line)
+        if len(content.fixed) > 1:
+            raise ValueError("a second vertex is fixed, but only one can be")
+    else:
+        content.skipped[tag] += 1
+
+
+def _check_length(fields: list[str], length: int) -> None:
+    if len(fields) != length:
+        raise ValueError(f"{fields[0]} has {len(fields) - 1} values instead of {length - 1}")
+
+
+def _id(text: str) -> int:
+    if not (text.isascii() and text.isdigit() and len(text) < 17 and int(text) <= LARGEST_ID):
+        raise ValueError(f"{text!r} is no vertex id")
+    return int(text)
+
+
+def _finite(texts: Iterable[str]) -> Array:
+    values = np.array([float(text) for text in texts])
+    if not np.isfinite(values).all():
+        raise ValueError("a number is not finite")
+    return values
+
+
+def _chained(content: _Content, name: str) -> dict[int, Array]:
+    """Poses by the fewest edges from the vertex of the smallest id, breadth first in file order."""
+    steps: dict[int, list[tuple[int, Array]]] = {}
+    for _, i, j, z, _ in content.edges:
+        steps.setdefault(i, []).append((j, z))
+        steps.setdefault(j, []).append((i, inverse(z)))
+    first = min(steps)
+    poses = {first: np.zeros(3)}
+    queue = deque([first])
+    while queue:
+        vertex = queue.popleft()
+        for other, z in steps[vertex]:
+            if other not in poses:
+                poses[other] = compose(poses[vertex], z)
+                queue.append(other)
+    for line, i, _, _, _ in content.edges:
+        if i not in poses:
+            problem = f"no VERTEX_SE2 lines, and no edges lead from vertex {first} to vertex {i}"
+            raise InputDataError(name, problem, "add the vertices or the missing edges", line=line)
+    return poses
+
+
+def _graph(content: _Content, vertices: dict[int, Array], name: str) -> Graph:
+    ids = sorted(vertices)
+    rows = {vertex: row for row, vertex in enumerate(ids)}
+    mentioned = [(line, vertex) for line, i, j, _, _ in content.edges for vertex in (i, j)]
+    for line, vertex in mentioned + [(line, vertex) for vertex, line in content.fixed.items()]:
+        if vertex not in rows:
+            raise InputDataError(name, f"there is no vertex {vertex}", "add its VERTEX_SE2 line", line=line)
+    graph = Graph(
+        scans=np.array(ids, dtype=np.int64),
+        stamps=[str(row) for row in range(len(ids))],
+        poses=np.array([vertices[vertex] for vertex in ids]),
+        odometry=None,
+        anchors=np.arange(len(ids), dtype=np.int64),
+    )
+    for _, i, j, z, information in content.edges:
+        a, b = rows[i], rows[j]
+        origin = "odometry" if abs(a - b) == 1 else "loop"
+        graph.pairwise.append(Pairwise((a, b), z, rotated_information(z, information), origin))
+    return graph

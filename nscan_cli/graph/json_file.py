@@ -1,0 +1,293 @@
+"""The pose graph as a JSON file; pose-graph.schema.json beside this module describes it.
+
+One record a line, keys in fixed order: equal graphs give equal bytes, and text tools can work on them.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+from collections.abc import Iterable, Iterator
+from typing import Any, NoReturn
+
+import numpy as np
+
+from nscan_cli import __version__
+from nscan_cli.errors import InputDataError
+from nscan_cli.graph.json_fields import MalformedError, Record, pose_rows, six_digits, triangle
+from nscan_cli.graph.model import Graph, Loop, NScan, Pairwise
+from nscan_cli.graph.triangles import is_indefinite
+from nscan_cli.inputs import label, read_bytes
+from nscan_cli.poses import Array
+
+FORMAT = "nscan-pose-graph"
+VERSION = "1.0"
+SCHEMA = "urn:nscan-cli:pose-graph:1.0"
+UNITS = {"length": "m", "angle": "rad", "time": "s"}
+ORIGINS = ("odometry", "track", "nscan", "loop")
+STAMP = re.compile(r"[-+]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][-+]?[0-9]+)?")
+REMEDY = "mend it, or write the graph again with nscan-cli slam"
+
+
+def write_graph(graph: Graph) -> bytes:
+    """The graph as a JSON document in UTF-8, with a final line feed.
+
+    Poses are rounded to 9 decimals and matrices to 6 significant digits. Raises ValueError when a
+    number is not finite.
+    """
+    tool = {"name": "nscan-cli", "version": __version__}
+    provenance = {"tool": tool, "inputs": [], "parameters": {}, **graph.provenance}
+    head: dict[str, Any] = {"$schema": SCHEMA, "format": FORMAT, "version": VERSION, "units": UNITS}
+    lines = [f'"{key}":{_compact(value)},' for key, value in {**head, "provenance": provenance}.items()]
+    relations = [_pairwise_record(relation) for relation in graph.pairwise]
+    relations += [nscan_record(relation) for relation in graph.nscan]
+    lists: dict[str, Iterable[dict[str, Any]]] = {
+        "nodes": _node_records(graph),
+        "relations": ({"id": number, **record} for number, record in enumerate(relations)),
+        "loops": (_loop_record(loop) for loop in graph.loops),
+        "marginals": (
+            {"node": node, "covariance": triangle(covariance)}
+            for node, covariance in sorted(graph.marginals.items())
+        ),
+    }
+    for key, records in lists.items():
+        rows = ",\n".join(_compact(record) for record in records)
+        lines.append(f'"{key}":[\n{rows}\n],' if rows else f'"{key}":[],')
+    return ("{" + "\n".join(lines).removesuffix(",") + "}\n").encode()
+
+
+def read_graph(path: str) -> Graph:
+    """The graph of a JSON file; "-" reads standard input.
+
+    Raises InputMissingError when the file cannot be read, InputDataError when it is no graph or its
+    parts do not fit each other.
+    """
+    return parse_graph(read_bytes(path), label(path))
+
+
+def parse_graph(data: bytes, name: str) -> Graph:
+    """The graph of a JSON document; `name` is the file that errors name. Raises InputDataError."""
+    try:
+        document = json.loads(data, parse_constant=_refuse_constant)
+    except json.JSONDecodeError as error:
+        problem = f"not JSON: {error.msg}" if data.strip() else "is empty"
+        raise InputDataError(name, problem, REMEDY, line=error.lineno) from error
+    except (ValueError, RecursionError) as error:
+        raise InputDataError(name, f"not JSON: {error}", REMEDY) from error
+    try:
+        return _graph(Record(document, "document"))
+    except MalformedError as error:
+        raise InputDataError(name, str(error), REMEDY) from error
+
+
+def nscan_record(relation: NScan, key: str = "nodes") -> dict[str, Any]:
+    """The JSON object of an nScan relation; `key` says what its members are: "nodes" or "scans"."""
+    return {
+        "type": "nscan",
+        key: list(relation.nodes),
+        "poses": pose_rows(relation.poses),
+        "hessian": triangle(relation.hessian),
+        "fixed": relation.nodes[relation.fixed],
+        "origin": relation.origin,
+        "score": six_digits(relation.score),
+    }
+
+
+def nscan_relation(record: Record, key: str = "nodes") -> NScan:
+    """The relation of such a JSON object. Raises MalformedError when its parts do not fit each other."""
+    record.text("type", ("nscan",))
+    members = record.integers(key)
+    fixed = record.integer("fixed")
+    if fixed not in members:
+        raise MalformedError(record.place, f"'fixed' is {fixed}, which is none of its {key}")
+    return NScan(
+        nodes=members,
+        poses=record.poses("poses", len(members)),
+        hessian=record.matrix("hessian", 3 * len(members)),
+        fixed=members.index(fixed),
+        origin=record.text("origin", ORIGINS),
+        score=record.number("score"),
+    )
+
+
+def _compact(value: Any) -> str:
+    return json.dumps(value, separators=(",", ":"), allow_nan=False)
+
+
+def _refuse_constant(constant: str) -> NoReturn:
+    raise ValueError(f"it has a number {constant}")
+
+
+def _node_records(graph: Graph) -> Iterator[dict[str, Any]]:
+    poses = pose_rows(graph.poses)
+    odometry = None if graph.odometry is None else pose_rows(graph.odometry)
+    scans, anchors = graph.scans.tolist(), graph.anchors.tolist()
+    for node, stamp in enumerate(graph.stamps):
+        record = {"id": node, "scan": scans[node], "stamp": stamp, "pose": poses[node]}
+        if odometry is not None:
+            record["odometry"] = odometry[node]
+        record["keyframe"] = anchors[node] == node
+        if anchors[node] != node:
+            record["attached"] = anchors[node]
+        yield record
+
+
+def _pairwise_record(relation: Pairwise) -> dict[str, Any]:
+    return {
+        "type": "pairwise",
+        "nodes": list(relation.nodes),
+        "measurement": pose_rows(relation.measurement[None])[0],
+        "information": triangle(relation.information),
+        "origin": relation.origin,
+        "score": six_digits(relation.score),
+    }
+
+
+def _loop_record(loop: Loop) -> dict[str, Any]:
+    return {
+        "nodes": list(loop.nodes),
+        "accepted": loop.accepted,
+        "reason": loop.reason,
+        "score": six_digits(loop.score),
+    }
+
+
+def _graph(document: Record) -> Graph:
+    if "format" not in document or document.get("format") != FORMAT:
+        raise MalformedError("document", f"'format' is not {FORMAT!r}, so this is no pose graph")
+    if document.get("version") != VERSION:
+        raise MalformedError("document", f"'version' is {document.get('version')!r}; {VERSION!r} can be read")
+    if document.get("units") != UNITS:
+        raise MalformedError("document", f"'units' is not {_compact(UNITS)}")
+    provenance = _provenance(document)
+    graph = _nodes(document)
+    graph.provenance = provenance
+    _relations(document, graph)
+    keyframes = set(graph.keyframes.tolist())
+    for record in document.records("loops"):
+        graph.loops.append(
+            Loop(
+                _pair(record, keyframes),
+                record.flag("accepted"),
+                record.text("reason"),
+                record.number("score"),
+            )
+        )
+    for record in document.records("marginals"):
+        node = record.integer("node")
+        _check_keyframes(record, (node,), keyframes)
+        if node in graph.marginals:
+            raise MalformedError(record.place, f"node {node} has a covariance already")
+        graph.marginals[node] = _information(record, "covariance")
+    return graph
+
+
+def _provenance(document: Record) -> dict[str, Any]:
+    provenance = Record(document.get("provenance"), "provenance")
+    tool = Record(provenance.get("tool"), "provenance.tool")
+    tool.text("name")
+    tool.text("version")
+    for source in provenance.records("inputs"):
+        source.text("name")
+        source.text("sha256")
+        source.integer("bytes")
+    Record(provenance.get("parameters"), "provenance.parameters")
+    return provenance.value
+
+
+def _nodes(document: Record) -> Graph:
+    scans: list[int] = []
+    stamps: list[str] = []
+    poses: list[Array] = []
+    odometry: list[Array] = []
+    anchors: list[int] = []
+    for node, record in enumerate(document.records("nodes")):
+        if record.integer("id") != node:
+            raise MalformedError(
+                record.place, f"'id' is {record.get('id')}, but ids count up from 0, here {node}"
+            )
+        scans.append(record.integer("scan"))
+        if node > 0 and scans[-1] <= scans[-2]:
+            raise MalformedError(record.place, "'scan' is not greater than that of the node before")
+        stamps.append(_stamp(record))
+        poses.append(record.pose("pose"))
+        if "odometry" in record:
+            odometry.append(record.pose("odometry"))
+        anchors.append(_anchor(record, node))
+    if not poses:
+        raise MalformedError("nodes", "there are none")
+    if odometry and len(odometry) != len(poses):
+        raise MalformedError("nodes", f"{len(odometry)} of {len(poses)} have 'odometry'; all or none may")
+    for node, anchor in enumerate(anchors):
+        if anchor >= len(anchors) or anchors[anchor] != anchor:
+            raise MalformedError(f"nodes[{node}]", f"'attached' is {anchor}, which is no keyframe")
+    return Graph(
+        scans=np.array(scans, dtype=np.int64),
+        stamps=stamps,
+        poses=np.array(poses),
+        odometry=np.array(odometry) if odometry else None,
+        anchors=np.array(anchors, dtype=np.int64),
+    )
+
+
+def _stamp(record: Record) -> str:
+    stamp = record.text("stamp")
+    if not STAMP.fullmatch(stamp) or not math.isfinite(float(stamp)):
+        raise record.wrong("stamp", "a time in seconds, as text")
+    return stamp
+
+
+def _anchor(record: Record, node: int) -> int:
+    if not record.flag("keyframe"):
+        anchor = record.integer("attached")
+        if anchor == node:
+            raise MalformedError(record.place, "'attached' is the node itself, which is no keyframe")
+        return anchor
+    if "attached" in record:
+        raise MalformedError(record.place, "a keyframe cannot be 'attached'")
+    return node
+
+
+def _relations(document: Record, graph: Graph) -> None:
+    keyframes = set(graph.keyframes.tolist())
+    for number, record in enumerate(document.records("relations")):
+        if record.integer("id") != number:
+            raise MalformedError(
+                record.place, f"'id' is {record.get('id')}, but ids count up from 0, here {number}"
+            )
+        if record.text("type", ("pairwise", "nscan")) == "nscan":
+            nscan = nscan_relation(record)
+            _check_keyframes(record, nscan.nodes, keyframes)
+            graph.nscan.append(nscan)
+            continue
+        graph.pairwise.append(
+            Pairwise(
+                nodes=_pair(record, keyframes),
+                measurement=record.pose("measurement"),
+                information=_information(record, "information"),
+                origin=record.text("origin", ORIGINS),
+                score=record.number("score"),
+            )
+        )
+
+
+def _pair(record: Record, keyframes: set[int]) -> tuple[int, int]:
+    nodes = record.integers("nodes")
+    if len(nodes) != 2:
+        raise record.wrong("nodes", "a pair of nodes")
+    _check_keyframes(record, nodes, keyframes)
+    return nodes[0], nodes[1]
+
+
+def _check_keyframes(record: Record, nodes: tuple[int, ...], keyframes: set[int]) -> None:
+    for node in nodes:
+        if node not in keyframes:
+            raise MalformedError(record.place, f"node {node} is no keyframe of this graph")
+
+
+def _information(record: Record, key: str) -> Array:
+    matrix = record.matrix(key, 3)
+    if is_indefinite(matrix):
+        raise record.wrong(key, "positive semi-definite")
+    return matrix
