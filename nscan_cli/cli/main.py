@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import contextlib
+import errno
 import importlib
 import os
 import sys
@@ -10,7 +12,7 @@ import traceback
 import click
 
 from nscan_cli import __version__
-from nscan_cli.errors import NscanError
+from nscan_cli.errors import NscanError, OutputError
 
 COMMANDS = {
     "info": "What is in a log, and what the other commands will use of it.",
@@ -21,6 +23,7 @@ COMMANDS = {
     "evaluate": "Measure a result against reference relations or a reference trajectory.",
 }
 INTERRUPTED, CLOSED_EARLY, INTERNAL_ERROR = 130, 141, 1
+NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)
 
 
 class LazyGroup(click.Group):
@@ -56,8 +59,10 @@ def cli() -> None:
 def main() -> None:
     """Entry point of the command; exits with the code of the outcome."""
     code = run(sys.argv[1:])
-    if code == CLOSED_EARLY:
-        # Python would flush standard output once more at its end, and complain.
+    if code in (CLOSED_EARLY, OutputError.exit_code) and sys.stdout is not None:
+        # What cannot be written, Python would try once more at its end, and complain.
+        with contextlib.suppress(OSError):
+            sys.stdout.flush()
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
     sys.exit(code)
 
@@ -67,14 +72,18 @@ def run(arguments: list[str]) -> int:
     verbose = "-vv" in arguments or arguments.count("-v") > 1
     try:
         outcome = cli.main(arguments, prog_name="nscan-cli", standalone_mode=False)
-        sys.stdout.flush()
+        if sys.stdout is not None:
+            sys.stdout.flush()
         return outcome if isinstance(outcome, int) else 0
     except click.exceptions.Exit as exit_:
         return exit_.exit_code
     except (click.Abort, KeyboardInterrupt):
         return INTERRUPTED
-    except click.ClickException as error:
+    except click.exceptions.NoArgsIsHelpError as error:
         error.show()
+        return error.exit_code
+    except click.ClickException as error:
+        _say(_usage(error), verbose)
         return error.exit_code
     except (BrokenPipeError, SystemExit):
         # Without its standalone mode, a closed pipe is the one thing that click itself exits for.
@@ -83,9 +92,22 @@ def run(arguments: list[str]) -> int:
         _say(str(error), verbose)
         return error.exit_code
     except Exception as error:
+        if isinstance(error, OSError) and error.errno in NO_ROOM and error.filename is None:
+            _say(f"standard output: cannot be written: {error.strerror}", verbose)
+            return OutputError.exit_code
         hint = "" if verbose else "; -vv shows where"
         _say(f"internal error, please report it: {type(error).__name__}: {error}{hint}", verbose)
         return INTERNAL_ERROR
+
+
+def _usage(error: click.ClickException) -> str:
+    """What click says in several lines, in one."""
+    problem = error.format_message().rstrip(".")
+    context = getattr(error, "ctx", None)
+    if context is None:
+        return problem
+    command = context.command_path.partition(" ")[2]
+    return f"{command}: {problem}".removeprefix(": ") + f"; see {context.command_path} --help"
 
 
 def _say(message: str, with_traceback: bool) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import json
 import math
 import tomllib
 from collections.abc import Callable
@@ -27,8 +28,6 @@ class PoseType(click.ParamType[Any]):
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
         """Parse the three numbers; a wrong form is a usage error."""
-        if isinstance(value, (tuple, list)):
-            value = ",".join(str(part) for part in value)
         try:
             x, y, degrees = (float(part) for part in value.split(","))
         except ValueError:
@@ -132,18 +131,38 @@ def _read_config(ctx: click.Context, _param: click.Parameter, value: str | None)
         raise InputDataError(value, f"not TOML: {error}", "mend it, or leave out --config") from error
     from nscan_cli.cli.main import COMMANDS
 
+    name = ctx.command.name or ""
     settings = {key: entry for key, entry in document.items() if key not in COMMANDS}
-    own = document.get(ctx.command.name or "", {})
-    settings.update(own if isinstance(own, dict) else {})
-    names = {_key(param): param.name for param in ctx.command.params if param.name not in NOT_PARAMETERS
-             and isinstance(param, click.Option)}  # fmt: skip
-    for key in settings:
-        if key not in names:
-            known = ", ".join(sorted(names))
-            raise InputDataError(value, f"{ctx.command.name} has no option {key!r}", f"known: {known}")
-    defaults = {names[key]: entry for key, entry in settings.items()}
+    own = document.get(name, {})
+    if not isinstance(own, dict):
+        raise InputDataError(value, f"{name} is no table", f"write [{name}], and its options below")
+    settings.update(own)
+    options = {_key(param): param for param in ctx.command.params if isinstance(param, click.Option)
+               and param.name not in NOT_PARAMETERS}  # fmt: skip
+    defaults = {}
+    for key, entry in settings.items():
+        if key not in options:
+            raise InputDataError(
+                value, f"{name} has no option {key!r}", f"known: {', '.join(sorted(options))}"
+            )
+        try:
+            options[key].type_cast_value(ctx, _as_typed(entry))
+        except click.BadParameter as error:
+            raise InputDataError(
+                value, f"{key}: {error.message.rstrip('.')}", f"see {ctx.command_path} --help"
+            ) from error
+        defaults[options[key].name] = _as_typed(entry)
     ctx.default_map = {**(ctx.default_map or {}), **defaults}
     return value
+
+
+def _as_typed(entry: Any) -> str:
+    """A TOML value as one would type it on the command line. Raises BadParameter for what none would."""
+    if isinstance(entry, list):
+        return ",".join(_as_typed(part) for part in entry)
+    if isinstance(entry, (str, int, float)):
+        return str(entry)
+    raise click.BadParameter(f"{str(entry)!r} is neither text, number, true, false nor a list of them")
 
 
 def _key(param: click.Parameter) -> str:
@@ -172,5 +191,5 @@ def _toml_value(value: Any) -> str:
         return repr(value)
     if isinstance(value, (tuple, list)):
         return "[" + ", ".join(_toml_value(part) for part in value) + "]"
-    text = str(value).replace("\\", "\\\\").replace('"', '\\"')
-    return f'"{text}"'
+    # JSON escapes what TOML does, but for one.
+    return json.dumps(str(value), ensure_ascii=False).replace("\x7f", "\\u007f")

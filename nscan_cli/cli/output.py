@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import os
+import stat
 import sys
 import tempfile
 from collections.abc import Iterator
@@ -17,16 +18,25 @@ from nscan_cli.errors import OutputError
 def whole_file(path: str) -> Iterator[BinaryIO]:
     """A binary file that appears under `path` whole when the block ends well, and not at all otherwise.
 
-    "-" is standard output. Raises OutputError when the folder is missing or nothing can be written.
+    "-" is standard output; what is no regular file, such as /dev/null or a named pipe, is written to as
+    it is. Raises OutputError when the folder is missing or nothing can be written.
     """
     if path == "-":
+        if sys.stdout is None:
+            raise OutputError("standard output: is closed; name a file with -o")
         yield sys.stdout.buffer
         sys.stdout.buffer.flush()
         return
     check_writable(path)
-    target = Path(path)
-    descriptor, temporary = tempfile.mkstemp(dir=target.parent, prefix=f".{target.name}.")
+    # A symbolic link stays what it is: the file that it names is replaced.
+    target = Path(os.path.realpath(path))
+    temporary = None
     try:
+        if is_device(path):
+            with open(path, "wb") as device:
+                yield device
+            return
+        descriptor, temporary = tempfile.mkstemp(dir=target.parent, prefix=".nscan-cli.")
         with os.fdopen(descriptor, "wb") as file:
             yield file
             file.flush()
@@ -35,11 +45,14 @@ def whole_file(path: str) -> Iterator[BinaryIO]:
         os.umask(umask)
         os.chmod(temporary, 0o666 & ~umask)
         os.replace(temporary, target)
+    except BrokenPipeError:
+        raise
     except OSError as error:
-        raise OutputError(f"{path}: cannot be written: {error.strerror or error}") from error
+        raise OutputError(f"{path}: cannot be written: {error.strerror or error}; choose another") from error
     finally:
-        with contextlib.suppress(FileNotFoundError):
-            os.unlink(temporary)
+        if temporary is not None:
+            with contextlib.suppress(FileNotFoundError):
+                os.unlink(temporary)
 
 
 def check_writable(path: str | None) -> None:
@@ -49,13 +62,27 @@ def check_writable(path: str | None) -> None:
     """
     if path is None or path == "-":
         return
-    target = Path(path)
-    if target.is_dir():
+    # os.path asks in a way that a name too long for the file system is no error yet.
+    folder = os.path.dirname(os.path.realpath(path))
+    if os.path.isdir(path):
         raise OutputError(f"{path}: is a folder; name a file in it")
-    if not target.parent.is_dir():
-        raise OutputError(f"{path}: the folder {target.parent} does not exist; create it first")
-    if not os.access(target.parent, os.W_OK):
-        raise OutputError(f"{path}: the folder {target.parent} is not writable; choose another")
+    if is_device(path):
+        if not os.access(path, os.W_OK):
+            raise OutputError(f"{path}: is not writable; choose another")
+        return
+    if not os.path.isdir(folder):
+        raise OutputError(f"{path}: the folder {Path(path).parent} does not exist; create it first")
+    if not os.access(folder, os.W_OK):
+        raise OutputError(f"{path}: the folder {Path(path).parent} is not writable; choose another")
+
+
+def is_device(path: str) -> bool:
+    """Whether there is something under `path` that is neither a file nor a folder."""
+    try:
+        mode = os.stat(path).st_mode
+    except OSError:
+        return False
+    return not (stat.S_ISREG(mode) or stat.S_ISDIR(mode))
 
 
 def write_whole(path: str, data: bytes) -> None:

@@ -1,0 +1,169 @@
+"""Pictures of a map for people: what the graph knows drawn over the map, and a figure for a paper."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nscan_cli.graph.model import Graph
+from nscan_cli.logs.scan import LaserLog
+from nscan_cli.mapping.axes import AXES_MARGINS, FOOTER_MARGINS, axes, footer
+from nscan_cli.mapping.canvas import (
+    BLACK,
+    BLUE,
+    DIM,
+    GREEN,
+    PURPLE,
+    SKY,
+    VERMILLION,
+    Bounds,
+    Canvas,
+    Colour,
+)
+from nscan_cli.mapping.image import gray
+from nscan_cli.mapping.occupancy import FREE, OCCUPIED, UNKNOWN, OccupancyGrid
+from nscan_cli.poses import Array, transform
+
+LEAST_PIXELS, MOST_PIXELS = 1600, 3200
+"""Of the longer side of a picture with overlays. A small map's cells become squares of pixels; of a large
+map several cells become one pixel, which is dark when one of them is, so that walls can still be seen."""
+FIGURE_PIXELS = 2400
+"""Of the longer side of a figure's plot: 20 cm at 300 dots an inch."""
+SOFT_GRAYS = {OCCUPIED: 60, UNKNOWN: 226, FREE: 255}
+"""Softer than map_server's, so that colours stand out."""
+SIGMAS = 3.0
+SEEN_ELLIPSE = 8.0
+"""Units of the longer half axis that an ellipse needs to be seen."""
+
+
+@dataclass(frozen=True)
+class Overlays:
+    """What is to be drawn over a map."""
+
+    trajectory: bool = False
+    graph: bool = False
+    uncertainty: bool = False
+
+    def __bool__(self) -> bool:
+        return self.trajectory or self.graph or self.uncertainty
+
+
+def draw_over_map(grid: OccupancyGrid, graph: Graph, overlays: Overlays) -> Canvas:
+    """The map in soft grays, the overlays in colour, and below them a scale and what the colours mean."""
+    background, cells_per_pixel = _background(grid)
+    canvas = Canvas(grid.bounds, 1 / (cells_per_pixel * grid.resolution), background, FOOTER_MARGINS)
+    footer(canvas, _draw_overlays(canvas, graph, overlays))
+    return canvas
+
+
+def draw_figure(
+    log: LaserLog,
+    rows: NDArray[np.int64],
+    poses: Array,
+    grid: OccupancyGrid,
+    graph: Graph,
+    overlays: Overlays,
+) -> Canvas:
+    """Points and path on white with axes in metres, as the paper's Figs. 6 and 7.
+
+    Of the points of the scans in `rows` (N,), taken at `poses` (N, 3), those are drawn that lie in
+    occupied cells of the grid: what moved through the scene is left out. Without overlays, the path is
+    drawn.
+    """
+    points = _points_of_occupied_cells(log, rows, poses, grid)
+    seen = np.concatenate([points, graph.poses[:, :2]])
+    canvas = Canvas.blank(_bounds_around(seen), FIGURE_PIXELS, AXES_MARGINS)
+    canvas.cloud(points, BLACK, 0.6)
+    _draw_overlays(canvas, graph, overlays if overlays else Overlays(trajectory=True))
+    axes(canvas)
+    return canvas
+
+
+def _draw_overlays(canvas: Canvas, graph: Graph, overlays: Overlays) -> list[tuple[str, Colour, str]]:
+    """Draw them; the legend's entries for what was drawn."""
+    entries: list[tuple[str, Colour, str]] = []
+    if overlays.trajectory:
+        # Beneath relations, a broad and light band.
+        colour, width = (SKY, 5.0) if overlays.graph else (BLUE, 2.2)
+        canvas.line(graph.poses[:, :2], colour, width)
+        entries.append(("line", colour, "path"))
+    if overlays.graph:
+        entries += _draw_graph(canvas, graph)
+    if overlays.uncertainty:
+        entries += _draw_uncertainty(canvas, graph)
+    return entries
+
+
+def _background(grid: OccupancyGrid) -> tuple[NDArray[np.uint8], float]:
+    """The map in soft grays, (h, w), and how many of its cells lie along a pixel's side."""
+    cells = gray(grid, SOFT_GRAYS)
+    longest = max(cells.shape)
+    if longest <= MOST_PIXELS:
+        zoom = math.ceil(LEAST_PIXELS / longest)
+        return cells.repeat(zoom, axis=0).repeat(zoom, axis=1), 1 / zoom
+    side = math.ceil(longest / MOST_PIXELS)
+    height, width = -(-cells.shape[0] // side), -(-cells.shape[1] // side)
+    # Whole pixels, filled up above and to the right: the lower left corner keeps its place.
+    above, right = height * side - cells.shape[0], width * side - cells.shape[1]
+    padded = np.pad(cells, ((above, 0), (0, right)), constant_values=SOFT_GRAYS[UNKNOWN])
+    blocks = padded.reshape(height, side, width, side)
+    darkest, mean = blocks.min(axis=(1, 3)), blocks.mean(axis=(1, 3))
+    return np.where(darkest == SOFT_GRAYS[OCCUPIED], darkest, np.round(mean)).astype(np.uint8), float(side)
+
+
+def _draw_graph(canvas: Canvas, graph: Graph) -> list[tuple[str, Colour, str]]:
+    """Relations as lines, of an nScan relation from its fixed scan to the others; keyframes as dots."""
+    edges = [
+        (relation.nodes, "loop" if relation.origin == "loop" else "pairwise") for relation in graph.pairwise
+    ]
+    for joint in graph.nscan:
+        centre = joint.nodes[joint.fixed]
+        kind = "loop" if joint.origin == "loop" else "nScan"
+        edges += [((centre, node), kind) for node in joint.nodes if node != centre]
+    entries: list[tuple[str, Colour, str]] = []
+    for kind, colour, width in (("nScan", GREEN, 1.2), ("pairwise", DIM, 1.2), ("loop", VERMILLION, 2.6)):
+        nodes = np.array(sorted({pair for pair, of in edges if of == kind})).reshape(-1, 2).astype(np.int64)
+        if len(nodes):
+            starts, ends = graph.poses[nodes[:, 0], :2], graph.poses[nodes[:, 1], :2]
+            canvas.segments(starts, ends, colour, width)
+            entries.append(("line", colour, kind))
+    canvas.circles(graph.poses[graph.keyframes, :2], 1.8, BLACK)
+    return [*entries, ("disc", BLACK, "keyframe")]
+
+
+def _draw_uncertainty(canvas: Canvas, graph: Graph) -> list[tuple[str, Colour, str]]:
+    """Ellipses of the keyframes' positions; enlarged, and said so, where they would be too small to see."""
+    keyframes = sorted(graph.marginals)
+    if not keyframes:
+        return []
+    covariances = np.array([graph.marginals[keyframe][:2, :2] for keyframe in keyframes])
+    largest = SIGMAS * math.sqrt(float(np.linalg.eigvalsh(covariances).max()))
+    seen = SEEN_ELLIPSE * canvas.unit / canvas.pixels_per_metre
+    times = 10.0 ** min(3, max(0, math.ceil(math.log10(seen / largest)))) if largest > 0 else 1.0
+    canvas.ellipses(graph.poses[keyframes, :2], covariances, SIGMAS * times, PURPLE)
+    enlarged = f" × {times:g}" if times > 1 else ""
+    return [("ellipse", PURPLE, f"{SIGMAS:g} sigma{enlarged}")]
+
+
+def _points_of_occupied_cells(
+    log: LaserLog, rows: NDArray[np.int64], poses: Array, grid: OccupancyGrid
+) -> Array:
+    """(M, 2) the end points of the beams, m, that lie in occupied cells."""
+    points = np.concatenate([transform(pose, log.points(row)) for row, pose in zip(rows, poses, strict=True)])
+    columns, lines = np.floor((points - np.array(grid.origin)) / grid.resolution).astype(np.int64).T
+    height, width = grid.hits.shape
+    inside = (columns >= 0) & (columns < width) & (lines >= 0) & (lines < height)
+    points, columns, lines = points[inside], columns[inside], lines[inside]
+    occupied: Array = points[grid.states()[lines, columns] == OCCUPIED]
+    return occupied
+
+
+def _bounds_around(points: Array) -> Bounds:
+    """The points' bounds with two hundredths of the longer side to spare."""
+    low, high = points.min(axis=0), points.max(axis=0)
+    spare = 0.02 * float((high - low).max())
+    (low_x, low_y), (high_x, high_y) = (low - spare).tolist(), (high + spare).tolist()
+    return low_x, low_y, high_x, high_y

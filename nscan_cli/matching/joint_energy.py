@@ -1,0 +1,219 @@
+"""The joint energy of n scans, its gradient and its Hessian (paper, III-B, III-C, eqs. (4), (9) to (13)).
+
+E(p) = Σ over (i, j) ∈ J of E_ij(p_j ⊖ p_i): the points of scan j against the Gaussians of scan i, for every
+ordered pair of the index set J. Priors (14) on relative poses add ½ (u − z)ᵗ P (u − z).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nscan_cli.compiled import kernel
+from nscan_cli.ndt.energy import OUT, accumulate
+from nscan_cli.ndt.grid import Grid, Ndt
+from nscan_cli.poses import Array
+
+
+class Scans(NamedTuple):
+    """The NDTs and points of n scans, laid end to end for the kernels."""
+
+    grid: Grid
+    """The arrays of all NDTs, one behind the other; rows count from the start of their own NDT."""
+    table_starts: NDArray[np.int64]
+    """(n + 1,)"""
+    row_starts: NDArray[np.int64]
+    """(n + 1,)"""
+    points: Array
+    """(Σ m, 2) the points of all scans, each in its own frame."""
+    point_starts: NDArray[np.int64]
+    """(n + 1,)"""
+    half: float
+    """Side (m) of a lattice cell, the same for all."""
+
+
+class Priors(NamedTuple):
+    """Q priors (14), each on the pose of scan b in the frame of scan a."""
+
+    pairs: NDArray[np.int64]
+    """(Q, 2) a and b."""
+    means: Array
+    """(Q, 3)"""
+    information: Array
+    """(Q, 3, 3)"""
+
+
+class JointEnergy(NamedTuple):
+    """The value with gradient (3n,) and Hessian (3n, 3n), variables (x, y, φ) scan by scan."""
+
+    value: float
+    gradient: Array
+    hessian: Array
+
+
+def lay_out(ndts: Sequence[Ndt], points: Sequence[Array]) -> Scans:
+    """Lay n NDTs of one cell size and the points (m_i, 2) of n scans end to end."""
+    tables = [ndt.grid.table for ndt in ndts]
+    keys, links, gaussians = (
+        np.concatenate([getattr(ndt.grid, name)[: ndt.rows] for ndt in ndts])
+        for name in ("keys", "links", "gaussians")
+    )
+    # The sums are for growing; matching needs the Gaussians alone.
+    grid = Grid(np.concatenate(tables), keys, links, np.empty((0, 6)), gaussians)
+    return Scans(
+        grid,
+        _starts([len(table) for table in tables]),
+        _starts([ndt.rows for ndt in ndts]),
+        np.concatenate([np.asarray(part, dtype=np.float64).reshape(-1, 2) for part in points]),
+        _starts([len(part) for part in points]),
+        ndts[0].half,
+    )
+
+
+def no_priors() -> Priors:
+    """An empty list of priors."""
+    return Priors(np.empty((0, 2), dtype=np.int64), np.empty((0, 3)), np.empty((0, 3, 3)))
+
+
+def all_pairs(n: int) -> NDArray[np.int64]:
+    """The index set J of all n (n − 1) ordered pairs, (n (n − 1), 2)."""
+    i, j = np.divmod(np.arange(n * n), n)
+    pairs: NDArray[np.int64] = np.stack([i, j], axis=1)[i != j]
+    return pairs
+
+
+def joint_energy(
+    scans: Scans,
+    pairs: NDArray[np.int64],
+    priors: Priors,
+    poses: Array,
+    scale: float = 1.0,
+    widening: float = 1.0,
+    exact: bool = True,
+) -> JointEnergy:
+    """Scale · E(p) plus the priors at the poses (n, 3), over the ordered pairs (m, 2) (i, j) ∈ J.
+
+    `exact=False` keeps the semi-definite part of the Hessian only: Σ (∂u/∂p)ᵗ H⁺ (∂u/∂p).
+    """
+    n = len(poses)
+    gradient, hessian = np.zeros(3 * n), np.zeros((3 * n, 3 * n))
+    value = _add_pairs(scans, pairs, poses, scale, widening, float(exact), gradient, hessian)
+    value += _add_priors(priors, poses, float(exact), gradient, hessian)
+    return JointEnergy(value, gradient, hessian)
+
+
+@kernel
+def _add_pairs(
+    scans: Scans,
+    pairs: NDArray[np.int64],
+    poses: Array,
+    scale: float,
+    widening: float,
+    curvature: float,
+    gradient: Array,
+    hessian: Array,
+) -> float:
+    out = np.empty(OUT)
+    u, g, h = np.empty(3), np.empty(3), np.empty((3, 3))
+    value = 0.0
+    for pair in range(pairs.shape[0]):
+        i, j = pairs[pair, 0], pairs[pair, 1]
+        _relative(poses[j], poses[i], u)
+        t0, t1 = scans.table_starts[i], scans.table_starts[i + 1]
+        r0, r1 = scans.row_starts[i], scans.row_starts[i + 1]
+        reference = Grid(
+            scans.grid.table[t0:t1],
+            scans.grid.keys[r0:r1],
+            scans.grid.links[r0:r1],
+            scans.grid.sums,
+            scans.grid.gaussians[r0:r1],
+        )
+        points = scans.points[scans.point_starts[j] : scans.point_starts[j + 1]]
+        accumulate(reference, scans.half, points, u[0], u[1], u[2], widening, curvature, out)
+        value += scale * out[0]
+        index = 4
+        for a in range(3):
+            g[a] = scale * out[1 + a]
+            for b in range(a, 3):
+                h[a, b] = scale * out[index]
+                h[b, a] = h[a, b]
+                index += 1
+        _chain(i, j, poses[i, 2], u, g, h, curvature, gradient, hessian)
+    return value
+
+
+@kernel
+def _add_priors(priors: Priors, poses: Array, curvature: float, gradient: Array, hessian: Array) -> float:
+    u, g = np.empty(3), np.empty(3)
+    value = 0.0
+    for q in range(priors.pairs.shape[0]):
+        i, j = priors.pairs[q, 0], priors.pairs[q, 1]
+        _relative(poses[j], poses[i], u)
+        difference = u - priors.means[q]
+        difference[2] -= 2 * np.pi * np.round(difference[2] / (2 * np.pi))
+        g[:] = priors.information[q] @ difference
+        value += 0.5 * (difference @ g)
+        _chain(i, j, poses[i, 2], u, g, priors.information[q], curvature, gradient, hessian)
+    return value
+
+
+@kernel
+def _relative(a: Array, b: Array, out: Array) -> None:
+    """Eq. (2), a ⊖ b; the angle is left as it is."""
+    cos, sin = np.cos(b[2]), np.sin(b[2])
+    dx, dy = a[0] - b[0], a[1] - b[1]
+    out[0], out[1], out[2] = cos * dx + sin * dy, cos * dy - sin * dx, a[2] - b[2]
+
+
+@kernel
+def _chain(
+    i: int,
+    j: int,
+    phi: float,
+    u: Array,
+    g: Array,
+    h: Array,
+    curvature: float,
+    gradient: Array,
+    hessian: Array,
+) -> None:
+    """Eqs. (10) to (13): add what a term in u = p_j ⊖ p_i gives to the gradient and Hessian in p."""
+    c, s = np.cos(phi), np.sin(phi)
+    # ∂u/∂(p_i, p_j), (3, 6), eq. (9).
+    jacobian = np.zeros((3, 6))
+    jacobian[0, 0], jacobian[0, 1], jacobian[0, 2] = -c, -s, u[1]
+    jacobian[1, 0], jacobian[1, 1], jacobian[1, 2] = s, -c, -u[0]
+    jacobian[2, 2] = -1.0
+    jacobian[0, 3], jacobian[0, 4] = c, s
+    jacobian[1, 3], jacobian[1, 4] = -s, c
+    jacobian[2, 5] = 1.0
+    block = np.zeros((6, 6))
+    for a in range(6):
+        for b in range(a, 6):
+            total = 0.0
+            for k in range(3):
+                for m in range(3):
+                    total += jacobian[k, a] * h[k, m] * jacobian[m, b]
+            block[a, b] = total
+    # Σ_k ∂E/∂u_k · ∂²u_k: all that is not zero has φ_i in it.
+    block[2, 2] -= curvature * (g[0] * u[0] + g[1] * u[1])
+    block[0, 2] += curvature * (g[0] * s + g[1] * c)
+    block[1, 2] += curvature * (g[1] * s - g[0] * c)
+    block[2, 3] -= curvature * (g[0] * s + g[1] * c)
+    block[2, 4] += curvature * (g[0] * c - g[1] * s)
+    for a in range(6):
+        row = 3 * i + a if a < 3 else 3 * j + a - 3
+        for k in range(3):
+            gradient[row] += jacobian[k, a] * g[k]
+        for b in range(a, 6):
+            column = 3 * i + b if b < 3 else 3 * j + b - 3
+            hessian[row, column] += block[a, b]
+            if a != b:
+                hessian[column, row] += block[a, b]
+
+
+def _starts(lengths: Sequence[int]) -> NDArray[np.int64]:
+    return np.concatenate([[0], np.cumsum(lengths)]).astype(np.int64)
