@@ -106,6 +106,21 @@ def joint_energy(
 
 
 @kernel
+def scan_grid(scans: Scans, i: int) -> Grid:
+    """The NDT of scan i."""
+    t0, t1 = scans.table_starts[i], scans.table_starts[i + 1]
+    r0, r1 = scans.row_starts[i], scans.row_starts[i + 1]
+    grid = scans.grid
+    return Grid(grid.table[t0:t1], grid.keys[r0:r1], grid.links[r0:r1], grid.sums, grid.gaussians[r0:r1])
+
+
+@kernel
+def scan_points(scans: Scans, i: int) -> Array:
+    """The points (m, 2) of scan i in its own frame."""
+    return scans.points[scans.point_starts[i] : scans.point_starts[i + 1]]
+
+
+@kernel
 def _add_pairs(
     scans: Scans,
     pairs: NDArray[np.int64],
@@ -121,18 +136,10 @@ def _add_pairs(
     value = 0.0
     for pair in range(pairs.shape[0]):
         i, j = pairs[pair, 0], pairs[pair, 1]
-        _relative(poses[j], poses[i], u)
-        t0, t1 = scans.table_starts[i], scans.table_starts[i + 1]
-        r0, r1 = scans.row_starts[i], scans.row_starts[i + 1]
-        reference = Grid(
-            scans.grid.table[t0:t1],
-            scans.grid.keys[r0:r1],
-            scans.grid.links[r0:r1],
-            scans.grid.sums,
-            scans.grid.gaussians[r0:r1],
+        relative_pose(poses[j], poses[i], u)
+        accumulate(
+            scan_grid(scans, i), scans.half, scan_points(scans, j), u[0], u[1], u[2], widening, curvature, out
         )
-        points = scans.points[scans.point_starts[j] : scans.point_starts[j + 1]]
-        accumulate(reference, scans.half, points, u[0], u[1], u[2], widening, curvature, out)
         value += scale * out[0]
         index = 4
         for a in range(3):
@@ -151,7 +158,7 @@ def _add_priors(priors: Priors, poses: Array, curvature: float, gradient: Array,
     value = 0.0
     for q in range(priors.pairs.shape[0]):
         i, j = priors.pairs[q, 0], priors.pairs[q, 1]
-        _relative(poses[j], poses[i], u)
+        relative_pose(poses[j], poses[i], u)
         difference = u - priors.means[q]
         difference[2] -= 2 * np.pi * np.round(difference[2] / (2 * np.pi))
         g[:] = priors.information[q] @ difference
@@ -161,7 +168,7 @@ def _add_priors(priors: Priors, poses: Array, curvature: float, gradient: Array,
 
 
 @kernel
-def _relative(a: Array, b: Array, out: Array) -> None:
+def relative_pose(a: Array, b: Array, out: Array) -> None:
     """Eq. (2), a ⊖ b; the angle is left as it is."""
     cos, sin = np.cos(b[2]), np.sin(b[2])
     dx, dy = a[0] - b[0], a[1] - b[1]

@@ -1,0 +1,67 @@
+"""How much of what each of n scans sees the others see as well."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nscan_cli.compiled import kernel
+from nscan_cli.matching.joint_energy import Scans, relative_pose, scan_grid, scan_points
+from nscan_cli.ndt.energy import inlier_share
+from nscan_cli.poses import Array
+
+INLIER_BOUND = 9.0
+"""A point within this squared Mahalanobis distance of a Gaussian lies on it."""
+LEAST_OVERLAP = 0.1
+"""With a smaller share of its points on another scan, a scan does not overlap it."""
+
+
+class Overlaps(NamedTuple):
+    """Shares of points that lie on Gaussians."""
+
+    pairs: Array
+    """(n, n) [i, j]: of scan j's points, on those of scan i; 0 on the diagonal."""
+    scans: Array
+    """(n,) of each scan's points, on those of at least one other scan."""
+
+
+def overlaps(scans: Scans, poses: Array) -> Overlaps:
+    """The overlaps of n scans at the poses (n, 3)."""
+    n = len(poses)
+    shares = Overlaps(np.zeros((n, n)), np.zeros(n))
+    _count(scans, poses, shares.pairs, shares.scans)
+    return shares
+
+
+@kernel
+def _count(scans: Scans, poses: Array, pairs: Array, shares: Array) -> None:
+    n = poses.shape[0]
+    u = np.empty(3)
+    for j in range(n):
+        points = scan_points(scans, j)
+        seen = np.zeros(points.shape[0])
+        weight = 1.0 / max(points.shape[0], 1)
+        for i in range(n):
+            if i == j:
+                continue
+            relative_pose(poses[j], poses[i], u)
+            grid = scan_grid(scans, i)
+            for k in range(points.shape[0]):
+                if inlier_share(grid, scans.half, points[k : k + 1], u, INLIER_BOUND) > 0.0:
+                    pairs[i, j] += weight
+                    seen[k] = weight
+        shares[j] = seen.sum()
+
+
+def held_together(pairs: Array, least: float, scan: int) -> NDArray[np.bool_]:
+    """(n,) the scans that hang together with `scan` by overlaps (n, n) of at least `least` either way."""
+    linked = np.maximum(pairs, pairs.T) >= least
+    reached = np.zeros(len(pairs), dtype=bool)
+    reached[scan] = True
+    while True:
+        further = reached | linked[reached].any(axis=0)
+        if (further == reached).all():
+            return reached
+        reached = further

@@ -1,0 +1,97 @@
+"""Step 2 of the loop (paper, V): the scans that the graph is made of, each with the Gaussians around it.
+
+A keyframe's NDT grows by the scans between its neighbours, as tracking placed them: a few centimetres of
+motion fill the gaps between the beams. Its points are those of its own scan.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from nscan_cli.graph.model import Pairwise
+from nscan_cli.ndt.grid import Ndt
+from nscan_cli.poses import Array, relative
+from nscan_cli.slam.options import GaussianOptions, KeyframeOptions
+from nscan_cli.slam.tracking import Tracked
+
+
+@dataclass(frozen=True)
+class Keyframe:
+    """A scan of the graph."""
+
+    row: int
+    """In the log; the id of its node."""
+    tracked: Tracked
+    points: Array
+    """(m, 2) in the robot's frame."""
+    ndt: Ndt
+
+
+class Keyframes:
+    """The keyframes in order of time, and the scans since the last of them."""
+
+    def __init__(self, options: KeyframeOptions, gaussians: GaussianOptions) -> None:
+        self.options, self.gaussians = options, gaussians
+        self.list: list[Keyframe] = []
+        self._since: list[tuple[Array, Tracked]] = []
+
+    def __len__(self) -> int:
+        return len(self.list)
+
+    def near_enough(self, tracked: Tracked) -> bool:
+        """Whether the last keyframe is near enough to a scan that it need not become one."""
+        if not self.list:
+            return False
+        step = relative(tracked.pose, self.list[-1].tracked.pose)
+        return bool(np.hypot(step[0], step[1]) <= self.options.distance and abs(step[2]) <= self.options.turn)
+
+    def attach(self, points: Array, tracked: Tracked) -> None:
+        """Let a scan between keyframes add to the Gaussians of both."""
+        if tracked.joined:
+            self._since.append((points, tracked))
+
+    def add(self, row: int, points: Array, tracked: Tracked) -> Keyframe:
+        """Make a scan a keyframe; the one before has its Gaussians whole then."""
+        gaussians = self.gaussians
+        keyframe = Keyframe(
+            row, tracked, points, Ndt(gaussians.cell, gaussians.minimum, gaussians.floor, 1024)
+        )
+        keyframe.ndt.add(points, np.zeros(3))
+        self._grow(keyframe)
+        self.finish_last()
+        self._since = []
+        self.list.append(keyframe)
+        return keyframe
+
+    def finish_last(self) -> None:
+        """Give the last keyframe the scans since; nothing is added to it any more."""
+        if self.list:
+            self._grow(self.list[-1])
+            self.list[-1].ndt.compact()
+
+    def _grow(self, keyframe: Keyframe) -> None:
+        for points, tracked in self._since:
+            keyframe.ndt.add(points, relative(tracked.pose, keyframe.tracked.pose))
+
+    def relation_to_previous(self) -> Pairwise:
+        """The pairwise relation of the last keyframe to the one before it, as it was tracked.
+
+        The information is that of the match, weighed down, and of the drift that no match shows.
+        """
+        before, last = self.list[-2], self.list[-1]
+        options = self.options
+        c, s = np.cos(before.tracked.pose[2]), np.sin(before.tracked.pose[2])
+        rotation = np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
+        information = options.information_scale * rotation @ last.tracked.hessian @ rotation.T
+        length = last.tracked.path - before.tracked.path
+        drift = np.array([options.drift, options.drift, options.drift_angle]) ** 2 * (length + 0.01)
+        covariance = np.linalg.inv(information + 1e-3 * np.eye(3)) + np.diag(drift)
+        return Pairwise(
+            nodes=(before.row, last.row),
+            measurement=relative(last.tracked.pose, before.tracked.pose),
+            information=np.linalg.inv(covariance),
+            origin="track",
+            score=last.tracked.inliers,
+        )

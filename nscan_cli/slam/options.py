@@ -1,0 +1,95 @@
+"""The parameters of the SLAM loop, one set for all logs; what the graph's provenance records."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from nscan_cli.matching.priors import MotionModel
+
+
+@dataclass(frozen=True)
+class GaussianOptions:
+    """How points become Gaussians."""
+
+    cell: float = 0.5
+    """Side of a cell, m."""
+    minimum: int = 5
+    """Least number of points that make a Gaussian."""
+    floor: float = 0.02
+    """Least standard deviation of a Gaussian, m."""
+
+
+@dataclass(frozen=True)
+class TrackingOptions:
+    """Step 1: every scan against the map of the last stretch of the path."""
+
+    gaussians: GaussianOptions = field(default_factory=GaussianOptions)
+    reach: float = 40.0
+    """Longer beams are not matched, m."""
+    window: float = 20.0
+    """Length of path whose scans the map holds, m."""
+    step: float = 0.05
+    """A scan joins the map when the robot has moved by so much (m, rad) since the last that did."""
+    widenings: tuple[float, ...] = (0.05, 0.3, 1.0)
+    max_iterations: int = 20
+    tolerance: float = 1e-4
+    """m, rad"""
+    scale: float = 0.1
+    """What the energy is multiplied with against the prior: four Gaussians see each point, and
+    neighbouring points hit the same wall."""
+    inlier_bound: float = 9.0
+    """A point within this squared Mahalanobis distance of a Gaussian is an inlier."""
+    inlier_share: float = 0.7
+    """With fewer inliers the match starts again from other angles."""
+    turns: tuple[tuple[float, ...], ...] = ((0.1, 0.2), (0.4, 0.7), (1.0, 1.3))
+    """Angles (rad, to both sides) to start again from; a later ring when those before did not help."""
+    odometry: MotionModel = field(default_factory=MotionModel)
+    constant_velocity: MotionModel = field(
+        default_factory=lambda: MotionModel(distance=0.3, angle=0.3, distance_per_metre=0.3)
+    )
+    """Without odometry a scan is expected to move as the last one did."""
+
+
+@dataclass(frozen=True)
+class KeyframeOptions:
+    """Step 2: which scans become keyframes, and how well tracking knows the way between two."""
+
+    distance: float = 1.0
+    """m"""
+    turn: float = 0.6
+    """rad"""
+    information_scale: float = 0.02
+    """The Hessian of tracking is weighed by so much: neighbouring scans make the same errors."""
+    drift: float = 0.005
+    """Standard deviation m/√m that no match shows."""
+    drift_angle: float = 0.002
+    """rad/√m"""
+
+
+@dataclass(frozen=True)
+class NScanOptions:
+    """Step 3: the joint match of the scans near a keyframe."""
+
+    gaussians: GaussianOptions = field(default_factory=lambda: GaussianOptions(minimum=4))
+    max_scans: int = 10
+    radius: float = 5.0
+    """How near (m) a keyframe must be to take part."""
+    recent: float = 20.0
+    """Keyframes further back along the path (m) count as seen before; half of the places go to them."""
+    scale: float = 0.02
+    widenings: tuple[float, ...] = (0.05, 0.3, 1.0)
+    max_iterations: int = 30
+    tolerance: float = 1e-4
+    overlap: float = 0.65
+    """Share of inliers, one of the other, that holds two scans together."""
+
+
+@dataclass(frozen=True)
+class SlamOptions:
+    """All of them."""
+
+    tracking: TrackingOptions = field(default_factory=TrackingOptions)
+    keyframes: KeyframeOptions = field(default_factory=KeyframeOptions)
+    nscan: NScanOptions = field(default_factory=NScanOptions)
+    optimise_after: float = 0.1
+    """The graph is optimised when joint matches have moved scans by so much in all, m."""

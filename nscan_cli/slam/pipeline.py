@@ -1,0 +1,133 @@
+"""The SLAM loop (paper, V): from the scans of a log to a pose graph."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import asdict
+from typing import Any
+
+import numpy as np
+
+from nscan_cli import __version__
+from nscan_cli.graph.model import Graph, Loop, NScan, Pairwise
+from nscan_cli.graph.optimise import optimise
+from nscan_cli.graph.system import GraphEnergy
+from nscan_cli.logs.options import ReadingOptions
+from nscan_cli.logs.scan import LaserLog
+from nscan_cli.poses import Array, compose, relative
+from nscan_cli.slam.keyframes import Keyframes
+from nscan_cli.slam.nearby import match_nearby
+from nscan_cli.slam.options import SlamOptions
+from nscan_cli.slam.tracking import Tracked, Tracker
+
+Report = Callable[[int, int], None]
+"""Called with the scans and keyframes done."""
+
+
+class Slam:
+    """The state of the loop: what was tracked, the keyframes, their relations and their poses."""
+
+    def __init__(self, log: LaserLog, options: SlamOptions) -> None:
+        self.log, self.options = log, options
+        self.tracker = Tracker(options.tracking)
+        self.keyframes = Keyframes(options.keyframes, options.nscan.gaussians)
+        self.tracked: list[Array] = []
+        self.anchors: list[int] = []
+        self.pairwise: list[Pairwise] = []
+        self.nscan: list[NScan] = []
+        self.loops: list[Loop] = []
+        self.poses = np.zeros((0, 3))
+        self._moved = 0.0
+
+    def run(self, report: Report) -> Graph:
+        """The paper's loop over all scans, and the last optimisation."""
+        for row in range(len(self.log)):
+            points = self.points(row)
+            tracked = self.track(row, points)
+            if self.keyframes.near_enough(tracked):
+                self.keyframes.attach(points, tracked)
+            else:
+                self.add_keyframe(row, points, tracked)
+                self.match_nearby(len(self.keyframes) - 2)
+            self.anchors.append(self.keyframes.list[-1].row)
+            report(row + 1, len(self.keyframes))
+        self.keyframes.finish_last()
+        self.match_nearby(len(self.keyframes) - 1)
+        self.optimise(max_iterations=50, tolerance=1e-5)
+        return self.graph()
+
+    def points(self, row: int) -> Array:
+        """The points (m, 2) of a scan that are matched: those within reach."""
+        points = self.log.points(row)
+        near = np.hypot(points[:, 0], points[:, 1]) < self.options.tracking.reach
+        return np.ascontiguousarray(points[near])
+
+    def track(self, row: int, points: Array) -> Tracked:
+        """Step 1: the pose of a scan by matching it with the map of the last metres."""
+        odometry = None if self.log.odometry is None else self.log.odometry[row]
+        tracked = self.tracker.track(points, odometry)
+        self.tracked.append(tracked.pose)
+        return tracked
+
+    def add_keyframe(self, row: int, points: Array, tracked: Tracked) -> None:
+        """Step 2: a new keyframe, with its relation to the one before."""
+        self.keyframes.add(row, points, tracked)
+        if len(self.keyframes) == 1:
+            self.poses = np.zeros((1, 3))
+            return
+        relation = self.keyframes.relation_to_previous()
+        self.pairwise.append(relation)
+        self.poses = np.vstack([self.poses, compose(self.poses[-1], relation.measurement)])
+
+    def match_nearby(self, newest: int) -> None:
+        """Step 3: a keyframe matched jointly with those near it; the graph follows when it must."""
+        if newest < 0:
+            return
+        nearby = match_nearby(self.keyframes.list, self.poses, self.pairwise, newest, self.options.nscan)
+        if nearby is None:
+            return
+        if nearby.closes_loop:
+            nodes = (self.keyframes.list[nearby.members[0]].row, self.keyframes.list[newest].row)
+            self.loops.append(Loop(nodes, nearby.relation is not None, nearby.reason, nearby.score))
+        if nearby.relation is None:
+            return
+        self.nscan.append(nearby.relation)
+        self._moved += nearby.moved
+        if self._moved > self.options.optimise_after:
+            self.optimise(max_iterations=10, tolerance=1e-3)
+
+    def optimise(self, max_iterations: int, tolerance: float) -> None:
+        """The global poses of all keyframes from all relations (paper, IV)."""
+        self._moved = 0.0
+        if len(self.keyframes) < 2:
+            return
+        positions = np.full(len(self.log), -1)
+        positions[[keyframe.row for keyframe in self.keyframes.list]] = np.arange(len(self.keyframes))
+        energy = GraphEnergy(len(self.poses), self.pairwise, self.nscan, positions)
+        self.poses = optimise(energy, self.poses, max_iterations, tolerance).poses
+
+    def graph(self) -> Graph:
+        """Every scan with its pose: a keyframe where the graph put it, the others along with theirs."""
+        anchors = np.array(self.anchors, dtype=np.int64)
+        rows = np.array([keyframe.row for keyframe in self.keyframes.list])
+        places = np.searchsorted(rows, anchors)
+        tracked = np.array(self.tracked)
+        return Graph(
+            scans=self.log.numbers,
+            stamps=list(self.log.stamps),
+            poses=compose(self.poses[places], relative(tracked, tracked[anchors])),
+            odometry=self.log.odometry,
+            anchors=anchors,
+            pairwise=self.pairwise,
+            nscan=self.nscan,
+            loops=self.loops,
+        )
+
+
+def provenance(log: LaserLog, reading: ReadingOptions, options: SlamOptions) -> dict[str, Any]:
+    """What a graph was made of: the tool, the log, and all parameters (m, rad)."""
+    return {
+        "tool": {"name": "nscan-cli", "version": __version__},
+        "inputs": [asdict(log.source)],
+        "parameters": {"reading": asdict(reading), "slam": asdict(options)},
+    }

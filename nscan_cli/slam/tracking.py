@@ -1,0 +1,115 @@
+"""Step 1 of the loop (paper, V): the pose of every scan by matching it with the map of the last metres.
+
+The map is one NDT that grows by the scans ahead and loses those behind, in a frame of its own: what
+loops later correct in the graph never tears it.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from dataclasses import dataclass
+
+import numpy as np
+
+from nscan_cli.matching.newton import minimise
+from nscan_cli.matching.priors import Prior, odometry_prior
+from nscan_cli.ndt.energy import inlier_share
+from nscan_cli.ndt.grid import Ndt
+from nscan_cli.poses import Array, compose, relative, wrap
+from nscan_cli.slam.options import TrackingOptions
+
+
+@dataclass(frozen=True)
+class Tracked:
+    """Where a scan was found."""
+
+    pose: Array
+    """(3,) of the robot in the tracker's frame."""
+    hessian: Array
+    """(3, 3) of scale · E there, without the prior."""
+    inliers: float
+    """Share of the points that lie on a Gaussian of the map."""
+    path: float
+    """Length of the path up to here, m."""
+    joined: bool
+    """Whether the scan's points joined the map."""
+
+
+class Tracker:
+    """Follows the robot from scan to scan."""
+
+    def __init__(self, options: TrackingOptions) -> None:
+        self.options = options
+        gaussians = options.gaussians
+        self.map = Ndt(gaussians.cell, gaussians.minimum, gaussians.floor, capacity=1 << 14)
+        self.restarts = 0
+        self._window: deque[tuple[Array, Array, float]] = deque()
+        self._poses: list[Array] = []
+        self._joined = np.zeros(3)
+        self._path = 0.0
+        self._odometry: Array | None = None
+        self._widenings = np.array(options.widenings)
+
+    def track(self, points: Array, odometry: Array | None) -> Tracked:
+        """The pose of the next scan: points (m, 2) in the robot's frame, odometry pose (3,) or None."""
+        if not self._poses:
+            self._odometry = odometry
+            return self._settle(np.zeros(3), np.zeros((3, 3)), 1.0, points, first=True)
+        prior = self._predict(odometry)
+        self._odometry = odometry
+        value, pose, hessian = self._match(points, prior, 0.0)
+        inliers = self._inliers(points, pose)
+        for ring in self.options.turns:
+            if inliers >= self.options.inlier_share:
+                break
+            self.restarts += 1
+            for turn in (sign * angle for angle in ring for sign in (1, -1)):
+                candidate = self._match(points, prior, turn)
+                if candidate[0] < value:
+                    value, pose, hessian = candidate
+            inliers = self._inliers(points, pose)
+        pose[2] = wrap(pose[2])
+        return self._settle(pose, hessian - prior.information, inliers, points)
+
+    def _predict(self, odometry: Array | None) -> Prior:
+        """Where the next scan is expected, in the tracker's frame, and how surely."""
+        options, last = self.options, self._poses[-1]
+        if odometry is not None and self._odometry is not None:
+            step, information = odometry_prior(self._odometry, odometry, options.odometry)
+        elif len(self._poses) > 1:
+            step, information = odometry_prior(self._poses[-2], last, options.constant_velocity)
+        else:
+            step, information = odometry_prior(last, last, options.constant_velocity)
+        # The prior is as sure along the path as across it: no need to turn its information.
+        return Prior(compose(last, step), information)
+
+    def _match(self, points: Array, prior: Prior, turn: float) -> tuple[float, Array, Array]:
+        """The objective's minimum from the prediction turned by `turn`: value, pose, Hessian."""
+        options = self.options
+        pose, hessian = prior.mean + np.array([0.0, 0.0, turn]), np.empty((3, 3))
+        value, *_ = minimise(
+            self.map.grid, self.map.half, points, pose, options.scale, prior.mean, prior.information,
+            self._widenings, options.max_iterations, options.tolerance, hessian,
+        )  # fmt: skip
+        return value, pose, hessian
+
+    def _inliers(self, points: Array, pose: Array) -> float:
+        return inlier_share(self.map.grid, self.map.half, points, pose, self.options.inlier_bound)
+
+    def _settle(
+        self, pose: Array, hessian: Array, inliers: float, points: Array, first: bool = False
+    ) -> Tracked:
+        """Take the pose; let the scan join the map when the robot has moved, and old ones leave it."""
+        step = relative(pose, self._joined)
+        distance = float(np.hypot(step[0], step[1]))
+        joined = first or distance > self.options.step or abs(step[2]) > self.options.step
+        if joined:
+            self._path += distance
+            self._joined = pose
+            self.map.add(points, pose)
+            self._window.append((points, pose, self._path))
+            while self._window[0][2] < self._path - self.options.window:
+                old_points, old_pose, _ = self._window.popleft()
+                self.map.subtract(old_points, old_pose)
+        self._poses = [*self._poses[-1:], pose]
+        return Tracked(pose, hessian, inliers, self._path, joined)
