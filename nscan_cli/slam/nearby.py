@@ -68,23 +68,46 @@ def match_nearby(
     """
     paths = np.array([keyframe.tracked.path for keyframe in keyframes[: newest + 1]])
     tried, closes_loop = choose_nearby(poses, paths, newest, options)
+    if len(tried) <= 2:
+        return None
+    # Mostly the poses are right to centimetres already, and the last stage is all it takes.
+    for widenings in (options.widenings[-1:], options.widenings):
+        nearby = _match_held(keyframes, poses, pairwise, tried, closes_loop, widenings, options)
+        if nearby.relation is not None and not nearby.reason and nearby.moved < options.settled:
+            break
+    return nearby
+
+
+def _match_held(
+    keyframes: Sequence[Keyframe],
+    poses: Array,
+    pairwise: Sequence[Pairwise],
+    tried: Indices,
+    closes_loop: bool,
+    widenings: tuple[float, ...],
+    options: NScanOptions,
+) -> Nearby:
+    """Match jointly, leave out what does not hang together, and match again, until all does."""
     members, start = tried, poses[tried]
     while len(members) > 2:
         scans = lay_out([keyframes[k].ndt for k in members], [keyframes[k].points for k in members])
-        match = _match(scans, members, pairwise, start, options)
+        match = _match(scans, members, pairwise, start, widenings, options)
         shares = overlaps(scans, match.poses).pairs
         last = len(members) - 1
         held = held_together(shares, options.overlap, last)
         if held.all():
             return _judge(keyframes, tried, members, match, shares, poses, closes_loop, options)
         members, start = members[held], match.poses[held]
-    if len(tried) <= 2:
-        return None
     return Nearby(tried, None, "overlaps none of the others", 0.0, closes_loop, 0.0)
 
 
 def _match(
-    scans: Scans, members: Indices, pairwise: Sequence[Pairwise], start: Array, options: NScanOptions
+    scans: Scans,
+    members: Indices,
+    pairwise: Sequence[Pairwise],
+    start: Array,
+    widenings: tuple[float, ...],
+    options: NScanOptions,
 ) -> JointMatch:
     """The joint match of some keyframes from global poses (n, 3)."""
     consecutive = np.flatnonzero(np.diff(members) == 1)
@@ -96,7 +119,7 @@ def _match(
             np.array([relation.measurement for relation in known]),
             np.array([relation.information for relation in known]),
         )
-    joint = JointOptions(options.widenings, options.max_iterations, options.tolerance)
+    joint = JointOptions(widenings, options.max_iterations, options.tolerance)
     return match_jointly(scans, all_pairs(len(members)), priors, start, options.scale, joint)
 
 

@@ -79,9 +79,11 @@ class NScanOptions:
     scale: float = 0.02
     widenings: tuple[float, ...] = (0.05, 0.3, 1.0)
     max_iterations: int = 30
-    tolerance: float = 1e-4
+    tolerance: float = 1e-3
     overlap: float = 0.65
     """Share of inliers, one of the other, that holds two scans together."""
+    settled: float = 0.1
+    """When the last stage alone moves a scan further (m), or leaves one out, all stages are run."""
 
 
 @dataclass(frozen=True)
