@@ -102,32 +102,46 @@ def pairwise_marginals(relation: NScan) -> list[Pairwise]:
     """An nScan relation as pairwise relations from pose c to each of the others: a lossy replacement.
 
     With pose c held fixed, the information on pose i alone is the Schur complement
-    H_ii − H_ir H_rr⁺ H_ri over all other poses r, turned from the relation's frame into that of pose c.
+    H_ii − H_ir H_rr⁺ H_ri over all other poses r (the inverse of its block of the covariance, where H has
+    an inverse), turned from the relation's frame into that of pose c.
     Directions that the relation does not hold get no information; the Hessian's negative eigenvalues
     count as 0.
     """
-    n, c = len(relation.nodes), relation.fixed
-    others = [index for index in range(n) if index != c]
-    free = np.concatenate([np.arange(3 * index, 3 * index + 3) for index in others])
-    eigenvalues, vectors = np.linalg.eigh(relation.hessian[np.ix_(free, free)])
-    H = (vectors * np.maximum(eigenvalues, 0)) @ vectors.T
+    c = relation.fixed
+    others = np.delete(np.arange(len(relation.nodes)), c)
+    free = (3 * others[:, None] + np.arange(3)).ravel()
     to_frame_of_c = inverse(relation.poses[c])
-    result = []
-    for block, index in enumerate(others):
-        i = np.arange(3 * block, 3 * block + 3)
-        r = np.setdiff1d(np.arange(len(free)), i)
-        H_ir = H[np.ix_(i, r)]
-        information = H[np.ix_(i, i)] - H_ir @ np.linalg.pinv(H[np.ix_(r, r)], 1e-12, True) @ H_ir.T
-        result.append(
-            Pairwise(
-                nodes=(relation.nodes[c], relation.nodes[index]),
-                measurement=relative(relation.poses[index], relation.poses[c]),
-                information=rotated_information(to_frame_of_c, 0.5 * (information + information.T)),
-                origin=relation.origin,
-                score=relation.score,
-            )
+    measurements = relative(relation.poses[others], relation.poses[c])
+    return [
+        Pairwise(
+            nodes=(relation.nodes[c], relation.nodes[index]),
+            measurement=measurement,
+            information=rotated_information(to_frame_of_c, information),
+            origin=relation.origin,
+            score=relation.score,
         )
-    return result
+        for index, measurement, information in zip(
+            others, measurements, _marginal_blocks(relation.hessian[np.ix_(free, free)]), strict=True
+        )
+    ]
+
+
+def _marginal_blocks(information: Array) -> Array:
+    """The information (m, 3, 3) on each of m poses alone, from that on all of them (3 m, 3 m)."""
+    m = len(information) // 3
+    eigenvalues, vectors = np.linalg.eigh(information)
+    if eigenvalues[0] > 1e-9 * eigenvalues[-1]:
+        covariance = (vectors / eigenvalues) @ vectors.T
+        blocks = np.linalg.inv(covariance.reshape(m, 3, m, 3)[np.arange(m), :, np.arange(m)])
+    else:
+        H = (vectors * np.maximum(eigenvalues, 0)) @ vectors.T
+        blocks = np.empty((m, 3, 3))
+        for block in range(m):
+            i = np.arange(3 * block, 3 * block + 3)
+            r = np.delete(np.arange(3 * m), i)
+            H_ir = H[np.ix_(i, r)]
+            blocks[block] = H[np.ix_(i, i)] - H_ir @ np.linalg.pinv(H[np.ix_(r, r)], 1e-12, True) @ H_ir.T
+    return 0.5 * (blocks + blocks.transpose(0, 2, 1))
 
 
 def _numbers(values: Array) -> str:

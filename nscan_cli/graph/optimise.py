@@ -5,13 +5,17 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.sparse import csc_array, diags_array
-from scipy.sparse.linalg import splu
 
+from nscan_cli.graph.cholesky import factorise, solve
+from nscan_cli.graph.pattern import Pattern
 from nscan_cli.graph.system import GraphEnergy, System
 from nscan_cli.poses import Array, wrap
 
-LEAST_DAMPING = 1e-12
+SETTLED = 0.1
+"""m, rad: the exact Hessian is used once a step is shorter. It needs fewer steps there than the
+Gauss–Newton part; farther away it needs more, and often is not positive definite."""
+FIRST_DAMPING = 1e-6
+LEAST_DAMPING = 1e-9
 GREATEST_DAMPING = 1e8
 
 
@@ -23,45 +27,56 @@ class Optimum:
     energy: float
     iterations: int
     converged: bool
+    """Whether the last step was within the tolerance, and not because it was damped."""
 
 
 def optimise(
-    energy: GraphEnergy, poses: Array, max_iterations: int = 50, tolerance: float = 1e-6, damping: float = 0.0
+    energy: GraphEnergy, poses: Array, max_iterations: int = 100, tolerance: float = 1e-6
 ) -> Optimum:
     """Minimise from the poses (K, 3) until a step moves no pose by more than `tolerance` (m, rad).
 
-    Gauss–Newton steps while the poses move far, the exact Hessian (25) when they settle; Levenberg's
-    damping when a step would raise the energy.
+    The steps are Newton's with the Gauss–Newton part of the Hessian while the poses move far, with the
+    exact Hessian (25) when they settle and it is positive definite. They are damped, after Levenberg and
+    Marquardt, when they would raise the energy or the relations leave a direction open. The energy never
+    rises.
     """
-    here, exact = energy.evaluate(poses, exact=False), False
-    iterations = 0
-    while iterations < max_iterations:
-        iterations += 1
-        step = _step(here, damping)
-        trial = poses.copy()
-        trial.reshape(-1)[energy.kept] += step
-        length = float(np.abs(step).max(initial=0.0))
-        there = energy.evaluate(trial, exact)
-        if there.value <= here.value:
-            poses, here = trial, there
-            damping = 0.1 * damping if damping > LEAST_DAMPING else 0.0
-        elif length > tolerance:
-            damping = max(10 * damping, 1e-6)
-            if damping > GREATEST_DAMPING:
-                break
-            continue
-        if length <= tolerance:
-            return Optimum(_wrapped(poses), here.value, iterations, True)
-    return Optimum(_wrapped(poses), here.value, iterations, False)
+    here, exact, damping = energy.evaluate(poses, exact=False), False, 0.0
+    iteration = 0
+    for iteration in range(1, max_iterations + 1):
+        step = newton_step(energy.pattern, here, damping)
+        if step is None and exact:
+            here, exact = energy.evaluate(poses, exact=False), False
+            step = newton_step(energy.pattern, here, damping)
+        if step is not None:
+            trial = poses.copy()
+            trial[energy.free] += step
+            length = float(np.abs(step).max(initial=0.0))
+            there = energy.evaluate(trial, exact=length < SETTLED)
+            lower = there.value <= here.value
+            if lower:
+                poses, here, exact = trial, there, length < SETTLED
+            if length <= tolerance and damping <= 1:
+                return Optimum(_wrapped(poses), here.value, iteration, True)
+            if lower:
+                damping = 0.1 * damping if damping > LEAST_DAMPING else 0.0
+                continue
+        damping = max(10 * damping, FIRST_DAMPING)
+        if damping > GREATEST_DAMPING:
+            break
+    return Optimum(_wrapped(poses), here.value, iteration, False)
 
 
-def _step(system: System, damping: float) -> Array:
+def newton_step(pattern: Pattern, system: System, damping: float = 0.0) -> Array | None:
+    """The step (K − 1, 3) of the free poses; None when the damped Hessian is not positive definite."""
     matrix = system.hessian
     if damping:
-        matrix = csc_array(matrix + diags_array(damping * system.hessian.diagonal()))
-    factor = splu(matrix, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
-    step: Array = -factor.solve(system.gradient)
-    return step
+        matrix = matrix.copy()
+        block, component = pattern.starts[:-1, None], np.arange(3)
+        diagonal = matrix[block, component, component]
+        # The second part is for a direction in which no relation has any information.
+        matrix[block, component, component] += damping * (diagonal + 1e-9 * diagonal.max(initial=0.0))
+    factor = factorise(pattern, matrix)
+    return None if factor.loose.any() else -solve(factor, system.gradient)
 
 
 def _wrapped(poses: Array) -> Array:

@@ -1,4 +1,4 @@
-"""The energy of a whole graph as sparse arrays: all relations' terms summed (paper, eqs. (17) and (23))."""
+"""The energy of a whole graph: all relations' terms summed into sparse blocks (paper, eqs. (17) and (23))."""
 
 from __future__ import annotations
 
@@ -6,19 +6,16 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
-from scipy.sparse import csc_array
 
 from nscan_cli.compiled import kernel
 from nscan_cli.graph.model import NScan, Pairwise
+from nscan_cli.graph.pattern import Indices, block_targets, find_pattern
 from nscan_cli.graph.terms import nscan_term, pairwise_term
 from nscan_cli.poses import Array
 
-Indices = NDArray[np.int64]
-
 
 class Columns(NamedTuple):
-    """P pairwise and Q nScan relations as columns for the kernels; nodes are positions 0 … K − 1."""
+    """P pairwise and Q nScan relations as columns for the kernels; nodes are places 0 … K − 1."""
 
     pairs: Indices
     """(P, 2)"""
@@ -41,15 +38,15 @@ class Columns(NamedTuple):
 
 
 class System(NamedTuple):
-    """The graph's energy at some poses, with the variables of the fixed node left out."""
+    """The energy at some poses and its derivatives by the free poses: all but the fixed one, in order."""
 
     value: float
     terms: Array
     """(P + Q,) what each relation gives: χ² at the poses."""
     gradient: Array
-    """(3 K − 3,)"""
-    hessian: csc_array
-    """(3 K − 3, 3 K − 3)"""
+    """(K − 1, 3)"""
+    hessian: Array
+    """(B, 3, 3) the lower triangle, in the blocks of the factor's pattern."""
 
 
 class GraphEnergy:
@@ -68,57 +65,25 @@ class GraphEnergy:
         The pose at place `fixed` is held where it is.
         """
         self.columns = _columns(pairwise, nscan, positions)
-        self.size = nodes
-        self.kept = np.delete(np.arange(3 * nodes), slice(3 * fixed, 3 * fixed + 3))
-        self._find_pattern(nodes, fixed)
-
-    def value(self, poses: Array) -> float:
-        """The energy alone at the poses (K, 3)."""
-        return self.evaluate(poses, exact=False).value
+        self.fixed = fixed
+        self.free: Indices = np.delete(np.arange(nodes), fixed)
+        """(K − 1,) the places of the poses that can move."""
+        self.free_row: Indices = np.full(nodes, -1)
+        """(K,) the place of a pose among those; −1 for the fixed one."""
+        self.free_row[self.free] = np.arange(nodes - 1)
+        edges = _edges(self.columns, self.free_row)
+        self.pattern = find_pattern(edges[edges.min(axis=1) >= 0], nodes - 1)
+        self._targets = block_targets(edges, self.pattern)
 
     def evaluate(self, poses: Array, exact: bool) -> System:
         """Energy, gradient and Hessian (exact, or its Gauss–Newton part) at the poses (K, 3)."""
         columns = self.columns
         terms = np.zeros(len(columns.pairs) + len(columns.fixed))
-        gradient = np.zeros(3 * self.size)
-        values = np.empty(36 * len(columns.pairs) + len(columns.hessians))
-        _evaluate(columns, np.ascontiguousarray(poses), float(exact), terms, gradient, values)
-        data = np.bincount(self._slots, weights=values[self._entries], minlength=len(self._indices))
-        m = len(self.kept)
-        hessian = csc_array((data, self._indices, self._indptr), shape=(m, m))
-        return System(float(terms.sum()), terms, gradient[self.kept], hessian)
-
-    def _find_pattern(self, nodes: int, fixed: int) -> None:
-        columns = self.columns
-        rows, cols = [], []
-        for group in _members_of_equal_size(columns):
-            variables = (3 * group[:, :, None] + np.arange(3)).reshape(len(group), -1)
-            m = variables.shape[1]
-            rows.append(np.repeat(variables, m, axis=1).ravel())
-            cols.append(np.tile(variables, (1, m)).ravel())
-        row, col = np.concatenate(rows), np.concatenate(cols)
-        reduced = np.full(3 * nodes, -1)
-        reduced[self.kept] = np.arange(len(self.kept))
-        row, col = reduced[row], reduced[col]
-        self._entries = np.flatnonzero((row >= 0) & (col >= 0))
-        m = len(self.kept)
-        keys, self._slots = np.unique(col[self._entries] * m + row[self._entries], return_inverse=True)
-        self._indices = (keys % m).astype(np.int32)
-        self._indptr = np.searchsorted(keys, np.arange(m + 1) * m).astype(np.int32)
-
-
-def _members_of_equal_size(columns: Columns) -> list[Indices]:
-    """The nodes of the relations in their order, as blocks (relations, n) of runs of one n."""
-    groups = [columns.pairs] if len(columns.pairs) else []
-    sizes = np.diff(columns.starts)
-    run = 0
-    while run < len(sizes):
-        end = run
-        while end < len(sizes) and sizes[end] == sizes[run]:
-            end += 1
-        groups.append(columns.members[columns.starts[run] : columns.starts[end]].reshape(end - run, -1))
-        run = end
-    return groups
+        gradient = np.zeros((len(poses), 3))
+        blocks = np.zeros((len(self.pattern.rows), 3, 3))
+        poses = np.ascontiguousarray(poses, dtype=np.float64)
+        _evaluate(columns, poses, float(exact), self._targets, terms, gradient, blocks)
+        return System(float(terms.sum()), terms, gradient[self.free], blocks)
 
 
 def _columns(pairwise: Sequence[Pairwise], nscan: Sequence[NScan], positions: Indices) -> Columns:
@@ -137,31 +102,83 @@ def _columns(pairwise: Sequence[Pairwise], nscan: Sequence[NScan], positions: In
 
 
 @kernel
+def _edges(columns: Columns, free_row: Indices) -> Indices:
+    """The blocks of the lower triangle of each term, in order, as pairs of rows; −1 is the fixed pose."""
+    sizes = columns.starts[1:] - columns.starts[:-1]
+    edges = np.empty((3 * columns.pairs.shape[0] + (sizes * (sizes + 1)).sum() // 2, 2), dtype=np.int64)
+    e = 0
+    for k in range(columns.pairs.shape[0]):
+        e = _add_edges(columns.pairs[k], free_row, edges, e)
+    for k in range(columns.fixed.shape[0]):
+        e = _add_edges(columns.members[columns.starts[k] : columns.starts[k + 1]], free_row, edges, e)
+    return edges
+
+
+@kernel
+def _add_edges(members: Indices, free_row: Indices, edges: Indices, e: int) -> int:
+    for i in range(members.shape[0]):
+        for j in range(i + 1):
+            edges[e, 0], edges[e, 1] = free_row[members[i]], free_row[members[j]]
+            e += 1
+    return e
+
+
+@kernel
 def _evaluate(
-    columns: Columns, poses: Array, curvature: float, terms: Array, gradient: Array, values: Array
+    columns: Columns,
+    poses: Array,
+    curvature: float,
+    targets: Indices,
+    terms: Array,
+    gradient: Array,
+    blocks: Array,
 ) -> None:
-    """Each relation's value into terms (P + Q,), its gradient added, its Hessian laid into values."""
-    pairs = columns.pairs.shape[0]
-    part6, block6 = np.empty(6), np.empty((6, 6))
+    """Each relation's value into terms (P + Q,), its gradient and Hessian added to their nodes."""
+    pairs, e = columns.pairs.shape[0], 0
+    part, block = np.empty(6), np.empty((6, 6))
     for k in range(pairs):
-        a, b = columns.pairs[k, 0], columns.pairs[k, 1]
+        members = columns.pairs[k]
         terms[k] = pairwise_term(
-            poses[a], poses[b], columns.measurements[k], columns.information[k], curvature, part6, block6
+            _at(poses, members), columns.measurements[k], columns.information[k], curvature, part, block
         )
-        gradient[3 * a : 3 * a + 3] += part6[:3]
-        gradient[3 * b : 3 * b + 3] += part6[3:]
-        values[36 * k : 36 * k + 36] = block6.ravel()
+        e = _add_term(members, part, block, targets, e, gradient, blocks)
     for k in range(columns.fixed.shape[0]):
         start, end = columns.starts[k], columns.starts[k + 1]
-        m = 3 * (end - start)
         members = columns.members[start:end]
-        part, block = np.empty(m), np.empty((m, m))
+        m = 3 * (end - start)
+        if part.shape[0] != m:
+            part, block = np.empty(m), np.empty((m, m))
         hessian = columns.hessians[columns.hessian_starts[k] : columns.hessian_starts[k + 1]].reshape(m, m)
         terms[pairs + k] = nscan_term(
-            poses[members], columns.local[start:end], hessian, columns.fixed[k], curvature, part, block
+            _at(poses, members), columns.local[start:end], hessian, columns.fixed[k], curvature, part, block
         )
-        for i in range(members.shape[0]):
-            for a in range(3):
-                gradient[3 * members[i] + a] += part[3 * i + a]
-        offset = 36 * pairs + columns.hessian_starts[k]
-        values[offset : offset + m * m] = block.ravel()
+        e = _add_term(members, part, block, targets, e, gradient, blocks)
+
+
+@kernel
+def _at(poses: Array, members: Indices) -> Array:
+    gathered = np.empty((members.shape[0], 3))
+    for i in range(members.shape[0]):
+        for a in range(3):
+            gathered[i, a] = poses[members[i], a]
+    return gathered
+
+
+@kernel
+def _add_term(
+    members: Indices, part: Array, block: Array, targets: Indices, e: int, gradient: Array, blocks: Array
+) -> int:
+    for i in range(members.shape[0]):
+        for a in range(3):
+            gradient[members[i], a] += part[3 * i + a]
+        for j in range(i + 1):
+            target = targets[e] >> 1
+            if targets[e] >= 0:
+                for a in range(3):
+                    for b in range(3):
+                        if targets[e] & 1:
+                            blocks[target, b, a] += block[3 * i + a, 3 * j + b]
+                        else:
+                            blocks[target, a, b] += block[3 * i + a, 3 * j + b]
+            e += 1
+    return e

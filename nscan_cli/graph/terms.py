@@ -14,62 +14,24 @@ from nscan_cli.poses import Array
 
 @kernel
 def pairwise_term(
-    a: Array,
-    b: Array,
+    poses: Array,
     measurement: Array,
     information: Array,
     curvature: float,
     gradient: Array,
     hessian: Array,
 ) -> float:
-    """ΔᵗC⁻¹Δ with Δ = (b ⊖ a) − p_ab, eqs. (16) and (17).
+    """ΔᵗC⁻¹Δ with Δ = (b ⊖ a) − p_ab, eqs. (16) and (17); poses (2, 3) are a, then b.
 
-    `curvature` 1 gives the exact Hessian, 0 its Gauss–Newton part. Variables: a, then b.
+    It is the nScan term of two poses with a at the origin of the local frame and c = a: there (19) to
+    (22) are (16). `curvature` as in nscan_term.
     """
-    c, s = np.cos(a[2]), np.sin(a[2])
-    dx, dy = b[0] - a[0], b[1] - a[1]
-    ux, uy = c * dx + s * dy, c * dy - s * dx
-    delta = np.empty(3)
-    delta[0], delta[1], delta[2] = ux - measurement[0], uy - measurement[1], b[2] - a[2] - measurement[2]
-    delta[2] -= 2 * np.pi * np.round(delta[2] / (2 * np.pi))
-    jacobian = np.zeros((3, 6))
-    jacobian[0, 0], jacobian[0, 1], jacobian[0, 2] = -c, -s, uy
-    jacobian[1, 0], jacobian[1, 1], jacobian[1, 2] = s, -c, -ux
-    jacobian[2, 2] = -1.0
-    jacobian[0, 3], jacobian[0, 4] = c, s
-    jacobian[1, 3], jacobian[1, 4] = -s, c
-    jacobian[2, 5] = 1.0
-    pull = information @ delta
-    gradient[:] = 2 * (jacobian.T @ pull)
-    hessian[:, :] = 2 * (jacobian.T @ information @ jacobian)
-    # 2 (C⁻¹Δ)ᵗ ∂²Δ: every second derivative that is not zero has φ_a in it.
-    twice = 2 * curvature
-    hessian[2, 2] -= twice * (pull[0] * ux + pull[1] * uy)
-    for row, value in (
-        (0, pull[0] * s + pull[1] * c),
-        (1, pull[1] * s - pull[0] * c),
-        (3, -pull[0] * s - pull[1] * c),
-        (4, pull[0] * c - pull[1] * s),
-    ):
-        hessian[row, 2] += twice * value
-        hessian[2, row] += twice * value
-    return float(delta @ pull)
-
-
-@kernel
-def nscan_difference(poses: Array, local: Array, fixed: int, out: Array) -> None:
-    """f, eqs. (19) to (22): global poses (n, 3), mapped into the local frame, less the local ones.
-
-    The mapping is the one that takes global pose c to local pose c, c = `fixed`; it moves with x̂_c.
-    """
-    theta = local[fixed, 2] - poses[fixed, 2]
-    cos, sin = np.cos(theta), np.sin(theta)
-    for i in range(poses.shape[0]):
-        dx, dy = poses[i, 0] - poses[fixed, 0], poses[i, 1] - poses[fixed, 1]
-        out[3 * i] = cos * dx - sin * dy + local[fixed, 0] - local[i, 0]
-        out[3 * i + 1] = sin * dx + cos * dy + local[fixed, 1] - local[i, 1]
-        turn = theta + poses[i, 2] - local[i, 2]
-        out[3 * i + 2] = turn - 2 * np.pi * np.round(turn / (2 * np.pi))
+    local, padded = np.zeros((2, 3)), np.zeros((6, 6))
+    for a in range(3):
+        local[1, a] = measurement[a]
+        for b in range(3):
+            padded[3 + a, 3 + b] = information[a, b]
+    return nscan_term(poses, local, padded, 0, curvature, gradient, hessian)
 
 
 @kernel
@@ -82,48 +44,100 @@ def nscan_term(
     gradient: Array,
     hessian: Array,
 ) -> float:
-    """fᵗHf, eq. (23), with gradient (24) and Hessian (25). Variables: the n global poses in order.
+    """fᵗHf, eq. (23), with gradient (24) and Hessian (25); f is eqs. (19) to (22).
 
-    `curvature` 1 gives the exact Hessian, 0 leaves out its term in ∂²f.
+    poses (n, 3) are global; pose c of them, c = `fixed`, takes part in the mapping alone: its own f is
+    0. `curvature` 1 gives the exact Hessian, 0 leaves out its term in ∂²f (the Gauss–Newton part).
+
+    With d_i = t̂_i − t̂_c and the rotation R by θ = φ_c − φ̂_c, f_i = (R d_i, φ̂_i + θ) − what is constant.
+    So ∂f_i/∂x̂_i = R and ∂f_i/∂x̂_c = R A_i, A_i = [[−1, 0, d_y], [0, −1, −d_x], [0, 0, −1]]: with H and its
+    pull Hf turned back into the global frame, only pose c needs products, and those are sums.
     """
-    n = poses.shape[0]
-    f = np.empty(3 * n)
-    nscan_difference(poses, local, fixed, f)
-    pull = information @ f
-    theta = local[fixed, 2] - poses[fixed, 2]
+    n, c = poses.shape[0], fixed
+    theta = local[c, 2] - poses[c, 2]
     cos, sin = np.cos(theta), np.sin(theta)
-    # ∂f/∂x̂: block (i, i) is the rotation by θ, block (i, c) takes it back and turns with φ̂_c.
-    jacobian = np.zeros((3 * n, 3 * n))
-    second = 0.0
+    d, f = np.empty((n, 2)), np.empty(3 * n)
     for i in range(n):
-        if i == fixed:
-            continue
-        dx, dy = poses[i, 0] - poses[fixed, 0], poses[i, 1] - poses[fixed, 1]
-        mx, my = cos * dx - sin * dy, sin * dx + cos * dy
-        r, k = 3 * i, 3 * fixed
-        jacobian[r, r], jacobian[r, r + 1] = cos, -sin
-        jacobian[r + 1, r], jacobian[r + 1, r + 1] = sin, cos
-        jacobian[r + 2, r + 2] = 1.0
-        jacobian[r, k], jacobian[r, k + 1], jacobian[r, k + 2] = -cos, sin, my
-        jacobian[r + 1, k], jacobian[r + 1, k + 1], jacobian[r + 1, k + 2] = -sin, -cos, -mx
-        jacobian[r + 2, k + 2] = -1.0
-        second -= pull[r] * mx + pull[r + 1] * my
-    gradient[:] = 2 * (jacobian.T @ pull)
-    hessian[:, :] = 2 * (jacobian.T @ (information @ jacobian))
-    turning = 3 * fixed + 2
-    twice = 2 * curvature
-    hessian[turning, turning] += twice * second
+        d[i, 0], d[i, 1] = poses[i, 0] - poses[c, 0], poses[i, 1] - poses[c, 1]
+        f[3 * i] = cos * d[i, 0] - sin * d[i, 1] + local[c, 0] - local[i, 0]
+        f[3 * i + 1] = sin * d[i, 0] + cos * d[i, 1] + local[c, 1] - local[i, 1]
+        turn = theta + poses[i, 2] - local[i, 2]
+        f[3 * i + 2] = turn - 2 * np.pi * np.round(turn / (2 * np.pi))
+
+    value, k = 0.0, 3 * c
+    for a in range(k, k + 3):
+        gradient[a] = 0.0
+        for b in range(3 * n):
+            hessian[a, b] = hessian[b, a] = 0.0
     for i in range(n):
-        if i == fixed:
+        if i == c:
             continue
-        by_x = twice * (pull[3 * i] * sin - pull[3 * i + 1] * cos)
-        by_y = twice * (pull[3 * i] * cos + pull[3 * i + 1] * sin)
-        for row, value in (
-            (3 * i, by_x),
-            (3 * i + 1, by_y),
-            (3 * fixed, -by_x),
-            (3 * fixed + 1, -by_y),
-        ):
-            hessian[row, turning] += value
-            hessian[turning, row] += value
-    return float(f @ pull)
+        r = 3 * i
+        # The pull 2 Hf, turned back by Rᵗ.
+        x, y, turn = 0.0, 0.0, 0.0
+        for b in range(3 * n):
+            x += information[r, b] * f[b]
+            y += information[r + 1, b] * f[b]
+            turn += information[r + 2, b] * f[b]
+        value += f[r] * x + f[r + 1] * y + f[r + 2] * turn
+        x, y, turn = 2 * (cos * x + sin * y), 2 * (cos * y - sin * x), 2 * turn
+        dx, dy = d[i, 0], d[i, 1]
+        gradient[r], gradient[r + 1], gradient[r + 2] = x, y, turn
+        gradient[k] -= x
+        gradient[k + 1] -= y
+        gradient[k + 2] += dy * x - dx * y - turn
+        for j in range(i + 1):
+            if j != c:
+                _turn_block(information, r, 3 * j, cos, sin, hessian)
+        # ∂²f: R turns with φ̂_c, and again.
+        hessian[k + 2, k + 2] -= curvature * (x * dx + y * dy)
+        hessian[r, k + 2] = -curvature * y
+        hessian[r + 1, k + 2] = curvature * x
+        hessian[k, k + 2] += curvature * y
+        hessian[k + 1, k + 2] -= curvature * x
+    hessian[k + 2, k], hessian[k + 2, k + 1] = hessian[k, k + 2], hessian[k + 1, k + 2]
+    _add_columns_of_c(d, c, hessian)
+    return value
+
+
+@kernel
+def _turn_block(information: Array, r: int, s: int, cos: float, sin: float, hessian: Array) -> None:
+    """The block (r, s) of 2 RᵗHR, and its mirror image."""
+    for b in range(3):
+        x, y = information[r, s + b], information[r + 1, s + b]
+        hessian[r, s + b] = 2 * (cos * x + sin * y)
+        hessian[r + 1, s + b] = 2 * (cos * y - sin * x)
+        hessian[r + 2, s + b] = 2 * information[r + 2, s + b]
+    for a in range(3):
+        x, y = hessian[r + a, s], hessian[r + a, s + 1]
+        hessian[r + a, s], hessian[r + a, s + 1] = cos * x + sin * y, cos * y - sin * x
+    for a in range(3):
+        for b in range(3):
+            hessian[s + b, r + a] = hessian[r + a, s + b]
+
+
+@kernel
+def _add_columns_of_c(d: Array, c: int, hessian: Array) -> None:
+    """Blocks (i, c) += Σ_j H_ij A_j and (c, c) += Σ_ij A_iᵗ H_ij A_j, from the blocks H_ij of the others."""
+    k = 3 * c
+    for i in range(d.shape[0]):
+        if i == c:
+            continue
+        dx, dy = d[i, 0], d[i, 1]
+        for a in range(3):
+            r = 3 * i + a
+            x, y, turn = 0.0, 0.0, 0.0
+            for j in range(d.shape[0]):
+                if j != c:
+                    hx, hy = hessian[r, 3 * j], hessian[r, 3 * j + 1]
+                    x -= hx
+                    y -= hy
+                    turn += d[j, 1] * hx - d[j, 0] * hy - hessian[r, 3 * j + 2]
+            for b, value in enumerate((x, y, turn)):
+                if a < 2:
+                    hessian[k + a, k + b] -= value
+                    hessian[k + 2, k + b] += (dy if a == 0 else -dx) * value
+                else:
+                    hessian[k + 2, k + b] -= value
+                hessian[r, k + b] += value
+                hessian[k + b, r] = hessian[r, k + b]

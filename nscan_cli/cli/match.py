@@ -1,0 +1,171 @@
+"""`nscan-cli match`: the relative pose of two scans, and what is known about it."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from nscan_cli.cli.options import CONTEXT, PoseType, common_options, reading_options
+from nscan_cli.cli.output import check_writable, write_whole
+from nscan_cli.cli.progress import say
+from nscan_cli.errors import WrongUsageError
+from nscan_cli.logs.options import ReadingOptions
+
+if TYPE_CHECKING:
+    from nscan_cli.logs.scan import LaserLog
+    from nscan_cli.matching.pairwise import PairMatch
+    from nscan_cli.poses import Array
+
+FORMAT = "nscan-match"
+
+
+class StartType(click.ParamType[Any]):
+    """odometry, identity or X,Y,DEG; kept as it was typed."""
+
+    name = "start"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        """Check the form; a wrong one is a usage error."""
+        if value not in ("odometry", "identity"):
+            PoseType().convert(value, param, ctx)
+        return value
+
+
+@click.command("match", context_settings=CONTEXT)
+@click.argument("log")
+@click.option("--reference", type=click.IntRange(0), required=True, metavar="I", help="The scan that stays.")
+@click.option("--scan", type=click.IntRange(0), required=True, metavar="J", help="The scan that moves.")
+@click.option(
+    "--initial",
+    type=StartType(),
+    metavar="odometry|identity|X,Y,DEG",
+    help="Pose of J in the frame of I to start from (m, degrees); the odometry's where the log has it.",
+)
+@click.option(
+    "--prior",
+    type=click.Choice(["odometry", "none"]),
+    help="What is known before matching; the odometry where the log has it.",
+)
+@click.option(
+    "-o", "--output", default="-", metavar="RESULT.json", help="The result; standard output if not given."
+)
+@reading_options
+@common_options
+def command(
+    log: str,
+    reference: int,
+    scan: int,
+    initial: str | None,
+    prior: str | None,
+    output: str,
+    reading: ReadingOptions,
+    quiet: bool,
+    **_verbosity: int,
+) -> None:
+    """Match scan J of LOG with scan I (NDT), and say how well the relative pose is known.
+
+    The result is the pose of J in the frame of I with energy, Hessian and covariance. What a corridor
+    leaves open shows as the weakest direction, and best with --prior none.
+    """
+    check_writable(output)
+    from nscan_cli.logs.load import read_log
+    from nscan_cli.matching.pairwise import PairOptions, match_pair, matched_points, scan_ndt
+    from nscan_cli.matching.priors import MotionModel, odometry_prior
+
+    scans = read_log(log, reading)
+    rows = scans.row(reference), scans.row(scan)
+    initial, prior = with_defaults(scans, initial, prior, quiet)
+    options, model = PairOptions(), MotionModel()
+    start = _start(scans, rows, initial)
+    known = None
+    if prior == "odometry" and scans.odometry is not None:
+        known = odometry_prior(scans.odometry[rows[0]], scans.odometry[rows[1]], model)
+    fixed, moving = (matched_points(scans, row, options) for row in rows)
+    match = match_pair(scan_ndt(fixed, options), moving, start, known, options)
+    parameters = {
+        "reading": dataclasses.asdict(reading),
+        "matching": dataclasses.asdict(options),
+        "prior": prior,
+        "odometry": dataclasses.asdict(model),
+    }
+    write_whole(output, _document(scans, (reference, scan), start, match, parameters))
+    for line in _summary(reference, scan, match):
+        say(line, quiet)
+
+
+def with_defaults(log: LaserLog, initial: str | None, prior: str | None, quiet: bool) -> tuple[str, str]:
+    """`initial` and `prior` with the log's odometry for what was not given, or without where it has none.
+
+    Raises WrongUsageError when odometry was asked for that is not there.
+    """
+    if log.odometry is not None:
+        return initial or "odometry", prior or "odometry"
+    for option, value, other in (("--initial", initial, "identity"), ("--prior", prior, "none")):
+        if value == "odometry":
+            raise WrongUsageError(f"{log.source.name}: has no odometry; give {option} {other}")
+    if initial is None or prior is None:
+        say(f"no odometry: initial {initial or 'identity'}, prior {prior or 'none'}", quiet)
+    return initial or "identity", prior or "none"
+
+
+def _start(log: LaserLog, rows: tuple[int, int], initial: str) -> Array:
+    """The relative pose (3,) to start from."""
+    import numpy as np
+
+    from nscan_cli.poses import relative
+
+    if initial == "odometry" and log.odometry is not None:
+        return relative(log.odometry[rows[1]], log.odometry[rows[0]])
+    if initial == "identity":
+        return np.zeros(3)
+    return np.array(PoseType().convert(initial, None, None))
+
+
+def _document(
+    log: LaserLog, numbers: tuple[int, int], start: Array, match: PairMatch, parameters: dict[str, Any]
+) -> bytes:
+    from nscan_cli.cli.document import document, provenance_of
+    from nscan_cli.graph.json_fields import pose_rows, six_digits, triangle
+
+    weakest = match.weakest
+    return document(
+        FORMAT,
+        provenance_of([log.source], parameters),
+        {
+            "reference": numbers[0],
+            "scan": numbers[1],
+            "initial": pose_rows(start[None])[0],
+            "pose": pose_rows(match.pose[None])[0],
+            "energy": six_digits(match.energy),
+            "gradient_norm": six_digits(match.gradient_norm),
+            "decrement": None if match.decrement is None else six_digits(match.decrement),
+            "hessian": triangle(match.hessian),
+            "covariance": None if match.covariance is None else triangle(match.covariance),
+            "eigenvalues": [six_digits(value) for value in match.eigenvalues.tolist()],
+            "weakest": {
+                "direction": six_digits(weakest.direction),
+                "sigma": None if weakest.sigma is None else six_digits(weakest.sigma),
+            },
+            "overlap": six_digits(match.overlap),
+            "iterations": match.iterations,
+            "evaluations": match.evaluations,
+            "converged": match.converged,
+            "reason": match.reason,
+        },
+    )
+
+
+def _summary(reference: int, scan: int, match: PairMatch) -> list[str]:
+    x, y, angle = match.pose.tolist()
+    outcome = "converged" if match.converged else f"not converged ({match.reason})"
+    sigma = match.weakest.sigma
+    known = "open" if sigma is None else f"σ {sigma:.3g} m"
+    return [
+        f"scan {scan} in the frame of scan {reference}: {x:.3f} m, {y:.3f} m, {math.degrees(angle):.2f}°; "
+        f"{outcome}, {match.iterations} iterations, {match.evaluations} evaluations",
+        f"overlap {match.overlap:.0%}; weakest along {math.degrees(match.weakest.direction):.1f}° from "
+        f"scan {reference}'s x axis: {known}",
+    ]

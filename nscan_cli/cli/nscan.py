@@ -1,0 +1,195 @@
+"""`nscan-cli nscan`: the joint match of n scans."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from nscan_cli.cli.match import with_defaults
+from nscan_cli.cli.options import CONTEXT, common_options, reading_options
+from nscan_cli.cli.output import check_writable, write_whole
+from nscan_cli.cli.progress import say
+from nscan_cli.cli.scan_spec import ScanSpecType
+from nscan_cli.errors import InputDataError, WrongUsageError
+from nscan_cli.logs.options import ReadingOptions
+
+if TYPE_CHECKING:
+    from nscan_cli.logs.scan import LaserLog, Source
+    from nscan_cli.matching.nscan import LeftOut, NScanMatch, PriorsAmong
+    from nscan_cli.matching.priors import MotionModel
+    from nscan_cli.poses import Array
+
+FORMAT = "nscan-joint-match"
+STARTS, PRIORS = ("odometry", "identity"), ("odometry", "none")
+"""What is no file in --initial and in --prior."""
+
+
+@click.command("nscan", context_settings=CONTEXT)
+@click.argument("log")
+@click.option(
+    "--scans", "numbers", type=ScanSpecType(), required=True, help="Such as 10,12,14-20 or 100-190:10."
+)
+@click.option(
+    "--gauge",
+    type=click.Choice(["free", "fixed"]),
+    default="free",
+    show_default=True,
+    help="Estimate all poses and take the smallest steps, or hold one scan where it is.",
+)
+@click.option(
+    "--fixed",
+    type=click.IntRange(0),
+    metavar="K",
+    help="The scan that a fixed gauge holds and the covariance is relative to; the first of SPEC.",
+)
+@click.option(
+    "--initial",
+    metavar="odometry|identity|GRAPH.json|TRAJECTORY.tum",
+    help="Poses to start from; the odometry's where the log has it.",
+)
+@click.option(
+    "--prior",
+    metavar="odometry|none|GRAPH.json",
+    help="What is known before matching: odometry (default), or a graph's pairwise relations.",
+)
+@click.option("-o", "--output", default="-", metavar="RESULT.json", help="Standard output if not given.")
+@reading_options
+@common_options
+def command(
+    log: str,
+    numbers: tuple[int, ...],
+    gauge: str,
+    fixed: int | None,
+    initial: str | None,
+    prior: str | None,
+    output: str,
+    reading: ReadingOptions,
+    quiet: bool,
+    **_verbosity: int,
+) -> None:
+    """Match n scans of LOG jointly (nScan-Matching): every scan against every other at once.
+
+    The result is an nScan relation: local poses and their Hessian, which still has the gauge in it, with
+    the covariance relative to one scan. Scans that overlap none of the others, and scans that break what
+    is known of them, are named and left out.
+    """
+    if fixed is not None and fixed not in numbers:
+        raise WrongUsageError(f"--fixed {fixed}: is none of the scans to match; choose one of them")
+    if log == "-" and "-" in (initial, prior):
+        raise WrongUsageError("standard input (-) can be one input only; give the others by their path")
+    check_writable(output)
+    from nscan_cli.cli.document import document, provenance_of
+    from nscan_cli.inputs import base_name
+    from nscan_cli.logs.load import read_log
+    from nscan_cli.matching.joint import JointOptions
+    from nscan_cli.matching.nscan import nscan_match
+    from nscan_cli.matching.pairwise import PairOptions, matched_points
+    from nscan_cli.matching.priors import MotionModel
+
+    scans = read_log(log, reading)
+    rows = [scans.row(number) for number in numbers]
+    initial, prior = with_defaults(scans, initial, prior, quiet)
+    options, model = PairOptions(), MotionModel()
+    joint = JointOptions(fixed=0 if gauge == "fixed" else None)
+    start, priors, sources = _known(scans, numbers, initial, prior, model)
+    if prior not in PRIORS and not len(priors(range(len(numbers))).pairs):
+        say(f"warning: {prior} has no pairwise relation between two of the scans", quiet)
+    points = [matched_points(scans, row, options) for row in rows]
+    held = 0 if fixed is None else numbers.index(fixed)
+    match, left_out = nscan_match(points, start, priors, held, options, joint)
+    if match is None:
+        raise InputDataError(
+            scans.source.name,
+            f"no two of the scans match: {_told(numbers, left_out)}",
+            "choose scans that see the same walls, or another --initial",
+        )
+    parameters = {
+        "reading": dataclasses.asdict(reading),
+        "matching": dataclasses.asdict(options),
+        "joint": {key: value for key, value in dataclasses.asdict(joint).items() if key != "fixed"},
+        "gauge": gauge,
+        "initial": base_name(initial),
+        "prior": base_name(prior),
+        "odometry": dataclasses.asdict(model),
+    }
+    provenance = provenance_of([scans.source, *sources], parameters)
+    write_whole(output, document(FORMAT, provenance, _fields(numbers, match, left_out)))
+    for line in _summary(numbers, match, left_out):
+        say(line, quiet)
+
+
+def _known(
+    log: LaserLog, numbers: tuple[int, ...], initial: str, prior: str, model: MotionModel
+) -> tuple[Array, PriorsAmong, list[Source]]:
+    """The poses (n, 3) to start from, the priors, and the files that they come from."""
+    import numpy as np
+
+    from nscan_cli.cli.knowledge import graph_priors, no_knowledge, odometry_priors, poses_of, read_knowledge
+    from nscan_cli.graph.model import Graph
+    from nscan_cli.poses import relative
+
+    rows = [log.row(number) for number in numbers]
+    odometry = None if log.odometry is None else log.odometry[rows]
+    paths = [path for path, words in ((initial, STARTS), (prior, PRIORS)) if path not in words]
+    files = {path: read_knowledge(path, log) for path in dict.fromkeys(paths)}
+    start = np.zeros((len(rows), 3))
+    priors: PriorsAmong = no_knowledge
+    if initial not in STARTS:
+        start = poses_of(files[initial], log, rows)
+    elif initial == "odometry" and odometry is not None:
+        start = relative(odometry, odometry[0])
+    if prior not in PRIORS:
+        graph = files[prior].content
+        if not isinstance(graph, Graph):
+            raise WrongUsageError(f"--prior {prior}: is a trajectory, which has no relations; give a graph")
+        priors = graph_priors(graph, numbers)
+    elif prior == "odometry" and odometry is not None:
+        priors = odometry_priors(odometry, numbers, model)
+    return start, priors, [knowledge.source for knowledge in files.values()]
+
+
+def _fields(numbers: tuple[int, ...], match: NScanMatch, left_out: list[LeftOut]) -> dict[str, Any]:
+    """What the document says of the match."""
+    from nscan_cli.graph.json_fields import six_digits, triangle
+    from nscan_cli.graph.json_file import nscan_record
+    from nscan_cli.graph.model import NScan
+
+    kept = [numbers[scan] for scan in match.kept]
+    joint = match.joint
+    score = float(match.overlap.min())
+    relation = NScan(tuple(kept), joint.poses, joint.hessian, match.fixed, "nscan", score)
+    return {
+        "relation": nscan_record(relation, "scans"),
+        "covariance": None if match.covariance is None else triangle(match.covariance),
+        "energy": six_digits(match.energy),
+        "gradient_norm": six_digits(joint.gradient_norm),
+        "decrement": None if match.decrement is None else six_digits(match.decrement),
+        "iterations": joint.iterations,
+        "evaluations": joint.evaluations,
+        "converged": match.reason is None,
+        "reason": match.reason,
+        "pairs": [[kept[i], kept[j]] for i, j in match.pairs.tolist()],
+        "overlap": [six_digits(share) for share in match.overlap.tolist()],
+        "left_out": [
+            {"scan": numbers[out.scan], "reason": out.reason, "overlap": six_digits(out.overlap)}
+            for out in left_out
+        ],
+    }
+
+
+def _summary(numbers: tuple[int, ...], match: NScanMatch, left_out: list[LeftOut]) -> list[str]:
+    joint = match.joint
+    outcome = "converged" if match.reason is None else f"not converged ({match.reason})"
+    lines = [
+        f"{len(match.kept)} scans, {len(match.pairs)} pairs: {outcome}, {joint.iterations} iterations, "
+        f"{joint.evaluations} evaluations; least overlap {match.overlap.min():.0%}"
+    ]
+    if left_out:
+        lines.append(f"left out: {_told(numbers, left_out)}")
+    return lines
+
+
+def _told(numbers: tuple[int, ...], left_out: list[LeftOut]) -> str:
+    return "; ".join(f"scan {numbers[out.scan]} {out.reason}" for out in left_out)

@@ -1,0 +1,41 @@
+"""SPEC, the scans of an nScan on the command line: `10,12,14-20`, `100-190:10`."""
+
+from __future__ import annotations
+
+import re
+from typing import Any
+
+import click
+
+PART = re.compile(r"(\d+)(?:-(\d+)(?::(\d+))?)?")
+MOST_SCANS = 500
+"""The Hessian grows with the square of the scans; more than these are a slip of the keyboard."""
+
+
+class ScanSpecType(click.ParamType[Any]):
+    """A list of scan numbers and ranges on the command line, a tuple of scan numbers inside."""
+
+    name = "SPEC"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        """Parse the scan numbers; a wrong form, a single scan and a scan twice are usage errors."""
+        scans: list[int] = []
+        for part in value.split(","):
+            match = PART.fullmatch(part.strip())
+            if match is None:
+                self.fail(f"{part!r} is not of the form 10, 14-20 or 100-190:10", param, ctx)
+            first, last, step = int(match[1]), int(match[2] or match[1]), int(match[3] or 1)
+            if last < first:
+                self.fail(f"{part!r} runs backwards", param, ctx)
+            if step == 0:
+                self.fail(f"{part!r} has a step of 0", param, ctx)
+            chosen = range(first, last + 1, step)
+            if len(chosen) > MOST_SCANS - len(scans):
+                self.fail(f"{value!r} has more than {MOST_SCANS} scans", param, ctx)
+            scans += chosen
+        if len(scans) < 2:
+            self.fail(f"{value!r} has one scan only; at least two are matched", param, ctx)
+        if len(set(scans)) < len(scans):
+            twice = next(scan for at, scan in enumerate(scans) if scan in scans[:at])
+            self.fail(f"{value!r} has scan {twice} twice", param, ctx)
+        return tuple(scans)

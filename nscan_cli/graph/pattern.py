@@ -1,0 +1,125 @@
+"""Where the factor of a sparse symmetric matrix of 3 × 3 blocks has blocks, in an order of little fill."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import coo_array, csc_array, diags_array
+from scipy.sparse.linalg import splu
+
+from nscan_cli.compiled import kernel
+
+Indices = NDArray[np.int64]
+
+
+class Pattern(NamedTuple):
+    """Which blocks of the factor of F nodes are there, and where."""
+
+    place: Indices
+    """(F,) the row of a node."""
+    starts: Indices
+    """(F + 1,) where the blocks of each column begin."""
+    rows: Indices
+    """(B,) the row of each block."""
+
+
+def find_pattern(edges: Indices, nodes: int) -> Pattern:
+    """The pattern of the factor when the matrix has blocks at the edges (E, 2), and on its diagonal."""
+    if nodes == 0:
+        return Pattern(np.empty(0, np.int64), np.zeros(1, np.int64), np.empty(0, np.int64))
+    indptr, indices = _adjacency(edges, nodes)
+    place = _order_of_little_fill(indptr, indices)
+    starts, rows = _fill(indptr, indices, place, np.argsort(place))
+    columns = csc_array((np.zeros(len(rows), dtype=np.int8), rows, starts), shape=(nodes, nodes))
+    columns.sort_indices()
+    return Pattern(place, starts, columns.indices.astype(np.int64))
+
+
+@kernel
+def block_targets(edges: Indices, pattern: Pattern) -> Indices:
+    """Where the block (row, column) of each edge (E, 2) goes among the blocks of the factor's lower triangle.
+
+    2 × its index there, + 1 when it is its transpose that lies there; −1 when a node is −1.
+    """
+    targets = np.full(edges.shape[0], -1)
+    for e in range(edges.shape[0]):
+        if edges[e, 0] < 0 or edges[e, 1] < 0:
+            continue
+        row, column = pattern.place[edges[e, 0]], pattern.place[edges[e, 1]]
+        transposed = row < column
+        if transposed:
+            row, column = column, row
+        low, high = pattern.starts[column], pattern.starts[column + 1] - 1
+        while low < high:
+            middle = (low + high) // 2
+            if pattern.rows[middle] < row:
+                low = middle + 1
+            else:
+                high = middle
+        targets[e] = 2 * low + transposed
+    return targets
+
+
+def _adjacency(edges: Indices, nodes: int) -> tuple[Indices, Indices]:
+    """The neighbours of each node, without itself, increasing: (indptr, indices)."""
+    a, b = edges[edges[:, 0] != edges[:, 1]].T
+    both = (np.concatenate([a, b]), np.concatenate([b, a]))
+    matrix = coo_array((np.ones(len(both[0]), dtype=np.int8), both), shape=(nodes, nodes)).tocsc()
+    return matrix.indptr.astype(np.int64), matrix.indices.astype(np.int64)
+
+
+def _order_of_little_fill(indptr: Indices, indices: Indices) -> Indices:
+    """Minimum degree, as SuperLU finds it for a matrix of the same pattern with one number a block."""
+    nodes = len(indptr) - 1
+    # Diagonally dominant, so that nothing is pivoted.
+    coupling = csc_array((np.full(len(indices), -1.0), indices, indptr), shape=(nodes, nodes))
+    matrix = csc_array(coupling + diags_array(np.diff(indptr) + 1.0))
+    factor = splu(matrix, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
+    place: Indices = factor.perm_c.astype(np.int64)
+    return place
+
+
+@kernel
+def _fill(indptr: Indices, indices: Indices, place: Indices, order: Indices) -> tuple[Indices, Indices]:
+    """The columns of the factor, unsorted: a column takes over the rows of those whose first row it is."""
+    nodes = order.shape[0]
+    starts = np.zeros(nodes + 1, dtype=np.int64)
+    rows = np.empty(4 * indices.shape[0] + 4 * nodes, dtype=np.int64)
+    child, sibling, seen = np.empty_like(place), np.empty_like(place), np.empty_like(place)
+    for j in range(nodes):
+        child[j] = sibling[j] = seen[j] = -1
+    for j in range(nodes):
+        start = starts[j]
+        if rows.shape[0] < start + nodes:
+            longer = np.empty(2 * rows.shape[0] + nodes, dtype=np.int64)
+            for p in range(start):
+                longer[p] = rows[p]
+            rows = longer
+        end = start + 1
+        rows[start] = j
+        seen[j] = j
+        node = order[j]
+        for p in range(indptr[node], indptr[node + 1]):
+            row = place[indices[p]]
+            if row > j and seen[row] != j:
+                seen[row] = j
+                rows[end] = row
+                end += 1
+        k = child[j]
+        while k >= 0:
+            for p in range(starts[k] + 1, starts[k + 1]):
+                row = rows[p]
+                if seen[row] != j:
+                    seen[row] = j
+                    rows[end] = row
+                    end += 1
+            k = sibling[k]
+        starts[j + 1] = end
+        parent = nodes
+        for p in range(start + 1, end):
+            parent = min(parent, rows[p])
+        if parent < nodes:
+            sibling[j], child[parent] = child[parent], j
+    return starts, rows[: starts[nodes]]

@@ -1,0 +1,92 @@
+"""Optimise a whole graph: all keyframes from all relations (paper, IV)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+
+from nscan_cli.graph.initialise import chordal_start
+from nscan_cli.graph.model import Graph, NScan, Pairwise
+from nscan_cli.graph.optimise import Optimum, optimise
+from nscan_cli.graph.pattern import Indices
+from nscan_cli.graph.system import GraphEnergy
+
+
+@dataclass(frozen=True)
+class GraphOptimum:
+    """The energy Σ ΔᵗC⁻¹Δ + Σ fᵗHf that is left, and how it was reached."""
+
+    energy: float
+    iterations: int
+    converged: bool
+    components: int
+    """Parts that no relation connects; a keyframe without any relation is one."""
+
+
+@dataclass(frozen=True)
+class Component:
+    """Keyframes that relations connect."""
+
+    keyframes: Indices
+    """Ids, increasing; the first one is held where it is."""
+    pairwise: list[Pairwise]
+    nscan: list[NScan]
+
+    def energy(self, nodes: int) -> GraphEnergy:
+        """The energy of the keyframes' poses; `nodes` is the number of nodes of the graph."""
+        positions = np.full(nodes, -1)
+        positions[self.keyframes] = np.arange(len(self.keyframes))
+        return GraphEnergy(len(self.keyframes), self.pairwise, self.nscan, positions)
+
+
+def optimise_graph(graph: Graph, max_iterations: int = 100, tolerance: float = 1e-6) -> GraphOptimum:
+    """Move the keyframes to the minimum of the graph's energy, and the attached nodes with them.
+
+    Starts once from the given poses and once from the chordal start, and keeps the lower minimum. The
+    first keyframe of each component stays. Marginals in the graph belonged to the poses before: they
+    are removed.
+    """
+    total, iterations, converged = 0.0, 0, True
+    parts = components(graph)
+    poses = graph.poses.copy()
+    for part in parts:
+        if len(part.keyframes) == 1:
+            continue
+        energy = part.energy(len(graph))
+        given = poses[part.keyframes]
+        best: Optimum | None = None
+        for start in (given, chordal_start(energy, given)):
+            found = optimise(energy, start, max_iterations, tolerance)
+            iterations += found.iterations
+            if best is None or not best.energy <= found.energy * (1 + 1e-9):
+                best = found
+        assert best is not None
+        poses[part.keyframes] = best.poses
+        total += best.energy
+        converged &= best.converged
+    graph.move_keyframes(graph.keyframes, poses[graph.keyframes])
+    graph.marginals = {}
+    return GraphOptimum(total, iterations, converged, len(parts))
+
+
+def components(graph: Graph) -> list[Component]:
+    """The connected parts of the graph, in order of their first keyframes."""
+    relations: list[Pairwise | NScan] = [*graph.pairwise, *graph.nscan]
+    links = [(relation.nodes[0], node) for relation in relations for node in relation.nodes[1:]]
+    a, b = np.array(links, dtype=np.int64).reshape(-1, 2).T
+    matrix = coo_array((np.ones(len(a)), (a, b)), shape=(len(graph), len(graph)))
+    _, labels = connected_components(matrix, directed=False)
+    keyframes = graph.keyframes
+    parts: dict[int, tuple[list[int], list[Pairwise], list[NScan]]] = {}
+    for keyframe in keyframes:
+        parts.setdefault(int(labels[keyframe]), ([], [], []))[0].append(int(keyframe))
+    for relation in graph.pairwise:
+        parts[int(labels[relation.nodes[0]])][1].append(relation)
+    for nscan in graph.nscan:
+        parts[int(labels[nscan.nodes[0]])][2].append(nscan)
+    return [
+        Component(np.array(ids, dtype=np.int64), pairwise, nscan) for ids, pairwise, nscan in parts.values()
+    ]

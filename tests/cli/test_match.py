@@ -1,0 +1,187 @@
+"""`nscan-cli match` as a user meets it."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from nscan_cli.cli.main import run
+from nscan_cli.graph.triangles import from_upper_triangle
+from nscan_cli.logs.load import read_log
+from nscan_cli.poses import relative
+from tests.data import data_file
+from tests.logs.lines import flaser
+
+SAMPLE = str(Path(__file__).resolve().parents[2] / "sample_logs" / "office.log.gz")
+CORRIDOR = str(Path(SAMPLE).with_name("corridor_and_room.log.gz"))
+KEYS = [
+    "format", "version", "units", "provenance", "reference", "scan", "initial", "pose", "energy",
+    "gradient_norm", "decrement", "hessian", "covariance", "eigenvalues", "weakest", "overlap", "iterations",
+    "evaluations", "converged", "reason",
+]  # fmt: skip
+
+
+def matched(capsys: pytest.CaptureFixture[str], *arguments: str) -> tuple[dict[str, Any], list[str]]:
+    """The document and what was said."""
+    assert run(["match", *arguments]) == 0
+    out, err = capsys.readouterr()
+    document: dict[str, Any] = json.loads(out, parse_constant=pytest.fail)
+    return document, err.splitlines()
+
+
+def off(document: dict[str, Any], log: str) -> np.ndarray:
+    """The error (3,) of the pose against the truth in the log."""
+    truth = read_log(log).truth
+    assert truth is not None
+    step = relative(truth[document["scan"]], truth[document["reference"]])
+    error: np.ndarray = relative(np.array(document["pose"]), step)
+    return error
+
+
+def test_the_document(capsys):
+    document, said = matched(capsys, SAMPLE, "--reference", "300", "--scan", "306")
+    assert list(document) == KEYS
+    assert (document["format"], document["version"]) == ("nscan-match", "1.0")
+    assert document["units"] == {"length": "m", "angle": "rad"}
+    log = read_log(SAMPLE)
+    source = {"name": "office.log.gz", "sha256": log.source.sha256, "bytes": log.source.bytes}
+    assert document["provenance"]["inputs"] == [source]
+    assert document["provenance"]["parameters"]["prior"] == "odometry"
+    assert log.odometry is not None
+    np.testing.assert_allclose(document["initial"], relative(log.odometry[306], log.odometry[300]), atol=1e-8)
+    assert np.hypot(*off(document, SAMPLE)[:2]) < 0.03
+    assert abs(off(document, SAMPLE)[2]) < 0.01
+    hessian, covariance = (from_upper_triangle(document[key], 3) for key in ("hessian", "covariance"))
+    np.testing.assert_allclose(hessian @ covariance, np.eye(3), atol=0.01)
+    np.testing.assert_allclose(np.linalg.eigvalsh(hessian), document["eigenvalues"], rtol=1e-3)
+    assert document["weakest"]["sigma"] ** 2 <= np.trace(covariance[:2, :2]) * 1.001
+    assert document["energy"] < -50
+    assert 0.5 < document["overlap"] <= 1
+    assert (document["converged"], document["reason"]) == (True, None)
+    assert document["evaluations"] > document["iterations"] > 0
+    assert len(said) == 2
+    assert "scan 306 in the frame of scan 300" in said[0]
+    assert "converged" in said[0]
+
+
+def test_a_corridor_shows_as_the_weakest_direction(capsys):
+    """Scans 45 and 117 are 1 and 2 of the paper's Fig. 3: open along the corridor, the x axis of 45."""
+    document, said = matched(capsys, CORRIDOR, "--reference", "45", "--scan", "117", "--prior", "none")
+    assert abs(np.degrees(document["weakest"]["direction"])) < 10
+    assert document["weakest"]["sigma"] is None or document["weakest"]["sigma"] > 0.2
+    assert "from scan 45's x axis" in said[1]
+
+
+def test_the_start_can_be_given(capsys):
+    near, _ = matched(capsys, SAMPLE, "--reference", "300", "--scan", "306", "--prior", "none")
+    x, y, angle = near["pose"]
+    initial = f"{x + 0.05:.4f},{y - 0.05:.4f},{np.degrees(angle) + 1:.4f}"
+    given, _ = matched(
+        capsys, SAMPLE, "--reference", "300", "--scan", "306", "--prior", "none", "--initial", initial
+    )
+    np.testing.assert_allclose(given["initial"], [x + 0.05, y - 0.05, angle + np.radians(1)], atol=1e-4)
+    np.testing.assert_allclose(given["pose"], near["pose"], atol=0.005)
+    still, _ = matched(capsys, SAMPLE, "--reference", "300", "--scan", "306", "--initial", "identity")
+    assert still["initial"] == [0, 0, 0]
+
+
+def test_no_overlap_is_a_result_that_says_so(capsys):
+    document, said = matched(
+        capsys, SAMPLE, "--reference", "0", "--scan", "1", "--initial", "-300,0,0", "--prior", "none"
+    )
+    assert (document["converged"], document["reason"]) == (False, "no overlap")
+    assert document["covariance"] is None
+    assert document["weakest"]["sigma"] is None
+    assert "not converged (no overlap)" in said[0]
+
+
+def test_the_file_holds_what_standard_output_would(tmp_path, capsys):
+    arguments = ["match", SAMPLE, "--reference", "10", "--scan", "12"]
+    assert run(arguments) == 0
+    out = capsys.readouterr().out
+    assert run([*arguments, "-o", str(tmp_path / "match.json"), "-q"]) == 0
+    assert (tmp_path / "match.json").read_text() == out
+    assert capsys.readouterr() == ("", "")
+    assert all(line.count('":') >= 1 for line in out.splitlines())
+
+
+def test_without_odometry_it_starts_from_identity_and_says_so(capsys):
+    document, said = matched(capsys, SAMPLE, "--reference", "10", "--scan", "12", "--no-odometry")
+    assert document["initial"] == [0, 0, 0]
+    assert document["provenance"]["parameters"]["prior"] == "none"
+    assert said[0] == "no odometry: initial identity, prior none"
+    _, said = matched(
+        capsys, SAMPLE, "--reference", "10", "--scan", "12", "--no-odometry", "--initial", "identity",
+        "--prior", "none",
+    )  # fmt: skip
+    assert "no odometry" not in said[0]
+
+
+def test_the_options_can_be_dumped_and_read_back(tmp_path, capsys):
+    arguments = ["match", SAMPLE, "--reference", "10", "--scan", "12", "--initial", "0.1,0,90"]
+    assert run([*arguments, "--dump-config"]) == 0
+    config = tmp_path / "match.toml"
+    config.write_text(capsys.readouterr().out)
+    assert 'initial = "0.1,0,90"' in config.read_text()
+    document, _ = matched(capsys, SAMPLE, "--config", str(config))
+    np.testing.assert_allclose(document["initial"], [0.1, 0, np.pi / 2], atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code", "said"),
+    [
+        (["--reference", "0"], 2, "--scan"),
+        (["--reference", "0", "--scan", "9999"], 2, "no scan 9999; scans read go from 0 to 2519"),
+        (["--reference", "0", "--scan", "-1"], 2, "--scan"),
+        (["--reference", "0", "--scan", "3", "--every", "2"], 2, "no scan 3"),
+        (["--reference", "0", "--scan", "1", "--initial", "1,2"], 2, "X,Y,DEG"),
+        (["--reference", "0", "--scan", "1", "--initial", "1,nan,2"], 2, "not finite"),
+        (["--reference", "0", "--scan", "1", "--prior", "graph"], 2, "--prior"),
+        (
+            ["--reference", "0", "--scan", "1", "--no-odometry", "--initial", "odometry"],
+            2,
+            "--initial identity",
+        ),
+        (["--reference", "0", "--scan", "1", "--no-odometry", "--prior", "odometry"], 2, "--prior none"),
+        (["--reference", "0", "--scan", "1", "--max-range", "0.1"], 65, "scan 0 has 0 usable beams"),
+        (["--reference", "0", "--scan", "1", "-o", "no/such/folder.json"], 73, "does not exist"),
+    ],
+)
+def test_mistakes_are_one_line(tmp_path, monkeypatch, capsys, arguments, code, said):
+    monkeypatch.chdir(tmp_path)
+    assert run(["match", SAMPLE, *arguments]) == code
+    out, err = capsys.readouterr()
+    assert out == ""
+    assert len(err.splitlines()) == 1
+    assert said in err
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_missing_log_and_one_that_is_none(tmp_path, capsys):
+    (tmp_path / "text.log").write_text("no log\n")
+    arguments = ["--reference", "0", "--scan", "1"]
+    assert run(["match", str(tmp_path / "none.log"), *arguments]) == 66
+    assert run(["match", str(tmp_path / "text.log"), *arguments]) == 65
+    assert len(capsys.readouterr().err.splitlines()) == 2
+
+
+def test_a_scan_of_two_beams_is_bad_data(tmp_path, capsys):
+    path = tmp_path / "few.log"
+    path.write_text(f"{flaser(1, (1, 2))}\n{flaser(2, (1, 2))}\n")
+    assert run(["match", str(path), "--reference", "0", "--scan", "1"]) == 65
+    assert "few.log: scan 0 has 2 usable beams" in capsys.readouterr().err
+
+
+@pytest.mark.logs
+def test_a_real_log(capsys):
+    """Intel, scans 2 s apart: the odometry is near, and most of the points lie on the walls of both."""
+    log = str(data_file("intel.log.gz"))
+    document, _ = matched(capsys, log, "--reference", "3000", "--scan", "3010")
+    assert document["converged"]
+    assert document["overlap"] > 0.7
+    assert document["weakest"]["sigma"] < 0.1
+    np.testing.assert_allclose(document["pose"][:2], document["initial"][:2], atol=0.15)

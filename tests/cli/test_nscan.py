@@ -1,0 +1,263 @@
+"""`nscan-cli nscan` as a user meets it."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import click
+import numpy as np
+import pytest
+
+from nscan_cli.cli.main import run
+from nscan_cli.cli.scan_spec import ScanSpecType
+from nscan_cli.graph.json_fields import Record
+from nscan_cli.graph.json_file import nscan_relation, write_graph
+from nscan_cli.graph.model import Graph, Pairwise
+from nscan_cli.graph.triangles import from_upper_triangle
+from nscan_cli.graph.tum import write_tum
+from nscan_cli.logs.load import read_log
+from nscan_cli.logs.scan import LaserLog
+from nscan_cli.poses import relative
+from tests.data import data_file
+from tests.matching.problems import errors
+
+SAMPLE = str(Path(__file__).resolve().parents[2] / "sample_logs" / "office.log.gz")
+CORRIDOR = str(Path(SAMPLE).with_name("corridor_and_room.log.gz"))
+SPEC = "2000-2024:8"
+SCANS = [2000, 2008, 2016, 2024]
+KEYS = [
+    "format", "version", "units", "provenance", "relation", "covariance", "energy", "gradient_norm",
+    "decrement", "iterations", "evaluations", "converged", "reason", "pairs", "overlap", "left_out",
+]  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def office() -> LaserLog:
+    return read_log(SAMPLE)
+
+
+def matched(capsys: pytest.CaptureFixture[str], *arguments: str) -> tuple[dict[str, Any], list[str]]:
+    """The document and what was said."""
+    assert run(["nscan", *arguments]) == 0
+    out, err = capsys.readouterr()
+    document: dict[str, Any] = json.loads(out, parse_constant=pytest.fail)
+    return document, err.splitlines()
+
+
+def graph_of(log: LaserLog, scans: list[int], relations: list[Pairwise] | None = None) -> Graph:
+    """A graph of true poses; all nodes are keyframes."""
+    assert log.truth is not None
+    source = {"name": log.source.name, "sha256": log.source.sha256, "bytes": log.source.bytes}
+    return Graph(
+        scans=np.array(scans),
+        stamps=[log.stamps[scan] for scan in scans],
+        poses=log.truth[scans],
+        odometry=None,
+        anchors=np.arange(len(scans)),
+        pairwise=relations or [],
+        provenance={"inputs": [source], "parameters": {}},
+    )
+
+
+def assert_true(document: dict[str, Any], log: LaserLog, metres: float = 0.03) -> None:
+    assert log.truth is not None
+    off = errors(np.array(document["relation"]["poses"]), log.truth[document["relation"]["scans"]])
+    assert np.hypot(off[:, 0], off[:, 1]).max() < metres
+
+
+def test_the_document(capsys, office):
+    document, said = matched(capsys, SAMPLE, "--scans", SPEC)
+    assert list(document) == KEYS
+    assert (document["format"], document["version"]) == ("nscan-joint-match", "1.0")
+    relation = nscan_relation(Record(document["relation"], "relation"), "scans")
+    assert (relation.nodes, relation.fixed, relation.origin) == (tuple(SCANS), 0, "nscan")
+    assert_true(document, office)
+    values = np.linalg.eigvalsh(relation.hessian)
+    assert np.abs(values[:3]).max() < 1e-3 * values[3]
+    covariance = from_upper_triangle(document["covariance"], 9)
+    np.testing.assert_allclose(covariance @ relation.hessian[3:, 3:], np.eye(9), atol=0.05)
+    assert document["pairs"] == [[i, j] for i in SCANS for j in SCANS if i != j]
+    assert len(document["overlap"]) == 4
+    assert relation.score == min(document["overlap"]) > 0.6
+    assert (document["converged"], document["reason"], document["left_out"]) == (True, None, [])
+    assert document["provenance"]["inputs"][0]["sha256"] == office.source.sha256
+    assert len(said) == 1
+    assert "4 scans, 12 pairs: converged" in said[0]
+
+
+def test_fig_3_of_the_paper_is_known_in_every_direction(capsys):
+    """Scans 45, 117 and 150 are 1, 2 and 3 of the figure: jointly no direction is left open."""
+    document, _ = matched(capsys, CORRIDOR, "--scans", "45,117,150", "--prior", "none")
+    assert document["converged"]
+    covariance = from_upper_triangle(document["covariance"], 6)
+    assert np.sqrt(covariance[[0, 1, 3, 4], [0, 1, 3, 4]]).max() < 0.1
+    assert_true(document, read_log(CORRIDOR), 0.15)
+
+
+def test_gauges_and_the_fixed_scan(capsys, office):
+    arguments = (SAMPLE, "--scans", SPEC, "--fixed", "2016")
+    free, _ = matched(capsys, *arguments)
+    fixed, _ = matched(capsys, *arguments, "--gauge", "fixed")
+    for document in (free, fixed):
+        assert document["relation"]["fixed"] == 2016
+        assert_true(document, office)
+    assert office.odometry is not None
+    start = relative(office.odometry[2016], office.odometry[2000])
+    np.testing.assert_allclose(fixed["relation"]["poses"][2], start, atol=1e-8)
+    off = errors(np.array(free["relation"]["poses"]), np.array(fixed["relation"]["poses"]))
+    assert np.abs(off).max() < 1e-3
+
+
+def test_without_odometry(capsys, office):
+    document, said = matched(capsys, SAMPLE, "--scans", "2000-2003", "--no-odometry")
+    assert said[0] == "no odometry: initial identity, prior none"
+    assert_true(document, office, 0.05)
+
+
+def test_starts_from_a_graph_and_from_a_trajectory(tmp_path, capsys, office):
+    assert office.truth is not None
+    graph, tum = tmp_path / "graph.json", tmp_path / "path.tum"
+    graph.write_bytes(write_graph(graph_of(office, [0, *SCANS])))
+    # Stamps of another clock tick: the nearest in time is taken.
+    stamps = [f"{float(office.stamps[scan]) + 0.01:.3f}" for scan in SCANS]
+    tum.write_bytes(write_tum(stamps, office.truth[SCANS]))
+    for path in (graph, tum):
+        document, _ = matched(
+            capsys, SAMPLE, "--scans", SPEC, "--initial", str(path), "--prior", "none", "--gauge", "fixed"
+        )
+        assert_true(document, office)
+        np.testing.assert_allclose(document["relation"]["poses"][0], office.truth[2000], atol=1e-8)
+        assert [source["name"] for source in document["provenance"]["inputs"]] == [
+            office.source.name,
+            path.name,
+        ]
+        assert document["provenance"]["parameters"]["initial"] == path.name
+
+
+def test_relations_of_a_graph_are_priors(tmp_path, capsys, office):
+    """A relation that is sure of a place 5 cm off pulls the scan there; one to another scan does nothing."""
+    assert office.truth is not None
+    step = relative(office.truth[2008], office.truth[2000]) + np.array([0.05, 0, 0])
+    relations = [
+        Pairwise((1, 2), step, np.eye(3) * 1e8, "track"),
+        Pairwise((0, 1), np.array([9.0, 9, 0]), np.eye(3) * 1e8, "track"),
+    ]
+    path = tmp_path / "graph.json"
+    path.write_bytes(write_graph(graph_of(office, [0, *SCANS], relations)))
+    document, said = matched(
+        capsys, SAMPLE, "--scans", "2000,2008", "--initial", str(path), "--prior", str(path)
+    )
+    poses = np.array(document["relation"]["poses"])
+    np.testing.assert_allclose(relative(poses[1], poses[0]), step, atol=2e-3)
+    assert len(document["provenance"]["inputs"]) == 2
+    assert len(said) == 1
+    _, said = matched(capsys, SAMPLE, "--scans", "2016,2024", "--prior", str(path))
+    assert "no pairwise relation" in said[0]
+
+
+def test_scans_that_overlap_none_are_named_and_left_out(tmp_path, capsys, office):
+    graph = graph_of(office, SCANS)
+    graph.poses[1] += [300.0, 0, 0]
+    path = tmp_path / "torn.json"
+    path.write_bytes(write_graph(graph))
+    arguments = ["--scans", SPEC, "--initial", str(path), "--prior", "none", "--fixed", "2008"]
+    document, said = matched(capsys, SAMPLE, *arguments)
+    assert document["relation"]["scans"] == [2000, 2016, 2024]
+    assert document["relation"]["fixed"] == 2000
+    assert document["left_out"] == [{"scan": 2008, "reason": "overlaps none of the others", "overlap": 0}]
+    assert len(document["relation"]["hessian"]) == 45
+    assert len(document["covariance"]) == 21
+    assert said[1] == "left out: scan 2008 overlaps none of the others"
+    assert_true(document, office)
+    code = run(["nscan", SAMPLE, "--scans", "2000,2008", *arguments[2:6]])
+    out, err = capsys.readouterr()
+    assert (code, out, len(err.splitlines())) == (65, "", 1)
+    assert "no two of the scans match: scan 2000 overlaps none" in err
+
+
+def test_the_same_bytes_every_time(tmp_path):
+    for name in ("a.json", "b.json"):
+        assert run(["nscan", CORRIDOR, "--scans", "20-100:20", "-q", "-o", str(tmp_path / name)]) == 0
+    assert (tmp_path / "a.json").read_bytes() == (tmp_path / "b.json").read_bytes()
+
+
+@pytest.mark.parametrize(
+    ("spec", "scans"),
+    [
+        ("10,12,14-20", [10, 12, *range(14, 21)]),
+        ("100-190:10", list(range(100, 200, 10))),
+        ("7, 3", [7, 3]),
+        ("0-5:2,9", [0, 2, 4, 9]),
+    ],
+)
+def test_spec(spec, scans):
+    assert ScanSpecType().convert(spec, None, None) == tuple(scans)
+
+
+@pytest.mark.parametrize(
+    ("spec", "said"),
+    [
+        ("", "not of the form"), ("a", "not of the form"), ("1,,2", "not of the form"),
+        ("1-", "not of the form"), ("1:2", "not of the form"), ("-3", "not of the form"),
+        ("1.5,2", "not of the form"), ("9-3", "backwards"), ("1-9:0", "step of 0"), ("5", "one scan only"),
+        ("5-9:10", "one scan only"), ("1,2,1", "scan 1 twice"), ("1-5,3-7", "scan 3 twice"),
+        ("0-99999999999", "more than 500"),
+    ],
+)  # fmt: skip
+def test_spec_that_is_none(spec, said):
+    with pytest.raises(click.BadParameter, match=said):
+        ScanSpecType().convert(spec, None, None)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code", "said"),
+    [
+        ([], 2, "--scans"),
+        (["--scans", "4"], 2, "one scan only"),
+        (["--scans", "1,1"], 2, "scan 1 twice"),
+        (["--scans", "1,9999"], 2, "no scan 9999"),
+        (["--scans", "1,2", "--fixed", "3"], 2, "--fixed 3"),
+        (["--scans", "1,2", "--gauge", "loose"], 2, "--gauge"),
+        (["--scans", "1,2", "--no-odometry", "--prior", "odometry"], 2, "--prior none"),
+        (["--scans", "1,2", "--initial", "none.tum"], 66, "none.tum"),
+        (["--scans", "1,2", "--initial", "none"], 66, "none: no such file"),
+        (["--scans", "1,2", "--prior", "identity"], 66, "identity: no such file"),
+        (["--scans", "1,2", "--prior", "path.tum"], 2, "has no relations"),
+        (["--scans", "1,2", "--initial", "path.tum"], 65, "path.tum: has no pose of scan 1"),
+        (["--scans", "1,2", "--initial", "graph.json"], 65, "graph.json: has no pose of scan 2"),
+        (["--scans", "1,2", "--initial", "other.json"], 65, "is not a graph of office.log.gz"),
+        (["--scans", "1,2", "--initial", "text"], 65, "text, line 1"),
+        (["--scans", "1,2", "--max-range", "0.1"], 65, "scan 1 has 0 usable beams"),
+        (["--scans", "1,2", "-o", "no/such.json"], 73, "does not exist"),
+    ],
+)
+def test_mistakes_are_one_line(tmp_path, monkeypatch, capsys, office, arguments, code, said):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "path.tum").write_text("1 0 0 0 0 0 0 1\n")
+    (tmp_path / "text").write_text("neither of the two\n")
+    graph = graph_of(office, [0, 1])
+    (tmp_path / "graph.json").write_bytes(write_graph(graph))
+    graph.provenance["inputs"][0]["sha256"] = "0" * 64
+    (tmp_path / "other.json").write_bytes(write_graph(graph))
+    assert run(["nscan", SAMPLE, *arguments]) == code
+    out, err = capsys.readouterr()
+    assert out == ""
+    assert len(err.splitlines()) == 1
+    assert said in err
+
+
+def test_standard_input_is_one_input(capsys):
+    assert run(["nscan", "-", "--scans", "1,2", "--initial", "-"]) == 2
+    assert "one input only" in capsys.readouterr().err
+
+
+@pytest.mark.logs
+def test_a_real_log(capsys):
+    """Ten scans of Intel along 5 m of way, from odometry: they fall together."""
+    log = str(data_file("intel.log.gz"))
+    document, _ = matched(capsys, log, "--scans", "3000-3090:10")
+    assert document["converged"]
+    assert document["left_out"] == []
+    assert min(document["overlap"]) > 0.8

@@ -1,0 +1,72 @@
+"""Scans to match, with the poses that they were taken from."""
+
+from __future__ import annotations
+
+import functools
+from dataclasses import dataclass
+
+import numpy as np
+
+from nscan_cli.matching.joint_energy import Scans, lay_out
+from nscan_cli.matching.pairwise import PairOptions, matched_points, scan_ndt
+from nscan_cli.ndt.grid import Ndt
+from nscan_cli.poses import Array, relative, wrap
+from tests.simulation.laser import exact
+from tests.simulation.scenes import FIG_3, Scene, corridor_and_room, office
+
+OPTIONS = PairOptions()
+
+
+@dataclass(frozen=True)
+class Problem:
+    """n scans."""
+
+    truth: Array
+    """(n, 3)"""
+    points: list[Array]
+    ndts: list[Ndt]
+
+    def __len__(self) -> int:
+        return len(self.points)
+
+    def laid_out(self, *chosen: int) -> Scans:
+        """Some of the scans, or all, as the joint energy takes them."""
+        scans = chosen or range(len(self))
+        return lay_out([self.ndts[scan] for scan in scans], [self.points[scan] for scan in scans])
+
+
+def problem(scene: Scene, truth: Array, noise: bool, seed: int = 1) -> Problem:
+    """Scans taken from true poses (n, 3)."""
+    log = scene.record_at(truth, seed, laser=scene.laser if noise else exact(scene.laser)).log()
+    points = [matched_points(log, row, OPTIONS) for row in range(len(log))]
+    return Problem(truth, points, [scan_ndt(part, OPTIONS) for part in points])
+
+
+@functools.cache
+def office_truth() -> Array:
+    """(S, 3) the way through the office."""
+    return office().truth()
+
+
+def office_problem(rows: tuple[int, ...], noise: bool = True, seed: int = 1) -> Problem:
+    """The office from the poses in `rows` of its drive."""
+    return problem(office(), office_truth()[list(rows)], noise, seed)
+
+
+def fig_3(noise: bool = False, seed: int = 1) -> Problem:
+    """The three scans of the paper's Fig. 3."""
+    return problem(corridor_and_room(), FIG_3, noise, seed)
+
+
+def errors(poses: Array, truth: Array) -> Array:
+    """(n, 3) differences of the poses seen from the first of each."""
+    off = relative(poses, poses[0]) - relative(truth, truth[0])
+    off[:, 2] = wrap(off[:, 2])
+    return off
+
+
+def near(truth: Array, seed: int, metres: float = 0.03, radians: float = 0.01) -> Array:
+    """Poses (n, 3) a little off the truth, by so much at most."""
+    rng = np.random.default_rng(seed)
+    off: Array = truth + rng.uniform(-1, 1, truth.shape) * [metres, metres, radians]
+    return off

@@ -1,0 +1,121 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from nscan_cli.ndt.energy import energy
+from nscan_cli.ndt.grid import Ndt, find_row, pack
+from nscan_cli.poses import transform
+from tests.ndt import plain
+from tests.ndt.rooms import room
+
+HERE = np.zeros(3)
+ELSEWHERE = np.array([-7.3, 4.1, 2.2])
+PROBE = np.array([0.1, -0.05, 0.04])
+
+
+def grown(points, cell=1.0, minimum=3, floor=0.02, capacity=512, pose=HERE) -> Ndt:
+    ndt = Ndt(cell, minimum, floor, capacity)
+    ndt.add(points, pose)
+    return ndt
+
+
+def entries(ndt: Ndt) -> dict[int, tuple[float, ...]]:
+    """Key → Gaussian, of all that have points enough."""
+    grid = ndt.grid
+    return {
+        int(grid.keys[row]): tuple(grid.gaussians[row])
+        for row in range(ndt.rows)
+        if grid.gaussians[row, 2] > 0
+    }
+
+
+def assert_same(a: Ndt, b: Ndt, tolerance: float = 1e-9) -> None:
+    first, second = entries(a), entries(b)
+    assert first.keys() == second.keys()
+    for key, gaussian in first.items():
+        np.testing.assert_allclose(gaussian, second[key], rtol=tolerance, atol=tolerance)
+
+
+@pytest.mark.parametrize(("cell", "minimum", "floor"), [(1.0, 3, 0.02), (0.5, 5, 0.02), (2.0, 4, 0.1)])
+def test_gaussians_are_mean_and_covariance_of_the_points_in_each_cell(cell, minimum, floor):
+    points = transform(ELSEWHERE, room(1))
+    ndt = grown(points, cell, minimum, floor)
+    expected = plain.gaussians(points, cell, minimum, floor)
+    assert len(expected) > 30
+    assert ndt.gaussian_count() == len(expected)
+    for (sx, sy, ix, iy), (mean, inverse) in expected.items():
+        row = find_row(ndt.grid, pack(2 * ix + sx, 2 * iy + sy))
+        assert row >= 0
+        found = ndt.grid.gaussians[row]
+        np.testing.assert_allclose(found[:2], mean, rtol=1e-12)
+        scale = np.abs(inverse).max()
+        np.testing.assert_allclose(found[2:], inverse[np.triu_indices(2)], rtol=1e-8, atol=1e-8 * scale)
+
+
+def test_a_straight_wall_is_held_across_and_hardly_along():
+    """Points on the line y = 0.2, x from 0.1 to 0.9: variance along 0.8²/12 · (1 + 2/(n−1))."""
+    x = np.linspace(0.1, 0.9, 17)
+    ndt = grown(np.stack([x, np.full(17, 0.2)], axis=1))
+    gaussian = entries(ndt)[int(pack(0, 0))]
+    along = np.var(x)
+    assert along == pytest.approx(0.8**2 / 12 * (1 + 2 / 16))
+    # The floor of 0.02 m across; along, the inverse variance times the ratio of the two.
+    expected = np.array([0.5, 0.2, 0.02**2 / along**2, 0.0, 0.02**-2])
+    np.testing.assert_allclose(np.array(gaussian), expected, atol=1e-9)
+
+
+def test_adding_moves_by_the_pose():
+    assert_same(grown(room(1), pose=ELSEWHERE), grown(transform(ELSEWHERE, room(1))))
+
+
+def test_growing_in_two_steps_is_growing_in_one():
+    points = room(2)
+    ndt = grown(points[::2])
+    ndt.add(points[1::2], HERE)
+    assert_same(ndt, grown(points))
+    np.testing.assert_allclose(ndt.grid.sums[: ndt.rows, 0].sum(), len(points))
+
+
+def test_subtracting_takes_back_what_was_added():
+    base, more = room(3), room(4)
+    ndt = grown(base)
+    before = entries(ndt)
+    ndt.add(more, ELSEWHERE)
+    ndt.add(more, PROBE)
+    assert entries(ndt).keys() != before.keys()
+    ndt.subtract(more, ELSEWHERE)
+    ndt.subtract(more, PROBE)
+    assert_same(ndt, grown(base))
+    ndt.subtract(base, HERE)
+    assert ndt.gaussian_count() == 0
+    assert energy(ndt, base, HERE).value == 0.0
+
+
+def test_capacity_grows_with_the_points():
+    points = np.concatenate([transform(pose, room(5)) for pose in np.arange(30).reshape(10, 3) - 15.0])
+    small, large = Ndt(1.0, capacity=16), grown(points, capacity=1 << 14)
+    for part in np.array_split(points, 50):
+        small.add(part, HERE)
+    assert len(small.grid.keys) > 500
+    assert_same(small, large)
+    # No key may be lost or doubled when the table is made anew.
+    keys = small.grid.keys[: small.rows]
+    assert len(np.unique(keys)) == small.rows
+    assert [find_row(small.grid, key) for key in keys] == list(range(small.rows))
+
+
+def test_compacting_keeps_the_energy_in_less_memory():
+    ndt = grown(room(6), capacity=4096)
+    before, bytes_before = energy(ndt, room(7), PROBE), sum(part.nbytes for part in ndt.grid)
+    ndt.compact()
+    after = energy(ndt, room(7), PROBE)
+    assert after.value == before.value
+    np.testing.assert_array_equal(after.hessian, before.hessian)
+    assert sum(part.nbytes for part in ndt.grid) < bytes_before / 2
+
+
+def test_nothing_added_is_nothing():
+    ndt = grown(np.empty((0, 2)))
+    assert ndt.gaussian_count() == 0
+    assert energy(ndt, room(1), HERE).value == 0.0
