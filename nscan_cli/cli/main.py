@@ -70,6 +70,9 @@ def main() -> None:
 def run(arguments: list[str]) -> int:
     """Run the command line `arguments` and return its exit code."""
     verbose = "-vv" in arguments or arguments.count("-v") > 1
+    # The matrices here are small: more threads make them slower, and the last digits depend on how many.
+    for library in ("OPENBLAS", "MKL", "OMP"):
+        os.environ.setdefault(f"{library}_NUM_THREADS", "1")
     try:
         outcome = cli.main(arguments, prog_name="nscan-cli", standalone_mode=False)
         if sys.stdout is not None:

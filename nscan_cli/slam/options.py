@@ -54,7 +54,7 @@ class TrackingOptions:
 class KeyframeOptions:
     """Step 2: which scans become keyframes, and how well tracking knows the way between two."""
 
-    distance: float = 1.0
+    distance: float = 1.5
     """m"""
     turn: float = 0.6
     """rad"""

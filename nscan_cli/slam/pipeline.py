@@ -14,11 +14,12 @@ from nscan_cli.graph.optimise import optimise
 from nscan_cli.graph.system import GraphEnergy
 from nscan_cli.logs.options import ReadingOptions
 from nscan_cli.logs.scan import LaserLog
-from nscan_cli.poses import Array, compose, relative
+from nscan_cli.poses import Array, compose
 from nscan_cli.slam.keyframes import Keyframes
 from nscan_cli.slam.nearby import match_nearby
 from nscan_cli.slam.options import SlamOptions
 from nscan_cli.slam.tracking import Tracked, Tracker
+from nscan_cli.slam.trajectory import between_keyframes
 
 Report = Callable[[int, int], None]
 """Called with the scans and keyframes done."""
@@ -107,15 +108,13 @@ class Slam:
         self.poses = optimise(energy, self.poses, max_iterations, tolerance).poses
 
     def graph(self) -> Graph:
-        """Every scan with its pose: a keyframe where the graph put it, the others along with theirs."""
+        """Every scan with its pose: a keyframe where the graph put it, the others in between."""
         anchors = np.array(self.anchors, dtype=np.int64)
-        rows = np.array([keyframe.row for keyframe in self.keyframes.list])
-        places = np.searchsorted(rows, anchors)
-        tracked = np.array(self.tracked)
+        keyframes = np.array([keyframe.row for keyframe in self.keyframes.list], dtype=np.int64)
         return Graph(
             scans=self.log.numbers,
             stamps=list(self.log.stamps),
-            poses=compose(self.poses[places], relative(tracked, tracked[anchors])),
+            poses=between_keyframes(np.array(self.tracked), keyframes, self.poses),
             odometry=self.log.odometry,
             anchors=anchors,
             pairwise=self.pairwise,

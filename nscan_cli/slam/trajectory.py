@@ -1,0 +1,35 @@
+"""The poses of all scans from those of the keyframes: what the graph corrects, all scans in between share."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nscan_cli.poses import Array, compose, relative, wrap
+
+METRES_PER_RADIAN = 0.3
+"""A turn wears tracking as this much way does."""
+
+
+def between_keyframes(tracked: Array, keyframes: NDArray[np.int64], poses: Array) -> Array:
+    """(S, 3) poses of all scans: as tracked (S, 3) from the keyframes (K,) on either side, blended.
+
+    `poses` (K, 3) are the keyframes' global poses. Seen from the keyframe before and from the one after,
+    a scan has two poses when the graph moved the two against each other. The closer one on the path
+    counts for more, so that the path bends and does not break at a keyframe.
+    """
+    scans = np.arange(len(tracked))
+    before = np.searchsorted(keyframes, scans, side="right") - 1
+    after = np.minimum(before + 1, len(keyframes) - 1)
+    step = np.diff(tracked, axis=0)
+    wear = np.hypot(step[:, 0], step[:, 1]) + METRES_PER_RADIAN * np.abs(wrap(step[:, 2]))
+    path = np.concatenate([[0.0], np.cumsum(wear)])
+    start, length = path[keyframes[before]], path[keyframes[after]] - path[keyframes[before]]
+    share = np.divide(path - start, length, out=np.zeros(len(path)), where=length > 0.0)
+    from_before = compose(poses[before], relative(tracked, tracked[keyframes[before]]))
+    from_after = compose(poses[after], relative(tracked, tracked[keyframes[after]]))
+    apart = from_after - from_before
+    apart[:, 2] = wrap(apart[:, 2])
+    blended = from_before + share[:, None] * apart
+    blended[:, 2] = wrap(blended[:, 2])
+    return blended
