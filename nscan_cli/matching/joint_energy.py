@@ -27,6 +27,8 @@ class Scans(NamedTuple):
     """(n + 1,)"""
     row_starts: NDArray[np.int64]
     """(n + 1,)"""
+    gaussian_starts: NDArray[np.int64]
+    """(n + 1,)"""
     points: Array
     """(Σ m, 2) the points of all scans, each in its own frame."""
     point_starts: NDArray[np.int64]
@@ -57,16 +59,16 @@ class JointEnergy(NamedTuple):
 def lay_out(ndts: Sequence[Ndt], points: Sequence[Array]) -> Scans:
     """Lay n NDTs of one cell size and the points (m_i, 2) of n scans end to end."""
     tables = [ndt.grid.table for ndt in ndts]
-    keys, links, gaussians = (
-        np.concatenate([getattr(ndt.grid, name)[: ndt.rows] for ndt in ndts])
-        for name in ("keys", "links", "gaussians")
-    )
+    keys = np.concatenate([ndt.grid.keys[: ndt.rows] for ndt in ndts])
+    links = np.concatenate([ndt.grid.links[: ndt.rows] for ndt in ndts])
+    gaussians = [ndt.grid.gaussians for ndt in ndts]
     # The sums are for growing; matching needs the Gaussians alone.
-    grid = Grid(np.concatenate(tables), keys, links, np.empty((0, 6)), gaussians)
+    grid = Grid(np.concatenate(tables), keys, links, np.empty((0, 6)), np.concatenate(gaussians))
     return Scans(
         grid,
         _starts([len(table) for table in tables]),
         _starts([ndt.rows for ndt in ndts]),
+        _starts([len(part) for part in gaussians]),
         np.concatenate([np.asarray(part, dtype=np.float64).reshape(-1, 2) for part in points]),
         _starts([len(part) for part in points]),
         ndts[0].half,
@@ -110,8 +112,9 @@ def scan_grid(scans: Scans, i: int) -> Grid:
     """The NDT of scan i."""
     t0, t1 = scans.table_starts[i], scans.table_starts[i + 1]
     r0, r1 = scans.row_starts[i], scans.row_starts[i + 1]
+    g0, g1 = scans.gaussian_starts[i], scans.gaussian_starts[i + 1]
     grid = scans.grid
-    return Grid(grid.table[t0:t1], grid.keys[r0:r1], grid.links[r0:r1], grid.sums, grid.gaussians[r0:r1])
+    return Grid(grid.table[t0:t1], grid.keys[r0:r1], grid.links[r0:r1], grid.sums, grid.gaussians[g0:g1])
 
 
 @kernel

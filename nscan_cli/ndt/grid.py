@@ -31,7 +31,8 @@ NEW_NEIGHBOURS = 9
 class Grid(NamedTuple):
     """The arrays of an NDT as the kernels take them. R rows, one for each lattice cell that was touched.
 
-    Row r stands for its lattice cell and for the Gaussian of the block whose lower left cell it is.
+    While it grows, row r stands for its lattice cell and for the Gaussian of the block whose lower left
+    cell it is; a compact one has the Gaussians that can be used and the cells that meet one.
     """
 
     table: NDArray[np.int32]
@@ -39,11 +40,11 @@ class Grid(NamedTuple):
     keys: NDArray[np.int64]
     """(R,) packed lattice coordinates."""
     links: NDArray[np.int32]
-    """(R, 4) rows of the four blocks that the lattice cell is part of."""
+    """(R, 4) rows of the Gaussians of the four blocks that the lattice cell is part of, or −1."""
     sums: Array
     """(R, 6) n, Σx, Σy, Σx², Σxy, Σy² about the centre of the lattice cell."""
     gaussians: Array
-    """(R, 5) mean x, y and Σ⁻¹ as (xx, xy, yy); Σ⁻¹ is 0 where a Gaussian has too few points."""
+    """(G, 5) mean x, y and Σ⁻¹ as (xx, xy, yy); Σ⁻¹ is 0 where a Gaussian has too few points."""
 
 
 @kernel
@@ -238,21 +239,22 @@ class Ndt:
 
     def compact(self) -> None:
         """Give back the memory that only growing needs; nothing can be added any more."""
-        rows = self.rows
-        grid = self.grid
-        table = np.full(_table_size(rows), -1, dtype=np.int32)
+        grid, rows = self.grid, self.rows
+        usable = grid.gaussians[:rows, 2] != 0.0
+        # −1 as an index finds the last entry: no Gaussian.
+        places = np.append(np.where(usable, np.cumsum(usable) - 1, -1), -1).astype(np.int32)
+        links = places[grid.links[:rows]]
+        kept = (links >= 0).any(axis=1)
+        self.rows = int(np.count_nonzero(kept))
+        table = np.full(_table_size(self.rows), -1, dtype=np.int32)
         self.grid = Grid(
-            table,
-            grid.keys[:rows].copy(),
-            grid.links[:rows].copy(),
-            np.empty((0, 6)),
-            grid.gaussians[:rows].copy(),
+            table, grid.keys[:rows][kept], links[kept], np.empty((0, 6)), grid.gaussians[:rows][usable]
         )
-        rehash(self.grid, rows)
+        rehash(self.grid, self.rows)
 
     def gaussian_count(self) -> int:
         """How many Gaussians have points enough."""
-        return int(np.count_nonzero(self.grid.gaussians[: self.rows, 2]))
+        return int(np.count_nonzero(self.grid.gaussians[:, 2]))
 
 
 def _empty(capacity: int) -> Grid:
@@ -261,7 +263,7 @@ def _empty(capacity: int) -> Grid:
         keys=np.empty(capacity, dtype=np.int64),
         links=np.empty((capacity, 4), dtype=np.int32),
         sums=np.empty((capacity, 6)),
-        gaussians=np.empty((capacity, 5)),
+        gaussians=np.zeros((capacity, 5)),
     )
 
 
