@@ -6,7 +6,7 @@ import numpy as np
 
 from nscan_cli.graph.cholesky import factorise, inverse_diagonal, loose_nodes
 from nscan_cli.graph.model import Graph
-from nscan_cli.graph.whole import components
+from nscan_cli.graph.solve import components
 from nscan_cli.poses import Array
 
 
@@ -20,9 +20,8 @@ def marginal_covariances(graph: Graph) -> dict[int, Array]:
     part = components(graph)[0]
     first, others = int(part.keyframes[0]), part.keyframes[1:]
     energy = part.energy(len(graph))
-    factor = factorise(
-        energy.pattern, 0.5 * energy.evaluate(graph.poses[part.keyframes], exact=False).hessian
-    )
+    system = energy.evaluate(graph.poses[part.keyframes], exact=False)
+    factor = factorise(energy.pattern, 0.5 * system.hessian)
     covariances = inverse_diagonal(factor)
     loose = loose_nodes(factor)
     marginals = {first: np.zeros((3, 3))}

@@ -17,6 +17,8 @@ Gauss–Newton part; farther away it needs more, and often is not positive defin
 FIRST_DAMPING = 1e-6
 LEAST_DAMPING = 1e-9
 GREATEST_DAMPING = 1e8
+ROUNDING = 1e-12
+"""Relative; an energy that rises by less counts as the same."""
 
 
 @dataclass(frozen=True)
@@ -37,8 +39,7 @@ def optimise(
 
     The steps are Newton's with the Gauss–Newton part of the Hessian while the poses move far, with the
     exact Hessian (25) when they settle and it is positive definite. They are damped, after Levenberg and
-    Marquardt, when they would raise the energy or the relations leave a direction open. The energy never
-    rises.
+    Marquardt, when they would raise the energy or the relations leave a direction open.
     """
     here, exact, damping = energy.evaluate(poses, exact=False), False, 0.0
     iteration = 0
@@ -52,7 +53,7 @@ def optimise(
             trial[energy.free] += step
             length = float(np.abs(step).max(initial=0.0))
             there = energy.evaluate(trial, exact=length < SETTLED)
-            lower = there.value <= here.value
+            lower = there.value <= here.value + ROUNDING * abs(here.value)
             if lower:
                 poses, here, exact = trial, there, length < SETTLED
             if length <= tolerance and damping <= 1:

@@ -57,6 +57,18 @@ def test_the_exact_hessian_ends_in_fewer_steps(monkeypatch: pytest.MonkeyPatch):
     assert found.iterations < slow.iterations
 
 
+def test_an_exact_hessian_that_is_not_positive_definite_is_left_for_the_part_that_is(
+    monkeypatch: pytest.MonkeyPatch,
+):
+    truth, pairwise, nscan = mixed_ring(30, noise=1.0)
+    energy, start = energy_of(truth, pairwise, nscan), disturbed(truth, 3.0)
+    best = optimise(energy, truth)
+    monkeypatch.setattr("nscan_cli.graph.optimise.SETTLED", np.inf)
+    found = optimise(energy, start)
+    assert found.energy == pytest.approx(best.energy, rel=1e-9)
+    assert found.iterations <= 15
+
+
 def test_a_direction_that_no_relation_holds_does_not_break_the_rest():
     # Pose 2 may turn freely, pose 4 has no relation at all.
     truth, pairwise, _ = mixed_ring(5, noise=0.0)

@@ -53,10 +53,6 @@ def error_and_weight(relation: Pairwise | NScan) -> tuple[Callable[[Any], Any], 
     return (lambda y: pairwise_error(y, relation)), relation.information
 
 
-def assert_close(actual: Array, expected: Array, share: float) -> None:
-    np.testing.assert_allclose(actual, expected, rtol=0, atol=share * np.abs(expected).max() + 1e-300)
-
-
 @settings(max_examples=60, deadline=None)
 @given(pairs() | joints())
 def test_value_gradient_and_hessian_are_those_of_the_paper(case: tuple[Array, Pairwise | NScan]):
@@ -68,14 +64,13 @@ def test_value_gradient_and_hessian_are_those_of_the_paper(case: tuple[Array, Pa
 
     # What cancels in the sums is as large as the largest entries.
     error, weight = error_and_weight(relation)
-    e, J = np.abs(error(x)), np.abs(derivative(error, x))
+    # Coordinates of some metres leave rounding in e even where it is 0.
+    e, J = np.abs(error(x)) + 0.01, np.abs(derivative(error, x))
     np.testing.assert_allclose(value, f(x), rtol=1e-9, atol=1e-13 * (e @ np.abs(weight) @ e))
     expected = derivative(f, x)
-    np.testing.assert_allclose(
-        gradient, expected, rtol=0, atol=1e-12 * (e @ np.abs(weight) @ J).max() + 1e-300
-    )
+    np.testing.assert_allclose(gradient, expected, rtol=0, atol=1e-12 * (e @ np.abs(weight) @ J).max())
     scale = (J.T @ np.abs(weight) @ J).max() + (e @ np.abs(weight) @ J).max()
-    np.testing.assert_allclose(hessian, second_derivative(f, x), rtol=0, atol=1e-7 * scale)
+    np.testing.assert_allclose(hessian, second_derivative(f, x), rtol=0, atol=1e-9 * scale)
     np.testing.assert_allclose(hessian, hessian.T, rtol=0, atol=1e-13 * scale)
 
 
@@ -87,7 +82,7 @@ def test_the_gauss_newton_part_is_that_of_the_error_and_semi_definite(case: tupl
     _, gradient, hessian = evaluate(x, relation, curvature=0.0)
     J = derivative(error, x)
     scale = (np.abs(J).T @ np.abs(weight) @ np.abs(J)).max()
-    np.testing.assert_allclose(hessian, 2 * J.T @ weight @ J, rtol=0, atol=1e-12 * scale + 1e-300)
+    np.testing.assert_allclose(hessian, 2 * J.T @ weight @ J, rtol=0, atol=1e-12 * scale)
     assert np.linalg.eigvalsh(hessian)[0] >= -1e-12 * scale
     np.testing.assert_array_equal(gradient, evaluate(x, relation)[1])
 
@@ -104,7 +99,7 @@ def test_the_gradient_of_a_turn_of_30_degrees_by_hand():
     np.testing.assert_allclose(gradient[2], 2 * (dx * -1.0 + 10 * dy * -np.sqrt(3) - 100 * turn))
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=60, deadline=None)
 @given(joints(n=2))
 def test_two_scans_are_a_pairwise_relation(case: tuple[Array, NScan]):
     x, relation = case
@@ -118,12 +113,13 @@ def test_two_scans_are_a_pairwise_relation(case: tuple[Array, NScan]):
     )
     joint, single = evaluate(x, relation), evaluate(x[[c, o]], pair)
     order = np.concatenate([np.arange(3) + 3 * c, np.arange(3) + 3 * o])
-    np.testing.assert_allclose(joint[0], single[0], rtol=1e-9, atol=1e-9)
-    assert_close(joint[1][order], single[1], 1e-9)
-    assert_close(joint[2][np.ix_(order, order)], single[2], 1e-9)
+    np.testing.assert_allclose(joint[0], single[0], rtol=1e-9, atol=1e-12 * np.abs(own).max())
+    scale = 1e-9 * (np.abs(joint[2]).max() + np.abs(joint[1]).max())
+    np.testing.assert_allclose(joint[1][order], single[1], rtol=0, atol=scale)
+    np.testing.assert_allclose(joint[2][np.ix_(order, order)], single[2], rtol=0, atol=scale)
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=60, deadline=None)
 @given(pairs() | joints(), poses)
 def test_a_motion_of_all_poses_changes_nothing(
     case: tuple[Array, Pairwise | NScan], motion: tuple[float, float, float]
@@ -131,14 +127,14 @@ def test_a_motion_of_all_poses_changes_nothing(
     x, relation = case
     value, gradient, _ = evaluate(x, relation)
     moved_value, moved_gradient, _ = evaluate(compose(np.array(motion), x), relation)
-    scale = np.abs(gradient).max() + value
-    np.testing.assert_allclose(moved_value, value, rtol=1e-7, atol=1e-9 * scale)
+    scale = np.abs(gradient).max() + value + np.abs(error_and_weight(relation)[1]).max()
+    np.testing.assert_allclose(moved_value, value, rtol=1e-7, atol=1e-10 * scale)
     c, s = np.cos(motion[2]), np.sin(motion[2])
     turned = gradient.reshape(-1, 3) @ np.array([[c, s, 0], [-s, c, 0], [0, 0, 1]])
-    np.testing.assert_allclose(moved_gradient.reshape(-1, 3), turned, rtol=0, atol=1e-7 * scale + 1e-300)
+    np.testing.assert_allclose(moved_gradient.reshape(-1, 3), turned, rtol=0, atol=1e-9 * scale)
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=60, deadline=None)
 @given(joints(), poses)
 def test_moved_local_poses_have_no_energy(case: tuple[Array, NScan], motion: tuple[float, float, float]):
     relation = case[1]
