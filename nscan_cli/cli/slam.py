@@ -88,9 +88,7 @@ def command(
         say(f"{seconds:.1f} s, {rate:.0f} scans a second, {span / seconds:.0f} times real time", quiet)
 
 
-def _map(
-    log: str, reading: ReadingOptions, max_scans: int, quiet: bool
-) -> tuple[LaserLog, Graph, str]:
+def _map(log: str, reading: ReadingOptions, max_scans: int, quiet: bool) -> tuple[LaserLog, Graph, str]:
     """Run the whole loop over a log."""
     from nscan_cli.compiled import first_compile
     from nscan_cli.logs.load import read_log
@@ -120,11 +118,13 @@ def _map(
 
 def _again(path: str) -> tuple[Graph, str]:
     """Optimise a saved graph."""
-    from nscan_cli.graph.files import read_any_graph
+    from nscan_cli.graph.load import load_graph
+    from nscan_cli.graph.marginals import marginal_covariances
     from nscan_cli.graph.solve import optimise_graph
 
-    graph = read_any_graph(path)
+    graph = load_graph(path)
     optimum = optimise_graph(graph)
+    graph.marginals = marginal_covariances(graph)
     if not optimum.converged:
         raise InputDataError(path, "its energy has no minimum that could be reached", "check its relations")
     return graph, (

@@ -52,7 +52,12 @@ def read_g2o(path: str) -> Graph:
 
     Raises InputMissingError when the file cannot be read, InputDataError on a malformed line.
     """
-    data, name = read_bytes(path), label(path)
+    return parse_g2o(read_bytes(path), path)
+
+
+def parse_g2o(data: bytes, path: str) -> Graph:
+    """The graph in the bytes of a g2o file, as read_g2o gives it."""
+    name = label(path)
     content = _Content()
     for number, line in enumerate(data.decode("utf-8", errors="replace").split("\n"), start=1):
         fields = line.split("#", 1)[0].split()

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from nscan_cli import __version__
+from nscan_cli.graph.marginals import marginal_covariances
 from nscan_cli.graph.model import Graph, Loop, NScan, Pairwise
 from nscan_cli.graph.optimise import optimise
 from nscan_cli.graph.system import GraphEnergy
@@ -54,8 +55,10 @@ class Slam:
             report(row + 1, len(self.keyframes))
         self.keyframes.finish_last()
         self.match_nearby(len(self.keyframes) - 1)
-        self.optimise(max_iterations=50, tolerance=1e-5)
-        return self.graph()
+        self.optimise(max_iterations=100, tolerance=1e-6)
+        graph = self.graph()
+        graph.marginals = marginal_covariances(graph)
+        return graph
 
     def points(self, row: int) -> Array:
         """The points (m, 2) of a scan that are matched: those within reach."""

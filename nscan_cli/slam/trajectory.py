@@ -30,6 +30,6 @@ def between_keyframes(tracked: Array, keyframes: NDArray[np.int64], poses: Array
     from_after = compose(poses[after], relative(tracked, tracked[keyframes[after]]))
     apart = from_after - from_before
     apart[:, 2] = wrap(apart[:, 2])
-    blended = from_before + share[:, None] * apart
+    blended: Array = from_before + share[:, None] * apart
     blended[:, 2] = wrap(blended[:, 2])
     return blended

@@ -1,0 +1,19 @@
+"""A saved graph of any form, found from its content."""
+
+from __future__ import annotations
+
+from nscan_cli.graph.g2o import parse_g2o
+from nscan_cli.graph.json_file import parse_graph
+from nscan_cli.graph.model import Graph
+from nscan_cli.inputs import label, read_bytes
+
+
+def load_graph(path: str) -> Graph:
+    """The graph in a JSON or a g2o file; "-" reads standard input.
+
+    Raises InputMissingError when there is nothing to read, InputDataError when it is no graph.
+    """
+    data = read_bytes(path)
+    if data.lstrip()[:1] == b"{":
+        return parse_graph(data, label(path))
+    return parse_g2o(data, path)
