@@ -112,9 +112,9 @@ def check_map_outputs(output: str, yaml: bool) -> None:
     """Refuse a map, and the YAML beside it, that could never be written. Raises OutputError."""
     check_writable(output)
     if yaml:
-        if _yaml_path(output) == output:
+        if yaml_path(output) == output:
             raise WrongUsageError(f"{output}: the map would have the name of its YAML; name it like MAP.png")
-        check_writable(_yaml_path(output))
+        check_writable(yaml_path(output))
 
 
 def write_map(output: str, grid: OccupancyGrid, yaml: bool) -> None:
@@ -123,10 +123,11 @@ def write_map(output: str, grid: OccupancyGrid, yaml: bool) -> None:
 
     write_whole(output, map_png(grid))
     if yaml:
-        write_whole(_yaml_path(output), map_yaml(Path(output).name, grid))
+        write_whole(yaml_path(output), map_yaml(Path(output).name, grid))
 
 
-def _yaml_path(output: str) -> str:
+def yaml_path(output: str) -> str:
+    """Where the YAML of a map is: beside it."""
     return str(Path(output).with_suffix(".yaml"))
 
 

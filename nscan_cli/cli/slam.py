@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import os
 import time
 from typing import TYPE_CHECKING, Any
 
@@ -11,7 +12,7 @@ import click
 from nscan_cli.cli.options import CONTEXT, common_options, reading_options
 from nscan_cli.cli.output import check_writable, write_whole
 from nscan_cli.cli.progress import progress, say
-from nscan_cli.cli.render import check_map_outputs, write_map
+from nscan_cli.cli.render import check_map_outputs, write_map, yaml_path
 from nscan_cli.errors import InputDataError, WrongUsageError
 from nscan_cli.logs.options import ReadingOptions
 
@@ -61,12 +62,11 @@ def command(
         raise WrongUsageError("slam: give either LOG or --from GRAPH")
     if from_file is not None and map_file is not None:
         raise WrongUsageError("slam: --map goes with LOG; draw a saved graph by render GRAPH.json LOG")
+    if from_file is not None and (reading != ReadingOptions() or _given("max_scans")):
+        raise WrongUsageError("slam: reading options and --max-scans go with LOG; --from only optimises")
     if "-" in (map_file, trajectory, g2o, depfile):
         raise WrongUsageError("slam: only the graph (-o) can go to standard output; name files for the rest")
-    for path in (output, trajectory, g2o, depfile):
-        check_writable(path)
-    if map_file is not None:
-        check_map_outputs(map_file, yaml=True)
+    _check_outputs(log or from_file or "", output, map_file, trajectory, g2o, depfile)
     began = time.perf_counter()
     if log is not None:
         scans, graph, summary = _map(log, reading, max_scans, quiet)
@@ -80,7 +80,8 @@ def command(
 
         write_map(map_file, occupancy_grid(scans, np.arange(len(scans)), graph.poses), yaml=True)
     if depfile is not None:
-        _write_rule(depfile, [output, map_file, trajectory, g2o], log or from_file or "")
+        maps = [] if map_file is None else [map_file, yaml_path(map_file)]
+        _write_rule(depfile, [output, *maps, trajectory, g2o], log or from_file or "")
     seconds = time.perf_counter() - began
     say(summary, quiet)
     if scans is not None:
@@ -154,4 +155,6 @@ def _write_rule(depfile: str, outputs: list[Any], source: str) -> None:
         return path.replace("$", "$$").replace(" ", "\\ ").replace("#", "\\#")
 
     targets = " ".join(escaped(path) for path in outputs if path not in (None, "-"))
-    write_whole(depfile, f"{targets}: {escaped(source)}\n".encode())
+    # Standard input is no file that make could look for.
+    prerequisite = "" if source == "-" else f" {escaped(source)}"
+    write_whole(depfile, f"{targets}:{prerequisite}\n".encode())

@@ -65,3 +65,16 @@ def held_together(pairs: Array, least: float, scan: int) -> NDArray[np.bool_]:
         if (further == reached).all():
             return reached
         reached = further
+
+
+def weakest_link(pairs: Array) -> float:
+    """The least overlap on the tree of greatest overlaps (n, n) that connects all scans, 0 for one scan."""
+    links = np.maximum(pairs, pairs.T)
+    best, weakest = links[0].copy(), np.inf
+    reached = np.arange(len(links)) == 0
+    for _ in range(len(links) - 1):
+        following = int(np.argmax(np.where(reached, -1.0, best)))
+        weakest = min(weakest, float(best[following]))
+        reached[following] = True
+        best = np.maximum(best, links[following])
+    return weakest if len(links) > 1 else 0.0

@@ -24,6 +24,8 @@ class Keyframe:
     row: int
     """In the log; the id of its node."""
     tracked: Tracked
+    expected: Array
+    """(3, 3) covariance of the way from the keyframe before, had nothing been matched."""
     points: Array
     """(m, 2) in the robot's frame."""
     ndt: Ndt
@@ -36,6 +38,7 @@ class Keyframes:
         self.options, self.gaussians = options, gaussians
         self.list: list[Keyframe] = []
         self._since: list[tuple[Array, Tracked]] = []
+        self._expected = np.zeros((3, 3))
 
     def __len__(self) -> int:
         return len(self.list)
@@ -49,6 +52,7 @@ class Keyframes:
 
     def attach(self, points: Array, tracked: Tracked) -> None:
         """Let a scan between keyframes add to the Gaussians of both."""
+        self._expected += tracked.expected
         if tracked.joined:
             self._since.append((points, tracked))
 
@@ -56,12 +60,16 @@ class Keyframes:
         """Make a scan a keyframe; the one before has its Gaussians whole then."""
         gaussians = self.gaussians
         keyframe = Keyframe(
-            row, tracked, points, Ndt(gaussians.cell, gaussians.minimum, gaussians.floor, 1024)
+            row,
+            tracked,
+            self._expected + tracked.expected,
+            points,
+            Ndt(gaussians.cell, gaussians.minimum, gaussians.floor, 1024),
         )
         keyframe.ndt.add(points, np.zeros(3))
         self._grow(keyframe)
         self.finish_last()
-        self._since = []
+        self._since, self._expected = [], np.zeros((3, 3))
         self.list.append(keyframe)
         return keyframe
 
@@ -78,7 +86,8 @@ class Keyframes:
     def relation_to_previous(self) -> Pairwise:
         """The pairwise relation of the last keyframe to the one before it, as it was tracked.
 
-        The information is that of the match, weighed down, and of the drift that no match shows.
+        The information is that of the match, weighed down, and of the motion that was expected; drift that
+        no match shows limits it.
         """
         before, last = self.list[-2], self.list[-1]
         options = self.options
@@ -87,7 +96,7 @@ class Keyframes:
         information = options.information_scale * rotation @ last.tracked.hessian @ rotation.T
         length = last.tracked.path - before.tracked.path
         drift = np.array([options.drift, options.drift, options.drift_angle]) ** 2 * (length + 0.01)
-        covariance = np.linalg.inv(information + 1e-3 * np.eye(3)) + np.diag(drift)
+        covariance = np.linalg.inv(information + np.linalg.inv(last.expected)) + np.diag(drift)
         return Pairwise(
             nodes=(before.row, last.row),
             measurement=relative(last.tracked.pose, before.tracked.pose),

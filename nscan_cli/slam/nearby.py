@@ -8,37 +8,37 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from nscan_cli.graph.model import NScan, Pairwise
+from nscan_cli.graph.model import Loop, NScan, Pairwise
 from nscan_cli.matching.joint import JointMatch, JointOptions, match_jointly
 from nscan_cli.matching.joint_energy import Priors, Scans, all_pairs, lay_out, no_priors
-from nscan_cli.matching.overlap import held_together, overlaps
+from nscan_cli.matching.overlap import held_together, overlaps, weakest_link
 from nscan_cli.poses import Array, relative
 from nscan_cli.slam.keyframes import Keyframe
 from nscan_cli.slam.options import NScanOptions
 
 Indices = NDArray[np.int64]
+LEAST_SCANS = 3
+"""Two scans are what a pairwise relation is for."""
 
 
 @dataclass(frozen=True)
 class Nearby:
     """What a joint match gave."""
 
-    members: Indices
-    """Places of the keyframes that were tried."""
     relation: NScan | None
-    """None when the match was refused."""
-    reason: str
-    """Why it was refused, or which keyframes were left out."""
-    score: float
-    """The least overlap that holds the scans together."""
-    closes_loop: bool
-    """Whether keyframes from further back along the path took part."""
+    """None when too few scans hang together, or the match did not converge."""
+    loop: Loop | None
+    """The verdict on what was seen before; None where nothing was."""
     moved: float
     """How far (m) the match moved a scan, seen from the newest."""
+    whole: bool
+    """Whether all scans that were tried are in the relation."""
 
 
-def choose_nearby(poses: Array, paths: Array, newest: int, options: NScanOptions) -> tuple[Indices, bool]:
-    """The keyframes for a joint match with `newest`, and whether some were seen before.
+def choose_nearby(
+    poses: Array, paths: Array, newest: int, options: NScanOptions
+) -> tuple[Indices, NDArray[np.bool_]]:
+    """The keyframes (n,) for a joint match with `newest`, increasing, and which of them were seen before.
 
     Poses (K, 3) are global ones, paths (K,) lengths of path. Of the keyframes within the radius, those
     nearest are taken; half of the places are kept for what was seen before, further back on the path.
@@ -50,7 +50,8 @@ def choose_nearby(poses: Array, paths: Array, newest: int, options: NScanOptions
     old, recent = near[before], near[~before]
     recent = recent[: options.max_scans - min(len(old), options.max_scans // 2)]
     old = old[: options.max_scans - len(recent)]
-    return np.sort(np.concatenate([old, recent])), len(old) > 0
+    chosen = np.sort(np.concatenate([old, recent]))
+    return chosen, np.isin(chosen, old)
 
 
 def match_nearby(
@@ -67,13 +68,13 @@ def match_nearby(
     when there are too few keyframes near.
     """
     paths = np.array([keyframe.tracked.path for keyframe in keyframes[: newest + 1]])
-    tried, closes_loop = choose_nearby(poses, paths, newest, options)
-    if len(tried) <= 2:
+    tried, seen_before = choose_nearby(poses, paths, newest, options)
+    if len(tried) < LEAST_SCANS:
         return None
     # Mostly the poses are right to centimetres already, and the last stage is all it takes.
     for widenings in (options.widenings[-1:], options.widenings):
-        nearby = _match_held(keyframes, poses, pairwise, tried, closes_loop, widenings, options)
-        if nearby.relation is not None and not nearby.reason and nearby.moved < options.settled:
+        nearby = _match_held(keyframes, poses, pairwise, tried, seen_before, widenings, options)
+        if nearby.whole and nearby.moved < options.settled:
             break
     return nearby
 
@@ -83,22 +84,35 @@ def _match_held(
     poses: Array,
     pairwise: Sequence[Pairwise],
     tried: Indices,
-    closes_loop: bool,
+    seen_before: NDArray[np.bool_],
     widenings: tuple[float, ...],
     options: NScanOptions,
 ) -> Nearby:
     """Match jointly, leave out what does not hang together, and match again, until all does."""
-    members, start = tried, poses[tried]
-    while len(members) > 2:
+    kept, start = np.arange(len(tried)), poses[tried]
+    while len(kept) >= LEAST_SCANS:
+        members = tried[kept]
         scans = lay_out([keyframes[k].ndt for k in members], [keyframes[k].points for k in members])
         match = _match(scans, members, pairwise, start, widenings, options)
         shares = overlaps(scans, match.poses).pairs
-        last = len(members) - 1
-        held = held_together(shares, options.overlap, last)
-        if held.all():
-            return _judge(keyframes, tried, members, match, shares, poses, closes_loop, options)
-        members, start = members[held], match.poses[held]
-    return Nearby(tried, None, "overlaps none of the others", 0.0, closes_loop, 0.0)
+        held = held_together(shares, options.overlap, len(kept) - 1)
+        if not held.all():
+            kept, start = kept[held], match.poses[held]
+            continue
+        score = weakest_link(shares)
+        if not match.converged:
+            return Nearby(
+                None, _loop(keyframes, tried, seen_before, False, "did not converge", score), 0.0, False
+            )
+        closed = bool(seen_before[kept].any())
+        relation = _relation(keyframes, members, match, "loop" if closed else "nscan", score)
+        whole = len(kept) == len(tried)
+        reason = "" if whole else f"{len(tried) - len(kept)} scans left out"
+        used, before = (members, seen_before[kept]) if closed else (tried, seen_before)
+        loop = _loop(keyframes, used, before, closed, reason, score)
+        return Nearby(relation, loop, _moved(poses[members], match.poses), whole)
+    reason = f"only {len(kept)} of {len(tried)} scans hang together"
+    return Nearby(None, _loop(keyframes, tried, seen_before, False, reason, 0.0), 0.0, False)
 
 
 def _match(
@@ -123,35 +137,37 @@ def _match(
     return match_jointly(scans, all_pairs(len(members)), priors, start, options.scale, joint)
 
 
-def _judge(
-    keyframes: Sequence[Keyframe],
-    tried: Indices,
-    members: Indices,
-    match: JointMatch,
-    shares: Array,
-    poses: Array,
-    closes_loop: bool,
-    options: NScanOptions,
-) -> Nearby:
-    """Make a relation of a match, or say why not."""
-    last = len(members) - 1
-    links = np.maximum(shares, shares.T)
-    score = float(links[links >= options.overlap].min())
-    before = relative(poses[members], poses[members[last]])
-    after = relative(match.poses, match.poses[last])
-    moved = float(np.hypot(*(after - before)[:, :2].T).max())
-    if not match.converged:
-        return Nearby(tried, None, "did not converge", score, closes_loop, moved)
-    missing = np.setdiff1d(tried, members)
-    reason = f"{len(missing)} scans left out" if len(missing) else ""
+def _relation(
+    keyframes: Sequence[Keyframe], members: Indices, match: JointMatch, origin: str, score: float
+) -> NScan:
     eigenvalues, vectors = np.linalg.eigh(match.hessian)
-    relation = NScan(
+    return NScan(
         nodes=tuple(int(keyframes[k].row) for k in members),
         poses=match.poses,
         # What is left of negative curvature at the optimum is rounding, or a cell's border.
         hessian=(vectors * np.maximum(eigenvalues, 0.0)) @ vectors.T,
-        fixed=last,
-        origin="loop" if closes_loop else "nscan",
+        fixed=len(members) - 1,
+        origin=origin,
         score=score,
     )
-    return Nearby(tried, relation, reason, score, closes_loop, moved)
+
+
+def _loop(
+    keyframes: Sequence[Keyframe],
+    members: Indices,
+    seen_before: NDArray[np.bool_],
+    accepted: bool,
+    reason: str,
+    score: float,
+) -> Loop | None:
+    """The verdict on the first keyframe that was seen before, and the newest."""
+    if not seen_before.any():
+        return None
+    first = members[np.argmax(seen_before)]
+    return Loop((keyframes[first].row, keyframes[members[-1]].row), accepted, reason, score)
+
+
+def _moved(before: Array, after: Array) -> float:
+    """How far (m) some pose (n, 3) moved, seen from the last."""
+    shift = relative(after, after[-1]) - relative(before, before[-1])
+    return float(np.hypot(shift[:, 0], shift[:, 1]).max())

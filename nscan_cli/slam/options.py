@@ -44,10 +44,12 @@ class TrackingOptions:
     turns: tuple[tuple[float, ...], ...] = ((0.1, 0.2), (0.4, 0.7), (1.0, 1.3))
     """Angles (rad, to both sides) to start again from; a later ring when those before did not help."""
     odometry: MotionModel = field(default_factory=MotionModel)
-    constant_velocity: MotionModel = field(
+    steady_scans: int = 5
+    """Without odometry a scan is expected to move as these did on average: stamps and motion jitter."""
+    steady_motion: MotionModel = field(
         default_factory=lambda: MotionModel(distance=0.3, angle=0.3, distance_per_metre=0.3)
     )
-    """Without odometry a scan is expected to move as the last one did."""
+    """How sure that is."""
 
 
 @dataclass(frozen=True)

@@ -90,9 +90,8 @@ class Slam:
         nearby = match_nearby(self.keyframes.list, self.poses, self.pairwise, newest, self.options.nscan)
         if nearby is None:
             return
-        if nearby.closes_loop:
-            nodes = (self.keyframes.list[nearby.members[0]].row, self.keyframes.list[newest].row)
-            self.loops.append(Loop(nodes, nearby.relation is not None, nearby.reason, nearby.score))
+        if nearby.loop is not None:
+            self.loops.append(nearby.loop)
         if nearby.relation is None:
             return
         self.nscan.append(nearby.relation)

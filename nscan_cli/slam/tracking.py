@@ -27,6 +27,8 @@ class Tracked:
     """(3,) of the robot in the tracker's frame."""
     hessian: Array
     """(3, 3) of scale · E there, without the prior."""
+    expected: Array
+    """(3, 3) covariance of the step to here before the match: the odometry's, or of steady motion."""
     inliers: float
     """Share of the points that lie on a Gaussian of the map."""
     path: float
@@ -44,7 +46,7 @@ class Tracker:
         self.map = Ndt(gaussians.cell, gaussians.minimum, gaussians.floor, capacity=1 << 14)
         self.restarts = 0
         self._window: deque[tuple[Array, Array, float]] = deque()
-        self._poses: list[Array] = []
+        self._poses: deque[Array] = deque(maxlen=options.steady_scans + 1)
         self._joined = np.zeros(3)
         self._path = 0.0
         self._odometry: Array | None = None
@@ -54,7 +56,7 @@ class Tracker:
         """The pose of the next scan: points (m, 2) in the robot's frame, odometry pose (3,) or None."""
         if not self._poses:
             self._odometry = odometry
-            return self._settle(np.zeros(3), np.zeros((3, 3)), 1.0, points, first=True)
+            return self._settle(np.zeros(3), np.zeros((3, 3)), np.zeros((3, 3)), 1.0, points)
         prior = self._predict(odometry)
         self._odometry = odometry
         value, pose, hessian = self._match(points, prior, 0.0)
@@ -69,17 +71,17 @@ class Tracker:
                     value, pose, hessian = candidate
             inliers = self._inliers(points, pose)
         pose[2] = wrap(pose[2])
-        return self._settle(pose, hessian - prior.information, inliers, points)
+        expected: Array = np.linalg.inv(prior.information)
+        return self._settle(pose, hessian - prior.information, expected, inliers, points)
 
     def _predict(self, odometry: Array | None) -> Prior:
         """Where the next scan is expected, in the tracker's frame, and how surely."""
         options, last = self.options, self._poses[-1]
         if odometry is not None and self._odometry is not None:
             step, information = odometry_prior(self._odometry, odometry, options.odometry)
-        elif len(self._poses) > 1:
-            step, information = odometry_prior(self._poses[-2], last, options.constant_velocity)
         else:
-            step, information = odometry_prior(last, last, options.constant_velocity)
+            step = relative(last, self._poses[0]) / max(len(self._poses) - 1, 1)
+            information = odometry_prior(last, compose(last, step), options.steady_motion).information
         # The prior is as sure along the path as across it: no need to turn its information.
         return Prior(compose(last, step), information)
 
@@ -96,13 +98,13 @@ class Tracker:
     def _inliers(self, points: Array, pose: Array) -> float:
         return inlier_share(self.map.grid, self.map.half, points, pose, self.options.inlier_bound)
 
-    def _settle(
-        self, pose: Array, hessian: Array, inliers: float, points: Array, first: bool = False
-    ) -> Tracked:
+    def _settle(self, pose: Array, hessian: Array, expected: Array, inliers: float, points: Array) -> Tracked:
         """Take the pose; let the scan join the map when the robot has moved, and old ones leave it."""
         step = relative(pose, self._joined)
         distance = float(np.hypot(step[0], step[1]))
-        joined = first or distance > self.options.step or abs(step[2]) > self.options.step
+        # Before anything was seen there is nothing to move against.
+        nothing_seen = self.map.rows == 0
+        joined = nothing_seen or distance > self.options.step or abs(step[2]) > self.options.step
         if joined:
             self._path += distance
             self._joined = pose
@@ -111,5 +113,5 @@ class Tracker:
             while self._window[0][2] < self._path - self.options.window:
                 old_points, old_pose, _ = self._window.popleft()
                 self.map.subtract(old_points, old_pose)
-        self._poses = [*self._poses[-1:], pose]
-        return Tracked(pose, hessian, inliers, self._path, joined)
+        self._poses.append(pose)
+        return Tracked(pose, hessian, expected, inliers, self._path, joined)

@@ -1,0 +1,268 @@
+"""`nscan-cli slam` as a user meets it."""
+
+from __future__ import annotations
+
+import gzip
+import hashlib
+import io
+import json
+import os
+import re
+import shutil
+import subprocess
+import tomllib
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from nscan_cli.cli.main import run
+from nscan_cli.graph.g2o import read_g2o
+from nscan_cli.graph.json_file import read_graph, write_graph
+from nscan_cli.graph.tum import read_tum
+from nscan_cli.logs.load import read_log
+from nscan_cli.logs.options import ReadingOptions
+from nscan_cli.poses import relative
+from tests.cli.room_log import ALL_OUTPUTS, room_log
+from tests.graph.test_json_file import validate
+
+SAMPLE = str(Path(__file__).resolve().parents[2] / "sample_logs" / "office.log.gz")
+SHORT = [SAMPLE, "--end", "40"]
+"""200 scans, 15 m."""
+
+
+@pytest.fixture(scope="module")
+def everything(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with all outputs of a run over the short log."""
+    folder = tmp_path_factory.mktemp("everything")
+    files = {"-o": "graph.json", "--map": "map.png", "--trajectory": "path.tum", "--g2o": "graph.g2o",
+             "--depfile": "graph.d"}  # fmt: skip
+    arguments = [part for option, name in files.items() for part in (option, str(folder / name))]
+    assert run(["slam", *SHORT, "-q", *arguments]) == 0
+    return folder
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """An empty folder to work in."""
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def document_of(path: Path) -> dict[str, Any]:
+    document: dict[str, Any] = json.loads(path.read_bytes(), parse_constant=pytest.fail)
+    return document
+
+
+def test_outputs_appear_whole_and_nothing_else(everything):
+    names = ["graph.d", "graph.g2o", "graph.json", "map.png", "map.yaml", "path.tum"]
+    assert sorted(path.name for path in everything.iterdir()) == names
+
+
+def test_the_graph_is_valid_against_the_schema(everything):
+    document = document_of(everything / "graph.json")
+    validate(document)
+    assert [node["scan"] for node in document["nodes"]] == list(range(201))
+    assert {relation["type"] for relation in document["relations"]} == {"pairwise", "nscan"}
+    assert (everything / "graph.json").read_bytes() == write_graph(read_graph(str(everything / "graph.json")))
+
+
+def test_the_graph_is_of_the_log(everything):
+    graph = read_graph(str(everything / "graph.json"))
+    log = read_log(SAMPLE, ReadingOptions(end=40.0))
+    assert log.truth is not None
+    truth = log.truth[: len(log)]
+    assert graph.stamps == list(log.stamps)
+    assert log.odometry is not None
+    assert graph.odometry is not None
+    np.testing.assert_allclose(graph.odometry, log.odometry, atol=1e-9)
+    off = relative(graph.poses, graph.poses[0]) - relative(truth, truth[0])
+    assert np.hypot(off[:, 0], off[:, 1]).mean() < 0.3
+
+
+def test_trajectory_and_g2o_are_those_of_the_graph(everything):
+    graph = read_graph(str(everything / "graph.json"))
+    path = read_tum(str(everything / "path.tum"))
+    assert list(path.stamps) == graph.stamps
+    np.testing.assert_allclose(relative(path.poses, graph.poses), 0, atol=1e-8)
+    g2o = read_g2o(str(everything / "graph.g2o"))
+    np.testing.assert_allclose(relative(g2o.poses, graph.poses[graph.keyframes]), 0, atol=1e-6)
+
+
+def test_the_map_is_of_the_floor_and_its_yaml_beside_it(everything):
+    with Image.open(everything / "map.png") as image:
+        shades, counts = np.unique(np.asarray(image), return_counts=True)
+        width, height = image.size
+    assert shades.tolist() == [0, 205, 254]
+    # The robot sees more than the corridor that it drives, and not beyond the building of 40 × 25 m.
+    assert counts[2] * 0.05**2 > 50
+    assert max(width, height) * 0.05 < 50
+    yaml = (everything / "map.yaml").read_text()
+    assert re.search(r'^image: "?map\.png"?$', yaml, re.MULTILINE)
+    assert "resolution: 0.05\n" in yaml
+
+
+def test_provenance_has_the_inputs_sha256_and_all_parameters_and_no_path(everything):
+    text = (everything / "graph.json").read_text()
+    provenance = json.loads(text)["provenance"]
+    data = Path(SAMPLE).read_bytes()
+    assert provenance["inputs"] == [
+        {"name": "office.log.gz", "sha256": hashlib.sha256(data).hexdigest(), "bytes": len(data)}
+    ]
+    assert provenance["parameters"]["reading"]["end"] == 40
+    slam = provenance["parameters"]["slam"]
+    assert slam["nscan"]["max_scans"] == 10
+    assert {"tracking", "keyframes", "nscan"} <= set(slam)
+    assert str(everything) not in text
+    assert str(Path(SAMPLE).parent) not in text
+    assert not re.search(r'"[^"]*/[^"]*"', text)
+
+
+def rule(text: str) -> tuple[list[str], list[str]]:
+    """Targets and prerequisites of make's rule."""
+    assert text.endswith("\n")
+    assert text.count("\n") == 1
+    targets, _, sources = text.rstrip("\n").partition(": ")
+
+    def names(part: str) -> list[str]:
+        found = re.split(r"(?<!\\) ", part)
+        return [name.replace("\\ ", " ").replace("\\#", "#").replace("$$", "$") for name in found]
+
+    return names(targets), names(sources)
+
+
+def test_the_depfile_names_every_output_and_the_log(everything):
+    targets, sources = rule((everything / "graph.d").read_text())
+    outputs = ("graph.json", "map.png", "map.yaml", "path.tum", "graph.g2o")
+    assert sorted(targets) == sorted(str(everything / name) for name in outputs)
+    assert sources == [SAMPLE]
+
+
+def test_make_understands_the_depfile(folder):
+    """The graph is made again when the log is newer, and only then; whatever is in the names."""
+    log, graph = folder / "my $log #1.gz", folder / "the graph.json"
+    log.write_bytes(gzip.compress(room_log(5).encode(), mtime=0))
+    assert run(["slam", log.name, "-o", graph.name, "--depfile", "graph.d", "-q"]) == 0
+    assert rule((folder / "graph.d").read_text()) == ([graph.name], [log.name])
+    make = shutil.which("make")
+    if make is None:
+        pytest.skip("make is not installed")
+    (folder / "Makefile").write_text("the\\ graph.json:\n\t@echo made again\ninclude graph.d\n")
+    for newer, older, said in ((graph, log, "up to date"), (log, graph, "made again")):
+        os.utime(older, (1e9, 1e9))
+        os.utime(newer, (1e9 + 5, 1e9 + 5))
+        made = subprocess.run([make, graph.name], cwd=folder, capture_output=True, text=True, check=True)
+        assert said in made.stdout
+
+
+def test_standard_input_is_no_file_for_make(folder, monkeypatch):
+    data = room_log(3).encode()
+    monkeypatch.setattr("sys.stdin", SimpleNamespace(buffer=io.BytesIO(data)))
+    assert run(["slam", "-", "-o", "graph.json", "--depfile", "graph.d", "-q"]) == 0
+    assert (folder / "graph.d").read_text() == "graph.json:\n"
+
+
+def test_standard_output_gets_the_graph_and_nothing_else(everything, capsysbinary):
+    assert run(["slam", *SHORT]) == 0
+    out, err = capsysbinary.readouterr()
+    assert out == (everything / "graph.json").read_bytes()
+    assert b"keyframes" in err
+    assert run(["slam", *SHORT, "-o", "-", "-q"]) == 0
+    assert capsysbinary.readouterr() == (out, b"")
+
+
+def test_the_log_may_come_from_standard_input(folder, everything, monkeypatch):
+    stdin = SimpleNamespace(buffer=io.BytesIO(Path(SAMPLE).read_bytes()))
+    monkeypatch.setattr("sys.stdin", stdin)
+    assert run(["slam", "-", "--end", "40", "-o", "graph.json", "-q"]) == 0
+    found, named = (document_of(path) for path in (folder / "graph.json", everything / "graph.json"))
+    assert found["provenance"]["inputs"][0]["name"] == "standard input"
+    assert found["nodes"] == named["nodes"]
+
+
+def test_the_summary(folder, capsys):
+    assert run(["slam", SAMPLE, "--every", "10", "-o", "graph.json"]) == 0
+    out, err = capsys.readouterr()
+    assert out == ""
+    graph = read_graph("graph.json")
+    accepted = sum(loop.accepted for loop in graph.loops)
+    scans, seen, speed = err.splitlines()[-3:]
+    assert scans == (
+        f"252 scans, {len(graph.keyframes)} keyframes, {len(graph.pairwise)} pairwise and "
+        f"{len(graph.nscan)} nScan relations"
+    )
+    assert len(graph.loops) > 20
+    assert seen == (
+        f"places seen before: {len(graph.loops)} tried, {accepted} matched, "
+        f"{len(graph.loops) - accepted} refused"
+    )
+    assert re.fullmatch(r"[\d.]+ s, \d+ scans a second, \d+ times real time", speed)
+
+
+def test_without_odometry(folder):
+    assert run(["slam", *SHORT, "--no-odometry", "-o", "graph.json", "-q"]) == 0
+    document = document_of(folder / "graph.json")
+    validate(document)
+    assert not any("odometry" in node for node in document["nodes"])
+    assert document["provenance"]["parameters"]["reading"]["odometry"] is False
+
+
+def test_max_scans_bounds_the_relations(folder):
+    assert run(["slam", *SHORT, "--max-scans", "4", "-o", "graph.json", "-q"]) == 0
+    graph = read_graph("graph.json")
+    assert graph.provenance["parameters"]["slam"]["nscan"]["max_scans"] == 4
+    assert {len(relation.nodes) for relation in graph.nscan} == {3, 4}
+
+
+def test_config_is_dumped_and_read_back(folder, capsys):
+    given = ["--max-scans", "4", "--map", "map.png", "--every", "7", "--mount", "0.1,0,90"]
+    assert run(["slam", SAMPLE, *given, "--dump-config"]) == 0
+    dumped = capsys.readouterr().out
+    options = tomllib.loads(dumped)["slam"]
+    assert (options["max-scans"], options["map"], options["every"]) == (4, "map.png", 7)
+    assert options["output"] == "-"
+    assert list(folder.iterdir()) == []
+    (folder / "slam.toml").write_text(dumped)
+    assert run(["slam", SAMPLE, "--config", "slam.toml", "--dump-config"]) == 0
+    assert capsys.readouterr().out == dumped
+    # A flag is stronger than the file, the file than the default.
+    assert run(["slam", SAMPLE, "--config", "slam.toml", "--max-scans", "5", "--dump-config"]) == 0
+    assert tomllib.loads(capsys.readouterr().out)["slam"] == {**options, "max-scans": 5}
+
+
+def test_config_takes_effect(folder):
+    (folder / "slam.toml").write_text('output = "graph.json"\n[slam]\nmax-scans = 3\nend = 20.0\n')
+    assert run(["slam", SAMPLE, "--config", "slam.toml", "-q"]) == 0
+    graph = read_graph("graph.json")
+    assert len(graph) == 101
+    assert {len(relation.nodes) for relation in graph.nscan} == {3}
+
+
+def test_a_saved_graph_is_optimised_again(folder, everything, capsys):
+    """At its minimum already: it stays, and so does what it was made from."""
+    saved = str(everything / "graph.json")
+    assert run(["slam", "--from", saved, "-o", "again.json", "--trajectory", "again.tum"]) == 0
+    assert "nScan relations: energy" in capsys.readouterr().err
+    before, after = read_graph(saved), read_graph("again.json")
+    np.testing.assert_allclose(relative(after.poses, before.poses), 0, atol=1e-4)
+    assert after.provenance == before.provenance
+    assert len(after.nscan) == len(before.nscan)
+    np.testing.assert_allclose(relative(read_tum("again.tum").poses, after.poses), 0, atol=1e-8)
+
+
+def test_the_same_bytes_every_time(folder, everything):
+    assert run(["slam", *SHORT, "-o", "a.json", "--map", "a.png", "-q"]) == 0
+    assert (folder / "a.json").read_bytes() == (everything / "graph.json").read_bytes()
+    assert (folder / "a.png").read_bytes() == (everything / "map.png").read_bytes()
+
+
+@pytest.mark.parametrize("count", [1, 2, 3])
+def test_logs_of_a_few_scans(folder, capsys, count):
+    (folder / "few.log").write_text(room_log(count))
+    assert run(["slam", "few.log", *ALL_OUTPUTS]) == 0
+    validate(document_of(folder / "out.json"))
+    assert f"{count} scans, 1 keyframes" in capsys.readouterr().err
+    assert (folder / "out.png").exists()

@@ -1,0 +1,91 @@
+"""What `nscan-cli slam` says of a user's mistakes."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from nscan_cli.cli.main import run
+from nscan_cli.graph.json_file import write_graph
+from tests.cli.room_log import ALL_OUTPUTS, room_log
+from tests.graph.small_graph import small_graph
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """An empty folder to work in."""
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+PNG = b"\x89PNG\r\n\x1a\n" + bytes(40)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code", "said"),
+    [
+        (["none.log"], 66, "none.log: no such file"),
+        (["folder"], 66, "folder: is a folder"),
+        (["empty.log"], 65, "empty.log: is empty"),
+        (["picture.log"], 65, "picture.log: is a PNG"),
+        (["wheels.log"], 65, "wheels.log: has no laser scans, only ODOM"),
+        (["good.log", "--laser", "RLASER"], 2, "has no RLASER scans"),
+        (["good.log", "--start", "1e6"], 2, "--start"),
+        (["good.log", "--max-scans", "2"], 2, "--max-scans"),
+        (["good.log", "--from", "graph.json", "--map", "-"], 2, "either LOG or --from"),
+        ([], 2, "either LOG or --from"),
+        (["--from", "none.json"], 2, "--map goes with LOG"),
+        (["good.log", "-o", "none/out.json"], 73, "none/out.json: the folder none does not exist"),
+        (["good.log", "--map", "none/out.png"], 73, "none/out.png: the folder none does not exist"),
+        (["good.log", "--trajectory", "none/out.tum"], 73, "none/out.tum: the folder none"),
+        (["good.log", "--g2o", "folder"], 73, "folder: is a folder"),
+        (["good.log", "--depfile", "none/out.d"], 73, "none/out.d: the folder none does not exist"),
+        (["good.log", "--map", "out.yaml"], 2, "out.yaml: the map would have the name of its YAML"),
+        (["good.log", "--map", "-"], 2, "only the graph (-o) can go to standard output"),
+        (["good.log", "--trajectory", "-"], 2, "only the graph (-o) can go to standard output"),
+        (["good.log", "--config", "none.toml"], 66, "none.toml"),
+        (["good.log", "--config", "wrong.toml"], 65, "slam has no option 'max_scans'"),
+    ],
+)
+def test_mistakes_are_one_line_and_leave_nothing_behind(folder, capsys, arguments, code, said):
+    (folder / "folder").mkdir()
+    (folder / "empty.log").write_bytes(b"")
+    (folder / "picture.log").write_bytes(PNG)
+    (folder / "wheels.log").write_text("ODOM 0 0 0 0 0 0 1.0 nohost 1.0\n" * 3)
+    (folder / "good.log").write_text(room_log(5))
+    (folder / "graph.json").write_bytes(write_graph(small_graph()))
+    (folder / "wrong.toml").write_text("[slam]\nmax_scans = 3\n")
+    before = sorted(path.name for path in folder.rglob("*"))
+    assert run(["slam", *ALL_OUTPUTS, *arguments]) == code
+    out, err = capsys.readouterr()
+    assert out == ""
+    assert len(err.splitlines()) == 1
+    assert err.startswith("nscan-cli: ")
+    assert said in err
+    assert sorted(path.name for path in folder.rglob("*")) == before
+
+
+@pytest.mark.parametrize(
+    ("content", "code", "said"),
+    [
+        (None, 66, "saved.json: no such file"),
+        (b"", 65, "saved.json"),
+        (b"{", 65, "saved.json, line 1"),
+        (PNG, 65, "saved.json"),
+    ],
+)
+def test_a_saved_graph_that_is_none(folder, capsys, content, code, said):
+    if content is not None:
+        (folder / "saved.json").write_bytes(content)
+    assert run(["slam", "--from", "saved.json", "-o", "out.json"]) == code
+    out, err = capsys.readouterr()
+    assert (out, len(err.splitlines())) == ("", 1)
+    assert said in err
+    assert not (folder / "out.json").exists()
+
+
+def test_an_existing_output_survives_a_failure(folder):
+    (folder / "graph.json").write_text("old")
+    assert run(["slam", "none.log", "-o", "graph.json"]) == 66
+    assert (folder / "graph.json").read_text() == "old"

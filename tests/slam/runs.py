@@ -1,0 +1,104 @@
+"""Logs for the SLAM loop, and what it makes of them: each is mapped once for all tests."""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nscan_cli.graph.model import Graph
+from nscan_cli.logs.load import read_log
+from nscan_cli.logs.options import ReadingOptions
+from nscan_cli.logs.scan import LaserLog
+from nscan_cli.poses import Array
+from nscan_cli.slam.options import SlamOptions, TrackingOptions
+from nscan_cli.slam.pipeline import Slam, provenance
+from nscan_cli.slam.tracking import Tracked, Tracker
+from tests.data import data_file
+
+SAMPLE = Path(__file__).resolve().parents[2] / "sample_logs" / "office.log.gz"
+Rows = slice | NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class Mapped:
+    """A log and its graph."""
+
+    log: LaserLog
+    graph: Graph
+    slam: Slam
+
+
+def mapped(log: LaserLog, options: SlamOptions | None = None) -> Mapped:
+    """Run the loop over a log."""
+    options = options or SlamOptions()
+    slam = Slam(log, options)
+    graph = slam.run(lambda done, keyframes: None)
+    graph.provenance = provenance(log, ReadingOptions(), options)
+    return Mapped(log, graph, slam)
+
+
+@functools.cache
+def office_log(odometry: bool = True) -> LaserLog:
+    """The office sample, with its true poses."""
+    return read_log(str(SAMPLE), ReadingOptions(odometry=odometry))
+
+
+@functools.cache
+def mapped_office(odometry: bool) -> Mapped:
+    """The office sample, mapped."""
+    return mapped(office_log(odometry))
+
+
+@functools.cache
+def mapped_real(name: str) -> Mapped:
+    """A real log, mapped; the test is skipped where it is absent."""
+    return mapped(read_log(str(data_file(f"{name}.log.gz"))))
+
+
+def truth_of(log: LaserLog) -> Array:
+    """(S, 3) true poses; the logs of the tests have one for every scan."""
+    assert log.truth is not None
+    assert len(log.truth) == len(log)
+    return log.truth
+
+
+def part(log: LaserLog, rows: Rows) -> LaserLog:
+    """The scans in `rows` as a log of their own."""
+    return dataclasses.replace(
+        log,
+        numbers=log.numbers[rows],
+        stamps=tuple(np.array(log.stamps)[rows].tolist()),
+        times=log.times[rows],
+        ranges=log.ranges[rows],
+        angle_min=log.angle_min[rows],
+        angle_increment=log.angle_increment[rows],
+        odometry=None if log.odometry is None else log.odometry[rows],
+        truth_times=log.times[rows],
+        truth=truth_of(log)[rows],
+    )
+
+
+def without_returns(log: LaserLog, rows: Rows, reading: float = np.inf) -> LaserLog:
+    """The log with no usable beam in the scans `rows`: inf is "nothing met", nan "nothing said"."""
+    ranges = log.ranges.copy()
+    ranges[rows] = reading
+    return dataclasses.replace(log, ranges=ranges)
+
+
+def tracked(log: LaserLog, options: TrackingOptions | None = None) -> tuple[list[Tracked], Tracker]:
+    """Step 1 alone, over a whole log."""
+    tracker = Tracker(options or TrackingOptions())
+    odometry = log.odometry
+    return [
+        tracker.track(log.points(row), None if odometry is None else odometry[row]) for row in range(len(log))
+    ], tracker
+
+
+def poses_of(found: list[Tracked]) -> Array:
+    """(S, 3)"""
+    return np.array([scan.pose for scan in found])

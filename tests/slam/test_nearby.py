@@ -1,0 +1,244 @@
+"""Step 3: the joint match of a keyframe with those near it."""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from nscan_cli.graph.model import Pairwise
+from nscan_cli.matching.joint import gauge_directions
+from nscan_cli.poses import Array, compose, relative, wrap
+from nscan_cli.slam.keyframes import Keyframe, Keyframes
+from nscan_cli.slam.nearby import Nearby, choose_nearby, match_nearby
+from nscan_cli.slam.options import KeyframeOptions, NScanOptions
+from nscan_cli.slam.tracking import Tracked
+from tests.matching.problems import office_truth
+from tests.simulation.scenes import office
+
+OPTIONS = NScanOptions(max_scans=6, radius=5.0, recent=20.0)
+
+
+def along(*x: float) -> Array:
+    """Poses on a line."""
+    return np.stack([np.array(x), np.zeros(len(x)), np.zeros(len(x))], axis=1)
+
+
+def test_the_nearest_within_the_radius_are_chosen_in_order_of_time():
+    poses = along(7, 4, 3, 2, 1, 0, -1, -2, 0)
+    chosen, seen = choose_nearby(poses, np.arange(9.0), 8, dataclasses.replace(OPTIONS, radius=3.0))
+    assert (chosen.tolist(), seen.tolist()) == ([3, 4, 5, 6, 7, 8], [False] * 6)
+    chosen, _ = choose_nearby(poses, np.arange(9.0), 8, dataclasses.replace(OPTIONS, radius=1.0))
+    assert chosen.tolist() == [4, 5, 6, 8]
+
+
+def test_keyframes_after_the_newest_take_no_part():
+    poses = along(0, 1, 2, 0.1, 0.2)
+    assert choose_nearby(poses, np.arange(5.0), 2, OPTIONS)[0].tolist() == [0, 1, 2]
+    assert choose_nearby(poses, np.arange(3.0), 2, OPTIONS)[0].tolist() == [0, 1, 2]
+
+
+@pytest.mark.parametrize(
+    ("old", "recent", "chosen_old", "chosen_recent"),
+    [(5, 5, 3, 3), (1, 8, 1, 5), (8, 1, 5, 1), (0, 9, 0, 6), (2, 3, 2, 3), (6, 3, 3, 3)],
+)
+def test_half_of_the_places_are_kept_for_what_was_seen_before(old, recent, chosen_old, chosen_recent):
+    """The old ones are farther than all recent ones, and yet three come in; the rest fills up."""
+    poses = along(*(2 + 0.1 * np.arange(old)), *(0.1 * np.arange(recent)[::-1]))
+    paths = np.concatenate([np.arange(old) * 0.1, 50 + np.arange(recent) * 0.1])
+    chosen, seen = choose_nearby(poses, paths, old + recent - 1, OPTIONS)
+    assert (seen == (chosen < old)).all()
+    assert (chosen < old).sum() == chosen_old
+    assert (chosen >= old).sum() == chosen_recent
+    # Of each kind those nearest: the first old ones, the last recent ones.
+    expected = [*range(chosen_old), *range(old + recent - chosen_recent, old + recent)]
+    assert chosen.tolist() == expected
+
+
+@given(st.integers(1, 40), st.integers(0, 10**6), st.integers(3, 12))
+@settings(max_examples=100, deadline=None)
+def test_what_is_chosen_is_near_not_too_much_and_has_the_newest(count, seed, most):
+    rng = np.random.default_rng(seed)
+    poses, paths = rng.uniform(-5, 5, (count, 3)), np.cumsum(rng.uniform(0, 3, count))
+    newest = int(rng.integers(count))
+    chosen, seen = choose_nearby(poses, paths, newest, dataclasses.replace(OPTIONS, max_scans=most))
+    assert chosen[-1] == newest
+    assert (np.diff(chosen) > 0).all()
+    distances = np.hypot(*(poses[: newest + 1, :2] - poses[newest, :2]).T)
+    assert len(chosen) == min(most, (distances <= 5).sum())
+    assert distances[chosen].max() <= 5
+    assert (seen == (paths[newest] - paths[chosen] > 20)).all()
+    if seen.any():
+        near_old = (distances <= 5) & (paths[newest] - paths[: newest + 1] > 20)
+        assert seen.sum() >= min(near_old.sum(), most // 2)
+
+
+OLD, BETWEEN, NEW = (280, 290, 300, 310, 320), (700, 1200), (1880, 1890, 1900, 1910, 1920)
+"""Rows of the office: along the corridor to the south; elsewhere; and along it again, 150 m later."""
+
+
+@functools.cache
+def keyframe(row: int, place: int) -> Keyframe:
+    """A keyframe that was tracked without an error where `row` says, but saw what is at `place`.
+
+    Scans 22 and 44 cm before and after it grow its Gaussians, as in the loop.
+    """
+    truth = office_truth()
+    path = float(np.hypot(*np.diff(truth[: row + 1, :2], axis=0).T).sum())
+    seen = place + np.array([0, -4, -2, 2, 4])
+    log = office().record_at(truth[seen], seed=row).log()
+    poses = compose(truth[row], relative(truth[seen], truth[place]))
+    scans = [Tracked(pose, np.diag([1e5, 1e5, 1e6]), np.eye(3), 0.95, path, True) for pose in poses]
+    found = Keyframes(KeyframeOptions(), NScanOptions().gaussians)
+    found.add(row, log.points(0), scans[0])
+    for k in range(1, len(scans)):
+        found.attach(log.points(k), scans[k])
+    found.finish_last()
+    return found.list[0]
+
+
+ROWS = (*OLD, *BETWEEN, *NEW)
+
+
+def revisit(foreign: dict[int, int] | None = None) -> list[Keyframe]:
+    """The two drives along the corridor; `foreign` says which rows see another place's scan."""
+    return [keyframe(row, (foreign or {}).get(row, row)) for row in ROWS]
+
+
+def matched(
+    keyframes: list[Keyframe],
+    off: Array,
+    options: NScanOptions = NScanOptions(),  # noqa: B008
+) -> Nearby:
+    """Match the last keyframe when all of the second drive are off the truth by one motion."""
+    poses = office_truth()[list(ROWS)]
+    new = slice(len(OLD) + len(BETWEEN), None)
+    centre = poses[new].mean(axis=0) * [1, 1, 0]
+    poses[new] = compose(compose(centre, off), relative(poses[new], centre))
+    pairwise = [chain(keyframes[: k + 2]) for k in range(len(keyframes) - 1)]
+    found = match_nearby(keyframes, poses, pairwise, len(keyframes) - 1, options)
+    assert found is not None
+    return found
+
+
+def chain(keyframes: list[Keyframe]) -> Pairwise:
+    """The relation of the last keyframe to the one before."""
+    found = Keyframes(KeyframeOptions(), NScanOptions().gaussians)
+    found.list = keyframes
+    return found.relation_to_previous()
+
+
+def off_truth(found: Nearby) -> Array:
+    """(n, 3) errors of a relation's poses, seen from its fixed one."""
+    assert found.relation is not None
+    relation, truth = found.relation, office_truth()
+    off = relative(relation.poses, relation.poses[relation.fixed]) - relative(
+        truth[list(relation.nodes)], truth[relation.nodes[relation.fixed]]
+    )
+    off[:, 2] = wrap(off[:, 2])
+    return off
+
+
+@pytest.mark.parametrize(
+    "off",
+    [(0.0, 0.0, 0.0), (0.3, 0.0, 0.0), (-0.2, 0.22, np.radians(2)), (0.2, -0.22, -np.radians(2))],
+)
+def test_a_revisit_is_brought_back_to_the_truth(off):
+    """Ranges are good to 15 mm; the centimetres are those of cells of 0.5 m and 180 beams."""
+    keyframes = revisit()
+    found = matched(keyframes, np.array(off))
+    assert found.relation is not None
+    assert found.loop is not None
+    assert (found.loop.accepted, found.loop.reason) == (True, "")
+    assert found.loop.nodes == (found.relation.nodes[0], ROWS[-1])
+    assert found.whole
+    assert len(set(found.relation.nodes) & set(OLD)) >= 3
+    assert len(set(found.relation.nodes) & set(NEW)) >= 3
+    errors = off_truth(found)
+    assert np.hypot(errors[:, 0], errors[:, 1]).max() < 0.04
+    assert np.abs(errors[:, 2]).max() < np.radians(0.5)
+    assert found.moved == pytest.approx(np.hypot(off[0], off[1]), abs=0.2)
+
+
+def test_nodes_fixed_origin_and_score():
+    keyframes = revisit()
+    found = matched(keyframes, np.array([0.1, 0.1, 0.01]))
+    relation = found.relation
+    assert relation is not None
+    assert relation.nodes == tuple(sorted(relation.nodes))
+    assert relation.nodes[relation.fixed] == ROWS[-1]
+    assert relation.origin == "loop"
+    assert relation.poses.shape == (len(relation.nodes), 3)
+    assert found.loop is not None
+    assert NScanOptions().overlap <= relation.score == found.loop.score <= 1
+
+
+def test_without_a_revisit_the_relation_closes_no_loop():
+    keyframes = revisit()[: len(OLD)]
+    truth = office_truth()[list(OLD)]
+    pairwise = [chain(keyframes[: k + 2]) for k in range(len(keyframes) - 1)]
+    found = match_nearby(keyframes, truth, pairwise, len(OLD) - 1, NScanOptions())
+    assert found is not None
+    assert found.relation is not None
+    assert (found.loop, found.relation.origin) == (None, "nscan")
+    assert found.moved < 0.05
+
+
+def test_the_hessian_is_positive_semi_definite_and_the_gauge_is_its_null_space():
+    relation = matched(revisit(), np.array([0.1, 0.1, 0.01])).relation
+    assert relation is not None
+    np.testing.assert_allclose(relation.hessian, relation.hessian.T, rtol=1e-9, atol=1e-6)
+    values = np.linalg.eigvalsh(relation.hessian)
+    assert values[0] > -1e-9 * values[-1]
+    assert np.abs(values[:3]).max() < 1e-3 * values[3]
+    moved = relation.hessian @ gauge_directions(relation.poses)
+    assert np.linalg.norm(moved, axis=0).max() < 1e-2 * values[3]
+
+
+def test_a_foreign_scan_is_left_out_and_named_in_the_reason():
+    """One of the old ones saw a room instead of the corridor."""
+    foreign = {300: 1320}
+    found = matched(revisit(foreign), np.array([0.1, 0.1, 0.01]))
+    assert found.relation is not None
+    assert 300 not in found.relation.nodes
+    assert not found.whole
+    assert found.loop is not None
+    assert (found.loop.accepted, found.loop.reason) == (True, "1 scans left out")
+    errors = off_truth(found)
+    assert np.hypot(errors[:, 0], errors[:, 1]).max() < 0.04
+
+
+def test_a_newest_scan_that_is_foreign_is_refused_with_a_reason():
+    found = matched(revisit({NEW[-1]: 1320}), np.zeros(3))
+    assert found.relation is None
+    assert found.loop is not None
+    assert not found.loop.accepted
+    assert found.loop.reason == f"only 1 of {len(OLD) + len(NEW)} scans hang together"
+
+
+def test_a_match_that_does_not_converge_is_refused_with_a_reason():
+    found = matched(revisit(), np.array([0.3, 0.2, 0.05]), NScanOptions(max_iterations=1))
+    assert found.relation is None
+    assert found.loop is not None
+    assert (found.loop.accepted, found.loop.reason) == (False, "did not converge")
+
+
+def test_when_all_that_was_seen_before_is_left_out_no_loop_is_closed():
+    """A place that only seemed to be seen before: what is left is a relation of the recent scans."""
+    found = matched(revisit(dict.fromkeys(OLD, 1320)), np.zeros(3))
+    assert found.relation is not None
+    assert not set(found.relation.nodes) & set(OLD)
+    assert found.relation.origin == "nscan"
+    assert found.loop is not None
+    assert not found.loop.accepted
+    assert "left out" in found.loop.reason
+
+
+def test_two_keyframes_are_too_few():
+    keyframes = revisit()[:2]
+    assert match_nearby(keyframes, office_truth()[[280, 290]], [chain(keyframes)], 1, NScanOptions()) is None
+    assert match_nearby(keyframes, office_truth()[[280]], [], 0, NScanOptions()) is None
