@@ -89,6 +89,26 @@ def command(
         say(f"{seconds:.1f} s, {rate:.0f} scans a second, {span / seconds:.0f} times real time", quiet)
 
 
+def _given(option: str) -> bool:
+    source = click.get_current_context().get_parameter_source(option)
+    return source is not None and source.name == "COMMANDLINE"
+
+
+def _check_outputs(source: str, output: str, map_file: str | None, *others: str | None) -> None:
+    """Refuse outputs that can never be written, that share a name, or that would replace the input."""
+    names = [path for path in (output, map_file, *others) if path not in (None, "-")]
+    if map_file is not None:
+        check_map_outputs(map_file, yaml=True)
+        names.append(yaml_path(map_file))
+    files = [os.path.realpath(str(name)) for name in names]
+    if len(set(files)) < len(files):
+        raise WrongUsageError("slam: two outputs have the same name; give each its own")
+    if source != "-" and os.path.realpath(source) in files:
+        raise WrongUsageError(f"slam: {source} is the input, and an output too; choose another name for it")
+    for path in (output, *others):
+        check_writable(path)
+
+
 def _map(log: str, reading: ReadingOptions, max_scans: int, quiet: bool) -> tuple[LaserLog, Graph, str]:
     """Run the whole loop over a log."""
     from nscan_cli.compiled import first_compile

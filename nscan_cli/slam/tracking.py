@@ -71,7 +71,7 @@ class Tracker:
                     value, pose, hessian = candidate
             inliers = self._inliers(points, pose)
         pose[2] = wrap(pose[2])
-        expected: Array = np.linalg.inv(prior.information)
+        expected = np.linalg.inv(prior.information).astype(np.float64)
         return self._settle(pose, hessian - prior.information, expected, inliers, points)
 
     def _predict(self, odometry: Array | None) -> Prior:

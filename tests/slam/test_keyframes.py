@@ -17,7 +17,7 @@ from tests.ndt.rooms import room
 
 OPTIONS = KeyframeOptions(distance=1.0, turn=0.5)
 GAUSSIANS = GaussianOptions(cell=1.0, minimum=4)
-EXPECTED = np.diag([1e8, 1e8, 1e8])
+EXPECTED = np.diag([1e3, 1e3, 1e3])
 HESSIAN = np.array([[9e4, 1e4, 2e3], [1e4, 4e4, -3e3], [2e3, -3e3, 1.6e5]])
 
 
