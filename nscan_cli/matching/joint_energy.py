@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nscan_cli.compiled import kernel
-from nscan_cli.ndt.energy import OUT, accumulate
+from nscan_cli.ndt.energy import OUT, accumulate, unpack
 from nscan_cli.ndt.grid import Grid, Ndt
 from nscan_cli.poses import Array
 
@@ -144,13 +144,7 @@ def _add_pairs(
             scan_grid(scans, i), scans.half, scan_points(scans, j), u[0], u[1], u[2], widening, curvature, out
         )
         value += scale * out[0]
-        index = 4
-        for a in range(3):
-            g[a] = scale * out[1 + a]
-            for b in range(a, 3):
-                h[a, b] = scale * out[index]
-                h[b, a] = h[a, b]
-                index += 1
+        unpack(out, scale, g, h)
         _chain(i, j, poses[i, 2], u, g, h, curvature, gradient, hessian)
     return value
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from nscan_cli.compiled import kernel
-from nscan_cli.ndt.energy import accumulate
+from nscan_cli.ndt.energy import accumulate, unpack
 from nscan_cli.ndt.grid import Grid
 from nscan_cli.poses import Array
 
@@ -36,13 +36,7 @@ def objective(
 ) -> float:
     """The objective at `pose`; writes its gradient (3,) and Hessian (3, 3), and E's own into out (10,)."""
     accumulate(grid, half, points, pose[0], pose[1], pose[2], widening, curvature, out)
-    index = 4
-    for a in range(3):
-        gradient[a] = scale * out[1 + a]
-        for b in range(a, 3):
-            hessian[a, b] = scale * out[index]
-            hessian[b, a] = hessian[a, b]
-            index += 1
+    unpack(out, scale, gradient, hessian)
     value = scale * out[0]
     turn = pose[2] - prior_mean[2]
     turn -= 2 * np.pi * np.round(turn / (2 * np.pi))

@@ -76,6 +76,18 @@ def accumulate(
 
 
 @kernel
+def unpack(out: Array, scale: float, gradient: Array, hessian: Array) -> None:
+    """Write gradient (3,) and Hessian (3, 3) of scale · E from the numbers (10,) of an evaluation."""
+    index = 4
+    for a in range(3):
+        gradient[a] = scale * out[1 + a]
+        for b in range(a, 3):
+            hessian[a, b] = scale * out[index]
+            hessian[b, a] = hessian[a, b]
+            index += 1
+
+
+@kernel
 def inlier_share(grid: Grid, half: float, points: Array, pose: Array, bound: float) -> float:
     """The share of points (m, 2) within a Mahalanobis distance² of `bound` of some Gaussian."""
     cos, sin = np.cos(pose[2]), np.sin(pose[2])
@@ -114,7 +126,6 @@ def energy(ndt: Ndt, points: Array, pose: Array, widening: float = 1.0, exact: b
     out = np.empty(OUT)
     x, y, phi = (float(part) for part in pose)
     accumulate(ndt.grid, ndt.half, points, x, y, phi, widening, float(exact), out)
-    hessian = np.empty((3, 3))
-    hessian[np.triu_indices(3)] = out[4:]
-    hessian.T[np.triu_indices(3)] = out[4:]
-    return Energy(float(out[0]), out[1:4].copy(), hessian)
+    gradient, hessian = np.empty(3), np.empty((3, 3))
+    unpack(out, 1.0, gradient, hessian)
+    return Energy(float(out[0]), gradient, hessian)
