@@ -117,7 +117,7 @@ def _map(log: str, reading: ReadingOptions, max_scans: int, quiet: bool) -> tupl
     from nscan_cli.slam.pipeline import Slam, provenance
 
     scans = read_log(log, reading)
-    for warning in scans.report.warnings:
+    for warning in scans.report.notices():
         say(f"warning: {warning}", quiet)
     if first_compile():
         say("compiling the kernels, once for this version on this machine: about half a minute", quiet)

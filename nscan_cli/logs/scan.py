@@ -33,6 +33,13 @@ class LogReport:
     warnings: tuple[str, ...] = ()
     """Whole sentences for the user."""
 
+    def notices(self) -> list[str]:
+        """The warnings, and what was skipped, for commands that do not list it."""
+        return [*self.warnings] + [
+            f"{count} records skipped: {reason}, first in line {line}"
+            for reason, (count, line) in self.skipped.items()
+        ]
+
 
 @dataclass(frozen=True)
 class LaserLog:
