@@ -7,19 +7,24 @@ from typing import TYPE_CHECKING
 import click
 
 from nscan_cli.cli.options import CONTEXT, common_options, reading_options
+from nscan_cli.cli.picture import check_plot, plot_option, write_plot
 from nscan_cli.cli.progress import say
 from nscan_cli.errors import CheckFailedError, WrongUsageError
 from nscan_cli.logs.options import ReadingOptions
 
 if TYPE_CHECKING:
     from nscan_cli.evaluation.report import Evaluation
+    from nscan_cli.graph.tum import Trajectory
+
+DRAWN = 10
+"""The worst relations that a picture shows where --worst does not say."""
 
 
 @click.command("evaluate", context_settings=CONTEXT)
 @click.argument("result")
 @click.option("--relations", metavar="FILE", help="Relations of the Kümmerle et al. 2009 benchmark.")
 @click.option("--reference", metavar="FILE", help="A TUM trajectory, or a log with TRUEPOS: ATE and RPE.")
-@click.option("--worst", type=click.IntRange(0), default=0, metavar="N", help="List the N worst relations.")
+@click.option("--worst", type=click.IntRange(0), metavar="N", help="List the N worst relations.")
 @click.option(
     "--max-translation",
     type=click.FloatRange(0),
@@ -28,16 +33,18 @@ if TYPE_CHECKING:
 )
 @click.option("--max-rotation", type=click.FloatRange(0), metavar="DEG", help="The same for the rotation.")
 @click.option("--json", "as_json", is_flag=True, help="Print JSON.")
+@plot_option("the worst relations (10, or N) over the trajectory, or the error against the reference")
 @reading_options
 @common_options
 def command(
     result: str,
     relations: str | None,
     reference: str | None,
-    worst: int,
+    worst: int | None,
     max_translation: float | None,
     max_rotation: float | None,
     as_json: bool,
+    plot: str | None,
     reading: ReadingOptions,
     quiet: bool,
     **_verbosity: int,
@@ -53,11 +60,12 @@ def command(
         raise WrongUsageError("nothing to measure against; give --relations or --reference")
     if [result, relations, reference].count("-") > 1:
         raise WrongUsageError("standard input (-) can be one input only; give the others by their path")
+    check_plot(plot, None, [result, relations, reference])
     import json
 
     from nscan_cli.evaluation.report import as_document, as_text
 
-    evaluation = _evaluate(result, relations, reference, worst, reading)
+    evaluation, trajectory, truth = _evaluate(result, relations, reference, worst or 0, reading)
     if evaluation.relations and evaluation.relations[1].too_far:
         table, errors = evaluation.relations
         say(f"warning: {errors.too_far} of {len(table)} relations have a stamp far from every pose", quiet)
@@ -65,12 +73,17 @@ def command(
         click.echo(json.dumps(as_document(evaluation), indent=2, allow_nan=False))
     else:
         click.echo(as_text(evaluation), nl=False)
+    if plot is not None:
+        from nscan_cli.evaluation.picture import picture
+
+        write_plot(plot, picture(evaluation, trajectory, truth, DRAWN if worst is None else worst))
     _check(evaluation, max_translation, max_rotation)
 
 
 def _evaluate(
     result: str, relations: str | None, reference: str | None, worst: int, reading: ReadingOptions
-) -> Evaluation:
+) -> tuple[Evaluation, Trajectory, Trajectory | None]:
+    """The evaluation, and the result and the reference that it was made from."""
     from nscan_cli.evaluation.relations import read_relations, relation_errors
     from nscan_cli.evaluation.report import Evaluation
     from nscan_cli.evaluation.results import load_reference, load_trajectory
@@ -78,7 +91,7 @@ def _evaluate(
     from nscan_cli.inputs import base_name, label
 
     trajectory = load_trajectory(result, reading)
-    on_relations, on_reference = None, None
+    on_relations, on_reference, truth = None, None, None
     if relations is not None:
         table = read_relations(relations)
         on_relations = (table, relation_errors(trajectory, table, label(result)))
@@ -88,7 +101,8 @@ def _evaluate(
             base_name(reference),
             trajectory_errors(trajectory, truth, label(result), label(reference)),
         )
-    return Evaluation(base_name(result), len(trajectory), on_relations, on_reference, worst)
+    evaluation = Evaluation(base_name(result), len(trajectory), on_relations, on_reference, worst)
+    return evaluation, trajectory, truth
 
 
 def _check(evaluation: Evaluation, max_translation: float | None, max_rotation: float | None) -> None:

@@ -10,6 +10,7 @@ import click
 
 from nscan_cli.cli.options import CONTEXT, PoseType, common_options, reading_options
 from nscan_cli.cli.output import check_writable, write_whole
+from nscan_cli.cli.picture import check_plot, plot_option, write_plot
 from nscan_cli.cli.progress import say
 from nscan_cli.errors import WrongUsageError
 from nscan_cli.logs.options import ReadingOptions
@@ -52,6 +53,7 @@ class StartType(click.ParamType[Any]):
 @click.option(
     "-o", "--output", default="-", metavar="RESULT.json", help="The result; standard output if not given."
 )
+@plot_option("both scans before and after, with the uncertainty")
 @reading_options
 @common_options
 def command(
@@ -61,6 +63,7 @@ def command(
     initial: str | None,
     prior: str | None,
     output: str,
+    plot: str | None,
     reading: ReadingOptions,
     quiet: bool,
     **_verbosity: int,
@@ -71,6 +74,7 @@ def command(
     leaves open shows as the weakest direction, and best with --prior none.
     """
     check_writable(output)
+    check_plot(plot, output, [log])
     from nscan_cli.logs.load import read_log
     from nscan_cli.matching.pairwise import PairOptions, match_pair, matched_points, scan_ndt
     from nscan_cli.matching.priors import MotionModel, odometry_prior
@@ -92,6 +96,10 @@ def command(
         "odometry": dataclasses.asdict(model),
     }
     write_whole(output, _document(scans, (reference, scan), start, match, parameters))
+    if plot is not None:
+        from nscan_cli.mapping.plots import plot_match
+
+        write_plot(plot, plot_match((reference, scan), fixed, moving, start, match))
     for line in _summary(reference, scan, match):
         say(line, quiet)
 

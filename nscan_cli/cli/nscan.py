@@ -10,6 +10,7 @@ import click
 from nscan_cli.cli.match import with_defaults
 from nscan_cli.cli.options import CONTEXT, common_options, reading_options
 from nscan_cli.cli.output import check_writable, write_whole
+from nscan_cli.cli.picture import check_plot, plot_option, write_plot
 from nscan_cli.cli.progress import say
 from nscan_cli.cli.scan_spec import ScanSpecType
 from nscan_cli.errors import InputDataError, WrongUsageError
@@ -55,6 +56,7 @@ STARTS, PRIORS = ("odometry", "identity"), ("odometry", "none")
     help="What is known before matching: odometry (default), or a graph's pairwise relations.",
 )
 @click.option("-o", "--output", default="-", metavar="RESULT.json", help="Standard output if not given.")
+@plot_option("all scans before and after, with circles at their poses")
 @reading_options
 @common_options
 def command(
@@ -65,6 +67,7 @@ def command(
     initial: str | None,
     prior: str | None,
     output: str,
+    plot: str | None,
     reading: ReadingOptions,
     quiet: bool,
     **_verbosity: int,
@@ -80,6 +83,8 @@ def command(
     if log == "-" and "-" in (initial, prior):
         raise WrongUsageError("standard input (-) can be one input only; give the others by their path")
     check_writable(output)
+    files = [path for path, words in ((initial, STARTS), (prior, PRIORS)) if path not in words]
+    check_plot(plot, output, [log, *files])
     from nscan_cli.cli.document import document, provenance_of
     from nscan_cli.inputs import base_name
     from nscan_cli.logs.load import read_log
@@ -116,6 +121,10 @@ def command(
     }
     provenance = provenance_of([scans.source, *sources], parameters)
     write_whole(output, document(FORMAT, provenance, _fields(numbers, match, left_out)))
+    if plot is not None:
+        from nscan_cli.mapping.plots import plot_nscan
+
+        write_plot(plot, plot_nscan(numbers, points, start, match, left_out))
     for line in _summary(numbers, match, left_out):
         say(line, quiet)
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from nscan_cli.errors import InputDataError
 from nscan_cli.evaluation.association import mutual, no_match
@@ -29,6 +30,10 @@ class TrajectoryErrors:
     """Poses of the result that have none."""
     alignment: Array
     """(3,) motion that takes the result into the frame of the reference."""
+    rows: NDArray[np.int64]
+    """(matched,) rows of the result's poses that have their match."""
+    translation: Array
+    """(matched,) m, absolute, of the poses in `rows`."""
     absolute_translation: Spread
     absolute_rotation: Spread
     relative_translation: Spread | None
@@ -54,12 +59,15 @@ def trajectory_errors(
     poses, truth = result.poses[rows], reference.poses[partners]
     motion = alignment(poses, truth)
     aligned = compose(motion, poses)
+    translation = np.hypot(*(aligned - truth)[:, :2].T)
     relative_errors = _relative_errors(poses, truth)
     return TrajectoryErrors(
         matched=len(rows),
         unmatched=len(result) - len(rows),
         alignment=motion,
-        absolute_translation=Spread.of(np.hypot(*(aligned - truth)[:, :2].T)),
+        rows=rows,
+        translation=translation,
+        absolute_translation=Spread.of(translation),
         absolute_rotation=Spread.of(np.degrees(np.abs(wrap(aligned[:, 2] - truth[:, 2])))),
         relative_translation=Spread.of(relative_errors[0]) if len(relative_errors[0]) else None,
         relative_rotation=Spread.of(relative_errors[1]) if len(relative_errors[1]) else None,

@@ -8,11 +8,20 @@ from collections.abc import Sequence
 import numpy as np
 
 from nscan_cli.mapping.canvas import BLACK, TEXT_SIZE, Canvas, Colour
+from nscan_cli.mapping.ramp import ramp
+from nscan_cli.mapping.symbols import crosses, robots
 
+Entry = tuple[str, Colour, str]
+"""Of a legend: a shape (line, disc, robot, cross, ellipse or, all colours of it, ramp), colour, meaning."""
 AXES_MARGINS = (64.0, 44.0, 24.0, 64.0)
 """What `axes` needs around the plot, units."""
+CAPTION_MARGINS = (64.0, 48.0, 24.0, 92.0)
+"""What `caption` needs."""
 FOOTER_MARGINS = (0.0, 0.0, 0.0, 44.0)
 """What `footer` needs."""
+GAP, BETWEEN = 8.0, 22.0
+"""Units from a symbol to its meaning, and from there to the next symbol."""
+RAMP_STEPS = 14
 
 
 def axes(canvas: Canvas) -> None:
@@ -35,11 +44,21 @@ def axes(canvas: Canvas) -> None:
     canvas.text((left, top - 12 * unit), "y (m)", "mb")
 
 
-def footer(canvas: Canvas, entries: Sequence[tuple[str, Colour, str]]) -> None:
-    """A scale and a legend below the plot.
+def caption(canvas: Canvas, title: str, entries: Sequence[Entry]) -> None:
+    """Axes, a title above the plot, and a legend below it; over whatever was drawn in the margins."""
+    left, top, right, bottom = canvas.plot
+    canvas.clear_margins()
+    axes(canvas)
+    # Beside "y (m)".
+    start = left + 40 * canvas.unit
+    size = TEXT_SIZE * min(1.0, (right - start) / canvas.text_width(title))
+    x = max(start, (left + right - canvas.text_width(title, size)) / 2)
+    canvas.text((x, top - 16 * canvas.unit), title, "ls", size)
+    legend(canvas, entries, left, right, bottom + 72 * canvas.unit, 0.5)
 
-    An entry is a shape ("line", "disc" or "ellipse"), its colour, and what it stands for.
-    """
+
+def footer(canvas: Canvas, entries: Sequence[Entry]) -> None:
+    """A scale and a legend below the plot."""
     left, _top, right, bottom = canvas.plot
     unit, y = canvas.unit, bottom + 22 * canvas.unit
     length = round_length((canvas.bounds[2] - canvas.bounds[0]) / 8)
@@ -50,17 +69,29 @@ def footer(canvas: Canvas, entries: Sequence[tuple[str, Colour, str]]) -> None:
     canvas.pixel_lines(ends, BLACK, 2)
     scale = f"{length:g} m"
     canvas.text((end + 9 * unit, y), scale)
-    room = right - end - canvas.text_width(scale) - 60 * unit
-    needed = sum(canvas.text_width(meaning) + 54 * unit for _shape, _colour, meaning in entries)
-    size = TEXT_SIZE * min(1.0, room / max(needed, 1.0))
-    shrunk = unit * size / TEXT_SIZE
-    x = right - 14 * unit
-    for shape, colour, meaning in reversed(entries):
-        x -= canvas.text_width(meaning, size)
-        canvas.text((x, y), meaning, size=size)
-        x -= 36 * shrunk
-        _symbol(canvas, shape, x, y, shrunk, colour)
-        x -= 18 * shrunk
+    legend(canvas, entries, end + canvas.text_width(scale) + 28 * unit, right - 14 * unit, y)
+
+
+def legend(
+    canvas: Canvas, entries: Sequence[Entry], left: float, right: float, y: float, align: float = 1.0
+) -> None:
+    """Symbols and what they stand for in a line at y, between left and right, all in pixels.
+
+    Smaller where there is little room; `align` is the share of what is left of it that comes first.
+    """
+    needed = sum(
+        canvas.text_width(entry[2]) + (_symbol_width(entry) + GAP + BETWEEN) * canvas.unit
+        for entry in entries
+    )
+    needed -= BETWEEN * canvas.unit
+    shrunk = min(1.0, (right - left) / max(needed, 1.0))
+    size, unit = TEXT_SIZE * shrunk, canvas.unit * shrunk
+    x = left + align * (right - left - shrunk * needed)
+    for entry in entries:
+        _symbol(canvas, entry, x, y, unit)
+        x += (_symbol_width(entry) + GAP) * unit
+        canvas.text((x, y), entry[2], size=size)
+        x += canvas.text_width(entry[2], size) + BETWEEN * unit
 
 
 def round_length(length: float) -> float:
@@ -69,14 +100,29 @@ def round_length(length: float) -> float:
     return next(factor * power for factor in (5, 2, 1) if factor * power <= length * (1 + 1e-9))
 
 
-def _symbol(canvas: Canvas, shape: str, x: float, y: float, unit: float, colour: Colour) -> None:
-    """A symbol of 28 units (of so many pixels) from x to the right."""
-    middle = np.array([[x + 14 * unit, y]])
+def _symbol_width(entry: Entry) -> float:
+    """Units."""
+    return 70.0 if entry[0] == "ramp" else 28.0
+
+
+def _symbol(canvas: Canvas, entry: Entry, x: float, y: float, unit: float) -> None:
+    """A symbol from x to the right, with units of so many pixels."""
+    shape, colour, _meaning = entry
+    width = _symbol_width(entry)
+    middle = np.array([[x + width / 2 * unit, y]])
     shrunk = unit / canvas.unit
     if shape == "line":
-        canvas.pixel_lines(np.array([[[x, y], [x + 28 * unit, y]]]), colour, 3)
+        canvas.pixel_lines(np.array([[[x, y], [x + width * unit, y]]]), colour, 3)
+    elif shape == "ramp":
+        edges = np.linspace(x, x + width * unit, RAMP_STEPS + 1)
+        for start, end, step in zip(edges[:-1], edges[1:], ramp(RAMP_STEPS), strict=True):
+            canvas.pixel_lines(np.array([[[start, y], [end, y]]]), step, 12 * shrunk)
     elif shape == "disc":
         canvas.pixel_ovals(middle, np.array([5.0, 5.0]) * shrunk, colour)
+    elif shape == "robot":
+        robots(canvas, middle, np.zeros(1), 7 * shrunk, colour)
+    elif shape == "cross":
+        crosses(canvas, middle, 6 * shrunk, colour)
     else:
         canvas.pixel_ovals(middle, np.array([12.0, 7.0]) * shrunk, (*colour[:3], 60), colour)
 

@@ -7,7 +7,7 @@ picture looks the same however many pixels it has.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -44,6 +44,8 @@ PIECE = 32
 """Corners of the pieces that long lines are drawn in."""
 CORNERS = 48
 """Of the polygon that is drawn for an ellipse."""
+DOT_CORNERS = 12
+"""The same for a small dot."""
 
 
 @dataclass(frozen=True)
@@ -75,10 +77,11 @@ class Canvas:
         pixels_per_metre: float,
         background: NDArray[np.uint8] | None = None,
         margins: Margins = (0, 0, 0, 0),
+        scale: float = 1.0,
     ) -> None:
         """A white picture, or one with a gray `background` (h, w) that covers the bounds.
 
-        The margins are added around it.
+        The margins are added around it. With a `scale`, units are larger, as a panel of a picture needs it.
         """
         self.bounds = bounds
         self.pixels_per_metre = pixels_per_metre
@@ -87,7 +90,7 @@ class Canvas:
             height = math.ceil((bounds[3] - bounds[1]) * pixels_per_metre)
             background = np.full((height, width), 255, dtype=np.uint8)
         height, width = background.shape
-        self.unit = max(width, height) / 1000
+        self.unit = scale * max(width, height) / 1000
         """Pixels."""
         left, top, right, bottom = (round(margin * self.unit) for margin in margins)
         self.plot = (left, top, left + width, top + height)
@@ -99,9 +102,12 @@ class Canvas:
         self._strokes: list[Callable[[Band], None]] = []
 
     @classmethod
-    def blank(cls, bounds: Bounds, longest: int, margins: Margins = (0, 0, 0, 0)) -> Canvas:
+    def blank(
+        cls, bounds: Bounds, longest: int, margins: Margins = (0, 0, 0, 0), scale: float = 1.0
+    ) -> Canvas:
         """A white plot whose longer side has `longest` pixels."""
-        return cls(bounds, longest / max(bounds[2] - bounds[0], bounds[3] - bounds[1]), margins=margins)
+        pixels_per_metre = longest / max(bounds[2] - bounds[0], bounds[3] - bounds[1])
+        return cls(bounds, pixels_per_metre, None, margins, scale)
 
     def pixels(self, points: Array) -> Array:
         """Points (…, 2) in metres as positions (…, 2) in the picture, pixels from its upper left corner."""
@@ -128,6 +134,12 @@ class Canvas:
     def circles(self, centres: Array, radius: float, colour: Colour, ring: Colour | None = None) -> None:
         """Discs at the points (N, 2), m, of `radius` units; with a `ring` around each if wanted."""
         self.pixel_ovals(self.pixels(centres), np.array([radius, radius]), colour, ring)
+
+    def dots(self, points: Array, radius: float, colour: Colour) -> None:
+        """Many small discs at those of the points (N, 2), m, that lie in the plot, of `radius` units."""
+        low, high = np.array(self.bounds[:2]), np.array(self.bounds[2:])
+        inside = points[np.all((points >= low) & (points <= high), axis=1)]
+        self.pixel_ovals(self.pixels(inside), np.array([radius, radius]), colour, corners=DOT_CORNERS)
 
     def ellipses(self, centres: Array, covariances: Array, sigmas: float, colour: Colour) -> None:
         """Ellipses of `sigmas` standard deviations of covariances (N, 2, 2), m², around (N, 2), m."""
@@ -165,18 +177,38 @@ class Canvas:
 
         self._strokes.append(stroke)
 
-    def pixel_ovals(self, centres: Array, radii: Array, colour: Colour, ring: Colour | None = None) -> None:
+    def pixel_ovals(
+        self,
+        centres: Array,
+        radii: Array,
+        colour: Colour,
+        ring: Colour | None = None,
+        corners: int = CORNERS,
+    ) -> None:
         """Ovals at (N, 2) in pixels, with two radii along the picture's axes, in units."""
-        angles = np.linspace(0, 2 * np.pi, CORNERS, endpoint=False)
+        angles = np.linspace(0, 2 * np.pi, corners, endpoint=False)
         circle = np.stack([np.cos(angles), np.sin(angles)], axis=-1) * radii * self.unit
         self._ovals(centres[:, None, :] + circle, ring, colour)
+
+    def clear_margins(self) -> None:
+        """White around the plot: cuts off what reaches beyond its edges."""
+        left, top, right, bottom = self.plot
+        width, height = self.size
+        sides = (
+            (0, 0, width, top),
+            (0, bottom, width, height),
+            (0, 0, left, height),
+            (right, 0, width, height),
+        )
+        corners = [[[a, b], [c, b], [c, d], [a, d]] for a, b, c, d in sides]
+        self._ovals(np.array(corners, dtype=np.float64), None, WHITE)
 
     def text(
         self, place: tuple[float, float], text: str, anchor: str = "lm", size: float = TEXT_SIZE
     ) -> None:
         """Text at a place in pixels; `anchor` is Pillow's: l m r, then a t m b (s: on the base line).
 
-        Pillow's own font has the letters of Latin 1 only: no Greek, and no minus but the hyphen.
+        Pillow's own font has some signs of Latin 1 only: ° and ±, but no ×, ², Greek, or true minus.
         """
         font = self._font(size)
 
@@ -213,7 +245,7 @@ class Canvas:
         return png_bytes(self.image())
 
     def _ovals(self, outlines: Array, ring: Colour | None, inside: Colour) -> None:
-        """Polygons (N, CORNERS, 2) in pixels."""
+        """Polygons (N, corners, 2) in pixels."""
 
         def stroke(band: Band) -> None:
             width = max(SAMPLES, round(1.2 * self.unit * SAMPLES))
@@ -231,15 +263,3 @@ class Canvas:
         font = ImageFont.load_default(size * self.unit * SAMPLES)
         assert isinstance(font, ImageFont.FreeTypeFont)
         return font
-
-
-def side_by_side(pictures: Sequence[Image]) -> Image:
-    """Pictures in a row on white."""
-    from PIL import Image
-
-    row = Image.new("RGB", (sum(p.width for p in pictures), max(p.height for p in pictures)), WHITE)
-    left = 0
-    for picture in pictures:
-        row.paste(picture, (left, 0))
-        left += picture.width
-    return row

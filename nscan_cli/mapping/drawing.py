@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from nscan_cli.graph.model import Graph
 from nscan_cli.logs.scan import LaserLog
-from nscan_cli.mapping.axes import AXES_MARGINS, FOOTER_MARGINS, axes, footer
+from nscan_cli.mapping.axes import AXES_MARGINS, FOOTER_MARGINS, Entry, axes, footer
 from nscan_cli.mapping.canvas import (
     BLACK,
     BLUE,
@@ -19,12 +19,12 @@ from nscan_cli.mapping.canvas import (
     PURPLE,
     SKY,
     VERMILLION,
-    Bounds,
     Canvas,
-    Colour,
 )
+from nscan_cli.mapping.ellipses import draw_ellipses
 from nscan_cli.mapping.image import gray
 from nscan_cli.mapping.occupancy import FREE, OCCUPIED, UNKNOWN, OccupancyGrid
+from nscan_cli.mapping.panels import bounds_around
 from nscan_cli.poses import Array, transform
 
 LEAST_PIXELS, MOST_PIXELS = 1600, 3200
@@ -34,7 +34,6 @@ FIGURE_PIXELS = 2400
 """Of the longer side of a figure's plot: 20 cm at 300 dots an inch."""
 SOFT_GRAYS = {OCCUPIED: 60, UNKNOWN: 226, FREE: 255}
 """Softer than map_server's, so that colours stand out."""
-SIGMAS = 3.0
 SEEN_ELLIPSE = 8.0
 """Units of the longer half axis that an ellipse needs to be seen."""
 
@@ -75,16 +74,16 @@ def draw_figure(
     """
     points = _points_of_occupied_cells(log, rows, poses, grid)
     seen = np.concatenate([points, graph.poses[:, :2]])
-    canvas = Canvas.blank(_bounds_around(seen), FIGURE_PIXELS, AXES_MARGINS)
+    canvas = Canvas.blank(bounds_around(seen), FIGURE_PIXELS, AXES_MARGINS)
     canvas.cloud(points, BLACK, 0.6)
     _draw_overlays(canvas, graph, overlays if overlays else Overlays(trajectory=True))
     axes(canvas)
     return canvas
 
 
-def _draw_overlays(canvas: Canvas, graph: Graph, overlays: Overlays) -> list[tuple[str, Colour, str]]:
+def _draw_overlays(canvas: Canvas, graph: Graph, overlays: Overlays) -> list[Entry]:
     """Draw them; the legend's entries for what was drawn."""
-    entries: list[tuple[str, Colour, str]] = []
+    entries: list[Entry] = []
     if overlays.trajectory:
         # Beneath relations, a broad and light band.
         colour, width = (SKY, 5.0) if overlays.graph else (BLUE, 2.2)
@@ -114,7 +113,7 @@ def _background(grid: OccupancyGrid) -> tuple[NDArray[np.uint8], float]:
     return np.where(darkest == SOFT_GRAYS[OCCUPIED], darkest, np.round(mean)).astype(np.uint8), float(side)
 
 
-def _draw_graph(canvas: Canvas, graph: Graph) -> list[tuple[str, Colour, str]]:
+def _draw_graph(canvas: Canvas, graph: Graph) -> list[Entry]:
     """Relations as lines, of an nScan relation from its fixed scan to the others; keyframes as dots."""
     edges = [
         (relation.nodes, "loop" if relation.origin == "loop" else "pairwise") for relation in graph.pairwise
@@ -123,7 +122,7 @@ def _draw_graph(canvas: Canvas, graph: Graph) -> list[tuple[str, Colour, str]]:
         centre = joint.nodes[joint.fixed]
         kind = "loop" if joint.origin == "loop" else "nScan"
         edges += [((centre, node), kind) for node in joint.nodes if node != centre]
-    entries: list[tuple[str, Colour, str]] = []
+    entries: list[Entry] = []
     for kind, colour, width in (("nScan", GREEN, 1.2), ("pairwise", DIM, 1.2), ("loop", VERMILLION, 2.6)):
         nodes = np.array(sorted({pair for pair, of in edges if of == kind})).reshape(-1, 2).astype(np.int64)
         if len(nodes):
@@ -134,18 +133,13 @@ def _draw_graph(canvas: Canvas, graph: Graph) -> list[tuple[str, Colour, str]]:
     return [*entries, ("disc", BLACK, "keyframe")]
 
 
-def _draw_uncertainty(canvas: Canvas, graph: Graph) -> list[tuple[str, Colour, str]]:
-    """Ellipses of the keyframes' positions; enlarged, and said so, where they would be too small to see."""
+def _draw_uncertainty(canvas: Canvas, graph: Graph) -> list[Entry]:
+    """Ellipses of the keyframes' positions."""
     keyframes = sorted(graph.marginals)
     if not keyframes:
         return []
     covariances = np.array([graph.marginals[keyframe][:2, :2] for keyframe in keyframes])
-    largest = SIGMAS * math.sqrt(float(np.linalg.eigvalsh(covariances).max()))
-    seen = SEEN_ELLIPSE * canvas.unit / canvas.pixels_per_metre
-    times = 10.0 ** min(3, max(0, math.ceil(math.log10(seen / largest)))) if largest > 0 else 1.0
-    canvas.ellipses(graph.poses[keyframes, :2], covariances, SIGMAS * times, PURPLE)
-    enlarged = f" × {times:g}" if times > 1 else ""
-    return [("ellipse", PURPLE, f"{SIGMAS:g} sigma{enlarged}")]
+    return [draw_ellipses(canvas, graph.poses[keyframes, :2], covariances, PURPLE, SEEN_ELLIPSE)]
 
 
 def _points_of_occupied_cells(
@@ -159,11 +153,3 @@ def _points_of_occupied_cells(
     points, columns, lines = points[inside], columns[inside], lines[inside]
     occupied: Array = points[grid.states()[lines, columns] == OCCUPIED]
     return occupied
-
-
-def _bounds_around(points: Array) -> Bounds:
-    """The points' bounds with two hundredths of the longer side to spare."""
-    low, high = points.min(axis=0), points.max(axis=0)
-    spare = 0.02 * float((high - low).max())
-    (low_x, low_y), (high_x, high_y) = (low - spare).tolist(), (high + spare).tolist()
-    return low_x, low_y, high_x, high_y

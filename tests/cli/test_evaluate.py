@@ -7,9 +7,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from PIL import Image
 
 from nscan_cli.cli.main import run
 from nscan_cli.graph.tum import write_tum
+from nscan_cli.mapping.canvas import BLUE, VERMILLION
+from nscan_cli.mapping.error_plots import REFERENCE
+from nscan_cli.mapping.ramp import ramp
 
 # The robot drives 1 m a second along x; the relations say 1.1 m, and 1 m with 2° more.
 STAMPS = ["10.000000", "11.000000", "12.000000", "13.000000"]
@@ -133,3 +137,88 @@ def test_a_mistake_is_one_line_and_its_code(
     assert out == ""
     assert problem in err
     assert len(err.splitlines()) == 1
+
+
+def plotted(capsys: pytest.CaptureFixture[str], *arguments: str) -> np.ndarray:
+    """The pixels of the picture; the tables are the same as without it."""
+    assert run(["evaluate", "result.tum", *arguments]) == 0
+    alone = capsys.readouterr()
+    assert run(["evaluate", "result.tum", *arguments, "--plot", "errors.png"]) == 0
+    assert capsys.readouterr() == alone
+    with Image.open("errors.png") as picture:
+        assert picture.format == "PNG"
+        pixels: np.ndarray = np.asarray(picture).astype(int)
+    return pixels
+
+
+def count(pixels: np.ndarray, colour: tuple[int, ...]) -> int:
+    return int(np.count_nonzero((pixels == colour).all(axis=-1)))
+
+
+def test_the_plot_shows_the_worst_relations(files: Path, capsys: pytest.CaptureFixture[str]):
+    relations = ("--relations", "floor.relations")
+    both, one, none = (
+        plotted(capsys, *relations, *worst) for worst in ((), ("--worst", "1"), ("--worst", "0"))
+    )
+    assert both.shape == one.shape
+    assert 2000 < both.shape[1] < 3500
+    assert count(both, BLUE) > 500
+    # The path is 3 m of nearly 2400 pixels, a relation 1 m of it: a line of 7 pixels and a number more.
+    assert count(both, VERMILLION) - count(one, VERMILLION) > 3000
+    assert count(none, VERMILLION) == 0
+
+
+def test_the_plot_shows_both_trajectories_and_the_error(files: Path, capsys: pytest.CaptureFixture[str]):
+    pixels = plotted(capsys, "--reference", "reference.tum")
+    assert count(pixels, REFERENCE) > 1000
+    # All errors are 0.1 m, the greatest.
+    assert count(pixels, ramp(16)[-1]) > 100
+
+
+@pytest.mark.parametrize("square", [True, False], ids=["side by side", "stacked"])
+def test_relations_and_reference_have_a_panel_each(
+    files: Path, capsys: pytest.CaptureFixture[str], square: bool
+):
+    if square:
+        poses = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]])
+        for name in ("result.tum", "reference.tum"):
+            Path(name).write_bytes(write_tum(STAMPS, poses))
+    pixels = plotted(capsys, "--relations", "floor.relations", "--reference", "reference.tum")
+    height, width, _channels = pixels.shape
+    if square:
+        first, second = pixels[:, : width // 2], pixels[:, width // 2 :]
+    else:
+        first, second = pixels[: height // 2], pixels[height // 2 :]
+    assert count(first, VERMILLION) > 500
+    assert count(second, REFERENCE) > 500
+    # A few pixels of the edges of letters have that gray as well.
+    assert count(first, REFERENCE) < 100
+    assert count(second, VERMILLION) == 0
+
+
+def test_a_failed_check_has_a_plot_too(files: Path, capsys: pytest.CaptureFixture[str]):
+    arguments = ["--relations", "floor.relations", "--max-translation", "0", "--plot", "errors.png"]
+    assert run(["evaluate", "result.tum", *arguments]) == 3
+    assert Path("errors.png").exists()
+
+
+@pytest.mark.parametrize(
+    ("plot", "code", "problem"),
+    [
+        ("-", 2, "--plot -: only the result can go to standard output"),
+        ("errors.jpg", 2, "pictures are PNG; name it like errors.png"),
+        ("result.tum", 2, "is an input, and would be replaced"),
+        ("./floor.relations", 2, "is an input, and would be replaced"),
+        ("no/errors.png", 73, "the folder no does not exist"),
+    ],
+)
+def test_a_plot_that_cannot_be_is_refused_before_the_work(
+    files: Path, capsys: pytest.CaptureFixture[str], plot: str, code: int, problem: str
+):
+    before = {path: path.read_bytes() for path in files.iterdir()}
+    assert run(["evaluate", "result.tum", "--relations", "floor.relations", "--plot", plot]) == code
+    out, err = capsys.readouterr()
+    assert out == ""
+    assert problem in err
+    assert len(err.splitlines()) == 1
+    assert {path: path.read_bytes() for path in files.iterdir()} == before

@@ -8,10 +8,12 @@ from typing import Any
 
 import numpy as np
 import pytest
+from PIL import Image
 
 from nscan_cli.cli.main import run
 from nscan_cli.graph.triangles import from_upper_triangle
 from nscan_cli.logs.load import read_log
+from nscan_cli.mapping.canvas import BLUE, PURPLE, VERMILLION
 from nscan_cli.poses import relative
 from tests.data import data_file
 from tests.logs.lines import flaser
@@ -129,6 +131,63 @@ def test_the_options_can_be_dumped_and_read_back(tmp_path, capsys):
     assert 'initial = "0.1,0,90"' in config.read_text()
     document, _ = matched(capsys, SAMPLE, "--config", str(config))
     np.testing.assert_allclose(document["initial"], [0.1, 0, np.pi / 2], atol=1e-9)
+
+
+def test_the_plot_shows_both_scans_before_and_after(tmp_path, capsys):
+    arguments = ["match", SAMPLE, "--reference", "2000", "--scan", "2008", "--initial", "0.6,0.4,12"]
+    assert run(arguments) == 0
+    alone = capsys.readouterr()
+    assert run([*arguments, "--plot", str(tmp_path / "match.png")]) == 0
+    assert capsys.readouterr() == alone
+    assert [path.name for path in tmp_path.iterdir()] == ["match.png"]
+    with Image.open(tmp_path / "match.png") as picture:
+        assert picture.format == "PNG"
+        pixels = np.asarray(picture).astype(int)
+    # Scans of a room, no wider than high: two panels side by side.
+    height, width, _channels = pixels.shape
+    assert 2000 < width < 3000
+    assert height < width
+    before, after = pixels[:, : width // 2], pixels[:, width // 2 :]
+    assert (before != after).any()
+    for panel in (before, after):
+        for colour in (BLUE, VERMILLION):
+            assert np.count_nonzero((panel == colour).all(axis=-1)) > 100
+    purple = [np.count_nonzero(np.abs(panel - PURPLE).max(axis=-1) < 40) for panel in (before, after)]
+    assert purple[0] == 0
+    assert purple[1] > 100
+
+
+def test_a_match_that_failed_has_a_plot_too(tmp_path, capsys):
+    document, _ = matched(
+        capsys, SAMPLE, "--reference", "0", "--scan", "1", "--initial", "-300,0,0", "--prior", "none",
+        "--plot", str(tmp_path / "failed.png"),
+    )  # fmt: skip
+    assert not document["converged"]
+    assert (tmp_path / "failed.png").exists()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code", "said"),
+    [
+        (["--plot", "-"], 2, "--plot -: only the result can go to standard output; name a file"),
+        (["--plot", "match.pdf"], 2, "pictures are PNG; name it like match.png"),
+        (["-o", "match", "--plot", "./match"], 2, "is the result's name too"),
+        (["--plot", SAMPLE], 2, "is an input, and would be replaced"),
+        (["--plot", "no/such.png"], 73, "the folder no does not exist"),
+        (["--plot", "."], 73, "is a folder"),
+    ],
+)
+def test_a_plot_that_cannot_be_is_refused_before_the_work(
+    tmp_path, monkeypatch, capsys, arguments, code, said
+):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("nscan_cli.logs.load.read_log", pytest.fail)
+    assert run(["match", SAMPLE, "--reference", "10", "--scan", "12", *arguments]) == code
+    out, err = capsys.readouterr()
+    assert out == ""
+    assert len(err.splitlines()) == 1
+    assert said in err
+    assert list(tmp_path.iterdir()) == []
 
 
 @pytest.mark.parametrize(

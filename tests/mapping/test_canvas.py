@@ -1,9 +1,8 @@
 import numpy as np
 import pytest
-from PIL import Image
 
 from nscan_cli.mapping import canvas as canvas_module
-from nscan_cli.mapping.canvas import BLUE, GREEN, ORANGE, PURPLE, VERMILLION, WHITE, Canvas, side_by_side
+from nscan_cli.mapping.canvas import BLUE, GREEN, ORANGE, PURPLE, VERMILLION, WHITE, Canvas
 
 BOUNDS = (-2.0, -1.0, 2.0, 1.0)
 
@@ -141,10 +140,3 @@ def test_text_stands_where_it_is_anchored_and_is_as_wide_as_said():
     assert (columns.min() + columns.max()) / 2 == pytest.approx(500, abs=4)
     assert (rows.min() + rows.max()) / 2 == pytest.approx(250, abs=6)
     assert np.ptp(columns) == pytest.approx(canvas.text_width("12.5 m", size=40), rel=0.1)
-
-
-def test_pictures_side_by_side():
-    row = side_by_side([Image.new("RGB", (10, 20), BLUE), Image.new("RGB", (5, 20), ORANGE)])
-    assert row.size == (15, 20)
-    assert row.getpixel((9, 19)) == BLUE
-    assert row.getpixel((10, 0)) == ORANGE

@@ -1,0 +1,50 @@
+"""The option --plot, which several commands have: a picture beside their result."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from nscan_cli.cli.options import Command
+from nscan_cli.cli.output import check_writable, write_whole
+from nscan_cli.errors import WrongUsageError
+
+if TYPE_CHECKING:
+    from PIL.Image import Image
+
+OTHER_FORMATS = (".bmp", ".eps", ".gif", ".jpeg", ".jpg", ".pdf", ".svg", ".tif", ".tiff", ".webp")
+
+
+def plot_option(shows: str) -> Callable[[Command], Command]:
+    """The option; `shows` is what the picture shows."""
+    return click.option("--plot", metavar="PICTURE.png", help=f"Draw {shows}, as a PNG.")
+
+
+def check_plot(plot: str | None, output: str | None, inputs: Sequence[str | None]) -> None:
+    """Refuse a picture that could never be written, or that would replace another file of the command.
+
+    Raises WrongUsageError and OutputError.
+    """
+    if plot is None:
+        return
+    if plot == "-":
+        raise WrongUsageError("--plot -: only the result can go to standard output; name a file")
+    if Path(plot).suffix.lower() in OTHER_FORMATS:
+        raise WrongUsageError(f"--plot {plot}: pictures are PNG; name it like {Path(plot).stem}.png")
+    file = os.path.realpath(plot)
+    if output not in (None, "-") and os.path.realpath(str(output)) == file:
+        raise WrongUsageError(f"--plot {plot}: is the result's name too; give each its own")
+    if file in (os.path.realpath(path) for path in inputs if path and path != "-"):
+        raise WrongUsageError(f"--plot {plot}: is an input, and would be replaced; choose another name")
+    check_writable(plot)
+
+
+def write_plot(plot: str, picture: Image) -> None:
+    """Write the picture whole or not at all. Raises OutputError."""
+    from nscan_cli.mapping.image import png_bytes
+
+    write_whole(plot, png_bytes(picture))
