@@ -120,7 +120,7 @@ def _map(log: str, reading: ReadingOptions, max_scans: int, quiet: bool) -> tupl
     for warning in scans.report.notices():
         say(f"warning: {warning}", quiet)
     if first_compile():
-        say("compiling the kernels, once for this version on this machine: about half a minute", quiet)
+        say("compiling the kernels, once for this version on this machine: about 20 s", quiet)
     options = SlamOptions()
     options = dataclasses.replace(options, nscan=dataclasses.replace(options.nscan, max_scans=max_scans))
     slam = Slam(scans, options)
