@@ -170,9 +170,10 @@ def _summary(reference: int, scan: int, match: PairMatch) -> list[str]:
     x, y, angle = match.pose.tolist()
     outcome = "converged" if match.converged else f"not converged ({match.reason})"
     sigma = match.weakest.sigma
+    degrees = round(math.degrees(angle), 2) + 0.0  # never −0.00
     known = "open" if sigma is None else f"σ {sigma:.3g} m"
     return [
-        f"scan {scan} in the frame of scan {reference}: {x:.3f} m, {y:.3f} m, {round(math.degrees(angle), 2) + 0.0:.2f}°; "
+        f"scan {scan} in the frame of scan {reference}: {x:.3f} m, {y:.3f} m, {degrees:.2f}°; "
         f"{outcome}, {match.iterations} iterations, {match.evaluations} evaluations",
         f"overlap {match.overlap:.0%}; weakest along {math.degrees(match.weakest.direction):.1f}° from "
         f"scan {reference}'s x axis: {known}",
