@@ -95,14 +95,20 @@ def joint_energy(
     scale: float = 1.0,
     widening: float = 1.0,
     exact: bool = True,
+    neutral: bool = False,
 ) -> JointEnergy:
     """Scale · E(p) plus the priors at the poses (n, 3), over the ordered pairs (m, 2) (i, j) ∈ J.
 
     `exact=False` keeps the semi-definite part of the Hessian only: Σ (∂u/∂p)ᵗ H⁺ (∂u/∂p).
+
+    E rewards every point that meets a Gaussian, so that it falls when scans are slid over each other.
+    `neutral=True` takes that reward away: a point counts s less 1/√(1 + w), which is the mean of s when
+    the distance from a wall is spread as its Gaussian says. Gradient and Hessian are the same.
     """
     n = len(poses)
     gradient, hessian = np.zeros(3 * n), np.zeros((3 * n, 3 * n))
-    value = _add_pairs(scans, pairs, poses, scale, widening, float(exact), gradient, hessian)
+    baseline = 1.0 / np.sqrt(1.0 + widening) if neutral else 0.0
+    value = _add_pairs(scans, pairs, poses, scale, widening, float(exact), baseline, gradient, hessian)
     value += _add_priors(priors, poses, float(exact), gradient, hessian)
     return JointEnergy(value, gradient, hessian)
 
@@ -131,6 +137,7 @@ def _add_pairs(
     scale: float,
     widening: float,
     curvature: float,
+    baseline: float,
     gradient: Array,
     hessian: Array,
 ) -> float:
@@ -141,7 +148,16 @@ def _add_pairs(
         i, j = pairs[pair, 0], pairs[pair, 1]
         relative_pose(poses[j], poses[i], u)
         accumulate(
-            scan_grid(scans, i), scans.half, scan_points(scans, j), u[0], u[1], u[2], widening, curvature, out
+            scan_grid(scans, i),
+            scans.half,
+            scan_points(scans, j),
+            u[0],
+            u[1],
+            u[2],
+            widening,
+            curvature,
+            baseline,
+            out,
         )
         value += scale * out[0]
         unpack(out, scale, g, h)

@@ -35,7 +35,7 @@ def objective(
     hessian: Array,
 ) -> float:
     """The objective at `pose`; writes its gradient (3,) and Hessian (3, 3), and E's own into out (10,)."""
-    accumulate(grid, half, points, pose[0], pose[1], pose[2], widening, curvature, out)
+    accumulate(grid, half, points, pose[0], pose[1], pose[2], widening, curvature, 0.0, out)
     unpack(out, scale, gradient, hessian)
     value = scale * out[0]
     turn = pose[2] - prior_mean[2]

@@ -43,9 +43,9 @@ class PairOptions:
     """Longer beams are not matched, m."""
     widenings: tuple[float, ...] = (0.05, 0.3, 1.0)
     """One stage each: w of the energy; the last is 1, the energy itself."""
-    scale: float = 0.1
-    """What the energy is multiplied with to be a negative log likelihood: four Gaussians see each
-    point, and neighbouring points hit the same wall."""
+    scale: float = 0.6
+    """What the energy is multiplied with to be a negative log likelihood. Found on simulated scans with
+    range noise of 1.5 cm, where it makes the errors of matches as large as their covariances say."""
     max_iterations: int = 50
     """In each stage."""
     tolerance: float = 1e-5

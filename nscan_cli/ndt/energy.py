@@ -29,12 +29,14 @@ def accumulate(
     phi: float,
     widening: float,
     curvature: float,
+    baseline: float,
     out: Array,
 ) -> None:
     """Write E, gradient and Hessian at the pose u = (x, y, phi) of points (m, 2) into out (10,).
 
     With `curvature` 1 the Hessian is exact; with 0 its two terms that can be negative are left out, so
-    that it is positive semi-definite everywhere.
+    that it is positive semi-definite everywhere. `baseline` is what every Gaussian that a point meets
+    costs, well hit or not; it only counts when energies are compared.
     """
     cos, sin = np.cos(phi), np.sin(phi)
     e = gx = gy = gp = hxx = hxy = hxp = hyy = hyp = hpp = 0.0
@@ -61,7 +63,7 @@ def accumulate(
             ap = ay * rx - ax * ry
             jx, jy = gaussian[3] * rx - gaussian[2] * ry, gaussian[4] * rx - gaussian[3] * ry
             cw = curvature * widening
-            e -= s
+            e -= s - baseline
             gx += ws * ax
             gy += ws * ay
             gp += ws * ap
@@ -125,7 +127,7 @@ def energy(ndt: Ndt, points: Array, pose: Array, widening: float = 1.0, exact: b
     """
     out = np.empty(OUT)
     x, y, phi = (float(part) for part in pose)
-    accumulate(ndt.grid, ndt.half, points, x, y, phi, widening, float(exact), out)
+    accumulate(ndt.grid, ndt.half, points, x, y, phi, widening, float(exact), 0.0, out)
     gradient, hessian = np.empty(3), np.empty((3, 3))
     unpack(out, 1.0, gradient, hessian)
     return Energy(float(out[0]), gradient, hessian)

@@ -74,7 +74,8 @@ def test_a_corridor_shows_as_the_weakest_direction(capsys):
     """Scans 45 and 117 are 1 and 2 of the paper's Fig. 3: open along the corridor, the x axis of 45."""
     document, said = matched(capsys, CORRIDOR, "--reference", "45", "--scan", "117", "--prior", "none")
     assert abs(np.degrees(document["weakest"]["direction"])) < 10
-    assert document["weakest"]["sigma"] is None or document["weakest"]["sigma"] > 0.2
+    across = 1 / np.sqrt(document["eigenvalues"][-1])
+    assert document["weakest"]["sigma"] is None or document["weakest"]["sigma"] > 20 * across
     assert "from scan 45's x axis" in said[1]
 
 

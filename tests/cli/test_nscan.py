@@ -106,11 +106,14 @@ def test_gauges_and_the_fixed_scan(capsys, office):
     for document in (free, fixed):
         assert document["relation"]["fixed"] == 2016
         assert_true(document, office)
+    covariance = from_upper_triangle(free["covariance"], 9)
     assert office.odometry is not None
     start = relative(office.odometry[2016], office.odometry[2000])
     np.testing.assert_allclose(fixed["relation"]["poses"][2], start, atol=1e-8)
     off = errors(np.array(free["relation"]["poses"]), np.array(fixed["relation"]["poses"]))
-    assert np.abs(off).max() < 1e-3
+    # Where they stop at a cell's border the two differ, by less than matching knows.
+    sigmas = np.sqrt(np.diag(covariance)).reshape(-1, 3)
+    assert (np.abs(np.delete(off, 2, axis=0)) < 0.5 * sigmas).all()
 
 
 def test_without_odometry(capsys, office):

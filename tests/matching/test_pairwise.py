@@ -41,7 +41,9 @@ def pair_matches(noise: bool) -> list[tuple[PairMatch, Array]]:
 
 
 def test_relative_poses_are_found_without_noise():
-    """What is left is that two scans sample the same walls at other places: small against a cell of 1 m."""
+    """What is left is that two scans sample the same walls at other places: small against a cell of 1 m,
+    and within the covariance of noisy scans (99 % of χ² with three degrees of freedom is 11.3).
+    """
     matches = pair_matches(noise=False)
     distances = [float(np.hypot(*off[:2])) for _, off in matches]
     assert np.median(distances) < 0.003
@@ -49,7 +51,7 @@ def test_relative_poses_are_found_without_noise():
     assert max(abs(off[2]) for _, off in matches) < 0.003
     for match, off in matches:
         assert match.covariance is not None
-        assert off @ np.linalg.solve(match.covariance, off) < 1
+        assert off @ np.linalg.solve(match.covariance, off) < 11.3
 
 
 def test_relative_poses_are_found_within_the_noise():
