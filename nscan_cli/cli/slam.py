@@ -13,7 +13,7 @@ from nscan_cli.cli.options import CONTEXT, common_options, reading_options
 from nscan_cli.cli.output import check_writable, write_whole
 from nscan_cli.cli.progress import progress, say
 from nscan_cli.cli.render import check_map_outputs, write_map, yaml_path
-from nscan_cli.errors import InputDataError, WrongUsageError
+from nscan_cli.errors import WrongUsageError
 from nscan_cli.logs.options import ReadingOptions
 
 if TYPE_CHECKING:
@@ -71,7 +71,7 @@ def command(
     if log is not None:
         scans, graph, summary = _map(log, reading, max_scans, quiet)
     elif from_file is not None:
-        scans, graph, summary = None, *_again(from_file)
+        scans, graph, summary = None, *_again(from_file, quiet)
     _write(graph, output, trajectory, g2o)
     if map_file is not None and scans is not None:
         import numpy as np
@@ -137,7 +137,7 @@ def _map(log: str, reading: ReadingOptions, max_scans: int, quiet: bool) -> tupl
     return scans, graph, summary
 
 
-def _again(path: str) -> tuple[Graph, str]:
+def _again(path: str, quiet: bool) -> tuple[Graph, str]:
     """Optimise a saved graph."""
     from nscan_cli.graph.load import load_graph
     from nscan_cli.graph.marginals import marginal_covariances
@@ -147,7 +147,7 @@ def _again(path: str) -> tuple[Graph, str]:
     optimum = optimise_graph(graph)
     graph.marginals = marginal_covariances(graph)
     if not optimum.converged:
-        raise InputDataError(path, "its energy has no minimum that could be reached", "check its relations")
+        say(f"warning: {path}: the optimum was not reached, its relations contradict each other", quiet)
     return graph, (
         f"{len(graph.keyframes)} keyframes, {len(graph.pairwise)} pairwise and {len(graph.nscan)} nScan "
         f"relations: energy {optimum.energy:.6g} after {optimum.iterations} iterations"

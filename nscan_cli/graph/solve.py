@@ -14,6 +14,9 @@ from nscan_cli.graph.optimise import Optimum, optimise
 from nscan_cli.graph.pattern import Indices
 from nscan_cli.graph.system import GraphEnergy
 
+TRIAL = 100
+"""Iterations after which two starts are compared; only the better one goes on."""
+
 
 @dataclass(frozen=True)
 class GraphOptimum:
@@ -42,7 +45,7 @@ class Component:
         return GraphEnergy(len(self.keyframes), self.pairwise, self.nscan, positions)
 
 
-def optimise_graph(graph: Graph, max_iterations: int = 100, tolerance: float = 1e-6) -> GraphOptimum:
+def optimise_graph(graph: Graph, max_iterations: int = 1000, tolerance: float = 1e-6) -> GraphOptimum:
     """Move the keyframes to the minimum of the graph's energy, and the attached nodes with them.
 
     Starts once from the given poses and once from the chordal start, and keeps the lower minimum. The
@@ -59,11 +62,14 @@ def optimise_graph(graph: Graph, max_iterations: int = 100, tolerance: float = 1
         given = poses[part.keyframes]
         best: Optimum | None = None
         for start in (given, chordal_start(energy, given)):
-            found = optimise(energy, start, max_iterations, tolerance)
+            found = optimise(energy, start, min(TRIAL, max_iterations), tolerance)
             iterations += found.iterations
             if best is None or not best.energy <= found.energy * (1 + 1e-9):
                 best = found
         assert best is not None
+        if not best.converged:
+            best = optimise(energy, best.poses, max_iterations, tolerance)
+            iterations += best.iterations
         poses[part.keyframes] = best.poses
         total += best.energy
         converged &= best.converged
