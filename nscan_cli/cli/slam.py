@@ -51,7 +51,7 @@ def command(
     depfile: str | None,
     reading: ReadingOptions,
     quiet: bool,
-    **_verbosity: int,
+    verbose: int,
 ) -> None:
     """Turn LOG into a globally consistent pose graph, and a map if asked.
 
@@ -69,7 +69,7 @@ def command(
     _check_outputs(log or from_file or "", output, map_file, trajectory, g2o, depfile)
     began = time.perf_counter()
     if log is not None:
-        scans, graph, summary = _map(log, reading, max_scans, quiet)
+        scans, graph, summary = _map(log, reading, max_scans, quiet, verbose)
     elif from_file is not None:
         scans, graph, summary = None, *_again(from_file, quiet)
     _write(graph, output, trajectory, g2o)
@@ -109,7 +109,9 @@ def _check_outputs(source: str, output: str, map_file: str | None, *others: str 
         check_writable(path)
 
 
-def _map(log: str, reading: ReadingOptions, max_scans: int, quiet: bool) -> tuple[LaserLog, Graph, str]:
+def _map(
+    log: str, reading: ReadingOptions, max_scans: int, quiet: bool, verbose: int
+) -> tuple[LaserLog, Graph, str]:
     """Run the whole loop over a log."""
     from nscan_cli.compiled import first_compile
     from nscan_cli.logs.load import read_log
@@ -134,6 +136,8 @@ def _map(log: str, reading: ReadingOptions, max_scans: int, quiet: bool) -> tupl
         f"places seen before: {len(graph.loops)} tried, {accepted} matched, "
         f"{len(graph.loops) - accepted} refused"
     )
+    if verbose:
+        summary += f"\nstarts from other angles while tracking: {slam.tracker.restarts}"
     return scans, graph, summary
 
 

@@ -18,7 +18,6 @@ from nscan_cli.errors import InputDataError
 from nscan_cli.poses import Array
 
 TAG = re.compile(rb"[A-Z][A-Z0-9_]{2,31}\Z")
-OLD = re.compile(r"([FR]LASER|LASER[3-5])\Z")
 NEW = re.compile(r"(RAW|ROBOT)LASER\d\Z")
 TRAILER = 3
 CHUNK = 1024

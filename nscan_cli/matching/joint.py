@@ -30,8 +30,6 @@ class JointOptions:
     """The scan that stays where it is; None leaves the gauge free (paper, III-D)."""
     neutral: bool = False
     """Whether steps are judged by the neutral energy, see joint_energy."""
-    exact: bool = True
-    """Whether the last stage may use the exact Hessian where it is positive definite."""
 
 
 @dataclass(frozen=True)
@@ -59,14 +57,14 @@ def match_jointly(
 ) -> JointMatch:
     """Minimise scale · E(p) plus priors from the poses `start` (n, 3), stage by stage.
 
-    The steps are Newton's, eq. (5) to (8), damped as by Levenberg and Marquardt; in the early stages
-    with the semi-definite part of the Hessian.
+    The steps are Newton's, eq. (5) to (8), damped as by Levenberg and Marquardt; with the semi-definite
+    part of the Hessian in the early stages, and in the last where the exact one is not positive definite.
     """
     poses = start.copy()
     iterations = evaluations = 0
     converged = False
     for stage, widening in enumerate(options.widenings):
-        exact = options.exact and stage == len(options.widenings) - 1
+        exact = stage == len(options.widenings) - 1
         here = joint_energy(scans, pairs, priors, poses, scale, widening, exact, options.neutral)
         evaluations += 1
         damping, converged = FIRST_DAMPING, False
