@@ -5,9 +5,6 @@ from __future__ import annotations
 import json
 from typing import Any
 
-from nscan_cli import __version__
-from nscan_cli.logs.scan import Source
-
 UNITS = {"length": "m", "angle": "rad"}
 
 
@@ -19,14 +16,3 @@ def document(name: str, provenance: dict[str, Any], fields: dict[str, Any]) -> b
         for key, value in {**head, **fields}.items()
     ]
     return ("{" + ",\n".join(lines) + "}\n").encode()
-
-
-def provenance_of(sources: list[Source], parameters: dict[str, Any]) -> dict[str, Any]:
-    """What a result was made from, as in the graph."""
-    return {
-        "tool": {"name": "nscan-cli", "version": __version__},
-        "inputs": [
-            {"name": source.name, "sha256": source.sha256, "bytes": source.bytes} for source in sources
-        ],
-        "parameters": parameters,
-    }

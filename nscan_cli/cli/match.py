@@ -14,6 +14,7 @@ from nscan_cli.cli.picture import check_plot, plot_option, write_plot
 from nscan_cli.cli.progress import say
 from nscan_cli.errors import WrongUsageError
 from nscan_cli.logs.options import ReadingOptions
+from nscan_cli.provenance import provenance_of
 
 if TYPE_CHECKING:
     from nscan_cli.logs.scan import LaserLog
@@ -135,7 +136,7 @@ def _start(log: LaserLog, rows: tuple[int, int], initial: str) -> Array:
 def _document(
     log: LaserLog, numbers: tuple[int, int], start: Array, match: PairMatch, parameters: dict[str, Any]
 ) -> bytes:
-    from nscan_cli.cli.document import document, provenance_of
+    from nscan_cli.cli.document import document
     from nscan_cli.graph.json_fields import pose_rows, six_digits, triangle
 
     weakest = match.weakest

@@ -15,6 +15,7 @@ from nscan_cli.cli.progress import say
 from nscan_cli.cli.scan_spec import ScanSpecType
 from nscan_cli.errors import InputDataError, WrongUsageError
 from nscan_cli.logs.options import ReadingOptions
+from nscan_cli.provenance import provenance_of
 
 if TYPE_CHECKING:
     from nscan_cli.logs.scan import LaserLog, Source
@@ -85,7 +86,7 @@ def command(
     check_writable(output)
     files = [path for path, words in ((initial, STARTS), (prior, PRIORS)) if path not in words]
     check_plot(plot, output, [log, *files])
-    from nscan_cli.cli.document import document, provenance_of
+    from nscan_cli.cli.document import document
     from nscan_cli.inputs import base_name
     from nscan_cli.logs.load import read_log
     from nscan_cli.matching.joint import JointOptions

@@ -15,6 +15,7 @@ from nscan_cli.cli.progress import progress, say
 from nscan_cli.cli.render import check_map_outputs, write_map, yaml_path
 from nscan_cli.errors import WrongUsageError
 from nscan_cli.logs.options import ReadingOptions
+from nscan_cli.provenance import provenance_of
 
 if TYPE_CHECKING:
     from nscan_cli.graph.model import Graph
@@ -33,7 +34,7 @@ if TYPE_CHECKING:
     "--from",
     "from_file",
     metavar="GRAPH",
-    help="Optimise a saved graph (JSON or g2o) again instead of tracking; LOG is needed for a map only.",
+    help="Optimise a saved graph (JSON or g2o) again, instead of mapping LOG.",
 )
 @click.option("--max-scans", type=click.IntRange(3), default=10, show_default=True, metavar="N",
               help="Most scans in an nScan relation.")  # fmt: skip
@@ -116,7 +117,7 @@ def _map(
     from nscan_cli.compiled import first_compile
     from nscan_cli.logs.load import read_log
     from nscan_cli.slam.options import SlamOptions
-    from nscan_cli.slam.pipeline import Slam, provenance
+    from nscan_cli.slam.pipeline import Slam
 
     scans = read_log(log, reading)
     for warning in scans.report.notices():
@@ -128,7 +129,8 @@ def _map(
     slam = Slam(scans, options)
     with progress("mapping", len(scans), quiet) as advance:
         graph = slam.run(lambda done, keyframes: advance(done, f"{keyframes} keyframes"))
-    graph.provenance = provenance(scans, reading, options)
+    parameters = {"reading": dataclasses.asdict(reading), "slam": dataclasses.asdict(options)}
+    graph.provenance = provenance_of([scans.source], parameters)
     accepted = sum(loop.accepted for loop in graph.loops)
     summary = (
         f"{len(scans)} scans, {len(graph.keyframes)} keyframes, {len(graph.pairwise)} pairwise and "

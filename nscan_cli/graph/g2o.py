@@ -18,12 +18,13 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from nscan_cli import __version__
 from nscan_cli.errors import InputDataError
 from nscan_cli.graph.model import Graph, NScan, Pairwise
 from nscan_cli.graph.triangles import from_upper_triangle, is_indefinite, upper_triangle
 from nscan_cli.inputs import base_name, label, read_bytes
+from nscan_cli.logs.scan import Source
 from nscan_cli.poses import Array, compose, inverse, relative, rotated_information
+from nscan_cli.provenance import provenance_of
 
 REMEDY = "mend or remove the line"
 LARGEST_ID = 2**53
@@ -71,12 +72,9 @@ def parse_g2o(data: bytes, path: str) -> Graph:
         raise InputDataError(name, "no VERTEX_SE2 or EDGE_SE2 line", "give a 2D pose graph of g2o")
     vertices = content.vertices or _chained(content, name)
     graph = _graph(content, vertices, name)
-    graph.provenance = {
-        "tool": {"name": "nscan-cli", "version": __version__},
-        "inputs": [{"name": base_name(path), "sha256": hashlib.sha256(data).hexdigest(), "bytes": len(data)}],
-        "parameters": {},
-        "skipped": dict(sorted(content.skipped.items())),
-    }
+    source = Source(base_name(path), hashlib.sha256(data).hexdigest(), len(data))
+    graph.provenance = provenance_of([source], {})
+    graph.provenance["skipped"] = dict(sorted(content.skipped.items()))
     return graph
 
 

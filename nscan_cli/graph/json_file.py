@@ -13,13 +13,13 @@ from typing import Any, NoReturn
 
 import numpy as np
 
-from nscan_cli import __version__
 from nscan_cli.errors import InputDataError
 from nscan_cli.graph.json_fields import MalformedError, Record, pose_rows, six_digits, triangle
 from nscan_cli.graph.model import Graph, Loop, NScan, Pairwise
 from nscan_cli.graph.triangles import is_indefinite
 from nscan_cli.inputs import label, read_bytes
 from nscan_cli.poses import Array
+from nscan_cli.provenance import provenance_of
 
 FORMAT = "nscan-pose-graph"
 VERSION = "1.0"
@@ -36,8 +36,7 @@ def write_graph(graph: Graph) -> bytes:
     Poses are rounded to 9 decimals and matrices to 6 significant digits. Raises ValueError when a
     number is not finite.
     """
-    tool = {"name": "nscan-cli", "version": __version__}
-    provenance = {"tool": tool, "inputs": [], "parameters": {}, **graph.provenance}
+    provenance = {**provenance_of([], {}), **graph.provenance}
     head: dict[str, Any] = {"$schema": SCHEMA, "format": FORMAT, "version": VERSION, "units": UNITS}
     lines = [f'"{key}":{_compact(value)},' for key, value in {**head, "provenance": provenance}.items()]
     relations = [_pairwise_record(relation) for relation in graph.pairwise]

@@ -3,17 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import asdict
-from typing import Any
 
 import numpy as np
 
-from nscan_cli import __version__
 from nscan_cli.graph.marginals import marginal_covariances
 from nscan_cli.graph.model import Graph, Loop, NScan, Pairwise
 from nscan_cli.graph.optimise import optimise
 from nscan_cli.graph.system import GraphEnergy
-from nscan_cli.logs.options import ReadingOptions
 from nscan_cli.logs.scan import LaserLog
 from nscan_cli.poses import Array, compose
 from nscan_cli.slam.keyframes import Keyframes
@@ -123,12 +119,3 @@ class Slam:
             nscan=self.nscan,
             loops=self.loops,
         )
-
-
-def provenance(log: LaserLog, reading: ReadingOptions, options: SlamOptions) -> dict[str, Any]:
-    """What a graph was made of: the tool, the log, and all parameters (m, rad)."""
-    return {
-        "tool": {"name": "nscan-cli", "version": __version__},
-        "inputs": [asdict(log.source)],
-        "parameters": {"reading": asdict(reading), "slam": asdict(options)},
-    }

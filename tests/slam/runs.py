@@ -15,8 +15,9 @@ from nscan_cli.logs.load import read_log
 from nscan_cli.logs.options import ReadingOptions
 from nscan_cli.logs.scan import LaserLog
 from nscan_cli.poses import Array
+from nscan_cli.provenance import provenance_of
 from nscan_cli.slam.options import SlamOptions, TrackingOptions
-from nscan_cli.slam.pipeline import Slam, provenance
+from nscan_cli.slam.pipeline import Slam
 from nscan_cli.slam.tracking import Tracked, Tracker
 from tests.data import data_file
 
@@ -38,7 +39,8 @@ def mapped(log: LaserLog, options: SlamOptions | None = None) -> Mapped:
     options = options or SlamOptions()
     slam = Slam(log, options)
     graph = slam.run(lambda done, keyframes: None)
-    graph.provenance = provenance(log, ReadingOptions(), options)
+    parameters = {"reading": dataclasses.asdict(ReadingOptions()), "slam": dataclasses.asdict(options)}
+    graph.provenance = provenance_of([log.source], parameters)
     return Mapped(log, graph, slam)
 
 

@@ -1,0 +1,86 @@
+"""`nscan-cli nscan --plot`."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from nscan_cli.cli.main import run
+from nscan_cli.graph.json_file import write_graph
+from nscan_cli.logs.load import read_log
+from nscan_cli.mapping.canvas import BLACK, DIM
+from nscan_cli.mapping.ramp import ramp
+from tests.cli.test_nscan import SAMPLE, SCANS, SPEC, graph_of, matched
+
+
+def count(pixels: np.ndarray, colour: tuple[int, ...]) -> int:
+    return int(np.count_nonzero((pixels == colour).all(axis=-1)))
+
+
+def test_the_plot_shows_the_start_above_the_result(tmp_path, capsys):
+    arguments = [SAMPLE, "--scans", SPEC]
+    alone, _ = matched(capsys, *arguments)
+    beside, said = matched(capsys, *arguments, "--plot", str(tmp_path / "nscan.png"))
+    assert beside == alone
+    assert len(said) == 1
+    with Image.open(tmp_path / "nscan.png") as picture:
+        assert picture.format == "PNG"
+        pixels = np.asarray(picture).astype(int)
+    height, width, _channels = pixels.shape
+    assert 1500 < width < 3000
+    above, below = pixels[: height // 2], pixels[height // 2 :]
+    assert above.shape == below.shape
+    # One circle for each scan in either, apart from the legend's; and they have moved.
+    for panel in (above, below):
+        assert all(count(panel, colour) > 200 for colour in ramp(4))
+    assert (above != below).any()
+
+
+def test_the_plot_marks_the_scans_that_were_left_out(tmp_path, capsys):
+    """Scan 2008 begins 8 m aside, where nearly nothing of its own lies on the others."""
+    graph = graph_of(read_log(SAMPLE), SCANS)
+    graph.poses[1] += [0, 8.0, 0]
+    path = tmp_path / "torn.json"
+    path.write_bytes(write_graph(graph))
+    document, _ = matched(
+        capsys, SAMPLE, "--scans", SPEC, "--initial", str(path), "--prior", "none",
+        "--plot", str(tmp_path / "nscan.png"),
+    )  # fmt: skip
+    assert [out["scan"] for out in document["left_out"]] == [2008]
+    with Image.open(tmp_path / "nscan.png") as picture:
+        pixels = np.asarray(picture).astype(int)
+    above, below = pixels[: len(pixels) // 2], pixels[len(pixels) // 2 :]
+    gray = [255 + (channel - 255) * 170 // 255 for channel in DIM]
+    gray_dots = [
+        np.count_nonzero(np.abs(panel - np.array(gray)).max(axis=-1) <= 2) for panel in (above, below)
+    ]
+    # About 40 dots of 39 pixels; in the panel below, edges of letters only.
+    assert gray_dots[0] > 500 + gray_dots[1]
+    # The cross, in the middle of the panel; beside it only the axes and what is written have black.
+    middles = [panel[150:-250, 200:-100] for panel in (above, below)]
+    assert [count(middle, BLACK) > 50 for middle in middles] == [True, False]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code", "said"),
+    [
+        (["--plot", "-"], 2, "--plot -: only the result can go to standard output"),
+        (["--plot", "nscan.svg"], 2, "pictures are PNG"),
+        (["-o", "nscan.png", "--plot", "nscan.png"], 2, "is the result's name too"),
+        (["--plot", SAMPLE], 2, "is an input"),
+        (["--initial", "start.tum", "--plot", "start.tum"], 2, "is an input"),
+        (["--plot", "no/such.png"], 73, "the folder no does not exist"),
+    ],
+)
+def test_a_plot_that_cannot_be_is_refused_before_the_work(
+    tmp_path, monkeypatch, capsys, arguments, code, said
+):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("nscan_cli.logs.load.read_log", pytest.fail)
+    assert run(["nscan", SAMPLE, "--scans", "1,2", *arguments]) == code
+    out, err = capsys.readouterr()
+    assert out == ""
+    assert len(err.splitlines()) == 1
+    assert said in err
+    assert list(tmp_path.iterdir()) == []
