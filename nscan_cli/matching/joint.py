@@ -5,15 +5,17 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
-from scipy.linalg import cho_factor, cho_solve
 
-from nscan_cli.matching.joint_energy import JointEnergy, Priors, Scans, joint_energy
+from nscan_cli.compiled import kernel
+from nscan_cli.matching.joint_energy import JointProblem, evaluate, joint_energy
+from nscan_cli.matching.linear import solve_definite
 from nscan_cli.poses import Array, wrap
 
 FIRST_DAMPING = 1e-3
 LEAST_DAMPING = 1e-8
 GREATEST_DAMPING = 1e4
+FREE = -1
+"""In place of a fixed scan: the gauge is free."""
 
 
 @dataclass(frozen=True)
@@ -47,53 +49,24 @@ class JointMatch:
     converged: bool
 
 
-def match_jointly(
-    scans: Scans,
-    pairs: NDArray[np.int64],
-    priors: Priors,
-    start: Array,
-    scale: float,
-    options: JointOptions,
-) -> JointMatch:
-    """Minimise scale · E(p) plus priors from the poses `start` (n, 3), stage by stage.
+def match_jointly(problem: JointProblem, start: Array, options: JointOptions) -> JointMatch:
+    """Minimise the joint energy from the poses `start` (n, 3), stage by stage.
 
     The steps are Newton's, eq. (5) to (8), damped as by Levenberg and Marquardt; with the semi-definite
     part of the Hessian in the early stages, and in the last where the exact one is not positive definite.
     """
     poses = start.copy()
+    fixed = FREE if options.fixed is None else options.fixed
     iterations = evaluations = 0
     converged = False
     for stage, widening in enumerate(options.widenings):
         exact = stage == len(options.widenings) - 1
-        here = joint_energy(scans, pairs, priors, poses, scale, widening, exact, options.neutral)
-        evaluations += 1
-        damping, converged = FIRST_DAMPING, False
-        for _ in range(options.max_iterations):
-            step = newton_step(here, poses, damping, options.fixed)
-            if step is None:
-                if exact:
-                    # Not positive definite: go on with the part that is.
-                    here = joint_energy(scans, pairs, priors, poses, scale, widening, False, options.neutral)
-                    evaluations += 1
-                    step = newton_step(here, poses, damping, options.fixed)
-                if step is None:
-                    damping *= 10
-                    continue
-            iterations += 1
-            trial = poses + step
-            there = joint_energy(scans, pairs, priors, trial, scale, widening, exact, options.neutral)
-            evaluations += 1
-            if there.value <= here.value:
-                poses, here = trial, there
-                damping = max(0.1 * damping, LEAST_DAMPING)
-            else:
-                damping *= 10
-            if np.abs(step).max() < options.tolerance:
-                converged = True
-                break
-            if damping > GREATEST_DAMPING:
-                break
-    final = joint_energy(scans, pairs, priors, poses, scale)
+        steps, evaluated, converged = _descend(
+            problem, poses, widening, exact, options.neutral, fixed, options.max_iterations, options.tolerance
+        )
+        iterations += steps
+        evaluations += evaluated
+    final = joint_energy(problem, poses)
     poses[:, 2] = wrap(poses[:, 2])
     return JointMatch(
         poses,
@@ -106,14 +79,7 @@ def match_jointly(
     )
 
 
-def match_near_and_far(
-    scans: Scans,
-    pairs: NDArray[np.int64],
-    priors: Priors,
-    start: Array,
-    scale: float,
-    options: JointOptions,
-) -> JointMatch:
+def match_near_and_far(problem: JointProblem, start: Array, options: JointOptions) -> JointMatch:
     """Match twice from `start` (n, 3), and keep the result of the lower neutral energy.
 
     Through all stages a far optimum is found; but the reward for overlap slides scans together where a
@@ -121,8 +87,8 @@ def match_near_and_far(
     but only a near optimum is found. Iterations and evaluations are those of both.
     """
     near = replace(options, widenings=options.widenings[-1:], neutral=True)
-    matches = [match_jointly(scans, pairs, priors, start, scale, each) for each in (options, near)]
-    values = [joint_energy(scans, pairs, priors, match.poses, scale, neutral=True).value for match in matches]
+    matches = [match_jointly(problem, start, each) for each in (options, near)]
+    values = [joint_energy(problem, match.poses, neutral=True).value for match in matches]
     best = matches[int(np.argmin(values))]
     return replace(
         best,
@@ -131,36 +97,93 @@ def match_near_and_far(
     )
 
 
-def newton_step(energy: JointEnergy, poses: Array, damping: float, fixed: int | None) -> Array | None:
-    """The step (n, 3) that solves (H + damping · diag H) Δp = −g in the chosen gauge (paper, III-D).
+@kernel
+def _descend(
+    problem: JointProblem,
+    poses: Array,
+    widening: float,
+    exact: bool,
+    neutral: bool,
+    fixed: int,
+    max_iterations: int,
+    tolerance: float,
+) -> tuple[int, int, bool]:
+    """One stage, from the poses (n, 3) in place: its iterations, evaluations, and whether it converged."""
+    n = poses.shape[0]
+    gradient, trial_gradient = np.empty(3 * n), np.empty(3 * n)
+    hessian, trial_hessian = np.empty((3 * n, 3 * n)), np.empty((3 * n, 3 * n))
+    step = np.empty((n, 3))
+    curvature = 1.0 if exact else 0.0
+    value = evaluate(problem, poses, widening, curvature, neutral, gradient, hessian)
+    iterations, evaluations, damping = 0, 1, FIRST_DAMPING
+    for _ in range(max_iterations):
+        solved = newton_step(gradient, hessian, poses, damping, fixed, step)
+        if not solved and exact:
+            # Not positive definite: go on with the part that is.
+            evaluate(problem, poses, widening, 0.0, neutral, gradient, hessian)
+            evaluations += 1
+            solved = newton_step(gradient, hessian, poses, damping, fixed, step)
+        if not solved:
+            damping *= 10
+            continue
+        iterations += 1
+        trial = poses + step
+        there = evaluate(problem, trial, widening, curvature, neutral, trial_gradient, trial_hessian)
+        evaluations += 1
+        if there <= value:
+            poses[:, :] = trial
+            value = there
+            gradient, trial_gradient = trial_gradient, gradient
+            hessian, trial_hessian = trial_hessian, hessian
+            damping = max(0.1 * damping, LEAST_DAMPING)
+        else:
+            damping *= 10
+        if np.abs(step).max() < tolerance:
+            return iterations, evaluations, True
+        if damping > GREATEST_DAMPING:
+            break
+    return iterations, evaluations, False
 
-    With `fixed` None the step is the smallest one: without any part along the three null directions.
-    None when the matrix is not positive definite.
+
+@kernel
+def newton_step(
+    gradient: Array, hessian: Array, poses: Array, damping: float, fixed: int, step: Array
+) -> bool:
+    """Write the step (n, 3) that solves (H + damping · diag H) Δp = −g in the chosen gauge (paper, III-D).
+
+    With `fixed` −1 the step is the smallest one: without any part along the three null directions. False
+    when the matrix is not positive definite.
     """
-    n = len(poses)
-    diagonal = np.abs(np.diag(energy.hessian))
-    matrix = energy.hessian + np.diag(damping * diagonal + 1e-9 * diagonal.max() + 1e-12)
-    if fixed is None:
+    size = gradient.shape[0]
+    matrix, right, solution = hessian.copy(), -gradient, np.empty(size)
+    diagonal = np.abs(np.diag(hessian))
+    greatest = diagonal.max()
+    for a in range(size):
+        matrix[a, a] += damping * diagonal[a] + 1e-9 * greatest + 1e-12
+    if fixed < 0:
         null = gauge_directions(poses)
-        matrix += diagonal.max() * (null @ null.T)
-        keep = np.arange(3 * n)
+        matrix += greatest * (null @ null.T)
     else:
-        keep = np.delete(np.arange(3 * n), [3 * fixed, 3 * fixed + 1, 3 * fixed + 2])
-        matrix = matrix[np.ix_(keep, keep)]
-    try:
-        factor = cho_factor(matrix, check_finite=False)
-    except np.linalg.LinAlgError:
-        return None
-    step = np.zeros(3 * n)
-    step[keep] = -cho_solve(factor, energy.gradient[keep], check_finite=False)
-    return step.reshape(n, 3)
+        for a in range(3 * fixed, 3 * fixed + 3):
+            matrix[a, :] = 0.0
+            matrix[:, a] = 0.0
+            matrix[a, a], right[a] = 1.0, 0.0
+    if not solve_definite(matrix, right, solution):
+        return False
+    step[:, :] = solution.reshape(step.shape)
+    return True
 
 
+@kernel
 def gauge_directions(poses: Array) -> Array:
     """An orthonormal basis (3n, 3) of the global motions that leave the energy as it is."""
-    n = len(poses)
-    directions = np.zeros((n, 3, 3))
-    directions[:, 0, 0] = directions[:, 1, 1] = directions[:, 2, 2] = 1.0
-    centred = poses[:, :2] - poses[:, :2].mean(axis=0)
-    directions[:, 0, 2], directions[:, 1, 2] = -centred[:, 1], centred[:, 0]
-    return np.linalg.qr(directions.reshape(3 * n, 3))[0]
+    n = poses.shape[0]
+    directions = np.zeros((3 * n, 3))
+    x, y = poses[:, 0] - poses[:, 0].mean(), poses[:, 1] - poses[:, 1].mean()
+    # About the centre a turn is orthogonal to the shifts.
+    along, turn = np.sqrt(n), np.sqrt(n + (x * x).sum() + (y * y).sum())
+    for i in range(n):
+        directions[3 * i, 0] = directions[3 * i + 1, 1] = 1.0 / along
+        directions[3 * i, 2], directions[3 * i + 1, 2] = -y[i] / turn, x[i] / turn
+        directions[3 * i + 2, 2] = 1.0 / turn
+    return directions

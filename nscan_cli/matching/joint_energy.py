@@ -48,6 +48,17 @@ class Priors(NamedTuple):
     """(Q, 3, 3)"""
 
 
+class JointProblem(NamedTuple):
+    """What is minimised: scale · Σ over (i, j) ∈ J of E_ij, plus priors; see joint_energy."""
+
+    scans: Scans
+    pairs: NDArray[np.int64]
+    """(m, 2) the index set J of ordered pairs (i, j)."""
+    priors: Priors
+    scale: float
+    """What E is multiplied with to be a negative log likelihood."""
+
+
 class JointEnergy(NamedTuple):
     """The value with gradient (3n,) and Hessian (3n, 3n), variables (x, y, φ) scan by scan."""
 
@@ -88,16 +99,9 @@ def all_pairs(n: int) -> NDArray[np.int64]:
 
 
 def joint_energy(
-    scans: Scans,
-    pairs: NDArray[np.int64],
-    priors: Priors,
-    poses: Array,
-    scale: float = 1.0,
-    widening: float = 1.0,
-    exact: bool = True,
-    neutral: bool = False,
+    problem: JointProblem, poses: Array, widening: float = 1.0, exact: bool = True, neutral: bool = False
 ) -> JointEnergy:
-    """Scale · E(p) plus the priors at the poses (n, 3), over the ordered pairs (m, 2) (i, j) ∈ J.
+    """Scale · E(p) plus the priors at the poses (n, 3).
 
     `exact=False` keeps the semi-definite part of the Hessian only: Σ (∂u/∂p)ᵗ H⁺ (∂u/∂p).
 
@@ -106,11 +110,27 @@ def joint_energy(
     the distance from a wall is spread as its Gaussian says. Gradient and Hessian are the same.
     """
     n = len(poses)
-    gradient, hessian = np.zeros(3 * n), np.zeros((3 * n, 3 * n))
-    baseline = 1.0 / np.sqrt(1.0 + widening) if neutral else 0.0
-    value = _add_pairs(scans, pairs, poses, scale, widening, float(exact), baseline, gradient, hessian)
-    value += _add_priors(priors, poses, float(exact), gradient, hessian)
+    gradient, hessian = np.empty(3 * n), np.empty((3 * n, 3 * n))
+    value = evaluate(problem, poses, widening, float(exact), neutral, gradient, hessian)
     return JointEnergy(value, gradient, hessian)
+
+
+@kernel
+def evaluate(
+    problem: JointProblem,
+    poses: Array,
+    widening: float,
+    curvature: float,
+    neutral: bool,
+    gradient: Array,
+    hessian: Array,
+) -> float:
+    """The joint energy; writes its gradient (3n,) and Hessian (3n, 3n), exact with a `curvature` of 1."""
+    gradient[:] = 0.0
+    hessian[:, :] = 0.0
+    baseline = 1.0 / np.sqrt(1.0 + widening) if neutral else 0.0
+    value = _add_pairs(problem, poses, widening, curvature, baseline, gradient, hessian)
+    return float(value + _add_priors(problem.priors, poses, curvature, gradient, hessian))
 
 
 @kernel
@@ -131,16 +151,15 @@ def scan_points(scans: Scans, i: int) -> Array:
 
 @kernel
 def _add_pairs(
-    scans: Scans,
-    pairs: NDArray[np.int64],
+    problem: JointProblem,
     poses: Array,
-    scale: float,
     widening: float,
     curvature: float,
     baseline: float,
     gradient: Array,
     hessian: Array,
 ) -> float:
+    scans, pairs, scale = problem.scans, problem.pairs, problem.scale
     out = np.empty(OUT)
     u, g, h = np.empty(3), np.empty(3), np.empty((3, 3))
     value = 0.0

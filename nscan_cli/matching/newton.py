@@ -1,16 +1,19 @@
 """Minimise the energy of one scan against one NDT: damped Newton steps in stages (paper, III-C, III-F).
 
-The objective is scale · E(u) + ½ (u − z)ᵗ P (u − z), with the prior (14) of mean z and information P. The
-stages widen the Gaussians less and less; far from the optimum the steps use the semi-definite part of the
-Hessian, because the exact one need not be positive there.
+The stages widen the Gaussians less and less; far from the optimum the steps use the semi-definite part of
+the Hessian, because the exact one need not be positive there.
 """
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from nscan_cli.compiled import kernel
-from nscan_cli.ndt.energy import accumulate, unpack
+from nscan_cli.matching.linear import solve_definite
+from nscan_cli.matching.priors import Prior
+from nscan_cli.ndt.energy import OUT, accumulate, unpack
 from nscan_cli.ndt.grid import Grid
 from nscan_cli.poses import Array
 
@@ -19,15 +22,24 @@ LEAST_DAMPING = 1e-7
 GREATEST_DAMPING = 1e6
 
 
+class PairProblem(NamedTuple):
+    """What is minimised: scale · E(u) + ½ (u − z)ᵗ P (u − z)."""
+
+    grid: Grid
+    half: float
+    """Side (m) of a lattice cell."""
+    points: Array
+    """(m, 2)"""
+    scale: float
+    """What E is multiplied with to be a negative log likelihood."""
+    prior: Prior
+    """(14), of mean z and information P."""
+
+
 @kernel
 def objective(
-    grid: Grid,
-    half: float,
-    points: Array,
+    problem: PairProblem,
     pose: Array,
-    scale: float,
-    prior_mean: Array,
-    prior_information: Array,
     widening: float,
     curvature: float,
     out: Array,
@@ -35,56 +47,29 @@ def objective(
     hessian: Array,
 ) -> float:
     """The objective at `pose`; writes its gradient (3,) and Hessian (3, 3), and E's own into out (10,)."""
-    accumulate(grid, half, points, pose[0], pose[1], pose[2], widening, curvature, 0.0, out)
-    unpack(out, scale, gradient, hessian)
-    value = scale * out[0]
-    turn = pose[2] - prior_mean[2]
+    accumulate(
+        problem.grid, problem.half, problem.points, pose[0], pose[1], pose[2], widening, curvature, 0.0, out
+    )
+    unpack(out, problem.scale, gradient, hessian)
+    value = problem.scale * out[0]
+    mean, information = problem.prior
+    turn = pose[2] - mean[2]
     turn -= 2 * np.pi * np.round(turn / (2 * np.pi))
     for a in range(3):
         pull = 0.0
         for b in range(3):
-            difference = turn if b == 2 else pose[b] - prior_mean[b]
-            pull += prior_information[a, b] * difference
-            hessian[a, b] += prior_information[a, b]
+            difference = turn if b == 2 else pose[b] - mean[b]
+            pull += information[a, b] * difference
+            hessian[a, b] += information[a, b]
         gradient[a] += pull
-        value += 0.5 * pull * (turn if a == 2 else pose[a] - prior_mean[a])
+        value += 0.5 * pull * (turn if a == 2 else pose[a] - mean[a])
     return float(value)
 
 
 @kernel
-def solve3(matrix: Array, right: Array, out: Array) -> bool:
-    """Solve a symmetric positive definite 3 × 3 system by Cholesky; False when it is not definite."""
-    if matrix[0, 0] <= 0.0:
-        return False
-    l00 = np.sqrt(matrix[0, 0])
-    l10, l20 = matrix[1, 0] / l00, matrix[2, 0] / l00
-    rest = matrix[1, 1] - l10 * l10
-    if rest <= 0.0:
-        return False
-    l11 = np.sqrt(rest)
-    l21 = (matrix[2, 1] - l20 * l10) / l11
-    rest = matrix[2, 2] - l20 * l20 - l21 * l21
-    if rest <= 0.0:
-        return False
-    l22 = np.sqrt(rest)
-    y0 = right[0] / l00
-    y1 = (right[1] - l10 * y0) / l11
-    y2 = (right[2] - l20 * y0 - l21 * y1) / l22
-    out[2] = y2 / l22
-    out[1] = (y1 - l21 * out[2]) / l11
-    out[0] = (y0 - l10 * out[1] - l20 * out[2]) / l00
-    return True
-
-
-@kernel
 def minimise(
-    grid: Grid,
-    half: float,
-    points: Array,
+    problem: PairProblem,
     pose: Array,
-    scale: float,
-    prior_mean: Array,
-    prior_information: Array,
     widenings: Array,
     max_iterations: int,
     tolerance: float,
@@ -96,29 +81,25 @@ def minimise(
     semi-definite Hessian of the objective (3, 3). Returns the objective's and E's value, iterations,
     evaluations, and whether the last stage converged.
     """
-    out, trial_out = np.empty(10), np.empty(10)
+    out, trial_out = np.empty(OUT), np.empty(OUT)
     gradient, step, trial = np.empty(3), np.empty(3), np.empty(3)
     trial_gradient, trial_hessian, damped = np.empty(3), np.empty((3, 3)), np.empty((3, 3))
     value, iterations, evaluations, converged = 0.0, 0, 0, False
     for stage in range(widenings.shape[0]):
         widening = widenings[stage]
-        value = objective(grid, half, points, pose, scale, prior_mean, prior_information,
-                          widening, 0.0, out, gradient, hessian)  # fmt: skip
+        value = objective(problem, pose, widening, 0.0, out, gradient, hessian)
         evaluations += 1
         damping = FIRST_DAMPING
         converged = False
         for _ in range(max_iterations):
             iterations += 1
+            damped[:, :] = hessian
             for a in range(3):
-                for b in range(3):
-                    damped[a, b] = hessian[a, b]
                 damped[a, a] += damping * hessian[a, a] + 1e-12
-            if not solve3(damped, gradient, step):
+            if not solve_definite(damped, gradient, step):
                 break
-            for a in range(3):
-                trial[a] = pose[a] - step[a]
-            trial_value = objective(grid, half, points, trial, scale, prior_mean, prior_information,
-                                    widening, 0.0, trial_out, trial_gradient, trial_hessian)  # fmt: skip
+            trial[:] = pose - step
+            trial_value = objective(problem, trial, widening, 0.0, trial_out, trial_gradient, trial_hessian)
             evaluations += 1
             length = max(abs(step[0]), abs(step[1]), abs(step[2]))
             if trial_value <= value:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nscan_cli.matching.joint import JointMatch, JointOptions, match_near_and_far
-from nscan_cli.matching.joint_energy import Priors, all_pairs, joint_energy, lay_out, no_priors
+from nscan_cli.matching.joint_energy import JointProblem, Priors, all_pairs, joint_energy, lay_out, no_priors
 from nscan_cli.matching.overlap import LEAST_OVERLAP, Overlaps, overlaps
 from nscan_cli.matching.pairwise import HELD, INDEFINITE, PairOptions, scan_ndt
 from nscan_cli.matching.uncertainty import covariance_of, decrement, is_settled
@@ -81,14 +81,15 @@ def nscan_match(
         pairs, priors = all_pairs(len(kept)), priors_among(kept)
         # The noise of one scan is in 2 (n − 1) of the pairs, that of one pair match in one.
         scale = 2 * options.scale / len(kept)
+        problem = JointProblem(scans, pairs, priors, scale)
         held = kept.index(fixed) if fixed in kept else 0
         gauge = replace(joint, fixed=None if joint.fixed is None else held)
-        match = match_near_and_far(scans, pairs, priors, start[kept], scale, gauge)
+        match = match_near_and_far(problem, start[kept], gauge)
         shares = overlaps(scans, match.poses)
         strays = _strays(shares, priors, match.poses)
         if not strays:
-            at_end = joint_energy(scans, pairs, priors, match.poses, scale)
-            alone = joint_energy(scans, pairs, no_priors(), match.poses)
+            at_end = joint_energy(problem, match.poses)
+            alone = joint_energy(JointProblem(scans, pairs, no_priors(), 1.0), match.poses)
             others = np.delete(np.arange(3 * len(kept)), np.arange(3 * held, 3 * held + 3))
             covariance = covariance_of(match.hessian[np.ix_(others, others)])
             gradient = at_end.gradient[others]

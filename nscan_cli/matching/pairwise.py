@@ -8,7 +8,7 @@ import numpy as np
 
 from nscan_cli.errors import InputDataError
 from nscan_cli.logs.scan import LaserLog
-from nscan_cli.matching.newton import minimise, objective
+from nscan_cli.matching.newton import PairProblem, minimise, objective
 from nscan_cli.matching.overlap import INLIER_BOUND, LEAST_OVERLAP
 from nscan_cli.matching.priors import Prior
 from nscan_cli.matching.uncertainty import (
@@ -113,19 +113,18 @@ def match_pair(
     Minimises scale · E plus the prior (14) stage by stage. E jumps where points cross the borders of
     cells, so a minimum may be a place where the gradient is not zero: `decrement` tells how much.
     """
-    mean, information = prior or Prior(np.zeros(3), np.zeros((3, 3)))
+    prior = prior or Prior(np.zeros(3), np.zeros((3, 3)))
+    problem = PairProblem(reference.grid, reference.half, points, options.scale, prior)
     pose, hessian, gradient, out = start.copy(), np.empty((3, 3)), np.empty(3), np.empty(OUT)
     iterations, evaluations, last, settled = 0, 1, 0, False
     # The last stage by itself: only its end tells whether the match has converged.
     for stages in (options.widenings[:-1], options.widenings[-1:]):
         _, _, last, evaluated, settled = minimise(
-            reference.grid, reference.half, points, pose, options.scale, mean, information,
-            np.array(stages), options.max_iterations, options.tolerance, hessian,
-        )  # fmt: skip
+            problem, pose, np.array(stages), options.max_iterations, options.tolerance, hessian
+        )
         iterations += last
         evaluations += evaluated
-    objective(reference.grid, reference.half, points, pose, options.scale, mean, information,
-              1.0, 1.0, out, gradient, hessian)  # fmt: skip
+    objective(problem, pose, 1.0, 1.0, out, gradient, hessian)
     overlap = inlier_share(reference.grid, reference.half, points, pose, INLIER_BOUND)
     covariance = covariance_of(hessian)
     reason = None

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from nscan_cli.graph.model import Loop, NScan, Pairwise
 from nscan_cli.matching.joint import JointMatch, JointOptions, match_jointly
-from nscan_cli.matching.joint_energy import Priors, Scans, all_pairs, lay_out, no_priors
+from nscan_cli.matching.joint_energy import JointProblem, Priors, Scans, all_pairs, lay_out, no_priors
 from nscan_cli.matching.overlap import held_together, overlaps, weakest_link
 from nscan_cli.poses import Array, relative
 from nscan_cli.slam.keyframes import Keyframe
@@ -134,7 +134,7 @@ def _match(
             np.array([relation.information for relation in known]),
         )
     joint = JointOptions(widenings, options.max_iterations, options.tolerance)
-    return match_jointly(scans, all_pairs(len(members)), priors, start, options.scale, joint)
+    return match_jointly(JointProblem(scans, all_pairs(len(members)), priors, options.scale), start, joint)
 
 
 def _relation(

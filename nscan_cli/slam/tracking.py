@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from nscan_cli.matching.newton import minimise
+from nscan_cli.matching.newton import PairProblem, minimise
 from nscan_cli.matching.priors import Prior, odometry_prior
 from nscan_cli.ndt.energy import inlier_share
 from nscan_cli.ndt.grid import Ndt
@@ -90,9 +90,13 @@ class Tracker:
         options = self.options
         pose, hessian = prior.mean + np.array([0.0, 0.0, turn]), np.empty((3, 3))
         value, *_ = minimise(
-            self.map.grid, self.map.half, points, pose, options.scale, prior.mean, prior.information,
-            self._widenings, options.max_iterations, options.tolerance, hessian,
-        )  # fmt: skip
+            PairProblem(self.map.grid, self.map.half, points, options.scale, prior),
+            pose,
+            self._widenings,
+            options.max_iterations,
+            options.tolerance,
+            hessian,
+        )
         return value, pose, hessian
 
     def _inliers(self, points: Array, pose: Array) -> float:

@@ -6,8 +6,9 @@ import functools
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
-from nscan_cli.matching.joint_energy import Scans, lay_out
+from nscan_cli.matching.joint_energy import JointProblem, Priors, all_pairs, lay_out, no_priors
 from nscan_cli.matching.pairwise import PairOptions, matched_points, scan_ndt
 from nscan_cli.ndt.grid import Ndt
 from nscan_cli.poses import Array, relative, wrap
@@ -29,10 +30,18 @@ class Problem:
     def __len__(self) -> int:
         return len(self.points)
 
-    def laid_out(self, *chosen: int) -> Scans:
-        """Some of the scans, or all, as the joint energy takes them."""
-        scans = chosen or range(len(self))
-        return lay_out([self.ndts[scan] for scan in scans], [self.points[scan] for scan in scans])
+    def joint(
+        self,
+        *chosen: int,
+        pairs: NDArray[np.int64] | None = None,
+        priors: Priors | None = None,
+        scale: float = OPTIONS.scale,
+    ) -> JointProblem:
+        """Some of the scans, or all, to be matched jointly: all pairs and no priors if none are given."""
+        kept = chosen or range(len(self))
+        scans = lay_out([self.ndts[scan] for scan in kept], [self.points[scan] for scan in kept])
+        index_set = all_pairs(len(kept)) if pairs is None else pairs
+        return JointProblem(scans, index_set, priors or no_priors(), scale)
 
 
 def problem(scene: Scene, truth: Array, noise: bool, seed: int = 1) -> Problem:

@@ -3,11 +3,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from nscan_cli.matching.joint import JointOptions, gauge_directions, match_jointly, newton_step
-from nscan_cli.matching.joint_energy import JointEnergy, Priors, all_pairs, joint_energy, no_priors
+from nscan_cli.matching.joint import FREE, JointOptions, gauge_directions, match_jointly, newton_step
+from nscan_cli.matching.joint_energy import Priors, joint_energy
 from nscan_cli.matching.uncertainty import weakest_translation
 from nscan_cli.poses import relative
-from tests.matching.problems import OPTIONS, Problem, errors, fig_3, near, office_problem
+from tests.matching.problems import Problem, errors, fig_3, near, office_problem
 
 NOISE = 0.015
 """Standard deviation (m) of the simulated laser's ranges."""
@@ -21,9 +21,9 @@ def five() -> Problem:
 
 def test_the_free_step_is_the_smallest_that_solves(five):
     poses = near(five.truth, 1)
-    here = joint_energy(five.laid_out(), all_pairs(5), no_priors(), poses, OPTIONS.scale, exact=False)
-    step = newton_step(here, poses, 0.0, None)
-    assert step is not None
+    here = joint_energy(five.joint(), poses, exact=False)
+    step = np.empty((5, 3))
+    assert newton_step(here.gradient, here.hessian, poses, 0.0, FREE, step)
     values, vectors = np.linalg.eigh(here.hessian)
     assert values[2] < 1e-9 * values[-1] < values[3]
     inverse = np.where(np.arange(15) < 3, 0.0, 1 / values)
@@ -34,9 +34,9 @@ def test_the_free_step_is_the_smallest_that_solves(five):
 
 def test_a_fixed_step_solves_for_the_others(five):
     poses = near(five.truth, 2)
-    here = joint_energy(five.laid_out(), all_pairs(5), no_priors(), poses, OPTIONS.scale, exact=False)
-    step = newton_step(here, poses, 0.0, 2)
-    assert step is not None
+    here = joint_energy(five.joint(), poses, exact=False)
+    step = np.empty((5, 3))
+    assert newton_step(here.gradient, here.hessian, poses, 0.0, 2, step)
     assert not step[2].any()
     others = np.delete(np.arange(15), [6, 7, 8])
     solved = np.linalg.solve(here.hessian[np.ix_(others, others)], -here.gradient[others])
@@ -44,8 +44,8 @@ def test_a_fixed_step_solves_for_the_others(five):
 
 
 def test_there_is_no_step_where_the_hessian_is_not_positive():
-    energy = JointEnergy(0.0, np.ones(6), -np.eye(6))
-    assert newton_step(energy, np.arange(6.0).reshape(2, 3), 0.0, None) is None
+    poses = np.arange(6.0).reshape(2, 3)
+    assert not newton_step(np.ones(6), -np.eye(6), poses, 0.0, FREE, np.empty((2, 3)))
 
 
 @pytest.mark.parametrize("rows", [(2000, 2008, 2016, 2024, 2032), (2000, 2012, 2024, 2036)])
@@ -54,9 +54,7 @@ def test_both_gauges_find_the_same_relative_poses(rows):
     n, found = len(rows), []
     start = near(problem.truth, 3)
     for fixed in (None, 0, n - 1):
-        match = match_jointly(
-            problem.laid_out(), all_pairs(n), no_priors(), start, OPTIONS.scale, JointOptions(fixed=fixed)
-        )
+        match = match_jointly(problem.joint(), start, JointOptions(fixed=fixed))
         assert match.converged
         if fixed is not None:
             np.testing.assert_array_equal(match.poses[fixed], start[fixed])
@@ -69,10 +67,8 @@ def test_both_gauges_find_the_same_relative_poses(rows):
 
 
 def test_the_result_is_a_minimum_with_the_gauge_in_its_hessian(five):
-    match = match_jointly(
-        five.laid_out(), all_pairs(5), no_priors(), near(five.truth, 4), OPTIONS.scale, JointOptions()
-    )
-    again = joint_energy(five.laid_out(), all_pairs(5), no_priors(), match.poses, OPTIONS.scale)
+    match = match_jointly(five.joint(), near(five.truth, 4), JointOptions())
+    again = joint_energy(five.joint(), match.poses)
     assert match.energy == pytest.approx(again.value, rel=1e-12)
     np.testing.assert_allclose(match.hessian, again.hessian, rtol=1e-9, atol=1e-6)
     values = np.linalg.eigvalsh(match.hessian)
@@ -88,7 +84,7 @@ def test_without_pairs_the_priors_are_met():
     priors = Priors(chain, means, np.tile(np.eye(3) * 100, (2, 1, 1)))
     none = np.empty((0, 2), dtype=np.int64)
     match = match_jointly(
-        problem.laid_out(), none, priors, problem.truth, OPTIONS.scale, JointOptions(tolerance=1e-6)
+        problem.joint(pairs=none, priors=priors), problem.truth, JointOptions(tolerance=1e-6)
     )
     assert match.converged
     assert match.energy == pytest.approx(0, abs=1e-9)
@@ -104,11 +100,11 @@ def test_fig_3_is_known_jointly_where_its_pairs_are_not(noise, factor):
     each pair.
     """
     problem = fig_3(noise)
-    whole = joint_energy(problem.laid_out(), all_pairs(3), no_priors(), problem.truth).hessian[3:, 3:]
+    whole = joint_energy(problem.joint(scale=1.0), problem.truth).hessian[3:, 3:]
     smallest = np.linalg.eigvalsh(whole)[0]
     for other, direction in ((1, 0.0), (2, 90.0)):
-        chosen = problem.laid_out(0, other)
-        pair = joint_energy(chosen, all_pairs(2), no_priors(), problem.truth[[0, other]]).hessian[3:, 3:]
+        chosen = problem.joint(0, other, scale=1.0)
+        pair = joint_energy(chosen, problem.truth[[0, other]]).hessian[3:, 3:]
         values = np.linalg.eigvalsh(pair)
         assert values[0] < 0.1 * values[1]
         assert smallest > factor * values[0]

@@ -52,7 +52,9 @@ def test_it_is_the_sum_of_the_pairs_and_the_priors(five):
         off = relative(poses[b], poses[a]) - mean
         off[2] = (off[2] + np.pi) % (2 * np.pi) - np.pi
         expected += 0.5 * off @ information @ off
-    assert joint_energy(five.laid_out(), pairs, priors, poses, SCALE).value == pytest.approx(expected)
+    assert joint_energy(five.joint(pairs=pairs, priors=priors, scale=SCALE), poses).value == pytest.approx(
+        expected
+    )
 
 
 def test_all_pairs_are_all_ordered_pairs():
@@ -62,14 +64,14 @@ def test_all_pairs_are_all_ordered_pairs():
 @pytest.mark.parametrize(("n", "with_priors", "widening"), [(2, False, 1.0), (3, True, 1.0), (5, True, 0.3)])
 def test_gradient_and_hessian_are_the_derivatives(five, n, with_priors, widening):
     problem = first(five, n)
-    scans, pairs = problem.laid_out(), all_pairs(n)
     priors = priors_for(problem.truth, n) if with_priors else no_priors()
+    joint = problem.joint(priors=priors, scale=SCALE)
     steps = np.tile(STEPS, n)
     checked = 0
     # One variable at a time: among all 3n, some point always crosses a border.
     for seed in range(4):
         start = near(problem.truth, seed, 0.2, 0.05).ravel()
-        found = joint_energy(scans, pairs, priors, start.reshape(n, 3), SCALE, widening)
+        found = joint_energy(joint, start.reshape(n, 3), widening)
         for variable in range(3 * n):
 
             def place(shift: Array, at: Array = start, axis: int = variable) -> Array:
@@ -78,11 +80,11 @@ def test_gradient_and_hessian_are_the_derivatives(five, n, with_priors, widening
                 return moved.reshape(n, 3)
 
             def function(shift: Array, place: Callable[[Array], Array] = place) -> Array:
-                there = joint_energy(scans, pairs, priors, place(shift), SCALE, widening)
+                there = joint_energy(joint, place(shift), widening)
                 return np.append(there.gradient, there.value)
 
             def piece(shift: Array, place: Callable[[Array], Array] = place) -> bytes:
-                return pieces(problem, pairs, place(shift))
+                return pieces(problem, joint.pairs, place(shift))
 
             rows = derivative(function, piece, np.zeros(1), steps[variable : variable + 1])
             if rows is None:
@@ -98,30 +100,28 @@ def test_gradient_and_hessian_are_the_derivatives(five, n, with_priors, widening
 
 
 def test_without_the_exact_terms_the_hessian_is_semi_definite(five):
-    scans, priors = five.laid_out(), priors_for(five.truth, 3)
+    joint = five.joint(priors=priors_for(five.truth, 3), scale=SCALE)
     indefinite = 0
     for seed in range(10):
         poses = near(five.truth, seed, 0.4, 0.2)
-        eigenvalues = np.linalg.eigvalsh(
-            joint_energy(scans, all_pairs(5), priors, poses, SCALE, exact=False).hessian
-        )
+        eigenvalues = np.linalg.eigvalsh(joint_energy(joint, poses, exact=False).hessian)
         assert eigenvalues[0] >= -1e-12 * eigenvalues[-1]
-        exact = joint_energy(scans, all_pairs(5), priors, poses, SCALE).hessian
+        exact = joint_energy(joint, poses).hessian
         indefinite += np.linalg.eigvalsh(exact)[0] < -1e-6 * eigenvalues[-1]
     assert indefinite > 0
 
 
 def test_a_global_motion_changes_nothing(five):
-    scans, priors = five.laid_out(), priors_for(five.truth, 4)
+    joint = five.joint(priors=priors_for(five.truth, 4), scale=SCALE)
     poses = near(five.truth, 4)
-    here = joint_energy(scans, all_pairs(5), priors, poses, SCALE)
+    here = joint_energy(joint, poses)
     motion = np.array([30.0, -12.0, 2.5])
-    there = joint_energy(scans, all_pairs(5), priors, compose(motion, poses), SCALE)
+    there = joint_energy(joint, compose(motion, poses))
     assert there.value == pytest.approx(here.value, rel=1e-9)
     null = gauge_directions(poses)
     np.testing.assert_allclose(null.T @ null, np.eye(3), atol=1e-12)
     np.testing.assert_allclose(null.T @ here.gradient, 0, atol=1e-9 * np.abs(here.gradient).max())
-    part = joint_energy(scans, all_pairs(5), priors, poses, SCALE, exact=False).hessian
+    part = joint_energy(joint, poses, exact=False).hessian
     np.testing.assert_allclose(part @ null, 0, atol=1e-9 * np.abs(part).max())
 
 
@@ -129,7 +129,7 @@ def test_priors_compare_angles_across_the_jump():
     """Poses at ±179°: their difference is 2°, and a prior of 2° is met."""
     poses = np.array([[0.0, 0.0, np.radians(179)], [0.0, 0.0, np.radians(-179)]])
     prior = Priors(np.array([[0, 1]]), np.array([[0.0, 0.0, np.radians(2)]]), np.eye(3)[None])
-    empty = office_problem((0, 1)).laid_out()
-    found = joint_energy(empty, np.empty((0, 2), dtype=np.int64), prior, poses)
+    none = np.empty((0, 2), dtype=np.int64)
+    found = joint_energy(office_problem((0, 1)).joint(pairs=none, priors=prior), poses)
     assert found.value == pytest.approx(0, abs=1e-20)
     np.testing.assert_allclose(found.gradient, 0, atol=1e-12)

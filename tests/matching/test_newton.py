@@ -3,7 +3,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from nscan_cli.matching.newton import minimise, objective, solve3
+from nscan_cli.matching.newton import PairProblem, minimise, objective
+from nscan_cli.matching.priors import Prior
 from nscan_cli.ndt.energy import OUT
 from nscan_cli.ndt.grid import Ndt
 from nscan_cli.poses import Array
@@ -24,41 +25,16 @@ def ndt_of(points: Array) -> Ndt:
 
 def evaluate(ndt: Ndt, points: Array, pose: Array, curvature: float = 1.0) -> tuple[float, Array, Array]:
     gradient, hessian = np.empty(3), np.empty((3, 3))
-    value = objective(
-        ndt.grid, ndt.half, points, pose, SCALE, MEAN, INFORMATION, 1.0, curvature,
-        np.empty(OUT), gradient, hessian,
-    )  # fmt: skip
+    problem = PairProblem(ndt.grid, ndt.half, points, SCALE, Prior(MEAN, INFORMATION))
+    value = objective(problem, pose, 1.0, curvature, np.empty(OUT), gradient, hessian)
     return value, gradient, hessian
 
 
 def run(ndt: Ndt, points: Array, start: Array, mean: Array, information: Array):
     pose, hessian = start.copy(), np.empty((3, 3))
-    outcome = minimise(
-        ndt.grid,
-        ndt.half,
-        points,
-        pose,
-        SCALE,
-        mean,
-        information,
-        np.array([0.05, 0.3, 1.0]),
-        30,
-        1e-6,
-        hessian,
-    )
+    problem = PairProblem(ndt.grid, ndt.half, points, SCALE, Prior(mean, information))
+    outcome = minimise(problem, pose, np.array([0.05, 0.3, 1.0]), 30, 1e-6, hessian)
     return pose, hessian, outcome
-
-
-def test_solve3_solves_definite_systems_and_refuses_others():
-    rng = np.random.default_rng(1)
-    for _ in range(20):
-        root, right, out = rng.normal(0, 1, (3, 3)), rng.normal(0, 1, 3), np.empty(3)
-        matrix = root @ root.T + 0.1 * np.eye(3)
-        assert solve3(matrix, right, out)
-        np.testing.assert_allclose(matrix @ out, right, atol=1e-9)
-        values, vectors = np.linalg.eigh(matrix)
-        values[rng.integers(3)] *= -1
-        assert not solve3((vectors * values) @ vectors.T, right, out)
 
 
 def test_gradient_and_hessian_of_the_objective_are_its_derivatives():

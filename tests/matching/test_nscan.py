@@ -44,7 +44,7 @@ def test_scans_that_belong_together_are_all_kept(four):
     assert (match.kept, match.fixed, match.reason, left_out) == ((0, 1, 2, 3), 1, None, [])
     assert match.pairs.tolist() == all_pairs(4).tolist()
     assert np.abs(errors(match.joint.poses, four.truth)[:, :2]).max() < 0.03
-    alone = joint_energy(four.laid_out(), all_pairs(4), no_priors(), match.joint.poses)
+    alone = joint_energy(four.joint(scale=1.0), match.joint.poses)
     assert match.energy == pytest.approx(alone.value)
     assert match.overlap.min() > 0.6
     others = [0, 1, 2, 6, 7, 8, 9, 10, 11]
@@ -62,7 +62,7 @@ def test_a_fixed_gauge_holds_the_scan_that_was_named(four):
 
 
 def test_overlaps_count_points_on_gaussians(four):
-    shares = overlaps(four.laid_out(), four.truth)
+    shares = overlaps(four.joint().scans, four.truth)
     seen = np.zeros((4, len(four.points[3])), dtype=bool)
     for i in range(4):
         for j in range(4):

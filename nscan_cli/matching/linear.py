@@ -1,0 +1,41 @@
+"""Small dense systems, solved inside the kernels."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from nscan_cli.compiled import kernel
+from nscan_cli.poses import Array
+
+
+@kernel
+def solve_definite(matrix: Array, right: Array, out: Array) -> bool:
+    """Solve a symmetric positive definite system (m, m) by Cholesky; False when it is not definite.
+
+    Reads the lower triangle of `matrix`, and writes its factor there.
+    """
+    m = right.shape[0]
+    for j in range(m):
+        pivot = matrix[j, j]
+        for k in range(j):
+            pivot -= matrix[j, k] * matrix[j, k]
+        if not pivot > 0.0:
+            return False
+        matrix[j, j] = np.sqrt(pivot)
+        for i in range(j + 1, m):
+            total = matrix[i, j]
+            for k in range(j):
+                total -= matrix[i, k] * matrix[j, k]
+            matrix[i, j] = total / matrix[j, j]
+    for i in range(m):
+        total = right[i]
+        for k in range(i):
+            total -= matrix[i, k] * out[k]
+        out[i] = total / matrix[i, i]
+    for back in range(m):
+        i = m - 1 - back
+        total = out[i]
+        for k in range(i + 1, m):
+            total -= matrix[k, i] * out[k]
+        out[i] = total / matrix[i, i]
+    return True
