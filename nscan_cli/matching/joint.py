@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from nscan_cli.compiled import kernel
 from nscan_cli.matching.joint_energy import JointProblem, evaluate, joint_energy
@@ -17,21 +20,26 @@ GREATEST_DAMPING = 1e4
 FREE = -1
 """In place of a fixed scan: the gauge is free."""
 
+PairsAt = Callable[[Array], NDArray[np.int64]]
+"""The index set J (m, 2) at the poses (n, 3)."""
+
 
 @dataclass(frozen=True)
 class JointOptions:
     """How a joint match is minimised."""
 
     widenings: tuple[float, ...] = (0.05, 0.3, 1.0)
-    """One stage each: w of the energy; 1 is the energy itself."""
+    """Stages of the approach: w of the energy; 1 is the energy itself, in which the last steps are done."""
+    near: float = 0.01
+    """A wide stage is left when no pose moves by more (m, rad), the one of w = 1 at half of that."""
+    approach_iterations: int = 30
+    """In each stage of the approach."""
     max_iterations: int = 30
-    """In each stage."""
+    """In the last stage."""
     tolerance: float = 1e-4
-    """A stage has converged when no pose moves by more (m, rad)."""
+    """The match has converged when no pose moves by more (m, rad)."""
     fixed: int | None = None
     """The scan that stays where it is; None leaves the gauge free (paper, III-D)."""
-    neutral: bool = False
-    """Whether steps are judged by the neutral energy, see joint_energy."""
 
 
 @dataclass(frozen=True)
@@ -42,59 +50,108 @@ class JointMatch:
     """(n, 3)"""
     hessian: Array
     """(3n, 3n) exact Hessian of the objective at the poses, the gauge still in it."""
+    pairs: NDArray[np.int64]
+    """(m, 2) the index set J at the end."""
     energy: float
     gradient_norm: float
     iterations: int
     evaluations: int
+    last_iterations: int
+    """Those of the iterations that were done in the last stage."""
     converged: bool
+
+
+class Way(NamedTuple):
+    """Where an approach has come."""
+
+    poses: Array
+    iterations: int
+    evaluations: int
 
 
 def match_jointly(problem: JointProblem, start: Array, options: JointOptions) -> JointMatch:
     """Minimise the joint energy from the poses `start` (n, 3), stage by stage.
 
-    The steps are Newton's, eq. (5) to (8), damped as by Levenberg and Marquardt; with the semi-definite
-    part of the Hessian in the early stages, and in the last where the exact one is not positive definite.
+    The steps are Newton's, eq. (5) to (8), damped as by Levenberg and Marquardt: with the semi-definite
+    part of the Hessian in the wide stages, with the exact one in the last where it is positive definite.
     """
+    way = _approach(problem, start, options, options.widenings[:-1], neutral=False)
+    return _finish(problem, way, options, neutral=False)
+
+
+def match_near_and_far(
+    problem: JointProblem, start: Array, options: JointOptions, pairs_at: PairsAt | None = None
+) -> JointMatch:
+    """Approach in two ways from `start` (n, 3), and finish from where the neutral energy is lower.
+
+    Through all stages a far optimum is found; but the reward for overlap slides scans together where a
+    corridor leaves them room. By the energy itself, judged by the neutral one, they stay apart; but only a
+    near optimum is found. `pairs_at` chooses the index set again before each stage; the pairs of `problem`
+    serve for comparison.
+    """
+    ways = [
+        _approach(problem, start, options, options.widenings, neutral=False, pairs_at=pairs_at),
+        _approach(problem, start, options, options.widenings[-1:], neutral=True, pairs_at=pairs_at),
+    ]
+    best = min(ways, key=lambda way: joint_energy(problem, way.poses, neutral=True).value)
+    both = best._replace(
+        iterations=sum(way.iterations for way in ways),
+        evaluations=sum(way.evaluations for way in ways) + len(ways),
+    )
+    return _finish(_at(problem, pairs_at, best.poses), both, options, neutral=True)
+
+
+def _approach(
+    problem: JointProblem,
+    start: Array,
+    options: JointOptions,
+    widenings: tuple[float, ...],
+    neutral: bool,
+    pairs_at: PairsAt | None = None,
+) -> Way:
     poses = start.copy()
-    fixed = FREE if options.fixed is None else options.fixed
     iterations = evaluations = 0
-    converged = False
-    for stage, widening in enumerate(options.widenings):
-        exact = stage == len(options.widenings) - 1
-        steps, evaluated, converged = _descend(
-            problem, poses, widening, exact, options.neutral, fixed, options.max_iterations, options.tolerance
+    for widening in widenings:
+        near = options.near if widening < 1.0 else 0.5 * options.near
+        steps, evaluated, _ = _descend(
+            _at(problem, pairs_at, poses),
+            poses,
+            widening,
+            False,
+            neutral,
+            FREE if options.fixed is None else options.fixed,
+            options.approach_iterations,
+            near,
         )
         iterations += steps
         evaluations += evaluated
+    return Way(poses, iterations, evaluations)
+
+
+def _finish(problem: JointProblem, way: Way, options: JointOptions, neutral: bool) -> JointMatch:
+    """The last steps, with the exact Hessian."""
+    poses = way.poses
+    fixed = FREE if options.fixed is None else options.fixed
+    last, evaluated, converged = _descend(
+        problem, poses, 1.0, True, neutral, fixed, options.max_iterations, options.tolerance
+    )
     final = joint_energy(problem, poses)
     poses[:, 2] = wrap(poses[:, 2])
     return JointMatch(
-        poses,
-        final.hessian,
-        final.value,
-        float(np.linalg.norm(final.gradient)),
-        iterations,
-        evaluations + 1,
-        converged,
+        poses=poses,
+        hessian=final.hessian,
+        pairs=problem.pairs,
+        energy=final.value,
+        gradient_norm=float(np.linalg.norm(final.gradient)),
+        iterations=way.iterations + last,
+        evaluations=way.evaluations + evaluated + 1,
+        last_iterations=last,
+        converged=converged,
     )
 
 
-def match_near_and_far(problem: JointProblem, start: Array, options: JointOptions) -> JointMatch:
-    """Match twice from `start` (n, 3), and keep the result of the lower neutral energy.
-
-    Through all stages a far optimum is found; but the reward for overlap slides scans together where a
-    corridor leaves them room. By the last stage alone, judged by the neutral energy, they stay apart;
-    but only a near optimum is found. Iterations and evaluations are those of both.
-    """
-    near = replace(options, widenings=options.widenings[-1:], neutral=True)
-    matches = [match_jointly(problem, start, each) for each in (options, near)]
-    values = [joint_energy(problem, match.poses, neutral=True).value for match in matches]
-    best = matches[int(np.argmin(values))]
-    return replace(
-        best,
-        iterations=sum(match.iterations for match in matches),
-        evaluations=sum(match.evaluations for match in matches) + len(matches),
-    )
+def _at(problem: JointProblem, pairs_at: PairsAt | None, poses: Array) -> JointProblem:
+    return problem if pairs_at is None else problem._replace(pairs=pairs_at(poses))
 
 
 @kernel

@@ -18,6 +18,10 @@ from nscan_cli.ndt.grid import Grid, Ndt
 from nscan_cli.poses import Array
 
 
+NEUTRAL = 0.78
+"""What a point must reach of the usual s to count for a match in the neutral energy."""
+
+
 class Scans(NamedTuple):
     """The NDTs and points of n scans, laid end to end for the kernels."""
 
@@ -35,6 +39,8 @@ class Scans(NamedTuple):
     """(n + 1,)"""
     half: float
     """Side (m) of a lattice cell, the same for all."""
+    usual: Array
+    """(n,) mean s of each scan's points on its own Gaussians: what a perfect match would reach."""
 
 
 class Priors(NamedTuple):
@@ -75,6 +81,7 @@ def lay_out(ndts: Sequence[Ndt], points: Sequence[Array]) -> Scans:
     gaussians = [ndt.grid.gaussians for ndt in ndts]
     # The sums are for growing; matching needs the Gaussians alone.
     grid = Grid(np.concatenate(tables), keys, links, np.empty((0, 6)), np.concatenate(gaussians))
+    own = np.array([_own_mean(ndt.grid, ndt.half, part) for ndt, part in zip(ndts, points, strict=True)])
     return Scans(
         grid,
         _starts([len(table) for table in tables]),
@@ -83,6 +90,7 @@ def lay_out(ndts: Sequence[Ndt], points: Sequence[Array]) -> Scans:
         np.concatenate([np.asarray(part, dtype=np.float64).reshape(-1, 2) for part in points]),
         _starts([len(part) for part in points]),
         ndts[0].half,
+        own,
     )
 
 
@@ -106,8 +114,8 @@ def joint_energy(
     `exact=False` keeps the semi-definite part of the Hessian only: Σ (∂u/∂p)ᵗ H⁺ (∂u/∂p).
 
     E rewards every point that meets a Gaussian, so that it falls when scans are slid over each other.
-    `neutral=True` takes that reward away: a point counts s less 1/√(1 + w), which is the mean of s when
-    the distance from a wall is spread as its Gaussian says. Gradient and Hessian are the same.
+    `neutral=True` takes that reward away: a point counts s less the greater part of what s usually is on
+    the scan that it meets. Gradient and Hessian are the same.
     """
     n = len(poses)
     gradient, hessian = np.empty(3 * n), np.empty((3 * n, 3 * n))
@@ -128,8 +136,7 @@ def evaluate(
     """The joint energy; writes its gradient (3n,) and Hessian (3n, 3n), exact with a `curvature` of 1."""
     gradient[:] = 0.0
     hessian[:, :] = 0.0
-    baseline = 1.0 / np.sqrt(1.0 + widening) if neutral else 0.0
-    value = _add_pairs(problem, poses, widening, curvature, baseline, gradient, hessian)
+    value = _add_pairs(problem, poses, widening, curvature, NEUTRAL if neutral else 0.0, gradient, hessian)
     return float(value + _add_priors(problem.priors, poses, curvature, gradient, hessian))
 
 
@@ -150,12 +157,22 @@ def scan_points(scans: Scans, i: int) -> Array:
 
 
 @kernel
+def _own_mean(grid: Grid, half: float, points: Array) -> float:
+    out = np.empty(OUT)
+    accumulate(grid, half, points, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, out)
+    energy = out[0]
+    accumulate(grid, half, points, 0.0, 0.0, 0.0, 1.0, 0.0, 1.0, out)
+    # The difference is the number of Gaussians met.
+    return float(-energy / max(out[0] - energy, 1.0))
+
+
+@kernel
 def _add_pairs(
     problem: JointProblem,
     poses: Array,
     widening: float,
     curvature: float,
-    baseline: float,
+    neutral: float,
     gradient: Array,
     hessian: Array,
 ) -> float:
@@ -175,7 +192,7 @@ def _add_pairs(
             u[2],
             widening,
             curvature,
-            baseline,
+            neutral * scans.usual[i],
             out,
         )
         value += scale * out[0]

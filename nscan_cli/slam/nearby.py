@@ -133,7 +133,9 @@ def _match(
             np.array([relation.measurement for relation in known]),
             np.array([relation.information for relation in known]),
         )
-    joint = JointOptions(widenings, options.max_iterations, options.tolerance)
+    joint = JointOptions(
+        widenings, near=options.tolerance, max_iterations=options.max_iterations, tolerance=options.tolerance
+    )
     return match_jointly(JointProblem(scans, all_pairs(len(members)), priors, options.scale), start, joint)
 
 

@@ -1,0 +1,30 @@
+"""Writes pictures and tables of all experiments: `python -m tests.experiments FOLDER`.
+
+The pictures go into the folder, the document experiments.md beside it. The same bytes every time.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+from tests.experiments import fig_2, fig_3, fig_4, fig_5
+from tests.experiments.output import write_reports
+from tests.experiments.report import Report
+
+EXPERIMENTS: tuple[Callable[[], Report], ...] = (fig_2.report, fig_3.report, fig_4.report, fig_5.report)
+
+
+def main(folder: str) -> None:
+    """Run every experiment, and write what they give; `folder` has to exist."""
+    reports = [experiment() for experiment in EXPERIMENTS]
+    for path in write_reports(reports, Path(folder)):
+        print(path.name)
+    for report in reports:
+        for line in report.left_out:
+            print(line)
+
+
+if __name__ == "__main__":
+    main(sys.argv[1])

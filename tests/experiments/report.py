@@ -1,0 +1,26 @@
+"""What an experiment gives: pictures, a table, and what they show."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from PIL.Image import Image
+
+
+@dataclass(frozen=True)
+class Report:
+    """One section of the document."""
+
+    title: str
+    text: str
+    """Markdown: what was done, and what is to be seen."""
+    pictures: Mapping[str, Image]
+    """By the names of their files, without ending."""
+    header: Sequence[str]
+    """Of the table."""
+    rows: Sequence[Sequence[str]]
+    left_out: Sequence[str] = field(default_factory=tuple)
+    """What could not be done, and why; whole sentences."""
