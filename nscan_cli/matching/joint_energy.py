@@ -17,7 +17,6 @@ from nscan_cli.ndt.energy import OUT, accumulate, unpack
 from nscan_cli.ndt.grid import Grid, Ndt
 from nscan_cli.poses import Array
 
-
 NEUTRAL = 0.78
 """What a point must reach of the usual s to count for a match in the neutral energy."""
 
@@ -80,7 +79,7 @@ def lay_out(ndts: Sequence[Ndt], points: Sequence[Array]) -> Scans:
     links = np.concatenate([ndt.grid.links[: ndt.rows] for ndt in ndts])
     gaussians = [ndt.grid.gaussians for ndt in ndts]
     # The sums are for growing; matching needs the Gaussians alone.
-    grid = Grid(np.concatenate(tables), keys, links, np.empty((0, 6)), np.concatenate(gaussians))
+    grid = Grid(np.concatenate(tables), keys, links, np.empty((0, 8)), np.concatenate(gaussians))
     own = np.array([_own_mean(ndt.grid, ndt.half, part) for ndt, part in zip(ndts, points, strict=True)])
     return Scans(
         grid,

@@ -1,8 +1,8 @@
 """The energy of points against Gaussians, its gradient and its Hessian ([19]; paper, III-F).
 
 With x' = f_u(x), v = x' − q and s = exp(−½ w vᵗΣ⁻¹v), the energy is E(u) = −Σ s over all points and the four
-Gaussians that each meets. `w` is 1 for the energy itself; less widens every Gaussian by 1/√w, and with it
-the basin of convergence.
+Gaussians that each meets, but for those that its beam would hit from behind. `w` is 1 for the energy
+itself; less widens every Gaussian by 1/√w, and with it the basin of convergence.
 """
 
 from __future__ import annotations
@@ -53,7 +53,7 @@ def accumulate(
             if link < 0:
                 continue
             gaussian = grid.gaussians[link]
-            if gaussian[2] == 0.0:
+            if gaussian[2] == 0.0 or gaussian[5] * rx + gaussian[6] * ry > 0.0:
                 continue
             vx, vy = px - gaussian[0], py - gaussian[1]
             ax, ay = gaussian[2] * vx + gaussian[3] * vy, gaussian[3] * vx + gaussian[4] * vy
@@ -95,8 +95,9 @@ def inlier_share(grid: Grid, half: float, points: Array, pose: Array, bound: flo
     cos, sin = np.cos(pose[2]), np.sin(pose[2])
     inliers = 0
     for k in range(points.shape[0]):
-        px = cos * points[k, 0] - sin * points[k, 1] + pose[0]
-        py = sin * points[k, 0] + cos * points[k, 1] + pose[1]
+        rx = cos * points[k, 0] - sin * points[k, 1]
+        ry = sin * points[k, 0] + cos * points[k, 1]
+        px, py = rx + pose[0], ry + pose[1]
         row = find_row(grid, pack(int(np.floor(px / half)), int(np.floor(py / half))))
         if row < 0:
             continue
@@ -105,6 +106,8 @@ def inlier_share(grid: Grid, half: float, points: Array, pose: Array, bound: flo
             if link < 0 or grid.gaussians[link, 2] == 0.0:
                 continue
             gaussian = grid.gaussians[link]
+            if gaussian[5] * rx + gaussian[6] * ry > 0.0:
+                continue
             vx, vy = px - gaussian[0], py - gaussian[1]
             if gaussian[2] * vx * vx + 2 * gaussian[3] * vx * vy + gaussian[4] * vy * vy < bound:
                 inliers += 1

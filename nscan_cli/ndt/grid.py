@@ -10,6 +10,10 @@ One thing differs from [19]: the inverse of the larger eigenvalue λ is multipli
 smaller to the larger. A round Gaussian stays what it is; a piece of wall, long and thin, hardly holds a
 point along itself. How points are spread along a wall says where the beams fell, not where the wall is:
 taken at its word, it drags the robot back in corridors, and the Hessian claims to know the way along.
+
+Another thing is added: a Gaussian knows from which side it was seen. A wall that is seen from a room and
+from the corridor has two faces, 10 or 15 cm apart; matched with each other they pull the scans together by
+that much. A beam that hits a Gaussian from behind therefore does not meet it.
 """
 
 from __future__ import annotations
@@ -24,6 +28,8 @@ from nscan_cli.poses import Array
 
 HALF_KEY = 1 << 30
 """Offset that makes lattice coordinates positive in a packed key."""
+ONE_SIDED = 0.2
+"""A Gaussian shows one side when its beams run through it by so much of their length on average."""
 NEW_NEIGHBOURS = 9
 """A point in new land creates at most its own lattice cell and the eight around it."""
 
@@ -42,9 +48,11 @@ class Grid(NamedTuple):
     links: NDArray[np.int32]
     """(R, 4) rows of the Gaussians of the four blocks that the lattice cell is part of, or −1."""
     sums: Array
-    """(R, 6) n, Σx, Σy, Σx², Σxy, Σy² about the centre of the lattice cell."""
+    """(R, 8) n, Σx, Σy, Σx², Σxy, Σy² about the centre of the lattice cell, and the sum of the unit vectors
+    along the beams."""
     gaussians: Array
-    """(G, 5) mean x, y and Σ⁻¹ as (xx, xy, yy); Σ⁻¹ is 0 where a Gaussian has too few points."""
+    """(G, 7) mean x, y; Σ⁻¹ as (xx, xy, yy), 0 where a Gaussian has too few points; and the normal (x, y)
+    of the side that it shows, 0 where it was seen from both."""
 
 
 @kernel
@@ -127,6 +135,9 @@ def add_points(
         sums[3] += sign * dx * dx
         sums[4] += sign * dx * dy
         sums[5] += sign * dy * dy
+        length = max(np.hypot(points[k, 0], points[k, 1]), 1e-9)
+        sums[6] += sign * (x - pose[0]) / length
+        sums[7] += sign * (y - pose[1]) / length
         if sums[0] < 0.5:
             sums[:] = 0.0
     previous = -1
@@ -158,9 +169,9 @@ def _settle(grid: Grid, rows: int, ix: int, iy: int) -> tuple[int, int]:
 
 @kernel
 def _make_gaussian(grid: Grid, row: int, half: float, minimum: float, floor: float) -> None:
-    """Mean and inverse covariance of the block of four lattice cells whose lower left one is `row`."""
+    """Mean, inverse covariance and side of the block of four lattice cells whose lower left one is `row`."""
     key = grid.keys[row]
-    n = sx = sy = sxx = sxy = syy = 0.0
+    n = sx = sy = sxx = sxy = syy = fx = fy = 0.0
     for corner in range(4):
         ox, oy = corner % 2, corner // 2
         cell = row if corner == 0 else find_row(grid, key + ox * 2 * HALF_KEY + oy)
@@ -175,6 +186,8 @@ def _make_gaussian(grid: Grid, row: int, half: float, minimum: float, floor: flo
         sxx += part[3] + 2 * dx * part[1] + part[0] * dx * dx
         sxy += part[4] + dx * part[2] + dy * part[1] + part[0] * dx * dy
         syy += part[5] + 2 * dy * part[2] + part[0] * dy * dy
+        fx += part[6]
+        fy += part[7]
     gaussian = grid.gaussians[row]
     if n < minimum:
         gaussian[:] = 0.0
@@ -197,6 +210,14 @@ def _make_gaussian(grid: Grid, row: int, half: float, minimum: float, floor: flo
     gaussian[2] = mean + half_gap * c2
     gaussian[3] = half_gap * s2
     gaussian[4] = mean - half_gap * c2
+    # The normal is the eigenvector of the smaller eigenvalue, at a right angle to (cos ½β, sin ½β).
+    along_angle = 0.5 * np.arctan2(s2, c2)
+    nx, ny = -np.sin(along_angle), np.cos(along_angle)
+    through = (fx * nx + fy * ny) / n
+    gaussian[5] = gaussian[6] = 0.0
+    if abs(through) > ONE_SIDED:
+        side = -1.0 if through > 0.0 else 1.0
+        gaussian[5], gaussian[6] = side * nx, side * ny
 
 
 class Ndt:
@@ -248,7 +269,7 @@ class Ndt:
         self.rows = int(np.count_nonzero(kept))
         table = np.full(_table_size(self.rows), -1, dtype=np.int32)
         self.grid = Grid(
-            table, grid.keys[:rows][kept], links[kept], np.empty((0, 6)), grid.gaussians[:rows][usable]
+            table, grid.keys[:rows][kept], links[kept], np.empty((0, 8)), grid.gaussians[:rows][usable]
         )
         rehash(self.grid, self.rows)
 
@@ -262,8 +283,8 @@ def _empty(capacity: int) -> Grid:
         table=np.full(_table_size(capacity), -1, dtype=np.int32),
         keys=np.empty(capacity, dtype=np.int64),
         links=np.empty((capacity, 4), dtype=np.int32),
-        sums=np.empty((capacity, 6)),
-        gaussians=np.zeros((capacity, 5)),
+        sums=np.empty((capacity, 8)),
+        gaussians=np.zeros((capacity, 7)),
     )
 
 

@@ -14,6 +14,7 @@ from nscan_cli.mapping.panels import SLIMMEST, bounds_around, panel, stacked_pan
 from nscan_cli.mapping.plots import OPACITY, plot_match, plot_nscan
 from nscan_cli.mapping.ramp import ramp
 from nscan_cli.matching.joint import JointMatch
+from nscan_cli.matching.joint_energy import all_pairs
 from nscan_cli.matching.nscan import OVERLAPS_NONE, LeftOut, NScanMatch
 from nscan_cli.matching.pairwise import NO_OVERLAP, PairMatch
 from nscan_cli.matching.uncertainty import Weakest
@@ -143,9 +144,8 @@ def test_wide_scans_are_stacked():
 
 def nscan_of(kept: tuple[int, ...], poses: np.ndarray) -> NScanMatch:
     n = len(kept)
-    joint = JointMatch(poses, np.eye(3 * n), -1.0, 0.0, 5, 6, True)
-    pairs = np.array([(i, j) for i in range(n) for j in range(n) if i != j])
-    return NScanMatch(kept, 0, joint, -1.0, None, None, pairs, np.full(n, 0.9), None)
+    joint = JointMatch(poses, np.eye(3 * n), all_pairs(n), -1.0, 0.0, 5, 6, 3, True)
+    return NScanMatch(kept, 0, joint, -1.0, None, None, joint.pairs, np.full(n, 0.9), None)
 
 
 def panels_of_nscan(

@@ -3,9 +3,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from nscan_cli.ndt.energy import energy
+from nscan_cli.ndt.energy import energy, inlier_share
 from nscan_cli.ndt.grid import Ndt, find_row, pack
-from nscan_cli.poses import transform
+from nscan_cli.poses import relative, transform
 from tests.ndt import plain
 from tests.ndt.rooms import room
 
@@ -44,13 +44,20 @@ def test_gaussians_are_mean_and_covariance_of_the_points_in_each_cell(cell, mini
     expected = plain.gaussians(points, cell, minimum, floor)
     assert len(expected) > 30
     assert ndt.gaussian_count() == len(expected)
-    for (sx, sy, ix, iy), (mean, inverse) in expected.items():
+    sided = 0
+    for (sx, sy, ix, iy), (mean, inverse, side) in expected.items():
         row = find_row(ndt.grid, pack(2 * ix + sx, 2 * iy + sy))
         assert row >= 0
         found = ndt.grid.gaussians[row]
         np.testing.assert_allclose(found[:2], mean, rtol=1e-12)
         scale = np.abs(inverse).max()
-        np.testing.assert_allclose(found[2:], inverse[np.triu_indices(2)], rtol=1e-8, atol=1e-8 * scale)
+        np.testing.assert_allclose(found[2:5], inverse[np.triu_indices(2)], rtol=1e-8, atol=1e-8 * scale)
+        values = np.linalg.eigvalsh(inverse)
+        if values[0] < 0.9 * values[1]:
+            # A round one has no normal.
+            np.testing.assert_allclose(found[5:], side, atol=1e-6)
+            sided += bool(side.any())
+    assert sided > 20
 
 
 def test_a_straight_wall_is_held_across_and_hardly_along():
@@ -61,12 +68,33 @@ def test_a_straight_wall_is_held_across_and_hardly_along():
     along = np.var(x)
     assert along == pytest.approx(0.8**2 / 12 * (1 + 2 / 16))
     # The floor of 0.02 m across; along, the inverse variance times the ratio of the two.
-    expected = np.array([0.5, 0.2, 0.02**2 / along**2, 0.0, 0.02**-2])
+    # Seen from the origin, its side is the one below.
+    expected = np.array([0.5, 0.2, 0.02**2 / along**2, 0.0, 0.02**-2, 0.0, -1.0])
     np.testing.assert_allclose(np.array(gaussian), expected, atol=1e-9)
 
 
 def test_adding_moves_by_the_pose():
-    assert_same(grown(room(1), pose=ELSEWHERE), grown(transform(ELSEWHERE, room(1))))
+    moved, there = entries(grown(room(1), pose=ELSEWHERE)), entries(grown(transform(ELSEWHERE, room(1))))
+    assert moved.keys() == there.keys()
+    for key, gaussian in moved.items():
+        # All but the side: it is that of the pose, or of the origin.
+        np.testing.assert_allclose(gaussian[:5], there[key][:5], rtol=1e-9, atol=1e-9)
+
+
+def test_a_wall_is_met_from_the_side_that_it_was_seen_from():
+    """A wall at y = 2 seen from the origin: a robot beyond it sees the other face, at the same place."""
+    x = np.linspace(-1.5, 1.5, 61)
+    wall = np.stack([x, np.full(61, 2.0)], axis=1)
+    ndt = grown(wall, cell=1.0)
+    ahead, beyond = np.array([0.4, -1.0, 0.2]), np.array([0.1, 5.0, 0.3])
+    near, far = (transform(relative(HERE, pose), wall) for pose in (ahead, beyond))
+    assert energy(ndt, near, ahead).value < -61
+    assert energy(ndt, far, beyond).value == 0.0
+    assert inlier_share(ndt.grid, ndt.half, far, beyond, 9.0) == 0.0
+    # Once it was seen from both sides, it is met from both.
+    ndt.add(far, beyond)
+    assert energy(ndt, near, ahead).value < -61
+    assert energy(ndt, far, beyond).value < -61
 
 
 def test_growing_in_two_steps_is_growing_in_one():

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from nscan_cli.ndt.energy import energy
 from nscan_cli.ndt.grid import Ndt
-from nscan_cli.poses import Array, compose, relative, rotated_information, transform
+from nscan_cli.poses import Array, compose, relative, rotated_information
 from nscan_cli.slam.keyframes import Keyframes
 from nscan_cli.slam.options import GaussianOptions, KeyframeOptions
 from nscan_cli.slam.tracking import Tracked
@@ -60,12 +60,12 @@ def expected(keyframe: Array, *scans: tuple[int, Array]) -> Ndt:
     """The NDT of the scans (seed, pose) seen from a keyframe's pose."""
     ndt = Ndt(GAUSSIANS.cell, GAUSSIANS.minimum, GAUSSIANS.floor)
     for seed, pose in scans:
-        ndt.add(transform(relative(pose, keyframe), room(seed)), np.zeros(3))
+        ndt.add(room(seed), relative(pose, keyframe))
     return ndt
 
 
 def gaussians(ndt: Ndt) -> Array:
-    """(G, 5) those with points enough, in order of their means."""
+    """(G, 7) those with points enough, in order of their means."""
     rows = ndt.grid.gaussians[ndt.grid.gaussians[:, 2] > 0]
     return rows[np.lexsort(np.round(rows[:, :2], 6).T)]
 
