@@ -10,9 +10,15 @@ import pytest
 BESIDE_THE_REPOSITORY = Path(__file__).resolve().parents[2] / "shared" / "data"
 
 
-def data_file(name: str) -> Path:
-    """The real log or graph `name`, from the folder NSCAN_DATA; the test is skipped where it is absent."""
+def find_data(name: str) -> Path | None:
+    """The real log or graph `name` in the folder NSCAN_DATA; None where it is absent."""
     path = Path(os.environ.get("NSCAN_DATA", BESIDE_THE_REPOSITORY)) / name
-    if not path.is_file():
+    return path if path.is_file() else None
+
+
+def data_file(name: str) -> Path:
+    """The real log or graph `name`, as find_data; the test is skipped where it is absent."""
+    path = find_data(name)
+    if path is None:
         pytest.skip(f"{name} is not there: set NSCAN_DATA to the folder of the real logs")
     return path

@@ -59,6 +59,8 @@ class JointMatch:
     last_iterations: int
     """Those of the iterations that were done in the last stage."""
     converged: bool
+    searched: bool = False
+    """Whether the scans were placed by search, because the start led nowhere."""
 
 
 class Way(NamedTuple):

@@ -9,11 +9,17 @@ import sys
 from collections.abc import Callable
 from pathlib import Path
 
-from tests.experiments import fig_2, fig_3, fig_4, fig_5
+from tests.experiments import fig_2, fig_3, fig_4, fig_5, gauge
 from tests.experiments.output import write_reports
 from tests.experiments.report import Report
 
-EXPERIMENTS: tuple[Callable[[], Report], ...] = (fig_2.report, fig_3.report, fig_4.report, fig_5.report)
+EXPERIMENTS: tuple[Callable[[], Report], ...] = (
+    fig_2.report,
+    fig_3.report,
+    fig_4.report,
+    fig_5.report,
+    gauge.report,
+)
 
 
 def main(folder: str) -> None:

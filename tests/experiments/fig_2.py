@@ -44,6 +44,9 @@ STROKES = (
     ((1, -0.75), (2, 0.25), (2, -0.75)),
 )
 """Of each shape: which height, and where along the wall, m."""
+ORIGIN = np.array([-4.0, 3.0])
+"""Where every shape is seen from, m: left of all strokes and above the wall, so that every part of a shape
+shows the same side in all of them."""
 PAIRS = ((0, 1), (1, 2), (0, 2))
 SHIFTS = np.linspace(-1.25, 2.5, 151)
 """m, of the curves and the image."""
@@ -69,7 +72,7 @@ class Minimum:
 
 
 def shape(which: int) -> Array:
-    """The points (m, 2) of a shape."""
+    """The points (m, 2) of a shape, seen from ORIGIN."""
     half = WALLS[which] / 2
     parts = [_segment((-half, 0.0), (half, 0.0))]
     for height, x in STROKES[which]:
@@ -77,7 +80,8 @@ def shape(which: int) -> Array:
         parts.append(_segment((x, low), (x, high)))
     points = np.concatenate(parts)
     noise = np.random.Generator(np.random.PCG64([SEED, which])).normal(0.0, NOISE, points.shape)
-    return points + noise
+    seen: Array = points + noise - ORIGIN
+    return seen
 
 
 @functools.cache
@@ -197,7 +201,7 @@ def _shapes(width: int) -> Image:
     canvas = Canvas.blank(bounds, int(width / (1 + margins)), CAPTION_MARGINS, SMALL)
     entries: list[Entry] = []
     for which, colour in enumerate((ORANGE, SKY, PURPLE)):
-        moved = shape(which) + np.array([lefts[which] + WALLS[which] / 2, 0.0])
+        moved = shape(which) + ORIGIN + np.array([lefts[which] + WALLS[which] / 2, 0.0])
         canvas.dots(moved, 3.2, colour)
         entries.append(("disc", colour, f"shape {which + 1}"))
     caption(canvas, "Three shapes", entries)

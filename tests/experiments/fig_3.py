@@ -17,23 +17,24 @@ from nscan_cli.mapping.axes import Entry, caption
 from nscan_cli.mapping.canvas import BLUE, GREEN, PURPLE, VERMILLION
 from nscan_cli.mapping.panels import bounds_around, panel, side_by_side, stacked
 from nscan_cli.mapping.symbols import robots
-from nscan_cli.matching.joint import JointMatch, JointOptions, match_jointly, match_near_and_far
+from nscan_cli.matching.joint import JointMatch, JointOptions, match_near_and_far
 from nscan_cli.matching.joint_energy import JointProblem, Priors, joint_energy
 from nscan_cli.matching.uncertainty import Weakest, weakest_translation
 from nscan_cli.poses import Array, compose, relative, transform
 from tests.experiments.charts import line_chart
 from tests.experiments.report import Report
-from tests.matching.problems import OPTIONS, Problem, errors, near, problem
-from tests.simulation.scenes import FIG_3, corridor_and_room
+from tests.matching.problems import OPTIONS, Problem, errors, fig_3, near
 
 if TYPE_CHECKING:
     from PIL.Image import Image
 
 COLOURS = (BLUE, VERMILLION, GREEN)
 """Of the scans."""
-POSES = np.array([FIG_3[0], FIG_3[1], (3.5, -1.0, np.pi / 3)])
-"""True poses (3, 3): from the third, the wall is seen that scan 2 sees as well, beside the door."""
-SEED = 2
+SEED = 4
+"""Of the noise and of the starts. With most others the joint match is held at a cell's border, where the
+energy jumps and its gradient is not zero: there the turn of all scans has some curvature too."""
+DRAWS = 20
+"""Seeds of the matches that tell how far off they usually end."""
 OFF, OFF_ANGLE = 0.1, 0.05
 """How far (m, rad) the poses are off at most that the matches start from."""
 PAIRS = ((0, 1), (0, 2), (1, 2))
@@ -42,8 +43,8 @@ ENLARGED = 30.0
 """Standard deviations of the ellipses, ten times what is usual, to be seen."""
 SHIFTS = np.linspace(-0.5, 0.5, 81)
 """m, of the curves."""
-SINGULAR = 1e-6
-"""An eigenvalue below this share of the greatest is 0: off a minimum by rounding, the gauge's are not."""
+SINGULAR = 1e-10
+"""An eigenvalue below this share of the greatest is 0 but for rounding."""
 PINNED = 1e9
 """Information (1/m²) of a prior that holds a scan at a shift."""
 
@@ -59,23 +60,31 @@ class Subset:
     """Of each scan's position but the first's."""
     error: float
     """m; how far off the truth their own match ends, the worst of the scans."""
+    usual_error: float
+    """m; its median over all DRAWS."""
 
 
 @functools.cache
-def scans() -> Problem:
+def scans(seed: int = SEED) -> Problem:
     """The three scans, with noise."""
-    return problem(corridor_and_room(), POSES, noise=True, seed=SEED)
+    return fig_3(noise=True, seed=seed)
 
 
-def energy_of(which: Sequence[int], priors: Priors | None = None) -> JointProblem:
+def energy_of(which: Sequence[int], priors: Priors | None = None, seed: int = SEED) -> JointProblem:
     """The energy of some of the scans, all pairs, as `nscan` weighs it."""
-    return scans().joint(*which, priors=priors, scale=2 * OPTIONS.scale / len(which))
+    return scans(seed).joint(*which, priors=priors, scale=2 * OPTIONS.scale / len(which))
 
 
-def matched(which: Sequence[int]) -> JointMatch:
+def matched(which: Sequence[int], seed: int = SEED) -> JointMatch:
     """Some of the scans matched by themselves."""
-    start = near(scans().truth, SEED, OFF, OFF_ANGLE)[list(which)]
-    return match_near_and_far(energy_of(which), start, JointOptions(fixed=0))
+    start = near(scans(seed).truth, seed, OFF, OFF_ANGLE)[list(which)]
+    return match_near_and_far(energy_of(which, seed=seed), start, JointOptions(fixed=0))
+
+
+def error(which: Sequence[int], seed: int = SEED) -> float:
+    """How far (m) off the truth their own match ends, the worst of the scans."""
+    off = errors(matched(which, seed).poses, scans(seed).truth[list(which)])
+    return float(np.hypot(off[:, 0], off[:, 1]).max())
 
 
 @functools.cache
@@ -96,13 +105,12 @@ def information(which: Sequence[int]) -> Array:
 def subset(which: tuple[int, ...]) -> Subset:
     """What they know."""
     hessian = information(which)
-    truth = scans().truth[list(which)]
-    off = errors(matched(which).poses, truth)
     return Subset(
         which,
         np.linalg.eigvalsh(hessian).astype(np.float64),
         tuple(weakest_translation(_marginal(hessian, at)) for at in range(len(which) - 1)),
-        float(np.hypot(off[:, 0], off[:, 1]).max()),
+        error(which),
+        float(np.median([error(which, seed) for seed in range(DRAWS)])),
     )
 
 
@@ -123,7 +131,7 @@ def profile(which: tuple[int, ...], moved: int, axis: int) -> Array:
     pose = relative(poses[place], poses[0])
     hold = np.zeros((1, 3, 3))
     hold[0, axis, axis] = PINNED
-    options = JointOptions(widenings=(1.0,), fixed=0, neutral=True)
+    options = JointOptions(widenings=(1.0,), fixed=0)
     energies = np.empty(len(SHIFTS))
     middle = len(SHIFTS) // 2
     # From the joint pose outwards, each match from the end of the one before.
@@ -133,7 +141,7 @@ def profile(which: tuple[int, ...], moved: int, axis: int) -> Array:
             mean = pose.copy()
             mean[axis] += SHIFTS[at]
             held = energy_of(which, Priors(np.array([[0, place]]), mean[None], hold))
-            here = match_jointly(held, here, options).poses
+            here = match_near_and_far(held, here, options).poses
             energies[at] = joint_energy(energy_of(which), here, neutral=True).value
     return energies
 
@@ -145,12 +153,13 @@ def report() -> Report:
         "Fig. 3: a robot enters a room (1), turns there (2), and leaves (3)",
         "Scans 1 and 2 share the walls of the corridor only, scans 1 and 3 only the far wall of the room: "
         "either pair leaves one direction open, and the little that is known there comes from the cells of "
-        "the NDT. Scans 2 and 3 both see the wall beside the door, and all three together leave nothing "
+        "the NDT. Scans 2 and 3 both see the corner beside the door, and all three together leave nothing "
         "open. The eigenvalues (1/m² and 1/rad², mixed) are those of the Hessian at the joint minimum with "
         "the first scan held, the standard deviations those along the weakest direction of each position "
         "(its angle is that in the frame of the first scan), and the error is that of a match of these "
-        f"scans alone from poses up to {OFF} m and {OFF_ANGLE} rad off. The curves show the lowest energy "
-        "when a scan is held at a shift from its joint pose: scan 2 along the corridor, scan 3 across it.",
+        f"scans alone from poses up to {OFF} m and {OFF_ANGLE} rad off, with the median over {DRAWS} draws "
+        "of noise and start in brackets. The curves show the lowest energy when a scan is held at a shift "
+        "from its joint pose: scan 2 along the corridor, scan 3 across it.",
         {"fig_3": _picture()},
         ("scans", "eigenvalues", "greatest σ of the others' positions", "error of their own match"),
         [*(_row(subset(which)) for which in (*PAIRS, ALL)), ["1, 2 and 3, gauge free", free, "", ""]],
@@ -163,7 +172,12 @@ def _row(of: Subset) -> list[str]:
         + f" along {np.degrees(weak.direction):.0f}°"
         for scan, weak in zip(of.scans[1:], of.weakest, strict=True)
     ]  # fmt: skip
-    return [_name(of.scans), _told(of.eigenvalues), "; ".join(known), f"{of.error:.3f} m"]
+    return [
+        _name(of.scans),
+        _told(of.eigenvalues),
+        "; ".join(known),
+        f"{of.error:.3f} m ({of.usual_error:.3f} m)",
+    ]
 
 
 def _told(eigenvalues: Array) -> str:

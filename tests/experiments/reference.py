@@ -6,7 +6,6 @@ import functools
 from dataclasses import dataclass
 
 import numpy as np
-import pytest
 from numpy.typing import NDArray
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
@@ -20,7 +19,7 @@ from nscan_cli.graph.system import GraphEnergy
 from nscan_cli.logs.load import read_log
 from nscan_cli.logs.scan import LaserLog
 from nscan_cli.poses import Array
-from tests.data import data_file
+from tests.data import find_data
 
 INFORMATION = np.diag([0.01**-2, 0.01**-2, 0.005**-2])
 """Of a reference relation: about as well (m, rad) as they agree with each other."""
@@ -44,9 +43,8 @@ def reference_log(name: str) -> ReferenceLog | None:
     Only the scans of the largest part that the relations connect have one. None where the log or its
     relations are not there.
     """
-    try:
-        log_path, relations_path = data_file(f"{name}.log.gz"), data_file(f"{name}.relations")
-    except pytest.skip.Exception:
+    log_path, relations_path = find_data(f"{name}.log.gz"), find_data(f"{name}.relations")
+    if log_path is None or relations_path is None:
         return None
     log, relations = read_log(str(log_path)), read_relations(str(relations_path))
     times, ends = np.unique(relations.times, return_inverse=True)

@@ -8,12 +8,10 @@ import numpy as np
 import pytest
 
 from tests.experiments import __main__ as experiments
-from tests.experiments import fig_2, fig_3, fig_4, fig_5, reference
-from tests.experiments.cases import Outcome
+from tests.experiments import fig_2, fig_3, fig_4, fig_5, gauge, reference
+from tests.experiments.cases import SUCCESS, Outcome, farthest
+from tests.experiments.gauge import Convergence
 from tests.experiments.report import Report
-
-SUCCESS = 0.1
-"""m"""
 
 
 def gap(which: tuple[int, ...]) -> float:
@@ -44,7 +42,7 @@ def test_fig_2_all_three_shapes_match_in_one_way():
 @pytest.mark.parametrize(("pair", "open_way"), [((0, 1), 0.0), ((0, 2), 90.0)])
 def test_fig_3_pairs_with_the_first_scan_leave_a_direction_open(pair, open_way):
     found = fig_3.subset(pair)
-    assert found.eigenvalues[0] < 0.05 * found.eigenvalues[1]
+    assert found.eigenvalues[0] < 0.01 * found.eigenvalues[1]
     off = np.degrees(found.weakest[0].direction) - open_way
     assert abs((off + 90) % 180 - 90) < 5
     assert found.error > SUCCESS
@@ -52,24 +50,34 @@ def test_fig_3_pairs_with_the_first_scan_leave_a_direction_open(pair, open_way):
 
 def test_fig_3_all_three_leave_nothing_open_but_the_gauge():
     whole, pairs = fig_3.subset((0, 1, 2)), [fig_3.subset(pair) for pair in ((0, 1), (0, 2))]
-    assert whole.eigenvalues[0] > 10 * max(pair.eigenvalues[0] for pair in pairs)
+    assert whole.eigenvalues[0] > 40 * max(pair.eigenvalues[0] for pair in pairs)
     for weakest, pair in zip(whole.weakest, pairs, strict=True):
         assert weakest.sigma is not None
         assert pair.weakest[0].sigma is not None
-        assert weakest.sigma < 0.3 * pair.weakest[0].sigma
+        assert weakest.sigma < 0.15 * pair.weakest[0].sigma
     assert whole.error < 0.05
+    assert min(pair.usual_error for pair in pairs) > 4 * whole.usual_error
+    # At a minimum: elsewhere the turn of all scans has the curvature that the gradient gives it.
+    assert fig_3.joint().gradient_norm < 1e-3
     free = fig_3.free_eigenvalues()
-    assert np.abs(free[:3]).max() < 1e-3 * free[3]
+    assert np.abs(free[:3]).max() < 1e-6 * free[3]
+
+
+@pytest.mark.parametrize(("moved", "axis"), [(1, 0), (2, 1)])
+def test_fig_3_a_shift_that_a_pair_leaves_open_costs_with_all_three(moved, axis):
+    pair, whole = (fig_3.profile(which, moved, axis) for which in ((0, moved), (0, 1, 2)))
+    far = np.abs(fig_3.SHIFTS) > 0.1
+    assert (whole[far] - whole.min()).min() > 2 * np.abs(pair[far] - pair.min()).max()
 
 
 def check(outcome: Outcome) -> None:
     """All scans are where they were taken after the match, and were not before it."""
-    before, after = (np.hypot(off[:, 0], off[:, 1]).max() for off in (outcome.before, outcome.after))
-    assert not outcome.left_out
-    assert outcome.match.reason is None
-    assert before > 5 * SUCCESS
-    assert after < SUCCESS
+    assert farthest(outcome.before) > 5 * SUCCESS
+    for matched in (outcome.free, outcome.fixed):
+        assert matched.succeeded()
+        assert matched.match.reason is None
     assert outcome.from_good.converged
+    assert outcome.from_good.iterations <= 10
 
 
 @pytest.mark.parametrize("figure", [fig_4, fig_5])
@@ -83,6 +91,25 @@ def test_scans_of_intel_find_their_places(figure):
     if reference.reference_log("intel") is None:
         pytest.skip("intel is not there")
     check(figure.outcomes()[1])
+
+
+def check_gauges(free: Convergence, fixed: Convergence) -> None:
+    """The paper, III-D: with the gauge free it converges in fewer iterations, and no less often."""
+    assert free.iterations() < 0.95 * fixed.iterations()
+    assert free.success() >= fixed.success()
+    assert free.success() > 0.6
+
+
+def test_in_the_office_a_free_gauge_converges_in_fewer_iterations():
+    check_gauges(*gauge.office_set())
+
+
+@pytest.mark.logs
+def test_on_intel_a_free_gauge_converges_in_fewer_iterations():
+    found = gauge.intel_set()
+    if found is None:
+        pytest.skip("intel is not there")
+    check_gauges(*found)
 
 
 def test_without_the_real_logs_the_reports_say_so(tmp_path, monkeypatch):

@@ -76,6 +76,23 @@ def test_the_result_is_a_minimum_with_the_gauge_in_its_hessian(five):
     assert values[3] > 0
 
 
+def test_off_a_minimum_the_turn_of_all_scans_has_the_curvature_of_its_gradient(five):
+    """E stays the same along the circles p(θ) on which all scans turn: p'ᵗ H p' + gᵗ p'' = 0.
+
+    So the Hessian's third null direction is one only where the gradient is zero; the shifts always are.
+    """
+    poses = near(five.truth, 5)
+    here = joint_energy(five.joint(), poses)
+    directions = gauge_directions(poses)
+    radius = np.zeros((5, 3))
+    radius[:, :2] = poses[:, :2] - poses[:, :2].mean(axis=0)
+    curvature = directions.T @ here.hessian @ directions
+    turned = here.gradient @ radius.ravel() * directions[2, 2] ** 2
+    assert abs(turned) > 1
+    assert curvature[2, 2] == pytest.approx(turned, rel=1e-6)
+    np.testing.assert_allclose(curvature[:2, :2], 0, atol=1e-6 * abs(turned))
+
+
 def test_without_pairs_the_priors_are_met():
     problem = office_problem((0, 400, 800))
     chain = np.array([[0, 1], [1, 2]])
@@ -92,7 +109,7 @@ def test_without_pairs_the_priors_are_met():
     np.testing.assert_allclose(found, means, atol=1e-5)
 
 
-@pytest.mark.parametrize(("noise", "factor"), [(False, 5), (True, 2.5)])
+@pytest.mark.parametrize(("noise", "factor"), [(False, 80), (True, 50)])
 def test_fig_3_is_known_jointly_where_its_pairs_are_not(noise, factor):
     """The paper's Fig. 3: (1, 2) leave open the way along the corridor, (1, 3) the way across it.
 
@@ -106,7 +123,7 @@ def test_fig_3_is_known_jointly_where_its_pairs_are_not(noise, factor):
         chosen = problem.joint(0, other, scale=1.0)
         pair = joint_energy(chosen, problem.truth[[0, other]]).hessian[3:, 3:]
         values = np.linalg.eigvalsh(pair)
-        assert values[0] < 0.1 * values[1]
+        assert values[0] < 0.01 * values[1]
         assert smallest > factor * values[0]
         off = np.degrees(weakest_translation(pair).direction) - direction
         assert abs((off + 90) % 180 - 90) < 5

@@ -53,7 +53,8 @@ def corridor_and_room() -> Scene:
     From the corridor (1) the laser sees both walls of the corridor and the room's far wall. Turned back
     in the room (2) it sees the corridor's walls, but not the far wall, so that 1 and 2 leave the
     direction of the corridor open. On the way out by another door (3) it sees the far wall, but not the
-    corridor, so that 1 and 3 leave the direction across open. A cabinet that 2 and 3 both see ties these.
+    corridor, so that 1 and 3 leave the direction across open. The corner beside the first door and a
+    cabinet there, which 2 and 3 both see, tie these.
     """
     floor = Builder()
     floor.line(-12.0, -1.0, 0.0, -1.0)
@@ -80,5 +81,5 @@ def corridor_and_room() -> Scene:
     return Scene("corridor_and_room", floor.world(), waypoints)
 
 
-FIG_3 = np.array([(-3.0, 0.0, 0.0), (3.0, 0.3, np.pi), (4.0, 0.0, np.pi / 4)])
+FIG_3 = np.array([(-3.0, 0.0, 0.0), (2.5, 0.3, np.pi), (4.0, 0.0, np.radians(75.0))])
 """True poses (3, 3) of the three scans of the paper's Fig. 3 in corridor_and_room()."""

@@ -1,0 +1,76 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from nscan_cli.matching.search import SearchOptions, likelihood_field, search
+from nscan_cli.poses import Array, relative, transform, wrap
+from tests.matching.problems import Problem, office_problem
+
+OPTIONS = SearchOptions()
+
+
+@pytest.fixture(scope="module")
+def two() -> Problem:
+    """Two scans of a room, a metre and a turn apart."""
+    return office_problem((200, 206))
+
+
+def score(reference: Array, points: Array, pose: Array) -> float:
+    """The score by its definition, cell by cell."""
+    field = likelihood_field(reference, OPTIONS)
+    cells = np.floor((transform(pose, points) - [field.x, field.y]) / field.cell).astype(int)
+    total = 0.0
+    for ix, iy in cells.tolist():
+        if 0 <= ix < field.levels.shape[1] and 0 <= iy < field.levels.shape[2]:
+            centre = np.array([field.x, field.y]) + field.cell * (np.array([ix, iy]) + 0.5)
+            square = ((reference - centre) ** 2).sum(axis=1).min()
+            near = np.abs(np.floor((reference - [field.x, field.y]) / field.cell) - [ix, iy]).max(axis=1)
+            # A point reaches two cells far.
+            square = ((reference[near <= 2] - centre) ** 2).sum(axis=1).min() if (near <= 2).any() else np.inf
+            total += np.exp(-0.5 * square / OPTIONS.spread**2)
+    return total / len(points)
+
+
+@pytest.mark.parametrize("off", [(0.0, 0.0, 0.0), (3.9, -2.2, 0.9), (-4.1, 4.2, -1.0)])
+def test_a_pose_is_found_from_far_away(two, off):
+    true = relative(two.truth[1], two.truth[0])
+    field = likelihood_field(two.points[0], OPTIONS)
+    found = search(field, two.points[1], true + np.array(off), 0.0, OPTIONS)
+    assert found is not None
+    wrong = found.pose - true
+    assert np.hypot(wrong[0], wrong[1]) < 0.25
+    assert abs(wrap(wrong[2])) < 0.05
+
+
+def test_nothing_in_the_window_scores_more(two):
+    """Against every pose of the lattice, a coarse window; and the score is the one of its definition."""
+    window = SearchOptions(distance=1.0, turn=0.1, beams=40)
+    field = likelihood_field(two.points[0], window)
+    points = two.points[1][np.linspace(0, len(two.points[1]) - 1, 40).astype(int)]
+    centre = relative(two.truth[1], two.truth[0]) + np.array([0.5, 0.4, 0.05])
+    found = search(field, points, centre, 0.0, window)
+    assert found is not None
+    assert found.score == pytest.approx(score(two.points[0], points, found.pose), rel=1e-5)
+    step = window.cell / min(np.hypot(points[:, 0], points[:, 1]).max(), window.lever)
+    turns = step * np.arange(-int(window.turn / step), int(window.turn / step) + 1)
+    shifts = window.cell * np.arange(-5, 6)
+    best = max(
+        score(two.points[0], points, centre + np.array([x, y, turn]))
+        for x in shifts[::2]
+        for y in shifts[::2]
+        for turn in turns[::4]
+    )
+    assert found.score >= best - 1e-6
+
+
+def test_what_scores_no_more_than_asked_is_not_found(two):
+    field = likelihood_field(two.points[0], OPTIONS)
+    true = relative(two.truth[1], two.truth[0])
+    found = search(field, two.points[1], true, 0.0, OPTIONS)
+    assert found is not None
+    assert search(field, two.points[1], true, found.score, OPTIONS) is None
+    again = search(field, two.points[1], true, found.score - 1e-6, OPTIONS)
+    assert again is not None
+    np.testing.assert_array_equal(again.pose, found.pose)
+    assert search(field, two.points[1], true + np.array([500.0, 0.0, 0.0]), 0.0, OPTIONS) is None
