@@ -4,7 +4,7 @@ VENV := .venv
 RUN := $(VENV)/bin
 READY := $(VENV)/.ready
 
-.PHONY: map test lint samples clean
+.PHONY: map test lint samples figures bench clean
 
 map: $(READY)
 	mkdir -p out
@@ -20,6 +20,13 @@ lint: $(READY)
 
 samples: $(READY)
 	$(RUN)/python -m tests.simulation.make_samples sample_logs
+
+figures: $(READY)
+	$(RUN)/python -m tests.experiments docs/pictures
+
+bench: $(READY)
+	mkdir -p out
+	$(RUN)/python -m tests.benchmarks out/bench.json
 
 $(READY): pyproject.toml
 	$(PYTHON) -m venv $(VENV)

@@ -24,8 +24,8 @@ Function = TypeVar("Function", bound=Callable[..., Any])
 def kernel(function: Function) -> Function:
     """Compile `function` at its first call with numba, or load its machine code from the cache folder.
 
-    No fastmath, no parallel loops: the same bytes come out on any number of threads. The interpreter's
-    lock is released, so threads can share the work.
+    No parallel loops, and of fastmath only fused multiply-adds, which change no order: the same bytes come
+    out on any number of threads. The interpreter's lock is released, so threads can share the work.
     """
     import numba
 
@@ -35,7 +35,9 @@ def kernel(function: Function) -> Function:
     # theirs.
     configured, config.CACHE_DIR = config.CACHE_DIR, "" if folder is None else str(folder)
     try:
-        compile_lazily = numba.njit(cache=folder is not None, nogil=True, error_model="numpy")
+        compile_lazily = numba.njit(
+            cache=folder is not None, nogil=True, error_model="numpy", fastmath={"contract"}
+        )
         return cast(Function, compile_lazily(function))
     finally:
         config.CACHE_DIR = configured

@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import json
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from nscan_cli.matching.uncertainty import Weakest
 
 UNITS = {"length": "m", "angle": "rad"}
 
@@ -16,3 +19,11 @@ def document(name: str, provenance: dict[str, Any], fields: dict[str, Any]) -> b
         for key, value in {**head, **fields}.items()
     ]
     return ("{" + ",\n".join(lines) + "}\n").encode()
+
+
+def weakest_record(weakest: Weakest) -> dict[str, Any]:
+    """The JSON object of the direction that is known least."""
+    from nscan_cli.graph.json_fields import six_digits
+
+    sigma = None if weakest.sigma is None else six_digits(weakest.sigma)
+    return {"direction": six_digits(weakest.direction), "sigma": sigma}

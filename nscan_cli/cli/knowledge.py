@@ -11,8 +11,9 @@ import numpy as np
 
 from nscan_cli.errors import InputDataError
 from nscan_cli.evaluation.association import TOLERANCE, nearest
+from nscan_cli.graph.between import Between
 from nscan_cli.graph.json_file import parse_graph
-from nscan_cli.graph.model import Graph
+from nscan_cli.graph.model import Graph, Pairwise
 from nscan_cli.graph.tum import Trajectory, parse_tum
 from nscan_cli.inputs import base_name, label, read_bytes
 from nscan_cli.logs.scan import LaserLog, Source
@@ -86,18 +87,48 @@ def odometry_priors(odometry: Array, numbers: Sequence[int], model: MotionModel)
 
 
 def graph_priors(graph: Graph, numbers: Sequence[int]) -> PriorsAmong:
-    """The graph's pairwise relations among the scans `numbers` as priors (paper, V, step 3)."""
+    """What the graph knows of the scans `numbers` as priors (paper, V, step 3).
+
+    These are its pairwise relations among them; and where these leave parts of them apart that other
+    relations connect, the relative poses of scans that are next in time, as all relations give them.
+    """
+    nodes = {int(scan): node for node, scan in enumerate(graph.scans)}
+    between = Between(graph, [nodes[number] for number in numbers if number in nodes])
 
     def among(kept: Sequence[int]) -> Priors:
-        places = {numbers[scan]: at for at, scan in enumerate(kept)}
-        found = []
-        for relation in graph.pairwise:
-            a, b = (places.get(int(graph.scans[node])) for node in relation.nodes)
-            if a is not None and b is not None:
-                found.append(((a, b), relation.measurement, relation.information))
-        return _priors([row[0] for row in found], [row[1] for row in found], [row[2] for row in found])
+        places = {nodes[numbers[scan]]: at for at, scan in enumerate(kept) if numbers[scan] in nodes}
+        found = [relation for relation in graph.pairwise if all(node in places for node in relation.nodes)]
+        found += _bridges(between, sorted(places), [relation.nodes for relation in found])
+        return _priors(
+            [(places[a], places[b]) for a, b in (relation.nodes for relation in found)],
+            [relation.measurement for relation in found],
+            [relation.information for relation in found],
+        )
 
     return among
+
+
+def _bridges(between: Between, nodes: list[int], joined: list[tuple[int, int]]) -> list[Pairwise]:
+    """The relations that connect what the graph connects, but those that are `joined` do not yet."""
+    group = {node: node for node in nodes}
+
+    def join(a: int, b: int) -> None:
+        gone = group[b]
+        group.update({node: group[a] for node in nodes if group[node] == gone})
+
+    for a, b in joined:
+        join(a, b)
+    bridges = []
+    for at, node in enumerate(nodes):
+        for earlier in reversed(nodes[:at]):
+            if group[earlier] == group[node]:
+                break
+            relation = between.relation(earlier, node)
+            if relation is not None:
+                bridges.append(relation)
+                join(earlier, node)
+                break
+    return bridges
 
 
 def _priors(pairs: list[tuple[int, int]], means: list[Array], information: list[Array]) -> Priors:

@@ -136,10 +136,9 @@ def _start(log: LaserLog, rows: tuple[int, int], initial: str) -> Array:
 def _document(
     log: LaserLog, numbers: tuple[int, int], start: Array, match: PairMatch, parameters: dict[str, Any]
 ) -> bytes:
-    from nscan_cli.cli.document import document
+    from nscan_cli.cli.document import document, weakest_record
     from nscan_cli.graph.json_fields import pose_rows, six_digits, triangle
 
-    weakest = match.weakest
     return document(
         FORMAT,
         provenance_of([log.source], parameters),
@@ -154,10 +153,7 @@ def _document(
             "hessian": triangle(match.hessian),
             "covariance": None if match.covariance is None else triangle(match.covariance),
             "eigenvalues": [six_digits(value) for value in match.eigenvalues.tolist()],
-            "weakest": {
-                "direction": six_digits(weakest.direction),
-                "sigma": None if weakest.sigma is None else six_digits(weakest.sigma),
-            },
+            "weakest": weakest_record(match.weakest),
             "overlap": six_digits(match.overlap),
             "iterations": match.iterations,
             "evaluations": match.evaluations,

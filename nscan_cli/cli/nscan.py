@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -19,19 +20,32 @@ from nscan_cli.provenance import provenance_of
 
 if TYPE_CHECKING:
     from nscan_cli.logs.scan import LaserLog, Source
-    from nscan_cli.matching.nscan import LeftOut, NScanMatch, PriorsAmong
+    from nscan_cli.matching.left_out import LeftOut
+    from nscan_cli.matching.nscan import NScanMatch, PriorsAmong
+    from nscan_cli.matching.pairs import Kind
     from nscan_cli.matching.priors import MotionModel
+    from nscan_cli.matching.uncertainty import Weakest
     from nscan_cli.poses import Array
 
 FORMAT = "nscan-joint-match"
 STARTS, PRIORS = ("odometry", "identity"), ("odometry", "none")
 """What is no file in --initial and in --prior."""
+NAMED = 6
+"""Weakly held scans that the summary names; the result has all."""
 
 
 @click.command("nscan", context_settings=CONTEXT)
 @click.argument("log")
 @click.option(
     "--scans", "numbers", type=ScanSpecType(), required=True, help="Such as 10,12,14-20 or 100-190:10."
+)
+@click.option(
+    "--pairs",
+    type=click.Choice(["all", "visible", "overlap"]),
+    default="overlap",
+    show_default=True,
+    help="Which scans are matched with each other: all, those of which one saw the other's position, or "
+    "those that overlap.",
 )
 @click.option(
     "--gauge",
@@ -54,7 +68,7 @@ STARTS, PRIORS = ("odometry", "identity"), ("odometry", "none")
 @click.option(
     "--prior",
     metavar="odometry|none|GRAPH.json",
-    help="What is known before matching: odometry (default), or a graph's pairwise relations.",
+    help="What is known before matching: odometry (default), or what a graph says of the scans.",
 )
 @click.option("-o", "--output", default="-", metavar="RESULT.json", help="Standard output if not given.")
 @plot_option("all scans before and after, with circles at their poses")
@@ -63,6 +77,7 @@ STARTS, PRIORS = ("odometry", "identity"), ("odometry", "none")
 def command(
     log: str,
     numbers: tuple[int, ...],
+    pairs: Kind,
     gauge: str,
     fixed: int | None,
     initial: str | None,
@@ -73,11 +88,12 @@ def command(
     quiet: bool,
     **_verbosity: int,
 ) -> None:
-    """Match n scans of LOG jointly (nScan-Matching): every scan against every other at once.
+    """Match n scans of LOG jointly (nScan-Matching): all of them at once, each against many others.
 
     The result is an nScan relation: local poses and their Hessian, which still has the gauge in it, with
-    the covariance relative to one scan. Scans that overlap none of the others, and scans that break what
-    is known of them, are named and left out.
+    the covariance relative to one scan. Scans that overlap none of the others, and scans that fall outside
+    the bounds of their priors, are named and left out; scans that are held weakly in one direction, as in
+    a corridor, are named.
     """
     if fixed is not None and fixed not in numbers:
         raise WrongUsageError(f"--fixed {fixed}: is none of the scans to match; choose one of them")
@@ -101,10 +117,10 @@ def command(
     joint = JointOptions(fixed=0 if gauge == "fixed" else None)
     start, priors, sources = _known(scans, numbers, initial, prior, model)
     if prior not in PRIORS and not len(priors(range(len(numbers))).pairs):
-        say(f"warning: {prior} has no pairwise relation between two of the scans", quiet)
+        say(f"warning: {prior} does not connect any two of the scans", quiet)
     points = [matched_points(scans, row, options) for row in rows]
     held = 0 if fixed is None else numbers.index(fixed)
-    match, left_out = nscan_match(points, start, priors, held, options, joint)
+    match, left_out = nscan_match(points, start, priors, held, options, joint, pairs)
     if match is None:
         raise InputDataError(
             scans.source.name,
@@ -115,6 +131,7 @@ def command(
         "reading": dataclasses.asdict(reading),
         "matching": dataclasses.asdict(options),
         "joint": {key: value for key, value in dataclasses.asdict(joint).items() if key != "fixed"},
+        "pairs": pairs,
         "gauge": gauge,
         "initial": base_name(initial),
         "prior": base_name(prior),
@@ -162,6 +179,7 @@ def _known(
 
 def _fields(numbers: tuple[int, ...], match: NScanMatch, left_out: list[LeftOut]) -> dict[str, Any]:
     """What the document says of the match."""
+    from nscan_cli.cli.document import weakest_record
     from nscan_cli.graph.json_fields import six_digits, triangle
     from nscan_cli.graph.json_file import nscan_record
     from nscan_cli.graph.model import NScan
@@ -182,8 +200,14 @@ def _fields(numbers: tuple[int, ...], match: NScanMatch, left_out: list[LeftOut]
         "reason": match.reason,
         "pairs": [[kept[i], kept[j]] for i, j in match.pairs.tolist()],
         "overlap": [six_digits(share) for share in match.overlap.tolist()],
+        "weakest": [weakest_record(weakest) for weakest in match.weakest],
         "left_out": [
-            {"scan": numbers[out.scan], "reason": out.reason, "overlap": six_digits(out.overlap)}
+            {
+                "scan": numbers[out.scan],
+                "reason": out.reason,
+                "overlap": six_digits(out.overlap),
+                "chi2": None if out.chi2 is None else six_digits(out.chi2),
+            }
             for out in left_out
         ],
     }
@@ -196,9 +220,22 @@ def _summary(numbers: tuple[int, ...], match: NScanMatch, left_out: list[LeftOut
         f"{len(match.kept)} scans, {len(match.pairs)} pairs: {outcome}, {joint.iterations} iterations, "
         f"{joint.evaluations} evaluations; least overlap {match.overlap.min():.0%}"
     ]
+    weak = [
+        _weakly_held(numbers[scan], weakest)
+        for scan, weakest in zip(match.kept, match.weakest, strict=True)
+        if weakest.is_weak
+    ]
+    if weak:
+        more = f" and {len(weak) - NAMED} more" if len(weak) > NAMED else ""
+        lines.append(f"held weakly by the others: {', '.join(weak[:NAMED])}{more}")
     if left_out:
         lines.append(f"left out: {_told(numbers, left_out)}")
     return lines
+
+
+def _weakly_held(number: int, weakest: Weakest) -> str:
+    known = "open" if weakest.sigma is None else f"σ {weakest.sigma:.2g} m"
+    return f"scan {number} along {math.degrees(weakest.direction):.0f}° ({known})"
 
 
 def _told(numbers: tuple[int, ...], left_out: list[LeftOut]) -> str:

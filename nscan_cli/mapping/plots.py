@@ -23,7 +23,8 @@ from nscan_cli.mapping.panels import (
 )
 from nscan_cli.mapping.ramp import ramp
 from nscan_cli.mapping.symbols import crosses, robots
-from nscan_cli.matching.nscan import LeftOut, NScanMatch
+from nscan_cli.matching.left_out import LeftOut
+from nscan_cli.matching.nscan import NScanMatch
 from nscan_cli.matching.pairwise import PairMatch
 from nscan_cli.poses import Array, transform
 

@@ -32,6 +32,8 @@ class JointOptions:
     """Stages of the approach: w of the energy; 1 is the energy itself, in which the last steps are done."""
     near: float = 0.01
     """A wide stage is left when no pose moves by more (m, rad), the one of w = 1 at half of that."""
+    stride: int = 2
+    """On the approach every so-manyth point is matched."""
     approach_iterations: int = 30
     """In each stage of the approach."""
     max_iterations: int = 30
@@ -48,12 +50,14 @@ class JointMatch:
 
     poses: Array
     """(n, 3)"""
+    gradient: Array
+    """(3n,) of the objective at the poses."""
     hessian: Array
     """(3n, 3n) exact Hessian of the objective at the poses, the gauge still in it."""
     pairs: NDArray[np.int64]
     """(m, 2) the index set J at the end."""
     energy: float
-    gradient_norm: float
+    """The objective's: scale · E with priors."""
     iterations: int
     evaluations: int
     last_iterations: int
@@ -61,6 +65,11 @@ class JointMatch:
     converged: bool
     searched: bool = False
     """Whether the scans were placed by search, because the start led nowhere."""
+
+    @property
+    def gradient_norm(self) -> float:
+        """Of the objective."""
+        return float(np.linalg.norm(self.gradient))
 
 
 class Way(NamedTuple):
@@ -121,6 +130,7 @@ def _approach(
             widening,
             False,
             neutral,
+            options.stride,
             FREE if options.fixed is None else options.fixed,
             options.approach_iterations,
             near,
@@ -135,16 +145,16 @@ def _finish(problem: JointProblem, way: Way, options: JointOptions, neutral: boo
     poses = way.poses
     fixed = FREE if options.fixed is None else options.fixed
     last, evaluated, converged = _descend(
-        problem, poses, 1.0, True, neutral, fixed, options.max_iterations, options.tolerance
+        problem, poses, 1.0, True, neutral, 1, fixed, options.max_iterations, options.tolerance
     )
     final = joint_energy(problem, poses)
     poses[:, 2] = wrap(poses[:, 2])
     return JointMatch(
         poses=poses,
+        gradient=final.gradient,
         hessian=final.hessian,
         pairs=problem.pairs,
         energy=final.value,
-        gradient_norm=float(np.linalg.norm(final.gradient)),
         iterations=way.iterations + last,
         evaluations=way.evaluations + evaluated + 1,
         last_iterations=last,
@@ -163,6 +173,7 @@ def _descend(
     widening: float,
     exact: bool,
     neutral: bool,
+    stride: int,
     fixed: int,
     max_iterations: int,
     tolerance: float,
@@ -173,13 +184,13 @@ def _descend(
     hessian, trial_hessian = np.empty((3 * n, 3 * n)), np.empty((3 * n, 3 * n))
     step = np.empty((n, 3))
     curvature = 1.0 if exact else 0.0
-    value = evaluate(problem, poses, widening, curvature, neutral, gradient, hessian)
+    value = evaluate(problem, poses, widening, curvature, neutral, stride, gradient, hessian)
     iterations, evaluations, damping = 0, 1, FIRST_DAMPING
     for _ in range(max_iterations):
         solved = newton_step(gradient, hessian, poses, damping, fixed, step)
         if not solved and exact:
             # Not positive definite: go on with the part that is.
-            evaluate(problem, poses, widening, 0.0, neutral, gradient, hessian)
+            evaluate(problem, poses, widening, 0.0, neutral, stride, gradient, hessian)
             evaluations += 1
             solved = newton_step(gradient, hessian, poses, damping, fixed, step)
         if not solved:
@@ -187,7 +198,7 @@ def _descend(
             continue
         iterations += 1
         trial = poses + step
-        there = evaluate(problem, trial, widening, curvature, neutral, trial_gradient, trial_hessian)
+        there = evaluate(problem, trial, widening, curvature, neutral, stride, trial_gradient, trial_hessian)
         evaluations += 1
         if there <= value:
             poses[:, :] = trial

@@ -6,40 +6,18 @@ ordered pair of the index set J. Priors (14) on relative poses add ½ (u − z)�
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from nscan_cli.compiled import kernel
+from nscan_cli.matching.scans import Scans, scan_grid, scan_points
 from nscan_cli.ndt.energy import OUT, accumulate, unpack
-from nscan_cli.ndt.grid import Grid, Ndt
 from nscan_cli.poses import Array
 
 NEUTRAL = 0.78
 """What a point must reach of the usual s to count for a match in the neutral energy."""
-
-
-class Scans(NamedTuple):
-    """The NDTs and points of n scans, laid end to end for the kernels."""
-
-    grid: Grid
-    """The arrays of all NDTs, one behind the other; rows count from the start of their own NDT."""
-    table_starts: NDArray[np.int64]
-    """(n + 1,)"""
-    row_starts: NDArray[np.int64]
-    """(n + 1,)"""
-    gaussian_starts: NDArray[np.int64]
-    """(n + 1,)"""
-    points: Array
-    """(Σ m, 2) the points of all scans, each in its own frame."""
-    point_starts: NDArray[np.int64]
-    """(n + 1,)"""
-    half: float
-    """Side (m) of a lattice cell, the same for all."""
-    usual: Array
-    """(n,) mean s of each scan's points on its own Gaussians: what a perfect match would reach."""
 
 
 class Priors(NamedTuple):
@@ -72,27 +50,6 @@ class JointEnergy(NamedTuple):
     hessian: Array
 
 
-def lay_out(ndts: Sequence[Ndt], points: Sequence[Array]) -> Scans:
-    """Lay n NDTs of one cell size and the points (m_i, 2) of n scans end to end."""
-    tables = [ndt.grid.table for ndt in ndts]
-    keys = np.concatenate([ndt.grid.keys[: ndt.rows] for ndt in ndts])
-    links = np.concatenate([ndt.grid.links[: ndt.rows] for ndt in ndts])
-    gaussians = [ndt.grid.gaussians for ndt in ndts]
-    # The sums are for growing; matching needs the Gaussians alone.
-    grid = Grid(np.concatenate(tables), keys, links, np.empty((0, 8)), np.concatenate(gaussians))
-    own = np.array([_own_mean(ndt.grid, ndt.half, part) for ndt, part in zip(ndts, points, strict=True)])
-    return Scans(
-        grid,
-        _starts([len(table) for table in tables]),
-        _starts([ndt.rows for ndt in ndts]),
-        _starts([len(part) for part in gaussians]),
-        np.concatenate([np.asarray(part, dtype=np.float64).reshape(-1, 2) for part in points]),
-        _starts([len(part) for part in points]),
-        ndts[0].half,
-        own,
-    )
-
-
 def no_priors() -> Priors:
     """An empty list of priors."""
     return Priors(np.empty((0, 2), dtype=np.int64), np.empty((0, 3)), np.empty((0, 3, 3)))
@@ -118,8 +75,15 @@ def joint_energy(
     """
     n = len(poses)
     gradient, hessian = np.empty(3 * n), np.empty((3 * n, 3 * n))
-    value = evaluate(problem, poses, widening, float(exact), neutral, gradient, hessian)
+    value = evaluate(problem, poses, widening, float(exact), neutral, 1, gradient, hessian)
     return JointEnergy(value, gradient, hessian)
+
+
+def pair_energies(problem: JointProblem, poses: Array) -> Array:
+    """The neutral energy of each pair at the poses (n, 3): (n, n), 0 where (i, j) is not in J."""
+    values = np.zeros((len(poses), len(poses)))
+    _each_pair(problem, poses, values)
+    return values
 
 
 @kernel
@@ -129,40 +93,43 @@ def evaluate(
     widening: float,
     curvature: float,
     neutral: bool,
+    stride: int,
     gradient: Array,
     hessian: Array,
 ) -> float:
-    """The joint energy; writes its gradient (3n,) and Hessian (3n, 3n), exact with a `curvature` of 1."""
+    """The joint energy; writes its gradient (3n,) and Hessian (3n, 3n), exact with a `curvature` of 1.
+
+    With a `stride` every so-manyth point stands for its neighbours.
+    """
     gradient[:] = 0.0
     hessian[:, :] = 0.0
-    value = _add_pairs(problem, poses, widening, curvature, NEUTRAL if neutral else 0.0, gradient, hessian)
+    value = _add_pairs(
+        problem, poses, widening, curvature, NEUTRAL if neutral else 0.0, stride, gradient, hessian
+    )
     return float(value + _add_priors(problem.priors, poses, curvature, gradient, hessian))
 
 
 @kernel
-def scan_grid(scans: Scans, i: int) -> Grid:
-    """The NDT of scan i."""
-    t0, t1 = scans.table_starts[i], scans.table_starts[i + 1]
-    r0, r1 = scans.row_starts[i], scans.row_starts[i + 1]
-    g0, g1 = scans.gaussian_starts[i], scans.gaussian_starts[i + 1]
-    grid = scans.grid
-    return Grid(grid.table[t0:t1], grid.keys[r0:r1], grid.links[r0:r1], grid.sums, grid.gaussians[g0:g1])
-
-
-@kernel
-def scan_points(scans: Scans, i: int) -> Array:
-    """The points (m, 2) of scan i in its own frame."""
-    return scans.points[scans.point_starts[i] : scans.point_starts[i + 1]]
-
-
-@kernel
-def _own_mean(grid: Grid, half: float, points: Array) -> float:
-    out = np.empty(OUT)
-    accumulate(grid, half, points, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, out)
-    energy = out[0]
-    accumulate(grid, half, points, 0.0, 0.0, 0.0, 1.0, 0.0, 1.0, out)
-    # The difference is the number of Gaussians met.
-    return float(-energy / max(out[0] - energy, 1.0))
+def _each_pair(problem: JointProblem, poses: Array, values: Array) -> None:
+    scans = problem.scans
+    u, out = np.empty(3), np.empty(OUT)
+    for pair in range(problem.pairs.shape[0]):
+        i, j = problem.pairs[pair, 0], problem.pairs[pair, 1]
+        relative_pose(poses[j], poses[i], u)
+        accumulate(
+            scan_grid(scans, i),
+            scans.half,
+            scan_points(scans, j),
+            u[0],
+            u[1],
+            u[2],
+            1.0,
+            0.0,
+            NEUTRAL * scans.usual[i],
+            1,
+            out,
+        )
+        values[i, j] = problem.scale * out[0]
 
 
 @kernel
@@ -172,10 +139,11 @@ def _add_pairs(
     widening: float,
     curvature: float,
     neutral: float,
+    stride: int,
     gradient: Array,
     hessian: Array,
 ) -> float:
-    scans, pairs, scale = problem.scans, problem.pairs, problem.scale
+    scans, pairs, scale = problem.scans, problem.pairs, stride * problem.scale
     out = np.empty(OUT)
     u, g, h = np.empty(3), np.empty(3), np.empty((3, 3))
     value = 0.0
@@ -192,6 +160,7 @@ def _add_pairs(
             widening,
             curvature,
             neutral * scans.usual[i],
+            stride,
             out,
         )
         value += scale * out[0]
@@ -268,7 +237,3 @@ def _chain(
             hessian[row, column] += block[a, b]
             if a != b:
                 hessian[column, row] += block[a, b]
-
-
-def _starts(lengths: Sequence[int]) -> NDArray[np.int64]:
-    return np.concatenate([[0], np.cumsum(lengths)]).astype(np.int64)

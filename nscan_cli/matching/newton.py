@@ -48,7 +48,17 @@ def objective(
 ) -> float:
     """The objective at `pose`; writes its gradient (3,) and Hessian (3, 3), and E's own into out (10,)."""
     accumulate(
-        problem.grid, problem.half, problem.points, pose[0], pose[1], pose[2], widening, curvature, 0.0, out
+        problem.grid,
+        problem.half,
+        problem.points,
+        pose[0],
+        pose[1],
+        pose[2],
+        widening,
+        curvature,
+        0.0,
+        1,
+        out,
     )
     unpack(out, problem.scale, gradient, hessian)
     value = problem.scale * out[0]

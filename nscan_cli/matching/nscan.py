@@ -4,36 +4,27 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
-from nscan_cli.matching.joint import JointMatch, JointOptions, match_near_and_far
-from nscan_cli.matching.joint_energy import JointProblem, Priors, all_pairs, joint_energy, lay_out, no_priors
-from nscan_cli.matching.overlap import LEAST_OVERLAP, Overlaps, overlaps
+from nscan_cli.matching.joint import JointMatch, JointOptions
+from nscan_cli.matching.joint_energy import JointProblem, Priors, all_pairs, joint_energy, no_priors
+from nscan_cli.matching.left_out import ALONE, OUT_OF_REACH, LeftOut, out_of_reach, strays
+from nscan_cli.matching.overlap import Overlaps, overlaps
+from nscan_cli.matching.pairs import Kind, index_set
 from nscan_cli.matching.pairwise import HELD, INDEFINITE, PairOptions, scan_ndt
-from nscan_cli.matching.uncertainty import covariance_of, decrement, is_settled
-from nscan_cli.poses import Array, relative, wrap
+from nscan_cli.matching.placing import match_or_search
+from nscan_cli.matching.scans import lay_out
+from nscan_cli.matching.search import SearchOptions
+from nscan_cli.matching.uncertainty import Weakest, covariance_of, decrement, is_settled, weakest_translation
+from nscan_cli.poses import Array
 
-OUT_OF_BOUNDS = 16.27
-"""A prior is broken at a larger squared Mahalanobis distance: 99.9 % of χ² with three degrees of freedom."""
 NOT_SETTLED = "not settled within the steps allowed"
-OVERLAPS_NONE = "overlaps none of the others"
-BREAKS_BOUNDS = "falls outside the bounds of all its priors"
 
 PriorsAmong = Callable[[Sequence[int]], Priors]
 """The priors among some of the scans: their indices → priors whose pairs count within these."""
-
-
-@dataclass(frozen=True)
-class LeftOut:
-    """A scan that is no part of the relation."""
-
-    scan: int
-    """Index among the scans given."""
-    reason: str
-    overlap: float
-    """Its greatest share of points in common with one other scan."""
 
 
 @dataclass(frozen=True)
@@ -56,6 +47,9 @@ class NScanMatch:
     """(m, 2) the index set J, indices among the kept."""
     overlap: Array
     """(k,) share of each scan's points that lie on at least one other scan."""
+    weakest: tuple[Weakest, ...]
+    """Of each of the k scans, the direction in which the others hold it least, in the frame of the poses:
+    by the scans alone, without priors. A corridor shows here."""
     reason: str | None
     """Why the match did not converge; None when it did."""
 
@@ -67,47 +61,85 @@ def nscan_match(
     fixed: int,
     options: PairOptions,
     joint: JointOptions,
+    pairs: Kind = "overlap",
 ) -> tuple[NScanMatch | None, list[LeftOut]]:
-    """Match n scans with points (m_i, 2) jointly from the poses `start` (n, 3), all pairs.
+    """Match n scans with points (m_i, 2) jointly from the poses `start` (n, 3), by the index set `pairs`.
 
     The scan `fixed` stays where it is when `joint.fixed` is not None, and carries the covariance in any
-    case. Scans that overlap none of the others, and a scan that breaks all its priors, are left out, and
-    the rest is matched again from `start`. No match when fewer than two are left.
+    case. Scans that cannot meet the others are left out before, those that overlap none, and the one that
+    is farthest out of the bounds of its priors, after the match; the rest is matched again from `start`.
+    No match when fewer than two are left.
     """
     ndts = [scan_ndt(part, options) for part in points]
-    kept, left_out = list(range(len(points))), list[LeftOut]()
+    far = out_of_reach(points, start, SearchOptions().distance)
+    left_out = [LeftOut(scan, OUT_OF_REACH, 0.0) for scan in far]
+    kept = [scan for scan in range(len(points)) if scan not in far]
     while len(kept) >= 2:
         scans = lay_out([ndts[scan] for scan in kept], [points[scan] for scan in kept])
-        pairs, priors = all_pairs(len(kept)), priors_among(kept)
         # The noise of one scan is in 2 (n − 1) of the pairs, that of one pair match in one.
         scale = 2 * options.scale / len(kept)
-        problem = JointProblem(scans, pairs, priors, scale)
+        problem = JointProblem(scans, all_pairs(len(kept)), priors_among(kept), scale)
         held = kept.index(fixed) if fixed in kept else 0
         gauge = replace(joint, fixed=None if joint.fixed is None else held)
-        match = match_near_and_far(problem, start[kept], gauge)
+        match = match_or_search(
+            problem,
+            [points[scan] for scan in kept],
+            start[kept],
+            options,
+            gauge,
+            partial(index_set, pairs, scans),
+        )
         shares = overlaps(scans, match.poses)
-        strays = _strays(shares, priors, match.poses)
-        if not strays:
-            at_end = joint_energy(problem, match.poses)
-            alone = joint_energy(JointProblem(scans, pairs, no_priors(), 1.0), match.poses)
-            others = np.delete(np.arange(3 * len(kept)), np.arange(3 * held, 3 * held + 3))
-            covariance = covariance_of(match.hessian[np.ix_(others, others)])
-            gradient = at_end.gradient[others]
-            return NScanMatch(
-                kept=tuple(kept),
-                fixed=held,
-                joint=match,
-                energy=alone.value,
-                covariance=covariance,
-                decrement=None if covariance is None else decrement(gradient, covariance),
-                pairs=pairs,
-                overlap=shares.scans,
-                reason=_reason(match.converged, gradient, covariance),
-            ), left_out
-        best = np.maximum(shares.pairs, shares.pairs.T).max(axis=0)
-        left_out += [LeftOut(kept[at], reason, float(best[at])) for at, reason in strays]
-        kept = [scan for at, scan in enumerate(kept) if at not in dict(strays)]
-    return None, left_out + [LeftOut(scan, OVERLAPS_NONE, 0.0) for scan in kept]
+        by_scans = problem._replace(pairs=match.pairs, priors=no_priors())
+        alone = joint_energy(by_scans, match.poses)
+        blocks = _blocks(alone.hessian, joint_energy(by_scans, match.poses, exact=False).hessian)
+        out = strays(shares, match.pairs, problem.priors, match.poses, blocks)
+        if not out:
+            return _relation(kept, held, match, shares, alone.value / scale, blocks), left_out
+        gone = [stray.scan for stray in out]
+        left_out += [replace(stray, scan=kept[stray.scan]) for stray in out]
+        kept = [scan for at, scan in enumerate(kept) if at not in gone]
+    return None, left_out + [LeftOut(scan, ALONE, 0.0) for scan in kept]
+
+
+def _relation(
+    kept: list[int],
+    held: int,
+    match: JointMatch,
+    shares: Overlaps,
+    energy: float,
+    blocks: Array,
+) -> NScanMatch:
+    others = np.delete(np.arange(3 * len(kept)), np.arange(3 * held, 3 * held + 3))
+    covariance = covariance_of(match.hessian[np.ix_(others, others)])
+    gradient = match.gradient[others]
+    return NScanMatch(
+        kept=tuple(kept),
+        fixed=held,
+        joint=match,
+        energy=energy,
+        covariance=covariance,
+        decrement=None if covariance is None else decrement(gradient, covariance),
+        pairs=match.pairs,
+        overlap=shares.scans,
+        weakest=tuple(weakest_translation(block) for block in blocks),
+        reason=_reason(match.converged, gradient, covariance),
+    )
+
+
+def _blocks(exact: Array, semidefinite: Array) -> Array:
+    """(n, 3, 3) what the others say of each pose: the blocks on the diagonal of a Hessian (3n, 3n).
+
+    Where priors hold a scan away from its minimum, the exact curvature can be negative: there it is the
+    semi-definite part.
+    """
+    both = []
+    for hessian in (exact, semidefinite):
+        scan = np.arange(len(hessian) // 3)
+        both.append(hessian.reshape(len(scan), 3, len(scan), 3)[scan, :, scan, :])
+    definite = np.linalg.eigvalsh(both[0])[:, 0] > 0.0
+    blocks: Array = np.where(definite[:, None, None], *both)
+    return blocks
 
 
 def _reason(converged: bool, gradient: Array, covariance: Array | None) -> str | None:
@@ -116,23 +148,3 @@ def _reason(converged: bool, gradient: Array, covariance: Array | None) -> str |
     if covariance is None:
         return INDEFINITE
     return None if is_settled(gradient, covariance) else HELD
-
-
-def _strays(shares: Overlaps, priors: Priors, poses: Array) -> list[tuple[int, str]]:
-    """The scans that do not belong to the others: all that overlap none, otherwise one out of bounds."""
-    best = np.maximum(shares.pairs, shares.pairs.T).max(axis=0)
-    apart = np.flatnonzero(best < LEAST_OVERLAP).tolist()
-    if apart:
-        return [(at, OVERLAPS_NONE) for at in apart]
-    i, j = priors.pairs.T
-    off = relative(poses[j], poses[i]) - priors.means
-    off[:, 2] = wrap(off[:, 2])
-    broken = np.einsum("qa,qab,qb->q", off, priors.information, off) > OUT_OF_BOUNDS
-    n = len(poses)
-    count, breaks = np.zeros(n, dtype=np.int64), np.zeros(n, dtype=np.int64)
-    for scans in (i, j):
-        np.add.at(count, scans, 1)
-        np.add.at(breaks, scans, broken)
-    # A scan that is wrong breaks the priors of its neighbours too: the one with the most goes first.
-    out = np.flatnonzero((breaks == count) & (count > 0))
-    return [(int(out[np.argmax(count[out])]), BREAKS_BOUNDS)] if len(out) else []

@@ -13,7 +13,7 @@ from dataclasses import replace
 import numpy as np
 
 from nscan_cli.matching.joint import JointMatch, JointOptions, PairsAt, match_near_and_far
-from nscan_cli.matching.joint_energy import JointProblem, joint_energy, no_priors
+from nscan_cli.matching.joint_energy import JointProblem, joint_energy, pair_energies
 from nscan_cli.matching.newton import PairProblem, minimise
 from nscan_cli.matching.overlap import overlaps, weakest_link
 from nscan_cli.matching.pairwise import PairOptions
@@ -70,13 +70,9 @@ def _hang_together(problem: JointProblem, poses: Array) -> bool:
 
 
 def _all_fit(problem: JointProblem, poses: Array) -> bool:
-    """Whether the pairs of every scan have a neutral energy below zero."""
-    for scan in range(len(poses)):
-        own = problem.pairs[(problem.pairs == scan).any(axis=1)]
-        alone = problem._replace(pairs=own, priors=no_priors())
-        if joint_energy(alone, poses, neutral=True).value > 0.0:
-            return False
-    return True
+    """Whether the pairs of every scan together have a neutral energy below zero."""
+    values = pair_energies(problem, poses)
+    return bool(np.all(values.sum(axis=0) + values.sum(axis=1) <= 0.0))
 
 
 class Placing:

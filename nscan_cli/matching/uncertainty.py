@@ -14,6 +14,9 @@ SINGULAR = 1e-10
 SETTLED_DEVIATIONS = 0.5
 SETTLED_STEP = 0.01
 """m, rad; half of the least standard deviation of a Gaussian."""
+WEAK_SIGMA = 0.05
+"""m; a scan that is held with a larger standard deviation in some direction is held weakly. In rooms it is
+0.003 to 0.015, in a corridor without any doors about 0.1."""
 
 
 class Weakest(NamedTuple):
@@ -23,6 +26,11 @@ class Weakest(NamedTuple):
     """Angle of the direction in the frame of the reference, rad in (−π/2, π/2]."""
     sigma: float | None
     """Standard deviation (m) along it; None when nothing holds the scan there."""
+
+    @property
+    def is_weak(self) -> bool:
+        """Whether it is worth a word: a corridor, or less."""
+        return self.sigma is None or self.sigma > WEAK_SIGMA
 
 
 def covariance_of(information: Array) -> Array | None:

@@ -30,17 +30,19 @@ def accumulate(
     widening: float,
     curvature: float,
     baseline: float,
+    stride: int,
     out: Array,
 ) -> None:
     """Write E, gradient and Hessian at the pose u = (x, y, phi) of points (m, 2) into out (10,).
 
     With `curvature` 1 the Hessian is exact; with 0 its two terms that can be negative are left out, so
     that it is positive semi-definite everywhere. `baseline` is what every Gaussian that a point meets
-    costs, well hit or not; it only counts when energies are compared.
+    costs, well hit or not; it only counts when energies are compared. Of the points, every so-manyth
+    counts by `stride`.
     """
     cos, sin = np.cos(phi), np.sin(phi)
     e = gx = gy = gp = hxx = hxy = hxp = hyy = hyp = hpp = 0.0
-    for k in range(points.shape[0]):
+    for k in range(0, points.shape[0], stride):
         # R(φ) x, and x' = R(φ) x + t; ∂x'/∂φ = (−ry, rx), ∂²x'/∂φ² = −(rx, ry).
         rx = cos * points[k, 0] - sin * points[k, 1]
         ry = sin * points[k, 0] + cos * points[k, 1]
@@ -130,7 +132,7 @@ def energy(ndt: Ndt, points: Array, pose: Array, widening: float = 1.0, exact: b
     """
     out = np.empty(OUT)
     x, y, phi = (float(part) for part in pose)
-    accumulate(ndt.grid, ndt.half, points, x, y, phi, widening, float(exact), 0.0, out)
+    accumulate(ndt.grid, ndt.half, points, x, y, phi, widening, float(exact), 0.0, 1, out)
     gradient, hessian = np.empty(3), np.empty((3, 3))
     unpack(out, 1.0, gradient, hessian)
     return Energy(float(out[0]), gradient, hessian)

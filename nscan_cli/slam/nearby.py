@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 
 from nscan_cli.graph.model import Loop, NScan, Pairwise
 from nscan_cli.matching.joint import JointMatch, JointOptions, match_jointly
-from nscan_cli.matching.joint_energy import JointProblem, Priors, Scans, all_pairs, lay_out, no_priors
+from nscan_cli.matching.joint_energy import JointProblem, Priors, all_pairs, no_priors
 from nscan_cli.matching.overlap import held_together, overlaps, weakest_link
+from nscan_cli.matching.scans import Scans, lay_out
 from nscan_cli.poses import Array, relative
 from nscan_cli.slam.keyframes import Keyframe
 from nscan_cli.slam.options import NScanOptions
@@ -134,7 +135,11 @@ def _match(
             np.array([relation.information for relation in known]),
         )
     joint = JointOptions(
-        widenings, near=options.tolerance, max_iterations=options.max_iterations, tolerance=options.tolerance
+        widenings,
+        near=options.tolerance,
+        stride=1,
+        max_iterations=options.max_iterations,
+        tolerance=options.tolerance,
     )
     return match_jointly(JointProblem(scans, all_pairs(len(members)), priors, options.scale), start, joint)
 

@@ -17,7 +17,7 @@ from nscan_cli.graph.triangles import from_upper_triangle
 from nscan_cli.graph.tum import write_tum
 from nscan_cli.logs.load import read_log
 from nscan_cli.logs.scan import LaserLog
-from nscan_cli.poses import relative
+from nscan_cli.poses import compose, relative
 from tests.data import data_file
 from tests.matching.problems import errors
 
@@ -27,7 +27,8 @@ SPEC = "2000-2024:8"
 SCANS = [2000, 2008, 2016, 2024]
 KEYS = [
     "format", "version", "units", "provenance", "relation", "covariance", "energy", "gradient_norm",
-    "decrement", "iterations", "evaluations", "converged", "reason", "pairs", "overlap", "left_out",
+    "decrement", "iterations", "evaluations", "converged", "reason", "pairs", "overlap", "weakest",
+    "left_out",
 ]  # fmt: skip
 
 
@@ -78,6 +79,10 @@ def test_the_document(capsys, office):
     np.testing.assert_allclose(covariance @ relation.hessian[3:, 3:], np.eye(9), atol=0.05)
     assert document["pairs"] == [[i, j] for i in SCANS for j in SCANS if i != j]
     assert len(document["overlap"]) == 4
+    assert len(document["weakest"]) == 4
+    assert all(0 < weakest["sigma"] < 0.02 for weakest in document["weakest"])
+    assert all(abs(weakest["direction"]) <= np.pi / 2 for weakest in document["weakest"])
+    assert document["provenance"]["parameters"]["pairs"] == "overlap"
     assert relation.score == min(document["overlap"]) > 0.6
     assert (document["converged"], document["reason"], document["left_out"]) == (True, None, [])
     assert document["provenance"]["inputs"][0]["sha256"] == office.source.sha256
@@ -155,27 +160,36 @@ def test_relations_of_a_graph_are_priors(tmp_path, capsys, office):
     assert len(document["provenance"]["inputs"]) == 2
     assert len(said) == 1
     _, said = matched(capsys, SAMPLE, "--scans", "2016,2024", "--prior", str(path))
-    assert "no pairwise relation" in said[0]
+    assert "does not connect any two of the scans" in said[0]
 
 
-def test_scans_that_overlap_none_are_named_and_left_out(tmp_path, capsys, office):
-    graph = graph_of(office, SCANS)
-    graph.poses[1] += [300.0, 0, 0]
-    path = tmp_path / "torn.json"
+def test_a_graph_gives_bounds_where_no_relation_joins_two_scans(tmp_path, capsys, office):
+    """The way from 2000 to 2008 leads over 2004; both steps are sure of a way 2 cm longer."""
+    assert office.truth is not None
+    truth = office.truth[[2000, 2004, 2008]]
+    steps = relative(truth[1:], truth[:-1]) + np.array([0.02, 0, 0])
+    relations = [Pairwise((at, at + 1), step, np.eye(3) * 1e8, "track") for at, step in enumerate(steps)]
+    graph = graph_of(office, [2000, 2004, 2008], relations)
+    graph.poses = np.array([truth[0], compose(truth[0], steps[0]), compose(truth[0], compose(*steps))])
+    path = tmp_path / "graph.json"
     path.write_bytes(write_graph(graph))
-    arguments = ["--scans", SPEC, "--initial", str(path), "--prior", "none", "--fixed", "2008"]
-    document, said = matched(capsys, SAMPLE, *arguments)
-    assert document["relation"]["scans"] == [2000, 2016, 2024]
-    assert document["relation"]["fixed"] == 2000
-    assert document["left_out"] == [{"scan": 2008, "reason": "overlaps none of the others", "overlap": 0}]
-    assert len(document["relation"]["hessian"]) == 45
-    assert len(document["covariance"]) == 21
-    assert said[1] == "left out: scan 2008 overlaps none of the others"
-    assert_true(document, office)
-    code = run(["nscan", SAMPLE, "--scans", "2000,2008", *arguments[2:6]])
-    out, err = capsys.readouterr()
-    assert (code, out, len(err.splitlines())) == (65, "", 1)
-    assert "no two of the scans match: scan 2000 overlaps none" in err
+    document, said = matched(capsys, SAMPLE, "--scans", "2000,2008", "--prior", str(path))
+    poses = np.array(document["relation"]["poses"])
+    np.testing.assert_allclose(relative(poses[1], poses[0]), compose(*steps), atol=2e-3)
+    assert len(said) == 1
+
+
+def test_pairs_are_those_that_were_asked_for(capsys, office):
+    arguments = (SAMPLE, "--scans", "0-360:40")
+    used = {}
+    for kind in ("all", "visible", "overlap"):
+        document, _ = matched(capsys, *arguments, "--pairs", kind)
+        assert document["provenance"]["parameters"]["pairs"] == kind
+        used[kind] = {tuple(pair) for pair in document["pairs"]}
+    assert len(used["all"]) == 90
+    assert used["visible"] < used["all"]
+    assert used["overlap"] < used["all"]
+    assert used["visible"] != used["overlap"]
 
 
 def test_the_same_bytes_every_time(tmp_path):
@@ -191,10 +205,13 @@ def test_the_same_bytes_every_time(tmp_path):
     [
         ([], 2, "--scans"),
         (["--scans", "4"], 2, "one scan only"),
+        (["--scans", "1,x"], 2, "'x' is not of the form"),
+        (["--scans", ""], 2, "is not of the form"),
         (["--scans", "1,1"], 2, "scan 1 twice"),
         (["--scans", "1,9999"], 2, "no scan 9999"),
         (["--scans", "1,2", "--fixed", "3"], 2, "--fixed 3"),
         (["--scans", "1,2", "--gauge", "loose"], 2, "--gauge"),
+        (["--scans", "1,2", "--pairs", "some"], 2, "--pairs"),
         (["--scans", "1,2", "--no-odometry", "--prior", "odometry"], 2, "--prior none"),
         (["--scans", "1,2", "--initial", "none.tum"], 66, "none.tum"),
         (["--scans", "1,2", "--initial", "none"], 66, "none: no such file"),

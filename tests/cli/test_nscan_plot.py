@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from PIL import Image
 
 from nscan_cli.cli.main import run
 from nscan_cli.graph.json_file import write_graph
+from nscan_cli.graph.model import Pairwise
 from nscan_cli.logs.load import read_log
 from nscan_cli.mapping.canvas import BLACK, DIM
 from nscan_cli.mapping.ramp import ramp
+from nscan_cli.poses import relative
 from tests.cli.test_nscan import SAMPLE, SCANS, SPEC, graph_of, matched
 
 
@@ -38,13 +42,16 @@ def test_the_plot_shows_the_start_above_the_result(tmp_path, capsys):
 
 
 def test_the_plot_marks_the_scans_that_were_left_out(tmp_path, capsys):
-    """Scan 2008 begins 8 m aside, where nearly nothing of its own lies on the others."""
+    """A graph puts scan 2008 1 m aside, within 0.2 m: where it fits is out of these bounds."""
     graph = graph_of(read_log(SAMPLE), SCANS)
-    graph.poses[1] += [0, 8.0, 0]
-    path = tmp_path / "torn.json"
-    path.write_bytes(write_graph(graph))
+    graph.poses[1, 1] += 1.0
+    for a, b in ((0, 1), (1, 2), (1, 3), (0, 2), (2, 3)):
+        step = relative(graph.poses[b], graph.poses[a])
+        graph.pairwise.append(Pairwise((a, b), step, np.eye(3) * 25, "track"))
+    path = str(tmp_path / "torn.json")
+    Path(path).write_bytes(write_graph(graph))
     document, _ = matched(
-        capsys, SAMPLE, "--scans", SPEC, "--initial", str(path), "--prior", "none",
+        capsys, SAMPLE, "--scans", SPEC, "--initial", path, "--prior", path,
         "--plot", str(tmp_path / "nscan.png"),
     )  # fmt: skip
     assert [out["scan"] for out in document["left_out"]] == [2008]
@@ -55,7 +62,7 @@ def test_the_plot_marks_the_scans_that_were_left_out(tmp_path, capsys):
     gray_dots = [
         np.count_nonzero(np.abs(panel - np.array(gray)).max(axis=-1) <= 2) for panel in (above, below)
     ]
-    # About 40 dots of 39 pixels; in the panel below, edges of letters only.
+    # Dots that no other scan covers; in the panel below, edges of letters only.
     assert gray_dots[0] > 500 + gray_dots[1]
     # The cross, in the middle of the panel; beside it only the axes and what is written have black.
     middles = [panel[150:-250, 200:-100] for panel in (above, below)]

@@ -12,10 +12,11 @@ from numpy.typing import NDArray
 
 from nscan_cli.cli.knowledge import no_knowledge
 from nscan_cli.mapping.plots import plot_nscan
-from nscan_cli.matching.joint import JointMatch, JointOptions, match_jointly
-from nscan_cli.matching.joint_energy import JointProblem, all_pairs, lay_out, no_priors
+from nscan_cli.matching.joint import JointMatch, JointOptions, match_near_and_far
+from nscan_cli.matching.joint_energy import JointProblem, all_pairs, no_priors
 from nscan_cli.matching.nscan import LeftOut, NScanMatch, nscan_match
 from nscan_cli.matching.pairwise import matched_points, scan_ndt
+from nscan_cli.matching.scans import lay_out
 from nscan_cli.poses import Array, compose, relative, wrap
 from tests.experiments.reference import ReferenceLog
 from tests.matching.problems import OPTIONS, errors, near, office_truth
@@ -71,12 +72,12 @@ class Case:
         return Matched(match, tuple(left_out), errors(match.joint.poses, self.truth[list(match.kept)]))
 
     def from_good_start(self, fixed: int | None = None) -> JointMatch:
-        """Matched stage by stage from near the truth."""
+        """Matched as nscan does, with all pairs, from near the truth."""
         count = len(self.points)
         scans = lay_out([scan_ndt(points, OPTIONS) for points in self.points], self.points)
         problem = JointProblem(scans, all_pairs(count), no_priors(), 2 * OPTIONS.scale / count)
         start = near(self.truth, GOOD_SEED, GOOD, GOOD_ANGLE)
-        return match_jointly(problem, start, JointOptions(fixed=fixed))
+        return match_near_and_far(problem, start, JointOptions(fixed=fixed))
 
 
 @dataclass(frozen=True)

@@ -50,7 +50,7 @@ def test_fig_3_pairs_with_the_first_scan_leave_a_direction_open(pair, open_way):
 
 def test_fig_3_all_three_leave_nothing_open_but_the_gauge():
     whole, pairs = fig_3.subset((0, 1, 2)), [fig_3.subset(pair) for pair in ((0, 1), (0, 2))]
-    assert whole.eigenvalues[0] > 40 * max(pair.eigenvalues[0] for pair in pairs)
+    assert whole.eigenvalues[0] > 30 * max(pair.eigenvalues[0] for pair in pairs)
     for weakest, pair in zip(whole.weakest, pairs, strict=True):
         assert weakest.sigma is not None
         assert pair.weakest[0].sigma is not None
@@ -77,7 +77,7 @@ def check(outcome: Outcome) -> None:
         assert matched.succeeded()
         assert matched.match.reason is None
     assert outcome.from_good.converged
-    assert outcome.from_good.iterations <= 10
+    assert outcome.from_good.last_iterations <= 10
 
 
 @pytest.mark.parametrize("figure", [fig_4, fig_5])

@@ -15,7 +15,8 @@ from nscan_cli.mapping.plots import OPACITY, plot_match, plot_nscan
 from nscan_cli.mapping.ramp import ramp
 from nscan_cli.matching.joint import JointMatch
 from nscan_cli.matching.joint_energy import all_pairs
-from nscan_cli.matching.nscan import OVERLAPS_NONE, LeftOut, NScanMatch
+from nscan_cli.matching.left_out import OVERLAPS_NONE, LeftOut
+from nscan_cli.matching.nscan import NScanMatch
 from nscan_cli.matching.pairwise import NO_OVERLAP, PairMatch
 from nscan_cli.matching.uncertainty import Weakest
 from nscan_cli.poses import transform
@@ -144,8 +145,8 @@ def test_wide_scans_are_stacked():
 
 def nscan_of(kept: tuple[int, ...], poses: np.ndarray) -> NScanMatch:
     n = len(kept)
-    joint = JointMatch(poses, np.eye(3 * n), all_pairs(n), -1.0, 0.0, 5, 6, 3, True)
-    return NScanMatch(kept, 0, joint, -1.0, None, None, joint.pairs, np.full(n, 0.9), None)
+    joint = JointMatch(poses, np.zeros(3 * n), np.eye(3 * n), all_pairs(n), -1.0, 0.0, 5, 6, 3, True)
+    return NScanMatch(kept, 0, joint, -1.0, None, None, joint.pairs, np.full(n, 0.9), (), None)
 
 
 def panels_of_nscan(

@@ -41,6 +41,12 @@ def test_the_weakest_direction_is_the_longest_axis_of_the_marginal_covariance(an
     assert -np.pi / 2 < weakest.direction <= np.pi / 2
 
 
+def test_weak_is_what_five_centimetres_do_not_hold():
+    for sigma, weak in ((0.04, False), (0.06, True)):
+        assert weakest_translation(np.diag([sigma**-2, 1e6, 1e6])).is_weak == weak
+    assert weakest_translation(np.diag([0.0, 1e6, 1e6])).is_weak
+
+
 def test_what_nothing_holds_has_no_deviation():
     assert weakest_translation(np.zeros((3, 3))).sigma is None
     open_along_y = weakest_translation(np.diag([100.0, 0.0, 5.0]))

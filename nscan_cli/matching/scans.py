@@ -1,0 +1,86 @@
+"""n scans as the kernels of joint matching take them: their NDTs and points, laid end to end."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nscan_cli.compiled import kernel
+from nscan_cli.ndt.energy import OUT, accumulate
+from nscan_cli.ndt.grid import Grid, Ndt
+from nscan_cli.poses import Array
+
+
+class Scans(NamedTuple):
+    """The NDTs and points of n scans, laid end to end for the kernels."""
+
+    grid: Grid
+    """The arrays of all NDTs, one behind the other; rows count from the start of their own NDT."""
+    table_starts: NDArray[np.int64]
+    """(n + 1,)"""
+    row_starts: NDArray[np.int64]
+    """(n + 1,)"""
+    gaussian_starts: NDArray[np.int64]
+    """(n + 1,)"""
+    points: Array
+    """(Σ m, 2) the points of all scans, each in its own frame."""
+    point_starts: NDArray[np.int64]
+    """(n + 1,)"""
+    half: float
+    """Side (m) of a lattice cell, the same for all."""
+    usual: Array
+    """(n,) mean s of each scan's points on its own Gaussians: what a perfect match would reach."""
+
+
+def lay_out(ndts: Sequence[Ndt], points: Sequence[Array]) -> Scans:
+    """Lay n NDTs of one cell size and the points (m_i, 2) of n scans end to end."""
+    tables = [ndt.grid.table for ndt in ndts]
+    keys = np.concatenate([ndt.grid.keys[: ndt.rows] for ndt in ndts])
+    links = np.concatenate([ndt.grid.links[: ndt.rows] for ndt in ndts])
+    gaussians = [ndt.grid.gaussians for ndt in ndts]
+    # The sums are for growing; matching needs the Gaussians alone.
+    grid = Grid(np.concatenate(tables), keys, links, np.empty((0, 8)), np.concatenate(gaussians))
+    own = np.array([_own_mean(ndt.grid, ndt.half, part) for ndt, part in zip(ndts, points, strict=True)])
+    return Scans(
+        grid,
+        _starts([len(table) for table in tables]),
+        _starts([ndt.rows for ndt in ndts]),
+        _starts([len(part) for part in gaussians]),
+        np.concatenate([np.asarray(part, dtype=np.float64).reshape(-1, 2) for part in points]),
+        _starts([len(part) for part in points]),
+        ndts[0].half,
+        own,
+    )
+
+
+@kernel
+def scan_grid(scans: Scans, i: int) -> Grid:
+    """The NDT of scan i."""
+    t0, t1 = scans.table_starts[i], scans.table_starts[i + 1]
+    r0, r1 = scans.row_starts[i], scans.row_starts[i + 1]
+    g0, g1 = scans.gaussian_starts[i], scans.gaussian_starts[i + 1]
+    grid = scans.grid
+    return Grid(grid.table[t0:t1], grid.keys[r0:r1], grid.links[r0:r1], grid.sums, grid.gaussians[g0:g1])
+
+
+@kernel
+def scan_points(scans: Scans, i: int) -> Array:
+    """The points (m, 2) of scan i in its own frame."""
+    return scans.points[scans.point_starts[i] : scans.point_starts[i + 1]]
+
+
+@kernel
+def _own_mean(grid: Grid, half: float, points: Array) -> float:
+    out = np.empty(OUT)
+    accumulate(grid, half, points, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 1, out)
+    energy = out[0]
+    accumulate(grid, half, points, 0.0, 0.0, 0.0, 1.0, 0.0, 1.0, 1, out)
+    # The difference is the number of Gaussians met.
+    return float(-energy / max(out[0] - energy, 1.0))
+
+
+def _starts(lengths: Sequence[int]) -> NDArray[np.int64]:
+    return np.concatenate([[0], np.cumsum(lengths)]).astype(np.int64)
