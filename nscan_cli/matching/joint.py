@@ -10,8 +10,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nscan_cli.compiled import kernel
-from nscan_cli.matching.joint_energy import JointProblem, evaluate, joint_energy
+from nscan_cli.matching.joint_energy import (
+    COVERING,
+    NEUTRAL,
+    JointProblem,
+    evaluate,
+    joint_energy,
+    neutral_energy,
+)
 from nscan_cli.matching.linear import solve_definite
+from nscan_cli.matching.overlap import SOUND_OVERLAP, overlaps, weakest_link
 from nscan_cli.poses import Array, wrap
 
 FIRST_DAMPING = 1e-3
@@ -97,14 +105,17 @@ def match_near_and_far(
 
     Through all stages a far optimum is found; but the reward for overlap slides scans together where a
     corridor leaves them room. By the energy itself, judged by the neutral one, they stay apart; but only a
-    near optimum is found. `pairs_at` chooses the index set again before each stage; the pairs of `problem`
+    near optimum is found; if the scans hang together there, covering more of each other counts no further.
+    `pairs_at` chooses the index set again before each stage; the pairs of `problem`
     serve for comparison.
     """
     ways = [
         _approach(problem, start, options, options.widenings, neutral=False, pairs_at=pairs_at),
         _approach(problem, start, options, options.widenings[-1:], neutral=True, pairs_at=pairs_at),
     ]
-    best = min(ways, key=lambda way: joint_energy(problem, way.poses, neutral=True).value)
+    together = weakest_link(overlaps(problem.scans, ways[1].poses).pairs) >= SOUND_OVERLAP
+    share = NEUTRAL if together else COVERING
+    best = min(ways, key=lambda way: neutral_energy(problem, way.poses, share, options.stride))
     both = best._replace(
         iterations=sum(way.iterations for way in ways),
         evaluations=sum(way.evaluations for way in ways) + len(ways),

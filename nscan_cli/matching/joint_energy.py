@@ -16,8 +16,10 @@ from nscan_cli.matching.scans import Scans, scan_grid, scan_points
 from nscan_cli.ndt.energy import OUT, accumulate, unpack
 from nscan_cli.poses import Array
 
-NEUTRAL = 0.78
-"""What a point must reach of the usual s to count for a match in the neutral energy."""
+NEUTRAL = 1.0
+"""Share of the usual s that a point must reach to lower the neutral energy: a perfect match gains nothing."""
+COVERING = 0.78
+"""The same where covering more of each other shall count."""
 
 
 class Priors(NamedTuple):
@@ -63,27 +65,35 @@ def all_pairs(n: int) -> NDArray[np.int64]:
 
 
 def joint_energy(
-    problem: JointProblem, poses: Array, widening: float = 1.0, exact: bool = True, neutral: bool = False
+    problem: JointProblem, poses: Array, widening: float = 1.0, exact: bool = True
 ) -> JointEnergy:
     """Scale · E(p) plus the priors at the poses (n, 3).
 
     `exact=False` keeps the semi-definite part of the Hessian only: Σ (∂u/∂p)ᵗ H⁺ (∂u/∂p).
-
-    E rewards every point that meets a Gaussian, so that it falls when scans are slid over each other.
-    `neutral=True` takes that reward away: a point counts s less the greater part of what s usually is on
-    the scan that it meets. Gradient and Hessian are the same.
     """
     n = len(poses)
     gradient, hessian = np.empty(3 * n), np.empty((3 * n, 3 * n))
-    value = evaluate(problem, poses, widening, float(exact), neutral, 1, gradient, hessian)
+    value = evaluate(problem, poses, widening, float(exact), False, 1, gradient, hessian)
     return JointEnergy(value, gradient, hessian)
 
 
-def pair_energies(problem: JointProblem, poses: Array) -> Array:
-    """The neutral energy of each pair at the poses (n, 3): (n, n), 0 where (i, j) is not in J."""
+def pair_energies(problem: JointProblem, poses: Array, share: float = COVERING, stride: int = 1) -> Array:
+    """The neutral energy of each pair at the poses (n, 3): (n, n), 0 where (i, j) is not in J.
+
+    E rewards every point that meets a Gaussian, so that it falls when scans are slid over each other. The
+    neutral energy takes that reward away: a point counts s less a share of what s usually is on the scan
+    that it meets. Its derivatives are the same. With a stride only every so-manyth point is counted.
+    """
     values = np.zeros((len(poses), len(poses)))
-    _each_pair(problem, poses, values)
+    _each_pair(problem, poses, share, stride, values)
     return values
+
+
+def neutral_energy(problem: JointProblem, poses: Array, share: float = COVERING, stride: int = 1) -> float:
+    """The neutral energy with priors at the poses (n, 3); see pair_energies."""
+    n = len(poses)
+    of_priors = _add_priors(problem.priors, poses, 0.0, np.zeros(3 * n), np.zeros((3 * n, 3 * n)))
+    return float(pair_energies(problem, poses, share, stride).sum() + of_priors)
 
 
 @kernel
@@ -110,7 +120,7 @@ def evaluate(
 
 
 @kernel
-def _each_pair(problem: JointProblem, poses: Array, values: Array) -> None:
+def _each_pair(problem: JointProblem, poses: Array, share: float, stride: int, values: Array) -> None:
     scans = problem.scans
     u, out = np.empty(3), np.empty(OUT)
     for pair in range(problem.pairs.shape[0]):
@@ -125,11 +135,11 @@ def _each_pair(problem: JointProblem, poses: Array, values: Array) -> None:
             u[2],
             1.0,
             0.0,
-            NEUTRAL * scans.usual[i],
-            1,
+            share * scans.usual[i],
+            stride,
             out,
         )
-        values[i, j] = problem.scale * out[0]
+        values[i, j] = stride * problem.scale * out[0]
 
 
 @kernel

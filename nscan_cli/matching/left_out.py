@@ -81,29 +81,32 @@ def squared_deviations(priors: Priors, poses: Array, information: Array) -> tupl
     wrong place disagrees with all. Both are 0 without a prior.
     """
     pulls, known = _seen_from_scans(priors, poses)
-    by_all, by_most = np.zeros(len(poses)), np.zeros(len(poses))
-    for scan, match in enumerate(information):
-        terms = [(pulls[q, end], known[q, end]) for q, end in np.argwhere(priors.pairs == scan)]
-        if not terms:
-            continue
-        pull, prior = (np.sum(parts, axis=0) for parts in zip(*terms, strict=True))
-        by_all[scan] = by_most[scan] = squared_deviation(pull, prior, match)
-        if len(terms) > 1:
-            by_most[scan] = min(squared_deviation(pull - p, prior - k, match) for p, k in terms)
+    n = len(poses)
+    pull, prior, count = np.zeros((n, 3)), np.zeros((n, 3, 3)), np.zeros(n, dtype=np.int64)
+    np.add.at(pull, priors.pairs, pulls)
+    np.add.at(prior, priors.pairs, known)
+    np.add.at(count, priors.pairs, 1)
+    by_all = squared_deviation(pull, prior, information)
+    by_most = by_all.copy()
+    several = np.argwhere(count[priors.pairs] > 1)
+    scans, terms = priors.pairs[tuple(several.T)], tuple(several.T)
+    without = squared_deviation(pull[scans] - pulls[terms], prior[scans] - known[terms], information[scans])
+    np.minimum.at(by_most, scans, without)
     return by_all, by_most
 
 
-def squared_deviation(pull: Array, prior: Array, match: Array) -> float:
-    """δᵗ (Λ⁻¹ + S⁻¹)⁻¹ δ of a pose: its deviation δ from a Gaussian against the uncertainty of both.
+def squared_deviation(pull: Array, prior: Array, match: Array) -> Array:
+    """δᵗ (Λ⁻¹ + S⁻¹)⁻¹ δ of poses: their deviations δ from Gaussians against the uncertainty of both, (m,).
 
-    `prior` (3, 3) is the Gaussian's information Λ and `pull` (3,) is Λδ. `match` (3, 3), semi-definite, is S:
-    what the match by itself says of the pose with the other scans held. Their own uncertainty, which a
-    marginal would add, is small against that of priors. A direction that the match leaves open, as in a
-    corridor, has no weight.
+    `prior` (m, 3, 3) are the Gaussians' information Λ, and `pull` (m, 3) is Λδ. `match` (m, 3, 3),
+    semi-definite, is S: what the match by itself says of the pose with the other scans held. Their own
+    uncertainty, which a marginal would add, is small against that of priors. A direction that the match
+    leaves open, as in a corridor, has no weight.
     """
     # Λ (Λ⁻¹ + S⁻¹)⁻¹ Λ is Λ⁻¹ − (Λ + S)⁻¹ between two Λ, and needs no inverse of S.
     between = np.linalg.pinv(prior, hermitian=True) - np.linalg.pinv(prior + match, hermitian=True)
-    return float(pull @ between @ pull)
+    deviations: Array = np.einsum("ma,mab,mb->m", pull, between, pull)
+    return deviations
 
 
 def _seen_from_scans(priors: Priors, poses: Array) -> tuple[Array, Array]:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from nscan_cli.matching.joint import JointMatch, JointOptions
 from nscan_cli.matching.joint_energy import JointProblem, Priors, all_pairs, joint_energy, no_priors
 from nscan_cli.matching.left_out import ALONE, OUT_OF_REACH, LeftOut, out_of_reach, strays
-from nscan_cli.matching.overlap import Overlaps, overlaps
+from nscan_cli.matching.overlap import Overlaps
 from nscan_cli.matching.pairs import Kind, index_set
 from nscan_cli.matching.pairwise import HELD, INDEFINITE, PairOptions, scan_ndt
 from nscan_cli.matching.placing import match_or_search
@@ -81,7 +81,7 @@ def nscan_match(
         problem = JointProblem(scans, all_pairs(len(kept)), priors_among(kept), scale)
         held = kept.index(fixed) if fixed in kept else 0
         gauge = replace(joint, fixed=None if joint.fixed is None else held)
-        match = match_or_search(
+        match, shares = match_or_search(
             problem,
             [points[scan] for scan in kept],
             start[kept],
@@ -89,13 +89,13 @@ def nscan_match(
             gauge,
             partial(index_set, pairs, scans),
         )
-        shares = overlaps(scans, match.poses)
-        by_scans = problem._replace(pairs=match.pairs, priors=no_priors())
-        alone = joint_energy(by_scans, match.poses)
-        blocks = _blocks(alone.hessian, joint_energy(by_scans, match.poses, exact=False).hessian)
+        known = joint_energy(problem._replace(pairs=match.pairs[:0]), match.poses)
+        blocks = _blocks(problem._replace(pairs=match.pairs), match, known.hessian)
         out = strays(shares, match.pairs, problem.priors, match.poses, blocks)
         if not out:
-            return _relation(kept, held, match, shares, alone.value / scale, blocks), left_out
+            return _relation(
+                kept, held, match, shares, (match.energy - known.value) / scale, blocks
+            ), left_out
         gone = [stray.scan for stray in out]
         left_out += [replace(stray, scan=kept[stray.scan]) for stray in out]
         kept = [scan for at, scan in enumerate(kept) if at not in gone]
@@ -127,18 +127,23 @@ def _relation(
     )
 
 
-def _blocks(exact: Array, semidefinite: Array) -> Array:
-    """(n, 3, 3) what the others say of each pose: the blocks on the diagonal of a Hessian (3n, 3n).
+def _blocks(problem: JointProblem, match: JointMatch, known: Array) -> Array:
+    """(n, 3, 3) what the others say of each pose: the blocks on the diagonal of the Hessian of the scans.
 
-    Where priors hold a scan away from its minimum, the exact curvature can be negative: there it is the
-    semi-definite part.
+    That is the match's Hessian without the priors' `known` (3n, 3n). Where priors hold a scan away from its
+    minimum, its curvature can be negative: there it is the semi-definite part.
     """
-    both = []
-    for hessian in (exact, semidefinite):
-        scan = np.arange(len(hessian) // 3)
-        both.append(hessian.reshape(len(scan), 3, len(scan), 3)[scan, :, scan, :])
-    definite = np.linalg.eigvalsh(both[0])[:, 0] > 0.0
-    blocks: Array = np.where(definite[:, None, None], *both)
+    blocks = _on_diagonal(match.hessian - known)
+    indefinite = np.linalg.eigvalsh(blocks)[:, 0] <= 0.0
+    if indefinite.any():
+        definite = joint_energy(problem._replace(priors=no_priors()), match.poses, exact=False)
+        blocks[indefinite] = _on_diagonal(definite.hessian)[indefinite]
+    return blocks
+
+
+def _on_diagonal(hessian: Array) -> Array:
+    scan = np.arange(len(hessian) // 3)
+    blocks: Array = hessian.reshape(len(scan), 3, len(scan), 3)[scan, :, scan, :]
     return blocks
 
 

@@ -18,6 +18,9 @@ INLIER_BOUND = 9.0
 LEAST_OVERLAP = 0.1
 """With a smaller share of its points on another scan, a scan does not overlap it."""
 
+SOUND_OVERLAP = 0.5
+"""Scans that lie where they belong hang together by so much of what they see, mostly."""
+
 
 class Overlaps(NamedTuple):
     """Shares of points that lie on Gaussians."""

@@ -13,9 +13,9 @@ from dataclasses import replace
 import numpy as np
 
 from nscan_cli.matching.joint import JointMatch, JointOptions, PairsAt, match_near_and_far
-from nscan_cli.matching.joint_energy import JointProblem, joint_energy, pair_energies
+from nscan_cli.matching.joint_energy import JointProblem, neutral_energy, pair_energies
 from nscan_cli.matching.newton import PairProblem, minimise
-from nscan_cli.matching.overlap import overlaps, weakest_link
+from nscan_cli.matching.overlap import SOUND_OVERLAP, Overlaps, overlaps, weakest_link
 from nscan_cli.matching.pairwise import PairOptions
 from nscan_cli.matching.priors import Prior
 from nscan_cli.matching.search import Field, Found, SearchOptions, likelihood_field, search
@@ -28,8 +28,6 @@ SWEEPS = 3
 """How often every scan is searched again among all others, as long as that helps."""
 WIDENINGS = np.array([0.3, 1.0])
 """Stages in which a pose that was found becomes exact: the search leaves 0.1 m or so."""
-SOUND_OVERLAP = 0.5
-"""Scans that were found where they belong hang together by so much of what they see."""
 
 
 def match_or_search(
@@ -39,34 +37,33 @@ def match_or_search(
     options: PairOptions,
     joint: JointOptions,
     pairs_at: PairsAt | None = None,
-) -> JointMatch:
+) -> tuple[JointMatch, Overlaps]:
     """Match n scans with points (m_i, 2) from the poses `start` (n, 3), and search where that does not do.
 
     A match is sound when all scans hang together by large overlaps, and each adds to the neutral energy
     what lowers it. If it is not, the scans are placed by search and matched from there; the result counts
-    if they hang together then, and its neutral energy is lower.
+    if they hang together then, and its neutral energy is lower. With the match come the overlaps there.
     """
     match = match_near_and_far(problem, start, joint, pairs_at)
-    if _hang_together(problem, match.poses) and _all_fit(problem, match.poses):
-        return match
+    shares = overlaps(problem.scans, match.poses)
+    if weakest_link(shares.pairs) >= SOUND_OVERLAP and _all_fit(problem, match.poses):
+        return match, shares
     placed = Placing(problem, points, start, options, SearchOptions()).best()
     if joint.fixed is None:
         motion = _motion(placed, start)
     else:
         motion = compose(start[joint.fixed], relative(np.zeros(3), placed[joint.fixed]))
     other = match_near_and_far(problem, compose(motion, placed), joint, pairs_at)
-    energies = [joint_energy(problem, each.poses, neutral=True).value for each in (match, other)]
-    better = energies[1] < energies[0] and _hang_together(problem, other.poses)
-    return replace(
+    energies = [neutral_energy(problem, each.poses) for each in (match, other)]
+    other_shares = overlaps(problem.scans, other.poses)
+    better = energies[1] < energies[0] and weakest_link(other_shares.pairs) >= SOUND_OVERLAP
+    both = replace(
         other if better else match,
         iterations=match.iterations + other.iterations,
         evaluations=match.evaluations + other.evaluations,
         searched=better,
     )
-
-
-def _hang_together(problem: JointProblem, poses: Array) -> bool:
-    return weakest_link(overlaps(problem.scans, poses).pairs) >= SOUND_OVERLAP
+    return both, other_shares if better else shares
 
 
 def _all_fit(problem: JointProblem, poses: Array) -> bool:
@@ -95,7 +92,7 @@ class Placing:
         return self._placed_again(min(placed, key=self._energy))
 
     def _energy(self, poses: Array) -> float:
-        return joint_energy(self.problem, poses, neutral=True).value
+        return neutral_energy(self.problem, poses)
 
     def _placed_from(self, first: int) -> Array:
         """Place all scans one by one, the best fitting next; `first` stays at its start."""

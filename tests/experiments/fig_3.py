@@ -18,7 +18,7 @@ from nscan_cli.mapping.canvas import BLUE, GREEN, PURPLE, VERMILLION
 from nscan_cli.mapping.panels import bounds_around, panel, side_by_side, stacked
 from nscan_cli.mapping.symbols import robots
 from nscan_cli.matching.joint import JointMatch, JointOptions, match_near_and_far
-from nscan_cli.matching.joint_energy import JointProblem, Priors, joint_energy
+from nscan_cli.matching.joint_energy import JointProblem, Priors, joint_energy, neutral_energy
 from nscan_cli.matching.uncertainty import Weakest, weakest_translation
 from nscan_cli.poses import Array, compose, relative, transform
 from tests.experiments.charts import line_chart
@@ -142,7 +142,7 @@ def profile(which: tuple[int, ...], moved: int, axis: int) -> Array:
             mean[axis] += SHIFTS[at]
             held = energy_of(which, Priors(np.array([[0, place]]), mean[None], hold))
             here = match_near_and_far(held, here, options).poses
-            energies[at] = joint_energy(energy_of(which), here, neutral=True).value
+            energies[at] = neutral_energy(energy_of(which), here)
     return energies
 
 

@@ -43,6 +43,11 @@ def information(seed: int) -> Array:
     return matrix
 
 
+def deviation(pull: Array, prior: Array, match: Array) -> float:
+    """Of one pose."""
+    return float(squared_deviation(pull[None], prior[None], match[None])[0])
+
+
 @pytest.mark.parametrize(("gap", "lost"), [(4.4, []), (4.6, [0]), (400.0, [0])])
 def test_a_scan_that_can_meet_no_other_is_out_of_reach(gap, lost):
     """Points 5 m and 3 m away, whatever their direction: behind, they may be ahead if a start is turned."""
@@ -60,7 +65,7 @@ def test_the_deviation_is_measured_by_both_uncertainties(a, b):
     prior, match = information(a), information(1000 + b)
     delta = np.random.default_rng(b).normal(size=3) * 0.1
     expected = delta @ np.linalg.solve(np.linalg.inv(prior) + np.linalg.inv(match), delta)
-    assert squared_deviation(prior @ delta, prior, match) == pytest.approx(expected, rel=1e-6)
+    assert deviation(prior @ delta, prior, match) == pytest.approx(expected, rel=1e-6)
 
 
 def test_the_deviations_of_sound_scans_are_chi_squared():
@@ -70,7 +75,7 @@ def test_the_deviations_of_sound_scans_are_chi_squared():
     roots = [np.linalg.inv(np.linalg.cholesky(matrix)).T for matrix in (prior, match)]
     for _ in range(4000):
         mean, matched = (root @ rng.normal(size=3) for root in roots)
-        found.append(squared_deviation(prior @ (matched - mean), prior, match))
+        found.append(deviation(prior @ (matched - mean), prior, match))
     assert np.mean(found) == pytest.approx(3, abs=0.15)
     assert 0 < np.mean(np.array(found) > BOUND) < 0.003
 
@@ -79,8 +84,8 @@ def test_what_a_match_leaves_open_is_no_deviation():
     """A corridor along x: the match knows y and the angle only."""
     prior = np.diag([400.0, 400, 100])
     corridor = np.diag([0.0, 1e6, 1e6])
-    assert squared_deviation(prior @ np.array([5.0, 0, 0]), prior, corridor) == pytest.approx(0)
-    assert squared_deviation(prior @ np.array([0, 0.3, 0]), prior, corridor) == pytest.approx(36, rel=1e-3)
+    assert deviation(prior @ np.array([5.0, 0, 0]), prior, corridor) == pytest.approx(0)
+    assert deviation(prior @ np.array([0, 0.3, 0]), prior, corridor) == pytest.approx(36, rel=1e-3)
 
 
 @given(st.integers(0, 99), st.floats(-3, 3), st.floats(-3, 3))

@@ -29,7 +29,7 @@ def test_scans_are_found_where_their_starts_lead_nowhere(five, seed):
     start, joint = astray(five.truth, seed), five.joint(scale=2 * OPTIONS.scale / 5)
     alone = match_near_and_far(joint, start, JointOptions())
     assert np.abs(errors(alone.poses, five.truth)[:, :2]).max() > 0.5
-    match = match_or_search(joint, five.points, start, OPTIONS, JointOptions())
+    match, _ = match_or_search(joint, five.points, start, OPTIONS, JointOptions())
     assert match.searched
     assert match.converged
     assert np.abs(errors(match.poses, five.truth)[:, :2]).max() < 0.03
@@ -39,7 +39,7 @@ def test_scans_are_found_where_their_starts_lead_nowhere(five, seed):
 def test_a_good_start_needs_no_search(five, monkeypatch):
     monkeypatch.setattr(placing, "Placing", None)
     joint = five.joint(scale=2 * OPTIONS.scale / 5)
-    match = match_or_search(joint, five.points, near(five.truth, 1), OPTIONS, JointOptions())
+    match, _ = match_or_search(joint, five.points, near(five.truth, 1), OPTIONS, JointOptions())
     assert not match.searched
     assert np.abs(errors(match.poses, five.truth)[:, :2]).max() < 0.03
 
@@ -49,7 +49,7 @@ def test_the_frame_stays_that_of_the_start(five, fixed):
     """The scan that is held does not move; with a free gauge, the scans as a whole do not."""
     start = compose(np.array([40.0, -7.0, 2.0]), astray(five.truth, 1))
     joint = five.joint(scale=2 * OPTIONS.scale / 5)
-    match = match_or_search(joint, five.points, start, OPTIONS, JointOptions(fixed=fixed))
+    match, _ = match_or_search(joint, five.points, start, OPTIONS, JointOptions(fixed=fixed))
     assert match.searched
     if fixed is None:
         off = match.poses - start
@@ -63,5 +63,5 @@ def test_what_hangs_no_better_together_is_not_taken():
     apart = office_problem((60, 72, 2000, 2012))
     joint = apart.joint(scale=2 * OPTIONS.scale / 4)
     start = relative(apart.truth, apart.truth[0])
-    match = match_or_search(joint, apart.points, start, OPTIONS, JointOptions())
+    match, _ = match_or_search(joint, apart.points, start, OPTIONS, JointOptions())
     assert not match.searched
