@@ -202,7 +202,7 @@ def _make_gaussian(grid: Grid, row: int, half: float, minimum: float, floor: flo
         c2, s2 = 0.5 * (xx - yy) / radius, xy / radius
     else:
         c2, s2 = 1.0, 0.0
-    along = small / (large * large)
+    along = small * small / (large * large * large)
     mean, half_gap = 0.5 * (along + 1 / small), 0.5 * (along - 1 / small)
     ix, iy = key // (2 * HALF_KEY) - HALF_KEY, key % (2 * HALF_KEY) - HALF_KEY
     gaussian[0] = (ix + 0.5) * half + mx
