@@ -6,10 +6,11 @@ meets are those of the 2 × 2 blocks of lattice cells around it. The sums of a p
 in its lattice cell, and a Gaussian is made from the sums of its four. Sums can be taken away again, which
 lets a map follow the robot.
 
-One thing differs from [19]: the inverse of the larger eigenvalue λ is multiplied by the ratio of the
-smaller to the larger. A round Gaussian stays what it is; a piece of wall, long and thin, hardly holds a
-point along itself. How points are spread along a wall says where the beams fell, not where the wall is:
-taken at its word, it drags the robot back in corridors, and the Hessian claims to know the way along.
+One thing differs from [19]: the inverse of the larger eigenvalue λ is multiplied by the square of the
+ratio of the smaller to the larger. A round Gaussian stays what it is; a piece of wall, long and thin,
+hardly holds a point along itself. How points are spread along a wall says where the beams fell, not where
+the wall is: taken at its word, it drags the robot back in corridors, and the Hessian claims to know the
+way along.
 
 Another thing is added: a Gaussian knows from which side it was seen. A wall that is seen from a room and
 from the corridor has two faces, 10 or 15 cm apart; matched with each other they pull the scans together by

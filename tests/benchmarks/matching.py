@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from functools import partial
 from pathlib import Path
+from typing import get_args
 
 import numpy as np
 
@@ -14,6 +15,7 @@ from nscan_cli.logs.scan import LaserLog
 from nscan_cli.matching.joint import JointOptions
 from nscan_cli.matching.joint_energy import JointProblem, all_pairs, joint_energy, no_priors
 from nscan_cli.matching.nscan import nscan_match
+from nscan_cli.matching.pairs import Kind
 from nscan_cli.matching.pairwise import PairOptions, match_pair, matched_points, scan_ndt
 from nscan_cli.matching.priors import MotionModel
 from nscan_cli.matching.scans import lay_out
@@ -35,8 +37,9 @@ def timings() -> Iterator[Timing]:
         ten, six, two = (list(_windows(log, n)) for n in (10, 6, 2))
         yield Timing(f"{name}: joint energy of 10 scans, all pairs", median_of(_energies(log, ten)))
         for n, windows in ((10, ten), (6, six)):
-            calls = [partial(_joint, log, window) for window in windows]
-            yield Timing(f"{name}: joint match of {n} scans from odometry", median_of(calls))
+            for kind in get_args(Kind):
+                calls = [partial(_joint, log, window, kind) for window in windows]
+                yield Timing(f"{name}: joint match of {n} scans, pairs: {kind}", median_of(calls))
         calls = [partial(_pair, log, window) for window in two]
         yield Timing(f"{name}: pairwise match from odometry", median_of(calls))
 
@@ -62,13 +65,13 @@ def _energies(log: LaserLog, windows: list[Array]) -> list[Callable[[], object]]
     return calls
 
 
-def _joint(log: LaserLog, rows: Array) -> object:
-    """All that `nscan` does once the log is read."""
+def _joint(log: LaserLog, rows: Array, pairs: Kind) -> object:
+    """All that `nscan` does from the odometry once the log is read."""
     assert log.odometry is not None
     odometry = log.odometry[rows]
     points = [matched_points(log, int(row), PairOptions()) for row in rows]
     priors = odometry_priors(odometry, rows.tolist(), MotionModel())
-    return nscan_match(points, odometry, priors, 0, PairOptions(), JointOptions())
+    return nscan_match(points, odometry, priors, 0, PairOptions(), JointOptions(), pairs)
 
 
 def _pair(log: LaserLog, rows: Array) -> object:

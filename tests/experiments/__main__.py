@@ -9,7 +9,7 @@ import sys
 from collections.abc import Callable
 from pathlib import Path
 
-from tests.experiments import comparison, fig_2, fig_3, fig_4, fig_5, gauge
+from tests.experiments import comparison, fig_2, fig_3, fig_4, fig_5, gauge, index_sets
 from tests.experiments.output import write_reports
 from tests.experiments.report import Report
 
@@ -19,6 +19,7 @@ EXPERIMENTS: tuple[Callable[[], Report], ...] = (
     fig_4.report,
     fig_5.report,
     gauge.report,
+    index_sets.report,
     comparison.report,
 )
 

@@ -15,6 +15,7 @@ from nscan_cli.mapping.plots import plot_nscan
 from nscan_cli.matching.joint import JointMatch, JointOptions, match_near_and_far
 from nscan_cli.matching.joint_energy import JointProblem, all_pairs, no_priors
 from nscan_cli.matching.nscan import LeftOut, NScanMatch, nscan_match
+from nscan_cli.matching.pairs import Kind
 from nscan_cli.matching.pairwise import matched_points, scan_ndt
 from nscan_cli.matching.scans import lay_out
 from nscan_cli.poses import Array, compose, relative, wrap
@@ -59,13 +60,13 @@ class Case:
     truth: Array
     """(n, 3), in any frame."""
 
-    def matched(self, fixed: int | None = None) -> Matched:
+    def matched(self, fixed: int | None = None, pairs: Kind = "overlap") -> Matched:
         """Matched as `nscan --prior none` does, the gauge free or a scan fixed.
 
         Raises RuntimeError when no two of the scans match.
         """
         match, left_out = nscan_match(
-            self.points, self.start, no_knowledge, fixed or 0, OPTIONS, JointOptions(fixed=fixed)
+            self.points, self.start, no_knowledge, fixed or 0, OPTIONS, JointOptions(fixed=fixed), pairs
         )
         if match is None:
             raise RuntimeError(f"{self.name}: no two of the scans match")

@@ -30,9 +30,9 @@ if TYPE_CHECKING:
 
 COLOURS = (BLUE, VERMILLION, GREEN)
 """Of the scans."""
-SEED = 7
-"""Of the noise and of the starts. With every other one the joint match is held at a cell's border, where the
-energy jumps and its gradient is not zero: there the turn of all scans has some curvature too."""
+MINIMUM = 1e-3
+"""Gradient norm of a minimum. Many joint matches are held at a cell's border instead, where the energy jumps
+and its gradient is not zero: there the turn of all scans has some curvature too."""
 DRAWS = 20
 """Seeds of the matches that tell how far off they usually end."""
 OFF, OFF_ANGLE = 0.1, 0.05
@@ -65,23 +65,29 @@ class Subset:
 
 
 @functools.cache
-def scans(seed: int = SEED) -> Problem:
-    """The three scans, with noise."""
-    return fig_3(noise=True, seed=seed)
+def usual_seed() -> int:
+    """Of the noise and of the starts: the first whose joint match ends in a minimum."""
+    return next(seed for seed in range(DRAWS) if matched((0, 1, 2), seed).gradient_norm < MINIMUM)
 
 
-def energy_of(which: Sequence[int], priors: Priors | None = None, seed: int = SEED) -> JointProblem:
+@functools.cache
+def scans(seed: int | None = None) -> Problem:
+    """The three scans, with noise; of the usual seed if none is given, as in all that follows."""
+    return fig_3(noise=True, seed=usual_seed() if seed is None else seed)
+
+
+def energy_of(which: Sequence[int], priors: Priors | None = None, seed: int | None = None) -> JointProblem:
     """The energy of some of the scans, all pairs, as `nscan` weighs it."""
     return scans(seed).joint(*which, priors=priors, scale=2 * OPTIONS.scale / len(which))
 
 
-def matched(which: Sequence[int], seed: int = SEED) -> JointMatch:
+def matched(which: Sequence[int], seed: int | None = None) -> JointMatch:
     """Some of the scans matched by themselves."""
-    start = near(scans(seed).truth, seed, OFF, OFF_ANGLE)[list(which)]
+    start = near(scans(seed).truth, usual_seed() if seed is None else seed, OFF, OFF_ANGLE)[list(which)]
     return match_near_and_far(energy_of(which, seed=seed), start, JointOptions(fixed=0))
 
 
-def error(which: Sequence[int], seed: int = SEED) -> float:
+def error(which: Sequence[int], seed: int | None = None) -> float:
     """How far (m) off the truth their own match ends, the worst of the scans."""
     off = errors(matched(which, seed).poses, scans(seed).truth[list(which)])
     return float(np.hypot(off[:, 0], off[:, 1]).max())

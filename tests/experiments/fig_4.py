@@ -50,7 +50,7 @@ def report() -> Report:
         "give by least squares. Iterations and evaluations are those of all stages of both approaches that "
         "`nscan` makes from a start, with the iterations of the last stage in brackets; an evaluation is "
         "one of the joint energy with gradient and Hessian. The good start is drawn up to "
-        f"{GOOD} m and {GOOD_ANGLE} rad off the truth, and matched once through all stages. These are "
+        f"{GOOD} m and {GOOD_ANGLE} rad off the truth, and matched in the same way. These are "
         "examples that succeed; how many of many do is told below, with the two gauges.",
         {name: outcome.picture() for name, outcome in zip(names, done, strict=False)},
         HEADER,

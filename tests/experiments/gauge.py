@@ -51,18 +51,30 @@ class Convergence:
 
 
 @functools.cache
-def office_set() -> tuple[Convergence, ...]:
-    """The simulated office in all GAUGES, from its odometry."""
-    return _solve([office_case(rows) for rows in _spread(len(office_truth()), OFFICE_STEP)])
+def office_cases() -> tuple[Case, ...]:
+    """The problems of the simulated office, from its odometry."""
+    return tuple(office_case(rows) for rows in _spread(len(office_truth()), OFFICE_STEP))
 
 
 @functools.cache
-def intel_set() -> tuple[Convergence, ...] | None:
-    """The same of intel; None where the log is not there."""
+def intel_cases() -> tuple[Case, ...] | None:
+    """Those of intel; None where the log is not there."""
     intel = reference_log("intel")
     if intel is None:
         return None
-    return _solve([real_case(intel, chosen) for chosen in _spread(len(intel.rows), INTEL_STEP)])
+    return tuple(real_case(intel, chosen) for chosen in _spread(len(intel.rows), INTEL_STEP))
+
+
+@functools.cache
+def office_set() -> tuple[Convergence, ...]:
+    """The simulated office in all GAUGES."""
+    return _solve(office_cases())
+
+
+def intel_set() -> tuple[Convergence, ...] | None:
+    """The same of intel; None where the log is not there."""
+    cases = intel_cases()
+    return None if cases is None else _solve(cases)
 
 
 def report() -> Report:
@@ -101,7 +113,7 @@ def _spread(count: int, step: int) -> Iterator[NDArray[np.int64]]:
         yield np.arange(first, first + SCANS * step, step)
 
 
-def _solve(cases: list[Case]) -> tuple[Convergence, ...]:
+def _solve(cases: tuple[Case, ...]) -> tuple[Convergence, ...]:
     return tuple(
         Convergence(
             tuple(case.matched(fixed) for case in cases),
