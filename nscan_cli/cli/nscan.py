@@ -196,6 +196,7 @@ def _fields(numbers: tuple[int, ...], match: NScanMatch, left_out: list[LeftOut]
         "decrement": None if match.decrement is None else six_digits(match.decrement),
         "iterations": joint.iterations,
         "evaluations": joint.evaluations,
+        "searched": joint.searched,
         "converged": match.reason is None,
         "reason": match.reason,
         "pairs": [[kept[i], kept[j]] for i, j in match.pairs.tolist()],
@@ -220,6 +221,8 @@ def _summary(numbers: tuple[int, ...], match: NScanMatch, left_out: list[LeftOut
         f"{len(match.kept)} scans, {len(match.pairs)} pairs: {outcome}, {joint.iterations} iterations, "
         f"{joint.evaluations} evaluations; least overlap {match.overlap.min():.0%}"
     ]
+    if joint.searched:
+        lines.append("placed by search: the start by itself led to a poorer match")
     weak = [
         _weakly_held(numbers[scan], weakest)
         for scan, weakest in zip(match.kept, match.weakest, strict=True)

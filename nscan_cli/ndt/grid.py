@@ -6,7 +6,7 @@ meets are those of the 2 × 2 blocks of lattice cells around it. The sums of a p
 in its lattice cell, and a Gaussian is made from the sums of its four. Sums can be taken away again, which
 lets a map follow the robot.
 
-One thing differs from [19]: the inverse of the larger eigenvalue λ is multiplied by the square of the
+One thing differs from [19]: the inverse of the larger eigenvalue λ is multiplied by the
 ratio of the smaller to the larger. A round Gaussian stays what it is; a piece of wall, long and thin,
 hardly holds a point along itself. How points are spread along a wall says where the beams fell, not where
 the wall is: taken at its word, it drags the robot back in corridors, and the Hessian claims to know the
@@ -203,7 +203,7 @@ def _make_gaussian(grid: Grid, row: int, half: float, minimum: float, floor: flo
         c2, s2 = 0.5 * (xx - yy) / radius, xy / radius
     else:
         c2, s2 = 1.0, 0.0
-    along = small * small / (large * large * large)
+    along = small / (large * large)
     mean, half_gap = 0.5 * (along + 1 / small), 0.5 * (along - 1 / small)
     ix, iy = key // (2 * HALF_KEY) - HALF_KEY, key % (2 * HALF_KEY) - HALF_KEY
     gaussian[0] = (ix + 0.5) * half + mx

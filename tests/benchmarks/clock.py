@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -29,7 +29,7 @@ def best_of(call: Callable[[], object], runs: int = 5) -> float:
     return 1000 * min(times)
 
 
-def median_of(calls: list[Callable[[], object]], runs: int = 5) -> float:
+def median_of(calls: Sequence[Callable[[], object]], runs: int = 5) -> float:
     """The median over several calls, ms."""
     return float(np.median([best_of(call, runs) for call in calls]))
 

@@ -14,7 +14,8 @@ from nscan_cli.cli.knowledge import no_knowledge
 from nscan_cli.mapping.plots import plot_nscan
 from nscan_cli.matching.joint import JointMatch, JointOptions, match_near_and_far
 from nscan_cli.matching.joint_energy import JointProblem, all_pairs, no_priors
-from nscan_cli.matching.nscan import LeftOut, NScanMatch, nscan_match
+from nscan_cli.matching.left_out import LeftOut
+from nscan_cli.matching.nscan import NScanMatch, nscan_match
 from nscan_cli.matching.pairs import Kind
 from nscan_cli.matching.pairwise import matched_points, scan_ndt
 from nscan_cli.matching.scans import lay_out

@@ -7,6 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from nscan_cli.cli.knowledge import no_knowledge
 from nscan_cli.graph.model import Graph, Pairwise
@@ -104,16 +105,19 @@ class Results:
     """What the methods made of P problems."""
 
     problems: list[Drawn]
-    solved: dict[str, Array]
+    solved: dict[str, NDArray[np.bool_]]
     """(P,) bool"""
     off: dict[str, Array]
     """(P,) root mean square of the errors of the positions, m, seen from the first scan."""
 
-    def chosen(self, which: Array) -> Results:
+    def chosen(self, which: NDArray[np.bool_]) -> Results:
         """Those of some problems."""
         problems = [problem for problem, here in zip(self.problems, which, strict=True) if here]
-        parts = ({name: values[which] for name, values in part.items()} for part in (self.solved, self.off))
-        return Results(problems, *parts)
+        return Results(
+            problems,
+            {name: values[which] for name, values in self.solved.items()},
+            {name: values[which] for name, values in self.off.items()},
+        )
 
 
 def compare(problems: list[Drawn]) -> Results:
@@ -161,7 +165,7 @@ def report() -> Report:
     ]
     rows += [_row(name, part) for name, part in parts.items()]
     rows += [_row("overlap enough to match", every.chosen(enough)), _row("all", every)]
-    failed = every.chosen(enough & ~every.solved[PAIRS])
+    failed = every.chosen(enough & np.logical_not(every.solved[PAIRS]))
     rows.append(_row("overlap enough, (b) fails", failed))
     common = every.chosen(np.all(list(every.solved.values()), axis=0))
     for name, part in (("all", every), ("those that all four solve", common)):

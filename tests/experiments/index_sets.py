@@ -18,10 +18,10 @@ def report() -> Report:
     return Report(
         "III-B: which pairs are matched",
         "The problems of the gauges again, with three index sets: `all` pairs; those where the position of "
-        "one scan lies in the free space that the other saw (`visible`); those where enough of one scan's points "
-        "fall into cells where the other has a Gaussian (`overlap`, the default). The set is chosen from the "
-        "poses before each stage. `make bench` tells the times. From poor starts `visible` solves fewer, and "
-        f"it loses the pair that ties the scans of Fig. 3. A problem succeeds within {SUCCESS} m.",
+        "one scan lies in the free space that the other saw (`visible`); those where enough of one scan's "
+        "points fall into cells where the other has a Gaussian (`overlap`, the default). The set is chosen "
+        "from the poses before each stage. `make bench` tells the times. From poor starts `visible` solves "
+        f"fewer, and it loses the pair that ties the scans of Fig. 3. A problem succeeds within {SUCCESS} m.",
         {},
         ("set", "pairs", "number of them (median)", "iterations (mean)", "succeeded"),
         [

@@ -43,5 +43,5 @@ def test_joint_matching_solves_more_than_pairs(drawn):
         assert results.solved[NSCAN].sum() > results.solved[other].sum()
         assert np.median(results.off[NSCAN]) < 0.8 * np.median(results.off[other])
     # Of what the pairs do not solve, though the scans overlap enough, more than half.
-    failed = enough & ~results.solved[PAIRS]
+    failed = enough & np.logical_not(results.solved[PAIRS])
     assert results.solved[NSCAN][failed].mean() > 0.5

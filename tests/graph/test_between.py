@@ -29,7 +29,7 @@ def dense(graph: Graph, held: int) -> Array:
     free = np.delete(np.arange(count), held)
     whole = np.zeros((count, 3, count, 3))
     inverse = np.linalg.inv(information).reshape(count - 1, 3, count - 1, 3)
-    whole[np.ix_(free, range(3), free, range(3))] = inverse
+    whole[np.ix_(free, np.arange(3), free, np.arange(3))] = inverse
     return whole
 
 

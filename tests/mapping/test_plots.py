@@ -145,7 +145,7 @@ def test_wide_scans_are_stacked():
 
 def nscan_of(kept: tuple[int, ...], poses: np.ndarray) -> NScanMatch:
     n = len(kept)
-    joint = JointMatch(poses, np.zeros(3 * n), np.eye(3 * n), all_pairs(n), -1.0, 0.0, 5, 6, 3, True)
+    joint = JointMatch(poses, np.zeros(3 * n), np.eye(3 * n), all_pairs(n), -1.0, 5, 6, 3, True)
     return NScanMatch(kept, 0, joint, -1.0, None, None, joint.pairs, np.full(n, 0.9), (), None)
 
 

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 import pytest
@@ -12,6 +13,7 @@ from nscan_cli.matching.left_out import ALONE, OUT_OF_BOUNDS, OUT_OF_REACH, OVER
 from nscan_cli.matching.nscan import nscan_match
 from nscan_cli.matching.overlap import INLIER_BOUND, overlaps
 from nscan_cli.matching.pairs import index_set
+from nscan_cli.matching.scans import Scans, lay_out
 from nscan_cli.ndt.energy import inlier_share
 from nscan_cli.poses import relative, relative_jacobians
 from tests.matching.problems import OPTIONS, Problem, errors, fig_3, near, office_problem
@@ -82,8 +84,13 @@ def test_overlaps_count_points_on_gaussians(four):
 
 def test_scans_too_far_to_meet_any_are_left_out_before_the_match(four, monkeypatch):
     away = four.truth + np.array([[0.0, 0, 0], [400, 0, 0], [0, 0, 0], [0, 400, 0]])
-    laid_out, lay_out = [], nscan_module.lay_out
-    monkeypatch.setattr(nscan_module, "lay_out", lambda *parts: laid_out.append(1) or lay_out(*parts))
+    laid_out = []
+
+    def counted(*parts: Any) -> Scans:
+        laid_out.append(parts)
+        return lay_out(*parts)
+
+    monkeypatch.setattr(nscan_module, "lay_out", counted)
     match, left_out = nscan_match(four.points, away, none, 1, OPTIONS, FIXED)
     assert match is not None
     assert match.kept == (0, 2)

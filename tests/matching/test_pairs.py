@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 from functools import cache, partial
+from typing import Any
 
 import numpy as np
 import pytest
@@ -60,8 +61,8 @@ def sees(i: np.ndarray, j: np.ndarray) -> bool | None:
     return not through and beyond < 0
 
 
-def crosses_a_wall(a: np.ndarray, b: np.ndarray) -> bool:
-    def side(p, q, r):
+def crosses_a_wall(a: Any, b: Any) -> bool:
+    def side(p: Any, q: Any, r: Any) -> Any:
         return (q[0] - p[0]) * (r[1] - p[1]) - (q[1] - p[1]) * (r[0] - p[0])
 
     for x1, y1, x2, y2 in plan().segments:
