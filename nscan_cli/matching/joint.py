@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -20,6 +21,7 @@ from nscan_cli.matching.joint_energy import (
 )
 from nscan_cli.matching.linear import solve_definite
 from nscan_cli.matching.overlap import SOUND_OVERLAP, overlaps, weakest_link
+from nscan_cli.matching.unheld import back_to_priors
 from nscan_cli.poses import Array, wrap
 
 FIRST_DAMPING = 1e-3
@@ -104,23 +106,31 @@ def match_near_and_far(
     """Approach in two ways from `start` (n, 3), and finish from where the neutral energy is lower.
 
     Through all stages a far optimum is found; but the reward for overlap slides scans together where a
-    corridor leaves them room. By the energy itself, judged by the neutral one, they stay apart; but only a
-    near optimum is found; if the scans hang together there, covering more of each other counts no further.
-    `pairs_at` chooses the index set again before each stage; the pairs of `problem`
-    serve for comparison.
+    corridor leaves them room. There they go back to where the priors want them, if that is no worse. By the
+    energy itself, judged by the neutral one, they stay apart from the start; but only a near optimum is
+    found. If the scans hang together, covering more of each other counts no further. `pairs_at` chooses the
+    index set again before each stage; the pairs of `problem` serve for comparison.
     """
-    ways = [
-        _approach(problem, start, options, options.widenings, neutral=False, pairs_at=pairs_at),
-        _approach(problem, start, options, options.widenings[-1:], neutral=True, pairs_at=pairs_at),
-    ]
-    together = weakest_link(overlaps(problem.scans, ways[1].poses).pairs) >= SOUND_OVERLAP
-    share = NEUTRAL if together else COVERING
-    best = min(ways, key=lambda way: neutral_energy(problem, way.poses, share, options.stride))
-    both = best._replace(
+    last = options.widenings[-1:]
+    far = _approach(problem, start, options, options.widenings, neutral=False, pairs_at=pairs_at)
+    near = _approach(problem, start, options, last, neutral=True, pairs_at=pairs_at)
+    ways = [far, near]
+    opened = back_to_priors(problem, far.poses)
+    if opened is not None:
+        back = _approach(problem, opened, options, last, neutral=True, pairs_at=pairs_at)
+        ways.append(back)
+        far = min(back, far, key=partial(_judge, problem, options, NEUTRAL))
+    together = weakest_link(overlaps(problem.scans, far.poses).pairs) >= SOUND_OVERLAP
+    best = min(far, near, key=partial(_judge, problem, options, NEUTRAL if together else COVERING))
+    work = best._replace(
         iterations=sum(way.iterations for way in ways),
         evaluations=sum(way.evaluations for way in ways) + len(ways),
     )
-    return _finish(_at(problem, pairs_at, best.poses), both, options, neutral=True)
+    return _finish(_at(problem, pairs_at, best.poses), work, options, neutral=True)
+
+
+def _judge(problem: JointProblem, options: JointOptions, share: float, way: Way) -> float:
+    return neutral_energy(problem, way.poses, share, options.stride)
 
 
 def _approach(

@@ -14,7 +14,7 @@ from nscan_cli.compiled import kernel
 from nscan_cli.matching.linear import solve_definite
 from nscan_cli.matching.priors import Prior
 from nscan_cli.ndt.energy import OUT, accumulate, unpack
-from nscan_cli.ndt.grid import Grid
+from nscan_cli.ndt.table import Grid
 from nscan_cli.poses import Array
 
 FIRST_DAMPING = 1e-3

@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 from nscan_cli.compiled import kernel
 from nscan_cli.ndt.energy import OUT, accumulate
-from nscan_cli.ndt.grid import Grid, Ndt
+from nscan_cli.ndt.grid import Ndt
+from nscan_cli.ndt.table import Grid
 from nscan_cli.poses import Array
 
 

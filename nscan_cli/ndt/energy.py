@@ -12,7 +12,8 @@ from typing import NamedTuple
 import numpy as np
 
 from nscan_cli.compiled import kernel
-from nscan_cli.ndt.grid import Grid, Ndt, find_row, pack
+from nscan_cli.ndt.grid import Ndt
+from nscan_cli.ndt.table import Grid, find_row, pack
 from nscan_cli.poses import Array
 
 OUT = 10

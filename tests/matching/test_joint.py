@@ -61,9 +61,9 @@ def test_both_gauges_find_the_same_relative_poses(rows):
         found.append(match)
         assert np.abs(errors(match.poses, problem.truth)[:, :2]).max() < 2 * NOISE
     for match in found[1:]:
-        # Where the energy jumps at a cell border, the two may stop on either side of a small step.
+        # Where the energy jumps at a cell border, the two may stop on either side of a few points' steps.
         assert np.abs(errors(match.poses, found[0].poses)).max() < 1e-3
-        assert match.energy == pytest.approx(found[0].energy, rel=1e-4)
+        assert match.energy == pytest.approx(found[0].energy, abs=5 * problem.joint().scale)
 
 
 def test_the_result_is_a_minimum_with_the_gauge_in_its_hessian(five):
@@ -72,8 +72,9 @@ def test_the_result_is_a_minimum_with_the_gauge_in_its_hessian(five):
     assert match.energy == pytest.approx(again.value, rel=1e-12)
     np.testing.assert_allclose(match.hessian, again.hessian, rtol=1e-9, atol=1e-6)
     values = np.linalg.eigvalsh(match.hessian)
-    assert np.abs(values[:3]).max() < 1e-4 * values[3]
-    assert values[3] > 0
+    # The turn of all scans has the curvature of what gradient is left at a cell border, see below.
+    assert np.sort(np.abs(values[:3]))[1] < 1e-9 * values[3]
+    assert np.abs(values[:3]).max() < 1e-3 * values[3]
 
 
 def test_off_a_minimum_the_turn_of_all_scans_has_the_curvature_of_its_gradient(five):

@@ -10,7 +10,7 @@ from nscan_cli.matching import pairs
 from nscan_cli.matching.joint import JointOptions, match_near_and_far
 from nscan_cli.matching.joint_energy import all_pairs
 from nscan_cli.matching.pairs import BESIDE, index_set
-from nscan_cli.ndt.grid import find_row, pack
+from nscan_cli.ndt.table import find_row, pack
 from nscan_cli.poses import relative, transform
 from tests.matching.problems import Problem, errors, fig_3, near, office_problem
 from tests.simulation.scenes import office

@@ -47,6 +47,14 @@ def office() -> Scene:
     return Scene("office", office_world(), office_way())
 
 
+def bare_corridor() -> Scene:
+    """Two walls, 2 m apart and 120 m long: nothing tells how far along one is."""
+    plan = Builder()
+    plan.line(-60.0, -1.0, 60.0, -1.0)
+    plan.line(-60.0, 1.0, 60.0, 1.0)
+    return Scene("bare_corridor", plan.world(), np.array([(-20.0, 0.0), (20.0, 0.0)]))
+
+
 def corridor_and_room() -> Scene:
     """The situation of the paper's Fig. 3; `FIG_3` has the poses of its three scans.
 

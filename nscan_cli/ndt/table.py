@@ -1,0 +1,88 @@
+"""The arrays of an NDT, and the hash table that finds a lattice cell in them."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nscan_cli.compiled import kernel
+from nscan_cli.poses import Array
+
+HALF_KEY = 1 << 30
+"""Offset that makes lattice coordinates positive in a packed key."""
+
+
+class Grid(NamedTuple):
+    """The arrays of an NDT as the kernels take them. R rows, one for each lattice cell that was touched.
+
+    While it grows, row r stands for its lattice cell and for the Gaussian of the block whose lower left
+    cell it is; a compact one has the Gaussians that can be used and the cells that meet one.
+    """
+
+    table: NDArray[np.int32]
+    """(T,) open-addressing hash table of rows, −1 where empty; T is a power of two."""
+    keys: NDArray[np.int64]
+    """(R,) packed lattice coordinates."""
+    links: NDArray[np.int32]
+    """(R, 4) rows of the Gaussians of the four blocks that the lattice cell is part of, or −1."""
+    sums: Array
+    """(R, 8) n, Σx, Σy, Σx², Σxy, Σy² about the centre of the lattice cell, and the sum of the unit vectors
+    along the beams."""
+    gaussians: Array
+    """(G, 7) mean x, y; Σ⁻¹ as (xx, xy, yy), 0 where a Gaussian has too few points; and the normal (x, y)
+    of the side that it shows, 0 where it was seen from both."""
+
+
+@kernel
+def find_row(grid: Grid, key: int) -> int:
+    """The row of a packed key, or −1."""
+    mask = grid.table.shape[0] - 1
+    slot = _hash(key) & mask
+    while True:
+        row = grid.table[slot]
+        if row < 0 or grid.keys[row] == key:
+            return int(row)
+        slot = (slot + 1) & mask
+
+
+@kernel
+def pack(ix: int, iy: int) -> int:
+    """One key for the lattice cell (ix, iy)."""
+    return (ix + HALF_KEY) * (2 * HALF_KEY) + (iy + HALF_KEY)
+
+
+@kernel
+def _hash(key: int) -> int:
+    mixed = np.uint64(key) * np.uint64(0x9E3779B97F4A7C15)
+    return int(mixed >> np.uint64(33))
+
+
+@kernel
+def insert(grid: Grid, rows: int, key: int) -> tuple[int, int]:
+    """The row of a key, made when it is new; and the number of rows then."""
+    mask = grid.table.shape[0] - 1
+    slot = _hash(key) & mask
+    while grid.table[slot] >= 0:
+        row = grid.table[slot]
+        if grid.keys[row] == key:
+            return row, rows
+        slot = (slot + 1) & mask
+    grid.table[slot] = rows
+    grid.keys[rows] = key
+    grid.links[rows, :] = -1
+    grid.sums[rows, :] = 0.0
+    grid.gaussians[rows, :] = 0.0
+    return rows, rows + 1
+
+
+@kernel
+def rehash(grid: Grid, rows: int) -> None:
+    """Enter the first `rows` keys into an empty table."""
+    mask = grid.table.shape[0] - 1
+    for row in range(rows):
+        slot = _hash(grid.keys[row]) & mask
+        while grid.table[slot] >= 0:
+            slot = (slot + 1) & mask
+        grid.table[slot] = row
