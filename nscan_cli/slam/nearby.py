@@ -29,25 +29,25 @@ class Nearby:
     relation: NScan | None
     """None when too few scans hang together, or the match did not converge."""
     loop: Loop | None
-    """The verdict on what was seen before; None where nothing was."""
+    """The verdict on what another visit saw; None where nothing was."""
     moved: float
-    """How far (m) the match moved a scan, seen from the newest."""
+    """How far (m) the match moved a scan, seen from the centre."""
     whole: bool
     """Whether all scans that were tried are in the relation."""
 
 
 def choose_nearby(
-    poses: Array, paths: Array, newest: int, options: NScanOptions
+    poses: Array, paths: Array, centre: int, options: NScanOptions
 ) -> tuple[Indices, NDArray[np.bool_]]:
-    """The keyframes (n,) for a joint match with `newest`, increasing, and which of them were seen before.
+    """The keyframes (n,) for a joint match about `centre`, increasing, and which are of another visit.
 
     Poses (K, 3) are global ones, paths (K,) lengths of path. Of the keyframes within the radius, those
-    nearest are taken; half of the places are kept for what was seen before, further back on the path.
+    nearest are taken; half of the places are kept for other visits, further along the path or back.
     """
-    distances = np.hypot(*(poses[: newest + 1, :2] - poses[newest, :2]).T)
+    distances = np.hypot(*(poses[:, :2] - poses[centre, :2]).T)
     near = np.flatnonzero(distances <= options.radius)
     near = near[np.argsort(distances[near], kind="stable")]
-    before = paths[newest] - paths[near] > options.recent
+    before = np.abs(paths[centre] - paths[near]) > options.recent
     old, recent = near[before], near[~before]
     recent = recent[: options.max_scans - min(len(old), options.max_scans // 2)]
     old = old[: options.max_scans - len(recent)]
@@ -59,22 +59,22 @@ def match_nearby(
     keyframes: Sequence[Keyframe],
     poses: Array,
     pairwise: Sequence[Pairwise],
-    newest: int,
+    centre: int,
     options: NScanOptions,
 ) -> Nearby | None:
     """Match a keyframe jointly with those near it, with the pairwise relations among them as priors.
 
-    `poses` (K, 3) are the global poses so far, `pairwise[k]` leads from keyframe k to k + 1. Scans that
-    do not hang together with the newest by overlaps are left out, and the others matched again. None
-    when there are too few keyframes near.
+    `poses` (K, 3) are the global poses of the keyframes (K,), `pairwise[k]` leads from keyframe k to
+    k + 1. Scans that do not hang together with the `centre` by overlaps are left out, and the others
+    matched again. None when there are too few keyframes near.
     """
-    paths = np.array([keyframe.tracked.path for keyframe in keyframes[: newest + 1]])
-    tried, seen_before = choose_nearby(poses, paths, newest, options)
+    paths = np.array([keyframe.tracked.path for keyframe in keyframes])
+    tried, seen_before = choose_nearby(poses, paths, centre, options)
     if len(tried) < LEAST_SCANS:
         return None
     # Mostly the poses are right to centimetres already, and the last stage is all it takes.
     for widenings in (options.widenings[-1:], options.widenings):
-        nearby = _match_held(keyframes, poses, pairwise, tried, seen_before, widenings, options)
+        nearby = _match_held(keyframes, poses, pairwise, tried, seen_before, centre, widenings, options)
         if nearby.whole and nearby.moved < options.settled:
             break
     return nearby
@@ -86,6 +86,7 @@ def _match_held(
     pairwise: Sequence[Pairwise],
     tried: Indices,
     seen_before: NDArray[np.bool_],
+    centre: int,
     widenings: tuple[float, ...],
     options: NScanOptions,
 ) -> Nearby:
@@ -96,24 +97,28 @@ def _match_held(
         scans = lay_out([keyframes[k].ndt for k in members], [keyframes[k].points for k in members])
         match = _match(scans, members, pairwise, start, widenings, options)
         shares = overlaps(scans, match.poses).pairs
-        held = held_together(shares, options.overlap, len(kept) - 1)
+        at = int(np.searchsorted(members, centre))
+        held = held_together(shares, options.overlap, at)
         if not held.all():
             kept, start = kept[held], match.poses[held]
             continue
         score = weakest_link(shares)
         if not match.converged:
             return Nearby(
-                None, _loop(keyframes, tried, seen_before, False, "did not converge", score), 0.0, False
+                None,
+                _loop(keyframes, tried, seen_before, centre, False, "did not converge", score),
+                0.0,
+                False,
             )
         closed = bool(seen_before[kept].any())
-        relation = _relation(keyframes, members, match, "loop" if closed else "nscan", score)
+        relation = _relation(keyframes, members, at, match, "loop" if closed else "nscan", score)
         whole = len(kept) == len(tried)
         reason = "" if whole else f"{len(tried) - len(kept)} scans left out"
         used, before = (members, seen_before[kept]) if closed else (tried, seen_before)
-        loop = _loop(keyframes, used, before, closed, reason, score)
-        return Nearby(relation, loop, _moved(poses[members], match.poses), whole)
+        loop = _loop(keyframes, used, before, centre, closed, reason, score)
+        return Nearby(relation, loop, _moved(poses[members], match.poses, at), whole)
     reason = f"only {len(kept)} of {len(tried)} scans hang together"
-    return Nearby(None, _loop(keyframes, tried, seen_before, False, reason, 0.0), 0.0, False)
+    return Nearby(None, _loop(keyframes, tried, seen_before, centre, False, reason, 0.0), 0.0, False)
 
 
 def _match(
@@ -145,7 +150,7 @@ def _match(
 
 
 def _relation(
-    keyframes: Sequence[Keyframe], members: Indices, match: JointMatch, origin: str, score: float
+    keyframes: Sequence[Keyframe], members: Indices, fixed: int, match: JointMatch, origin: str, score: float
 ) -> NScan:
     eigenvalues, vectors = np.linalg.eigh(match.hessian)
     return NScan(
@@ -153,7 +158,7 @@ def _relation(
         poses=match.poses,
         # What is left of negative curvature at the optimum is rounding, or a cell's border.
         hessian=(vectors * np.maximum(eigenvalues, 0.0)) @ vectors.T,
-        fixed=len(members) - 1,
+        fixed=fixed,
         origin=origin,
         score=score,
     )
@@ -163,18 +168,19 @@ def _loop(
     keyframes: Sequence[Keyframe],
     members: Indices,
     seen_before: NDArray[np.bool_],
+    centre: int,
     accepted: bool,
     reason: str,
     score: float,
 ) -> Loop | None:
-    """The verdict on the first keyframe that was seen before, and the newest."""
+    """The verdict on the first keyframe of another visit, and the centre."""
     if not seen_before.any():
         return None
     first = members[np.argmax(seen_before)]
-    return Loop((keyframes[first].row, keyframes[members[-1]].row), accepted, reason, score)
+    return Loop((keyframes[first].row, keyframes[centre].row), accepted, reason, score)
 
 
-def _moved(before: Array, after: Array) -> float:
-    """How far (m) some pose (n, 3) moved, seen from the last."""
-    shift = relative(after, after[-1]) - relative(before, before[-1])
+def _moved(before: Array, after: Array, fixed: int) -> float:
+    """How far (m) some pose (n, 3) moved, seen from one of them."""
+    shift = relative(after, after[fixed]) - relative(before, before[fixed])
     return float(np.hypot(shift[:, 0], shift[:, 1]).max())

@@ -97,3 +97,7 @@ class SlamOptions:
     nscan: NScanOptions = field(default_factory=NScanOptions)
     optimise_after: float = 0.1
     """The graph is optimised when joint matches have moved scans by so much in all, m."""
+    refinements: int = 4
+    """Most sweeps of joint matches from the final poses."""
+    refined: float = 0.01
+    """A joint match is made again when a scan has moved by so much (m, rad) since."""

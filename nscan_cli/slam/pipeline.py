@@ -15,6 +15,7 @@ from nscan_cli.poses import Array, compose
 from nscan_cli.slam.keyframes import Keyframes
 from nscan_cli.slam.nearby import match_nearby
 from nscan_cli.slam.options import SlamOptions
+from nscan_cli.slam.refinement import Refinement
 from nscan_cli.slam.tracking import Tracked, Tracker
 from nscan_cli.slam.trajectory import between_keyframes
 
@@ -52,6 +53,7 @@ class Slam:
         self.keyframes.finish_last()
         self.match_nearby(len(self.keyframes) - 1)
         self.optimise(max_iterations=100, tolerance=1e-6)
+        self.refine()
         graph = self.graph()
         graph.marginals = marginal_covariances(graph)
         return graph
@@ -83,7 +85,10 @@ class Slam:
         """Step 3: a keyframe matched jointly with those near it; the graph follows when it must."""
         if newest < 0:
             return
-        nearby = match_nearby(self.keyframes.list, self.poses, self.pairwise, newest, self.options.nscan)
+        known = newest + 1
+        nearby = match_nearby(
+            self.keyframes.list[:known], self.poses[:known], self.pairwise, newest, self.options.nscan
+        )
         if nearby is None:
             return
         if nearby.loop is not None:
@@ -94,6 +99,16 @@ class Slam:
         self._moved += nearby.moved
         if self._moved > self.options.optimise_after:
             self.optimise(max_iterations=10, tolerance=1e-3)
+
+    def refine(self) -> None:
+        """Step 5: the joint matches again, until they move nothing that was matched."""
+        options = self.options
+        refinement = Refinement(self.keyframes.list, self.pairwise, options.nscan)
+        for _ in range(options.refinements):
+            if not refinement.sweep(self.poses, options.refined):
+                break
+            self.nscan = refinement.relations()
+            self.optimise(max_iterations=100, tolerance=1e-6)
 
     def optimise(self, max_iterations: int, tolerance: float) -> None:
         """The global poses of all keyframes from all relations (paper, IV)."""
