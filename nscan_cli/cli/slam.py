@@ -20,6 +20,10 @@ from nscan_cli.provenance import provenance_of
 if TYPE_CHECKING:
     from nscan_cli.graph.model import Graph
     from nscan_cli.logs.scan import LaserLog
+    from nscan_cli.slam.options import Relations, SlamOptions
+
+MAPPING = ("max_scans", "relations", "no_loops")
+"""Options that say how a log is mapped."""
 
 
 @click.command("slam", context_settings=CONTEXT)
@@ -38,6 +42,10 @@ if TYPE_CHECKING:
 )
 @click.option("--max-scans", type=click.IntRange(3), default=10, show_default=True, metavar="N",
               help="Most scans in an nScan relation.")  # fmt: skip
+@click.option("--relations", type=click.Choice(["pairwise", "nscan", "both"]), default="both",
+              show_default=True, help="Match scans near each other one by one (pairwise), or jointly "
+              "(nscan; both: and keep the chain of tracking).")  # fmt: skip
+@click.option("--no-loops", is_flag=True, help="Match nothing with what an earlier visit saw: drift stays.")
 @click.option("--depfile", metavar="FILE", help="Write what the outputs were made from as a rule for make.")
 @reading_options
 @common_options
@@ -49,6 +57,8 @@ def command(
     g2o: str | None,
     from_file: str | None,
     max_scans: int,
+    relations: Relations,
+    no_loops: bool,
     depfile: str | None,
     reading: ReadingOptions,
     quiet: bool,
@@ -63,14 +73,17 @@ def command(
         raise WrongUsageError("slam: give either LOG or --from GRAPH")
     if from_file is not None and map_file is not None:
         raise WrongUsageError("slam: --map goes with LOG; draw a saved graph by render GRAPH.json LOG")
-    if from_file is not None and (reading != ReadingOptions() or _given("max_scans")):
-        raise WrongUsageError("slam: reading options and --max-scans go with LOG; --from only optimises")
+    if from_file is not None and (reading != ReadingOptions() or _given(*MAPPING)):
+        raise WrongUsageError(
+            "slam: reading options, --max-scans, --relations and --no-loops go with LOG; "
+            "--from only optimises"
+        )
     if "-" in (map_file, trajectory, g2o, depfile):
         raise WrongUsageError("slam: only the graph (-o) can go to standard output; name files for the rest")
     _check_outputs(log or from_file or "", output, map_file, trajectory, g2o, depfile)
     began = time.perf_counter()
     if log is not None:
-        scans, graph, summary = _map(log, reading, max_scans, quiet, verbose)
+        scans, graph, summary = _map(log, reading, _options(max_scans, relations, no_loops), quiet, verbose)
     elif from_file is not None:
         scans, graph, summary = None, *_again(from_file, quiet)
     _write(graph, output, trajectory, g2o)
@@ -90,9 +103,16 @@ def command(
         say(f"{seconds:.1f} s, {rate:.0f} scans a second, {span / seconds:.0f} times real time", quiet)
 
 
-def _given(option: str) -> bool:
-    source = click.get_current_context().get_parameter_source(option)
-    return source is not None and source.name == "COMMANDLINE"
+def _given(*options: str) -> bool:
+    """Whether one of the options stands on the command line."""
+    sources = [click.get_current_context().get_parameter_source(option) for option in options]
+    return any(source is not None and source.name == "COMMANDLINE" for source in sources)
+
+
+def _options(max_scans: int, relations: Relations, no_loops: bool) -> SlamOptions:
+    from nscan_cli.slam.options import NScanOptions, SlamOptions
+
+    return SlamOptions(nscan=NScanOptions(max_scans=max_scans, loops=not no_loops), relations=relations)
 
 
 def _check_outputs(source: str, output: str, map_file: str | None, *others: str | None) -> None:
@@ -111,12 +131,11 @@ def _check_outputs(source: str, output: str, map_file: str | None, *others: str 
 
 
 def _map(
-    log: str, reading: ReadingOptions, max_scans: int, quiet: bool, verbose: int
+    log: str, reading: ReadingOptions, options: SlamOptions, quiet: bool, verbose: int
 ) -> tuple[LaserLog, Graph, str]:
     """Run the whole loop over a log."""
     from nscan_cli.compiled import first_compile
     from nscan_cli.logs.load import read_log
-    from nscan_cli.slam.options import SlamOptions
     from nscan_cli.slam.pipeline import Slam
 
     scans = read_log(log, reading)
@@ -124,8 +143,6 @@ def _map(
         say(f"warning: {warning}", quiet)
     if first_compile():
         say("compiling the kernels, once for this version on this machine: about 20 s", quiet)
-    options = SlamOptions()
-    options = dataclasses.replace(options, nscan=dataclasses.replace(options.nscan, max_scans=max_scans))
     slam = Slam(scans, options)
     with progress("mapping", len(scans), quiet) as advance:
         graph = slam.run(lambda done, keyframes: advance(done, f"{keyframes} keyframes"))

@@ -32,10 +32,16 @@ class Keyframe:
 
 
 class Keyframes:
-    """The keyframes in order of time, and the scans since the last of them."""
+    """The keyframes in order of time, and the scans since the last of them.
 
-    def __init__(self, options: KeyframeOptions, gaussians: GaussianOptions) -> None:
+    `median_range` (m) is that of the log's beams.
+    """
+
+    def __init__(
+        self, options: KeyframeOptions, gaussians: GaussianOptions, median_range: float = 0.0
+    ) -> None:
         self.options, self.gaussians = options, gaussians
+        self.distance = max(options.distance, options.distance_per_range * median_range)
         self.list: list[Keyframe] = []
         self._since: list[tuple[Array, Tracked]] = []
         self._expected = np.zeros((3, 3))
@@ -48,7 +54,7 @@ class Keyframes:
         if not self.list:
             return False
         step = relative(tracked.pose, self.list[-1].tracked.pose)
-        return bool(np.hypot(step[0], step[1]) <= self.options.distance and abs(step[2]) <= self.options.turn)
+        return bool(np.hypot(step[0], step[1]) <= self.distance and abs(step[2]) <= self.options.turn)
 
     def attach(self, points: Array, tracked: Tracked) -> None:
         """Let a scan between keyframes add to the Gaussians of both."""

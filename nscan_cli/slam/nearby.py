@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -24,31 +24,38 @@ LEAST_SCANS = 3
 
 @dataclass(frozen=True)
 class Nearby:
-    """What a joint match gave."""
+    """What the match of a keyframe with those near it gave: a joint one, or single ones."""
 
-    relation: NScan | None
-    """None when too few scans hang together, or the match did not converge."""
+    pairwise: tuple[Pairwise, ...]
+    """The relations of single matches."""
+    nscan: NScan | None
+    """That of a joint match; None when too few scans hang together, or the match did not converge."""
     loop: Loop | None
     """The verdict on what another visit saw; None where nothing was."""
     moved: float
     """How far (m) the match moved a scan, seen from the centre."""
     whole: bool
-    """Whether all scans that were tried are in the relation."""
+    """Whether all scans that were tried are related."""
+
+
+MatchNearby = Callable[[Sequence[Keyframe], Array, Sequence[Pairwise], int, NScanOptions], Nearby | None]
+"""Step 3, jointly or in pairs: match_nearby tells the arguments."""
 
 
 def choose_nearby(
     poses: Array, paths: Array, centre: int, options: NScanOptions
 ) -> tuple[Indices, NDArray[np.bool_]]:
-    """The keyframes (n,) for a joint match about `centre`, increasing, and which are of another visit.
+    """The keyframes (n,) for a match about `centre`, increasing, and which are of another visit.
 
     Poses (K, 3) are global ones, paths (K,) lengths of path. Of the keyframes within the radius, those
-    nearest are taken; half of the places are kept for other visits, further along the path or back.
+    nearest are taken; half of the places are kept for other visits, further along the path or back,
+    unless the options leave these out.
     """
     distances = np.hypot(*(poses[:, :2] - poses[centre, :2]).T)
     near = np.flatnonzero(distances <= options.radius)
     near = near[np.argsort(distances[near], kind="stable")]
     before = np.abs(paths[centre] - paths[near]) > options.recent
-    old, recent = near[before], near[~before]
+    old, recent = near[before & options.loops], near[~before]
     recent = recent[: options.max_scans - min(len(old), options.max_scans // 2)]
     old = old[: options.max_scans - len(recent)]
     chosen = np.sort(np.concatenate([old, recent]))
@@ -72,8 +79,7 @@ def match_nearby(
     tried, seen_before = choose_nearby(poses, paths, centre, options)
     if len(tried) < LEAST_SCANS:
         return None
-    # Mostly the poses are right to centimetres already, and the last stage is all it takes.
-    for widenings in (options.widenings[-1:], options.widenings):
+    for widenings in options.attempts:
         nearby = _match_held(keyframes, poses, pairwise, tried, seen_before, centre, widenings, options)
         if nearby.whole and nearby.moved < options.settled:
             break
@@ -104,21 +110,18 @@ def _match_held(
             continue
         score = weakest_link(shares)
         if not match.converged:
-            return Nearby(
-                None,
-                _loop(keyframes, tried, seen_before, centre, False, "did not converge", score),
-                0.0,
-                False,
-            )
+            loop = verdict(keyframes, tried, seen_before, centre, False, "did not converge", score)
+            return Nearby((), None, loop, 0.0, False)
         closed = bool(seen_before[kept].any())
         relation = _relation(keyframes, members, at, match, "loop" if closed else "nscan", score)
         whole = len(kept) == len(tried)
         reason = "" if whole else f"{len(tried) - len(kept)} scans left out"
         used, before = (members, seen_before[kept]) if closed else (tried, seen_before)
-        loop = _loop(keyframes, used, before, centre, closed, reason, score)
-        return Nearby(relation, loop, _moved(poses[members], match.poses, at), whole)
+        loop = verdict(keyframes, used, before, centre, closed, reason, score)
+        return Nearby((), relation, loop, moved_by(poses[members], match.poses, at), whole)
     reason = f"only {len(kept)} of {len(tried)} scans hang together"
-    return Nearby(None, _loop(keyframes, tried, seen_before, centre, False, reason, 0.0), 0.0, False)
+    loop = verdict(keyframes, tried, seen_before, centre, False, reason, 0.0)
+    return Nearby((), None, loop, 0.0, False)
 
 
 def _match(
@@ -164,7 +167,7 @@ def _relation(
     )
 
 
-def _loop(
+def verdict(
     keyframes: Sequence[Keyframe],
     members: Indices,
     seen_before: NDArray[np.bool_],
@@ -180,7 +183,7 @@ def _loop(
     return Loop((keyframes[first].row, keyframes[centre].row), accepted, reason, score)
 
 
-def _moved(before: Array, after: Array, fixed: int) -> float:
+def moved_by(before: Array, after: Array, fixed: int) -> float:
     """How far (m) some pose (n, 3) moved, seen from one of them."""
     shift = relative(after, after[fixed]) - relative(before, before[fixed])
     return float(np.hypot(shift[:, 0], shift[:, 1]).max())

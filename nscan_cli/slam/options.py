@@ -3,8 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import Literal
 
 from nscan_cli.matching.priors import MotionModel
+from nscan_cli.matching.search import SearchOptions
+
+Relations = Literal["pairwise", "nscan", "both"]
+"""What the graph is made of; see SlamOptions."""
 
 
 @dataclass(frozen=True)
@@ -23,7 +28,7 @@ class GaussianOptions:
 class TrackingOptions:
     """Step 1: every scan against the map of the last stretch of the path."""
 
-    gaussians: GaussianOptions = field(default_factory=GaussianOptions)
+    gaussians: GaussianOptions = field(default_factory=lambda: GaussianOptions(floor=0.03))
     reach: float = 40.0
     """Longer beams are not matched, m."""
     window: float = 20.0
@@ -44,12 +49,16 @@ class TrackingOptions:
     turns: tuple[tuple[float, ...], ...] = ((0.1, 0.2), (0.4, 0.7), (1.0, 1.3))
     """Angles (rad, to both sides) to start again from; a later ring when those before did not help."""
     odometry: MotionModel = field(default_factory=MotionModel)
+    steady_inlier_share: float = 0.8
+    """The same without odometry: a turn that was not expected can still match by three quarters."""
     steady_scans: int = 5
     """Without odometry a scan is expected to move as these did on average: stamps and motion jitter."""
     steady_motion: MotionModel = field(
         default_factory=lambda: MotionModel(distance=0.3, angle=0.3, distance_per_metre=0.3)
     )
     """How sure that is."""
+    steady_search: SearchOptions = field(default_factory=lambda: SearchOptions(distance=1.5, turn=1.5))
+    """About what is expected, when other angles do not help either."""
 
 
 @dataclass(frozen=True)
@@ -57,10 +66,12 @@ class KeyframeOptions:
     """Step 2: which scans become keyframes, and how well tracking knows the way between two."""
 
     distance: float = 1.5
-    """m"""
+    """m, at least."""
+    distance_per_range: float = 0.3
+    """Times the median range of the log's beams: who sees further sees the same for longer."""
     turn: float = 0.6
     """rad"""
-    information_scale: float = 0.02
+    information_scale: float = 0.2
     """The Hessian of tracking is weighed by so much: neighbouring scans make the same errors."""
     drift: float = 0.005
     """Standard deviation m/√m that no match shows."""
@@ -70,7 +81,7 @@ class KeyframeOptions:
 
 @dataclass(frozen=True)
 class NScanOptions:
-    """Step 3: the joint match of the scans near a keyframe."""
+    """Step 3: the joint match of the scans near a keyframe, or the single matches in its place."""
 
     gaussians: GaussianOptions = field(default_factory=lambda: GaussianOptions(minimum=4))
     max_scans: int = 10
@@ -78,6 +89,8 @@ class NScanOptions:
     """How near (m) a keyframe must be to take part."""
     recent: float = 20.0
     """Keyframes further back along the path (m) count as seen before; half of the places go to them."""
+    loops: bool = True
+    """Whether these take part at all; without them the graph keeps the drift of tracking."""
     scale: float = 0.02
     widenings: tuple[float, ...] = (0.05, 0.3, 1.0)
     max_iterations: int = 30
@@ -87,6 +100,14 @@ class NScanOptions:
     settled: float = 0.1
     """When the last stage alone moves a scan further (m), or leaves one out, all stages are run."""
 
+    @property
+    def attempts(self) -> tuple[tuple[float, ...], ...]:
+        """The widenings to match with, the next ones when those before did not settle.
+
+        Mostly the poses are right to centimetres already, and the last stage is all it takes.
+        """
+        return self.widenings[-1:], self.widenings
+
 
 @dataclass(frozen=True)
 class SlamOptions:
@@ -95,6 +116,10 @@ class SlamOptions:
     tracking: TrackingOptions = field(default_factory=TrackingOptions)
     keyframes: KeyframeOptions = field(default_factory=KeyframeOptions)
     nscan: NScanOptions = field(default_factory=NScanOptions)
+    relations: Relations = "both"
+    """both: the chain of pairwise relations from tracking, and nScan relations of joint matches. nscan: of
+    the chain only what no nScan relation holds together. pairwise: the chain, and each scan near a keyframe
+    matched with it alone."""
     optimise_after: float = 0.1
     """The graph is optimised when joint matches have moved scans by so much in all, m."""
     refinements: int = 4

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable
 
 import numpy as np
@@ -13,8 +14,9 @@ from nscan_cli.graph.system import GraphEnergy
 from nscan_cli.logs.scan import LaserLog
 from nscan_cli.poses import Array, compose
 from nscan_cli.slam.keyframes import Keyframes
-from nscan_cli.slam.nearby import match_nearby
+from nscan_cli.slam.nearby import MatchNearby, match_nearby
 from nscan_cli.slam.options import SlamOptions
+from nscan_cli.slam.pairs_nearby import match_pairs_nearby
 from nscan_cli.slam.refinement import Refinement
 from nscan_cli.slam.tracking import Tracked, Tracker
 from nscan_cli.slam.trajectory import between_keyframes
@@ -29,10 +31,14 @@ class Slam:
     def __init__(self, log: LaserLog, options: SlamOptions) -> None:
         self.log, self.options = log, options
         self.tracker = Tracker(options.tracking)
-        self.keyframes = Keyframes(options.keyframes, options.nscan.gaussians)
+        seen = log.ranges[log.ranges < options.tracking.reach]
+        median_range = float(np.median(seen)) if len(seen) else 0.0
+        self.keyframes = Keyframes(options.keyframes, options.nscan.gaussians, median_range)
         self.tracked: list[Array] = []
         self.anchors: list[int] = []
-        self.pairwise: list[Pairwise] = []
+        self.match: MatchNearby = match_pairs_nearby if options.relations == "pairwise" else match_nearby
+        self.chain: list[Pairwise] = []
+        self.pairs: list[Pairwise] = []
         self.nscan: list[NScan] = []
         self.loops: list[Loop] = []
         self.poses = np.zeros((0, 3))
@@ -78,36 +84,37 @@ class Slam:
             self.poses = np.zeros((1, 3))
             return
         relation = self.keyframes.relation_to_previous()
-        self.pairwise.append(relation)
+        self.chain.append(relation)
         self.poses = np.vstack([self.poses, compose(self.poses[-1], relation.measurement)])
 
     def match_nearby(self, newest: int) -> None:
-        """Step 3: a keyframe matched jointly with those near it; the graph follows when it must."""
+        """Step 3: a keyframe matched with those near it; the graph follows when it must."""
         if newest < 0:
             return
         known = newest + 1
-        nearby = match_nearby(
-            self.keyframes.list[:known], self.poses[:known], self.pairwise, newest, self.options.nscan
+        nearby = self.match(
+            self.keyframes.list[:known], self.poses[:known], self.chain, newest, self.options.nscan
         )
         if nearby is None:
             return
         if nearby.loop is not None:
             self.loops.append(nearby.loop)
-        if nearby.relation is None:
-            return
-        self.nscan.append(nearby.relation)
+        self.pairs.extend(nearby.pairwise)
+        if nearby.nscan is not None:
+            self.nscan.append(nearby.nscan)
         self._moved += nearby.moved
         if self._moved > self.options.optimise_after:
             self.optimise(max_iterations=10, tolerance=1e-3)
 
     def refine(self) -> None:
-        """Step 5: the joint matches again, until they move nothing that was matched."""
+        """Step 5: the matches again, until they move nothing that was matched."""
         options = self.options
-        refinement = Refinement(self.keyframes.list, self.pairwise, options.nscan)
+        refinement = Refinement(self.keyframes.list, self.chain, options.nscan, self.match)
         for _ in range(options.refinements):
             if not refinement.sweep(self.poses, options.refined):
                 break
-            self.nscan = refinement.relations()
+            self.pairs, self.nscan = refinement.relations()
+            self.loops = refinement.loops()
             self.optimise(max_iterations=100, tolerance=1e-6)
 
     def optimise(self, max_iterations: int, tolerance: float) -> None:
@@ -119,6 +126,14 @@ class Slam:
         positions[[keyframe.row for keyframe in self.keyframes.list]] = np.arange(len(self.keyframes))
         energy = GraphEnergy(len(self.poses), self.pairwise, self.nscan, positions)
         self.poses = optimise(energy, self.poses, max_iterations, tolerance).poses
+
+    @property
+    def pairwise(self) -> list[Pairwise]:
+        """The pairwise relations of the graph: the chain, or what is needed of it, and single matches."""
+        if self.options.relations != "nscan":
+            return self.chain + self.pairs
+        joined = {pair for relation in self.nscan for pair in itertools.pairwise(relation.nodes)}
+        return [relation for relation in self.chain if relation.nodes not in joined]
 
     def graph(self) -> Graph:
         """Every scan with its pose: a keyframe where the graph put it, the others in between."""

@@ -1,4 +1,4 @@
-"""Step 5 of the loop: joint matches again, from the poses that all relations together have found.
+"""Step 5 of the loop: the matches of step 3 again, from the poses that all relations together have found.
 
 A match made on the way knew only what had been seen so far, and started from poses that later loops have
 corrected. From the final poses, and with the scans of all visits, some find a better place; the graph moves,
@@ -12,22 +12,26 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from nscan_cli.graph.model import NScan, Pairwise
+from nscan_cli.graph.model import Loop, NScan, Pairwise
 from nscan_cli.poses import Array, relative, wrap
 from nscan_cli.slam.keyframes import Keyframe
-from nscan_cli.slam.nearby import choose_nearby, match_nearby
+from nscan_cli.slam.nearby import MatchNearby, Nearby, choose_nearby
 from nscan_cli.slam.options import NScanOptions
 
 
 class Refinement:
-    """The nScan relations about all keyframes, each as of the poses that it was last matched from."""
+    """The relations about all keyframes, each as of the poses that it was last matched from."""
 
     def __init__(
-        self, keyframes: Sequence[Keyframe], pairwise: Sequence[Pairwise], options: NScanOptions
+        self,
+        keyframes: Sequence[Keyframe],
+        chain: Sequence[Pairwise],
+        options: NScanOptions,
+        match: MatchNearby,
     ) -> None:
-        self._keyframes, self._pairwise, self._options = keyframes, pairwise, options
+        self._keyframes, self._chain, self._options, self._match = keyframes, chain, options, match
         self._paths = np.array([keyframe.tracked.path for keyframe in keyframes])
-        self._relations: list[NScan | None] = [None] * len(keyframes)
+        self._found: list[Nearby | None] = [None] * len(keyframes)
         self._starts: list[tuple[NDArray[np.int64], Array] | None] = [None] * len(keyframes)
 
     def sweep(self, poses: Array, moved: float) -> int:
@@ -41,14 +45,19 @@ class Refinement:
                 continue
             tried, _ = choose_nearby(poses, self._paths, centre, self._options)
             self._starts[centre] = tried, relative(poses[tried], poses[centre])
-            nearby = match_nearby(self._keyframes, poses, self._pairwise, centre, self._options)
-            self._relations[centre] = None if nearby is None else nearby.relation
+            self._found[centre] = self._match(self._keyframes, poses, self._chain, centre, self._options)
             matched += 1
         return matched
 
-    def relations(self) -> list[NScan]:
-        """The relations as they are now."""
-        return [relation for relation in self._relations if relation is not None]
+    def relations(self) -> tuple[list[Pairwise], list[NScan]]:
+        """The relations as they are now: of single matches, and of joint ones."""
+        found = [nearby for nearby in self._found if nearby is not None]
+        pairs = [relation for nearby in found for relation in nearby.pairwise]
+        return pairs, [nearby.nscan for nearby in found if nearby.nscan is not None]
+
+    def loops(self) -> list[Loop]:
+        """The verdicts on other visits that these relations come from."""
+        return [nearby.loop for nearby in self._found if nearby is not None and nearby.loop is not None]
 
     def _has_moved(self, centre: int, poses: Array, moved: float) -> bool:
         start = self._starts[centre]

@@ -13,10 +13,16 @@ import numpy as np
 
 from nscan_cli.matching.newton import PairProblem, minimise
 from nscan_cli.matching.priors import Prior, odometry_prior
+from nscan_cli.matching.search import likelihood_field, search
 from nscan_cli.ndt.energy import inlier_share
 from nscan_cli.ndt.grid import Ndt
-from nscan_cli.poses import Array, compose, relative, wrap
+from nscan_cli.poses import Array, compose, relative, transform, wrap
 from nscan_cli.slam.options import TrackingOptions
+
+RECENT = 5.0
+"""A lost scan is searched among those of the last stretch of path, m."""
+LEAST_SCORE = 0.3
+"""What a search must find at least."""
 
 
 @dataclass(frozen=True)
@@ -44,7 +50,7 @@ class Tracker:
         self.options = options
         gaussians = options.gaussians
         self.map = Ndt(gaussians.cell, gaussians.minimum, gaussians.floor, capacity=1 << 14)
-        self.restarts = 0
+        self.restarts = self.searches = 0
         self._window: deque[tuple[Array, Array, float]] = deque()
         self._poses: deque[Array] = deque(maxlen=options.steady_scans + 1)
         self._joined = np.zeros(3)
@@ -59,16 +65,21 @@ class Tracker:
             return self._settle(np.zeros(3), np.zeros((3, 3)), np.zeros((3, 3)), 1.0, points)
         prior = self._predict(odometry)
         self._odometry = odometry
-        value, pose, hessian = self._match(points, prior, 0.0)
+        value, pose, hessian = self._match(points, prior, prior.mean)
         inliers = self._inliers(points, pose)
-        for ring in self.options.turns:
-            if inliers >= self.options.inlier_share:
+        options = self.options
+        enough = options.steady_inlier_share if odometry is None else options.inlier_share
+        for ring in options.turns:
+            if inliers >= enough:
                 break
             self.restarts += 1
             for turn in (sign * angle for angle in ring for sign in (1, -1)):
-                candidate = self._match(points, prior, turn)
+                candidate = self._match(points, prior, prior.mean + np.array([0.0, 0.0, turn]))
                 if candidate[0] < value:
                     value, pose, hessian = candidate
+            inliers = self._inliers(points, pose)
+        if odometry is None and inliers < enough:
+            value, pose, hessian = self._search(points, prior, (value, pose, hessian))
             inliers = self._inliers(points, pose)
         pose[2] = wrap(pose[2])
         expected = np.linalg.inv(prior.information).astype(np.float64)
@@ -85,10 +96,10 @@ class Tracker:
         # The prior is as sure along the path as across it: no need to turn its information.
         return Prior(compose(last, step), information)
 
-    def _match(self, points: Array, prior: Prior, turn: float) -> tuple[float, Array, Array]:
-        """The objective's minimum from the prediction turned by `turn`: value, pose, Hessian."""
+    def _match(self, points: Array, prior: Prior, start: Array) -> tuple[float, Array, Array]:
+        """The objective's minimum from the pose `start` (3,): value, pose, Hessian."""
         options = self.options
-        pose, hessian = prior.mean + np.array([0.0, 0.0, turn]), np.empty((3, 3))
+        pose, hessian = start.copy(), np.empty((3, 3))
         value, *_ = minimise(
             PairProblem(self.map.grid, self.map.half, points, options.scale, prior),
             pose,
@@ -98,6 +109,22 @@ class Tracker:
             hessian,
         )
         return value, pose, hessian
+
+    def _search(
+        self, points: Array, prior: Prior, best: tuple[float, Array, Array]
+    ) -> tuple[float, Array, Array]:
+        """The better of what was found and the match from where a search among the last scans leads."""
+        clouds = [transform(pose, part) for part, pose, path in self._window if path > self._path - RECENT]
+        cloud = np.concatenate(clouds)
+        if not len(cloud) or not len(points):
+            return best
+        field = likelihood_field(cloud, self.options.steady_search)
+        found = search(field, points, prior.mean, LEAST_SCORE, self.options.steady_search)
+        if found is None:
+            return best
+        self.searches += 1
+        candidate = self._match(points, prior, found.pose)
+        return candidate if candidate[0] < best[0] else best
 
     def _inliers(self, points: Array, pose: Array) -> float:
         return inlier_share(self.map.grid, self.map.half, points, pose, self.options.inlier_bound)

@@ -214,7 +214,28 @@ def test_max_scans_bounds_the_relations(folder):
     assert run(["slam", *SHORT, "--max-scans", "4", "-o", "graph.json", "-q"]) == 0
     graph = read_graph("graph.json")
     assert graph.provenance["parameters"]["slam"]["nscan"]["max_scans"] == 4
-    assert {len(relation.nodes) for relation in graph.nscan} == {3, 4}
+    assert {len(relation.nodes) for relation in graph.nscan} == {4}
+
+
+def test_relations_of_one_kind(folder):
+    assert run(["slam", *SHORT, "--relations", "pairwise", "-o", "pairwise.json", "-q"]) == 0
+    assert run(["slam", *SHORT, "--relations", "nscan", "-o", "nscan.json", "-q"]) == 0
+    for kind in ("pairwise", "nscan"):
+        validate(document_of(folder / f"{kind}.json"))
+        assert read_graph(f"{kind}.json").provenance["parameters"]["slam"]["relations"] == kind
+    pairwise, nscan = read_graph("pairwise.json"), read_graph("nscan.json")
+    assert pairwise.nscan == []
+    assert len(pairwise.pairwise) > 2 * len(pairwise.keyframes)
+    assert len(nscan.nscan) > 5
+    assert len(nscan.pairwise) < len(nscan.keyframes) - 1
+
+
+def test_no_loops(folder):
+    assert run(["slam", SAMPLE, "--every", "10", "--no-loops", "-o", "graph.json", "-q"]) == 0
+    graph = read_graph("graph.json")
+    assert graph.provenance["parameters"]["slam"]["nscan"]["loops"] is False
+    assert graph.loops == []
+    assert {relation.origin for relation in graph.nscan} == {"nscan"}
 
 
 def test_config_is_dumped_and_read_back(folder, capsys):

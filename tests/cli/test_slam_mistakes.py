@@ -33,6 +33,7 @@ PNG = b"\x89PNG\r\n\x1a\n" + bytes(40)
         (["good.log", "--laser", "RLASER"], 2, "has no RLASER scans"),
         (["good.log", "--start", "1e6"], 2, "--start"),
         (["good.log", "--max-scans", "2"], 2, "--max-scans"),
+        (["good.log", "--relations", "some"], 2, "--relations"),
         (["good.log", "--from", "graph.json", "--map", "-"], 2, "either LOG or --from"),
         ([], 2, "either LOG or --from"),
         (["--from", "none.json"], 2, "--map goes with LOG"),
@@ -82,6 +83,18 @@ def test_a_saved_graph_that_is_none(folder, capsys, content, code, said):
     out, err = capsys.readouterr()
     assert (out, len(err.splitlines())) == ("", 1)
     assert said in err
+    assert not (folder / "out.json").exists()
+
+
+@pytest.mark.parametrize(
+    "options", [["--max-scans", "4"], ["--relations", "both"], ["--no-loops"], ["--every", "2"]]
+)
+def test_options_of_mapping_do_not_go_with_a_saved_graph(folder, capsys, options):
+    (folder / "saved.json").write_bytes(write_graph(small_graph()))
+    assert run(["slam", "--from", "saved.json", "-o", "out.json", *options]) == 2
+    out, err = capsys.readouterr()
+    assert (out, len(err.splitlines())) == ("", 1)
+    assert "--max-scans, --relations and --no-loops go with LOG" in err
     assert not (folder / "out.json").exists()
 
 

@@ -16,7 +16,7 @@ from nscan_cli.logs.options import ReadingOptions
 from nscan_cli.logs.scan import LaserLog
 from nscan_cli.poses import Array
 from nscan_cli.provenance import provenance_of
-from nscan_cli.slam.options import SlamOptions, TrackingOptions
+from nscan_cli.slam.options import NScanOptions, Relations, SlamOptions, TrackingOptions
 from nscan_cli.slam.pipeline import Slam
 from nscan_cli.slam.tracking import Tracked, Tracker
 from tests.data import data_file
@@ -51,9 +51,16 @@ def office_log(odometry: bool = True) -> LaserLog:
 
 
 @functools.cache
-def mapped_office(odometry: bool) -> Mapped:
+def mapped_office(odometry: bool, relations: Relations = "both", loops: bool = True) -> Mapped:
     """The office sample, mapped."""
-    return mapped(office_log(odometry))
+    options = SlamOptions(nscan=NScanOptions(loops=loops), relations=relations)
+    return mapped(office_log(odometry), options)
+
+
+@functools.cache
+def office_unrefined() -> Graph:
+    """As the relations are found on the way: those of each keyframe with the ones before it."""
+    return mapped(office_log(), SlamOptions(refinements=0)).graph
 
 
 @functools.cache

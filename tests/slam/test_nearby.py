@@ -36,10 +36,19 @@ def test_the_nearest_within_the_radius_are_chosen_in_order_of_time():
     assert chosen.tolist() == [4, 5, 6, 8]
 
 
-def test_keyframes_after_the_newest_take_no_part():
-    poses = along(0, 1, 2, 0.1, 0.2)
-    assert choose_nearby(poses, np.arange(5.0), 2, OPTIONS)[0].tolist() == [0, 1, 2]
-    assert choose_nearby(poses, np.arange(3.0), 2, OPTIONS)[0].tolist() == [0, 1, 2]
+def test_keyframes_after_the_centre_take_part_and_are_of_another_visit_when_far_along_the_path():
+    poses, paths = along(0, 1, 2, 0.1, 0.2), np.array([0.0, 1, 2, 3, 30])
+    chosen, seen = choose_nearby(poses, paths, 2, OPTIONS)
+    assert (chosen.tolist(), seen.tolist()) == ([0, 1, 2, 3, 4], [False] * 4 + [True])
+
+
+def test_without_loops_other_visits_leave_their_places_to_this_one():
+    poses = along(2.0, 2.1, *(0.1 * np.arange(8)[::-1]), 2.2)
+    paths = np.array([0.0, 0.1, *(50 + np.arange(8)), 100])
+    chosen, seen = choose_nearby(poses, paths, 9, OPTIONS)
+    assert (chosen.tolist(), seen.tolist()) == ([0, 1, 7, 8, 9, 10], [True, True, False, False, False, True])
+    chosen, seen = choose_nearby(poses, paths, 9, dataclasses.replace(OPTIONS, loops=False))
+    assert (chosen.tolist(), seen.tolist()) == ([4, 5, 6, 7, 8, 9], [False] * 6)
 
 
 @pytest.mark.parametrize(
@@ -59,22 +68,26 @@ def test_half_of_the_places_are_kept_for_what_was_seen_before(old, recent, chose
     assert chosen.tolist() == expected
 
 
-@given(st.integers(1, 40), st.integers(0, 10**6), st.integers(3, 12))
+@given(st.integers(1, 40), st.integers(0, 10**6), st.integers(3, 12), st.booleans())
 @settings(max_examples=100, deadline=None)
-def test_what_is_chosen_is_near_not_too_much_and_has_the_newest(count, seed, most):
+def test_what_is_chosen_is_near_not_too_much_and_has_the_centre(count, seed, most, loops):
     rng = np.random.default_rng(seed)
     poses, paths = rng.uniform(-5, 5, (count, 3)), np.cumsum(rng.uniform(0, 3, count))
-    newest = int(rng.integers(count))
-    chosen, seen = choose_nearby(poses, paths, newest, dataclasses.replace(OPTIONS, max_scans=most))
-    assert chosen[-1] == newest
+    centre = int(rng.integers(count))
+    options = dataclasses.replace(OPTIONS, max_scans=most, loops=loops)
+    chosen, seen = choose_nearby(poses, paths, centre, options)
+    assert centre in chosen
     assert (np.diff(chosen) > 0).all()
-    distances = np.hypot(*(poses[: newest + 1, :2] - poses[newest, :2]).T)
-    assert len(chosen) == min(most, (distances <= 5).sum())
-    assert distances[chosen].max() <= 5
-    assert (seen == (paths[newest] - paths[chosen] > 20)).all()
-    if seen.any():
-        near_old = (distances <= 5) & (paths[newest] - paths[: newest + 1] > 20)
-        assert seen.sum() >= min(near_old.sum(), most // 2)
+    near = np.hypot(*(poses[:, :2] - poses[centre, :2]).T) <= 5
+    old = np.abs(paths - paths[centre]) > 20
+    assert near[chosen].all()
+    assert (seen == old[chosen]).all()
+    if loops:
+        assert len(chosen) == min(most, near.sum())
+        assert seen.sum() >= min((near & old).sum(), most // 2)
+    else:
+        assert len(chosen) == min(most, (near & ~old).sum())
+        assert not seen.any()
 
 
 OLD, BETWEEN, NEW = (280, 290, 300, 310, 320), (700, 1200), (1880, 1890, 1900, 1910, 1920)
@@ -134,8 +147,8 @@ def chain(keyframes: list[Keyframe]) -> Pairwise:
 
 def off_truth(found: Nearby) -> Array:
     """(n, 3) errors of a relation's poses, seen from its fixed one."""
-    assert found.relation is not None
-    relation, truth = found.relation, office_truth()
+    assert found.nscan is not None
+    relation, truth = found.nscan, office_truth()
     off = relative(relation.poses, relation.poses[relation.fixed]) - relative(
         truth[list(relation.nodes)], truth[relation.nodes[relation.fixed]]
     )
@@ -151,13 +164,13 @@ def test_a_revisit_is_brought_back_to_the_truth(off):
     """Ranges are good to 15 mm; the centimetres are those of cells of 0.5 m and 180 beams."""
     keyframes = revisit()
     found = matched(keyframes, np.array(off))
-    assert found.relation is not None
+    assert found.nscan is not None
     assert found.loop is not None
     assert (found.loop.accepted, found.loop.reason) == (True, "")
-    assert found.loop.nodes == (found.relation.nodes[0], ROWS[-1])
+    assert found.loop.nodes == (found.nscan.nodes[0], ROWS[-1])
     assert found.whole
-    assert len(set(found.relation.nodes) & set(OLD)) >= 3
-    assert len(set(found.relation.nodes) & set(NEW)) >= 3
+    assert len(set(found.nscan.nodes) & set(OLD)) >= 3
+    assert len(set(found.nscan.nodes) & set(NEW)) >= 3
     errors = off_truth(found)
     assert np.hypot(errors[:, 0], errors[:, 1]).max() < 0.04
     assert np.abs(errors[:, 2]).max() < np.radians(0.5)
@@ -167,7 +180,7 @@ def test_a_revisit_is_brought_back_to_the_truth(off):
 def test_nodes_fixed_origin_and_score():
     keyframes = revisit()
     found = matched(keyframes, np.array([0.1, 0.1, 0.01]))
-    relation = found.relation
+    relation = found.nscan
     assert relation is not None
     assert relation.nodes == tuple(sorted(relation.nodes))
     assert relation.nodes[relation.fixed] == ROWS[-1]
@@ -183,13 +196,13 @@ def test_without_a_revisit_the_relation_closes_no_loop():
     pairwise = [chain(keyframes[: k + 2]) for k in range(len(keyframes) - 1)]
     found = match_nearby(keyframes, truth, pairwise, len(OLD) - 1, NScanOptions())
     assert found is not None
-    assert found.relation is not None
-    assert (found.loop, found.relation.origin) == (None, "nscan")
+    assert found.nscan is not None
+    assert (found.loop, found.nscan.origin) == (None, "nscan")
     assert found.moved < 0.05
 
 
 def test_the_hessian_is_positive_semi_definite_and_the_gauge_is_its_null_space():
-    relation = matched(revisit(), np.array([0.1, 0.1, 0.01])).relation
+    relation = matched(revisit(), np.array([0.1, 0.1, 0.01])).nscan
     assert relation is not None
     np.testing.assert_allclose(relation.hessian, relation.hessian.T, rtol=1e-9, atol=1e-6)
     values = np.linalg.eigvalsh(relation.hessian)
@@ -203,8 +216,8 @@ def test_a_foreign_scan_is_left_out_and_named_in_the_reason():
     """One of the old ones saw a room instead of the corridor."""
     foreign = {300: 1320}
     found = matched(revisit(foreign), np.array([0.1, 0.1, 0.01]))
-    assert found.relation is not None
-    assert 300 not in found.relation.nodes
+    assert found.nscan is not None
+    assert 300 not in found.nscan.nodes
     assert not found.whole
     assert found.loop is not None
     assert (found.loop.accepted, found.loop.reason) == (True, "1 scans left out")
@@ -214,15 +227,15 @@ def test_a_foreign_scan_is_left_out_and_named_in_the_reason():
 
 def test_a_newest_scan_that_is_foreign_is_refused_with_a_reason():
     found = matched(revisit({NEW[-1]: 1320}), np.zeros(3))
-    assert found.relation is None
+    assert found.nscan is None
     assert found.loop is not None
     assert not found.loop.accepted
     assert found.loop.reason == f"only 1 of {len(OLD) + len(NEW)} scans hang together"
 
 
 def test_a_match_that_does_not_converge_is_refused_with_a_reason():
-    found = matched(revisit(), np.array([0.3, 0.2, 0.05]), NScanOptions(max_iterations=1))
-    assert found.relation is None
+    found = matched(revisit(), np.array([0.3, 0.2, 0.05]), NScanOptions(max_iterations=0))
+    assert found.nscan is None
     assert found.loop is not None
     assert (found.loop.accepted, found.loop.reason) == (False, "did not converge")
 
@@ -230,9 +243,9 @@ def test_a_match_that_does_not_converge_is_refused_with_a_reason():
 def test_when_all_that_was_seen_before_is_left_out_no_loop_is_closed():
     """A place that only seemed to be seen before: what is left is a relation of the recent scans."""
     found = matched(revisit(dict.fromkeys(OLD, 1320)), np.zeros(3))
-    assert found.relation is not None
-    assert not set(found.relation.nodes) & set(OLD)
-    assert found.relation.origin == "nscan"
+    assert found.nscan is not None
+    assert not set(found.nscan.nodes) & set(OLD)
+    assert found.nscan.origin == "nscan"
     assert found.loop is not None
     assert not found.loop.accepted
     assert "left out" in found.loop.reason

@@ -25,6 +25,7 @@ from tests.slam.runs import (
     mapped_office,
     mapped_real,
     office_log,
+    office_unrefined,
     part,
     truth_of,
     without_returns,
@@ -103,21 +104,27 @@ def test_relations_connect_keyframes_only():
     chain = list(zip(keyframes[:-1].tolist(), keyframes[1:].tolist(), strict=True))
     assert [relation.nodes for relation in graph.pairwise] == chain
     assert len(graph.nscan) > 0.9 * len(keyframes)
+    # Each keyframe is the centre of one match at most, which holds the gauge.
+    centres = [relation.nodes[relation.fixed] for relation in graph.nscan]
+    assert centres == sorted(set(centres))
     for relation in graph.nscan:
         assert set(relation.nodes) <= set(keyframes.tolist())
         assert 3 <= len(relation.nodes) <= options.max_scans
         assert list(relation.nodes) == sorted(set(relation.nodes))
-        assert relation.fixed == len(relation.nodes) - 1
-    # Each keyframe is the newest of one match at most, and the newest holds the gauge.
+
+
+def test_on_the_way_the_newest_keyframe_is_the_centre():
+    graph = office_unrefined()
     newest = [relation.nodes[-1] for relation in graph.nscan]
+    assert [relation.nodes[relation.fixed] for relation in graph.nscan] == newest
     assert newest == sorted(set(newest))
     # The last one too, after which no keyframe comes.
-    assert newest[-1] == keyframes[-1]
+    assert newest[-1] == graph.keyframes[-1]
 
 
 def test_loops_are_recorded():
     """The second round, of 75 m, is matched with the first; its keyframes are 1.5 m apart at most."""
-    graph = mapped_office(True).graph
+    graph = office_unrefined()
     assert len(graph.loops) >= 40
     accepted = [loop for loop in graph.loops if loop.accepted]
     closing = [relation for relation in graph.nscan if relation.origin == "loop"]

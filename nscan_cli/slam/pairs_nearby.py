@@ -1,0 +1,129 @@
+"""Step 3 of the loop without joint matches: a keyframe matched with each of those near it alone.
+
+What nScan matching is compared with: the same scans are chosen, and the same energy of two of them is
+minimised, but each result is a pairwise relation of its own.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from nscan_cli.graph.model import Pairwise
+from nscan_cli.matching.newton import PairProblem, minimise
+from nscan_cli.matching.overlap import INLIER_BOUND
+from nscan_cli.matching.priors import Prior
+from nscan_cli.ndt.energy import energy, inlier_share
+from nscan_cli.poses import Array, inverse, relative, relative_jacobians, wrap
+from nscan_cli.slam.keyframes import Keyframe
+from nscan_cli.slam.nearby import Nearby, choose_nearby, moved_by, verdict
+from nscan_cli.slam.options import NScanOptions
+
+
+@dataclass(frozen=True)
+class _Single:
+    """The match of the centre's points with the Gaussians of another keyframe."""
+
+    pose: Array
+    """(3,) of the centre in the other's frame."""
+    overlap: float
+    """The greater of the shares of points of one that lie on Gaussians of the other."""
+    moved: float
+    """How far (m) the match moved the other, seen from the centre."""
+
+
+def match_pairs_nearby(
+    keyframes: Sequence[Keyframe],
+    poses: Array,
+    chain: Sequence[Pairwise],
+    centre: int,
+    options: NScanOptions,
+) -> Nearby | None:
+    """Match a keyframe with each of those near it, and keep the matches with overlap enough.
+
+    Arguments as for match_nearby. A loop is accepted when a match with some keyframe of another visit
+    is. None when no other keyframe is near.
+    """
+    paths = np.array([keyframe.tracked.path for keyframe in keyframes])
+    chosen, before = choose_nearby(poses, paths, centre, options)
+    tried, seen_before = chosen[chosen != centre], before[chosen != centre]
+    if len(tried) == 0:
+        return None
+    singles = [_match(keyframes, poses, chain, int(other), centre, options) for other in tried]
+    overlaps = np.array([single.overlap for single in singles])
+    kept = overlaps >= options.overlap
+    relations = tuple(
+        _relation(keyframes[other], keyframes[centre], single, "loop" if seen else "track", options)
+        for other, seen, single, keep in zip(tried, seen_before, singles, kept, strict=True)
+        if keep
+    )
+    closed, whole = bool((kept & seen_before).any()), bool(kept.all())
+    if closed:
+        reason = "" if whole else f"{(~kept).sum()} scans left out"
+    else:
+        reason = f"too little overlap with all {seen_before.sum()} scans of another visit"
+    best = float(overlaps[seen_before].max(initial=0.0))
+    used = kept if closed else np.ones(len(tried), dtype=bool)
+    loop = verdict(keyframes, tried[used], seen_before[used], centre, closed, reason, best)
+    moved = max((single.moved for single, keep in zip(singles, kept, strict=True) if keep), default=0.0)
+    return Nearby(relations, None, loop, moved, whole)
+
+
+def _match(
+    keyframes: Sequence[Keyframe],
+    poses: Array,
+    chain: Sequence[Pairwise],
+    other: int,
+    centre: int,
+    options: NScanOptions,
+) -> _Single:
+    """The match of the centre with one other keyframe, from global poses (K, 3)."""
+    reference, points = keyframes[other].ndt, keyframes[centre].points
+    prior = _prior(chain, other, centre)
+    problem = PairProblem(reference.grid, reference.half, points, options.scale, prior)
+    start, origin = relative(poses[centre], poses[other]), np.zeros(3)
+    for widenings in options.attempts:
+        pose, hessian = start.copy(), np.empty((3, 3))
+        minimise(problem, pose, np.array(widenings), options.max_iterations, options.tolerance, hessian)
+        pose[2] = wrap(pose[2])
+        moved = moved_by(np.stack([origin, start]), np.stack([origin, pose]), 1)
+        overlap = _overlap(keyframes[other], keyframes[centre], pose)
+        if overlap >= options.overlap and moved < options.settled:
+            break
+    return _Single(pose, overlap, moved)
+
+
+def _prior(chain: Sequence[Pairwise], other: int, centre: int) -> Prior:
+    """What tracking says of the centre's pose in the other's frame; nothing unless one follows the other."""
+    if other == centre - 1:
+        return Prior(chain[other].measurement, chain[other].information)
+    if other == centre + 1:
+        mean = inverse(chain[centre].measurement)
+        # The measurement is the inverse of the pose that is asked for.
+        _, by_pose = relative_jacobians(np.zeros(3), mean)
+        return Prior(mean, np.ascontiguousarray(by_pose.T @ chain[centre].information @ by_pose))
+    return Prior(np.zeros(3), np.zeros((3, 3)))
+
+
+def _overlap(other: Keyframe, centre: Keyframe, pose: Array) -> float:
+    """As in matching.overlap, of two: `pose` (3,) is the centre's in the other's frame."""
+    ndt, own = other.ndt, centre.ndt
+    on_other = inlier_share(ndt.grid, ndt.half, centre.points, pose, INLIER_BOUND)
+    on_centre = inlier_share(own.grid, own.half, other.points, inverse(pose), INLIER_BOUND)
+    return max(on_other, on_centre)
+
+
+def _relation(
+    other: Keyframe, centre: Keyframe, single: _Single, origin: str, options: NScanOptions
+) -> Pairwise:
+    """Weighed as nScan relations are: by the Hessian of the scaled energy, here without the prior."""
+    hessian = energy(other.ndt, centre.points, single.pose, exact=False).hessian
+    return Pairwise(
+        nodes=(other.row, centre.row),
+        measurement=single.pose,
+        information=options.scale * hessian,
+        origin=origin,
+        score=single.overlap,
+    )
