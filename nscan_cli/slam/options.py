@@ -106,7 +106,8 @@ class NScanOptions:
 
         Mostly the poses are right to centimetres already, and the last stage is all it takes.
         """
-        return self.widenings[-1:], self.widenings
+        last, whole = self.widenings[-1:], self.widenings
+        return (last,) if last == whole else (last, whole)
 
 
 @dataclass(frozen=True)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import itertools
 from collections.abc import Callable
 
@@ -109,7 +110,9 @@ class Slam:
     def refine(self) -> None:
         """Step 5: the matches again, until they move nothing that was matched."""
         options = self.options
-        refinement = Refinement(self.keyframes.list, self.chain, options.nscan, self.match)
+        # The poses are right to centimetres: the last stage is all it takes.
+        last = dataclasses.replace(options.nscan, widenings=options.nscan.widenings[-1:])
+        refinement = Refinement(self.keyframes.list, self.chain, last, self.match)
         for _ in range(options.refinements):
             if not refinement.sweep(self.poses, options.refined):
                 break
