@@ -156,7 +156,8 @@ def _map(
         f"{len(graph.loops) - accepted} refused"
     )
     if verbose:
-        summary += f"\nstarts from other angles while tracking: {slam.tracker.restarts}"
+        restarts, searches = slam.tracker.restarts, slam.tracker.searches
+        summary += f"\nwhile tracking: {restarts} starts from other angles, {searches} searches"
     return scans, graph, summary
 
 
