@@ -9,7 +9,7 @@ import sys
 from collections.abc import Callable
 from pathlib import Path
 
-from tests.experiments import comparison, fig_2, fig_3, fig_4, fig_5, gauge, index_sets
+from tests.experiments import comparison, fig_2, fig_3, fig_4, fig_5, gauge, index_sets, transformation
 from tests.experiments.output import write_reports
 from tests.experiments.report import Report
 
@@ -20,6 +20,7 @@ EXPERIMENTS: tuple[Callable[[], Report], ...] = (
     fig_5.report,
     gauge.report,
     index_sets.report,
+    transformation.report,
     comparison.report,
 )
 

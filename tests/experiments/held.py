@@ -1,0 +1,146 @@
+"""Graphs minimised with a mapping to the local coordinates that is held in each iteration (paper, IV).
+
+Held, f has simple derivatives; it is found again for the next iteration. The same steps for the chosen
+mapping, which follows pose c.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Sequence
+from typing import Protocol
+
+import numpy as np
+from scipy.sparse import csr_array
+
+from nscan_cli.graph.model import NScan, Pairwise
+from nscan_cli.graph.optimise import (
+    FIRST_DAMPING,
+    GREATEST_DAMPING,
+    LEAST_DAMPING,
+    ROUNDING,
+    Optimum,
+    newton_step,
+)
+from nscan_cli.graph.pattern import Indices, Pattern, block_targets
+from nscan_cli.graph.system import GraphEnergy, System
+from nscan_cli.poses import Array
+from tests.experiments.mappings import Mapping, Relations, differences, grouped
+
+MAX_ITERATIONS, TOLERANCE = 200, 1e-6
+
+
+class Stepwise(Protocol):
+    """An energy whose function is another one in each iteration."""
+
+    pattern: Pattern
+    free: Indices
+
+    def hold(self, poses: Array) -> list[Array]:
+        """The mappings of the iteration that starts at the poses (K, 3)."""
+
+    def evaluate_held(self, poses: Array, held: list[Array]) -> System:
+        """The function of that iteration, with the Gauss–Newton part of its Hessian."""
+
+    def value_held(self, poses: Array, held: list[Array]) -> float:
+        """The function alone."""
+
+
+class Followed(GraphEnergy):
+    """The chosen way: nothing is held."""
+
+    def hold(self, poses: Array) -> list[Array]:
+        return []
+
+    def evaluate_held(self, poses: Array, held: list[Array]) -> System:
+        return self.evaluate(poses, exact=False)
+
+    def value_held(self, poses: Array, held: list[Array]) -> float:
+        return self.evaluate(poses, exact=False).value
+
+
+class Held(GraphEnergy):
+    """The mapping of every nScan relation held in each iteration."""
+
+    def __init__(
+        self,
+        nodes: int,
+        pairwise: Sequence[Pairwise],
+        nscan: Sequence[NScan],
+        positions: Indices,
+        mapping: Mapping,
+    ) -> None:
+        # Without information they give the pattern its places, and nothing else.
+        empty = [dataclasses.replace(each, hessian=np.zeros_like(each.hessian)) for each in nscan]
+        super().__init__(nodes, pairwise, empty, positions)
+        self.mapping = mapping
+        self.groups = [(group, *self._lower(group)) for group in grouped(nscan, positions)]
+
+    def _lower(self, group: Relations) -> tuple[Array, csr_array[np.float64]]:
+        """The blocks (Q, T, 3, 3) of the lower triangles of H, and what adds them to those of the factor."""
+        count, n = group.members.shape
+        i, j = np.tril_indices(n)
+        blocks = group.hessians.reshape(count, n, 3, n, 3)[:, i, :, j].swapaxes(0, 1)
+        edges = self.free_row[np.stack([group.members[:, i], group.members[:, j]], axis=-1)]
+        targets = block_targets(edges.reshape(-1, 2), self.pattern).reshape(count, -1)
+        transposed = (targets >= 0) & (targets & 1 == 1)
+        blocks[transposed] = blocks[transposed].swapaxes(1, 2)
+        chosen = np.flatnonzero(targets >= 0)
+        places = (targets.ravel()[chosen] >> 1, chosen)
+        add = csr_array((np.ones(len(chosen)), places), shape=(len(self.pattern.rows), targets.size))
+        return blocks, add
+
+    def hold(self, poses: Array) -> list[Array]:
+        return [self.mapping(group, poses[group.members]) for group, _, _ in self.groups]
+
+    def value_held(self, poses: Array, held: list[Array]) -> float:
+        value = self.evaluate(poses, exact=False).value
+        for (group, _, _), mapping in zip(self.groups, held, strict=True):
+            f = differences(group, poses[group.members], mapping).reshape(len(mapping), -1, 1)
+            value += float((f * (group.hessians @ f)).sum())
+        return value
+
+    def evaluate_held(self, poses: Array, held: list[Array]) -> System:
+        value, terms, gradient, hessian = self.evaluate(poses, exact=False)
+        pulls = np.zeros_like(poses)
+        for (group, blocks, add), mapping in zip(self.groups, held, strict=True):
+            f = differences(group, poses[group.members], mapping)
+            pull = (group.hessians @ f.reshape(len(f), -1, 1)).reshape(f.shape)
+            value += float((f * pull).sum())
+            turn = np.tile(np.eye(3), (len(f), 1, 1))
+            turn[:, 0, 0] = turn[:, 1, 1] = np.cos(mapping[:, 2])
+            turn[:, 1, 0] = np.sin(mapping[:, 2])
+            turn[:, 0, 1] = -turn[:, 1, 0]
+            np.add.at(pulls, group.members, 2 * pull @ turn)
+            turned = turn.swapaxes(1, 2)[:, None] @ blocks @ turn[:, None]
+            added = np.asarray(add @ turned.reshape(-1, 9))
+            hessian += 2 * added.reshape(-1, 3, 3)
+        return System(value, terms, gradient + pulls[self.free], hessian)
+
+
+def minimise(energy: Stepwise, poses: Array, max_iterations: int = MAX_ITERATIONS) -> Optimum:
+    """nscan_cli.graph.optimise with the same damping, for a function that is another one in each iteration.
+
+    A step counts as good when it lowers the function of its iteration.
+    """
+    held = energy.hold(poses)
+    here, damping, iteration = energy.evaluate_held(poses, held), 0.0, 0
+    for iteration in range(1, max_iterations + 1):
+        step = newton_step(energy.pattern, here, damping)
+        if step is not None:
+            trial = poses.copy()
+            trial[energy.free] += step
+            length = float(np.abs(step).max(initial=0.0))
+            lower = energy.value_held(trial, held) <= here.value + ROUNDING * abs(here.value)
+            if lower:
+                poses, held = trial, energy.hold(trial)
+                here = energy.evaluate_held(poses, held)
+            if length <= TOLERANCE and damping <= 1:
+                return Optimum(poses, here.value, iteration, True)
+            if lower:
+                damping = 0.1 * damping if damping > LEAST_DAMPING else 0.0
+                continue
+        damping = max(10 * damping, FIRST_DAMPING)
+        if damping > GREATEST_DAMPING:
+            break
+    return Optimum(poses, here.value, iteration, False)
