@@ -187,7 +187,7 @@ def _fields(numbers: tuple[int, ...], match: NScanMatch, left_out: list[LeftOut]
     kept = [numbers[scan] for scan in match.kept]
     joint = match.joint
     score = float(match.overlap.min())
-    relation = NScan(tuple(kept), joint.poses, joint.hessian, match.fixed, "nscan", score)
+    relation = NScan(tuple(kept), match.poses, joint.hessian, match.fixed, "nscan", score)
     return {
         "relation": nscan_record(relation, "scans"),
         "covariance": None if match.covariance is None else triangle(match.covariance),

@@ -90,7 +90,7 @@ def plot_nscan(
     `numbers` are the scans' numbers, `points` (m_i, 2) theirs in the frame of each robot, `start` (n, 3)
     the poses that the match began with.
     """
-    kept, poses = list(match.kept), match.joint.poses
+    kept, poses = list(match.kept), match.poses
     both = [
         transform(pose, points[scan])
         for stage in (start[kept], poses)

@@ -19,6 +19,7 @@ from nscan_cli.matching.placing import match_or_search
 from nscan_cli.matching.scans import lay_out
 from nscan_cli.matching.search import SearchOptions
 from nscan_cli.matching.uncertainty import Weakest, covariance_of, decrement, is_settled, weakest_translation
+from nscan_cli.matching.walls import fit_to_walls
 from nscan_cli.poses import Array
 
 NOT_SETTLED = "not settled within the steps allowed"
@@ -36,7 +37,9 @@ class NScanMatch:
     fixed: int
     """Index among the kept of the scan that `covariance` is relative to."""
     joint: JointMatch
-    """Poses (k, 3) and exact Hessian (3k, 3k)."""
+    """The least energy: poses (k, 3) and exact Hessian (3k, 3k) there."""
+    poses: Array
+    """(k, 3) those of the least energy, fitted to the walls that the scans see in common."""
     energy: float
     """E itself, neither scaled nor with priors."""
     covariance: Array | None
@@ -93,9 +96,9 @@ def nscan_match(
         blocks = _blocks(problem._replace(pairs=match.pairs), match, known.hessian)
         out = strays(shares, match.pairs, problem.priors, match.poses, blocks)
         if not out:
-            return _relation(
-                kept, held, match, shares, (match.energy - known.value) / scale, blocks
-            ), left_out
+            fitted = fit_to_walls(scans, match.poses, match.hessian, gauge.fixed)
+            energy = (match.energy - known.value) / scale
+            return _relation(kept, held, match, fitted, shares, energy, blocks), left_out
         gone = [stray.scan for stray in out]
         left_out += [replace(stray, scan=kept[stray.scan]) for stray in out]
         kept = [scan for at, scan in enumerate(kept) if at not in gone]
@@ -106,6 +109,7 @@ def _relation(
     kept: list[int],
     held: int,
     match: JointMatch,
+    poses: Array,
     shares: Overlaps,
     energy: float,
     blocks: Array,
@@ -117,6 +121,7 @@ def _relation(
         kept=tuple(kept),
         fixed=held,
         joint=match,
+        poses=poses,
         energy=energy,
         covariance=covariance,
         decrement=None if covariance is None else decrement(gradient, covariance),

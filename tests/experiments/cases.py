@@ -71,7 +71,7 @@ class Case:
         )
         if match is None:
             raise RuntimeError(f"{self.name}: no two of the scans match")
-        return Matched(match, tuple(left_out), errors(match.joint.poses, self.truth[list(match.kept)]))
+        return Matched(match, tuple(left_out), errors(match.poses, self.truth[list(match.kept)]))
 
     def from_good_start(self, fixed: int | None = None) -> JointMatch:
         """Matched as nscan does, with all pairs, from near the truth."""

@@ -89,7 +89,7 @@ def from_start(problem: Drawn) -> Array:
 def by_nscan(problem: Drawn) -> Array | None:
     """(c) What `nscan` gives; None when it leaves scans out."""
     match, left_out = nscan_match(problem.points, problem.start, no_knowledge, 0, OPTIONS, JointOptions())
-    return None if match is None or left_out else match.joint.poses
+    return None if match is None or left_out else match.poses
 
 
 METHODS: dict[str, Callable[[Drawn], Array | None]] = {

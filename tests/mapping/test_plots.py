@@ -146,7 +146,7 @@ def test_wide_scans_are_stacked():
 def nscan_of(kept: tuple[int, ...], poses: np.ndarray) -> NScanMatch:
     n = len(kept)
     joint = JointMatch(poses, np.zeros(3 * n), np.eye(3 * n), all_pairs(n), -1.0, 5, 6, 3, True)
-    return NScanMatch(kept, 0, joint, -1.0, None, None, joint.pairs, np.full(n, 0.9), (), None)
+    return NScanMatch(kept, 0, joint, poses, -1.0, None, None, joint.pairs, np.full(n, 0.9), (), None)
 
 
 def panels_of_nscan(
@@ -154,7 +154,7 @@ def panels_of_nscan(
 ) -> tuple[Canvas, np.ndarray, np.ndarray]:
     """A canvas of the panels' size, the upper and the lower panel."""
     picture = pixels(plot_nscan(range(10, 10 + len(start)), [ROOM] * len(start), start, match, left_out))
-    stages = [*start[list(match.kept)], *match.joint.poses]
+    stages = [*start[list(match.kept)], *match.poses]
     places = [*(transform(pose, ROOM) for pose in stages)]
     canvas, _ = stacked_panels(bounds_around(np.concatenate(places), SLIMMEST))
     height = len(picture) // 2

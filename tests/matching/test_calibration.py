@@ -88,7 +88,7 @@ def normalised_error(match: NScanMatch, truth: Array) -> float:
     """The error squared in units of the covariance, per degree of freedom."""
     assert match.covariance is not None
     # The error in the frame that the covariance is given in: that of the local poses.
-    poses, fixed = match.joint.poses, match.fixed
+    poses, fixed = match.poses, match.fixed
     true = compose(poses[fixed], relative(truth, truth[fixed]))
     off = poses - true
     off[:, 2] = wrap(off[:, 2])
