@@ -6,7 +6,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from nscan_cli.graph.cholesky import factorise, loose_nodes, solve
+from nscan_cli.graph.cholesky import loose_nodes, solve
+from nscan_cli.graph.information import information
 from nscan_cli.graph.model import Graph, Pairwise
 from nscan_cli.graph.solve import Component, components
 from nscan_cli.poses import Array, relative, relative_jacobians
@@ -54,12 +55,9 @@ class Between:
 def _joint_covariance(graph: Graph, part: Component, chosen: list[int]) -> tuple[list[int], Array]:
     """The keyframes (m,) of those chosen that are determined, and the covariance (3m, 3m) of their poses.
 
-    The component's first keyframe is held; relative poses do not depend on that. As in
-    marginal_covariances, the information is half the Hessian's Gauss–Newton part.
+    The component's first keyframe is held; relative poses do not depend on that.
     """
-    energy = part.energy(len(graph))
-    system = energy.evaluate(graph.poses[part.keyframes], exact=False)
-    factor = factorise(energy.pattern, 0.5 * system.hessian)
+    energy, factor = information(graph, part)
     loose = loose_nodes(factor)
     rows = energy.free_row[np.searchsorted(part.keyframes, chosen)]
     known = [at for at, row in enumerate(rows) if row < 0 or not loose[row]]

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from nscan_cli.graph.cholesky import factorise, inverse_diagonal, loose_nodes
+from nscan_cli.graph.cholesky import inverse_diagonal, loose_nodes
+from nscan_cli.graph.information import information
 from nscan_cli.graph.model import Graph
 from nscan_cli.graph.solve import components
 from nscan_cli.poses import Array
@@ -13,15 +14,12 @@ from nscan_cli.poses import Array
 def marginal_covariances(graph: Graph) -> dict[int, Array]:
     """Keyframe id → covariance (3, 3) of its global pose (x, y, φ), with the first keyframe held fixed.
 
-    The energies (17) and (23) have no ½, so the information is half their Hessian; its Gauss–Newton
-    part at the graph's poses is taken. The first keyframe gets zeros. A keyframe is left out when it is
-    not determined: no relations lead to it from the first one, or they leave a direction open.
+    The first keyframe gets zeros. A keyframe is left out when it is not determined: no relations lead to it
+    from the first one, or they leave a direction open.
     """
     part = components(graph)[0]
     first, others = int(part.keyframes[0]), part.keyframes[1:]
-    energy = part.energy(len(graph))
-    system = energy.evaluate(graph.poses[part.keyframes], exact=False)
-    factor = factorise(energy.pattern, 0.5 * system.hessian)
+    _, factor = information(graph, part)
     covariances = inverse_diagonal(factor)
     loose = loose_nodes(factor)
     marginals = {first: np.zeros((3, 3))}

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -91,6 +92,22 @@ def graph_of(poses: Array, pairwise: list[Pairwise], nscan: list[NScan]) -> Grap
 def energy_of(poses: Array, pairwise: list[Pairwise], nscan: list[NScan], fixed: int = 0) -> GraphEnergy:
     """The energy of a graph whose ids are its places."""
     return GraphEnergy(len(poses), pairwise, nscan, np.arange(len(poses)), fixed)
+
+
+def each_scan_once(pairwise: list[Pairwise], nscan: list[NScan]) -> tuple[list[Pairwise], list[NScan]]:
+    """The relations as marginals weigh them: by the mean of 1 / m over their scans.
+
+    m is in how many nScan relations a scan is, for a pairwise one and itself.
+    """
+
+    def weight(nodes: tuple[int, ...], itself: int) -> float:
+        counts = [sum(node in relation.nodes for relation in nscan) + itself for node in nodes]
+        return float(np.mean(1.0 / np.array(counts)))
+
+    return (
+        [replace(r, information=r.information * weight(r.nodes, 1)) for r in pairwise],
+        [replace(r, hessian=r.hessian * weight(r.nodes, 0)) for r in nscan],
+    )
 
 
 def disturbed(poses: Array, by: float, seed: int = 1) -> Array:

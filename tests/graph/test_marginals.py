@@ -9,14 +9,26 @@ from nscan_cli.graph.model import Pairwise
 from nscan_cli.graph.solve import optimise_graph
 from nscan_cli.poses import compose, relative, rotated_information, wrap
 from tests.data import data_file
-from tests.graph.simulated import SIGMA, dense_matrix, energy_of, graph_of, mixed_ring
+from tests.graph.simulated import (
+    SIGMA,
+    dense_matrix,
+    disturbed,
+    each_scan_once,
+    energy_of,
+    graph_of,
+    mixed_ring,
+    nscan_relation,
+    pairwise_relations,
+    ring,
+    ring_edges,
+)
 
 
 def test_they_are_the_blocks_of_the_dense_inverse():
     truth, pairwise, nscan = mixed_ring(30, noise=1.0)
     graph = graph_of(truth, pairwise, nscan)
     optimise_graph(graph)
-    energy = energy_of(truth, pairwise, nscan)
+    energy = energy_of(truth, *each_scan_once(pairwise, nscan))
     information = 0.5 * dense_matrix(energy, energy.evaluate(graph.poses, exact=False).hessian)
     blocks = np.linalg.inv(information).reshape(29, 3, 29, 3)
     marginals = marginal_covariances(graph)
@@ -46,15 +58,26 @@ def test_the_covariances_of_a_chain_add_up_as_by_hand():
 def test_they_are_how_far_the_estimates_scatter():
     estimates = []
     for seed in range(150):
-        truth, pairwise, nscan = mixed_ring(8, noise=1.0, seed=seed)
-        graph = graph_of(truth, pairwise, nscan)
+        truth = ring(8)
+        pairwise = pairwise_relations(truth, ring_edges(8), np.random.default_rng(seed), noise=1.0)
+        graph = graph_of(disturbed(truth, 0.05), pairwise, [])
         optimise_graph(graph)
         covariance = marginal_covariances(graph)[4]
-        error = graph.poses[4] - truth[4]
+        error = relative(graph.poses[4], graph.poses[0]) - relative(truth[4], truth[0])
         error[2] = wrap(error[2])
-        estimates.append(error @ np.linalg.solve(covariance, error))
+        rotated = rotated_information(-graph.poses[0], covariance)
+        estimates.append(error @ np.linalg.solve(rotated, error))
     # χ² of 3 degrees: mean 3, standard deviation of the mean √(6/150) = 0.2.
     assert abs(np.mean(estimates) - 3) < 0.6
+
+
+def test_the_same_scans_related_three_times_over_are_known_no_better():
+    truth = ring(4)
+    relation = nscan_relation(truth, range(4), np.random.default_rng(3))
+    once = marginal_covariances(graph_of(truth, [], [relation]))
+    thrice = marginal_covariances(graph_of(truth, [], [relation] * 3))
+    for keyframe in range(1, 4):
+        np.testing.assert_allclose(thrice[keyframe], once[keyframe], rtol=1e-9)
 
 
 def test_keyframes_that_are_not_determined_are_left_out():
