@@ -4,7 +4,7 @@ VENV := .venv
 RUN := $(VENV)/bin
 READY := $(VENV)/.ready
 
-.PHONY: map test lint samples figures bench clean
+.PHONY: map test lint samples figures bench robustness clean
 
 map: $(READY)
 	mkdir -p out
@@ -27,6 +27,9 @@ figures: $(READY)
 bench: $(READY)
 	mkdir -p out
 	$(RUN)/python -m tests.benchmarks out/bench.json
+
+robustness: $(READY)
+	$(RUN)/python -m tests.benchmarks.robustness docs/robustness.md
 
 $(READY): pyproject.toml
 	$(PYTHON) -m venv $(VENV)

@@ -157,7 +157,10 @@ def _map(
     )
     if verbose:
         restarts, searches = slam.tracker.restarts, slam.tracker.searches
-        summary += f"\nwhile tracking: {restarts} starts from other angles, {searches} searches"
+        summary += (
+            f"\nwhile tracking: {restarts} starts from other angles, {searches} searches\n"
+            f"large loops: {len(slam.places)} keyframes found at a place seen before by search"
+        )
     return scans, graph, summary
 
 

@@ -30,21 +30,23 @@ def information(graph: Graph, part: Component) -> tuple[GraphEnergy, Factor]:
 
 
 def _each_scan_once(part: Component) -> Component:
-    """The relations with H / m, where m is of how many nScan relations a scan is on the (harmonic) average.
+    """The relations with their information divided by m, of how many a scan is on the (harmonic) average.
 
-    A pairwise relation is one more of its scans.
+    Pairwise relations by themselves are measured apart from each other. To joint matches they are priors:
+    what they say is in H already.
     """
-    count = Counter(node for relation in part.nscan for node in relation.nodes)
+    joint = Counter(node for relation in part.nscan for node in relation.nodes)
+    either = joint + Counter(node for relation in part.pairwise for node in relation.nodes)
     pairwise = [
-        replace(relation, information=relation.information * _mean_share(count, relation.nodes, 1))
+        replace(relation, information=relation.information * _mean_share(joint, relation.nodes, 1))
         for relation in part.pairwise
     ]
     nscan = [
-        replace(relation, hessian=relation.hessian * _mean_share(count, relation.nodes, 0))
+        replace(relation, hessian=relation.hessian * _mean_share(either, relation.nodes, 0))
         for relation in part.nscan
     ]
     return replace(part, pairwise=pairwise, nscan=nscan)
 
 
-def _mean_share(count: Counter[int], nodes: tuple[int, ...], more: int) -> float:
-    return float(np.mean([1.0 / (count[node] + more) for node in nodes]))
+def _mean_share(count: Counter[int], nodes: tuple[int, ...], itself: int) -> float:
+    return float(np.mean([1.0 / (count[node] + itself) for node in nodes]))

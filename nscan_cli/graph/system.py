@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -74,6 +75,16 @@ class GraphEnergy:
         edges = _edges(self.columns, self.free_row)
         self.pattern = find_pattern(edges[edges.min(axis=1) >= 0], nodes - 1)
         self._targets = block_targets(edges, self.pattern)
+
+    def weighted(self, weights: Array) -> GraphEnergy:
+        """The energy with every relation's term multiplied by its weight (P + Q,)."""
+        columns, pairs = self.columns, len(self.columns.pairs)
+        each = np.repeat(weights[pairs:], np.diff(columns.hessian_starts))
+        other = copy.copy(self)
+        other.columns = columns._replace(
+            information=columns.information * weights[:pairs, None, None], hessians=columns.hessians * each
+        )
+        return other
 
     def evaluate(self, poses: Array, exact: bool) -> System:
         """Energy, gradient and Hessian (exact, or its Gauss–Newton part) at the poses (K, 3)."""

@@ -72,14 +72,25 @@ def likelihood_field(points: Array, options: SearchOptions) -> Field:
     return field
 
 
-def search(field: Field, points: Array, centre: Array, least: float, options: SearchOptions) -> Found | None:
-    """The best pose about `centre` (3,) of a scan with points (m, 2), if it scores more than `least`."""
+def search(
+    field: Field,
+    points: Array,
+    centre: Array,
+    least: float,
+    options: SearchOptions,
+    without: tuple[Array, float] | None = None,
+) -> Found | None:
+    """The best pose about `centre` (3,) of a scan with points (m, 2), if it scores more than `least`.
+
+    `without` is a place, as a pose (3,) and a distance (m) from it, where none is looked for.
+    """
     some = np.linspace(0, len(points) - 1, min(options.beams, len(points))).astype(np.int64)
     chosen = np.ascontiguousarray(points[some])
     step = options.cell / min(float(np.hypot(chosen[:, 0], chosen[:, 1]).max()), options.lever)
     angles = centre[2] + step * np.arange(-int(options.turn / step), int(options.turn / step) + 1)
     reach, pose = int(options.distance / options.cell), np.empty(3)
-    score = _branch_and_bound(field, chosen, centre, angles, reach, least, pose)
+    place, away = (centre, -1.0) if without is None else without
+    score = _branch_and_bound(field, chosen, centre, angles, reach, least, place, away, pose)
     return Found(score, pose) if score > least else None
 
 
@@ -132,9 +143,20 @@ def _bound(
 
 @kernel
 def _branch_and_bound(
-    field: Field, points: Array, centre: Array, angles: Array, reach: int, least: float, pose: Array
+    field: Field,
+    points: Array,
+    centre: Array,
+    angles: Array,
+    reach: int,
+    least: float,
+    place: Array,
+    away: float,
+    pose: Array,
 ) -> float:
-    """Write the pose (3,) of the best score above `least`; returns that score, or `least`."""
+    """Write the pose (3,) of the best score above `least`; returns that score, or `least`.
+
+    Poses within `away` of the `place` (3,) do not count.
+    """
     top = LEVELS - 1
     side = 1 << top
     tiles = (2 * reach) // side + 1
@@ -166,9 +188,10 @@ def _branch_and_bound(
             if stack_bounds[size] <= best:
                 continue
             if level == 0:
-                best = stack_bounds[size]
-                pose[0], pose[1] = centre[0] + ox * field.cell, centre[1] + oy * field.cell
-                pose[2] = angles[a]
+                x, y = centre[0] + ox * field.cell, centre[1] + oy * field.cell
+                if np.hypot(x - place[0], y - place[1]) > away:
+                    best = stack_bounds[size]
+                    pose[0], pose[1], pose[2] = x, y, angles[a]
                 continue
             half, first = 1 << (level - 1), size
             for quarter in range(4):

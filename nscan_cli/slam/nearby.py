@@ -37,6 +37,22 @@ class Nearby:
     whole: bool
     """Whether all scans that were tried are related."""
 
+    @property
+    def relations(self) -> list[Pairwise | NScan]:
+        """All of them."""
+        return [*self.pairwise, *([] if self.nscan is None else [self.nscan])]
+
+    def tie(self, centre: int) -> tuple[int, Array] | None:
+        """A node of another visit, and the pose (3,) of node `centre` in its frame; None without a loop."""
+        for pair in self.pairwise:
+            if pair.origin == "loop":
+                return pair.nodes[0], pair.measurement
+        if self.nscan is None or self.nscan.origin != "loop" or self.loop is None:
+            return None
+        nodes, poses = self.nscan.nodes, self.nscan.poses
+        old = self.loop.nodes[0]
+        return old, relative(poses[nodes.index(centre)], poses[nodes.index(old)])
+
 
 MatchNearby = Callable[[Sequence[Keyframe], Array, Sequence[Pairwise], int, NScanOptions], Nearby | None]
 """Step 3, jointly or in pairs: match_nearby tells the arguments."""

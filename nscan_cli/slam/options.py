@@ -71,11 +71,11 @@ class KeyframeOptions:
     """Times the median range of the log's beams: who sees further sees the same for longer."""
     turn: float = 0.6
     """rad"""
-    information_scale: float = 0.2
+    information_scale: float = 0.8
     """The Hessian of tracking is weighed by so much: neighbouring scans make the same errors."""
-    drift: float = 0.005
+    drift: float = 0.0025
     """Standard deviation m/√m that no match shows."""
-    drift_angle: float = 0.002
+    drift_angle: float = 0.001
     """rad/√m"""
 
 
@@ -89,9 +89,13 @@ class NScanOptions:
     """How near (m) a keyframe must be to take part."""
     recent: float = 20.0
     """Keyframes further back along the path (m) count as seen before; half of the places go to them."""
+    covered: float = 0.7
+    """No match is made about a keyframe when others hold so many of its pairs already."""
+    behind: int = 3
+    """The centre is so many keyframes behind the newest, so that those on both sides of it are known."""
     loops: bool = True
     """Whether these take part at all; without them the graph keeps the drift of tracking."""
-    scale: float = 0.02
+    scale: float = 0.08
     widenings: tuple[float, ...] = (0.05, 0.3, 1.0)
     max_iterations: int = 30
     tolerance: float = 1e-3
@@ -111,12 +115,54 @@ class NScanOptions:
 
 
 @dataclass(frozen=True)
+class ClosingOptions:
+    """Step 4: the search for a place seen before, and what its result has to stand."""
+
+    drift: float = 0.05
+    """Standard deviation (m/√m) of tracking, slips that it does not know of included."""
+    drift_angle: float = 0.002
+    """rad/√m"""
+    deviations: float = 3.0
+    """A keyframe may be off by so many standard deviations."""
+    settled: float = 1.0
+    """By no more than this (m) a joint match finds the place itself."""
+    step: float = 3.0
+    """From one search to the next, m of path."""
+    search: SearchOptions = field(default_factory=lambda: SearchOptions(beams=180))
+    least: float = 4.0
+    """How far a place is searched at least: a slip while all else is well known, m."""
+    least_turn: float = 0.2
+    """rad"""
+    farthest: float = 25.0
+    """And at most, m."""
+    beside: float = 6.0
+    """The keyframes of so much path (m) to both sides are searched together."""
+    around: float = 15.0
+    """Among those of the earlier visit within this distance (m) of where the place may be."""
+    alike: float = 0.3
+    """Keyframes whose uncertainty differs by no more, relatively, were seen in one visit."""
+    score: float = 0.55
+    """Least share of the points that must fit."""
+    rival: float = 0.88
+    """No other place may fit as well as that, relative to the best."""
+    apart: float = 1.5
+    """What is farther off (m) is another place."""
+    agree: float = 0.5
+    """How well two keyframes must agree, m."""
+    agree_turn: float = 0.05
+    """rad"""
+    together: float = 30.0
+    """And how near each other they must be, m of path."""
+
+
+@dataclass(frozen=True)
 class SlamOptions:
     """All of them."""
 
     tracking: TrackingOptions = field(default_factory=TrackingOptions)
     keyframes: KeyframeOptions = field(default_factory=KeyframeOptions)
     nscan: NScanOptions = field(default_factory=NScanOptions)
+    closing: ClosingOptions = field(default_factory=ClosingOptions)
     relations: Relations = "both"
     """both: the chain of pairwise relations from tracking, and nScan relations of joint matches. nscan: of
     the chain only what no nScan relation holds together. pairwise: the chain, and each scan near a keyframe

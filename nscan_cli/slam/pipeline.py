@@ -11,16 +11,23 @@ import numpy as np
 from nscan_cli.graph.marginals import marginal_covariances
 from nscan_cli.graph.model import Graph, Loop, NScan, Pairwise
 from nscan_cli.graph.optimise import optimise
+from nscan_cli.graph.pattern import Indices
+from nscan_cli.graph.robust import contradicting
 from nscan_cli.graph.system import GraphEnergy
 from nscan_cli.logs.scan import LaserLog
 from nscan_cli.poses import Array, compose
+from nscan_cli.slam.closing import Closing
+from nscan_cli.slam.coverage import Coverage
 from nscan_cli.slam.keyframes import Keyframes
-from nscan_cli.slam.nearby import MatchNearby, match_nearby
+from nscan_cli.slam.nearby import MatchNearby, Nearby, choose_nearby, match_nearby
 from nscan_cli.slam.options import SlamOptions
 from nscan_cli.slam.pairs_nearby import match_pairs_nearby
+from nscan_cli.slam.place import Place
 from nscan_cli.slam.refinement import Refinement
 from nscan_cli.slam.tracking import Tracked, Tracker
 from nscan_cli.slam.trajectory import between_keyframes
+
+CONTRADICTS = "contradicts the rest of the graph"
 
 Report = Callable[[int, int], None]
 """Called with the scans and keyframes done."""
@@ -43,6 +50,9 @@ class Slam:
         self.nscan: list[NScan] = []
         self.loops: list[Loop] = []
         self.poses = np.zeros((0, 3))
+        self.covered = Coverage()
+        self.closing = Closing(options.closing, options.nscan, self.match)
+        self.places: list[Place] = []
         self._moved = 0.0
 
     def run(self, report: Report) -> Graph:
@@ -54,12 +64,14 @@ class Slam:
                 self.keyframes.attach(points, tracked)
             else:
                 self.add_keyframe(row, points, tracked)
-                self.match_nearby(len(self.keyframes) - 2)
+                self.match_nearby(len(self.keyframes) - 1 - self.options.nscan.behind)
             self.anchors.append(self.keyframes.list[-1].row)
             report(row + 1, len(self.keyframes))
         self.keyframes.finish_last()
-        self.match_nearby(len(self.keyframes) - 1)
+        for centre in range(len(self.keyframes) - self.options.nscan.behind, len(self.keyframes)):
+            self.match_nearby(centre)
         self.optimise(max_iterations=100, tolerance=1e-6)
+        self.reject()
         self.refine()
         graph = self.graph()
         graph.marginals = marginal_covariances(graph)
@@ -86,49 +98,102 @@ class Slam:
             return
         relation = self.keyframes.relation_to_previous()
         self.chain.append(relation)
+        before, last = self.keyframes.list[-2:]
+        self.closing.extend(relation, last.tracked.path - before.tracked.path)
         self.poses = np.vstack([self.poses, compose(self.poses[-1], relation.measurement)])
 
-    def match_nearby(self, newest: int) -> None:
+    def match_nearby(self, centre: int) -> None:
         """Step 3: a keyframe matched with those near it; the graph follows when it must."""
-        if newest < 0:
+        if centre < 0:
             return
-        known = newest + 1
-        nearby = self.match(
-            self.keyframes.list[:known], self.poses[:known], self.chain, newest, self.options.nscan
-        )
-        if nearby is None:
+        keyframes, options = self.keyframes.list, self.options.nscan
+        paths = np.array([keyframe.tracked.path for keyframe in keyframes])
+        tried, seen_before = choose_nearby(self.poses, paths, centre, options)
+        node, others = keyframes[centre].row, [keyframes[k].row for k in tried.tolist()]
+        if self.covered.share(node, others) >= options.covered:
             return
+        nearby = self.match(keyframes, self.poses, self.chain, centre, options)
+        self.covered.add(node, others, nearby)
+        if nearby is not None:
+            self.take(nearby)
+            if self._moved > self.options.optimise_after:
+                self.optimise(max_iterations=10, tolerance=1e-3)
+        if options.loops:
+            refused = nearby is not None and nearby.loop is not None and not nearby.loop.accepted
+            self.close_loops(centre, tried[seen_before & refused])
+
+    def close_loops(self, centre: int, left_out: Indices) -> None:
+        """Step 4: a keyframe searched where its place may be farther off than a joint match finds it."""
+        keyframes = self.keyframes.list
+        places = self.closing.close(keyframes, self.chain, self.poses, centre, left_out, self._known)
+        for place in places:
+            self.take(place.nearby)
+        if places:
+            self.places.extend(places)
+            self.optimise(max_iterations=100, tolerance=1e-4)
+
+    def take(self, nearby: Nearby) -> None:
+        """The relations of a match join the graph."""
         if nearby.loop is not None:
             self.loops.append(nearby.loop)
         self.pairs.extend(nearby.pairwise)
         if nearby.nscan is not None:
             self.nscan.append(nearby.nscan)
         self._moved += nearby.moved
-        if self._moved > self.options.optimise_after:
-            self.optimise(max_iterations=10, tolerance=1e-3)
 
     def refine(self) -> None:
-        """Step 5: the matches again, until they move nothing that was matched."""
+        """Step 6: the matches again, until they move nothing that was matched."""
         options = self.options
         # The poses are right to centimetres: the last stage is all it takes.
         last = dataclasses.replace(options.nscan, widenings=options.nscan.widenings[-1:])
-        refinement = Refinement(self.keyframes.list, self.chain, last, self.match)
+        wider = {place.centre: place.radius for place in self.places}
+        refinement = Refinement(self.keyframes.list, self.chain, last, self.match, wider)
         for _ in range(options.refinements):
             if not refinement.sweep(self.poses, options.refined):
                 break
             self.pairs, self.nscan = refinement.relations()
             self.loops = refinement.loops()
             self.optimise(max_iterations=100, tolerance=1e-6)
+            self.reject()
+
+    def reject(self) -> None:
+        """Loops that contradict the rest of the graph are taken back."""
+        energy = self._energy(self.pairwise, self.nscan, fixed=0)
+        relations: list[Pairwise | NScan] = [*self.pairwise, *self.nscan]
+        doubted = np.array([relation.origin == "loop" for relation in relations], dtype=np.bool_)
+        wrong = contradicting(energy, self.poses, doubted)
+        if not wrong.any():
+            return
+        gone = [relation for relation, is_wrong in zip(relations, wrong, strict=True) if is_wrong]
+        self.pairs = [pair for pair in self.pairs if not any(pair is each for each in gone)]
+        self.nscan = [joint for joint in self.nscan if not any(joint is each for each in gone)]
+        centres = {each.nodes[each.fixed] if isinstance(each, NScan) else each.nodes[1] for each in gone}
+        self.loops = [
+            dataclasses.replace(loop, accepted=False, reason=CONTRADICTS)
+            if loop.accepted and loop.nodes[1] in centres
+            else loop
+            for loop in self.loops
+        ]
+        self.optimise(max_iterations=100, tolerance=1e-6)
 
     def optimise(self, max_iterations: int, tolerance: float) -> None:
-        """The global poses of all keyframes from all relations (paper, IV)."""
+        """Step 5: the global poses of all keyframes from all relations (paper, IV)."""
         self._moved = 0.0
         if len(self.keyframes) < 2:
             return
+        energy = self._energy(self.pairwise, self.nscan, fixed=0)
+        self.poses = optimise(energy, self.poses, max_iterations, tolerance).poses
+
+    def _known(self, fixed: int) -> GraphEnergy:
+        """What loops and the way say of how the keyframes lie to one of them, slips allowed for."""
+        pairs = [relation for relation in self.pairs if relation.origin == "loop"]
+        nscan = [relation for relation in self.nscan if relation.origin == "loop"]
+        return self._energy(self.closing.way + pairs, nscan, fixed)
+
+    def _energy(self, pairwise: list[Pairwise], nscan: list[NScan], fixed: int) -> GraphEnergy:
         positions = np.full(len(self.log), -1)
         positions[[keyframe.row for keyframe in self.keyframes.list]] = np.arange(len(self.keyframes))
-        energy = GraphEnergy(len(self.poses), self.pairwise, self.nscan, positions)
-        self.poses = optimise(energy, self.poses, max_iterations, tolerance).poses
+        return GraphEnergy(len(self.poses), pairwise, nscan, positions, fixed)
 
     @property
     def pairwise(self) -> list[Pairwise]:
@@ -150,5 +215,5 @@ class Slam:
             anchors=anchors,
             pairwise=self.pairwise,
             nscan=self.nscan,
-            loops=self.loops,
+            loops=self.loops + self.closing.refused(),
         )

@@ -1,4 +1,4 @@
-"""Step 5 of the loop: the matches of step 3 again, from the poses that all relations together have found.
+"""Step 6 of the loop: the matches of step 3 again, from the poses that all relations together have found.
 
 A match made on the way knew only what had been seen so far, and started from poses that later loops have
 corrected. From the final poses, and with the scans of all visits, some find a better place; the graph moves,
@@ -7,13 +7,15 @@ and those about what has moved are matched again.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from nscan_cli.graph.model import Loop, NScan, Pairwise
 from nscan_cli.poses import Array, relative, wrap
+from nscan_cli.slam.coverage import Coverage
 from nscan_cli.slam.keyframes import Keyframe
 from nscan_cli.slam.nearby import MatchNearby, Nearby, choose_nearby
 from nscan_cli.slam.options import NScanOptions
@@ -28,8 +30,11 @@ class Refinement:
         chain: Sequence[Pairwise],
         options: NScanOptions,
         match: MatchNearby,
+        wider: Mapping[int, float],
     ) -> None:
+        """Take the radius (m) about some centres that is `wider`: where large loops were closed."""
         self._keyframes, self._chain, self._options, self._match = keyframes, chain, options, match
+        self._wider, self._covered = wider, Coverage()
         self._paths = np.array([keyframe.tracked.path for keyframe in keyframes])
         self._found: list[Nearby | None] = [None] * len(keyframes)
         self._starts: list[tuple[NDArray[np.int64], Array] | None] = [None] * len(keyframes)
@@ -43,9 +48,17 @@ class Refinement:
         for centre in range(len(self._keyframes)):
             if not self._has_moved(centre, poses, moved):
                 continue
-            tried, _ = choose_nearby(poses, self._paths, centre, self._options)
-            self._starts[centre] = tried, relative(poses[tried], poses[centre])
-            self._found[centre] = self._match(self._keyframes, poses, self._chain, centre, self._options)
+            options = self._options
+            if centre in self._wider:
+                options = replace(options, radius=self._wider[centre])
+            tried, _ = choose_nearby(poses, self._paths, centre, options)
+            node, others = self._keyframes[centre].row, [self._keyframes[k].row for k in tried.tolist()]
+            needed = self._starts[centre] is not None or centre in self._wider
+            if not needed and self._covered.share(node, others) >= options.covered:
+                continue
+            nearby = self._match(self._keyframes, poses, self._chain, centre, options)
+            self._covered.add(node, others, nearby)
+            self._starts[centre], self._found[centre] = (tried, relative(poses[tried], poses[centre])), nearby
             matched += 1
         return matched
 

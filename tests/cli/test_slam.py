@@ -225,8 +225,8 @@ def test_relations_of_one_kind(folder):
         assert read_graph(f"{kind}.json").provenance["parameters"]["slam"]["relations"] == kind
     pairwise, nscan = read_graph("pairwise.json"), read_graph("nscan.json")
     assert pairwise.nscan == []
-    assert len(pairwise.pairwise) > 2 * len(pairwise.keyframes)
-    assert len(nscan.nscan) > 5
+    assert len(pairwise.pairwise) > 1.5 * len(pairwise.keyframes)
+    assert len(nscan.nscan) >= 1
     assert len(nscan.pairwise) < len(nscan.keyframes) - 1
 
 

@@ -97,16 +97,24 @@ def energy_of(poses: Array, pairwise: list[Pairwise], nscan: list[NScan], fixed:
 def each_scan_once(pairwise: list[Pairwise], nscan: list[NScan]) -> tuple[list[Pairwise], list[NScan]]:
     """The relations as marginals weigh them: by the mean of 1 / m over their scans.
 
-    m is in how many nScan relations a scan is, for a pairwise one and itself.
+    m is in how many relations a scan is: for a pairwise one, itself and the nScan ones.
     """
 
-    def weight(nodes: tuple[int, ...], itself: int) -> float:
-        counts = [sum(node in relation.nodes for relation in nscan) + itself for node in nodes]
+    def among(node: int, relations: Sequence[Pairwise | NScan]) -> int:
+        return sum(node in relation.nodes for relation in relations)
+
+    def mean_share(counts: list[int]) -> float:
         return float(np.mean(1.0 / np.array(counts)))
 
     return (
-        [replace(r, information=r.information * weight(r.nodes, 1)) for r in pairwise],
-        [replace(r, hessian=r.hessian * weight(r.nodes, 0)) for r in nscan],
+        [
+            replace(r, information=r.information * mean_share([1 + among(a, nscan) for a in r.nodes]))
+            for r in pairwise
+        ],
+        [
+            replace(r, hessian=r.hessian * mean_share([among(a, [*nscan, *pairwise]) for a in r.nodes]))
+            for r in nscan
+        ],
     )
 
 

@@ -3,7 +3,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from nscan_cli.matching.search import SearchOptions, likelihood_field, search
+from nscan_cli.matching.search import Found, SearchOptions, likelihood_field, search
 from nscan_cli.poses import Array, relative, transform, wrap
 from tests.matching.problems import Problem, office_problem
 
@@ -74,3 +74,61 @@ def test_what_scores_no_more_than_asked_is_not_found(two):
     assert again is not None
     np.testing.assert_array_equal(again.pose, found.pose)
     assert search(field, two.points[1], true + np.array([500.0, 0.0, 0.0]), 0.0, OPTIONS) is None
+
+
+AWAY = 1.5
+"""m"""
+
+
+def test_without_a_place_the_best_pose_lies_outside_of_it(two):
+    true = relative(two.truth[1], two.truth[0])
+    field = likelihood_field(two.points[0], OPTIONS)
+    best = search(field, two.points[1], true, 0.0, OPTIONS)
+    assert best is not None
+    other = search(field, two.points[1], true, 0.0, OPTIONS, without=(best.pose, AWAY))
+    assert other is not None
+    assert np.hypot(*(other.pose - best.pose)[:2]) > AWAY
+    assert other.score == pytest.approx(
+        score(
+            two.points[0], two.points[1][np.linspace(0, len(two.points[1]) - 1, 90).astype(int)], other.pose
+        ),
+        rel=1e-5,
+    )
+    assert other.score < best.score
+    # The heading does not matter, and a place that is elsewhere leaves the best.
+    turned = best.pose + np.array([0.0, 0.0, 2.0])
+    assert_found(search(field, two.points[1], true, 0.0, OPTIONS, without=(turned, AWAY)), other)
+    far = best.pose + np.array([AWAY + 0.01, 0.0, 0.0])
+    assert_found(search(field, two.points[1], true, 0.0, OPTIONS, without=(far, AWAY)), best)
+    everywhere = (best.pose, 100.0)
+    assert search(field, two.points[1], true, 0.0, OPTIONS, without=everywhere) is None
+
+
+def assert_found(found: Found | None, wanted: Found) -> None:
+    assert found is not None
+    assert found.score == wanted.score
+    np.testing.assert_array_equal(found.pose, wanted.pose)
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_without_a_place_nothing_outside_of_it_scores_more(seed):
+    """Against every pose of the lattice, on a few points: the score is the field's value, cell by cell."""
+    rng = np.random.default_rng(seed)
+    reference, points = rng.uniform(-1.5, 1.5, (40, 2)), rng.uniform(-1.0, 1.0, (12, 2))
+    window = SearchOptions(distance=1.5, turn=0.6, spread=0.2)
+    field = likelihood_field(reference, window)
+    centre, place, away = rng.uniform(-0.2, 0.2, 3), rng.uniform(-0.3, 0.3, 3), float(rng.uniform(0.4, 1.0))
+    step = window.cell / np.hypot(points[:, 0], points[:, 1]).max()
+    turns = step * np.arange(-int(window.turn / step), int(window.turn / step) + 1)
+    shifts = window.cell * np.arange(-7, 8)
+    lattice = centre + np.stack(np.meshgrid(shifts, shifts, turns), axis=-1).reshape(-1, 3)
+    outside = lattice[np.hypot(*(lattice - place)[:, :2].T) > away]
+    cells = transform(outside[:, None], points) - [field.x, field.y]
+    ix, iy = np.moveaxis(np.floor(cells / field.cell).astype(int), -1, 0)
+    _, width, height = field.levels.shape
+    on = (ix >= 0) & (iy >= 0) & (ix < width) & (iy < height)
+    scores = np.where(on, field.levels[0][np.where(on, ix, 0), np.where(on, iy, 0)], 0.0).mean(axis=1)
+    found = search(field, points, centre, 0.0, window, without=(place, away))
+    assert found is not None
+    assert np.hypot(*(found.pose - place)[:2]) > away
+    assert found.score == pytest.approx(scores.max(), rel=1e-5)

@@ -10,15 +10,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from nscan_cli.graph.model import Pairwise
 from nscan_cli.matching.joint import gauge_directions
 from nscan_cli.poses import Array, compose, relative, wrap
-from nscan_cli.slam.keyframes import Keyframe, Keyframes
+from nscan_cli.slam.keyframes import Keyframe
 from nscan_cli.slam.nearby import Nearby, choose_nearby, match_nearby
-from nscan_cli.slam.options import KeyframeOptions, NScanOptions
-from nscan_cli.slam.tracking import Tracked
+from nscan_cli.slam.options import NScanOptions
 from tests.matching.problems import office_truth
 from tests.simulation.scenes import office
+from tests.slam.drives import keyframe_of, path_of, relation_to_previous
 
 OPTIONS = NScanOptions(max_scans=6, radius=5.0, recent=20.0)
 
@@ -101,17 +100,8 @@ def keyframe(row: int, place: int) -> Keyframe:
     Scans 22 and 44 cm before and after it grow its Gaussians, as in the loop.
     """
     truth = office_truth()
-    path = float(np.hypot(*np.diff(truth[: row + 1, :2], axis=0).T).sum())
-    seen = place + np.array([0, -4, -2, 2, 4])
-    log = office().record_at(truth[seen], seed=row).log()
-    poses = compose(truth[row], relative(truth[seen], truth[place]))
-    scans = [Tracked(pose, np.diag([1e5, 1e5, 1e6]), np.eye(3), 0.95, path, True) for pose in poses]
-    found = Keyframes(KeyframeOptions(), NScanOptions().gaussians)
-    found.add(row, log.points(0), scans[0])
-    for k in range(1, len(scans)):
-        found.attach(log.points(k), scans[k])
-    found.finish_last()
-    return found.list[0]
+    path = float(path_of(truth)[row])
+    return keyframe_of(office(), row, truth[row], path, truth[place + np.array([0, -4, -2, 2, 4])])
 
 
 ROWS = (*OLD, *BETWEEN, *NEW)
@@ -132,17 +122,10 @@ def matched(
     new = slice(len(OLD) + len(BETWEEN), None)
     centre = poses[new].mean(axis=0) * [1, 1, 0]
     poses[new] = compose(compose(centre, off), relative(poses[new], centre))
-    pairwise = [chain(keyframes[: k + 2]) for k in range(len(keyframes) - 1)]
+    pairwise = [relation_to_previous(keyframes[: k + 2]) for k in range(len(keyframes) - 1)]
     found = match_nearby(keyframes, poses, pairwise, len(keyframes) - 1, options)
     assert found is not None
     return found
-
-
-def chain(keyframes: list[Keyframe]) -> Pairwise:
-    """The relation of the last keyframe to the one before."""
-    found = Keyframes(KeyframeOptions(), NScanOptions().gaussians)
-    found.list = keyframes
-    return found.relation_to_previous()
 
 
 def off_truth(found: Nearby) -> Array:
@@ -193,7 +176,7 @@ def test_nodes_fixed_origin_and_score():
 def test_without_a_revisit_the_relation_closes_no_loop():
     keyframes = revisit()[: len(OLD)]
     truth = office_truth()[list(OLD)]
-    pairwise = [chain(keyframes[: k + 2]) for k in range(len(keyframes) - 1)]
+    pairwise = [relation_to_previous(keyframes[: k + 2]) for k in range(len(keyframes) - 1)]
     found = match_nearby(keyframes, truth, pairwise, len(OLD) - 1, NScanOptions())
     assert found is not None
     assert found.nscan is not None
@@ -253,5 +236,10 @@ def test_when_all_that_was_seen_before_is_left_out_no_loop_is_closed():
 
 def test_two_keyframes_are_too_few():
     keyframes = revisit()[:2]
-    assert match_nearby(keyframes, office_truth()[[280, 290]], [chain(keyframes)], 1, NScanOptions()) is None
+    assert (
+        match_nearby(
+            keyframes, office_truth()[[280, 290]], [relation_to_previous(keyframes)], 1, NScanOptions()
+        )
+        is None
+    )
     assert match_nearby(keyframes, office_truth()[[280]], [], 0, NScanOptions()) is None

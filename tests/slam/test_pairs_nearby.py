@@ -15,7 +15,8 @@ from nscan_cli.slam.nearby import Nearby
 from nscan_cli.slam.options import NScanOptions
 from nscan_cli.slam.pairs_nearby import match_pairs_nearby
 from tests.matching.problems import office_truth
-from tests.slam.test_nearby import BETWEEN, NEW, OLD, ROWS, chain, revisit
+from tests.slam.drives import relation_to_previous
+from tests.slam.test_nearby import BETWEEN, NEW, OLD, ROWS, revisit
 
 OFF = np.array([0.1, 0.1, 0.01])
 
@@ -26,7 +27,7 @@ def matched(keyframes: list[Keyframe], off: Array = OFF, centre: int = len(ROWS)
     new = slice(len(OLD) + len(BETWEEN), None)
     middle = poses[new].mean(axis=0) * [1, 1, 0]
     poses[new] = compose(compose(middle, off), relative(poses[new], middle))
-    links = [chain(keyframes[: k + 2]) for k in range(len(keyframes) - 1)]
+    links = [relation_to_previous(keyframes[: k + 2]) for k in range(len(keyframes) - 1)]
     found = match_pairs_nearby(keyframes, poses, links, centre, NScanOptions())
     assert found is not None
     return found
@@ -81,7 +82,7 @@ def test_the_chain_holds_two_that_follow_each_other(centre):
     """A prior that is surer than any match keeps the pose, whichever of the two is the centre."""
     keyframes = revisit()
     truth = office_truth()[list(ROWS)]
-    links = [chain(keyframes[: k + 2]) for k in range(len(keyframes) - 1)]
+    links = [relation_to_previous(keyframes[: k + 2]) for k in range(len(keyframes) - 1)]
     wrong = compose(links[-1].measurement, np.array([0.05, 0.03, 0.01]))
     links[-1] = dataclasses.replace(links[-1], measurement=wrong, information=np.diag([1e9, 1e9, 1e9]))
     found = match_pairs_nearby(keyframes, truth, links, centre, NScanOptions())

@@ -1,8 +1,6 @@
-"""The whole loop: on the simulated office with its true poses, on odd logs, on real ones."""
+"""The whole loop: on the simulated office with its true poses, and on real logs."""
 
 from __future__ import annotations
-
-import dataclasses
 
 import numpy as np
 import pytest
@@ -10,15 +8,12 @@ import pytest
 from nscan_cli.evaluation.relations import read_relations, relation_errors
 from nscan_cli.evaluation.trajectory import trajectory_errors
 from nscan_cli.graph.json_file import parse_graph, write_graph
-from nscan_cli.graph.model import Graph
 from nscan_cli.graph.solve import optimise_graph
 from nscan_cli.graph.tum import Trajectory
-from nscan_cli.logs.scan import LaserLog
-from nscan_cli.poses import relative, wrap
+from nscan_cli.poses import relative
 from nscan_cli.slam.options import SlamOptions
 from nscan_cli.slam.pipeline import Slam
 from tests.data import data_file
-from tests.simulation.scenes import office
 from tests.slam.runs import (
     Mapped,
     mapped,
@@ -28,12 +23,11 @@ from tests.slam.runs import (
     office_unrefined,
     part,
     truth_of,
-    without_returns,
 )
 
 ODOMETRY = pytest.mark.parametrize("odometry", [True, False], ids=["odometry", "no odometry"])
-CORRIDOR = slice(1880, 2080)
-"""Rows of the office in which the robot drives 22 m of corridor."""
+SECOND_ROUND = 1810
+"""The row from which on it drives where it has been before."""
 
 
 @ODOMETRY
@@ -103,7 +97,9 @@ def test_relations_connect_keyframes_only():
     keyframes = graph.keyframes
     chain = list(zip(keyframes[:-1].tolist(), keyframes[1:].tolist(), strict=True))
     assert [relation.nodes for relation in graph.pairwise] == chain
-    assert len(graph.nscan) > 0.9 * len(keyframes)
+    # Nearly all are in some of them; test_coverage tells how few matches that takes.
+    joined = {node for relation in graph.nscan for node in relation.nodes}
+    assert len(joined) > 0.95 * len(keyframes)
     # Each keyframe is the centre of one match at most, which holds the gauge.
     centres = [relation.nodes[relation.fixed] for relation in graph.nscan]
     assert centres == sorted(set(centres))
@@ -113,27 +109,37 @@ def test_relations_connect_keyframes_only():
         assert list(relation.nodes) == sorted(set(relation.nodes))
 
 
-def test_on_the_way_the_newest_keyframe_is_the_centre():
+def test_on_the_way_the_centre_is_three_keyframes_behind_the_newest():
+    """So that it is matched with those on both sides; at the end of the log there are fewer."""
     graph = office_unrefined()
-    newest = [relation.nodes[-1] for relation in graph.nscan]
-    assert [relation.nodes[relation.fixed] for relation in graph.nscan] == newest
-    assert newest == sorted(set(newest))
-    # The last one too, after which no keyframe comes.
-    assert newest[-1] == graph.keyframes[-1]
+    keyframes = graph.keyframes
+    centres = [relation.nodes[relation.fixed] for relation in graph.nscan]
+    assert centres == sorted(set(centres))
+    newest = np.searchsorted(keyframes, [relation.nodes[-1] for relation in graph.nscan])
+    ahead = newest - np.searchsorted(keyframes, centres)
+    # The newest may be too far away, or left out.
+    assert ahead.max() == np.median(ahead) == 3
+    # About those that others cover no match is made.
+    assert 0.3 * len(keyframes) < len(centres) < 0.6 * len(keyframes)
+    # Until the last one, after which no keyframe comes.
+    assert centres[-1] == keyframes[-1]
+    assert ahead[-1] == 0
 
 
 def test_loops_are_recorded():
-    """The second round, of 75 m, is matched with the first; its keyframes are 1.5 m apart at most."""
+    """The second round, of 75 m, is matched with the first, but for a visit to a room that is new."""
     graph = office_unrefined()
-    assert len(graph.loops) >= 40
     accepted = [loop for loop in graph.loops if loop.accepted]
     closing = [relation for relation in graph.nscan if relation.origin == "loop"]
-    assert [loop.nodes[1] for loop in accepted] == [relation.nodes[-1] for relation in closing]
+    assert len(accepted) >= 30
+    assert [loop.nodes[1] for loop in accepted] == [relation.nodes[relation.fixed] for relation in closing]
     assert [loop.score for loop in accepted] == [relation.score for relation in closing]
     for loop in graph.loops:
         assert loop.nodes[0] < loop.nodes[1]
         assert set(loop.nodes) <= set(graph.keyframes.tolist())
         assert loop.accepted or loop.reason
+    second = graph.keyframes[graph.keyframes >= SECOND_ROUND]
+    assert np.isin(second, [node for relation in closing for node in relation.nodes]).mean() > 0.85
 
 
 def test_marginals_grow_from_the_first_keyframe_on():
@@ -171,100 +177,6 @@ def test_scan_numbers_are_those_of_the_log():
     assert graph.keyframes[0] == 0
 
 
-# ----------------------------------------------------------------------------- odd logs
-
-
-def sound(log: LaserLog) -> Graph:
-    """The graph of a log; it can be written and read, and no number in it is not finite."""
-    with np.errstate(divide="raise", invalid="raise"):
-        graph = mapped(log).graph
-    back = parse_graph(write_graph(graph), "graph.json")
-    assert len(back) == len(log)
-    np.testing.assert_allclose(back.poses[:, :2], graph.poses[:, :2], atol=1e-8)
-    return graph
-
-
-def off_truth(graph: Graph, log: LaserLog) -> float:
-    """The largest error (m) of a position seen from the first scan."""
-    truth = truth_of(log)
-    off = relative(graph.poses, graph.poses[0]) - relative(truth, truth[0])
-    return float(np.hypot(off[:, 0], off[:, 1]).max())
-
-
-@ODOMETRY
-def test_a_log_of_one_scan(odometry):
-    graph = sound(part(office_log(odometry), slice(700, 701)))
-    np.testing.assert_array_equal(graph.poses, np.zeros((1, 3)))
-    assert graph.keyframes.tolist() == [0]
-    assert [*graph.pairwise, *graph.nscan, *graph.loops] == []
-
-
-@ODOMETRY
-@pytest.mark.parametrize(("second", "keyframes"), [(201, [0]), (217, [0, 1])], ids=["near", "far"])
-def test_a_log_of_two_scans(odometry, second, keyframes):
-    """0.1 m and 1.6 m apart; the far one is found with odometry only."""
-    log = part(office_log(odometry), np.array([200, second]))
-    graph = sound(log)
-    assert graph.nscan == []
-    assert len(graph.pairwise) == len(graph.keyframes) - 1
-    if odometry:
-        assert graph.keyframes.tolist() == keyframes
-        assert off_truth(graph, log) < 0.05
-
-
-@ODOMETRY
-def test_a_robot_that_stands_still(odometry):
-    """Every scan sees the first one's map: the noise of a match does not add up."""
-    log = office().record_at(np.repeat(office().truth()[1900:1901], 100, axis=0), seed=2).log()
-    if not odometry:
-        log = dataclasses.replace(log, odometry=None)
-    graph = sound(log)
-    assert graph.keyframes.tolist() == [0]
-    assert off_truth(graph, log) < 0.03
-    assert np.abs(wrap(graph.poses[:, 2])).max() < 0.01
-
-
-@ODOMETRY
-@pytest.mark.parametrize("reading", [np.inf, np.nan], ids=["no return", "no reading"])
-def test_scans_without_a_usable_beam_in_between(odometry, reading):
-    log = without_returns(part(office_log(odometry), CORRIDOR), np.arange(5, 200, 5), reading)
-    graph = sound(log)
-    assert off_truth(graph, log) < 0.1
-    assert len(graph.keyframes) > 10
-
-
-@ODOMETRY
-def test_a_stretch_of_nothing_but_no_returns(odometry):
-    """3.3 m blind: with odometry the way goes on by it; without, as the robot drove last."""
-    log = without_returns(part(office_log(odometry), CORRIDOR), np.arange(60, 90))
-    graph = sound(log)
-    assert off_truth(graph, log) < (0.1 if odometry else 1.0)
-    truth = truth_of(log)
-    # When it sees again, what is before and what is behind are one map.
-    end = relative(graph.poses[-1], graph.poses[0]) - relative(truth[-1], truth[0])
-    assert np.hypot(end[0], end[1]) < 0.1
-
-
-def test_a_log_that_is_blind_at_its_start_and_its_end():
-    log = part(office_log(), CORRIDOR)
-    for rows in (np.arange(30), np.arange(140, 200), np.arange(200)):
-        blind = without_returns(log, rows)
-        # The odometry's scale is 1 % off: 0.22 m on this way, and it veers.
-        assert off_truth(sound(blind), blind) < 0.7
-
-
-def test_a_log_that_is_blind_throughout_and_without_odometry():
-    graph = sound(without_returns(part(office_log(False), CORRIDOR), np.arange(200)))
-    np.testing.assert_array_equal(graph.poses, 0)
-
-
-def test_without_odometry_a_first_scan_that_sees_nothing_is_no_end():
-    log = without_returns(part(office_log(False), CORRIDOR), np.array([0]))
-    graph = sound(log)
-    assert len(graph.keyframes) > 10
-    assert off_truth(graph, log) < 0.3
-
-
 # ----------------------------------------------------------------------------- real logs
 
 
@@ -281,7 +193,7 @@ def real(name: str) -> tuple[Mapped, float]:
 @pytest.mark.logs
 @pytest.mark.parametrize(("name", "bound"), [("intel", 0.025), ("fr079", 0.045), ("mit-csail", 0.045)])
 def test_a_real_log_is_mapped(name, bound):
-    """Bounds between what is reached (0.013, 0.031, 0.027 m) and the best that is published."""
+    """Bounds between what is reached (0.013, 0.030, 0.026 m) and the best that is published."""
     run, mean = real(name)
     assert mean <= bound
     accepted = [loop for loop in run.graph.loops if loop.accepted]

@@ -27,7 +27,7 @@ def chain(graph: Graph) -> list[tuple[int, int]]:
     return list(itertools.pairwise(graph.keyframes.tolist()))
 
 
-# Measured: 5.6, 5.6 and 7.5 mm.
+# Measured: 6.3, 6.2 and 7.5 mm.
 @pytest.mark.parametrize(("relations", "bound"), [("both", 0.01), ("nscan", 0.01), ("pairwise", 0.013)])
 def test_the_error_of_the_office(relations: Relations, bound: float):
     assert rmse(mapped_office(True, relations)) < bound
@@ -61,8 +61,11 @@ def test_pairwise_has_the_chain_and_single_matches_and_no_joint_one():
 
 
 def test_pairwise_loops_have_one_verdict_for_each_centre():
-    graph = mapped_office(True, "pairwise").graph
-    centres = [loop.nodes[1] for loop in graph.loops]
+    """And another one where a place was searched and not found."""
+    office = mapped_office(True, "pairwise")
+    graph, refused = office.graph, office.slam.closing.refused()
+    centres = [loop.nodes[1] for loop in graph.loops[: len(graph.loops) - len(refused)]]
+    assert graph.loops[len(centres) :] == refused
     assert centres == sorted(set(centres))
     accepted = [loop for loop in graph.loops if loop.accepted]
     assert len(accepted) > 40
@@ -71,15 +74,16 @@ def test_pairwise_loops_have_one_verdict_for_each_centre():
         assert loop.accepted or loop.reason
 
 
-@pytest.mark.parametrize("relations", ["both", "pairwise"])
-def test_without_loops_no_relation_joins_different_visits(relations: Relations):
+# Measured: 300, of which 64 are nScan relations, and 1430.
+@pytest.mark.parametrize(("relations", "least"), [("both", 280), ("pairwise", 1000)])
+def test_without_loops_no_relation_joins_different_visits(relations: Relations, least: int):
     office = mapped_office(True, relations, loops=False)
     paths = {keyframe.row: keyframe.tracked.path for keyframe in office.slam.keyframes.list}
     recent = SlamOptions().nscan.recent
     pairwise, nscan = office.graph.pairwise, office.graph.nscan
     found: list[tuple[tuple[int, ...], int]] = [(relation.nodes, relation.nodes[1]) for relation in pairwise]
     found += [(relation.nodes, relation.nodes[relation.fixed]) for relation in nscan]
-    assert len(found) > 400
+    assert len(found) > least
     for nodes, centre in found:
         assert np.abs([paths[node] - paths[centre] for node in nodes]).max() <= recent
     assert office.graph.loops == []

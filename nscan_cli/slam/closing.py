@@ -1,0 +1,129 @@
+"""Step 4 of the loop: large loops, where drift has carried the path away from a place seen before (paper, V).
+
+A joint match needs a start within a metre. Where the graph knows less than that of how a keyframe lies to an
+older one that may be near, or a joint match has left out all scans of another visit, the place is searched.
+It counts when a second keyframe, searched by itself, agrees.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nscan_cli.graph.model import Loop, Pairwise
+from nscan_cli.graph.system import GraphEnergy
+from nscan_cli.poses import Array, wrap
+from nscan_cli.slam.keyframes import Keyframe
+from nscan_cli.slam.nearby import MatchNearby
+from nscan_cli.slam.options import ClosingOptions, NScanOptions
+from nscan_cli.slam.place import Place, find_place
+from nscan_cli.slam.whereabouts import Reach, Whereabouts, with_slips
+
+NO_SECOND = "no second keyframe finds the same"
+
+Indices = NDArray[np.int64]
+
+
+class Closing:
+    """The search for large loops, keyframe by keyframe."""
+
+    def __init__(self, options: ClosingOptions, nscan: NScanOptions, match: MatchNearby) -> None:
+        self.options, self.nscan, self.match = options, nscan, match
+        self.way: list[Pairwise] = []
+        """The chain, with slips allowed for."""
+        self._refused: list[Loop] = []
+        self._waiting: list[Place] = []
+        self._whereabouts = Whereabouts()
+        self._searched = -np.inf
+
+    def extend(self, relation: Pairwise, length: float) -> None:
+        """Follow the chain by a relation over a way of `length` (m)."""
+        self.way.append(with_slips(relation, length, self.options.drift, self.options.drift_angle))
+
+    def close(
+        self,
+        keyframes: Sequence[Keyframe],
+        chain: Sequence[Pairwise],
+        poses: Array,
+        centre: int,
+        left_out: Indices,
+        energy: Callable[[int], GraphEnergy],
+    ) -> list[Place]:
+        """The places of a keyframe, and of those before that agree with it: two at least, or none.
+
+        `poses` (K, 3) are the global ones, `chain[k]` leads from keyframe k to k + 1, `left_out` (m,) are
+        keyframes of another visit that the joint match about `centre` was tried with. `energy` gives that
+        of the graph of `way` and all loops, with a keyframe held.
+        """
+        paths = np.array([keyframe.tracked.path for keyframe in keyframes])
+        if paths[centre] - self._searched < self.options.step:
+            return []
+        reach = self._whereabouts.bound(centre, self.way, poses)
+        near = self._near(paths, poses, centre, reach)
+        if len(near) or len(left_out):
+            reach = self._whereabouts.ask(centre, energy, poses)
+            near = np.union1d(self._near(paths, poses, centre, reach), left_out).astype(np.int64)
+        if not len(near):
+            return []
+        self._searched = paths[centre]
+        place = self._search(keyframes, chain, poses, centre, near, reach)
+        if place is None:
+            return []
+        agreeing = [other for other in self._waiting if self._agree(other, place, poses, paths)]
+        self._waiting = [other for other in self._waiting if other not in agreeing]
+        if agreeing:
+            return [*agreeing, place]
+        self._waiting.append(place)
+        return []
+
+    def refused(self) -> list[Loop]:
+        """The verdicts on what was not accepted."""
+        waiting = [place.nearby.loop for place in self._waiting if place.nearby.loop is not None]
+        return self._refused + [replace(loop, accepted=False, reason=NO_SECOND) for loop in waiting]
+
+    def _near(self, paths: Array, poses: Array, centre: int, reach: Reach) -> Indices:
+        """The older keyframes that may be near, but may be too far off for a joint match."""
+        options, away = self.options, np.hypot(*(poses[:, :2] - poses[centre, :2]).T)
+        bound = options.deviations * reach.distance
+        may_be = away <= self.nscan.radius + np.minimum(bound, options.farthest)
+        older = paths[centre] - paths > self.nscan.recent
+        return np.flatnonzero(older & may_be & (bound > options.settled))
+
+    def _search(
+        self,
+        keyframes: Sequence[Keyframe],
+        chain: Sequence[Pairwise],
+        poses: Array,
+        centre: int,
+        near: Indices,
+        reach: Reach,
+    ) -> Place | None:
+        """Search among the visit that most likely is near: keyframes that are about as far off."""
+        options = self.options
+        away = np.hypot(*(poses[:, :2] - poses[centre, :2]).T)
+        first = int(near[np.argmin(away[near] - options.deviations * reach.distance[near])])
+        distance = max(options.deviations * reach.distance[first], options.least)
+        turn = max(options.deviations * reach.angle[first], options.least_turn)
+        window = replace(
+            options.search, distance=min(distance, options.farthest), turn=min(turn, float(np.pi))
+        )
+        paths = np.array([keyframe.tracked.path for keyframe in keyframes])
+        older = paths[centre] - paths > self.nscan.recent
+        alike = np.abs(reach.distance - reach.distance[first]) <= options.alike * max(
+            reach.distance[first], 1.0
+        )
+        around = np.flatnonzero(older & alike & (away <= options.around + window.distance))
+        found = find_place(keyframes, chain, poses, centre, around, window, self.match, options, self.nscan)
+        if isinstance(found, Loop):
+            self._refused.append(found)
+            return None
+        return found
+
+    def _agree(self, one: Place, other: Place, poses: Array, paths: Array) -> bool:
+        off = one.corrected(poses, other.centre) - other.corrected(poses, other.centre)
+        within = np.hypot(off[0], off[1]) <= self.options.agree
+        turned = abs(wrap(off[2])) <= self.options.agree_turn
+        return bool(within and turned and paths[other.centre] - paths[one.centre] <= self.options.together)

@@ -1,0 +1,94 @@
+"""Where a keyframe lies among those of an earlier visit, found without a good start, and verified.
+
+The scans around the keyframe are searched together, by branch and bound, among those of the earlier visit.
+What is found must stand alone: no other place may fit nearly as well. And the scans of both visits must
+match from there. A wrong loop is worse than a missed one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nscan_cli.graph.model import Loop, Pairwise
+from nscan_cli.matching.search import SearchOptions, likelihood_field, search
+from nscan_cli.poses import Array, compose, relative, transform
+from nscan_cli.slam.keyframes import Keyframe
+from nscan_cli.slam.nearby import MatchNearby, Nearby
+from nscan_cli.slam.options import ClosingOptions, NScanOptions
+
+AMBIGUOUS = "another place fits as well"
+NO_MATCH = "the scans of both visits do not match"
+ELSEWHERE = "the match leads away from the place found"
+
+
+@dataclass(frozen=True)
+class Place:
+    """A keyframe found at a place seen before."""
+
+    old: int
+    """A keyframe of the earlier visit."""
+    centre: int
+    """The keyframe that was found."""
+    measured: Array
+    """(3,) pose of the centre in the frame of the old."""
+    radius: float
+    """How near the centre (m) those of the earlier visit were taken from."""
+    nearby: Nearby
+    """The match of both visits."""
+
+    def corrected(self, poses: Array, keyframe: int) -> Array:
+        """(3,) where a keyframe of this visit lies if the place is right, at the graph's poses (K, 3)."""
+        here = compose(poses[self.old], self.measured)
+        return compose(here, relative(poses[keyframe], poses[self.centre]))
+
+
+def find_place(
+    keyframes: Sequence[Keyframe],
+    chain: Sequence[Pairwise],
+    poses: Array,
+    centre: int,
+    earlier: NDArray[np.int64],
+    window: SearchOptions,
+    match: MatchNearby,
+    closing: ClosingOptions,
+    nscan: NScanOptions,
+) -> Place | Loop | None:
+    """The place of keyframe `centre` among the `earlier` ones (m,), or why what was found is refused.
+
+    `poses` (K, 3) are the global ones, `chain[k]` leads from keyframe k to k + 1. None when nothing fits.
+    """
+    paths = np.array([keyframe.tracked.path for keyframe in keyframes])
+    way = np.abs(paths - paths[centre])
+    here = relative(poses, poses[centre])
+    beside = np.flatnonzero(way <= closing.beside).tolist()
+    scan = np.concatenate([transform(here[k], keyframes[k].points) for k in beside])
+    cloud = np.concatenate([transform(poses[k], keyframes[k].points) for k in earlier.tolist()])
+    if not len(scan) or not len(cloud):
+        return None
+    field = likelihood_field(cloud, window)
+    found = search(field, scan, poses[centre], closing.score, window)
+    if found is None:
+        return None
+    nodes = keyframes[int(earlier[0])].row, keyframes[centre].row
+    elsewhere = found.pose, closing.apart
+    if search(field, scan, poses[centre], closing.rival * found.score, window, elsewhere) is not None:
+        return Loop(nodes, False, AMBIGUOUS, found.score)
+    moved = poses.copy()
+    visit = way <= nscan.recent
+    moved[visit] = compose(found.pose, here[visit])
+    away = np.hypot(*(poses[earlier, :2] - found.pose[:2]).T).min()
+    radius = max(nscan.radius, float(away) + nscan.radius)
+    nearby = match(keyframes, moved, chain, centre, replace(nscan, radius=radius))
+    tie = None if nearby is None else nearby.tie(keyframes[centre].row)
+    rows = [keyframe.row for keyframe in keyframes]
+    if nearby is None or tie is None:
+        return Loop(nodes, False, NO_MATCH, found.score)
+    old = rows.index(tie[0])
+    off = compose(moved[old], tie[1]) - found.pose
+    if np.hypot(off[0], off[1]) > closing.settled:
+        return Loop(nodes, False, ELSEWHERE, found.score)
+    return Place(old, centre, tie[1], radius, nearby)
