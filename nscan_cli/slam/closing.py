@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from nscan_cli.graph.model import Loop, Pairwise
 from nscan_cli.graph.system import GraphEnergy
 from nscan_cli.poses import Array, wrap
-from nscan_cli.slam.keyframes import Keyframe
+from nscan_cli.slam.keyframes import Keyframe, paths_of
 from nscan_cli.slam.nearby import MatchNearby
 from nscan_cli.slam.options import ClosingOptions, NScanOptions
 from nscan_cli.slam.place import Place, find_place
@@ -58,7 +58,7 @@ class Closing:
         keyframes of another visit that the joint match about `centre` was tried with. `energy` gives that
         of the graph of `way` and all loops, with a keyframe held.
         """
-        paths = np.array([keyframe.tracked.path for keyframe in keyframes])
+        paths = paths_of(keyframes)
         if paths[centre] - self._searched < self.options.step:
             return []
         reach = self._whereabouts.bound(centre, self.way, poses)
@@ -110,7 +110,7 @@ class Closing:
         window = replace(
             options.search, distance=min(distance, options.farthest), turn=min(turn, float(np.pi))
         )
-        paths = np.array([keyframe.tracked.path for keyframe in keyframes])
+        paths = paths_of(keyframes)
         older = paths[centre] - paths > self.nscan.recent
         alike = np.abs(reach.distance - reach.distance[first]) <= options.alike * max(
             reach.distance[first], 1.0

@@ -6,6 +6,7 @@ motion fill the gaps between the beams. Its points are those of its own scan.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -29,6 +30,11 @@ class Keyframe:
     points: Array
     """(m, 2) in the robot's frame."""
     ndt: Ndt
+
+
+def paths_of(keyframes: Sequence[Keyframe]) -> Array:
+    """(K,) the length of path up to each, m."""
+    return np.array([keyframe.tracked.path for keyframe in keyframes])
 
 
 class Keyframes:

@@ -14,7 +14,7 @@ from nscan_cli.matching.joint_energy import JointProblem, Priors, all_pairs, no_
 from nscan_cli.matching.overlap import held_together, overlaps, weakest_link
 from nscan_cli.matching.scans import Scans, lay_out
 from nscan_cli.poses import Array, relative
-from nscan_cli.slam.keyframes import Keyframe
+from nscan_cli.slam.keyframes import Keyframe, paths_of
 from nscan_cli.slam.options import NScanOptions
 
 Indices = NDArray[np.int64]
@@ -91,7 +91,7 @@ def match_nearby(
     k + 1. Scans that do not hang together with the `centre` by overlaps are left out, and the others
     matched again. None when there are too few keyframes near.
     """
-    paths = np.array([keyframe.tracked.path for keyframe in keyframes])
+    paths = paths_of(keyframes)
     tried, seen_before = choose_nearby(poses, paths, centre, options)
     if len(tried) < LEAST_SCANS:
         return None

@@ -17,7 +17,7 @@ from nscan_cli.matching.overlap import INLIER_BOUND
 from nscan_cli.matching.priors import Prior
 from nscan_cli.ndt.energy import energy, inlier_share
 from nscan_cli.poses import Array, inverse, relative, relative_jacobians, wrap
-from nscan_cli.slam.keyframes import Keyframe
+from nscan_cli.slam.keyframes import Keyframe, paths_of
 from nscan_cli.slam.nearby import Nearby, choose_nearby, moved_by, verdict
 from nscan_cli.slam.options import NScanOptions
 
@@ -46,7 +46,7 @@ def match_pairs_nearby(
     Arguments as for match_nearby. A loop is accepted when a match with some keyframe of another visit
     is. None when no other keyframe is near.
     """
-    paths = np.array([keyframe.tracked.path for keyframe in keyframes])
+    paths = paths_of(keyframes)
     chosen, before = choose_nearby(poses, paths, centre, options)
     tried, seen_before = chosen[chosen != centre], before[chosen != centre]
     if len(tried) == 0:

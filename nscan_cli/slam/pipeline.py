@@ -18,7 +18,7 @@ from nscan_cli.logs.scan import LaserLog
 from nscan_cli.poses import Array, compose
 from nscan_cli.slam.closing import Closing
 from nscan_cli.slam.coverage import Coverage
-from nscan_cli.slam.keyframes import Keyframes
+from nscan_cli.slam.keyframes import Keyframes, paths_of
 from nscan_cli.slam.nearby import MatchNearby, Nearby, choose_nearby, match_nearby
 from nscan_cli.slam.options import SlamOptions
 from nscan_cli.slam.pairs_nearby import match_pairs_nearby
@@ -107,7 +107,7 @@ class Slam:
         if centre < 0:
             return
         keyframes, options = self.keyframes.list, self.options.nscan
-        paths = np.array([keyframe.tracked.path for keyframe in keyframes])
+        paths = paths_of(keyframes)
         tried, seen_before = choose_nearby(self.poses, paths, centre, options)
         node, others = keyframes[centre].row, [keyframes[k].row for k in tried.tolist()]
         if self.covered.share(node, others) >= options.covered:

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from nscan_cli.graph.model import Loop, Pairwise
 from nscan_cli.matching.search import SearchOptions, likelihood_field, search
 from nscan_cli.poses import Array, compose, relative, transform
-from nscan_cli.slam.keyframes import Keyframe
+from nscan_cli.slam.keyframes import Keyframe, paths_of
 from nscan_cli.slam.nearby import MatchNearby, Nearby
 from nscan_cli.slam.options import ClosingOptions, NScanOptions
 
@@ -61,7 +61,7 @@ def find_place(
 
     `poses` (K, 3) are the global ones, `chain[k]` leads from keyframe k to k + 1. None when nothing fits.
     """
-    paths = np.array([keyframe.tracked.path for keyframe in keyframes])
+    paths = paths_of(keyframes)
     way = np.abs(paths - paths[centre])
     here = relative(poses, poses[centre])
     beside = np.flatnonzero(way <= closing.beside).tolist()

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from nscan_cli.graph.model import Loop, NScan, Pairwise
 from nscan_cli.poses import Array, relative, wrap
 from nscan_cli.slam.coverage import Coverage
-from nscan_cli.slam.keyframes import Keyframe
+from nscan_cli.slam.keyframes import Keyframe, paths_of
 from nscan_cli.slam.nearby import MatchNearby, Nearby, choose_nearby
 from nscan_cli.slam.options import NScanOptions
 
@@ -35,7 +35,7 @@ class Refinement:
         """Take the radius (m) about some centres that is `wider`: where large loops were closed."""
         self._keyframes, self._chain, self._options, self._match = keyframes, chain, options, match
         self._wider, self._covered = wider, Coverage()
-        self._paths = np.array([keyframe.tracked.path for keyframe in keyframes])
+        self._paths = paths_of(keyframes)
         self._found: list[Nearby | None] = [None] * len(keyframes)
         self._starts: list[tuple[NDArray[np.int64], Array] | None] = [None] * len(keyframes)
 
