@@ -27,6 +27,18 @@ def kernel(function: Function) -> Function:
     No parallel loops, and of fastmath only fused multiply-adds, which change no order: the same bytes come
     out on any number of threads. The interpreter's lock is released, so threads can share the work.
     """
+    return _compiled(function, {"contract"})
+
+
+def summing_kernel(function: Function) -> Function:
+    """The same for a loop that does nothing but sum: its terms may be summed in lanes, side by side.
+
+    How many lanes there are depends on the processor, on nothing else.
+    """
+    return _compiled(function, {"contract", "reassoc", "nsz"})
+
+
+def _compiled(function: Function, fastmath: set[str]) -> Function:
     import numba
 
     config: Any = numba.config
@@ -36,7 +48,7 @@ def kernel(function: Function) -> Function:
     configured, config.CACHE_DIR = config.CACHE_DIR, "" if folder is None else str(folder)
     try:
         compile_lazily = numba.njit(
-            cache=folder is not None, nogil=True, error_model="numpy", fastmath={"contract"}
+            cache=folder is not None, nogil=True, error_model="numpy", fastmath=fastmath
         )
         return cast(Function, compile_lazily(function))
     finally:

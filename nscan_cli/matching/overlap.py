@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from nscan_cli.compiled import kernel
 from nscan_cli.matching.joint_energy import relative_pose
 from nscan_cli.matching.scans import Scans, scan_grid, scan_points
-from nscan_cli.ndt.energy import inlier_share
+from nscan_cli.ndt.energy import find_inliers
 from nscan_cli.poses import Array
 
 INLIER_BOUND = 9.0
@@ -45,18 +45,16 @@ def _count(scans: Scans, poses: Array, pairs: Array, shares: Array) -> None:
     u = np.empty(3)
     for j in range(n):
         points = scan_points(scans, j)
-        seen = np.zeros(points.shape[0])
+        seen = np.zeros(points.shape[0], dtype=np.bool_)
         weight = 1.0 / max(points.shape[0], 1)
         for i in range(n):
             if i == j:
                 continue
             relative_pose(poses[j], poses[i], u)
-            grid = scan_grid(scans, i)
-            for k in range(points.shape[0]):
-                if inlier_share(grid, scans.half, points[k : k + 1], u, INLIER_BOUND) > 0.0:
-                    pairs[i, j] += weight
-                    seen[k] = weight
-        shares[j] = seen.sum()
+            pairs[i, j] = weight * find_inliers(
+                scan_grid(scans, i), scans.half, points, u, INLIER_BOUND, seen
+            )
+        shares[j] = weight * seen.sum()
 
 
 def held_together(pairs: Array, least: float, scan: int) -> NDArray[np.bool_]:

@@ -10,14 +10,22 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
-from nscan_cli.compiled import kernel
+from nscan_cli.compiled import kernel, summing_kernel
 from nscan_cli.ndt.grid import Ndt
 from nscan_cli.ndt.table import Grid, find_row, pack
 from nscan_cli.poses import Array
 
 OUT = 10
 """Numbers that an evaluation gives: E, gradient (3), upper triangle of the Hessian (6)."""
+MET = 7
+"""Numbers of a point that meets a Gaussian: R(φ) x, v, and Σ⁻¹ as (xx, xy, yy)."""
+LEAST_EXPONENT = -700.0
+"""So far away a point counts 10⁻³⁰⁴."""
+LOG2_E = 1.4426950408889634
+LN2_HIGH, LN2_LOW = 0.6931471803691238, 1.9082149292705877e-10
+"""ln 2 in two parts, of which the first times a whole number is exact."""
 
 
 @kernel
@@ -41,14 +49,24 @@ def accumulate(
     costs, well hit or not; it only counts when energies are compared. Of the points, every so-manyth
     counts by `stride`.
     """
+    met = np.empty((MET, 4 * (points.shape[0] // stride + 1)))
+    count = _meet(grid, half, points, x, y, phi, stride, met)
+    _sum(met, count, widening, curvature, baseline, out)
+
+
+@kernel
+def _meet(
+    grid: Grid, half: float, points: Array, x: float, y: float, phi: float, stride: int, met: Array
+) -> int:
+    """Write the numbers of every point that meets a Gaussian to the columns of `met` (7, …); how many do."""
     cos, sin = np.cos(phi), np.sin(phi)
-    e = gx = gy = gp = hxx = hxy = hxp = hyy = hyp = hpp = 0.0
+    per_metre = 1.0 / half
+    count = 0
     for k in range(0, points.shape[0], stride):
-        # R(φ) x, and x' = R(φ) x + t; ∂x'/∂φ = (−ry, rx), ∂²x'/∂φ² = −(rx, ry).
         rx = cos * points[k, 0] - sin * points[k, 1]
         ry = sin * points[k, 0] + cos * points[k, 1]
         px, py = rx + x, ry + y
-        row = find_row(grid, pack(int(np.floor(px / half)), int(np.floor(py / half))))
+        row = find_row(grid, pack(int(np.floor(px * per_metre)), int(np.floor(py * per_metre))))
         if row < 0:
             continue
         for block in range(4):
@@ -58,26 +76,53 @@ def accumulate(
             gaussian = grid.gaussians[link]
             if gaussian[2] == 0.0 or gaussian[5] * rx + gaussian[6] * ry > 0.0:
                 continue
-            vx, vy = px - gaussian[0], py - gaussian[1]
-            ax, ay = gaussian[2] * vx + gaussian[3] * vy, gaussian[3] * vx + gaussian[4] * vy
-            s = np.exp(-0.5 * widening * (vx * ax + vy * ay))
-            ws = widening * s
-            # vᵗΣ⁻¹ ∂x'/∂φ, and Σ⁻¹ ∂x'/∂φ.
-            ap = ay * rx - ax * ry
-            jx, jy = gaussian[3] * rx - gaussian[2] * ry, gaussian[4] * rx - gaussian[3] * ry
-            cw = curvature * widening
-            e -= s - baseline
-            gx += ws * ax
-            gy += ws * ay
-            gp += ws * ap
-            hxx += ws * (gaussian[2] - cw * ax * ax)
-            hxy += ws * (gaussian[3] - cw * ax * ay)
-            hyy += ws * (gaussian[4] - cw * ay * ay)
-            hxp += ws * (jx - cw * ax * ap)
-            hyp += ws * (jy - cw * ay * ap)
-            hpp += ws * (jy * rx - jx * ry - curvature * (ax * rx + ay * ry) - cw * ap * ap)
+            met[0, count], met[1, count] = rx, ry
+            met[2, count], met[3, count] = px - gaussian[0], py - gaussian[1]
+            met[4, count], met[5, count], met[6, count] = gaussian[2], gaussian[3], gaussian[4]
+            count += 1
+    return count
+
+
+@summing_kernel
+def _sum(met: Array, count: int, widening: float, curvature: float, baseline: float, out: Array) -> None:
+    """Write E, gradient and Hessian of `count` points on Gaussians into out (10,).
+
+    There is no branch in the loop and no call, so that the processor takes several points at a time.
+    """
+    cw = curvature * widening
+    e = gx = gy = gp = hxx = hxy = hxp = hyy = hyp = hpp = 0.0
+    for k in range(count):
+        rx, ry, vx, vy = met[0, k], met[1, k], met[2, k], met[3, k]
+        xx, xy, yy = met[4, k], met[5, k], met[6, k]
+        # Σ⁻¹v; vᵗΣ⁻¹ ∂x'/∂φ and Σ⁻¹ ∂x'/∂φ, with ∂x'/∂φ = (−ry, rx) and ∂²x'/∂φ² = −(rx, ry).
+        ax, ay = xx * vx + xy * vy, xy * vx + yy * vy
+        ap = ay * rx - ax * ry
+        jx, jy = xy * rx - xx * ry, yy * rx - xy * ry
+        s = _exp(max(-0.5 * widening * (vx * ax + vy * ay), LEAST_EXPONENT))
+        ws = widening * s
+        e -= s - baseline
+        gx += ws * ax
+        gy += ws * ay
+        gp += ws * ap
+        hxx += ws * (xx - cw * ax * ax)
+        hxy += ws * (xy - cw * ax * ay)
+        hyy += ws * (yy - cw * ay * ay)
+        hxp += ws * (jx - cw * ax * ap)
+        hyp += ws * (jy - cw * ay * ap)
+        hpp += ws * (jy * rx - jx * ry - curvature * (ax * rx + ay * ry) - cw * ap * ap)
     out[0], out[1], out[2], out[3] = e, gx, gy, gp
     out[4], out[5], out[6], out[7], out[8], out[9] = hxx, hxy, hxp, hyy, hyp, hpp
+
+
+@kernel
+def _exp(t: float) -> float:
+    """eᵗ for −700 ≤ t ≤ 0, to 10⁻¹⁴ of it: 2ⁿ eʳ with |r| ≤ ½ ln 2, and eʳ by its series."""
+    n = np.floor(t * LOG2_E + 0.5)
+    r = t - n * LN2_HIGH - n * LN2_LOW
+    tail = 1 / 5040 + r * (1 / 40320 + r * (1 / 362880 + r * (1 / 3628800 + r * (1 / 39916800))))
+    series = 1 + r * (1 + r * (1 / 2 + r * (1 / 6 + r * (1 / 24 + r * (1 / 120 + r * (1 / 720 + r * tail))))))
+    # 2ⁿ by its bits: the exponent stands above the 52 of the fraction.
+    return float(series * np.int64((np.int64(n) + 1023) << 52).view(np.float64))
 
 
 @kernel
@@ -95,13 +140,26 @@ def unpack(out: Array, scale: float, gradient: Array, hessian: Array) -> None:
 @kernel
 def inlier_share(grid: Grid, half: float, points: Array, pose: Array, bound: float) -> float:
     """The share of points (m, 2) within a Mahalanobis distance² of `bound` of some Gaussian."""
+    inliers = np.zeros(points.shape[0], dtype=np.bool_)
+    return float(find_inliers(grid, half, points, pose, bound, inliers) / max(points.shape[0], 1))
+
+
+@kernel
+def find_inliers(
+    grid: Grid, half: float, points: Array, pose: Array, bound: float, inliers: NDArray[np.bool_]
+) -> int:
+    """Mark the points (m, 2) within a Mahalanobis distance² of `bound` of some Gaussian in `inliers` (m,).
+
+    How many they are; other marks are left as they were.
+    """
     cos, sin = np.cos(pose[2]), np.sin(pose[2])
-    inliers = 0
+    per_metre = 1.0 / half
+    count = 0
     for k in range(points.shape[0]):
         rx = cos * points[k, 0] - sin * points[k, 1]
         ry = sin * points[k, 0] + cos * points[k, 1]
         px, py = rx + pose[0], ry + pose[1]
-        row = find_row(grid, pack(int(np.floor(px / half)), int(np.floor(py / half))))
+        row = find_row(grid, pack(int(np.floor(px * per_metre)), int(np.floor(py * per_metre))))
         if row < 0:
             continue
         for block in range(4):
@@ -113,9 +171,10 @@ def inlier_share(grid: Grid, half: float, points: Array, pose: Array, bound: flo
                 continue
             vx, vy = px - gaussian[0], py - gaussian[1]
             if gaussian[2] * vx * vx + 2 * gaussian[3] * vx * vy + gaussian[4] * vy * vy < bound:
-                inliers += 1
+                inliers[k] = True
+                count += 1
                 break
-    return float(inliers / max(points.shape[0], 1))
+    return count
 
 
 class Energy(NamedTuple):
