@@ -2,7 +2,8 @@
 
 A joint match needs a start within a metre. Where the graph knows less than that of how a keyframe lies to an
 older one that may be near, or a joint match has left out all scans of another visit, the place is searched.
-It counts when a second keyframe, searched by itself, agrees.
+It counts when a second keyframe, searched by itself, agrees. A loop that a joint match has closed from such a
+start must stand the search too.
 """
 
 from __future__ import annotations
@@ -15,12 +16,13 @@ from numpy.typing import NDArray
 
 from nscan_cli.graph.model import Loop, Pairwise
 from nscan_cli.graph.system import GraphEnergy
-from nscan_cli.poses import Array, wrap
+from nscan_cli.matching.search import SearchOptions
+from nscan_cli.poses import Array, compose, wrap
 from nscan_cli.slam.keyframes import Keyframe, paths_of
-from nscan_cli.slam.nearby import MatchNearby
+from nscan_cli.slam.nearby import MatchNearby, Nearby
 from nscan_cli.slam.options import ClosingOptions, NScanOptions
-from nscan_cli.slam.place import Place, find_place
-from nscan_cli.slam.whereabouts import Reach, Whereabouts, with_slips
+from nscan_cli.slam.place import Place, find_place, why_doubted
+from nscan_cli.slam.whereabouts import Reach, Whereabouts, seen_from, with_slips
 
 NO_SECOND = "no second keyframe finds the same"
 
@@ -69,7 +71,7 @@ class Closing:
         if not len(near):
             return []
         self._searched = paths[centre]
-        place = self._search(keyframes, chain, poses, centre, near, reach)
+        place = self._search(keyframes, chain, poses, centre, near, reach, energy)
         if place is None:
             return []
         agreeing = [other for other in self._waiting if self._agree(other, place, poses, paths)]
@@ -78,6 +80,35 @@ class Closing:
             return [*agreeing, place]
         self._waiting.append(place)
         return []
+
+    def why_doubted(
+        self,
+        keyframes: Sequence[Keyframe],
+        poses: Array,
+        centre: int,
+        nearby: Nearby,
+        energy: Callable[[int], GraphEnergy],
+    ) -> str | None:
+        """Why the place is not sure that the joint match about `centre` has in an earlier visit, or None.
+
+        Arguments as for close. A match that began near enough, or closes no loop, is not doubted.
+        """
+        tie = nearby.tie(keyframes[centre].row)
+        if tie is None:
+            return None
+        old = [keyframe.row for keyframe in keyframes].index(tie[0])
+        if not self._may_be_off(self._whereabouts.bound(centre, self.way, poses), old):
+            return None
+        reach = self._whereabouts.ask(centre, energy, poses)
+        if not self._may_be_off(reach, old):
+            return None
+        window, earlier = self._visit(keyframes, poses, centre, old, reach, energy)
+        pose = compose(poses[old], tie[1])
+        return why_doubted(keyframes, poses, centre, pose, earlier, window, self.options)
+
+    def _may_be_off(self, reach: Reach, keyframe: int) -> bool:
+        """Whether a keyframe may be too far off for a joint match."""
+        return bool(self.options.deviations * reach.distance[keyframe] > self.options.settled)
 
     def refused(self) -> list[Loop]:
         """The verdicts on what was not accepted."""
@@ -100,27 +131,43 @@ class Closing:
         centre: int,
         near: Indices,
         reach: Reach,
+        energy: Callable[[int], GraphEnergy],
     ) -> Place | None:
-        """Search among the visit that most likely is near: keyframes that are about as far off."""
-        options = self.options
+        """Search among the visit that most likely is near."""
         away = np.hypot(*(poses[:, :2] - poses[centre, :2]).T)
-        first = int(near[np.argmin(away[near] - options.deviations * reach.distance[near])])
+        first = int(near[np.argmin(away[near] - self.options.deviations * reach.distance[near])])
+        window, around = self._visit(keyframes, poses, centre, first, reach, energy)
+        found = find_place(
+            keyframes, chain, poses, centre, around, window, self.match, self.options, self.nscan
+        )
+        if isinstance(found, Loop):
+            self._refused.append(found)
+            return None
+        return found
+
+    def _visit(
+        self,
+        keyframes: Sequence[Keyframe],
+        poses: Array,
+        centre: int,
+        first: int,
+        reach: Reach,
+        energy: Callable[[int], GraphEnergy],
+    ) -> tuple[SearchOptions, Indices]:
+        """Where to search keyframe `centre` about an older one, the `first`, and among which (m,).
+
+        These are what the graph knows well as seen from the first: the map that they make is in one piece.
+        """
+        options, paths = self.options, paths_of(keyframes)
         distance = max(options.deviations * reach.distance[first], options.least)
         turn = max(options.deviations * reach.angle[first], options.least_turn)
         window = replace(
             options.search, distance=min(distance, options.farthest), turn=min(turn, float(np.pi))
         )
-        paths = paths_of(keyframes)
         older = paths[centre] - paths > self.nscan.recent
-        alike = np.abs(reach.distance - reach.distance[first]) <= options.alike * max(
-            reach.distance[first], 1.0
-        )
-        around = np.flatnonzero(older & alike & (away <= options.around + window.distance))
-        found = find_place(keyframes, chain, poses, centre, around, window, self.match, options, self.nscan)
-        if isinstance(found, Loop):
-            self._refused.append(found)
-            return None
-        return found
+        near = np.hypot(*(poses[:, :2] - poses[centre, :2]).T) <= options.around + window.distance
+        in_one_piece = options.deviations * seen_from(energy(first), poses).distance <= options.settled
+        return window, np.flatnonzero(older & near & in_one_piece)
 
     def _agree(self, one: Place, other: Place, poses: Array, paths: Array) -> bool:
         off = one.corrected(poses, other.centre) - other.corrected(poses, other.centre)

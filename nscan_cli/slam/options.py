@@ -139,8 +139,6 @@ class ClosingOptions:
     """The keyframes of so much path (m) to both sides are searched together."""
     around: float = 15.0
     """Among those of the earlier visit within this distance (m) of where the place may be."""
-    alike: float = 0.3
-    """Keyframes whose uncertainty differs by no more, relatively, were seen in one visit."""
     score: float = 0.55
     """Least share of the points that must fit."""
     rival: float = 0.88

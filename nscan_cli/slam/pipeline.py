@@ -112,7 +112,7 @@ class Slam:
         node, others = keyframes[centre].row, [keyframes[k].row for k in tried.tolist()]
         if self.covered.share(node, others) >= options.covered:
             return
-        nearby = self.match(keyframes, self.poses, self.chain, centre, options)
+        nearby = self.match_unless_doubted(centre)
         self.covered.add(node, others, nearby)
         if nearby is not None:
             self.take(nearby)
@@ -121,6 +121,20 @@ class Slam:
         if options.loops:
             refused = nearby is not None and nearby.loop is not None and not nearby.loop.accepted
             self.close_loops(centre, tried[seen_before & refused])
+
+    def match_unless_doubted(self, centre: int) -> Nearby | None:
+        """The match of a keyframe with those near it; without other visits if its place there is doubted."""
+        keyframes, options = self.keyframes.list, self.options.nscan
+        nearby = self.match(keyframes, self.poses, self.chain, centre, options)
+        if nearby is None or nearby.loop is None:
+            return nearby
+        reason = self.closing.why_doubted(keyframes, self.poses, centre, nearby, self._known)
+        if reason is None:
+            return nearby
+        loop = dataclasses.replace(nearby.loop, accepted=False, reason=reason)
+        alone = dataclasses.replace(options, loops=False)
+        nearby = self.match(keyframes, self.poses, self.chain, centre, alone)
+        return None if nearby is None else dataclasses.replace(nearby, loop=loop, whole=False)
 
     def close_loops(self, centre: int, left_out: Indices) -> None:
         """Step 4: a keyframe searched where its place may be farther off than a joint match finds it."""

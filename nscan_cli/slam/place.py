@@ -14,13 +14,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nscan_cli.graph.model import Loop, Pairwise
-from nscan_cli.matching.search import SearchOptions, likelihood_field, search
+from nscan_cli.matching.search import Field, SearchOptions, likelihood_field, search
 from nscan_cli.poses import Array, compose, relative, transform
 from nscan_cli.slam.keyframes import Keyframe, paths_of
 from nscan_cli.slam.nearby import MatchNearby, Nearby
 from nscan_cli.slam.options import ClosingOptions, NScanOptions
 
 AMBIGUOUS = "another place fits as well"
+OUTDONE = "another place fits better"
+TOO_LITTLE = "too little of an earlier visit is seen to tell the place"
 NO_MATCH = "the scans of both visits do not match"
 ELSEWHERE = "the match leads away from the place found"
 
@@ -61,15 +63,10 @@ def find_place(
 
     `poses` (K, 3) are the global ones, `chain[k]` leads from keyframe k to k + 1. None when nothing fits.
     """
-    paths = paths_of(keyframes)
-    way = np.abs(paths - paths[centre])
-    here = relative(poses, poses[centre])
-    beside = np.flatnonzero(way <= closing.beside).tolist()
-    scan = np.concatenate([transform(here[k], keyframes[k].points) for k in beside])
-    cloud = np.concatenate([transform(poses[k], keyframes[k].points) for k in earlier.tolist()])
-    if not len(scan) or not len(cloud):
+    sought = _sought(keyframes, poses, centre, earlier, window, closing)
+    if sought is None:
         return None
-    field = likelihood_field(cloud, window)
+    scan, field = sought
     found = search(field, scan, poses[centre], closing.score, window)
     if found is None:
         return None
@@ -77,9 +74,9 @@ def find_place(
     elsewhere = found.pose, closing.apart
     if search(field, scan, poses[centre], closing.rival * found.score, window, elsewhere) is not None:
         return Loop(nodes, False, AMBIGUOUS, found.score)
-    moved = poses.copy()
-    visit = way <= nscan.recent
-    moved[visit] = compose(found.pose, here[visit])
+    moved, paths = poses.copy(), paths_of(keyframes)
+    visit = np.abs(paths - paths[centre]) <= nscan.recent
+    moved[visit] = compose(found.pose, relative(poses[visit], poses[centre]))
     away = np.hypot(*(poses[earlier, :2] - found.pose[:2]).T).min()
     radius = max(nscan.radius, float(away) + nscan.radius)
     nearby = match(keyframes, moved, chain, centre, replace(nscan, radius=radius))
@@ -92,3 +89,49 @@ def find_place(
     if np.hypot(off[0], off[1]) > closing.settled:
         return Loop(nodes, False, ELSEWHERE, found.score)
     return Place(old, centre, tie[1], radius, nearby)
+
+
+def why_doubted(
+    keyframes: Sequence[Keyframe],
+    poses: Array,
+    centre: int,
+    pose: Array,
+    earlier: NDArray[np.int64],
+    window: SearchOptions,
+    closing: ClosingOptions,
+) -> str | None:
+    """Why keyframe `centre` may lie elsewhere among the `earlier` ones (m,) than at `pose` (3,), or None.
+
+    A joint match ends at the optimum that is next. Along a corridor there is one at every door.
+    """
+    sought = _sought(keyframes, poses, centre, earlier, window, closing)
+    if sought is None:
+        return TOO_LITTLE
+    scan, field = sought
+    cells = replace(window, distance=2 * window.cell, turn=closing.agree_turn)
+    here = search(field, scan, pose, closing.score, cells)
+    if here is None:
+        return TOO_LITTLE
+    return None if search(field, scan, poses[centre], here.score / closing.rival, window) is None else OUTDONE
+
+
+def _sought(
+    keyframes: Sequence[Keyframe],
+    poses: Array,
+    centre: int,
+    earlier: NDArray[np.int64],
+    window: SearchOptions,
+    closing: ClosingOptions,
+) -> tuple[Array, Field] | None:
+    """The points (m, 2) around keyframe `centre`, in its frame, and the field of the `earlier` ones (m,).
+
+    None when one of them has no points.
+    """
+    paths = paths_of(keyframes)
+    beside = np.flatnonzero(np.abs(paths - paths[centre]) <= closing.beside)
+    here = relative(poses[beside], poses[centre])
+    scan = [transform(pose, keyframes[k].points) for k, pose in zip(beside.tolist(), here, strict=True)]
+    cloud = [transform(poses[k], keyframes[k].points) for k in earlier.tolist()]
+    if not any(map(len, scan)) or not any(map(len, cloud)):
+        return None
+    return np.concatenate(scan), likelihood_field(np.concatenate(cloud), window)
