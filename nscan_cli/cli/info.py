@@ -59,11 +59,12 @@ def facts_of(log: LaserLog) -> dict[str, Any]:
         "beams_without_return": _share(np.isinf(log.ranges)),
         "beams_unusable": _share(np.isnan(log.ranges)),
         "mounting": [*(round(float(part), 6) for part in log.mount[:2]), _degrees(log.mount[2])],
-        "range_limits": list(log.range_limits),
+        "range_limits": [round(limit, 6) for limit in log.range_limits],
+        "used": log.report.used,
         "records": log.report.records,
         "skipped": [
-            {"reason": reason, "records": count, "first_line": line}
-            for reason, (count, line) in log.report.skipped.items()
+            {"reason": reason, "records": count, f"first_{log.report.skipped_place}": first}
+            for reason, (count, first) in log.report.skipped.items()
         ],
         "backward_stamps": log.report.backward_stamps,
         "truth": 0 if log.truth is None else len(log.truth),
@@ -76,11 +77,15 @@ def as_text(facts: dict[str, Any]) -> str:
     odometry, no_return, gap = facts["odometry"], facts["no_return"], facts["longest_gap"]
     x, y, degrees = facts["mounting"]
     low, high = facts["range_limits"]
+    used = facts["used"]
+    path = "" if odometry is None else f"a path of {odometry['path']:.1f} m"
     rate = "" if facts["rate"] is None else f", {facts['rate']:.3g} a second, longest gap {gap:.3g} s"
     rows: list[tuple[str, list[str]]] = [
         ("log", [f"{facts['file']}, {facts['bytes']} bytes"]),
         ("sha256", [facts["sha256"]]),
-        ("format", [f"{facts['format']}, laser {facts['laser']}"]),
+        ("format", [facts["format"]]),
+        ("checksums", [used["checksums"]] if "checksums" in used else []),
+        ("laser", [f"{facts['laser']}, {used['laser']}"]),
         ("scans", [f"{facts['scans']}, numbered {facts['first_scan']} to {facts['last_scan']}{rate}"]),
         ("duration", [f"{facts['duration']:.1f} s from {facts['start']}"]),
         ("beams", [f"{facts['beams']}"]),
@@ -90,13 +95,13 @@ def as_text(facts: dict[str, Any]) -> str:
         ("no return", ["no such value" if no_return is None else f"{no_return:g} m and above"]),
         ("beams lost", [f"{facts['beams_without_return']:.1%} without return, "
                         f"{facts['beams_unusable']:.1%} unusable"]),
-        ("mounting", [f"{x:g} m ahead, {y:g} m to the left, turned by {degrees:g}°"]),
-        ("odometry", ["none" if odometry is None else f"a path of {odometry['path']:.1f} m"]),
+        ("mounting", [f"{x:g} m ahead, {y:g} m to the left, turned by {degrees:g}°",
+                      used["mounting"]]),
+        ("odometry", [path, used["odometry"]] if path else [used["odometry"]]),
         ("truth", [f"{facts['truth']} poses" if facts["truth"] else "none"]),
         ("records", [f"{count} {tag}" for tag, count in facts["records"].items()]),
         ("out of order", [f"{facts['backward_stamps']} time stamps" if facts["backward_stamps"] else "none"]),
-        ("skipped", [f"{entry['records']} records: {entry['reason']}, first in line {entry['first_line']}"
-                     for entry in facts["skipped"]] or ["none"]),
+        ("skipped", [_skipped(entry) for entry in facts["skipped"]] or ["none"]),
         ("warnings", facts["warnings"] or ["none"]),
     ]  # fmt: skip
     width = max(len(title) for title, _ in rows) + 2
@@ -105,6 +110,13 @@ def as_text(facts: dict[str, Any]) -> str:
         for title, values in rows
         for at, value in enumerate(values)
     )
+
+
+def _skipped(entry: dict[str, Any]) -> str:
+    ((place, first),) = (
+        (key.removeprefix("first_"), entry[key]) for key in entry if key.startswith("first_")
+    )
+    return f"{entry['records']} records: {entry['reason']}, first in {place} {first}"
 
 
 def _share(beams: Any) -> float:

@@ -69,7 +69,9 @@ def common_options(command: Command) -> Command:
 def reading_options(command: Command) -> Command:
     """How a log is to be read; the command gets `reading`, a ReadingOptions."""
     options = [
-        click.option("--laser", metavar="TAG", help="Laser record to use, such as FLASER or RLASER."),
+        click.option("--laser", metavar="TAG", help="Laser of a text log, such as FLASER or laser:0."),
+        click.option("--topic", metavar="TOPIC", help="Laser of an MCAP or a bag, such as /scan."),
+        click.option("--odom-topic", metavar="TOPIC", help="Odometry to use, such as /odom or /tf."),
         click.option("--mount", type=PoseType(), help="Pose of the laser on the robot (m, degrees)."),
         click.option("--flip", is_flag=True, help="The laser is mounted upside down."),
         click.option("--min-range", type=click.FloatRange(0), metavar="M", help="Drop shorter beams."),
@@ -83,6 +85,7 @@ def reading_options(command: Command) -> Command:
                      help="Use every Nth scan."),
         click.option("--no-odometry", is_flag=True, help="Do as if the log had no odometry."),
         click.option("--strict", is_flag=True, help="A malformed record is an error, not a warning."),
+        click.option("--salvage", is_flag=True, help="Use what is readable of a damaged or cut-off file."),
         click.option("--allow-corrected", is_flag=True,
                      help="Accept a log whose poses a mapper has corrected already."),
     ]  # fmt: skip
@@ -94,6 +97,8 @@ def reading_options(command: Command) -> Command:
 
         reading = ReadingOptions(
             laser=kwargs.pop("laser"),
+            topic=kwargs.pop("topic"),
+            odom_topic=kwargs.pop("odom_topic"),
             mount=kwargs.pop("mount"),
             flip=kwargs.pop("flip"),
             min_range=kwargs.pop("min_range"),
@@ -106,6 +111,7 @@ def reading_options(command: Command) -> Command:
             odometry=not kwargs.pop("no_odometry"),
             strict=kwargs.pop("strict"),
             allow_corrected=kwargs.pop("allow_corrected"),
+            salvage=kwargs.pop("salvage"),
         )
         return command(*args, reading=reading, **kwargs)
 

@@ -9,16 +9,13 @@ import numpy as np
 
 from nscan_cli.errors import InputDataError, WrongUsageError
 from nscan_cli.logs import carmen_records, corrected, order
-from nscan_cli.logs.carmen_records import Scans, Skips
-from nscan_cli.logs.laser import (
-    CARMEN_MAX_RANGE,
-    beam_angles,
-    mark_no_returns,
-    mount_from_poses,
-    no_return_value,
-)
+from nscan_cli.logs.assemble import Findings, Motion, RawScans, laser_log
+from nscan_cli.logs.carmen_records import Scans
+from nscan_cli.logs.laser import CARMEN_MAX_RANGE, beam_angles, mount_from_poses
+from nscan_cli.logs.odometry import interpolated
 from nscan_cli.logs.options import ReadingOptions
-from nscan_cli.logs.scan import LaserLog, LogReport, Source
+from nscan_cli.logs.scan import LaserLog, Source
+from nscan_cli.logs.skips import Skips
 from nscan_cli.poses import Array, relative, wrap
 
 Lines = dict[str, list[tuple[int, bytes]]]
@@ -29,6 +26,12 @@ LARGEST_OFFSET = 1e3
 """m; what is beyond was never a mounting."""
 REAR = ("RLASER", "ROBOTLASER2", "RAWLASER2")
 FRONT = ("FLASER", "ROBOTLASER1", "ROBOTLASER0", "RAWLASER1")
+TAGS = re.compile(
+    r"((RAW|ROBOT)?LASER\d|[FR]LASER|ODOM|TRUEPOS|GLOBALPOS|PARAM|SYNC|ODOMETRY|ARM|IMU|XSENS|INERTIAL"
+    r"|SONAR|BUMPER|PANTILT|PTU\w*|GPS\w*|NMEA\w*|NEFF|WEIGHT|MARKER|COMMENT|SM_UPDATE|SCANMARK|POSITION)"
+)
+"""The tags that CARMEN and GMapping write, and some that go with them."""
+MOST_KINDS = 5
 KNOWN = re.compile(
     rb"^[ \t]*(FLASER|RLASER|(RAW|ROBOT)?LASER\d|ODOM|TRUEPOS|PARAM|SYNC|GLOBALPOS)[ \t]", re.MULTILINE
 )
@@ -47,8 +50,15 @@ def read(data: bytes, file: str, source: Source, options: ReadingOptions) -> Las
     """
     skips = Skips(file, options.strict)
     lines = carmen_records.lines_by_tag(data, skips)
-    warnings: list[str] = []
-    tag = _chosen_laser(lines, options, file, warnings)
+    findings = Findings(skips, {name: len(found) for name, found in lines.items()})
+    warnings, used = findings.warnings, findings.used
+    options.refuse_topics(file, "a CARMEN log", "--laser")
+    tag, used["laser"] = _chosen_laser(lines, options, file, warnings)
+    strange = {name: count for name, count in findings.records.items() if not TAGS.fullmatch(name)}
+    if strange:
+        kinds = ", ".join(f"{name} ({count})" for name, count in list(strange.items())[:MOST_KINDS])
+        more = ", …" if len(strange) > MOST_KINDS else ""
+        warnings.append(f"{sum(strange.values())} records of kinds unknown to CARMEN: {kinds}{more}")
     scans = carmen_records.scans(tag, lines[tag], skips)
     if not scans.stamps:
         reason, (_, first) = next(iter(skips.reasons.items()))
@@ -67,41 +77,19 @@ def read(data: bytes, file: str, source: Source, options: ReadingOptions) -> Las
     params = _params(lines)
     times = order.by_time(scans.stamps)
     warnings += times.warnings
-    numbers = order.selection(times.times, options, file)
-    rows = times.rows[numbers]
-    mount = _mount(tag, scans, params, options, warnings)
-    angle_min, angle_increment = _angles(scans, options)
-    no_return, limits = _limits(scans, params, options)
-    ranges = scans.ranges if np.array_equal(rows, np.arange(len(scans.stamps))) else scans.ranges[rows]
-    mark_no_returns(ranges, limits)
-    odometry = _odometry(tag, scans, times, lines, skips, warnings) if options.odometry else None
-    truth_times, truth = _truth(lines, skips, warnings)
-    return LaserLog(
-        source=source,
-        format="CARMEN",
-        laser=tag,
-        numbers=numbers,
-        stamps=tuple(times.stamps[number] for number in numbers),
-        times=times.times[numbers],
-        ranges=ranges,
-        angle_min=angle_min[rows],
-        angle_increment=angle_increment[rows],
-        mount=mount,
-        odometry=None if odometry is None else odometry[numbers],
-        no_return=no_return,
-        range_limits=limits,
-        report=LogReport(
-            records={name: len(found) for name, found in lines.items()},
-            skipped=skips.reasons,
-            backward_stamps=times.backward,
-            warnings=tuple(warnings),
-        ),
-        truth_times=truth_times,
-        truth=truth,
-    )
+    mount, used["mounting"] = _mount(tag, scans, params, options, warnings)
+    angle_min, angle_increment = _angles(scans)
+    raw = RawScans(scans.ranges, angle_min, angle_increment, scans.stamps, (0.0, _farthest(scans, params)))
+    odometry: Array | None = None
+    used["odometry"] = "none: --no-odometry"
+    if options.odometry:
+        odometry, used["odometry"] = _odometry(tag, scans, times, lines, skips, warnings)
+    motion = Motion(odometry, *_truth(lines, skips, warnings))
+    return laser_log(source, "CARMEN", tag, raw, times, mount, motion, findings, options, file)
 
 
-def _chosen_laser(lines: Lines, options: ReadingOptions, file: str, warnings: list[str]) -> str:
+def _chosen_laser(lines: Lines, options: ReadingOptions, file: str, warnings: list[str]) -> tuple[str, str]:
+    """The tag of the laser to use, and why."""
     present = [tag for tag in LASERS if tag in lines]
     if not present:
         found = ", ".join(lines) or "no record at all"
@@ -113,11 +101,12 @@ def _chosen_laser(lines: Lines, options: ReadingOptions, file: str, warnings: li
             raise WrongUsageError(
                 f"{file}: has no {options.laser} scans; --laser can be {', '.join(present)}"
             )
-        return options.laser
+        return options.laser, "chosen by --laser"
     others = ", ".join(f"{tag} ({len(lines[tag])})" for tag in present[1:])
     if others:
         warnings.append(f"{present[0]} is used; --laser would choose {others}")
-    return present[0]
+        return present[0], "the laser in front, with poses, before others"
+    return present[0], "the only laser"
 
 
 def _params(lines: Lines) -> dict[str, float]:
@@ -135,14 +124,14 @@ def _params(lines: Lines) -> dict[str, float]:
 
 def _mount(
     tag: str, scans: Scans, params: Mapping[str, float], options: ReadingOptions, warnings: list[str]
-) -> Array:
-    """The laser on the robot: as the user says, else from both poses of the record, else from PARAM.
+) -> tuple[Array, str]:
+    """The laser on the robot, and why: as the user says, else from both poses of the record, else from PARAM.
 
     CARMEN: laser pose = robot pose ⊕ (offset, side offset, angular offset), for the rear laser too, whose
     angular offset is half a turn where the log gives none.
     """
     if options.mount is not None:
-        return np.array(options.mount, dtype=np.float64)
+        return np.array(options.mount, dtype=np.float64), "--mount"
     given = _param_mount(tag, params)
     if scans.robot.shape[1] and not np.array_equal(scans.laser, scans.robot):
         mount = mount_from_poses(scans.laser, scans.robot)
@@ -152,19 +141,19 @@ def _mount(
                 warnings.append(
                     f"PARAM mounts the laser at {_said(given)}, the poses at {_said(mount)}: these hold"
                 )
-        return mount
+        return mount, f"both poses of {tag}"
     if given is not None:
         if scans.robot.shape[1] and given.any():
             warnings.append(f"both poses of {tag} are equal; the mounting is PARAM's, {_said(given)}")
-        return given
+        return given, "PARAM"
     if tag in REAR:
         warnings.append("the log does not say how the rear laser is mounted: taken as turned by 180°")
-        return np.array([0.0, 0.0, np.pi])
+        return np.array([0.0, 0.0, np.pi]), "assumed: turned by 180°"
     if tag not in FRONT:
         warnings.append(
             f"the log does not say how {tag} is mounted: taken as at the robot's centre; see --mount"
         )
-    return np.zeros(3)
+    return np.zeros(3), "assumed: at the robot's centre"
 
 
 def _param_mount(tag: str, params: Mapping[str, float]) -> Array | None:
@@ -184,67 +173,47 @@ def _said(pose: Array) -> str:
     return f"{pose[0]:g} m, {pose[1]:g} m, {np.degrees(pose[2]):g}°"
 
 
-def _angles(scans: Scans, options: ReadingOptions) -> tuple[Array, Array]:
+def _angles(scans: Scans) -> tuple[Array, Array]:
     """First direction and step (S,) of each scan, rad."""
     by_count = {int(n): beam_angles(int(n)) for n in np.unique(scans.beams)}
     angles = np.array([by_count[int(n)] for n in scans.beams])
     if scans.head.shape[1]:
         known = scans.head[:, 3] != 0
         angles[known] = scans.head[known][:, (1, 3)]
-    if options.angle_increment is not None:
-        angles[:, 1] = options.angle_increment
-    if options.angle_min is not None:
-        angles[:, 0] = options.angle_min
-    if options.flip:
-        angles = -angles
     return angles[:, 0], angles[:, 1]
 
 
-def _limits(
-    scans: Scans, params: Mapping[str, float], options: ReadingOptions
-) -> tuple[float | None, tuple[float, float]]:
-    """The no-return value found, and the range limits in force (m)."""
-    no_return = no_return_value(scans.ranges)
-    high = CARMEN_MAX_RANGE
+def _farthest(scans: Scans, params: Mapping[str, float]) -> float:
+    """The range (m) from which on a reading says that nothing was met."""
+    farthest = CARMEN_MAX_RANGE
     if scans.head.shape[1] and (scans.head[:, 4] > 0).any():
-        high = float(scans.head[:, 4].max())
+        farthest = float(scans.head[:, 4].max())
     if params.get("robot_front_laser_max", 0) > 0:
-        high = min(high, params["robot_front_laser_max"])
-    if options.max_range is not None:
-        high = options.max_range
-    if no_return is not None:
-        high = min(high, no_return)
-    return no_return, (options.min_range or 0.0, high)
+        farthest = min(farthest, params["robot_front_laser_max"])
+    return farthest
 
 
 def _odometry(
     tag: str, scans: Scans, times: order.Order, lines: Lines, skips: Skips, warnings: list[str]
-) -> Array | None:
-    """Poses of the robot (S, 3) in order of time: the record's own, else of the ODOM lines around it."""
+) -> tuple[Array | None, str]:
+    """Poses of the robot (S, 3) in order of time, and why: the record's own, else of the ODOM lines."""
     if scans.robot.shape[1]:
         if len(times.rows) > 1 and not scans.robot.any():
             warnings.append("all poses are zero: taken as a log without odometry")
-            return None
+            return None, "none: all poses are zero"
         poses = scans.robot[times.rows]
         poses[:, 2] = wrap(poses[:, 2])
-        return poses
+        return poses, f"the poses in {tag}"
     values, stamps, _ = carmen_records.numbers(lines.get("ODOM", []), 6, skips)
     if not len(values):
         warnings.append(f"{tag} carries no pose and the log has no ODOM record: no odometry")
-        return None
+        return None, "none: no pose in the log"
     moments = order.by_time(stamps)
     if times.nominal or moments.nominal:
         warnings.append(f"{tag} carries no pose, and the time stamps do not lead to ODOM's: no odometry")
-        return None
-    poses = values[moments.rows, :3]
-    at = moments.times
-    outside = int(np.sum((times.times < at[0]) | (times.times > at[-1])))
-    if outside:
-        warnings.append(f"{outside} scans lie before the first ODOM record or after the last")
-    poses[:, 2] = np.unwrap(poses[:, 2])
-    found = np.stack([np.interp(times.times, at, poses[:, axis]) for axis in range(3)], axis=-1)
-    found[:, 2] = wrap(found[:, 2])
-    return found
+        return None, "none: no time stamps"
+    found = interpolated(times.times, moments.times, values[moments.rows, :3], "ODOM record", warnings)
+    return found, "none: at other times" if found is None else "ODOM records, interpolated"
 
 
 def _truth(lines: Lines, skips: Skips, warnings: list[str]) -> tuple[Array | None, Array | None]:

@@ -7,52 +7,18 @@ logger_timestamp`; lines that begin with # are comments.
 from __future__ import annotations
 
 import re
-import warnings
-from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
-from nscan_cli.errors import InputDataError
+from nscan_cli.logs.skips import Skips
+from nscan_cli.logs.text_records import Record, as_text, beam_count, parsed, sound
 from nscan_cli.poses import Array
 
 TAG = re.compile(rb"[A-Z][A-Z0-9_]{2,31}\Z")
 NEW = re.compile(r"(RAW|ROBOT)LASER\d\Z")
 TRAILER = 3
-CHUNK = 1024
-MAX_BEAMS = 16384
-LARGEST = 1e9
-"""m; no pose is beyond, whatever its coordinates."""
-
-
-@dataclass
-class Skips:
-    """Records that were left out, by reason; under `strict` the first one is an error."""
-
-    file: str
-    strict: bool
-    reasons: dict[str, tuple[int, int]] = field(default_factory=dict)
-
-    def add(self, reason: str, line: int) -> None:
-        """Count one record. Raises InputDataError under strict."""
-        if self.strict:
-            raise InputDataError(self.file, reason, "mend the line, or leave out --strict", line)
-        count, first = self.reasons.get(reason, (0, line))
-        self.reasons[reason] = (count + 1, min(first, line))
-
-
-@dataclass(frozen=True)
-class Record:
-    """One line: its number in the file (from 1), the values as text, and the trailer where there is one."""
-
-    line: int
-    values: bytes
-    count: int
-    """How many values."""
-    stamp: str
-    """The ipc timestamp as written; empty when the line has no trailer."""
-    host: bytes = b""
 
 
 @dataclass
@@ -113,11 +79,11 @@ def numbers(
         except ValueError:
             skips.add("a value is not a number", number)
             continue
-        if not _sound(row):
+        if not sound(row):
             skips.add("a value is out of bounds", number)
             continue
         rows.append(row)
-        stamps.append(_text(tokens[count]) if len(tokens) > count else "")
+        stamps.append(as_text(tokens[count]) if len(tokens) > count else "")
         places.append(number)
     return np.array(rows, dtype=np.float64).reshape(-1, count), stamps, places
 
@@ -141,7 +107,7 @@ def scans(tag: str, lines: list[tuple[int, bytes]], skips: Skips) -> Scans:
         hosts=set(),
     )
     row = 0
-    for record, beams, values in _parsed(records, skips):
+    for record, beams, values in parsed(records, skips):
         problem = _problem(values, head, beams, poses, tail)
         if problem:
             skips.add(problem, record.line)
@@ -175,13 +141,8 @@ def _record(number: int, text: bytes, head: int, tail: int, skips: Skips) -> tup
     if not text or len(start) <= head:
         skips.add("wrong number of values", number)
         return None
-    try:
-        beams = int(start[head])
-    except ValueError:
-        skips.add("the beam count is not a number", number)
-        return None
-    if not 0 < beams <= MAX_BEAMS:
-        skips.add(f"the beam count is not in 1…{MAX_BEAMS}", number)
+    beams = beam_count(start[head], number, skips)
+    if beams is None:
         return None
     least = head + 1 + beams + tail + (1 if head else 0)
     if tokens == least and not head:
@@ -190,37 +151,7 @@ def _record(number: int, text: bytes, head: int, tail: int, skips: Skips) -> tup
         skips.add("wrong number of values", number)
         return None
     values, stamp, host, _ = text.rsplit(b" ", TRAILER)
-    return Record(number, values, tokens - TRAILER, _text(stamp), host), beams
-
-
-def _parsed(records: list[tuple[Record, int]], skips: Skips) -> Iterator[tuple[Record, int, Array]]:
-    """Each record with its numbers, parsed many lines at a time where all are well formed."""
-    for begin in range(0, len(records), CHUNK):
-        part = records[begin : begin + CHUNK]
-        values = _floats(b" ".join(record.values for record, _ in part))
-        if values is not None and values.size == sum(record.count for record, _ in part):
-            at = 0
-            for record, beams in part:
-                yield record, beams, values[at : at + record.count]
-                at += record.count
-            continue
-        for record, beams in part:
-            alone = _floats(record.values)
-            if alone is None or alone.size != record.count:
-                skips.add("a value is not a number", record.line)
-            else:
-                yield record, beams, alone
-
-
-def _floats(text: bytes) -> Array | None:
-    """All numbers of a text separated by blanks, or None when something else is among them."""
-    with warnings.catch_warnings():
-        # NumPy warns where it stops early; a later one raises ValueError.
-        warnings.simplefilter("error", DeprecationWarning)
-        try:
-            return np.fromstring(text, dtype=np.float64, sep=" ")
-        except (DeprecationWarning, ValueError):
-            return None
+    return Record(number, values, tokens - TRAILER, as_text(stamp), host), beams
 
 
 def _problem(values: Array, head: int, beams: int, poses: int, tail: int) -> str:
@@ -229,18 +160,10 @@ def _problem(values: Array, head: int, beams: int, poses: int, tail: int) -> str
         remissions = values[head + 1 + beams]
         if remissions != len(values) - (head + 1 + beams + 1 + tail):
             return "wrong number of values"
-        if not _sound(values[:head]) or np.abs(values[[1, 3]]).max() > 4 * np.pi:
+        if not sound(values[:head]) or np.abs(values[[1, 3]]).max() > 4 * np.pi:
             return "an angle is out of bounds"
     if poses:
         at = len(values) - tail
-        if not _sound(values[at : at + poses]):
+        if not sound(values[at : at + poses]):
             return "a pose is out of bounds"
     return ""
-
-
-def _sound(values: ArrayLike) -> bool:
-    return bool((np.abs(values) < LARGEST).all())
-
-
-def _text(stamp: bytes) -> str:
-    return stamp.decode("ascii", "replace")

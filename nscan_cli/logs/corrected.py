@@ -8,6 +8,9 @@ import numpy as np
 
 from nscan_cli.logs.carmen_records import Scans
 
+OWN_HOST = b"nscan-cli"
+"""The host of the records that this program writes, whose poses are corrected ones."""
+
 
 def sign(tags: Container[str], scans: Scans) -> str:
     """What gives the log away as corrected (by GMapping's gfs2log and its like), or an empty string.
@@ -20,6 +23,8 @@ def sign(tags: Container[str], scans: Scans) -> str:
             return f"it has {tag} records"
     if b"pippo" in scans.hosts:
         return "its host is pippo, which GMapping writes"
+    if OWN_HOST in scans.hosts:
+        return "its host is nscan-cli, which writes corrected poses"
     equal = scans.robot.shape[1] and np.array_equal(scans.laser, scans.robot)
     stamps = [stamp for stamp in scans.stamps if stamp]
     if equal and stamps and all(map(_is_short, stamps)) and any(map(_lost_digits, stamps)):

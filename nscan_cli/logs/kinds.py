@@ -5,9 +5,7 @@ from __future__ import annotations
 import re
 
 MAGIC = (
-    (b"\x89MCAP0\r\n", "an MCAP recording"),
-    (b"#ROSBAG V", "a ROS 1 bag"),
-    (b"SQLite format 3\0", "an SQLite database, as a ROS 2 .db3 bag is"),
+    (b"#ROSBAG V", "a ROS 1 bag of an old version"),
     (b"\x89PNG\r\n\x1a\n", "a PNG picture"),
     (b"\xff\xd8\xff", "a JPEG picture"),
     (b"P5", "a PGM picture"),
@@ -28,9 +26,8 @@ TEXT = (
     (rb"<", "HTML or XML text"),
     (rb"(VERTEX_SE2|EDGE_SE2|VERTEX2|EDGE2|VERTEX_SE3:QUAT|EDGE_SE3:QUAT)\s", "a pose graph (g2o or TORO)"),
     (rb"(LASER_READING|GFS_\w+)\s", "a GMapping .gfs file"),
-    (rb"(POS|LASER-RANGE) \d+ \d+:", "a log in the .script form (cm and degrees)"),
-    (rb"\d+\.\d+ \S+ \d+ [a-z]\w* \d+ \d+\.\d+(\s|$)", "a Player log, version 1"),
-    (rb"\d+\.\d+ \S+ \d+ [a-z]\w* \d+ \d+ \d+(\s|$)", "a Player log, version 2"),
+    (rb"(position|laser) \d+ -?\d+(\.\d+)? -?\d+(\.\d+)? ", "a Player log of 2002, older than version 1"),
+    (rb"(@SENS|@OPEN|#ROBOT|#LASER)\s", "a BeeSoft .rec log"),
     (rb"(image|resolution):", "a map's YAML file"),
     (rb"([-+.\deE]+[ \t]+){7}[-+.\deE]+\s*$", "a list of eight numbers a line, as of poses or relations"),
 )

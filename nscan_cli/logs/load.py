@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import gzip
 import hashlib
+import importlib
 import zlib
+from dataclasses import replace
 from typing import Protocol
 
 from nscan_cli.errors import InputDataError
 from nscan_cli.inputs import base_name, label, read_bytes
-from nscan_cli.logs import carmen
+from nscan_cli.logs import carmen, player, script
 from nscan_cli.logs.kinds import name_of
 from nscan_cli.logs.options import ReadingOptions
 from nscan_cli.logs.scan import LaserLog, Source
@@ -18,18 +20,31 @@ from nscan_cli.logs.scan import LaserLog, Source
 class Reader(Protocol):
     """What a module that reads a form of log has."""
 
-    def recognises(self, data: bytes) -> bool:
-        """Whether these bytes are of its form."""
-
     def read(self, data: bytes, file: str, source: Source, options: ReadingOptions) -> LaserLog:
         """The scans; `file` is what messages call it. Raises InputDataError and WrongUsageError."""
 
 
-READERS: tuple[Reader, ...] = (carmen,)
+class TextReader(Reader, Protocol):
+    """What a module that reads a form of text has besides."""
+
+    def recognises(self, data: bytes) -> bool:
+        """Whether these bytes are of its form."""
+
+
+BINARY = {
+    b"\x89MCAP0\r\n": "nscan_cli.logs.mcap_log",
+    b"#ROSBAG V2.0\n": "nscan_cli.logs.rosbag1",
+    b"SQLite format 3\0": "nscan_cli.logs.rosbag2",
+}
+"""Modules by the first bytes of what they read; imported when such a log is met."""
+TEXT: tuple[TextReader, ...] = (carmen, player, script)
 """In order of trial."""
 AS_FOUND = ReadingOptions()
 
 GZIP = b"\x1f\x8b"
+PIECE = 256
+FORMS = "CARMEN or Player text, MCAP, a ROS bag; plain or compressed by gzip"
+MEND = "fetch the file again, or use what can be read with --salvage"
 
 
 def read_log(path: str, options: ReadingOptions = AS_FOUND) -> LaserLog:
@@ -41,14 +56,26 @@ def read_log(path: str, options: ReadingOptions = AS_FOUND) -> LaserLog:
     stored = read_bytes(path)
     name = label(path)
     source = Source(base_name(path), hashlib.sha256(stored).hexdigest(), len(stored))
-    data = unpacked(stored, name)
+    data, lost = salvaged(stored) if options.salvage else (unpacked(stored, name), None)
     del stored
     if not data.strip():
         raise InputDataError(name, "is empty", "give a log with laser scans")
-    for reader in READERS:
-        if reader.recognises(data):
-            return reader.read(data, name, source, options)
-    raise InputDataError(name, f"is {name_of(data)}", "give a CARMEN log, plain or compressed by gzip")
+    log = _reader(data, name).read(data, name, source, options)
+    if lost is None:
+        return log
+    report = replace(log.report, warnings=(lost, *log.report.warnings))
+    return replace(log, report=report)
+
+
+def _reader(data: bytes, name: str) -> Reader:
+    for magic, module in BINARY.items():
+        if data.startswith(magic):
+            reader: Reader = importlib.import_module(module)
+            return reader
+    for text in TEXT:
+        if text.recognises(data):
+            return text
+    raise InputDataError(name, f"is {name_of(data)}", f"give a log: {FORMS}")
 
 
 def unpacked(stored: bytes, name: str) -> bytes:
@@ -58,6 +85,30 @@ def unpacked(stored: bytes, name: str) -> bytes:
     try:
         return gzip.decompress(stored)
     except EOFError as error:
-        raise InputDataError(name, "the gzip data end too early", "fetch the file again") from error
+        raise InputDataError(name, "the gzip data end too early", MEND) from error
     except (zlib.error, OSError) as error:
-        raise InputDataError(name, f"the gzip data are damaged ({error})", "fetch the file again") from error
+        raise InputDataError(name, f"the gzip data are damaged ({error})", MEND) from error
+
+
+def salvaged(stored: bytes) -> tuple[bytes, str | None]:
+    """The content of `stored` as far as it can be unpacked, and what was lost; None when nothing was."""
+    if not stored.startswith(GZIP):
+        return stored, None
+    content, rest = bytearray(), stored
+    while rest.startswith(GZIP):
+        member = zlib.decompressobj(zlib.MAX_WBITS | 16)
+        try:
+            # In pieces: what goes before the damage stays.
+            for at in range(0, len(rest), PIECE):
+                content += member.decompress(rest[at : at + PIECE])
+                if member.eof:
+                    break
+        except zlib.error as error:
+            at = len(stored) - len(rest) + at
+            return bytes(content), f"the gzip data are damaged near byte {at} ({error}): the rest is lost"
+        if not member.eof:
+            return bytes(content), "the gzip data end too early: the rest is lost"
+        rest = (member.unused_data + rest[at + PIECE :]).lstrip(b"\0")
+    if rest:
+        return bytes(content), f"{len(rest)} bytes after the gzip data are no such data: left out"
+    return bytes(content), None

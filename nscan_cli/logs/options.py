@@ -13,6 +13,11 @@ class ReadingOptions:
     """What the user may say about how a log is to be read; None means: find it in the log."""
 
     laser: str | None = None
+    """Tag or device of the laser in a text log."""
+    topic: str | None = None
+    """Topic of the laser in a recording."""
+    odom_topic: str | None = None
+    """Topic, or device of a Player log, of the odometry."""
     mount: tuple[float, float, float] | None = None
     """x, y (m), θ (rad)."""
     flip: bool = False
@@ -30,6 +35,8 @@ class ReadingOptions:
     odometry: bool = True
     strict: bool = False
     allow_corrected: bool = False
+    salvage: bool = False
+    """Use what is readable of a damaged or truncated file."""
 
     def __post_init__(self) -> None:
         """Refuse values that no log fits. Raises WrongUsageError."""
@@ -42,3 +49,16 @@ class ReadingOptions:
             raise WrongUsageError("--angle-increment is 0; beams need different directions")
         if self.start is not None and self.end is not None and self.start > self.end:
             raise WrongUsageError("--start is after --end; no scan lies between")
+
+    def refuse_topic(self, file: str, form: str, instead: str) -> None:
+        """For a log of `form` whose lasers are no topics. Raises WrongUsageError when one is asked for."""
+        self._refuse("--topic", self.topic, file, form, instead)
+
+    def refuse_topics(self, file: str, form: str, instead: str) -> None:
+        """For a log of `form` without topics at all. Raises WrongUsageError when one is asked for."""
+        self.refuse_topic(file, form, instead)
+        self._refuse("--odom-topic", self.odom_topic, file, form, instead)
+
+    def _refuse(self, option: str, value: str | None, file: str, form: str, instead: str) -> None:
+        if value is not None:
+            raise WrongUsageError(f"{file}: is {form}, without topics; leave out {option}, see {instead}")

@@ -28,16 +28,20 @@ class LogReport:
     """Records by their tag."""
     skipped: dict[str, tuple[int, int]] = field(default_factory=dict)
     """Reason → (how many records were skipped for it, line of the first)."""
+    skipped_place: str = "line"
+    """What the first is counted in: "line", or "message" of its topic."""
     backward_stamps: int = 0
     """Steps back in time in file order; the scans are sorted stably all the same."""
     warnings: tuple[str, ...] = ()
     """Whole sentences for the user."""
+    used: dict[str, str] = field(default_factory=dict)
+    """Why it is this "laser", and where "odometry" and "mounting" are from."""
 
     def notices(self) -> list[str]:
         """The warnings, and what was skipped, for commands that do not list it."""
         return [*self.warnings] + [
-            f"{count} records skipped: {reason}, first in line {line}"
-            for reason, (count, line) in self.skipped.items()
+            f"{count} records skipped: {reason}, first in {self.skipped_place} {first}"
+            for reason, (count, first) in self.skipped.items()
         ]
 
 

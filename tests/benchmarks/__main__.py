@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import json
 import sys
+from itertools import chain
 from pathlib import Path
 
-from tests.benchmarks import matching
+from tests.benchmarks import matching, reading
 from tests.benchmarks.clock import best_of, workload
 
 
@@ -15,7 +16,7 @@ def main(out: str | None) -> None:
     unit = best_of(workload, 20)
     print(f"{'workload':<48}{unit:>10.2f} ms{'ratio':>9}")
     rows = {}
-    for timing in matching.timings():
+    for timing in chain(matching.timings(), reading.timings()):
         ratio = timing.milliseconds / unit
         rows[timing.name] = {"milliseconds": round(timing.milliseconds, 3), "ratio": round(ratio, 4)}
         print(f"{timing.name:<48}{timing.milliseconds:>10.2f} ms{ratio:>9.3f}")

@@ -7,7 +7,7 @@ import numpy as np
 from tests.logs.lines import flaser
 
 ALL_OUTPUTS = ["-o", "out.json", "--map", "out.png", "--trajectory", "out.tum", "--g2o", "out.g2o",
-               "--depfile", "out.d"]  # fmt: skip
+               "--carmen", "out.log", "--depfile", "out.d"]  # fmt: skip
 
 
 def room_log(count: int) -> str:

@@ -12,8 +12,8 @@ from tests.logs.lines import flaser
 KEYS = [
     "file", "sha256", "bytes", "format", "laser", "scans", "first_scan", "last_scan", "beams", "angle_min",
     "angle_max", "angle_increment", "start", "duration", "rate", "longest_gap", "odometry", "no_return",
-    "beams_without_return", "beams_unusable", "mounting", "range_limits", "records", "skipped",
-    "backward_stamps", "truth", "warnings",
+    "beams_without_return", "beams_unusable", "mounting", "range_limits", "used", "records",
+    "skipped", "backward_stamps", "truth", "warnings",
 ]  # fmt: skip
 
 
@@ -46,6 +46,7 @@ def test_json(log, capsys):
         "range_limits": [0, 80], "records": {"PARAM": 1, "FLASER": 4, "TRUEPOS": 1},
         "skipped": [{"reason": "wrong number of values", "records": 1, "first_line": 4}],
         "backward_stamps": 1, "truth": 1,
+        "used": {"laser": "the only laser", "mounting": "PARAM", "odometry": "the poses in FLASER"},
     }  # fmt: skip
     assert {key: facts[key] for key in expected} == expected
 
@@ -59,6 +60,7 @@ def test_text_is_aligned_and_says_the_same(log, capsys):
     for said in (
         "numbered 0 to 2", "-90° to 90°, 60° a beam", "81.91 m and above", "a path of 7.0 m",
         "turned by 28.6479°", "1 records: wrong number of values, first in line 4", "1 time stamps",
+        "FLASER, the only laser", "the poses in FLASER", "PARAM",
     ):  # fmt: skip
         assert said in text
 
@@ -86,7 +88,8 @@ def test_a_single_scan_has_no_rate(tmp_path, capsys):
     ("arguments", "code"),
     [(["none.log"], 66), (["."], 66), (["empty"], 65), (["small.log", "--strict"], 65),
      (["small.log", "--laser", "RLASER"], 2), (["small.log", "--start", "99"], 2),
-     (["small.log", "--max-range", "nan"], 2)],
+     (["small.log", "--max-range", "nan"], 2), (["small.log", "--topic", "/scan"], 2),
+     (["small.log", "--odom-topic", "/odom"], 2)],
 )  # fmt: skip
 def test_mistakes_are_one_line(log, tmp_path, monkeypatch, capsys, arguments, code):
     monkeypatch.chdir(tmp_path)

@@ -288,3 +288,9 @@ def test_equal_poses_alone_are_no_sign_of_correction(tmp_path, times):
 
 def test_six_digit_times_alone_are_no_sign_of_correction(tmp_path):
     assert len(read(tmp_path, flaser("1.13486e+09", laser=(1.1, 0, 0), robot=(1, 0, 0)))) == 1
+
+
+def test_records_of_unknown_kinds_are_told(tmp_path):
+    log = read(tmp_path, flaser(1), flaser(2).replace("FLASER", "FLASEQ"), flaser(3), "SONAR 1 2 3 h 4")
+    assert len(log) == 2
+    assert log.report.warnings[0] == "1 records of kinds unknown to CARMEN: FLASEQ (1)"

@@ -1,0 +1,194 @@
+"""Messages as bytes → what the reader needs of them, whatever they are encoded in."""
+
+from __future__ import annotations
+
+import re
+import struct
+from collections.abc import Callable, Iterable
+from functools import lru_cache
+from typing import Any, NamedTuple, TypeVar
+
+from numpy.typing import NDArray
+from rosbags.serde import SerdeError
+from rosbags.typesys import Stores, TypesysError, get_types_from_idl, get_types_from_msg, get_typestore
+
+from nscan_cli.errors import InputDataError
+from nscan_cli.logs.recording import Channel
+
+Quaternion = tuple[float, float, float, float]
+"""x, y, z, w"""
+Point = tuple[float, float, float]
+T = TypeVar("T")
+S = 10**9
+"""ns"""
+LATEST = 2**63
+"""ns"""
+NO_DEFINITION = (TypesysError, KeyError, ValueError, IndexError, AttributeError, TypeError, NameError,
+                 AssertionError, SyntaxError, RecursionError)  # fmt: skip
+"""What a damaged definition can raise: rosbags makes code of it."""
+IDL_PART = "=" * 80 + "\nIDL: "
+INCLUDE = re.compile(r"^[ \t]*#.*$", re.MULTILINE)
+UNDECODABLE = (SerdeError, ValueError, IndexError, KeyError, TypeError, AttributeError, AssertionError,
+               OverflowError, MemoryError, struct.error)  # fmt: skip
+"""What decoding a damaged message can raise; protobuf's own error is turned into ValueError."""
+
+
+class Rigid(NamedTuple):
+    """A pose or a transform in space."""
+
+    translation: Point
+    """m"""
+    rotation: Quaternion
+
+
+class Sweep(NamedTuple):
+    """One scan."""
+
+    stamp: int
+    """ns, 0 where the message has none."""
+    frame: str
+    angle_min: float
+    """rad"""
+    angle_increment: float
+    """rad"""
+    range_min: float
+    """m; readings outside range_min … range_max say nothing."""
+    range_max: float
+    ranges: NDArray[Any]
+    """(B,) m"""
+    pose: Rigid | None
+    """Of the laser in `frame`, where the message has one."""
+
+
+class Placed(NamedTuple):
+    """The child frame in the parent frame at a time: a transform, or odometry."""
+
+    stamp: int
+    """ns, 0 where the message has none."""
+    parent: str
+    child: str
+    pose: Rigid
+
+
+def sweep_decoder(channel: Channel, file: str) -> Callable[[bytes], Sweep]:
+    """What turns a message with a scan into one. Raises InputDataError when the channel is not known."""
+    return _viewed(channel, file, _foxglove().sweep if _is_foxglove(channel) else _ros_sweep)
+
+
+def placed_decoder(channel: Channel, file: str) -> Callable[[bytes], list[Placed]]:
+    """What turns a message with odometry or transforms into them. Raises InputDataError likewise."""
+    if _is_foxglove(channel):
+        return _viewed(channel, file, _foxglove().VIEWS[channel.type])
+    return _viewed(channel, file, _ros_odometry if channel.type.endswith("Odometry") else _ros_transforms)
+
+
+def nanoseconds(seconds: int, rest: int) -> int:
+    """A time in ns; 0 for one before 1970, which was never set. Raises ValueError for one out of bounds."""
+    time = int(seconds) * S + int(rest)
+    if time >= LATEST:
+        raise ValueError("the time is out of bounds")
+    return max(time, 0)
+
+
+def frame_name(name: str) -> str:
+    """A frame's name; ROS 1 wrote some with a slash in front."""
+    return name.removeprefix("/")
+
+
+def _is_foxglove(channel: Channel) -> bool:
+    return channel.type.startswith("foxglove.")
+
+
+def unknown_encoding(channel: Channel, file: str) -> InputDataError:
+    """The error that a channel's messages are in no form that is known."""
+    problem = f"{channel.topic} ({channel.type}) is encoded in {channel.encoding or 'nothing that is named'}"
+    return InputDataError(file, problem, "record ROS messages as ros1 or cdr, Foxglove's as protobuf or json")
+
+
+def _foxglove() -> Any:
+    """The module that only Foxglove's recordings need."""
+    from nscan_cli.logs import foxglove
+
+    return foxglove
+
+
+def _viewed(channel: Channel, file: str, view: Callable[[Any], T]) -> Callable[[bytes], T]:
+    decode = _foxglove().decoder(channel, file) if _is_foxglove(channel) else _ros_decoder(channel, file)
+    return lambda data: view(decode(data))
+
+
+def _ros_decoder(channel: Channel, file: str) -> Callable[[bytes], Any]:
+    if channel.encoding not in ("ros1", "cdr"):
+        raise unknown_encoding(channel, file)
+    try:
+        return _deserializer(channel.type, channel.encoding, channel.schema_encoding, channel.schema)
+    except NO_DEFINITION as error:
+        problem = f"the definition of {channel.type} on {channel.topic} cannot be read"
+        remedy = f"record it with its {channel.schema_encoding or 'ROS'} definition"
+        raise InputDataError(file, problem, remedy) from error
+
+
+@lru_cache(maxsize=64)
+def _deserializer(name: str, encoding: str, schema_encoding: str, schema: bytes) -> Callable[[bytes], Any]:
+    """What decodes a type of message; rosbags compiles it from the definition, which takes its time."""
+    if schema:
+        store = get_typestore(Stores.EMPTY)
+        store.register(_types(name, schema_encoding, schema))
+    else:
+        # Bags written before ROS 2 Iron have no definitions; these types have not changed since.
+        store = get_typestore(Stores.ROS1_NOETIC if encoding == "ros1" else Stores.ROS2_HUMBLE)
+    store.get_msgdef(name)
+    deserialize = store.deserialize_ros1 if encoding == "ros1" else store.deserialize_cdr
+    return lambda data: deserialize(data, name)
+
+
+def _types(name: str, schema_encoding: str, schema: bytes) -> Any:
+    text = schema.decode("utf-8", "replace")
+    if schema_encoding != "ros2idl":
+        return get_types_from_msg(text, name)
+    # The definitions that a text includes are in its other parts.
+    text = INCLUDE.sub("", text)
+    if not text.startswith(IDL_PART):
+        return get_types_from_idl(text)
+    types = {}
+    for part in text.split(IDL_PART)[1:]:
+        types.update(get_types_from_idl(part.partition("\n")[2]))
+    return types
+
+
+def _ros_sweep(message: Any) -> Sweep:
+    """sensor_msgs/LaserScan; its stamp is the time of the first ray."""
+    header, ranges, step = message.header, message.ranges, message.angle_increment
+    if step == 0 and len(ranges) > 1:
+        step = (message.angle_max - message.angle_min) / (len(ranges) - 1)
+    return Sweep(
+        nanoseconds(header.stamp.sec, header.stamp.nanosec),
+        frame_name(header.frame_id),
+        message.angle_min,
+        step,
+        message.range_min,
+        message.range_max,
+        ranges,
+        None,
+    )
+
+
+def _ros_odometry(message: Any) -> list[Placed]:
+    """nav_msgs/Odometry"""
+    pose = message.pose.pose
+    return [_ros_placed(message.header, message.child_frame_id, pose.position, pose.orientation)]
+
+
+def _ros_transforms(message: Any) -> list[Placed]:
+    """tf2_msgs/TFMessage"""
+    parts: Iterable[Any] = message.transforms
+    return [
+        _ros_placed(part.header, part.child_frame_id, part.transform.translation, part.transform.rotation)
+        for part in parts
+    ]
+
+
+def _ros_placed(header: Any, child: str, at: Any, turned: Any) -> Placed:
+    pose = Rigid((at.x, at.y, at.z), (turned.x, turned.y, turned.z, turned.w))
+    stamp = nanoseconds(header.stamp.sec, header.stamp.nanosec)
+    return Placed(stamp, frame_name(header.frame_id), frame_name(child), pose)

@@ -1,0 +1,140 @@
+"""Player text logs, version 1 (Player 1.x) and version 2 (Player 2 and 3), as in the Radish collection."""
+
+from __future__ import annotations
+
+import re
+
+import numpy as np
+
+from nscan_cli.errors import InputDataError, WrongUsageError
+from nscan_cli.logs import order, player_records
+from nscan_cli.logs.assemble import Findings, Motion, laser_log
+from nscan_cli.logs.kinds import FIRST_LINE
+from nscan_cli.logs.odometry import interpolated
+from nscan_cli.logs.options import ReadingOptions
+from nscan_cli.logs.player_records import Lines, Scans, Version
+from nscan_cli.logs.scan import LaserLog, Source
+from nscan_cli.logs.skips import Skips
+from nscan_cli.poses import Array, wrap
+
+FORMS: tuple[tuple[Version, re.Pattern[bytes]], ...] = (
+    (1, re.compile(rb"\d+\.\d+ +\S+ +\d+ +[a-z]\w* +\d+ +\d+\.\d+(\s|$)")),
+    (2, re.compile(rb"\d+\.\d+ +\S+ +\d+ +[a-z]\w* +\d+ +\d+ +\d+(\s|$)")),
+)
+"""Version 1 has the time of the data where version 2 has type and subtype."""
+ODOMETRY = ("position", "position2d")
+DATA = ("", "1:1", "1:2")
+"""The kinds of records that hold scans or poses."""
+UNSAID_MOUNT = "the log does not say how the laser is mounted: taken as at the robot's centre; see --mount"
+
+
+def recognises(data: bytes) -> bool:
+    """Whether the first line that is neither blank nor a comment has a Player log's beginning."""
+    return _version(data) is not None
+
+
+def read(data: bytes, file: str, source: Source, options: ReadingOptions) -> LaserLog:
+    """The scans of one laser of a Player log, with the odometry of a position device.
+
+    Raises InputDataError when no scan is left to read, WrongUsageError when the options do not fit the
+    log or have to choose between devices.
+    """
+    options.refuse_topic(file, "a Player log", "--laser laser:0")
+    version = _version(data) or 1
+    skips = Skips(file, options.strict)
+    lines = player_records.lines_by_device(data, version, skips)
+    findings = Findings(skips, {_said(key): len(found) for key, found in lines.items()})
+    laser, findings.used["laser"] = _chosen("laser", options.laser, ("laser",), lines, file)
+    if laser is None:
+        found = ", ".join(findings.records) or "no record at all"
+        raise InputDataError(file, f"has no laser scans, only {found}", "give a log of a laser device")
+    scans = player_records.scans(laser, lines, version, skips)
+    if not scans.raw.stamps:
+        reason, (_, first) = next(iter(skips.reasons.items()))
+        problem = f"no record of {laser} can be read: {reason}"
+        raise InputDataError(file, problem, "give a log with whole records", first)
+    times = order.by_time(scans.raw.stamps)
+    findings.warnings += times.warnings
+    mount = _mount(laser, lines, options, findings)
+    odometry = _odometry(scans, lines, times, options, findings, file)
+    form, motion = f"Player, version {version}", Motion(odometry)
+    return laser_log(source, form, laser, scans.raw, times, mount, motion, findings, options, file)
+
+
+def _version(data: bytes) -> Version | None:
+    line = FIRST_LINE.search(data, 0, 1 << 16)
+    if b"\0" in data[:512] or line is None:
+        return None
+    return next((version for version, form in FORMS if form.match(line.group(1))), None)
+
+
+def _chosen(
+    option: str, asked: str | None, interfaces: tuple[str, ...], lines: Lines, file: str
+) -> tuple[str | None, str]:
+    """The device to use of some interfaces, and why; None when there is none.
+
+    Raises WrongUsageError when the one asked for is not there, or there are several and none is asked for.
+    """
+    counts: dict[str, int] = {}
+    for (device, kind), found in sorted(lines.items()):
+        if device.split(":")[-2] in interfaces and kind in DATA:
+            counts[device] = counts.get(device, 0) + len(found)
+    listed = ", ".join(f"{device} ({count} records)" for device, count in counts.items())
+    if asked is not None:
+        if asked not in counts:
+            raise WrongUsageError(f"{file}: has no {asked}; --{option} can be {listed or 'left out'}")
+        return asked, f"chosen by --{option}"
+    if len(counts) > 1:
+        raise WrongUsageError(f"{file}: has several such devices, {listed}; choose one by --{option}")
+    return next(iter(counts), None), f"the only {interfaces[-1]} device"
+
+
+def _mount(laser: str, lines: Lines, options: ReadingOptions, findings: Findings) -> Array:
+    """The laser on the robot: as the user says, else of the log's geometry record (4:1), else none."""
+    if options.mount is not None:
+        findings.used["mounting"] = "--mount"
+        return np.array(options.mount, dtype=np.float64)
+    rows, _ = player_records.numbers(lines.get((laser, "4:1"), []), 5, findings.skips)
+    if len(rows):
+        mount: Array = rows[-1, :3]
+        mount[2] = wrap(mount[2])
+        findings.used["mounting"] = f"the geometry (4:1) of {laser}"
+        return mount
+    findings.used["mounting"] = "assumed: at the robot's centre"
+    findings.warnings.append(UNSAID_MOUNT)
+    return np.zeros(3)
+
+
+def _odometry(
+    scans: Scans, lines: Lines, times: order.Order, options: ReadingOptions, findings: Findings, file: str
+) -> Array | None:
+    """Poses of the robot (S, 3) in order of time: those in the scans, else of a position device."""
+    used, warnings = findings.used, findings.warnings
+    if not options.odometry:
+        used["odometry"] = "none: --no-odometry"
+        return None
+    if scans.robot is not None and scans.robot.any() and options.odom_topic is None:
+        poses = scans.robot[times.rows]
+        poses[:, 2] = wrap(poses[:, 2])
+        used["odometry"] = "the poses in the scans (1:2)"
+        return poses
+    device, why = _chosen("odom-topic", options.odom_topic, ODOMETRY, lines, file)
+    values, stamps = player_records.numbers(
+        [] if device is None else lines.get((device, ""), lines.get((device, "1:1"), [])), 7, findings.skips
+    )
+    if not len(values):
+        warnings.append("the log has no record of a position device: no odometry")
+        used["odometry"] = "none: no pose in the log"
+        return None
+    moments = order.by_time(stamps)
+    if times.nominal or moments.nominal:
+        warnings.append(f"the time stamps do not lead from the scans to {device}: no odometry")
+        used["odometry"] = "none: no time stamps"
+        return None
+    used["odometry"] = f"{device}, {why}, interpolated"
+    return interpolated(times.times, moments.times, values[moments.rows, :3], f"record of {device}", warnings)
+
+
+def _said(key: tuple[str, str]) -> str:
+    device, kind = key
+    return f"{device} {kind}".strip()

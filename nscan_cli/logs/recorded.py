@@ -1,0 +1,132 @@
+"""A recording's messages → the scans of one topic, with odometry and mounting."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from nscan_cli.errors import InputDataError, WrongUsageError
+from nscan_cli.logs import order, recorded_motion
+from nscan_cli.logs.assemble import Findings, Motion, RawScans, laser_log, stacked
+from nscan_cli.logs.decoding import UNDECODABLE, S, Sweep, sweep_decoder
+from nscan_cli.logs.options import ReadingOptions
+from nscan_cli.logs.recording import Channel, Message, Recording
+from nscan_cli.logs.scan import LaserLog, Source
+from nscan_cli.logs.skips import Skips
+from nscan_cli.logs.text_records import MAX_BEAMS
+from nscan_cli.logs.topics import scan_topic
+from nscan_cli.poses import Array
+
+FARTHEST = 1e4
+"""m; no reading is beyond, and no limit has to be said to be."""
+
+
+def read(recording: Recording, file: str, source: Source, options: ReadingOptions) -> LaserLog:
+    """The scans of one topic in order of time.
+
+    Raises InputDataError when there are none, or the laser is tilted; WrongUsageError when the options do
+    not fit the recording or have to choose between topics.
+    """
+    if options.laser is not None:
+        raise WrongUsageError(f"{file}: has topics, no lasers by tag; leave out --laser, see --topic")
+    choice = scan_topic(recording, options, file)
+    skips = Skips(file, options.strict, place="message")
+    findings = Findings(skips, recording.listed(), recording.warnings)
+    findings.used = {"laser": choice.why, "checksums": recording.checksums}
+    sweeps, messages = _sweeps(recording.messages.get(choice.topic, []), choice.topic, skips, file)
+    header_time = _has_clock([sweep.stamp for sweep in sweeps])
+    if not header_time:
+        findings.warnings.append("the scans' own time stamps say nothing: the times of recording are used")
+    stamps = [s.stamp for s in sweeps] if header_time else [message.log_time for message in messages]
+    raw = _raw(sweeps, [_written(stamp) for stamp in stamps])
+    times = order.by_time(raw.stamps)
+    findings.warnings += times.warnings
+    motion, robot, frames = recorded_motion.odometry(recording, times, header_time, options, findings, file)
+    mount, hanging = recorded_motion.mounting(sweeps, robot, frames, options, findings, file)
+    if hanging and not options.flip:
+        # Seen from above, the beams of a laser that hangs run clockwise.
+        raw = RawScans(raw.ranges, -raw.angle_min, -raw.angle_increment, raw.stamps, raw.limits)
+    return laser_log(
+        source, recording.form, choice.topic, raw, times, mount, Motion(motion), findings, options, file
+    )
+
+
+def _sweeps(
+    messages: Sequence[Message], topic: str, skips: Skips, file: str
+) -> tuple[list[Sweep], list[Message]]:
+    """The scans that can be decoded, of one frame, and their messages."""
+    decoders = {channel: sweep_decoder(channel, file) for channel in _channels(messages)}
+    sweeps, kept = [], []
+    frame = None
+    for number, message in enumerate(messages, 1):
+        try:
+            sweep = decoders[message.channel](message.data)
+            problem = _problem(sweep)
+        except UNDECODABLE:
+            problem = f"{topic}: cannot be decoded"
+        if not problem and frame not in (None, sweep.frame):
+            problem = f"{topic}: a scan in another frame than {frame}"
+        if problem:
+            skips.add(problem, number)
+            continue
+        frame = sweep.frame
+        sweeps.append(sweep)
+        kept.append(message)
+    if not sweeps:
+        reason = next(iter(skips.reasons), "there is none")
+        raise InputDataError(file, f"no scan of {topic} can be read: {reason}",
+                             "give a recording with whole messages")  # fmt: skip
+    return sweeps, kept
+
+
+def _channels(messages: Sequence[Message]) -> list[Channel]:
+    return list(dict.fromkeys(message.channel for message in messages))
+
+
+def _problem(sweep: Sweep) -> str:
+    """What makes a scan unusable; empty when nothing does."""
+    if not 0 < len(sweep.ranges) <= MAX_BEAMS:
+        return f"the beam count is not in 1…{MAX_BEAMS}"
+    if not (abs(sweep.angle_min) <= 4 * np.pi and 0 < abs(sweep.angle_increment) <= 4 * np.pi):
+        return "an angle is out of bounds"
+    return ""
+
+
+def _has_clock(stamps: Sequence[int]) -> bool:
+    """Whether the stamps (ns) of the messages say when these were: most are there, and differ."""
+    there = [stamp for stamp in stamps if stamp > 0]
+    return 2 * len(there) >= len(stamps) and (len(stamps) == 1 or 2 * len(set(there)) >= len(stamps))
+
+
+def _written(stamp: int) -> str:
+    return f"{stamp // S}.{stamp % S:09d}" if stamp > 0 else ""
+
+
+def _raw(sweeps: Sequence[Sweep], stamps: list[str]) -> RawScans:
+    """The scans as columns, what lies outside their own limits marked."""
+    ranges = stacked([sweep.ranges for sweep in sweeps])
+    low = _limit([sweep.range_min for sweep in sweeps], 0.0)
+    high = _limit([sweep.range_max for sweep in sweeps], FARTHEST)
+    with np.errstate(invalid="ignore"):
+        for values, outside, mark in ((low, np.less, np.nan), (high, np.greater, np.inf)):
+            if (values != values[0]).any():
+                ranges[outside(ranges, values[:, None].astype(np.float32))] = mark
+    # A reading at a limit counts (sensor_msgs/LaserScan); the limits of a log do not.
+    limits = (
+        max(0.0, float(np.nextafter(np.float32(low.min()), np.float32(-1)))),
+        float(np.nextafter(np.float32(high.max()), np.float32(np.inf))),
+    )
+    return RawScans(
+        ranges,
+        np.array([sweep.angle_min for sweep in sweeps], dtype=np.float64),
+        np.array([sweep.angle_increment for sweep in sweeps], dtype=np.float64),
+        stamps,
+        limits,
+    )
+
+
+def _limit(values: list[float], unsaid: float) -> Array:
+    """Limits (S,) where they say something: between 0 and FARTHEST."""
+    found = np.array(values, dtype=np.float64)
+    return np.where((found > 0) & (found < FARTHEST), found, unsaid)

@@ -1,0 +1,106 @@
+"""What a small robot would record, for tests; other modules write it in every form."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+from typing import Any, NamedTuple
+
+import numpy as np
+
+S = 10**9
+START = 1_700_000_000 * S + 123_456_789
+PERIOD = S // 10
+LEVEL = (0.0, 0.0, 0.0, 1.0)
+
+
+class Scan(NamedTuple):
+    stamp: int
+    """ns"""
+    ranges: Any
+    frame: str = "laser"
+    angle_min: float = -1.0
+    step: float = 0.5
+    range_min: float = 0.1
+    range_max: float = 30.0
+
+
+class Odom(NamedTuple):
+    stamp: int
+    x: float
+    y: float
+    yaw: float
+    child: str = "base_link"
+
+
+class Tf(NamedTuple):
+    stamp: int
+    parent: str
+    child: str
+    xyz: tuple[float, float, float]
+    quaternion: tuple[float, float, float, float] = LEVEL
+
+
+Content = Scan | Odom | tuple[Tf, ...]
+
+
+@dataclass(frozen=True)
+class Written:
+    """One message: its topic, when it was recorded (ns), and what it says."""
+
+    topic: str
+    log_time: int
+    content: Content
+
+    def with_scan(self, **changes: Any) -> Written:
+        """The same with other fields in its scan."""
+        assert isinstance(self.content, Scan)
+        return replace(self, content=self.content._replace(**changes))
+
+
+def turned(yaw: float = 0.0, roll: float = 0.0, pitch: float = 0.0) -> tuple[float, float, float, float]:
+    """The quaternion (x, y, z, w) of Rz(yaw)·Ry(pitch)·Rx(roll)."""
+    cy, sy, cp, sp, cr, sr = (f(a / 2) for a in (yaw, pitch, roll) for f in (math.cos, math.sin))
+    return (
+        sr * cp * cy - cr * sp * sy,
+        cr * sp * cy + sr * cp * sy,
+        cr * cp * sy - sr * sp * cy,
+        cr * cp * cy + sr * sp * sy,
+    )
+
+
+MOUNT = Tf(START, "base_link", "laser", (0.2, 0.1, 0.5), turned(yaw=0.3))
+
+
+def drive(
+    count: int = 12,
+    *,
+    mount: Iterable[Tf] = (MOUNT,),
+    odom_topic: str | None = "/odom",
+    odom_in_tf: bool = False,
+    scan_topic: str = "/scan",
+    beams: int = 5,
+) -> list[Written]:
+    """A robot that drives along x at 1 m/s and turns by 0.1 rad/s; scans lie midway between odometry."""
+    written: list[Written] = []
+    statics = tuple(mount)
+    if statics:
+        written.append(Written("/tf_static", START, statics))
+    for k in range(count + 1):
+        at = START + k * PERIOD
+        x, yaw = 0.1 * k, 0.01 * k
+        if odom_topic is not None:
+            written.append(Written(odom_topic, at, Odom(at, x, 0.0, yaw)))
+        if odom_in_tf:
+            written.append(Written("/tf", at, (Tf(at, "odom", "base_link", (x, 0.0, 0.0), turned(yaw)),)))
+        if k < count:
+            between = at + PERIOD // 2
+            ranges = np.linspace(1.0 + 0.01 * k, 3.0, beams).astype(np.float32)
+            written.append(Written(scan_topic, between + 7, Scan(between, ranges)))
+    return written
+
+
+def with_scans(**changes) -> list[Written]:
+    """drive() with other fields in its scans."""
+    return [one.with_scan(**changes) if isinstance(one.content, Scan) else one for one in drive()]
