@@ -2,24 +2,20 @@
 
 from __future__ import annotations
 
-import dataclasses
+import os
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import click
 
+from nscan_cli.cli.graph_log import find_log, read_graph_log
 from nscan_cli.cli.options import CONTEXT, common_options, reading_options
 from nscan_cli.cli.output import check_writable, is_device, write_whole
 from nscan_cli.cli.progress import say
-from nscan_cli.errors import InputDataError, InputMissingError, WrongUsageError
+from nscan_cli.errors import WrongUsageError
 from nscan_cli.logs.options import ReadingOptions
 
 if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
-
-    from nscan_cli.graph.model import Graph
-    from nscan_cli.logs.scan import LaserLog
     from nscan_cli.mapping.occupancy import OccupancyGrid
 
 
@@ -50,6 +46,7 @@ if TYPE_CHECKING:
     default=None,
     help="Write MAP.yaml for map_server and Nav2 beside the map; done for plain maps.",
 )
+@click.option("--mcap", metavar="OUT.mcap", help="Map, path, graph and scans for Foxglove and RViz too.")
 @reading_options
 @common_options
 def command(
@@ -62,6 +59,7 @@ def command(
     uncertainty: bool,
     style: str,
     yaml: bool | None,
+    mcap: str | None,
     reading: ReadingOptions,
     quiet: bool,
     **_verbosity: int,
@@ -72,6 +70,9 @@ def command(
     slam has read it where no option says otherwise. The map is an 8-bit gray PNG with a YAML for
     map_server and Nav2. With overlays or in the style of a paper it is a picture in colour for people,
     which robots cannot load: no YAML is written then.
+
+    OUT.mcap is a recording of ROS 2 messages on the topics /map, /path, /graph, /scan, /tf and /tf_static;
+    the robot's frame is base_link, that of the result map.
     """
     picture = trajectory or graph or uncertainty or style == "paper"
     if yaml and picture:
@@ -81,13 +82,16 @@ def command(
         raise WrongUsageError("--yaml needs a map in a file; give -o MAP.png, or leave out --yaml")
     yaml = in_file and not picture if yaml is None else yaml
     check_map_outputs(output, yaml)
+    _check_mcap(mcap, [graph_file, log, output, yaml_path(output) if yaml else None])
     if graph_file == "-" and log == "-":
         raise WrongUsageError("standard input (-) can be one input only; give the other by its path")
     from nscan_cli.graph.json_file import read_graph
     from nscan_cli.mapping.occupancy import occupancy_grid
 
     whole = read_graph(graph_file)
-    scans, nodes, rows = _read_scans(graph_file, whole, log, reading)
+    log = find_log(graph_file, whole) if log is None else log
+    _check_mcap(mcap, [log])
+    scans, nodes, rows = read_graph_log(graph_file, whole, log, reading)
     poses = whole.poses[nodes]
     grid = occupancy_grid(scans, rows, poses, resolution)
     if picture:
@@ -103,6 +107,10 @@ def command(
         write_whole(output, canvas.png())
     else:
         write_map(output, grid, yaml)
+    if mcap is not None:
+        from nscan_cli.exports.mcap import recording
+
+        write_whole(mcap, recording(scans, rows, nodes, whole, grid))
     if output != "-":
         low_x, low_y, high_x, high_y = grid.bounds
         say(f"{output}: {high_x - low_x:.1f} m × {high_y - low_y:.1f} m from {len(rows)} scans", quiet)
@@ -131,58 +139,12 @@ def yaml_path(output: str) -> str:
     return str(Path(output).with_suffix(".yaml"))
 
 
-def _read_scans(
-    graph_file: str, graph: Graph, log_file: str | None, reading: ReadingOptions
-) -> tuple[LaserLog, NDArray[np.int64], NDArray[np.int64]]:
-    """The graph's log; the nodes (N,) whose scans are to be drawn, and the rows (N,) of their scans.
-
-    Raises InputDataError when it is another log than the graph's.
-    """
-    import numpy as np
-
-    from nscan_cli.logs.load import read_log
-
-    sources = graph.provenance.get("inputs") or [{}]
-    path = _find_log(graph_file, sources[0].get("name")) if log_file is None else log_file
-    log = read_log(path, _as_tracked(reading, graph.provenance))
-    sha256 = sources[0].get("sha256")
-    remedy = "give the log that the graph was made from"
-    if sha256 is not None and sha256 != log.source.sha256:
-        raise InputDataError(path, f"is not the log of {graph_file}: its SHA-256 is another", remedy)
-    rows = np.minimum(np.searchsorted(log.numbers, graph.scans), len(log) - 1)
-    there = log.numbers[rows] == graph.scans
-    some_left_out = reading.start is not None or reading.end is not None or reading.every > 1
-    if not there.all() and not some_left_out:
-        number = int(graph.scans[np.argmin(there)])
-        raise InputDataError(path, f"has no scan {number}, which {graph_file} has", remedy)
-    return log, np.flatnonzero(there), rows[there]
-
-
-def _find_log(graph_file: str, name: str | None) -> str:
-    """The path of the log `name`, beside the graph or in the current folder. Raises InputMissingError."""
-    if name is None:
-        raise InputMissingError(f"{graph_file}: does not name its log; give LOG after it")
-    for folder in (Path(graph_file).parent, Path()):
-        path = folder / Path(name).name
-        if path.is_file():
-            return str(path)
-    raise InputMissingError(
-        f"{graph_file}: its log {name} is neither beside it nor in the current folder; give LOG after it"
-    )
-
-
-def _as_tracked(reading: ReadingOptions, provenance: dict[str, Any]) -> ReadingOptions:
-    """The options that the graph's log was read with, where `reading` does not say otherwise.
-
-    But which scans there are, the graph itself says; `reading` may leave out more.
-    """
-    choices = {"start", "end", "every"}
-    tracked = provenance.get("parameters", {}).get("reading", {})
-    default = ReadingOptions()
-    kept: dict[str, Any] = {}
-    for option in dataclasses.fields(ReadingOptions):
-        unsaid = getattr(reading, option.name) == getattr(default, option.name)
-        if unsaid and option.name in tracked and option.name not in choices:
-            value = tracked[option.name]
-            kept[option.name] = tuple(value) if isinstance(value, list) else value
-    return dataclasses.replace(reading, **kept)
+def _check_mcap(mcap: str | None, others: list[str | None]) -> None:
+    """Refuse a recording that could never be written, or would replace another file of the command."""
+    if mcap is None:
+        return
+    if mcap == "-":
+        raise WrongUsageError("--mcap -: only the picture can go to standard output; name a file")
+    if os.path.realpath(mcap) in (os.path.realpath(path) for path in others if path and path != "-"):
+        raise WrongUsageError(f"--mcap {mcap}: is another file of this command; choose another name")
+    check_writable(mcap)

@@ -13,11 +13,14 @@ from nscan_cli.cli.options import CONTEXT, common_options, reading_options
 from nscan_cli.cli.output import check_writable, write_whole
 from nscan_cli.cli.progress import progress, say
 from nscan_cli.cli.render import check_map_outputs, write_map, yaml_path
-from nscan_cli.errors import WrongUsageError
+from nscan_cli.errors import InputMissingError, WrongUsageError
 from nscan_cli.logs.options import ReadingOptions
 from nscan_cli.provenance import provenance_of
 
 if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
     from nscan_cli.graph.model import Graph
     from nscan_cli.logs.scan import LaserLog
     from nscan_cli.slam.options import Relations, SlamOptions
@@ -33,12 +36,17 @@ MAPPING = ("max_scans", "relations", "no_loops")
 )
 @click.option("--map", "map_file", metavar="MAP.png", help="The map too, and its YAML beside it.")
 @click.option("--trajectory", metavar="OUT.tum", help="The pose of every scan in TUM's form too.")
-@click.option("--g2o", metavar="OUT.g2o", help="The keyframes' graph in g2o's form too.")
+@click.option(
+    "--g2o",
+    metavar="OUT.g2o",
+    help="The keyframes' graph in g2o's form too, nScan relations as pairwise ones.",
+)
+@click.option("--carmen", metavar="OUT.log", help="The log with corrected poses in CARMEN's form too.")
 @click.option(
     "--from",
     "from_file",
     metavar="GRAPH",
-    help="Optimise a saved graph (JSON or g2o) again, instead of mapping LOG.",
+    help="Optimise a saved graph (JSON or g2o), and refine it again with its LOG; nothing is tracked.",
 )
 @click.option("--max-scans", type=click.IntRange(3), default=10, show_default=True, metavar="N",
               help="Most scans in an nScan relation.")  # fmt: skip
@@ -55,6 +63,7 @@ def command(
     map_file: str | None,
     trajectory: str | None,
     g2o: str | None,
+    carmen: str | None,
     from_file: str | None,
     max_scans: int,
     relations: Relations,
@@ -68,39 +77,57 @@ def command(
 
     Every scan gets a pose: tracked against the map of the last metres, then moved along with its
     keyframe when the graph of pairwise and nScan relations is optimised.
+
+    With --from, LOG is looked for beside the graph, then in the current folder, when it is not given; it
+    is read, and its scans are matched, with the options that the graph was made with. Without it the
+    graph is optimised only.
     """
-    if (log is None) == (from_file is None):
-        raise WrongUsageError("slam: give either LOG or --from GRAPH")
-    if from_file is not None and map_file is not None:
-        raise WrongUsageError("slam: --map goes with LOG; draw a saved graph by render GRAPH.json LOG")
+    if log is None and from_file is None:
+        raise WrongUsageError("slam: give LOG, or --from GRAPH")
+    if log == "-" and from_file == "-":
+        raise WrongUsageError("standard input (-) can be one input only; give the other by its path")
     if from_file is not None and (reading != ReadingOptions() or _given(*MAPPING)):
         raise WrongUsageError(
-            "slam: reading options, --max-scans, --relations and --no-loops go with LOG; "
-            "--from only optimises"
+            "slam: reading options, --max-scans, --relations and --no-loops do not go with --from; "
+            "those that the graph was made with hold"
         )
-    if "-" in (map_file, trajectory, g2o, depfile):
+    if "-" in (map_file, trajectory, g2o, carmen, depfile):
         raise WrongUsageError("slam: only the graph (-o) can go to standard output; name files for the rest")
-    _check_outputs(log or from_file or "", output, map_file, trajectory, g2o, depfile)
+    inputs = [path for path in (from_file, log) if path is not None]
+    _check_outputs(inputs, output, map_file, trajectory, g2o, carmen, depfile)
     began = time.perf_counter()
-    if log is not None:
-        scans, graph, summary = _map(log, reading, _options(max_scans, relations, no_loops), quiet, verbose)
-    elif from_file is not None:
-        scans, graph, summary = None, *_again(from_file, quiet)
-    _write(graph, output, trajectory, g2o)
-    if map_file is not None and scans is not None:
-        import numpy as np
-
-        from nscan_cli.mapping.occupancy import occupancy_grid
-
-        write_map(map_file, occupancy_grid(scans, np.arange(len(scans)), graph.poses), yaml=True)
+    if from_file is None:
+        assert log is not None
+        run = _map(log, reading, _options(max_scans, relations, no_loops), quiet, verbose)
+    else:
+        run = _again(from_file, log, needs_log=bool(map_file or carmen), quiet=quiet)
+        # A log that was found must not be replaced either.
+        _check_outputs(run.inputs, output, map_file, trajectory, g2o, carmen, depfile)
+    _write(run.graph, output, trajectory, g2o)
+    if run.scans is not None:
+        _write_with_scans(run.scans, run.rows, run.graph, map_file, carmen)
     if depfile is not None:
         maps = [] if map_file is None else [map_file, yaml_path(map_file)]
-        _write_rule(depfile, [output, *maps, trajectory, g2o], log or from_file or "")
+        _write_rule(depfile, [output, *maps, trajectory, g2o, carmen], run.inputs)
     seconds = time.perf_counter() - began
-    say(summary, quiet)
-    if scans is not None:
-        rate, span = len(scans) / seconds, float(scans.times[-1] - scans.times[0])
+    say(run.summary, quiet)
+    if from_file is None and run.scans is not None:
+        rate, span = len(run.scans) / seconds, float(run.scans.times[-1] - run.scans.times[0])
         say(f"{seconds:.1f} s, {rate:.0f} scans a second, {span / seconds:.0f} times real time", quiet)
+
+
+@dataclasses.dataclass(frozen=True)
+class _Run:
+    """What there is to write and to say."""
+
+    graph: Graph
+    scans: LaserLog | None
+    """The graph's log, where there is one."""
+    rows: NDArray[np.int64]
+    """(N,) the rows of its scans."""
+    inputs: list[str]
+    """The paths that were read."""
+    summary: str
 
 
 def _given(*options: str) -> bool:
@@ -115,8 +142,8 @@ def _options(max_scans: int, relations: Relations, no_loops: bool) -> SlamOption
     return SlamOptions(nscan=NScanOptions(max_scans=max_scans, loops=not no_loops), relations=relations)
 
 
-def _check_outputs(source: str, output: str, map_file: str | None, *others: str | None) -> None:
-    """Refuse outputs that can never be written, that share a name, or that would replace the input."""
+def _check_outputs(inputs: list[str], output: str, map_file: str | None, *others: str | None) -> None:
+    """Refuse outputs that can never be written, that share a name, or that would replace an input."""
     names = [path for path in (output, map_file, *others) if path not in (None, "-")]
     if map_file is not None:
         check_map_outputs(map_file, yaml=True)
@@ -124,25 +151,26 @@ def _check_outputs(source: str, output: str, map_file: str | None, *others: str 
     files = [os.path.realpath(str(name)) for name in names]
     if len(set(files)) < len(files):
         raise WrongUsageError("slam: two outputs have the same name; give each its own")
-    if source != "-" and os.path.realpath(source) in files:
-        raise WrongUsageError(f"slam: {source} is the input, and an output too; choose another name for it")
+    for source in inputs:
+        if source != "-" and os.path.realpath(source) in files:
+            raise WrongUsageError(
+                f"slam: {source} is an input, and an output too; choose another name for it"
+            )
     for path in (output, *others):
         check_writable(path)
 
 
-def _map(
-    log: str, reading: ReadingOptions, options: SlamOptions, quiet: bool, verbose: int
-) -> tuple[LaserLog, Graph, str]:
+def _map(log: str, reading: ReadingOptions, options: SlamOptions, quiet: bool, verbose: int) -> _Run:
     """Run the whole loop over a log."""
-    from nscan_cli.compiled import first_compile
+    import numpy as np
+
     from nscan_cli.logs.load import read_log
     from nscan_cli.slam.pipeline import Slam
 
     scans = read_log(log, reading)
     for warning in scans.report.notices():
         say(f"warning: {warning}", quiet)
-    if first_compile():
-        say("compiling the kernels, once for this version on this machine: about 20 s", quiet)
+    _announce_compiling(quiet)
     slam = Slam(scans, options)
     with progress("mapping", len(scans), quiet) as advance:
         graph = slam.run(lambda done, keyframes: advance(done, f"{keyframes} keyframes"))
@@ -161,24 +189,73 @@ def _map(
             f"\nwhile tracking: {restarts} starts from other angles, {searches} searches\n"
             f"large loops: {len(slam.places)} keyframes found at a place seen before by search"
         )
-    return scans, graph, summary
+    return _Run(graph, scans, np.arange(len(scans)), [log], summary)
 
 
-def _again(path: str, quiet: bool) -> tuple[Graph, str]:
-    """Optimise a saved graph."""
+def _announce_compiling(quiet: bool) -> None:
+    from nscan_cli.compiled import first_compile
+
+    if first_compile():
+        say("compiling the kernels, once for this version on this machine: about 20 s", quiet)
+
+
+def _again(path: str, log_file: str | None, needs_log: bool, quiet: bool) -> _Run:
+    """Optimise a saved graph, and refine it where its log is there."""
+    import numpy as np
+
     from nscan_cli.graph.load import load_graph
     from nscan_cli.graph.marginals import marginal_covariances
     from nscan_cli.graph.solve import optimise_graph
 
     graph = load_graph(path)
+    read = _log_of(path, graph, log_file, needs_log, quiet)
+    before = graph.poses
     optimum = optimise_graph(graph)
-    graph.marginals = marginal_covariances(graph)
     if not optimum.converged:
         say(f"warning: {path}: the optimum was not reached, its relations contradict each other", quiet)
-    return graph, (
+    scans, rows, inputs = None, np.arange(0), [path]
+    if read is None:
+        graph.marginals = marginal_covariances(graph)
+    else:
+        from nscan_cli.slam.again import refine_again
+
+        scans, rows, log_path = read
+        inputs.append(log_path)
+        _announce_compiling(quiet)
+        graph = refine_again(graph, scans, rows)
+    moved = float(np.hypot(*(graph.poses - before)[:, :2].T).max())
+    summary = (
         f"{len(graph.keyframes)} keyframes, {len(graph.pairwise)} pairwise and {len(graph.nscan)} nScan "
         f"relations: energy {optimum.energy:.6g} after {optimum.iterations} iterations"
+        + ("" if read is None else ", then refined")
+        + f"; no pose moved by more than {moved:.3g} m"
     )
+    return _Run(graph, scans, rows, inputs, summary)
+
+
+def _log_of(
+    path: str, graph: Graph, log_file: str | None, needed: bool, quiet: bool
+) -> tuple[LaserLog, NDArray[np.int64], str] | None:
+    """The log of a saved graph, the rows of its scans, and its path; None where the graph has none."""
+    from nscan_cli.cli.graph_log import find_log, read_graph_log
+    from nscan_cli.slam.again import can_refine
+
+    if not can_refine(graph):
+        if needed or log_file is not None:
+            raise WrongUsageError(
+                f"slam: {path} is no graph that slam made from a log; leave out LOG, --map and --carmen"
+            )
+        say(f"{path}: is no graph that slam made from a log: it is optimised only", quiet)
+        return None
+    try:
+        log_file = find_log(path, graph) if log_file is None else log_file
+    except InputMissingError as error:
+        if needed:
+            raise
+        say(f"warning: optimised only, and not refined: {error}", quiet)
+        return None
+    scans, _nodes, rows = read_graph_log(path, graph, log_file, ReadingOptions())
+    return scans, rows, log_file
 
 
 def _write(graph: Graph, output: str, trajectory: str | None, g2o: str | None) -> None:
@@ -195,13 +272,26 @@ def _write(graph: Graph, output: str, trajectory: str | None, g2o: str | None) -
         write_whole(g2o, write_g2o(graph))
 
 
-def _write_rule(depfile: str, outputs: list[Any], source: str) -> None:
-    """`outputs: source` for make's include, with spaces and dollars escaped."""
+def _write_with_scans(
+    scans: LaserLog, rows: NDArray[np.int64], graph: Graph, map_file: str | None, carmen: str | None
+) -> None:
+    if map_file is not None:
+        from nscan_cli.mapping.occupancy import occupancy_grid
+
+        write_map(map_file, occupancy_grid(scans, rows, graph.poses), yaml=True)
+    if carmen is not None:
+        from nscan_cli.exports.carmen import corrected_log
+
+        write_whole(carmen, corrected_log(scans, rows, graph.poses))
+
+
+def _write_rule(depfile: str, outputs: list[Any], inputs: list[str]) -> None:
+    """`outputs: inputs` for make's include, with spaces and dollars escaped."""
 
     def escaped(path: str) -> str:
         return path.replace("$", "$$").replace(" ", "\\ ").replace("#", "\\#")
 
     targets = " ".join(escaped(path) for path in outputs if path not in (None, "-"))
     # Standard input is no file that make could look for.
-    prerequisite = "" if source == "-" else f" {escaped(source)}"
-    write_whole(depfile, f"{targets}:{prerequisite}\n".encode())
+    prerequisites = "".join(f" {escaped(path)}" for path in inputs if path != "-")
+    write_whole(depfile, f"{targets}:{prerequisites}\n".encode())

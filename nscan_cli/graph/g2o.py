@@ -28,6 +28,8 @@ from nscan_cli.provenance import provenance_of
 
 REMEDY = "mend or remove the line"
 LARGEST_ID = 2**53
+LEAST_SHARE = 1e-9
+"""Of the greatest eigenvalue of a marginal's information."""
 
 
 @dataclass
@@ -89,7 +91,6 @@ def write_g2o(graph: Graph) -> bytes:
     keyframes = graph.keyframes.tolist()
     names = graph.scans.tolist()
     lines = [f"VERTEX_SE2 {names[node]} {_numbers(graph.poses[node])}" for node in keyframes]
-    lines += [f"FIX {names[node]}" for node in keyframes[:1]]
     relations = list(graph.pairwise)
     for nscan in graph.nscan:
         relations += pairwise_marginals(nscan)
@@ -98,6 +99,8 @@ def write_g2o(graph: Graph) -> bytes:
         information = upper_triangle(rotated_information(inverse(z), relation.information))
         a, b = relation.nodes
         lines.append(f"EDGE_SE2 {names[a]} {names[b]} {_numbers(z)} {_numbers(information)}")
+    # GTSAM's reader drops all edges after a tag that it does not know.
+    lines += [f"FIX {names[node]}" for node in keyframes[:1]]
     return ("\n".join(lines) + "\n").encode()
 
 
@@ -107,8 +110,9 @@ def pairwise_marginals(relation: NScan) -> list[Pairwise]:
     With pose c held fixed, the information on pose i alone is the Schur complement
     H_ii − H_ir H_rr⁺ H_ri over all other poses r (the inverse of its block of the covariance, where H has
     an inverse), turned from the relation's frame into that of pose c.
-    Directions that the relation does not hold get no information; the Hessian's negative eigenvalues
-    count as 0.
+    Directions that the relation does not hold get next to no information, LEAST_SHARE of the greatest: with
+    none at all, readers that factorise after Cholesky (GTSAM) would make much out of rounding. The
+    Hessian's negative eigenvalues count as 0.
     """
     c = relation.fixed
     others = np.delete(np.arange(len(relation.nodes)), c)
@@ -144,7 +148,10 @@ def _marginal_blocks(information: Array) -> Array:
             r = np.delete(np.arange(3 * m), i)
             H_ir = H[np.ix_(i, r)]
             blocks[block] = H[np.ix_(i, i)] - H_ir @ np.linalg.pinv(H[np.ix_(r, r)], 1e-12, True) @ H_ir.T
-    return 0.5 * (blocks + blocks.transpose(0, 2, 1))
+    eigenvalues, vectors = np.linalg.eigh(0.5 * (blocks + blocks.transpose(0, 2, 1)))
+    held = np.maximum(eigenvalues, LEAST_SHARE * eigenvalues[:, -1:])
+    sound: Array = (vectors * held[:, None, :]) @ vectors.transpose(0, 2, 1)
+    return 0.5 * (sound + sound.transpose(0, 2, 1))
 
 
 def _numbers(values: Array) -> str:

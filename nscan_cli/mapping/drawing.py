@@ -14,13 +14,11 @@ from nscan_cli.mapping.axes import AXES_MARGINS, FOOTER_MARGINS, Entry, axes, fo
 from nscan_cli.mapping.canvas import (
     BLACK,
     BLUE,
-    DIM,
-    GREEN,
     PURPLE,
     SKY,
-    VERMILLION,
     Canvas,
 )
+from nscan_cli.mapping.edges import EDGE_COLOURS, edges_by_kind
 from nscan_cli.mapping.ellipses import draw_ellipses
 from nscan_cli.mapping.image import gray
 from nscan_cli.mapping.occupancy import FREE, OCCUPIED, UNKNOWN, OccupancyGrid
@@ -115,16 +113,10 @@ def _background(grid: OccupancyGrid) -> tuple[NDArray[np.uint8], float]:
 
 def _draw_graph(canvas: Canvas, graph: Graph) -> list[Entry]:
     """Relations as lines, of an nScan relation from its fixed scan to the others; keyframes as dots."""
-    edges = [
-        (relation.nodes, "loop" if relation.origin == "loop" else "pairwise") for relation in graph.pairwise
-    ]
-    for joint in graph.nscan:
-        centre = joint.nodes[joint.fixed]
-        kind = "loop" if joint.origin == "loop" else "nScan"
-        edges += [((centre, node), kind) for node in joint.nodes if node != centre]
     entries: list[Entry] = []
-    for kind, colour, width in (("nScan", GREEN, 1.2), ("pairwise", DIM, 1.2), ("loop", VERMILLION, 2.6)):
-        nodes = np.array(sorted({pair for pair, of in edges if of == kind})).reshape(-1, 2).astype(np.int64)
+    edges = edges_by_kind(graph)
+    for kind, width in (("nScan", 1.2), ("pairwise", 1.2), ("loop", 2.6)):
+        nodes, colour = edges[kind], EDGE_COLOURS[kind]
         if len(nodes):
             starts, ends = graph.poses[nodes[:, 0], :2], graph.poses[nodes[:, 1], :2]
             canvas.segments(starts, ends, colour, width)

@@ -14,6 +14,7 @@ from nscan_cli.cli.main import run
 from nscan_cli.graph.json_file import write_graph
 from nscan_cli.graph.model import Graph, Pairwise
 from tests.data import data_file
+from tests.mapping.nav2 import load_map
 
 POSES = np.array([[1.0, 2.0, 0.0], [2.0, 2.0, 0.5], [3.0, 2.0, 0.0], [4.0, 2.0, -0.5], [5.0, 2.0, 3.0]])
 WIDTH, HEIGHT = 6.0, 4.0
@@ -86,6 +87,19 @@ def test_the_map_is_the_room(room, capsys):
     assert (gray[10:-10, 10:-10] == 254).mean() > 0.95
     assert (gray[[0, -1]] == 205).all()
     assert "6.2 m × 4.2 m from 5 scans" in capsys.readouterr().err
+
+
+def test_nav2_finds_the_walls_where_they_are(room):
+    assert run(["render", "room.json", "-o", "map.png"]) == 0
+    loaded = load_map(room / "map.yaml")
+    # The walls are on the borders of cells: rounding to mm decides which side a hit is on. A single scan
+    # sees the wall at x = 0, too thinly for walls.
+    along, sides = np.arange(1.0, 3.0, 0.05), (-0.03, 0.03)
+    assert 100 in [loaded.at(WIDTH + side, y) for y in along for side in sides]
+    for wall in (0.0, HEIGHT):
+        assert 100 in [loaded.at(1.5 + x, wall + side) for x in along for side in sides]
+    assert [loaded.at(x, y) for x, y in ((0.5, 0.5), (5.5, 0.5), (5.5, 3.5), (3.0, 2.0))] == [0] * 4
+    assert loaded.at(loaded.origin[0] + 0.01, loaded.origin[1] + 0.01) == -1
 
 
 def test_the_log_is_found_beside_the_graph_then_here(room, monkeypatch, tmp_path_factory):
@@ -213,6 +227,48 @@ def test_finer_cells_make_a_larger_picture(room):
     assert run(["render", "room.json", "-o", "map.png", "--resolution", "0.02"]) == 0
     assert picture(room / "map.png").shape[1] == pytest.approx(WIDTH / 0.02 + 3, abs=1)
     assert "resolution: 0.02\n" in (room / "map.yaml").read_text()
+
+
+def test_the_mcap_has_map_path_graph_and_scans(room):
+    """tests/exports/test_mcap.py looks into it."""
+    reader = pytest.importorskip("mcap.reader", reason="mcap is not installed: pip install nscan-cli[test]")
+    assert run(["render", "room.json", "-o", "map.png", "--mcap", "out.mcap", "--every", "2"]) == 0
+    data = (room / "out.mcap").read_bytes()
+    summary = reader.make_reader(io.BytesIO(data), validate_crcs=True).get_summary()
+    counts = {
+        channel.topic: summary.statistics.channel_message_counts[number]
+        for number, channel in summary.channels.items()
+    }
+    assert counts == {"/map": 1, "/path": 1, "/graph": 1, "/tf_static": 1, "/tf": 3, "/scan": 3}
+    assert run(["render", "room.json", "-o", "map.png", "--mcap", "again.mcap", "--every", "2"]) == 0
+    assert (room / "again.mcap").read_bytes() == data
+
+
+@pytest.mark.parametrize(
+    ("mcap", "code", "said"),
+    [
+        ("-", 2, "--mcap -: only the picture can go to standard output"),
+        ("missing/out.mcap", 73, "missing/out.mcap: the folder missing does not exist"),
+        ("map.png", 2, "--mcap map.png: is another file of this command"),
+        ("map.yaml", 2, "--mcap map.yaml: is another file of this command"),
+        ("room.json", 2, "--mcap room.json: is another file of this command"),
+        ("room.log", 2, "--mcap room.log: is another file of this command"),
+    ],
+)
+def test_an_mcap_that_cannot_be_is_refused_before_the_work(room, capsys, mcap, code, said):
+    before = sorted(path.name for path in room.iterdir())
+    assert run(["render", "room.json", "room.log", "-o", "map.png", "--mcap", mcap]) == code
+    error = capsys.readouterr().err
+    assert said in error
+    assert error.count("\n") == 1
+    assert sorted(path.name for path in room.iterdir()) == before
+
+
+def test_an_mcap_never_replaces_the_log_that_was_found(room, capsys):
+    assert run(["render", "room.json", "-o", "map.png", "--mcap", "room.log"]) == 2
+    assert "--mcap room.log: is another file of this command" in capsys.readouterr().err
+    assert (room / "room.log").read_bytes() == log_text()
+    assert not list(room.glob("map*"))
 
 
 def test_a_real_log_and_its_reference_poses_give_a_map(tmp_path):

@@ -1,8 +1,6 @@
 import io
-import json
 import math
 import struct
-from typing import Any
 
 import numpy as np
 import pytest
@@ -10,25 +8,7 @@ from PIL import Image
 
 from nscan_cli.mapping.image import map_png, map_yaml
 from nscan_cli.mapping.occupancy import FREE, OCCUPIED, UNKNOWN, OccupancyGrid
-
-
-def load_as_nav2(png: bytes, yaml: bytes) -> tuple[np.ndarray, dict[str, Any]]:
-    """nav_msgs/OccupancyGrid data (H, W), row 0 least y, by the rules of Nav2's map_io.cpp; trinary."""
-    fields: dict[str, Any] = {}
-    for line in yaml.decode().splitlines():
-        key, _colon, value = line.partition(": ")
-        try:
-            fields[key] = json.loads(value)
-        except json.JSONDecodeError:
-            fields[key] = value
-    assert fields["mode"] == "trinary"
-    assert fields["negate"] == 0
-    shade = np.asarray(Image.open(io.BytesIO(png))).astype(float)
-    occupancy = (255 - shade) / 255
-    data = np.full(shade.shape, -1)
-    data[occupancy > fields["occupied_thresh"]] = 100
-    data[occupancy < fields["free_thresh"]] = 0
-    return data[::-1], fields
+from tests.mapping.nav2 import load_map
 
 
 @pytest.fixture
@@ -38,13 +18,18 @@ def grid() -> OccupancyGrid:
     return OccupancyGrid(hits, misses, 0.05, (-1.2, 3.45))
 
 
-def test_nav2_loads_the_states_that_were_meant(grid):
-    data, fields = load_as_nav2(map_png(grid), map_yaml("map.png", grid))
-    assert data.tolist() == [[FREE, OCCUPIED, UNKNOWN], [UNKNOWN, FREE, OCCUPIED]]
-    assert data.tolist() == grid.states().tolist()
-    assert fields["image"] == "map.png"
-    assert fields["resolution"] == 0.05
-    assert fields["origin"] == [-1.2, 3.45, 0.0]
+def test_nav2_loads_the_states_that_were_meant(grid, tmp_path):
+    name = 'a: "b" #ü.png'
+    (tmp_path / name).write_bytes(map_png(grid))
+    (tmp_path / "map.yaml").write_bytes(map_yaml(name, grid))
+    loaded = load_map(tmp_path / "map.yaml")
+    assert loaded.data.tolist() == [[FREE, OCCUPIED, UNKNOWN], [UNKNOWN, FREE, OCCUPIED]]
+    assert loaded.data.tolist() == grid.states().tolist()
+    assert loaded.resolution == 0.05
+    assert loaded.origin == (-1.2, 3.45, 0.0)
+    # The second cell of the lower row: x from −1.15 to −1.10, y from 3.45 to 3.50.
+    assert loaded.at(-1.12, 3.46) == OCCUPIED
+    assert loaded.at(-1.12, 3.51) == FREE
 
 
 def test_the_png_is_8_bit_gray_without_alpha_and_has_the_greatest_y_on_top(grid):

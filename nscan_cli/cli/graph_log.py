@@ -1,0 +1,80 @@
+"""The log of a graph: found through it, checked to be the one, and read as slam has read it."""
+
+from __future__ import annotations
+
+import dataclasses
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from nscan_cli.errors import InputDataError, InputMissingError
+from nscan_cli.logs.options import ReadingOptions
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from nscan_cli.graph.model import Graph
+    from nscan_cli.logs.scan import LaserLog
+
+REMEDY = "give the log that the graph was made from"
+
+
+def read_graph_log(
+    graph_file: str, graph: Graph, path: str, reading: ReadingOptions
+) -> tuple[LaserLog, NDArray[np.int64], NDArray[np.int64]]:
+    """The graph's log at `path`; the nodes (N,) whose scans `reading` leaves in, and the rows (N,) of these.
+
+    Raises InputMissingError when it cannot be read, InputDataError when it is another log than the graph's.
+    """
+    import numpy as np
+
+    from nscan_cli.logs.load import read_log
+
+    log = read_log(path, _as_tracked(reading, graph.provenance))
+    sha256 = _source(graph).get("sha256")
+    if sha256 is not None and sha256 != log.source.sha256:
+        raise InputDataError(path, f"is not the log of {graph_file}: its SHA-256 is another", REMEDY)
+    rows = np.minimum(np.searchsorted(log.numbers, graph.scans), len(log) - 1)
+    there = log.numbers[rows] == graph.scans
+    some_left_out = reading.start is not None or reading.end is not None or reading.every > 1
+    if not there.all() and not some_left_out:
+        number = int(graph.scans[np.argmin(there)])
+        raise InputDataError(path, f"has no scan {number}, which {graph_file} has", REMEDY)
+    return log, np.flatnonzero(there), rows[there]
+
+
+def find_log(graph_file: str, graph: Graph) -> str:
+    """The path of the graph's log, beside the graph or in the current folder. Raises InputMissingError."""
+    name = _source(graph).get("name")
+    if name is None:
+        raise InputMissingError(f"{graph_file}: does not name its log; give LOG too")
+    for folder in (Path(graph_file).parent, Path()):
+        path = folder / Path(name).name
+        if path.is_file():
+            return str(path)
+    raise InputMissingError(
+        f"{graph_file}: its log {name} is neither beside it nor in the current folder; give LOG too"
+    )
+
+
+def _source(graph: Graph) -> dict[str, Any]:
+    """What the graph says of the log that it was made from."""
+    sources: list[dict[str, Any]] = graph.provenance.get("inputs") or [{}]
+    return sources[0]
+
+
+def _as_tracked(reading: ReadingOptions, provenance: dict[str, Any]) -> ReadingOptions:
+    """The options that the graph's log was read with, where `reading` does not say otherwise.
+
+    But which scans there are, the graph itself says; `reading` may leave out more.
+    """
+    choices = {"start", "end", "every"}
+    tracked = provenance.get("parameters", {}).get("reading", {})
+    default = ReadingOptions()
+    kept: dict[str, Any] = {}
+    for option in dataclasses.fields(ReadingOptions):
+        unsaid = getattr(reading, option.name) == getattr(default, option.name)
+        if unsaid and option.name in tracked and option.name not in choices:
+            value = tracked[option.name]
+            kept[option.name] = tuple(value) if isinstance(value, list) else value
+    return dataclasses.replace(reading, **kept)

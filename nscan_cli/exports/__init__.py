@@ -1,0 +1,1 @@
+"""Poses and scans in the forms that other tools read."""

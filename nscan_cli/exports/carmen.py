@@ -1,0 +1,102 @@
+"""A log with corrected poses as CARMEN text, for the relations metric and for other readers of CARMEN logs.
+
+Laser records carry two poses: that of the laser, then that of the robot (CARMEN,
+src/logger/writelog.c). Here both are corrected ones, the laser's with its mounting on the robot, and the
+time stamps are those of the source, so that tools find the same scans by them.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nscan_cli.logs.corrected import OWN_HOST
+from nscan_cli.logs.laser import CARMEN_MAX_RANGE, beam_angles
+from nscan_cli.logs.scan import LaserLog
+from nscan_cli.poses import Array, wrap
+
+HEADER = """\
+# CARMEN Logfile
+# the poses are corrected ones, a result of nscan-cli, and no odometry
+"""
+SAME_ANGLES = 1e-6
+"""rad; directions of the beams that differ by less are the same."""
+
+
+def corrected_log(log: LaserLog, rows: NDArray[np.int64], poses: Array) -> bytes:
+    """The scans in `rows` (N,) of a log as CARMEN text, taken at the robot's `poses` (N, 3).
+
+    The records are FLASER where the beams have the directions that CARMEN gives to so many of them and
+    end within CARMEN's greatest range, else ROBOTLASER1, which says both. A beam that met nothing gets
+    the least value that stands for it in the log (PARAM robot_front_laser_max says so), one that says
+    nothing 0. Ranges keep all digits, poses 9 decimals, and read back they are the same.
+    """
+    ranges = log.ranges[rows]
+    greatest = ranges[np.isfinite(ranges)].max(initial=np.float32(0.0))
+    limit = _limit(log, float(greatest))
+    nothing = limit if log.no_return is None else max(np.float32(log.no_return), limit)
+    first, step = log.angle_min[rows], log.angle_increment[rows]
+    plain = greatest < CARMEN_MAX_RANGE and _by_convention(first, step, ranges.shape[1])
+    lines = [HEADER, *_params(log, limit, float(step[0]))]
+    lasers = log.laser_pose(poses)
+    since = log.times - log.times[0]
+    beams = _texts(ranges, nothing)
+    for k, row in enumerate(rows.tolist()):
+        triples = f"{_pose(lasers[k])} {_pose(poses[k])}"
+        end = f"{log.stamps[row]} {OWN_HOST.decode()} {since[row]:.6f}\n"
+        if plain:
+            lines.append(f"FLASER {next(beams)} {triples} {end}")
+        else:
+            fov = step[k] * (ranges.shape[1] - 1)
+            head = f"0 {float(first[k])!r} {float(fov)!r} {float(step[k])!r} {limit!s} 0 0"
+            lines.append(f"ROBOTLASER1 {head} {next(beams)} 0 {triples} 0 0 0 0 0 {end}")
+    return "".join(lines).encode()
+
+
+def _limit(log: LaserLog, greatest: float) -> np.float32:
+    """The range (m) at and beyond which a beam met nothing; where the log has no limit, one that fits."""
+    limit = log.range_limits[1]
+    if math.isfinite(limit):
+        return np.float32(limit)
+    return np.float32(max(CARMEN_MAX_RANGE, math.floor(greatest) + 1.0))
+
+
+def _by_convention(first: Array, step: Array, beams: int) -> bool:
+    """Whether all scans have the directions that CARMEN gives to so many beams."""
+    usual_first, usual_step = beam_angles(beams)
+    off = np.abs(first - usual_first) + beams * np.abs(step - usual_step)
+    return bool((off < SAME_ANGLES).all())
+
+
+def _params(log: LaserLog, limit: np.float32, step: float) -> Iterator[str]:
+    x, y, angle = log.mount.tolist()
+    for name, value in (
+        ("robot_frontlaser_offset", x + 0.0),
+        ("robot_frontlaser_side_offset", y + 0.0),
+        ("robot_frontlaser_angular_offset", angle + 0.0),
+        ("robot_front_laser_max", limit),
+        ("laser_front_laser_resolution", round(math.degrees(abs(step)), 6)),
+    ):
+        yield f"PARAM {name} {value!s} 0 {OWN_HOST.decode()} 0\n"
+
+
+def _texts(ranges: NDArray[np.float32], nothing: np.float32) -> Iterator[str]:
+    """Of each scan, the number of its beams and their ranges, in the fewest digits that read back."""
+    values, places = np.unique(ranges, return_inverse=True, equal_nan=True)
+    texts = np.array([_range(value, nothing) for value in values], dtype=object)
+    for scan in places.reshape(ranges.shape):
+        yield f"{len(scan)} {' '.join(texts[scan])}"
+
+
+def _range(value: np.float32, nothing: np.float32) -> str:
+    if np.isnan(value):
+        return "0"
+    return str(nothing if np.isinf(value) else value)
+
+
+def _pose(pose: Array) -> str:
+    x, y, angle = (np.round([pose[0], pose[1], wrap(pose[2])], 9) + 0.0).tolist()
+    return f"{x:.9f} {y:.9f} {angle:.9f}"

@@ -1,0 +1,115 @@
+"""Map, path, graph and scans as an MCAP recording of ROS 2 messages, for Foxglove and RViz.
+
+The topics: /map (nav_msgs/OccupancyGrid), /path (nav_msgs/Path), /graph (visualization_msgs/MarkerArray)
+and /tf_static once, at the time of the first scan; /scan (sensor_msgs/LaserScan) and /tf for every scan.
+Frames as in REP 105: map, odom where there is odometry, base_link (the robot) and laser.
+
+https://mcap.dev/spec, https://mcap.dev/spec/registry (profile ros2, schemas ros2msg, messages cdr)
+"""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Sequence
+from decimal import Decimal
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nscan_cli import __version__
+from nscan_cli.exports.messages import (
+    Messages,
+    graph_markers,
+    map_message,
+    path_message,
+    scan_message,
+    transforms,
+)
+from nscan_cli.graph.model import Graph
+from nscan_cli.logs.scan import LaserLog
+from nscan_cli.mapping.occupancy import OccupancyGrid
+from nscan_cli.poses import compose, inverse
+
+TOPICS = {
+    "/map": "nav_msgs/msg/OccupancyGrid",
+    "/path": "nav_msgs/msg/Path",
+    "/graph": "visualization_msgs/msg/MarkerArray",
+    "/tf_static": "tf2_msgs/msg/TFMessage",
+    "/tf": "tf2_msgs/msg/TFMessage",
+    "/scan": "sensor_msgs/msg/LaserScan",
+}
+NANOSECONDS = 10**9
+LAST_SECOND = 2**31
+"""A stamp's seconds are 32 bits wide."""
+
+
+def recording(
+    log: LaserLog, rows: NDArray[np.int64], nodes: NDArray[np.int64], graph: Graph, grid: OccupancyGrid
+) -> bytes:
+    """The MCAP of a graph and its map `grid`, with the scans in `rows` (N,) of the log at `nodes` (N,).
+
+    Stamps are those of the log; where ROS has no room for them (before 0, from 2³¹ s on), all count from
+    the log's first second. Equal inputs give equal bytes.
+    """
+    messages = Messages()
+    file = _File(messages)
+    stamps = _nanoseconds(graph.stamps)
+    times = [stamps[node] for node in nodes.tolist()]
+    first = min(times)
+    file.write("/map", map_message(messages, grid, first), first)
+    file.write("/path", path_message(messages, graph.poses, stamps), first)
+    file.write("/graph", graph_markers(messages, graph, first), first)
+    file.write("/tf_static", transforms(messages, first, [("base_link", "laser", log.mount)]), first)
+    robots = graph.poses[nodes]
+    odometry = None if graph.odometry is None else graph.odometry[nodes]
+    corrections = None if odometry is None else compose(robots, inverse(odometry))
+    for k, (row, time) in enumerate(zip(rows.tolist(), times, strict=True)):
+        if odometry is None or corrections is None:
+            links = [("map", "base_link", robots[k])]
+        else:
+            links = [("map", "odom", corrections[k]), ("odom", "base_link", odometry[k])]
+        file.write("/tf", transforms(messages, time, links), time)
+        file.write("/scan", scan_message(messages, log, row, time), time)
+    return file.finished()
+
+
+class _File:
+    """The MCAP that is being written, chunk by chunk, compressed by zstd."""
+
+    def __init__(self, messages: Messages) -> None:
+        from mcap.writer import Writer
+
+        self._messages, self._stream = messages, io.BytesIO()
+        self._writer = Writer(self._stream)
+        self._writer.start(profile="ros2", library=f"nscan-cli {__version__}")
+        schemas = {
+            name: self._writer.register_schema(name, "ros2msg", messages.definition(name).encode())
+            for name in dict.fromkeys(TOPICS.values())
+        }
+        self._channels = {
+            topic: self._writer.register_channel(topic, "cdr", schemas[name])
+            for topic, name in TOPICS.items()
+        }
+        self._written = dict.fromkeys(TOPICS, 0)
+
+    def write(self, topic: str, message: Any, time: int) -> None:
+        """Add a message of the topic's type; `time` in ns."""
+        data = self._messages.encoded(message, TOPICS[topic])
+        self._writer.add_message(self._channels[topic], time, data, time, self._written[topic])
+        self._written[topic] += 1
+
+    def finished(self) -> bytes:
+        """All bytes of the file."""
+        self._writer.finish()  # type: ignore[no-untyped-call]
+        return self._stream.getvalue()
+
+
+def _nanoseconds(stamps: Sequence[str]) -> list[int]:
+    """The stamps (s, as text) in ns, exactly as far as they are written."""
+    times = [int((Decimal(stamp) * NANOSECONDS).to_integral_value()) for stamp in stamps]
+    first, last = min(times), max(times)
+    if first >= 0 and last < LAST_SECOND * NANOSECONDS:
+        return times
+    start = first // NANOSECONDS * NANOSECONDS
+    return [time - start for time in times]

@@ -1,0 +1,27 @@
+"""What a graph's relations look like: lines between keyframes, of three kinds."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nscan_cli.graph.model import Graph
+from nscan_cli.mapping.canvas import DIM, GREEN, VERMILLION
+
+EDGE_COLOURS = {"nScan": GREEN, "pairwise": DIM, "loop": VERMILLION}
+"""In the order in which they are drawn: loops on top."""
+
+
+def edges_by_kind(graph: Graph) -> dict[str, NDArray[np.int64]]:
+    """For each of EDGE_COLOURS, the nodes (E, 2) that are joined, sorted, each pair once.
+
+    An nScan relation joins its fixed scan with each of the others.
+    """
+    found: dict[str, set[tuple[int, int]]] = {kind: set() for kind in EDGE_COLOURS}
+    for relation in graph.pairwise:
+        found["loop" if relation.origin == "loop" else "pairwise"].add(relation.nodes)
+    for joint in graph.nscan:
+        centre = joint.nodes[joint.fixed]
+        kind = "loop" if joint.origin == "loop" else "nScan"
+        found[kind].update((centre, node) for node in joint.nodes if node != centre)
+    return {kind: np.array(sorted(pairs), dtype=np.int64).reshape(-1, 2) for kind, pairs in found.items()}

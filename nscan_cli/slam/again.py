@@ -1,0 +1,156 @@
+"""A saved graph refined again: steps 5 and 6 of the loop (paper, V), without tracking.
+
+The keyframes are laid out anew from the scans, with the poses of the graph where tracking had its own.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import itertools
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nscan_cli.graph.marginals import marginal_covariances
+from nscan_cli.graph.model import Graph, Pairwise
+from nscan_cli.logs.scan import LaserLog
+from nscan_cli.matching.priors import odometry_prior
+from nscan_cli.poses import relative
+from nscan_cli.slam.closing import NO_SECOND
+from nscan_cli.slam.nearby import Nearby
+from nscan_cli.slam.options import SlamOptions
+from nscan_cli.slam.pipeline import Slam
+from nscan_cli.slam.place import AMBIGUOUS, ELSEWHERE, NO_MATCH, Place
+from nscan_cli.slam.tracking import Tracked
+
+SEARCHED = (AMBIGUOUS, ELSEWHERE, NO_MATCH, NO_SECOND)
+"""Verdicts of the search for large loops, which is not made again: they stay."""
+
+
+def can_refine(graph: Graph) -> bool:
+    """Whether slam made the graph: its parameters are there, and all scans go with the last keyframe."""
+    keyframes = graph.keyframes
+    if "slam" not in graph.provenance.get("parameters", {}) or keyframes[0] != 0:
+        return False
+    last = keyframes[np.searchsorted(keyframes, np.arange(len(graph)), side="right") - 1]
+    return bool(np.array_equal(graph.anchors, last))
+
+
+def options_of(graph: Graph) -> SlamOptions:
+    """The parameters that the graph was made with; what it does not say has its default."""
+    options: SlamOptions = _restored(SlamOptions(), graph.provenance["parameters"]["slam"])
+    return options
+
+
+def refine_again(graph: Graph, log: LaserLog, rows: NDArray[np.int64]) -> Graph:
+    """The graph after its loops are checked, and its matches made again from its poses.
+
+    `rows` (N,) are the rows of the log with the scans of the nodes. `can_refine` has to hold.
+    """
+    options = options_of(graph)
+    slam = Slam(_scans(log, rows), options)
+    _lay_out(slam, graph)
+    slam.poses = graph.poses[graph.keyframes]
+    slam.chain = _chain(graph, options)
+    in_chain = {id(relation) for relation in slam.chain}
+    slam.pairs = [pair for pair in graph.pairwise if id(pair) not in in_chain]
+    slam.nscan = list(graph.nscan)
+    slam.loops = [loop for loop in graph.loops if loop.reason not in SEARCHED]
+    slam.places = _places(graph, options)
+    slam.reject()
+    slam.refine()
+    refined = slam.graph()
+    refined.loops += [loop for loop in graph.loops if loop.reason in SEARCHED]
+    refined.provenance = graph.provenance
+    refined.marginals = marginal_covariances(refined)
+    return refined
+
+
+def _scans(log: LaserLog, rows: NDArray[np.int64]) -> LaserLog:
+    """The log with the scans in some rows (N,) alone."""
+    if np.array_equal(rows, np.arange(len(log))):
+        return log
+    return dataclasses.replace(
+        log,
+        numbers=log.numbers[rows],
+        stamps=tuple(log.stamps[row] for row in rows.tolist()),
+        times=log.times[rows],
+        ranges=log.ranges[rows],
+        angle_min=log.angle_min[rows],
+        angle_increment=log.angle_increment[rows],
+        odometry=None if log.odometry is None else log.odometry[rows],
+    )
+
+
+def _lay_out(slam: Slam, graph: Graph) -> None:
+    """The keyframes with their Gaussians, as tracking would have made them at the graph's poses."""
+    step, path, joined_at = slam.options.tracking.step, 0.0, graph.poses[0]
+    nothing = np.zeros((3, 3))
+    for row, (pose, anchor) in enumerate(zip(graph.poses, graph.anchors.tolist(), strict=True)):
+        moved = relative(pose, joined_at)
+        distance = float(np.hypot(moved[0], moved[1]))
+        joined = row == 0 or distance > step or abs(moved[2]) > step
+        if joined:
+            path, joined_at = path + distance, pose
+        points, tracked = slam.points(row), Tracked(pose, nothing, nothing, 1.0, path, joined)
+        if anchor == row:
+            slam.keyframes.add(row, points, tracked)
+        else:
+            slam.keyframes.attach(points, tracked)
+        slam.tracked.append(pose)
+        slam.anchors.append(anchor)
+    slam.keyframes.finish_last()
+
+
+def _chain(graph: Graph, options: SlamOptions) -> list[Pairwise]:
+    """The relations from each keyframe to the next.
+
+    A graph of nScan relations alone has left out those that these hold together. In their place stands
+    what odometry would know of such a step.
+    """
+    tracked: dict[tuple[int, int], Pairwise] = {}
+    for pair in graph.pairwise:
+        if pair.origin == "track":
+            tracked.setdefault(pair.nodes, pair)
+    chain = []
+    for a, b in itertools.pairwise(graph.keyframes.tolist()):
+        step, information = odometry_prior(graph.poses[a], graph.poses[b], options.tracking.odometry)
+        chain.append(tracked.get((a, b)) or Pairwise((a, b), step, information, "track"))
+    return chain
+
+
+def _places(graph: Graph, options: SlamOptions) -> list[Place]:
+    """The large loops: those whose scans are further apart than a joint match reaches by itself."""
+    position = {int(node): k for k, node in enumerate(graph.keyframes)}
+    loops = [(joint.nodes, joint.nodes[joint.fixed], Nearby((), joint, None, 0.0, True))
+             for joint in graph.nscan if joint.origin == "loop"]  # fmt: skip
+    loops += [(pair.nodes, pair.nodes[1], Nearby((pair,), None, None, 0.0, True))
+              for pair in graph.pairwise if pair.origin == "loop"]  # fmt: skip
+    places = []
+    for nodes, centre, nearby in loops:
+        away = relative(graph.poses[list(nodes)], graph.poses[centre])
+        distances = np.hypot(away[:, 0], away[:, 1])
+        farthest = nodes[int(np.argmax(distances))]
+        if distances.max() > options.nscan.radius:
+            measured = relative(graph.poses[centre], graph.poses[farthest])
+            radius = float(distances.max()) + options.refined
+            places.append(Place(position[farthest], position[centre], measured, radius, nearby))
+    return places
+
+
+def _restored(default: Any, values: dict[str, Any]) -> Any:
+    """The dataclass `default` with the values of a JSON object, as far as it has such fields."""
+    given: dict[str, Any] = {}
+    for field in dataclasses.fields(default):
+        if field.name not in values:
+            continue
+        value, usual = values[field.name], getattr(default, field.name)
+        if dataclasses.is_dataclass(usual):
+            value = _restored(usual, value)
+        given[field.name] = _as_tuple(value)
+    return dataclasses.replace(default, **given)
+
+
+def _as_tuple(value: Any) -> Any:
+    return tuple(_as_tuple(part) for part in value) if isinstance(value, list) else value

@@ -1,0 +1,137 @@
+"""`nscan-cli slam --from GRAPH` as a user meets it."""
+
+from __future__ import annotations
+
+import gzip
+import hashlib
+import io
+import shutil
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from nscan_cli.cli.main import run
+from nscan_cli.graph.g2o import write_g2o
+from nscan_cli.graph.json_file import read_graph, write_graph
+from nscan_cli.graph.tum import read_tum
+from nscan_cli.logs.load import read_log
+from nscan_cli.logs.options import ReadingOptions
+from nscan_cli.poses import relative
+from tests.graph.small_graph import small_graph
+
+SAMPLE = Path(__file__).resolve().parents[2] / "sample_logs" / "office.log.gz"
+
+
+@pytest.fixture(scope="module")
+def saved(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with the graph of 200 scans of the sample alone."""
+    folder = tmp_path_factory.mktemp("saved")
+    assert run(["slam", str(SAMPLE), "--end", "40", "-q", "-o", str(folder / "graph.json")]) == 0
+    return folder
+
+
+@pytest.fixture
+def folder(saved: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """The current folder, with that graph in it."""
+    shutil.copy(saved / "graph.json", tmp_path)
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def test_with_its_log_a_graph_is_refined(folder, capsys):
+    outputs = {"-o": "again.json", "--map": "again.png", "--trajectory": "again.tum", "--g2o": "again.g2o",
+               "--carmen": "again.log", "--depfile": "again.d"}  # fmt: skip
+    arguments = [part for pair in outputs.items() for part in pair]
+    assert run(["slam", "--from", "graph.json", str(SAMPLE), *arguments]) == 0
+    (said,) = capsys.readouterr().err.splitlines()
+    assert "iterations, then refined; no pose moved by more than" in said
+    before, after = read_graph("graph.json"), read_graph("again.json")
+    assert after.provenance == before.provenance
+    np.testing.assert_allclose(relative(after.poses, before.poses), 0, atol=0.05)
+    # The matches are made again: their last digits tell.
+    assert len(after.nscan) >= 1
+    assert not np.array_equal(after.nscan[0].hessian, before.nscan[0].hessian)
+    np.testing.assert_allclose(relative(read_tum("again.tum").poses, after.poses), 0, atol=1e-8)
+    corrected = read_log("again.log", ReadingOptions(allow_corrected=True))
+    assert corrected.odometry is not None
+    np.testing.assert_allclose(relative(corrected.odometry, after.poses), 0, atol=3e-9)
+    assert (folder / "again.d").read_text() == (
+        f"again.json again.png again.yaml again.tum again.g2o again.log: graph.json {SAMPLE}\n"
+    )
+
+
+@pytest.mark.parametrize("beside", [True, False])
+def test_the_log_is_found_beside_the_graph_or_here(folder, tmp_path_factory, monkeypatch, beside):
+    elsewhere = tmp_path_factory.mktemp("elsewhere")
+    shutil.copy(SAMPLE, folder if beside else elsewhere)
+    monkeypatch.chdir(elsewhere)
+    assert run(["slam", "--from", str(folder / "graph.json"), "-o", "found.json", "-q"]) == 0
+    assert run(["slam", "--from", str(folder / "graph.json"), str(SAMPLE), "-o", "given.json", "-q"]) == 0
+    assert (elsewhere / "found.json").read_bytes() == (elsewhere / "given.json").read_bytes()
+
+
+def test_without_its_log_a_graph_is_optimised_only(folder, capsys):
+    """At its minimum already: it stays."""
+    assert run(["slam", "--from", "graph.json", "-o", "again.json", "--trajectory", "again.tum"]) == 0
+    warning, summary = capsys.readouterr().err.splitlines()
+    assert warning.startswith(
+        "warning: optimised only, and not refined: graph.json: its log office.log.gz is"
+    )
+    assert "nScan relations: energy" in summary
+    assert "refined" not in summary
+    before, after = read_graph("graph.json"), read_graph("again.json")
+    np.testing.assert_allclose(relative(after.poses, before.poses), 0, atol=1e-4)
+    np.testing.assert_array_equal(after.nscan[0].hessian, before.nscan[0].hessian)
+    assert after.provenance == before.provenance
+
+
+@pytest.mark.parametrize("name", ["foreign.json", "foreign.g2o"])
+def test_a_graph_of_another_tool_is_optimised_only(folder, capsys, name):
+    graph = small_graph()
+    (folder / name).write_bytes(write_graph(graph) if name.endswith("json") else write_g2o(graph))
+    assert run(["slam", "--from", name, "-o", "again.json"]) == 0
+    assert f"{name}: is no graph that slam made from a log" in capsys.readouterr().err
+    assert run(["slam", "--from", name, str(SAMPLE), "-o", "more.json"]) == 2
+    assert not (folder / "more.json").exists()
+
+
+def test_a_map_needs_the_log(folder, capsys):
+    assert run(["slam", "--from", "graph.json", "-o", "again.json", "--map", "again.png"]) == 66
+    assert "its log office.log.gz is neither beside it nor in the current folder" in capsys.readouterr().err
+    assert not list(folder.glob("again*"))
+
+
+def test_another_log_is_refused(folder, capsys):
+    other = gzip.compress(gzip.decompress(SAMPLE.read_bytes()) + b"# another\n", mtime=0)
+    (folder / "office.log.gz").write_bytes(other)
+    assert hashlib.sha256(other).hexdigest() != read_graph("graph.json").provenance["inputs"][0]["sha256"]
+    for arguments in ([], ["office.log.gz"]):
+        assert run(["slam", "--from", "graph.json", *arguments, "-o", "again.json"]) == 65
+        assert (
+            "office.log.gz: is not the log of graph.json: its SHA-256 is another" in capsys.readouterr().err
+        )
+        assert not (folder / "again.json").exists()
+
+
+def test_the_log_that_was_found_is_never_replaced(folder, capsys):
+    shutil.copy(SAMPLE, folder)
+    assert run(["slam", "--from", "graph.json", "-o", "again.json", "--carmen", "office.log.gz"]) == 2
+    assert "office.log.gz is an input, and an output too" in capsys.readouterr().err
+    assert (folder / "office.log.gz").read_bytes() == SAMPLE.read_bytes()
+
+
+def test_the_graph_may_come_from_standard_input(folder, monkeypatch):
+    shutil.copy(SAMPLE, folder)
+    data = (folder / "graph.json").read_bytes()
+    monkeypatch.setattr("sys.stdin", SimpleNamespace(buffer=io.BytesIO(data)))
+    assert run(["slam", "--from", "-", "-o", "piped.json", "-q"]) == 0
+    assert run(["slam", "--from", "graph.json", "-o", "named.json", "-q"]) == 0
+    assert (folder / "piped.json").read_bytes() == (folder / "named.json").read_bytes()
+
+
+def test_the_same_bytes_every_time(folder):
+    for name in ("a.json", "b.json"):
+        assert run(["slam", "--from", "graph.json", str(SAMPLE), "-o", name, "-q"]) == 0
+    assert (folder / "a.json").read_bytes() == (folder / "b.json").read_bytes()
