@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -102,10 +103,16 @@ class LaserLog:
         """The usable beams' end points (m, 2) of one row in the robot's frame, in beam order."""
         ranges = self.ranges[scan]
         beams = np.flatnonzero(np.isfinite(ranges))
-        angles = self.angle_min[scan] + beams * self.angle_increment[scan]
-        r = ranges[beams].astype(np.float64)
-        return transform(self.mount, np.stack([r * np.cos(angles), r * np.sin(angles)], axis=-1))
+        directions = _directions(len(ranges), float(self.angle_min[scan]), float(self.angle_increment[scan]))
+        return transform(self.mount, ranges[beams, None] * directions[beams])
 
     def laser_pose(self, robot: Array) -> Array:
         """Poses (…, 3) of the laser for poses (…, 3) of the robot."""
         return compose(robot, self.mount)
+
+
+@functools.lru_cache(maxsize=8)
+def _directions(beams: int, first: float, step: float) -> Array:
+    """Unit vectors (B, 2) of the beams in the laser's frame; mostly those of all scans are the same."""
+    angles = first + step * np.arange(beams)
+    return np.stack([np.cos(angles), np.sin(angles)], axis=-1)

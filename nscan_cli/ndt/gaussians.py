@@ -64,8 +64,7 @@ def make_gaussian(grid: Grid, row: int, half: float, minimum: float, floor: floa
     gaussian[3] = half_gap * s2
     gaussian[4] = mean - half_gap * c2
     # The normal is the eigenvector of the smaller eigenvalue, at a right angle to (cos ½β, sin ½β).
-    along_angle = 0.5 * np.arctan2(s2, c2)
-    nx, ny = -np.sin(along_angle), np.cos(along_angle)
+    nx, ny = -np.copysign(np.sqrt(max(0.5 - 0.5 * c2, 0.0)), s2), np.sqrt(max(0.5 + 0.5 * c2, 0.0))
     through = fx * nx + fy * ny
     gaussian[5] = gaussian[6] = 0.0
     if abs(through) > ONE_SIDED:

@@ -10,6 +10,7 @@ lets a map follow the robot.
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from nscan_cli.compiled import kernel
 from nscan_cli.ndt.gaussians import make_gaussian
@@ -22,24 +23,13 @@ NEW_NEIGHBOURS = 9
 
 @kernel
 def add_points(
-    grid: Grid,
-    rows: int,
-    half: float,
-    points: Array,
-    pose: Array,
-    sign: float,
-    minimum: float,
-    floor: float,
-    straight: bool,
+    grid: Grid, rows: int, half: float, points: Array, pose: Array, sign: float, touched: NDArray[np.int32]
 ) -> int:
     """Add (sign +1) or take away (−1) points (m, 2), moved by `pose`; returns the number of rows.
 
-    Gaussians are made again where sums changed: from at least `minimum` points, with a standard
-    deviation of at least `floor` (m) and a smaller eigenvalue of at least 0.001 of the larger ([19]);
-    `straight` as in make_gaussian.
+    The row of each point is written to `touched` (m,); the Gaussians there are to be made again.
     """
     cos, sin = np.cos(pose[2]), np.sin(pose[2])
-    touched = np.empty(points.shape[0], dtype=np.int32)
     for k in range(points.shape[0]):
         x = cos * points[k, 0] - sin * points[k, 1] + pose[0]
         y = sin * points[k, 0] + cos * points[k, 1] + pose[1]
@@ -61,14 +51,36 @@ def add_points(
         sums[7] += sign * (y - pose[1]) / length
         if sums[0] < 0.5:
             sums[:] = 0.0
-    previous = -1
-    for k in range(points.shape[0]):
-        # Neighbouring beams mostly fall into the same cell.
-        if touched[k] != previous:
-            previous = touched[k]
-            for block in range(4):
-                make_gaussian(grid, grid.links[previous, block], half, minimum, floor, straight)
     return rows
+
+
+@kernel
+def make_gaussians(
+    grid: Grid,
+    rows: int,
+    touched: NDArray[np.int32],
+    half: float,
+    minimum: float,
+    floor: float,
+    straight: bool,
+) -> None:
+    """Make the Gaussians of all lattice cells in `touched` (m,), of the first `rows`.
+
+    From at least `minimum` points, with a standard deviation of at least `floor` (m) and a smaller
+    eigenvalue of at least 0.001 of the larger ([19]); `straight` as in make_gaussian.
+    """
+    made = np.zeros(rows, dtype=np.bool_)
+    previous = -1
+    for k in range(touched.shape[0]):
+        # Neighbouring beams mostly fall into the same cell.
+        if touched[k] == previous:
+            continue
+        previous = touched[k]
+        for block in range(4):
+            row = grid.links[previous, block]
+            if row >= 0 and not made[row]:
+                made[row] = True
+                make_gaussian(grid, row, half, minimum, floor, straight)
 
 
 @kernel
@@ -115,17 +127,29 @@ class Ndt:
 
     def add(self, points: Array, pose: Array) -> None:
         """Grow by points (m, 2), moved by `pose` (3,)."""
-        self._change(points, pose, 1.0)
+        self._make(self._change(points, pose, 1.0))
 
     def subtract(self, points: Array, pose: Array) -> None:
         """Take away points that were added with the very same pose."""
-        self._change(points, pose, -1.0)
+        self._make(self._change(points, pose, -1.0))
 
-    def _change(self, points: Array, pose: Array, sign: float) -> None:
+    def gather(self, points: Array, pose: Array) -> None:
+        """Take points (m, 2) in, moved by `pose` (3,), for Gaussians that `make` or `compact` makes."""
+        self._change(points, pose, 1.0)
+
+    def make(self) -> None:
+        """Make all Gaussians of the points gathered."""
+        self._make(np.arange(self.rows, dtype=np.int32))
+
+    def _change(self, points: Array, pose: Array, sign: float) -> NDArray[np.int32]:
+        """Change the sums; the rows (m,) where they changed."""
         self._reserve(self.rows + NEW_NEIGHBOURS * len(points))
-        self.rows = add_points(
-            self.grid, self.rows, self.half, points, pose, sign, self.minimum, self.floor, self.straight
-        )
+        touched = np.empty(len(points), dtype=np.int32)
+        self.rows = add_points(self.grid, self.rows, self.half, points, pose, sign, touched)
+        return touched
+
+    def _make(self, touched: NDArray[np.int32]) -> None:
+        make_gaussians(self.grid, self.rows, touched, self.half, self.minimum, self.floor, self.straight)
 
     def _reserve(self, rows: int) -> None:
         capacity = len(self.grid.keys)
@@ -137,7 +161,8 @@ class Ndt:
         rehash(self.grid, self.rows)
 
     def compact(self) -> None:
-        """Give back the memory that only growing needs; nothing can be added any more."""
+        """Make all Gaussians, and give back what only growing needs; nothing can be added any more."""
+        self.make()
         grid, rows = self.grid, self.rows
         usable = grid.gaussians[:rows, 2] != 0.0
         # −1 as an index finds the last entry: no Gaussian.

@@ -78,8 +78,10 @@ class Keyframes:
             points,
             Ndt(gaussians.cell, gaussians.minimum, gaussians.floor, 1024),
         )
-        keyframe.ndt.add(points, np.zeros(3))
+        keyframe.ndt.gather(points, np.zeros(3))
         self._grow(keyframe)
+        # Joint matches may have it before the scans that follow are there.
+        keyframe.ndt.make()
         self.finish_last()
         self._since, self._expected = [], np.zeros((3, 3))
         self.list.append(keyframe)
@@ -93,7 +95,7 @@ class Keyframes:
 
     def _grow(self, keyframe: Keyframe) -> None:
         for points, tracked in self._since:
-            keyframe.ndt.add(points, relative(tracked.pose, keyframe.tracked.pose))
+            keyframe.ndt.gather(points, relative(tracked.pose, keyframe.tracked.pose))
 
     def relation_to_previous(self) -> Pairwise:
         """The pairwise relation of the last keyframe to the one before it, as it was tracked.
