@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 import dataclasses
-import os
 import time
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import click
 
 from nscan_cli.cli.options import CONTEXT, common_options, reading_options
-from nscan_cli.cli.output import check_writable, write_whole
 from nscan_cli.cli.progress import progress, say
-from nscan_cli.cli.render import check_map_outputs, write_map, yaml_path
+from nscan_cli.cli.slam_outputs import Outputs
 from nscan_cli.errors import InputMissingError, WrongUsageError
 from nscan_cli.logs.options import ReadingOptions
 from nscan_cli.provenance import provenance_of
@@ -54,6 +52,8 @@ MAPPING = ("max_scans", "relations", "no_loops")
               show_default=True, help="Match scans near each other one by one (pairwise), or jointly "
               "(nscan; both: and keep the chain of tracking).")  # fmt: skip
 @click.option("--no-loops", is_flag=True, help="Match nothing with what an earlier visit saw: drift stays.")
+@click.option("--threads", type=click.IntRange(1), metavar="N",
+              help="Work in so many threads, with the same result; by default one a processor.")  # fmt: skip
 @click.option("--depfile", metavar="FILE", help="Write what the outputs were made from as a rule for make.")
 @reading_options
 @common_options
@@ -68,6 +68,7 @@ def command(
     max_scans: int,
     relations: Relations,
     no_loops: bool,
+    threads: int | None,
     depfile: str | None,
     reading: ReadingOptions,
     quiet: bool,
@@ -91,24 +92,20 @@ def command(
             "slam: reading options, --max-scans, --relations and --no-loops do not go with --from; "
             "those that the graph was made with hold"
         )
-    if "-" in (map_file, trajectory, g2o, carmen, depfile):
-        raise WrongUsageError("slam: only the graph (-o) can go to standard output; name files for the rest")
-    inputs = [path for path in (from_file, log) if path is not None]
-    _check_outputs(inputs, output, map_file, trajectory, g2o, carmen, depfile)
+    outputs = Outputs(output, map_file, trajectory, g2o, carmen, depfile)
+    outputs.check([path for path in (from_file, log) if path is not None])
+    from nscan_cli.threads import available_threads
+
+    threads = threads or available_threads()
     began = time.perf_counter()
     if from_file is None:
         assert log is not None
-        run = _map(log, reading, _options(max_scans, relations, no_loops), quiet, verbose)
+        run = _map(log, reading, _options(max_scans, relations, no_loops), threads, quiet, verbose)
     else:
-        run = _again(from_file, log, needs_log=bool(map_file or carmen), quiet=quiet)
+        run = _again(from_file, log, outputs.need_scans, threads, quiet)
         # A log that was found must not be replaced either.
-        _check_outputs(run.inputs, output, map_file, trajectory, g2o, carmen, depfile)
-    _write(run.graph, output, trajectory, g2o)
-    if run.scans is not None:
-        _write_with_scans(run.scans, run.rows, run.graph, map_file, carmen)
-    if depfile is not None:
-        maps = [] if map_file is None else [map_file, yaml_path(map_file)]
-        _write_rule(depfile, [output, *maps, trajectory, g2o, carmen], run.inputs)
+        outputs.check(run.inputs)
+    outputs.write(run.graph, run.scans, run.rows, run.inputs)
     seconds = time.perf_counter() - began
     say(run.summary, quiet)
     if from_file is None and run.scans is not None:
@@ -142,25 +139,9 @@ def _options(max_scans: int, relations: Relations, no_loops: bool) -> SlamOption
     return SlamOptions(nscan=NScanOptions(max_scans=max_scans, loops=not no_loops), relations=relations)
 
 
-def _check_outputs(inputs: list[str], output: str, map_file: str | None, *others: str | None) -> None:
-    """Refuse outputs that can never be written, that share a name, or that would replace an input."""
-    names = [path for path in (output, map_file, *others) if path not in (None, "-")]
-    if map_file is not None:
-        check_map_outputs(map_file, yaml=True)
-        names.append(yaml_path(map_file))
-    files = [os.path.realpath(str(name)) for name in names]
-    if len(set(files)) < len(files):
-        raise WrongUsageError("slam: two outputs have the same name; give each its own")
-    for source in inputs:
-        if source != "-" and os.path.realpath(source) in files:
-            raise WrongUsageError(
-                f"slam: {source} is an input, and an output too; choose another name for it"
-            )
-    for path in (output, *others):
-        check_writable(path)
-
-
-def _map(log: str, reading: ReadingOptions, options: SlamOptions, quiet: bool, verbose: int) -> _Run:
+def _map(
+    log: str, reading: ReadingOptions, options: SlamOptions, threads: int, quiet: bool, verbose: int
+) -> _Run:
     """Run the whole loop over a log."""
     import numpy as np
 
@@ -171,7 +152,7 @@ def _map(log: str, reading: ReadingOptions, options: SlamOptions, quiet: bool, v
     for warning in scans.report.notices():
         say(f"warning: {warning}", quiet)
     _announce_compiling(quiet)
-    slam = Slam(scans, options)
+    slam = Slam(scans, options, threads)
     with progress("mapping", len(scans), quiet) as advance:
         graph = slam.run(lambda done, keyframes: advance(done, f"{keyframes} keyframes"))
     parameters = {"reading": dataclasses.asdict(reading), "slam": dataclasses.asdict(options)}
@@ -199,7 +180,7 @@ def _announce_compiling(quiet: bool) -> None:
         say("compiling the kernels, once for this version on this machine: about 20 s", quiet)
 
 
-def _again(path: str, log_file: str | None, needs_log: bool, quiet: bool) -> _Run:
+def _again(path: str, log_file: str | None, needs_log: bool, threads: int, quiet: bool) -> _Run:
     """Optimise a saved graph, and refine it where its log is there."""
     import numpy as np
 
@@ -222,7 +203,7 @@ def _again(path: str, log_file: str | None, needs_log: bool, quiet: bool) -> _Ru
         scans, rows, log_path = read
         inputs.append(log_path)
         _announce_compiling(quiet)
-        graph = refine_again(graph, scans, rows)
+        graph = refine_again(graph, scans, rows, threads)
     moved = float(np.hypot(*(graph.poses - before)[:, :2].T).max())
     summary = (
         f"{len(graph.keyframes)} keyframes, {len(graph.pairwise)} pairwise and {len(graph.nscan)} nScan "
@@ -256,42 +237,3 @@ def _log_of(
         return None
     scans, _nodes, rows = read_graph_log(path, graph, log_file, ReadingOptions())
     return scans, rows, log_file
-
-
-def _write(graph: Graph, output: str, trajectory: str | None, g2o: str | None) -> None:
-    from nscan_cli.graph.json_file import write_graph
-
-    write_whole(output, write_graph(graph))
-    if trajectory is not None:
-        from nscan_cli.graph.tum import write_tum
-
-        write_whole(trajectory, write_tum(graph.stamps, graph.poses))
-    if g2o is not None:
-        from nscan_cli.graph.g2o import write_g2o
-
-        write_whole(g2o, write_g2o(graph))
-
-
-def _write_with_scans(
-    scans: LaserLog, rows: NDArray[np.int64], graph: Graph, map_file: str | None, carmen: str | None
-) -> None:
-    if map_file is not None:
-        from nscan_cli.mapping.occupancy import occupancy_grid
-
-        write_map(map_file, occupancy_grid(scans, rows, graph.poses), yaml=True)
-    if carmen is not None:
-        from nscan_cli.exports.carmen import corrected_log
-
-        write_whole(carmen, corrected_log(scans, rows, graph.poses))
-
-
-def _write_rule(depfile: str, outputs: list[Any], inputs: list[str]) -> None:
-    """`outputs: inputs` for make's include, with spaces and dollars escaped."""
-
-    def escaped(path: str) -> str:
-        return path.replace("$", "$$").replace(" ", "\\ ").replace("#", "\\#")
-
-    targets = " ".join(escaped(path) for path in outputs if path not in (None, "-"))
-    # Standard input is no file that make could look for.
-    prerequisites = "".join(f" {escaped(path)}" for path in inputs if path != "-")
-    write_whole(depfile, f"{targets}:{prerequisites}\n".encode())

@@ -18,6 +18,7 @@ from nscan_cli.logs.scan import LaserLog
 from nscan_cli.matching.priors import odometry_prior
 from nscan_cli.poses import relative
 from nscan_cli.slam.closing import NO_SECOND
+from nscan_cli.slam.keyframes import route
 from nscan_cli.slam.nearby import Nearby
 from nscan_cli.slam.options import SlamOptions
 from nscan_cli.slam.pipeline import Slam
@@ -43,17 +44,17 @@ def options_of(graph: Graph) -> SlamOptions:
     return options
 
 
-def refine_again(graph: Graph, log: LaserLog, rows: NDArray[np.int64]) -> Graph:
+def refine_again(graph: Graph, log: LaserLog, rows: NDArray[np.int64], threads: int = 1) -> Graph:
     """The graph after its loops are checked, and its matches made again from its poses.
 
     `rows` (N,) are the rows of the log with the scans of the nodes. `can_refine` has to hold.
     """
     options = options_of(graph)
-    slam = Slam(_scans(log, rows), options)
+    slam = Slam(_scans(log, rows), options, threads)
     _lay_out(slam, graph)
-    slam.poses = graph.poses[graph.keyframes]
-    slam.chain = _chain(graph, options)
-    in_chain = {id(relation) for relation in slam.chain}
+    chain = _chain(graph, options)
+    slam.route = route(slam.keyframes.list, chain, graph.poses[graph.keyframes])
+    in_chain = {id(relation) for relation in chain}
     slam.pairs = [pair for pair in graph.pairwise if id(pair) not in in_chain]
     slam.nscan = list(graph.nscan)
     slam.loops = [loop for loop in graph.loops if loop.reason not in SEARCHED]
@@ -123,10 +124,13 @@ def _chain(graph: Graph, options: SlamOptions) -> list[Pairwise]:
 def _places(graph: Graph, options: SlamOptions) -> list[Place]:
     """The large loops: those whose scans are further apart than a joint match reaches by itself."""
     position = {int(node): k for k, node in enumerate(graph.keyframes)}
-    loops = [(joint.nodes, joint.nodes[joint.fixed], Nearby((), joint, None, 0.0, True))
-             for joint in graph.nscan if joint.origin == "loop"]  # fmt: skip
-    loops += [(pair.nodes, pair.nodes[1], Nearby((pair,), None, None, 0.0, True))
-              for pair in graph.pairwise if pair.origin == "loop"]  # fmt: skip
+    loops: list[tuple[tuple[int, ...], int, Nearby]] = []
+    for joint in graph.nscan:
+        if joint.origin == "loop":
+            loops.append((joint.nodes, joint.nodes[joint.fixed], Nearby((), joint, None, 0.0, True)))
+    for pair in graph.pairwise:
+        if pair.origin == "loop":
+            loops.append((pair.nodes, pair.nodes[1], Nearby((pair,), None, None, 0.0, True)))
     places = []
     for nodes, centre, nearby in loops:
         away = relative(graph.poses[list(nodes)], graph.poses[centre])

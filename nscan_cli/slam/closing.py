@@ -8,7 +8,7 @@ start must stand the search too.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 from nscan_cli.graph.model import Loop, Pairwise
 from nscan_cli.graph.system import GraphEnergy
 from nscan_cli.matching.search import SearchOptions
-from nscan_cli.poses import Array, compose, wrap
-from nscan_cli.slam.keyframes import Keyframe, paths_of
+from nscan_cli.poses import compose, wrap
+from nscan_cli.slam.keyframes import Route
 from nscan_cli.slam.nearby import MatchNearby, Nearby
 from nscan_cli.slam.options import ClosingOptions, NScanOptions
 from nscan_cli.slam.place import Place, find_place, why_doubted
@@ -47,34 +47,31 @@ class Closing:
 
     def close(
         self,
-        keyframes: Sequence[Keyframe],
-        chain: Sequence[Pairwise],
-        poses: Array,
+        route: Route,
         centre: int,
         left_out: Indices,
         energy: Callable[[int], GraphEnergy],
     ) -> list[Place]:
         """The places of a keyframe, and of those before that agree with it: two at least, or none.
 
-        `poses` (K, 3) are the global ones, `chain[k]` leads from keyframe k to k + 1, `left_out` (m,) are
-        keyframes of another visit that the joint match about `centre` was tried with. `energy` gives that
-        of the graph of `way` and all loops, with a keyframe held.
+        `left_out` (m,) are keyframes of another visit that the joint match about `centre` was tried with.
+        `energy` gives that of the graph of `way` and all loops, with a keyframe held.
         """
-        paths = paths_of(keyframes)
+        paths, poses = route.paths, route.poses
         if paths[centre] - self._searched < self.options.step:
             return []
         reach = self._whereabouts.bound(centre, self.way, poses)
-        near = self._near(paths, poses, centre, reach)
+        near = self._near(route, centre, reach)
         if len(near) or len(left_out):
             reach = self._whereabouts.ask(centre, energy, poses)
-            near = np.union1d(self._near(paths, poses, centre, reach), left_out).astype(np.int64)
+            near = np.union1d(self._near(route, centre, reach), left_out).astype(np.int64)
         if not len(near):
             return []
         self._searched = paths[centre]
-        place = self._search(keyframes, chain, poses, centre, near, reach, energy)
+        place = self._search(route, centre, near, reach, energy)
         if place is None:
             return []
-        agreeing = [other for other in self._waiting if self._agree(other, place, poses, paths)]
+        agreeing = [other for other in self._waiting if self._agree(other, place, route)]
         self._waiting = [other for other in self._waiting if other not in agreeing]
         if agreeing:
             return [*agreeing, place]
@@ -83,8 +80,7 @@ class Closing:
 
     def why_doubted(
         self,
-        keyframes: Sequence[Keyframe],
-        poses: Array,
+        route: Route,
         centre: int,
         nearby: Nearby,
         energy: Callable[[int], GraphEnergy],
@@ -93,18 +89,19 @@ class Closing:
 
         Arguments as for close. A match that began near enough, or closes no loop, is not doubted.
         """
-        tie = nearby.tie(keyframes[centre].row)
+        poses = route.poses
+        tie = nearby.tie(route.keyframes[centre].row)
         if tie is None:
             return None
-        old = [keyframe.row for keyframe in keyframes].index(tie[0])
+        old = route.rows(range(len(poses))).index(tie[0])
         if not self._may_be_off(self._whereabouts.bound(centre, self.way, poses), old):
             return None
         reach = self._whereabouts.ask(centre, energy, poses)
         if not self._may_be_off(reach, old):
             return None
-        window, earlier = self._visit(keyframes, poses, centre, old, reach, energy)
+        window, earlier = self._visit(route, centre, old, reach, energy)
         pose = compose(poses[old], tie[1])
-        return why_doubted(keyframes, poses, centre, pose, earlier, window, self.options)
+        return why_doubted(route, centre, pose, earlier, window, self.options)
 
     def _may_be_off(self, reach: Reach, keyframe: int) -> bool:
         """Whether a keyframe may be too far off for a joint match."""
@@ -115,8 +112,9 @@ class Closing:
         waiting = [place.nearby.loop for place in self._waiting if place.nearby.loop is not None]
         return self._refused + [replace(loop, accepted=False, reason=NO_SECOND) for loop in waiting]
 
-    def _near(self, paths: Array, poses: Array, centre: int, reach: Reach) -> Indices:
+    def _near(self, route: Route, centre: int, reach: Reach) -> Indices:
         """The older keyframes that may be near, but may be too far off for a joint match."""
+        paths, poses = route.paths, route.poses
         options, away = self.options, np.hypot(*(poses[:, :2] - poses[centre, :2]).T)
         bound = options.deviations * reach.distance
         may_be = away <= self.nscan.radius + np.minimum(bound, options.farthest)
@@ -125,21 +123,17 @@ class Closing:
 
     def _search(
         self,
-        keyframes: Sequence[Keyframe],
-        chain: Sequence[Pairwise],
-        poses: Array,
+        route: Route,
         centre: int,
         near: Indices,
         reach: Reach,
         energy: Callable[[int], GraphEnergy],
     ) -> Place | None:
         """Search among the visit that most likely is near."""
-        away = np.hypot(*(poses[:, :2] - poses[centre, :2]).T)
+        away = np.hypot(*(route.poses[:, :2] - route.poses[centre, :2]).T)
         first = int(near[np.argmin(away[near] - self.options.deviations * reach.distance[near])])
-        window, around = self._visit(keyframes, poses, centre, first, reach, energy)
-        found = find_place(
-            keyframes, chain, poses, centre, around, window, self.match, self.options, self.nscan
-        )
+        window, around = self._visit(route, centre, first, reach, energy)
+        found = find_place(route, centre, around, window, self.match, self.options, self.nscan)
         if isinstance(found, Loop):
             self._refused.append(found)
             return None
@@ -147,8 +141,7 @@ class Closing:
 
     def _visit(
         self,
-        keyframes: Sequence[Keyframe],
-        poses: Array,
+        route: Route,
         centre: int,
         first: int,
         reach: Reach,
@@ -158,7 +151,7 @@ class Closing:
 
         These are what the graph knows well as seen from the first: the map that they make is in one piece.
         """
-        options, paths = self.options, paths_of(keyframes)
+        options, paths, poses = self.options, route.paths, route.poses
         distance = max(options.deviations * reach.distance[first], options.least)
         turn = max(options.deviations * reach.angle[first], options.least_turn)
         window = replace(
@@ -169,7 +162,8 @@ class Closing:
         in_one_piece = options.deviations * seen_from(energy(first), poses).distance <= options.settled
         return window, np.flatnonzero(older & near & in_one_piece)
 
-    def _agree(self, one: Place, other: Place, poses: Array, paths: Array) -> bool:
+    def _agree(self, one: Place, other: Place, route: Route) -> bool:
+        poses, paths = route.poses, route.paths
         off = one.corrected(poses, other.centre) - other.corrected(poses, other.centre)
         within = np.hypot(off[0], off[1]) <= self.options.agree
         turned = abs(wrap(off[2])) <= self.options.agree_turn

@@ -23,7 +23,17 @@ class Coverage:
         """A match of `centre` with all others that was tried, and what it related."""
         self._pairs.update(_pairs(centre, others))
         for relation in [] if nearby is None else nearby.relations:
-            self._pairs.update(combinations(sorted(relation.nodes), 2))
+            self.relate(relation.nodes)
+
+    def relate(self, nodes: Iterable[int]) -> None:
+        """Every keyframe has been matched with every other."""
+        self._pairs.update(combinations(sorted(set(nodes)), 2))
+
+    def copy(self) -> Coverage:
+        """One that goes its own way from here."""
+        copied = Coverage()
+        copied._pairs = self._pairs.copy()
+        return copied
 
 
 def _pairs(centre: int, others: Iterable[int]) -> list[tuple[int, int]]:

@@ -6,8 +6,9 @@ motion fill the gaps between the beams. Its points are those of its own scan.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -32,9 +33,27 @@ class Keyframe:
     ndt: Ndt
 
 
-def paths_of(keyframes: Sequence[Keyframe]) -> Array:
+class Route(NamedTuple):
+    """K keyframes along the path, and where the graph has them."""
+
+    keyframes: Sequence[Keyframe]
+    chain: Sequence[Pairwise]
+    """The relations of tracking: `chain[k]` leads from keyframe k to k + 1."""
+    paths: Array
     """(K,) the length of path up to each, m."""
-    return np.array([keyframe.tracked.path for keyframe in keyframes])
+    poses: Array
+    """(K, 3) global ones."""
+
+    def rows(self, indices: Iterable[int]) -> list[int]:
+        """Those of some keyframes in the log."""
+        return [self.keyframes[k].row for k in indices]
+
+
+def route(keyframes: Sequence[Keyframe], chain: Sequence[Pairwise], poses: Array) -> Route:
+    """The route of as many keyframes as there are poses (K, 3)."""
+    keyframes = keyframes[: len(poses)]
+    paths = np.array([keyframe.tracked.path for keyframe in keyframes])
+    return Route(keyframes, chain[: max(len(poses) - 1, 0)], paths, poses)
 
 
 class Keyframes:
@@ -80,8 +99,6 @@ class Keyframes:
         )
         keyframe.ndt.gather(points, np.zeros(3))
         self._grow(keyframe)
-        # Joint matches may have it before the scans that follow are there.
-        keyframe.ndt.make()
         self.finish_last()
         self._since, self._expected = [], np.zeros((3, 3))
         self.list.append(keyframe)
@@ -97,24 +114,23 @@ class Keyframes:
         for points, tracked in self._since:
             keyframe.ndt.gather(points, relative(tracked.pose, keyframe.tracked.pose))
 
-    def relation_to_previous(self) -> Pairwise:
-        """The pairwise relation of the last keyframe to the one before it, as it was tracked.
 
-        The information is that of the match, weighed down, and of the motion that was expected; drift that
-        no match shows limits it.
-        """
-        before, last = self.list[-2], self.list[-1]
-        options = self.options
-        c, s = np.cos(before.tracked.pose[2]), np.sin(before.tracked.pose[2])
-        rotation = np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
-        information = options.information_scale * rotation @ last.tracked.hessian @ rotation.T
-        length = last.tracked.path - before.tracked.path
-        drift = np.array([options.drift, options.drift, options.drift_angle]) ** 2 * (length + 0.01)
-        covariance = np.linalg.inv(information + np.linalg.inv(last.expected)) + np.diag(drift)
-        return Pairwise(
-            nodes=(before.row, last.row),
-            measurement=relative(last.tracked.pose, before.tracked.pose),
-            information=np.linalg.inv(covariance),
-            origin="track",
-            score=last.tracked.inliers,
-        )
+def relation_between(before: Keyframe, last: Keyframe, options: KeyframeOptions) -> Pairwise:
+    """The pairwise relation of a keyframe to the one before it, as it was tracked.
+
+    The information is that of the match, weighed down, and of the motion that was expected; drift that
+    no match shows limits it.
+    """
+    c, s = np.cos(before.tracked.pose[2]), np.sin(before.tracked.pose[2])
+    rotation = np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
+    information = options.information_scale * rotation @ last.tracked.hessian @ rotation.T
+    length = last.tracked.path - before.tracked.path
+    drift = np.array([options.drift, options.drift, options.drift_angle]) ** 2 * (length + 0.01)
+    covariance = np.linalg.inv(information + np.linalg.inv(last.expected)) + np.diag(drift)
+    return Pairwise(
+        nodes=(before.row, last.row),
+        measurement=relative(last.tracked.pose, before.tracked.pose),
+        information=np.linalg.inv(covariance),
+        origin="track",
+        score=last.tracked.inliers,
+    )

@@ -14,7 +14,7 @@ from nscan_cli.matching.joint_energy import JointProblem, Priors, all_pairs, no_
 from nscan_cli.matching.overlap import held_together, overlaps, weakest_link
 from nscan_cli.matching.scans import Scans, lay_out
 from nscan_cli.poses import Array, relative
-from nscan_cli.slam.keyframes import Keyframe, paths_of
+from nscan_cli.slam.keyframes import Keyframe, Route
 from nscan_cli.slam.options import NScanOptions
 
 Indices = NDArray[np.int64]
@@ -54,7 +54,7 @@ class Nearby:
         return old, relative(poses[nodes.index(centre)], poses[nodes.index(old)])
 
 
-MatchNearby = Callable[[Sequence[Keyframe], Array, Sequence[Pairwise], int, NScanOptions], Nearby | None]
+MatchNearby = Callable[[Route, int, NScanOptions], Nearby | None]
 """Step 3, jointly or in pairs: match_nearby tells the arguments."""
 
 
@@ -78,34 +78,24 @@ def choose_nearby(
     return chosen, np.isin(chosen, old)
 
 
-def match_nearby(
-    keyframes: Sequence[Keyframe],
-    poses: Array,
-    pairwise: Sequence[Pairwise],
-    centre: int,
-    options: NScanOptions,
-) -> Nearby | None:
-    """Match a keyframe jointly with those near it, with the pairwise relations among them as priors.
+def match_nearby(route: Route, centre: int, options: NScanOptions) -> Nearby | None:
+    """Match a keyframe jointly with those near it, with the relations of the chain among them as priors.
 
-    `poses` (K, 3) are the global poses of the keyframes (K,), `pairwise[k]` leads from keyframe k to
-    k + 1. Scans that do not hang together with the `centre` by overlaps are left out, and the others
-    matched again. None when there are too few keyframes near.
+    Scans that do not hang together with the `centre` by overlaps are left out, and the others matched
+    again. None when there are too few keyframes near.
     """
-    paths = paths_of(keyframes)
-    tried, seen_before = choose_nearby(poses, paths, centre, options)
+    tried, seen_before = choose_nearby(route.poses, route.paths, centre, options)
     if len(tried) < LEAST_SCANS:
         return None
     for widenings in options.attempts:
-        nearby = _match_held(keyframes, poses, pairwise, tried, seen_before, centre, widenings, options)
+        nearby = _match_held(route, tried, seen_before, centre, widenings, options)
         if nearby.whole and nearby.moved < options.settled:
             break
     return nearby
 
 
 def _match_held(
-    keyframes: Sequence[Keyframe],
-    poses: Array,
-    pairwise: Sequence[Pairwise],
+    route: Route,
     tried: Indices,
     seen_before: NDArray[np.bool_],
     centre: int,
@@ -113,11 +103,12 @@ def _match_held(
     options: NScanOptions,
 ) -> Nearby:
     """Match jointly, leave out what does not hang together, and match again, until all does."""
+    keyframes, poses = route.keyframes, route.poses
     kept, start = np.arange(len(tried)), poses[tried]
     while len(kept) >= LEAST_SCANS:
         members = tried[kept]
         scans = lay_out([keyframes[k].ndt for k in members], [keyframes[k].points for k in members])
-        match = _match(scans, members, pairwise, start, widenings, options)
+        match = _match(scans, members, route.chain, start, widenings, options)
         shares = overlaps(scans, match.poses).pairs
         at = int(np.searchsorted(members, centre))
         held = held_together(shares, options.overlap, at)
@@ -143,7 +134,7 @@ def _match_held(
 def _match(
     scans: Scans,
     members: Indices,
-    pairwise: Sequence[Pairwise],
+    chain: Sequence[Pairwise],
     start: Array,
     widenings: tuple[float, ...],
     options: NScanOptions,
@@ -152,7 +143,7 @@ def _match(
     consecutive = np.flatnonzero(np.diff(members) == 1)
     priors = no_priors()
     if len(consecutive):
-        known = [pairwise[members[k]] for k in consecutive]
+        known = [chain[members[k]] for k in consecutive]
         priors = Priors(
             np.stack([consecutive, consecutive + 1], axis=1),
             np.array([relation.measurement for relation in known]),

@@ -17,7 +17,7 @@ from nscan_cli.matching.overlap import INLIER_BOUND
 from nscan_cli.matching.priors import Prior
 from nscan_cli.ndt.energy import energy, inlier_share
 from nscan_cli.poses import Array, inverse, relative, relative_jacobians, wrap
-from nscan_cli.slam.keyframes import Keyframe, paths_of
+from nscan_cli.slam.keyframes import Keyframe, Route
 from nscan_cli.slam.nearby import Nearby, choose_nearby, moved_by, verdict
 from nscan_cli.slam.options import NScanOptions
 
@@ -34,24 +34,18 @@ class _Single:
     """How far (m) the match moved the other, seen from the centre."""
 
 
-def match_pairs_nearby(
-    keyframes: Sequence[Keyframe],
-    poses: Array,
-    chain: Sequence[Pairwise],
-    centre: int,
-    options: NScanOptions,
-) -> Nearby | None:
+def match_pairs_nearby(route: Route, centre: int, options: NScanOptions) -> Nearby | None:
     """Match a keyframe with each of those near it, and keep the matches with overlap enough.
 
     Arguments as for match_nearby. A loop is accepted when a match with some keyframe of another visit
     is. None when no other keyframe is near.
     """
-    paths = paths_of(keyframes)
-    chosen, before = choose_nearby(poses, paths, centre, options)
+    keyframes = route.keyframes
+    chosen, before = choose_nearby(route.poses, route.paths, centre, options)
     tried, seen_before = chosen[chosen != centre], before[chosen != centre]
     if len(tried) == 0:
         return None
-    singles = [_match(keyframes, poses, chain, int(other), centre, options) for other in tried]
+    singles = [_match(route, int(other), centre, options) for other in tried]
     overlaps = np.array([single.overlap for single in singles])
     kept = overlaps >= options.overlap
     relations = tuple(
@@ -71,17 +65,11 @@ def match_pairs_nearby(
     return Nearby(relations, None, loop, moved, whole)
 
 
-def _match(
-    keyframes: Sequence[Keyframe],
-    poses: Array,
-    chain: Sequence[Pairwise],
-    other: int,
-    centre: int,
-    options: NScanOptions,
-) -> _Single:
-    """The match of the centre with one other keyframe, from global poses (K, 3)."""
+def _match(route: Route, other: int, centre: int, options: NScanOptions) -> _Single:
+    """The match of the centre with one other keyframe, from where the graph has them."""
+    keyframes, poses = route.keyframes, route.poses
     reference, points = keyframes[other].ndt, keyframes[centre].points
-    prior = _prior(chain, other, centre)
+    prior = _prior(route.chain, other, centre)
     problem = PairProblem(reference.grid, reference.half, points, options.scale, prior)
     start, origin = relative(poses[centre], poses[other]), np.zeros(3)
     for widenings in options.attempts:

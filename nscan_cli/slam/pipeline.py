@@ -18,7 +18,7 @@ from nscan_cli.logs.scan import LaserLog
 from nscan_cli.poses import Array, compose
 from nscan_cli.slam.closing import Closing
 from nscan_cli.slam.coverage import Coverage
-from nscan_cli.slam.keyframes import Keyframes, paths_of
+from nscan_cli.slam.keyframes import Keyframe, Keyframes, Route, relation_between
 from nscan_cli.slam.nearby import MatchNearby, Nearby, choose_nearby, match_nearby
 from nscan_cli.slam.options import SlamOptions
 from nscan_cli.slam.pairs_nearby import match_pairs_nearby
@@ -26,6 +26,7 @@ from nscan_cli.slam.place import Place
 from nscan_cli.slam.refinement import Refinement
 from nscan_cli.slam.tracking import Tracked, Tracker
 from nscan_cli.slam.trajectory import between_keyframes
+from nscan_cli.threads import Beside
 
 CONTRADICTS = "contradicts the rest of the graph"
 
@@ -34,10 +35,13 @@ Report = Callable[[int, int], None]
 
 
 class Slam:
-    """The state of the loop: what was tracked, the keyframes, their relations and their poses."""
+    """The state of the loop: what was tracked, the keyframes, their relations and their poses.
 
-    def __init__(self, log: LaserLog, options: SlamOptions) -> None:
-        self.log, self.options = log, options
+    Tracking needs nothing of the graph, so that with two `threads` the graph grows beside it.
+    """
+
+    def __init__(self, log: LaserLog, options: SlamOptions, threads: int = 1) -> None:
+        self.log, self.options, self.threads = log, options, threads
         self.tracker = Tracker(options.tracking)
         seen = log.ranges[log.ranges < options.tracking.reach]
         median_range = float(np.median(seen)) if len(seen) else 0.0
@@ -45,11 +49,10 @@ class Slam:
         self.tracked: list[Array] = []
         self.anchors: list[int] = []
         self.match: MatchNearby = match_pairs_nearby if options.relations == "pairwise" else match_nearby
-        self.chain: list[Pairwise] = []
+        self.route = Route([], [], np.zeros(0), np.zeros((0, 3)))
         self.pairs: list[Pairwise] = []
         self.nscan: list[NScan] = []
         self.loops: list[Loop] = []
-        self.poses = np.zeros((0, 3))
         self.covered = Coverage()
         self.closing = Closing(options.closing, options.nscan, self.match)
         self.places: list[Place] = []
@@ -57,17 +60,19 @@ class Slam:
 
     def run(self, report: Report) -> Graph:
         """The paper's loop over all scans, and the last optimisation."""
-        for row in range(len(self.log)):
-            points = self.points(row)
-            tracked = self.track(row, points)
-            if self.keyframes.near_enough(tracked):
-                self.keyframes.attach(points, tracked)
-            else:
-                self.add_keyframe(row, points, tracked)
-                self.match_nearby(len(self.keyframes) - 1 - self.options.nscan.behind)
-            self.anchors.append(self.keyframes.list[-1].row)
-            report(row + 1, len(self.keyframes))
+        with Beside(self.threads) as beside:
+            for row in range(len(self.log)):
+                points = self.points(row)
+                tracked = self.track(row, points)
+                if self.keyframes.near_enough(tracked):
+                    self.keyframes.attach(points, tracked)
+                else:
+                    self.keyframes.add(row, points, tracked)
+                    beside(self.grow, len(self.keyframes) - 1)
+                self.anchors.append(self.keyframes.list[-1].row)
+                report(row + 1, len(self.keyframes))
         self.keyframes.finish_last()
+        self.grow(len(self.keyframes))
         for centre in range(len(self.keyframes) - self.options.nscan.behind, len(self.keyframes)):
             self.match_nearby(centre)
         self.optimise(max_iterations=100, tolerance=1e-6)
@@ -90,26 +95,31 @@ class Slam:
         self.tracked.append(tracked.pose)
         return tracked
 
-    def add_keyframe(self, row: int, points: Array, tracked: Tracked) -> None:
+    def grow(self, size: int) -> None:
+        """The graph takes in the first `size` keyframes, which are whole, and matches what is due."""
+        for keyframe in self.keyframes.list[len(self.poses) : size]:
+            self.add_keyframe(keyframe)
+            self.match_nearby(len(self.poses) - 1 - self.options.nscan.behind)
+
+    def add_keyframe(self, keyframe: Keyframe) -> None:
         """Step 2: a new keyframe, with its relation to the one before."""
-        self.keyframes.add(row, points, tracked)
-        if len(self.keyframes) == 1:
-            self.poses = np.zeros((1, 3))
+        keyframes, chain, paths, poses = self.route
+        paths = np.append(paths, keyframe.tracked.path)
+        if not len(keyframes):
+            self.route = Route([keyframe], [], paths, np.zeros((1, 3)))
             return
-        relation = self.keyframes.relation_to_previous()
-        self.chain.append(relation)
-        before, last = self.keyframes.list[-2:]
-        self.closing.extend(relation, last.tracked.path - before.tracked.path)
-        self.poses = np.vstack([self.poses, compose(self.poses[-1], relation.measurement)])
+        relation = relation_between(keyframes[-1], keyframe, self.options.keyframes)
+        self.closing.extend(relation, paths[-1] - paths[-2])
+        poses = np.vstack([poses, compose(poses[-1], relation.measurement)])
+        self.route = Route([*keyframes, keyframe], [*chain, relation], paths, poses)
 
     def match_nearby(self, centre: int) -> None:
         """Step 3: a keyframe matched with those near it; the graph follows when it must."""
         if centre < 0:
             return
-        keyframes, options = self.keyframes.list, self.options.nscan
-        paths = paths_of(keyframes)
-        tried, seen_before = choose_nearby(self.poses, paths, centre, options)
-        node, others = keyframes[centre].row, [keyframes[k].row for k in tried.tolist()]
+        route, options = self.route, self.options.nscan
+        tried, seen_before = choose_nearby(route.poses, route.paths, centre, options)
+        node, others = route.keyframes[centre].row, route.rows(tried.tolist())
         if self.covered.share(node, others) >= options.covered:
             return
         nearby = self.match_unless_doubted(centre)
@@ -124,22 +134,21 @@ class Slam:
 
     def match_unless_doubted(self, centre: int) -> Nearby | None:
         """The match of a keyframe with those near it; without other visits if its place there is doubted."""
-        keyframes, options = self.keyframes.list, self.options.nscan
-        nearby = self.match(keyframes, self.poses, self.chain, centre, options)
+        options = self.options.nscan
+        nearby = self.match(self.route, centre, options)
         if nearby is None or nearby.loop is None:
             return nearby
-        reason = self.closing.why_doubted(keyframes, self.poses, centre, nearby, self._known)
+        reason = self.closing.why_doubted(self.route, centre, nearby, self._known)
         if reason is None:
             return nearby
         loop = dataclasses.replace(nearby.loop, accepted=False, reason=reason)
         alone = dataclasses.replace(options, loops=False)
-        nearby = self.match(keyframes, self.poses, self.chain, centre, alone)
+        nearby = self.match(self.route, centre, alone)
         return None if nearby is None else dataclasses.replace(nearby, loop=loop, whole=False)
 
     def close_loops(self, centre: int, left_out: Indices) -> None:
         """Step 4: a keyframe searched where its place may be farther off than a joint match finds it."""
-        keyframes = self.keyframes.list
-        places = self.closing.close(keyframes, self.chain, self.poses, centre, left_out, self._known)
+        places = self.closing.close(self.route, centre, left_out, self._known)
         for place in places:
             self.take(place.nearby)
         if places:
@@ -161,7 +170,7 @@ class Slam:
         # The poses are right to centimetres: the last stage is all it takes.
         last = dataclasses.replace(options.nscan, widenings=options.nscan.widenings[-1:])
         wider = {place.centre: place.radius for place in self.places}
-        refinement = Refinement(self.keyframes.list, self.chain, last, self.match, wider)
+        refinement = Refinement(self.route, last, self.match, wider, self.threads)
         for _ in range(options.refinements):
             if not refinement.sweep(self.poses, options.refined):
                 break
@@ -193,10 +202,15 @@ class Slam:
     def optimise(self, max_iterations: int, tolerance: float) -> None:
         """Step 5: the global poses of all keyframes from all relations (paper, IV)."""
         self._moved = 0.0
-        if len(self.keyframes) < 2:
+        if len(self.poses) < 2:
             return
         energy = self._energy(self.pairwise, self.nscan, fixed=0)
-        self.poses = optimise(energy, self.poses, max_iterations, tolerance).poses
+        self.route = self.route._replace(poses=optimise(energy, self.poses, max_iterations, tolerance).poses)
+
+    @property
+    def poses(self) -> Array:
+        """(K, 3) where the graph has the keyframes."""
+        return self.route.poses
 
     def _known(self, fixed: int) -> GraphEnergy:
         """What loops and the way say of how the keyframes lie to one of them, slips allowed for."""
@@ -206,16 +220,16 @@ class Slam:
 
     def _energy(self, pairwise: list[Pairwise], nscan: list[NScan], fixed: int) -> GraphEnergy:
         positions = np.full(len(self.log), -1)
-        positions[[keyframe.row for keyframe in self.keyframes.list]] = np.arange(len(self.keyframes))
+        positions[[keyframe.row for keyframe in self.route.keyframes]] = np.arange(len(self.poses))
         return GraphEnergy(len(self.poses), pairwise, nscan, positions, fixed)
 
     @property
     def pairwise(self) -> list[Pairwise]:
         """The pairwise relations of the graph: the chain, or what is needed of it, and single matches."""
         if self.options.relations != "nscan":
-            return self.chain + self.pairs
+            return [*self.route.chain, *self.pairs]
         joined = {pair for relation in self.nscan for pair in itertools.pairwise(relation.nodes)}
-        return [relation for relation in self.chain if relation.nodes not in joined]
+        return [relation for relation in self.route.chain if relation.nodes not in joined]
 
     def graph(self) -> Graph:
         """Every scan with its pose: a keyframe where the graph put it, the others in between."""

@@ -7,16 +7,15 @@ match from there. A wrong loop is worse than a missed one.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from nscan_cli.graph.model import Loop, Pairwise
+from nscan_cli.graph.model import Loop
 from nscan_cli.matching.search import Field, SearchOptions, likelihood_field, search
 from nscan_cli.poses import Array, compose, relative, transform
-from nscan_cli.slam.keyframes import Keyframe, paths_of
+from nscan_cli.slam.keyframes import Route
 from nscan_cli.slam.nearby import MatchNearby, Nearby
 from nscan_cli.slam.options import ClosingOptions, NScanOptions
 
@@ -49,9 +48,7 @@ class Place:
 
 
 def find_place(
-    keyframes: Sequence[Keyframe],
-    chain: Sequence[Pairwise],
-    poses: Array,
+    route: Route,
     centre: int,
     earlier: NDArray[np.int64],
     window: SearchOptions,
@@ -61,12 +58,13 @@ def find_place(
 ) -> Place | Loop | None:
     """The place of keyframe `centre` among the `earlier` ones (m,), or why what was found is refused.
 
-    `poses` (K, 3) are the global ones, `chain[k]` leads from keyframe k to k + 1. None when nothing fits.
+    None when nothing fits.
     """
-    sought = _sought(keyframes, poses, centre, earlier, window, closing)
+    sought = _sought(route, centre, earlier, window, closing)
     if sought is None:
         return None
     scan, field = sought
+    keyframes, poses = route.keyframes, route.poses
     found = search(field, scan, poses[centre], closing.score, window)
     if found is None:
         return None
@@ -74,17 +72,15 @@ def find_place(
     elsewhere = found.pose, closing.apart
     if search(field, scan, poses[centre], closing.rival * found.score, window, elsewhere) is not None:
         return Loop(nodes, False, AMBIGUOUS, found.score)
-    moved, paths = poses.copy(), paths_of(keyframes)
-    visit = np.abs(paths - paths[centre]) <= nscan.recent
+    moved, visit = poses.copy(), np.abs(route.paths - route.paths[centre]) <= nscan.recent
     moved[visit] = compose(found.pose, relative(poses[visit], poses[centre]))
     away = np.hypot(*(poses[earlier, :2] - found.pose[:2]).T).min()
     radius = max(nscan.radius, float(away) + nscan.radius)
-    nearby = match(keyframes, moved, chain, centre, replace(nscan, radius=radius))
+    nearby = match(route._replace(poses=moved), centre, replace(nscan, radius=radius))
     tie = None if nearby is None else nearby.tie(keyframes[centre].row)
-    rows = [keyframe.row for keyframe in keyframes]
     if nearby is None or tie is None:
         return Loop(nodes, False, NO_MATCH, found.score)
-    old = rows.index(tie[0])
+    old = route.rows(range(len(poses))).index(tie[0])
     off = compose(moved[old], tie[1]) - found.pose
     if np.hypot(off[0], off[1]) > closing.settled:
         return Loop(nodes, False, ELSEWHERE, found.score)
@@ -92,8 +88,7 @@ def find_place(
 
 
 def why_doubted(
-    keyframes: Sequence[Keyframe],
-    poses: Array,
+    route: Route,
     centre: int,
     pose: Array,
     earlier: NDArray[np.int64],
@@ -104,7 +99,7 @@ def why_doubted(
 
     A joint match ends at the optimum that is next. Along a corridor there is one at every door.
     """
-    sought = _sought(keyframes, poses, centre, earlier, window, closing)
+    sought = _sought(route, centre, earlier, window, closing)
     if sought is None:
         return TOO_LITTLE
     scan, field = sought
@@ -112,12 +107,15 @@ def why_doubted(
     here = search(field, scan, pose, closing.score, cells)
     if here is None:
         return TOO_LITTLE
-    return None if search(field, scan, poses[centre], here.score / closing.rival, window) is None else OUTDONE
+    return (
+        None
+        if search(field, scan, route.poses[centre], here.score / closing.rival, window) is None
+        else OUTDONE
+    )
 
 
 def _sought(
-    keyframes: Sequence[Keyframe],
-    poses: Array,
+    route: Route,
     centre: int,
     earlier: NDArray[np.int64],
     window: SearchOptions,
@@ -127,7 +125,7 @@ def _sought(
 
     None when one of them has no points.
     """
-    paths = paths_of(keyframes)
+    keyframes, _, paths, poses = route
     beside = np.flatnonzero(np.abs(paths - paths[centre]) <= closing.beside)
     here = relative(poses[beside], poses[centre])
     scan = [transform(pose, keyframes[k].points) for k, pose in zip(beside.tolist(), here, strict=True)]

@@ -11,14 +11,14 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from nscan_cli.graph.model import Loop, NScan, Pairwise
 from nscan_cli.poses import Array, relative, wrap
 from nscan_cli.slam.coverage import Coverage
-from nscan_cli.slam.keyframes import Keyframe, paths_of
-from nscan_cli.slam.nearby import MatchNearby, Nearby, choose_nearby
+from nscan_cli.slam.keyframes import Route
+from nscan_cli.slam.nearby import Indices, MatchNearby, Nearby, choose_nearby
 from nscan_cli.slam.options import NScanOptions
+from nscan_cli.threads import in_threads
 
 
 class Refinement:
@@ -26,41 +26,58 @@ class Refinement:
 
     def __init__(
         self,
-        keyframes: Sequence[Keyframe],
-        chain: Sequence[Pairwise],
+        route: Route,
         options: NScanOptions,
         match: MatchNearby,
         wider: Mapping[int, float],
+        threads: int = 1,
     ) -> None:
         """Take the radius (m) about some centres that is `wider`: where large loops were closed."""
-        self._keyframes, self._chain, self._options, self._match = keyframes, chain, options, match
+        self._route, self._options, self._match, self._threads = route, options, match, threads
         self._wider, self._covered = wider, Coverage()
-        self._paths = paths_of(keyframes)
-        self._found: list[Nearby | None] = [None] * len(keyframes)
-        self._starts: list[tuple[NDArray[np.int64], Array] | None] = [None] * len(keyframes)
+        self._found: list[Nearby | None] = [None] * len(route.keyframes)
+        self._starts: list[tuple[Indices, Array] | None] = [None] * len(route.keyframes)
 
     def sweep(self, poses: Array, moved: float) -> int:
         """Match again about the keyframes whose neighbours have moved by more than `moved` (m, rad).
 
-        `poses` (K, 3) are the global ones; returns how many were matched.
+        `poses` (K, 3) are the global ones; returns how many were matched. Those that are chosen together
+        are matched side by side.
         """
-        matched = 0
-        for centre in range(len(self._keyframes)):
-            if not self._has_moved(centre, poses, moved):
-                continue
-            options = self._options
-            if centre in self._wider:
-                options = replace(options, radius=self._wider[centre])
-            tried, _ = choose_nearby(poses, self._paths, centre, options)
-            node, others = self._keyframes[centre].row, [self._keyframes[k].row for k in tried.tolist()]
-            needed = self._starts[centre] is not None or centre in self._wider
-            if not needed and self._covered.share(node, others) >= options.covered:
-                continue
-            nearby = self._match(self._keyframes, poses, self._chain, centre, options)
-            self._covered.add(node, others, nearby)
-            self._starts[centre], self._found[centre] = (tried, relative(poses[tried], poses[centre])), nearby
-            matched += 1
+        route, matched = self._route._replace(poses=poses), 0
+        waiting = [k for k in range(len(poses)) if self._has_moved(k, poses, moved)]
+        while chosen := self._uncovered(route, waiting):
+            found = in_threads(
+                self._threads, lambda centre: self._match(route, centre, self._options_of(centre)), chosen
+            )
+            for (centre, tried), nearby in zip(chosen.items(), found, strict=True):
+                self._covered.add(route.keyframes[centre].row, route.rows(tried.tolist()), nearby)
+                self._starts[centre] = tried, relative(poses[tried], poses[centre])
+                self._found[centre] = nearby
+            waiting = [centre for centre in waiting if centre not in chosen]
+            matched += len(chosen)
         return matched
+
+    def _uncovered(self, route: Route, waiting: Sequence[int]) -> dict[int, Indices]:
+        """The centres to match next, with the keyframes (n,) near each.
+
+        As if every match related all that it is tried with; where one does not, the next choice makes up.
+        """
+        chosen, covered = {}, self._covered.copy()
+        for centre in waiting:
+            options = self._options_of(centre)
+            tried, _ = choose_nearby(route.poses, route.paths, centre, options)
+            node, others = route.keyframes[centre].row, route.rows(tried.tolist())
+            needed = self._starts[centre] is not None or centre in self._wider
+            if needed or covered.share(node, others) < options.covered:
+                chosen[centre] = tried
+                covered.relate([node, *others])
+        return chosen
+
+    def _options_of(self, centre: int) -> NScanOptions:
+        if centre not in self._wider:
+            return self._options
+        return replace(self._options, radius=self._wider[centre])
 
     def relations(self) -> tuple[list[Pairwise], list[NScan]]:
         """The relations as they are now: of single matches, and of joint ones."""

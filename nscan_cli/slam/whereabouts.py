@@ -55,23 +55,27 @@ class Whereabouts:
 
     def __init__(self) -> None:
         self._origin = 0
-        self._then = Reach(np.zeros(1), np.zeros(1))
+        self._reach = Reach(np.zeros(1), np.zeros(1))
 
     def ask(self, origin: int, energy: Callable[[int], GraphEnergy], poses: Array) -> Reach:
         """The reach (K,) from keyframe `origin`; `energy` gives the graph's with a keyframe held."""
-        self._origin, self._then = origin, seen_from(energy(origin), poses)
-        return self._then
+        self._origin, self._reach = origin, seen_from(energy(origin), poses)
+        return self._reach
 
     def bound(self, origin: int, way: Sequence[Pairwise], poses: Array) -> Reach:
-        """At most the reach from `origin`, of the keyframes before it; `way[k]` leads from k to k + 1."""
-        known = len(self._then.distance)
+        """At most the reach from `origin`, of the keyframes before it; `way[k]` leads from k to k + 1.
+
+        The origin never goes back.
+        """
+        known = len(self._reach.distance)
         distance, angle = np.zeros(len(poses)), np.zeros(len(poses))
-        distance[:known], angle[:known] = self._then.distance**2, self._then.angle**2
+        distance[:known], angle[:known] = self._reach.distance**2, self._reach.angle**2
         for step in range(self._origin, origin):
             covariance: Array = np.linalg.inv(way[step].information).astype(np.float64)
             distance[: step + 1] += _swung(covariance, way[step].measurement, poses[: step + 1], poses[step])
             angle[: step + 1] += covariance[2, 2]
-        return Reach(np.sqrt(distance), np.sqrt(angle))
+        self._origin, self._reach = origin, Reach(np.sqrt(distance), np.sqrt(angle))
+        return self._reach
 
 
 def _swung(covariance: Array, measurement: Array, poses: Array, before: Array) -> Array:

@@ -14,7 +14,7 @@ from nscan_cli.graph.system import GraphEnergy
 from nscan_cli.logs.scan import LaserLog
 from nscan_cli.poses import Array, compose, relative
 from nscan_cli.slam.closing import Closing
-from nscan_cli.slam.keyframes import Keyframe, Keyframes
+from nscan_cli.slam.keyframes import Keyframe, Keyframes, relation_between, route
 from nscan_cli.slam.options import KeyframeOptions, NScanOptions
 from nscan_cli.slam.place import Place
 from nscan_cli.slam.tracking import Tracked
@@ -47,9 +47,7 @@ def keyframe_of(scene: Scene, row: int, pose: Array, path: float, seen: Array) -
 
 def relation_to_previous(keyframes: list[Keyframe]) -> Pairwise:
     """The relation of the last keyframe to the one before."""
-    found = Keyframes(KeyframeOptions(), NScanOptions().gaussians)
-    found.list = keyframes
-    return found.relation_to_previous()
+    return relation_between(keyframes[-2], keyframes[-1], KeyframeOptions())
 
 
 class Driven(NamedTuple):
@@ -203,7 +201,7 @@ def closed_along(
             return GraphEnergy(size, closing.way, [], positions, fixed)
 
         out = others[others < centre]
-        places = closing.close(keyframes[:size], chain[:newest], poses[:size], centre, out, energy)
+        places = closing.close(route(keyframes, chain, poses[:size]), centre, out, energy)
         if places:
             found.append((centre, places))
     return found

@@ -34,10 +34,10 @@ class Mapped:
     slam: Slam
 
 
-def mapped(log: LaserLog, options: SlamOptions | None = None) -> Mapped:
+def mapped(log: LaserLog, options: SlamOptions | None = None, threads: int = 1) -> Mapped:
     """Run the loop over a log."""
     options = options or SlamOptions()
-    slam = Slam(log, options)
+    slam = Slam(log, options, threads)
     graph = slam.run(lambda done, keyframes: None)
     parameters = {"reading": dataclasses.asdict(ReadingOptions()), "slam": dataclasses.asdict(options)}
     graph.provenance = provenance_of([log.source], parameters)

@@ -13,6 +13,7 @@ from nscan_cli.matching.search import SearchOptions
 from nscan_cli.poses import Array, compose, relative
 from nscan_cli.slam import closing as closing_module
 from nscan_cli.slam.closing import NO_SECOND, Closing
+from nscan_cli.slam.keyframes import route
 from nscan_cli.slam.nearby import Nearby, match_nearby
 from nscan_cli.slam.options import ClosingOptions, NScanOptions, SlamOptions
 from nscan_cli.slam.place import AMBIGUOUS, OUTDONE, TOO_LITTLE, Place
@@ -145,7 +146,8 @@ class Searches(list[tuple[int, Array, SearchOptions]]):
         super().__init__()
         self.corrections = corrections
 
-    def __call__(self, keyframes, chain, poses, centre, earlier, window, *rest) -> Place | None:
+    def __call__(self, visited, centre, earlier, window, *rest) -> Place | None:
+        keyframes, poses = visited.keyframes, visited.poses
         self.append((centre, earlier, window))
         if centre not in self.corrections:
             return None
@@ -260,8 +262,8 @@ def doubted(off: tuple[float, float, float], options: ClosingOptions, origin: st
     def energy(fixed: int) -> GraphEnergy:
         return GraphEnergy(centre + 1, tried.way, [], positions, fixed)
 
-    known = drive.keyframes[: centre + 1], drive.truth[: centre + 1]
-    return tried.why_doubted(*known, centre, nearby, energy)
+    known = route(drive.keyframes, drive.chain, drive.truth[: centre + 1])
+    return tried.why_doubted(known, centre, nearby, energy)
 
 
 def test_a_loop_from_a_poor_start_must_stand_a_search():

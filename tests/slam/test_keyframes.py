@@ -7,10 +7,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from nscan_cli.graph.model import Pairwise
 from nscan_cli.ndt.energy import energy
 from nscan_cli.ndt.grid import Ndt
 from nscan_cli.poses import Array, compose, relative, rotated_information
-from nscan_cli.slam.keyframes import Keyframes
+from nscan_cli.slam.keyframes import Keyframes, relation_between
 from nscan_cli.slam.options import GaussianOptions, KeyframeOptions
 from nscan_cli.slam.tracking import Tracked
 from tests.ndt.rooms import room
@@ -102,9 +103,13 @@ def test_finishing_no_keyframes_is_nothing():
     assert len(found) == 0
 
 
+def relation_to_previous(found: Keyframes) -> Pairwise:
+    return relation_between(found.list[-2], found.list[-1], found.options)
+
+
 def test_the_relation_to_the_previous_keyframe():
     poses = [np.array(p) for p in ([5.0, 5, 1], [2.0, 1.0, 3.0], [2.5, 1.4, -3.0])]
-    relation = keyframes(*poses).relation_to_previous()
+    relation = relation_to_previous(keyframes(*poses))
     assert relation.nodes == (10, 20)
     np.testing.assert_allclose(relation.measurement, relative(poses[2], poses[1]))
     assert (relation.origin, relation.score) == ("track", 0.9)
@@ -117,7 +122,7 @@ def test_the_information_is_the_matchs_and_the_drifts():
     found.add(1, room(1), tracked(np.array([1.0, 0, 0]), np.diag([1e5, 4e4, 2.5e5]), path=0.99))
     # 0.01² m² of drift along 1 m, and 1 / (0.1 · 1e5) of the match: 1 / (1e-4 + 1e-4).
     information = np.diag([5e3, 1 / (1e-4 + 2.5e-4), 1 / (4e-6 + 4e-5)])
-    np.testing.assert_allclose(found.relation_to_previous().information, information, rtol=1e-5, atol=1e-3)
+    np.testing.assert_allclose(relation_to_previous(found).information, information, rtol=1e-5, atol=1e-3)
 
 
 @given(st.integers(0, 10**6), st.sampled_from([0, 1, 2, 3]), st.floats(0, 50))
@@ -129,7 +134,7 @@ def test_the_information_is_positive_definite_and_never_more_than_the_drift_allo
     found = Keyframes(OPTIONS, GAUSSIANS)
     found.add(0, room(0), tracked(rng.uniform(-3, 3, 3)))
     found.add(1, room(1), tracked(rng.uniform(-3, 3, 3), root @ root.T, path=length))
-    information = found.relation_to_previous().information
+    information = relation_to_previous(found).information
     np.testing.assert_allclose(information, information.T, rtol=1e-6, atol=1e-6)
     assert np.linalg.eigvalsh(information).min() > 0
     drift = np.diag([OPTIONS.drift**2, OPTIONS.drift**2, OPTIONS.drift_angle**2]) * length
@@ -150,7 +155,7 @@ def test_the_relation_does_not_depend_on_the_trackers_frame(turn, x, y):
         found = Keyframes(OPTIONS, GAUSSIANS)
         found.add(0, room(0), tracked(a))
         found.add(1, room(1), tracked(b, hessian, path=0.6))
-        relations.append(found.relation_to_previous())
+        relations.append(relation_to_previous(found))
     np.testing.assert_allclose(relations[0].measurement, relations[1].measurement, atol=1e-9)
     np.testing.assert_allclose(relations[0].information, relations[1].information, rtol=1e-6, atol=1e-3)
 
@@ -163,5 +168,5 @@ def test_a_match_that_says_nothing_leaves_the_motion_that_was_expected():
     found.attach(room(1), step)
     found.attach(room(2), step)
     found.add(3, room(3), step)
-    covariance = np.linalg.inv(found.relation_to_previous().information)
+    covariance = np.linalg.inv(relation_to_previous(found).information)
     np.testing.assert_allclose(covariance, np.diag([0.03, 0.03, 0.0075]), rtol=0.01, atol=1e-9)

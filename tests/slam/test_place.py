@@ -10,7 +10,7 @@ import pytest
 from nscan_cli.graph.model import Loop
 from nscan_cli.matching.search import SearchOptions
 from nscan_cli.poses import Array, compose, relative, wrap
-from nscan_cli.slam.keyframes import Keyframe
+from nscan_cli.slam.keyframes import Keyframe, route
 from nscan_cli.slam.nearby import MatchNearby, Nearby, match_nearby
 from nscan_cli.slam.options import ClosingOptions, NScanOptions
 from nscan_cli.slam.pairs_nearby import match_pairs_nearby
@@ -50,7 +50,9 @@ def found(
 ) -> Place | Loop | None:
     drive = drive or round_drive()
     poses = moved(drive, centre, off)
-    return find_place(drive.keyframes, drive.chain, poses, centre, EARLIER, window, match, closing, NSCAN)
+    return find_place(
+        route(drive.keyframes, drive.chain, poses), centre, EARLIER, window, match, closing, NSCAN
+    )
 
 
 def off_truth(place: Place, truth: Array) -> Array:
@@ -83,7 +85,7 @@ def test_the_place_is_found_from_three_metres_away(off, match):
 def test_from_there_a_joint_match_alone_does_not_find_it(off):
     drive = round_drive()
     poses = moved(drive, CENTRE, off)
-    nearby = match_nearby(drive.keyframes, poses, drive.chain, CENTRE, NSCAN)
+    nearby = match_nearby(route(drive.keyframes, drive.chain, poses), CENTRE, NSCAN)
     assert nearby is not None
     assert nearby.tie(ROWS * CENTRE) is None
 
@@ -145,9 +147,9 @@ def matching(
     """match_nearby, but its relation has the other visit shifted, or there is none; and what it was given."""
     calls = []
 
-    def match(keyframes, poses, chain, centre, options) -> Nearby | None:
-        calls.append((poses, options))
-        nearby = match_nearby(keyframes, poses, chain, centre, options)
+    def match(visited, centre, options) -> Nearby | None:
+        calls.append((visited.poses, options))
+        nearby = match_nearby(visited, centre, options)
         if shift is None or nearby is None or nearby.nscan is None:
             return None
         local = nearby.nscan.poses.copy()

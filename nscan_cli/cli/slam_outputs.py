@@ -1,0 +1,100 @@
+"""What `slam` writes: the graph, and beside it whatever else was asked for."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from nscan_cli.cli.output import check_writable, write_whole
+from nscan_cli.cli.render import check_map_outputs, write_map, yaml_path
+from nscan_cli.errors import WrongUsageError
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from nscan_cli.graph.model import Graph
+    from nscan_cli.logs.scan import LaserLog
+
+
+@dataclass(frozen=True)
+class Outputs:
+    """Paths, None where nothing was asked for; only the graph's may be "-", standard output."""
+
+    graph: str
+    map: str | None
+    trajectory: str | None
+    g2o: str | None
+    carmen: str | None
+    depfile: str | None
+
+    @property
+    def need_scans(self) -> bool:
+        """Whether the graph alone does not do."""
+        return self.map is not None or self.carmen is not None
+
+    def check(self, inputs: Sequence[str]) -> None:
+        """Refuse what can never be written, shares a name, or would replace an input.
+
+        Raises WrongUsageError and OutputError.
+        """
+        others = (self.trajectory, self.g2o, self.carmen, self.depfile)
+        if "-" in (self.map, *others):
+            raise WrongUsageError(
+                "slam: only the graph (-o) can go to standard output; name files for the rest"
+            )
+        names = [path for path in (self.graph, *others) if path not in (None, "-")]
+        if self.map is not None:
+            check_map_outputs(self.map, yaml=True)
+            names += [self.map, yaml_path(self.map)]
+        files = [os.path.realpath(str(name)) for name in names]
+        if len(set(files)) < len(files):
+            raise WrongUsageError("slam: two outputs have the same name; give each its own")
+        for source in inputs:
+            if source != "-" and os.path.realpath(source) in files:
+                raise WrongUsageError(
+                    f"slam: {source} is an input, and an output too; choose another name for it"
+                )
+        for path in (self.graph, *others):
+            check_writable(path)
+
+    def write(
+        self, graph: Graph, scans: LaserLog | None, rows: NDArray[np.int64], inputs: Sequence[str]
+    ) -> None:
+        """Write all; `rows` (N,) are those of the graph's scans, `inputs` what the depfile names."""
+        from nscan_cli.graph.json_file import write_graph
+
+        write_whole(self.graph, write_graph(graph))
+        if self.trajectory is not None:
+            from nscan_cli.graph.tum import write_tum
+
+            write_whole(self.trajectory, write_tum(graph.stamps, graph.poses))
+        if self.g2o is not None:
+            from nscan_cli.graph.g2o import write_g2o
+
+            write_whole(self.g2o, write_g2o(graph))
+        if scans is not None and self.map is not None:
+            from nscan_cli.mapping.occupancy import occupancy_grid
+
+            write_map(self.map, occupancy_grid(scans, rows, graph.poses), yaml=True)
+        if scans is not None and self.carmen is not None:
+            from nscan_cli.exports.carmen import corrected_log
+
+            write_whole(self.carmen, corrected_log(scans, rows, graph.poses))
+        if self.depfile is not None:
+            write_whole(self.depfile, self._rule(inputs))
+
+    def _rule(self, inputs: Sequence[str]) -> bytes:
+        """`outputs: inputs` for make's include, with spaces and dollars escaped."""
+
+        def escaped(path: str) -> str:
+            return path.replace("$", "$$").replace(" ", "\\ ").replace("#", "\\#")
+
+        maps = [] if self.map is None else [self.map, yaml_path(self.map)]
+        outputs = [self.graph, *maps, self.trajectory, self.g2o, self.carmen]
+        targets = " ".join(escaped(path) for path in outputs if path not in (None, "-"))
+        # Standard input is no file that make could look for.
+        prerequisites = "".join(f" {escaped(path)}" for path in inputs if path != "-")
+        return f"{targets}:{prerequisites}\n".encode()

@@ -1,0 +1,60 @@
+"""Work beside other work: the kernels hold no lock, and what comes out does not depend on the threads."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterable
+from concurrent.futures import Future, ThreadPoolExecutor
+from types import TracebackType
+from typing import Any, TypeVar
+
+Item = TypeVar("Item")
+Result = TypeVar("Result")
+
+
+def available_threads() -> int:
+    """As many as this process may use at a time."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def in_threads(threads: int, function: Callable[[Item], Result], items: Iterable[Item]) -> list[Result]:
+    """What a function gives for each of the items, in their order."""
+    if threads < 2:
+        return [function(item) for item in items]
+    with ThreadPoolExecutor(threads) as pool:
+        return list(pool.map(function, items))
+
+
+class Beside:
+    """Calls that are made one after another beside the caller's own work; at once if there is one thread.
+
+    To be used with `with`: at its end all calls are made. The first error of a call is raised at the next
+    call or there; after an error, the calls that still wait are not made.
+    """
+
+    def __init__(self, threads: int) -> None:
+        self._pool = ThreadPoolExecutor(1) if threads > 1 else None
+        self._calls: list[Future[Any]] = []
+
+    def __call__(self, function: Callable[[Item], Any], item: Item) -> None:
+        """Make this call when those before it are done."""
+        if self._pool is None:
+            function(item)
+            return
+        while self._calls and self._calls[0].done():
+            self._calls.pop(0).result()
+        self._calls.append(self._pool.submit(function, item))
+
+    def __enter__(self) -> Beside:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        if self._pool is None:
+            return
+        try:
+            for call in self._calls if kind is None else ():
+                call.result()
+        finally:
+            self._pool.shutdown(cancel_futures=True)
