@@ -96,7 +96,7 @@ def match_jointly(problem: JointProblem, start: Array, options: JointOptions) ->
     The steps are Newton's, eq. (5) to (8), damped as by Levenberg and Marquardt: with the semi-definite
     part of the Hessian in the wide stages, with the exact one in the last where it is positive definite.
     """
-    way = _approach(problem, start, options, options.widenings[:-1], neutral=False)
+    way = _approach(problem, start, options, options.widenings, neutral=False)
     return _finish(problem, way, options, neutral=False)
 
 

@@ -20,6 +20,11 @@ from nscan_cli.slam.options import NScanOptions
 Indices = NDArray[np.int64]
 LEAST_SCANS = 3
 """Two scans are what a pairwise relation is for."""
+POSSIBLE = 0.5
+"""The last stage moves scans by centimetres: from less than this share of the overlap that holds two scans
+together, it brings none there."""
+NEAR = 5e-3
+"""m, rad; with every other point no stage is worth more."""
 
 
 @dataclass(frozen=True)
@@ -105,9 +110,13 @@ def _match_held(
     """Match jointly, leave out what does not hang together, and match again, until all does."""
     keyframes, poses = route.keyframes, route.poses
     kept, start = np.arange(len(tried)), poses[tried]
+    if len(widenings) == 1:
+        near = overlaps(_laid_out(keyframes, tried), start).pairs
+        held = held_together(near, POSSIBLE * options.overlap, int(np.searchsorted(tried, centre)))
+        kept, start = kept[held], start[held]
     while len(kept) >= LEAST_SCANS:
         members = tried[kept]
-        scans = lay_out([keyframes[k].ndt for k in members], [keyframes[k].points for k in members])
+        scans = _laid_out(keyframes, members)
         match = _match(scans, members, route.chain, start, widenings, options)
         shares = overlaps(scans, match.poses).pairs
         at = int(np.searchsorted(members, centre))
@@ -131,6 +140,10 @@ def _match_held(
     return Nearby((), None, loop, 0.0, False)
 
 
+def _laid_out(keyframes: Sequence[Keyframe], members: Indices) -> Scans:
+    return lay_out([keyframes[k].ndt for k in members], [keyframes[k].points for k in members])
+
+
 def _match(
     scans: Scans,
     members: Indices,
@@ -151,8 +164,7 @@ def _match(
         )
     joint = JointOptions(
         widenings,
-        near=options.tolerance,
-        stride=1,
+        near=NEAR,
         max_iterations=options.max_iterations,
         tolerance=options.tolerance,
     )
