@@ -23,7 +23,7 @@ def transform(pose: ArrayLike, points: ArrayLike) -> Array:
     """Eq. (1): points (…, 2) of the pose's frame in the frame that the pose is given in."""
     p, x = np.asarray(pose, dtype=np.float64), np.asarray(points, dtype=np.float64)
     c, s = np.cos(p[..., 2]), np.sin(p[..., 2])
-    moved = np.empty(np.broadcast_shapes(p.shape[:-1], x.shape[:-1]) + (2,))
+    moved = np.empty((*np.broadcast_shapes(p.shape[:-1], x.shape[:-1]), 2))
     moved[..., 0] = c * x[..., 0] - s * x[..., 1] + p[..., 0]
     moved[..., 1] = s * x[..., 0] + c * x[..., 1] + p[..., 1]
     return moved

@@ -14,7 +14,6 @@ from nscan_cli.logs.options import ReadingOptions
 
 if TYPE_CHECKING:
     from nscan_cli.evaluation.report import Evaluation
-    from nscan_cli.graph.tum import Trajectory
 
 DRAWN = 10
 """The worst relations that a picture shows where --worst does not say."""
@@ -63,9 +62,11 @@ def command(
     check_plot(plot, None, [result, relations, reference])
     import json
 
+    from nscan_cli.evaluation.measure import measure
     from nscan_cli.evaluation.report import as_document, as_text
 
-    evaluation, trajectory, truth = _evaluate(result, relations, reference, worst or 0, reading)
+    measured = measure(result, relations, reference, worst or 0, reading)
+    evaluation = measured.evaluation
     if evaluation.relations and evaluation.relations[1].too_far:
         table, errors = evaluation.relations
         say(f"warning: {errors.too_far} of {len(table)} relations have a stamp far from every pose", quiet)
@@ -76,33 +77,9 @@ def command(
     if plot is not None:
         from nscan_cli.evaluation.picture import picture
 
-        write_plot(plot, picture(evaluation, trajectory, truth, DRAWN if worst is None else worst))
+        drawn = DRAWN if worst is None else worst
+        write_plot(plot, picture(evaluation, measured.trajectory, measured.reference, drawn))
     _check(evaluation, max_translation, max_rotation)
-
-
-def _evaluate(
-    result: str, relations: str | None, reference: str | None, worst: int, reading: ReadingOptions
-) -> tuple[Evaluation, Trajectory, Trajectory | None]:
-    """The evaluation, and the result and the reference that it was made from."""
-    from nscan_cli.evaluation.relations import read_relations, relation_errors
-    from nscan_cli.evaluation.report import Evaluation
-    from nscan_cli.evaluation.results import load_reference, load_trajectory
-    from nscan_cli.evaluation.trajectory import trajectory_errors
-    from nscan_cli.inputs import base_name, label
-
-    trajectory = load_trajectory(result, reading)
-    on_relations, on_reference, truth = None, None, None
-    if relations is not None:
-        table = read_relations(relations)
-        on_relations = (table, relation_errors(trajectory, table, label(result)))
-    if reference is not None:
-        truth = load_reference(reference, reading)
-        on_reference = (
-            base_name(reference),
-            trajectory_errors(trajectory, truth, label(result), label(reference)),
-        )
-    evaluation = Evaluation(base_name(result), len(trajectory), on_relations, on_reference, worst)
-    return evaluation, trajectory, truth
 
 
 def _check(evaluation: Evaluation, max_translation: float | None, max_rotation: float | None) -> None:

@@ -21,6 +21,7 @@ COMMANDS = {
     "slam": "Turn a log into a pose graph and a map.",
     "render": "Draw the map of a pose graph.",
     "evaluate": "Measure a result against reference relations or a reference trajectory.",
+    "nightly": "Map and measure many logs, and report what has changed.",
 }
 INTERRUPTED, CLOSED_EARLY, INTERNAL_ERROR = 130, 141, 1
 NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)

@@ -13,6 +13,9 @@ from typing import BinaryIO
 
 from nscan_cli.errors import OutputError
 
+TEMPORARY = ".nscan-cli."
+"""What the name of a file begins with that is not whole yet; a process that is killed leaves it behind."""
+
 
 @contextlib.contextmanager
 def whole_file(path: str) -> Iterator[BinaryIO]:
@@ -36,7 +39,7 @@ def whole_file(path: str) -> Iterator[BinaryIO]:
             with open(path, "wb") as device:
                 yield device
             return
-        descriptor, temporary = tempfile.mkstemp(dir=target.parent, prefix=".nscan-cli.")
+        descriptor, temporary = tempfile.mkstemp(dir=target.parent, prefix=TEMPORARY)
         with os.fdopen(descriptor, "wb") as file:
             yield file
             file.flush()

@@ -17,6 +17,7 @@ from nscan_cli.evaluation.association import TOLERANCE, nearest, no_match
 from nscan_cli.evaluation.statistics import Spread
 from nscan_cli.graph.tum import Trajectory
 from nscan_cli.inputs import base_name, label, read_bytes
+from nscan_cli.limits import DISTANCE, GRAPH, TIME
 from nscan_cli.poses import Array, relative, wrap
 
 COLUMNS = 8
@@ -87,7 +88,7 @@ def read_relations(path: str) -> Relations:
     stamps: list[tuple[str, str]] = []
     rows: list[list[float]] = []
     lines: list[int] = []
-    for number, line in enumerate(read_bytes(path).decode("utf-8", errors="replace").split("\n"), start=1):
+    for number, line in enumerate(read_bytes(path, GRAPH).decode("utf-8", errors="replace").split("\n"), start=1):
         fields = line.split()
         if not fields or fields[0].startswith("#"):
             continue
@@ -137,6 +138,8 @@ def _values(fields: list[str]) -> list[float]:
     values = [float(field) for field in fields]
     if not all(math.isfinite(value) for value in values):
         raise ValueError("a number is not finite")
+    if max(map(abs, values[:2])) > TIME.value or max(map(abs, values[2:])) > DISTANCE.value:
+        raise ValueError(f"a number is beyond {DISTANCE.value:g}, or a time beyond {TIME.shown()}")
     if max(abs(value) for value in values[4:7]) > PLANAR:
         raise ValueError("z, roll or pitch is not 0, but only 2D poses can be compared")
     return values

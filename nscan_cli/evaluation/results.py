@@ -9,6 +9,7 @@ from nscan_cli.errors import InputDataError, WrongUsageError
 from nscan_cli.graph.json_file import parse_graph
 from nscan_cli.graph.tum import Trajectory, parse_tum
 from nscan_cli.inputs import STANDARD_INPUT, label, read_bytes
+from nscan_cli.limits import GRAPH, MB, ExceededError
 from nscan_cli.logs.load import AS_FOUND, read_log, unpacked
 from nscan_cli.logs.options import ReadingOptions
 from nscan_cli.logs.scan import LaserLog
@@ -43,7 +44,12 @@ def load_reference(path: str, options: ReadingOptions = AS_FOUND) -> Trajectory:
 
 def _load(path: str, options: ReadingOptions) -> Trajectory | LaserLog:
     name = label(path)
-    data = unpacked(read_bytes(path), name)
+    try:
+        data = unpacked(read_bytes(path), name)
+        if data.lstrip().startswith(b"{") or _begins_with_numbers(data):
+            GRAPH.check(len(data) / MB, f"has {len(data) / MB:,.0f} MB")
+    except ExceededError as error:
+        raise InputDataError(name, str(error), error.remedy) from error
     if not data.strip():
         raise InputDataError(name, "is empty", "give a graph, a TUM file or a log")
     if data.lstrip().startswith(b"{"):

@@ -1,0 +1,85 @@
+"""What a person sees of a night: a line for every log, alive on a terminal, plain elsewhere."""
+
+from __future__ import annotations
+
+import contextlib
+import sys
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+from nscan_cli.cli.progress import say
+from nscan_cli.nightly.manifest import Entry
+from nscan_cli.nightly.nights import Night
+from nscan_cli.nightly.verdict import Errors
+
+if TYPE_CHECKING:
+    from rich.progress import Progress, TaskID
+
+    from nscan_cli.nightly.night import Watcher
+
+
+@contextlib.contextmanager
+def night_lines(names: list[str], quiet: bool) -> Iterator[Watcher]:
+    """The lines of the logs that are to be done, as long as the block lasts."""
+    if quiet or not sys.stderr.isatty():
+        yield PlainLines(quiet)
+        return
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+
+    columns = (TextColumn("{task.description}"), BarColumn(), TextColumn("{task.fields[detail]}"),
+               TimeElapsedColumn())  # fmt: skip
+    with Progress(*columns, console=Console(stderr=True), refresh_per_second=4) as bars:
+        yield LiveLines(bars, names)
+
+
+class PlainLines:
+    """A line when a log is done."""
+
+    def __init__(self, quiet: bool) -> None:
+        self.quiet = quiet
+
+    def progress(self, name: str, done: int, total: int, keyframes: int) -> None:
+        """Nothing."""
+
+    def finished(self, entry: Entry, night: Night) -> None:
+        """Say what became of it."""
+        say(f"{entry.name}: {_outcome(night)}", self.quiet)
+
+
+class LiveLines:
+    """A bar for every log, from the beginning."""
+
+    def __init__(self, bars: Progress, names: list[str]) -> None:
+        self.bars = bars
+        self.tasks: dict[str, TaskID] = {name: self._line(name) for name in names}
+
+    def progress(self, name: str, done: int, total: int, keyframes: int) -> None:
+        """Move its bar."""
+        task = self.tasks[name]
+        if not self.bars.tasks[task].started:
+            self.bars.start_task(task)
+        self.bars.update(
+            task, completed=done, total=total, detail=f"{done}/{total} scans, {keyframes} keyframes"
+        )
+
+    def finished(self, entry: Entry, night: Night) -> None:
+        """Say in its line what became of it."""
+        if entry.name not in self.tasks:
+            self.tasks[entry.name] = self._line(entry.name)
+        task = self.tasks[entry.name]
+        total = self.bars.tasks[task].total or 1
+        completed = total if night["outcome"] == "done" else None
+        self.bars.update(task, completed=completed, total=total, detail=_outcome(night))
+        self.bars.stop_task(task)
+
+    def _line(self, name: str) -> TaskID:
+        return self.bars.add_task(name, total=None, start=False, detail="")
+
+
+def _outcome(night: Night) -> str:
+    if night["outcome"] != "done":
+        return f"failed: {night['reason']}"
+    errors, took, counts = Errors.of(night), night["times"]["seconds"], night["counts"]
+    measured = "" if errors is None else f"{errors.what} {errors.metres:.4f} m, "
+    return f"{measured}{took:.1f} s, {counts['duration'] / max(took, 0.001):.0f} times real time"

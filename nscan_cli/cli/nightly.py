@@ -1,0 +1,116 @@
+"""`nscan-cli nightly`: every log of a manifest mapped, measured, and compared with the night before."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from nscan_cli.cli.options import CONTEXT, common_options
+from nscan_cli.cli.progress import say
+from nscan_cli.errors import CheckFailedError, InputMissingError
+from nscan_cli.inputs import base_name
+
+if TYPE_CHECKING:
+    from nscan_cli.nightly.night import Engine, Outcomes
+    from nscan_cli.nightly.task import Report, Task
+
+
+@click.command("nightly", context_settings=CONTEXT)
+@click.argument("manifest", metavar="MANIFEST.toml")
+@click.option(
+    "-o", "--output", required=True, metavar="FOLDER", help="Results, history and report; made if new."
+)
+@click.option("--data", metavar="FOLDER", help="Where the logs are, if not beside the manifest.")
+@click.option("--jobs", type=click.IntRange(1), metavar="N", help="Logs at a time; one a core if not given.")
+@click.option(
+    "--scheduler", metavar="ADDRESS", help="Run on the Dask cluster of this scheduler, tcp://HOST:PORT."
+)
+@click.option("--timeout", type=click.FloatRange(0, min_open=True), default=3600, show_default=True,
+              metavar="S", help="Stop a log that takes longer, seconds.")  # fmt: skip
+@click.option("--force", is_flag=True, help="Do what is up to date as well.")
+@common_options
+def command(
+    manifest: str,
+    output: str,
+    data: str | None,
+    jobs: int | None,
+    scheduler: str | None,
+    timeout: float,
+    force: bool,
+    quiet: bool,
+    **_verbosity: int,
+) -> None:
+    """Map and measure every log of MANIFEST.toml, and report what changed since the night before.
+
+    MANIFEST.toml may also be kuemmerle or radish, manifests that come with nscan-cli; --data says then
+    where the logs are. A log is done again when its bytes, its reference, its parameters or the code of
+    nscan-cli have changed, or it failed. Whenever this is stopped, the next call goes on from there.
+
+    FOLDER/report.html and report.json are the report. Exit code 3 when a log fails or is above its bound.
+    """
+    from nscan_cli.nightly.folder import claimed
+    from nscan_cli.nightly.manifest import read_manifest
+    from nscan_cli.nightly.night import carry_out, plan
+    from nscan_cli.nightly.publish import publish
+    from nscan_cli.nightly.verdict import headline
+
+    entries = read_manifest(manifest, data)
+    if not any(entry.is_there for entry in entries):
+        first = entries[0].inputs["log"]
+        raise InputMissingError(
+            f"{manifest}: none of its logs is there, not even {first}; give --data FOLDER"
+        )
+    with claimed(output) as folder:
+        planned = plan(entries, folder, force)
+        for entry in planned.absent:
+            source = entry.sources.get("log")
+            say(f"{entry.name}: {entry.inputs['log']} is not there, skipped"
+                + (f"; to be had from {source}" if source else ""), quiet)  # fmt: skip
+        for name, notes in planned.notes.items():
+            for note in notes:
+                say(f"{name}: warning: {note}", quiet)
+        if planned.to_do or planned.unreadable:
+            from nscan_cli.cli.night_lines import night_lines
+            from nscan_cli.compiled import first_compile
+
+            if scheduler is None and first_compile():
+                say("compiling the kernels, once for this version on this machine: about 20 s", quiet)
+            names = [entry.name for entry, _key in planned.to_do]
+            with night_lines(names, quiet) as lines:
+                carry_out(planned, folder, _engine(jobs, scheduler, timeout), lines)
+        else:
+            logs = "the log is" if len(planned.up_to_date) == 1 else f"all {len(planned.up_to_date)} logs are"
+            say(f"nothing to do: {logs} up to date", quiet)
+        verdicts = publish(base_name(manifest), entries, planned, folder)
+
+    report = os.path.join(output, "report.html")
+    failures = [verdict for verdict in verdicts if verdict.is_failure]
+    for verdict in failures:
+        say(f"nscan-cli: {verdict.entry.name}: {'; '.join(verdict.reasons)}")
+    if failures:
+        raise CheckFailedError(f"{headline(verdicts)}; see {report}")
+    say(f"{headline(verdicts)}: {report}", quiet)
+
+
+def _engine(jobs: int | None, scheduler: str | None, timeout: float) -> Engine:
+    """What does the tasks: processes here, or a cluster."""
+
+    def here(tasks: list[Task], scratch: Path, report: Report) -> Outcomes:
+        from nscan_cli.nightly import processes
+        from nscan_cli.threads import available_threads
+
+        side_by_side = min(jobs or available_threads(), len(tasks))
+        # Processors that are left over help along.
+        threads = max(1, available_threads() // side_by_side)
+        return processes.run_all(tasks, side_by_side, timeout, scratch, report, threads)
+
+    def there(tasks: list[Task], _scratch: Path, report: Report) -> Outcomes:
+        from nscan_cli.nightly import cluster
+
+        assert scheduler is not None
+        return cluster.run_all(tasks, scheduler, timeout, report)
+
+    return here if scheduler is None else there

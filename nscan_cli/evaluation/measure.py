@@ -1,0 +1,49 @@
+"""A result measured against what is given: relations, a reference trajectory, or both."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from nscan_cli.evaluation.relations import read_relations, relation_errors
+from nscan_cli.evaluation.report import Evaluation
+from nscan_cli.evaluation.results import load_reference, load_trajectory
+from nscan_cli.evaluation.trajectory import trajectory_errors
+from nscan_cli.graph.tum import Trajectory
+from nscan_cli.inputs import base_name, label
+from nscan_cli.logs.load import AS_FOUND
+from nscan_cli.logs.options import ReadingOptions
+
+
+@dataclass(frozen=True)
+class Measured:
+    """An evaluation, and the trajectories that it was made from."""
+
+    evaluation: Evaluation
+    trajectory: Trajectory
+    reference: Trajectory | None
+
+
+def measure(
+    result: str,
+    relations: str | None,
+    reference: str | None,
+    worst: int = 0,
+    reading: ReadingOptions = AS_FOUND,
+) -> Measured:
+    """The errors of the file `result`, and its `worst` relations.
+
+    Raises InputMissingError, InputDataError, and WrongUsageError where the options do not fit a log.
+    """
+    trajectory = load_trajectory(result, reading)
+    on_relations, on_reference, truth = None, None, None
+    if relations is not None:
+        table = read_relations(relations)
+        on_relations = (table, relation_errors(trajectory, table, label(result)))
+    if reference is not None:
+        truth = load_reference(reference, reading)
+        on_reference = (
+            base_name(reference),
+            trajectory_errors(trajectory, truth, label(result), label(reference)),
+        )
+    evaluation = Evaluation(base_name(result), len(trajectory), on_relations, on_reference, worst)
+    return Measured(evaluation, trajectory, truth)

@@ -1,0 +1,121 @@
+"""Logs on a Dask cluster: the same processes as here, started by its workers.
+
+Inputs and outputs travel as bytes, so that the machines need no files in common. On a worker every log has
+a process of its own as well: one that dies costs that log alone, and the worker lives on.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import logging
+import re
+import tempfile
+from collections import deque
+from collections.abc import Generator, Sequence
+from dataclasses import replace
+from pathlib import Path
+from queue import Empty, Queue
+from typing import Any
+
+from nscan_cli.errors import InputMissingError, NscanError, WrongUsageError
+from nscan_cli.inputs import read_bytes
+from nscan_cli.nightly.fingerprint import tool_key
+from nscan_cli.nightly.processes import run_all as run_here
+from nscan_cli.nightly.task import Outcome, Report, Task
+
+ADDRESS = re.compile(r"[a-z]+://.+:\d+")
+PATIENCE = 10.0
+"""For the scheduler to answer, s."""
+AHEAD = 2
+"""Logs that are sent ahead for each thread of the cluster: none has to wait, and not all are in memory."""
+
+
+def run_all(
+    tasks: Sequence[Task], address: str, timeout: float | None, report: Report
+) -> Generator[tuple[Task, Outcome]]:
+    """Do the tasks on the cluster whose scheduler has this address, and yield each when it is done.
+
+    When the iterator is closed, what has not begun yet is taken back. Raises WrongUsageError where Dask is
+    not installed, InputMissingError where no scheduler answers, or it is lost.
+    """
+    client = _client(address)
+    topic = f"nscan-cli-{client.id}"
+    client.subscribe_topic(topic, lambda event: report(*event[1]))
+    waiting = deque(tasks)
+    sent: dict[Any, Task] = {}
+    done: Queue[Any] = Queue()
+    try:
+        while waiting or sent:
+            room = AHEAD * max(1, sum(client.nthreads().values()))
+            while waiting and len(sent) < room:
+                task = waiting.popleft()
+                try:
+                    content = {role: read_bytes(path) for role, path in task.inputs.items()}
+                except NscanError as error:
+                    yield task, Outcome.failed(str(error))
+                    continue
+                future = client.submit(run_there, task, content, timeout, tool_key(), topic, pure=False)
+                sent[future] = task
+                future.add_done_callback(done.put)
+            with contextlib.suppress(Empty):
+                future = done.get(timeout=0.5)
+                yield sent.pop(future), _outcome(future)
+            if client.status != "running":
+                raise InputMissingError(f"--scheduler {address}: is gone; start it, and call again to go on")
+    finally:
+        with contextlib.suppress(Exception):
+            client.cancel(list(sent))
+        client.close(timeout=2)
+
+
+def run_there(task: Task, content: dict[str, bytes], timeout: float | None, tool: str, topic: str) -> Outcome:
+    """On a worker: do a task whose inputs have come along, and say under the topic how far it is."""
+    from distributed import get_worker
+
+    worker = get_worker()
+    if tool != tool_key():
+        return Outcome.failed(
+            f"a Dask worker has another nscan-cli, {tool_key()} in place of {tool}; install the same"
+        )
+    with tempfile.TemporaryDirectory(prefix="nscan-cli.") as folder:
+        inputs = {}
+        for role, data in content.items():
+            path = Path(folder, "come", role, Path(task.inputs[role]).name)
+            path.parent.mkdir(parents=True)
+            path.write_bytes(data)
+            inputs[role] = str(path)
+        local = replace(task, inputs=inputs)
+        run = run_here([local], 1, timeout, Path(folder), lambda *said: worker.log_event(topic, said))
+        with contextlib.closing(run):
+            return next(run)[1]
+
+
+def _client(address: str) -> Any:
+    if not ADDRESS.fullmatch(address):
+        raise WrongUsageError(f"--scheduler {address}: is no address of the form tcp://HOST:PORT; give one")
+    try:
+        import distributed
+    except ImportError as error:
+        raise WrongUsageError(
+            "nightly: --scheduler needs Dask: pip install 'nscan-cli[distributed]'"
+        ) from error
+    # What it logs on its own is said in one line here.
+    logging.getLogger("distributed").setLevel(logging.CRITICAL)
+    connect: Any = distributed.Client
+    try:
+        return connect(address, timeout=PATIENCE, set_as_default=False)
+    except (OSError, ValueError) as error:
+        raise InputMissingError(
+            f"--scheduler {address}: no Dask scheduler answers there; start one, or leave --scheduler out"
+        ) from error
+
+
+def _outcome(future: Any) -> Outcome:
+    error = future.exception()
+    if error is None:
+        outcome: Outcome = future.result()
+        return outcome
+    kind = type(error).__name__
+    if kind == "KilledWorker":
+        return Outcome.failed("the Dask workers that had it died")
+    return Outcome.failed(f"on a Dask worker: {kind}: {error}")

@@ -1,0 +1,186 @@
+"""The manifest: which logs there are, what they are measured against, and what is expected of them."""
+
+from __future__ import annotations
+
+import math
+import re
+import tomllib
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from nscan_cli.errors import InputDataError, InputMissingError, WrongUsageError
+from nscan_cli.inputs import read_bytes
+from nscan_cli.nightly.parameters import Parameters, parameters_from
+
+ENDINGS = (".log.gz", ".log", ".clf.gz", ".clf", ".script.gz", ".script", ".mcap", ".bag")
+"""Of a log that the manifest gives by its name alone; the first that is there is taken."""
+NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,99}")
+TAKEN = ("report.html", "report.json")
+"""Files of the folder that has the logs' folders."""
+SHA256 = re.compile(r"[0-9a-f]{64}")
+ROLES = ("log", "relations", "reference")
+
+
+@dataclass(frozen=True)
+class Entry:
+    """A log of the manifest."""
+
+    name: str
+    """What the log is called; its results are in a folder of this name."""
+    inputs: dict[str, Path]
+    """The paths by their role: log, and relations or reference where there are such."""
+    max_translation: float | None = None
+    """Bound, m: of the mean on relations, or of the RMSE against a reference."""
+    max_rotation: float | None = None
+    """degrees"""
+    published: dict[str, float] = field(default_factory=dict)
+    """Method → its translational error (m) that somebody has published."""
+    parameters: Parameters = field(default_factory=Parameters)
+    sources: dict[str, str] = field(default_factory=dict)
+    """Role → where the file can be got."""
+    sha256: dict[str, str] = field(default_factory=dict)
+    """Role → SHA-256 of the file that bounds and figures are of."""
+
+    @property
+    def is_there(self) -> bool:
+        """Whether there is a log under the path."""
+        return self.inputs["log"].exists()
+
+
+def read_manifest(path: str, data: str | None) -> list[Entry]:
+    """The logs of the manifest at `path`, or of the one of that name which comes with the package.
+
+    Their paths are relative to the folder `data`, or to the manifest where there is none. Raises
+    InputMissingError when it cannot be read, InputDataError when it is not as it should be.
+    """
+    file, folder = path, Path(path).parent
+    if path in shipped() and not Path(path).exists():
+        file = str(shipped()[path])
+        if data is None:
+            raise WrongUsageError(f"nightly: {path} has no logs of its own; give their folder with --data")
+    if data is not None:
+        folder = Path(data)
+        if not folder.is_dir():
+            raise InputMissingError(f"--data {data}: is no folder; give that of the logs")
+    try:
+        document = tomllib.loads(read_bytes(file).decode())
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise InputDataError(path, f"not TOML: {error}", "mend it") from error
+    unknown = [key for key in document if key != "log"]
+    if unknown:
+        raise InputDataError(path, f"has an unknown key {unknown[0]!r}", "a manifest has [[log]] tables only")
+    tables = document.get("log")
+    if not isinstance(tables, list) or not all(isinstance(table, dict) for table in tables) or not tables:
+        raise InputDataError(path, "has no logs", "begin each with [[log]], its name and path below")
+    entries: list[Entry] = []
+    for number, table in enumerate(tables, 1):
+        entry = _entry(path, number, table, folder)
+        # Folders of names that differ in their case only are one folder on some file systems.
+        if entry.name.lower() in (other.name.lower() for other in entries):
+            raise InputDataError(path, f"two logs have the name {entry.name}", "give each its own")
+        entries.append(entry)
+    return entries
+
+
+def shipped() -> dict[str, Path]:
+    """The manifests that come with the package, by name."""
+    return {path.stem: path for path in sorted(Path(__file__).parent.glob("*.toml"))}
+
+
+def _entry(file: str, number: int, table: dict[str, Any], folder: Path) -> Entry:
+    place = f"{file}, log {number}"
+    name = table.get("name")
+    if not isinstance(name, str) or not NAME.fullmatch(name) or name.lower() in TAKEN:
+        remedy = "letters, digits, '.', '_' and '-' make one, such as intel"
+        raise InputDataError(place, "has no name" if name is None else f"{name!r} is no name", remedy)
+    place += f" ({name})"
+    for key, value in table.items():
+        if key not in KEYS:
+            raise InputDataError(place, f"has an unknown key {key!r}", f"known: {', '.join(KEYS)}")
+        problem = KEYS[key](value)
+        if problem is not None:
+            raise InputDataError(place, f"{key} is {_shown(value)}", f"give {problem}")
+    if "relations" in table and "reference" in table:
+        raise InputDataError(place, "has relations and reference", "leave one of them out")
+    for role in ROLES:
+        for key in _about(role):
+            if key in table and role != "log" and role not in table:
+                raise InputDataError(place, f"has {key}, but no {role}", f"give {role} too, or leave it out")
+    bounds = [key for key in ("max_translation", "max_rotation", "published") if key in table]
+    if bounds and "relations" not in table and "reference" not in table:
+        remedy = "give relations or reference too"
+        raise InputDataError(place, f"has {bounds[0]}, but nothing to measure against", remedy)
+    inputs = {"log": folder / table["path"] if "path" in table else _by_name(folder, name)}
+    inputs.update({role: folder / table[role] for role in ROLES[1:] if role in table})
+    return Entry(
+        name=name,
+        inputs=inputs,
+        max_translation=table.get("max_translation"),
+        max_rotation=table.get("max_rotation"),
+        published={method: float(error) for method, error in table.get("published", {}).items()},
+        parameters=parameters_from(place, table.get("parameters", {})),
+        sources={role: table[_about(role)[0]] for role in ROLES if _about(role)[0] in table},
+        sha256={role: table[_about(role)[1]] for role in ROLES if _about(role)[1] in table},
+    )
+
+
+def _about(role: str) -> tuple[str, str]:
+    """The keys that say where a file can be got, and its SHA-256."""
+    return ("source", "sha256") if role == "log" else (f"{role}_source", f"{role}_sha256")
+
+
+def _by_name(folder: Path, name: str) -> Path:
+    paths = [folder / (name + ending) for ending in ENDINGS]
+    return next((path for path in paths if path.exists()), paths[0])
+
+
+def _shown(value: Any) -> str:
+    text = repr(value)
+    return text if len(text) < 50 else f"{text[:47]}..."
+
+
+def _text(value: Any) -> str | None:
+    return None if isinstance(value, str) and value else "a text"
+
+
+def _number(value: Any) -> str | None:
+    good = isinstance(value, (int, float)) and not isinstance(value, bool) and value >= 0
+    return None if good and math.isfinite(value) else "a number that is not negative"
+
+
+def _figures(value: Any) -> str | None:
+    good = isinstance(value, dict) and all(_number(error) is None for error in value.values())
+    return None if good else 'errors in metres by method, as in { "RBPF" = 0.070 }'
+
+
+def _digest(value: Any) -> str | None:
+    return (
+        None
+        if isinstance(value, str) and SHA256.fullmatch(value)
+        else "64 hexadecimal digits, in small letters"
+    )
+
+
+def _table(value: Any) -> str | None:
+    return None if isinstance(value, dict) else "a table of options, as in { end = 60 }"
+
+
+KEYS: dict[str, Callable[[Any], str | None]] = {
+    "name": _text,
+    "path": _text,
+    "relations": _text,
+    "reference": _text,
+    "max_translation": _number,
+    "max_rotation": _number,
+    "published": _figures,
+    "parameters": _table,
+    "source": _text,
+    "sha256": _digest,
+    "relations_source": _text,
+    "relations_sha256": _digest,
+    "reference_source": _text,
+    "reference_sha256": _digest,
+}
+"""What a [[log]] may have; each says what it wants where a value is none."""

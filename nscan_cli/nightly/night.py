@@ -1,0 +1,105 @@
+"""A night: what is out of date is done again, and its results go to the folder, log by log."""
+
+from __future__ import annotations
+
+import contextlib
+import datetime
+from collections.abc import Callable, Generator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Protocol
+
+from nscan_cli.errors import NscanError
+from nscan_cli.nightly.fingerprint import fingerprint, sha256_of, tool_key
+from nscan_cli.nightly.folder import folder_of, scratch
+from nscan_cli.nightly.manifest import Entry
+from nscan_cli.nightly.nights import Night, add_night, is_up_to_date
+from nscan_cli.nightly.task import Outcome, Report, Task
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What a night has to do."""
+
+    absent: list[Entry] = field(default_factory=list)
+    up_to_date: list[Entry] = field(default_factory=list)
+    to_do: list[tuple[Entry, str]] = field(default_factory=list)
+    """With their fingerprints; the largest first, so that none is left to run alone at the end."""
+    unreadable: list[tuple[Entry, str]] = field(default_factory=list)
+    """With the reason."""
+    notes: dict[str, list[str]] = field(default_factory=dict)
+    """Name → what is odd about its inputs."""
+
+
+Outcomes = Generator[tuple[Task, Outcome]]
+"""Every task with its outcome, as they get done; closed, it stops what is running."""
+Engine = Callable[[list[Task], Path, Report], Outcomes]
+"""What does the tasks, with a folder for what is only needed meanwhile: see `processes` and `cluster`."""
+
+
+class Watcher(Protocol):
+    """Is told what goes on."""
+
+    def progress(self, name: str, done: int, total: int, keyframes: int) -> None:
+        """Scans done, all scans, and keyframes so far."""
+
+    def finished(self, entry: Entry, night: Night) -> None:
+        """A log is done, or failed."""
+
+
+def plan(entries: list[Entry], folder: Path, force: bool) -> Plan:
+    """What has to be done; with `force` all that is there."""
+    planned = Plan()
+    for entry in entries:
+        if not entry.is_there:
+            planned.absent.append(entry)
+            continue
+        try:
+            hashes = {role: sha256_of(path) for role, path in entry.inputs.items()}
+        except NscanError as error:
+            planned.unreadable.append((entry, str(error)))
+            continue
+        planned.notes[entry.name] = [
+            f"{entry.inputs[role].name} is not the file that the manifest means: its SHA-256 is another"
+            for role, sha256 in entry.sha256.items()
+            if hashes[role] != sha256
+        ]
+        key = fingerprint(entry, hashes)
+        if not force and is_up_to_date(folder / entry.name, key):
+            planned.up_to_date.append(entry)
+        else:
+            planned.to_do.append((entry, key))
+    planned.to_do.sort(key=lambda item: -item[0].inputs["log"].stat().st_size)
+    return planned
+
+
+def carry_out(planned: Plan, folder: Path, engine: Engine, watcher: Watcher) -> None:
+    """Do what is planned. Each log's results are in the folder as soon as it is done.
+
+    Raises OutputError, and what the engine raises.
+    """
+    for entry, reason in planned.unreadable:
+        # What cannot be read has no hash: never the same as anything.
+        _finish(entry, "", Outcome.failed(reason), folder, watcher)
+    entries = {entry.name: (entry, key) for entry, key in planned.to_do}
+    if not entries:
+        return
+    with scratch(folder) as place:
+        tasks = [Task.of(entry) for entry, _key in planned.to_do]
+        outcomes = engine(tasks, place, watcher.progress)
+        with contextlib.closing(outcomes):
+            for task, outcome in outcomes:
+                _finish(*entries[task.name], outcome, folder, watcher)
+
+
+def _finish(entry: Entry, key: str, outcome: Outcome, folder: Path, watcher: Watcher) -> None:
+    now = datetime.datetime.now(datetime.UTC).replace(microsecond=0)
+    night: Night = {
+        "key": key,
+        "tool": tool_key(),
+        "outcome": "failed" if "reason" in outcome.result else "done",
+        **{name: value for name, value in outcome.result.items() if name != "times"},
+        "times": {**outcome.result.get("times", {}), "finished": now.isoformat().replace("+00:00", "Z")},
+    }
+    add_night(folder_of(folder, entry.name), night, outcome.files)
+    watcher.finished(entry, night)

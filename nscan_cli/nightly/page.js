@@ -1,0 +1,42 @@
+"use strict";
+// Maps grow where they are tapped or by their buttons, and are dragged by the mouse; a finger scrolls them.
+for (const map of document.querySelectorAll(".map")) {
+  const frame = map.querySelector(".frame"), sheet = map.querySelector(".sheet");
+  let zoom = 1, held = null, moved = false;
+  const grow = (to, x = frame.clientWidth / 2, y = frame.clientHeight / 2) => {
+    const was = zoom;
+    zoom = Math.min(16, Math.max(1, to));
+    const left = (frame.scrollLeft + x) * zoom / was - x, top = (frame.scrollTop + y) * zoom / was - y;
+    sheet.style.setProperty("--zoom", zoom);
+    sheet.style.cursor = zoom > 1 ? "grab" : "zoom-in";
+    frame.scrollTo(left, top);
+  };
+  for (const button of map.querySelectorAll("button")) {
+    button.addEventListener("click", () => {
+      const factor = Number(button.dataset.zoom);
+      grow(factor ? zoom * factor : 1);
+    });
+  }
+  sheet.addEventListener("click", (event) => {
+    const box = frame.getBoundingClientRect();
+    if (!moved && zoom === 1) grow(3, event.clientX - box.left, event.clientY - box.top);
+  });
+  frame.addEventListener("wheel", (event) => {
+    if (!event.ctrlKey) return;
+    event.preventDefault();
+    const box = frame.getBoundingClientRect();
+    grow(zoom * Math.exp(-event.deltaY / 200), event.clientX - box.left, event.clientY - box.top);
+  }, { passive: false });
+  sheet.addEventListener("pointerdown", (event) => {
+    moved = false;
+    if (event.pointerType === "mouse" && zoom > 1) held = event;
+  });
+  addEventListener("pointermove", (event) => {
+    if (!held) return;
+    moved = true;
+    frame.scrollBy(held.clientX - event.clientX, held.clientY - event.clientY);
+    held = event;
+  });
+  addEventListener("pointerup", () => { held = null; });
+  sheet.addEventListener("dragstart", (event) => event.preventDefault());
+}

@@ -1,0 +1,130 @@
+"""One log from its bytes to map and errors, in a process of its own.
+
+It is started as `python -m nscan_cli.nightly.work PLACE`. What it does is what `slam` with --map and
+--trajectory, and `evaluate`, do. It says how far it is on its standard output, a line of JSON at a time, and
+ends itself when its standard input does: whoever started it is gone then.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import dataclasses
+import json
+import os
+import sys
+import threading
+import time
+import traceback
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from nscan_cli.errors import NscanError
+from nscan_cli.nightly.task import OUTPUTS, RESULT, TASK, reading_of
+
+BETWEEN_REPORTS = 0.2
+"""s"""
+
+
+def main(place: str) -> None:
+    """Do the task of a place of work; its outputs and its result are there afterwards."""
+    threading.Thread(target=_end_with_the_parent, daemon=True).start()
+    os.chdir(place)
+    try:
+        result = work(json.loads(Path(TASK).read_bytes()), Path(OUTPUTS), _reporter())
+    except NscanError as error:
+        result = {"reason": str(error)}
+    except OSError as error:
+        result = {"reason": f"cannot write its results: {error.strerror or error}"}
+    except MemoryError:
+        result = {"reason": "out of memory"}
+    except Exception as error:
+        traceback.print_exc()
+        result = {"reason": f"internal error, please report it: {type(error).__name__}: {error}"}
+    Path(RESULT).write_text(json.dumps(result, allow_nan=False))
+
+
+def work(task: dict[str, Any], outputs: Path, report: Callable[[int, int, int], None]) -> dict[str, Any]:
+    """Map and measure; the counts, the evaluation and the times. Raises the errors of both."""
+    import numpy as np
+
+    from nscan_cli.graph.json_file import write_graph
+    from nscan_cli.graph.tum import write_tum
+    from nscan_cli.logs.load import read_log
+    from nscan_cli.mapping.image import map_png, map_yaml
+    from nscan_cli.mapping.occupancy import occupancy_grid
+    from nscan_cli.nightly.preview import preview
+    from nscan_cli.provenance import provenance_of
+    from nscan_cli.slam.pipeline import Slam
+
+    began = time.perf_counter()
+    reading, options = reading_of(task["reading"]), _options(task["mapping"])
+    log = read_log(task["inputs"]["log"], reading)
+    slam = Slam(log, options, task["threads"])
+    graph = slam.run(lambda done, keyframes: report(done, len(log), keyframes))
+    parameters = {"reading": dataclasses.asdict(reading), "slam": dataclasses.asdict(options)}
+    graph.provenance = provenance_of([log.source], parameters)
+    grid = occupancy_grid(log, np.arange(len(log)), graph.poses)
+    (outputs / "graph.json").write_bytes(write_graph(graph))
+    (outputs / "trajectory.tum").write_bytes(write_tum(graph.stamps, graph.poses))
+    (outputs / "map.png").write_bytes(map_png(grid))
+    (outputs / "map.yaml").write_bytes(map_yaml("map.png", grid))
+    seconds = time.perf_counter() - began
+    picture, overlay = preview(grid, graph)
+    (outputs / "preview.png").write_bytes(picture)
+    (outputs / "preview.svg").write_bytes(overlay)
+    accepted = sum(loop.accepted for loop in graph.loops)
+    counts = {
+        "scans": len(log),
+        "duration": round(float(log.times[-1] - log.times[0]), 3),
+        "keyframes": len(graph.keyframes),
+        "pairwise": len(graph.pairwise),
+        "nscan": len(graph.nscan),
+        "loops": {"accepted": accepted, "refused": len(graph.loops) - accepted},
+        "warnings": log.report.notices(),
+    }
+    evaluation = _evaluation(task["inputs"], str(outputs / "graph.json"))
+    return {"counts": counts, "evaluation": evaluation, "times": {"seconds": round(seconds, 3)}}
+
+
+def _options(mapping: dict[str, Any]) -> Any:
+    from nscan_cli.slam.options import NScanOptions, SlamOptions
+
+    nscan = NScanOptions(max_scans=mapping.get("max-scans", 10), loops=not mapping.get("no-loops", False))
+    return SlamOptions(nscan=nscan, relations=mapping.get("relations", "both"))
+
+
+def _evaluation(inputs: dict[str, str], graph_file: str) -> dict[str, Any] | None:
+    """What `evaluate --json` says of the graph; None where there is nothing to measure against."""
+    from nscan_cli.evaluation.measure import measure
+    from nscan_cli.evaluation.report import as_document
+
+    relations, reference = inputs.get("relations"), inputs.get("reference")
+    if relations is None and reference is None:
+        return None
+    return as_document(measure(graph_file, relations, reference).evaluation)
+
+
+def _reporter() -> Callable[[int, int, int], None]:
+    """Says how far the work is, not too often."""
+    next_time = 0.0
+
+    def report(done: int, total: int, keyframes: int) -> None:
+        nonlocal next_time
+        if done < total and time.monotonic() < next_time:
+            return
+        next_time = time.monotonic() + BETWEEN_REPORTS
+        print(json.dumps([done, total, keyframes]), flush=True)
+
+    return report
+
+
+def _end_with_the_parent() -> None:
+    with contextlib.suppress(OSError):
+        while os.read(0, 1024):
+            pass
+    os._exit(1)
+
+
+if __name__ == "__main__":
+    main(sys.argv[1])

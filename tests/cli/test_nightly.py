@@ -1,0 +1,174 @@
+"""`nscan-cli nightly` as a user meets it."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from nscan_cli.cli.main import run
+from tests.data import data_file
+from tests.nightly.small import copy_of, results, write_logs
+
+SAMPLES = Path(__file__).resolve().parents[2] / "sample_logs"
+
+
+@pytest.fixture(scope="module")
+def manifest(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return write_logs(tmp_path_factory.mktemp("logs"))
+
+
+@pytest.fixture(scope="module")
+def first(manifest: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The folder of a first night; not to be changed."""
+    folder = tmp_path_factory.mktemp("first") / "nights"
+    assert run(["nightly", str(manifest), "-o", str(folder), "--jobs", "2", "-q"]) == 0
+    return folder
+
+
+def report(folder: Path):
+    return json.loads((folder / "report.json").read_bytes(), parse_constant=pytest.fail)
+
+
+def test_the_results_are_those_of_slam_and_evaluate(manifest, first, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    outputs = ["-o", "graph.json", "--map", "map.png", "--trajectory", "trajectory.tum"]
+    assert run(["slam", str(manifest.parent / "two.log"), *outputs, "-q"]) == 0
+    for name in ("graph.json", "map.png", "map.yaml", "trajectory.tum"):
+        assert (first / "two" / name).read_bytes() == (tmp_path / name).read_bytes(), name
+    assert run(["evaluate", "graph.json", "--reference", str(manifest.parent / "two.tum"), "--json"]) == 0
+    document = report(first)
+    assert document["good"] is True
+    assert document["headline"] == "All 3 logs are good"
+    assert [log["name"] for log in document["logs"]] == ["one", "two", "three"]
+    assert document["logs"][1]["evaluation"] == json.loads(capsys.readouterr().out)
+
+
+@pytest.mark.parametrize("jobs", ["1", "3"])
+def test_the_same_bytes_whatever_the_jobs(manifest, first, tmp_path, jobs):
+    assert run(["nightly", str(manifest), "-o", str(tmp_path / "n"), "--jobs", jobs, "-q"]) == 0
+    assert results(tmp_path / "n") == results(first)
+
+
+def test_a_second_call_does_nothing_and_says_so_without_loading_anything(manifest, first, tmp_path):
+    folder = copy_of(first, tmp_path / "nights")
+    before = {path: (path.stat().st_mtime_ns, path.stat().st_ino) for path in folder.rglob("*.*")}
+    script = (
+        "import sys; from nscan_cli.cli.main import run; assert run(sys.argv[1:]) == 0; "
+        "heavy = {'numpy', 'scipy', 'numba', 'PIL', 'rich', 'distributed'} & set(sys.modules); "
+        "assert not heavy, heavy"
+    )
+    call = [sys.executable, "-c", script, "nightly", str(manifest), "-o", str(folder)]
+    said = subprocess.run(call, check=True, capture_output=True, text=True)
+    assert said.stdout == ""
+    assert said.stderr == (
+        f"nothing to do: all 3 logs are up to date\nAll 3 logs are good: {folder}/report.html\n"
+    )
+    assert {path: (path.stat().st_mtime_ns, path.stat().st_ino) for path in folder.rglob("*.*")} == before
+
+
+def test_what_has_changed_is_done_again_and_compared(manifest, first, tmp_path, capsys):
+    folder = copy_of(first, tmp_path / "nights")
+    changed = tmp_path / "changed.toml"
+    text = manifest.read_text().replace('name = "two"', 'name = "two"\nparameters = { every = 3 }')
+    changed.write_text(text)
+    arguments = ["nightly", str(changed), "-o", str(folder), "--data", str(manifest.parent)]
+    assert run(arguments) == 0
+    lines = capsys.readouterr().err.splitlines()
+    assert len(lines) == 2
+    assert lines[0].startswith("two: RMSE of the ATE 0.")
+    one, two, _three = report(folder)["logs"]
+    assert [len(log["nights"]) for log in (one, two)] == [1, 2]
+    assert one["before"] is None
+    assert two["before"] == two["nights"][0]["errors"] == report(first)["logs"][1]["errors"]
+    assert two["counts"]["scans"] == 6
+
+
+def test_failures_have_their_reasons_and_code_3(manifest, first, tmp_path, capsys):
+    """A damaged log, one that is above its bound, one that is not there; the fourth is fine all the same."""
+    folder = copy_of(first, tmp_path / "nights")
+    logs = tmp_path / "logs"
+    logs.mkdir()
+    write_logs(logs)
+    (logs / "one.log").write_text("no log")
+    text = (logs / "small.toml").read_text()
+    head, _, tail = text.partition('name = "two"')
+    tail = tail.replace("max_translation = 0.5", "max_translation = 0", 1)
+    text = f'{head}name = "two"{tail}\n[[log]]\nname = "four"\nsource = "https://example.org/four.log"\n'
+    (logs / "small.toml").write_text(text)
+    assert run(["nightly", str(logs / "small.toml"), "-o", str(folder), "-q"]) == 3
+    one, two, last = capsys.readouterr().err.splitlines()
+    assert one.startswith("nscan-cli: one: log/one.log: is ")
+    assert two.startswith("nscan-cli: two: RMSE of the ATE 0.")
+    assert two.endswith(" m is above 0 m")
+    assert last == f"nscan-cli: Not good: of 3 logs 1 failed, 1 above bound; see {folder}/report.html"
+    document = report(folder)
+    assert document["good"] is False
+    assert [log["status"] for log in document["logs"]] == ["failed", "above", "good", "absent"]
+    # What the last good night has left is still there.
+    assert document["logs"][0]["errors"] is not None
+    assert (folder / "one" / "map.png").exists()
+    # Nothing is mended by a second look; only what failed is tried again.
+    assert run(["nightly", str(logs / "small.toml"), "-o", str(folder)]) == 3
+    lines = capsys.readouterr().err.splitlines()
+    assert lines[0] == (
+        f"four: {logs}/four.log.gz is not there, skipped; to be had from https://example.org/four.log"
+    )
+    assert [line.partition(":")[0] for line in lines[1:]] == ["one", "nscan-cli", "nscan-cli", "nscan-cli"]
+
+
+def test_force(manifest, first, tmp_path, capsys):
+    folder = copy_of(first, tmp_path / "nights")
+    assert run(["nightly", str(manifest), "-o", str(folder), "--force"]) == 0
+    assert len(capsys.readouterr().err.splitlines()) == 4
+    assert results(folder) == results(first)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code", "message"),
+    [
+        (["none.toml", "-o", "out"], 66, "none.toml: no such file; check the path"),
+        (["bad.toml", "-o", "out"], 65, "bad.toml, log 1 (a): has an unknown key 'pth'; known: name, path,"),
+        (["empty.toml", "-o", "out"], 66, "empty.toml: none of its logs is there, not even a.log.gz; give"),
+        (["kuemmerle", "-o", "out"], 2, "nightly: kuemmerle has no logs of its own; give their folder with"),
+        (["kuemmerle", "-o", "out", "--data", "nowhere"], 66, "--data nowhere: is no folder; give that"),
+        (["fine.toml", "-o", "no/out"], 73, "no/out: the folder no does not exist; create it first"),
+        (["fine.toml", "-o", "fine.toml"], 73, "fine.toml: cannot be written to"),
+        (["fine.toml", "-o", "out", "--scheduler", "x"], 2, "--scheduler x: is no address of the form tcp://"),
+        (["fine.toml"], 2, "nightly: Missing option '-o'"),
+    ],
+)  # fmt: skip
+def test_a_mistake_is_one_line_with_its_code(arguments, code, message, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    if "--scheduler" in arguments:
+        pytest.importorskip("distributed")
+    Path("bad.toml").write_text('[[log]]\nname = "a"\npth = "x"')
+    Path("empty.toml").write_text('[[log]]\nname = "a"')
+    Path("fine.toml").write_text('[[log]]\nname = "fine"')
+    Path("fine.log").write_text("no log")
+    assert run(["nightly", *arguments]) == code
+    out, err = capsys.readouterr()
+    assert out == ""
+    assert err.startswith(f"nscan-cli: {message}")
+    assert err.count("\n") == 1
+
+
+def test_the_sample_logs_and_their_manifest(tmp_path):
+    assert run(["nightly", str(SAMPLES / "nightly.toml"), "-o", str(tmp_path / "nights"), "-q"]) == 0
+
+
+@pytest.mark.logs
+def test_a_shipped_manifest_over_real_logs(tmp_path, capsys):
+    """One of its logs; the others of the folder are left out."""
+    (tmp_path / "data").mkdir()
+    for name in ("mit-csail.log.gz", "mit-csail.relations"):
+        (tmp_path / "data" / name).symlink_to(data_file(name))
+    folder = tmp_path / "nights"
+    assert run(["nightly", "kuemmerle", "--data", str(tmp_path / "data"), "-o", str(folder)]) == 0
+    assert "warning" not in capsys.readouterr().err
+    logs = {log["name"]: log for log in report(folder)["logs"]}
+    assert logs.pop("mit-csail")["status"] == "good"
+    assert {log["status"] for log in logs.values()} == {"absent"}

@@ -1,0 +1,82 @@
+"""On a real Dask scheduler with two worker processes, over loopback."""
+
+from __future__ import annotations
+
+import os
+import signal
+import socket
+import threading
+
+import pytest
+
+from nscan_cli.cli.main import run
+from nscan_cli.errors import InputMissingError, WrongUsageError
+from nscan_cli.nightly import cluster
+from nscan_cli.nightly.manifest import Entry, read_manifest
+from nscan_cli.nightly.task import Task
+from tests.nightly.small import results
+
+distributed = pytest.importorskip("distributed")
+
+
+@pytest.fixture(scope="module")
+def scheduler():
+    with distributed.LocalCluster(
+        n_workers=2, threads_per_worker=1, processes=True, host="127.0.0.1", dashboard_address=None
+    ) as running:
+        yield running.scheduler_address
+
+
+def test_the_same_results_as_in_local_processes(scheduler, small, undisturbed, tmp_path):
+    folder = tmp_path / "nights"
+    assert run(["nightly", str(small), "-o", str(folder), "--scheduler", scheduler, "-q"]) == 0
+    assert results(folder) == results(undisturbed)
+
+
+def test_a_failure_costs_its_log_alone_and_reads_as_it_does_here(scheduler, small, tmp_path):
+    (tmp_path / "empty.log").touch()
+    bad = Task.of(Entry("empty", {"log": tmp_path / "empty.log"}))
+    lost = Task.of(Entry("lost", {"log": tmp_path / "lost.log"}))
+    fine = Task.of(read_manifest(str(small), None)[0])
+    said = []
+    found = {
+        task.name: outcome
+        for task, outcome in cluster.run_all(
+            [bad, lost, fine], scheduler, 60.0, lambda *progress: said.append(progress)
+        )
+    }
+    assert found["empty"].result == {"reason": "log/empty.log: is empty; give a log with laser scans"}
+    assert "lost.log: no such file" in found["lost"].result["reason"]
+    assert found["one"].result["counts"]["scans"] == 12
+    assert {name for name, *_ in said} <= {"one"}
+
+
+def test_a_worker_that_dies_costs_no_log(scheduler, small, undisturbed, tmp_path):
+    """Dask gives its log to the other one."""
+    folder = tmp_path / "nights"
+    client = distributed.Client(scheduler, set_as_default=False)
+    pids = list(client.run(os.getpid).values())
+    threading.Timer(0.8, lambda: os.kill(pids[0], signal.SIGKILL)).start()
+    assert run(["nightly", str(small), "-o", str(folder), "--scheduler", scheduler, "-q"]) == 0
+    client.wait_for_workers(2, timeout=20)
+    client.close()
+    assert results(folder) == results(undisturbed)
+
+
+def test_a_worker_with_another_version_is_named(scheduler, small, monkeypatch):
+    monkeypatch.setattr(cluster, "tool_key", lambda: "9.9.9-0")
+    task = Task.of(read_manifest(str(small), None)[0])
+    ((_task, outcome),) = cluster.run_all([task], scheduler, None, lambda *_: None)
+    assert "another nscan-cli" in outcome.result["reason"]
+    assert "in place of 9.9.9-0; install the same" in outcome.result["reason"]
+
+
+def test_no_scheduler(monkeypatch):
+    monkeypatch.setattr(cluster, "PATIENCE", 0.5)
+    with socket.socket() as port:
+        port.bind(("127.0.0.1", 0))
+        address = f"tcp://127.0.0.1:{port.getsockname()[1]}"
+        with pytest.raises(InputMissingError, match="no Dask scheduler answers there"):
+            next(cluster.run_all([], address, None, lambda *_: None), None)
+    with pytest.raises(WrongUsageError, match="no address of the form tcp://HOST:PORT"):
+        next(cluster.run_all([], "here", None, lambda *_: None), None)

@@ -1,0 +1,122 @@
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import pytest
+
+from nscan_cli.errors import InputDataError, InputMissingError, WrongUsageError
+from nscan_cli.nightly.manifest import Entry, read_manifest, shipped
+
+INTEL = """
+[[log]]
+name = "intel"
+path = "logs/intel.log.gz"
+relations = "intel.relations"
+max_translation = 0.02
+published = { "Cartographer" = 0.0229, "RBPF" = 0.070 }
+"""
+
+
+def read(tmp_path: Path, text: str, data: str | None = None) -> list[Entry]:
+    (tmp_path / "night.toml").write_text(text)
+    return read_manifest(str(tmp_path / "night.toml"), data)
+
+
+def test_a_log_with_paths_relative_to_the_manifest(tmp_path):
+    (entry,) = read(tmp_path, INTEL)
+    assert entry.name == "intel"
+    assert entry.inputs == {
+        "log": tmp_path / "logs" / "intel.log.gz",
+        "relations": tmp_path / "intel.relations",
+    }
+    assert (entry.max_translation, entry.max_rotation) == (0.02, None)
+    assert entry.published == {"Cartographer": 0.0229, "RBPF": 0.07}
+    assert not entry.is_there
+
+
+def test_paths_relative_to_data(tmp_path):
+    data = tmp_path / "data"
+    with pytest.raises(InputMissingError, match="is no folder"):
+        read(tmp_path, INTEL, str(data))
+    data.mkdir()
+    (entry,) = read(tmp_path, INTEL, str(data))
+    assert entry.inputs["log"] == data / "logs" / "intel.log.gz"
+
+
+@pytest.mark.parametrize("file", ["aces.clf", "aces.log.gz", "aces.mcap"])
+def test_a_log_by_its_name_alone(tmp_path, file):
+    (tmp_path / file).touch()
+    (tmp_path / "aces.relations").touch()
+    (entry,) = read(tmp_path, '[[log]]\nname = "aces"')
+    assert entry.inputs == {"log": tmp_path / file}
+    assert entry.is_there
+
+
+def test_parameters_are_options_of_slam(tmp_path):
+    parameters = "parameters = { mount = [0.1, 0, 90], angle-min = -90, no-odometry = true, max-scans = 4 }"
+    (entry,) = read(tmp_path, f'[[log]]\nname = "a"\n{parameters}')
+    assert entry.parameters.reading.mount == (0.1, 0.0, math.pi / 2)
+    assert entry.parameters.reading.angle_min == -math.pi / 2
+    assert entry.parameters.reading.odometry is False
+    assert entry.parameters.mapping == {"max-scans": 4}
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("[[log]\n", "night.toml: not TOML: .*; mend it"),
+        ("", "night.toml: has no logs; begin each with"),
+        ("log = 3", "night.toml: has no logs"),
+        ("[[logs]]", "night.toml: has an unknown key 'logs'; a manifest has"),
+        ("[[log]]", "night.toml, log 1: has no name; letters"),
+        ('[[log]]\nname = "../up"', "log 1: '../up' is no name"),
+        ('[[log]]\nname = "Report.html"', "'Report.html' is no name"),
+        ('[[log]]\nname = "a"\npth = "x"', r"log 1 \(a\): has an unknown key 'pth'; known: name, path"),
+        ('[[log]]\nname = "a"\n[[log]]\nname = "A"', "two logs have the name A; give each its own"),
+        ('[[log]]\nname = "a"\npath = 3', "path is 3; give a text"),
+        (
+            '[[log]]\nname = "a"\nrelations = "r"\nmax_translation = -1',
+            "max_translation is -1; give a number",
+        ),
+        ('[[log]]\nname = "a"\nrelations = "r"\nmax_rotation = nan', "max_rotation is nan; give a number"),
+        ('[[log]]\nname = "a"\nmax_rotation = 1', "has max_rotation, but nothing to measure against; give"),
+        ('[[log]]\nname = "a"\nrelations = "r"\nreference = "t"', "has relations and reference; leave one"),
+        ('[[log]]\nname = "a"\nrelations = "r"\npublished = { x = "1" }', "published is .*; give errors in"),
+        ('[[log]]\nname = "a"\nsha256 = "12"', "sha256 is '12'; give 64 hexadecimal digits"),
+        ('[[log]]\nname = "a"\nrelations_source = "x"', "has relations_source, but no relations; give"),
+        (
+            '[[log]]\nname = "a"\nparameters = { topics = "x" }',
+            "unknown key 'topics'; known: allow-corrected",
+        ),
+        ('[[log]]\nname = "a"\nparameters = { end = "x" }', "parameters: end is 'x'; give a number"),
+        ('[[log]]\nname = "a"\nparameters = { flip = 1 }', "parameters: flip is 1; give true or false"),
+        ('[[log]]\nname = "a"\nparameters = { max-scans = 2 }', "max-scans is 2; give 3 or more"),
+        ('[[log]]\nname = "a"\nparameters = { relations = "x" }', "give one of pairwise, nscan, both"),
+        ('[[log]]\nname = "a"\nparameters = { mount = [1] }', r"mount is \[1\]; give \[x, y, degrees\]"),
+        ('[[log]]\nname = "a"\nparameters = { start = 9, end = 5 }', "parameters: --start is after --end"),
+    ],
+)
+def test_a_mistake_is_named_with_its_place_and_a_remedy(tmp_path, text, message):
+    with pytest.raises(InputDataError, match=message) as caught:
+        read(tmp_path, text)
+    assert "\n" not in str(caught.value)
+
+
+def test_a_manifest_that_is_not_there(tmp_path):
+    with pytest.raises(InputMissingError, match="no such file"):
+        read_manifest(str(tmp_path / "night.toml"), None)
+
+
+@pytest.mark.parametrize("name", ["kuemmerle", "radish"])
+def test_shipped_manifests_say_where_to_get_every_file(tmp_path, name):
+    with pytest.raises(WrongUsageError, match="--data"):
+        read_manifest(name, None)
+    entries = read_manifest(name, str(tmp_path))
+    assert all(entry.inputs["log"].parent == tmp_path for entry in entries)
+    assert all(set(entry.sources) == set(entry.inputs) for entry in entries)
+    assert all(not entry.is_there for entry in entries)
+
+
+def test_the_manifests_that_are_shipped():
+    assert set(shipped()) == {"kuemmerle", "radish"}

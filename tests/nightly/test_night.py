@@ -1,0 +1,166 @@
+"""What is up to date, and what a folder remembers; by an engine that makes its results up."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from nscan_cli.nightly import fingerprint
+from nscan_cli.nightly.manifest import Entry
+from nscan_cli.nightly.night import carry_out, plan
+from nscan_cli.nightly.nights import read_nights
+from nscan_cli.nightly.parameters import parameters_from
+from nscan_cli.nightly.task import Outcome
+
+
+class Silent:
+    def progress(self, *_progress):
+        pass
+
+    def finished(self, *_finished):
+        pass
+
+
+class Fake:
+    """Gives each log the outcome that is asked for, and counts."""
+
+    def __init__(self, *outcomes: Outcome):
+        self.outcomes = list(outcomes)
+        self.done: list[str] = []
+
+    def __call__(self, tasks, scratch, report):
+        for task in tasks:
+            self.done.append(task.name)
+            yield task, self.outcomes.pop(0)
+
+
+def good(content: bytes = b"map") -> Outcome:
+    return Outcome({"counts": {}, "evaluation": None, "times": {"seconds": 1.0}}, {"map.png": content})
+
+
+@pytest.fixture
+def entry(tmp_path: Path) -> Entry:
+    (tmp_path / "a.log").write_text("a")
+    (tmp_path / "a.tum").write_text("t")
+    return Entry("a", {"log": tmp_path / "a.log", "reference": tmp_path / "a.tum"})
+
+
+@pytest.fixture
+def nights(tmp_path: Path) -> Path:
+    (tmp_path / "nights").mkdir()
+    return tmp_path / "nights"
+
+
+def night(entry: Entry, folder: Path, *outcomes: Outcome, force: bool = False) -> Fake:
+    fake = Fake(*outcomes)
+    carry_out(plan([entry], folder, force), folder, fake, Silent())
+    return fake
+
+
+def is_done(entry: Entry, folder: Path) -> bool:
+    return plan([entry], folder, False).up_to_date == [entry]
+
+
+def test_what_is_done_is_up_to_date(entry, nights):
+    assert not is_done(entry, nights)
+    assert night(entry, nights, good()).done == ["a"]
+    assert is_done(entry, nights)
+    assert night(entry, nights).done == []
+    assert night(entry, nights, good(), force=True).done == ["a"]
+    assert not (nights / ".scratch").exists()
+
+
+@pytest.mark.parametrize("change", ["log", "reference", "parameters", "code", "name", "output", "no output"])
+def test_whatever_changes_makes_it_out_of_date(entry, nights, tmp_path, monkeypatch, change):
+    night(entry, nights, good())
+    if change in ("log", "reference"):
+        entry.inputs[change].write_text("b")
+    elif change == "parameters":
+        entry = replace(entry, parameters=parameters_from("", {"end": 5}))
+    elif change == "code":
+        monkeypatch.setattr(fingerprint, "tool_key", lambda: "0.2.0")
+    elif change == "name":
+        entry = replace(entry, inputs={**entry.inputs, "log": entry.inputs["log"].rename(tmp_path / "b.log")})
+    elif change == "output":
+        (nights / "a" / "map.png").write_bytes(b"another")
+    else:
+        (nights / "a" / "map.png").unlink()
+    assert not is_done(entry, nights)
+
+
+def test_bounds_and_published_figures_are_no_reason_to_do_it_again(entry, nights):
+    night(entry, nights, good())
+    assert is_done(replace(entry, max_translation=0.1, published={"x": 1.0}, sources={"log": "y"}), nights)
+
+
+def test_a_copy_of_the_log_elsewhere_is_the_same_log(entry, nights, tmp_path):
+    night(entry, nights, good())
+    (tmp_path / "copy").mkdir()
+    (tmp_path / "copy" / "a.log").write_text("a")
+    assert is_done(replace(entry, inputs={**entry.inputs, "log": tmp_path / "copy" / "a.log"}), nights)
+
+
+def test_a_failure_is_tried_again_and_told_once(entry, nights):
+    night(entry, nights, Outcome.failed("no\nroom"))
+    assert not is_done(entry, nights)
+    night(entry, nights, Outcome.failed("no room"))
+    assert [line["reason"] for line in read_nights(nights / "a")] == ["no room"]
+    night(entry, nights, good())
+    assert [line["outcome"] for line in read_nights(nights / "a")] == ["done"]
+
+
+def test_a_night_for_every_change(entry, nights):
+    night(entry, nights, good(b"1"))
+    night(entry, nights, good(b"1"), force=True)
+    entry.inputs["log"].write_text("b")
+    night(entry, nights, good(b"2"))
+    night(entry, nights, Outcome.failed("stopped"), force=True)
+    assert [line["outcome"] for line in read_nights(nights / "a")] == ["done", "done", "failed"]
+    assert (nights / "a" / "map.png").read_bytes() == b"2"
+    assert not is_done(entry, nights)
+
+
+def test_a_history_that_is_damaged_begins_anew(entry, nights):
+    night(entry, nights, good())
+    for damage in (b'{"key": 1', b"[]\n", b"\xff\n", b"{}\n"):
+        (nights / "a" / "nights.jsonl").write_bytes(damage)
+        assert not is_done(entry, nights)
+        night(entry, nights, good())
+        assert len(read_nights(nights / "a")) == 1
+
+
+def test_logs_that_are_absent_or_unreadable_do_not_reach_the_engine(entry, nights, tmp_path):
+    absent = Entry("b", {"log": tmp_path / "b.log"})
+    folder = Entry("c", {"log": tmp_path})
+    lost = Entry("d", {"log": tmp_path / "a.log", "relations": tmp_path / "d.relations"})
+    planned = plan([absent, folder, lost, entry], nights, False)
+    assert planned.absent == [absent]
+    assert [each.name for each, _reason in planned.unreadable] == ["c", "d"]
+    fake = Fake(good())
+    carry_out(planned, nights, fake, Silent())
+    assert fake.done == ["a"]
+    assert "d.relations: no such file" in read_nights(nights / "d")[0]["reason"]
+    assert not (nights / "b").exists()
+
+
+def test_the_largest_log_is_begun_first(nights, tmp_path):
+    entries = []
+    for name, size in (("a", 1), ("b", 3), ("c", 2)):
+        (tmp_path / f"{name}.log").write_text("x" * size)
+        entries.append(Entry(name, {"log": tmp_path / f"{name}.log"}))
+    assert [entry.name for entry, _key in plan(entries, nights, False).to_do] == ["b", "c", "a"]
+
+
+def test_another_file_than_the_manifest_means_is_noted(entry, nights):
+    sha256 = "ca978112ca1bbdcafac231b39a23dc4da786eff8147c4e72b9807785afee48bb"  # of "a"
+    assert plan([replace(entry, sha256={"log": sha256})], nights, False).notes == {"a": []}
+    (note,) = plan([replace(entry, sha256={"log": "0" * 64})], nights, False).notes["a"]
+    assert note == "a.log is not the file that the manifest means: its SHA-256 is another"
+
+
+def test_the_tools_key_is_of_the_code_that_makes_results():
+    key = fingerprint.tool_key()
+    assert fingerprint.tool_key.__wrapped__() == key
+    assert len(key.rpartition("-")[2]) == 16

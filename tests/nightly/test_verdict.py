@@ -1,0 +1,87 @@
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from nscan_cli.nightly.manifest import Entry
+from nscan_cli.nightly.nights import Night
+from nscan_cli.nightly.verdict import Verdict, headline, verdict
+
+
+def figures(value: float) -> dict[str, float]:
+    return dict.fromkeys(("mean", "sd", "median", "mean_square", "rmse", "max"), value)
+
+
+def done(translation: float, rotation: float = 0.1) -> Night:
+    evaluation = {"relations": {"translation": figures(translation), "rotation": figures(rotation)}}
+    return {"key": "", "tool": "", "outcome": "done", "counts": {"warnings": []}, "evaluation": evaluation}
+
+
+FAILED = {
+    "key": "",
+    "tool": "",
+    "outcome": "failed",
+    "reason": "it died",
+    "times": {"finished": "2026-11-21T03:00:00Z"},
+}
+
+
+def judged(
+    *nights: Night, translation: float | None = None, rotation: float | None = None, absent: bool = False
+) -> Verdict:
+    entry = Entry("a", {"log": Path("a.log"), "relations": Path("r")}, translation, rotation)
+    return verdict(entry, list(nights), [], absent)
+
+
+@pytest.mark.parametrize(
+    ("found", "status", "reasons"),
+    [
+        (judged(done(0.02), translation=0.02), "good", []),
+        (judged(done(0.021), translation=0.02), "above", ["mean on relations 0.0210 m is above 0.02 m"]),
+        (judged(done(0.02, 0.5), rotation=0.4), "above",
+         ["mean on relations 0.5000 degrees is above 0.4 degrees"]),
+        (judged(FAILED), "failed", ["it died"]),
+        (judged(done(0.02), FAILED, translation=0.01), "failed", ["it died"]),
+        (judged(FAILED, done(0.02)), "good", []),
+        (judged(done(0.02), done(0.0209)), "good", []),
+        (judged(done(0.02), done(0.0212)), "worse", ["mean on relations rose from 0.0200 to 0.0212 m"]),
+        (judged(done(0.002), done(0.0024)), "good", []),
+        (judged(done(0.02), FAILED, done(0.03)), "worse", ["mean on relations rose from 0.0200 to 0.0300 m"]),
+        (judged(done(0.02, 0.1), done(0.02, 0.2)), "worse",
+         ["mean on relations rose from 0.1000 to 0.2000 degrees"]),
+        (judged(done(0.03), done(0.02)), "good", []),
+        (judged(done(0.02), done(0.03), translation=0.025), "above",
+         ["mean on relations 0.0300 m is above 0.025 m"]),
+        (judged(absent=True), "absent", ["a.log is not there"]),
+        (judged(done(0.1), absent=True, translation=0.05), "absent", ["a.log is not there"]),
+    ],
+)  # fmt: skip
+def test_the_verdict(found, status, reasons):
+    assert (found.status, found.reasons) == (status, reasons)
+    assert found.is_failure == (status in ("failed", "above"))
+
+
+def test_a_log_without_anything_to_measure_against_is_good_when_it_is_done():
+    assert judged({**done(1.0), "evaluation": None}).status == "good"
+
+
+def test_of_a_trajectory_the_rmse_counts():
+    ate = {"translation": {**figures(0.1), "rmse": 0.3}, "rotation": figures(1.0)}
+    found = judged({**done(0), "evaluation": {"reference": {"ate": ate}}}, translation=0.2)
+    assert found.reasons == ["RMSE of the ATE 0.3000 m is above 0.2 m"]
+
+
+@pytest.mark.parametrize(
+    ("verdicts", "line"),
+    [
+        ([judged(done(1))], "The log is good"),
+        ([judged(done(1))] * 3 + [judged(absent=True)], "All 3 logs are good"),
+        ([judged(done(1)), judged(done(1), done(2))], "Within bounds, but of 2 logs 1 worse than before"),
+        ([judged(FAILED), judged(done(2), translation=1), judged(done(1), done(2)), judged(done(1))],
+         "Not good: of 4 logs 1 failed, 1 above bound, 1 worse than before"),
+        ([judged(FAILED)], "Not good: of 1 log 1 failed"),
+    ],
+)  # fmt: skip
+def test_the_headline(verdicts, line):
+    assert headline(verdicts) == line
