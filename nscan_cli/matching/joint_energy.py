@@ -169,7 +169,7 @@ def _add_pairs(
             u[2],
             widening,
             curvature,
-            neutral * scans.usual[i],
+            neutral * scans.usual[i] if neutral > 0.0 else 0.0,
             stride,
             out,
         )

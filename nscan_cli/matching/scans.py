@@ -33,18 +33,23 @@ class Scans(NamedTuple):
     half: float
     """Side (m) of a lattice cell, the same for all."""
     usual: Array
-    """(n,) mean s of each scan's points on its own Gaussians: what a perfect match would reach."""
+    """(n,) mean s of each scan's points on its own Gaussians: what a perfect match would reach; or nan."""
 
 
-def lay_out(ndts: Sequence[Ndt], points: Sequence[Array]) -> Scans:
-    """Lay n NDTs of one cell size and the points (m_i, 2) of n scans end to end."""
+def lay_out(ndts: Sequence[Ndt], points: Sequence[Array], neutral: bool = True) -> Scans:
+    """Lay n NDTs of one cell size and the points (m_i, 2) of n scans end to end.
+
+    Without `neutral` the `usual` is nan: the neutral energy is not to be asked for.
+    """
     tables = [ndt.grid.table for ndt in ndts]
     keys = np.concatenate([ndt.grid.keys[: ndt.rows] for ndt in ndts])
     links = np.concatenate([ndt.grid.links[: ndt.rows] for ndt in ndts])
     gaussians = [ndt.grid.gaussians for ndt in ndts]
     # The sums are for growing; matching needs the Gaussians alone.
     grid = Grid(np.concatenate(tables), keys, links, np.empty((0, 8)), np.concatenate(gaussians))
-    own = np.array([_own_mean(ndt.grid, ndt.half, part) for ndt, part in zip(ndts, points, strict=True)])
+    own = np.full(len(ndts), np.nan)
+    if neutral:
+        own[:] = [_own_mean(ndt.grid, ndt.half, part) for ndt, part in zip(ndts, points, strict=True)]
     return Scans(
         grid,
         _starts([len(table) for table in tables]),

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import dataclasses
 import itertools
-from typing import Any
+from typing import Any, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,11 +20,13 @@ from nscan_cli.poses import relative
 from nscan_cli.slam.closing import NO_SECOND
 from nscan_cli.slam.keyframes import route
 from nscan_cli.slam.nearby import Nearby
-from nscan_cli.slam.options import SlamOptions
+from nscan_cli.slam.options import Relations, SlamOptions
 from nscan_cli.slam.pipeline import Slam
 from nscan_cli.slam.place import AMBIGUOUS, ELSEWHERE, NO_MATCH, Place
 from nscan_cli.slam.tracking import Tracked
 
+LEAST_VALUE, LARGEST_VALUE, MOST_VALUES = 1e-9, 1e9, 10
+"""What a parameter can be, and how many values a list of them can have."""
 SEARCHED = (AMBIGUOUS, ELSEWHERE, NO_MATCH, NO_SECOND)
 """Verdicts of the search for large loops, which is not made again: they stay."""
 
@@ -39,8 +41,11 @@ def can_refine(graph: Graph) -> bool:
 
 
 def options_of(graph: Graph) -> SlamOptions:
-    """The parameters that the graph was made with; what it does not say has its default."""
-    options: SlamOptions = _restored(SlamOptions(), graph.provenance["parameters"]["slam"])
+    """The parameters that the graph was made with; what it does not say has its default.
+
+    Raises ValueError naming a parameter that none can have been made with.
+    """
+    options: SlamOptions = _restored(SlamOptions(), graph.provenance["parameters"]["slam"], "slam")
     return options
 
 
@@ -143,18 +148,33 @@ def _places(graph: Graph, options: SlamOptions) -> list[Place]:
     return places
 
 
-def _restored(default: Any, values: dict[str, Any]) -> Any:
+def _restored(default: Any, values: Any, place: str) -> Any:
     """The dataclass `default` with the values of a JSON object, as far as it has such fields."""
+    if not isinstance(values, dict):
+        raise ValueError(f"{place} is no object")
     given: dict[str, Any] = {}
     for field in dataclasses.fields(default):
         if field.name not in values:
             continue
-        value, usual = values[field.name], getattr(default, field.name)
-        if dataclasses.is_dataclass(usual):
-            value = _restored(usual, value)
-        given[field.name] = _as_tuple(value)
+        inner = f"{place}.{field.name}"
+        given[field.name] = _like(getattr(default, field.name), values[field.name], inner)
     return dataclasses.replace(default, **given)
 
 
-def _as_tuple(value: Any) -> Any:
-    return tuple(_as_tuple(part) for part in value) if isinstance(value, list) else value
+def _like(usual: Any, value: Any, place: str) -> Any:
+    """A value of the JSON as one of the kind that is usual there. Raises ValueError."""
+    if dataclasses.is_dataclass(usual):
+        return _restored(usual, value, place)
+    if isinstance(usual, tuple):
+        if not isinstance(value, list) or not value or (usual and len(value) > MOST_VALUES):
+            raise ValueError(f"{place} is no list of a few values")
+        return tuple(_like(usual[0], part, place) for part in value)
+    if isinstance(usual, (bool, str)) or usual is None:
+        if type(value) is type(usual) and (not isinstance(usual, str) or value in get_args(Relations)):
+            return value
+    elif type(value) in (int, float) and type(value) in (int, type(usual)):
+        # Nothing that is measured by a parameter is below 0, and where 0 is none, it would divide.
+        least = 0 if isinstance(usual, int) or usual == 0 else LEAST_VALUE
+        if least <= value <= LARGEST_VALUE:
+            return value
+    raise ValueError(f"{place} is {str(value)[:40]!r}, which no graph is made with")

@@ -80,7 +80,7 @@ def choose_nearby(
     recent = recent[: options.max_scans - min(len(old), options.max_scans // 2)]
     old = old[: options.max_scans - len(recent)]
     chosen = np.sort(np.concatenate([old, recent]))
-    return chosen, np.isin(chosen, old)
+    return chosen, np.abs(paths[centre] - paths[chosen]) > options.recent
 
 
 def match_nearby(route: Route, centre: int, options: NScanOptions) -> Nearby | None:
@@ -109,14 +109,15 @@ def _match_held(
 ) -> Nearby:
     """Match jointly, leave out what does not hang together, and match again, until all does."""
     keyframes, poses = route.keyframes, route.poses
-    kept, start = np.arange(len(tried)), poses[tried]
+    kept, start, scans = np.arange(len(tried)), poses[tried], _laid_out(keyframes, tried)
     if len(widenings) == 1:
-        near = overlaps(_laid_out(keyframes, tried), start).pairs
+        near = overlaps(scans, start).pairs
         held = held_together(near, POSSIBLE * options.overlap, int(np.searchsorted(tried, centre)))
         kept, start = kept[held], start[held]
     while len(kept) >= LEAST_SCANS:
         members = tried[kept]
-        scans = _laid_out(keyframes, members)
+        if len(members) < len(scans.point_starts) - 1:
+            scans = _laid_out(keyframes, members)
         match = _match(scans, members, route.chain, start, widenings, options)
         shares = overlaps(scans, match.poses).pairs
         at = int(np.searchsorted(members, centre))
@@ -141,7 +142,8 @@ def _match_held(
 
 
 def _laid_out(keyframes: Sequence[Keyframe], members: Indices) -> Scans:
-    return lay_out([keyframes[k].ndt for k in members], [keyframes[k].points for k in members])
+    ndts, points = [keyframes[k].ndt for k in members], [keyframes[k].points for k in members]
+    return lay_out(ndts, points, neutral=False)
 
 
 def _match(
