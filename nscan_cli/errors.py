@@ -1,10 +1,19 @@
 """The errors that a user can cause; each carries its exit code and prints as one line."""
 
 
+LONGEST = 2000
+"""Characters of a message: it may quote an input, in which anything can stand."""
+
+
 class NscanError(Exception):
     """A failure that the user can mend. The message names file, place and remedy."""
 
     exit_code = 1
+
+    def __init__(self, message: str) -> None:
+        if len(message) > LONGEST:
+            message = f"{message[: LONGEST // 2]} … {message[-LONGEST // 2 :]}"
+        super().__init__(message)
 
 
 class InputDataError(NscanError):
