@@ -10,6 +10,7 @@ from nscan_cli.evaluation.trajectory import trajectory_errors
 from nscan_cli.graph.json_file import parse_graph, write_graph
 from nscan_cli.graph.solve import optimise_graph
 from nscan_cli.graph.tum import Trajectory
+from nscan_cli.logs.load import read_log
 from nscan_cli.poses import relative
 from nscan_cli.slam.options import SlamOptions
 from nscan_cli.slam.pipeline import Slam
@@ -208,3 +209,15 @@ def test_the_largest_log_runs_to_its_end():
     assert len(run.graph) == 17480
     assert np.isfinite(run.graph.poses).all()
     assert len(write_graph(run.graph)) < 10_000_000
+
+
+@pytest.mark.logs
+def test_a_log_and_its_recording_give_maps_alike():
+    """Angles differ by 5e-8 rad, which is enough for another choice here and there. Measured: 0.047 m, 0.19 m."""
+    text = mapped_real("mit-csail").graph
+    recording = mapped(read_log(str(data_file("mit-csail.ros2.mcap")))).graph
+    assert abs(len(text.keyframes) - len(recording.keyframes)) <= 3
+    apart = relative(text.poses, text.poses[0]) - relative(recording.poses, recording.poses[0])
+    distances = np.hypot(apart[:, 0], apart[:, 1])
+    assert distances.mean() < 0.1
+    assert distances.max() < 0.4
