@@ -213,7 +213,7 @@ def test_the_largest_log_runs_to_its_end():
 
 @pytest.mark.logs
 def test_a_log_and_its_recording_give_maps_alike():
-    """Angles differ by 5e-8 rad, which is enough for another choice here and there. Measured: 0.047 m, 0.19 m."""
+    """Angles differ by 5e-8 rad, enough for another choice here and there. Measured: 0.047 m, 0.19 m."""
     text = mapped_real("mit-csail").graph
     recording = mapped(read_log(str(data_file("mit-csail.ros2.mcap")))).graph
     assert abs(len(text.keyframes) - len(recording.keyframes)) <= 3
