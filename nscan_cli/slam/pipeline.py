@@ -22,7 +22,7 @@ from nscan_cli.slam.keyframes import Keyframe, Keyframes, Route, relation_betwee
 from nscan_cli.slam.nearby import MatchNearby, Nearby, choose_nearby, match_nearby
 from nscan_cli.slam.options import SlamOptions
 from nscan_cli.slam.pairs_nearby import match_pairs_nearby
-from nscan_cli.slam.place import Place
+from nscan_cli.slam.place import TOO_LITTLE, Place
 from nscan_cli.slam.refinement import Refinement
 from nscan_cli.slam.tracking import Tracked, Tracker
 from nscan_cli.slam.trajectory import between_keyframes
@@ -128,8 +128,11 @@ class Slam:
             self.take(nearby)
             if self._moved > self.options.optimise_after:
                 self.optimise(max_iterations=10, tolerance=1e-3)
-        if options.loops:
-            refused = nearby is not None and nearby.loop is not None and not nearby.loop.accepted
+        loop = None if nearby is None else nearby.loop
+        # At the border of an earlier visit a place well inside fits better than the right one, half of which
+        # was not seen: there a search says no more than the match.
+        if options.loops and not (loop is not None and loop.reason == TOO_LITTLE):
+            refused = loop is not None and not loop.accepted
             self.close_loops(centre, tried[seen_before & refused])
 
     def match_unless_doubted(self, centre: int) -> Nearby | None:
