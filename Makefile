@@ -4,7 +4,7 @@ VENV := .venv
 RUN := $(VENV)/bin
 READY := $(VENV)/.ready
 
-.PHONY: map test lint samples figures bench robustness clean
+.PHONY: map test lint samples figures bench robustness soak lowest lock clean
 
 map: $(READY)
 	mkdir -p out
@@ -30,6 +30,18 @@ bench: $(READY)
 
 robustness: $(READY)
 	$(RUN)/python -m tests.benchmarks.robustness docs/robustness.md
+
+soak: $(READY)
+	mkdir -p out
+	$(RUN)/python -m tests.soak
+
+lowest:
+	$(PYTHON) -m venv out/lowest
+	out/lowest/bin/python -m pip install --quiet --constraint requirements-lowest.txt '.[test]'
+	out/lowest/bin/python -m pytest -n 2
+
+lock: $(READY)
+	$(RUN)/python -m pip freeze --exclude-editable > requirements-dev.lock
 
 $(READY): pyproject.toml
 	$(PYTHON) -m venv $(VENV)

@@ -7,6 +7,7 @@ changes, all are compiled again. A constant that a kernel uses belongs into a fi
 
 from __future__ import annotations
 
+import contextlib
 import functools
 import hashlib
 import os
@@ -50,9 +51,31 @@ def _compiled(function: Function, fastmath: set[str]) -> Function:
         compile_lazily = numba.njit(
             cache=folder is not None, nogil=True, error_model="numpy", fastmath=fastmath
         )
-        return cast(Function, compile_lazily(function))
+        compiled = compile_lazily(function)
     finally:
         config.CACHE_DIR = configured
+    _forgive(getattr(compiled, "_cache"))  # noqa: B009, numba's types do not have it
+    return cast(Function, compiled)
+
+
+def _forgive(cache: Any) -> None:
+    """Let no folder that is full or damaged stop the work: what cannot be loaded is compiled anew."""
+    load, save = cache.load_overload, cache.save_overload
+
+    def load_if_sound(*call: Any) -> Any:
+        try:
+            return load(*call)
+        except Exception:
+            # What is damaged can raise anything. An empty index takes its place.
+            with contextlib.suppress(Exception):
+                cache.flush()
+            return None
+
+    def save_if_possible(*call: Any) -> None:
+        with contextlib.suppress(OSError):
+            save(*call)
+
+    cache.load_overload, cache.save_overload = load_if_sound, save_if_possible
 
 
 def first_compile() -> bool:

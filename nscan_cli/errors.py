@@ -1,6 +1,5 @@
 """The errors that a user can cause; each carries its exit code and prints as one line."""
 
-
 LONGEST = 2000
 """Characters of a message: it may quote an input, in which anything can stand."""
 

@@ -2,23 +2,37 @@
 
 from __future__ import annotations
 
+import os
+import stat
 import sys
+import tomllib
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
-from nscan_cli.errors import InputMissingError
+from nscan_cli.errors import InputDataError, InputMissingError
+from nscan_cli.limits import CONFIG, INPUT, MB, ExceededError, Limit
 
 STANDARD_INPUT = "-"
 
 
-def read_bytes(path: str) -> bytes:
+def read_bytes(path: str, limit: Limit = INPUT) -> bytes:
     """All bytes of the file `path`, or of standard input when it is "-".
 
-    Raises InputMissingError when there is no such file, or it cannot be read.
+    Raises InputMissingError when there is no such file, or it cannot be read; InputDataError when there
+    are more than the limit allows.
     """
-    if path == STANDARD_INPUT:
-        return sys.stdin.buffer.read()
     try:
-        return Path(path).read_bytes()
+        if path == STANDARD_INPUT:
+            return in_pieces(sys.stdin.buffer.read, limit)
+        with open(path, "rb") as file:
+            status = os.fstat(file.fileno())
+            if not stat.S_ISREG(status.st_mode):
+                return in_pieces(file.read, limit)
+            limit.check(status.st_size / MB, f"has {status.st_size / MB:,.0f} MB")
+            return file.read()
+    except ExceededError as error:
+        raise InputDataError(label(path), str(error), error.remedy) from error
     except FileNotFoundError as error:
         raise InputMissingError(f"{path}: no such file; check the path") from error
     except IsADirectoryError as error:
@@ -27,6 +41,26 @@ def read_bytes(path: str) -> bytes:
         raise InputMissingError(f"{path}: may not be read; change its permissions") from error
     except (OSError, ValueError) as error:
         raise InputMissingError(f"{path!r}: cannot be read: {error}; check the path") from error
+
+
+def in_pieces(read: Callable[[int], bytes], limit: Limit, problem: str = "goes on and on") -> bytes:
+    """All that can be read from where nobody knows the length. Raises ExceededError beyond the limit."""
+    pieces, size, most = [], 0, limit.bytes
+    while piece := read(MB):
+        size += len(piece)
+        if size > most:
+            raise ExceededError(limit, problem)
+        pieces.append(piece)
+    return b"".join(pieces)
+
+
+def read_toml(path: str, remedy: str) -> dict[str, Any]:
+    """The tables of a TOML file. Raises InputMissingError, and InputDataError when it is no TOML."""
+    try:
+        return tomllib.loads(read_bytes(path, CONFIG).decode())
+    except (ValueError, RecursionError) as error:
+        # Not only TOML's own error: bytes that are no text, a number of thousands of digits.
+        raise InputDataError(label(path), f"not TOML: {error}", remedy) from error
 
 
 def label(path: str) -> str:

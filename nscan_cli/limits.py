@@ -61,8 +61,8 @@ class Limit:
 
     def shown(self) -> str:
         """As messages say it."""
-        value = self.value
-        number = f"{value:,.0f}" if value < 1e9 else f"{value:g}"
+        value = float(self.value)
+        number = f"{value:,.0f}" if value.is_integer() and value < 1e9 else f"{value:g}"
         return f"{number} {self.unit}".strip()
 
     def check(self, value: float, problem: str) -> None:

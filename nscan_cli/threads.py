@@ -57,4 +57,5 @@ class Beside:
             for call in self._calls if kind is None else ():
                 call.result()
         finally:
-            self._pool.shutdown(cancel_futures=True)
+            # Who interrupts does not wait for what would be thrown away.
+            self._pool.shutdown(wait=kind is not KeyboardInterrupt, cancel_futures=True)

@@ -117,7 +117,8 @@ def report(**environment: str) -> list[object]:
         key: value for key, value in os.environ.items() if key not in ("NUMBA_CACHE_DIR", "XDG_CACHE_HOME")
     }
     script = Path(environment.pop("SCRIPT"))
-    script.write_text(KERNEL)
+    if not script.exists():
+        script.write_text(KERNEL)
     done = subprocess.run(
         [sys.executable, str(script)], env={**kept, **environment}, capture_output=True, check=True,
         cwd=Path(__file__).parents[1],
@@ -126,13 +127,41 @@ def report(**environment: str) -> list[object]:
     return answer
 
 
+def kept_in(folder: Path) -> dict[str, str]:
+    return {
+        "SCRIPT": str(folder / "script.py"),
+        "NUMBA_CACHE_DIR": str(folder / "cache"),
+        "PYTHONPATH": str(Path(__file__).parents[1]),
+    }
+
+
 def test_machine_code_is_kept_between_processes(tmp_path):
-    environment = {"SCRIPT": str(tmp_path / "script.py"), "NUMBA_CACHE_DIR": str(tmp_path / "cache"),
-                   "PYTHONPATH": str(Path(__file__).parents[1])}  # fmt: skip
+    environment = kept_in(tmp_path)
     folder, first, after, values, hits, same = report(**environment)
     assert str(folder).startswith(str(tmp_path / "cache"))
     assert (first, after, values, hits, same) == (True, False, [3, 1.5], 0, True)
     assert report(**environment) == [folder, False, False, [3, 1.5], 2, True]
+
+
+def test_a_full_disk_under_the_cache_stops_nothing(tmp_path):
+    """No file can grow beyond 100 bytes."""
+    script = f"import resource; resource.setrlimit(resource.RLIMIT_FSIZE, (100, 100))\n{KERNEL}"
+    (tmp_path / "script.py").write_text(script)
+    folder, _first, _after, values, hits, _same = report(**kept_in(tmp_path))
+    assert (values, hits) == ([3, 1.5], 0)
+    files = [path for path in Path(str(folder)).rglob("*") if path.is_file()]
+    assert not [path.name for path in files if path.stat().st_size > 100 or ".tmp." in path.name]
+
+
+@pytest.mark.parametrize("suffix", ["nbi", "nbc"])
+def test_a_damaged_cache_is_made_anew(tmp_path, suffix):
+    assert report(**kept_in(tmp_path))[3:5] == [[3, 1.5], 0]
+    kept = list((tmp_path / "cache").rglob(f"*.{suffix}"))
+    assert kept
+    for path in kept:
+        path.write_bytes(path.read_bytes()[: path.stat().st_size // 2])
+    assert report(**kept_in(tmp_path))[3:5] == [[3, 1.5], 0]
+    assert report(**kept_in(tmp_path))[3:5] == [[3, 1.5], 2]
 
 
 def test_kernels_run_where_nothing_can_be_kept(places, monkeypatch):

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from nscan_cli.errors import InputDataError, InputMissingError
+from nscan_cli.limits import DISTANCE
 from nscan_cli.logs.options import ReadingOptions
 
 if TYPE_CHECKING:
@@ -30,7 +31,7 @@ def read_graph_log(
 
     from nscan_cli.logs.load import read_log
 
-    log = read_log(path, _as_tracked(reading, graph.provenance))
+    log = read_log(path, _as_tracked(reading, graph_file, graph.provenance))
     sha256 = _source(graph).get("sha256")
     if sha256 is not None and sha256 != log.source.sha256:
         raise InputDataError(path, f"is not the log of {graph_file}: its SHA-256 is another", REMEDY)
@@ -63,10 +64,11 @@ def _source(graph: Graph) -> dict[str, Any]:
     return sources[0]
 
 
-def _as_tracked(reading: ReadingOptions, provenance: dict[str, Any]) -> ReadingOptions:
+def _as_tracked(reading: ReadingOptions, graph_file: str, provenance: dict[str, Any]) -> ReadingOptions:
     """The options that the graph's log was read with, where `reading` does not say otherwise.
 
     But which scans there are, the graph itself says; `reading` may leave out more.
+    Raises InputDataError where the graph has options that the log cannot have been read with.
     """
     choices = {"start", "end", "every"}
     tracked = provenance.get("parameters", {}).get("reading", {})
@@ -74,7 +76,23 @@ def _as_tracked(reading: ReadingOptions, provenance: dict[str, Any]) -> ReadingO
     kept: dict[str, Any] = {}
     for option in dataclasses.fields(ReadingOptions):
         unsaid = getattr(reading, option.name) == getattr(default, option.name)
-        if unsaid and option.name in tracked and option.name not in choices:
+        if isinstance(tracked, dict) and unsaid and option.name in tracked and option.name not in choices:
             value = tracked[option.name]
+            if not _fits(value, str(option.type)):
+                problem = f"provenance.parameters.reading: {option.name} is {str(value)[:40]!r}"
+                raise InputDataError(graph_file, problem, "mend it, or write the graph again")
             kept[option.name] = tuple(value) if isinstance(value, list) else value
     return dataclasses.replace(reading, **kept)
+
+
+def _fits(value: Any, kind: str) -> bool:
+    """Whether a value of the graph is one for a field of ReadingOptions with this annotation."""
+    if value is None:
+        return "None" in kind
+    if isinstance(value, list):
+        return kind.startswith("tuple") and len(value) == 3 and all(_fits(part, "float") for part in value)
+    if isinstance(value, bool) or kind == "bool":
+        return isinstance(value, bool) and kind == "bool"
+    if isinstance(value, str):
+        return kind.startswith("str")
+    return kind.startswith("float") and isinstance(value, (int, float)) and abs(value) <= DISTANCE.value

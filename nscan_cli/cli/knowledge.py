@@ -16,6 +16,7 @@ from nscan_cli.graph.json_file import parse_graph
 from nscan_cli.graph.model import Graph, Pairwise
 from nscan_cli.graph.tum import Trajectory, parse_tum
 from nscan_cli.inputs import base_name, label, read_bytes
+from nscan_cli.limits import GRAPH
 from nscan_cli.logs.scan import LaserLog, Source
 from nscan_cli.matching.joint_energy import Priors, no_priors
 from nscan_cli.matching.nscan import PriorsAmong
@@ -41,7 +42,7 @@ def read_knowledge(path: str, log: LaserLog) -> Knowledge:
     Raises InputMissingError when it cannot be read, InputDataError when it is neither, or the graph of
     another log.
     """
-    data, name = read_bytes(path), label(path)
+    data, name = read_bytes(path, GRAPH), label(path)
     source = Source(base_name(path), hashlib.sha256(data).hexdigest(), len(data))
     if not data.lstrip().startswith(b"{"):
         return Knowledge(parse_tum(data, name), source, name)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import errno
 import importlib
+import io
 import os
 import sys
 import traceback
@@ -12,7 +13,7 @@ import traceback
 import click
 
 from nscan_cli import __version__
-from nscan_cli.errors import NscanError, OutputError
+from nscan_cli.errors import InputDataError, NscanError, OutputError
 
 COMMANDS = {
     "info": "What is in a log, and what the other commands will use of it.",
@@ -59,7 +60,19 @@ def cli() -> None:
 
 def main() -> None:
     """Entry point of the command; exits with the code of the outcome."""
+    raw: object = getattr(sys.stdout, "buffer", None)
+    if isinstance(raw, io.RawIOBase):
+        # With PYTHONUNBUFFERED, what a pipe does not take at once would be lost without an error.
+        sys.stdout = io.TextIOWrapper(
+            io.BufferedWriter(raw), sys.stdout.encoding, sys.stdout.errors, line_buffering=True
+        )
     code = run(sys.argv[1:])
+    if code == INTERRUPTED:
+        # Python would wait for threads whose work nobody wants any more.
+        for stream in (sys.stdout, sys.stderr):
+            with contextlib.suppress(OSError, ValueError, AttributeError):
+                stream.flush()
+        os._exit(code)
     if code in (CLOSED_EARLY, OutputError.exit_code) and sys.stdout is not None:
         # What cannot be written, Python would try once more at its end, and complain.
         with contextlib.suppress(OSError):
@@ -95,6 +108,9 @@ def run(arguments: list[str]) -> int:
     except NscanError as error:
         _say(str(error), verbose)
         return error.exit_code
+    except MemoryError:
+        _say("there is not enough memory for this; see --every, --start and --end", verbose)
+        return InputDataError.exit_code
     except Exception as error:
         if isinstance(error, OSError) and error.errno in NO_ROOM and error.filename is None:
             _say(f"standard output: cannot be written: {error.strerror}", verbose)

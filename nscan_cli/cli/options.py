@@ -5,14 +5,13 @@ from __future__ import annotations
 import functools
 import json
 import math
-import tomllib
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
 import click
 
-from nscan_cli.errors import InputDataError, InputMissingError
+from nscan_cli.errors import InputDataError
+from nscan_cli.inputs import read_toml
 from nscan_cli.logs.options import ReadingOptions
 
 Command = Callable[..., Any]
@@ -128,13 +127,7 @@ def _read_config(ctx: click.Context, _param: click.Parameter, value: str | None)
     """
     if value is None:
         return None
-    try:
-        with Path(value).open("rb") as file:
-            document = tomllib.load(file)
-    except OSError as error:
-        raise InputMissingError(f"{value}: {error.strerror}; --config takes a TOML file") from error
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise InputDataError(value, f"not TOML: {error}", "mend it, or leave out --config") from error
+    document = read_toml(value, "mend it, or leave out --config")
     from nscan_cli.cli.main import COMMANDS
 
     name = ctx.command.name or ""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import fcntl
 import os
 import stat
 import sys
@@ -22,7 +23,8 @@ def whole_file(path: str) -> Iterator[BinaryIO]:
     """A binary file that appears under `path` whole when the block ends well, and not at all otherwise.
 
     "-" is standard output; what is no regular file, such as /dev/null or a named pipe, is written to as
-    it is. Raises OutputError when the folder is missing or nothing can be written.
+    it is. What killed processes have left in the folder is cleared away. Raises OutputError when the
+    folder is missing or nothing can be written.
     """
     if path == "-":
         if sys.stdout is None:
@@ -33,29 +35,55 @@ def whole_file(path: str) -> Iterator[BinaryIO]:
     check_writable(path)
     # A symbolic link stays what it is: the file that it names is replaced.
     target = Path(os.path.realpath(path))
-    temporary = None
     try:
         if is_device(path):
             with open(path, "wb") as device:
                 yield device
             return
-        descriptor, temporary = tempfile.mkstemp(dir=target.parent, prefix=TEMPORARY)
-        with os.fdopen(descriptor, "wb") as file:
+        clear_left_over(target.parent)
+        with _temporary(target.parent) as (file, name):
             yield file
             file.flush()
+            umask = os.umask(0)
+            os.umask(umask)
+            os.fchmod(file.fileno(), 0o666 & ~umask)
             os.fsync(file.fileno())
-        umask = os.umask(0)
-        os.umask(umask)
-        os.chmod(temporary, 0o666 & ~umask)
-        os.replace(temporary, target)
+            os.replace(name, target)
     except BrokenPipeError:
         raise
     except OSError as error:
         raise OutputError(f"{path}: cannot be written: {error.strerror or error}; choose another") from error
-    finally:
-        if temporary is not None:
-            with contextlib.suppress(FileNotFoundError):
-                os.unlink(temporary)
+
+
+@contextlib.contextmanager
+def _temporary(folder: Path) -> Iterator[tuple[BinaryIO, str]]:
+    """A new file in the folder, and its name; gone when the block ends, unless it was renamed.
+
+    It is locked as long as it is open: by that, others see that somebody is at work on it.
+    """
+    while True:
+        descriptor, name = tempfile.mkstemp(dir=folder, prefix=TEMPORARY)
+        with os.fdopen(descriptor, "wb") as file:
+            try:
+                # Before it is locked, another process may take it for left over.
+                with contextlib.suppress(OSError):
+                    fcntl.flock(descriptor, fcntl.LOCK_EX)
+                if os.fstat(descriptor).st_nlink == 0:
+                    continue
+                yield file, name
+                return
+            finally:
+                with contextlib.suppress(FileNotFoundError):
+                    os.unlink(name)
+
+
+def clear_left_over(folder: Path) -> None:
+    """Remove the files that killed processes have begun to write in the folder."""
+    with contextlib.suppress(OSError):
+        for left_over in folder.glob(f"{TEMPORARY}*"):
+            with contextlib.suppress(OSError), left_over.open("rb") as file:
+                fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                left_over.unlink()
 
 
 def check_writable(path: str | None) -> None:

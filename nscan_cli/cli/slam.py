@@ -11,7 +11,8 @@ import click
 from nscan_cli.cli.options import CONTEXT, common_options, reading_options
 from nscan_cli.cli.progress import progress, say
 from nscan_cli.cli.slam_outputs import Outputs
-from nscan_cli.errors import InputMissingError, WrongUsageError
+from nscan_cli.errors import InputDataError, InputMissingError, WrongUsageError
+from nscan_cli.inputs import label
 from nscan_cli.logs.options import ReadingOptions
 from nscan_cli.provenance import provenance_of
 
@@ -219,7 +220,7 @@ def _log_of(
 ) -> tuple[LaserLog, NDArray[np.int64], str] | None:
     """The log of a saved graph, the rows of its scans, and its path; None where the graph has none."""
     from nscan_cli.cli.graph_log import find_log, read_graph_log
-    from nscan_cli.slam.again import can_refine
+    from nscan_cli.slam.again import can_refine, options_of
 
     if not can_refine(graph):
         if needed or log_file is not None:
@@ -228,6 +229,12 @@ def _log_of(
             )
         say(f"{path}: is no graph that slam made from a log: it is optimised only", quiet)
         return None
+    try:
+        options_of(graph)
+    except ValueError as error:
+        raise InputDataError(
+            label(path), f"provenance.parameters: {error}", "mend it, or write it again"
+        ) from error
     try:
         log_file = find_log(path, graph) if log_file is None else log_file
     except InputMissingError as error:

@@ -9,7 +9,9 @@ from typing import TYPE_CHECKING
 
 from nscan_cli.cli.output import check_writable, write_whole
 from nscan_cli.cli.render import check_map_outputs, write_map, yaml_path
-from nscan_cli.errors import WrongUsageError
+from nscan_cli.errors import InputDataError, WrongUsageError
+from nscan_cli.inputs import label
+from nscan_cli.limits import DISTANCE
 
 if TYPE_CHECKING:
     import numpy as np
@@ -66,6 +68,12 @@ class Outputs:
         """Write all; `rows` (N,) are those of the graph's scans, `inputs` what the depfile names."""
         from nscan_cli.graph.json_file import write_graph
 
+        farthest = float(abs(graph.poses[:, :2]).max())
+        if farthest > DISTANCE.value:
+            problem = f"leads to a pose {farthest:.3g} m away, which no graph may have"
+            raise InputDataError(
+                label(inputs[0]), problem, f"look for jumps, or set {DISTANCE.variable} higher"
+            )
         write_whole(self.graph, write_graph(graph))
         if self.trajectory is not None:
             from nscan_cli.graph.tum import write_tum
@@ -75,14 +83,15 @@ class Outputs:
             from nscan_cli.graph.g2o import write_g2o
 
             write_whole(self.g2o, write_g2o(graph))
-        if scans is not None and self.map is not None:
-            from nscan_cli.mapping.occupancy import occupancy_grid
-
-            write_map(self.map, occupancy_grid(scans, rows, graph.poses), yaml=True)
         if scans is not None and self.carmen is not None:
             from nscan_cli.exports.carmen import corrected_log
 
             write_whole(self.carmen, corrected_log(scans, rows, graph.poses))
+        if scans is not None and self.map is not None:
+            from nscan_cli.mapping.occupancy import occupancy_grid
+
+            # Last, since it may be refused for its size: the rest is then there.
+            write_map(self.map, occupancy_grid(scans, rows, graph.poses), yaml=True)
         if self.depfile is not None:
             write_whole(self.depfile, self._rule(inputs))
 

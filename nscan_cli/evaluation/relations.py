@@ -6,6 +6,7 @@ relative pose of each pair of stamps is compared with the reference's, and so no
 
 from __future__ import annotations
 
+import io
 import math
 from dataclasses import dataclass
 
@@ -88,8 +89,8 @@ def read_relations(path: str) -> Relations:
     stamps: list[tuple[str, str]] = []
     rows: list[list[float]] = []
     lines: list[int] = []
-    for number, line in enumerate(read_bytes(path, GRAPH).decode("utf-8", errors="replace").split("\n"), start=1):
-        fields = line.split()
+    for number, line in enumerate(io.BytesIO(read_bytes(path, GRAPH)), start=1):
+        fields = line.decode("utf-8", errors="replace").split()
         if not fields or fields[0].startswith("#"):
             continue
         try:

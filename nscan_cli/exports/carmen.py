@@ -13,6 +13,7 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
+from nscan_cli.finite import check_finite
 from nscan_cli.logs.corrected import OWN_HOST
 from nscan_cli.logs.laser import CARMEN_MAX_RANGE, beam_angles
 from nscan_cli.logs.scan import LaserLog
@@ -32,8 +33,10 @@ def corrected_log(log: LaserLog, rows: NDArray[np.int64], poses: Array) -> bytes
     The records are FLASER where the beams have the directions that CARMEN gives to so many of them and
     end within CARMEN's greatest range, else ROBOTLASER1, which says both. A beam that met nothing gets
     the least value that stands for it in the log (PARAM robot_front_laser_max says so), one that says
-    nothing 0. Ranges keep all digits, poses 9 decimals, and read back they are the same.
+    nothing 0. Ranges keep all digits, poses 9 decimals, and read back they are the same. Raises
+    NotFiniteError.
     """
+    check_finite("the corrected poses", poses)
     ranges = log.ranges[rows]
     greatest = ranges[np.isfinite(ranges)].max(initial=np.float32(0.0))
     limit = _limit(log, float(greatest))

@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nscan_cli import __version__
+from nscan_cli.errors import WrongUsageError
 from nscan_cli.exports.messages import (
     Messages,
     graph_markers,
@@ -26,6 +27,7 @@ from nscan_cli.exports.messages import (
     scan_message,
     transforms,
 )
+from nscan_cli.finite import check_finite
 from nscan_cli.graph.model import Graph
 from nscan_cli.logs.scan import LaserLog
 from nscan_cli.mapping.occupancy import OccupancyGrid
@@ -40,6 +42,8 @@ TOPICS = {
     "/scan": "sensor_msgs/msg/LaserScan",
 }
 NANOSECONDS = 10**9
+YEAR = 365.25 * 86400
+"""s"""
 LAST_SECOND = 2**31
 """A stamp's seconds are 32 bits wide."""
 
@@ -50,8 +54,10 @@ def recording(
     """The MCAP of a graph and its map `grid`, with the scans in `rows` (N,) of the log at `nodes` (N,).
 
     Stamps are those of the log; where ROS has no room for them (before 0, from 2³¹ s on), all count from
-    the log's first second. Equal inputs give equal bytes.
+    the log's first second. Equal inputs give equal bytes. Raises NotFiniteError, and WrongUsageError when
+    the stamps are too far apart even for that.
     """
+    check_finite("the poses of the recording", graph.poses, graph.odometry)
     messages = Messages()
     file = _File(messages)
     stamps = _nanoseconds(graph.stamps)
@@ -112,4 +118,8 @@ def _nanoseconds(stamps: Sequence[str]) -> list[int]:
     if first >= 0 and last < LAST_SECOND * NANOSECONDS:
         return times
     start = first // NANOSECONDS * NANOSECONDS
+    if last - start >= LAST_SECOND * NANOSECONDS:
+        years = (last - first) / NANOSECONDS / YEAR
+        problem = f"the stamps span {years:.0f} years, and those of ROS 68 at most"
+        raise WrongUsageError(f"{problem}; leave out the recording, or choose other scans")
     return [time - start for time in times]

@@ -12,6 +12,7 @@ the two, which leaves the energy as it is.
 from __future__ import annotations
 
 import hashlib
+import io
 from collections import Counter, deque
 from collections.abc import Iterable
 from dataclasses import dataclass, field
@@ -19,9 +20,11 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from nscan_cli.errors import InputDataError
+from nscan_cli.finite import check_finite
 from nscan_cli.graph.model import Graph, NScan, Pairwise
 from nscan_cli.graph.triangles import from_upper_triangle, is_indefinite, upper_triangle
 from nscan_cli.inputs import base_name, label, read_bytes
+from nscan_cli.limits import DISTANCE, GRAPH, INFORMATION, KINDS, Limit
 from nscan_cli.logs.scan import Source
 from nscan_cli.poses import Array, compose, inverse, relative, rotated_information
 from nscan_cli.provenance import provenance_of
@@ -55,15 +58,15 @@ def read_g2o(path: str) -> Graph:
 
     Raises InputMissingError when the file cannot be read, InputDataError on a malformed line.
     """
-    return parse_g2o(read_bytes(path), path)
+    return parse_g2o(read_bytes(path, GRAPH), path)
 
 
 def parse_g2o(data: bytes, path: str) -> Graph:
     """The graph in the bytes of a g2o file, as read_g2o gives it."""
     name = label(path)
     content = _Content()
-    for number, line in enumerate(data.decode("utf-8", errors="replace").split("\n"), start=1):
-        fields = line.split("#", 1)[0].split()
+    for number, line in enumerate(io.BytesIO(data), start=1):
+        fields = line.decode("utf-8", errors="replace").split("#", 1)[0].split()
         if not fields:
             continue
         try:
@@ -86,8 +89,10 @@ def write_g2o(graph: Graph) -> bytes:
     g2o has no form for an nScan relation: each is replaced by the marginals of its Hessian between pose
     c and every other pose, as pairwise edges. This loses what the relation says about the other poses
     among each other, and a graph optimised from the file differs from one that has the whole Hessian.
-    Nodes that are no keyframes are left out. Numbers have the digits that read back exactly.
+    Nodes that are no keyframes are left out. Numbers have the digits that read back exactly. Raises
+    NotFiniteError.
     """
+    check_finite("the poses of the graph", graph.poses)
     keyframes = graph.keyframes.tolist()
     names = graph.scans.tolist()
     lines = [f"VERTEX_SE2 {names[node]} {_numbers(graph.poses[node])}" for node in keyframes]
@@ -98,6 +103,7 @@ def write_g2o(graph: Graph) -> bytes:
         z = relation.measurement
         information = upper_triangle(rotated_information(inverse(z), relation.information))
         a, b = relation.nodes
+        check_finite(f"the edge of {relation.nodes}", z, information)
         lines.append(f"EDGE_SE2 {names[a]} {names[b]} {_numbers(z)} {_numbers(information)}")
     # GTSAM's reader drops all edges after a tag that it does not know.
     lines += [f"FIX {names[node]}" for node in keyframes[:1]]
@@ -166,13 +172,14 @@ def _take(content: _Content, line: int, fields: list[str]) -> None:
         vertex = _id(fields[1])
         if vertex in content.vertices:
             raise ValueError(f"vertex {vertex} is there already")
-        content.vertices[vertex] = _finite(fields[2:])
+        content.vertices[vertex] = _numbers_of(fields[2:], DISTANCE)
     elif tag == "EDGE_SE2":
         _check_length(fields, 12)
         i, j = _id(fields[1]), _id(fields[2])
         if i == j:
             raise ValueError(f"the edge joins vertex {i} with itself")
-        z, information = _finite(fields[3:6]), from_upper_triangle(_finite(fields[6:]), 3)
+        z = _numbers_of(fields[3:6], DISTANCE)
+        information = from_upper_triangle(_numbers_of(fields[6:], INFORMATION), 3)
         if is_indefinite(information):
             raise ValueError("the information matrix has a negative eigenvalue")
         content.edges.append((line, i, j, z, information))
@@ -182,7 +189,8 @@ def _take(content: _Content, line: int, fields: list[str]) -> None:
         if len(content.fixed) > 1:
             raise ValueError("a second vertex is fixed, but only one can be")
     else:
-        content.skipped[tag] += 1
+        known = tag in content.skipped or len(content.skipped) < KINDS.value
+        content.skipped[tag if known else "others"] += 1
 
 
 def _check_length(fields: list[str], length: int) -> None:
@@ -196,10 +204,12 @@ def _id(text: str) -> int:
     return int(text)
 
 
-def _finite(texts: Iterable[str]) -> Array:
+def _numbers_of(texts: Iterable[str], limit: Limit) -> Array:
     values = np.array([float(text) for text in texts])
     if not np.isfinite(values).all():
         raise ValueError("a number is not finite")
+    if (np.abs(values) > limit.value).any():
+        raise ValueError(f"a number is beyond {limit.value:g}")
     return values
 
 

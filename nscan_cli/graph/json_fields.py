@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from nscan_cli.graph.triangles import from_upper_triangle, upper_triangle
+from nscan_cli.limits import DISTANCE, INFORMATION, Limit
 from nscan_cli.poses import Array, wrap
 
 DECIMALS = 9
@@ -107,25 +108,27 @@ class Record:
 
     def number(self, key: str) -> float:
         """A finite number."""
-        return float(_numbers([self.get(key)], 1, self.wrong(key, "a finite number"))[0])
+        error = self.wrong(key, "a finite number")
+        return float(_numbers([self.get(key)], 1, error)[0])
 
     def pose(self, key: str) -> Array:
         """(3,) x, y, φ."""
-        return _numbers(self.get(key), 3, self.wrong(key, "a pose of three finite numbers"))
+        return _numbers(self.get(key), 3, self.wrong(key, f"a pose of three {_bounded(DISTANCE)}"), DISTANCE)
 
     def poses(self, key: str, count: int) -> Array:
         """(count, 3) poses."""
         values = self.get(key)
-        error = self.wrong(key, f"a list of {count} poses of three finite numbers")
+        error = self.wrong(key, f"a list of {count} poses of three {_bounded(DISTANCE)}")
         if not isinstance(values, list) or len(values) != count:
             raise error
-        return np.array([_numbers(value, 3, error) for value in values])
+        return np.array([_numbers(value, 3, error, DISTANCE) for value in values])
 
     def matrix(self, key: str, size: int) -> Array:
         """The symmetric matrix (size, size) of an upper triangle."""
         count = size * (size + 1) // 2
-        error = self.wrong(key, f"the upper triangle of a {size} × {size} matrix: {count} finite numbers")
-        return from_upper_triangle(_numbers(self.get(key), count, error), size)
+        numbers = f"{count} {_bounded(INFORMATION)}"
+        error = self.wrong(key, f"the upper triangle of a {size} × {size} matrix: {numbers}")
+        return from_upper_triangle(_numbers(self.get(key), count, error, INFORMATION), size)
 
     def records(self, key: str) -> Iterator[Record]:
         """The objects of a list, each with its place."""
@@ -140,7 +143,11 @@ def _is_integer(value: Any) -> bool:
     return isinstance(value, int) and not isinstance(value, bool) and 0 <= value <= LARGEST_INTEGER
 
 
-def _numbers(values: Any, count: int, error: MalformedError) -> Array:
+def _bounded(limit: Limit) -> str:
+    return f"finite numbers up to {limit.value:g}"
+
+
+def _numbers(values: Any, count: int, error: MalformedError, limit: Limit | None = None) -> Array:
     if not isinstance(values, list) or len(values) != count:
         raise error
     # A bool is an int for Python, but no number of JSON.
@@ -150,6 +157,6 @@ def _numbers(values: Any, count: int, error: MalformedError) -> Array:
         array = np.array(values, dtype=np.float64)
     except OverflowError:
         raise error from None
-    if not np.isfinite(array).all():
+    if not np.isfinite(array).all() or (limit is not None and (np.abs(array) > limit.value).any()):
         raise error
     return array

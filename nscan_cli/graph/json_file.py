@@ -6,18 +6,19 @@ One record a line, keys in fixed order: equal graphs give equal bytes, and text 
 from __future__ import annotations
 
 import json
-import math
-import re
 from collections.abc import Iterable, Iterator
 from typing import Any, NoReturn
 
 import numpy as np
 
 from nscan_cli.errors import InputDataError
+from nscan_cli.finite import check_finite
 from nscan_cli.graph.json_fields import MalformedError, Record, pose_rows, six_digits, triangle
 from nscan_cli.graph.model import Graph, Loop, NScan, Pairwise
 from nscan_cli.graph.triangles import is_indefinite
 from nscan_cli.inputs import label, read_bytes
+from nscan_cli.limits import GRAPH, TIME
+from nscan_cli.logs.order import STAMP
 from nscan_cli.poses import Array
 from nscan_cli.provenance import provenance_of
 
@@ -26,16 +27,21 @@ VERSION = "1.0"
 SCHEMA = "urn:nscan-cli:pose-graph:1.0"
 UNITS = {"length": "m", "angle": "rad", "time": "s"}
 ORIGINS = ("odometry", "track", "nscan", "loop")
-STAMP = re.compile(r"[-+]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][-+]?[0-9]+)?")
 REMEDY = "mend it, or write the graph again with nscan-cli slam"
 
 
 def write_graph(graph: Graph) -> bytes:
     """The graph as a JSON document in UTF-8, with a final line feed.
 
-    Poses are rounded to 9 decimals and matrices to 6 significant digits. Raises ValueError when a
-    number is not finite.
+    Poses are rounded to 9 decimals and matrices to 6 significant digits. Raises NotFiniteError, and
+    ValueError where it is the provenance that has a number that is not finite.
     """
+    check_finite("the poses of the graph", graph.poses, graph.odometry)
+    check_finite("the covariances of the graph", *graph.marginals.values())
+    for pair in graph.pairwise:
+        check_finite(f"the relation of {pair.nodes}", pair.measurement, pair.information, pair.score)
+    for joint in graph.nscan:
+        check_finite(f"the nScan relation of {joint.nodes}", joint.poses, joint.hessian, joint.score)
     provenance = {**provenance_of([], {}), **graph.provenance}
     head: dict[str, Any] = {"$schema": SCHEMA, "format": FORMAT, "version": VERSION, "units": UNITS}
     lines = [f'"{key}":{_compact(value)},' for key, value in {**head, "provenance": provenance}.items()]
@@ -62,7 +68,7 @@ def read_graph(path: str) -> Graph:
     Raises InputMissingError when the file cannot be read, InputDataError when it is no graph or its
     parts do not fit each other.
     """
-    return parse_graph(read_bytes(path), label(path))
+    return parse_graph(read_bytes(path, GRAPH), label(path))
 
 
 def parse_graph(data: bytes, name: str) -> Graph:
@@ -232,8 +238,8 @@ def _nodes(document: Record) -> Graph:
 
 def _stamp(record: Record) -> str:
     stamp = record.text("stamp")
-    if not STAMP.fullmatch(stamp) or not math.isfinite(float(stamp)):
-        raise record.wrong("stamp", "a time in seconds, as text")
+    if not STAMP.fullmatch(stamp) or abs(float(stamp)) > TIME.value:
+        raise record.wrong("stamp", f"a time in seconds, as text, up to {TIME.shown()}")
     return stamp
 
 

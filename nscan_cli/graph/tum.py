@@ -5,6 +5,7 @@ https://cvg.cit.tum.de/data/datasets/rgbd-dataset/file_formats
 
 from __future__ import annotations
 
+import io
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -12,7 +13,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from nscan_cli.errors import InputDataError
+from nscan_cli.finite import check_finite
 from nscan_cli.inputs import label, read_bytes
+from nscan_cli.limits import DISTANCE, GRAPH, TIME
 from nscan_cli.poses import Array, wrap
 
 COLUMNS = 8
@@ -43,7 +46,11 @@ class Trajectory:
 
 
 def write_tum(stamps: Sequence[str], poses: Array) -> bytes:
-    """Poses (N, 3) at N stamps, which are kept as they are; positions and quaternions with 9 decimals."""
+    """Poses (N, 3) at N stamps, which are kept as they are; positions and quaternions with 9 decimals.
+
+    Raises NotFiniteError.
+    """
+    check_finite("the trajectory", poses)
     half = 0.5 * wrap(poses[:, 2])
     columns = np.round(np.column_stack([poses[:, :2], np.sin(half), np.cos(half)]), 9) + 0.0
     return "".join(
@@ -58,15 +65,15 @@ def read_tum(path: str) -> Trajectory:
     z is left out, and of the rotation only the yaw is kept. Raises InputMissingError when the file
     cannot be read, InputDataError on a line that is not of the format or when there is no pose.
     """
-    return parse_tum(read_bytes(path), label(path))
+    return parse_tum(read_bytes(path, GRAPH), label(path))
 
 
 def parse_tum(data: bytes, name: str) -> Trajectory:
     """The trajectory of TUM text; `name` is the file that errors name. Raises InputDataError."""
     stamps: list[str] = []
     rows: list[tuple[float, float, float, float]] = []
-    for number, line in enumerate(data.decode("utf-8", errors="replace").split("\n"), start=1):
-        fields = line.split()
+    for number, line in enumerate(io.BytesIO(data), start=1):
+        fields = line.decode("utf-8", errors="replace").split()
         if not fields or fields[0].startswith("#"):
             continue
         try:
@@ -87,6 +94,8 @@ def _pose(fields: list[str]) -> tuple[float, float, float, float]:
     values = [float(field) for field in fields]
     if not all(math.isfinite(value) for value in values):
         raise ValueError("a number is not finite")
+    if abs(values[0]) > TIME.value or max(map(abs, values[1:])) > DISTANCE.value:
+        raise ValueError(f"a number is beyond {DISTANCE.value:g}, or the time beyond {TIME.shown()}")
     t, x, y, _, qx, qy, qz, qw = values
     if abs(math.hypot(qx, qy, qz, qw) - 1) > UNIT_TOLERANCE:
         raise ValueError("the quaternion is not of length 1")

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from nscan_cli.limits import READINGS
 from nscan_cli.logs.laser import mark_no_returns, no_return_value
 from nscan_cli.logs.options import ReadingOptions
 from nscan_cli.logs.order import Order, selection
@@ -52,9 +53,16 @@ class Motion:
     truth: Array | None = None
 
 
+def empty_table(scans: int, beams: int) -> NDArray[np.float32]:
+    """The readings (S, B) of a log before they are filled in, nan. Raises ExceededError for too many."""
+    problem = f"has {scans:,} scans of up to {beams:,} beams, {scans * beams:,} readings"
+    READINGS.check(scans * beams, problem)
+    return np.full((scans, beams), np.nan, dtype=np.float32)
+
+
 def stacked(readings: Sequence[NDArray[Any]]) -> NDArray[np.float32]:
-    """Scans of different lengths as rows (S, B), nan beyond a scan's own beams."""
-    rows = np.full((len(readings), max(map(len, readings), default=0)), np.nan, dtype=np.float32)
+    """Scans of different lengths as rows (S, B), nan beyond a scan's own beams. Raises ExceededError."""
+    rows = empty_table(len(readings), max(map(len, readings), default=0))
     with np.errstate(over="ignore", invalid="ignore"):
         for row, values in zip(rows, readings, strict=True):
             row[: len(values)] = values

@@ -6,18 +6,25 @@ logger_timestamp`; lines that begin with # are comments.
 
 from __future__ import annotations
 
+import io
 import re
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from nscan_cli.limits import KINDS
+from nscan_cli.logs.assemble import empty_table
 from nscan_cli.logs.skips import Skips
 from nscan_cli.logs.text_records import Record, as_text, beam_count, parsed, sound
 from nscan_cli.poses import Array
 
 TAG = re.compile(rb"[A-Z][A-Z0-9_]{2,31}\Z")
 NEW = re.compile(r"(RAW|ROBOT)LASER\d\Z")
+LASER = re.compile(rb"((RAW|ROBOT)?LASER\d|[FR]LASER)\Z")
+USED = (b"ODOM", b"TRUEPOS", b"PARAM")
+UNUSED = (0, b"")
+"""Stands for a line that is only counted."""
 TRAILER = 3
 
 
@@ -41,9 +48,12 @@ class Scans:
 
 
 def lines_by_tag(data: bytes, skips: Skips) -> dict[str, list[tuple[int, bytes]]]:
-    """The lines of a log (number from 1, bytes without the tag), by their tag, in file order."""
+    """The lines of a log (number from 1, bytes without the tag), by their tag, in file order.
+
+    Of tags that are neither of a laser nor USED, there are as many UNUSED as lines.
+    """
     by_tag: dict[bytes, list[tuple[int, bytes]]] = {}
-    for number, line in enumerate(data.split(b"\n"), 1):
+    for number, line in enumerate(io.BytesIO(data), 1):
         text = line.strip()
         if not text or text.startswith(b"#"):
             continue
@@ -52,11 +62,11 @@ def lines_by_tag(data: bytes, skips: Skips) -> dict[str, list[tuple[int, bytes]]
             tag, rest = [*text.split(None, 1), b""][:2]
         known = by_tag.get(tag)
         if known is None:
-            if not TAG.match(tag):
+            if not TAG.match(tag) or len(by_tag) >= KINDS.value:
                 skips.add("not a CARMEN record", number)
                 continue
             known = by_tag[tag] = []
-        known.append((number, rest))
+        known.append((number, rest) if tag in USED or LASER.match(tag) else UNUSED)
     return {tag.decode(): lines for tag, lines in by_tag.items()}
 
 
@@ -89,7 +99,7 @@ def numbers(
 
 
 def scans(tag: str, lines: list[tuple[int, bytes]], skips: Skips) -> Scans:
-    """The scans of all lines of one laser tag; malformed ones are skipped."""
+    """The scans of all lines of one laser tag; malformed ones are skipped. Raises ExceededError."""
     head = 7 if NEW.match(tag) else 0
     poses = 6 if tag in ("FLASER", "RLASER") or tag.startswith("ROBOT") else 0
     tail = poses + (5 if tag.startswith("ROBOT") else 0)
@@ -97,7 +107,7 @@ def scans(tag: str, lines: list[tuple[int, bytes]], skips: Skips) -> Scans:
     widest = max((n for _, n in records), default=0)
     size = len(records)
     result = Scans(
-        ranges=np.full((size, widest), np.nan, dtype=np.float32),
+        ranges=empty_table(size, widest),
         beams=np.zeros(size, dtype=np.int64),
         head=np.zeros((size, head)),
         laser=np.zeros((size, poses // 2)),

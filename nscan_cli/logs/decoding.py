@@ -13,7 +13,7 @@ from rosbags.serde import SerdeError
 from rosbags.typesys import Stores, TypesysError, get_types_from_idl, get_types_from_msg, get_typestore
 
 from nscan_cli.errors import InputDataError
-from nscan_cli.logs.recording import Channel
+from nscan_cli.logs.recording import TRANSFORMS, Channel
 
 Quaternion = tuple[float, float, float, float]
 """x, y, z, w"""
@@ -24,12 +24,19 @@ S = 10**9
 LATEST = 2**63
 """ns"""
 NO_DEFINITION = (TypesysError, KeyError, ValueError, IndexError, AttributeError, TypeError, NameError,
-                 AssertionError, SyntaxError, RecursionError)  # fmt: skip
-"""What a damaged definition can raise: rosbags makes code of it."""
+                 AssertionError, RecursionError)  # fmt: skip
+"""What a damaged definition can raise."""
+TF_DEFINITION = "geometry_msgs/TransformStamped[] transforms"
+"""Of all TRANSFORMS of ROS, which not all of rosbags' tables have."""
+COMPUTED = re.compile(r"\bconst\b|<<|\*")
+"""What numbers of any size can be made with in IDL; no message that is read has it."""
+COMMENT = re.compile(r"//[^\n]*|/\*.*?\*/", re.DOTALL)
+LONGEST_DEFINITION = 1 << 17
+"""Characters; the longest of those that are read has some 6,000."""
 IDL_PART = "=" * 80 + "\nIDL: "
 INCLUDE = re.compile(r"^[ \t]*#.*$", re.MULTILINE)
 UNDECODABLE = (SerdeError, ValueError, IndexError, KeyError, TypeError, AttributeError, AssertionError,
-               OverflowError, MemoryError, struct.error)  # fmt: skip
+               OverflowError, MemoryError, RecursionError, struct.error)  # fmt: skip
 """What decoding a damaged message can raise; protobuf's own error is turned into ValueError."""
 
 
@@ -130,24 +137,50 @@ def _ros_decoder(channel: Channel, file: str) -> Callable[[bytes], Any]:
 
 @lru_cache(maxsize=64)
 def _deserializer(name: str, encoding: str, schema_encoding: str, schema: bytes) -> Callable[[bytes], Any]:
-    """What decodes a type of message; rosbags compiles it from the definition, which takes its time."""
+    """What decodes a type of message, by ROS's own definition of it.
+
+    The file's has to agree, where it has one: bags written before ROS 2 Iron have none. It is compared
+    only, since rosbags makes code of a definition, and no file may say what is run. Raises one of
+    NO_DEFINITION.
+    """
+    store = get_typestore(Stores.ROS1_NOETIC if encoding == "ros1" else Stores.ROS2_HUMBLE)
+    store.register(
+        {
+            name: definition
+            for transforms in TRANSFORMS
+            if transforms not in store.fielddefs and not transforms.startswith("foxglove.")
+            for name, definition in get_types_from_msg(TF_DEFINITION, transforms).items()
+        }
+    )
     if schema:
-        store = get_typestore(Stores.EMPTY)
-        store.register(_types(name, schema_encoding, schema))
-    else:
-        # Bags written before ROS 2 Iron have no definitions; these types have not changed since.
-        store = get_typestore(Stores.ROS1_NOETIC if encoding == "ros1" else Stores.ROS2_HUMBLE)
-    store.get_msgdef(name)
+        found = _types(name, schema_encoding, schema)
+        _compare(name, found, store.fielddefs)
     deserialize = store.deserialize_ros1 if encoding == "ros1" else store.deserialize_cdr
     return lambda data: deserialize(data, name)
 
 
+def _compare(name: str, found: Any, known: Any) -> None:
+    """Raises ValueError when a message, or one that it consists of, has other fields than are known."""
+    if found[name][1] != known[name][1]:
+        raise ValueError(f"{name} has other fields than in ROS")
+    for _, (_, detail) in found[name][1]:
+        # Of a field: a type's name; of an array or a sequence: what it consists of, and its length.
+        inner = detail[0][1] if isinstance(detail[0], tuple) else detail
+        # A time of ROS 1 needs no definition.
+        if isinstance(inner, str) and inner in found:
+            _compare(inner, found, known)
+
+
 def _types(name: str, schema_encoding: str, schema: bytes) -> Any:
     text = schema.decode("utf-8", "replace")
+    if len(text) > LONGEST_DEFINITION:
+        raise ValueError("it is too long")
     if schema_encoding != "ros2idl":
         return get_types_from_msg(text, name)
     # The definitions that a text includes are in its other parts.
     text = INCLUDE.sub("", text)
+    if COMPUTED.search(COMMENT.sub("", text)):
+        raise ValueError("it has numbers that are to be computed")
     if not text.startswith(IDL_PART):
         return get_types_from_idl(text)
     types = {}

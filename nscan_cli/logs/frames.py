@@ -7,14 +7,13 @@ from collections.abc import Iterable
 
 import numpy as np
 
+from nscan_cli.limits import DISTANCE
 from nscan_cli.logs.decoding import Placed, Rigid
 from nscan_cli.poses import Array
 
 LARGEST_TILT = math.radians(1.0)
 STILL = 1e-6
 """m and quaternion units; a transform that moves less is fixed."""
-LARGEST = 1e9
-"""m"""
 
 
 class Frames:
@@ -71,7 +70,7 @@ def as_matrix(pose: Rigid) -> Array | None:
     """A pose as a matrix (4, 4); None when it has a value that is none or its quaternion is zero."""
     x, y, z, w = pose.rotation
     norm = math.sqrt(x * x + y * y + z * z + w * w)
-    if not 1e-3 < norm < 1e3 or not all(abs(part) < LARGEST for part in pose.translation):
+    if not 1e-3 < norm < 1e3 or not all(abs(part) < DISTANCE.value for part in pose.translation):
         return None
     x, y, z, w = x / norm, y / norm, z / norm, w / norm
     matrix = np.eye(4)
@@ -96,7 +95,7 @@ def heading(pose: Rigid) -> float | None:
     """The angle (rad) about the vertical that a pose is turned by; None when it is no pose."""
     x, y, z, w = pose.rotation
     norm = x * x + y * y + z * z + w * w
-    if not 1e-6 < norm < 1e6 or not all(abs(part) < LARGEST for part in pose.translation):
+    if not 1e-6 < norm < 1e6 or not all(abs(part) < DISTANCE.value for part in pose.translation):
         return None
     return math.atan2(2 * (w * z + x * y), w * w + x * x - y * y - z * z)
 

@@ -5,12 +5,14 @@ from __future__ import annotations
 import gzip
 import hashlib
 import importlib
+import io
 import zlib
 from dataclasses import replace
 from typing import Protocol
 
 from nscan_cli.errors import InputDataError
-from nscan_cli.inputs import base_name, label, read_bytes
+from nscan_cli.inputs import base_name, in_pieces, label, read_bytes
+from nscan_cli.limits import INPUT, ExceededError
 from nscan_cli.logs import carmen, player, script
 from nscan_cli.logs.kinds import name_of
 from nscan_cli.logs.options import ReadingOptions
@@ -44,6 +46,7 @@ AS_FOUND = ReadingOptions()
 GZIP = b"\x1f\x8b"
 PIECE = 256
 FORMS = "CARMEN or Player text, MCAP, a ROS bag; plain or compressed by gzip"
+UNPACKS = "unpacks to more and more"
 MEND = "fetch the file again, or use what can be read with --salvage"
 
 
@@ -56,11 +59,14 @@ def read_log(path: str, options: ReadingOptions = AS_FOUND) -> LaserLog:
     stored = read_bytes(path)
     name = label(path)
     source = Source(base_name(path), hashlib.sha256(stored).hexdigest(), len(stored))
-    data, lost = salvaged(stored) if options.salvage else (unpacked(stored, name), None)
-    del stored
-    if not data.strip():
-        raise InputDataError(name, "is empty", "give a log with laser scans")
-    log = _reader(data, name).read(data, name, source, options)
+    try:
+        data, lost = salvaged(stored) if options.salvage else (unpacked(stored, name), None)
+        del stored
+        if not data.strip():
+            raise InputDataError(name, "is empty", "give a log with laser scans")
+        log = _reader(data, name).read(data, name, source, options)
+    except ExceededError as error:
+        raise InputDataError(name, str(error), error.remedy) from error
     if lost is None:
         return log
     report = replace(log.report, warnings=(lost, *log.report.warnings))
@@ -79,11 +85,12 @@ def _reader(data: bytes, name: str) -> Reader:
 
 
 def unpacked(stored: bytes, name: str) -> bytes:
-    """The content of `stored`, which may be compressed by gzip. Raises InputDataError."""
+    """The content of `stored`, which may be compressed by gzip. Raises InputDataError and ExceededError."""
     if not stored.startswith(GZIP):
         return stored
     try:
-        return gzip.decompress(stored)
+        with gzip.GzipFile(fileobj=io.BytesIO(stored)) as file:
+            return in_pieces(file.read, INPUT, UNPACKS)
     except EOFError as error:
         raise InputDataError(name, "the gzip data end too early", MEND) from error
     except (zlib.error, OSError) as error:
@@ -91,24 +98,28 @@ def unpacked(stored: bytes, name: str) -> bytes:
 
 
 def salvaged(stored: bytes) -> tuple[bytes, str | None]:
-    """The content of `stored` as far as it can be unpacked, and what was lost; None when nothing was."""
+    """The content of `stored` as far as it can be unpacked, and what was lost; None when nothing was.
+
+    Raises ExceededError.
+    """
     if not stored.startswith(GZIP):
         return stored, None
-    content, rest = bytearray(), stored
-    while rest.startswith(GZIP):
+    content, at, most = bytearray(), 0, INPUT.bytes
+    while stored.startswith(GZIP, at):
         member = zlib.decompressobj(zlib.MAX_WBITS | 16)
         try:
             # In pieces: what goes before the damage stays.
-            for at in range(0, len(rest), PIECE):
-                content += member.decompress(rest[at : at + PIECE])
-                if member.eof:
-                    break
+            while at < len(stored) and not member.eof:
+                content += member.decompress(stored[at : at + PIECE])
+                at = min(at + PIECE, len(stored)) - len(member.unused_data)
+                if len(content) > most:
+                    raise ExceededError(INPUT, UNPACKS)
         except zlib.error as error:
-            at = len(stored) - len(rest) + at
             return bytes(content), f"the gzip data are damaged near byte {at} ({error}): the rest is lost"
         if not member.eof:
             return bytes(content), "the gzip data end too early: the rest is lost"
-        rest = (member.unused_data + rest[at + PIECE :]).lstrip(b"\0")
-    if rest:
-        return bytes(content), f"{len(rest)} bytes after the gzip data are no such data: left out"
+        while stored.startswith(b"\0", at):
+            at += 1
+    if at < len(stored):
+        return bytes(content), f"{len(stored) - at} bytes after the gzip data are no such data: left out"
     return bytes(content), None

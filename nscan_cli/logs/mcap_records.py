@@ -18,9 +18,9 @@ from mcap import records
 from mcap.data_stream import ReadDataStream
 from mcap.exceptions import McapError
 from mcap.opcode import Opcode
-from mcap.stream_reader import get_chunk_data_stream
 
 from nscan_cli.errors import InputDataError
+from nscan_cli.limits import INPUT, MB
 from nscan_cli.logs.recording import DAMAGED, WANTED, Channel, Message, Recording, ros_name
 
 MAGIC = b"\x89MCAP0\r\n"
@@ -72,7 +72,8 @@ class Summary:
 def read_records(data: bytes, file: str, salvage: bool) -> Recording:
     """All messages that scans, odometry and mounting can come from.
 
-    With `salvage`, damaged parts are left out and told in the recording's warnings. Raises InputDataError.
+    With `salvage`, damaged parts are left out and told in the recording's warnings. Raises InputDataError
+    and ExceededError.
     """
     reader = _Reader(data, file, salvage)
     reader.read()
@@ -214,14 +215,33 @@ class _Reader:
             if chunk.compression not in COMPRESSIONS:
                 raise BrokenError(at, f"compressed by {chunk.compression!r}, which is not known")
             self.checked &= chunk.uncompressed_crc != 0
-            stream, size = get_chunk_data_stream(chunk, validate_crc=True)
-            if size != chunk.uncompressed_size:
+            content = self._unpacked(chunk)
+            if len(content) != chunk.uncompressed_size:
                 raise BrokenError(at, "not of the length that it should have")
-            content = stream.read(size)
-            for opcode, first, last in self._framed(content, 0, size, IN_CHUNK):
+            if chunk.uncompressed_crc not in (0, zlib.crc32(content)):
+                raise BrokenError(at, "it does not fit its checksum")
+            for opcode, first, last in self._framed(content, 0, len(content), IN_CHUNK):
                 self._record(opcode, content, first, last)
         except UNREADABLE as error:
             self._lost(at, f"a chunk is damaged ({_said(error)})")
+
+    def _unpacked(self, chunk: records.Chunk) -> bytes:
+        """What is in a chunk, no longer than it says itself. Raises ExceededError when that is too much."""
+        size: int = chunk.uncompressed_size
+        INPUT.check(size / MB, f"has a chunk of {size / MB:,.0f} MB")
+        if chunk.compression == "lz4":
+            from lz4.frame import LZ4FrameDecompressor
+
+            content: bytes = LZ4FrameDecompressor().decompress(chunk.data, max_length=size + 1)
+        elif chunk.compression == "zstd":
+            # What the packed data say of their length is what the package takes memory for.
+            if zstandard.frame_content_size(chunk.data) > size:
+                raise BrokenError(0, "not of the length that it should have")
+            content = zstandard.ZstdDecompressor().decompress(chunk.data, max_output_size=size)
+        else:
+            content = chunk.data
+        self.recording.grow(len(content))
+        return content
 
     def _record(self, opcode: int, data: bytes, begin: int, stop: int) -> None:
         """Take up a record that defines something, or a message."""

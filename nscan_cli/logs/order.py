@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from nscan_cli.errors import WrongUsageError
+from nscan_cli.limits import TIME
 from nscan_cli.logs.options import ReadingOptions
 from nscan_cli.poses import Array
 
 NOMINAL_PERIOD = 0.1
 """s between scans whose stamps say nothing."""
-LARGEST_TIME = 1e11
-"""s; what is beyond was never a time."""
+STAMP = re.compile(r"[-+]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][-+]?[0-9]+)?")
+"""A time in seconds, as text; what else Python takes for a number is none."""
 
 
 @dataclass(frozen=True)
@@ -84,8 +86,5 @@ def selection(times: Array, options: ReadingOptions, file: str) -> NDArray[np.in
 
 
 def _seconds(stamp: str) -> float:
-    try:
-        seconds = float(stamp)
-    except ValueError:
-        return np.nan
-    return seconds if abs(seconds) < LARGEST_TIME else np.nan
+    seconds = float(stamp) if STAMP.fullmatch(stamp) else np.nan
+    return seconds if abs(seconds) <= TIME.value else np.nan

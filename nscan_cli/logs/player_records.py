@@ -7,12 +7,14 @@ angles in rad; lines that begin with # are comments.
 
 from __future__ import annotations
 
+import io
 import re
 from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 
+from nscan_cli.limits import KINDS
 from nscan_cli.logs.assemble import RawScans, stacked
 from nscan_cli.logs.laser import CARMEN_MAX_RANGE
 from nscan_cli.logs.skips import Skips
@@ -26,6 +28,8 @@ Lines = dict[tuple[str, str], list[Line]]
 """By device, as in laser:0, and by type and subtype, as in 1:1; these are empty in version 1."""
 ANGLES = {1: slice(-4, -1), 2: slice(-5, -2)}
 """Where first and last direction and step stand in what goes before the ranges."""
+LONGEST_NUMBER = 10
+"""Digits of an index or a type."""
 INTERFACE = re.compile(rb"[a-z]\w*\Z")
 
 
@@ -46,18 +50,21 @@ def lines_by_device(data: bytes, version: Version, skips: Skips) -> Lines:
     """
     fields = 6 if version == 1 else 7
     found: dict[tuple[bytes, bytes, bytes, bytes, bytes], list[Line]] = {}
-    for number, line in enumerate(data.split(b"\n"), 1):
+    for number, line in enumerate(io.BytesIO(data), 1):
         text = line.strip()
         if not text or text.startswith(b"#"):
             continue
         parts = text.split(None, fields)
-        if len(parts) < fields or not INTERFACE.match(parts[3]) or not parts[4].isdigit():
+        if len(parts) < fields or not INTERFACE.match(parts[3]) or _number(parts[4]) < 0:
             skips.add("not a Player record", number)
             continue
         payload = parts[fields] if len(parts) > fields else b""
         kind = b"" if version == 1 else b"%d:%d" % (_number(parts[5]), _number(parts[6]))
         stamp = parts[5] if version == 1 else parts[0]
         key = (parts[1], parts[2], parts[3], parts[4], kind)
+        if key not in found and len(found) >= KINDS.value:
+            skips.add("a device too many", number)
+            continue
         found.setdefault(key, []).append((number, stamp, payload))
     hosts, robots = ({key[at] for key in found} for at in (0, 1))
     lines: Lines = {}
@@ -120,7 +127,8 @@ def scans(laser: str, lines: Lines, version: Version, skips: Skips) -> Scans:
 
 
 def _number(text: bytes) -> int:
-    return int(text) if text.isdigit() else -1
+    """A small number; -1 where there is none."""
+    return int(text) if text.isdigit() and len(text) < LONGEST_NUMBER else -1
 
 
 def _record(line: Line) -> Record:

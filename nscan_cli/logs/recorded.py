@@ -14,7 +14,7 @@ from nscan_cli.logs.options import ReadingOptions
 from nscan_cli.logs.recording import Channel, Message, Recording
 from nscan_cli.logs.scan import LaserLog, Source
 from nscan_cli.logs.skips import Skips
-from nscan_cli.logs.text_records import MAX_BEAMS
+from nscan_cli.logs.text_records import beams_problem
 from nscan_cli.logs.topics import scan_topic
 from nscan_cli.poses import Array
 
@@ -86,11 +86,11 @@ def _channels(messages: Sequence[Message]) -> list[Channel]:
 
 def _problem(sweep: Sweep) -> str:
     """What makes a scan unusable; empty when nothing does."""
-    if not 0 < len(sweep.ranges) <= MAX_BEAMS:
-        return f"the beam count is not in 1…{MAX_BEAMS}"
-    if not (abs(sweep.angle_min) <= 4 * np.pi and 0 < abs(sweep.angle_increment) <= 4 * np.pi):
-        return "an angle is out of bounds"
-    return ""
+    problem = beams_problem(len(sweep.ranges))
+    turns = 4 * np.pi
+    if not (abs(sweep.angle_min) <= turns and 0 < abs(sweep.angle_increment) <= turns):
+        problem = problem or "an angle is out of bounds"
+    return problem
 
 
 def _has_clock(stamps: Sequence[int]) -> bool:

@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
+from nscan_cli.limits import INPUT, MB
+
 SCANS = ("sensor_msgs/msg/LaserScan", "foxglove.LaserScan")
 ODOMETRY = ("nav_msgs/msg/Odometry", "foxglove.Odometry")
 TRANSFORMS = (
@@ -52,6 +54,18 @@ class Recording:
     warnings: list[str] = field(default_factory=list)
     checksums: str = "none in this format"
     """Whether damage would have been found."""
+    size: int = 0
+    """Bytes that were unpacked or kept so far."""
+
+    def grow(self, size: int) -> None:
+        """Take account of bytes that are unpacked or kept. Raises ExceededError when they are too many."""
+        self.size += size
+        INPUT.check(self.size / MB, "unpacks to more and more")
+
+    def keep(self, message: Message) -> None:
+        """Take up a message. Raises ExceededError when they get too large together."""
+        self.grow(len(message.data))
+        self.messages.setdefault(message.channel.topic, []).append(message)
 
     def topics(self, types: tuple[str, ...]) -> dict[str, int]:
         """Topics that have messages of some types, and how many."""

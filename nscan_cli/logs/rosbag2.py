@@ -26,6 +26,8 @@ def _recording(data: bytes, file: str, salvage: bool) -> Recording:
     recording = Recording("ROS 2 bag (SQLite)")
     try:
         with closing(sqlite3.connect(":memory:")) as bag:
+            # A column may be made from a formula: its values need not be in the file.
+            bag.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, len(data))
             bag.deserialize(data[: JOURNAL.start] + LEGACY_JOURNAL + data[JOURNAL.stop :])
             tables = {name for (name,) in bag.execute("SELECT name FROM sqlite_master WHERE type = 'table'")}
             if not {"topics", "messages"} <= tables:
@@ -56,6 +58,6 @@ def _read_tables(bag: sqlite3.Connection, with_schemas: bool, recording: Recordi
         (count,) = next(bag.execute("SELECT count(*) FROM messages WHERE topic_id = ?", (number,)))
         recording.counts[channel] = recording.counts.get(channel, 0) + count
         if channel.type in WANTED:
-            kept = recording.messages.setdefault(topic, [])
             query = "SELECT timestamp, data FROM messages WHERE topic_id = ? ORDER BY id"
-            kept += (Message(channel, time, message) for time, message in bag.execute(query, (number,)))
+            for time, message in bag.execute(query, (number,)):
+                recording.keep(Message(channel, time, message))

@@ -6,11 +6,13 @@ Source of the form: CARMEN, logtools (rec2d reader and writer). `POS sec usec: x
 
 from __future__ import annotations
 
+import io
 import re
 
 import numpy as np
 
 from nscan_cli.errors import InputDataError, WrongUsageError
+from nscan_cli.limits import KINDS
 from nscan_cli.logs import order
 from nscan_cli.logs.assemble import Findings, Motion, RawScans, laser_log, stacked
 from nscan_cli.logs.kinds import FIRST_LINE
@@ -24,10 +26,12 @@ from nscan_cli.poses import Array, wrap
 
 BEGIN = re.compile(rb"(POS|LASER-RANGE|LASER-SCAN)\s+\d+\s+\d+[^:]*:")
 RECORD = re.compile(
-    rb"(?P<tag>[A-Z][A-Z-]*)\s+(?P<sec>\d+)\s+(?P<usec>\d+)\s*(?P<head>[^:]*):(?P<values>.*)\Z"
+    rb"(?P<tag>[A-Z][A-Z-]*)\s+(?P<sec>\d{1,12})\s+(?P<usec>\d{1,12})(?P<head>(\s[^:]*)?):(?P<values>.*)\Z"
 )
 CM = 0.01
 """m"""
+UNUSED = (Record(0, b"", 0, ""), b"")
+"""Stands for a line that is only counted."""
 Lines = dict[str, list[tuple[Record, bytes]]]
 """By tag, for lasers with their number: the record, and what stands between its time and the colon."""
 
@@ -69,7 +73,7 @@ def read(data: bytes, file: str, source: Source, options: ReadingOptions) -> Las
 
 def _lines(data: bytes, skips: Skips) -> Lines:
     lines: Lines = {}
-    for number, line in enumerate(data.split(b"\n"), 1):
+    for number, line in enumerate(io.BytesIO(data), 1):
         text = line.strip()
         if not text or text[:1] in b"#*":
             continue
@@ -80,6 +84,12 @@ def _lines(data: bytes, skips: Skips) -> Lines:
         tag, head = parts["tag"].decode(), parts["head"]
         if tag in ("LASER-RANGE", "LASER-SCAN"):
             tag = f"LASER-RANGE:{head.split()[0].decode('ascii', 'replace') if head.strip() else ''}"
+        if tag not in lines and len(lines) >= KINDS.value:
+            skips.add("a kind of record too many", number)
+            continue
+        if tag != "POS" and not tag.startswith("LASER-RANGE:"):
+            lines.setdefault(tag, []).append(UNUSED)
+            continue
         values = b" ".join(parts["values"].split())
         stamp = f"{int(parts['sec'])}.{int(parts['usec']):06d}"
         record = Record(number, values, values.count(b" ") + 1 if values else 0, stamp)

@@ -9,13 +9,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
+from nscan_cli.limits import BEAMS, DISTANCE
 from nscan_cli.logs.skips import Skips
 from nscan_cli.poses import Array
 
 CHUNK = 1024
-MAX_BEAMS = 16384
-LARGEST = 1e9
-"""m; no pose is beyond, whatever its coordinates."""
 
 
 @dataclass(frozen=True)
@@ -68,15 +66,22 @@ def beam_count(token: bytes, line: int, skips: Skips) -> int | None:
     except ValueError:
         skips.add("the beam count is not a number", line)
         return None
-    if not 0 < beams <= MAX_BEAMS:
-        skips.add(f"the beam count is not in 1…{MAX_BEAMS}", line)
+    problem = beams_problem(beams)
+    if problem:
+        skips.add(problem, line)
         return None
     return beams
 
 
+def beams_problem(beams: int) -> str:
+    """What is wrong with a scan of so many beams; empty when nothing is."""
+    most = BEAMS.value
+    return "" if 0 < beams <= most else f"the beam count is not in 1…{most:.0f}"
+
+
 def sound(values: ArrayLike) -> bool:
     """Whether all values are finite and of a size that a pose or an angle can have."""
-    return bool((np.abs(values) < LARGEST).all())
+    return bool((np.abs(values) < DISTANCE.value).all())
 
 
 def as_text(stamp: bytes) -> str:

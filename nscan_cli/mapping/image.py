@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from nscan_cli.finite import check_finite
 from nscan_cli.mapping.occupancy import FREE, OCCUPIED, UNKNOWN, OccupancyGrid
 
 if TYPE_CHECKING:
@@ -46,6 +47,7 @@ def map_yaml(image_name: str, grid: OccupancyGrid) -> bytes:
 
     The origin's yaw is 0: consumers ignore it.
     """
+    check_finite("the origin of the map", grid.origin, grid.resolution)
     x, y = (_decimal(value) for value in grid.origin)
     return (
         f"image: {json.dumps(image_name, ensure_ascii=False)}\n"

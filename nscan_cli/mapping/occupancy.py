@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from nscan_cli.compiled import kernel
 from nscan_cli.errors import WrongUsageError
+from nscan_cli.limits import MAP_CELLS
 from nscan_cli.logs.scan import LaserLog
 from nscan_cli.poses import Array
 
@@ -23,8 +24,8 @@ RESOLUTION = 0.05
 REACH = 40.0
 """A beam is followed so far (m): further out, neighbouring beams leave gaps of many cells, and a slip of
 the angle carries a wall away."""
-MOST_CELLS = 200_000_000
-"""700 m × 700 m at 0.05 m. Memory is taken for what is seen, 8 bytes a cell."""
+COARSEST = 10.0
+"""m; a map of larger cells shows nothing."""
 OCCUPIED_SHARE = 0.25
 """A cell is occupied when at least this share of the beams that reached it ended in it. Under one half,
 since beams that run along a wall graze its cells on their way to the next ones, and a wall on the border
@@ -77,7 +78,7 @@ def occupancy_grid(
     A beam that met nothing clears nothing: it may as well have met black velvet, or glass. A beam longer
     than REACH clears the cells up to there. The grid covers all beams and poses, and its cells lie on
     multiples of the resolution. Raises WrongUsageError when there are no scans, or when the grid would
-    have more than MOST_CELLS cells.
+    have more cells than the limit MAP_CELLS allows.
     """
     if len(rows) == 0:
         raise WrongUsageError(f"{log.source.name}: no scans to draw a map of; choose some")
@@ -88,11 +89,13 @@ def occupancy_grid(
     left, bottom = math.floor(low_x / resolution) - 1, math.floor(low_y / resolution) - 1
     width = math.floor(high_x / resolution) + 2 - left
     height = math.floor(high_y / resolution) + 2 - bottom
-    if width * height > MOST_CELLS:
-        enough = resolution * math.sqrt(width * height / MOST_CELLS)
+    most = MAP_CELLS.value
+    if width * height > most:
+        enough = _rounded_up(resolution * math.sqrt(width * height / most))
+        remedy = "some poses are far off" if enough > COARSEST else f"choose --resolution {enough:g}"
         raise WrongUsageError(
             f"a map of {high_x - low_x:.0f} m × {high_y - low_y:.0f} m would have {width * height:,} cells "
-            f"of {resolution:g} m, more than {MOST_CELLS:,}; choose --resolution {_rounded_up(enough):g}"
+            f"of {resolution:g} m, more than {most:,.0f}; {remedy}, or set {MAP_CELLS.variable} higher"
         )
     hits, misses = np.zeros((height, width), dtype=np.int32), np.zeros((height, width), dtype=np.int32)
     _cast(*scans, REACH, resolution, left, bottom, hits, misses)

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import math
 import re
-import tomllib
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 from nscan_cli.errors import InputDataError, InputMissingError, WrongUsageError
-from nscan_cli.inputs import read_bytes
+from nscan_cli.inputs import read_toml
 from nscan_cli.nightly.parameters import Parameters, parameters_from
 
 ENDINGS = (".log.gz", ".log", ".clf.gz", ".clf", ".script.gz", ".script", ".mcap", ".bag")
@@ -64,10 +63,7 @@ def read_manifest(path: str, data: str | None) -> list[Entry]:
         folder = Path(data)
         if not folder.is_dir():
             raise InputMissingError(f"--data {data}: is no folder; give that of the logs")
-    try:
-        document = tomllib.loads(read_bytes(file).decode())
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise InputDataError(path, f"not TOML: {error}", "mend it") from error
+    document = read_toml(file, "mend it")
     unknown = [key for key in document if key != "log"]
     if unknown:
         raise InputDataError(path, f"has an unknown key {unknown[0]!r}", "a manifest has [[log]] tables only")

@@ -166,7 +166,7 @@ def _like(usual: Any, value: Any, place: str) -> Any:
     if dataclasses.is_dataclass(usual):
         return _restored(usual, value, place)
     if isinstance(usual, tuple):
-        if not isinstance(value, list) or not value or (usual and len(value) > MOST_VALUES):
+        if not isinstance(value, (list, tuple)) or not 0 < len(value) <= MOST_VALUES:
             raise ValueError(f"{place} is no list of a few values")
         return tuple(_like(usual[0], part, place) for part in value)
     if isinstance(usual, (bool, str)) or usual is None:

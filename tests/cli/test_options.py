@@ -133,7 +133,7 @@ def test_bad_settings_are_named_with_their_file(calls, text, named, capsys):
 
 def test_a_missing_config_is_a_missing_input(calls, capsys):
     assert run(["info", "some.log", "--config", "absent.toml"]) == 66
-    assert "absent.toml: No such file" in capsys.readouterr().err
+    assert "absent.toml: no such file" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("wrong", ["1,2", "1,2,3,4", "a,b,c", "", "nan,0,0"])

@@ -2,12 +2,14 @@ from __future__ import annotations
 
 import os
 import stat
+import subprocess
+import sys
 import threading
 from pathlib import Path
 
 import pytest
 
-from nscan_cli.cli.output import check_writable, whole_file, write_whole
+from nscan_cli.cli.output import TEMPORARY, check_writable, whole_file, write_whole
 from nscan_cli.errors import OutputError
 
 
@@ -61,6 +63,35 @@ def test_the_file_has_the_rights_that_the_umask_gives(tmp_path):
     finally:
         os.umask(before)
     assert stat.S_IMODE((tmp_path / "out.json").stat().st_mode) == 0o640
+
+
+def test_what_a_killed_process_has_left_is_cleared_away(tmp_path):
+    """But not what another one is writing at the moment."""
+    for name in ("dead", "dead2"):
+        (tmp_path / f"{TEMPORARY}{name}").write_bytes(b"half")
+    other = "import sys; from nscan_cli.cli.output import whole_file\n"
+    other += "with whole_file('other.json') as file: file.write(b'x'); print(1, flush=True); sys.stdin.read()"
+    process = subprocess.Popen(
+        [sys.executable, "-c", other], cwd=tmp_path, stdin=subprocess.PIPE, stdout=subprocess.PIPE
+    )
+    assert process.stdout is not None
+    process.stdout.readline()
+    left = set(names(tmp_path))
+    assert len(left) == 1
+    write_whole(str(tmp_path / "out.json"), b"new")
+    assert set(names(tmp_path)) == {"out.json", *left}
+    process.communicate(b"")
+    assert names(tmp_path) == ["other.json", "out.json"]
+    process = subprocess.Popen(
+        [sys.executable, "-c", other], cwd=tmp_path, stdin=subprocess.PIPE, stdout=subprocess.PIPE
+    )
+    assert process.stdout is not None
+    process.stdout.readline()
+    process.kill()
+    process.communicate()
+    assert len(names(tmp_path)) == 3
+    write_whole(str(tmp_path / "out.json"), b"newer")
+    assert names(tmp_path) == ["other.json", "out.json"]
 
 
 def test_a_link_stays_a_link_and_its_file_is_replaced(tmp_path):

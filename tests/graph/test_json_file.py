@@ -94,7 +94,7 @@ def test_every_graph_written_is_valid_and_has_no_signed_zero(graph: Graph):
 def test_a_number_that_is_not_finite_is_never_written():
     graph = small_graph()
     graph.poses[1, 0] = np.nan
-    with pytest.raises(ValueError, match="JSON compliant"):
+    with pytest.raises(ValueError, match="the poses of the graph: a number is not finite"):
         write_graph(graph)
 
 

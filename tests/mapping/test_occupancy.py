@@ -7,7 +7,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from nscan_cli.errors import WrongUsageError
-from nscan_cli.mapping import occupancy
 from nscan_cli.mapping.occupancy import FREE, OCCUPIED, REACH, UNKNOWN, OccupancyGrid, occupancy_grid
 from tests.mapping.scenes import half_circle, log_of
 
@@ -122,7 +121,7 @@ def test_somebody_who_walks_through_the_room_is_not_in_the_map():
 
 
 def test_too_large_a_map_is_refused_with_a_resolution_that_will_do(monkeypatch):
-    monkeypatch.setattr(occupancy, "MOST_CELLS", 10_000)
+    monkeypatch.setenv("NSCAN_CLI_MAX_MAP_CELLS", "10000")
     log, row = log_of([[30.0, 30.0]], 0.0, math.pi / 2), np.array([0])
     with pytest.raises(WrongUsageError, match="choose --resolution") as refusal:
         occupancy_grid(log, row, ORIGIN)
