@@ -33,12 +33,14 @@ robustness: $(READY)
 
 soak: $(READY)
 	mkdir -p out
-	$(RUN)/python -m tests.soak
+	$(RUN)/python -m tests.soak --seconds 180 --runs 120
 
 lowest:
 	$(PYTHON) -m venv out/lowest
-	out/lowest/bin/python -m pip install --quiet --constraint requirements-lowest.txt '.[test]'
-	out/lowest/bin/python -m pytest -n 2
+	out/lowest/bin/python -m pip install --quiet --disable-pip-version-check -r requirements-lowest.txt \
+	  pytest hypothesis jsonschema foxglove-schemas-protobuf mcap-protobuf-support mcap-ros1-support mcap-ros2-support
+	PYTHONPATH=. out/lowest/bin/python -m pytest tests --ignore tests/soak --ignore tests/nightly \
+	  --ignore tests/slam --ignore tests/experiments --ignore tests/simulation
 
 lock: $(READY)
 	$(RUN)/python -m pip freeze --exclude-editable > requirements-dev.lock

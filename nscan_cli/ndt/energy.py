@@ -60,13 +60,12 @@ def _meet(
 ) -> int:
     """Write the numbers of every point that meets a Gaussian to the columns of `met` (7, …); how many do."""
     cos, sin = np.cos(phi), np.sin(phi)
-    per_metre = 1.0 / half
     count = 0
     for k in range(0, points.shape[0], stride):
         rx = cos * points[k, 0] - sin * points[k, 1]
         ry = sin * points[k, 0] + cos * points[k, 1]
         px, py = rx + x, ry + y
-        row = find_row(grid, pack(int(np.floor(px * per_metre)), int(np.floor(py * per_metre))))
+        row = find_row(grid, pack(int(np.floor(px / half)), int(np.floor(py / half))))
         if row < 0:
             continue
         for block in range(4):
@@ -153,13 +152,12 @@ def find_inliers(
     How many they are; other marks are left as they were.
     """
     cos, sin = np.cos(pose[2]), np.sin(pose[2])
-    per_metre = 1.0 / half
     count = 0
     for k in range(points.shape[0]):
         rx = cos * points[k, 0] - sin * points[k, 1]
         ry = sin * points[k, 0] + cos * points[k, 1]
         px, py = rx + pose[0], ry + pose[1]
-        row = find_row(grid, pack(int(np.floor(px * per_metre)), int(np.floor(py * per_metre))))
+        row = find_row(grid, pack(int(np.floor(px / half)), int(np.floor(py / half))))
         if row < 0:
             continue
         for block in range(4):

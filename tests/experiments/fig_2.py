@@ -98,7 +98,7 @@ def minima(*which: int) -> tuple[Minimum, ...]:
     """The minima of the energy of some of the shapes, the lowest first: all poses free but the first."""
     found = []
     for shifts in itertools.product(STARTS, repeat=len(which) - 1):
-        options = JointOptions(widenings=(1.0,), fixed=0)
+        options = JointOptions(widenings=(1.0,), stride=1, fixed=0)
         match = match_jointly(problem(*which), poses_at(np.array(shifts)), options)
         values = np.linalg.eigvalsh(match.hessian[3:, 3:])
         found.append(Minimum(match.energy, match.poses[1:, 0], float(values[0])))
