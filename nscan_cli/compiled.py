@@ -119,9 +119,12 @@ def _places() -> Iterator[Path]:
 
 
 def _sources_hash() -> str:
-    """Hash of the paths and bytes of all files of the package that import `kernel`."""
+    """Hash of the package's place, and of the paths and bytes of all its files that import `kernel`.
+
+    Of the place because numba keeps the code of each copy of a file apart.
+    """
     package = Path(__file__).parent
-    sources = hashlib.sha256()
+    sources = hashlib.sha256(f"{package}\0".encode())
     for path in sorted(package.glob("*/*.py")):
         text = path.read_bytes()
         if b"nscan_cli.compiled import" in text:

@@ -6,8 +6,6 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import coo_array, csc_array, diags_array
-from scipy.sparse.linalg import splu
 
 from nscan_cli.compiled import kernel
 
@@ -32,9 +30,7 @@ def find_pattern(edges: Indices, nodes: int) -> Pattern:
     indptr, indices = _adjacency(edges, nodes)
     place = _order_of_little_fill(indptr, indices)
     starts, rows = _fill(indptr, indices, place, np.argsort(place))
-    columns = csc_array((np.zeros(len(rows), dtype=np.int8), rows, starts), shape=(nodes, nodes))
-    columns.sort_indices()
-    return Pattern(place, starts, columns.indices.astype(np.int64))
+    return Pattern(place, starts, rows)
 
 
 @kernel
@@ -63,19 +59,25 @@ def block_targets(edges: Indices, pattern: Pattern) -> Indices:
 
 
 def _adjacency(edges: Indices, nodes: int) -> tuple[Indices, Indices]:
-    """The neighbours of each node, without itself, increasing: (indptr, indices)."""
-    a, b = edges[edges[:, 0] != edges[:, 1]].T
-    both = (np.concatenate([a, b]), np.concatenate([b, a]))
+    """The neighbours of each node, itself among them, increasing: (indptr, indices)."""
+    from scipy.sparse import coo_array
+
+    (a, b), itself = edges.T, np.arange(nodes)
+    both = np.concatenate([a, b, itself]), np.concatenate([b, a, itself])
     matrix = coo_array((np.ones(len(both[0]), dtype=np.int8), both), shape=(nodes, nodes)).tocsc()
     return matrix.indptr.astype(np.int64), matrix.indices.astype(np.int64)
 
 
 def _order_of_little_fill(indptr: Indices, indices: Indices) -> Indices:
     """Minimum degree, as SuperLU finds it for a matrix of the same pattern with one number a block."""
-    nodes = len(indptr) - 1
+    from scipy.sparse import csc_array
+    from scipy.sparse.linalg import splu
+
+    degrees = np.diff(indptr)
+    nodes = len(degrees)
     # Diagonally dominant, so that nothing is pivoted.
-    coupling = csc_array((np.full(len(indices), -1.0), indices, indptr), shape=(nodes, nodes))
-    matrix = csc_array(coupling + diags_array(np.diff(indptr) + 1.0))
+    coupling = np.where(indices == np.repeat(np.arange(nodes), degrees), np.repeat(degrees, degrees), -1.0)
+    matrix = csc_array((coupling, indices, indptr), shape=(nodes, nodes))
     factor = splu(matrix, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
     place: Indices = factor.perm_c.astype(np.int64)
     return place
@@ -83,7 +85,7 @@ def _order_of_little_fill(indptr: Indices, indices: Indices) -> Indices:
 
 @kernel
 def _fill(indptr: Indices, indices: Indices, place: Indices, order: Indices) -> tuple[Indices, Indices]:
-    """The columns of the factor, unsorted: a column takes over the rows of those whose first row it is."""
+    """The columns of the factor: each takes over the rows of those whose first row it is."""
     nodes = order.shape[0]
     starts = np.zeros(nodes + 1, dtype=np.int64)
     rows = np.empty(4 * indices.shape[0] + 4 * nodes, dtype=np.int64)
@@ -117,9 +119,8 @@ def _fill(indptr: Indices, indices: Indices, place: Indices, order: Indices) -> 
                     end += 1
             k = sibling[k]
         starts[j + 1] = end
-        parent = nodes
-        for p in range(start + 1, end):
-            parent = min(parent, rows[p])
-        if parent < nodes:
+        if end > start + 1:
+            rows[start + 1 : end].sort()
+            parent = rows[start + 1]
             sibling[j], child[parent] = child[parent], j
     return starts, rows[: starts[nodes]]

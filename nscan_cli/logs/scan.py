@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import functools
+import math
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -10,6 +12,9 @@ from numpy.typing import NDArray
 
 from nscan_cli.errors import WrongUsageError
 from nscan_cli.poses import Array, compose, transform
+
+TOGETHER = 256
+"""Scans whose points are computed at once."""
 
 
 @dataclass(frozen=True)
@@ -105,6 +110,25 @@ class LaserLog:
         beams = np.flatnonzero(np.isfinite(ranges))
         directions = _directions(len(ranges), float(self.angle_min[scan]), float(self.angle_increment[scan]))
         return transform(self.mount, ranges[beams, None] * directions[beams])
+
+    def each_points(self, reach: float = math.inf) -> Iterator[Array]:
+        """The end points of each scan's usable beams, in order of time, that are nearer than `reach` (m).
+
+        As `points` has them; many scans at a time, which costs a tenth.
+        """
+        for first in range(0, len(self), TOGETHER):
+            rows = slice(first, first + TOGETHER)
+            ranges = self.ranges[rows]
+            angles = self.angle_min[rows, None] + self.angle_increment[rows, None] * np.arange(
+                ranges.shape[1]
+            )
+            finite = np.isfinite(ranges)
+            ends = np.where(finite, ranges, 0.0)[..., None] * np.stack(
+                [np.cos(angles), np.sin(angles)], axis=-1
+            )
+            ends = transform(self.mount, ends)
+            near = finite & (np.hypot(ends[..., 0], ends[..., 1]) < reach)
+            yield from np.split(ends[near], np.cumsum(near.sum(axis=1))[:-1])
 
     def laser_pose(self, robot: Array) -> Array:
         """Poses (…, 3) of the laser for poses (…, 3) of the robot."""

@@ -145,7 +145,7 @@ def _approach(
     iterations = evaluations = 0
     for widening in widenings:
         near = options.near if widening < 1.0 else 0.5 * options.near
-        steps, evaluated, _ = _descend(
+        _, steps, evaluated, _ = _descend(
             _at(problem, pairs_at, poses),
             poses,
             widening,
@@ -155,6 +155,7 @@ def _approach(
             FREE if options.fixed is None else options.fixed,
             options.approach_iterations,
             near,
+            *_derivatives(poses),
         )
         iterations += steps
         evaluations += evaluated
@@ -165,22 +166,41 @@ def _finish(problem: JointProblem, way: Way, options: JointOptions, neutral: boo
     """The last steps, with the exact Hessian."""
     poses = way.poses
     fixed = FREE if options.fixed is None else options.fixed
-    last, evaluated, converged = _descend(
-        problem, poses, 1.0, True, neutral, 1, fixed, options.max_iterations, options.tolerance
+    gradient, hessian = _derivatives(poses)
+    value, last, evaluated, converged = _descend(
+        problem,
+        poses,
+        1.0,
+        True,
+        neutral,
+        1,
+        fixed,
+        options.max_iterations,
+        options.tolerance,
+        gradient,
+        hessian,
     )
-    final = joint_energy(problem, poses)
+    if neutral:
+        # The derivatives are the same.
+        value = joint_energy(problem, poses).value
+        evaluated += 1
     poses[:, 2] = wrap(poses[:, 2])
     return JointMatch(
         poses=poses,
-        gradient=final.gradient,
-        hessian=final.hessian,
+        gradient=gradient,
+        hessian=hessian,
         pairs=problem.pairs,
-        energy=final.value,
+        energy=value,
         iterations=way.iterations + last,
-        evaluations=way.evaluations + evaluated + 1,
+        evaluations=way.evaluations + evaluated,
         last_iterations=last,
         converged=converged,
     )
+
+
+def _derivatives(poses: Array) -> tuple[Array, Array]:
+    """Room for a gradient (3n,) and a Hessian (3n, 3n)."""
+    return np.empty(3 * len(poses)), np.empty((3 * len(poses), 3 * len(poses)))
 
 
 def _at(problem: JointProblem, pairs_at: PairsAt | None, poses: Array) -> JointProblem:
@@ -198,42 +218,47 @@ def _descend(
     fixed: int,
     max_iterations: int,
     tolerance: float,
-) -> tuple[int, int, bool]:
-    """One stage, from the poses (n, 3) in place: its iterations, evaluations, and whether it converged."""
-    n = poses.shape[0]
-    gradient, trial_gradient = np.empty(3 * n), np.empty(3 * n)
-    hessian, trial_hessian = np.empty((3 * n, 3 * n)), np.empty((3 * n, 3 * n))
-    step = np.empty((n, 3))
+    gradient: Array,
+    hessian: Array,
+) -> tuple[float, int, int, bool]:
+    """One stage, from the poses (n, 3) in place: the value, iterations, evaluations, whether it converged.
+
+    Writes gradient (3n,) and Hessian (3n, 3n) at the poses; but those before the last step when they need
+    not be `exact`.
+    """
+    trial_gradient, trial_hessian = np.empty_like(gradient), np.empty_like(hessian)
+    step = np.empty_like(poses)
     curvature = 1.0 if exact else 0.0
     value = evaluate(problem, poses, widening, curvature, neutral, stride, gradient, hessian)
-    iterations, evaluations, damping = 0, 1, FIRST_DAMPING
+    iterations, evaluations, damping, converged = 0, 1, FIRST_DAMPING, False
     for _ in range(max_iterations):
         solved = newton_step(gradient, hessian, poses, damping, fixed, step)
         if not solved and exact:
             # Not positive definite: go on with the part that is.
-            evaluate(problem, poses, widening, 0.0, neutral, stride, gradient, hessian)
+            evaluate(problem, poses, widening, 0.0, neutral, stride, trial_gradient, trial_hessian)
             evaluations += 1
-            solved = newton_step(gradient, hessian, poses, damping, fixed, step)
+            solved = newton_step(gradient, trial_hessian, poses, damping, fixed, step)
         if not solved:
             damping *= 10
             continue
         iterations += 1
         trial = poses + step
+        converged = bool(np.abs(step).max() < tolerance)
+        if converged and not exact:
+            poses[:, :] = trial
+            break
         there = evaluate(problem, trial, widening, curvature, neutral, stride, trial_gradient, trial_hessian)
         evaluations += 1
         if there <= value:
             poses[:, :] = trial
             value = there
-            gradient, trial_gradient = trial_gradient, gradient
-            hessian, trial_hessian = trial_hessian, hessian
+            gradient[:], hessian[:, :] = trial_gradient, trial_hessian
             damping = max(0.1 * damping, LEAST_DAMPING)
         else:
             damping *= 10
-        if np.abs(step).max() < tolerance:
-            return iterations, evaluations, True
-        if damping > GREATEST_DAMPING:
+        if converged or damping > GREATEST_DAMPING:
             break
-    return iterations, evaluations, False
+    return value, iterations, evaluations, converged
 
 
 @kernel

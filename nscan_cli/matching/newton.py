@@ -87,9 +87,9 @@ def minimise(
 ) -> tuple[float, float, int, int, bool]:
     """Levenberg–Marquardt from `pose` (3,), in place, one stage for each entry of `widenings`.
 
-    A stage ends when a step moves the pose by less than `tolerance` (m, rad). Writes the last stage's
+    A stage ends with a step that moves the pose by less than `tolerance` (m, rad). Writes the last stage's
     semi-definite Hessian of the objective (3, 3). Returns the objective's and E's value, iterations,
-    evaluations, and whether the last stage converged.
+    evaluations, and whether the last stage converged. Hessian and values are those before that last step.
     """
     out, trial_out = np.empty(OUT), np.empty(OUT)
     gradient, step, trial = np.empty(3), np.empty(3), np.empty(3)
@@ -109,18 +109,20 @@ def minimise(
             if not solve_definite(damped, gradient, step):
                 break
             trial[:] = pose - step
+            length = max(abs(step[0]), abs(step[1]), abs(step[2]))
+            if length < tolerance:
+                # So near that the value and the Hessian are known well enough.
+                pose[:] = trial
+                converged = True
+                break
             trial_value = objective(problem, trial, widening, 0.0, trial_out, trial_gradient, trial_hessian)
             evaluations += 1
-            length = max(abs(step[0]), abs(step[1]), abs(step[2]))
             if trial_value <= value:
                 pose[:], value, out[:] = trial, trial_value, trial_out
                 gradient[:], hessian[:, :] = trial_gradient, trial_hessian
                 damping = max(damping * 0.1, LEAST_DAMPING)
             else:
                 damping *= 10.0
-            if length < tolerance:
-                converged = True
-                break
             if damping > GREATEST_DAMPING:
                 break
     return value, out[0], iterations, evaluations, converged

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -39,7 +40,9 @@ class MotionModel:
 def odometry_prior(reference: Array, pose: Array, model: MotionModel) -> Prior:
     """The prior on pose ⊖ reference from the odometry poses (3,) of two scans."""
     step = relative(pose, reference)
-    distance, turn = float(np.hypot(step[0], step[1])), float(abs(step[2]))
+    x, y, turn = step.tolist()
+    distance = math.hypot(x, y)
     sigma = model.distance + model.distance_per_metre * distance
-    sigma_angle = model.angle + model.angle_per_radian * turn + model.angle_per_metre * distance
-    return Prior(step, np.diag([sigma**-2, sigma**-2, sigma_angle**-2]))
+    sigma_angle = model.angle + model.angle_per_radian * abs(turn) + model.angle_per_metre * distance
+    along, about = sigma**-2, sigma_angle**-2
+    return Prior(step, np.array([[along, 0.0, 0.0], [0.0, along, 0.0], [0.0, 0.0, about]]))

@@ -30,13 +30,19 @@ def add_points(
     The row of each point is written to `touched` (m,); the Gaussians there are to be made again.
     """
     cos, sin = np.cos(pose[2]), np.sin(pose[2])
+    row, key = -1, -1
     for k in range(points.shape[0]):
-        x = cos * points[k, 0] - sin * points[k, 1] + pose[0]
-        y = sin * points[k, 0] + cos * points[k, 1] + pose[1]
+        # Along the beam and across it, in the frame of the grid.
+        bx = cos * points[k, 0] - sin * points[k, 1]
+        by = sin * points[k, 0] + cos * points[k, 1]
+        x, y = bx + pose[0], by + pose[1]
         ix, iy = int(np.floor(x / half)), int(np.floor(y / half))
-        row = find_row(grid, pack(ix, iy))
-        if row < 0 or grid.links[row].min() < 0:
-            row, rows = _settle(grid, rows, ix, iy)
+        # Neighbouring beams mostly fall into the same cell.
+        if pack(ix, iy) != key:
+            key = pack(ix, iy)
+            row = find_row(grid, key)
+            if row < 0 or grid.links[row].min() < 0:
+                row, rows = _settle(grid, rows, ix, iy)
         touched[k] = row
         dx, dy = x - (ix + 0.5) * half, y - (iy + 0.5) * half
         sums = grid.sums[row]
@@ -46,9 +52,9 @@ def add_points(
         sums[3] += sign * dx * dx
         sums[4] += sign * dx * dy
         sums[5] += sign * dy * dy
-        length = max(np.hypot(points[k, 0], points[k, 1]), 1e-9)
-        sums[6] += sign * (x - pose[0]) / length
-        sums[7] += sign * (y - pose[1]) / length
+        per_length = sign / max(np.sqrt(bx * bx + by * by), 1e-9)
+        sums[6] += per_length * bx
+        sums[7] += per_length * by
         if sums[0] < 0.5:
             sums[:] = 0.0
     return rows
@@ -72,7 +78,6 @@ def make_gaussians(
     made = np.zeros(rows, dtype=np.bool_)
     previous = -1
     for k in range(touched.shape[0]):
-        # Neighbouring beams mostly fall into the same cell.
         if touched[k] == previous:
             continue
         previous = touched[k]
@@ -81,6 +86,25 @@ def make_gaussians(
             if row >= 0 and not made[row]:
                 made[row] = True
                 make_gaussian(grid, row, half, minimum, floor, straight)
+
+
+@kernel
+def change(
+    grid: Grid,
+    rows: int,
+    half: float,
+    points: Array,
+    pose: Array,
+    sign: float,
+    minimum: float,
+    floor: float,
+    straight: bool,
+) -> int:
+    """Both: the sums, and the Gaussians made of them."""
+    touched = np.empty(points.shape[0], dtype=np.int32)
+    rows = add_points(grid, rows, half, points, pose, sign, touched)
+    make_gaussians(grid, rows, touched, half, minimum, floor, straight)
+    return rows
 
 
 @kernel
@@ -127,29 +151,36 @@ class Ndt:
 
     def add(self, points: Array, pose: Array) -> None:
         """Grow by points (m, 2), moved by `pose` (3,)."""
-        self._make(self._change(points, pose, 1.0))
+        self._change(points, pose, 1.0)
 
     def subtract(self, points: Array, pose: Array) -> None:
         """Take away points that were added with the very same pose."""
-        self._make(self._change(points, pose, -1.0))
+        self._change(points, pose, -1.0)
 
     def gather(self, points: Array, pose: Array) -> None:
         """Take points (m, 2) in, moved by `pose` (3,), for Gaussians that `make` or `compact` makes."""
-        self._change(points, pose, 1.0)
+        self._reserve(self.rows + NEW_NEIGHBOURS * len(points))
+        touched = np.empty(len(points), dtype=np.int32)
+        self.rows = add_points(self.grid, self.rows, self.half, points, pose, 1.0, touched)
 
     def make(self) -> None:
         """Make all Gaussians of the points gathered."""
-        self._make(np.arange(self.rows, dtype=np.int32))
-
-    def _change(self, points: Array, pose: Array, sign: float) -> NDArray[np.int32]:
-        """Change the sums; the rows (m,) where they changed."""
-        self._reserve(self.rows + NEW_NEIGHBOURS * len(points))
-        touched = np.empty(len(points), dtype=np.int32)
-        self.rows = add_points(self.grid, self.rows, self.half, points, pose, sign, touched)
-        return touched
-
-    def _make(self, touched: NDArray[np.int32]) -> None:
+        touched = np.arange(self.rows, dtype=np.int32)
         make_gaussians(self.grid, self.rows, touched, self.half, self.minimum, self.floor, self.straight)
+
+    def _change(self, points: Array, pose: Array, sign: float) -> None:
+        self._reserve(self.rows + NEW_NEIGHBOURS * len(points))
+        self.rows = change(
+            self.grid,
+            self.rows,
+            self.half,
+            points,
+            pose,
+            sign,
+            self.minimum,
+            self.floor,
+            self.straight,
+        )
 
     def _reserve(self, rows: int) -> None:
         capacity = len(self.grid.keys)

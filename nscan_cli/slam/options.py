@@ -37,7 +37,7 @@ class TrackingOptions:
     """A scan joins the map when the robot has moved by so much (m, rad) since the last that did."""
     widenings: tuple[float, ...] = (0.05, 0.3, 1.0)
     max_iterations: int = 20
-    tolerance: float = 1e-4
+    tolerance: float = 1e-3
     """m, rad"""
     scale: float = 0.1
     """What the energy is multiplied with against the prior: four Gaussians see each point, and
@@ -98,7 +98,8 @@ class NScanOptions:
     scale: float = 0.08
     widenings: tuple[float, ...] = (0.05, 0.3, 1.0)
     max_iterations: int = 30
-    tolerance: float = 1e-3
+    tolerance: float = 3e-3
+    """m, rad: the last steps are Newton's, each a small part of the one before."""
     overlap: float = 0.65
     """Share of inliers, one of the other, that holds two scans together."""
     settled: float = 0.1

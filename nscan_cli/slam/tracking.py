@@ -6,11 +6,15 @@ loops later correct in the graph never tears it.
 
 from __future__ import annotations
 
+import math
 from collections import deque
 from dataclasses import dataclass
+from operator import attrgetter
+from typing import NamedTuple
 
 import numpy as np
 
+from nscan_cli.compiled import kernel
 from nscan_cli.matching.newton import PairProblem, minimise
 from nscan_cli.matching.priors import Prior, odometry_prior
 from nscan_cli.matching.search import likelihood_field, search
@@ -22,7 +26,7 @@ from nscan_cli.slam.options import TrackingOptions
 RECENT = 5.0
 """A lost scan is searched among those of the last stretch of path, m."""
 LEAST_SCORE = 0.3
-"""What a search must find at least."""
+"""What a search must find at least; with fewer inliers a scan is lost, whatever the odometry says."""
 
 
 @dataclass(frozen=True)
@@ -41,6 +45,34 @@ class Tracked:
     """Length of the path up to here, m."""
     joined: bool
     """Whether the scan's points joined the map."""
+
+
+class Match(NamedTuple):
+    """An optimum for a scan."""
+
+    value: float
+    """Of the objective."""
+    pose: Array
+    """(3,)"""
+    hessian: Array
+    """(3, 3) of the objective."""
+    inliers: float
+    """Share of the points."""
+
+
+@kernel
+def match_and_count(
+    problem: PairProblem,
+    pose: Array,
+    widenings: Array,
+    max_iterations: int,
+    tolerance: float,
+    hessian: Array,
+    bound: float,
+) -> tuple[float, float]:
+    """Minimise from `pose` (3,), in place; the objective's value, and the share of inliers there."""
+    value, _, _, _, _ = minimise(problem, pose, widenings, max_iterations, tolerance, hessian)
+    return value, inlier_share(problem.grid, problem.half, problem.points, pose, bound)
 
 
 class Tracker:
@@ -65,25 +97,21 @@ class Tracker:
             return self._settle(np.zeros(3), np.zeros((3, 3)), np.zeros((3, 3)), 1.0, points)
         prior = self._predict(odometry)
         self._odometry = odometry
-        value, pose, hessian = self._match(points, prior, prior.mean)
-        inliers = self._inliers(points, pose)
+        match = self._match(points, prior, prior.mean)
         options = self.options
         enough = options.steady_inlier_share if odometry is None else options.inlier_share
         for ring in options.turns:
-            if inliers >= enough:
+            if match.inliers >= enough:
                 break
             self.restarts += 1
             for turn in (sign * angle for angle in ring for sign in (1, -1)):
                 candidate = self._match(points, prior, prior.mean + np.array([0.0, 0.0, turn]))
-                if candidate[0] < value:
-                    value, pose, hessian = candidate
-            inliers = self._inliers(points, pose)
-        if odometry is None and inliers < enough:
-            value, pose, hessian = self._search(points, prior, (value, pose, hessian))
-            inliers = self._inliers(points, pose)
-        pose[2] = wrap(pose[2])
-        expected = np.linalg.inv(prior.information).astype(np.float64)
-        return self._settle(pose, hessian - prior.information, expected, inliers, points)
+                match = min(match, candidate, key=attrgetter("value"))
+        if match.inliers < (enough if odometry is None else LEAST_SCORE):
+            match = self._search(points, prior, match)
+        match.pose[2] = wrap(match.pose[2])
+        expected = np.diag(1.0 / np.diag(prior.information))
+        return self._settle(match.pose, match.hessian - prior.information, expected, match.inliers, points)
 
     def _predict(self, odometry: Array | None) -> Prior:
         """Where the next scan is expected, in the tracker's frame, and how surely."""
@@ -96,23 +124,22 @@ class Tracker:
         # The prior is as sure along the path as across it: no need to turn its information.
         return Prior(compose(last, step), information)
 
-    def _match(self, points: Array, prior: Prior, start: Array) -> tuple[float, Array, Array]:
-        """The objective's minimum from the pose `start` (3,): value, pose, Hessian."""
+    def _match(self, points: Array, prior: Prior, start: Array) -> Match:
+        """The objective's minimum from the pose `start` (3,)."""
         options = self.options
         pose, hessian = start.copy(), np.empty((3, 3))
-        value, *_ = minimise(
+        value, inliers = match_and_count(
             PairProblem(self.map.grid, self.map.half, points, options.scale, prior),
             pose,
             self._widenings,
             options.max_iterations,
             options.tolerance,
             hessian,
+            options.inlier_bound,
         )
-        return value, pose, hessian
+        return Match(value, pose, hessian, inliers)
 
-    def _search(
-        self, points: Array, prior: Prior, best: tuple[float, Array, Array]
-    ) -> tuple[float, Array, Array]:
+    def _search(self, points: Array, prior: Prior, best: Match) -> Match:
         """The better of what was found and the match from where a search among the last scans leads."""
         clouds = [transform(pose, part) for part, pose, path in self._window if path > self._path - RECENT]
         cloud = np.concatenate(clouds)
@@ -123,16 +150,12 @@ class Tracker:
         if found is None:
             return best
         self.searches += 1
-        candidate = self._match(points, prior, found.pose)
-        return candidate if candidate[0] < best[0] else best
-
-    def _inliers(self, points: Array, pose: Array) -> float:
-        return inlier_share(self.map.grid, self.map.half, points, pose, self.options.inlier_bound)
+        return min(best, self._match(points, prior, found.pose), key=attrgetter("value"))
 
     def _settle(self, pose: Array, hessian: Array, expected: Array, inliers: float, points: Array) -> Tracked:
         """Take the pose; let the scan join the map when the robot has moved, and old ones leave it."""
         step = relative(pose, self._joined)
-        distance = float(np.hypot(step[0], step[1]))
+        distance = math.hypot(*step[:2].tolist())
         # Before anything was seen there is nothing to move against.
         nothing_seen = self.map.rows == 0
         joined = nothing_seen or distance > self.options.step or abs(step[2]) > self.options.step
