@@ -30,6 +30,8 @@ class Keyframe:
     """(3, 3) covariance of the way from the keyframe before, had nothing been matched."""
     points: Array
     """(m, 2) in the robot's frame."""
+    cells: int
+    """How many lattice cells of the NDT its points fall into."""
     ndt: Ndt
 
 
@@ -47,6 +49,16 @@ class Route(NamedTuple):
     def rows(self, indices: Iterable[int]) -> list[int]:
         """Those of some keyframes in the log."""
         return [self.keyframes[k].row for k in indices]
+
+
+def points_per_cell(keyframes: Iterable[Keyframe]) -> float:
+    """How many points of a scan fall into a lattice cell on average, of those that have any; at least 1."""
+    points, cells = np.sum([(len(each.points), each.cells) for each in keyframes], axis=0)
+    return float(points / cells) if cells else 1.0
+
+
+def _count_cells(points: Array, side: float) -> int:
+    return len(np.unique(np.floor(points / side) @ np.array([1.0, 1j])))
 
 
 def route(keyframes: Sequence[Keyframe], chain: Sequence[Pairwise], poses: Array) -> Route:
@@ -95,6 +107,7 @@ class Keyframes:
             tracked,
             self._expected + tracked.expected,
             points,
+            _count_cells(points, 0.5 * gaussians.cell),
             Ndt(gaussians.cell, gaussians.minimum, gaussians.floor, 1024),
         )
         keyframe.ndt.gather(points, np.zeros(3))

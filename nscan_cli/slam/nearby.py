@@ -14,7 +14,7 @@ from nscan_cli.matching.joint_energy import JointProblem, Priors, all_pairs, no_
 from nscan_cli.matching.overlap import held_together, overlaps, weakest_link
 from nscan_cli.matching.scans import Scans, lay_out
 from nscan_cli.poses import Array, relative
-from nscan_cli.slam.keyframes import Keyframe, Route
+from nscan_cli.slam.keyframes import Keyframe, Route, points_per_cell
 from nscan_cli.slam.options import NScanOptions
 
 Indices = NDArray[np.int64]
@@ -118,7 +118,7 @@ def _match_held(
         members = tried[kept]
         if len(members) < len(scans.point_starts) - 1:
             scans = _laid_out(keyframes, members)
-        match = _match(scans, members, route.chain, start, widenings, options)
+        match = _match(scans, members, route, start, widenings, options)
         shares = overlaps(scans, match.poses).pairs
         at = int(np.searchsorted(members, centre))
         held = held_together(shares, options.overlap, at)
@@ -149,7 +149,7 @@ def _laid_out(keyframes: Sequence[Keyframe], members: Indices) -> Scans:
 def _match(
     scans: Scans,
     members: Indices,
-    chain: Sequence[Pairwise],
+    route: Route,
     start: Array,
     widenings: tuple[float, ...],
     options: NScanOptions,
@@ -158,7 +158,7 @@ def _match(
     consecutive = np.flatnonzero(np.diff(members) == 1)
     priors = no_priors()
     if len(consecutive):
-        known = [chain[members[k]] for k in consecutive]
+        known = [route.chain[members[k]] for k in consecutive]
         priors = Priors(
             np.stack([consecutive, consecutive + 1], axis=1),
             np.array([relation.measurement for relation in known]),
@@ -170,7 +170,13 @@ def _match(
         max_iterations=options.max_iterations,
         tolerance=options.tolerance,
     )
-    return match_jointly(JointProblem(scans, all_pairs(len(members)), priors, options.scale), start, joint)
+    scale = scale_of([route.keyframes[k] for k in members], options)
+    return match_jointly(JointProblem(scans, all_pairs(len(members)), priors, scale), start, joint)
+
+
+def scale_of(keyframes: Sequence[Keyframe], options: NScanOptions) -> float:
+    """What the energy of some keyframes' scans is multiplied with to be a negative log likelihood."""
+    return options.scale_per_cell / points_per_cell(keyframes)
 
 
 def _relation(

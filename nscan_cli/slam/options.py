@@ -95,7 +95,9 @@ class NScanOptions:
     """The centre is so many keyframes behind the newest, so that those on both sides of it are known."""
     loops: bool = True
     """Whether these take part at all; without them the graph keeps the drift of tracking."""
-    scale: float = 0.08
+    scale_per_cell: float = 0.3
+    """What the energy is multiplied with where a scan has one point in each lattice cell: four Gaussians see
+    each point. More points in a cell hit the same piece of wall, and count as much together."""
     widenings: tuple[float, ...] = (0.05, 0.3, 1.0)
     max_iterations: int = 30
     tolerance: float = 3e-3

@@ -18,7 +18,7 @@ from nscan_cli.matching.priors import Prior
 from nscan_cli.ndt.energy import energy, inlier_share
 from nscan_cli.poses import Array, inverse, relative, relative_jacobians, wrap
 from nscan_cli.slam.keyframes import Keyframe, Route
-from nscan_cli.slam.nearby import Nearby, choose_nearby, moved_by, verdict
+from nscan_cli.slam.nearby import Nearby, choose_nearby, moved_by, scale_of, verdict
 from nscan_cli.slam.options import NScanOptions
 
 
@@ -70,7 +70,8 @@ def _match(route: Route, other: int, centre: int, options: NScanOptions) -> _Sin
     keyframes, poses = route.keyframes, route.poses
     reference, points = keyframes[other].ndt, keyframes[centre].points
     prior = _prior(route.chain, other, centre)
-    problem = PairProblem(reference.grid, reference.half, points, options.scale, prior)
+    scale = scale_of([keyframes[centre]], options)
+    problem = PairProblem(reference.grid, reference.half, points, scale, prior)
     start, origin = relative(poses[centre], poses[other]), np.zeros(3)
     for widenings in options.attempts:
         pose, hessian = start.copy(), np.empty((3, 3))
@@ -111,7 +112,7 @@ def _relation(
     return Pairwise(
         nodes=(other.row, centre.row),
         measurement=single.pose,
-        information=options.scale * hessian,
+        information=scale_of([centre], options) * hessian,
         origin=origin,
         score=single.overlap,
     )

@@ -63,7 +63,10 @@ def test_the_information_is_the_scaled_energys_without_the_prior():
     for relation in matched(keyframes).pairwise:
         other, centre = (by_row[node] for node in relation.nodes)
         there = energy(other.ndt, centre.points, relation.measurement, exact=False)
-        np.testing.assert_allclose(relation.information, NScanOptions().scale * there.hessian, rtol=1e-9)
+        # Of the points in one lattice cell, half a cell wide, all together count as much as one.
+        cells = {(int(x // 0.25), int(y // 0.25)) for x, y in centre.points}
+        scale = NScanOptions().scale_per_cell * len(cells) / len(centre.points)
+        np.testing.assert_allclose(relation.information, scale * there.hessian, rtol=1e-9)
         assert np.linalg.eigvalsh(relation.information)[0] > 0
 
 
