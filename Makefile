@@ -4,7 +4,7 @@ VENV := .venv
 RUN := $(VENV)/bin
 READY := $(VENV)/.ready
 
-.PHONY: map test lint samples figures bench robustness soak lowest lock clean
+.PHONY: map test lint samples figures reference bench robustness soak lowest lock clean
 
 map: $(READY)
 	mkdir -p out
@@ -23,6 +23,9 @@ samples: $(READY)
 
 figures: $(READY)
 	$(RUN)/python -m tests.experiments docs/pictures
+
+reference: $(READY)
+	$(RUN)/python -m tests.reference docs/reference.md
 
 bench: $(READY)
 	mkdir -p out

@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING
 
 import click
 
-from nscan_cli.cli.options import CONTEXT, common_options, reading_options
+from nscan_cli.cli.command import FILE, argument, option, subcommand
+from nscan_cli.cli.options import common_options, reading_options
 from nscan_cli.cli.picture import check_plot, plot_option, write_plot
 from nscan_cli.cli.progress import say
 from nscan_cli.errors import CheckFailedError, WrongUsageError
@@ -19,19 +20,24 @@ DRAWN = 10
 """The worst relations that a picture shows where --worst does not say."""
 
 
-@click.command("evaluate", context_settings=CONTEXT)
-@click.argument("result")
-@click.option("--relations", metavar="FILE", help="Relations of the Kümmerle et al. 2009 benchmark.")
-@click.option("--reference", metavar="FILE", help="A TUM trajectory, or a log with TRUEPOS: ATE and RPE.")
-@click.option("--worst", type=click.IntRange(0), metavar="N", help="List the N worst relations.")
-@click.option(
-    "--max-translation",
-    type=click.FloatRange(0),
-    metavar="M",
-    help="Exit 3 when the mean on relations or the RMSE of the ATE is above.",
+@subcommand(
+    "evaluate",
+    ("nscan-cli evaluate intel.json --relations intel.relations --worst 5", "on a benchmark's relations"),
+    ("nscan-cli evaluate robot.json --reference truth.tum --plot errors.png", "against a trajectory"),
+    (
+        "nscan-cli evaluate robot.json --reference robot.log.gz --max-translation 0.05",
+        "as a test: exit code 3",
+    ),
 )
-@click.option("--max-rotation", type=click.FloatRange(0), metavar="DEG", help="The same for the rotation.")
-@click.option("--json", "as_json", is_flag=True, help="Print JSON.")
+@argument("result", type=FILE, tells="A graph, a TUM trajectory, or a CARMEN log with corrected poses; - is "
+          "standard input.")  # fmt: skip
+@option("--relations", type=FILE, metavar="FILE", help="Relations of the benchmark of Kümmerle et al. 2009.")
+@option("--reference", type=FILE, metavar="FILE", help="A TUM trajectory, a graph, or a log with TRUEPOS.")
+@option("--worst", type=click.IntRange(0), metavar="N", help="List the N worst relations.")
+@option("--max-translation", type=click.FloatRange(0), metavar="M",
+        help="Exit with 3 when the mean on relations, or the RMSE of the ATE, is above.")  # fmt: skip
+@option("--max-rotation", type=click.FloatRange(0), metavar="DEG", help="The same for the rotation.")
+@option("--json", "as_json", is_flag=True, help="Print JSON (m, degrees).")
 @plot_option("the worst relations (10, or N) over the trajectory, or the error against the reference")
 @reading_options
 @common_options
@@ -48,7 +54,7 @@ def command(
     quiet: bool,
     **_verbosity: int,
 ) -> None:
-    """Measure RESULT: a graph, a TUM trajectory, or a CARMEN log with corrected poses.
+    """Measure RESULT against reference relations or a reference trajectory.
 
     With --relations, the relative poses of pairs of stamps are compared, and no common frame is
     needed: translational and rotational error, mean ± sd, median, mean square and maximum. With
@@ -67,6 +73,8 @@ def command(
 
     measured = measure(result, relations, reference, worst or 0, reading)
     evaluation = measured.evaluation
+    for notice in measured.notices:
+        say(f"warning: {notice}", quiet)
     if evaluation.relations and evaluation.relations[1].too_far:
         table, errors = evaluation.relations
         say(f"warning: {errors.too_far} of {len(table)} relations have a stamp far from every pose", quiet)

@@ -48,13 +48,13 @@ def find_log(graph_file: str, graph: Graph) -> str:
     """The path of the graph's log, beside the graph or in the current folder. Raises InputMissingError."""
     name = _source(graph).get("name")
     if name is None:
-        raise InputMissingError(f"{graph_file}: does not name its log; give LOG too")
+        raise InputMissingError(f"{graph_file}: does not name its log; give its path as LOG")
     for folder in (Path(graph_file).parent, Path()):
         path = folder / Path(name).name
         if path.is_file():
             return str(path)
     raise InputMissingError(
-        f"{graph_file}: its log {name} is neither beside it nor in the current folder; give LOG too"
+        f"{graph_file}: its log {name} is neither beside it nor in the current folder; give its path as LOG"
     )
 
 

@@ -8,20 +8,30 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from nscan_cli.cli.options import CONTEXT, common_options, reading_options
+from nscan_cli.cli.command import log_argument, option, subcommand
+from nscan_cli.cli.options import common_options, reading_options
+from nscan_cli.cli.summary import Row, table
 from nscan_cli.logs.options import ReadingOptions
 
 if TYPE_CHECKING:
     from nscan_cli.logs.scan import LaserLog
 
 
-@click.command("info", context_settings=CONTEXT)
-@click.argument("log", type=click.Path())
-@click.option("--json", "as_json", is_flag=True, help="Print one JSON object (m, s, degrees).")
+@subcommand(
+    "info",
+    ("nscan-cli info robot.log.gz", "what is in a log"),
+    ("nscan-cli info --json robot.mcap | jq .scans", "one fact of it, for a script"),
+)
+@log_argument()
+@option("--json", "as_json", is_flag=True, help="Print one JSON object (m, s, degrees).")
 @reading_options
 @common_options
 def command(log: str, as_json: bool, reading: ReadingOptions, **_common: Any) -> None:
-    """What is in a log, and what the other commands will use of it."""
+    """Tell what is in LOG, and what the other commands will use of it.
+
+    These are scans, laser, mounting, odometry, what stands for no return, and what was skipped and why.
+    The reading options change what the other commands see in the same way.
+    """
     from nscan_cli.logs.load import read_log
 
     facts = facts_of(read_log(log, reading))
@@ -80,7 +90,7 @@ def as_text(facts: dict[str, Any]) -> str:
     used = facts["used"]
     path = "" if odometry is None else f"a path of {odometry['path']:.1f} m"
     rate = "" if facts["rate"] is None else f", {facts['rate']:.3g} a second, longest gap {gap:.3g} s"
-    rows: list[tuple[str, list[str]]] = [
+    rows: list[Row] = [
         ("log", [f"{facts['file']}, {facts['bytes']} bytes"]),
         ("sha256", [facts["sha256"]]),
         ("format", [facts["format"]]),
@@ -104,12 +114,7 @@ def as_text(facts: dict[str, Any]) -> str:
         ("skipped", [_skipped(entry) for entry in facts["skipped"]] or ["none"]),
         ("warnings", facts["warnings"] or ["none"]),
     ]  # fmt: skip
-    width = max(len(title) for title, _ in rows) + 2
-    return "\n".join(
-        f"{title if at == 0 else '':{width}}{value}"
-        for title, values in rows
-        for at, value in enumerate(values)
-    )
+    return table(rows)
 
 
 def _skipped(entry: dict[str, Any]) -> str:

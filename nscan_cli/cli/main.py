@@ -13,10 +13,12 @@ import traceback
 import click
 
 from nscan_cli import __version__
+from nscan_cli.cli.command import CONTEXT, write_examples
+from nscan_cli.cli.manual import ENVIRONMENT, EXAMPLES, EXIT_CODES
 from nscan_cli.errors import InputDataError, NscanError, OutputError
 
 COMMANDS = {
-    "info": "What is in a log, and what the other commands will use of it.",
+    "info": "Tell what is in a log, and what the other commands will use of it.",
     "match": "Match two scans of a log (NDT).",
     "nscan": "Match n scans of a log jointly.",
     "slam": "Turn a log into a pose graph and a map.",
@@ -25,6 +27,8 @@ COMMANDS = {
     "nightly": "Map and measure many logs, and report what has changed.",
 }
 INTERRUPTED, CLOSED_EARLY, INTERNAL_ERROR = 130, 141, 1
+COMPLETION = "_NSCAN_CLI_COMPLETE"
+"""The variable by which a shell asks what a line can go on with."""
 NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)
 
 
@@ -48,13 +52,22 @@ class LazyGroup(click.Group):
         with formatter.section("Commands"):
             formatter.write_dl(list(COMMANDS.items()))
 
+    def format_epilog(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        """Examples, and what holds for all commands."""
+        write_examples(formatter, EXAMPLES)
+        with formatter.section("Exit codes"):
+            formatter.write_dl([(str(code), meaning) for code, meaning in EXIT_CODES.items()])
+        with formatter.section("Environment"):
+            formatter.write_dl(list(ENVIRONMENT.items()))
 
-@click.group(cls=LazyGroup, context_settings={"help_option_names": ["-h", "--help"]})
+
+@click.group(cls=LazyGroup, context_settings=CONTEXT)
 @click.version_option(__version__, prog_name="nscan-cli")
 def cli() -> None:
     """Turn 2D laser logs into globally consistent maps by nScan-Matching.
 
-    LOG is a path, or - for standard input; its kind is found from its content.
+    Results go to files, or to standard output with -o -; what people read goes to standard error.
+    nscan-cli COMMAND --help tells about a command, docs/reference.md about all.
     """
 
 
@@ -88,7 +101,7 @@ def run(arguments: list[str]) -> int:
     for library in ("OPENBLAS", "MKL", "OMP"):
         os.environ.setdefault(f"{library}_NUM_THREADS", "1")
     try:
-        outcome = cli.main(arguments, prog_name="nscan-cli", standalone_mode=False)
+        outcome = cli.main(arguments, prog_name="nscan-cli", complete_var=COMPLETION, standalone_mode=False)
         if sys.stdout is not None:
             sys.stdout.flush()
         return outcome if isinstance(outcome, int) else 0
@@ -102,8 +115,10 @@ def run(arguments: list[str]) -> int:
     except click.ClickException as error:
         _say(_usage(error), verbose)
         return error.exit_code
-    except (BrokenPipeError, SystemExit):
-        # Without its standalone mode, a closed pipe is the one thing that click itself exits for.
+    except (BrokenPipeError, SystemExit) as error:
+        # Without its standalone mode, click itself exits for completions and for a closed pipe alone.
+        if COMPLETION in os.environ and isinstance(error, SystemExit):
+            return int(error.code or 0)
         return CLOSED_EARLY
     except NscanError as error:
         _say(str(error), verbose)

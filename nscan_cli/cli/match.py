@@ -8,12 +8,14 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from nscan_cli.cli.options import CONTEXT, PoseType, common_options, reading_options
-from nscan_cli.cli.output import check_writable, write_whole
+from nscan_cli.cli.command import log_argument, option, result_option, subcommand
+from nscan_cli.cli.options import PoseType, common_options, reading_options
 from nscan_cli.cli.picture import check_plot, plot_option, write_plot
-from nscan_cli.cli.progress import say
+from nscan_cli.cli.progress import announce_compiling, say
+from nscan_cli.cli.summary import Row, table
 from nscan_cli.errors import WrongUsageError
 from nscan_cli.logs.options import ReadingOptions
+from nscan_cli.outputs import check_writable, write_whole
 from nscan_cli.provenance import provenance_of
 
 if TYPE_CHECKING:
@@ -36,24 +38,30 @@ class StartType(click.ParamType[Any]):
         return value
 
 
-@click.command("match", context_settings=CONTEXT)
-@click.argument("log")
-@click.option("--reference", type=click.IntRange(0), required=True, metavar="I", help="The scan that stays.")
-@click.option("--scan", type=click.IntRange(0), required=True, metavar="J", help="The scan that moves.")
-@click.option(
+@subcommand(
+    "match",
+    ("nscan-cli match robot.log.gz --reference 100 --scan 105", "scan 105 in the frame of scan 100"),
+    (
+        "nscan-cli match robot.log.gz --reference 100 --scan 105 --prior none -o match.json --plot match.png",
+        "by the scans alone, with a picture",
+    ),
+)
+@log_argument()
+@option("--reference", type=click.IntRange(0), required=True, metavar="I", help="The scan that stays.")
+@option("--scan", type=click.IntRange(0), required=True, metavar="J", help="The scan that moves.")
+@option(
     "--initial",
     type=StartType(),
     metavar="odometry|identity|X,Y,DEG",
-    help="Pose of J in the frame of I to start from (m, degrees); the odometry's where the log has it.",
+    help="Pose of J in the frame of I to start from (m, degrees); if not given, that of the odometry where "
+    "the log has it, or else identity.",
 )
-@click.option(
+@option(
     "--prior",
     type=click.Choice(["odometry", "none"]),
-    help="What is known before matching; the odometry where the log has it.",
+    help="What is known before matching; if not given, the odometry where the log has it.",
 )
-@click.option(
-    "-o", "--output", default="-", metavar="RESULT.json", help="The result; standard output if not given."
-)
+@result_option
 @plot_option("both scans before and after, with the uncertainty")
 @reading_options
 @common_options
@@ -69,10 +77,10 @@ def command(
     quiet: bool,
     **_verbosity: int,
 ) -> None:
-    """Match scan J of LOG with scan I (NDT), and say how well the relative pose is known.
+    """Match two scans of LOG (NDT), and say how well their relative pose is known.
 
-    The result is the pose of J in the frame of I with energy, Hessian and covariance. What a corridor
-    leaves open shows as the weakest direction, and best with --prior none.
+    The result is the pose of scan J in the frame of scan I (m, rad) with energy, Hessian and covariance.
+    What a corridor leaves open shows as the weakest direction, and best with --prior none.
     """
     check_writable(output)
     check_plot(plot, output, [log])
@@ -83,6 +91,7 @@ def command(
     scans = read_log(log, reading)
     rows = scans.row(reference), scans.row(scan)
     initial, prior = with_defaults(scans, initial, prior, quiet)
+    announce_compiling(quiet)
     options, model = PairOptions(), MotionModel()
     start = _start(scans, rows, initial)
     known = None
@@ -101,8 +110,7 @@ def command(
         from nscan_cli.mapping.plots import plot_match
 
         write_plot(plot, plot_match((reference, scan), fixed, moving, start, match))
-    for line in _summary(reference, scan, match):
-        say(line, quiet)
+    say(table(_summary(reference, scan, match)), quiet)
 
 
 def with_defaults(log: LaserLog, initial: str | None, prior: str | None, quiet: bool) -> tuple[str, str]:
@@ -112,9 +120,9 @@ def with_defaults(log: LaserLog, initial: str | None, prior: str | None, quiet: 
     """
     if log.odometry is not None:
         return initial or "odometry", prior or "odometry"
-    for option, value, other in (("--initial", initial, "identity"), ("--prior", prior, "none")):
+    for name, value, other in (("--initial", initial, "identity"), ("--prior", prior, "none")):
         if value == "odometry":
-            raise WrongUsageError(f"{log.source.name}: has no odometry; give {option} {other}")
+            raise WrongUsageError(f"{log.source.name}: has no odometry; give {name} {other}")
     if initial is None or prior is None:
         say(f"no odometry: initial {initial or 'identity'}, prior {prior or 'none'}", quiet)
     return initial or "identity", prior or "none"
@@ -163,15 +171,26 @@ def _document(
     )
 
 
-def _summary(reference: int, scan: int, match: PairMatch) -> list[str]:
+def _summary(reference: int, scan: int, match: PairMatch) -> list[Row]:
+    import numpy as np
+
     x, y, angle = match.pose.tolist()
     outcome = "converged" if match.converged else f"not converged ({match.reason})"
-    sigma = match.weakest.sigma
-    degrees = round(math.degrees(angle), 2) + 0.0  # never −0.00
-    known = "open" if sigma is None else f"σ {sigma:.3g} m"
+    weakest = match.weakest
+    if match.covariance is None:
+        known = "unknown"
+    else:
+        sigmas = np.sqrt(np.diag(match.covariance))
+        known = f"{sigmas[0]:.2g} m, {sigmas[1]:.2g} m, {math.degrees(sigmas[2]):.2g}°"
+    least = "open" if weakest.sigma is None else f"σ {weakest.sigma:.2g} m"
+    along = f"along {math.degrees(weakest.direction):.1f}° from scan {reference}'s x axis"
+    # Adding 0.0 makes no number −0.
     return [
-        f"scan {scan} in the frame of scan {reference}: {x:.3f} m, {y:.3f} m, {degrees:.2f}°; "
-        f"{outcome}, {match.iterations} iterations, {match.evaluations} evaluations",
-        f"overlap {match.overlap:.0%}; weakest along {math.degrees(match.weakest.direction):.1f}° from "
-        f"scan {reference}'s x axis: {known}",
-    ]
+        ("scan", [f"{scan} in the frame of scan {reference}"]),
+        ("pose", [f"{round(x, 3) + 0.0:.3f} m, {round(y, 3) + 0.0:.3f} m, "
+                  f"{round(math.degrees(angle), 2) + 0.0:.2f}°"]),
+        ("sigma", [known]),
+        ("weakest", [f"{least} {along}"]),
+        ("overlap", [f"{match.overlap:.0%}"]),
+        ("match", [f"{outcome}, {match.iterations} iterations, {match.evaluations} evaluations"]),
+    ]  # fmt: skip

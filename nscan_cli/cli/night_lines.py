@@ -25,11 +25,11 @@ def night_lines(names: list[str], quiet: bool) -> Iterator[Watcher]:
         yield PlainLines(quiet)
         return
     from rich.console import Console
-    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+    from rich.progress import BarColumn, Progress, TextColumn
 
-    columns = (TextColumn("{task.description}"), BarColumn(), TextColumn("{task.fields[detail]}"),
-               TimeElapsedColumn())  # fmt: skip
-    with Progress(*columns, console=Console(stderr=True), refresh_per_second=4) as bars:
+    # The bar has the room that the words leave.
+    columns = (TextColumn("{task.description}"), BarColumn(None), TextColumn("{task.fields[detail]}"))
+    with Progress(*columns, console=Console(stderr=True), refresh_per_second=4, expand=True) as bars:
         yield LiveLines(bars, names)
 
 
@@ -59,9 +59,9 @@ class LiveLines:
         task = self.tasks[name]
         if not self.bars.tasks[task].started:
             self.bars.start_task(task)
-        self.bars.update(
-            task, completed=done, total=total, detail=f"{done}/{total} scans, {keyframes} keyframes"
-        )
+        elapsed = self.bars.tasks[task].elapsed or 0.0
+        detail = f"{done}/{total} scans, {keyframes} keyframes, {elapsed:.0f} s"
+        self.bars.update(task, completed=done, total=total, detail=detail)
 
     def finished(self, entry: Entry, night: Night) -> None:
         """Say in its line what became of it."""

@@ -8,29 +8,34 @@ from typing import TYPE_CHECKING
 
 import click
 
-from nscan_cli.cli.options import CONTEXT, common_options
-from nscan_cli.cli.progress import say
+from nscan_cli.cli.command import FILE, argument, option, subcommand
+from nscan_cli.cli.options import common_options
+from nscan_cli.cli.progress import announce_compiling, say
 from nscan_cli.errors import CheckFailedError, InputMissingError
 from nscan_cli.inputs import base_name
 
 if TYPE_CHECKING:
+    from nscan_cli.nightly.manifest import Entry
     from nscan_cli.nightly.night import Engine, Outcomes
     from nscan_cli.nightly.task import Report, Task
 
 
-@click.command("nightly", context_settings=CONTEXT)
-@click.argument("manifest", metavar="MANIFEST.toml")
-@click.option(
-    "-o", "--output", required=True, metavar="FOLDER", help="Results, history and report; made if new."
+@subcommand(
+    "nightly",
+    ("nscan-cli nightly robots.toml -o nights", "every log of a manifest; again the next night"),
+    ("nscan-cli nightly kuemmerle --data logs -o nights", "a benchmark, with published figures"),
 )
-@click.option("--data", metavar="FOLDER", help="Where the logs are, if not beside the manifest.")
-@click.option("--jobs", type=click.IntRange(1), metavar="N", help="Logs at a time; one a core if not given.")
-@click.option(
-    "--scheduler", metavar="ADDRESS", help="Run on the Dask cluster of this scheduler, tcp://HOST:PORT."
-)
-@click.option("--timeout", type=click.FloatRange(0, min_open=True), default=3600, show_default=True,
-              metavar="S", help="Stop a log that takes longer, seconds.")  # fmt: skip
-@click.option("--force", is_flag=True, help="Do what is up to date as well.")
+@argument("manifest", metavar="MANIFEST.toml", type=FILE, tells="A manifest; or kuemmerle or radish, which "
+          "come with nscan-cli.")  # fmt: skip
+@option("-o", "--output", type=FILE, required=True, metavar="FOLDER",
+        help="Results, history and report; made if new.")  # fmt: skip
+@option("--data", type=FILE, metavar="FOLDER", help="Where the logs are, if not beside the manifest.")
+@option("--jobs", type=click.IntRange(1), metavar="N", help="Logs at a time; one a processor if not given.")
+@option("--scheduler", metavar="ADDRESS",
+        help="Run on the Dask cluster of this scheduler, tcp://HOST:PORT.")  # fmt: skip
+@option("--timeout", type=click.FloatRange(0, min_open=True), default=3600, show_default=True, metavar="S",
+        help="Stop a log that takes longer, seconds.")  # fmt: skip
+@option("--force", is_flag=True, help="Do what is up to date as well.")
 @common_options
 def command(
     manifest: str,
@@ -45,9 +50,10 @@ def command(
 ) -> None:
     """Map and measure every log of MANIFEST.toml, and report what changed since the night before.
 
-    MANIFEST.toml may also be kuemmerle or radish, manifests that come with nscan-cli; --data says then
-    where the logs are. A log is done again when its bytes, its reference, its parameters or the code of
-    nscan-cli have changed, or it failed. Whenever this is stopped, the next call goes on from there.
+    The manifests that come with nscan-cli need --data, the folder of their logs; what is not there is
+    listed with the place to get it from. A log is done again when its bytes, its reference, its parameters
+    or the code of nscan-cli have changed, or it failed. Whenever this is stopped, the next call goes on from
+    there.
 
     FOLDER/report.html and report.json are the report. Exit code 3 when a log fails or is above its bound.
     """
@@ -59,6 +65,9 @@ def command(
 
     entries = read_manifest(manifest, data)
     if not any(entry.is_there for entry in entries):
+        for entry in entries:
+            if "log" in entry.sources:
+                _say_absent(entry, quiet)
         first = entries[0].inputs["log"]
         raise InputMissingError(
             f"{manifest}: none of its logs is there, not even {first}; give --data FOLDER"
@@ -66,18 +75,15 @@ def command(
     with claimed(output) as folder:
         planned = plan(entries, folder, force)
         for entry in planned.absent:
-            source = entry.sources.get("log")
-            say(f"{entry.name}: {entry.inputs['log']} is not there, skipped"
-                + (f"; to be had from {source}" if source else ""), quiet)  # fmt: skip
+            _say_absent(entry, quiet)
         for name, notes in planned.notes.items():
             for note in notes:
                 say(f"{name}: warning: {note}", quiet)
         if planned.to_do or planned.unreadable:
             from nscan_cli.cli.night_lines import night_lines
-            from nscan_cli.compiled import first_compile
 
-            if scheduler is None and first_compile():
-                say("compiling the kernels, once for this version on this machine: about 20 s", quiet)
+            if scheduler is None:
+                announce_compiling(quiet)
             names = [entry.name for entry, _key in planned.to_do]
             with night_lines(names, quiet) as lines:
                 carry_out(planned, folder, _engine(jobs, scheduler, timeout), lines)
@@ -93,6 +99,12 @@ def command(
     if failures:
         raise CheckFailedError(f"{headline(verdicts)}; see {report}")
     say(f"{headline(verdicts)}: {report}", quiet)
+
+
+def _say_absent(entry: Entry, quiet: bool) -> None:
+    source = entry.sources.get("log")
+    remedy = f"; to be had from {source}" if source else ""
+    say(f"{entry.name}: {entry.inputs['log']} is not there, skipped{remedy}", quiet)
 
 
 def _engine(jobs: int | None, scheduler: str | None, timeout: float) -> Engine:

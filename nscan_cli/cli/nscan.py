@@ -8,14 +8,16 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from nscan_cli.cli.command import FILE, log_argument, option, result_option, subcommand
 from nscan_cli.cli.match import with_defaults
-from nscan_cli.cli.options import CONTEXT, common_options, reading_options
-from nscan_cli.cli.output import check_writable, write_whole
+from nscan_cli.cli.options import common_options, reading_options
 from nscan_cli.cli.picture import check_plot, plot_option, write_plot
-from nscan_cli.cli.progress import say
+from nscan_cli.cli.progress import announce_compiling, say
 from nscan_cli.cli.scan_spec import ScanSpecType
+from nscan_cli.cli.summary import Row, table
 from nscan_cli.errors import InputDataError, WrongUsageError
 from nscan_cli.logs.options import ReadingOptions
+from nscan_cli.outputs import check_writable, write_whole
 from nscan_cli.provenance import provenance_of
 
 if TYPE_CHECKING:
@@ -34,43 +36,32 @@ NAMED = 6
 """Weakly held scans that the summary names; the result has all."""
 
 
-@click.command("nscan", context_settings=CONTEXT)
-@click.argument("log")
-@click.option(
-    "--scans", "numbers", type=ScanSpecType(), required=True, help="Such as 10,12,14-20 or 100-190:10."
+@subcommand(
+    "nscan",
+    ("nscan-cli nscan robot.log.gz --scans 100-190:10 -o nscan.json --plot nscan.png", "ten scans"),
+    (
+        "nscan-cli nscan robot.log.gz --scans 10,12,200 --initial robot.json --prior robot.json",
+        "from what a graph knows of them",
+    ),
 )
-@click.option(
-    "--pairs",
-    type=click.Choice(["all", "visible", "overlap"]),
-    default="overlap",
-    show_default=True,
-    help="Which scans are matched with each other: all, those of which one saw the other's position, or "
-    "those that overlap.",
-)
-@click.option(
-    "--gauge",
-    type=click.Choice(["free", "fixed"]),
-    default="free",
-    show_default=True,
-    help="Estimate all poses and take the smallest steps, or hold one scan where it is.",
-)
-@click.option(
-    "--fixed",
-    type=click.IntRange(0),
-    metavar="K",
-    help="The scan that a fixed gauge holds and the covariance is relative to; the first of SPEC.",
-)
-@click.option(
-    "--initial",
-    metavar="odometry|identity|GRAPH.json|TRAJECTORY.tum",
-    help="Poses to start from; the odometry's where the log has it.",
-)
-@click.option(
-    "--prior",
-    metavar="odometry|none|GRAPH.json",
-    help="What is known before matching: odometry (default), or what a graph says of the scans.",
-)
-@click.option("-o", "--output", default="-", metavar="RESULT.json", help="Standard output if not given.")
+@log_argument()
+@option("--scans", "numbers", type=ScanSpecType(), required=True,
+        help="The scans to match, such as 10,12,14-20 or 100-190:10.")  # fmt: skip
+@option("--pairs", type=click.Choice(["all", "visible", "overlap"]), default="overlap", show_default=True,
+        help="Which scans are matched with each other: all, those of which one saw the other's position, "
+        "or those that overlap.")  # fmt: skip
+@option("--gauge", type=click.Choice(["free", "fixed"]), default="free", show_default=True,
+        help="Estimate all poses and take the smallest steps, or hold one scan where it is.")  # fmt: skip
+@option("--fixed", type=click.IntRange(0), metavar="K",
+        help="The scan that a fixed gauge holds and the covariance is relative to; the first of SPEC if not "
+        "given.")  # fmt: skip
+@option("--initial", type=FILE, metavar="odometry|identity|GRAPH.json|TRAJECTORY.tum",
+        help="Poses to start from; if not given, the odometry where the log has it, or else "
+        "identity.")  # fmt: skip
+@option("--prior", type=FILE, metavar="odometry|none|GRAPH.json",
+        help="What is known before matching, or what a graph says of the scans; if not given, the odometry "
+        "where the log has it.")  # fmt: skip
+@result_option
 @plot_option("all scans before and after, with circles at their poses")
 @reading_options
 @common_options
@@ -113,6 +104,7 @@ def command(
     scans = read_log(log, reading)
     rows = [scans.row(number) for number in numbers]
     initial, prior = with_defaults(scans, initial, prior, quiet)
+    announce_compiling(quiet)
     options, model = PairOptions(), MotionModel()
     joint = JointOptions(fixed=0 if gauge == "fixed" else None)
     start, priors, sources = _known(scans, numbers, initial, prior, model)
@@ -143,8 +135,7 @@ def command(
         from nscan_cli.mapping.plots import plot_nscan
 
         write_plot(plot, plot_nscan(numbers, points, start, match, left_out))
-    for line in _summary(numbers, match, left_out):
-        say(line, quiet)
+    say(table(_summary(numbers, match, left_out)), quiet)
 
 
 def _known(
@@ -214,26 +205,24 @@ def _fields(numbers: tuple[int, ...], match: NScanMatch, left_out: list[LeftOut]
     }
 
 
-def _summary(numbers: tuple[int, ...], match: NScanMatch, left_out: list[LeftOut]) -> list[str]:
+def _summary(numbers: tuple[int, ...], match: NScanMatch, left_out: list[LeftOut]) -> list[Row]:
     joint = match.joint
     outcome = "converged" if match.reason is None else f"not converged ({match.reason})"
-    lines = [
-        f"{len(match.kept)} scans, {len(match.pairs)} pairs: {outcome}, {joint.iterations} iterations, "
-        f"{joint.evaluations} evaluations; least overlap {match.overlap.min():.0%}"
-    ]
-    if joint.searched:
-        lines.append("placed by search: the start by itself led to a poorer match")
     weak = [
         _weakly_held(numbers[scan], weakest)
         for scan, weakest in zip(match.kept, match.weakest, strict=True)
         if weakest.is_weak
     ]
-    if weak:
-        more = f" and {len(weak) - NAMED} more" if len(weak) > NAMED else ""
-        lines.append(f"held weakly by the others: {', '.join(weak[:NAMED])}{more}")
-    if left_out:
-        lines.append(f"left out: {_told(numbers, left_out)}")
-    return lines
+    more = [f"and {len(weak) - NAMED} more"] if len(weak) > NAMED else []
+    searched = "by search: the start by itself led to a poorer match"
+    return [
+        ("scans", [f"{len(match.kept)} of {len(numbers)}, matched in {len(match.pairs)} pairs"]),
+        ("overlap", [f"{match.overlap.min():.0%} at least"]),
+        ("match", [f"{outcome}, {joint.iterations} iterations, {joint.evaluations} evaluations"]),
+        ("placed", [searched] if joint.searched else []),
+        ("held weakly", [*weak[:NAMED], *more]),
+        ("left out", [f"scan {numbers[out.scan]} {out.reason}" for out in left_out]),
+    ]
 
 
 def _weakly_held(number: int, weakest: Weakest) -> str:

@@ -5,18 +5,17 @@ from __future__ import annotations
 import functools
 import json
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import click
 
+from nscan_cli.cli.command import COMMON, READING, Option, option
 from nscan_cli.errors import InputDataError
 from nscan_cli.inputs import read_toml
 from nscan_cli.logs.options import ReadingOptions
 
 Command = Callable[..., Any]
-# One prefix for all commands: what is set once in a shell or a Makefile holds for each of them.
-CONTEXT = {"help_option_names": ["-h", "--help"], "auto_envvar_prefix": "NSCAN_CLI"}
 NOT_PARAMETERS = ("config", "dump_config", "quiet", "verbose")
 
 
@@ -47,46 +46,47 @@ def common_options(command: Command) -> Command:
             return None
         return command(*args, **kwargs)
 
-    for option in reversed(
-        [
-            click.option("-q", "--quiet", is_flag=True, help="Say nothing but errors."),
-            click.option("-v", "--verbose", count=True, help="Say more; -vv shows where an error arose."),
-            click.option(
-                "--config",
-                type=click.Path(),
-                is_eager=True,
-                callback=_read_config,
-                help="Read option values from a TOML file.",
-            ),
-            click.option("--dump-config", is_flag=True, help="Print the options in force as TOML, and stop."),
-        ]
-    ):
-        wrapped = option(wrapped)
-    return wrapped
+    say = functools.partial(option, section=COMMON)
+    options = [
+        say("-q", "--quiet", is_flag=True, help="Say nothing but errors."),
+        say("-v", "--verbose", count=True, help="Say more; -vv shows where an error arose."),
+        say("--config", type=click.Path(), metavar="FILE.toml", is_eager=True, callback=_read_config,
+            help="Take option values from a TOML file."),
+        say("--dump-config", is_flag=True, help="Print the options in force as TOML, and stop."),
+    ]  # fmt: skip
+    return _with_options(wrapped, options)
+
+
+def _with_options(command: Command, options: Sequence[Callable[[Command], Command]]) -> Command:
+    """The command with the options, in this order in its help."""
+    for decorator in reversed(options):
+        command = decorator(command)
+    return command
 
 
 def reading_options(command: Command) -> Command:
     """How a log is to be read; the command gets `reading`, a ReadingOptions."""
+    read = functools.partial(option, section=READING)
     options = [
-        click.option("--laser", metavar="TAG", help="Laser of a text log, such as FLASER or laser:0."),
-        click.option("--topic", metavar="TOPIC", help="Laser of an MCAP or a bag, such as /scan."),
-        click.option("--odom-topic", metavar="TOPIC", help="Odometry to use, such as /odom or /tf."),
-        click.option("--mount", type=PoseType(), help="Pose of the laser on the robot (m, degrees)."),
-        click.option("--flip", is_flag=True, help="The laser is mounted upside down."),
-        click.option("--min-range", type=click.FloatRange(0), metavar="M", help="Drop shorter beams."),
-        click.option("--max-range", type=click.FloatRange(0, min_open=True), metavar="M",
-                     help="Take longer beams for no return."),
-        click.option("--angle-min", type=float, metavar="DEG", help="Direction of the first beam."),
-        click.option("--angle-increment", type=float, metavar="DEG", help="Angle from beam to beam."),
-        click.option("--start", type=float, metavar="T", help="Leave out the first T seconds."),
-        click.option("--end", type=float, metavar="T", help="Stop T seconds after the first scan."),
-        click.option("--every", type=click.IntRange(1), default=1, show_default=True, metavar="N",
-                     help="Use every Nth scan."),
-        click.option("--no-odometry", is_flag=True, help="Do as if the log had no odometry."),
-        click.option("--strict", is_flag=True, help="A malformed record is an error, not a warning."),
-        click.option("--salvage", is_flag=True, help="Use what is readable of a damaged or cut-off file."),
-        click.option("--allow-corrected", is_flag=True,
-                     help="Accept a log whose poses a mapper has corrected already."),
+        read("--laser", metavar="TAG", help="Laser of a text log, such as FLASER or laser:0."),
+        read("--topic", metavar="TOPIC", help="Laser of an MCAP or a bag, such as /scan."),
+        read("--odom-topic", metavar="TOPIC", help="Odometry to use, such as /odom or /tf."),
+        read("--mount", type=PoseType(), help="Pose of the laser on the robot (m, degrees)."),
+        read("--flip", is_flag=True, help="The laser is mounted upside down."),
+        read("--min-range", type=click.FloatRange(0), metavar="M", help="Drop shorter beams."),
+        read("--max-range", type=click.FloatRange(0, min_open=True), metavar="M",
+             help="Take longer beams for no return."),
+        read("--angle-min", type=float, metavar="DEG", help="Direction of the first beam."),
+        read("--angle-increment", type=float, metavar="DEG", help="Angle from beam to beam."),
+        read("--start", type=float, metavar="T", help="Leave out the first T seconds."),
+        read("--end", type=float, metavar="T", help="Stop T seconds after the first scan."),
+        read("--every", type=click.IntRange(1), default=1, show_default=True, metavar="N",
+             help="Use every Nth scan."),
+        read("--no-odometry", is_flag=True, help="Do as if the log had no odometry."),
+        read("--strict", is_flag=True, help="A malformed record is an error, not a warning."),
+        read("--salvage", is_flag=True, help="Use what is readable of a damaged or cut-off file."),
+        read("--allow-corrected", is_flag=True,
+             help="Accept a log whose poses a mapper has corrected already."),
     ]  # fmt: skip
 
     @functools.wraps(command)
@@ -114,9 +114,7 @@ def reading_options(command: Command) -> Command:
         )
         return command(*args, reading=reading, **kwargs)
 
-    for option in reversed(options):
-        wrapped = option(wrapped)
-    return wrapped
+    return _with_options(wrapped, options)
 
 
 def _read_config(ctx: click.Context, _param: click.Parameter, value: str | None) -> str | None:
@@ -136,8 +134,7 @@ def _read_config(ctx: click.Context, _param: click.Parameter, value: str | None)
     if not isinstance(own, dict):
         raise InputDataError(value, f"{name} is no table", f"write [{name}], and its options below")
     settings.update(own)
-    options = {_key(param): param for param in ctx.command.params if isinstance(param, click.Option)
-               and param.name not in NOT_PARAMETERS}  # fmt: skip
+    options = {param.long_name: param for param in _parameters(ctx)}
     defaults = {}
     for key, entry in settings.items():
         if key not in options:
@@ -164,22 +161,25 @@ def _as_typed(entry: Any) -> str:
     raise click.BadParameter(f"{str(entry)!r} is neither text, number, true, false nor a list of them")
 
 
-def _key(param: click.Parameter) -> str:
-    return max(param.opts, key=len).lstrip("-")
+def _parameters(ctx: click.Context) -> list[Option]:
+    """The options of the command that a TOML file can have, in the order of --help."""
+    return [
+        param
+        for param in ctx.command.params
+        if isinstance(param, Option) and param.name not in NOT_PARAMETERS
+    ]
 
 
 def _as_toml(ctx: click.Context) -> str:
-    """The command's options in force as a TOML table of its name, in the order of --help."""
+    """The command's options in force as a TOML table of its name."""
     lines = [f"[{ctx.command.name}]"]
-    for param in ctx.command.params:
-        if not isinstance(param, click.Option) or param.name in NOT_PARAMETERS:
-            continue
+    for param in _parameters(ctx):
         value = ctx.params.get(param.name or "")
         if value is None or value == ():
             continue
         if isinstance(param.type, PoseType):
             value = [value[0], value[1], math.degrees(value[2])]
-        lines.append(f"{_key(param)} = {_toml_value(value)}")
+        lines.append(f"{param.long_name} = {_toml_value(value)}")
     return "\n".join(lines) + "\n"
 
 

@@ -7,21 +7,28 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import click
-
+from nscan_cli.cli.command import option
 from nscan_cli.cli.options import Command
-from nscan_cli.cli.output import check_writable, write_whole
 from nscan_cli.errors import WrongUsageError
+from nscan_cli.outputs import check_writable, write_whole
 
 if TYPE_CHECKING:
     from PIL.Image import Image
 
-OTHER_FORMATS = (".bmp", ".eps", ".gif", ".jpeg", ".jpg", ".pdf", ".svg", ".tif", ".tiff", ".webp")
+OTHER_FORMATS = (
+    ".bmp", ".eps", ".gif", ".jpeg", ".jpg", ".pdf", ".pgm", ".ppm", ".svg", ".tif", ".tiff", ".webp",
+)  # fmt: skip
 
 
 def plot_option(shows: str) -> Callable[[Command], Command]:
     """The option; `shows` is what the picture shows."""
-    return click.option("--plot", metavar="PICTURE.png", help=f"Draw {shows}, as a PNG.")
+    return option("--plot", metavar="PICTURE.png", help=f"Draw {shows}, as a PNG.")
+
+
+def check_png(place: str, path: str) -> None:
+    """Refuse a name that says that the picture is of another format. Raises WrongUsageError."""
+    if Path(path).suffix.lower() in OTHER_FORMATS:
+        raise WrongUsageError(f"{place}: pictures are PNG; name it like {Path(path).stem}.png")
 
 
 def check_plot(plot: str | None, output: str | None, inputs: Sequence[str | None]) -> None:
@@ -33,8 +40,7 @@ def check_plot(plot: str | None, output: str | None, inputs: Sequence[str | None
         return
     if plot == "-":
         raise WrongUsageError("--plot -: only the result can go to standard output; name a file")
-    if Path(plot).suffix.lower() in OTHER_FORMATS:
-        raise WrongUsageError(f"--plot {plot}: pictures are PNG; name it like {Path(plot).stem}.png")
+    check_png(f"--plot {plot}", plot)
     file = os.path.realpath(plot)
     if output not in (None, "-") and os.path.realpath(str(output)) == file:
         raise WrongUsageError(f"--plot {plot}: is the result's name too; give each its own")

@@ -15,6 +15,17 @@ def say(message: str, quiet: bool = False) -> None:
         print(message, file=sys.stderr)
 
 
+def announce_compiling(quiet: bool) -> bool:
+    """Say so where the kernels are still to be compiled; whether they are."""
+    # As a whole: what imports names of it counts as a file with kernels, on which their cache hangs.
+    from nscan_cli import compiled
+
+    compiling = compiled.first_compile()
+    if compiling:
+        say("compiling the kernels, once for this version on this machine: about 20 s", quiet)
+    return compiling
+
+
 @contextlib.contextmanager
 def progress(title: str, total: int, quiet: bool) -> Iterator[Advance]:
     """A progress bar, only on a terminal. Yields advance(done, detail), cheap enough to call per scan."""
@@ -39,8 +50,9 @@ def progress(title: str, total: int, quiet: bool) -> Iterator[Advance]:
         def render(self, task: Task) -> Text:
             return Text("" if task.speed is None else f"{task.speed:.0f}/s")
 
-    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), Rate(),
+    columns = (TextColumn("{task.description}"), BarColumn(None), MofNCompleteColumn(), Rate(),
                TextColumn("{task.fields[detail]}"), TimeRemainingColumn())  # fmt: skip
-    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
+    # The bar has the room that the words leave.
+    with Progress(*columns, console=Console(stderr=True), transient=True, expand=True) as bar:
         task = bar.add_task(title, total=total, detail="")
         yield lambda done, detail: bar.update(task, completed=done, detail=detail)

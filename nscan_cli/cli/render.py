@@ -8,45 +8,41 @@ from typing import TYPE_CHECKING
 
 import click
 
+from nscan_cli.cli.command import FILE, argument, option, subcommand
 from nscan_cli.cli.graph_log import find_log, read_graph_log
-from nscan_cli.cli.options import CONTEXT, common_options, reading_options
-from nscan_cli.cli.output import check_writable, is_device, write_whole
+from nscan_cli.cli.options import common_options, reading_options
+from nscan_cli.cli.picture import check_png
 from nscan_cli.cli.progress import say
 from nscan_cli.errors import WrongUsageError
 from nscan_cli.logs.options import ReadingOptions
+from nscan_cli.outputs import check_writable, is_device, write_whole
 
 if TYPE_CHECKING:
     from nscan_cli.mapping.occupancy import OccupancyGrid
 
 
-@click.command("render", context_settings=CONTEXT)
-@click.argument("graph_file", metavar="GRAPH.json")
-@click.argument("log", required=False)
-@click.option("-o", "--output", required=True, metavar="MAP.png", help="The picture; - for standard output.")
-@click.option(
-    "--resolution",
-    type=click.FloatRange(0.001, 10),
-    default=0.05,
-    show_default=True,
-    metavar="M",
-    help="Size of a cell.",
+@subcommand(
+    "render",
+    ("nscan-cli render robot.json robot.log.gz -o robot.png", "a map for robots, robot.png and robot.yaml"),
+    ("nscan-cli render robot.json -o figure.png --style paper", "a figure; the log is beside the graph"),
+    ("nscan-cli render robot.json -o graph.png --trajectory --graph", "the path and the graph over the map"),
 )
-@click.option("--trajectory", is_flag=True, help="Draw the path.")
-@click.option("--graph", is_flag=True, help="Draw keyframes and relations.")
-@click.option("--uncertainty", is_flag=True, help="Draw the uncertainty of the keyframes' positions.")
-@click.option(
-    "--style",
-    type=click.Choice(["map_server", "paper"]),
-    default="map_server",
-    show_default=True,
-    help="A map for robots, or points and path on white with axes.",
-)
-@click.option(
-    "--yaml/--no-yaml",
-    default=None,
-    help="Write MAP.yaml for map_server and Nav2 beside the map; done for plain maps.",
-)
-@click.option("--mcap", metavar="OUT.mcap", help="Map, path, graph and scans for Foxglove and RViz too.")
+@argument("graph_file", metavar="GRAPH.json", type=FILE, tells="A result of slam; - is standard input.")
+@argument("log", required=False, type=FILE,
+          tells="The log that the graph was made from; if not given, it is looked for beside the graph, then "
+          "in the current folder.")  # fmt: skip
+@option("-o", "--output", type=FILE, required=True, metavar="MAP.png",
+        help="The picture; - is standard output.")  # fmt: skip
+@option("--resolution", type=click.FloatRange(0.001, 10), default=0.05, show_default=True, metavar="M",
+        help="Size of a cell.")  # fmt: skip
+@option("--trajectory", is_flag=True, help="Draw the path.")
+@option("--graph", is_flag=True, help="Draw keyframes and relations.")
+@option("--uncertainty", is_flag=True, help="Draw the uncertainty of the keyframes' positions.")
+@option("--style", type=click.Choice(["map_server", "paper"]), default="map_server", show_default=True,
+        help="A map for robots, or points and path on white with axes.")  # fmt: skip
+@option("--yaml/--no-yaml", default=None,
+        help="Write MAP.yaml for map_server and Nav2 beside the map; done for plain maps.")  # fmt: skip
+@option("--mcap", type=FILE, metavar="OUT.mcap", help="Map, path, graph and scans for Foxglove and RViz too.")
 @reading_options
 @common_options
 def command(
@@ -64,12 +60,11 @@ def command(
     quiet: bool,
     **_verbosity: int,
 ) -> None:
-    """Draw the occupancy map of a graph, a result of slam, from the scans of its LOG.
+    """Draw the occupancy map of a graph from the scans of its LOG.
 
-    LOG is looked for beside the graph, then in the current folder, when it is not given; it is read as
-    slam has read it where no option says otherwise. The map is an 8-bit gray PNG with a YAML for
-    map_server and Nav2. With overlays or in the style of a paper it is a picture in colour for people,
-    which robots cannot load: no YAML is written then.
+    LOG is read as slam has read it where no option says otherwise. The map is an 8-bit gray PNG with a
+    YAML for map_server and Nav2. With overlays or in the style of a paper it is a picture in colour for
+    people, which robots cannot load: no YAML is written then.
 
     OUT.mcap is a recording of ROS 2 messages on the topics /map, /path, /graph, /scan, /tf and /tf_static;
     the robot's frame is base_link, that of the result map.
@@ -117,7 +112,11 @@ def command(
 
 
 def check_map_outputs(output: str, yaml: bool) -> None:
-    """Refuse a map, and the YAML beside it, that could never be written. Raises OutputError."""
+    """Refuse a map, and the YAML beside it, that could never be written.
+
+    Raises WrongUsageError and OutputError.
+    """
+    check_png(output, output)
     check_writable(output)
     if yaml:
         if yaml_path(output) == output:

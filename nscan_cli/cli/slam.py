@@ -3,18 +3,22 @@
 from __future__ import annotations
 
 import dataclasses
+import re
+import sys
 import time
+from collections import Counter
 from typing import TYPE_CHECKING
 
 import click
 
-from nscan_cli.cli.options import CONTEXT, common_options, reading_options
-from nscan_cli.cli.progress import progress, say
+from nscan_cli.cli.command import FILE, log_argument, option, subcommand
+from nscan_cli.cli.options import common_options, reading_options
+from nscan_cli.cli.progress import announce_compiling, progress, say
 from nscan_cli.cli.slam_outputs import Outputs
+from nscan_cli.cli.summary import Row, table
 from nscan_cli.errors import InputDataError, InputMissingError, WrongUsageError
 from nscan_cli.inputs import label
 from nscan_cli.logs.options import ReadingOptions
-from nscan_cli.provenance import provenance_of
 
 if TYPE_CHECKING:
     import numpy as np
@@ -28,34 +32,64 @@ MAPPING = ("max_scans", "relations", "no_loops")
 """Options that say how a log is mapped."""
 
 
-@click.command("slam", context_settings=CONTEXT)
-@click.argument("log", required=False)
-@click.option(
-    "-o", "--output", default="-", metavar="GRAPH.json", help="The graph; standard output if not given."
+@subcommand(
+    "slam",
+    ("nscan-cli slam robot.log.gz -o robot.json --map robot.png", "a graph, a map and its YAML"),
+    ("nscan-cli slam robot.mcap --no-odometry -o robot.json", "by the laser alone"),
+    ("nscan-cli slam robot.log.gz -o robot.json --depfile robot.d", "in a Makefile"),
+    ("nscan-cli slam --from robot.json -o refined.json", "a saved graph, optimised and refined again"),
 )
-@click.option("--map", "map_file", metavar="MAP.png", help="The map too, and its YAML beside it.")
-@click.option("--trajectory", metavar="OUT.tum", help="The pose of every scan in TUM's form too.")
-@click.option(
+@log_argument(required=False)
+@option(
+    "-o",
+    "--output",
+    type=FILE,
+    default="-",
+    metavar="GRAPH.json",
+    help="The graph; standard output if not given.",
+)
+@option("--map", "map_file", type=FILE, metavar="MAP.png", help="The map too, and MAP.yaml beside it.")
+@option("--trajectory", type=FILE, metavar="OUT.tum", help="The pose of every scan too, in TUM's form.")
+@option(
     "--g2o",
+    type=FILE,
     metavar="OUT.g2o",
-    help="The keyframes' graph in g2o's form too, nScan relations as pairwise ones.",
+    help="The keyframes' graph too, in g2o's form; nScan relations become pairwise ones.",
 )
-@click.option("--carmen", metavar="OUT.log", help="The log with corrected poses in CARMEN's form too.")
-@click.option(
+@option("--carmen", type=FILE, metavar="OUT.log", help="The log with corrected poses too, in CARMEN's form.")
+@option(
     "--from",
     "from_file",
+    type=FILE,
     metavar="GRAPH",
-    help="Optimise a saved graph (JSON or g2o), and refine it again with its LOG; nothing is tracked.",
+    help="Optimise a saved graph (JSON or g2o) and refine it with its LOG; nothing is tracked.",
 )
-@click.option("--max-scans", type=click.IntRange(3), default=10, show_default=True, metavar="N",
-              help="Most scans in an nScan relation.")  # fmt: skip
-@click.option("--relations", type=click.Choice(["pairwise", "nscan", "both"]), default="both",
-              show_default=True, help="Match scans near each other one by one (pairwise), or jointly "
-              "(nscan; both: and keep the chain of tracking).")  # fmt: skip
-@click.option("--no-loops", is_flag=True, help="Match nothing with what an earlier visit saw: drift stays.")
-@click.option("--threads", type=click.IntRange(1), metavar="N",
-              help="Work in so many threads, with the same result; by default one a processor.")  # fmt: skip
-@click.option("--depfile", metavar="FILE", help="Write what the outputs were made from as a rule for make.")
+@option(
+    "--max-scans",
+    type=click.IntRange(3),
+    default=10,
+    show_default=True,
+    metavar="N",
+    help="Most scans in an nScan relation.",
+)
+@option(
+    "--relations",
+    type=click.Choice(["pairwise", "nscan", "both"]),
+    default="both",
+    show_default=True,
+    help="Match scans near each other one by one (pairwise) or jointly (nscan); both is nscan with the "
+    "whole chain of tracking.",
+)
+@option("--no-loops", is_flag=True, help="Match nothing with what an earlier visit saw: drift stays.")
+@option(
+    "--threads",
+    type=click.IntRange(1),
+    metavar="N",
+    help="Work in so many threads, one a processor if not given; the result is the same.",
+)
+@option(
+    "--depfile", type=FILE, metavar="FILE", help="Write what the outputs were made from as a rule for make."
+)
 @reading_options
 @common_options
 def command(
@@ -81,11 +115,13 @@ def command(
     keyframe when the graph of pairwise and nScan relations is optimised.
 
     With --from, LOG is looked for beside the graph, then in the current folder, when it is not given; it
-    is read, and its scans are matched, with the options that the graph was made with. Without it the
-    graph is optimised only.
+    is read, and its scans are matched, with the options that the graph was made with. When it is not
+    there, the graph is optimised only.
     """
     if log is None and from_file is None:
         raise WrongUsageError("slam: give LOG, or --from GRAPH")
+    if output == "-" and not _given("output") and sys.stdout is not None and sys.stdout.isatty():
+        raise WrongUsageError("slam: the graph is long; give -o GRAPH.json, or -o - to see it here")
     if log == "-" and from_file == "-":
         raise WrongUsageError("standard input (-) can be one input only; give the other by its path")
     if from_file is not None and (reading != ReadingOptions() or _given(*MAPPING)):
@@ -95,23 +131,25 @@ def command(
         )
     outputs = Outputs(output, map_file, trajectory, g2o, carmen, depfile)
     outputs.check([path for path in (from_file, log) if path is not None])
+    from nscan_cli.slam.run import slam_options
     from nscan_cli.threads import available_threads
 
     threads = threads or available_threads()
     began = time.perf_counter()
     if from_file is None:
         assert log is not None
-        run = _map(log, reading, _options(max_scans, relations, no_loops), threads, quiet, verbose)
+        run = _map(log, reading, slam_options(max_scans, relations, not no_loops), threads, quiet, verbose)
     else:
         run = _again(from_file, log, outputs.need_scans, threads, quiet)
         # A log that was found must not be replaced either.
         outputs.check(run.inputs)
     outputs.write(run.graph, run.scans, run.rows, run.inputs)
     seconds = time.perf_counter() - began
-    say(run.summary, quiet)
-    if from_file is None and run.scans is not None:
+    took = [f"{seconds:.1f} s" + (", the kernels' compilation included" if run.compiled else "")]
+    if from_file is None and run.scans is not None and not run.compiled:
         rate, span = len(run.scans) / seconds, float(run.scans.times[-1] - run.scans.times[0])
-        say(f"{seconds:.1f} s, {rate:.0f} scans a second, {span / seconds:.0f} times real time", quiet)
+        took = [f"{took[0]}, {rate:.0f} scans a second, {span / seconds:.0f} times real time"]
+    say(table([*run.summary, ("time", took), ("written", [", ".join(outputs.files())])]), quiet)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -125,19 +163,15 @@ class _Run:
     """(N,) the rows of its scans."""
     inputs: list[str]
     """The paths that were read."""
-    summary: str
+    summary: list[Row]
+    compiled: bool = False
+    """Whether the kernels had to be compiled first."""
 
 
 def _given(*options: str) -> bool:
     """Whether one of the options stands on the command line."""
     sources = [click.get_current_context().get_parameter_source(option) for option in options]
     return any(source is not None and source.name == "COMMANDLINE" for source in sources)
-
-
-def _options(max_scans: int, relations: Relations, no_loops: bool) -> SlamOptions:
-    from nscan_cli.slam.options import NScanOptions, SlamOptions
-
-    return SlamOptions(nscan=NScanOptions(max_scans=max_scans, loops=not no_loops), relations=relations)
 
 
 def _map(
@@ -147,38 +181,51 @@ def _map(
     import numpy as np
 
     from nscan_cli.logs.load import read_log
-    from nscan_cli.slam.pipeline import Slam
+    from nscan_cli.slam.run import map_log
 
     scans = read_log(log, reading)
     for warning in scans.report.notices():
         say(f"warning: {warning}", quiet)
-    _announce_compiling(quiet)
-    slam = Slam(scans, options, threads)
+    compiled = announce_compiling(quiet)
     with progress("mapping", len(scans), quiet) as advance:
-        graph = slam.run(lambda done, keyframes: advance(done, f"{keyframes} keyframes"))
-    parameters = {"reading": dataclasses.asdict(reading), "slam": dataclasses.asdict(options)}
-    graph.provenance = provenance_of([scans.source], parameters)
-    accepted = sum(loop.accepted for loop in graph.loops)
-    summary = (
-        f"{len(scans)} scans, {len(graph.keyframes)} keyframes, {len(graph.pairwise)} pairwise and "
-        f"{len(graph.nscan)} nScan relations\n"
-        f"places seen before: {len(graph.loops)} tried, {accepted} matched, "
-        f"{len(graph.loops) - accepted} refused"
-    )
+
+        def report(done: int, keyframes: int, loops: int) -> None:
+            last = ", closing up" if done == len(scans) else ""
+            advance(done, f"{keyframes} keyframes, {loops} loops{last}")
+
+        slam, graph = map_log(scans, reading, options, threads, report)
+    summary: list[Row] = [
+        ("scans", [f"{len(scans)} in {float(scans.times[-1] - scans.times[0]):.1f} s"]),
+        *_graph_rows(graph),
+    ]
     if verbose:
-        restarts, searches = slam.tracker.restarts, slam.tracker.searches
-        summary += (
-            f"\nwhile tracking: {restarts} starts from other angles, {searches} searches\n"
-            f"large loops: {len(slam.places)} keyframes found at a place seen before by search"
-        )
-    return _Run(graph, scans, np.arange(len(scans)), [log], summary)
+        tracker = slam.tracker
+        summary += [
+            ("tracking", [f"{tracker.restarts} starts from other angles, {tracker.searches} searches"]),
+            ("large loops", [f"{len(slam.places)} keyframes found by search at a place seen before"]),
+        ]
+    return _Run(graph, scans, np.arange(len(scans)), [log], summary, compiled)
 
 
-def _announce_compiling(quiet: bool) -> None:
-    from nscan_cli.compiled import first_compile
+def _graph_rows(graph: Graph) -> list[Row]:
+    """What a graph is made of, and why loops were refused."""
+    from nscan_cli.slam.run import Counts
 
-    if first_compile():
-        say("compiling the kernels, once for this version on this machine: about 20 s", quiet)
+    counts = Counts.of(graph)
+    tried, refused = counts.accepted + counts.refused.total(), counts.refused.total()
+    reasons: Counter[str] = Counter()
+    for reason, count in counts.refused.items():
+        # Alike but for a number of scans.
+        reasons[re.sub(r"\d+", "some", reason)] += count
+    return [
+        ("keyframes", [f"{counts.keyframes}"]),
+        ("relations", [f"{counts.pairwise} pairwise, {counts.nscan} nScan"]),
+        (
+            "loops",
+            [f"{tried} tried, {counts.accepted} accepted, {refused} refused" if tried else "none tried"],
+        ),
+        ("refused", [f"{count}: {reason}" for reason, count in reasons.most_common()]),
+    ]
 
 
 def _again(path: str, log_file: str | None, needs_log: bool, threads: int, quiet: bool) -> _Run:
@@ -195,7 +242,7 @@ def _again(path: str, log_file: str | None, needs_log: bool, threads: int, quiet
     optimum = optimise_graph(graph)
     if not optimum.converged:
         say(f"warning: {path}: the optimum was not reached, its relations contradict each other", quiet)
-    scans, rows, inputs = None, np.arange(0), [path]
+    scans, rows, inputs, compiled = None, np.arange(0), [path], False
     if read is None:
         graph.marginals = marginal_covariances(graph)
     else:
@@ -203,16 +250,17 @@ def _again(path: str, log_file: str | None, needs_log: bool, threads: int, quiet
 
         scans, rows, log_path = read
         inputs.append(log_path)
-        _announce_compiling(quiet)
+        compiled = announce_compiling(quiet)
         graph = refine_again(graph, scans, rows, threads)
     moved = float(np.hypot(*(graph.poses - before)[:, :2].T).max())
-    summary = (
-        f"{len(graph.keyframes)} keyframes, {len(graph.pairwise)} pairwise and {len(graph.nscan)} nScan "
-        f"relations: energy {optimum.energy:.6g} after {optimum.iterations} iterations"
-        + ("" if read is None else ", then refined")
-        + f"; no pose moved by more than {moved:.3g} m"
-    )
-    return _Run(graph, scans, rows, inputs, summary)
+    refined = "" if read is None else ", then refined"
+    outcome = f"energy {optimum.energy:.6g} after {optimum.iterations} iterations{refined}"
+    summary: list[Row] = [
+        *_graph_rows(graph),
+        ("optimised", [outcome]),
+        ("moved", [f"no pose by more than {moved:.3g} m"]),
+    ]
+    return _Run(graph, scans, rows, inputs, summary, compiled)
 
 
 def _log_of(

@@ -7,11 +7,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from nscan_cli.cli.output import check_writable, write_whole
 from nscan_cli.cli.render import check_map_outputs, write_map, yaml_path
 from nscan_cli.errors import InputDataError, WrongUsageError
 from nscan_cli.inputs import label
 from nscan_cli.limits import DISTANCE
+from nscan_cli.outputs import check_writable, write_whole
 
 if TYPE_CHECKING:
     import numpy as np
@@ -37,6 +37,12 @@ class Outputs:
         """Whether the graph alone does not do."""
         return self.map is not None or self.carmen is not None
 
+    def files(self) -> list[str]:
+        """The paths of all outputs, the graph's first; standard output is none."""
+        maps = [] if self.map is None else [self.map, yaml_path(self.map)]
+        paths = [self.graph, *maps, self.trajectory, self.g2o, self.carmen, self.depfile]
+        return [path for path in paths if path not in (None, "-")]
+
     def check(self, inputs: Sequence[str]) -> None:
         """Refuse what can never be written, shares a name, or would replace an input.
 
@@ -47,11 +53,9 @@ class Outputs:
             raise WrongUsageError(
                 "slam: only the graph (-o) can go to standard output; name files for the rest"
             )
-        names = [path for path in (self.graph, *others) if path not in (None, "-")]
         if self.map is not None:
             check_map_outputs(self.map, yaml=True)
-            names += [self.map, yaml_path(self.map)]
-        files = [os.path.realpath(str(name)) for name in names]
+        files = [os.path.realpath(path) for path in self.files()]
         if len(set(files)) < len(files):
             raise WrongUsageError("slam: two outputs have the same name; give each its own")
         for source in inputs:
@@ -101,9 +105,7 @@ class Outputs:
         def escaped(path: str) -> str:
             return path.replace("$", "$$").replace(" ", "\\ ").replace("#", "\\#")
 
-        maps = [] if self.map is None else [self.map, yaml_path(self.map)]
-        outputs = [self.graph, *maps, self.trajectory, self.g2o, self.carmen]
-        targets = " ".join(escaped(path) for path in outputs if path not in (None, "-"))
+        targets = " ".join(escaped(path) for path in self.files() if path != self.depfile)
         # Standard input is no file that make could look for.
         prerequisites = "".join(f" {escaped(path)}" for path in inputs if path != "-")
         return f"{targets}:{prerequisites}\n".encode()

@@ -21,6 +21,8 @@ class Measured:
     evaluation: Evaluation
     trajectory: Trajectory
     reference: Trajectory | None
+    notices: tuple[str, ...] = ()
+    """What a user should know of the files."""
 
 
 def measure(
@@ -34,16 +36,17 @@ def measure(
 
     Raises InputMissingError, InputDataError, and WrongUsageError where the options do not fit a log.
     """
-    trajectory = load_trajectory(result, reading)
+    notices: list[str] = []
+    trajectory = load_trajectory(result, reading, notices)
     on_relations, on_reference, truth = None, None, None
     if relations is not None:
         table = read_relations(relations)
         on_relations = (table, relation_errors(trajectory, table, label(result)))
     if reference is not None:
-        truth = load_reference(reference, reading)
+        truth = load_reference(reference, reading, notices)
         on_reference = (
             base_name(reference),
             trajectory_errors(trajectory, truth, label(result), label(reference)),
         )
     evaluation = Evaluation(base_name(result), len(trajectory), on_relations, on_reference, worst)
-    return Measured(evaluation, trajectory, truth)
+    return Measured(evaluation, trajectory, truth, tuple(notices))

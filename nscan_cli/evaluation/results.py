@@ -5,63 +5,74 @@ from __future__ import annotations
 import io
 from dataclasses import replace
 
-from nscan_cli.errors import InputDataError, WrongUsageError
+from nscan_cli.errors import InputDataError
 from nscan_cli.graph.json_file import parse_graph
 from nscan_cli.graph.tum import Trajectory, parse_tum
-from nscan_cli.inputs import STANDARD_INPUT, label, read_bytes
+from nscan_cli.inputs import label, read_bytes
 from nscan_cli.limits import GRAPH, MB, ExceededError
-from nscan_cli.logs.load import AS_FOUND, read_log, unpacked
+from nscan_cli.logs.load import AS_FOUND, content_of, log_from
 from nscan_cli.logs.options import ReadingOptions
 from nscan_cli.logs.scan import LaserLog
 
 
-def load_trajectory(path: str, options: ReadingOptions = AS_FOUND) -> Trajectory:
+def load_trajectory(
+    path: str, options: ReadingOptions = AS_FOUND, notices: list[str] | None = None
+) -> Trajectory:
     """The poses of all scans of a graph, of a TUM file, or the robot's poses in a (corrected) log.
 
-    Raises InputMissingError, InputDataError, and WrongUsageError where the options do not fit a log.
+    What a user should know of the file is added to the `notices`. Raises InputMissingError,
+    InputDataError, and WrongUsageError where the options do not fit a log.
     """
-    loaded = _load(path, options)
+    loaded = _load(path, options, notices)
     if isinstance(loaded, Trajectory):
         return loaded
     if loaded.odometry is None:
         raise InputDataError(
-            path, "the log has no poses of the robot", "give a graph, a TUM file or another log"
+            label(path), "the log has no poses of the robot", "give a graph, a TUM file or another log"
         )
     return Trajectory.in_order(loaded.times, loaded.odometry, loaded.stamps)
 
 
-def load_reference(path: str, options: ReadingOptions = AS_FOUND) -> Trajectory:
-    """The poses of a TUM file or a graph, or the true poses (TRUEPOS) in a log; raises the same errors."""
-    loaded = _load(path, options)
+def load_reference(
+    path: str, options: ReadingOptions = AS_FOUND, notices: list[str] | None = None
+) -> Trajectory:
+    """The poses of a TUM file or a graph, or the true poses (TRUEPOS) in a log; likewise."""
+    loaded = _load(path, options, notices)
     if isinstance(loaded, Trajectory):
         return loaded
     if loaded.truth is None or loaded.truth_times is None:
         problem = "the log has no true poses (TRUEPOS)"
-        raise InputDataError(path, problem, "give a TUM file or a log with TRUEPOS as the reference")
+        raise InputDataError(label(path), problem, "give a TUM file or a log with TRUEPOS as the reference")
     stamps = [repr(time) for time in loaded.truth_times.tolist()]
     return Trajectory.in_order(loaded.truth_times, loaded.truth, stamps)
 
 
-def _load(path: str, options: ReadingOptions) -> Trajectory | LaserLog:
-    name = label(path)
-    try:
-        data = unpacked(read_bytes(path), name)
-        if data.lstrip().startswith(b"{") or _begins_with_numbers(data):
-            GRAPH.check(len(data) / MB, f"has {len(data) / MB:,.0f} MB")
-    except ExceededError as error:
-        raise InputDataError(name, str(error), error.remedy) from error
+def _load(path: str, options: ReadingOptions, notices: list[str] | None) -> Trajectory | LaserLog:
+    name, stored = label(path), read_bytes(path)
+    notices = [] if notices is None else notices
+    data, lost = content_of(stored, path, options.salvage)
     if not data.strip():
         raise InputDataError(name, "is empty", "give a graph, a TUM file or a log")
-    if data.lstrip().startswith(b"{"):
+    is_graph = data.lstrip().startswith(b"{")
+    if not is_graph and not _begins_with_numbers(data):
+        del data
+        log = log_from(stored, path, replace(options, allow_corrected=True))
+        # That its poses are corrected ones is as it should be; what is lost or skipped is not.
+        told = log.report.notices()[0 if options.salvage else len(log.report.warnings) :]
+        notices += [f"{name}: {notice}" for notice in told]
+        return log
+    try:
+        GRAPH.check(len(data) / MB, f"has {len(data) / MB:,.0f} MB")
+    except ExceededError as error:
+        raise InputDataError(name, str(error), error.remedy) from error
+    if lost is not None:
+        notices.append(f"{name}: {lost}")
+        # The last line is cut off somewhere, and what it still has may be wrong.
+        data = data[: data.rfind(b"\n") + 1]
+    if is_graph:
         graph = parse_graph(data, name)
         return Trajectory.in_order(graph.times, graph.poses, graph.stamps)
-    if _begins_with_numbers(data):
-        return parse_tum(data, name)
-    if path == STANDARD_INPUT:
-        raise WrongUsageError(
-            "-: a log has to be given by its path here; standard input takes a graph or TUM"
-        )
-    return read_log(path, replace(options, allow_corrected=True))
+    return parse_tum(data, name)
 
 
 def _begins_with_numbers(data: bytes) -> bool:

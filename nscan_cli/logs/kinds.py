@@ -1,8 +1,50 @@
-"""Names for files that are not logs that can be read, so that the user learns what was given."""
+"""What a file is, by its content: the forms of log that are read, and names for what is none of them."""
 
 from __future__ import annotations
 
+import importlib
 import re
+from typing import Any, NamedTuple
+
+
+class Form(NamedTuple):
+    """A form of log, and the module that reads it, which is imported when such a log is met.
+
+    The module has `read`, as logs.load.Reader says; for a text without `magic` also `recognises`.
+    """
+
+    name: str
+    module: str
+    magic: bytes | None = None
+    """The first bytes of such a file; None: the module is asked."""
+
+    def fits(self, data: bytes) -> bool:
+        """Whether these bytes are of this form."""
+        if self.magic is not None:
+            return data.startswith(self.magic)
+        recognised: bool = self.reader().recognises(data)
+        return recognised
+
+    def reader(self) -> Any:
+        """The module."""
+        return importlib.import_module(self.module)
+
+
+FORMS: tuple[Form, ...] = (
+    Form("MCAP", "nscan_cli.logs.mcap_log", b"\x89MCAP0\r\n"),
+    Form("ROS 1 bag", "nscan_cli.logs.rosbag1", b"#ROSBAG V2.0\n"),
+    Form("ROS 2 bag", "nscan_cli.logs.rosbag2", b"SQLite format 3\0"),
+    Form("CARMEN text", "nscan_cli.logs.carmen"),
+    Form("Player text", "nscan_cli.logs.player"),
+    Form(".script text", "nscan_cli.logs.script"),
+)
+"""In order of trial. A new form of log is a module and a line here."""
+
+
+def readable() -> str:
+    """The forms that are read, as messages name them."""
+    return f"{', '.join(form.name for form in FORMS)}; plain or packed by gzip"
+
 
 MAGIC = (
     (b"#ROSBAG V", "a ROS 1 bag of an old version"),
@@ -22,6 +64,7 @@ MAGIC = (
 
 TEXT = (
     (rb"\[[\w.-]+\]\s*$", "TOML or INI text"),
+    (rb'\{"format": ?"nscan-pose-graph"', "a pose graph (JSON)"),
     (rb"[{\[]", "JSON text"),
     (rb"<", "HTML or XML text"),
     (rb"(VERTEX_SE2|EDGE_SE2|VERTEX2|EDGE2|VERTEX_SE3:QUAT|EDGE_SE3:QUAT)\s", "a pose graph (g2o or TORO)"),

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import gzip
 import hashlib
-import importlib
 import io
 import zlib
 from dataclasses import replace
@@ -13,8 +12,7 @@ from typing import Protocol
 from nscan_cli.errors import InputDataError
 from nscan_cli.inputs import base_name, in_pieces, label, read_bytes
 from nscan_cli.limits import INPUT, ExceededError
-from nscan_cli.logs import carmen, player, script
-from nscan_cli.logs.kinds import name_of
+from nscan_cli.logs.kinds import FORMS, name_of, readable
 from nscan_cli.logs.options import ReadingOptions
 from nscan_cli.logs.scan import LaserLog, Source
 
@@ -26,26 +24,10 @@ class Reader(Protocol):
         """The scans; `file` is what messages call it. Raises InputDataError and WrongUsageError."""
 
 
-class TextReader(Reader, Protocol):
-    """What a module that reads a form of text has besides."""
-
-    def recognises(self, data: bytes) -> bool:
-        """Whether these bytes are of its form."""
-
-
-BINARY = {
-    b"\x89MCAP0\r\n": "nscan_cli.logs.mcap_log",
-    b"#ROSBAG V2.0\n": "nscan_cli.logs.rosbag1",
-    b"SQLite format 3\0": "nscan_cli.logs.rosbag2",
-}
-"""Modules by the first bytes of what they read; imported when such a log is met."""
-TEXT: tuple[TextReader, ...] = (carmen, player, script)
-"""In order of trial."""
 AS_FOUND = ReadingOptions()
 
 GZIP = b"\x1f\x8b"
 PIECE = 256
-FORMS = "CARMEN or Player text, MCAP, a ROS bag; plain or compressed by gzip"
 UNPACKS = "unpacks to more and more"
 MEND = "fetch the file again, or use what can be read with --salvage"
 
@@ -56,14 +38,18 @@ def read_log(path: str, options: ReadingOptions = AS_FOUND) -> LaserLog:
     Raises InputMissingError when there is nothing to read, InputDataError when it is no log or a damaged
     one, WrongUsageError when the options do not fit it.
     """
-    stored = read_bytes(path)
+    return log_from(read_bytes(path), path, options)
+
+
+def log_from(stored: bytes, path: str, options: ReadingOptions = AS_FOUND) -> LaserLog:
+    """The log in the bytes that `path` has; raises the same errors."""
     name = label(path)
     source = Source(base_name(path), hashlib.sha256(stored).hexdigest(), len(stored))
+    data, lost = content_of(stored, path, options.salvage)
+    del stored
+    if not data.strip():
+        raise InputDataError(name, "is empty", "give a log with laser scans")
     try:
-        data, lost = salvaged(stored) if options.salvage else (unpacked(stored, name), None)
-        del stored
-        if not data.strip():
-            raise InputDataError(name, "is empty", "give a log with laser scans")
         log = _reader(data, name).read(data, name, source, options)
     except ExceededError as error:
         raise InputDataError(name, str(error), error.remedy) from error
@@ -73,15 +59,23 @@ def read_log(path: str, options: ReadingOptions = AS_FOUND) -> LaserLog:
     return replace(log, report=report)
 
 
+def content_of(stored: bytes, path: str, salvage: bool) -> tuple[bytes, str | None]:
+    """What the bytes of `path` hold when they are unpacked, and what was lost when that was allowed.
+
+    Raises InputDataError.
+    """
+    try:
+        return salvaged(stored) if salvage else (unpacked(stored, label(path)), None)
+    except ExceededError as error:
+        raise InputDataError(label(path), str(error), error.remedy) from error
+
+
 def _reader(data: bytes, name: str) -> Reader:
-    for magic, module in BINARY.items():
-        if data.startswith(magic):
-            reader: Reader = importlib.import_module(module)
+    for form in FORMS:
+        if form.fits(data):
+            reader: Reader = form.reader()
             return reader
-    for text in TEXT:
-        if text.recognises(data):
-            return text
-    raise InputDataError(name, f"is {name_of(data)}", f"give a log: {FORMS}")
+    raise InputDataError(name, f"is {name_of(data)}", f"give a log: {readable()}")
 
 
 def unpacked(stored: bytes, name: str) -> bytes:

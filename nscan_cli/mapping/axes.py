@@ -16,7 +16,7 @@ Entry = tuple[str, Colour, str]
 AXES_MARGINS = (64.0, 44.0, 24.0, 64.0)
 """What `axes` needs around the plot, units."""
 CAPTION_MARGINS = (64.0, 48.0, 24.0, 92.0)
-"""What `caption` needs."""
+"""What `caption` and `legend_below` need."""
 FOOTER_MARGINS = (0.0, 0.0, 0.0, 44.0)
 """What `footer` needs."""
 GAP, BETWEEN = 8.0, 22.0
@@ -46,14 +46,20 @@ def axes(canvas: Canvas) -> None:
 
 def caption(canvas: Canvas, title: str, entries: Sequence[Entry]) -> None:
     """Axes, a title above the plot, and a legend below it; over whatever was drawn in the margins."""
-    left, top, right, bottom = canvas.plot
-    canvas.clear_margins()
-    axes(canvas)
+    legend_below(canvas, entries)
+    left, top, right, _bottom = canvas.plot
     # Beside "y (m)".
     start = left + 40 * canvas.unit
     size = TEXT_SIZE * min(1.0, (right - start) / canvas.text_width(title))
     x = max(start, (left + right - canvas.text_width(title, size)) / 2)
     canvas.text((x, top - 16 * canvas.unit), title, "ls", size)
+
+
+def legend_below(canvas: Canvas, entries: Sequence[Entry]) -> None:
+    """Axes, and a legend below the plot; over whatever was drawn in the margins."""
+    left, _top, right, bottom = canvas.plot
+    canvas.clear_margins()
+    axes(canvas)
     legend(canvas, entries, left, right, bottom + 72 * canvas.unit, 0.5)
 
 

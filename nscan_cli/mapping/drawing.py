@@ -10,12 +10,21 @@ from numpy.typing import NDArray
 
 from nscan_cli.graph.model import Graph
 from nscan_cli.logs.scan import LaserLog
-from nscan_cli.mapping.axes import AXES_MARGINS, FOOTER_MARGINS, Entry, axes, footer
+from nscan_cli.mapping.axes import (
+    AXES_MARGINS,
+    CAPTION_MARGINS,
+    FOOTER_MARGINS,
+    Entry,
+    axes,
+    footer,
+    legend_below,
+)
 from nscan_cli.mapping.canvas import (
     BLACK,
     BLUE,
     PURPLE,
     SKY,
+    Bounds,
     Canvas,
 )
 from nscan_cli.mapping.edges import EDGE_COLOURS, edges_by_kind
@@ -32,6 +41,7 @@ FIGURE_PIXELS = 2400
 """Of the longer side of a figure's plot: 20 cm at 300 dots an inch."""
 SOFT_GRAYS = {OCCUPIED: 60, UNKNOWN: 226, FREE: 255}
 """Softer than map_server's, so that colours stand out."""
+FAR_OUT = 5e-4
 SEEN_ELLIPSE = 8.0
 """Units of the longer half axis that an ellipse needs to be seen."""
 
@@ -67,16 +77,29 @@ def draw_figure(
     """Points and path on white with axes in metres, as the paper's Figs. 6 and 7.
 
     Of the points of the scans in `rows` (N,), taken at `poses` (N, 3), those are drawn that lie in
-    occupied cells of the grid: what moved through the scene is left out. Without overlays, the path is
-    drawn.
+    occupied cells of the grid: what moved through the scene is left out. The few points that lie far
+    outside, seen through a window, do not make the picture larger. Without overlays, the path is drawn;
+    what else is drawn, a legend tells.
     """
     points = _points_of_occupied_cells(log, rows, poses, grid)
-    seen = np.concatenate([points, graph.poses[:, :2]])
-    canvas = Canvas.blank(bounds_around(seen), FIGURE_PIXELS, AXES_MARGINS)
+    margins = CAPTION_MARGINS if overlays.graph or overlays.uncertainty else AXES_MARGINS
+    canvas = Canvas.blank(_figure_bounds(points, graph.poses), FIGURE_PIXELS, margins)
     canvas.cloud(points, BLACK, 0.6)
-    _draw_overlays(canvas, graph, overlays if overlays else Overlays(trajectory=True))
-    axes(canvas)
+    entries = _draw_overlays(canvas, graph, overlays if overlays else Overlays(trajectory=True))
+    if margins is CAPTION_MARGINS:
+        legend_below(canvas, entries)
+    else:
+        canvas.clear_margins()
+        axes(canvas)
     return canvas
+
+
+def _figure_bounds(points: Array, poses: Array) -> Bounds:
+    """Around the poses (N, 3), and the points (M, 2) but a share of FAR_OUT on each side."""
+    seen = poses[:, :2]
+    if len(points):
+        seen = np.concatenate([np.quantile(points, [FAR_OUT, 1 - FAR_OUT], axis=0), seen])
+    return bounds_around(seen, spare=0.03)
 
 
 def _draw_overlays(canvas: Canvas, graph: Graph, overlays: Overlays) -> list[Entry]:
@@ -115,7 +138,7 @@ def _draw_graph(canvas: Canvas, graph: Graph) -> list[Entry]:
     """Relations as lines, of an nScan relation from its fixed scan to the others; keyframes as dots."""
     entries: list[Entry] = []
     edges = edges_by_kind(graph)
-    for kind, width in (("nScan", 1.2), ("pairwise", 1.2), ("loop", 2.6)):
+    for kind, width in (("nScan", 1.2), ("pairwise", 1.2), ("loop", 2.0)):
         nodes, colour = edges[kind], EDGE_COLOURS[kind]
         if len(nodes):
             starts, ends = graph.poses[nodes[:, 0], :2], graph.poses[nodes[:, 1], :2]

@@ -13,8 +13,8 @@ from nscan_cli.errors import InputMissingError
 from nscan_cli.inputs import read_bytes
 from nscan_cli.nightly.manifest import Entry
 
-NO_RESULTS = ("cli", "nightly", "exports")
-"""Packages whose code does not go into the results of a night."""
+NO_RESULTS = ("cli", "nightly", "exports", "outputs.py")
+"""Packages and modules whose code does not go into the results of a night."""
 MAKING = ("work.py", "preview.py")
 """But these files of this one do."""
 

@@ -9,8 +9,8 @@ import shutil
 from collections.abc import Iterator
 from pathlib import Path
 
-from nscan_cli.cli.output import TEMPORARY
 from nscan_cli.errors import OutputError
+from nscan_cli.outputs import TEMPORARY
 
 LOCK, SCRATCH = ".lock", ".scratch"
 

@@ -58,7 +58,10 @@ def read_manifest(path: str, data: str | None) -> list[Entry]:
     if path in shipped() and not Path(path).exists():
         file = str(shipped()[path])
         if data is None:
-            raise WrongUsageError(f"nightly: {path} has no logs of its own; give their folder with --data")
+            raise WrongUsageError(
+                f"nightly: {path} has no logs of its own; give their folder with --data FOLDER; an empty one "
+                "lists where to get them"
+            )
     if data is not None:
         folder = Path(data)
         if not folder.is_dir():

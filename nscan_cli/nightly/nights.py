@@ -7,7 +7,7 @@ import json
 from pathlib import Path
 from typing import Any
 
-from nscan_cli.cli.output import write_whole
+from nscan_cli.outputs import write_whole
 
 FILE = "nights.jsonl"
 

@@ -8,7 +8,6 @@ ends itself when its standard input does: whoever started it is gone then.
 from __future__ import annotations
 
 import contextlib
-import dataclasses
 import json
 import os
 import sys
@@ -54,16 +53,21 @@ def work(task: dict[str, Any], outputs: Path, report: Callable[[int, int, int], 
     from nscan_cli.mapping.image import map_png, map_yaml
     from nscan_cli.mapping.occupancy import occupancy_grid
     from nscan_cli.nightly.preview import preview
-    from nscan_cli.provenance import provenance_of
-    from nscan_cli.slam.pipeline import Slam
+    from nscan_cli.slam.run import Counts, map_log, slam_options
 
     began = time.perf_counter()
-    reading, options = reading_of(task["reading"]), _options(task["mapping"])
+    reading, mapping = reading_of(task["reading"]), task["mapping"]
+    options = slam_options(
+        mapping.get("max-scans"), mapping.get("relations"), not mapping.get("no-loops", False)
+    )
     log = read_log(task["inputs"]["log"], reading)
-    slam = Slam(log, options, task["threads"])
-    graph = slam.run(lambda done, keyframes: report(done, len(log), keyframes))
-    parameters = {"reading": dataclasses.asdict(reading), "slam": dataclasses.asdict(options)}
-    graph.provenance = provenance_of([log.source], parameters)
+    _slam, graph = map_log(
+        log,
+        reading,
+        options,
+        task["threads"],
+        lambda done, keyframes, _accepted: report(done, len(log), keyframes),
+    )
     grid = occupancy_grid(log, np.arange(len(log)), graph.poses)
     (outputs / "graph.json").write_bytes(write_graph(graph))
     (outputs / "trajectory.tum").write_bytes(write_tum(graph.stamps, graph.poses))
@@ -73,25 +77,18 @@ def work(task: dict[str, Any], outputs: Path, report: Callable[[int, int, int], 
     picture, overlay = preview(grid, graph)
     (outputs / "preview.png").write_bytes(picture)
     (outputs / "preview.svg").write_bytes(overlay)
-    accepted = sum(loop.accepted for loop in graph.loops)
+    made = Counts.of(graph)
     counts = {
         "scans": len(log),
         "duration": round(float(log.times[-1] - log.times[0]), 3),
-        "keyframes": len(graph.keyframes),
-        "pairwise": len(graph.pairwise),
-        "nscan": len(graph.nscan),
-        "loops": {"accepted": accepted, "refused": len(graph.loops) - accepted},
+        "keyframes": made.keyframes,
+        "pairwise": made.pairwise,
+        "nscan": made.nscan,
+        "loops": {"accepted": made.accepted, "refused": made.refused.total()},
         "warnings": log.report.notices(),
     }
     evaluation = _evaluation(task["inputs"], str(outputs / "graph.json"))
     return {"counts": counts, "evaluation": evaluation, "times": {"seconds": round(seconds, 3)}}
-
-
-def _options(mapping: dict[str, Any]) -> Any:
-    from nscan_cli.slam.options import NScanOptions, SlamOptions
-
-    nscan = NScanOptions(max_scans=mapping.get("max-scans", 10), loops=not mapping.get("no-loops", False))
-    return SlamOptions(nscan=nscan, relations=mapping.get("relations", "both"))
 
 
 def _evaluation(inputs: dict[str, str], graph_file: str) -> dict[str, Any] | None:

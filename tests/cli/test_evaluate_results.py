@@ -70,8 +70,8 @@ def test_every_form_of_a_result_gives_the_same_figures(mapped, capsys, name):
     assert_the_same(found, expected)
 
 
-@pytest.mark.parametrize("name", RESULTS[:2])
-def test_graphs_and_trajectories_may_come_from_standard_input(mapped, capsys, monkeypatch, name):
+@pytest.mark.parametrize("name", RESULTS)
+def test_all_of_them_may_come_from_standard_input(mapped, capsys, monkeypatch, name):
     relations = mapped / "office.relations"
     expected = figures(capsys, str(mapped / name), relations)
     stdin = io.TextIOWrapper(io.BytesIO((mapped / name).read_bytes()))

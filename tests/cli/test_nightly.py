@@ -156,6 +156,15 @@ def test_a_mistake_is_one_line_with_its_code(arguments, code, message, tmp_path,
     assert err.count("\n") == 1
 
 
+def test_where_no_log_is_there_it_is_said_where_to_get_them(tmp_path, capsys):
+    assert run(["nightly", "kuemmerle", "--data", str(tmp_path), "-o", str(tmp_path / "nights")]) == 66
+    *lines, error = capsys.readouterr().err.splitlines()
+    assert error.startswith("nscan-cli: kuemmerle: none of its logs is there")
+    assert [line.partition(":")[0] for line in lines][:4] == ["intel", "fr079", "mit-csail", "mit-killian"]
+    assert all("is not there, skipped; to be had from http" in line for line in lines)
+    assert list(tmp_path.iterdir()) == []
+
+
 def test_the_sample_logs_and_their_manifest(tmp_path):
     assert run(["nightly", str(SAMPLES / "nightly.toml"), "-o", str(tmp_path / "nights"), "-q"]) == 0
 

@@ -34,7 +34,7 @@ def test_a_live_line_for_each_log_and_no_more():
         lines = LiveLines(bars, ["intel", "fr079"])
         lines.progress("intel", 50, 200, 7)
         details = [task.fields["detail"] for task in bars.tasks]
-        assert details == ["50/200 scans, 7 keyframes", ""]
+        assert details == ["50/200 scans, 7 keyframes, 0 s", ""]
         assert [task.percentage for task in bars.tasks] == [25, 0]
         lines.finished(entry("intel"), DONE)
         lines.finished(entry("fr079"), FAILED)

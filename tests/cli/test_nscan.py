@@ -42,7 +42,7 @@ def matched(capsys: pytest.CaptureFixture[str], *arguments: str) -> tuple[dict[s
     assert run(["nscan", *arguments]) == 0
     out, err = capsys.readouterr()
     document: dict[str, Any] = json.loads(out, parse_constant=pytest.fail)
-    return document, err.splitlines()
+    return document, [line for line in err.splitlines() if not line.startswith("compiling")]
 
 
 def graph_of(log: LaserLog, scans: list[int], relations: list[Pairwise] | None = None) -> Graph:
@@ -86,8 +86,9 @@ def test_the_document(capsys, office):
     assert relation.score == min(document["overlap"]) > 0.6
     assert (document["converged"], document["reason"], document["left_out"]) == (True, None, [])
     assert document["provenance"]["inputs"][0]["sha256"] == office.source.sha256
-    assert len(said) == 1
-    assert "4 scans, 12 pairs: converged" in said[0]
+    assert [line.split()[0] for line in said] == ["scans", "overlap", "match"]
+    assert said[0] == "scans    4 of 4, matched in 12 pairs"
+    assert said[2].startswith("match    converged, ")
 
 
 def test_fig_3_of_the_paper_is_known_in_every_direction(capsys):
@@ -158,7 +159,7 @@ def test_relations_of_a_graph_are_priors(tmp_path, capsys, office):
     poses = np.array(document["relation"]["poses"])
     np.testing.assert_allclose(relative(poses[1], poses[0]), step, atol=2e-3)
     assert len(document["provenance"]["inputs"]) == 2
-    assert len(said) == 1
+    assert "warning" not in said[0]
     _, said = matched(capsys, SAMPLE, "--scans", "2016,2024", "--prior", str(path))
     assert "does not connect any two of the scans" in said[0]
 
@@ -176,7 +177,7 @@ def test_a_graph_gives_bounds_where_no_relation_joins_two_scans(tmp_path, capsys
     document, said = matched(capsys, SAMPLE, "--scans", "2000,2008", "--prior", str(path))
     poses = np.array(document["relation"]["poses"])
     np.testing.assert_allclose(relative(poses[1], poses[0]), compose(*steps), atol=2e-3)
-    assert len(said) == 1
+    assert "warning" not in said[0]
 
 
 def test_pairs_are_those_that_were_asked_for(capsys, office):

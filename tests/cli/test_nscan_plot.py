@@ -27,7 +27,7 @@ def test_the_plot_shows_the_start_above_the_result(tmp_path, capsys):
     alone, _ = matched(capsys, *arguments)
     beside, said = matched(capsys, *arguments, "--plot", str(tmp_path / "nscan.png"))
     assert beside == alone
-    assert len(said) == 1
+    assert len(said) == 3
     with Image.open(tmp_path / "nscan.png") as picture:
         assert picture.format == "PNG"
         pixels = np.asarray(picture).astype(int)

@@ -8,8 +8,9 @@ import click
 import pytest
 
 from nscan_cli.cli import main as frame
+from nscan_cli.cli.command import argument, option, subcommand
 from nscan_cli.cli.main import run
-from nscan_cli.cli.options import CONTEXT, common_options, reading_options
+from nscan_cli.cli.options import common_options, reading_options
 from nscan_cli.logs.options import ReadingOptions
 
 
@@ -18,11 +19,12 @@ def calls(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> list[dict[str, Any
     """What the command `info`, replaced by one that does nothing, is called with."""
     seen: list[dict[str, Any]] = []
 
-    @click.command("info", context_settings=CONTEXT)
-    @click.argument("log")
-    @click.option("-o", "--output", default="out.json")
-    @click.option("--resolution", type=click.FloatRange(0, 10), default=0.05)
-    @click.option("--yaml/--no-yaml", default=None)
+    @subcommand("info")
+    @argument("log", tells="a log")
+    @option("-o", "--output", default="out.json")
+    @option("--map", "map_file")
+    @option("--resolution", type=click.FloatRange(0, 10), default=0.05)
+    @option("--yaml/--no-yaml", default=None)
     @reading_options
     @common_options
     def command(**values: Any) -> None:
@@ -72,6 +74,40 @@ def test_flag_before_environment_before_toml_before_default(calls, monkeypatch):
     monkeypatch.setenv("NSCAN_CLI_RESOLUTION", "0.3")
     assert called(calls, *toml)["resolution"] == 0.3
     assert called(calls, *toml, "--resolution", "0.4")["resolution"] == 0.4
+
+
+def test_the_environment_names_options_as_the_command_line_does(calls, monkeypatch):
+    monkeypatch.setenv("NSCAN_CLI_MAP", "map.png")
+    monkeypatch.setenv("NSCAN_CLI_NO_ODOMETRY", "1")
+    monkeypatch.setenv("NSCAN_CLI_MOUNT", "1,2,0")
+    values = called(calls)
+    assert (values["map_file"], values["reading"].odometry) == ("map.png", False)
+    assert values["reading"].mount == (1, 2, 0)
+    monkeypatch.setenv("NSCAN_CLI_MAP_FILE", "other.png")
+    assert called(calls)["map_file"] == "map.png"
+
+
+def test_a_variable_of_one_command_goes_before_that_of_all(calls, monkeypatch, capsys):
+    monkeypatch.setenv("NSCAN_CLI_EVERY", "3")
+    monkeypatch.setenv("NSCAN_CLI_SLAM_EVERY", "4")
+    assert called(calls)["reading"].every == 3
+    monkeypatch.setenv("NSCAN_CLI_INFO_EVERY", "5")
+    monkeypatch.setenv("NSCAN_CLI_INFO_FLIP", "1")
+    assert called(calls)["reading"].every == 5
+    assert called(calls)["reading"].flip
+    assert called(calls, "--every", "6")["reading"].every == 6
+    monkeypatch.setenv("NSCAN_CLI_INFO_EVERY", "often")
+    assert run(["info", "some.log"]) == 2
+    assert "Invalid value for NSCAN_CLI_INFO_EVERY in the environment: 'often'" in capsys.readouterr().err
+
+
+def test_a_wrong_value_in_the_environment_is_said_to_be_there(calls, monkeypatch, capsys):
+    monkeypatch.setenv("NSCAN_CLI_EVERY", "x")
+    assert run(["info", "some.log"]) == 2
+    err = capsys.readouterr().err
+    assert err.startswith("nscan-cli: info: Invalid value for NSCAN_CLI_EVERY in the environment: 'x' is not")
+    assert run(["info", "some.log", "--every", "y"]) == 2
+    assert "Invalid value for '--every'" in capsys.readouterr().err
 
 
 def test_the_config_may_come_after_other_options_and_from_the_environment(calls, monkeypatch):

@@ -115,14 +115,17 @@ def test_a_log_that_is_nowhere_is_named(room, capsys):
     (room / "room.log").unlink()
     assert run(["render", "room.json", "-o", "map.png"]) == 66
     error = capsys.readouterr().err
-    assert "room.json: its log room.log is neither beside it nor in the current folder; give LOG" in error
+    assert (
+        "room.json: its log room.log is neither beside it nor in the current folder; give its path as LOG"
+        in error
+    )
     assert not list(room.glob("map*"))
 
 
 def test_a_graph_without_provenance_needs_a_log(room, capsys):
     (room / "room.json").write_bytes(write_graph(graph_of(b"", provenance={})))
     assert run(["render", "room.json", "-o", "map.png"]) == 66
-    assert "does not name its log; give LOG" in capsys.readouterr().err
+    assert "does not name its log; give its path as LOG" in capsys.readouterr().err
     assert run(["render", "room.json", "room.log", "-o", "map.png"]) == 0
 
 

@@ -200,17 +200,47 @@ def test_the_summary(folder, capsys):
     assert out == ""
     graph = read_graph("graph.json")
     accepted = sum(loop.accepted for loop in graph.loops)
-    scans, seen, speed = err.splitlines()[-3:]
-    assert scans == (
-        f"252 scans, {len(graph.keyframes)} keyframes, {len(graph.pairwise)} pairwise and "
-        f"{len(graph.nscan)} nScan relations"
-    )
+    refused = len(graph.loops) - accepted
+    lines = err.splitlines()
+    assert max(map(len, lines)) <= 80
+    said = {line[:11].strip(): line[11:] for line in lines if line[:11].strip()}
+    assert list(said) == ["scans", "keyframes", "relations", "loops", "refused", "time", "written"]
+    assert said["scans"] == "252 in 502.0 s"
+    assert said["keyframes"] == f"{len(graph.keyframes)}"
+    assert said["relations"] == f"{len(graph.pairwise)} pairwise, {len(graph.nscan)} nScan"
     assert len(graph.loops) > 20
-    assert seen == (
-        f"places seen before: {len(graph.loops)} tried, {accepted} matched, "
-        f"{len(graph.loops) - accepted} refused"
-    )
-    assert re.fullmatch(r"[\d.]+ s, \d+ scans a second, \d+ times real time", speed)
+    assert said["loops"] == f"{len(graph.loops)} tried, {accepted} accepted, {refused} refused"
+    why = [re.match(r"(?:refused)? +(\d+): .", line) for line in lines]
+    assert sum(int(match[1]) for match in why if match) == refused
+    assert re.fullmatch(r"[\d.]+ s, \d+ scans a second, \d+ times real time", said["time"])
+    assert said["written"] == "graph.json"
+
+
+def test_more_is_said_when_asked_and_nothing_with_q(folder, capsys):
+    assert run(["slam", *SHORT, "-v", "-o", "graph.json"]) == 0
+    err = capsys.readouterr().err
+    assert re.search(r"^tracking +\d+ starts from other angles, \d+ searches$", err, re.MULTILINE)
+    assert re.search(r"^large loops +\d+ keyframes found by search", err, re.MULTILINE)
+    assert run(["slam", *SHORT, "-q", "-o", "graph.json"]) == 0
+    assert capsys.readouterr() == ("", "")
+
+
+def test_a_graph_is_not_poured_over_a_terminal_unasked(folder, capsys, monkeypatch):
+    monkeypatch.setattr("sys.stdout.isatty", lambda: True)
+    assert run(["slam", *SHORT]) == 2
+    out, err = capsys.readouterr()
+    assert out == ""
+    assert err == "nscan-cli: slam: the graph is long; give -o GRAPH.json, or -o - to see it here\n"
+
+
+def test_the_progress_has_rate_keyframes_loops_and_time_left(folder, monkeypatch, capsys):
+    """And is there on a terminal only: the other tests see no such line."""
+    monkeypatch.setattr("sys.stderr.isatty", lambda: True)
+    monkeypatch.setenv("COLUMNS", "100")
+    monkeypatch.setenv("TERM", "xterm")
+    assert run(["slam", *SHORT, "--map", "map.png", "-o", "graph.json"]) == 0
+    shown = re.sub(r"\x1b\[[\d;?]*[a-zA-Z]", "", capsys.readouterr().err)
+    assert re.search(r"mapping .*201/201 .*\d+ keyframes, \d+ loops, closing up.* \d:\d\d:\d\d", shown)
 
 
 def test_without_odometry(folder):
@@ -284,5 +314,8 @@ def test_logs_of_a_few_scans(folder, capsys, count):
     (folder / "few.log").write_text(room_log(count))
     assert run(["slam", "few.log", *ALL_OUTPUTS]) == 0
     validate(document_of(folder / "out.json"))
-    assert f"{count} scans, 1 keyframes" in capsys.readouterr().err
+    said = capsys.readouterr().err
+    assert f"scans      {count} in" in said
+    assert "keyframes  1\n" in said
+    assert "loops      none tried\n" in said
     assert (folder / "out.png").exists()

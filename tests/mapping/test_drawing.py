@@ -6,6 +6,7 @@ from nscan_cli.mapping import drawing
 from nscan_cli.mapping.axes import round_length
 from nscan_cli.mapping.canvas import BLUE, DIM, GREEN, PURPLE, SKY, VERMILLION, Canvas
 from nscan_cli.mapping.drawing import Overlays, draw_figure, draw_over_map
+from nscan_cli.mapping.edges import edges_by_kind
 from nscan_cli.mapping.occupancy import OccupancyGrid, occupancy_grid
 from tests.mapping.scenes import half_circle
 
@@ -107,6 +108,49 @@ def test_a_figure_shows_walls_and_path_and_leaves_out_who_walked_by():
     distance = np.hypot(inside[:, 1] - laser[0], inside[:, 0] - laser[1]) / canvas.pixels_per_metre
     assert len(inside) > 100
     assert np.abs(distance - 5.0).max() < 0.1
+
+
+def figure(overlays: Overlays, ranges: np.ndarray | None = None) -> Canvas:
+    """Of a laser at the origin in the middle of a half circle, with the graph of a square."""
+    scans = 20
+    log = half_circle(np.full((scans, 181), 5.0) if ranges is None else ranges)
+    rows, poses = np.arange(scans), np.zeros((scans, 3))
+    return draw_figure(log, rows, poses, occupancy_grid(log, rows, poses), graph_of_a_square(), overlays)
+
+
+def colours_below(canvas: Canvas) -> set[tuple[int, ...]]:
+    """Those of the legend."""
+    below = np.asarray(canvas.image())[canvas.plot[3] + 1 :].reshape(-1, 3)
+    return set(map(tuple, np.unique(below, axis=0).tolist()))
+
+
+def test_a_figure_says_what_its_colours_mean_where_it_has_several():
+    assert BLUE not in colours_below(figure(Overlays(trajectory=True)))
+    assert {SKY, GREEN, DIM, VERMILLION} <= colours_below(figure(Overlays(trajectory=True, graph=True)))
+    assert PURPLE in colours_below(figure(Overlays(uncertainty=True)))
+
+
+def test_a_few_points_far_out_do_not_make_a_figure_larger():
+    ranges = np.full((20, 181), 5.0)
+    plain = figure(Overlays(), ranges)
+    ranges[:, 90] = 40.0
+    ranges[1:, 90] = np.inf
+    seldom = figure(Overlays(), ranges)
+    assert seldom.bounds == pytest.approx(plain.bounds, abs=0.2)
+    ranges[:, 80:100] = 40.0
+    assert figure(Overlays(), ranges).bounds[2] > 39
+
+
+def test_of_a_relation_that_closes_a_loop_the_lines_to_another_visit_are_the_loop():
+    graph = graph_of_a_square()
+    graph.pairwise, graph.nscan = [], [NScan((0, 1, 2, 3), np.zeros((4, 3)), np.eye(12), 0, "loop")]
+    graph.poses = PATH * (5.0, 5.0, 1.0)
+    edges = edges_by_kind(graph)
+    # 20, 40 and 60 m of path away.
+    assert edges["loop"].tolist() == [[0, 2], [0, 3]]
+    assert edges["nScan"].tolist() == [[0, 1]]
+    graph.poses = PATH
+    assert edges_by_kind(graph)["loop"].tolist() == [[0, 1], [0, 2], [0, 3]]
 
 
 @pytest.mark.parametrize(

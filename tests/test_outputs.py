@@ -9,8 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from nscan_cli.cli.output import TEMPORARY, check_writable, whole_file, write_whole
 from nscan_cli.errors import OutputError
+from nscan_cli.outputs import TEMPORARY, check_writable, whole_file, write_whole
 
 
 def names(folder: Path) -> list[str]:
@@ -69,7 +69,7 @@ def test_what_a_killed_process_has_left_is_cleared_away(tmp_path):
     """But not what another one is writing at the moment."""
     for name in ("dead", "dead2"):
         (tmp_path / f"{TEMPORARY}{name}").write_bytes(b"half")
-    other = "import sys; from nscan_cli.cli.output import whole_file\n"
+    other = "import sys; from nscan_cli.outputs import whole_file\n"
     other += "with whole_file('other.json') as file: file.write(b'x'); print(1, flush=True); sys.stdin.read()"
     process = subprocess.Popen(
         [sys.executable, "-c", other], cwd=tmp_path, stdin=subprocess.PIPE, stdout=subprocess.PIPE

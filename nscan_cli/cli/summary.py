@@ -1,0 +1,25 @@
+"""What a command has done, as a table that fits a terminal of 80 columns."""
+
+from __future__ import annotations
+
+import textwrap
+from collections.abc import Sequence
+
+WIDTH = 80
+Row = tuple[str, Sequence[str]]
+"""A title, and the lines beside it; no line, no row."""
+
+
+def table(rows: Sequence[Row], width: int | None = WIDTH) -> str:
+    """The rows with their titles in a column of its own; lines are broken at `width`, where it is given."""
+    filled = [(title, lines) for title, lines in rows if lines]
+    aside = max(len(title) for title, _lines in filled) + 2
+    shown = []
+    for title, lines in filled:
+        if width is not None:
+            broken = textwrap.TextWrapper(width - aside, break_long_words=False, break_on_hyphens=False)
+            lines = [part for line in lines for part in broken.wrap(line)]
+        for line in lines:
+            shown.append(f"{title:{aside}}{line}")
+            title = ""
+    return "\n".join(shown)

@@ -1,0 +1,221 @@
+"""docs/reference.md, made from the commands themselves: python -m tests.reference docs/reference.md"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterable
+
+import click
+
+from nscan_cli.cli.command import (
+    ARGUMENTS,
+    COMMON,
+    CONTEXT,
+    OWN,
+    READING,
+    Argument,
+    Option,
+    Subcommand,
+    section_of,
+)
+from nscan_cli.cli.main import COMMANDS, cli
+from nscan_cli.cli.manual import ENVIRONMENT, EXAMPLES, EXIT_CODES
+from nscan_cli.limits import ALL, Limit
+from nscan_cli.logs.kinds import readable
+from nscan_cli.outputs import write_whole
+
+HEAD = """\
+# Reference
+
+Every command of `nscan-cli` with its arguments, options, files and exit codes. This page is made from the
+commands by `python -m tests.reference docs/reference.md`; do not edit it.
+"""
+GENERAL = f"""\
+`nscan-cli COMMAND [OPTIONS] ARGUMENTS`, or `python -m nscan_cli`. Options may stand before and after
+arguments. A log is found to be of its form from its content, never from its name:
+{readable()}. `-` is standard input or output.
+
+Scans are numbered from 0 in order of time, and have the same numbers in every command. Lengths are metres,
+times seconds, angles radians in files and degrees on the command line and in tables. A pose is x, y and the
+angle from the x axis to the left.
+
+What people read goes to standard error, results go to files or to standard output; of `info` and `evaluate`
+the tables are the result. On a terminal a bar shows scans done, scans a second, keyframes, loops closed and
+the time left; elsewhere nothing does. An error is one line that names the file, the place and what helps;
+`-vv` adds where it arose.
+"""
+CONFIG = """\
+An option's value is taken from the command line, else from the environment, else from the TOML file that
+`--config` names, else from the default. In the file, an option has its long name without dashes. Keys at the
+top hold for every command that is given the file, those in a table of a command's name for that one alone; a
+key that the command does not know is an error. `--dump-config` writes the options in force in this form.
+
+```toml
+max-range = 30.0
+mount = [0.1, 0, 0]      # x, y in m, degrees
+
+[slam]
+no-loops = true
+```
+"""
+MANIFEST = """\
+The manifest of `nightly` has a table for every log. All keys but `name` may be left out; without `path`, a
+log of that name and a usual ending is looked for. Paths are relative to the manifest, or to `--data`.
+
+```toml
+[[log]]
+name = "intel"
+path = "intel.log.gz"
+relations = "intel.relations"              # or reference = "intel.tum", or a log with TRUEPOS
+max_translation = 0.02                     # m; a larger error fails the log
+max_rotation = 0.4                         # degrees
+published = { "Cartographer" = 0.0229 }    # m, shown beside ours
+parameters = { end = 600, max-scans = 8 }  # options of slam and of reading, by their long names
+source = "http://example.org/intel.clf"    # where to get it, said when it is not there
+relations_source = "http://example.org/intel.relations"
+sha256 = "9f86d081884c7d659a2feaa0c55ad015a3bf4f1b2b0b822cd15d6c15b0f00a08"  # of the log that bounds are for
+```
+
+`reference_source`, `relations_sha256` and `reference_sha256` are likewise.
+"""
+FILES = """\
+Files appear whole or not at all: they are written under a name that begins with `.nscan-cli.` in the same
+folder, and renamed. Folders are not made, but for the one of `nightly`. What a killed run has left is cleared
+by the next.
+"""
+WRITTEN = (
+    ("GRAPH.json", "`slam -o`", "the pose graph, described by the JSON Schema that it names; read by "
+     "`render`, `evaluate`, `nscan`, `slam --from`"),
+    ("MAP.png, MAP.yaml", "`slam --map`, `render -o`", "8-bit gray (0 occupied, 205 unknown, 254 free), its "
+     "place and its scale, for map_server and Nav2"),
+    ("OUT.tum", "`slam --trajectory`", "`t x y z qx qy qz qw`, the pose of every scan"),
+    ("OUT.g2o", "`slam --g2o`", "`VERTEX_SE2`, `EDGE_SE2` and `FIX` for the keyframes"),
+    ("OUT.log", "`slam --carmen`", "CARMEN text: the log with corrected poses"),
+    ("OUT.mcap", "`render --mcap`", "a ROS 2 recording: `/map`, `/path`, `/graph`, `/scan`, "
+     "`/tf`, `/tf_static`"),
+    ("RESULT.json", "`match`, `nscan`", "poses, Hessian and covariance; matrices as upper "
+     "triangles, row by row"),
+    ("PICTURE.png", "`--plot`", "a picture for people"),
+    ("FILE", "`slam --depfile`", "`outputs: inputs` for `include` in a Makefile"),
+    ("FOLDER", "`nightly -o`", "report.html, report.json, and for each log a folder with graph, trajectory, "
+     "map and history"),
+    ("~/.cache/nscan-cli", "all that match", "compiled kernels; may be deleted at any time"),
+)  # fmt: skip
+COMPLETION = """\
+Commands, options, choices and file names are completed by the shell after one of these lines, in the file
+that the comment names (bash from 4.4):
+
+```sh
+eval "$(_NSCAN_CLI_COMPLETE=bash_source nscan-cli)"    # ~/.bashrc
+eval "$(_NSCAN_CLI_COMPLETE=zsh_source nscan-cli)"     # ~/.zshrc
+_NSCAN_CLI_COMPLETE=fish_source nscan-cli | source     # ~/.config/fish/completions/nscan-cli.fish
+```
+"""
+
+
+def reference() -> str:
+    """The page, Markdown with a final line feed."""
+    context = click.Context(cli, info_name="nscan-cli")
+    commands = {name: _command(context, name) for name in COMMANDS}
+    first = commands["info"]
+    titles = ["All commands", *(f"nscan-cli {name}" for name in COMMANDS), READING, COMMON, "Exit codes",
+              "Environment", "Settings in a file", "Manifest", "Files", "Completion"]  # fmt: skip
+    parts = [
+        HEAD,
+        "".join(f"- [{title}](#{title.lower().replace(' ', '-')})\n" for title in titles),
+        "## All commands\n\n" + GENERAL,
+        _examples(EXAMPLES),
+        *(_chapter(context, command) for command in commands.values()),
+        f"## {READING}\n\nOptions of the commands that read a log.\n\n" + _options(first, READING),
+        f"## {COMMON}\n\n" + _options(first, COMMON),
+        "## Exit codes\n\n" + _table(("code", "meaning"), ((str(c), m) for c, m in EXIT_CODES.items())),
+        "## Environment\n\n" + _table(("variable", "what it does"), _variables()),
+        "## Settings in a file\n\n" + CONFIG,
+        "## Manifest\n\n" + MANIFEST,
+        "## Files\n\n" + FILES,
+        _table(("file", "by", "what"), WRITTEN),
+        "## Completion\n\n" + COMPLETION,
+    ]
+    return "\n".join(parts)
+
+
+def _command(context: click.Context, name: str) -> Subcommand:
+    command = cli.get_command(context, name)
+    assert isinstance(command, Subcommand)
+    return command
+
+
+def _context(command: Subcommand, parent: click.Context | None = None) -> click.Context:
+    return click.Context(command, info_name=command.name, parent=parent, **CONTEXT)
+
+
+def _chapter(parent: click.Context, command: Subcommand) -> str:
+    """All of one command; options that others have too stand in chapters of their own."""
+    context = _context(command, parent)
+    assert command.help is not None
+    shared = [
+        f"[{title}](#{title.lower().replace(' ', '-')})"
+        for title in (READING, COMMON)
+        if command.records(context, title)
+    ]
+    parts = [
+        f"## nscan-cli {command.name}\n",
+        f"`{command.get_usage(context).removeprefix('Usage: ')}`\n",
+        "\n\n".join(" ".join(part.split()) for part in command.help.split("\n\n")) + "\n",
+        _table(
+            ("argument", "what it is"),
+            (_code_first(command.records(context, ARGUMENTS))),
+        ),
+        _options(command, OWN),
+        f"And the options of {' and '.join(shared)}.\n",
+        _examples(command.examples),
+    ]
+    return "\n".join(parts)
+
+
+def _code_first(rows: Iterable[tuple[str, str]]) -> Iterable[tuple[str, str]]:
+    return ((f"`{name}`", meaning) for name, meaning in rows)
+
+
+def _options(command: Subcommand, section: str) -> str:
+    """The table of a section's options; the names of their variables follow from theirs."""
+    context = _context(command)
+    rows = []
+    for parameter in command.get_params(context):
+        if section_of(parameter) != section or isinstance(parameter, Argument):
+            continue
+        assert isinstance(parameter, click.Option)
+        record = parameter.get_help_record(context)
+        assert record is not None
+        extra = parameter.get_help_extra(context)
+        limits = "required" if "required" in extra else extra.get("range", "")
+        default = extra.get("default", "")
+        variable = f"`{parameter.envvar}`" if isinstance(parameter, Option) else ""
+        rows.append((f"`{record[0]}`", default, limits, parameter.help or "", variable))
+    return _table(("option", "default", "values", "what it does", "variable"), rows)
+
+
+def _variables() -> Iterable[tuple[str, str]]:
+    yield from _code_first(ENVIRONMENT.items())
+    for limit in ALL:
+        yield f"`{limit.variable}`", f"at most {_shown(limit)}; see [limits](limits.md)"
+
+
+def _shown(limit: Limit) -> str:
+    """The default, whatever is set where this page is made."""
+    number = f"{limit.default:,.0f}" if limit.default < 1e9 else f"{limit.default:g}"
+    return f"{number} {limit.unit}".strip()
+
+
+def _examples(examples: Iterable[tuple[str, str]]) -> str:
+    lines = "".join(f"# {purpose}\n{line}\n" for line, purpose in examples)
+    return f"```sh\n{lines}```\n"
+
+
+def _table(head: tuple[str, ...], rows: Iterable[tuple[str, ...]]) -> str:
+    lines = [head, tuple("---" for _ in head), *rows]
+    return "".join(f"| {' | '.join(cell.replace('|', chr(92) + '|') for cell in line)} |\n" for line in lines)
+
+
+if __name__ == "__main__":
+    write_whole(sys.argv[1], reference().encode())
