@@ -4,7 +4,7 @@ VENV := .venv
 RUN := $(VENV)/bin
 READY := $(VENV)/.ready
 
-.PHONY: map test lint samples figures reference bench robustness soak lowest lock clean
+.PHONY: map test lint samples figures reference bench growth robustness soak lowest lock clean
 
 map: $(READY)
 	mkdir -p out
@@ -30,6 +30,10 @@ reference: $(READY)
 bench: $(READY)
 	mkdir -p out
 	$(RUN)/python -m tests.benchmarks out/bench.json
+
+growth: $(READY)
+	mkdir -p out
+	$(RUN)/python -m tests.benchmarks.growth out/growth.json docs/pictures/growth.png
 
 robustness: $(READY)
 	$(RUN)/python -m tests.benchmarks.robustness docs/robustness.md

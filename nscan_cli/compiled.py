@@ -78,10 +78,10 @@ def _forgive(cache: Any) -> None:
     cache.load_overload, cache.save_overload = load_if_sound, save_if_possible
 
 
-def first_compile() -> bool:
-    """Whether the kernels are still to be compiled: nothing is in the cache folder, or there is none."""
+def first_compile(name: str) -> bool:
+    """Whether the kernel `name` is still to be compiled: it is not in the cache folder, or there is none."""
     folder = cache_folder()
-    return folder is None or next(folder.rglob("*.nbi"), None) is None
+    return folder is None or next(folder.rglob(f"*.{name}-*.nbi"), None) is None
 
 
 @functools.cache

@@ -91,7 +91,7 @@ def command(
     scans = read_log(log, reading)
     rows = scans.row(reference), scans.row(scan)
     initial, prior = with_defaults(scans, initial, prior, quiet)
-    announce_compiling(quiet)
+    announce_compiling("minimise", quiet)
     options, model = PairOptions(), MotionModel()
     start = _start(scans, rows, initial)
     known = None

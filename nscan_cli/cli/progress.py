@@ -15,12 +15,12 @@ def say(message: str, quiet: bool = False) -> None:
         print(message, file=sys.stderr)
 
 
-def announce_compiling(quiet: bool) -> bool:
-    """Say so where the kernels are still to be compiled; whether they are."""
+def announce_compiling(kernel: str, quiet: bool) -> bool:
+    """Say so where the kernels are still to be compiled, among them one that is needed; whether they are."""
     # As a whole: what imports names of it counts as a file with kernels, on which their cache hangs.
     from nscan_cli import compiled
 
-    compiling = compiled.first_compile()
+    compiling = compiled.first_compile(kernel)
     if compiling:
         say("compiling the kernels, once for this version on this machine: about 20 s", quiet)
     return compiling

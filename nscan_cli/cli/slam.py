@@ -186,7 +186,7 @@ def _map(
     scans = read_log(log, reading)
     for warning in scans.report.notices():
         say(f"warning: {warning}", quiet)
-    compiled = announce_compiling(quiet)
+    compiled = announce_compiling("match_and_count", quiet)
     with progress("mapping", len(scans), quiet) as advance:
 
         def report(done: int, keyframes: int, loops: int) -> None:
@@ -250,7 +250,7 @@ def _again(path: str, log_file: str | None, needs_log: bool, threads: int, quiet
 
         scans, rows, log_path = read
         inputs.append(log_path)
-        compiled = announce_compiling(quiet)
+        compiled = announce_compiling("match_and_count", quiet)
         graph = refine_again(graph, scans, rows, threads)
     moved = float(np.hypot(*(graph.poses - before)[:, :2].T).max())
     refined = "" if read is None else ", then refined"

@@ -71,7 +71,9 @@ class Outputs:
     ) -> None:
         """Write all; `rows` (N,) are those of the graph's scans, `inputs` what the depfile names."""
         from nscan_cli.graph.json_file import write_graph
+        from nscan_cli.memory import give_back
 
+        give_back()
         farthest = float(abs(graph.poses[:, :2]).max())
         if farthest > DISTANCE.value:
             problem = f"leads to a pose {farthest:.3g} m away, which no graph may have"

@@ -163,7 +163,7 @@ def _points_of_occupied_cells(
     """(M, 2) the end points of the beams, m, that lie in occupied cells."""
     points = np.concatenate([transform(pose, log.points(row)) for row, pose in zip(rows, poses, strict=True)])
     columns, lines = np.floor((points - np.array(grid.origin)) / grid.resolution).astype(np.int64).T
-    height, width = grid.hits.shape
+    height, width = grid.shape
     inside = (columns >= 0) & (columns < width) & (lines >= 0) & (lines < height)
     points, columns, lines = points[inside], columns[inside], lines[inside]
     occupied: Array = points[grid.states()[lines, columns] == OCCUPIED]

@@ -32,7 +32,12 @@ def gray(grid: OccupancyGrid, grays: dict[int, int] = MAP_GRAYS) -> Gray:
     table = np.zeros(256, dtype=np.uint8)
     for state, value in grays.items():
         table[state % 256] = value
-    return table[grid.states().view(np.uint8)[::-1]]
+    cells = grid.states().view(np.uint8)
+    # In place, two rows at a time: a map can be large.
+    for low in range((len(cells) + 1) // 2):
+        pair = [low, len(cells) - 1 - low]
+        cells[pair] = table[cells[pair[::-1]]]
+    return cells
 
 
 def map_png(grid: OccupancyGrid) -> bytes:

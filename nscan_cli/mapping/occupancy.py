@@ -1,22 +1,22 @@
 """Poses + scans → how often each cell of the floor was hit by a beam and how often passed through.
 
-Rays are followed cell by cell (J. Amanatides, A. Woo, "A fast voxel traversal algorithm for ray
-tracing", 1987). A cell's share of hits estimates how likely it reflects a beam (the counting model of
-S. Thrun, W. Burgard, D. Fox, "Probabilistic Robotics", 2005, 9.2).
+A cell's share of hits estimates how likely it reflects a beam (the counting model of S. Thrun, W. Burgard,
+D. Fox, "Probabilistic Robotics", 2005, 9.2).
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Callable
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from nscan_cli.compiled import kernel
 from nscan_cli.errors import WrongUsageError
 from nscan_cli.limits import MAP_CELLS
 from nscan_cli.logs.scan import LaserLog
+from nscan_cli.mapping.casting import TILE, Tiles, counted, extent
 from nscan_cli.poses import Array
 
 RESOLUTION = 0.05
@@ -36,24 +36,56 @@ LEAST_HITS = 2
 FREE, OCCUPIED, UNKNOWN = 0, 100, -1
 """The states of a cell, with the values of ROS's OccupancyGrid message."""
 
+Number = TypeVar("Number", bound=np.integer[Any])
 
-@dataclass(frozen=True)
+
 class OccupancyGrid:
     """Counts of a grid of H × W cells; row 0 is the row of least y, column 0 that of least x."""
 
-    hits: NDArray[np.int32]
-    """(H, W) how many beams end in the cell."""
-    misses: NDArray[np.int32]
-    """(H, W) how many beams pass through the cell or start in it, and end in another."""
-    resolution: float
-    """Size of a cell, m."""
-    origin: tuple[float, float]
-    """x, y (m) of the lower left corner of the cell (0, 0)."""
+    def __init__(
+        self,
+        hits: NDArray[np.int32],
+        misses: NDArray[np.int32],
+        resolution: float,
+        origin: tuple[float, float],
+    ) -> None:
+        """Take hits and misses (H, W) as the properties have them."""
+        self._take(_tiled(hits, misses), hits.shape, resolution, origin)
+
+    @classmethod
+    def of_tiles(
+        cls, tiles: Tiles, shape: tuple[int, int], resolution: float, origin: tuple[float, float]
+    ) -> OccupancyGrid:
+        """The grid of `shape` (H, W) with the counts of its tiles."""
+        grid = cls.__new__(cls)
+        grid._take(tiles, shape, resolution, origin)
+        return grid
+
+    def _take(
+        self, tiles: Tiles, shape: tuple[int, ...], resolution: float, origin: tuple[float, float]
+    ) -> None:
+        self._tiles = tiles
+        self.shape = shape[0], shape[1]
+        """H, W"""
+        self.resolution = resolution
+        """Size of a cell, m."""
+        self.origin = origin
+        """x, y (m) of the lower left corner of the cell (0, 0)."""
+
+    @property
+    def hits(self) -> NDArray[np.int32]:
+        """(H, W) how many beams end in the cell."""
+        return self._whole(lambda counts: counts[:, 0], 0)
+
+    @property
+    def misses(self) -> NDArray[np.int32]:
+        """(H, W) how many beams pass through the cell or start in it, and end in another."""
+        return self._whole(lambda counts: counts[:, 1], 0)
 
     @property
     def bounds(self) -> tuple[float, float, float, float]:
         """The least x, least y, greatest x and greatest y (m) that the grid covers."""
-        (height, width), (x, y) = self.hits.shape, self.origin
+        (height, width), (x, y) = self.shape, self.origin
         return x, y, x + width * self.resolution, y + height * self.resolution
 
     def states(self) -> NDArray[np.int8]:
@@ -62,12 +94,39 @@ class OccupancyGrid:
         A cell that was passed through but not hit often enough to be occupied is free; one that was only
         hit, by a single beam, stays unknown.
         """
-        states = np.full(self.hits.shape, UNKNOWN, dtype=np.int8)
-        states[self.misses > 0] = FREE
-        hit = np.flatnonzero(self.hits.ravel() >= LEAST_HITS)
-        hits, misses = self.hits.ravel()[hit], self.misses.ravel()[hit]
-        states.ravel()[hit[hits >= OCCUPIED_SHARE * (hits + misses)]] = OCCUPIED
-        return states
+        return self._whole(_states, UNKNOWN)
+
+    def _whole(
+        self, of_tiles: Callable[[NDArray[np.int32]], NDArray[Number]], elsewhere: int
+    ) -> NDArray[Number]:
+        """(H, W) what is made of the counts (n, 2, TILE, TILE) of tiles; `elsewhere` where there are none."""
+        (height, width), index, counts = self.shape, *self._tiles
+        whole = np.full((height, width), elsewhere, dtype=of_tiles(counts[:0]).dtype)
+        for row, numbers in enumerate(index):
+            columns = np.flatnonzero(numbers >= 0)
+            lines = whole[row * TILE : (row + 1) * TILE]
+            for column, tile in zip(columns.tolist(), of_tiles(counts[numbers[columns]]), strict=True):
+                part = lines[:, column * TILE : (column + 1) * TILE]
+                part[:] = tile[: part.shape[0], : part.shape[1]]
+        return whole
+
+
+def _states(counts: NDArray[np.int32]) -> NDArray[np.int8]:
+    """(n, TILE, TILE) the states of tiles with the counts (n, 2, TILE, TILE)."""
+    hits, misses = counts[:, 0], counts[:, 1]
+    states = np.where(misses > 0, np.int8(FREE), np.int8(UNKNOWN))
+    states[(hits >= LEAST_HITS) & (hits >= OCCUPIED_SHARE * (hits + misses))] = OCCUPIED
+    return states
+
+
+def _tiled(hits: NDArray[np.int32], misses: NDArray[np.int32]) -> Tiles:
+    """The tiles of counts (H, W), all of them."""
+    height, width = hits.shape
+    rows, columns = -(-height // TILE), -(-width // TILE)
+    padded = np.zeros((2, rows * TILE, columns * TILE), dtype=np.int32)
+    padded[:, :height, :width] = hits, misses
+    counts = padded.reshape(2, rows, TILE, columns, TILE).transpose(1, 3, 0, 2, 4).reshape(-1, 2, TILE, TILE)
+    return Tiles(np.arange(len(counts), dtype=np.int32).reshape(rows, columns), np.ascontiguousarray(counts))
 
 
 def occupancy_grid(
@@ -84,7 +143,7 @@ def occupancy_grid(
         raise WrongUsageError(f"{log.source.name}: no scans to draw a map of; choose some")
     lasers = np.ascontiguousarray(log.laser_pose(poses))
     scans = (np.asarray(rows, dtype=np.int64), log.ranges, log.angle_min, log.angle_increment, lasers)
-    low_x, low_y, high_x, high_y = _extent(*scans, REACH)
+    low_x, low_y, high_x, high_y = extent(*scans, REACH)
     # One cell to spare: the border of the map is then free of what is drawn in it, and rounding harmless.
     left, bottom = math.floor(low_x / resolution) - 1, math.floor(low_y / resolution) - 1
     width = math.floor(high_x / resolution) + 2 - left
@@ -97,102 +156,12 @@ def occupancy_grid(
             f"a map of {high_x - low_x:.0f} m × {high_y - low_y:.0f} m would have {width * height:,} cells "
             f"of {resolution:g} m, more than {most:,.0f}; {remedy}, or set {MAP_CELLS.variable} higher"
         )
-    hits, misses = np.zeros((height, width), dtype=np.int32), np.zeros((height, width), dtype=np.int32)
-    _cast(*scans, REACH, resolution, left, bottom, hits, misses)
-    return OccupancyGrid(hits, misses, resolution, (left * resolution, bottom * resolution))
+    shape, corner = (height, width), (left * resolution, bottom * resolution)
+    tiles = counted(scans, REACH, shape, resolution, left, bottom)
+    return OccupancyGrid.of_tiles(tiles, shape, resolution, corner)
 
 
 def _rounded_up(value: float) -> float:
     """To two significant digits, never less than `value`."""
     unit = 10.0 ** (math.floor(math.log10(value)) - 1)
     return round(math.ceil(value / unit) * unit, 12)
-
-
-@kernel
-def _extent(
-    rows: NDArray[np.int64],
-    ranges: NDArray[np.float32],
-    angle_min: Array,
-    angle_increment: Array,
-    lasers: Array,
-    reach: float,
-) -> tuple[float, float, float, float]:
-    """The least x and y and the greatest x and y of the lasers (N, 3) and of their beams' ends."""
-    low_x = high_x = lasers[0, 0]
-    low_y = high_y = lasers[0, 1]
-    for k in range(len(rows)):
-        row = rows[k]
-        x, y, heading = lasers[k]
-        low_x, high_x = min(low_x, x), max(high_x, x)
-        low_y, high_y = min(low_y, y), max(high_y, y)
-        for beam in range(ranges.shape[1]):
-            r = float(ranges[row, beam])
-            if not np.isfinite(r):
-                continue
-            angle = heading + angle_min[row] + beam * angle_increment[row]
-            end_x = x + min(r, reach) * np.cos(angle)
-            end_y = y + min(r, reach) * np.sin(angle)
-            low_x, high_x = min(low_x, end_x), max(high_x, end_x)
-            low_y, high_y = min(low_y, end_y), max(high_y, end_y)
-    return low_x, low_y, high_x, high_y
-
-
-@kernel
-def _cast(
-    rows: NDArray[np.int64],
-    ranges: NDArray[np.float32],
-    angle_min: Array,
-    angle_increment: Array,
-    lasers: Array,
-    reach: float,
-    resolution: float,
-    left: int,
-    bottom: int,
-    hits: NDArray[np.int32],
-    misses: NDArray[np.int32],
-) -> None:
-    """Add the beams of all scans to `hits` and `misses` (H, W).
-
-    Cell (0, 0) of the arrays has its lower left corner at (left, bottom) · resolution.
-    """
-    for k in range(len(rows)):
-        row = rows[k]
-        x = lasers[k, 0] / resolution - left
-        y = lasers[k, 1] / resolution - bottom
-        for beam in range(ranges.shape[1]):
-            r = float(ranges[row, beam])
-            if not np.isfinite(r):
-                continue
-            angle = lasers[k, 2] + angle_min[row] + beam * angle_increment[row]
-            length = min(r, reach) / resolution
-            end_x, end_y = x + length * np.cos(angle), y + length * np.sin(angle)
-            _pass(x, y, end_x, end_y, misses)
-            if r <= reach:
-                hits[int(end_y), int(end_x)] += 1
-
-
-@kernel
-def _pass(x: float, y: float, end_x: float, end_y: float, misses: NDArray[np.int32]) -> None:
-    """Count the cells from (x, y) up to, and without, the cell of the end as missed; in cells.
-
-    `t` grows from 0 to 1 along the ray; a ray through a corner takes the step in y first.
-    """
-    column, line = int(x), int(y)
-    dx, dy = end_x - x, end_y - y
-    steps_x, steps_y = abs(int(end_x) - column), abs(int(end_y) - line)
-    step_x, step_y = (1 if dx > 0 else -1), (1 if dy > 0 else -1)
-    between_x = 1 / abs(dx) if steps_x > 0 else np.inf
-    between_y = 1 / abs(dy) if steps_y > 0 else np.inf
-    next_x = ((column + 1 - x) if dx > 0 else (x - column)) * between_x if steps_x > 0 else np.inf
-    next_y = ((line + 1 - y) if dy > 0 else (y - line)) * between_y if steps_y > 0 else np.inf
-    while steps_x + steps_y > 0:
-        misses[line, column] += 1
-        # The counts of steps decide at the end, so that rounding never leads past the cell of the end.
-        if steps_y == 0 or (steps_x > 0 and next_x < next_y):
-            column += step_x
-            next_x += between_x
-            steps_x -= 1
-        else:
-            line += step_y
-            next_y += between_y
-            steps_y -= 1

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.linalg import eigh
 
 from nscan_cli.matching.joint_energy import JointProblem, joint_energy, no_priors
 from nscan_cli.poses import Array
@@ -19,6 +18,8 @@ def back_to_priors(problem: JointProblem, poses: Array) -> Array | None:
     Wide Gaussians slide scans together along a corridor, and nothing there brings them back; what the
     slide has found across the corridor and in rotation stays. None when the scans hold all directions.
     """
+    from scipy.linalg import eigh
+
     if not len(problem.priors.pairs):
         return None
     scans = joint_energy(problem._replace(priors=no_priors()), poses, exact=False).hessian[3:, 3:]

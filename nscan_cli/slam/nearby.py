@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from nscan_cli.compiled import kernel
 from nscan_cli.graph.model import Loop, NScan, Pairwise
 from nscan_cli.matching.joint import JointMatch, JointOptions, match_jointly
 from nscan_cli.matching.joint_energy import JointProblem, Priors, all_pairs, no_priors
@@ -72,15 +73,29 @@ def choose_nearby(
     nearest are taken; half of the places are kept for other visits, further along the path or back,
     unless the options leave these out.
     """
-    distances = np.hypot(*(poses[:, :2] - poses[centre, :2]).T)
-    near = np.flatnonzero(distances <= options.radius)
-    near = near[np.argsort(distances[near], kind="stable")]
+    near, distances = _within(poses, centre, options.radius)
+    near = near[np.argsort(distances, kind="stable")]
     before = np.abs(paths[centre] - paths[near]) > options.recent
     old, recent = near[before & options.loops], near[~before]
     recent = recent[: options.max_scans - min(len(old), options.max_scans // 2)]
     old = old[: options.max_scans - len(recent)]
     chosen = np.sort(np.concatenate([old, recent]))
     return chosen, np.abs(paths[centre] - paths[chosen]) > options.recent
+
+
+@kernel
+def _within(poses: Array, centre: int, radius: float) -> tuple[Indices, Array]:
+    """The keyframes (n,) within the radius (m) of one, increasing, and their distances (n,)."""
+    near, distances = np.empty(len(poses), dtype=np.int64), np.empty(len(poses))
+    n = 0
+    for k in range(len(poses)):
+        dx, dy = poses[k, 0] - poses[centre, 0], poses[k, 1] - poses[centre, 1]
+        if abs(dx) <= radius and abs(dy) <= radius:
+            distance = np.sqrt(dx * dx + dy * dy)
+            if distance <= radius:
+                near[n], distances[n] = k, distance
+                n += 1
+    return near[:n].copy(), distances[:n].copy()
 
 
 def match_nearby(route: Route, centre: int, options: NScanOptions) -> Nearby | None:

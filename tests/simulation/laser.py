@@ -131,7 +131,13 @@ def _pairs(
 
 def measure(world: World, robot: Array, laser: Laser, rng: np.random.Generator) -> Array:
     """Readings (S, B) of the laser on a robot at poses (S, 3)."""
-    ranges, incidence, absorption = cast(world, robot, laser)
+    return with_errors(*cast(world, robot, laser), laser, rng)
+
+
+def with_errors(
+    ranges: Array, incidence: Array, absorption: Array, laser: Laser, rng: np.random.Generator
+) -> Array:
+    """Readings (S, B) that an imperfect laser makes of what `cast` gives."""
     chance = rng.random(ranges.shape)
     lost = 1 - (1 - laser.dropout) * (1 - absorption) * np.where(incidence > laser.grazing, 0.5, 1.0)
     noisy = ranges + laser.noise * rng.standard_normal(ranges.shape)
