@@ -41,6 +41,8 @@ robustness: $(READY)
 soak: $(READY)
 	mkdir -p out
 	$(RUN)/python -m tests.soak --seconds 180 --runs 120
+	$(RUN)/python -m tests.soak.kills --kills 50
+	$(RUN)/python -m tests.soak.trouble
 
 lowest:
 	$(PYTHON) -m venv out/lowest

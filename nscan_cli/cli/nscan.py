@@ -172,15 +172,15 @@ def _fields(numbers: tuple[int, ...], match: NScanMatch, left_out: list[LeftOut]
     """What the document says of the match."""
     from nscan_cli.cli.document import weakest_record
     from nscan_cli.graph.json_fields import six_digits, triangle
-    from nscan_cli.graph.json_file import nscan_record
     from nscan_cli.graph.model import NScan
+    from nscan_cli.graph.relation_types import relation_record
 
     kept = [numbers[scan] for scan in match.kept]
     joint = match.joint
     score = float(match.overlap.min())
     relation = NScan(tuple(kept), match.poses, joint.hessian, match.fixed, "nscan", score)
     return {
-        "relation": nscan_record(relation, "scans"),
+        "relation": relation_record(relation, "scans"),
         "covariance": None if match.covariance is None else triangle(match.covariance),
         "energy": six_digits(match.energy),
         "gradient_norm": six_digits(joint.gradient_norm),

@@ -181,7 +181,7 @@ def _map(
     import numpy as np
 
     from nscan_cli.logs.load import read_log
-    from nscan_cli.slam.run import map_log
+    from nscan_cli.slam.run import map_log, notices
 
     scans = read_log(log, reading)
     for warning in scans.report.notices():
@@ -194,6 +194,8 @@ def _map(
             advance(done, f"{keyframes} keyframes, {loops} loops{last}")
 
         slam, graph = map_log(scans, reading, options, threads, report)
+    for warning in notices(slam):
+        say(f"warning: {warning}", quiet)
     summary: list[Row] = [
         ("scans", [f"{len(scans)} in {float(scans.times[-1] - scans.times[0]):.1f} s"]),
         *_graph_rows(graph),

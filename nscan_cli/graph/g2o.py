@@ -21,7 +21,8 @@ import numpy as np
 
 from nscan_cli.errors import InputDataError
 from nscan_cli.finite import check_finite
-from nscan_cli.graph.model import Graph, NScan, Pairwise
+from nscan_cli.graph.model import Graph, Pairwise
+from nscan_cli.graph.relation import Relation
 from nscan_cli.graph.triangles import from_upper_triangle, is_indefinite, upper_triangle
 from nscan_cli.inputs import base_name, label, read_bytes
 from nscan_cli.limits import DISTANCE, GRAPH, INFORMATION, KINDS, Limit
@@ -86,8 +87,8 @@ def parse_g2o(data: bytes, path: str) -> Graph:
 def write_g2o(graph: Graph) -> bytes:
     """The keyframes and relations as g2o text; the first keyframe is fixed. A vertex's id is its scan number.
 
-    g2o has no form for an nScan relation: each is replaced by the marginals of its Hessian between pose
-    c and every other pose, as pairwise edges. This loses what the relation says about the other poses
+    g2o has a form for pairwise relations alone: any other is replaced by the marginals of its Hessian
+    between pose c and every other pose, as pairwise edges. This loses what it says about the other poses
     among each other, and a graph optimised from the file differs from one that has the whole Hessian.
     Nodes that are no keyframes are left out. Numbers have the digits that read back exactly. Raises
     NotFiniteError.
@@ -96,10 +97,11 @@ def write_g2o(graph: Graph) -> bytes:
     keyframes = graph.keyframes.tolist()
     names = graph.scans.tolist()
     lines = [f"VERTEX_SE2 {names[node]} {_numbers(graph.poses[node])}" for node in keyframes]
-    relations = list(graph.pairwise)
-    for nscan in graph.nscan:
-        relations += pairwise_marginals(nscan)
-    for relation in relations:
+    edges: list[Pairwise] = []
+    for each in graph.relations:
+        poses = graph.poses[list(each.nodes)]
+        edges += [each] if isinstance(each, Pairwise) else pairwise_marginals(each, poses)
+    for relation in edges:
         z = relation.measurement
         information = upper_triangle(rotated_information(inverse(z), relation.information))
         a, b = relation.nodes
@@ -110,21 +112,23 @@ def write_g2o(graph: Graph) -> bytes:
     return ("\n".join(lines) + "\n").encode()
 
 
-def pairwise_marginals(relation: NScan) -> list[Pairwise]:
-    """An nScan relation as pairwise relations from pose c to each of the others: a lossy replacement.
+def pairwise_marginals(relation: Relation, poses: Array) -> list[Pairwise]:
+    """A relation as pairwise relations from pose c to each of the others: a lossy replacement.
 
     With pose c held fixed, the information on pose i alone is the Schur complement
     H_ii − H_ir H_rr⁺ H_ri over all other poses r (the inverse of its block of the covariance, where H has
     an inverse), turned from the relation's frame into that of pose c.
+    One that is not linear counts as it is at its global poses (n, 3).
     Directions that the relation does not hold get next to no information, LEAST_SHARE of the greatest: with
     none at all, readers that factorise after Cholesky (GTSAM) would make much out of rounding. The
     Hessian's negative eigenvalues count as 0.
     """
-    c = relation.fixed
+    term = relation.term()
+    local, hessian, c, _ = term if term.at is None else term.at(poses)
     others = np.delete(np.arange(len(relation.nodes)), c)
     free = (3 * others[:, None] + np.arange(3)).ravel()
-    to_frame_of_c = inverse(relation.poses[c])
-    measurements = relative(relation.poses[others], relation.poses[c])
+    to_frame_of_c = inverse(local[c])
+    measurements = relative(local[others], local[c])
     return [
         Pairwise(
             nodes=(relation.nodes[c], relation.nodes[index]),
@@ -134,7 +138,7 @@ def pairwise_marginals(relation: NScan) -> list[Pairwise]:
             score=relation.score,
         )
         for index, measurement, information in zip(
-            others, measurements, _marginal_blocks(relation.hessian[np.ix_(free, free)]), strict=True
+            others, measurements, _marginal_blocks(hessian[np.ix_(free, free)]), strict=True
         )
     ]
 

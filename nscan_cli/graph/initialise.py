@@ -22,8 +22,8 @@ LEAST_SHARE = 1e-9
 def chordal_start(energy: GraphEnergy, poses: Array) -> Array:
     """Poses (K, 3) from the relations alone, with the fixed pose kept where it is in `poses`.
 
-    An nScan relation gives the turns from its pose c to each of its other poses, weighed by their
-    marginals; for the positions it counts as it is. The relations have to connect all poses.
+    A relation gives the turns from its pose c to each of its other poses, weighed by their marginals; for
+    the positions it counts as it is. The relations have to connect all poses.
     """
     start = np.zeros_like(poses)
     start[:, 2] = _rotations(energy, float(poses[energy.fixed, 2]))
@@ -68,9 +68,8 @@ def _rotations(energy: GraphEnergy, angle: float) -> Array:
 
 def _turns(columns: Columns) -> tuple[Indices, Indices, Array, Array]:
     """The turns θ_ab that the relations measured, with their weights 1/σ²: (a, b, θ, w)."""
-    parts = [
-        (*columns.pairs.T, columns.measurements[:, 2], _marginal_weights(columns.information)[:, 0]),
-    ]
+    nobody = np.zeros(0, dtype=np.int64)
+    parts = [(nobody, nobody, np.zeros(0), np.zeros(0))]
     sizes = np.diff(columns.starts)
     for n in np.unique(sizes):
         chosen = np.flatnonzero(sizes == n)

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from nscan_cli.graph.triangles import from_upper_triangle, upper_triangle
+from nscan_cli.graph.triangles import from_upper_triangle, is_indefinite, upper_triangle
 from nscan_cli.limits import DISTANCE, INFORMATION, Limit
 from nscan_cli.poses import Array, wrap
 
@@ -129,6 +129,13 @@ class Record:
         numbers = f"{count} {_bounded(INFORMATION)}"
         error = self.wrong(key, f"the upper triangle of a {size} × {size} matrix: {numbers}")
         return from_upper_triangle(_numbers(self.get(key), count, error, INFORMATION), size)
+
+    def information(self, key: str, size: int) -> Array:
+        """The same, and positive semi-definite."""
+        matrix = self.matrix(key, size)
+        if is_indefinite(matrix):
+            raise self.wrong(key, "positive semi-definite")
+        return matrix
 
     def records(self, key: str) -> Iterator[Record]:
         """The objects of a list, each with its place."""

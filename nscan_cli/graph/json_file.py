@@ -5,6 +5,7 @@ One record a line, keys in fixed order: equal graphs give equal bytes, and text 
 
 from __future__ import annotations
 
+import io
 import json
 from collections.abc import Iterable, Iterator
 from typing import Any, NoReturn
@@ -14,10 +15,12 @@ import numpy as np
 from nscan_cli.errors import InputDataError
 from nscan_cli.finite import check_finite
 from nscan_cli.graph.json_fields import MalformedError, Record, pose_rows, six_digits, triangle
-from nscan_cli.graph.model import Graph, Loop, NScan, Pairwise
-from nscan_cli.graph.triangles import is_indefinite
+from nscan_cli.graph.model import Graph, Loop
+from nscan_cli.graph.relation_types import relation_of, relation_record
 from nscan_cli.inputs import label, read_bytes
 from nscan_cli.limits import GRAPH, TIME
+from nscan_cli.logs.kinds import FORMS, name_of
+from nscan_cli.logs.load import GZIP
 from nscan_cli.logs.order import STAMP
 from nscan_cli.poses import Array
 from nscan_cli.provenance import provenance_of
@@ -26,7 +29,8 @@ FORMAT = "nscan-pose-graph"
 VERSION = "1.0"
 SCHEMA = "urn:nscan-cli:pose-graph:1.0"
 UNITS = {"length": "m", "angle": "rad", "time": "s"}
-ORIGINS = ("odometry", "track", "nscan", "loop")
+NEXT = ",\n"
+"""From one record to the next."""
 REMEDY = "mend it, or write the graph again with nscan-cli slam"
 
 
@@ -38,28 +42,35 @@ def write_graph(graph: Graph) -> bytes:
     """
     check_finite("the poses of the graph", graph.poses, graph.odometry)
     check_finite("the covariances of the graph", *graph.marginals.values())
-    for pair in graph.pairwise:
-        check_finite(f"the relation of {pair.nodes}", pair.measurement, pair.information, pair.score)
-    for joint in graph.nscan:
-        check_finite(f"the nScan relation of {joint.nodes}", joint.poses, joint.hessian, joint.score)
+    for relation in graph.relations:
+        term = relation.term()
+        check_finite(f"the relation of {relation.nodes}", term.local, term.hessian, relation.score)
     provenance = {**provenance_of([], {}), **graph.provenance}
     head: dict[str, Any] = {"$schema": SCHEMA, "format": FORMAT, "version": VERSION, "units": UNITS}
-    lines = [f'"{key}":{_compact(value)},' for key, value in {**head, "provenance": provenance}.items()]
-    relations = [_pairwise_record(relation) for relation in graph.pairwise]
-    relations += [nscan_record(relation) for relation in graph.nscan]
     lists: dict[str, Iterable[dict[str, Any]]] = {
         "nodes": _node_records(graph),
-        "relations": ({"id": number, **record} for number, record in enumerate(relations)),
+        "relations": (
+            {"id": number, **relation_record(relation)} for number, relation in enumerate(graph.relations)
+        ),
         "loops": (_loop_record(loop) for loop in graph.loops),
         "marginals": (
             {"node": node, "covariance": triangle(covariance)}
             for node, covariance in sorted(graph.marginals.items())
         ),
     }
+    # Piece by piece: as lists of numbers all records at once take many times the room of the document.
+    document = io.BytesIO()
+    for key, value in {**head, "provenance": provenance}.items():
+        document.write(f'{NEXT if document.tell() else "{"}"{key}":{_compact(value)}'.encode())
     for key, records in lists.items():
-        rows = ",\n".join(_compact(record) for record in records)
-        lines.append(f'"{key}":[\n{rows}\n],' if rows else f'"{key}":[],')
-    return ("{" + "\n".join(lines).removesuffix(",") + "}\n").encode()
+        document.write(f'{NEXT}"{key}":['.encode())
+        separator = "\n"
+        for record in records:
+            document.write(f"{separator}{_compact(record)}".encode())
+            separator = NEXT
+        document.write(b"]" if separator == "\n" else b"\n]")
+    document.write(b"}\n")
+    return document.getvalue()
 
 
 def read_graph(path: str) -> Graph:
@@ -75,45 +86,29 @@ def parse_graph(data: bytes, name: str) -> Graph:
     """The graph of a JSON document; `name` is the file that errors name. Raises InputDataError."""
     try:
         document = json.loads(data, parse_constant=_refuse_constant)
-    except json.JSONDecodeError as error:
-        problem = f"not JSON: {error.msg}" if data.strip() else "is empty"
-        raise InputDataError(name, problem, REMEDY, line=error.lineno) from error
     except (ValueError, RecursionError) as error:
-        raise InputDataError(name, f"not JSON: {error}", REMEDY) from error
+        raise _not_json(data, name, error) from error
     try:
         return _graph(Record(document, "document"))
     except MalformedError as error:
         raise InputDataError(name, str(error), REMEDY) from error
 
 
-def nscan_record(relation: NScan, key: str = "nodes") -> dict[str, Any]:
-    """The JSON object of an nScan relation; `key` says what its members are: "nodes" or "scans"."""
-    return {
-        "type": "nscan",
-        key: list(relation.nodes),
-        "poses": pose_rows(relation.poses),
-        "hessian": triangle(relation.hessian),
-        "fixed": relation.nodes[relation.fixed],
-        "origin": relation.origin,
-        "score": six_digits(relation.score),
-    }
+def _not_json(data: bytes, name: str, error: Exception) -> InputDataError:
+    """What is wrong with a file that is no JSON: where it is broken, or what it is instead."""
+    if data.strip() and data.lstrip()[:1] not in (b"{", b"["):
+        return InputDataError(name, f"is {_kind(data)}", "give a graph in JSON, as nscan-cli slam writes it")
+    if isinstance(error, json.JSONDecodeError):
+        problem = f"not JSON: {error.msg}" if data.strip() else "is empty"
+        return InputDataError(name, problem, REMEDY, line=error.lineno)
+    return InputDataError(name, f"not JSON: {error}", REMEDY)
 
 
-def nscan_relation(record: Record, key: str = "nodes") -> NScan:
-    """The relation of such a JSON object. Raises MalformedError when its parts do not fit each other."""
-    record.text("type", ("nscan",))
-    members = record.integers(key)
-    fixed = record.integer("fixed")
-    if fixed not in members:
-        raise MalformedError(record.place, f"'fixed' is {fixed}, which is none of its {key}")
-    return NScan(
-        nodes=members,
-        poses=record.poses("poses", len(members)),
-        hessian=record.matrix("hessian", 3 * len(members)),
-        fixed=members.index(fixed),
-        origin=record.text("origin", ORIGINS),
-        score=record.number("score"),
-    )
+def _kind(data: bytes) -> str:
+    if data.startswith(GZIP):
+        return "compressed by gzip"
+    log = next((form.name for form in FORMS if form.fits(data)), None)
+    return f"a log ({log})" if log else name_of(data)
 
 
 def _compact(value: Any) -> str:
@@ -136,17 +131,6 @@ def _node_records(graph: Graph) -> Iterator[dict[str, Any]]:
         if anchors[node] != node:
             record["attached"] = anchors[node]
         yield record
-
-
-def _pairwise_record(relation: Pairwise) -> dict[str, Any]:
-    return {
-        "type": "pairwise",
-        "nodes": list(relation.nodes),
-        "measurement": pose_rows(relation.measurement[None])[0],
-        "information": triangle(relation.information),
-        "origin": relation.origin,
-        "score": six_digits(relation.score),
-    }
 
 
 def _loop_record(loop: Loop) -> dict[str, Any]:
@@ -184,7 +168,7 @@ def _graph(document: Record) -> Graph:
         _check_keyframes(record, (node,), keyframes)
         if node in graph.marginals:
             raise MalformedError(record.place, f"node {node} has a covariance already")
-        graph.marginals[node] = _information(record, "covariance")
+        graph.marginals[node] = record.information("covariance", 3)
     return graph
 
 
@@ -261,20 +245,9 @@ def _relations(document: Record, graph: Graph) -> None:
             raise MalformedError(
                 record.place, f"'id' is {record.get('id')}, but ids count up from 0, here {number}"
             )
-        if record.text("type", ("pairwise", "nscan")) == "nscan":
-            nscan = nscan_relation(record)
-            _check_keyframes(record, nscan.nodes, keyframes)
-            graph.nscan.append(nscan)
-            continue
-        graph.pairwise.append(
-            Pairwise(
-                nodes=_pair(record, keyframes),
-                measurement=record.pose("measurement"),
-                information=_information(record, "information"),
-                origin=record.text("origin", ORIGINS),
-                score=record.number("score"),
-            )
-        )
+        relation = relation_of(record)
+        _check_keyframes(record, relation.nodes, keyframes)
+        graph.add(relation)
 
 
 def _pair(record: Record, keyframes: set[int]) -> tuple[int, int]:
@@ -289,10 +262,3 @@ def _check_keyframes(record: Record, nodes: tuple[int, ...], keyframes: set[int]
     for node in nodes:
         if node not in keyframes:
             raise MalformedError(record.place, f"node {node} is no keyframe of this graph")
-
-
-def _information(record: Record, key: str) -> Array:
-    matrix = record.matrix(key, 3)
-    if is_indefinite(matrix):
-        raise record.wrong(key, "positive semi-definite")
-    return matrix

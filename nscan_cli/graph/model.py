@@ -8,36 +8,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from nscan_cli.graph.nscan import NScan
+from nscan_cli.graph.pairwise import Pairwise
+from nscan_cli.graph.relation import Relation
 from nscan_cli.poses import Array, compose, relative
 
-
-@dataclass(frozen=True)
-class Pairwise:
-    """A pairwise relation, eqs. (16) and (17): x̂_b ⊖ x̂_a was measured, where (a, b) = nodes."""
-
-    nodes: tuple[int, int]
-    measurement: Array
-    """(3,) pose of nodes[1] in the frame of nodes[0]."""
-    information: Array
-    """(3, 3) C⁻¹ of the components of the measurement."""
-    origin: str
-    """odometry, track or loop."""
-    score: float = 0.0
-
-
-@dataclass(frozen=True)
-class NScan:
-    """An nScan relation, eqs. (19) to (23): the local poses of n scans matched jointly."""
-
-    nodes: tuple[int, ...]
-    poses: Array
-    """(n, 3) local poses, in a frame of their own."""
-    hessian: Array
-    """(3n, 3n) H, at the local poses, variables (x, y, φ) scan by scan; its null space is the gauge."""
-    fixed: int
-    """Index into nodes of pose c, which carries the mapping from global to local coordinates."""
-    origin: str
-    score: float = 0.0
+__all__ = ["Graph", "Loop", "NScan", "Pairwise"]
 
 
 @dataclass(frozen=True)
@@ -68,6 +44,8 @@ class Graph:
     """(N,) id of the keyframe that the node is attached to."""
     pairwise: list[Pairwise] = field(default_factory=list)
     nscan: list[NScan] = field(default_factory=list)
+    others: list[Relation] = field(default_factory=list)
+    """Relations of further types."""
     loops: list[Loop] = field(default_factory=list)
     marginals: dict[int, Array] = field(default_factory=dict)
     """Keyframe id → (3, 3) marginal covariance of its global pose, the first keyframe held fixed."""
@@ -76,6 +54,20 @@ class Graph:
 
     def __len__(self) -> int:
         return len(self.stamps)
+
+    @property
+    def relations(self) -> list[Relation]:
+        """All relations: pairwise, nScan, others."""
+        return [*self.pairwise, *self.nscan, *self.others]
+
+    def add(self, relation: Relation) -> None:
+        """Put a relation of any type among those of its type."""
+        if isinstance(relation, Pairwise):
+            self.pairwise.append(relation)
+        elif isinstance(relation, NScan):
+            self.nscan.append(relation)
+        else:
+            self.others.append(relation)
 
     @property
     def keyframes(self) -> NDArray[np.int64]:

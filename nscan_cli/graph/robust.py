@@ -28,8 +28,8 @@ LEAST_WEIGHT = 0.25
 def contradicting(energy: GraphEnergy, poses: Array, doubted: NDArray[np.bool_]) -> NDArray[np.bool_]:
     """Which of the doubted relations (R,) contradict the others; `poses` (K, 3) are at the energy's optimum.
 
-    The relations are in the energy's order: pairwise, then nScan. Nothing is done when all are within the
-    bound already. A relation of n scans is judged by its χ² for 3 (n − 1) degrees of freedom, by three.
+    The relations are in the energy's order. Nothing is done when all are within the bound already. A
+    relation of n scans is judged by its χ² for 3 (n − 1) degrees of freedom, by three.
     """
     chi2 = chi2_by_three(energy, poses)
     narrow = float(chi2[doubted].max(initial=0.0)) / BOUND
@@ -47,7 +47,6 @@ def contradicting(energy: GraphEnergy, poses: Array, doubted: NDArray[np.bool_])
 
 def chi2_by_three(energy: GraphEnergy, poses: Array) -> Array:
     """(R,) χ² of every relation at the poses (K, 3) for three degrees of freedom."""
-    columns = energy.columns
-    sizes = np.concatenate([np.full(len(columns.pairs), 2), np.diff(columns.starts)])
+    sizes = np.diff(energy.columns.starts)
     chi2: Array = energy.evaluate(poses, exact=False).terms / (sizes - 1)
     return chi2

@@ -9,9 +9,10 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from nscan_cli.graph.initialise import chordal_start
-from nscan_cli.graph.model import Graph, NScan, Pairwise
+from nscan_cli.graph.model import Graph
 from nscan_cli.graph.optimise import Optimum, optimise
 from nscan_cli.graph.pattern import Indices
+from nscan_cli.graph.relation import Relation
 from nscan_cli.graph.system import GraphEnergy
 
 TRIAL = 100
@@ -20,7 +21,7 @@ TRIAL = 100
 
 @dataclass(frozen=True)
 class GraphOptimum:
-    """The energy Σ ΔᵗC⁻¹Δ + Σ fᵗHf that is left, and how it was reached."""
+    """The energy Σ fᵗHf of all relations that is left, and how it was reached."""
 
     energy: float
     iterations: int
@@ -35,14 +36,13 @@ class Component:
 
     keyframes: Indices
     """Ids, increasing; the first one is held where it is."""
-    pairwise: list[Pairwise]
-    nscan: list[NScan]
+    relations: list[Relation]
 
     def energy(self, nodes: int) -> GraphEnergy:
         """The energy of the keyframes' poses; `nodes` is the number of nodes of the graph."""
         positions = np.full(nodes, -1)
         positions[self.keyframes] = np.arange(len(self.keyframes))
-        return GraphEnergy(len(self.keyframes), self.pairwise, self.nscan, positions)
+        return GraphEnergy(len(self.keyframes), self.relations, positions)
 
 
 def optimise_graph(graph: Graph, max_iterations: int = 1000, tolerance: float = 1e-6) -> GraphOptimum:
@@ -80,19 +80,15 @@ def optimise_graph(graph: Graph, max_iterations: int = 1000, tolerance: float = 
 
 def components(graph: Graph) -> list[Component]:
     """The connected parts of the graph, in order of their first keyframes."""
-    relations: list[Pairwise | NScan] = [*graph.pairwise, *graph.nscan]
+    relations = graph.relations
     links = [(relation.nodes[0], node) for relation in relations for node in relation.nodes[1:]]
     a, b = np.array(links, dtype=np.int64).reshape(-1, 2).T
     matrix = coo_array((np.ones(len(a)), (a, b)), shape=(len(graph), len(graph)))
     _, labels = connected_components(matrix, directed=False)
     keyframes = graph.keyframes
-    parts: dict[int, tuple[list[int], list[Pairwise], list[NScan]]] = {}
+    parts: dict[int, tuple[list[int], list[Relation]]] = {}
     for keyframe in keyframes:
-        parts.setdefault(int(labels[keyframe]), ([], [], []))[0].append(int(keyframe))
-    for relation in graph.pairwise:
+        parts.setdefault(int(labels[keyframe]), ([], []))[0].append(int(keyframe))
+    for relation in relations:
         parts[int(labels[relation.nodes[0]])][1].append(relation)
-    for nscan in graph.nscan:
-        parts[int(labels[nscan.nodes[0]])][2].append(nscan)
-    return [
-        Component(np.array(ids, dtype=np.int64), pairwise, nscan) for ids, pairwise, nscan in parts.values()
-    ]
+    return [Component(np.array(ids, dtype=np.int64), relations) for ids, relations in parts.values()]

@@ -9,23 +9,17 @@ from typing import NamedTuple
 import numpy as np
 
 from nscan_cli.compiled import kernel
-from nscan_cli.graph.model import NScan, Pairwise
 from nscan_cli.graph.pattern import Indices, block_targets, find_pattern
-from nscan_cli.graph.terms import nscan_term, pairwise_term
+from nscan_cli.graph.relation import Relation, Term
+from nscan_cli.graph.terms import nscan_term
 from nscan_cli.poses import Array
 
 
 class Columns(NamedTuple):
-    """P pairwise and Q nScan relations as columns for the kernels; nodes are places 0 … K − 1."""
+    """The terms of Q relations as columns for the kernels; nodes are places 0 … K − 1."""
 
-    pairs: Indices
-    """(P, 2)"""
-    measurements: Array
-    """(P, 3)"""
-    information: Array
-    """(P, 3, 3)"""
     starts: Indices
-    """(Q + 1,) where the nodes of each nScan relation begin."""
+    """(Q + 1,) where the nodes of each relation begin."""
     members: Indices
     """(Σ n,)"""
     local: Array
@@ -43,7 +37,7 @@ class System(NamedTuple):
 
     value: float
     terms: Array
-    """(P + Q,) what each relation gives: χ² at the poses."""
+    """(Q,) what each relation gives: χ² at the poses."""
     gradient: Array
     """(K − 1, 3)"""
     hessian: Array
@@ -56,8 +50,7 @@ class GraphEnergy:
     def __init__(
         self,
         nodes: int,
-        pairwise: Sequence[Pairwise],
-        nscan: Sequence[NScan],
+        relations: Sequence[Relation],
         positions: Indices,
         fixed: int = 0,
     ) -> None:
@@ -65,7 +58,10 @@ class GraphEnergy:
 
         The pose at place `fixed` is held where it is.
         """
-        self.columns = _columns(pairwise, nscan, positions)
+        terms = [relation.term() for relation in relations]
+        self.columns = _columns(relations, terms, positions)
+        self._weights = np.ones(len(terms))
+        self._not_linear = [(k, term.at) for k, term in enumerate(terms) if term.at is not None]
         self.fixed = fixed
         self.free: Indices = np.delete(np.arange(nodes), fixed)
         """(K − 1,) the places of the poses that can move."""
@@ -77,38 +73,48 @@ class GraphEnergy:
         self._targets = block_targets(edges, self.pattern)
 
     def weighted(self, weights: Array) -> GraphEnergy:
-        """The energy with every relation's term multiplied by its weight (P + Q,)."""
-        columns, pairs = self.columns, len(self.columns.pairs)
-        each = np.repeat(weights[pairs:], np.diff(columns.hessian_starts))
+        """The energy with every relation's term multiplied by its weight (Q,)."""
+        columns = self.columns
+        each = np.repeat(weights, np.diff(columns.hessian_starts))
         other = copy.copy(self)
-        other.columns = columns._replace(
-            information=columns.information * weights[:pairs, None, None], hessians=columns.hessians * each
-        )
+        other.columns = columns._replace(hessians=columns.hessians * each)
+        other._weights = self._weights * weights
         return other
 
     def evaluate(self, poses: Array, exact: bool) -> System:
         """Energy, gradient and Hessian (exact, or its Gauss–Newton part) at the poses (K, 3)."""
-        columns = self.columns
-        terms = np.zeros(len(columns.pairs) + len(columns.fixed))
+        poses = np.ascontiguousarray(poses, dtype=np.float64)
+        columns = self._columns_at(poses) if self._not_linear else self.columns
+        terms = np.zeros(len(columns.fixed))
         gradient = np.zeros((len(poses), 3))
         blocks = np.zeros((len(self.pattern.rows), 3, 3))
-        poses = np.ascontiguousarray(poses, dtype=np.float64)
         _evaluate(columns, poses, float(exact), self._targets, terms, gradient, blocks)
         return System(float(terms.sum()), terms, gradient[self.free], blocks)
 
+    def _columns_at(self, poses: Array) -> Columns:
+        """The columns with those terms that are others at other poses."""
+        columns = self.columns
+        columns = columns._replace(local=columns.local.copy(), hessians=columns.hessians.copy())
+        for k, at in self._not_linear:
+            nodes = slice(columns.starts[k], columns.starts[k + 1])
+            term = at(poses[columns.members[nodes]])
+            columns.local[nodes] = term.local
+            entries = slice(columns.hessian_starts[k], columns.hessian_starts[k + 1])
+            columns.hessians[entries] = self._weights[k] * term.hessian.ravel()
+        return columns
 
-def _columns(pairwise: Sequence[Pairwise], nscan: Sequence[NScan], positions: Indices) -> Columns:
-    sizes = [len(relation.nodes) for relation in nscan]
+
+def _columns(relations: Sequence[Relation], terms: Sequence[Term], positions: Indices) -> Columns:
+    sizes = [len(relation.nodes) for relation in relations]
     return Columns(
-        pairs=positions[np.array([r.nodes for r in pairwise], dtype=np.int64).reshape(-1, 2)],
-        measurements=np.array([r.measurement for r in pairwise], dtype=np.float64).reshape(-1, 3),
-        information=np.array([r.information for r in pairwise], dtype=np.float64).reshape(-1, 3, 3),
         starts=np.concatenate([[0], np.cumsum(sizes)]).astype(np.int64),
-        members=positions[np.array([node for r in nscan for node in r.nodes], dtype=np.int64)],
-        local=np.concatenate([r.poses for r in nscan]) if nscan else np.empty((0, 3)),
+        members=positions[
+            np.array([node for relation in relations for node in relation.nodes], dtype=np.int64)
+        ],
+        local=np.concatenate([term.local for term in terms]) if terms else np.empty((0, 3)),
         hessian_starts=np.concatenate([[0], np.cumsum([9 * n * n for n in sizes])]).astype(np.int64),
-        hessians=np.concatenate([r.hessian.ravel() for r in nscan]) if nscan else np.empty(0),
-        fixed=np.array([r.fixed for r in nscan], dtype=np.int64),
+        hessians=np.concatenate([term.hessian.ravel() for term in terms]) if terms else np.empty(0),
+        fixed=np.array([term.fixed for term in terms], dtype=np.int64),
     )
 
 
@@ -116,10 +122,8 @@ def _columns(pairwise: Sequence[Pairwise], nscan: Sequence[NScan], positions: In
 def _edges(columns: Columns, free_row: Indices) -> Indices:
     """The blocks of the lower triangle of each term, in order, as pairs of rows; −1 is the fixed pose."""
     sizes = columns.starts[1:] - columns.starts[:-1]
-    edges = np.empty((3 * columns.pairs.shape[0] + (sizes * (sizes + 1)).sum() // 2, 2), dtype=np.int64)
+    edges = np.empty(((sizes * (sizes + 1)).sum() // 2, 2), dtype=np.int64)
     e = 0
-    for k in range(columns.pairs.shape[0]):
-        e = _add_edges(columns.pairs[k], free_row, edges, e)
     for k in range(columns.fixed.shape[0]):
         e = _add_edges(columns.members[columns.starts[k] : columns.starts[k + 1]], free_row, edges, e)
     return edges
@@ -144,15 +148,9 @@ def _evaluate(
     gradient: Array,
     blocks: Array,
 ) -> None:
-    """Each relation's value into terms (P + Q,), its gradient and Hessian added to their nodes."""
-    pairs, e = columns.pairs.shape[0], 0
+    """Each relation's value into terms (Q,), its gradient and Hessian added to their nodes."""
+    e = 0
     part, block = np.empty(6), np.empty((6, 6))
-    for k in range(pairs):
-        members = columns.pairs[k]
-        terms[k] = pairwise_term(
-            _at(poses, members), columns.measurements[k], columns.information[k], curvature, part, block
-        )
-        e = _add_term(members, part, block, targets, e, gradient, blocks)
     for k in range(columns.fixed.shape[0]):
         start, end = columns.starts[k], columns.starts[k + 1]
         members = columns.members[start:end]
@@ -160,7 +158,7 @@ def _evaluate(
         if part.shape[0] != m:
             part, block = np.empty(m), np.empty((m, m))
         hessian = columns.hessians[columns.hessian_starts[k] : columns.hessian_starts[k + 1]].reshape(m, m)
-        terms[pairs + k] = nscan_term(
+        terms[k] = nscan_term(
             _at(poses, members), columns.local[start:end], hessian, columns.fixed[k], curvature, part, block
         )
         e = _add_term(members, part, block, targets, e, gradient, blocks)

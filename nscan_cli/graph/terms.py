@@ -1,7 +1,7 @@
-"""What each relation adds to the energy of a graph, with exact derivatives (paper, IV, eqs. (15) to (25)).
+"""What each relation adds to the energy of a graph, with exact derivatives (paper, IV, eqs. (18) to (25)).
 
-Both kinds are weighed alike: a pairwise relation gives ΔᵗC⁻¹Δ, eq. (17), an nScan relation fᵗHf, eq. (23),
-both without a ½. A term of m poses writes its value, gradient (3m,) and Hessian (3m, 3m).
+Every relation gives fᵗHf, eq. (23), without a ½: also a pairwise one, of two poses (graph/pairwise.py). A
+term of n poses writes its value, gradient (3n,) and Hessian (3n, 3n).
 """
 
 from __future__ import annotations
@@ -10,28 +10,6 @@ import numpy as np
 
 from nscan_cli.compiled import kernel
 from nscan_cli.poses import Array
-
-
-@kernel
-def pairwise_term(
-    poses: Array,
-    measurement: Array,
-    information: Array,
-    curvature: float,
-    gradient: Array,
-    hessian: Array,
-) -> float:
-    """ΔᵗC⁻¹Δ with Δ = (b ⊖ a) − p_ab, eqs. (16) and (17); poses (2, 3) are a, then b.
-
-    It is the nScan term of two poses with a at the origin of the local frame and c = a: there (19) to
-    (22) are (16). `curvature` as in nscan_term.
-    """
-    local, padded = np.zeros((2, 3)), np.zeros((6, 6))
-    for a in range(3):
-        local[1, a] = measurement[a]
-        for b in range(3):
-            padded[3 + a, 3 + b] = information[a, b]
-    return nscan_term(poses, local, padded, 0, curvature, gradient, hessian)
 
 
 @kernel

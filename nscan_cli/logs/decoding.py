@@ -6,23 +6,16 @@ import re
 import struct
 from collections.abc import Callable, Iterable
 from functools import lru_cache
-from typing import Any, NamedTuple, TypeVar
+from typing import Any, TypeVar
 
-from numpy.typing import NDArray
 from rosbags.serde import SerdeError
 from rosbags.typesys import Stores, TypesysError, get_types_from_idl, get_types_from_msg, get_typestore
 
 from nscan_cli.errors import InputDataError
 from nscan_cli.logs.recording import TRANSFORMS, Channel
+from nscan_cli.logs.sensed import Placed, Rigid, Sweep, frame_name, nanoseconds, unknown_encoding
 
-Quaternion = tuple[float, float, float, float]
-"""x, y, z, w"""
-Point = tuple[float, float, float]
 T = TypeVar("T")
-S = 10**9
-"""ns"""
-LATEST = 2**63
-"""ns"""
 NO_DEFINITION = (TypesysError, KeyError, ValueError, IndexError, AttributeError, TypeError, NameError,
                  AssertionError, RecursionError)  # fmt: skip
 """What a damaged definition can raise."""
@@ -40,43 +33,6 @@ UNDECODABLE = (SerdeError, ValueError, IndexError, KeyError, TypeError, Attribut
 """What decoding a damaged message can raise; protobuf's own error is turned into ValueError."""
 
 
-class Rigid(NamedTuple):
-    """A pose or a transform in space."""
-
-    translation: Point
-    """m"""
-    rotation: Quaternion
-
-
-class Sweep(NamedTuple):
-    """One scan."""
-
-    stamp: int
-    """ns, 0 where the message has none."""
-    frame: str
-    angle_min: float
-    """rad"""
-    angle_increment: float
-    """rad"""
-    range_min: float
-    """m; readings outside range_min … range_max say nothing."""
-    range_max: float
-    ranges: NDArray[Any]
-    """(B,) m"""
-    pose: Rigid | None
-    """Of the laser in `frame`, where the message has one."""
-
-
-class Placed(NamedTuple):
-    """The child frame in the parent frame at a time: a transform, or odometry."""
-
-    stamp: int
-    """ns, 0 where the message has none."""
-    parent: str
-    child: str
-    pose: Rigid
-
-
 def sweep_decoder(channel: Channel, file: str) -> Callable[[bytes], Sweep]:
     """What turns a message with a scan into one. Raises InputDataError when the channel is not known."""
     return _viewed(channel, file, _foxglove().sweep if _is_foxglove(channel) else _ros_sweep)
@@ -89,27 +45,8 @@ def placed_decoder(channel: Channel, file: str) -> Callable[[bytes], list[Placed
     return _viewed(channel, file, _ros_odometry if channel.type.endswith("Odometry") else _ros_transforms)
 
 
-def nanoseconds(seconds: int, rest: int) -> int:
-    """A time in ns; 0 for one before 1970, which was never set. Raises ValueError for one out of bounds."""
-    time = int(seconds) * S + int(rest)
-    if time >= LATEST:
-        raise ValueError("the time is out of bounds")
-    return max(time, 0)
-
-
-def frame_name(name: str) -> str:
-    """A frame's name; ROS 1 wrote some with a slash in front."""
-    return name.removeprefix("/")
-
-
 def _is_foxglove(channel: Channel) -> bool:
     return channel.type.startswith("foxglove.")
-
-
-def unknown_encoding(channel: Channel, file: str) -> InputDataError:
-    """The error that a channel's messages are in no form that is known."""
-    problem = f"{channel.topic} ({channel.type}) is encoded in {channel.encoding or 'nothing that is named'}"
-    return InputDataError(file, problem, "record ROS messages as ros1 or cdr, Foxglove's as protobuf or json")
 
 
 def _foxglove() -> Any:

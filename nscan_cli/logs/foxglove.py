@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 
 from nscan_cli.errors import InputDataError
-from nscan_cli.logs.decoding import Placed, Rigid, Sweep, frame_name, nanoseconds, unknown_encoding
 from nscan_cli.logs.recording import Channel
+from nscan_cli.logs.sensed import Placed, Rigid, Sweep, frame_name, nanoseconds, unknown_encoding
 
 ENDLESS = float("inf")
 

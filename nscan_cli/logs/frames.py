@@ -8,7 +8,7 @@ from collections.abc import Iterable
 import numpy as np
 
 from nscan_cli.limits import DISTANCE
-from nscan_cli.logs.decoding import Placed, Rigid
+from nscan_cli.logs.sensed import Placed, Rigid
 from nscan_cli.poses import Array
 
 LARGEST_TILT = math.radians(1.0)

@@ -15,6 +15,11 @@ from nscan_cli.poses import Array
 
 NOMINAL_PERIOD = 0.1
 """s between scans whose stamps say nothing."""
+MIXED = 20
+"""Sorted by time, the scans before and after a clock was set back alternate so often at least. Messages that
+come late fill a gap instead."""
+MOST_SET_BACK = 20
+"""With more steps back than that, lines are out of order, and the clock is not to blame."""
 STAMP = re.compile(r"[-+]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][-+]?[0-9]+)?")
 """A time in seconds, as text; what else Python takes for a number is none."""
 
@@ -56,16 +61,41 @@ def by_time(stamps: list[str]) -> Order:
         return Order(np.arange(size), times, texts, 0, True, warnings)
     texts = list(stamps)
     if not good.all():
-        at = np.arange(size)
-        times[~good] = np.interp(at[~good], at[good], times[good])
+        places = np.arange(size)
+        times[~good] = np.interp(places[~good], places[good], times[good])
         for row in np.flatnonzero(~good):
             texts[row] = f"{times[row]:.6f}"
         warnings.append(f"{np.sum(~good)} scans have no usable time stamp; it was filled in between others")
+    for since, by in _set_back(times):
+        times[since:] += by
+        texts[since:] = [f"{time:.6f}" for time in times[since:]]
+        warnings.append(
+            f"the clock is set back by {by:.1f} s at scan {since}; the times go on from those before"
+        )
     backward = int(np.sum(np.diff(times) < 0))
     if backward:
         warnings.append(f"{backward} time stamps step back; the scans are sorted by time")
     rows = np.argsort(times, kind="stable")
     return Order(rows, times[rows], [texts[row] for row in rows], backward, False, warnings)
+
+
+def _set_back(times: Array) -> list[tuple[int, float]]:
+    """Where (positions in file order) the clock was set back, and by how much (s) to carry the times on."""
+    if len(times) < 2:
+        return []
+    times, found = times.copy(), []
+    period = float(np.median(np.abs(np.diff(times))))
+    steps = np.flatnonzero(np.diff(times) < -MIXED * period) + 1
+    for at in steps.tolist() if len(steps) <= MOST_SET_BACK else ():
+        latest = float(times[:at].max())
+        caught_up = times[at:] > latest
+        until = at + (int(np.argmax(caught_up)) if caught_up.any() else len(caught_up))
+        is_behind = np.argsort(times[:until], kind="stable") >= at
+        if np.count_nonzero(np.diff(is_behind)) >= MIXED:
+            by = latest + period - float(times[at])
+            times[at:] += by
+            found.append((at, by))
+    return found
 
 
 def selection(times: Array, options: ReadingOptions, file: str) -> NDArray[np.int64]:

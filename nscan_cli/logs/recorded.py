@@ -9,10 +9,11 @@ import numpy as np
 from nscan_cli.errors import InputDataError, WrongUsageError
 from nscan_cli.logs import order, recorded_motion
 from nscan_cli.logs.assemble import Findings, Motion, RawScans, laser_log, stacked
-from nscan_cli.logs.decoding import UNDECODABLE, S, Sweep, sweep_decoder
+from nscan_cli.logs.decoding import UNDECODABLE, sweep_decoder
 from nscan_cli.logs.options import ReadingOptions
 from nscan_cli.logs.recording import Channel, Message, Recording
 from nscan_cli.logs.scan import LaserLog, Source
+from nscan_cli.logs.sensed import S, Sweep
 from nscan_cli.logs.skips import Skips
 from nscan_cli.logs.text_records import beams_problem
 from nscan_cli.logs.topics import scan_topic

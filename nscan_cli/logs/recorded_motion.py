@@ -9,12 +9,13 @@ import numpy as np
 
 from nscan_cli.errors import InputDataError, WrongUsageError
 from nscan_cli.logs.assemble import Findings
-from nscan_cli.logs.decoding import UNDECODABLE, Placed, S, Sweep, placed_decoder
+from nscan_cli.logs.decoding import UNDECODABLE, placed_decoder
 from nscan_cli.logs.frames import LARGEST_TILT, Frames, as_matrix, heading, planar, unmoved
 from nscan_cli.logs.odometry import interpolated
 from nscan_cli.logs.options import ReadingOptions
 from nscan_cli.logs.order import Order
 from nscan_cli.logs.recording import TRANSFORMS, Recording
+from nscan_cli.logs.sensed import Placed, S, Sweep
 from nscan_cli.logs.skips import Skips
 from nscan_cli.logs.topics import odometry_topic
 from nscan_cli.poses import Array

@@ -244,7 +244,7 @@ def _descend(
         iterations += 1
         trial = poses + step
         converged = bool(np.abs(step).max() < tolerance)
-        if converged and not exact:
+        if converged and not exact and damping <= FIRST_DAMPING:
             poses[:, :] = trial
             break
         there = evaluate(problem, trial, widening, curvature, neutral, stride, trial_gradient, trial_hessian)

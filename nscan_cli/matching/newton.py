@@ -20,6 +20,8 @@ from nscan_cli.poses import Array
 FIRST_DAMPING = 1e-3
 LEAST_DAMPING = 1e-7
 GREATEST_DAMPING = 1e6
+STALLED = 0.1
+"""Share of the tolerance below which a damped step ends a stage."""
 
 
 class PairProblem(NamedTuple):
@@ -110,7 +112,7 @@ def minimise(
                 break
             trial[:] = pose - step
             length = max(abs(step[0]), abs(step[1]), abs(step[2]))
-            if length < tolerance:
+            if length < tolerance and damping <= FIRST_DAMPING:
                 # So near that the value and the Hessian are known well enough.
                 pose[:] = trial
                 converged = True
@@ -123,6 +125,8 @@ def minimise(
                 damping = max(damping * 0.1, LEAST_DAMPING)
             else:
                 damping *= 10.0
-            if damping > GREATEST_DAMPING:
+            # A step that is short because it is damped says less.
+            converged = length < STALLED * tolerance
+            if converged or damping > GREATEST_DAMPING:
                 break
     return value, out[0], iterations, evaluations, converged

@@ -61,7 +61,7 @@ def refine_again(graph: Graph, log: LaserLog, rows: NDArray[np.int64], threads: 
     slam.route = route(slam.keyframes.list, chain, graph.poses[graph.keyframes])
     in_chain = {id(relation) for relation in chain}
     slam.pairs = [pair for pair in graph.pairwise if id(pair) not in in_chain]
-    slam.nscan = list(graph.nscan)
+    slam.nscan, slam.others = list(graph.nscan), list(graph.others)
     slam.loops = [loop for loop in graph.loops if loop.reason not in SEARCHED]
     slam.places = _places(graph, options)
     slam.reject()
@@ -92,14 +92,19 @@ def _scans(log: LaserLog, rows: NDArray[np.int64]) -> LaserLog:
 def _lay_out(slam: Slam, graph: Graph) -> None:
     """The keyframes with their Gaussians, as tracking would have made them at the graph's poses."""
     step, path, joined_at = slam.options.tracking.step, 0.0, graph.poses[0]
-    nothing = np.zeros((3, 3))
-    for row, (pose, anchor) in enumerate(zip(graph.poses, graph.anchors.tolist(), strict=True)):
+    nothing, breaks = np.zeros((3, 3)), _breaks(graph, slam.options)
+    scans = zip(slam.points(), graph.poses, graph.anchors.tolist(), strict=True)
+    for row, (points, pose, anchor) in enumerate(scans):
         moved = relative(pose, joined_at)
         distance = float(np.hypot(moved[0], moved[1]))
         joined = row == 0 or distance > step or abs(moved[2]) > step
         if joined:
             path, joined_at = path + distance, pose
-        points, tracked = slam.points(row), Tracked(pose, nothing, nothing, 1.0, path, joined)
+        if row in breaks:
+            slam.keyframes.part()
+            slam.breaks.append(row)
+            path += slam.options.breaks.path
+        tracked = Tracked(pose, nothing, nothing, 1.0, path, joined)
         if anchor == row:
             slam.keyframes.add(row, points, tracked)
         else:
@@ -107,6 +112,13 @@ def _lay_out(slam: Slam, graph: Graph) -> None:
         slam.tracked.append(pose)
         slam.anchors.append(anchor)
     slam.keyframes.finish_last()
+
+
+def _breaks(graph: Graph, options: SlamOptions) -> set[int]:
+    """The keyframes before which the track broke: not even the direction of the way there is known."""
+    least = (options.breaks.turn / 2) ** -2
+    tracked = [pair for pair in graph.pairwise if pair.origin == "track"]
+    return {pair.nodes[1] for pair in tracked if pair.information[2, 2] <= least}
 
 
 def _chain(graph: Graph, options: SlamOptions) -> list[Pairwise]:

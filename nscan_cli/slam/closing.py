@@ -8,8 +8,8 @@ start must stand the search too.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from nscan_cli.graph.model import Loop, Pairwise
 from nscan_cli.graph.system import GraphEnergy
 from nscan_cli.matching.search import SearchOptions
-from nscan_cli.poses import compose, wrap
+from nscan_cli.poses import Array, compose, wrap
 from nscan_cli.slam.keyframes import Route
 from nscan_cli.slam.nearby import MatchNearby, Nearby
 from nscan_cli.slam.options import ClosingOptions, NScanOptions
@@ -25,8 +25,16 @@ from nscan_cli.slam.place import Place, find_place, why_doubted
 from nscan_cli.slam.whereabouts import Reach, Whereabouts, seen_from, with_slips
 
 NO_SECOND = "no second keyframe finds the same"
+LOST = "tracking has broken since: the place must be searched"
 
 Indices = NDArray[np.int64]
+
+
+class Energy(Protocol):
+    """What loops and the way say of the keyframes, with one of them held."""
+
+    def __call__(self, fixed: int, among: Indices | None = None) -> GraphEnergy:
+        """Of all keyframes, or of some (m,) alone."""
 
 
 class Closing:
@@ -50,9 +58,9 @@ class Closing:
         route: Route,
         centre: int,
         left_out: Indices,
-        energy: Callable[[int], GraphEnergy],
+        energy: Energy,
     ) -> list[Place]:
-        """The places of a keyframe, and of those before that agree with it: two at least, or none.
+        """The places of a keyframe, and of those before that agree with it, if they are enough, or none.
 
         `left_out` (m,) are keyframes of another visit that the joint match about `centre` was tried with.
         `energy` gives that of the graph of `way` and all loops, with a keyframe held.
@@ -62,6 +70,8 @@ class Closing:
             return []
         reach = self._whereabouts.bound(centre, self.way, poses)
         near = self._near(route, centre, reach)
+        if len(near) and not len(left_out):
+            near = self._near(route, centre, self._whereabouts.narrow(centre, energy, poses))
         if len(near) or len(left_out):
             reach = self._whereabouts.ask(centre, energy, poses)
             near = np.union1d(self._near(route, centre, reach), left_out).astype(np.int64)
@@ -71,19 +81,20 @@ class Closing:
         place = self._search(route, centre, near, reach, energy)
         if place is None:
             return []
-        agreeing = [other for other in self._waiting if self._agree(other, place, route)]
+        agreeing = [*(other for other in self._waiting if self._agree(other, place, route)), place]
+        lost = self.is_lost(reach)[place.old]
+        if len(agreeing) < (self.options.agreeing_lost if lost else self.options.agreeing):
+            self._waiting.append(place)
+            return []
         self._waiting = [other for other in self._waiting if other not in agreeing]
-        if agreeing:
-            return [*agreeing, place]
-        self._waiting.append(place)
-        return []
+        return agreeing
 
     def why_doubted(
         self,
         route: Route,
         centre: int,
         nearby: Nearby,
-        energy: Callable[[int], GraphEnergy],
+        energy: Energy,
     ) -> str | None:
         """Why the place is not sure that the joint match about `centre` has in an earlier visit, or None.
 
@@ -96,12 +107,25 @@ class Closing:
         old = route.rows(range(len(poses))).index(tie[0])
         if not self._may_be_off(self._whereabouts.bound(centre, self.way, poses), old):
             return None
+        if not self._may_be_off(self._whereabouts.narrow(centre, energy, poses), old):
+            return None
         reach = self._whereabouts.ask(centre, energy, poses)
         if not self._may_be_off(reach, old):
             return None
+        if self.is_lost(reach)[old]:
+            return LOST
         window, earlier = self._visit(route, centre, old, reach, energy)
         pose = compose(poses[old], tie[1])
         return why_doubted(route, centre, pose, earlier, window, self.options)
+
+    def is_lost(self, reach: Reach) -> NDArray[np.bool_]:
+        """Which keyframes (K,) the graph does not know even the direction of: the track has broken since."""
+        lost: NDArray[np.bool_] = self.options.deviations * reach.angle >= np.pi
+        return lost
+
+    def _farthest(self, reach: Reach) -> Array:
+        """(K,) how far (m) keyframes are searched at most."""
+        return np.where(self.is_lost(reach), self.options.lost, self.options.farthest)
 
     def _may_be_off(self, reach: Reach, keyframe: int) -> bool:
         """Whether a keyframe may be too far off for a joint match."""
@@ -117,7 +141,7 @@ class Closing:
         paths, poses = route.paths, route.poses
         options, away = self.options, np.hypot(*(poses[:, :2] - poses[centre, :2]).T)
         bound = options.deviations * reach.distance
-        may_be = away <= self.nscan.radius + np.minimum(bound, options.farthest)
+        may_be = away <= self.nscan.radius + np.minimum(bound, self._farthest(reach))
         older = paths[centre] - paths > self.nscan.recent
         return np.flatnonzero(older & may_be & (bound > options.settled))
 
@@ -127,7 +151,7 @@ class Closing:
         centre: int,
         near: Indices,
         reach: Reach,
-        energy: Callable[[int], GraphEnergy],
+        energy: Energy,
     ) -> Place | None:
         """Search among the visit that most likely is near."""
         away = np.hypot(*(route.poses[:, :2] - route.poses[centre, :2]).T)
@@ -145,20 +169,20 @@ class Closing:
         centre: int,
         first: int,
         reach: Reach,
-        energy: Callable[[int], GraphEnergy],
+        energy: Energy,
     ) -> tuple[SearchOptions, Indices]:
         """Where to search keyframe `centre` about an older one, the `first`, and among which (m,).
 
         These are what the graph knows well as seen from the first: the map that they make is in one piece.
         """
         options, paths, poses = self.options, route.paths, route.poses
+        away = np.hypot(*(poses[:, :2] - poses[centre, :2]).T)
+        farthest = min(float(self._farthest(reach)[first]), max(float(away.max()), options.farthest))
         distance = max(options.deviations * reach.distance[first], options.least)
         turn = max(options.deviations * reach.angle[first], options.least_turn)
-        window = replace(
-            options.search, distance=min(distance, options.farthest), turn=min(turn, float(np.pi))
-        )
+        window = replace(options.search, distance=min(distance, farthest), turn=min(turn, float(np.pi)))
         older = paths[centre] - paths > self.nscan.recent
-        near = np.hypot(*(poses[:, :2] - poses[centre, :2]).T) <= options.around + window.distance
+        near = away <= options.around + window.distance
         in_one_piece = options.deviations * seen_from(energy(first), poses).distance <= options.settled
         return window, np.flatnonzero(older & near & in_one_piece)
 

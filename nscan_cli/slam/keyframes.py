@@ -117,6 +117,12 @@ class Keyframes:
         self.list.append(keyframe)
         return keyframe
 
+    def part(self) -> None:
+        """The track begins anew: the next keyframe sees none of the scans since the last."""
+        if self.list:
+            self._grow(self.list[-1])
+        self._since = []
+
     def finish_last(self) -> None:
         """Give the last keyframe the scans since; nothing is added to it any more."""
         if self.list:

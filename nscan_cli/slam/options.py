@@ -37,20 +37,18 @@ class TrackingOptions:
     """A scan joins the map when the robot has moved by so much (m, rad) since the last that did."""
     widenings: tuple[float, ...] = (0.05, 0.3, 1.0)
     max_iterations: int = 20
-    tolerance: float = 1e-3
+    tolerance: float = 1e-4
     """m, rad"""
     scale: float = 0.1
     """What the energy is multiplied with against the prior: four Gaussians see each point, and
     neighbouring points hit the same wall."""
     inlier_bound: float = 9.0
     """A point within this squared Mahalanobis distance of a Gaussian is an inlier."""
-    inlier_share: float = 0.7
-    """With fewer inliers the match starts again from other angles."""
+    inlier_share: float = 0.8
+    """With fewer inliers the match starts again from other angles: one that is off by 12° can have 0.7."""
     turns: tuple[tuple[float, ...], ...] = ((0.1, 0.2), (0.4, 0.7), (1.0, 1.3))
     """Angles (rad, to both sides) to start again from; a later ring when those before did not help."""
     odometry: MotionModel = field(default_factory=MotionModel)
-    steady_inlier_share: float = 0.8
-    """The same without odometry: a turn that was not expected can still match by three quarters."""
     steady_scans: int = 5
     """Without odometry a scan is expected to move as these did on average: stamps and motion jitter."""
     steady_motion: MotionModel = field(
@@ -59,6 +57,32 @@ class TrackingOptions:
     """How sure that is."""
     steady_search: SearchOptions = field(default_factory=lambda: SearchOptions(distance=1.5, turn=1.5))
     """About what is expected, when other angles do not help either."""
+
+
+@dataclass(frozen=True)
+class BreakOptions:
+    """Step 1: when the track has broken, and what is known of the way then."""
+
+    inlier_share: float = 0.7
+    """A match with fewer inliers is poor."""
+    alike: float = 0.7
+    """A poor match goes on from the scans before if it sees the same in such a share of bearings."""
+    apart: float = 0.2
+    """The same is what is no further apart (m),"""
+    apart_per_metre: float = 0.1
+    """and by so much for each metre of its range."""
+    far: float = 2.0
+    """From farther (m) by odometry it may see something else;"""
+    far_turned: float = 1.0
+    """or turned by more (rad)."""
+    patience: int = 5
+    """For so many scans more the robot may see again what it saw before: someone stood in its way."""
+    path: float = 40.0
+    """A break counts as so much path (m): what lies before is another visit."""
+    distance: float = 100.0
+    """Standard deviation (m) of the way over a break,"""
+    turn: float = 1.8
+    """and of the turn (rad): any one is as likely."""
 
 
 @dataclass(frozen=True)
@@ -100,8 +124,8 @@ class NScanOptions:
     each point. More points in a cell hit the same piece of wall, and count as much together."""
     widenings: tuple[float, ...] = (0.05, 0.3, 1.0)
     max_iterations: int = 30
-    tolerance: float = 3e-3
-    """m, rad: the last steps are Newton's, each a small part of the one before."""
+    tolerance: float = 1e-3
+    """m, rad"""
     overlap: float = 0.65
     """Share of inliers, one of the other, that holds two scans together."""
     settled: float = 0.1
@@ -138,6 +162,8 @@ class ClosingOptions:
     """rad"""
     farthest: float = 25.0
     """And at most, m."""
+    lost: float = 100.0
+    """How far (m) when not even the direction is known: the track has broken."""
     beside: float = 6.0
     """The keyframes of so much path (m) to both sides are searched together."""
     around: float = 15.0
@@ -154,6 +180,10 @@ class ClosingOptions:
     """rad"""
     together: float = 30.0
     """And how near each other they must be, m of path."""
+    agreeing: int = 2
+    """How many keyframes must agree;"""
+    agreeing_lost: int = 3
+    """when the track has broken, where rooms alike are not told apart by how far they are."""
 
 
 @dataclass(frozen=True)
@@ -161,6 +191,7 @@ class SlamOptions:
     """All of them."""
 
     tracking: TrackingOptions = field(default_factory=TrackingOptions)
+    breaks: BreakOptions = field(default_factory=BreakOptions)
     keyframes: KeyframeOptions = field(default_factory=KeyframeOptions)
     nscan: NScanOptions = field(default_factory=NScanOptions)
     closing: ClosingOptions = field(default_factory=ClosingOptions)
@@ -170,7 +201,9 @@ class SlamOptions:
     matched with it alone."""
     optimise_after: float = 0.1
     """The graph is optimised when joint matches have moved scans by so much in all, m."""
-    refinements: int = 4
+    optimise_growth: float = 0.01
+    """And only when so large a share of its keyframes is new: in all, that takes time in proportion."""
+    refinements: int = 2
     """Most sweeps of joint matches from the final poses."""
-    refined: float = 0.01
+    refined: float = 0.02
     """A joint match is made again when a scan has moved by so much (m, rad) since."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import itertools
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 
@@ -12,19 +12,21 @@ from nscan_cli.graph.marginals import marginal_covariances
 from nscan_cli.graph.model import Graph, Loop, NScan, Pairwise
 from nscan_cli.graph.optimise import optimise
 from nscan_cli.graph.pattern import Indices
+from nscan_cli.graph.relation import Relation
 from nscan_cli.graph.robust import contradicting
 from nscan_cli.graph.system import GraphEnergy
 from nscan_cli.logs.scan import LaserLog
-from nscan_cli.poses import Array, compose
+from nscan_cli.poses import Array, compose, relative
+from nscan_cli.slam.believed import believed_odometry, hanging
 from nscan_cli.slam.closing import Closing
 from nscan_cli.slam.coverage import Coverage
+from nscan_cli.slam.following import Followed, Follower
 from nscan_cli.slam.keyframes import Keyframe, Keyframes, Route, relation_between
 from nscan_cli.slam.nearby import MatchNearby, Nearby, choose_nearby, match_nearby
 from nscan_cli.slam.options import SlamOptions
 from nscan_cli.slam.pairs_nearby import match_pairs_nearby
 from nscan_cli.slam.place import TOO_LITTLE, Place
 from nscan_cli.slam.refinement import Refinement
-from nscan_cli.slam.tracking import Tracked, Tracker
 from nscan_cli.slam.trajectory import between_keyframes
 from nscan_cli.threads import Beside
 
@@ -42,34 +44,36 @@ class Slam:
 
     def __init__(self, log: LaserLog, options: SlamOptions, threads: int = 1) -> None:
         self.log, self.options, self.threads = log, options, threads
-        self.tracker = Tracker(options.tracking)
+        self.tracker = Follower(options.tracking, options.breaks)
+        self.odometry, self.jumps = log.odometry, np.zeros(0, dtype=np.int64)
+        if log.odometry is not None:
+            self.odometry, self.jumps = believed_odometry(log.odometry, log.times)
+        self.hanging = frozenset(hanging(log, self.odometry).tolist())
         seen = log.ranges[log.ranges < options.tracking.reach]
         median_range = float(np.median(seen)) if len(seen) else 0.0
         self.keyframes = Keyframes(options.keyframes, options.nscan.gaussians, median_range)
         self.tracked: list[Array] = []
         self.anchors: list[int] = []
+        self.breaks: list[int] = []
         self.match: MatchNearby = match_pairs_nearby if options.relations == "pairwise" else match_nearby
         self.route = Route([], [], np.zeros(0), np.zeros((0, 3)))
         self.pairs: list[Pairwise] = []
         self.nscan: list[NScan] = []
+        self.others: list[Relation] = []
         self.loops: list[Loop] = []
         self.covered = Coverage()
         self.closing = Closing(options.closing, options.nscan, self.match)
         self.places: list[Place] = []
         self._moved = 0.0
+        self._optimised = 0
 
     def run(self, report: Report) -> Graph:
         """The paper's loop over all scans, and the last optimisation."""
         with Beside(self.threads) as beside:
-            for row in range(len(self.log)):
-                points = self.points(row)
-                tracked = self.track(row, points)
-                if self.keyframes.near_enough(tracked):
-                    self.keyframes.attach(points, tracked)
-                else:
-                    self.keyframes.add(row, points, tracked)
-                    beside(self.grow, len(self.keyframes) - 1)
-                self.anchors.append(self.keyframes.list[-1].row)
+            for row, points in enumerate(self.points()):
+                for scan in self.track(row, points):
+                    if self.settle(scan):
+                        beside(self.grow, len(self.keyframes) - 1)
                 report(row + 1, len(self.keyframes))
         self.keyframes.finish_last()
         self.grow(len(self.keyframes))
@@ -82,18 +86,34 @@ class Slam:
         graph.marginals = marginal_covariances(graph)
         return graph
 
-    def points(self, row: int) -> Array:
-        """The points (m, 2) of a scan that are matched: those within reach."""
-        points = self.log.points(row)
-        near = np.hypot(points[:, 0], points[:, 1]) < self.options.tracking.reach
-        return np.ascontiguousarray(points[near])
+    def points(self) -> Iterator[Array]:
+        """The points (m, 2) of each scan that are matched: those within reach, none of a laser that hangs."""
+        for row, points in enumerate(self.log.each_points(self.options.tracking.reach)):
+            yield points[:0] if row in self.hanging else points
 
-    def track(self, row: int, points: Array) -> Tracked:
-        """Step 1: the pose of a scan by matching it with the map of the last metres."""
-        odometry = None if self.log.odometry is None else self.log.odometry[row]
-        tracked = self.tracker.track(points, odometry)
-        self.tracked.append(tracked.pose)
-        return tracked
+    def track(self, row: int, points: Array) -> list[Followed]:
+        """Step 1: the pose of a scan by matching it with the map of the last metres.
+
+        Returns the scans that are settled by it; with the last one these are all.
+        """
+        odometry = None if self.odometry is None else self.odometry[row]
+        settled = self.tracker.follow(row, points, odometry)
+        return settled + self.tracker.finish() if row == len(self.log) - 1 else settled
+
+    def settle(self, scan: Followed) -> bool:
+        """Step 2: whether a scan that was tracked is a new keyframe."""
+        if scan.begins:
+            self.keyframes.part()
+        if scan.breaks:
+            self.breaks.append(scan.row)
+        is_new = scan.begins or not self.keyframes.near_enough(scan.tracked)
+        if is_new:
+            self.keyframes.add(scan.row, scan.points, scan.tracked)
+        else:
+            self.keyframes.attach(scan.points, scan.tracked)
+        self.tracked.append(scan.tracked.pose)
+        self.anchors.append(self.keyframes.list[-1].row)
+        return is_new
 
     def grow(self, size: int) -> None:
         """The graph takes in the first `size` keyframes, which are whole, and matches what is due."""
@@ -126,7 +146,7 @@ class Slam:
         self.covered.add(node, others, nearby)
         if nearby is not None:
             self.take(nearby)
-            if self._moved > self.options.optimise_after:
+            if self._moved > self.options.optimise_after and self._has_grown():
                 self.optimise(max_iterations=10, tolerance=1e-3)
         loop = None if nearby is None else nearby.loop
         # At the border of an earlier visit a place well inside fits better than the right one, half of which
@@ -134,6 +154,10 @@ class Slam:
         if options.loops and not (loop is not None and loop.reason == TOO_LITTLE):
             refused = loop is not None and not loop.accepted
             self.close_loops(centre, tried[seen_before & refused])
+
+    def _has_grown(self) -> bool:
+        """Whether the graph has grown by so much since it was optimised that it is worth another time."""
+        return len(self.poses) - self._optimised >= self.options.optimise_growth * len(self.poses)
 
     def match_unless_doubted(self, centre: int) -> Nearby | None:
         """The match of a keyframe with those near it; without other visits if its place there is doubted."""
@@ -152,11 +176,26 @@ class Slam:
     def close_loops(self, centre: int, left_out: Indices) -> None:
         """Step 4: a keyframe searched where its place may be farther off than a joint match finds it."""
         places = self.closing.close(self.route, centre, left_out, self._known)
+        if places:
+            self._put(places[-1])
         for place in places:
             self.take(place.nearby)
         if places:
             self.places.extend(places)
             self.optimise(max_iterations=100, tolerance=1e-4)
+
+    def _put(self, place: Place) -> None:
+        """The piece of a keyframe that was found moves there, if the track has broken since the place.
+
+        The graph would find it too, but hardly from half a turn away.
+        """
+        rows = [keyframe.row for keyframe in self.route.keyframes]
+        begins = [row for row in self.breaks if rows[place.old] < row <= rows[place.centre]]
+        if begins:
+            piece, poses = slice(rows.index(begins[-1]), None), self.poses.copy()
+            here = compose(poses[place.old], place.measured)
+            poses[piece] = compose(here, relative(poses[piece], poses[place.centre]))
+            self.route = self.route._replace(poses=poses)
 
     def take(self, nearby: Nearby) -> None:
         """The relations of a match join the graph."""
@@ -184,8 +223,8 @@ class Slam:
 
     def reject(self) -> None:
         """Loops that contradict the rest of the graph are taken back."""
-        energy = self._energy(self.pairwise, self.nscan, fixed=0)
-        relations: list[Pairwise | NScan] = [*self.pairwise, *self.nscan]
+        relations = self.relations
+        energy = self._energy(relations, fixed=0)
         doubted = np.array([relation.origin == "loop" for relation in relations], dtype=np.bool_)
         wrong = contradicting(energy, self.poses, doubted)
         if not wrong.any():
@@ -193,6 +232,7 @@ class Slam:
         gone = [relation for relation, is_wrong in zip(relations, wrong, strict=True) if is_wrong]
         self.pairs = [pair for pair in self.pairs if not any(pair is each for each in gone)]
         self.nscan = [joint for joint in self.nscan if not any(joint is each for each in gone)]
+        self.others = [other for other in self.others if not any(other is each for each in gone)]
         centres = {each.nodes[each.fixed] if isinstance(each, NScan) else each.nodes[1] for each in gone}
         self.loops = [
             dataclasses.replace(loop, accepted=False, reason=CONTRADICTS)
@@ -204,10 +244,10 @@ class Slam:
 
     def optimise(self, max_iterations: int, tolerance: float) -> None:
         """Step 5: the global poses of all keyframes from all relations (paper, IV)."""
-        self._moved = 0.0
+        self._moved, self._optimised = 0.0, len(self.poses)
         if len(self.poses) < 2:
             return
-        energy = self._energy(self.pairwise, self.nscan, fixed=0)
+        energy = self._energy(self.relations, fixed=0)
         self.route = self.route._replace(poses=optimise(energy, self.poses, max_iterations, tolerance).poses)
 
     @property
@@ -215,16 +255,32 @@ class Slam:
         """(K, 3) where the graph has the keyframes."""
         return self.route.poses
 
-    def _known(self, fixed: int) -> GraphEnergy:
-        """What loops and the way say of how the keyframes lie to one of them, slips allowed for."""
+    def _known(self, fixed: int, among: Indices | None = None) -> GraphEnergy:
+        """What loops and the way say of how the keyframes lie to one of them, slips allowed for.
+
+        With `among` (m,) only of these, whose places among them are the energy's.
+        """
         pairs = [relation for relation in self.pairs if relation.origin == "loop"]
         nscan = [relation for relation in self.nscan if relation.origin == "loop"]
-        return self._energy(self.closing.way + pairs, nscan, fixed)
+        if among is None:
+            return self._energy([*self.closing.way, *pairs, *nscan], fixed)
+        positions = np.full(len(self.log), -1)
+        positions[self.route.rows(among.tolist())] = np.arange(len(among))
+        inside = (positions >= 0).tolist()
+        way = [self.closing.way[k] for k in among[:-1][np.diff(among) == 1].tolist()]
+        pairs = [relation for relation in pairs if all(inside[node] for node in relation.nodes)]
+        nscan = [relation for relation in nscan if all(inside[node] for node in relation.nodes)]
+        return GraphEnergy(len(among), [*way, *pairs, *nscan], positions, int(np.searchsorted(among, fixed)))
 
-    def _energy(self, pairwise: list[Pairwise], nscan: list[NScan], fixed: int) -> GraphEnergy:
+    def _energy(self, relations: Sequence[Relation], fixed: int) -> GraphEnergy:
         positions = np.full(len(self.log), -1)
         positions[[keyframe.row for keyframe in self.route.keyframes]] = np.arange(len(self.poses))
-        return GraphEnergy(len(self.poses), pairwise, nscan, positions, fixed)
+        return GraphEnergy(len(self.poses), relations, positions, fixed)
+
+    @property
+    def relations(self) -> list[Relation]:
+        """All relations of the graph, in its order."""
+        return [*self.pairwise, *self.nscan, *self.others]
 
     @property
     def pairwise(self) -> list[Pairwise]:
@@ -241,10 +297,11 @@ class Slam:
         return Graph(
             scans=self.log.numbers,
             stamps=list(self.log.stamps),
-            poses=between_keyframes(np.array(self.tracked), keyframes, self.poses),
+            poses=between_keyframes(np.array(self.tracked), keyframes, self.poses, self.breaks),
             odometry=self.log.odometry,
             anchors=anchors,
             pairwise=self.pairwise,
             nscan=self.nscan,
+            others=self.others,
             loops=self.loops + self.closing.refused(),
         )

@@ -25,6 +25,8 @@ from nscan_cli.slam.options import TrackingOptions
 
 RECENT = 5.0
 """A lost scan is searched among those of the last stretch of path, m."""
+CLEARLY = 0.05
+"""By so many inliers more the match from another start must be better."""
 LEAST_SCORE = 0.3
 """What a search must find at least; with fewer inliers a scan is lost, whatever the odometry says."""
 
@@ -98,16 +100,16 @@ class Tracker:
         prior = self._predict(odometry)
         self._odometry = odometry
         match = self._match(points, prior, prior.mean)
-        options = self.options
-        enough = options.steady_inlier_share if odometry is None else options.inlier_share
-        for ring in options.turns:
-            if match.inliers >= enough:
+        for ring in self.options.turns:
+            if match.inliers >= self.options.inlier_share:
                 break
             self.restarts += 1
             for turn in (sign * angle for angle in ring for sign in (1, -1)):
                 candidate = self._match(points, prior, prior.mean + np.array([0.0, 0.0, turn]))
-                match = min(match, candidate, key=attrgetter("value"))
-        if match.inliers < (enough if odometry is None else LEAST_SCORE):
+                # From elsewhere it may slide along a corridor; a wrong turn shows in what then fits.
+                if candidate.inliers > match.inliers + CLEARLY:
+                    match = min(match, candidate, key=attrgetter("value"))
+        if match.inliers < (self.options.inlier_share if odometry is None else LEAST_SCORE):
             match = self._search(points, prior, match)
         match.pose[2] = wrap(match.pose[2])
         expected = np.diag(1.0 / np.diag(prior.information))

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -11,12 +13,15 @@ METRES_PER_RADIAN = 0.3
 """A turn wears tracking as this much way does."""
 
 
-def between_keyframes(tracked: Array, keyframes: NDArray[np.int64], poses: Array) -> Array:
+def between_keyframes(
+    tracked: Array, keyframes: NDArray[np.int64], poses: Array, breaks: Sequence[int] = ()
+) -> Array:
     """(S, 3) poses of all scans: as tracked (S, 3) from the keyframes (K,) on either side, blended.
 
     `poses` (K, 3) are the keyframes' global poses. Seen from the keyframe before and from the one after,
     a scan has two poses when the graph moved the two against each other. The closer one on the path
-    counts for more, so that the path bends and does not break at a keyframe.
+    counts for more, so that the path bends and does not break at a keyframe. Over the `breaks` of the
+    track, which are keyframes, it does: the scans before belong to the keyframe before.
     """
     scans = np.arange(len(tracked))
     before = np.searchsorted(keyframes, scans, side="right") - 1
@@ -25,7 +30,8 @@ def between_keyframes(tracked: Array, keyframes: NDArray[np.int64], poses: Array
     wear = np.hypot(step[:, 0], step[:, 1]) + METRES_PER_RADIAN * np.abs(wrap(step[:, 2]))
     path = np.concatenate([[0.0], np.cumsum(wear)])
     start, length = path[keyframes[before]], path[keyframes[after]] - path[keyframes[before]]
-    share = np.divide(path - start, length, out=np.zeros(len(path)), where=length > 0.0)
+    bends = (length > 0.0) & ~np.isin(keyframes[after], list(breaks))
+    share = np.divide(path - start, length, out=np.zeros(len(path)), where=bends)
     from_before = compose(poses[before], relative(tracked, tracked[keyframes[before]]))
     from_after = compose(poses[after], relative(tracked, tracked[keyframes[after]]))
     apart = from_after - from_before

@@ -8,10 +8,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from nscan_cli.graph.cholesky import factorise, inverse_diagonal
+from nscan_cli.graph.cholesky import factorise, inverse_diagonal, loose_nodes
 from nscan_cli.graph.model import Pairwise
+from nscan_cli.graph.pattern import Indices
 from nscan_cli.graph.system import GraphEnergy
 from nscan_cli.poses import Array, relative
+
+AROUND = 45.0
+"""m; the part of the graph that is asked first. A search looks no farther than 30 m."""
 
 
 class Reach(NamedTuple):
@@ -46,6 +50,22 @@ def seen_from(energy: GraphEnergy, poses: Array) -> Reach:
     return Reach(distance, angle)
 
 
+def at_most(energy: GraphEnergy, poses: Array) -> Reach:
+    """As seen_from, of a part of a graph that may be in pieces: infinite where nothing holds a keyframe.
+
+    What the rest of the graph knows besides makes the true values smaller, never larger.
+    """
+    system = energy.evaluate(poses, exact=False)
+    factor = factorise(energy.pattern, 0.5 * system.hessian)
+    held = ~loose_nodes(factor)
+    covariances = inverse_diagonal(factor)[held]
+    distance, angle = np.full(len(poses), np.inf), np.full(len(poses), np.inf)
+    distance[energy.fixed] = angle[energy.fixed] = 0.0
+    distance[energy.free[held]] = np.sqrt(np.linalg.eigvalsh(covariances[:, :2, :2])[:, 1])
+    angle[energy.free[held]] = np.sqrt(covariances[:, 2, 2])
+    return Reach(distance, angle)
+
+
 class Whereabouts:
     """The reach of all keyframes from one that moves on, without asking the whole graph each time.
 
@@ -60,6 +80,23 @@ class Whereabouts:
     def ask(self, origin: int, energy: Callable[[int], GraphEnergy], poses: Array) -> Reach:
         """The reach (K,) from keyframe `origin`; `energy` gives the graph's with a keyframe held."""
         self._origin, self._reach = origin, seen_from(energy(origin), poses)
+        return self._reach
+
+    def narrow(self, origin: int, energy: Callable[[int, Indices], GraphEnergy], poses: Array) -> Reach:
+        """A bound again, by what is known of the keyframes around alone; `origin` as last for `bound`.
+
+        The same one where these are most of the graph: then it is as well to ask that.
+
+        `energy` gives that of the graph of some keyframes (m,) with one of them held.
+        """
+        around = np.flatnonzero(np.hypot(*(poses[:, :2] - poses[origin, :2]).T) <= AROUND)
+        if 2 * len(around) > len(poses):
+            return self._reach
+        local = at_most(energy(origin, around), poses[around])
+        distance, angle = self._reach.distance.copy(), self._reach.angle.copy()
+        distance[around] = np.minimum(distance[around], local.distance)
+        angle[around] = np.minimum(angle[around], local.angle)
+        self._reach = Reach(distance, angle)
         return self._reach
 
     def bound(self, origin: int, way: Sequence[Pairwise], poses: Array) -> Reach:

@@ -11,8 +11,9 @@ import pytest
 
 from nscan_cli.cli.main import run
 from nscan_cli.graph.json_fields import Record
-from nscan_cli.graph.json_file import nscan_relation, write_graph
-from nscan_cli.graph.model import Graph, Pairwise
+from nscan_cli.graph.json_file import write_graph
+from nscan_cli.graph.model import Graph, NScan, Pairwise
+from nscan_cli.graph.relation_types import relation_of
 from nscan_cli.graph.triangles import from_upper_triangle
 from nscan_cli.graph.tum import write_tum
 from nscan_cli.logs.load import read_log
@@ -70,7 +71,8 @@ def test_the_document(capsys, office):
     document, said = matched(capsys, SAMPLE, "--scans", SPEC)
     assert list(document) == KEYS
     assert (document["format"], document["version"]) == ("nscan-joint-match", "1.0")
-    relation = nscan_relation(Record(document["relation"], "relation"), "scans")
+    relation = relation_of(Record(document["relation"], "relation"), "scans")
+    assert isinstance(relation, NScan)
     assert (relation.nodes, relation.fixed, relation.origin) == (tuple(SCANS), 0, "nscan")
     assert_true(document, office)
     values = np.linalg.eigvalsh(relation.hessian)

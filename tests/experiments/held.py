@@ -72,7 +72,7 @@ class Held(GraphEnergy):
     ) -> None:
         # Without information they give the pattern its places, and nothing else.
         empty = [dataclasses.replace(each, hessian=np.zeros_like(each.hessian)) for each in nscan]
-        super().__init__(nodes, pairwise, empty, positions)
+        super().__init__(nodes, [*pairwise, *empty], positions)
         self.mapping = mapping
         self.groups = [(group, *self._lower(group)) for group in grouped(nscan, positions)]
 

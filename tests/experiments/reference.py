@@ -57,7 +57,7 @@ def reference_log(name: str) -> ReferenceLog | None:
         for (a, b), pose in zip(nodes.tolist(), relations.poses, strict=True)
         if positions[a] >= 0
     ]
-    energy = GraphEnergy(len(part), pairwise, [], positions)
+    energy = GraphEnergy(len(part), pairwise, positions)
     poses = optimise(energy, chordal_start(energy, np.zeros((len(part), 3)))).poses
     return ReferenceLog(log, nearest(log.times, times[part]), poses)
 

@@ -30,7 +30,7 @@ COUNT = 12
 
 def chosen_ring(noise: float) -> tuple[Array, Followed]:
     truth, pairwise, nscan = mixed_ring(COUNT, noise)
-    return truth, Followed(COUNT, pairwise, nscan, np.arange(COUNT))
+    return truth, Followed(COUNT, [*pairwise, *nscan], np.arange(COUNT))
 
 
 def held_ring(mapping: Mapping, noise: float, c_held: bool = False) -> Held:

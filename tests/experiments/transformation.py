@@ -84,7 +84,7 @@ def problem_of(name: str, graph: Graph) -> Problem:
     keyframes = graph.keyframes
     positions = np.full(len(graph), -1)
     positions[keyframes] = np.arange(len(keyframes))
-    energy = Followed(len(keyframes), graph.pairwise, graph.nscan, positions)
+    energy = Followed(len(keyframes), graph.relations, positions)
     return Problem(name, graph.pairwise, graph.nscan, positions, energy, dict(_starts(graph)))
 
 

@@ -91,7 +91,7 @@ def graph_of(poses: Array, pairwise: list[Pairwise], nscan: list[NScan]) -> Grap
 
 def energy_of(poses: Array, pairwise: list[Pairwise], nscan: list[NScan], fixed: int = 0) -> GraphEnergy:
     """The energy of a graph whose ids are its places."""
-    return GraphEnergy(len(poses), pairwise, nscan, np.arange(len(poses)), fixed)
+    return GraphEnergy(len(poses), [*pairwise, *nscan], np.arange(len(poses)), fixed)
 
 
 def each_scan_once(pairwise: list[Pairwise], nscan: list[NScan]) -> tuple[list[Pairwise], list[NScan]]:

@@ -138,7 +138,7 @@ def test_marginals_of_two_scans_are_the_hessian_in_the_frame_of_pose_c():
     H = np.zeros((6, 6))
     H[3:, 3:] = np.diag([4.0, 1.0, 9.0])
     relation = NScan((5, 8), np.array([[1.0, 1.0, np.pi / 2], [1.0, 3.0, np.pi / 2]]), H, 0, "nscan", 0.5)
-    (edge,) = pairwise_marginals(relation)
+    (edge,) = pairwise_marginals(relation, relation.poses)
     assert (edge.nodes, edge.origin, edge.score) == ((5, 8), "nscan", 0.5)
     np.testing.assert_allclose(edge.measurement, [2, 0, 0], atol=1e-15)
     np.testing.assert_allclose(edge.information, np.diag([1, 4, 9]), atol=1e-12)
@@ -152,7 +152,9 @@ def test_marginals_are_the_blocks_of_the_covariance():
     others = [0, 1, 3]
     free = [3 * index + k for index in others for k in range(3)]
     covariance = np.linalg.inv(relation.hessian[np.ix_(free, free)])
-    for block, (index, edge) in enumerate(zip(others, pairwise_marginals(relation), strict=True)):
+    for block, (index, edge) in enumerate(
+        zip(others, pairwise_marginals(relation, relation.poses), strict=True)
+    ):
         assert edge.nodes == (2, index)
         np.testing.assert_allclose(edge.measurement, relative(poses[index], poses[2]))
         # Σ of the components of the relative pose is JΣJᵗ, with J from central differences.
@@ -172,7 +174,7 @@ def test_a_direction_that_nothing_holds_gets_next_to_no_information():
     # Two of three scans slide along x together: they hold each other, but nothing holds them to pose c.
     slide = np.array([0, 0, 0, 1.0, 0, 0, -1.0, 0, 0])
     H = np.outer(slide, slide) + np.diag([0, 0, 0, 0, 1.0, 1.0, 0, 1.0, 1.0])
-    edges = pairwise_marginals(NScan((0, 1, 2), np.zeros((3, 3)), H, 0, "nscan"))
+    edges = pairwise_marginals(NScan((0, 1, 2), np.zeros((3, 3)), H, 0, "nscan"), np.zeros((3, 3)))
     for edge in edges:
         np.testing.assert_allclose(edge.information, np.diag([1e-9, 1, 1]), atol=1e-12)
 
@@ -180,7 +182,7 @@ def test_a_direction_that_nothing_holds_gets_next_to_no_information():
 def test_negative_curvature_gives_no_negative_information():
     H = np.zeros((6, 6))
     H[3:, 3:] = np.diag([-2.0, 1.0, 1.0])
-    (edge,) = pairwise_marginals(NScan((0, 1), np.zeros((2, 3)), H, 0, "nscan"))
+    (edge,) = pairwise_marginals(NScan((0, 1), np.zeros((2, 3)), H, 0, "nscan"), np.zeros((2, 3)))
     np.testing.assert_allclose(edge.information, np.diag([1e-9, 1, 1]), atol=1e-12)
 
 

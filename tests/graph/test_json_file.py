@@ -16,8 +16,9 @@ from hypothesis import given, settings
 
 from nscan_cli.errors import InputDataError, InputMissingError
 from nscan_cli.graph.json_fields import MalformedError, Record
-from nscan_cli.graph.json_file import nscan_record, nscan_relation, parse_graph, read_graph, write_graph
+from nscan_cli.graph.json_file import parse_graph, read_graph, write_graph
 from nscan_cli.graph.model import Graph, NScan, Pairwise
+from nscan_cli.graph.relation_types import relation_of, relation_record
 from nscan_cli.poses import wrap
 from tests.graph.small_graph import graphs, small_graph
 
@@ -149,10 +150,7 @@ WRONG: list[tuple[Change, str]] = [
     (lambda d: d["nodes"][1].update(keyframe="no"), "'keyframe' is not true or false"),
     (lambda d: d["nodes"][1].pop("attached"), "'attached' is missing"),
     (lambda d: d["nodes"][0].update(attached=2), "a keyframe cannot be 'attached'"),
-    (
-        lambda d: d["relations"][0].update(type="edge"),
-        r"relations\[0\]: 'type' is not one of pairwise, nscan",
-    ),
+    (lambda d: d["relations"][0].update(type=7), r"relations\[0\]: 'type' is not one of pairwise, nscan"),
     (lambda d: d["relations"][0].update(nodes=[0]), "distinct integers"),
     (lambda d: d["relations"][0].update(nodes=[2, 2]), "distinct integers"),
     (lambda d: d["relations"][0].update(information=[1] * 5), "upper triangle of a 3 × 3 matrix: 6 finite"),
@@ -163,6 +161,10 @@ WRONG: list[tuple[Change, str]] = [
 ]
 # What a schema cannot say.
 WRONG_IN_ITSELF: list[tuple[Change, str]] = [
+    (
+        lambda d: d["relations"][0].update(type="edge"),
+        r"relations\[0\]: 'type' is not one of pairwise, nscan",
+    ),
     (lambda d: d["nodes"][1].update(pose=[0, 1, 10**400]), "'pose' is not a pose"),
     (lambda d: d["nodes"][1].update(stamp="1e999"), "'stamp' is not a time"),
     (lambda d: d["nodes"][2].update(id=3), r"nodes\[2\]: 'id' is 3, but ids count up from 0, here 2"),
@@ -200,9 +202,12 @@ def test_the_schema_refuses_a_wrong_document(change: Change):
     [
         (b"", "g.json, line 1: is empty"),
         (b'{"format":\n"nscan-pose-graph",\n}', "g.json, line 3: not JSON"),
-        (b"# CARMEN log\nFLASER 3", "g.json, line 1: not JSON"),
+        (b"# Dear all,\nfirst", "g.json: is of an unknown kind; give a graph in JSON, as nscan-cli slam"),
+        (b"FLASER 1 2.0 0 0 0 0 0 0 1.0 host 1.0\n" * 3, r"g.json: is a log \(CARMEN text\); give a graph"),
+        (b"\x1f\x8b\x08\x00\x00", "g.json: is compressed by gzip; give a graph"),
+        (b"VERTEX_SE2 0 0 0 0\n", r"g.json: is a pose graph \(g2o or TORO\); give a graph in JSON"),
         (b'{"format":NaN}', "not JSON: it has a number NaN"),
-        (b"\xff\xfe\xfd\x00\x01", "not JSON"),
+        (b"\xff\xfe\xfd\x00\x01", "is binary data of an unknown kind"),
         (b"[" * 100_000, "not JSON"),
         (b"[]", "document: is not a JSON object"),
         (b"{}", "'format' is not"),
@@ -229,11 +234,11 @@ def test_a_missing_file_and_a_folder_say_what_to_do(tmp_path: Path):
 
 def test_an_nscan_result_names_scans_instead_of_nodes():
     relation = NScan((140, 120), np.zeros((2, 3)), np.eye(6), 1, "nscan")
-    record = nscan_record(relation, key="scans")
+    record = relation_record(relation, key="scans")
     assert (record["scans"], record["fixed"]) == ([140, 120], 120)
-    assert nscan_relation(Record(record, "relation"), key="scans").nodes == (140, 120)
+    assert relation_of(Record(record, "relation"), key="scans").nodes == (140, 120)
     with pytest.raises(MalformedError, match="relation: 'nodes' is missing"):
-        nscan_relation(Record(record, "relation"))
+        relation_of(Record(record, "relation"))
 
 
 def changed(change: Change) -> dict[str, Any]:

@@ -43,7 +43,8 @@ def test_node_ids_are_mapped_to_places():
     poses = disturbed(truth, 0.3)
     plain = energy_of(poses, pairwise, nscan).evaluate(poses, exact=True)
     places = np.array([2, 0, 3, 1, 7, 6, 5, 4])
-    mixed = GraphEnergy(8, pairwise, nscan, places, fixed=2).evaluate(poses[np.argsort(places)], exact=True)
+    mixed_energy = GraphEnergy(8, [*pairwise, *nscan], places, fixed=2)
+    mixed = mixed_energy.evaluate(poses[np.argsort(places)], exact=True)
     np.testing.assert_allclose(mixed.terms, plain.terms, rtol=1e-12)
     np.testing.assert_allclose(mixed.gradient[[0, 2, 1]], plain.gradient[[0, 1, 2]], rtol=1e-9, atol=1e-9)
 

@@ -8,7 +8,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from nscan_cli.graph.model import NScan, Pairwise
-from nscan_cli.graph.terms import nscan_term, pairwise_term
+from nscan_cli.graph.terms import nscan_term
 from nscan_cli.poses import Array, compose, inverse, relative, rotated_information
 from tests.graph.reference import derivative, nscan_error, pairwise_error, second_derivative, term
 from tests.graph.small_graph import matrices
@@ -39,10 +39,7 @@ def joints(draw: st.DrawFn, n: int | None = None) -> tuple[Array, NScan]:
 def evaluate(x: Array, relation: Pairwise | NScan, curvature: float = 1.0) -> tuple[float, Array, Array]:
     # Filled, because a kernel has to write every entry.
     gradient, hessian = np.full(x.size, np.nan), np.full((x.size, x.size), np.nan)
-    if isinstance(relation, Pairwise):
-        value = pairwise_term(x, relation.measurement, relation.information, curvature, gradient, hessian)
-    else:
-        value = nscan_term(x, relation.poses, relation.hessian, relation.fixed, curvature, gradient, hessian)
+    value = nscan_term(x, *relation.term()[:3], curvature, gradient, hessian)
     return value, gradient, hessian
 
 

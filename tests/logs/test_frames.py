@@ -9,8 +9,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from nscan_cli.logs.decoding import Placed, Rigid
 from nscan_cli.logs.frames import Frames, as_matrix, heading, inverse, planar, unmoved
+from nscan_cli.logs.sensed import Placed, Rigid
 from nscan_cli.poses import compose, wrap
 from tests.logs.recordings import turned
 

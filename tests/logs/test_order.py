@@ -60,3 +60,24 @@ def test_selection_counts_from_the_first_scan():
 def test_selection_of_nothing_is_wrong_usage():
     with pytest.raises(WrongUsageError, match=r"a\.log.*lasts 4\.5 s"):
         selection(np.arange(10) / 2, ReadingOptions(start=60.0), "a.log")
+
+
+def test_a_clock_that_is_set_back_while_the_robot_drives_on_goes_on():
+    """Two ways through the same 8 s: sorted, their scans would take turns."""
+    times = np.concatenate([0.2 * np.arange(100), 12.0 + 0.2 * np.arange(100)])
+    order = by_time([f"{time:.1f}" for time in times])
+    np.testing.assert_array_equal(order.rows, np.arange(200))
+    np.testing.assert_allclose(order.times, 0.2 * np.arange(200), atol=1e-9)
+    assert order.stamps[99:101] == ["19.8", "20.000000"]
+    assert order.backward == 0
+    assert order.warnings == ["the clock is set back by 8.0 s at scan 100; the times go on from those before"]
+
+
+def test_messages_that_come_late_are_sorted_in():
+    """They fill the gap that they left; nor is a clock set back that meets no time again."""
+    times = 0.2 * np.arange(200)
+    late = np.concatenate([times[:60], times[120:160], times[60:120], times[160:]])
+    order = by_time([f"{time:.1f}" for time in late])
+    np.testing.assert_allclose(order.times, times, atol=1e-9)
+    apart = np.concatenate([times + 3600.0, times])
+    assert np.all(np.diff(by_time([f"{time:.1f}" for time in apart]).times) > 0)

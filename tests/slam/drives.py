@@ -13,7 +13,7 @@ from nscan_cli.graph.model import Pairwise
 from nscan_cli.graph.system import GraphEnergy
 from nscan_cli.logs.scan import LaserLog
 from nscan_cli.poses import Array, compose, relative
-from nscan_cli.slam.closing import Closing
+from nscan_cli.slam.closing import Closing, Energy, Indices
 from nscan_cli.slam.keyframes import Keyframe, Keyframes, relation_between, route
 from nscan_cli.slam.options import KeyframeOptions, NScanOptions
 from nscan_cli.slam.place import Place
@@ -119,11 +119,13 @@ def slipped_round(slip: Sequence[float], seed: int = 5, max_range: float = 30.0)
     log = round_scene(max_range).record(seed).log()
     path = path_of(truth_of(log))
     blind = np.flatnonzero((path > 50.0) & (path < 53.0))
-    at = int(blind[len(blind) // 2])
     assert log.odometry is not None
-    odometry = log.odometry.copy()
-    off = compose(odometry[at], np.array(slip))
-    odometry[at:] = compose(off, relative(log.odometry[at:], log.odometry[at]))
+    steps, odometry = relative(log.odometry[1:], log.odometry[:-1]), log.odometry.copy()
+    # In steps of less than a metre: at once nobody would believe it.
+    some = blind[len(blind) // 2 :][:3] - 1
+    steps[some] = compose(steps[some], np.array(slip) / len(some))
+    for row in range(int(blind[0]), len(log)):
+        odometry[row] = compose(odometry[row - 1], steps[row - 1])
     return dataclasses.replace(without_returns(log, blind), odometry=odometry)
 
 
@@ -177,6 +179,19 @@ def twin_drive(apart: float = TWIN) -> Driven:
     return driven(twin_corridors(), truth, np.concatenate([x + 12.0, x + 76.0]))
 
 
+def energy_of_way(closing: Closing, size: int) -> Energy:
+    """What the way alone says of the first `size` keyframes, every ROWS rows."""
+
+    def energy(fixed: int, among: Indices | None = None) -> GraphEnergy:
+        keyframes = np.arange(size) if among is None else among
+        positions = np.full(ROWS * size, -1)
+        positions[ROWS * keyframes] = np.arange(len(keyframes))
+        way = [closing.way[k] for k in keyframes[:-1][np.diff(keyframes) == 1].tolist()]
+        return GraphEnergy(len(keyframes), way, positions, int(np.searchsorted(keyframes, fixed)))
+
+    return energy
+
+
 def closed_along(
     closing: Closing, drive: Driven, until: int | None = None, left_out: Sequence[int] = ()
 ) -> list[tuple[int, list[Place]]]:
@@ -186,9 +201,6 @@ def closed_along(
     `left_out` these keyframes of another visit.
     """
     keyframes, chain, poses, _ = drive
-    rows = np.array([keyframe.row for keyframe in keyframes])
-    positions = np.full(rows[-1] + 1, -1)
-    positions[rows] = np.arange(len(rows))
     others, found = np.array(left_out, dtype=np.int64), []
     for newest in range(1, len(keyframes) if until is None else until + BEHIND + 1):
         length = keyframes[newest].tracked.path - keyframes[newest - 1].tracked.path
@@ -197,9 +209,7 @@ def closed_along(
         if centre < 0:
             continue
 
-        def energy(fixed: int, size: int = size) -> GraphEnergy:
-            return GraphEnergy(size, closing.way, [], positions, fixed)
-
+        energy = energy_of_way(closing, size)
         out = others[others < centre]
         places = closing.close(route(keyframes, chain, poses[:size]), centre, out, energy)
         if places:

@@ -28,7 +28,7 @@ class Walk(NamedTuple):
     def energy(self, fixed: int) -> GraphEnergy:
         """The graph's, with a keyframe held."""
         size = len(self.poses)
-        return GraphEnergy(size, self.way + self.loops, self.nscan, np.arange(size), fixed)
+        return GraphEnergy(size, [*self.way, *self.loops, *self.nscan], np.arange(size), fixed)
 
     def until(self, size: int) -> Walk:
         """The first keyframes only; the loops have to be among them."""

@@ -1,0 +1,179 @@
+"""What goes wrong with a robot and its sensors, put into a log that was recorded without trouble.
+
+Every function takes a log and gives another, with the same scans but for the trouble; true poses stay true.
+Rows are positions in the log; `rows` is any slice or array of them.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nscan_cli.logs.order import by_time
+from nscan_cli.logs.scan import LaserLog
+from nscan_cli.poses import Array, compose, relative, transform, wrap
+
+Rows = slice | NDArray[np.int64]
+
+
+def taken(log: LaserLog, rows: Rows) -> LaserLog:
+    """The scans in `rows` alone, in that order; the numbers are those of a log that never had others."""
+    some = np.arange(len(log))[rows]
+    return replace(
+        log,
+        numbers=np.arange(len(some)),
+        stamps=tuple(log.stamps[row] for row in some.tolist()),
+        times=log.times[some],
+        ranges=log.ranges[some],
+        angle_min=log.angle_min[some],
+        angle_increment=log.angle_increment[some],
+        odometry=None if log.odometry is None else log.odometry[some],
+        truth_times=None if log.truth is None else log.times[some],
+        truth=None if log.truth is None else log.truth[some],
+    )
+
+
+def blind(log: LaserLog, rows: Rows, reading: float = np.inf) -> LaserLog:
+    """No beam comes back: inf is "nothing met", nan "nothing said"."""
+    ranges = log.ranges.copy()
+    ranges[rows] = reading
+    return replace(log, ranges=ranges)
+
+
+def glass(log: LaserLog, x: tuple[float, float], y: tuple[float, float], angle: float) -> LaserLog:
+    """Walls within a box of the floor plan reflect beams near to head-on only (to `angle`, rad).
+
+    The walls lie along x or y, whichever the box is longer in. The other beams go through, and nothing
+    behind the glass is near.
+    """
+    ranges, truth = log.ranges.copy(), _truth(log)
+    along = 0 if x[1] - x[0] > y[1] - y[0] else 1
+    for row in range(len(log)):
+        beams = log.angle_min[row] + log.angle_increment[row] * np.arange(ranges.shape[1])
+        laser = log.laser_pose(truth[row])
+        directions = laser[2] + beams
+        reached = np.nan_to_num(ranges[row], nan=0.0, posinf=1e3)
+        ends = laser[:2] + reached[:, None] * np.stack([np.cos(directions), np.sin(directions)], axis=-1)
+        within = (ends[:, 0] > x[0]) & (ends[:, 0] < x[1]) & (ends[:, 1] > y[0]) & (ends[:, 1] < y[1])
+        normal = np.abs(np.sin(directions) if along == 0 else np.cos(directions))
+        ranges[row, within & (np.arccos(np.clip(normal, 0, 1)) > angle)] = np.inf
+    return replace(log, ranges=ranges)
+
+
+def dropped(log: LaserLog, rows: Rows) -> LaserLog:
+    """Scans are missing; the odometry of those behind knows of the way."""
+    return taken(log, np.delete(np.arange(len(log)), rows))
+
+
+def carried(log: LaserLog, rows: Rows) -> LaserLog:
+    """Someone lifts the robot at the first of `rows` and puts it down behind the last.
+
+    Nothing was recorded meanwhile, and the wheels did not turn.
+    """
+    some = np.arange(len(log))[rows]
+    return spliced([taken(log, slice(0, int(some[0]))), taken(log, slice(int(some[-1]) + 1, None))])
+
+
+def spliced(parts: list[LaserLog], pause: float = 5.0) -> LaserLog:
+    """Drives one after the other as one log: between two the robot is carried, in `pause` seconds.
+
+    The odometry of each goes on where that of the one before ended.
+    """
+    times, odometry = [parts[0].times], [parts[0].odometry]
+    for part in parts[1:]:
+        times.append(times[-1][-1] + pause + part.times - part.times[0])
+        before, own = odometry[-1], part.odometry
+        if before is None or own is None:
+            odometry.append(None)
+        else:
+            odometry.append(compose(before[-1], relative(own, own[0])))
+    known = [poses for poses in odometry if poses is not None]
+    together = np.concatenate(times)
+    return replace(
+        parts[0],
+        numbers=np.arange(len(together)),
+        stamps=tuple(f"{time:.6f}" for time in together),
+        times=together,
+        ranges=np.concatenate([part.ranges for part in parts]),
+        angle_min=np.concatenate([part.angle_min for part in parts]),
+        angle_increment=np.concatenate([part.angle_increment for part in parts]),
+        odometry=np.concatenate(known) if len(known) == len(parts) else None,
+        truth_times=None if parts[0].truth is None else together,
+        truth=None if parts[0].truth is None else np.concatenate([_truth(part) for part in parts]),
+    )
+
+
+def frozen(log: LaserLog, rows: Rows) -> LaserLog:
+    """The laser repeats its reading before the first of `rows`, while the robot drives on."""
+    some, ranges = np.arange(len(log))[rows], log.ranges.copy()
+    ranges[some] = ranges[some[0] - 1]
+    return replace(log, ranges=ranges)
+
+
+def odometry_reset(log: LaserLog, at: int) -> LaserLog:
+    """The odometry begins at (0, 0, 0) again with row `at`."""
+    odometry = _odometry(log).copy()
+    odometry[at:] = relative(odometry[at:], odometry[at])
+    return replace(log, odometry=odometry)
+
+
+def odometry_jump(log: LaserLog, at: int, jump: tuple[float, float, float]) -> LaserLog:
+    """From row `at` on the odometry is off by a pose, in its own frame."""
+    odometry = _odometry(log).copy()
+    odometry[at:] = compose(np.array(jump), odometry[at:])
+    return replace(log, odometry=odometry)
+
+
+def odometry_spike(log: LaserLog, at: int, value: tuple[float, float, float]) -> LaserLog:
+    """A single wrong value in row `at`."""
+    odometry = _odometry(log).copy()
+    odometry[at] = value
+    return replace(log, odometry=odometry)
+
+
+def odometry_wrapped(log: LaserLog, limit: float) -> LaserLog:
+    """Coordinates kept in [−limit, limit), as a counter of too few bits does."""
+    odometry = _odometry(log).copy()
+    odometry[:, :2] = np.mod(odometry[:, :2] + limit, 2 * limit) - limit
+    return replace(log, odometry=odometry)
+
+
+def clock_jump(log: LaserLog, at: int, seconds: float) -> LaserLog:
+    """The clock is set by so much at row `at`; the log is read as any other, in the order of its stamps."""
+    times = log.times.copy()
+    times[at:] += seconds
+    order = by_time([f"{time:.6f}" for time in times])
+    return replace(taken(log, order.rows), stamps=tuple(order.stamps), times=order.times)
+
+
+def people(log: LaserLog, walkers: Array, speed: float = 1.2, radius: float = 0.25) -> LaserLog:
+    """People walk to and fro: discs, each between two points of the floor plan, walkers (W, 4)."""
+    ranges, truth = log.ranges.copy(), _truth(log)
+    start, leg = walkers[:, :2], walkers[:, 2:] - walkers[:, :2]
+    length = np.hypot(leg[:, 0], leg[:, 1])
+    for row, time in enumerate(log.times - log.times[0]):
+        gone = np.mod(speed * time / length, 2.0)
+        places = start + np.where(gone < 1, gone, 2 - gone)[:, None] * leg
+        seen = transform(relative(np.zeros(3), log.laser_pose(truth[row])), places)
+        beams = log.angle_min[row] + log.angle_increment[row] * np.arange(ranges.shape[1])
+        for x, y in seen.tolist():
+            off = wrap(beams - np.arctan2(y, x))
+            away = np.hypot(x, y)
+            across = away * np.sin(off)
+            hit = (np.abs(across) < radius) & (np.abs(off) < np.pi / 2) & (away > radius)
+            near = away * np.cos(off) - np.sqrt(np.maximum(radius**2 - across**2, 0.0))
+            ranges[row, hit] = np.fmin(ranges[row, hit], near[hit])
+    return replace(log, ranges=ranges)
+
+
+def _truth(log: LaserLog) -> Array:
+    assert log.truth is not None
+    assert len(log.truth) == len(log)
+    return log.truth
+
+
+def _odometry(log: LaserLog) -> Array:
+    assert log.odometry is not None
+    return log.odometry

@@ -1,0 +1,218 @@
+"""Physical trouble in good logs: what the graph says of it, and that both sides of it are right."""
+
+from __future__ import annotations
+
+import copy
+import dataclasses
+import functools
+
+import numpy as np
+import pytest
+
+from nscan_cli.graph.model import Pairwise
+from nscan_cli.logs.load import read_log
+from nscan_cli.logs.options import ReadingOptions
+from nscan_cli.logs.scan import LaserLog
+from nscan_cli.poses import Array, relative
+from nscan_cli.slam.believed import believed_odometry, hanging
+from nscan_cli.slam.options import BreakOptions
+from nscan_cli.slam.run import notices
+from tests.data import data_file
+from tests.simulation import trouble
+from tests.slam import troubles
+from tests.slam.drives import round_scene
+from tests.slam.runs import Mapped, mapped
+from tests.slam.troubles import ROUND, Case, errors, without_odometry
+
+MENDED = ("3 m without a return", "3 m of nan", "15 m without a return", "3 s of scans dropped",
+          "10 s of scans dropped", "laser frozen for 3 m", "laser frozen for 8 m", "odometry reset to 0",
+          "odometry jumps by 30 m and 2 rad", "odometry wrong in one scan", "odometry wraps round",
+          "clock set forward by 1 h", "clock set back by 1 h", "clock set back by 10 s",
+          "people who pass")  # fmt: skip
+"""As if it had not happened."""
+FOUND_AGAIN = ("carried by 2 m", "carried by 5 m", "carried by 30 m", "kidnapped to a place seen before")
+NEVER_SEEN_AGAIN = "carried by 30 m, nothing seen again"
+
+
+@functools.cache
+def log() -> LaserLog:
+    return round_scene().record(5).log()
+
+
+@functools.cache
+def case(name: str, odometry: bool = True) -> tuple[Case, Mapped]:
+    made = ROUND[name](log())
+    made = made if odometry else without_odometry(made)
+    return made, mapped(made.log)
+
+
+@pytest.mark.parametrize("name", MENDED)
+def test_the_map_is_as_if_it_had_not_happened(name):
+    """Measured: 0.024 m at most; before, 16 m after a wrong value of odometry, 4 m with a frozen laser."""
+    made, found = case(name)
+    assert max(errors(made, found.graph.poses)) < 0.05
+    assert found.slam.breaks == []
+
+
+@pytest.mark.parametrize(
+    ("name", "odometry"),
+    [*((name, True) for name in FOUND_AGAIN), ("kidnapped to a place seen before", False)],
+)
+def test_a_robot_that_was_carried_is_found_again_by_a_loop(name, odometry):
+    """Without odometry a jump along a corridor may look like a drive; elsewhere it shows too."""
+    made, found = case(name, odometry)
+    assert max(errors(made, found.graph.poses)) < 0.05
+    assert found.slam.breaks == [made.before]
+    tie = relation_over_break(found)
+    assert np.sqrt(1 / tie.information[0, 0]) > BreakOptions().distance / 2
+    across = [
+        relation for relation in found.graph.nscan if min(relation.nodes) < made.before <= max(relation.nodes)
+    ]
+    assert {relation.origin for relation in across} == {"loop"}
+
+
+def test_what_went_wrong_is_said_by_the_numbers_of_the_scans():
+    made, found = case("carried by 5 m")
+    slam, numbers = copy.copy(found.slam), made.log.numbers
+    broken = f"tracking broke at scan {numbers[made.before]}; of the way there nothing is known"
+    assert notices(slam) == [broken]
+    slam.jumps, slam.hanging = np.arange(12), frozenset({7, 3})
+    several = ", ".join(str(number) for number in numbers[:10])
+    assert notices(slam)[1:] == [
+        f"the odometry jumps at scans {several} and 2 more; these steps are not believed",
+        f"the laser repeats itself at scans {numbers[3]}, {numbers[7]}; these are not matched",
+    ]
+
+
+def relation_over_break(found: Mapped) -> Pairwise:
+    (row,) = found.slam.breaks
+    (tie,) = [
+        relation
+        for relation in found.graph.pairwise
+        if relation.nodes[1] == row and relation.origin == "track"
+    ]
+    return tie
+
+
+def test_what_is_never_seen_again_is_a_piece_of_its_own_and_the_graph_says_so():
+    """Both pieces are right to centimetres; where the one lies to the other nobody knows, to 100 m."""
+    made, found = case(NEVER_SEEN_AGAIN)
+    error = errors(made, found.graph.poses)
+    assert error.whole > 1.0
+    assert max(error.before, error.after) < 0.05
+    assert found.slam.breaks == [made.before]
+    assert np.sqrt(1 / relation_over_break(found).information[0, 0]) > BreakOptions().distance / 2
+    assert not any(min(each.nodes) < made.before <= max(each.nodes) for each in found.graph.nscan)
+    last = int(found.graph.keyframes[-1])
+    assert np.sqrt(found.graph.marginals[last][0, 0]) > BreakOptions().distance / 2
+    assert np.sqrt(found.graph.marginals[int(found.graph.keyframes[3])][0, 0]) < 0.1
+
+
+def test_the_scans_around_a_break_belong_to_one_side_each():
+    made, found = case("kidnapped to a place seen before")
+    at, truth, poses = made.before, made.log.truth, found.graph.poses
+    assert truth is not None
+    off = relative(poses, poses[0]) - relative(truth, truth[0])
+    assert np.abs(off[at - 8 : at + 8, :2]).max() < 0.05
+    assert found.graph.anchors[at] == at
+    assert found.graph.anchors[at - 1] < at
+
+
+def test_threads_change_nothing():
+    made, found = case("carried by 2 m")
+    beside = mapped(made.log, threads=2)
+    np.testing.assert_array_equal(beside.graph.poses, found.graph.poses)
+    assert beside.slam.breaks == found.slam.breaks
+
+
+def test_rooms_alike_are_not_taken_for_one_another():
+    alike = troubles.rooms_alike().record(1).log()
+    made = Case(alike, len(alike) // 2, len(alike) // 2)
+    found = mapped(alike)
+    assert max(errors(made, found.graph.poses)) < 0.05
+    assert not any(loop.accepted for loop in found.graph.loops)
+
+
+def test_standing_still_makes_no_keyframes():
+    graph = mapped(troubles.standing(600)).graph
+    assert graph.keyframes.tolist() == [0]
+    assert np.abs(graph.poses[:, :2]).max() < 0.02
+
+
+def test_someone_in_the_way_for_half_a_second_breaks_nothing():
+    """In three scans all is hidden by something at 0.5 m; then the robot sees what it saw before."""
+    at = troubles.at_metre(log(), 30.0)
+    ranges = log().ranges.copy()
+    ranges[at : at + 3] = 0.5
+    found = mapped(dataclasses.replace(log(), ranges=ranges))
+    assert found.slam.breaks == []
+    assert errors(Case(log(), at, at), found.graph.poses).whole < 0.05
+
+
+# ----------------------------------------------------------------------------- what is not believed
+
+
+def clock(scans: int) -> Array:
+    return 0.1 * np.arange(scans, dtype=np.float64)
+
+
+def steady(scans: int = 150, step: float = 0.1) -> Array:
+    return np.stack([step * np.arange(scans), np.zeros(scans), np.full(scans, 0.3)], axis=1)
+
+
+def test_odometry_without_jumps_is_left_alone():
+    odometry = steady()
+    believed, jumps = believed_odometry(odometry, clock(150))
+    assert believed is odometry
+    assert len(jumps) == 0
+    # Two scans, or one, say nothing of what is usual.
+    for few in (1, 2):
+        assert len(believed_odometry(odometry[:few], clock(few))[1]) == 0
+
+
+def test_a_reset_goes_on_as_in_the_step_before():
+    odometry = steady()
+    odometry[20:] = relative(odometry[20:], odometry[20])
+    believed, jumps = believed_odometry(odometry, clock(150))
+    assert jumps.tolist() == [20]
+    np.testing.assert_allclose(
+        relative(believed[1:], believed[:-1]),
+        np.tile(relative(steady()[1], steady()[0]), (149, 1)),
+        atol=1e-9,
+    )
+
+
+def test_a_pause_in_which_the_robot_drove_on_is_believed():
+    """2 m from scan to scan where 0.1 m are usual: 2 s of scans are missing."""
+    rows = np.delete(np.arange(150), np.arange(20, 39))
+    _, jumps = believed_odometry(steady()[rows], clock(150)[rows])
+    assert len(jumps) == 0
+    _, jumps = believed_odometry(steady()[rows], clock(len(rows)))
+    assert jumps.tolist() == [20]
+
+
+def test_a_laser_hangs_only_if_the_robot_moves():
+    moves = trouble.frozen(log(), slice(40, 45))
+    assert hanging(moves, moves.odometry).tolist() == list(range(40, 45))
+    assert hanging(moves, None).tolist() == []
+    assert moves.odometry is not None
+    stands = np.repeat(moves.odometry[:1], len(moves), axis=0)
+    assert hanging(moves, stands).tolist() == []
+    # Where nothing is met, nothing repeats.
+    assert hanging(trouble.blind(log(), slice(40, 45)), moves.odometry).tolist() == []
+
+
+# ----------------------------------------------------------------------------- real logs
+
+
+@pytest.mark.logs
+def test_a_real_log_whose_robot_was_kidnapped():
+    """The first 200 s of intel, and most of them once more; their map without trouble is the truth."""
+    real = read_log(str(data_file("intel.log.gz")), ReadingOptions(end=200.0))
+    clean = mapped(real).graph
+    real = dataclasses.replace(real, truth_times=real.times, truth=clean.poses)
+    path = float(np.hypot(*np.diff(clean.poses[:, :2], axis=0).T).sum())
+    made = troubles.kidnapped(real, path, 0.2 * path, 0.9 * path)
+    found = mapped(made.log)
+    assert found.slam.breaks == [made.before]
+    assert max(errors(made, found.graph.poses)) < 0.05
