@@ -241,7 +241,8 @@ def test_toml_beyond_reason_is_bad_data(tmp_path, monkeypatch, capsys, text):
 
 def test_a_map_of_a_million_cells_a_side_is_refused_at_once(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
-    line = flaser(9.0, (1.0,) * 30, (1e6, 1e6, 0.0))
+    # In a hundred days a robot comes far.
+    line = flaser(9e6, (1.0,) * 30, (1e6, 1e6, 0.0))
     (tmp_path / "far.log").write_text(room_log(3) + line + "\n")
     arguments = ["slam", "far.log", "-q", "-o", "far.json", "--map", "far.png", "--carmen", "far.carmen"]
     assert run(arguments) == 2

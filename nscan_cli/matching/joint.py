@@ -223,8 +223,7 @@ def _descend(
 ) -> tuple[float, int, int, bool]:
     """One stage, from the poses (n, 3) in place: the value, iterations, evaluations, whether it converged.
 
-    Writes gradient (3n,) and Hessian (3n, 3n) at the poses; but those before the last step when they need
-    not be `exact`.
+    Writes gradient (3n,) and Hessian (3n, 3n) at the poses.
     """
     trial_gradient, trial_hessian = np.empty_like(gradient), np.empty_like(hessian)
     step = np.empty_like(poses)
@@ -244,9 +243,6 @@ def _descend(
         iterations += 1
         trial = poses + step
         converged = bool(np.abs(step).max() < tolerance)
-        if converged and not exact and damping <= FIRST_DAMPING:
-            poses[:, :] = trial
-            break
         there = evaluate(problem, trial, widening, curvature, neutral, stride, trial_gradient, trial_hessian)
         evaluations += 1
         if there <= value:
