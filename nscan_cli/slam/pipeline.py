@@ -16,7 +16,7 @@ from nscan_cli.graph.relation import Relation
 from nscan_cli.graph.robust import contradicting
 from nscan_cli.graph.system import GraphEnergy
 from nscan_cli.logs.scan import LaserLog
-from nscan_cli.poses import Array, compose, relative
+from nscan_cli.poses import Array, compose
 from nscan_cli.slam.believed import believed_odometry, hanging
 from nscan_cli.slam.closing import Closing
 from nscan_cli.slam.coverage import Coverage
@@ -25,7 +25,7 @@ from nscan_cli.slam.keyframes import Keyframe, Keyframes, Route, relation_betwee
 from nscan_cli.slam.nearby import MatchNearby, Nearby, choose_nearby, match_nearby
 from nscan_cli.slam.options import SlamOptions
 from nscan_cli.slam.pairs_nearby import match_pairs_nearby
-from nscan_cli.slam.place import TOO_LITTLE, Place
+from nscan_cli.slam.place import TOO_LITTLE, Place, piece_moved
 from nscan_cli.slam.refinement import Refinement
 from nscan_cli.slam.trajectory import between_keyframes
 from nscan_cli.threads import Beside
@@ -176,26 +176,13 @@ class Slam:
     def close_loops(self, centre: int, left_out: Indices) -> None:
         """Step 4: a keyframe searched where its place may be farther off than a joint match finds it."""
         places = self.closing.close(self.route, centre, left_out, self._known)
-        if places:
-            self._put(places[-1])
+        if not places:
+            return
+        self.route = piece_moved(self.route, places[-1], self.breaks)
         for place in places:
             self.take(place.nearby)
-        if places:
-            self.places.extend(places)
-            self.optimise(max_iterations=100, tolerance=1e-4)
-
-    def _put(self, place: Place) -> None:
-        """The piece of a keyframe that was found moves there, if the track has broken since the place.
-
-        The graph would find it too, but hardly from half a turn away.
-        """
-        rows = [keyframe.row for keyframe in self.route.keyframes]
-        begins = [row for row in self.breaks if rows[place.old] < row <= rows[place.centre]]
-        if begins:
-            piece, poses = slice(rows.index(begins[-1]), None), self.poses.copy()
-            here = compose(poses[place.old], place.measured)
-            poses[piece] = compose(here, relative(poses[piece], poses[place.centre]))
-            self.route = self.route._replace(poses=poses)
+        self.places.extend(places)
+        self.optimise(max_iterations=100, tolerance=1e-4)
 
     def take(self, nearby: Nearby) -> None:
         """The relations of a match join the graph."""

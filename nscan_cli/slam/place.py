@@ -7,6 +7,7 @@ match from there. A wrong loop is worse than a missed one.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -45,6 +46,21 @@ class Place:
         """(3,) where a keyframe of this visit lies if the place is right, at the graph's poses (K, 3)."""
         here = compose(poses[self.old], self.measured)
         return compose(here, relative(poses[keyframe], poses[self.centre]))
+
+
+def piece_moved(route: Route, place: Place, breaks: Sequence[int]) -> Route:
+    """The route with the piece of the keyframe found moved there, if the track has broken since the place.
+
+    `breaks` are rows of the log, increasing. The graph would find it too, but hardly from half a turn away.
+    """
+    rows = [keyframe.row for keyframe in route.keyframes]
+    begins = [row for row in breaks if rows[place.old] < row <= rows[place.centre]]
+    if not begins:
+        return route
+    first, poses = rows.index(begins[-1]), route.poses.copy()
+    for keyframe in range(first, len(poses)):
+        poses[keyframe] = place.corrected(route.poses, keyframe)
+    return route._replace(poses=poses)
 
 
 def find_place(
