@@ -13,7 +13,8 @@ import numpy as np
 from nscan_cli.compiled import kernel
 from nscan_cli.matching.linear import solve_definite
 from nscan_cli.matching.priors import Prior
-from nscan_cli.ndt.energy import OUT, accumulate, unpack
+from nscan_cli.ndt.energy import OUT, sum_meeting, unpack
+from nscan_cli.ndt.meeting import Meeting, begin, meet_again
 from nscan_cli.ndt.table import Grid
 from nscan_cli.poses import Array
 
@@ -22,6 +23,9 @@ LEAST_DAMPING = 1e-7
 GREATEST_DAMPING = 1e6
 STALLED = 0.1
 """Share of the tolerance below which a damped step ends a stage."""
+REFUSED_DAMPING = 1.0
+"""The least after a step that led uphill: mostly there is a cell's border in between, and it takes a step of
+half the length, not one that is a little shorter."""
 
 
 class PairProblem(NamedTuple):
@@ -41,6 +45,7 @@ class PairProblem(NamedTuple):
 @kernel
 def objective(
     problem: PairProblem,
+    meeting: Meeting,
     pose: Array,
     widening: float,
     curvature: float,
@@ -48,20 +53,10 @@ def objective(
     gradient: Array,
     hessian: Array,
 ) -> float:
-    """The objective at `pose`; writes its gradient (3,) and Hessian (3, 3), and E's own into out (10,)."""
-    accumulate(
-        problem.grid,
-        problem.half,
-        problem.points,
-        pose[0],
-        pose[1],
-        pose[2],
-        widening,
-        curvature,
-        0.0,
-        1,
-        out,
-    )
+    """The objective at `pose`, to which the meeting of the points moves; writes its gradient (3,) and Hessian
+    (3, 3), and E's own into out (10,)."""
+    meet_again(problem.grid, problem.half, meeting, pose[0], pose[1], pose[2])
+    sum_meeting(meeting, widening, curvature, out)
     unpack(out, problem.scale, gradient, hessian)
     value = problem.scale * out[0]
     mean, information = problem.prior
@@ -93,16 +88,17 @@ def minimise(
     semi-definite Hessian of the objective (3, 3). Returns the objective's and E's value, iterations,
     evaluations, and whether the last stage converged. Hessian and values are those before that last step.
     """
+    meeting = begin(problem.points)
     out, trial_out = np.empty(OUT), np.empty(OUT)
     gradient, step, trial = np.empty(3), np.empty(3), np.empty(3)
     trial_gradient, trial_hessian, damped = np.empty(3), np.empty((3, 3)), np.empty((3, 3))
     value, iterations, evaluations, converged = 0.0, 0, 0, False
     for stage in range(widenings.shape[0]):
         widening = widenings[stage]
-        value = objective(problem, pose, widening, 0.0, out, gradient, hessian)
+        value = objective(problem, meeting, pose, widening, 0.0, out, gradient, hessian)
         evaluations += 1
         damping = FIRST_DAMPING
-        converged = False
+        converged = refused = False
         for _ in range(max_iterations):
             iterations += 1
             damped[:, :] = hessian
@@ -117,14 +113,19 @@ def minimise(
                 pose[:] = trial
                 converged = True
                 break
-            trial_value = objective(problem, trial, widening, 0.0, trial_out, trial_gradient, trial_hessian)
+            trial_value = objective(
+                problem, meeting, trial, widening, 0.0, trial_out, trial_gradient, trial_hessian
+            )
             evaluations += 1
             if trial_value <= value:
                 pose[:], value, out[:] = trial, trial_value, trial_out
                 gradient[:], hessian[:, :] = trial_gradient, trial_hessian
-                damping = max(damping * 0.1, LEAST_DAMPING)
+                # After a refused step the next one of full length would mostly be refused again.
+                damping = damping if refused else max(damping * 0.1, LEAST_DAMPING)
+                refused = False
             else:
-                damping *= 10.0
+                refused = True
+                damping = max(10.0 * damping, REFUSED_DAMPING)
             # A step that is short because it is damped says less.
             converged = length < STALLED * tolerance
             if converged or damping > GREATEST_DAMPING:

@@ -20,6 +20,7 @@ from nscan_cli.matching.uncertainty import (
 )
 from nscan_cli.ndt.energy import OUT, inlier_share
 from nscan_cli.ndt.grid import Ndt
+from nscan_cli.ndt.meeting import begin
 from nscan_cli.poses import Array, wrap
 
 NO_OVERLAP = "no overlap"
@@ -124,7 +125,7 @@ def match_pair(
         )
         iterations += last
         evaluations += evaluated
-    objective(problem, pose, 1.0, 1.0, out, gradient, hessian)
+    objective(problem, begin(points), pose, 1.0, 1.0, out, gradient, hessian)
     overlap = inlier_share(reference.grid, reference.half, points, pose, INLIER_BOUND)
     covariance = covariance_of(hessian)
     reason = None

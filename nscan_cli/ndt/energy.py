@@ -14,13 +14,16 @@ from numpy.typing import NDArray
 
 from nscan_cli.compiled import kernel, summing_kernel
 from nscan_cli.ndt.grid import Ndt
+from nscan_cli.ndt.meeting import BLOCKS, MET, Meeting, meet
 from nscan_cli.ndt.table import Grid, find_row, pack
 from nscan_cli.poses import Array
 
+Vector = tuple[float, float]
+Symmetric = tuple[float, float, float]
+Terms = tuple[float, float, float, float, float, float, float, float, float, float]
+
 OUT = 10
 """Numbers that an evaluation gives: E, gradient (3), upper triangle of the Hessian (6)."""
-MET = 7
-"""Numbers of a point that meets a Gaussian: R(φ) x, v, and Σ⁻¹ as (xx, xy, yy)."""
 LEAST_EXPONENT = -700.0
 """So far away a point counts 10⁻³⁰⁴."""
 LOG2_E = 1.4426950408889634
@@ -50,36 +53,8 @@ def accumulate(
     counts by `stride`.
     """
     met = np.empty((MET, 4 * (points.shape[0] // stride + 1)))
-    count = _meet(grid, half, points, x, y, phi, stride, met)
+    count = meet(grid, half, points, x, y, phi, stride, met)
     _sum(met, count, widening, curvature, baseline, out)
-
-
-@kernel
-def _meet(
-    grid: Grid, half: float, points: Array, x: float, y: float, phi: float, stride: int, met: Array
-) -> int:
-    """Write the numbers of every point that meets a Gaussian to the columns of `met` (7, …); how many do."""
-    cos, sin = np.cos(phi), np.sin(phi)
-    count = 0
-    for k in range(0, points.shape[0], stride):
-        rx = cos * points[k, 0] - sin * points[k, 1]
-        ry = sin * points[k, 0] + cos * points[k, 1]
-        px, py = rx + x, ry + y
-        row = find_row(grid, pack(int(np.floor(px / half)), int(np.floor(py / half))))
-        if row < 0:
-            continue
-        for block in range(4):
-            link = grid.links[row, block]
-            if link < 0:
-                continue
-            gaussian = grid.gaussians[link]
-            if gaussian[2] == 0.0 or gaussian[5] * rx + gaussian[6] * ry > 0.0:
-                continue
-            met[0, count], met[1, count] = rx, ry
-            met[2, count], met[3, count] = px - gaussian[0], py - gaussian[1]
-            met[4, count], met[5, count], met[6, count] = gaussian[2], gaussian[3], gaussian[4]
-            count += 1
-    return count
 
 
 @summing_kernel
@@ -88,29 +63,69 @@ def _sum(met: Array, count: int, widening: float, curvature: float, baseline: fl
 
     There is no branch in the loop and no call, so that the processor takes several points at a time.
     """
-    cw = curvature * widening
     e = gx = gy = gp = hxx = hxy = hxp = hyy = hyp = hpp = 0.0
     for k in range(count):
-        rx, ry, vx, vy = met[0, k], met[1, k], met[2, k], met[3, k]
-        xx, xy, yy = met[4, k], met[5, k], met[6, k]
-        # Σ⁻¹v; vᵗΣ⁻¹ ∂x'/∂φ and Σ⁻¹ ∂x'/∂φ, with ∂x'/∂φ = (−ry, rx) and ∂²x'/∂φ² = −(rx, ry).
-        ax, ay = xx * vx + xy * vy, xy * vx + yy * vy
-        ap = ay * rx - ax * ry
-        jx, jy = xy * rx - xx * ry, yy * rx - xy * ry
-        s = _exp(max(-0.5 * widening * (vx * ax + vy * ay), LEAST_EXPONENT))
-        ws = widening * s
-        e -= s - baseline
-        gx += ws * ax
-        gy += ws * ay
-        gp += ws * ap
-        hxx += ws * (xx - cw * ax * ax)
-        hxy += ws * (xy - cw * ax * ay)
-        hyy += ws * (yy - cw * ay * ay)
-        hxp += ws * (jx - cw * ax * ap)
-        hyp += ws * (jy - cw * ay * ap)
-        hpp += ws * (jy * rx - jx * ry - curvature * (ax * rx + ay * ry) - cw * ap * ap)
+        v, sigma = (met[2, k], met[3, k]), (met[4, k], met[5, k], met[6, k])
+        t = _terms(met[0, k], met[1, k], v, sigma, 1.0, widening, curvature)
+        e += baseline - t[0]
+        gx, gy, gp = gx + t[1], gy + t[2], gp + t[3]
+        hxx, hxy, hxp, hyy, hyp, hpp = hxx + t[4], hxy + t[5], hxp + t[6], hyy + t[7], hyp + t[8], hpp + t[9]
     out[0], out[1], out[2], out[3] = e, gx, gy, gp
     out[4], out[5], out[6], out[7], out[8], out[9] = hxx, hxy, hxp, hyy, hyp, hpp
+
+
+@summing_kernel
+def sum_meeting(meeting: Meeting, widening: float, curvature: float, out: Array) -> None:
+    """Write E, gradient and Hessian of the points of a meeting into out (10,), as `accumulate` does."""
+    moved, gaussians = meeting.moved, meeting.gaussians
+    e = gx = gy = gp = hxx = hxy = hxp = hyy = hyp = hpp = 0.0
+    for block in range(BLOCKS):
+        for k in range(moved.shape[1]):
+            rx, ry = moved[0, k], moved[1, k]
+            v = moved[2, k] - gaussians[block, 0, k], moved[3, k] - gaussians[block, 1, k]
+            sigma = gaussians[block, 2, k], gaussians[block, 3, k], gaussians[block, 4, k]
+            shows = gaussians[block, 5, k] * rx + gaussians[block, 6, k] * ry <= 0.0
+            # Without `and`, which would be a branch.
+            t = _terms(rx, ry, v, sigma, 1.0 if shows & (sigma[0] > 0.0) else 0.0, widening, curvature)
+            e -= t[0]
+            gx, gy, gp = gx + t[1], gy + t[2], gp + t[3]
+            hxx, hxy, hxp, hyy, hyp, hpp = (
+                hxx + t[4],
+                hxy + t[5],
+                hxp + t[6],
+                hyy + t[7],
+                hyp + t[8],
+                hpp + t[9],
+            )
+    out[0], out[1], out[2], out[3] = e, gx, gy, gp
+    out[4], out[5], out[6], out[7], out[8], out[9] = hxx, hxy, hxp, hyy, hyp, hpp
+
+
+@summing_kernel
+def _terms(
+    rx: float, ry: float, v: Vector, sigma: Symmetric, weight: float, widening: float, curvature: float
+) -> Terms:
+    """The s, gradient and Hessian of a point on a Gaussian, times its weight."""
+    (vx, vy), (xx, xy, yy) = v, sigma
+    cw = curvature * widening
+    # Σ⁻¹v; vᵗΣ⁻¹ ∂x'/∂φ and Σ⁻¹ ∂x'/∂φ, with ∂x'/∂φ = (−ry, rx) and ∂²x'/∂φ² = −(rx, ry).
+    ax, ay = xx * vx + xy * vy, xy * vx + yy * vy
+    ap = ay * rx - ax * ry
+    jx, jy = xy * rx - xx * ry, yy * rx - xy * ry
+    s = weight * _exp(max(-0.5 * widening * (vx * ax + vy * ay), LEAST_EXPONENT))
+    ws = widening * s
+    return (
+        s,
+        ws * ax,
+        ws * ay,
+        ws * ap,
+        ws * (xx - cw * ax * ax),
+        ws * (xy - cw * ax * ay),
+        ws * (jx - cw * ax * ap),
+        ws * (yy - cw * ay * ay),
+        ws * (jy - cw * ay * ap),
+        ws * (jy * rx - jx * ry - curvature * (ax * rx + ay * ry) - cw * ap * ap),
+    )
 
 
 @kernel

@@ -7,6 +7,7 @@ from nscan_cli.matching.newton import PairProblem, minimise, objective
 from nscan_cli.matching.priors import Prior
 from nscan_cli.ndt.energy import OUT
 from nscan_cli.ndt.grid import Ndt
+from nscan_cli.ndt.meeting import begin
 from nscan_cli.poses import Array
 from tests.ndt import plain
 from tests.ndt.differences import derivative
@@ -26,7 +27,7 @@ def ndt_of(points: Array) -> Ndt:
 def evaluate(ndt: Ndt, points: Array, pose: Array, curvature: float = 1.0) -> tuple[float, Array, Array]:
     gradient, hessian = np.empty(3), np.empty((3, 3))
     problem = PairProblem(ndt.grid, ndt.half, points, SCALE, Prior(MEAN, INFORMATION))
-    value = objective(problem, pose, 1.0, curvature, np.empty(OUT), gradient, hessian)
+    value = objective(problem, begin(points), pose, 1.0, curvature, np.empty(OUT), gradient, hessian)
     return value, gradient, hessian
 
 

@@ -1,0 +1,97 @@
+"""Which Gaussians the points of a scan meet at a pose: looked up once, or kept while the pose changes."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from nscan_cli.compiled import kernel
+from nscan_cli.ndt.table import Grid, find_row, pack
+from nscan_cli.poses import Array
+
+BLOCKS = 4
+"""A point meets at most so many."""
+MET = 7
+"""Numbers of a point that meets a Gaussian: R(φ) x, v, and Σ⁻¹ as (xx, xy, yy)."""
+GAUSSIAN = 7
+"""Numbers of a Gaussian; see Grid."""
+
+
+@kernel
+def meet(
+    grid: Grid, half: float, points: Array, x: float, y: float, phi: float, stride: int, met: Array
+) -> int:
+    """Write the numbers of every point that meets a Gaussian to the columns of `met` (7, …); how many do.
+
+    Of the points, every so-manyth counts by `stride`.
+    """
+    cos, sin = np.cos(phi), np.sin(phi)
+    count = 0
+    for k in range(0, points.shape[0], stride):
+        rx = cos * points[k, 0] - sin * points[k, 1]
+        ry = sin * points[k, 0] + cos * points[k, 1]
+        px, py = rx + x, ry + y
+        row = find_row(grid, pack(int(np.floor(px / half)), int(np.floor(py / half))))
+        if row < 0:
+            continue
+        for block in range(BLOCKS):
+            link = grid.links[row, block]
+            if link < 0:
+                continue
+            gaussian = grid.gaussians[link]
+            if gaussian[2] == 0.0 or gaussian[5] * rx + gaussian[6] * ry > 0.0:
+                continue
+            met[0, count], met[1, count] = rx, ry
+            met[2, count], met[3, count] = px - gaussian[0], py - gaussian[1]
+            met[4, count], met[5, count], met[6, count] = gaussian[2], gaussian[3], gaussian[4]
+            count += 1
+    return count
+
+
+class Meeting(NamedTuple):
+    """m points where they were last, and the Gaussians of the lattice cells there."""
+
+    points: Array
+    """(2, m) in their own frame."""
+    cells: Array
+    """(2, m) lattice coordinates; nan before the first time."""
+    moved: Array
+    """(4, m) R(φ) x, and x'."""
+    gaussians: Array
+    """(4, 7, m) those of the four blocks; all 0 where there is none."""
+
+
+@kernel
+def begin(points: Array) -> Meeting:
+    """Room for the meeting of points (m, 2), which have met nothing yet."""
+    m = points.shape[0]
+    room = np.empty((2, m)), np.full((2, m), np.nan), np.empty((4, m)), np.empty((BLOCKS, GAUSSIAN, m))
+    meeting = Meeting(*room)
+    meeting.points[:, :] = points.T
+    return meeting
+
+
+@kernel
+def meet_again(grid: Grid, half: float, meeting: Meeting, x: float, y: float, phi: float) -> None:
+    """Move the points to the pose (x, y, phi), and look up what those meet that get into another cell."""
+    moved, cells = meeting.moved, meeting.cells
+    _move(meeting.points, x, y, np.cos(phi), np.sin(phi), moved)
+    for k in range(moved.shape[1]):
+        ix, iy = np.floor(moved[2, k] / half), np.floor(moved[3, k] / half)
+        if ix != cells[0, k] or iy != cells[1, k]:
+            cells[0, k], cells[1, k] = ix, iy
+            row = find_row(grid, pack(int(ix), int(iy)))
+            for block in range(BLOCKS):
+                link = -1 if row < 0 else grid.links[row, block]
+                for number in range(GAUSSIAN):
+                    value = 0.0 if link < 0 else grid.gaussians[link, number]
+                    meeting.gaussians[block, number, k] = value
+
+
+@kernel
+def _move(points: Array, x: float, y: float, cos: float, sin: float, moved: Array) -> None:
+    for k in range(points.shape[1]):
+        rx = cos * points[0, k] - sin * points[1, k]
+        ry = sin * points[0, k] + cos * points[1, k]
+        moved[0, k], moved[1, k], moved[2, k], moved[3, k] = rx, ry, rx + x, ry + y

@@ -1,0 +1,52 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from nscan_cli.ndt.energy import OUT, accumulate, sum_meeting
+from nscan_cli.ndt.grid import Ndt
+from nscan_cli.ndt.meeting import begin, meet_again
+from tests.ndt.rooms import room
+
+
+def outside_in(count: int) -> Ndt:
+    """An NDT whose walls are seen from one side, as a robot in the middle does."""
+    ndt = Ndt(0.5)
+    for seed in range(count):
+        ndt.add(room(seed), np.array([0.02 * seed, 0.0, 0.01 * seed]))
+    return ndt
+
+
+@pytest.mark.parametrize("curvature", [0.0, 1.0])
+@pytest.mark.parametrize("step", [1e-3, 0.05, 1.0, 30.0])
+def test_what_was_kept_on_the_way_says_the_same_as_what_is_looked_up_anew(step, curvature):
+    ndt, points = outside_in(3), room(7)
+    meeting, kept, anew = begin(points), np.empty(OUT), np.empty(OUT)
+    rng, start = np.random.default_rng(5), np.array([0.1, -0.1, 0.05])
+    counted = 0
+    for n in range(40):
+        # Every other time back where something is met.
+        pose = start + (n % 2) * step * rng.uniform(-1, 1, 3)
+        meet_again(ndt.grid, ndt.half, meeting, *pose)
+        sum_meeting(meeting, 0.3, curvature, kept)
+        accumulate(ndt.grid, ndt.half, points, pose[0], pose[1], pose[2], 0.3, curvature, 0.0, 1, anew)
+        np.testing.assert_allclose(kept, anew, rtol=1e-9, atol=1e-9 * np.abs(anew).max())
+        counted += anew[0] < -1.0
+    assert counted >= 20
+
+
+def test_no_points_meet_nothing():
+    ndt, out = outside_in(1), np.empty(OUT)
+    meeting = begin(np.empty((0, 2)))
+    meet_again(ndt.grid, ndt.half, meeting, 0.0, 0.0, 0.0)
+    sum_meeting(meeting, 1.0, 1.0, out)
+    assert (out == 0.0).all()
+
+
+def test_poses_that_are_not_numbers_meet_nothing():
+    ndt = outside_in(1)
+    meeting, out = begin(room(1)), np.empty(OUT)
+    for x in (np.nan, np.inf, 1e300):
+        meet_again(ndt.grid, ndt.half, meeting, x, 0.0, 0.0)
+        sum_meeting(meeting, 1.0, 0.0, out)
+        assert not out[0] < -1e-300
