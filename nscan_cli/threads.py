@@ -3,10 +3,15 @@
 from __future__ import annotations
 
 import os
+import sys
 from collections.abc import Callable, Iterable
 from concurrent.futures import Future, ThreadPoolExecutor
 from types import TracebackType
 from typing import Any, TypeVar
+
+SWITCH = 2e-4
+"""s; a thread that comes out of a kernel waits for the interpreter so long at most. The kernels take about as
+long, and by Python's own 5 ms both threads would wait most of the time."""
 
 Item = TypeVar("Item")
 Result = TypeVar("Result")
@@ -25,6 +30,19 @@ def in_threads(threads: int, function: Callable[[Item], Result], items: Iterable
         return list(pool.map(function, items))
 
 
+def meanwhile(threads: int, function: Callable[[], Result]) -> Callable[[], Result]:
+    """Call a function beside the caller's own work; with one thread, when its result is asked for.
+
+    Returns what gives the result, or raises the function's error.
+    """
+    if threads < 2:
+        return function
+    pool = ThreadPoolExecutor(1)
+    future = pool.submit(function)
+    pool.shutdown(wait=False)
+    return future.result
+
+
 class Beside:
     """Calls that are made one after another beside the caller's own work; at once if there is one thread.
 
@@ -34,6 +52,7 @@ class Beside:
 
     def __init__(self, threads: int) -> None:
         self._pool = ThreadPoolExecutor(1) if threads > 1 else None
+        self._interval = sys.getswitchinterval()
         self._calls: list[Future[Any]] = []
 
     def __call__(self, function: Callable[[Item], Any], item: Item) -> None:
@@ -46,6 +65,8 @@ class Beside:
         self._calls.append(self._pool.submit(function, item))
 
     def __enter__(self) -> Beside:
+        if self._pool is not None:
+            sys.setswitchinterval(SWITCH)
         return self
 
     def __exit__(
@@ -57,5 +78,6 @@ class Beside:
             for call in self._calls if kind is None else ():
                 call.result()
         finally:
+            sys.setswitchinterval(self._interval)
             # Who interrupts does not wait for what would be thrown away.
             self._pool.shutdown(wait=kind is not KeyboardInterrupt, cancel_futures=True)

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import sys
 import threading
 import time
 
 import pytest
 
-from nscan_cli.threads import Beside, available_threads, in_threads
+from nscan_cli.threads import Beside, available_threads, in_threads, meanwhile
 
 THREADS = pytest.mark.parametrize("threads", [1, 2, 5])
 
@@ -28,6 +29,28 @@ def test_one_thread_is_the_callers_own():
     with Beside(1) as beside:
         beside(lambda _: seen.append(threading.get_ident()), 0)
         assert seen == [own]
+
+
+@THREADS
+def test_what_is_called_meanwhile_gives_its_result_or_its_error(threads):
+    assert meanwhile(threads, lambda: 7)() == 7
+    called: list[int] = []
+
+    def fail() -> None:
+        called.append(threading.get_ident())
+        raise ValueError("at last")
+
+    result = meanwhile(threads, fail)
+    with pytest.raises(ValueError, match="at last"):
+        result()
+    assert (called == [threading.get_ident()]) == (threads == 1)
+
+
+def test_beside_leaves_the_interpreter_as_it_was():
+    before = sys.getswitchinterval()
+    with Beside(2):
+        assert sys.getswitchinterval() < before
+    assert sys.getswitchinterval() == before
 
 
 @THREADS

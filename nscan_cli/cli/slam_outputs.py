@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING
 
 from nscan_cli.cli.render import check_map_outputs, write_map, yaml_path
@@ -67,11 +68,18 @@ class Outputs:
             check_writable(path)
 
     def write(
-        self, graph: Graph, scans: LaserLog | None, rows: NDArray[np.int64], inputs: Sequence[str]
+        self,
+        graph: Graph,
+        scans: LaserLog | None,
+        rows: NDArray[np.int64],
+        inputs: Sequence[str],
+        threads: int,
     ) -> None:
         """Write all; `rows` (N,) are those of the graph's scans, `inputs` what the depfile names."""
         from nscan_cli.graph.json_file import write_graph
+        from nscan_cli.mapping.occupancy import occupancy_grid
         from nscan_cli.memory import give_back
+        from nscan_cli.threads import meanwhile
 
         give_back()
         farthest = float(abs(graph.poses[:, :2]).max())
@@ -80,6 +88,9 @@ class Outputs:
             raise InputDataError(
                 label(inputs[0]), problem, f"look for jumps, or set {DISTANCE.variable} higher"
             )
+        grid = None
+        if scans is not None and self.map is not None:
+            grid = meanwhile(threads, partial(occupancy_grid, scans, rows, graph.poses))
         write_whole(self.graph, write_graph(graph))
         if self.trajectory is not None:
             from nscan_cli.graph.tum import write_tum
@@ -93,11 +104,9 @@ class Outputs:
             from nscan_cli.exports.carmen import corrected_log
 
             write_whole(self.carmen, corrected_log(scans, rows, graph.poses))
-        if scans is not None and self.map is not None:
-            from nscan_cli.mapping.occupancy import occupancy_grid
-
+        if grid is not None and self.map is not None:
             # Last, since it may be refused for its size: the rest is then there.
-            write_map(self.map, occupancy_grid(scans, rows, graph.poses), yaml=True)
+            write_map(self.map, grid(), yaml=True)
         if self.depfile is not None:
             write_whole(self.depfile, self._rule(inputs))
 

@@ -49,6 +49,7 @@ def by_time(stamps: list[str]) -> Order:
     between its neighbours in the file.
     """
     times: Array = np.array([_seconds(stamp) for stamp in stamps], dtype=np.float64)
+    times[np.abs(times) > TIME.value] = np.nan
     good = np.isfinite(times)
     size = len(stamps)
     warnings = []
@@ -116,5 +117,4 @@ def selection(times: Array, options: ReadingOptions, file: str) -> NDArray[np.in
 
 
 def _seconds(stamp: str) -> float:
-    seconds = float(stamp) if STAMP.fullmatch(stamp) else np.nan
-    return seconds if abs(seconds) <= TIME.value else np.nan
+    return float(stamp) if STAMP.fullmatch(stamp) else np.nan
