@@ -47,7 +47,8 @@ class Recorded:
 
 def refinement(match: MatchNearby, wider: dict[int, float] | None = None) -> Refinement:
     slam = unrefined().slam
-    return Refinement(slam.route, slam.options.nscan, match, wider or {})
+    options = dataclasses.replace(slam.options.nscan, covered=slam.options.refined_covered)
+    return Refinement(slam.route, options, match, wider or {})
 
 
 def near(centre: int) -> list[int]:
