@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nscan_cli.compiled import kernel
+from nscan_cli.matching.gauge import gauge_of, newton_step
 from nscan_cli.matching.joint_energy import (
     COVERING,
     NEUTRAL,
@@ -19,7 +20,6 @@ from nscan_cli.matching.joint_energy import (
     joint_energy,
     neutral_energy,
 )
-from nscan_cli.matching.linear import solve_definite
 from nscan_cli.matching.overlap import SOUND_OVERLAP, overlaps, weakest_link
 from nscan_cli.matching.unheld import back_to_priors
 from nscan_cli.poses import Array, wrap
@@ -27,8 +27,6 @@ from nscan_cli.poses import Array, wrap
 FIRST_DAMPING = 1e-3
 LEAST_DAMPING = 1e-8
 GREATEST_DAMPING = 1e4
-FREE = -1
-"""In place of a fixed scan: the gauge is free."""
 
 PairsAt = Callable[[Array], NDArray[np.int64]]
 """The index set J (m, 2) at the poses (n, 3)."""
@@ -52,6 +50,11 @@ class JointOptions:
     """The match has converged when no pose moves by more (m, rad)."""
     fixed: int | None = None
     """The scan that stays where it is; None leaves the gauge free (paper, III-D)."""
+
+    @property
+    def gauge(self) -> int:
+        """As the kernels take it."""
+        return gauge_of(self.fixed)
 
 
 @dataclass(frozen=True)
@@ -152,7 +155,7 @@ def _approach(
             False,
             neutral,
             options.stride,
-            FREE if options.fixed is None else options.fixed,
+            options.gauge,
             options.approach_iterations,
             near,
             *_derivatives(poses),
@@ -165,7 +168,6 @@ def _approach(
 def _finish(problem: JointProblem, way: Way, options: JointOptions, neutral: bool) -> JointMatch:
     """The last steps, with the exact Hessian."""
     poses = way.poses
-    fixed = FREE if options.fixed is None else options.fixed
     gradient, hessian = _derivatives(poses)
     value, last, evaluated, converged = _descend(
         problem,
@@ -174,7 +176,7 @@ def _finish(problem: JointProblem, way: Way, options: JointOptions, neutral: boo
         True,
         neutral,
         1,
-        fixed,
+        options.gauge,
         options.max_iterations,
         options.tolerance,
         gradient,
@@ -255,47 +257,3 @@ def _descend(
         if converged or damping > GREATEST_DAMPING:
             break
     return value, iterations, evaluations, converged
-
-
-@kernel
-def newton_step(
-    gradient: Array, hessian: Array, poses: Array, damping: float, fixed: int, step: Array
-) -> bool:
-    """Write the step (n, 3) that solves (H + damping · diag H) Δp = −g in the chosen gauge (paper, III-D).
-
-    With `fixed` −1 the step is the smallest one: without any part along the three null directions. False
-    when the matrix is not positive definite.
-    """
-    size = gradient.shape[0]
-    matrix, right, solution = hessian.copy(), -gradient, np.empty(size)
-    diagonal = np.abs(np.diag(hessian))
-    greatest = diagonal.max()
-    for a in range(size):
-        matrix[a, a] += damping * diagonal[a] + 1e-9 * greatest + 1e-12
-    if fixed < 0:
-        null = gauge_directions(poses)
-        matrix += greatest * (null @ null.T)
-    else:
-        for a in range(3 * fixed, 3 * fixed + 3):
-            matrix[a, :] = 0.0
-            matrix[:, a] = 0.0
-            matrix[a, a], right[a] = 1.0, 0.0
-    if not solve_definite(matrix, right, solution):
-        return False
-    step[:, :] = solution.reshape(step.shape)
-    return True
-
-
-@kernel
-def gauge_directions(poses: Array) -> Array:
-    """An orthonormal basis (3n, 3) of the global motions that leave the energy as it is."""
-    n = poses.shape[0]
-    directions = np.zeros((3 * n, 3))
-    x, y = poses[:, 0] - poses[:, 0].mean(), poses[:, 1] - poses[:, 1].mean()
-    # About the centre a turn is orthogonal to the shifts.
-    along, turn = np.sqrt(n), np.sqrt(n + (x * x).sum() + (y * y).sum())
-    for i in range(n):
-        directions[3 * i, 0] = directions[3 * i + 1, 1] = 1.0 / along
-        directions[3 * i, 2], directions[3 * i + 1, 2] = -y[i] / turn, x[i] / turn
-        directions[3 * i + 2, 2] = 1.0 / turn
-    return directions

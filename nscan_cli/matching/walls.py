@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nscan_cli.compiled import kernel
-from nscan_cli.matching.joint import FREE, newton_step
+from nscan_cli.matching.gauge import gauge_of, newton_step
 from nscan_cli.matching.scans import Scans
 from nscan_cli.poses import Array, wrap
 
@@ -58,7 +58,7 @@ def fit_to_walls(scans: Scans, poses: Array, hessian: Array, fixed: int | None) 
     leaves the gauge free.
     """
     fitted = poses.copy()
-    _fit(scans, fitted, hessian, FREE if fixed is None else fixed)
+    _fit(scans, fitted, hessian, gauge_of(fixed))
     fitted[:, 2] = wrap(fitted[:, 2])
     return fitted
 

@@ -3,7 +3,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from nscan_cli.matching.joint import FREE, JointOptions, gauge_directions, match_jointly, newton_step
+from nscan_cli.matching.gauge import FREE, gauge_directions, newton_step
+from nscan_cli.matching.joint import JointOptions, match_jointly
 from nscan_cli.matching.joint_energy import Priors, joint_energy
 from nscan_cli.matching.uncertainty import weakest_translation
 from nscan_cli.poses import relative

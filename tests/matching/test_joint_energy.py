@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from nscan_cli.matching.joint import gauge_directions
+from nscan_cli.matching.gauge import gauge_directions
 from nscan_cli.matching.joint_energy import Priors, all_pairs, joint_energy, no_priors
 from nscan_cli.ndt.energy import energy
 from nscan_cli.poses import Array, compose, relative

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from nscan_cli.matching.joint import gauge_directions
+from nscan_cli.matching.gauge import gauge_directions
 from nscan_cli.poses import Array, compose, relative, wrap
 from nscan_cli.slam.keyframes import Keyframe, route
 from nscan_cli.slam.nearby import Nearby, choose_nearby, match_nearby
