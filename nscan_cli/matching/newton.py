@@ -23,9 +23,6 @@ LEAST_DAMPING = 1e-7
 GREATEST_DAMPING = 1e6
 STALLED = 0.1
 """Share of the tolerance below which a damped step ends a stage."""
-REFUSED_DAMPING = 1.0
-"""The least after a step that led uphill: mostly there is a cell's border in between, and it takes a step of
-half the length, not one that is a little shorter."""
 
 
 class PairProblem(NamedTuple):
@@ -98,7 +95,7 @@ def minimise(
         value = objective(problem, meeting, pose, widening, 0.0, out, gradient, hessian)
         evaluations += 1
         damping = FIRST_DAMPING
-        converged = refused = False
+        converged = False
         for _ in range(max_iterations):
             iterations += 1
             damped[:, :] = hessian
@@ -120,12 +117,9 @@ def minimise(
             if trial_value <= value:
                 pose[:], value, out[:] = trial, trial_value, trial_out
                 gradient[:], hessian[:, :] = trial_gradient, trial_hessian
-                # After a refused step the next one of full length would mostly be refused again.
-                damping = damping if refused else max(damping * 0.1, LEAST_DAMPING)
-                refused = False
+                damping = max(damping * 0.1, LEAST_DAMPING)
             else:
-                refused = True
-                damping = max(10.0 * damping, REFUSED_DAMPING)
+                damping *= 10.0
             # A step that is short because it is damped says less.
             converged = length < STALLED * tolerance
             if converged or damping > GREATEST_DAMPING:
