@@ -113,8 +113,8 @@ class NScanOptions:
     """How near (m) a keyframe must be to take part."""
     recent: float = 20.0
     """Keyframes further back along the path (m) count as seen before; half of the places go to them."""
-    covered: float = 0.35
-    """On the way no match is made about a keyframe when others hold so many of its pairs already."""
+    covered: float = 0.7
+    """No match is made about a keyframe when others hold so many of its pairs already."""
     behind: int = 3
     """The centre is so many keyframes behind the newest, so that those on both sides of it are known."""
     loops: bool = True
@@ -205,8 +205,5 @@ class SlamOptions:
     """And only when so large a share of its keyframes is new: in all, that takes time in proportion."""
     refinements: int = 2
     """Most sweeps of joint matches from the final poses."""
-    refined_covered: float = 0.6
-    """No match is made again about a keyframe when others hold so many of its pairs already: more than on the
-    way, because these relations stay."""
     refined: float = 0.02
     """A joint match is made again when a scan has moved by so much (m, rad) since."""

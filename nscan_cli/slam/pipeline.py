@@ -140,15 +140,15 @@ class Slam:
         route, options = self.route, self.options.nscan
         tried, seen_before = choose_nearby(route.poses, route.paths, centre, options)
         node, others = route.keyframes[centre].row, route.rows(tried.tolist())
-        loop = None
-        if self.covered.share(node, others) < options.covered:
-            nearby = self.match_unless_doubted(centre)
-            self.covered.add(node, others, nearby)
-            if nearby is not None:
-                loop = nearby.loop
-                self.take(nearby)
-                if self._moved > self.options.optimise_after and self._has_grown():
-                    self.optimise(max_iterations=10, tolerance=1e-3)
+        if self.covered.share(node, others) >= options.covered:
+            return
+        nearby = self.match_unless_doubted(centre)
+        self.covered.add(node, others, nearby)
+        if nearby is not None:
+            self.take(nearby)
+            if self._moved > self.options.optimise_after and self._has_grown():
+                self.optimise(max_iterations=10, tolerance=1e-3)
+        loop = None if nearby is None else nearby.loop
         # At the border of an earlier visit a place well inside fits better than the right one, half of which
         # was not seen: there a search says no more than the match.
         if options.loops and not (loop is not None and loop.reason == TOO_LITTLE):
@@ -197,9 +197,7 @@ class Slam:
         """Step 6: the matches again, until they move nothing that was matched."""
         options = self.options
         # The poses are right to centimetres: the last stage is all it takes.
-        last = dataclasses.replace(
-            options.nscan, widenings=options.nscan.widenings[-1:], covered=options.refined_covered
-        )
+        last = dataclasses.replace(options.nscan, widenings=options.nscan.widenings[-1:])
         wider = {place.centre: place.radius for place in self.places}
         refinement = Refinement(self.route, last, self.match, wider, self.threads)
         for _ in range(options.refinements):

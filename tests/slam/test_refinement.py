@@ -47,8 +47,7 @@ class Recorded:
 
 def refinement(match: MatchNearby, wider: dict[int, float] | None = None) -> Refinement:
     slam = unrefined().slam
-    options = dataclasses.replace(slam.options.nscan, covered=slam.options.refined_covered)
-    return Refinement(slam.route, options, match, wider or {})
+    return Refinement(slam.route, slam.options.nscan, match, wider or {})
 
 
 def near(centre: int) -> list[int]:
