@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nscan_cli.compiled import kernel
+from nscan_cli.matching.planar import relative_pose
 from nscan_cli.matching.scans import Scans, scan_grid, scan_points
 from nscan_cli.ndt.energy import OUT, accumulate, unpack
 from nscan_cli.poses import Array
@@ -192,14 +193,6 @@ def _add_priors(priors: Priors, poses: Array, curvature: float, gradient: Array,
         value += 0.5 * (difference @ g)
         _chain(i, j, poses[i, 2], u, g, priors.information[q], curvature, gradient, hessian)
     return value
-
-
-@kernel
-def relative_pose(a: Array, b: Array, out: Array) -> None:
-    """Eq. (2), a ⊖ b; the angle is left as it is."""
-    cos, sin = np.cos(b[2]), np.sin(b[2])
-    dx, dy = a[0] - b[0], a[1] - b[1]
-    out[0], out[1], out[2] = cos * dx + sin * dy, cos * dy - sin * dx, a[2] - b[2]
 
 
 @kernel

@@ -11,7 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nscan_cli.compiled import kernel
-from nscan_cli.matching.joint_energy import all_pairs, relative_pose
+from nscan_cli.matching.joint_energy import all_pairs
+from nscan_cli.matching.planar import relative_pose
 from nscan_cli.matching.scans import Scans, scan_grid, scan_points
 from nscan_cli.ndt.table import find_row, pack
 from nscan_cli.poses import Array

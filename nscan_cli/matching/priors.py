@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import math
-from dataclasses import dataclass
+from dataclasses import astuple, dataclass
 from typing import NamedTuple
 
 import numpy as np
 
+from nscan_cli.compiled import kernel
 from nscan_cli.poses import Array, relative
 
 
@@ -37,12 +37,32 @@ class MotionModel:
     angle_per_metre: float = 0.1
 
 
+class Motion(NamedTuple):
+    """The numbers of a MotionModel as the kernels take them."""
+
+    distance: float
+    distance_per_metre: float
+    angle: float
+    angle_per_radian: float
+    angle_per_metre: float
+
+    @classmethod
+    def of(cls, model: MotionModel) -> Motion:
+        """Those of a model."""
+        return cls(*astuple(model))
+
+
+@kernel
+def sigmas(step: Array, motion: Motion) -> tuple[float, float]:
+    """Standard deviations of a step (3,): of its place (m), along as across, and of its turn (rad)."""
+    distance = np.hypot(step[0], step[1])
+    along = motion.distance + motion.distance_per_metre * distance
+    turned = motion.angle_per_radian * abs(step[2]) + motion.angle_per_metre * distance
+    return along, motion.angle + turned
+
+
 def odometry_prior(reference: Array, pose: Array, model: MotionModel) -> Prior:
     """The prior on pose ⊖ reference from the odometry poses (3,) of two scans."""
     step = relative(pose, reference)
-    x, y, turn = step.tolist()
-    distance = math.hypot(x, y)
-    sigma = model.distance + model.distance_per_metre * distance
-    sigma_angle = model.angle + model.angle_per_radian * abs(turn) + model.angle_per_metre * distance
-    along, about = sigma**-2, sigma_angle**-2
-    return Prior(step, np.array([[along, 0.0, 0.0], [0.0, along, 0.0], [0.0, 0.0, about]]))
+    along, about = sigmas(step, Motion.of(model))
+    return Prior(step, np.diag([along**-2, along**-2, about**-2]))

@@ -9,6 +9,8 @@ lets a map follow the robot.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -58,6 +60,29 @@ def add_points(
         if sums[0] < 0.5:
             sums[:] = 0.0
     return rows
+
+
+@kernel
+def add_scans(
+    grid: Grid,
+    rows: int,
+    half: float,
+    points: Array,
+    ends: NDArray[np.int64],
+    poses: Array,
+    first: int,
+) -> tuple[int, int]:
+    """Add scans from the `first` on, as long as there is room: the next one, and the number of rows.
+
+    Scan k has points[ends[k] : ends[k + 1]], moved by poses[k].
+    """
+    touched = np.empty(points.shape[0], dtype=np.int32)
+    for k in range(first, poses.shape[0]):
+        scan = points[ends[k] : ends[k + 1]]
+        if rows + NEW_NEIGHBOURS * scan.shape[0] > grid.keys.shape[0]:
+            return k, rows
+        rows = add_points(grid, rows, half, scan, poses[k], 1.0, touched)
+    return poses.shape[0], rows
 
 
 @kernel
@@ -157,11 +182,16 @@ class Ndt:
         """Take away points that were added with the very same pose."""
         self._change(points, pose, -1.0)
 
-    def gather(self, points: Array, pose: Array) -> None:
-        """Take points (m, 2) in, moved by `pose` (3,), for Gaussians that `make` or `compact` makes."""
-        self._reserve(self.rows + NEW_NEIGHBOURS * len(points))
-        touched = np.empty(len(points), dtype=np.int32)
-        self.rows = add_points(self.grid, self.rows, self.half, points, pose, 1.0, touched)
+    def gather(self, scans: Sequence[Array], poses: Array) -> None:
+        """Take the points (m, 2) of n scans in, moved by `poses` (n, 3).
+
+        Their Gaussians are left for `make` or `compact`.
+        """
+        points = np.concatenate([np.empty((0, 2)), *scans])
+        ends, done = np.cumsum([0, *map(len, scans)]), 0
+        while done < len(scans):
+            self.reserve(len(scans[done]))
+            done, self.rows = add_scans(self.grid, self.rows, self.half, points, ends, poses, done)
 
     def make(self) -> None:
         """Make all Gaussians of the points gathered."""
@@ -169,7 +199,7 @@ class Ndt:
         make_gaussians(self.grid, self.rows, touched, self.half, self.minimum, self.floor, self.straight)
 
     def _change(self, points: Array, pose: Array, sign: float) -> None:
-        self._reserve(self.rows + NEW_NEIGHBOURS * len(points))
+        self.reserve(len(points))
         self.rows = change(
             self.grid,
             self.rows,
@@ -182,8 +212,9 @@ class Ndt:
             self.straight,
         )
 
-    def _reserve(self, rows: int) -> None:
-        capacity = len(self.grid.keys)
+    def reserve(self, points: int) -> None:
+        """Make room for so many more points."""
+        rows, capacity = self.rows + NEW_NEIGHBOURS * points, len(self.grid.keys)
         if rows <= capacity:
             return
         old, self.grid = self.grid, _empty(max(rows, 2 * capacity))

@@ -56,6 +56,8 @@ class Meeting(NamedTuple):
     """(2, m) in their own frame."""
     cells: Array
     """(2, m) lattice coordinates; nan before the first time."""
+    cells_now: Array
+    """(2, m) the same, before what is there is looked up."""
     moved: Array
     """(4, m) R(φ) x, and x'."""
     gaussians: Array
@@ -66,8 +68,10 @@ class Meeting(NamedTuple):
 def begin(points: Array) -> Meeting:
     """Room for the meeting of points (m, 2), which have met nothing yet."""
     m = points.shape[0]
-    room = np.empty((2, m)), np.full((2, m), np.nan), np.empty((4, m)), np.empty((BLOCKS, GAUSSIAN, m))
-    meeting = Meeting(*room)
+    cells = np.full((2, m), np.nan)
+    meeting = Meeting(
+        np.empty((2, m)), cells, np.empty((2, m)), np.empty((4, m)), np.empty((BLOCKS, GAUSSIAN, m))
+    )
     meeting.points[:, :] = points.T
     return meeting
 
@@ -75,10 +79,11 @@ def begin(points: Array) -> Meeting:
 @kernel
 def meet_again(grid: Grid, half: float, meeting: Meeting, x: float, y: float, phi: float) -> None:
     """Move the points to the pose (x, y, phi), and look up what those meet that get into another cell."""
-    moved, cells = meeting.moved, meeting.cells
-    _move(meeting.points, x, y, np.cos(phi), np.sin(phi), moved)
-    for k in range(moved.shape[1]):
-        ix, iy = np.floor(moved[2, k] / half), np.floor(moved[3, k] / half)
+    cells, cells_now = meeting.cells, meeting.cells_now
+    left = _move(meeting.points, x, y, np.cos(phi), np.sin(phi), half, meeting.moved, cells, cells_now)
+    # A short step takes no point into another cell, most of the times.
+    for k in range(cells.shape[1] if left else 0):
+        ix, iy = cells_now[0, k], cells_now[1, k]
         if ix != cells[0, k] or iy != cells[1, k]:
             cells[0, k], cells[1, k] = ix, iy
             row = find_row(grid, pack(int(ix), int(iy)))
@@ -90,8 +95,24 @@ def meet_again(grid: Grid, half: float, meeting: Meeting, x: float, y: float, ph
 
 
 @kernel
-def _move(points: Array, x: float, y: float, cos: float, sin: float, moved: Array) -> None:
+def _move(
+    points: Array,
+    x: float,
+    y: float,
+    cos: float,
+    sin: float,
+    half: float,
+    moved: Array,
+    cells: Array,
+    cells_now: Array,
+) -> int:
+    """Write where the points and their cells are; how many have left their cell."""
+    left = 0
     for k in range(points.shape[1]):
         rx = cos * points[0, k] - sin * points[1, k]
         ry = sin * points[0, k] + cos * points[1, k]
+        ix, iy = np.floor((rx + x) / half), np.floor((ry + y) / half)
         moved[0, k], moved[1, k], moved[2, k], moved[3, k] = rx, ry, rx + x, ry + y
+        cells_now[0, k], cells_now[1, k] = ix, iy
+        left += (ix != cells[0, k]) | (iy != cells[1, k])
+    return left

@@ -9,15 +9,18 @@ from nscan_cli.slam.nearby import Nearby
 
 
 class Coverage:
-    """Pairs of keyframes, by their nodes."""
+    """Pairs of keyframes, by their nodes; those of the coverage `beneath` too, to which nothing is added."""
 
-    def __init__(self) -> None:
+    def __init__(self, beneath: Coverage | None = None) -> None:
         self._pairs: set[tuple[int, int]] = set()
+        self._beneath = set() if beneath is None else beneath._pairs
 
     def share(self, centre: int, others: Iterable[int]) -> float:
         """The share of the pairs of `centre` with each of the others that are there; 1 without any other."""
         pairs = _pairs(centre, others)
-        return sum(pair in self._pairs for pair in pairs) / len(pairs) if pairs else 1.0
+        return (
+            sum(pair in self._pairs or pair in self._beneath for pair in pairs) / len(pairs) if pairs else 1.0
+        )
 
     def add(self, centre: int, others: Iterable[int], nearby: Nearby | None) -> None:
         """A match of `centre` with all others that was tried, and what it related."""
@@ -28,12 +31,6 @@ class Coverage:
     def relate(self, nodes: Iterable[int]) -> None:
         """Every keyframe has been matched with every other."""
         self._pairs.update(combinations(sorted(set(nodes)), 2))
-
-    def copy(self) -> Coverage:
-        """One that goes its own way from here."""
-        copied = Coverage()
-        copied._pairs = self._pairs.copy()
-        return copied
 
 
 def _pairs(centre: int, others: Iterable[int]) -> list[tuple[int, int]]:

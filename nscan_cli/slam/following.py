@@ -6,7 +6,10 @@ takes the best match all the same. That it is none shows in what two scans see f
 
 from __future__ import annotations
 
+from collections import deque
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -20,13 +23,22 @@ LEAST_BEARINGS = 10
 """Of these two scans must share so many to be compared."""
 
 
-@dataclass(frozen=True)
-class Followed:
-    """A scan whose pose is settled."""
+class Sensed(NamedTuple):
+    """A scan of the log, and what the odometry says."""
 
     row: int
     points: Array
     """(m, 2) in the robot's frame."""
+    odometry: Array | None
+    """(3,) pose of the robot; of all scans or of none."""
+
+
+@dataclass(frozen=True)
+class Followed:
+    """A scan that was tracked; see Sensed."""
+
+    row: int
+    points: Array
     odometry: Array | None
     tracked: Tracked
     begins: bool
@@ -60,12 +72,19 @@ class Follower:
         """Searches for a scan among the last ones."""
         return self._searches + self._tracker.searches
 
-    def follow(self, row: int, points: Array, odometry: Array | None) -> list[Followed]:
-        """Track a scan: points (m, 2) in the robot's frame, odometry pose (3,) or None.
+    def follow(self, scans: Sequence[Sensed]) -> list[Followed]:
+        """Track the next scans. Returns those, in order, that are settled by it: not those still doubted."""
+        settled, ahead = [], deque(self._track(scans))
+        while ahead:
+            tracker = self._tracker
+            settled += self._take(ahead.popleft())
+            if self._tracker is not tracker:
+                # A new piece has begun, and what was tracked ahead goes on from it.
+                ahead = deque(self._track(ahead))
+        return settled
 
-        Returns the scans, in order, that are settled by it: it alone as a rule, none while it is doubted.
-        """
-        scan = self._track(row, points, odometry)
+    def _take(self, scan: Followed) -> list[Followed]:
+        """Settle a scan, doubt it, or find that it puts an end to doubts; returns what is settled by it."""
         if not self._doubted:
             if not self._is_doubted(scan):
                 return self._settle([scan])
@@ -83,19 +102,28 @@ class Follower:
         scans, self._doubted = self._doubted, []
         return self._settle(scans)
 
-    def _track(self, row: int, points: Array, odometry: Array | None) -> Followed:
-        tracked = self._tracker.track(points, odometry)
+    def _track(self, scans: Sequence[Sensed | Followed]) -> list[Followed]:
+        odometry = [scan.odometry for scan in scans if scan.odometry is not None]
+        found = self._tracker.track([scan.points for scan in scans], np.array(odometry) if odometry else None)
         if self._origin is not None:
-            c, s = np.cos(self._origin[2]), np.sin(self._origin[2])
-            turn = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
-            tracked = replace(
-                tracked,
-                pose=compose(self._origin, tracked.pose),
-                hessian=turn @ tracked.hessian @ turn.T,
-                expected=turn @ tracked.expected @ turn.T,
-                path=self._path + tracked.path,
-            )
-        return Followed(row, points, odometry, tracked, False, False)
+            found = [self._of_the_piece(tracked) for tracked in found]
+        return [
+            Followed(scan.row, scan.points, scan.odometry, tracked, False, False)
+            for scan, tracked in zip(scans, found, strict=True)
+        ]
+
+    def _of_the_piece(self, tracked: Tracked) -> Tracked:
+        """What was found in a later piece, in the frame of the first."""
+        assert self._origin is not None
+        c, s = np.cos(self._origin[2]), np.sin(self._origin[2])
+        turn = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+        return replace(
+            tracked,
+            pose=compose(self._origin, tracked.pose),
+            hessian=turn @ tracked.hessian @ turn.T,
+            expected=turn @ tracked.expected @ turn.T,
+            path=self._path + tracked.path,
+        )
 
     def _settle(self, scans: list[Followed]) -> list[Followed]:
         for scan in scans:
@@ -140,7 +168,7 @@ class Follower:
         is_known = self._has_come_far(first)
         self._path = last.tracked.path
         self._path += float(np.hypot(*(guess - last.tracked.pose)[:2])) if is_known else self.breaking.path
-        piece = [self._track(scan.row, scan.points, scan.odometry) for scan in doubted]
+        piece = self._track(doubted)
         if np.median([scan.tracked.inliers for scan in piece[1:]]) < self.breaking.inlier_share:
             self._tracker, self._origin, self._path = kept
             return []

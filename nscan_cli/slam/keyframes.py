@@ -6,6 +6,7 @@ motion fill the gaps between the beams. Its points are those of its own scan.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -14,7 +15,7 @@ import numpy as np
 
 from nscan_cli.graph.model import Pairwise
 from nscan_cli.ndt.grid import Ndt
-from nscan_cli.poses import Array, relative
+from nscan_cli.poses import Array, compose, relative
 from nscan_cli.slam.options import GaussianOptions, KeyframeOptions
 from nscan_cli.slam.tracking import Tracked
 
@@ -68,6 +69,19 @@ def route(keyframes: Sequence[Keyframe], chain: Sequence[Pairwise], poses: Array
     return Route(keyframes, chain[: max(len(poses) - 1, 0)], paths, poses)
 
 
+def extended(route: Route, keyframes: Sequence[Keyframe], chain: Sequence[Pairwise]) -> Route:
+    """The route with more keyframes at its end, where the relations that lead to each of them place them."""
+    poses = [route.poses[-1]]
+    for relation in chain:
+        poses.append(compose(poses[-1], relation.measurement))
+    return Route(
+        [*route.keyframes, *keyframes],
+        [*route.chain, *chain],
+        np.append(route.paths, [keyframe.tracked.path for keyframe in keyframes]),
+        np.vstack([route.poses, *poses[1:]]),
+    )
+
+
 class Keyframes:
     """The keyframes in order of time, and the scans since the last of them.
 
@@ -90,8 +104,11 @@ class Keyframes:
         """Whether the last keyframe is near enough to a scan that it need not become one."""
         if not self.list:
             return False
-        step = relative(tracked.pose, self.list[-1].tracked.pose)
-        return bool(np.hypot(step[0], step[1]) <= self.distance and abs(step[2]) <= self.options.turn)
+        # Asked for every scan, and arrays of three numbers cost ten times more.
+        x, y, angle = tracked.pose.tolist()
+        last_x, last_y, last_angle = self.list[-1].tracked.pose.tolist()
+        turned = math.remainder(angle - last_angle, 2 * math.pi)
+        return math.hypot(x - last_x, y - last_y) <= self.distance and abs(turned) <= self.options.turn
 
     def attach(self, points: Array, tracked: Tracked) -> None:
         """Let a scan between keyframes add to the Gaussians of both."""
@@ -106,11 +123,12 @@ class Keyframes:
             row,
             tracked,
             self._expected + tracked.expected,
-            points,
+            # Of its own: else it would keep those of the scans around it, which were made together.
+            points.copy(),
             _count_cells(points, 0.5 * gaussians.cell),
             Ndt(gaussians.cell, gaussians.minimum, gaussians.floor, 1024),
         )
-        keyframe.ndt.gather(points, np.zeros(3))
+        keyframe.ndt.gather([points], np.zeros((1, 3)))
         self._grow(keyframe)
         self.finish_last()
         self._since, self._expected = [], np.zeros((3, 3))
@@ -130,8 +148,8 @@ class Keyframes:
             self.list[-1].ndt.compact()
 
     def _grow(self, keyframe: Keyframe) -> None:
-        for points, tracked in self._since:
-            keyframe.ndt.gather(points, relative(tracked.pose, keyframe.tracked.pose))
+        poses = np.array([tracked.pose for _, tracked in self._since]).reshape(-1, 3)
+        keyframe.ndt.gather([points for points, _ in self._since], relative(poses, keyframe.tracked.pose))
 
 
 def relation_between(before: Keyframe, last: Keyframe, options: KeyframeOptions) -> Pairwise:

@@ -16,12 +16,13 @@ from nscan_cli.graph.relation import Relation
 from nscan_cli.graph.robust import contradicting
 from nscan_cli.graph.system import GraphEnergy
 from nscan_cli.logs.scan import LaserLog
-from nscan_cli.poses import Array, compose
+from nscan_cli.poses import Array
+from nscan_cli.slam.ahead import Ahead
 from nscan_cli.slam.believed import believed_odometry, hanging
 from nscan_cli.slam.closing import Closing
 from nscan_cli.slam.coverage import Coverage
-from nscan_cli.slam.following import Followed, Follower
-from nscan_cli.slam.keyframes import Keyframe, Keyframes, Route, relation_between
+from nscan_cli.slam.following import Followed, Follower, Sensed
+from nscan_cli.slam.keyframes import Keyframe, Keyframes, Route, extended, relation_between
 from nscan_cli.slam.nearby import MatchNearby, Nearby, choose_nearby, match_nearby
 from nscan_cli.slam.options import SlamOptions
 from nscan_cli.slam.pairs_nearby import match_pairs_nearby
@@ -31,6 +32,9 @@ from nscan_cli.slam.trajectory import between_keyframes
 from nscan_cli.threads import Beside
 
 CONTRADICTS = "contradicts the rest of the graph"
+
+STRETCH = 64
+"""Scans that are tracked together, before the keyframes among them are looked for."""
 
 Report = Callable[[int, int], None]
 """Called with the scans and keyframes done."""
@@ -56,6 +60,8 @@ class Slam:
         self.anchors: list[int] = []
         self.breaks: list[int] = []
         self.match: MatchNearby = match_pairs_nearby if options.relations == "pairwise" else match_nearby
+        self.ahead = Ahead(self.match, options.nscan, threads)
+        self.way: list[Pairwise] = []
         self.route = Route([], [], np.zeros(0), np.zeros((0, 3)))
         self.pairs: list[Pairwise] = []
         self.nscan: list[NScan] = []
@@ -69,12 +75,12 @@ class Slam:
 
     def run(self, report: Report) -> Graph:
         """The paper's loop over all scans, and the last optimisation."""
-        with Beside(self.threads) as beside:
-            for row, points in enumerate(self.points()):
-                for scan in self.track(row, points):
+        with self.ahead, Beside(self.threads) as beside:
+            for scans in self.stretches():
+                for scan in self.track(scans):
                     if self.settle(scan):
                         beside(self.grow, len(self.keyframes) - 1)
-                report(row + 1, len(self.keyframes))
+                report(scans[-1].row + 1, len(self.keyframes))
         self.keyframes.finish_last()
         self.grow(len(self.keyframes))
         for centre in range(len(self.keyframes) - self.options.nscan.behind, len(self.keyframes)):
@@ -91,14 +97,20 @@ class Slam:
         for row, points in enumerate(self.log.each_points(self.options.tracking.reach)):
             yield points[:0] if row in self.hanging else points
 
-    def track(self, row: int, points: Array) -> list[Followed]:
-        """Step 1: the pose of a scan by matching it with the map of the last metres.
+    def stretches(self) -> Iterator[list[Sensed]]:
+        """The scans, a stretch of them at a time."""
+        odometry = itertools.repeat(None) if self.odometry is None else self.odometry
+        scans = map(Sensed, itertools.count(), self.points(), odometry)
+        while stretch := list(itertools.islice(scans, STRETCH)):
+            yield stretch
+
+    def track(self, scans: Sequence[Sensed]) -> list[Followed]:
+        """Step 1: the poses of the next scans, each by matching it with the map of the last metres.
 
         Returns the scans that are settled by it; with the last one these are all.
         """
-        odometry = None if self.odometry is None else self.odometry[row]
-        settled = self.tracker.follow(row, points, odometry)
-        return settled + self.tracker.finish() if row == len(self.log) - 1 else settled
+        settled = self.tracker.follow(scans)
+        return settled + self.tracker.finish() if scans[-1].row == len(self.log) - 1 else settled
 
     def settle(self, scan: Followed) -> bool:
         """Step 2: whether a scan that was tracked is a new keyframe."""
@@ -108,7 +120,10 @@ class Slam:
             self.breaks.append(scan.row)
         is_new = scan.begins or not self.keyframes.near_enough(scan.tracked)
         if is_new:
-            self.keyframes.add(scan.row, scan.points, scan.tracked)
+            keyframe = self.keyframes.add(scan.row, scan.points, scan.tracked)
+            if len(self.keyframes) > 1:
+                before = self.keyframes.list[-2]
+                self.way.append(relation_between(before, keyframe, self.options.keyframes))
         else:
             self.keyframes.attach(scan.points, scan.tracked)
         self.tracked.append(scan.tracked.pose)
@@ -123,15 +138,13 @@ class Slam:
 
     def add_keyframe(self, keyframe: Keyframe) -> None:
         """Step 2: a new keyframe, with its relation to the one before."""
-        keyframes, chain, paths, poses = self.route
-        paths = np.append(paths, keyframe.tracked.path)
-        if not len(keyframes):
-            self.route = Route([keyframe], [], paths, np.zeros((1, 3)))
+        before, path = len(self.poses), keyframe.tracked.path
+        if not before:
+            self.route = Route([keyframe], [], np.array([path]), np.zeros((1, 3)))
             return
-        relation = relation_between(keyframes[-1], keyframe, self.options.keyframes)
-        self.closing.extend(relation, paths[-1] - paths[-2])
-        poses = np.vstack([poses, compose(poses[-1], relation.measurement)])
-        self.route = Route([*keyframes, keyframe], [*chain, relation], paths, poses)
+        relation = self.way[before - 1]
+        self.closing.extend(relation, path - float(self.route.paths[-1]))
+        self.route = extended(self.route, [keyframe], [relation])
 
     def match_nearby(self, centre: int) -> None:
         """Step 3: a keyframe matched with those near it; the graph follows when it must."""
@@ -142,6 +155,10 @@ class Slam:
         node, others = route.keyframes[centre].row, route.rows(tried.tolist())
         if self.covered.share(node, others) >= options.covered:
             return
+        # One more may be there that is not whole.
+        whole, known = len(self.keyframes) - 1, len(self.poses)
+        coming = self.keyframes.list[known:whole], self.way[known - 1 : whole - 1]
+        self.ahead.begin(route, coming, centre, others, self.covered)
         nearby = self.match_unless_doubted(centre)
         self.covered.add(node, others, nearby)
         if nearby is not None:
@@ -162,7 +179,7 @@ class Slam:
     def match_unless_doubted(self, centre: int) -> Nearby | None:
         """The match of a keyframe with those near it; without other visits if its place there is doubted."""
         options = self.options.nscan
-        nearby = self.match(self.route, centre, options)
+        nearby = self.ahead.match(self.route, centre)
         if nearby is None or nearby.loop is None:
             return nearby
         reason = self.closing.why_doubted(self.route, centre, nearby, self._known)

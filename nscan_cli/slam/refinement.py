@@ -63,7 +63,7 @@ class Refinement:
 
         As if every match related all that it is tried with; where one does not, the next choice makes up.
         """
-        chosen, covered = {}, self._covered.copy()
+        chosen, covered = {}, Coverage(beneath=self._covered)
         for centre in waiting:
             options = self._options_of(centre)
             tried, _ = choose_nearby(route.poses, route.paths, centre, options)

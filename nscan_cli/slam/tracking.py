@@ -6,22 +6,19 @@ loops later correct in the graph never tears it.
 
 from __future__ import annotations
 
-import math
-from collections import deque
+from collections.abc import Sequence
 from dataclasses import dataclass
 from operator import attrgetter
 from typing import NamedTuple
 
 import numpy as np
 
-from nscan_cli.compiled import kernel
-from nscan_cli.matching.newton import PairProblem, minimise
-from nscan_cli.matching.priors import Prior, odometry_prior
+from nscan_cli.matching.priors import Prior
 from nscan_cli.matching.search import likelihood_field, search
-from nscan_cli.ndt.energy import inlier_share
 from nscan_cli.ndt.grid import Ndt
-from nscan_cli.poses import Array, compose, relative, transform, wrap
+from nscan_cli.poses import Array
 from nscan_cli.slam.options import TrackingOptions
+from nscan_cli.slam.track import ROWS, Found, Settings, Track, follow, match_and_count, take
 
 RECENT = 5.0
 """A lost scan is searched among those of the last stretch of path, m."""
@@ -62,21 +59,6 @@ class Match(NamedTuple):
     """Share of the points."""
 
 
-@kernel
-def match_and_count(
-    problem: PairProblem,
-    pose: Array,
-    widenings: Array,
-    max_iterations: int,
-    tolerance: float,
-    hessian: Array,
-    bound: float,
-) -> tuple[float, float]:
-    """Minimise from `pose` (3,), in place; the objective's value, and the share of inliers there."""
-    value, _, _, _, _ = minimise(problem, pose, widenings, max_iterations, tolerance, hessian)
-    return value, inlier_share(problem.grid, problem.half, problem.points, pose, bound)
-
-
 class Tracker:
     """Follows the robot from scan to scan."""
 
@@ -85,89 +67,65 @@ class Tracker:
         gaussians = options.gaussians
         self.map = Ndt(gaussians.cell, gaussians.minimum, gaussians.floor, capacity=1 << 14)
         self.restarts = self.searches = 0
-        self._window: deque[tuple[Array, Array, float]] = deque()
-        self._poses: deque[Array] = deque(maxlen=options.steady_scans + 1)
-        self._joined = np.zeros(3)
-        self._path = 0.0
-        self._odometry: Array | None = None
-        self._widenings = np.array(options.widenings)
+        self._settings = Settings.of(options)
+        self._track = Track.begin(options.steady_scans + 1)
+        self._prior = Prior(np.zeros(3), np.zeros((3, 3)))
 
-    def track(self, points: Array, odometry: Array | None) -> Tracked:
-        """The pose of the next scan: points (m, 2) in the robot's frame, odometry pose (3,) or None."""
-        if not self._poses:
-            self._odometry = odometry
-            return self._settle(np.zeros(3), np.zeros((3, 3)), np.zeros((3, 3)), 1.0, points)
-        prior = self._predict(odometry)
-        self._odometry = odometry
-        match = self._match(points, prior, prior.mean)
+    def track(self, scans: Sequence[Array], odometry: Array | None) -> list[Tracked]:
+        """Where the next n scans are found: points (m, 2) in the robot's frame, odometry (n, 3) or None."""
+        n, ends = len(scans), np.cumsum([0, *map(len, scans)])
+        points = np.concatenate([np.empty((0, 2)), *scans])
+        if odometry is None:
+            odometry = np.full((n, 3), np.nan)
+        self._track = self._track.with_room(n, len(points))
+        found, k = Found.room(n), 0
+        while k < n:
+            self.map.reserve(len(scans[k]))
+            track, grid, settings, prior = self._track, self.map.grid, self._settings, self._prior
+            k = follow(track, grid, settings, points, ends, odometry, k, prior, found)
+            if k < n and np.isfinite(found.inliers[k]):
+                match = Match(found.values[k], found.poses[k], found.hessians[k], found.inliers[k])
+                least = LEAST_SCORE if np.isfinite(odometry[k, 0]) else self.options.inlier_share
+                match = self._match_elsewhere(scans[k], match, least)
+                found.poses[k], found.hessians[k], found.inliers[k] = match[1:]
+                take(track, grid, settings, scans[k], odometry[k], prior, found, k)
+                k += 1
+            self.map.rows = int(self._track.counts[ROWS])
+        matrices = found.poses, found.hessians, found.expected
+        numbers = found.inliers.tolist(), found.paths.tolist(), found.joined.tolist()
+        return [Tracked(*scan) for scan in zip(*matrices, *numbers, strict=True)]
+
+    def _match_elsewhere(self, points: Array, match: Match, least: float) -> Match:
+        """The best of a match with too few inliers, and of those from other angles, and of a search.
+
+        It is searched with fewer inliers than `least`.
+        """
+        start = self._prior.mean
         for ring in self.options.turns:
             if match.inliers >= self.options.inlier_share:
                 break
             self.restarts += 1
             for turn in (sign * angle for angle in ring for sign in (1, -1)):
-                candidate = self._match(points, prior, prior.mean + np.array([0.0, 0.0, turn]))
+                candidate = self._match(points, start + np.array([0.0, 0.0, turn]))
                 # From elsewhere it may slide along a corridor; a wrong turn shows in what then fits.
                 if candidate.inliers > match.inliers + CLEARLY:
                     match = min(match, candidate, key=attrgetter("value"))
-        if match.inliers < (self.options.inlier_share if odometry is None else LEAST_SCORE):
-            match = self._search(points, prior, match)
-        match.pose[2] = wrap(match.pose[2])
-        expected = np.diag(1.0 / np.diag(prior.information))
-        return self._settle(match.pose, match.hessian - prior.information, expected, match.inliers, points)
+        return match if match.inliers >= least else self._search(points, match)
 
-    def _predict(self, odometry: Array | None) -> Prior:
-        """Where the next scan is expected, in the tracker's frame, and how surely."""
-        options, last = self.options, self._poses[-1]
-        if odometry is not None and self._odometry is not None:
-            step, information = odometry_prior(self._odometry, odometry, options.odometry)
-        else:
-            step = relative(last, self._poses[0]) / max(len(self._poses) - 1, 1)
-            information = odometry_prior(last, compose(last, step), options.steady_motion).information
-        # The prior is as sure along the path as across it: no need to turn its information.
-        return Prior(compose(last, step), information)
-
-    def _match(self, points: Array, prior: Prior, start: Array) -> Match:
+    def _match(self, points: Array, start: Array) -> Match:
         """The objective's minimum from the pose `start` (3,)."""
-        options = self.options
         pose, hessian = start.copy(), np.empty((3, 3))
-        value, inliers = match_and_count(
-            PairProblem(self.map.grid, self.map.half, points, options.scale, prior),
-            pose,
-            self._widenings,
-            options.max_iterations,
-            options.tolerance,
-            hessian,
-            options.inlier_bound,
-        )
+        value, inliers = match_and_count(self.map.grid, self._settings, points, self._prior, pose, hessian)
         return Match(value, pose, hessian, inliers)
 
-    def _search(self, points: Array, prior: Prior, best: Match) -> Match:
+    def _search(self, points: Array, best: Match) -> Match:
         """The better of what was found and the match from where a search among the last scans leads."""
-        clouds = [transform(pose, part) for part, pose, path in self._window if path > self._path - RECENT]
-        cloud = np.concatenate(clouds)
+        cloud = self._track.recent(RECENT)
         if not len(cloud) or not len(points):
             return best
         field = likelihood_field(cloud, self.options.steady_search)
-        found = search(field, points, prior.mean, LEAST_SCORE, self.options.steady_search)
+        found = search(field, points, self._prior.mean, LEAST_SCORE, self.options.steady_search)
         if found is None:
             return best
         self.searches += 1
-        return min(best, self._match(points, prior, found.pose), key=attrgetter("value"))
-
-    def _settle(self, pose: Array, hessian: Array, expected: Array, inliers: float, points: Array) -> Tracked:
-        """Take the pose; let the scan join the map when the robot has moved, and old ones leave it."""
-        step = relative(pose, self._joined)
-        distance = math.hypot(*step[:2].tolist())
-        # Before anything was seen there is nothing to move against.
-        nothing_seen = self.map.rows == 0
-        joined = nothing_seen or distance > self.options.step or abs(step[2]) > self.options.step
-        if joined:
-            self._path += distance
-            self._joined = pose
-            self.map.add(points, pose)
-            self._window.append((points, pose, self._path))
-            while self._window[0][2] < self._path - self.options.window:
-                old_points, old_pose, _ = self._window.popleft()
-                self.map.subtract(old_points, old_pose)
-        self._poses.append(pose)
-        return Tracked(pose, hessian, expected, inliers, self._path, joined)
+        return min(best, self._match(points, found.pose), key=attrgetter("value"))

@@ -102,10 +102,7 @@ def without_returns(log: LaserLog, rows: Rows, reading: float = np.inf) -> Laser
 def tracked(log: LaserLog, options: TrackingOptions | None = None) -> tuple[list[Tracked], Tracker]:
     """Step 1 alone, over a whole log."""
     tracker = Tracker(options or TrackingOptions())
-    odometry = log.odometry
-    return [
-        tracker.track(log.points(row), None if odometry is None else odometry[row]) for row in range(len(log))
-    ], tracker
+    return tracker.track([log.points(row) for row in range(len(log))], log.odometry), tracker
 
 
 def poses_of(found: list[Tracked]) -> Array:

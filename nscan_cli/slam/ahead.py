@@ -1,0 +1,99 @@
+"""Step 3 ahead of its turn: the next matches are made beside other work, as if the graph stayed as it is.
+
+At its turn a match counts if it is the very one that would be made then. So the graph is the same on any
+number of threads.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
+from types import TracebackType
+from typing import NamedTuple
+
+import numpy as np
+
+from nscan_cli.graph.model import Pairwise
+from nscan_cli.poses import Array
+from nscan_cli.slam.coverage import Coverage
+from nscan_cli.slam.keyframes import Keyframe, Route, extended
+from nscan_cli.slam.nearby import MatchNearby, Nearby, choose_nearby
+from nscan_cli.slam.options import NScanOptions
+
+AHEAD = 2
+"""So many matches are begun ahead of their turn."""
+
+
+class _Begun(NamedTuple):
+    poses: Array
+    """(k, 3) of the route it is made with."""
+    nodes: list[int]
+    """What it is tried with."""
+    match: Future[Nearby | None]
+
+
+class Ahead:
+    """The matches about the keyframes to come. To be used with `with`; with one thread none is begun."""
+
+    def __init__(self, match: MatchNearby, options: NScanOptions, threads: int) -> None:
+        self._match, self._options = match, options
+        self._pool = ThreadPoolExecutor(1) if threads > 1 else None
+        self._begun: dict[int, _Begun] = {}
+
+    def match(self, route: Route, centre: int) -> Nearby | None:
+        """The match about keyframe `centre`, whether it has been begun or not."""
+        begun = self._begun.pop(centre, None)
+        # What waits still is as well made here.
+        if begun is None or not np.array_equal(begun.poses, route.poses) or begun.match.cancel():
+            return self._match(route, centre, self._options)
+        return begun.match.result()
+
+    def begin(
+        self,
+        route: Route,
+        coming: tuple[Sequence[Keyframe], Sequence[Pairwise]],
+        centre: int,
+        others: Sequence[int],
+        covered: Coverage,
+    ) -> None:
+        """Begin what comes after the match of keyframe `centre` with the `others`, nodes of the graph.
+
+        `coming` are the keyframes that will join the route next, with their relations of tracking. Every
+        match is taken to relate all that it is tried with.
+        """
+        if self._pool is None:
+            return
+        assumed = Coverage(beneath=covered)
+        assumed.relate(others)
+        self._drop_outdated(route, centre)
+        for begun in self._begun.values():
+            assumed.relate(begun.nodes)
+        behind = self._options.behind
+        following = range(max([centre, *self._begun]) + 1, len(route.poses) + len(coming[0]) - behind)
+        for keyframe in following:
+            if len(self._begun.keys() - {centre}) >= AHEAD:
+                return
+            joining = keyframe + behind + 1 - len(route.poses)
+            longer = extended(route, coming[0][:joining], coming[1][:joining])
+            tried, _ = choose_nearby(longer.poses, longer.paths, keyframe, self._options)
+            nodes = longer.rows(tried.tolist())
+            if assumed.share(longer.keyframes[keyframe].row, nodes) < self._options.covered:
+                assumed.relate(nodes)
+                match = self._pool.submit(self._match, longer, keyframe, self._options)
+                self._begun[keyframe] = _Begun(longer.poses, nodes, match)
+
+    def _drop_outdated(self, route: Route, centre: int) -> None:
+        """Forget what is past, and what was begun before the graph moved."""
+        for keyframe, begun in list(self._begun.items()):
+            if keyframe < centre or not np.array_equal(begun.poses[: len(route.poses)], route.poses):
+                begun.match.cancel()
+                del self._begun[keyframe]
+
+    def __enter__(self) -> Ahead:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        if self._pool is not None:
+            self._pool.shutdown(wait=kind is not KeyboardInterrupt, cancel_futures=True)

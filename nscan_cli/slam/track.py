@@ -1,0 +1,283 @@
+"""Step 1 in compiled code: scan after scan is predicted, matched and added to the map of the last metres.
+
+It stops at a scan that the match with the map does not explain; see tracking.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nscan_cli.compiled import kernel
+from nscan_cli.matching.newton import PairProblem, minimise
+from nscan_cli.matching.planar import composed_pose, relative_pose, wrapped
+from nscan_cli.matching.priors import Motion, Prior, sigmas
+from nscan_cli.ndt.energy import inlier_share
+from nscan_cli.ndt.grid import NEW_NEIGHBOURS, change
+from nscan_cli.ndt.table import Grid
+from nscan_cli.poses import Array, transform
+from nscan_cli.slam.options import TrackingOptions
+
+SCANS, OLDEST, KNOWN, ROWS = 0, 1, 2, 3
+"""What is counted: scans that have joined the map, the oldest of them that it still holds, the last poses
+that are known, and the rows of the grid."""
+
+
+class Settings(NamedTuple):
+    """The tracker's options as the kernels take them; see TrackingOptions."""
+
+    half: float
+    """Side (m) of a lattice cell of the map."""
+    minimum: float
+    floor: float
+    window: float
+    step: float
+    widenings: Array
+    max_iterations: int
+    tolerance: float
+    scale: float
+    inlier_bound: float
+    inlier_share: float
+    odometry: Motion
+    steady_motion: Motion
+
+    @classmethod
+    def of(cls, options: TrackingOptions) -> Settings:
+        """Those of the options."""
+        gaussians = options.gaussians
+        return cls(
+            0.5 * gaussians.cell,
+            float(gaussians.minimum),
+            gaussians.floor,
+            options.window,
+            options.step,
+            np.array(options.widenings),
+            options.max_iterations,
+            options.tolerance,
+            options.scale,
+            options.inlier_bound,
+            options.inlier_share,
+            Motion.of(options.odometry),
+            Motion.of(options.steady_motion),
+        )
+
+
+class Track(NamedTuple):
+    """Where the robot came along, and the scans of the map."""
+
+    poses: Array
+    """(h, 3) the last ones, the newest last."""
+    odometry: Array
+    """(3,) of the last scan; nan where there is none."""
+    joined: Array
+    """(3,) pose of the last scan that joined the map."""
+    points: Array
+    """(P, 2) of the scans of the map, one after another, each in its robot's frame."""
+    ends: NDArray[np.int64]
+    """(W + 1,) scan s of the map has points[ends[s] : ends[s + 1]]."""
+    placed: Array
+    """(W, 4) its pose, and the path (m) up to there."""
+    counts: NDArray[np.int64]
+    """(4,) SCANS, OLDEST, KNOWN and ROWS"""
+    path: Array
+    """(1,) length of the path, m."""
+
+    @classmethod
+    def begin(cls, last: int) -> Track:
+        """A track that has not begun, of which so many last poses will be known."""
+        scans = np.zeros((0, 2)), np.zeros(1, dtype=np.int64), np.zeros((0, 4))
+        counts = np.zeros(4, dtype=np.int64)
+        return cls(np.zeros((last, 3)), np.full(3, np.nan), np.zeros(3), *scans, counts, np.zeros(1))
+
+    def with_room(self, scans: int, points: int) -> Track:
+        """The track with room for so many more scans, and points of them, in its map."""
+        oldest, newest = self.counts[[OLDEST, SCANS]].tolist()
+        first, last = self.ends[[oldest, newest]].tolist()
+        if newest + scans <= len(self.placed) and last + points <= len(self.points):
+            return self
+        held, held_points = newest - oldest, last - first
+        roomy_points, placed = np.empty((2 * (held_points + points), 2)), np.empty((2 * (held + scans), 4))
+        ends = np.empty(len(placed) + 1, dtype=np.int64)
+        roomy_points[:held_points], placed[:held] = self.points[first:last], self.placed[oldest:newest]
+        ends[: held + 1] = self.ends[oldest : newest + 1] - first
+        self.counts[[OLDEST, SCANS]] = 0, held
+        return self._replace(points=roomy_points, ends=ends, placed=placed)
+
+    def recent(self, path: float) -> Array:
+        """The points (m, 2) of the map's scans over the last `path` (m), in the tracker's frame."""
+        oldest, newest = self.counts[[OLDEST, SCANS]].tolist()
+        return np.concatenate(
+            [
+                transform(self.placed[scan, :3], self.points[self.ends[scan] : self.ends[scan + 1]])
+                for scan in range(oldest, newest)
+                if self.placed[scan, 3] > self.path[0] - path
+            ]
+        )
+
+
+class Found(NamedTuple):
+    """What tracking finds of n scans; see Tracked."""
+
+    values: Array
+    """(n,) the objective's."""
+    poses: Array
+    """(n, 3)"""
+    hessians: Array
+    """(n, 3, 3)"""
+    expected: Array
+    """(n, 3, 3)"""
+    inliers: Array
+    """(n,)"""
+    paths: Array
+    """(n,)"""
+    joined: NDArray[np.bool_]
+    """(n,)"""
+
+    @classmethod
+    def room(cls, n: int) -> Found:
+        """For so many scans."""
+        values, inliers, paths = np.empty((3, n))
+        hessians, expected = np.empty((2, n, 3, 3))
+        joined = np.empty(n, dtype=np.bool_)
+        return cls(values, np.empty((n, 3)), hessians, expected, inliers, paths, joined)
+
+
+@kernel
+def match_and_count(
+    grid: Grid, settings: Settings, points: Array, prior: Prior, pose: Array, hessian: Array
+) -> tuple[float, float]:
+    """Minimise from `pose` (3,), in place; the objective's value, and the share of inliers there.
+
+    Writes the Hessian (3, 3) of the objective.
+    """
+    half, scale, widenings = settings.half, settings.scale, settings.widenings
+    problem = PairProblem(grid, half, points, scale, prior)
+    value, _, _, _, _ = minimise(
+        problem, pose, widenings, settings.max_iterations, settings.tolerance, hessian
+    )
+    return value, inlier_share(grid, half, points, pose, settings.inlier_bound)
+
+
+@kernel
+def predict(track: Track, settings: Settings, odometry: Array, prior: Prior) -> None:
+    """Write where the next scan is expected, in the tracker's frame, and how surely.
+
+    By its odometry (3,), or without, as by steady motion.
+    """
+    known, last = track.counts[KNOWN], track.poses[-1]
+    step = np.empty(3)
+    if np.isfinite(odometry[0]) and np.isfinite(track.odometry[0]):
+        relative_pose(odometry, track.odometry, step)
+        step[2] = wrapped(step[2])
+        along, about = sigmas(step, settings.odometry)
+    else:
+        relative_pose(last, track.poses[-known], step)
+        step[2] = wrapped(step[2])
+        step /= max(known - 1, 1)
+        along, about = sigmas(step, settings.steady_motion)
+    composed_pose(last, step, prior.mean)
+    prior.mean[2] = wrapped(prior.mean[2])
+    # As sure along the path as across it: no need to turn the information.
+    prior.information[:, :] = 0.0
+    prior.information[0, 0] = prior.information[1, 1] = along**-2
+    prior.information[2, 2] = about**-2
+
+
+@kernel
+def take(
+    track: Track,
+    grid: Grid,
+    settings: Settings,
+    points: Array,
+    odometry: Array,
+    prior: Prior,
+    found: Found,
+    k: int,
+) -> None:
+    """Settle scan k where it was found; it joins the map when the robot has moved, and old ones leave it.
+
+    Its pose, inliers and Hessian of the objective were written to `found`; the rest is written here.
+    """
+    counts, pose, step = track.counts, found.poses[k], np.empty(3)
+    pose[2] = wrapped(pose[2])
+    relative_pose(pose, track.joined, step)
+    distance = np.hypot(step[0], step[1])
+    # Before anything was seen there is nothing to move against.
+    nothing_seen = counts[ROWS] == 0
+    joins = nothing_seen or distance > settings.step or abs(wrapped(step[2])) > settings.step
+    if joins:
+        track.path[0] += distance
+        track.joined[:] = pose
+        _join(track, grid, settings, points, pose)
+    for row in range(track.poses.shape[0] - 1):
+        track.poses[row] = track.poses[row + 1]
+    track.poses[-1], track.odometry[:] = pose, odometry
+    counts[KNOWN] = min(counts[KNOWN] + 1, track.poses.shape[0])
+    found.paths[k], found.joined[k] = track.path[0], joins
+    found.expected[k] = 0.0
+    for a in range(3):
+        for b in range(3):
+            found.hessians[k, a, b] -= prior.information[a, b]
+        if prior.information[a, a] > 0.0:
+            found.expected[k, a, a] = 1.0 / prior.information[a, a]
+
+
+@kernel
+def _join(track: Track, grid: Grid, settings: Settings, points: Array, pose: Array) -> None:
+    counts, newest = track.counts, track.counts[SCANS]
+    first = track.ends[newest]
+    track.points[first : first + points.shape[0]] = points
+    track.ends[newest + 1] = first + points.shape[0]
+    track.placed[newest, :3], track.placed[newest, 3] = pose, track.path[0]
+    counts[SCANS] += 1
+    _change(track, grid, settings, newest, 1.0)
+    while track.placed[counts[OLDEST], 3] < track.path[0] - settings.window:
+        _change(track, grid, settings, counts[OLDEST], -1.0)
+        counts[OLDEST] += 1
+
+
+@kernel
+def _change(track: Track, grid: Grid, settings: Settings, scan: int, sign: float) -> None:
+    half, minimum, floor = settings.half, settings.minimum, settings.floor
+    points, pose = track.points[track.ends[scan] : track.ends[scan + 1]], track.placed[scan, :3]
+    rows = track.counts[ROWS]
+    track.counts[ROWS] = change(grid, rows, half, points, pose, sign, minimum, floor, False)
+
+
+@kernel
+def follow(
+    track: Track,
+    grid: Grid,
+    settings: Settings,
+    points: Array,
+    ends: NDArray[np.int64],
+    odometry: Array,
+    first: int,
+    prior: Prior,
+    found: Found,
+) -> int:
+    """Track scans from the `first` on, and return the next one, which is not settled.
+
+    Scan k has points[ends[k] : ends[k + 1]] and odometry[k], nan where there is none. The one that is not
+    settled has too few inliers where it was `found`; or they are nan: there is no room for it in the grid.
+    """
+    for k in range(first, ends.shape[0] - 1):
+        scan = points[ends[k] : ends[k + 1]]
+        if track.counts[ROWS] + NEW_NEIGHBOURS * scan.shape[0] > grid.keys.shape[0]:
+            found.inliers[k] = np.nan
+            return k
+        if track.counts[KNOWN] == 0:
+            prior.mean[:], prior.information[:, :] = 0.0, 0.0
+            found.poses[k], found.hessians[k], found.inliers[k] = 0.0, 0.0, 1.0
+        else:
+            predict(track, settings, odometry[k], prior)
+            found.poses[k] = prior.mean
+            found.values[k], found.inliers[k] = match_and_count(
+                grid, settings, scan, prior, found.poses[k], found.hessians[k]
+            )
+            if not found.inliers[k] >= settings.inlier_share:
+                return k
+        take(track, grid, settings, scan, odometry[k], prior, found, k)
+    return len(ends) - 1

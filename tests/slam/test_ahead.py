@@ -1,0 +1,116 @@
+"""Matches made ahead of their turn: which, and when they count. Whole runs are compared in test_pipeline."""
+
+from __future__ import annotations
+
+import threading
+
+import numpy as np
+import pytest
+
+from nscan_cli.graph.model import Pairwise
+from nscan_cli.ndt.grid import Ndt
+from nscan_cli.slam.ahead import AHEAD, Ahead
+from nscan_cli.slam.coverage import Coverage
+from nscan_cli.slam.keyframes import Keyframe, Route, extended
+from nscan_cli.slam.nearby import Nearby
+from nscan_cli.slam.options import NScanOptions
+from nscan_cli.slam.tracking import Tracked
+
+OPTIONS = NScanOptions(radius=2.5)
+"""Two keyframes to both sides of one are near."""
+SIZE = 20
+
+
+def keyframe(k: int) -> Keyframe:
+    """The k-th, 1 m further along a straight line."""
+    tracked = Tracked(np.array([k, 0.0, 0.0]), np.eye(3), np.eye(3), 1.0, float(k), True)
+    return Keyframe(k, tracked, np.eye(3), np.empty((0, 2)), 0, Ndt(0.5))
+
+
+def straight(size: int) -> tuple[Route, tuple[list[Keyframe], list[Pairwise]]]:
+    """A route of so many keyframes, and those of twenty in all that are still to come."""
+    keyframes = [keyframe(k) for k in range(SIZE)]
+    step = np.array([1.0, 0.0, 0.0])
+    chain = [Pairwise((k, k + 1), step, np.eye(3), "track") for k in range(SIZE - 1)]
+    first = Route(keyframes[:1], [], np.zeros(1), np.zeros((1, 3)))
+    return extended(first, keyframes[1:size], chain[: size - 1]), (keyframes[size:], chain[size - 1 :])
+
+
+class Matches:
+    """In place of real matches: who was asked for what."""
+
+    def __init__(self) -> None:
+        self.made: list[tuple[int, int, int]] = []
+        """Thread, centre and size of the route."""
+
+    def __call__(self, route: Route, centre: int, options: NScanOptions) -> Nearby | None:
+        self.made.append((threading.get_ident(), centre, len(route.poses)))
+        return Nearby((), None, None, float(centre), True)
+
+
+def let_finish(ahead: Ahead) -> None:
+    """The pool has one thread: what comes last is done after all that was begun."""
+    assert ahead._pool is not None
+    ahead._pool.submit(int).result()
+
+
+def test_what_is_due_next_is_begun_as_if_every_match_related_all():
+    """Around 6 all pairs of 4 to 8 are: keyframe 7 misses one of its four (with 9), 8 two (9 and 10)."""
+    matches, (route, coming) = Matches(), straight(10)
+    with Ahead(matches, OPTIONS, 2) as ahead:
+        ahead.begin(route, coming, 6, [4, 5, 6, 7, 8], Coverage())
+        ahead.begin(route, coming, 6, [4, 5, 6, 7, 8], Coverage())
+        let_finish(ahead)
+    begun = [(centre, size) for _, centre, size in matches.made]
+    # Each with the route as it will be at its turn, three keyframes further than the centre.
+    assert begun == [(8, 12), (10, 14)]
+    assert len(begun) == AHEAD
+
+
+def test_a_match_counts_if_the_graph_lies_as_it_was_assumed():
+    matches, (route, coming) = Matches(), straight(10)
+    with Ahead(matches, OPTIONS, 2) as ahead:
+        ahead.begin(route, coming, 6, [4, 5, 6, 7, 8], Coverage())
+        let_finish(ahead)
+        longer = extended(route, coming[0][:2], coming[1][:2])
+        found = ahead.match(longer, 8)
+        assert found is not None
+        assert found.moved == 8.0
+        assert [centre for _, centre, _ in matches.made] == [8, 10]
+        moved = extended(longer, coming[0][2:4], coming[1][2:4])
+        moved.poses[3, 0] += 1e-12
+        ahead.match(moved, 10)
+    assert [centre for _, centre, _ in matches.made] == [8, 10, 10]
+    assert matches.made[-1][0] == threading.get_ident() != matches.made[0][0]
+
+
+def test_what_the_graph_has_left_behind_is_begun_anew():
+    matches, (route, coming) = Matches(), straight(10)
+    with Ahead(matches, OPTIONS, 2) as ahead:
+        ahead.begin(route, coming, 6, [4, 5, 6, 7, 8], Coverage())
+        route.poses[9, 1] = 0.5
+        ahead.begin(route, coming, 6, [4, 5, 6, 7, 8], Coverage())
+        let_finish(ahead)
+    assert [centre for _, centre, _ in matches.made if centre == 10][-1:] == [10]
+    assert sum(centre == 8 for _, centre, _ in matches.made) in (1, 2)
+    assert len(matches.made) >= 2
+
+
+def test_with_one_thread_none_is_begun():
+    matches, (route, coming) = Matches(), straight(10)
+    with Ahead(matches, OPTIONS, 1) as ahead:
+        ahead.begin(route, coming, 6, [4, 5, 6, 7, 8], Coverage())
+        assert matches.made == []
+        ahead.match(route, 6)
+    assert [centre for _, centre, _ in matches.made] == [6]
+
+
+def test_an_error_is_raised_at_its_turn():
+    def fail(route: Route, centre: int, options: NScanOptions) -> Nearby | None:
+        raise ZeroDivisionError
+
+    route, coming = straight(10)
+    with Ahead(fail, OPTIONS, 2) as ahead:
+        ahead.begin(route, coming, 6, [4, 5, 6, 7, 8], Coverage())
+        with pytest.raises(ZeroDivisionError):
+            ahead.match(extended(route, coming[0][:2], coming[1][:2]), 8)
