@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import errno
+import gc
 import importlib
 import io
 import os
@@ -29,6 +30,9 @@ COMMANDS = {
 INTERRUPTED, CLOSED_EARLY, INTERNAL_ERROR = 130, 141, 1
 COMPLETION = "_NSCAN_CLI_COMPLETE"
 """The variable by which a shell asks what a line can go on with."""
+OBJECTS = 50_000
+"""So many new ones before the garbage collection looks for what can go. Python's own 700 have it look through
+all that the imports make again and again, and of that nothing ever goes."""
 NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)
 
 
@@ -73,6 +77,7 @@ def cli() -> None:
 
 def main() -> None:
     """Entry point of the command; exits with the code of the outcome."""
+    gc.set_threshold(OBJECTS)
     raw: object = getattr(sys.stdout, "buffer", None)
     if isinstance(raw, io.RawIOBase):
         # With PYTHONUNBUFFERED, what a pipe does not take at once would be lost without an error.
@@ -80,6 +85,8 @@ def main() -> None:
             io.BufferedWriter(raw), sys.stdout.encoding, sys.stdout.errors, line_buffering=True
         )
     code = run(sys.argv[1:])
+    # What is left goes with the process: at its end, Python need not look for what it could free.
+    gc.freeze()
     if code == INTERRUPTED:
         # Python would wait for threads whose work nobody wants any more.
         for stream in (sys.stdout, sys.stderr):

@@ -31,6 +31,7 @@ SCHEMA = "urn:nscan-cli:pose-graph:1.0"
 UNITS = {"length": "m", "angle": "rad", "time": "s"}
 NEXT = ",\n"
 """From one record to the next."""
+_compact = json.JSONEncoder(separators=(",", ":"), allow_nan=False, check_circular=False).encode
 REMEDY = "mend it, or write the graph again with nscan-cli slam"
 
 
@@ -109,10 +110,6 @@ def _kind(data: bytes) -> str:
         return "compressed by gzip"
     log = next((form.name for form in FORMS if form.fits(data)), None)
     return f"a log ({log})" if log else name_of(data)
-
-
-def _compact(value: Any) -> str:
-    return json.dumps(value, separators=(",", ":"), allow_nan=False)
 
 
 def _refuse_constant(constant: str) -> NoReturn:

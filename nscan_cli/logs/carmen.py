@@ -175,8 +175,8 @@ def _said(pose: Array) -> str:
 
 def _angles(scans: Scans) -> tuple[Array, Array]:
     """First direction and step (S,) of each scan, rad."""
-    by_count = {int(n): beam_angles(int(n)) for n in np.unique(scans.beams)}
-    angles = np.array([by_count[int(n)] for n in scans.beams])
+    counts, which = np.unique(scans.beams, return_inverse=True)
+    angles = np.array([beam_angles(beams) for beams in counts.tolist()])[which]
     if scans.head.shape[1]:
         known = scans.head[:, 3] != 0
         angles[known] = scans.head[known][:, (1, 3)]

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from nscan_cli.limits import KINDS
 from nscan_cli.logs.assemble import empty_table
 from nscan_cli.logs.skips import Skips
-from nscan_cli.logs.text_records import Record, as_text, beam_count, parsed, sound
+from nscan_cli.logs.text_records import Block, Record, as_text, beam_count, blocks, sound, sound_rows
 from nscan_cli.poses import Array
 
 TAG = re.compile(rb"[A-Z][A-Z0-9_]{2,31}\Z")
@@ -53,6 +53,7 @@ def lines_by_tag(data: bytes, skips: Skips) -> dict[str, list[tuple[int, bytes]]
     Of tags that are neither of a laser nor USED, there are as many UNUSED as lines.
     """
     by_tag: dict[bytes, list[tuple[int, bytes]]] = {}
+    used: set[bytes] = set()
     for number, line in enumerate(io.BytesIO(data), 1):
         text = line.strip()
         if not text or text.startswith(b"#"):
@@ -66,7 +67,9 @@ def lines_by_tag(data: bytes, skips: Skips) -> dict[str, list[tuple[int, bytes]]
                 skips.add("not a CARMEN record", number)
                 continue
             known = by_tag[tag] = []
-        known.append((number, rest) if tag in USED or LASER.match(tag) else UNUSED)
+            if tag in USED or LASER.match(tag):
+                used.add(tag)
+        known.append((number, rest) if tag in used else UNUSED)
     return {tag.decode(): lines for tag, lines in by_tag.items()}
 
 
@@ -103,7 +106,12 @@ def scans(tag: str, lines: list[tuple[int, bytes]], skips: Skips) -> Scans:
     head = 7 if NEW.match(tag) else 0
     poses = 6 if tag in ("FLASER", "RLASER") or tag.startswith("ROBOT") else 0
     tail = poses + (5 if tag.startswith("ROBOT") else 0)
-    records = [r for number, text in lines if (r := _record(number, text, head, tail, skips)) is not None]
+    counts: dict[bytes, int] = {}
+    records = [
+        record
+        for number, text in lines
+        if (record := _record(number, text, head, tail, counts, skips)) is not None
+    ]
     widest = max((n for _, n in records), default=0)
     size = len(records)
     result = Scans(
@@ -117,32 +125,33 @@ def scans(tag: str, lines: list[tuple[int, bytes]], skips: Skips) -> Scans:
         hosts=set(),
     )
     row = 0
-    for record, beams, values in parsed(records, skips):
-        problem = _problem(values, head, beams, poses, tail)
-        if problem:
-            skips.add(problem, record.line)
-            continue
+    for block in blocks(records, skips):
+        good, values = _without_problems(block, head, poses, tail, skips)
+        rows = slice(row, row + len(good))
         with np.errstate(over="ignore"):
-            result.ranges[row, :beams] = values[head + 1 : head + 1 + beams]
-        result.beams[row] = beams
-        result.head[row] = values[:head]
+            result.ranges[rows, : block.beams] = values[:, head + 1 : head + 1 + block.beams]
+        result.beams[rows] = block.beams
+        result.head[rows] = values[:, :head]
         if poses:
-            at = len(values) - tail
-            result.laser[row], result.robot[row] = values[at : at + 3], values[at + 3 : at + 6]
-        result.stamps.append(record.stamp)
-        result.lines.append(record.line)
-        result.hosts.add(record.host)
-        row += 1
+            at = values.shape[1] - tail
+            result.laser[rows], result.robot[rows] = values[:, at : at + 3], values[:, at + 3 : at + 6]
+        result.stamps += [record.stamp for record in good]
+        result.lines += [record.line for record in good]
+        result.hosts.update(record.host for record in good)
+        row += len(good)
     if row < size:
         for name in ("ranges", "beams", "head", "laser", "robot"):
             setattr(result, name, getattr(result, name)[:row])
     return result
 
 
-def _record(number: int, text: bytes, head: int, tail: int, skips: Skips) -> tuple[Record, int] | None:
+def _record(
+    number: int, text: bytes, head: int, tail: int, counts: dict[bytes, int], skips: Skips
+) -> tuple[Record, int] | None:
     """One laser line and its number of beams, or None when it is malformed.
 
-    The beam count is believed only as far as the line has that many values.
+    The beam count is believed only as far as the line has that many values. `counts` are the beam counts
+    that were found to be some already: a log has few.
     """
     if b"  " in text or b"\t" in text:
         text = b" ".join(text.split())
@@ -151,9 +160,10 @@ def _record(number: int, text: bytes, head: int, tail: int, skips: Skips) -> tup
     if not text or len(start) <= head:
         skips.add("wrong number of values", number)
         return None
-    beams = beam_count(start[head], number, skips)
+    beams = counts.get(start[head]) or beam_count(start[head], number, skips)
     if beams is None:
         return None
+    counts[start[head]] = beams
     least = head + 1 + beams + tail + (1 if head else 0)
     if tokens == least and not head:
         return Record(number, text, tokens, ""), beams
@@ -164,16 +174,26 @@ def _record(number: int, text: bytes, head: int, tail: int, skips: Skips) -> tup
     return Record(number, values, tokens - TRAILER, as_text(stamp), host), beams
 
 
-def _problem(values: Array, head: int, beams: int, poses: int, tail: int) -> str:
-    """What is wrong with the numbers of a laser record; empty when nothing is."""
+def _without_problems(
+    block: Block, head: int, poses: int, tail: int, skips: Skips
+) -> tuple[list[Record], Array]:
+    """The laser records of a block whose numbers can be true, and their values; the others are skipped."""
+    values = block.values
+    problems: list[tuple[str, NDArray[np.bool_]]] = []
     if head:
-        remissions = values[head + 1 + beams]
-        if remissions != len(values) - (head + 1 + beams + 1 + tail):
-            return "wrong number of values"
-        if not sound(values[:head]) or np.abs(values[[1, 3]]).max() > 4 * np.pi:
-            return "an angle is out of bounds"
+        after = head + 1 + block.beams
+        remissions = values[:, after] == values.shape[1] - (after + 1 + tail)
+        angles = sound_rows(values[:, :head]) & (np.abs(values[:, [1, 3]]).max(axis=1) <= 4 * np.pi)
+        problems += [("wrong number of values", ~remissions), ("an angle is out of bounds", ~angles)]
     if poses:
-        at = len(values) - tail
-        if not sound(values[at : at + poses]):
-            return "a pose is out of bounds"
-    return ""
+        at = values.shape[1] - tail
+        problems.append(("a pose is out of bounds", ~sound_rows(values[:, at : at + poses])))
+    bad = np.zeros(len(values), dtype=np.bool_)
+    for _, wrong in problems:
+        bad |= wrong
+    if not bad.any():
+        return block.records, values
+    for row in np.flatnonzero(bad).tolist():
+        reason = next(reason for reason, wrong in problems if wrong[row])
+        skips.add(reason, block.records[row].line)
+    return [block.records[row] for row in np.flatnonzero(~bad).tolist()], values[~bad]

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import itertools
 import warnings
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from nscan_cli.limits import BEAMS, DISTANCE
 from nscan_cli.logs.skips import Skips
@@ -16,7 +18,7 @@ from nscan_cli.poses import Array
 CHUNK = 1024
 
 
-@dataclass(frozen=True)
+@dataclass(slots=True)
 class Record:
     """One line: its number in the file (from 1), the values as text, and when and where it is from."""
 
@@ -29,23 +31,46 @@ class Record:
     host: bytes = b""
 
 
+class Block(NamedTuple):
+    """Records that follow each other, with as many beams and values each."""
+
+    records: list[Record]
+    """R"""
+    beams: int
+    values: Array
+    """(R, V)"""
+
+
 def parsed(records: list[tuple[Record, int]], skips: Skips) -> Iterator[tuple[Record, int, Array]]:
     """Each record with its number of beams and its values; those that are no numbers are skipped."""
+    for block in blocks(records, skips):
+        for record, values in zip(block.records, block.values, strict=True):
+            yield record, block.beams, values
+
+
+def blocks(records: list[tuple[Record, int]], skips: Skips) -> Iterator[Block]:
+    """The values of records with their numbers of beams; those that are no numbers are skipped."""
     for begin in range(0, len(records), CHUNK):
         part = records[begin : begin + CHUNK]
         values = floats(b" ".join(record.values for record, _ in part))
         if values is not None and values.size == sum(record.count for record, _ in part):
             at = 0
-            for record, beams in part:
-                yield record, beams, values[at : at + record.count]
-                at += record.count
+            for (beams, count), group in itertools.groupby(part, _layout):
+                same = [record for record, _ in group]
+                end = at + count * len(same)
+                yield Block(same, beams, values[at:end].reshape(len(same), count))
+                at = end
             continue
         for record, beams in part:
             alone = floats(record.values)
             if alone is None or alone.size != record.count:
                 skips.add("a value is not a number", record.line)
             else:
-                yield record, beams, alone
+                yield Block([record], beams, alone[None])
+
+
+def _layout(record: tuple[Record, int]) -> tuple[int, int]:
+    return record[1], record[0].count
 
 
 def floats(text: bytes) -> Array | None:
@@ -81,7 +106,13 @@ def beams_problem(beams: int) -> str:
 
 def sound(values: ArrayLike) -> bool:
     """Whether all values are finite and of a size that a pose or an angle can have."""
-    return bool((np.abs(values) < DISTANCE.value).all())
+    return bool(sound_rows(np.reshape(values, (1, -1)))[0])
+
+
+def sound_rows(values: Array) -> NDArray[np.bool_]:
+    """(R,) the same of each row of the values (R, V)."""
+    found: NDArray[np.bool_] = np.all(np.abs(values) < DISTANCE.value, axis=1)
+    return found
 
 
 def as_text(stamp: bytes) -> str:

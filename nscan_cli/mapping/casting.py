@@ -26,8 +26,19 @@ class Tiles(NamedTuple):
     """(T, 2, TILE, TILE) hits, then misses, of each tile that has a number; those of others are 0."""
 
 
-Scans = tuple[NDArray[np.int64], NDArray[np.float32], Array, Array, Array]
-"""N rows of a log, its ranges (S, B), first angles and steps (S,), and the poses (N, 3) of the laser."""
+class Scans(NamedTuple):
+    """The scans of a log that are cast, and where from."""
+
+    rows: NDArray[np.int64]
+    """(N,) of the log."""
+    ranges: NDArray[np.float32]
+    """(S, B) m"""
+    angle_min: Array
+    """(S,) rad"""
+    angle_increment: Array
+    """(S,) rad"""
+    lasers: Array
+    """(N, 3) poses of the laser."""
 
 
 def counted(
@@ -40,20 +51,14 @@ def counted(
     index = np.full((-(-shape[0] // TILE), -(-shape[1] // TILE)), -1, dtype=np.int32)
     # There is room for all tiles, but only those that are written to take any memory: the first ones.
     counts = np.zeros((index.size, 2, TILE, TILE), dtype=np.int32)
-    _cast(*scans, reach, resolution, left, bottom, Tiles(index, counts))
+    _cast(scans, reach, resolution, left, bottom, Tiles(index, counts))
     return Tiles(index, counts)
 
 
 @kernel
-def extent(
-    rows: NDArray[np.int64],
-    ranges: NDArray[np.float32],
-    angle_min: Array,
-    angle_increment: Array,
-    lasers: Array,
-    reach: float,
-) -> tuple[float, float, float, float]:
-    """The least x and y and the greatest x and y of the lasers (N, 3) and of their beams' ends."""
+def extent(scans: Scans, reach: float) -> tuple[float, float, float, float]:
+    """The least x and y and the greatest x and y of the lasers and of their beams' ends."""
+    rows, ranges, angle_min, angle_increment, lasers = scans
     low_x = high_x = lasers[0, 0]
     low_y = high_y = lasers[0, 1]
     for k in range(len(rows)):
@@ -62,31 +67,23 @@ def extent(
         low_x, high_x = min(low_x, x), max(high_x, x)
         low_y, high_y = min(low_y, y), max(high_y, y)
         for beam in range(ranges.shape[1]):
-            r = float(ranges[row, beam])
-            if not np.isfinite(r):
+            if not np.isfinite(ranges[row, beam]):
+                continue
+            r = min(float(ranges[row, beam]), reach)
+            # Most beams are so short that they end within, whatever their direction is.
+            if x - r > low_x and x + r < high_x and y - r > low_y and y + r < high_y:
                 continue
             angle = heading + angle_min[row] + beam * angle_increment[row]
-            end_x = x + min(r, reach) * np.cos(angle)
-            end_y = y + min(r, reach) * np.sin(angle)
+            end_x, end_y = x + r * np.cos(angle), y + r * np.sin(angle)
             low_x, high_x = min(low_x, end_x), max(high_x, end_x)
             low_y, high_y = min(low_y, end_y), max(high_y, end_y)
     return low_x, low_y, high_x, high_y
 
 
 @kernel
-def _cast(
-    rows: NDArray[np.int64],
-    ranges: NDArray[np.float32],
-    angle_min: Array,
-    angle_increment: Array,
-    lasers: Array,
-    reach: float,
-    resolution: float,
-    left: int,
-    bottom: int,
-    tiles: Tiles,
-) -> None:
+def _cast(scans: Scans, reach: float, resolution: float, left: int, bottom: int, tiles: Tiles) -> None:
     """Add the beams of all scans to the counts of the tiles."""
+    rows, ranges, angle_min, angle_increment, lasers = scans
     used = 0
     for k in range(len(rows)):
         row = rows[k]

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from nscan_cli.errors import WrongUsageError
 from nscan_cli.limits import MAP_CELLS
 from nscan_cli.logs.scan import LaserLog
-from nscan_cli.mapping.casting import TILE, Tiles, counted, extent
+from nscan_cli.mapping.casting import TILE, Scans, Tiles, counted, extent
 from nscan_cli.poses import Array
 
 RESOLUTION = 0.05
@@ -142,8 +142,8 @@ def occupancy_grid(
     if len(rows) == 0:
         raise WrongUsageError(f"{log.source.name}: no scans to draw a map of; choose some")
     lasers = np.ascontiguousarray(log.laser_pose(poses))
-    scans = (np.asarray(rows, dtype=np.int64), log.ranges, log.angle_min, log.angle_increment, lasers)
-    low_x, low_y, high_x, high_y = extent(*scans, REACH)
+    scans = Scans(np.asarray(rows, dtype=np.int64), log.ranges, log.angle_min, log.angle_increment, lasers)
+    low_x, low_y, high_x, high_y = extent(scans, REACH)
     # One cell to spare: the border of the map is then free of what is drawn in it, and rounding harmless.
     left, bottom = math.floor(low_x / resolution) - 1, math.floor(low_y / resolution) - 1
     width = math.floor(high_x / resolution) + 2 - left
