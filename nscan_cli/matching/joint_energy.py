@@ -13,8 +13,9 @@ from numpy.typing import NDArray
 
 from nscan_cli.compiled import kernel
 from nscan_cli.matching.planar import relative_pose
-from nscan_cli.matching.scans import Scans, scan_grid, scan_points
+from nscan_cli.matching.scans import Scans, most_points, scan_grid, scan_points
 from nscan_cli.ndt.energy import OUT, accumulate, unpack
+from nscan_cli.ndt.meeting import room_to_meet
 from nscan_cli.poses import Array
 
 NEUTRAL = 1.0
@@ -123,7 +124,7 @@ def evaluate(
 @kernel
 def _each_pair(problem: JointProblem, poses: Array, share: float, stride: int, values: Array) -> None:
     scans = problem.scans
-    u, out = np.empty(3), np.empty(OUT)
+    u, out, met = np.empty(3), np.empty(OUT), room_to_meet(most_points(scans), stride)
     for pair in range(problem.pairs.shape[0]):
         i, j = problem.pairs[pair, 0], problem.pairs[pair, 1]
         relative_pose(poses[j], poses[i], u)
@@ -138,6 +139,7 @@ def _each_pair(problem: JointProblem, poses: Array, share: float, stride: int, v
             0.0,
             share * scans.usual[i],
             stride,
+            met,
             out,
         )
         values[i, j] = stride * problem.scale * out[0]
@@ -155,7 +157,7 @@ def _add_pairs(
     hessian: Array,
 ) -> float:
     scans, pairs, scale = problem.scans, problem.pairs, stride * problem.scale
-    out = np.empty(OUT)
+    out, met = np.empty(OUT), room_to_meet(most_points(scans), stride)
     u, g, h = np.empty(3), np.empty(3), np.empty((3, 3))
     value = 0.0
     for pair in range(pairs.shape[0]):
@@ -172,6 +174,7 @@ def _add_pairs(
             curvature,
             neutral * scans.usual[i] if neutral > 0.0 else 0.0,
             stride,
+            met,
             out,
         )
         value += scale * out[0]
@@ -207,36 +210,62 @@ def _chain(
     gradient: Array,
     hessian: Array,
 ) -> None:
-    """Eqs. (10) to (13): add what a term in u = p_j ⊖ p_i gives to the gradient and Hessian in p."""
+    """Eqs. (10) to (13): add what a term in u = p_j ⊖ p_i gives to the gradient and Hessian in p.
+
+    With R the turn by φ_i and w = (u_y, −u_x), eq. (9) is ∂u/∂p_j = [Rᵗ 0; 0 1] and
+    ∂u/∂p_i = [−Rᵗ w; 0 −1]. Multiplied out it takes a fifth of the time of products of matrices.
+    """
     c, s = np.cos(phi), np.sin(phi)
-    # ∂u/∂(p_i, p_j), (3, 6), eq. (9).
-    jacobian = np.zeros((3, 6))
-    jacobian[0, 0], jacobian[0, 1], jacobian[0, 2] = -c, -s, u[1]
-    jacobian[1, 0], jacobian[1, 1], jacobian[1, 2] = s, -c, -u[0]
-    jacobian[2, 2] = -1.0
-    jacobian[0, 3], jacobian[0, 4] = c, s
-    jacobian[1, 3], jacobian[1, 4] = -s, c
-    jacobian[2, 5] = 1.0
-    block = np.zeros((6, 6))
-    for a in range(6):
-        for b in range(a, 6):
-            total = 0.0
-            for k in range(3):
-                for m in range(3):
-                    total += jacobian[k, a] * h[k, m] * jacobian[m, b]
-            block[a, b] = total
+    wx, wy = u[1], -u[0]
+    i, j = 3 * i, 3 * j
+    # R times the gradient in (x, y).
+    gx, gy = c * g[0] - s * g[1], s * g[0] + c * g[1]
+    gradient[i] -= gx
+    gradient[i + 1] -= gy
+    gradient[i + 2] += wx * g[0] + wy * g[1] - g[2]
+    gradient[j] += gx
+    gradient[j + 1] += gy
+    gradient[j + 2] += g[2]
+    # R times the Hessian in (x, y) times Rᵗ; R times its column of φ; and R q, with q = H w − that column.
+    left_xx, left_xy = c * h[0, 0] - s * h[0, 1], c * h[0, 1] - s * h[1, 1]
+    left_yx, left_yy = s * h[0, 0] + c * h[0, 1], s * h[0, 1] + c * h[1, 1]
+    xx, xy, yy = c * left_xx - s * left_xy, s * left_xx + c * left_xy, s * left_yx + c * left_yy
+    xp, yp = c * h[0, 2] - s * h[1, 2], s * h[0, 2] + c * h[1, 2]
+    qx, qy = h[0, 0] * wx + h[0, 1] * wy - h[0, 2], h[0, 1] * wx + h[1, 1] * wy - h[1, 2]
     # Σ_k ∂E/∂u_k · ∂²u_k: all that is not zero has φ_i in it.
-    block[2, 2] -= curvature * (g[0] * u[0] + g[1] * u[1])
-    block[0, 2] += curvature * (g[0] * s + g[1] * c)
-    block[1, 2] += curvature * (g[1] * s - g[0] * c)
-    block[2, 3] -= curvature * (g[0] * s + g[1] * c)
-    block[2, 4] += curvature * (g[0] * c - g[1] * s)
-    for a in range(6):
-        row = 3 * i + a if a < 3 else 3 * j + a - 3
-        for k in range(3):
-            gradient[row] += jacobian[k, a] * g[k]
-        for b in range(a, 6):
-            column = 3 * i + b if b < 3 else 3 * j + b - 3
-            hessian[row, column] += block[a, b]
-            if a != b:
-                hessian[column, row] += block[a, b]
+    bend_x, bend_y = curvature * gy, -curvature * gx
+    rx, ry = c * qx - s * qy - bend_x, s * qx + c * qy - bend_y
+    w_column = wx * h[0, 2] + wy * h[1, 2]
+    turn = wx * qx + wy * qy - w_column + h[2, 2] + curvature * (g[0] * wy - g[1] * wx)
+    _add_symmetric(hessian, i, xx, xy, -rx, yy, -ry, turn)
+    _add_symmetric(hessian, j, xx, xy, xp, yy, yp, h[2, 2])
+    _add_row(hessian, i, j, -xx, -xy, -xp)
+    _add_row(hessian, i + 1, j, -xy, -yy, -yp)
+    _add_row(hessian, i + 2, j, rx, ry, w_column - h[2, 2])
+
+
+@kernel
+def _add_symmetric(
+    matrix: Array, at: int, xx: float, xy: float, xp: float, yy: float, yp: float, pp: float
+) -> None:
+    """Add a symmetric block (3, 3) on the diagonal."""
+    matrix[at, at] += xx
+    matrix[at, at + 1] += xy
+    matrix[at, at + 2] += xp
+    matrix[at + 1, at] += xy
+    matrix[at + 1, at + 1] += yy
+    matrix[at + 1, at + 2] += yp
+    matrix[at + 2, at] += xp
+    matrix[at + 2, at + 1] += yp
+    matrix[at + 2, at + 2] += pp
+
+
+@kernel
+def _add_row(matrix: Array, row: int, column: int, x: float, y: float, p: float) -> None:
+    """Add a row (3,) of a block, and as a column what mirrors it."""
+    matrix[row, column] += x
+    matrix[row, column + 1] += y
+    matrix[row, column + 2] += p
+    matrix[column, row] += x
+    matrix[column + 1, row] += y
+    matrix[column + 2, row] += p

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from nscan_cli.compiled import kernel
 from nscan_cli.ndt.energy import OUT, accumulate
 from nscan_cli.ndt.grid import Ndt
+from nscan_cli.ndt.meeting import room_to_meet
 from nscan_cli.ndt.table import Grid
 from nscan_cli.poses import Array
 
@@ -79,11 +80,17 @@ def scan_points(scans: Scans, i: int) -> Array:
 
 
 @kernel
+def most_points(scans: Scans) -> int:
+    """Those of the scan that has most."""
+    return int(np.diff(scans.point_starts).max())
+
+
+@kernel
 def _own_mean(grid: Grid, half: float, points: Array) -> float:
-    out = np.empty(OUT)
-    accumulate(grid, half, points, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 1, out)
+    out, met = np.empty(OUT), room_to_meet(points.shape[0], 1)
+    accumulate(grid, half, points, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 1, met, out)
     energy = out[0]
-    accumulate(grid, half, points, 0.0, 0.0, 0.0, 1.0, 0.0, 1.0, 1, out)
+    accumulate(grid, half, points, 0.0, 0.0, 0.0, 1.0, 0.0, 1.0, 1, met, out)
     # The difference is the number of Gaussians met.
     return float(-energy / max(out[0] - energy, 1.0))
 

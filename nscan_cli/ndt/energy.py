@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from nscan_cli.compiled import kernel, summing_kernel
 from nscan_cli.ndt.grid import Ndt
-from nscan_cli.ndt.meeting import BLOCKS, MET, Meeting, meet
+from nscan_cli.ndt.meeting import BLOCKS, Meeting, meet, room_to_meet
 from nscan_cli.ndt.table import Grid, find_row, pack
 from nscan_cli.poses import Array
 
@@ -43,6 +43,7 @@ def accumulate(
     curvature: float,
     baseline: float,
     stride: int,
+    met: Array,
     out: Array,
 ) -> None:
     """Write E, gradient and Hessian at the pose u = (x, y, phi) of points (m, 2) into out (10,).
@@ -50,9 +51,8 @@ def accumulate(
     With `curvature` 1 the Hessian is exact; with 0 its two terms that can be negative are left out, so
     that it is positive semi-definite everywhere. `baseline` is what every Gaussian that a point meets
     costs, well hit or not; it only counts when energies are compared. Of the points, every so-manyth
-    counts by `stride`.
+    counts by `stride`. `met` is room to work in; see room_to_meet.
     """
-    met = np.empty((MET, 4 * (points.shape[0] // stride + 1)))
     count = meet(grid, half, points, x, y, phi, stride, met)
     _sum(met, count, widening, curvature, baseline, out)
 
@@ -167,12 +167,14 @@ def find_inliers(
     How many they are; other marks are left as they were.
     """
     cos, sin = np.cos(pose[2]), np.sin(pose[2])
-    count = 0
+    count, row, key = 0, -1, -1
     for k in range(points.shape[0]):
         rx = cos * points[k, 0] - sin * points[k, 1]
         ry = sin * points[k, 0] + cos * points[k, 1]
         px, py = rx + pose[0], ry + pose[1]
-        row = find_row(grid, pack(int(np.floor(px / half)), int(np.floor(py / half))))
+        cell = pack(int(np.floor(px / half)), int(np.floor(py / half)))
+        if cell != key:
+            key, row = cell, find_row(grid, cell)
         if row < 0:
             continue
         for block in range(4):
@@ -205,7 +207,8 @@ def energy(ndt: Ndt, points: Array, pose: Array, widening: float = 1.0, exact: b
     """
     out = np.empty(OUT)
     x, y, phi = (float(part) for part in pose)
-    accumulate(ndt.grid, ndt.half, points, x, y, phi, widening, float(exact), 0.0, 1, out)
+    met = room_to_meet(len(points), 1)
+    accumulate(ndt.grid, ndt.half, points, x, y, phi, widening, float(exact), 0.0, 1, met, out)
     gradient, hessian = np.empty(3), np.empty((3, 3))
     unpack(out, 1.0, gradient, hessian)
     return Energy(float(out[0]), gradient, hessian)

@@ -19,6 +19,12 @@ GAUSSIAN = 7
 
 
 @kernel
+def room_to_meet(points: int, stride: int) -> Array:
+    """Room for what so many points meet; see meet."""
+    return np.empty((MET, BLOCKS * (points // stride + 1)))
+
+
+@kernel
 def meet(
     grid: Grid, half: float, points: Array, x: float, y: float, phi: float, stride: int, met: Array
 ) -> int:
@@ -27,12 +33,15 @@ def meet(
     Of the points, every so-manyth counts by `stride`.
     """
     cos, sin = np.cos(phi), np.sin(phi)
-    count = 0
+    count, row, key = 0, -1, -1
     for k in range(0, points.shape[0], stride):
         rx = cos * points[k, 0] - sin * points[k, 1]
         ry = sin * points[k, 0] + cos * points[k, 1]
         px, py = rx + x, ry + y
-        row = find_row(grid, pack(int(np.floor(px / half)), int(np.floor(py / half))))
+        cell = pack(int(np.floor(px / half)), int(np.floor(py / half)))
+        # Neighbouring beams mostly fall into the same cell.
+        if cell != key:
+            key, row = cell, find_row(grid, cell)
         if row < 0:
             continue
         for block in range(BLOCKS):
@@ -42,9 +51,11 @@ def meet(
             gaussian = grid.gaussians[link]
             if gaussian[2] == 0.0 or gaussian[5] * rx + gaussian[6] * ry > 0.0:
                 continue
-            met[0, count], met[1, count] = rx, ry
-            met[2, count], met[3, count] = px - gaussian[0], py - gaussian[1]
-            met[4, count], met[5, count], met[6, count] = gaussian[2], gaussian[3], gaussian[4]
+            # Unsigned, so that nobody asks whether it counts from the end.
+            c = np.uint64(count)
+            met[0, c], met[1, c] = rx, ry
+            met[2, c], met[3, c] = px - gaussian[0], py - gaussian[1]
+            met[4, c], met[5, c], met[6, c] = gaussian[2], gaussian[3], gaussian[4]
             count += 1
     return count
 
@@ -89,9 +100,12 @@ def meet_again(grid: Grid, half: float, meeting: Meeting, x: float, y: float, ph
             row = find_row(grid, pack(int(ix), int(iy)))
             for block in range(BLOCKS):
                 link = -1 if row < 0 else grid.links[row, block]
+                if link < 0:
+                    meeting.gaussians[block, :, k] = 0.0
+                    continue
+                gaussian = grid.gaussians[link]
                 for number in range(GAUSSIAN):
-                    value = 0.0 if link < 0 else grid.gaussians[link, number]
-                    meeting.gaussians[block, number, k] = value
+                    meeting.gaussians[block, number, k] = gaussian[number]
 
 
 @kernel

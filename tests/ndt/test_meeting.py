@@ -5,7 +5,7 @@ import pytest
 
 from nscan_cli.ndt.energy import OUT, accumulate, sum_meeting
 from nscan_cli.ndt.grid import Ndt
-from nscan_cli.ndt.meeting import begin, meet_again
+from nscan_cli.ndt.meeting import begin, meet_again, room_to_meet
 from tests.ndt.rooms import room
 
 
@@ -29,7 +29,8 @@ def test_what_was_kept_on_the_way_says_the_same_as_what_is_looked_up_anew(step, 
         pose = start + (n % 2) * step * rng.uniform(-1, 1, 3)
         meet_again(ndt.grid, ndt.half, meeting, *pose)
         sum_meeting(meeting, 0.3, curvature, kept)
-        accumulate(ndt.grid, ndt.half, points, pose[0], pose[1], pose[2], 0.3, curvature, 0.0, 1, anew)
+        met = room_to_meet(len(points), 1)
+        accumulate(ndt.grid, ndt.half, points, pose[0], pose[1], pose[2], 0.3, curvature, 0.0, 1, met, anew)
         np.testing.assert_allclose(kept, anew, rtol=1e-9, atol=1e-9 * np.abs(anew).max())
         counted += anew[0] < -1.0
     assert counted >= 20
