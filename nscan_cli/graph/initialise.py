@@ -10,9 +10,10 @@ from __future__ import annotations
 import numpy as np
 
 from nscan_cli.graph.cholesky import factorise, solve
+from nscan_cli.graph.columns import Columns
 from nscan_cli.graph.optimise import FIRST_DAMPING, newton_step
 from nscan_cli.graph.pattern import Indices, block_targets
-from nscan_cli.graph.system import Columns, GraphEnergy
+from nscan_cli.graph.system import GraphEnergy
 from nscan_cli.poses import Array
 
 LEAST_SHARE = 1e-9
@@ -77,6 +78,7 @@ def _turns(columns: Columns) -> tuple[Indices, Indices, Array, Array]:
         others = np.arange(n - 1) + (np.arange(n - 1) >= c)
         first = columns.starts[chosen, None]
         H = columns.hessians[columns.hessian_starts[chosen, None] + np.arange(9 * n * n)]
+        H *= columns.weights[chosen, None]
         free = (3 * others[:, :, None] + np.arange(3)).reshape(len(chosen), -1)
         kept = H.reshape(-1, 3 * n, 3 * n)[
             np.arange(len(chosen))[:, None, None], free[:, :, None], free[:, None]

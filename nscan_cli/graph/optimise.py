@@ -52,13 +52,15 @@ def optimise(
             trial = poses.copy()
             trial[energy.free] += step
             length = float(np.abs(step).max(initial=0.0))
-            there = energy.evaluate(trial, exact=length < SETTLED)
-            lower = there.value <= here.value + ROUNDING * abs(here.value)
-            if lower:
-                poses, here, exact = trial, there, length < SETTLED
+            least = here.value + ROUNDING * abs(here.value)
             if length <= tolerance and damping <= 1:
+                value = float(energy.terms(trial).sum())
+                if value <= least:
+                    return Optimum(_wrapped(trial), value, iteration, True)
                 return Optimum(_wrapped(poses), here.value, iteration, True)
-            if lower:
+            there = energy.evaluate(trial, exact=length < SETTLED)
+            if there.value <= least:
+                poses, here, exact = trial, there, length < SETTLED
                 damping = 0.1 * damping if damping > LEAST_DAMPING else 0.0
                 continue
         damping = max(10 * damping, FIRST_DAMPING)

@@ -24,7 +24,10 @@ class Pattern(NamedTuple):
 
 
 def find_pattern(edges: Indices, nodes: int) -> Pattern:
-    """The pattern of the factor when the matrix has blocks at the edges (E, 2), and on its diagonal."""
+    """The pattern of the factor when the matrix has blocks at the edges (E, 2), and on its diagonal.
+
+    An edge with a node of −1 is none.
+    """
     if nodes == 0:
         return Pattern(np.empty(0, np.int64), np.zeros(1, np.int64), np.empty(0, np.int64))
     indptr, indices = _adjacency(edges, nodes)
@@ -58,14 +61,44 @@ def block_targets(edges: Indices, pattern: Pattern) -> Indices:
     return targets
 
 
+@kernel
 def _adjacency(edges: Indices, nodes: int) -> tuple[Indices, Indices]:
     """The neighbours of each node, itself among them, increasing: (indptr, indices)."""
-    from scipy.sparse import coo_array
-
-    (a, b), itself = edges.T, np.arange(nodes)
-    both = np.concatenate([a, b, itself]), np.concatenate([b, a, itself])
-    matrix = coo_array((np.ones(len(both[0]), dtype=np.int8), both), shape=(nodes, nodes)).tocsc()
-    return matrix.indptr.astype(np.int64), matrix.indices.astype(np.int64)
+    ends = np.ones(nodes, dtype=np.int64)
+    for e in range(edges.shape[0]):
+        a, b = edges[e, 0], edges[e, 1]
+        if a >= 0 and b >= 0 and a != b:
+            ends[a] += 1
+            ends[b] += 1
+    for node in range(1, nodes):
+        ends[node] += ends[node - 1]
+    # As often as they are named, in any order; then, of each node in order, to its neighbours: sorted.
+    starts = np.zeros(nodes + 1, dtype=np.int64)
+    starts[1:] = ends
+    at, named = starts[:-1].copy(), np.empty(starts[nodes], dtype=np.int64)
+    for node in range(nodes):
+        named[at[node]] = node
+        at[node] += 1
+    for e in range(edges.shape[0]):
+        a, b = edges[e, 0], edges[e, 1]
+        if a >= 0 and b >= 0 and a != b:
+            named[at[a]], named[at[b]] = b, a
+            at[a] += 1
+            at[b] += 1
+    at, indices = starts[:-1].copy(), np.empty_like(named)
+    for node in range(nodes):
+        for p in range(starts[node], starts[node + 1]):
+            other = named[p]
+            if at[other] == starts[other] or indices[at[other] - 1] != node:
+                indices[at[other]] = node
+                at[other] += 1
+    indptr = np.zeros(nodes + 1, dtype=np.int64)
+    for node in range(nodes):
+        begin, count = indptr[node], at[node] - starts[node]
+        for p in range(count):
+            indices[begin + p] = indices[starts[node] + p]
+        indptr[node + 1] = begin + count
+    return indptr, indices[: indptr[nodes]].copy()
 
 
 def _order_of_little_fill(indptr: Indices, indices: Indices) -> Indices:

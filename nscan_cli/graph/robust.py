@@ -48,5 +48,5 @@ def contradicting(energy: GraphEnergy, poses: Array, doubted: NDArray[np.bool_])
 def chi2_by_three(energy: GraphEnergy, poses: Array) -> Array:
     """(R,) χ² of every relation at the poses (K, 3) for three degrees of freedom."""
     sizes = np.diff(energy.columns.starts)
-    chi2: Array = energy.evaluate(poses, exact=False).terms / (sizes - 1)
+    chi2: Array = energy.terms(poses) / (sizes - 1)
     return chi2

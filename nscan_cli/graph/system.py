@@ -9,27 +9,11 @@ from typing import NamedTuple
 import numpy as np
 
 from nscan_cli.compiled import kernel
+from nscan_cli.graph.columns import Columns, Terms
 from nscan_cli.graph.pattern import Indices, block_targets, find_pattern
-from nscan_cli.graph.relation import Relation, Term
-from nscan_cli.graph.terms import nscan_term
+from nscan_cli.graph.relation import Relation
+from nscan_cli.graph.terms import nscan_term, nscan_value
 from nscan_cli.poses import Array
-
-
-class Columns(NamedTuple):
-    """The terms of Q relations as columns for the kernels; nodes are places 0 … K − 1."""
-
-    starts: Indices
-    """(Q + 1,) where the nodes of each relation begin."""
-    members: Indices
-    """(Σ n,)"""
-    local: Array
-    """(Σ n, 3)"""
-    hessian_starts: Indices
-    """(Q + 1,)"""
-    hessians: Array
-    """(Σ 9 n²,)"""
-    fixed: Indices
-    """(Q,)"""
 
 
 class System(NamedTuple):
@@ -53,15 +37,15 @@ class GraphEnergy:
         relations: Sequence[Relation],
         positions: Indices,
         fixed: int = 0,
+        terms: Terms | None = None,
     ) -> None:
         """Take relations between node ids; `positions[id]` is a node's place among the `nodes` poses.
 
-        The pose at place `fixed` is held where it is.
+        The pose at place `fixed` is held where it is. With `terms`, those of the relations are kept there.
         """
-        terms = [relation.term() for relation in relations]
-        self.columns = _columns(relations, terms, positions)
-        self._weights = np.ones(len(terms))
-        self._not_linear = [(k, term.at) for k, term in enumerate(terms) if term.at is not None]
+        terms = terms or Terms()
+        self.columns = terms.columns(relations, positions)
+        self._not_linear = terms.not_linear(relations)
         self.fixed = fixed
         self.free: Indices = np.delete(np.arange(nodes), fixed)
         """(K − 1,) the places of the poses that can move."""
@@ -69,17 +53,22 @@ class GraphEnergy:
         """(K,) the place of a pose among those; −1 for the fixed one."""
         self.free_row[self.free] = np.arange(nodes - 1)
         edges = _edges(self.columns, self.free_row)
-        self.pattern = find_pattern(edges[edges.min(axis=1) >= 0], nodes - 1)
+        self.pattern = find_pattern(edges, nodes - 1)
         self._targets = block_targets(edges, self.pattern)
 
     def weighted(self, weights: Array) -> GraphEnergy:
         """The energy with every relation's term multiplied by its weight (Q,)."""
-        columns = self.columns
-        each = np.repeat(weights, np.diff(columns.hessian_starts))
         other = copy.copy(self)
-        other.columns = columns._replace(hessians=columns.hessians * each)
-        other._weights = self._weights * weights
+        other.columns = self.columns._replace(weights=self.columns.weights * weights)
         return other
+
+    def terms(self, poses: Array) -> Array:
+        """(Q,) what each relation gives at the poses (K, 3)."""
+        poses = np.ascontiguousarray(poses, dtype=np.float64)
+        columns = self._columns_at(poses) if self._not_linear else self.columns
+        terms = np.zeros(len(columns.fixed))
+        _values(columns, poses, terms)
+        return terms
 
     def evaluate(self, poses: Array, exact: bool) -> System:
         """Energy, gradient and Hessian (exact, or its Gauss–Newton part) at the poses (K, 3)."""
@@ -99,23 +88,9 @@ class GraphEnergy:
             nodes = slice(columns.starts[k], columns.starts[k + 1])
             term = at(poses[columns.members[nodes]])
             columns.local[nodes] = term.local
-            entries = slice(columns.hessian_starts[k], columns.hessian_starts[k + 1])
-            columns.hessians[entries] = self._weights[k] * term.hessian.ravel()
+            start = columns.hessian_starts[k]
+            columns.hessians[start : start + term.hessian.size] = term.hessian.ravel()
         return columns
-
-
-def _columns(relations: Sequence[Relation], terms: Sequence[Term], positions: Indices) -> Columns:
-    sizes = [len(relation.nodes) for relation in relations]
-    return Columns(
-        starts=np.concatenate([[0], np.cumsum(sizes)]).astype(np.int64),
-        members=positions[
-            np.array([node for relation in relations for node in relation.nodes], dtype=np.int64)
-        ],
-        local=np.concatenate([term.local for term in terms]) if terms else np.empty((0, 3)),
-        hessian_starts=np.concatenate([[0], np.cumsum([9 * n * n for n in sizes])]).astype(np.int64),
-        hessians=np.concatenate([term.hessian.ravel() for term in terms]) if terms else np.empty(0),
-        fixed=np.array([term.fixed for term in terms], dtype=np.int64),
-    )
 
 
 @kernel
@@ -153,15 +128,35 @@ def _evaluate(
     part, block = np.empty(6), np.empty((6, 6))
     for k in range(columns.fixed.shape[0]):
         start, end = columns.starts[k], columns.starts[k + 1]
-        members = columns.members[start:end]
-        m = 3 * (end - start)
+        members, m = columns.members[start:end], 3 * (end - start)
         if part.shape[0] != m:
             part, block = np.empty(m), np.empty((m, m))
-        hessian = columns.hessians[columns.hessian_starts[k] : columns.hessian_starts[k + 1]].reshape(m, m)
+        hessian = columns.hessians[columns.hessian_starts[k] : columns.hessian_starts[k] + m * m].reshape(
+            m, m
+        )
         terms[k] = nscan_term(
             _at(poses, members), columns.local[start:end], hessian, columns.fixed[k], curvature, part, block
         )
+        weight = columns.weights[k]
+        if weight != 1.0:
+            terms[k] *= weight
+            part *= weight
+            block *= weight
         e = _add_term(members, part, block, targets, e, gradient, blocks)
+
+
+@kernel
+def _values(columns: Columns, poses: Array, terms: Array) -> None:
+    """Each relation's value into terms (Q,)."""
+    for k in range(columns.fixed.shape[0]):
+        start, end = columns.starts[k], columns.starts[k + 1]
+        members, m = columns.members[start:end], 3 * (end - start)
+        hessian = columns.hessians[columns.hessian_starts[k] : columns.hessian_starts[k] + m * m].reshape(
+            m, m
+        )
+        terms[k] = columns.weights[k] * nscan_value(
+            _at(poses, members), columns.local[start:end], hessian, columns.fixed[k]
+        )
 
 
 @kernel

@@ -32,15 +32,8 @@ def nscan_term(
     pull Hf turned back into the global frame, only pose c needs products, and those are sums.
     """
     n, c = poses.shape[0], fixed
-    theta = local[c, 2] - poses[c, 2]
-    cos, sin = np.cos(theta), np.sin(theta)
     d, f = np.empty((n, 2)), np.empty(3 * n)
-    for i in range(n):
-        d[i, 0], d[i, 1] = poses[i, 0] - poses[c, 0], poses[i, 1] - poses[c, 1]
-        f[3 * i] = cos * d[i, 0] - sin * d[i, 1] + local[c, 0] - local[i, 0]
-        f[3 * i + 1] = sin * d[i, 0] + cos * d[i, 1] + local[c, 1] - local[i, 1]
-        turn = theta + poses[i, 2] - local[i, 2]
-        f[3 * i + 2] = turn - 2 * np.pi * np.round(turn / (2 * np.pi))
+    cos, sin = _residual(poses, local, c, d, f)
 
     value, k = 0.0, 3 * c
     for a in range(k, k + 3):
@@ -76,6 +69,35 @@ def nscan_term(
     hessian[k + 2, k], hessian[k + 2, k + 1] = hessian[k, k + 2], hessian[k + 1, k + 2]
     _add_columns_of_c(d, c, hessian)
     return value
+
+
+@kernel
+def nscan_value(poses: Array, local: Array, information: Array, fixed: int) -> float:
+    """fᵗHf alone."""
+    n = poses.shape[0]
+    f = np.empty(3 * n)
+    _residual(poses, local, fixed, np.empty((n, 2)), f)
+    value = 0.0
+    for r in range(3 * n):
+        pull = 0.0
+        for b in range(3 * n):
+            pull += information[r, b] * f[b]
+        value += f[r] * pull
+    return value
+
+
+@kernel
+def _residual(poses: Array, local: Array, c: int, d: Array, f: Array) -> tuple[float, float]:
+    """Write d (n, 2) and f (3n,), whose part of pose c is 0; returns R as (cos θ, sin θ)."""
+    theta = local[c, 2] - poses[c, 2]
+    cos, sin = np.cos(theta), np.sin(theta)
+    for i in range(poses.shape[0]):
+        d[i, 0], d[i, 1] = poses[i, 0] - poses[c, 0], poses[i, 1] - poses[c, 1]
+        f[3 * i] = cos * d[i, 0] - sin * d[i, 1] + local[c, 0] - local[i, 0]
+        f[3 * i + 1] = sin * d[i, 0] + cos * d[i, 1] + local[c, 1] - local[i, 1]
+        turn = theta + poses[i, 2] - local[i, 2]
+        f[3 * i + 2] = turn - 2 * np.pi * np.round(turn / (2 * np.pi))
+    return cos, sin
 
 
 @kernel

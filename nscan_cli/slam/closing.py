@@ -22,7 +22,7 @@ from nscan_cli.slam.keyframes import Route
 from nscan_cli.slam.nearby import MatchNearby, Nearby
 from nscan_cli.slam.options import ClosingOptions, NScanOptions
 from nscan_cli.slam.place import Place, find_place, why_doubted
-from nscan_cli.slam.whereabouts import Reach, Whereabouts, seen_from, with_slips
+from nscan_cli.slam.whereabouts import Reach, Whereabouts, with_slips
 
 NO_SECOND = "no second keyframe finds the same"
 LOST = "tracking has broken since: the place must be searched"
@@ -78,7 +78,7 @@ class Closing:
         if not len(near):
             return []
         self._searched = paths[centre]
-        place = self._search(route, centre, near, reach, energy)
+        place = self._search(route, centre, near, reach)
         if place is None:
             return []
         agreeing = [*(other for other in self._waiting if self._agree(other, place, route)), place]
@@ -114,7 +114,7 @@ class Closing:
             return None
         if self.is_lost(reach)[old]:
             return LOST
-        window, earlier = self._visit(route, centre, old, reach, energy)
+        window, earlier = self._visit(route, centre, old, reach)
         pose = compose(poses[old], tie[1])
         return why_doubted(route, centre, pose, earlier, window, self.options)
 
@@ -151,12 +151,11 @@ class Closing:
         centre: int,
         near: Indices,
         reach: Reach,
-        energy: Energy,
     ) -> Place | None:
         """Search among the visit that most likely is near."""
         away = np.hypot(*(route.poses[:, :2] - route.poses[centre, :2]).T)
         first = int(near[np.argmin(away[near] - self.options.deviations * reach.distance[near])])
-        window, around = self._visit(route, centre, first, reach, energy)
+        window, around = self._visit(route, centre, first, reach)
         found = find_place(route, centre, around, window, self.match, self.options, self.nscan)
         if isinstance(found, Loop):
             self._refused.append(found)
@@ -169,11 +168,11 @@ class Closing:
         centre: int,
         first: int,
         reach: Reach,
-        energy: Energy,
     ) -> tuple[SearchOptions, Indices]:
         """Where to search keyframe `centre` about an older one, the `first`, and among which (m,).
 
         These are what the graph knows well as seen from the first: the map that they make is in one piece.
+        `reach` is that from the centre, for which the graph was asked last.
         """
         options, paths, poses = self.options, route.paths, route.poses
         away = np.hypot(*(poses[:, :2] - poses[centre, :2]).T)
@@ -183,7 +182,7 @@ class Closing:
         window = replace(options.search, distance=min(distance, farthest), turn=min(turn, float(np.pi)))
         older = paths[centre] - paths > self.nscan.recent
         near = away <= options.around + window.distance
-        in_one_piece = options.deviations * seen_from(energy(first), poses).distance <= options.settled
+        in_one_piece = options.deviations * self._whereabouts.asked_from(first).distance <= options.settled
         return window, np.flatnonzero(older & near & in_one_piece)
 
     def _agree(self, one: Place, other: Place, route: Route) -> bool:

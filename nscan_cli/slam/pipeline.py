@@ -21,6 +21,7 @@ from nscan_cli.slam.ahead import Ahead
 from nscan_cli.slam.believed import believed_odometry, hanging
 from nscan_cli.slam.closing import Closing
 from nscan_cli.slam.coverage import Coverage
+from nscan_cli.slam.energies import Energies
 from nscan_cli.slam.following import Followed, Follower, Sensed
 from nscan_cli.slam.keyframes import Keyframe, Keyframes, Route, extended, relation_between
 from nscan_cli.slam.nearby import MatchNearby, Nearby, choose_nearby, match_nearby
@@ -67,11 +68,10 @@ class Slam:
         self.nscan: list[NScan] = []
         self.others: list[Relation] = []
         self.loops: list[Loop] = []
-        self.covered = Coverage()
+        self.energies, self.covered = Energies(len(log)), Coverage()
         self.closing = Closing(options.closing, options.nscan, self.match)
         self.places: list[Place] = []
-        self._moved = 0.0
-        self._optimised = 0
+        self._moved, self._optimised = 0.0, 0
 
     def run(self, report: Report) -> Graph:
         """The paper's loop over all scans, and the last optimisation."""
@@ -228,7 +228,7 @@ class Slam:
     def reject(self) -> None:
         """Loops that contradict the rest of the graph are taken back."""
         relations = self.relations
-        energy = self._energy(relations, fixed=0)
+        energy = self.energies.whole(self.route, relations)
         doubted = np.array([relation.origin == "loop" for relation in relations], dtype=np.bool_)
         wrong = contradicting(energy, self.poses, doubted)
         if not wrong.any():
@@ -251,7 +251,7 @@ class Slam:
         self._moved, self._optimised = 0.0, len(self.poses)
         if len(self.poses) < 2:
             return
-        energy = self._energy(self.relations, fixed=0)
+        energy = self.energies.whole(self.route, self.relations)
         self.route = self.route._replace(poses=optimise(energy, self.poses, max_iterations, tolerance).poses)
 
     @property
@@ -264,22 +264,11 @@ class Slam:
 
         With `among` (m,) only of these, whose places among them are the energy's.
         """
-        pairs = [relation for relation in self.pairs if relation.origin == "loop"]
-        nscan = [relation for relation in self.nscan if relation.origin == "loop"]
+        relations: list[Relation] = [*self.pairs, *self.nscan]
+        way, loops = self.closing.way, [each for each in relations if each.origin == "loop"]
         if among is None:
-            return self._energy([*self.closing.way, *pairs, *nscan], fixed)
-        positions = np.full(len(self.log), -1)
-        positions[self.route.rows(among.tolist())] = np.arange(len(among))
-        inside = (positions >= 0).tolist()
-        way = [self.closing.way[k] for k in among[:-1][np.diff(among) == 1].tolist()]
-        pairs = [relation for relation in pairs if all(inside[node] for node in relation.nodes)]
-        nscan = [relation for relation in nscan if all(inside[node] for node in relation.nodes)]
-        return GraphEnergy(len(among), [*way, *pairs, *nscan], positions, int(np.searchsorted(among, fixed)))
-
-    def _energy(self, relations: Sequence[Relation], fixed: int) -> GraphEnergy:
-        positions = np.full(len(self.log), -1)
-        positions[[keyframe.row for keyframe in self.route.keyframes]] = np.arange(len(self.poses))
-        return GraphEnergy(len(self.poses), relations, positions, fixed)
+            return self.energies.whole(self.route, [*way, *loops], fixed)
+        return self.energies.part(self.route, way, loops, fixed, among)
 
     @property
     def relations(self) -> list[Relation]:

@@ -13,10 +13,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from nscan_cli.compiled import kernel
 from nscan_cli.graph.model import Loop
-from nscan_cli.matching.search import Field, SearchOptions, likelihood_field, search
-from nscan_cli.poses import Array, compose, relative, transform
-from nscan_cli.slam.keyframes import Route
+from nscan_cli.matching.search import Field, Search, SearchOptions, likelihood_field, search
+from nscan_cli.poses import Array, compose, relative
+from nscan_cli.slam.keyframes import Keyframe, Route
 from nscan_cli.slam.nearby import MatchNearby, Nearby
 from nscan_cli.slam.options import ClosingOptions, NScanOptions
 
@@ -81,12 +82,12 @@ def find_place(
         return None
     scan, field = sought
     keyframes, poses = route.keyframes, route.poses
-    found = search(field, scan, poses[centre], closing.score, window)
+    about = Search(field, scan, poses[centre], window)
+    found = about.best(closing.score)
     if found is None:
         return None
     nodes = keyframes[int(earlier[0])].row, keyframes[centre].row
-    elsewhere = found.pose, closing.apart
-    if search(field, scan, poses[centre], closing.rival * found.score, window, elsewhere) is not None:
+    if about.best(closing.rival * found.score, without=(found.pose, closing.apart)) is not None:
         return Loop(nodes, False, AMBIGUOUS, found.score)
     moved, visit = poses.copy(), np.abs(route.paths - route.paths[centre]) <= nscan.recent
     moved[visit] = compose(found.pose, relative(poses[visit], poses[centre]))
@@ -143,9 +144,29 @@ def _sought(
     """
     keyframes, _, paths, poses = route
     beside = np.flatnonzero(np.abs(paths - paths[centre]) <= closing.beside)
-    here = relative(poses[beside], poses[centre])
-    scan = [transform(pose, keyframes[k].points) for k, pose in zip(beside.tolist(), here, strict=True)]
-    cloud = [transform(poses[k], keyframes[k].points) for k in earlier.tolist()]
-    if not any(map(len, scan)) or not any(map(len, cloud)):
+    scan = _cloud(keyframes, beside, relative(poses[beside], poses[centre]))
+    cloud = _cloud(keyframes, earlier, poses[earlier])
+    if not len(scan) or not len(cloud):
         return None
-    return np.concatenate(scan), likelihood_field(np.concatenate(cloud), window)
+    return scan, likelihood_field(cloud, window)
+
+
+def _cloud(keyframes: Sequence[Keyframe], chosen: NDArray[np.int64], poses: Array) -> Array:
+    """The points (m, 2) of the keyframes chosen (n,), at poses (n, 3)."""
+    points = [keyframes[k].points for k in chosen.tolist()]
+    cloud = np.concatenate([np.empty((0, 2)), *points])
+    _place(poses, np.array([len(each) for each in points], dtype=np.int64), cloud)
+    return cloud
+
+
+@kernel
+def _place(poses: Array, counts: NDArray[np.int64], points: Array) -> None:
+    """Transform the points (m, 2), in place: so many (n,) by each of the poses (n, 3), eq. (1)."""
+    end = 0
+    for k in range(len(poses)):
+        cos, sin = np.cos(poses[k, 2]), np.sin(poses[k, 2])
+        start, end = end, end + counts[k]
+        for p in range(start, end):
+            x, y = points[p, 0], points[p, 1]
+            points[p, 0] = cos * x - sin * y + poses[k, 0]
+            points[p, 1] = sin * x + cos * y + poses[k, 1]

@@ -8,11 +8,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from nscan_cli.graph.cholesky import factorise, inverse_diagonal, loose_nodes
+from nscan_cli.compiled import kernel
+from nscan_cli.graph.cholesky import Factor, factorise, inverse_diagonal, loose_nodes, solve
 from nscan_cli.graph.model import Pairwise
 from nscan_cli.graph.pattern import Indices
 from nscan_cli.graph.system import GraphEnergy
-from nscan_cli.poses import Array, relative
+from nscan_cli.poses import Array
 
 AROUND = 45.0
 """m; the part of the graph that is asked first. A search looks no farther than 30 m."""
@@ -37,32 +38,79 @@ def with_slips(relation: Pairwise, length: float, drift: float, drift_angle: flo
     return replace(relation, information=np.linalg.inv(covariance).astype(np.float64))
 
 
-def seen_from(energy: GraphEnergy, poses: Array) -> Reach:
-    """The marginals of the poses (K, 3) with the energy's fixed one held: relative to that one.
+class Known(NamedTuple):
+    """What a graph knows of its poses when one of them is held."""
+
+    held: int
+    poses: Array
+    """(K, 3)"""
+    free: Indices
+    """(K − 1,) all but the held one, in the factor's order."""
+    factor: Factor
+    covariances: Array
+    """(K, 3, 3), 0 for the held one."""
+
+    def reach(self) -> Reach:
+        """As seen from the held one."""
+        return _reach(self.covariances)
+
+    def seen_from(self, other: int) -> Reach:
+        """As seen from another one, which is what would be known with that one held.
+
+        With d from there to a pose and A = [[−1, 0, d_y], [0, −1, −d_x], [0, 0, −1]], a pose moves there by
+        its own motion plus A times that of the other.
+        """
+        if other == self.held:
+            return self.reach()
+        with_other, row = np.zeros_like(self.covariances), int(np.searchsorted(self.free, other))
+        for component in range(3):
+            unit = np.zeros((len(self.free), 3))
+            unit[row, component] = 1.0
+            with_other[self.free, :, component] = solve(self.factor, unit)
+        by_other = np.tile(-np.eye(3), (len(self.poses), 1, 1))
+        d = self.poses[:, :2] - self.poses[other, :2]
+        by_other[:, 0, 2], by_other[:, 1, 2] = d[:, 1], -d[:, 0]
+        half = by_other @ (
+            0.5 * self.covariances[other] @ by_other.transpose(0, 2, 1) + with_other.transpose(0, 2, 1)
+        )
+        relative = self.covariances + half + half.transpose(0, 2, 1)
+        relative[other] = 0.0
+        return _reach(relative)
+
+
+def known(energy: GraphEnergy, poses: Array) -> Known:
+    """The marginals of the poses (K, 3) with the energy's fixed one held.
 
     As in marginal_covariances, the information is half the Hessian's Gauss–Newton part.
     """
-    system = energy.evaluate(poses, exact=False)
-    covariances = inverse_diagonal(factorise(energy.pattern, 0.5 * system.hessian))
-    distance, angle = np.zeros(len(poses)), np.zeros(len(poses))
-    distance[energy.free] = np.sqrt(np.linalg.eigvalsh(covariances[:, :2, :2])[:, 1])
-    angle[energy.free] = np.sqrt(covariances[:, 2, 2])
-    return Reach(distance, angle)
+    factor = factorise(energy.pattern, 0.5 * energy.evaluate(poses, exact=False).hessian)
+    covariances = np.zeros((len(poses), 3, 3))
+    covariances[energy.free] = inverse_diagonal(factor)
+    return Known(energy.fixed, poses, energy.free, factor, covariances)
+
+
+def _reach(covariances: Array) -> Reach:
+    """Of covariances (K, 3, 3)."""
+    distance = np.sqrt(_greatest(covariances[:, 0, 0], covariances[:, 0, 1], covariances[:, 1, 1]))
+    return Reach(distance, np.sqrt(np.maximum(covariances[:, 2, 2], 0.0)))
+
+
+def _greatest(xx: Array, xy: Array, yy: Array) -> Array:
+    """The greater eigenvalues (K,) of covariances [[xx, xy], [xy, yy]]."""
+    return np.maximum(0.5 * (xx + yy) + np.hypot(0.5 * (xx - yy), xy), 0.0)
 
 
 def at_most(energy: GraphEnergy, poses: Array) -> Reach:
-    """As seen_from, of a part of a graph that may be in pieces: infinite where nothing holds a keyframe.
+    """Of a part of a graph that may be in pieces, from the fixed one: infinite where nothing holds it.
 
     What the rest of the graph knows besides makes the true values smaller, never larger.
     """
     system = energy.evaluate(poses, exact=False)
     factor = factorise(energy.pattern, 0.5 * system.hessian)
     held = ~loose_nodes(factor)
-    covariances = inverse_diagonal(factor)[held]
     distance, angle = np.full(len(poses), np.inf), np.full(len(poses), np.inf)
     distance[energy.fixed] = angle[energy.fixed] = 0.0
-    distance[energy.free[held]] = np.sqrt(np.linalg.eigvalsh(covariances[:, :2, :2])[:, 1])
-    angle[energy.free[held]] = np.sqrt(covariances[:, 2, 2])
+    distance[energy.free[held]], angle[energy.free[held]] = _reach(inverse_diagonal(factor)[held])
     return Reach(distance, angle)
 
 
@@ -76,11 +124,18 @@ class Whereabouts:
     def __init__(self) -> None:
         self._origin = 0
         self._reach = Reach(np.zeros(1), np.zeros(1))
+        self._known: Known | None = None
 
     def ask(self, origin: int, energy: Callable[[int], GraphEnergy], poses: Array) -> Reach:
         """The reach (K,) from keyframe `origin`; `energy` gives the graph's with a keyframe held."""
-        self._origin, self._reach = origin, seen_from(energy(origin), poses)
+        self._known = known(energy(origin), poses)
+        self._origin, self._reach = origin, self._known.reach()
         return self._reach
+
+    def asked_from(self, other: int) -> Reach:
+        """The reach (K,) from another keyframe, by the graph that was asked last."""
+        assert self._known is not None
+        return self._known.seen_from(other)
 
     def narrow(self, origin: int, energy: Callable[[int, Indices], GraphEnergy], poses: Array) -> Reach:
         """A bound again, by what is known of the keyframes around alone; `origin` as last for `bound`.
@@ -109,21 +164,24 @@ class Whereabouts:
         distance[:known], angle[:known] = self._reach.distance**2, self._reach.angle**2
         for step in range(self._origin, origin):
             covariance: Array = np.linalg.inv(way[step].information).astype(np.float64)
-            distance[: step + 1] += _swung(covariance, way[step].measurement, poses[: step + 1], poses[step])
+            _swing(covariance, way[step].measurement, poses, step, distance)
             angle[: step + 1] += covariance[2, 2]
         self._origin, self._reach = origin, Reach(np.sqrt(distance), np.sqrt(angle))
         return self._reach
 
 
-def _swung(covariance: Array, measurement: Array, poses: Array, before: Array) -> Array:
-    """The greatest variances (n,) of positions seen from the end of a relation, by what it is off.
+@kernel
+def _swing(covariance: Array, measurement: Array, poses: Array, step: int, variances: Array) -> None:
+    """Add to (K,) the greatest variances of positions up to `step`, seen from the end of its relation.
 
-    The relation begins at the pose `before` (3,); what lies v from its end, in its frame, moves by its shift
-    and by its turn times v turned by a right angle.
+    By what the relation is off: what lies v from its end, in its frame, moves by its shift and by its turn
+    times v turned by a right angle.
     """
-    v = relative(poses, before)[:, :2] - measurement[:2]
-    by = np.zeros((len(v), 2, 3))
-    by[:, 0, 0] = by[:, 1, 1] = 1.0
-    by[:, 0, 2], by[:, 1, 2] = -v[:, 1], v[:, 0]
-    spread: Array = by @ covariance @ by.transpose(0, 2, 1)
-    return np.linalg.eigvalsh(spread)[:, 1].astype(np.float64)
+    cos, sin = np.cos(poses[step, 2]), np.sin(poses[step, 2])
+    for k in range(step + 1):
+        dx, dy = poses[k, 0] - poses[step, 0], poses[k, 1] - poses[step, 1]
+        vx, vy = cos * dx + sin * dy - measurement[0], cos * dy - sin * dx - measurement[1]
+        xx = covariance[0, 0] - vy * (2 * covariance[0, 2] - vy * covariance[2, 2])
+        yy = covariance[1, 1] + vx * (2 * covariance[1, 2] + vx * covariance[2, 2])
+        xy = covariance[0, 1] + vx * covariance[0, 2] - vy * (covariance[1, 2] + vx * covariance[2, 2])
+        variances[k] += 0.5 * (xx + yy) + np.sqrt(0.25 * (xx - yy) ** 2 + xy * xy)

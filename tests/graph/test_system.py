@@ -62,3 +62,30 @@ def test_a_graph_without_relations_has_no_energy():
     system = energy_of(np.zeros((3, 3)), [], []).evaluate(np.ones((3, 3)), exact=True)
     assert (system.value, system.terms.shape) == (0.0, (0,))
     np.testing.assert_array_equal(system.gradient, np.zeros((2, 3)))
+
+
+def test_the_terms_alone_are_those_of_the_system():
+    truth, pairwise, nscan = mixed_ring(8, noise=1.0)
+    poses = disturbed(truth, 0.3)
+    energy = energy_of(poses, pairwise, nscan)
+    weights = np.linspace(0.5, 1.5, len(pairwise) + len(nscan))
+    plain, weighted = (
+        energy.evaluate(poses, exact=False),
+        energy.weighted(weights).evaluate(poses, exact=False),
+    )
+    np.testing.assert_allclose(energy.terms(poses), plain.terms, rtol=1e-12)
+    np.testing.assert_allclose(weighted.terms, weights * plain.terms, rtol=1e-12)
+    np.testing.assert_allclose(energy.weighted(weights).terms(poses), weighted.terms, rtol=1e-12)
+
+
+def test_a_weight_counts_in_all_derivatives():
+    truth, pairwise, nscan = mixed_ring(8, noise=1.0)
+    poses = disturbed(truth, 0.3)
+    energy = energy_of(poses, pairwise, nscan)
+    count = len(pairwise) + len(nscan)
+    parts = [energy.weighted(np.eye(count)[k]).evaluate(poses, exact=True) for k in range(count)]
+    weights = np.linspace(0.5, 1.5, count)
+    whole = energy.weighted(weights).evaluate(poses, exact=True)
+    for name in ("gradient", "hessian"):
+        total = sum(weight * getattr(part, name) for weight, part in zip(weights, parts, strict=True))
+        np.testing.assert_allclose(getattr(whole, name), total, rtol=1e-9, atol=1e-9 * np.abs(total).max())

@@ -2,8 +2,19 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
-from nscan_cli.matching.search import Found, SearchOptions, likelihood_field, search
+from nscan_cli.matching.search import (
+    LANES,
+    LEVELS,
+    PAD,
+    Field,
+    Found,
+    Search,
+    SearchOptions,
+    likelihood_field,
+    search,
+)
 from nscan_cli.poses import Array, relative, transform, wrap
 from tests.matching.problems import Problem, office_problem
 
@@ -16,13 +27,18 @@ def two() -> Problem:
     return office_problem((200, 206))
 
 
+def finest(field: Field) -> NDArray[np.float32]:
+    """(w, h) the cells of the field itself."""
+    return field.levels[0, PAD:-1, PAD:-1]
+
+
 def score(reference: Array, points: Array, pose: Array) -> float:
     """The score by its definition, cell by cell."""
     field = likelihood_field(reference, OPTIONS)
     cells = np.floor((transform(pose, points) - [field.x, field.y]) / field.cell).astype(int)
     total = 0.0
     for ix, iy in cells.tolist():
-        if 0 <= ix < field.levels.shape[1] and 0 <= iy < field.levels.shape[2]:
+        if 0 <= ix < finest(field).shape[0] and 0 <= iy < finest(field).shape[1]:
             centre = np.array([field.x, field.y]) + field.cell * (np.array([ix, iy]) + 0.5)
             square = ((reference - centre) ** 2).sum(axis=1).min()
             near = np.abs(np.floor((reference - [field.x, field.y]) / field.cell) - [ix, iy]).max(axis=1)
@@ -76,6 +92,36 @@ def test_what_scores_no_more_than_asked_is_not_found(two):
     assert search(field, two.points[1], true + np.array([500.0, 0.0, 0.0]), 0.0, OPTIONS) is None
 
 
+def test_a_coarser_level_has_the_greatest_value_of_a_square_of_cells(two):
+    field = likelihood_field(two.points[0], OPTIONS)
+    padded = field.levels[0]
+    for around in (padded[:PAD], padded[:, :PAD], padded[-1], padded[:, -1]):
+        assert not around.any()
+    width, height = padded.shape
+    behind = np.pad(padded, (0, PAD))
+    squares = np.lib.stride_tricks.sliding_window_view
+    for level in range(1, LEVELS - 1):
+        side = 1 << level
+        greatest = squares(behind, (side, side)).max(axis=(2, 3))[:width, :height]
+        np.testing.assert_array_equal(field.levels[level], greatest)
+    greatest = squares(behind, (PAD, PAD)).max(axis=(2, 3))[:width, :height]
+    for iy in range(height):
+        np.testing.assert_array_equal(field.coarsest[iy % PAD, :, LANES + iy // PAD], greatest[:, iy])
+    assert not field.coarsest[:, :, :LANES].any()
+    assert not field.coarsest[:, :, -LANES:].any()
+
+
+def test_what_was_searched_once_can_be_searched_again(two):
+    true = relative(two.truth[1], two.truth[0])
+    field = likelihood_field(two.points[0], OPTIONS)
+    about = Search(field, two.points[1], true, OPTIONS)
+    best = about.best(0.0)
+    assert best is not None
+    assert about.best(best.score) is None
+    for least in (0.0, 0.5 * best.score):
+        assert_found(about.best(least), best)
+
+
 AWAY = 1.5
 """m"""
 
@@ -85,7 +131,7 @@ def test_without_a_place_the_best_pose_lies_outside_of_it(two):
     field = likelihood_field(two.points[0], OPTIONS)
     best = search(field, two.points[1], true, 0.0, OPTIONS)
     assert best is not None
-    other = search(field, two.points[1], true, 0.0, OPTIONS, without=(best.pose, AWAY))
+    other = Search(field, two.points[1], true, OPTIONS).best(0.0, without=(best.pose, AWAY))
     assert other is not None
     assert np.hypot(*(other.pose - best.pose)[:2]) > AWAY
     assert other.score == pytest.approx(
@@ -97,11 +143,11 @@ def test_without_a_place_the_best_pose_lies_outside_of_it(two):
     assert other.score < best.score
     # The heading does not matter, and a place that is elsewhere leaves the best.
     turned = best.pose + np.array([0.0, 0.0, 2.0])
-    assert_found(search(field, two.points[1], true, 0.0, OPTIONS, without=(turned, AWAY)), other)
+    assert_found(Search(field, two.points[1], true, OPTIONS).best(0.0, without=(turned, AWAY)), other)
     far = best.pose + np.array([AWAY + 0.01, 0.0, 0.0])
-    assert_found(search(field, two.points[1], true, 0.0, OPTIONS, without=(far, AWAY)), best)
+    assert_found(Search(field, two.points[1], true, OPTIONS).best(0.0, without=(far, AWAY)), best)
     everywhere = (best.pose, 100.0)
-    assert search(field, two.points[1], true, 0.0, OPTIONS, without=everywhere) is None
+    assert Search(field, two.points[1], true, OPTIONS).best(0.0, without=everywhere) is None
 
 
 def assert_found(found: Found | None, wanted: Found) -> None:
@@ -125,10 +171,10 @@ def test_without_a_place_nothing_outside_of_it_scores_more(seed):
     outside = lattice[np.hypot(*(lattice - place)[:, :2].T) > away]
     cells = transform(outside[:, None], points) - [field.x, field.y]
     ix, iy = np.moveaxis(np.floor(cells / field.cell).astype(int), -1, 0)
-    _, width, height = field.levels.shape
+    width, height = finest(field).shape
     on = (ix >= 0) & (iy >= 0) & (ix < width) & (iy < height)
-    scores = np.where(on, field.levels[0][np.where(on, ix, 0), np.where(on, iy, 0)], 0.0).mean(axis=1)
-    found = search(field, points, centre, 0.0, window, without=(place, away))
+    scores = np.where(on, finest(field)[np.where(on, ix, 0), np.where(on, iy, 0)], 0.0).mean(axis=1)
+    found = Search(field, points, centre, window).best(0.0, without=(place, away))
     assert found is not None
     assert np.hypot(*(found.pose - place)[:2]) > away
     assert found.score == pytest.approx(scores.max(), rel=1e-5)

@@ -13,7 +13,12 @@ from nscan_cli.graph.model import NScan, Pairwise
 from nscan_cli.graph.pattern import Indices
 from nscan_cli.graph.system import GraphEnergy
 from nscan_cli.poses import Array, compose, relative, relative_jacobians
-from nscan_cli.slam.whereabouts import Reach, Whereabouts, seen_from, with_slips
+from nscan_cli.slam.whereabouts import Reach, Whereabouts, known, with_slips
+
+
+def seen_from(energy: GraphEnergy, poses: Array) -> Reach:
+    """From the energy's fixed keyframe."""
+    return known(energy, poses).reach()
 
 
 class Walk(NamedTuple):
@@ -110,6 +115,24 @@ def test_seen_from_gives_the_marginals_of_relative_poses(seed, origin):
         assert found.angle[k] == pytest.approx(np.sqrt(marginal[2, 2]), rel=1e-5)
 
 
+@pytest.mark.parametrize("held", [0, 5, 11])
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_from_any_keyframe_it_is_as_if_that_one_were_held(seed, held):
+    walked = walk(seed, 12, loops=3)
+    asked = known(walked.energy(held), walked.poses)
+    for other in range(12):
+        direct, found = seen_from(walked.energy(other), walked.poses), asked.seen_from(other)
+        np.testing.assert_allclose(found.distance, direct.distance, rtol=1e-8, atol=1e-12)
+        np.testing.assert_allclose(found.angle, direct.angle, rtol=1e-8, atol=1e-12)
+
+
+def test_what_was_asked_can_be_seen_from_another_keyframe():
+    walked, whereabouts = walk(4, 9, loops=2), Whereabouts()
+    whereabouts.ask(8, walked.energy, walked.poses)
+    found, direct = whereabouts.asked_from(3), seen_from(walked.energy(3), walked.poses)
+    np.testing.assert_allclose(found.distance, direct.distance, rtol=1e-8, atol=1e-12)
+
+
 def straight(count: int) -> Walk:
     """Keyframes 2 m apart on a line: σ of 0.1 m along, 0.2 m across and 0.1 rad from each to the next."""
     each = np.diag([1e2, 25.0, 1e2])
@@ -196,11 +219,11 @@ def test_before_anything_was_asked_the_first_keyframe_counts_as_known():
 
 def test_with_slips_adds_their_variances_by_the_length():
     """Golden: 4 m with 0.05 m/√m and 0.002 rad/√m are 0.1 m and 0.004 rad."""
-    known = information(np.random.default_rng(4))
-    relation = Pairwise((3, 8), np.array([4.0, 0, 0.1]), known, "track", 0.9)
+    given = information(np.random.default_rng(4))
+    relation = Pairwise((3, 8), np.array([4.0, 0, 0.1]), given, "track", 0.9)
     slipping = with_slips(relation, 4.0, 0.05, 0.002)
-    added = np.linalg.inv(slipping.information) - np.linalg.inv(known)
+    added = np.linalg.inv(slipping.information) - np.linalg.inv(given)
     np.testing.assert_allclose(added, np.diag([0.1, 0.1, 0.004]) ** 2, rtol=1e-6, atol=1e-12)
     assert (slipping.nodes, slipping.origin, slipping.score) == ((3, 8), "track", 0.9)
     np.testing.assert_array_equal(slipping.measurement, relation.measurement)
-    np.testing.assert_allclose(with_slips(relation, 0.0, 0.05, 0.002).information, known, rtol=1e-9)
+    np.testing.assert_allclose(with_slips(relation, 0.0, 0.05, 0.002).information, given, rtol=1e-9)

@@ -1,0 +1,58 @@
+"""The terms kept while a graph grows, against those of the same relations alone."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from nscan_cli.graph.columns import Columns, Terms
+from nscan_cli.graph.relation import Relation
+from nscan_cli.graph.system import GraphEnergy
+from tests.graph.simulated import disturbed, mixed_ring
+
+SIZE = 12
+TRUTH, PAIRWISE, NSCAN = mixed_ring(SIZE, noise=1.0)
+RELATIONS: list[Relation] = [*PAIRWISE, *NSCAN]
+
+
+def assert_same(found: Columns, wanted: Columns) -> None:
+    for name in ("starts", "members", "local", "fixed", "weights"):
+        np.testing.assert_array_equal(getattr(found, name), getattr(wanted, name))
+    for k, size in enumerate(9 * np.diff(wanted.starts) ** 2):
+        here, there = (each.hessians[each.hessian_starts[k] :][:size] for each in (found, wanted))
+        np.testing.assert_array_equal(here, there)
+
+
+@given(st.lists(st.permutations(range(len(RELATIONS))), min_size=1, max_size=5), st.data())
+@settings(max_examples=50, deadline=None)
+def test_columns_are_those_of_the_relations_asked_for(orders, data):
+    """Whatever was asked for before, in whatever order, at whatever places."""
+    terms = Terms()
+    for order in orders:
+        chosen = [RELATIONS[k] for k in order[: data.draw(st.integers(0, len(order)))]]
+        positions = np.array(data.draw(st.permutations(range(SIZE))))
+        assert_same(terms.columns(chosen, positions), Terms().columns(chosen, positions))
+
+
+def test_an_energy_does_not_change_when_the_graph_grows():
+    poses, terms, positions = disturbed(TRUTH, 0.3), Terms(), np.arange(SIZE)
+    first = GraphEnergy(SIZE, PAIRWISE, positions, terms=terms)
+    before = first.evaluate(poses, exact=True)
+    both = GraphEnergy(SIZE, RELATIONS, positions, terms=terms)
+    after = first.evaluate(poses, exact=True)
+    np.testing.assert_array_equal(after.hessian, before.hessian)
+    np.testing.assert_array_equal(after.terms, before.terms)
+    alone = GraphEnergy(SIZE, RELATIONS, positions)
+    for found, wanted in zip(both.evaluate(poses, True), alone.evaluate(poses, True), strict=True):
+        np.testing.assert_array_equal(found, wanted)
+
+
+def test_a_relation_in_the_place_of_another_is_one_of_its_own():
+    terms, positions = Terms(), np.arange(SIZE)
+    terms.columns(RELATIONS, positions)
+    other = replace(PAIRWISE[0], measurement=PAIRWISE[0].measurement + 0.5)
+    relations = [other, *RELATIONS[1:]]
+    assert_same(terms.columns(relations, positions), Terms().columns(relations, positions))
