@@ -41,8 +41,8 @@ angle from the x axis to the left.
 
 What people read goes to standard error, results go to files or to standard output; of `info` and `evaluate`
 the tables are the result. On a terminal a bar shows scans done, scans a second, keyframes, loops closed and
-the time left; elsewhere nothing does. An error is one line that names the file, the place and what helps;
-`-vv` adds where it arose.
+the time left, and then that the graph is refined; elsewhere nothing does. An error is one line that names the
+file, the place and what helps; `-vv` adds where it arose.
 """
 CONFIG = """\
 An option's value is taken from the command line, else from the environment, else from the TOML file that
@@ -95,11 +95,48 @@ WRITTEN = (
      "`/tf`, `/tf_static`"),
     ("RESULT.json", "`match`, `nscan`", "poses, Hessian and covariance; matrices as upper "
      "triangles, row by row"),
-    ("PICTURE.png", "`--plot`", "a picture for people"),
+    ("PICTURE.png", "`--plot`, `render` for people", "a picture in colour, of 300 dots an inch: the plot of "
+     "`--style paper` is 20 cm long in print, its text of 10 points"),
     ("FILE", "`slam --depfile`", "`outputs: inputs` for `include` in a Makefile"),
     ("FOLDER", "`nightly -o`", "report.html, report.json, and for each log a folder with graph, trajectory, "
      "map and history"),
     ("~/.cache/nscan-cli", "all that match", "compiled kernels; may be deleted at any time"),
+)  # fmt: skip
+RESULTS = """\
+What `match` and `nscan` write, one key a line, in m and rad. A matrix is its upper triangle, row by row: a
+covariance of x, y and the angle is `[xx, xy, xθ, yy, yθ, θθ]`.
+"""
+KEYS = (
+    ("format, version, units, provenance", "both",
+     "what this is, and the logs and parameters that it was made from"),
+    ("reference, scan", "`match`", "the numbers of the scans I and J"),
+    ("initial", "`match`", "the pose that the match began with"),
+    ("pose", "`match`", "of J in the frame of I"),
+    ("relation", "`nscan`",
+     "as in a graph, with `scans` in place of `nodes`: their `poses` in one local frame, `hessian` with "
+     "the gauge in it, and `fixed`, the place among them of the scan that stays"),
+    ("covariance", "both",
+     "of the pose; of `nscan` that of the other scans' poses, in their order, relative to the fixed one; "
+     "null where the Hessian leaves them open"),
+    ("energy", "both", "E of eqs. (3) and (4), neither scaled nor with priors"),
+    ("gradient_norm", "both", "of what is minimised: E scaled to a negative log likelihood, with priors"),
+    ("hessian, eigenvalues", "`match`", "of the same, at the pose"),
+    ("decrement", "both", "the Newton step that is left, in standard deviations"),
+    ("iterations, evaluations", "both",
+     "of all stages, and of all ways that were tried; `max_iterations` of the parameters holds for one "
+     "stage"),
+    ("searched", "`nscan`", "whether the scans were placed by search"),
+    ("converged, reason", "both",
+     "whether the last stage, that of the energy itself, ended at a minimum within its iterations, and if "
+     "not, why"),
+    ("pairs", "`nscan`", "which scans were matched with each other"),
+    ("overlap", "both", "the share of a scan's points that lie on the other scan, or on another"),
+    ("weakest", "both",
+     "the direction (rad) in which the translation is known least, and the standard deviation (m) along "
+     "it, null where nothing holds it; of `nscan` for each scan, by the scans alone"),
+    ("left_out", "`nscan`",
+     "the scans that are not in the relation, each with `reason`, `overlap`, and its χ² against its priors "
+     "(`chi2`)"),
 )  # fmt: skip
 COMPLETION = """\
 Commands, options, choices and file names are completed by the shell after one of these lines, in the file
@@ -107,7 +144,7 @@ that the comment names (bash from 4.4):
 
 ```sh
 eval "$(_NSCAN_CLI_COMPLETE=bash_source nscan-cli)"    # ~/.bashrc
-eval "$(_NSCAN_CLI_COMPLETE=zsh_source nscan-cli)"     # ~/.zshrc
+eval "$(_NSCAN_CLI_COMPLETE=zsh_source nscan-cli)"     # ~/.zshrc, after compinit
 _NSCAN_CLI_COMPLETE=fish_source nscan-cli | source     # ~/.config/fish/completions/nscan-cli.fish
 ```
 """
@@ -119,7 +156,8 @@ def reference() -> str:
     commands = {name: _command(context, name) for name in COMMANDS}
     first = commands["info"]
     titles = ["All commands", *(f"nscan-cli {name}" for name in COMMANDS), READING, COMMON, "Exit codes",
-              "Environment", "Settings in a file", "Manifest", "Files", "Completion"]  # fmt: skip
+              "Environment", "Settings in a file", "Manifest", "Files", "Results of match and nscan",
+              "Completion"]  # fmt: skip
     parts = [
         HEAD,
         "".join(f"- [{title}](#{title.lower().replace(' ', '-')})\n" for title in titles),
@@ -134,6 +172,8 @@ def reference() -> str:
         "## Manifest\n\n" + MANIFEST,
         "## Files\n\n" + FILES,
         _table(("file", "by", "what"), WRITTEN),
+        "## Results of match and nscan\n\n" + RESULTS,
+        _table(("key", "of", "what it is"), ((_keys(keys), of, what) for keys, of, what in KEYS)),
         "## Completion\n\n" + COMPLETION,
     ]
     return "\n".join(parts)
@@ -171,6 +211,10 @@ def _chapter(parent: click.Context, command: Subcommand) -> str:
         _examples(command.examples),
     ]
     return "\n".join(parts)
+
+
+def _keys(names: str) -> str:
+    return ", ".join(f"`{name}`" for name in names.split(", "))
 
 
 def _code_first(rows: Iterable[tuple[str, str]]) -> Iterable[tuple[str, str]]:

@@ -77,7 +77,7 @@ def command(
         say(f"warning: {notice}", quiet)
     if evaluation.relations and evaluation.relations[1].too_far:
         table, errors = evaluation.relations
-        say(f"warning: {errors.too_far} of {len(table)} relations have a stamp far from every pose", quiet)
+        say(f"warning: a stamp is far from every pose in {errors.too_far} of {len(table)} relations", quiet)
     if as_json:
         click.echo(json.dumps(as_document(evaluation), indent=2, allow_nan=False))
     else:

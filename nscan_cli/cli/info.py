@@ -11,6 +11,7 @@ import click
 from nscan_cli.cli.command import log_argument, option, subcommand
 from nscan_cli.cli.options import common_options, reading_options
 from nscan_cli.cli.summary import Row, table
+from nscan_cli.counting import counted
 from nscan_cli.logs.options import ReadingOptions
 
 if TYPE_CHECKING:
@@ -108,9 +109,10 @@ def as_text(facts: dict[str, Any]) -> str:
         ("mounting", [f"{x:g} m ahead, {y:g} m to the left, turned by {degrees:g}°",
                       used["mounting"]]),
         ("odometry", [path, used["odometry"]] if path else [used["odometry"]]),
-        ("truth", [f"{facts['truth']} poses" if facts["truth"] else "none"]),
+        ("truth", [counted(facts["truth"], "pose") if facts["truth"] else "none"]),
         ("records", [f"{count} {tag}" for tag, count in facts["records"].items()]),
-        ("out of order", [f"{facts['backward_stamps']} time stamps" if facts["backward_stamps"] else "none"]),
+        ("out of order", [counted(facts["backward_stamps"], "time stamp") if facts["backward_stamps"]
+                          else "none"]),
         ("skipped", [_skipped(entry) for entry in facts["skipped"]] or ["none"]),
         ("warnings", facts["warnings"] or ["none"]),
     ]  # fmt: skip
@@ -121,7 +123,7 @@ def _skipped(entry: dict[str, Any]) -> str:
     ((place, first),) = (
         (key.removeprefix("first_"), entry[key]) for key in entry if key.startswith("first_")
     )
-    return f"{entry['records']} records: {entry['reason']}, first in {place} {first}"
+    return f"{counted(entry['records'], 'record')}: {entry['reason']}, first in {place} {first}"
 
 
 def _share(beams: Any) -> float:

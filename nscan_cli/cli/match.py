@@ -12,7 +12,7 @@ from nscan_cli.cli.command import log_argument, option, result_option, subcomman
 from nscan_cli.cli.options import PoseType, common_options, reading_options
 from nscan_cli.cli.picture import check_plot, plot_option, write_plot
 from nscan_cli.cli.progress import announce_compiling, say
-from nscan_cli.cli.summary import Row, table
+from nscan_cli.cli.summary import Row, ended, table
 from nscan_cli.errors import WrongUsageError
 from nscan_cli.logs.options import ReadingOptions
 from nscan_cli.outputs import check_writable, write_whole
@@ -175,7 +175,6 @@ def _summary(reference: int, scan: int, match: PairMatch) -> list[Row]:
     import numpy as np
 
     x, y, angle = match.pose.tolist()
-    outcome = "converged" if match.converged else f"not converged ({match.reason})"
     weakest = match.weakest
     if match.covariance is None:
         known = "unknown"
@@ -192,5 +191,5 @@ def _summary(reference: int, scan: int, match: PairMatch) -> list[Row]:
         ("sigma", [known]),
         ("weakest", [f"{least} {along}"]),
         ("overlap", [f"{match.overlap:.0%}"]),
-        ("match", [f"{outcome}, {match.iterations} iterations, {match.evaluations} evaluations"]),
+        ("match", [ended(match.reason, match.iterations, match.evaluations)]),
     ]  # fmt: skip

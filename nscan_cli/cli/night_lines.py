@@ -8,6 +8,7 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 from nscan_cli.cli.progress import say
+from nscan_cli.counting import counted
 from nscan_cli.nightly.manifest import Entry
 from nscan_cli.nightly.nights import Night
 from nscan_cli.nightly.verdict import Errors
@@ -60,7 +61,7 @@ class LiveLines:
         if not self.bars.tasks[task].started:
             self.bars.start_task(task)
         elapsed = self.bars.tasks[task].elapsed or 0.0
-        detail = f"{done}/{total} scans, {keyframes} keyframes, {elapsed:.0f} s"
+        detail = f"{done}/{total} scans, {counted(keyframes, 'keyframe')}, {elapsed:.0f} s"
         self.bars.update(task, completed=done, total=total, detail=detail)
 
     def finished(self, entry: Entry, night: Night) -> None:

@@ -102,8 +102,7 @@ def command(
 
 
 def _say_absent(entry: Entry, quiet: bool) -> None:
-    source = entry.sources.get("log")
-    remedy = f"; to be had from {source}" if source else ""
+    remedy = f"; to be had from {' and '.join(entry.sources.values())}" if entry.sources else ""
     say(f"{entry.name}: {entry.inputs['log']} is not there, skipped{remedy}", quiet)
 
 

@@ -14,7 +14,8 @@ from nscan_cli.cli.options import common_options, reading_options
 from nscan_cli.cli.picture import check_plot, plot_option, write_plot
 from nscan_cli.cli.progress import announce_compiling, say
 from nscan_cli.cli.scan_spec import ScanSpecType
-from nscan_cli.cli.summary import Row, table
+from nscan_cli.cli.summary import Row, ended, table
+from nscan_cli.counting import counted
 from nscan_cli.errors import InputDataError, WrongUsageError
 from nscan_cli.logs.options import ReadingOptions
 from nscan_cli.outputs import check_writable, write_whole
@@ -207,7 +208,6 @@ def _fields(numbers: tuple[int, ...], match: NScanMatch, left_out: list[LeftOut]
 
 def _summary(numbers: tuple[int, ...], match: NScanMatch, left_out: list[LeftOut]) -> list[Row]:
     joint = match.joint
-    outcome = "converged" if match.reason is None else f"not converged ({match.reason})"
     weak = [
         _weakly_held(numbers[scan], weakest)
         for scan, weakest in zip(match.kept, match.weakest, strict=True)
@@ -216,9 +216,9 @@ def _summary(numbers: tuple[int, ...], match: NScanMatch, left_out: list[LeftOut
     more = [f"and {len(weak) - NAMED} more"] if len(weak) > NAMED else []
     searched = "by search: the start by itself led to a poorer match"
     return [
-        ("scans", [f"{len(match.kept)} of {len(numbers)}, matched in {len(match.pairs)} pairs"]),
+        ("scans", [f"{len(match.kept)} of {len(numbers)}, matched in {counted(len(match.pairs), 'pair')}"]),
         ("overlap", [f"{match.overlap.min():.0%} at least"]),
-        ("match", [f"{outcome}, {joint.iterations} iterations, {joint.evaluations} evaluations"]),
+        ("match", [ended(match.reason, joint.iterations, joint.evaluations)]),
         ("placed", [searched] if joint.searched else []),
         ("held weakly", [*weak[:NAMED], *more]),
         ("left out", [f"scan {numbers[out.scan]} {out.reason}" for out in left_out]),

@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from nscan_cli.cli.command import option
+from nscan_cli.cli.command import FILE, option
 from nscan_cli.cli.options import Command
 from nscan_cli.errors import WrongUsageError
 from nscan_cli.outputs import check_writable, write_whole
@@ -22,7 +22,7 @@ OTHER_FORMATS = (
 
 def plot_option(shows: str) -> Callable[[Command], Command]:
     """The option; `shows` is what the picture shows."""
-    return option("--plot", metavar="PICTURE.png", help=f"Draw {shows}, as a PNG.")
+    return option("--plot", type=FILE, metavar="PICTURE.png", help=f"Draw {shows}, as a PNG.")
 
 
 def check_png(place: str, path: str) -> None:
@@ -51,6 +51,6 @@ def check_plot(plot: str | None, output: str | None, inputs: Sequence[str | None
 
 def write_plot(plot: str, picture: Image) -> None:
     """Write the picture whole or not at all. Raises OutputError."""
-    from nscan_cli.mapping.image import png_bytes
+    from nscan_cli.mapping.canvas import figure_png
 
-    write_whole(plot, png_bytes(picture))
+    write_whole(plot, figure_png(picture))

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import contextlib
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
 
-Advance = Callable[[int, str], None]
+if TYPE_CHECKING:
+    from rich.progress import Progress
 
 
 def say(message: str, quiet: bool = False) -> None:
@@ -26,33 +28,54 @@ def announce_compiling(kernel: str, quiet: bool) -> bool:
     return compiling
 
 
+class Bar:
+    """How far the work is. This one shows nothing, where there is no terminal."""
+
+    def begin(self, title: str, total: int | None) -> None:
+        """A piece of work of so many steps, of which the bar tells from now on; None where nobody knows."""
+
+    def advance(self, done: int, detail: str) -> None:
+        """So many steps are done; cheap enough to be called at every scan."""
+
+
+class LiveBar(Bar):
+    """One on a terminal."""
+
+    def __init__(self, live: Progress, title: str, total: int | None) -> None:
+        self._live, self._task = live, live.add_task(title, total=total, detail="")
+
+    def begin(self, title: str, total: int | None) -> None:
+        """The last state of the work before is shown once more, and its line used again."""
+        self._live.refresh()
+        self._live.remove_task(self._task)
+        self._task = self._live.add_task(title, total=total, detail="")
+
+    def advance(self, done: int, detail: str) -> None:
+        """Shown at the next of ten times a second."""
+        self._live.update(self._task, completed=done, detail=detail)
+
+
 @contextlib.contextmanager
-def progress(title: str, total: int, quiet: bool) -> Iterator[Advance]:
-    """A progress bar, only on a terminal. Yields advance(done, detail), cheap enough to call per scan."""
+def progress(title: str, total: int | None, quiet: bool) -> Iterator[Bar]:
+    """A bar that has begun, and is gone at the end; shown on a terminal only."""
     if quiet or not sys.stderr.isatty():
-        yield lambda _done, _detail: None
+        yield Bar()
         return
     from rich.console import Console
-    from rich.progress import (
-        BarColumn,
-        MofNCompleteColumn,
-        Progress,
-        ProgressColumn,
-        Task,
-        TextColumn,
-        TimeRemainingColumn,
-    )
+    from rich.progress import BarColumn, Progress, ProgressColumn, Task, TextColumn, TimeRemainingColumn
     from rich.text import Text
 
-    class Rate(ProgressColumn):
-        """Steps a second."""
+    class Steps(ProgressColumn):
+        """How many are done, and a second."""
 
         def render(self, task: Task) -> Text:
-            return Text("" if task.speed is None else f"{task.speed:.0f}/s")
+            if task.total is None:
+                return Text("")
+            speed = "" if task.speed is None else f" {task.speed:.0f}/s"
+            return Text(f"{task.completed:.0f}/{task.total:.0f}{speed}")
 
-    columns = (TextColumn("{task.description}"), BarColumn(None), MofNCompleteColumn(), Rate(),
+    columns = (TextColumn("{task.description}"), BarColumn(None), Steps(),
                TextColumn("{task.fields[detail]}"), TimeRemainingColumn())  # fmt: skip
     # The bar has the room that the words leave.
-    with Progress(*columns, console=Console(stderr=True), transient=True, expand=True) as bar:
-        task = bar.add_task(title, total=total, detail="")
-        yield lambda done, detail: bar.update(task, completed=done, detail=detail)
+    with Progress(*columns, console=Console(stderr=True), transient=True, expand=True) as live:
+        yield LiveBar(live, title, total)

@@ -13,6 +13,7 @@ from nscan_cli.cli.graph_log import find_log, read_graph_log
 from nscan_cli.cli.options import common_options, reading_options
 from nscan_cli.cli.picture import check_png
 from nscan_cli.cli.progress import say
+from nscan_cli.counting import counted
 from nscan_cli.errors import WrongUsageError
 from nscan_cli.logs.options import ReadingOptions
 from nscan_cli.outputs import check_writable, is_device, write_whole
@@ -108,7 +109,10 @@ def command(
         write_whole(mcap, recording(scans, rows, nodes, whole, grid))
     if output != "-":
         low_x, low_y, high_x, high_y = grid.bounds
-        say(f"{output}: {high_x - low_x:.1f} m × {high_y - low_y:.1f} m from {len(rows)} scans", quiet)
+        say(
+            f"{output}: {high_x - low_x:.1f} m × {high_y - low_y:.1f} m from {counted(len(rows), 'scan')}",
+            quiet,
+        )
 
 
 def check_map_outputs(output: str, yaml: bool) -> None:

@@ -2,31 +2,22 @@
 
 from __future__ import annotations
 
-import dataclasses
-import re
 import sys
 import time
-from collections import Counter
 from typing import TYPE_CHECKING
 
 import click
 
 from nscan_cli.cli.command import FILE, log_argument, option, subcommand
 from nscan_cli.cli.options import common_options, reading_options
-from nscan_cli.cli.progress import announce_compiling, progress, say
+from nscan_cli.cli.progress import say
 from nscan_cli.cli.slam_outputs import Outputs
-from nscan_cli.cli.summary import Row, table
-from nscan_cli.errors import InputDataError, InputMissingError, WrongUsageError
-from nscan_cli.inputs import label
+from nscan_cli.cli.summary import table
+from nscan_cli.errors import WrongUsageError
 from nscan_cli.logs.options import ReadingOptions
 
 if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
-
-    from nscan_cli.graph.model import Graph
-    from nscan_cli.logs.scan import LaserLog
-    from nscan_cli.slam.options import Relations, SlamOptions
+    from nscan_cli.slam.options import Relations
 
 MAPPING = ("max_scans", "relations", "no_loops")
 """Options that say how a log is mapped."""
@@ -131,6 +122,7 @@ def command(
         )
     outputs = Outputs(output, map_file, trajectory, g2o, carmen, depfile)
     outputs.check([path for path in (from_file, log) if path is not None])
+    from nscan_cli.cli.slam_runs import map_whole, refine_saved
     from nscan_cli.slam.run import slam_options
     from nscan_cli.threads import available_threads
 
@@ -138,9 +130,10 @@ def command(
     began = time.perf_counter()
     if from_file is None:
         assert log is not None
-        run = _map(log, reading, slam_options(max_scans, relations, not no_loops), threads, quiet, verbose)
+        options = slam_options(max_scans, relations, not no_loops)
+        run = map_whole(log, reading, options, threads, quiet, verbose)
     else:
-        run = _again(from_file, log, outputs.need_scans, threads, quiet)
+        run = refine_saved(from_file, log, outputs.need_scans, threads, quiet)
         # A log that was found must not be replaced either.
         outputs.check(run.inputs)
     outputs.write(run.graph, run.scans, run.rows, run.inputs, threads)
@@ -152,145 +145,7 @@ def command(
     say(table([*run.summary, ("time", took), ("written", [", ".join(outputs.files())])]), quiet)
 
 
-@dataclasses.dataclass(frozen=True)
-class _Run:
-    """What there is to write and to say."""
-
-    graph: Graph
-    scans: LaserLog | None
-    """The graph's log, where there is one."""
-    rows: NDArray[np.int64]
-    """(N,) the rows of its scans."""
-    inputs: list[str]
-    """The paths that were read."""
-    summary: list[Row]
-    compiled: bool = False
-    """Whether the kernels had to be compiled first."""
-
-
 def _given(*options: str) -> bool:
     """Whether one of the options stands on the command line."""
     sources = [click.get_current_context().get_parameter_source(option) for option in options]
     return any(source is not None and source.name == "COMMANDLINE" for source in sources)
-
-
-def _map(
-    log: str, reading: ReadingOptions, options: SlamOptions, threads: int, quiet: bool, verbose: int
-) -> _Run:
-    """Run the whole loop over a log."""
-    import numpy as np
-
-    from nscan_cli.logs.load import read_log
-    from nscan_cli.slam.run import map_log, notices
-
-    scans = read_log(log, reading)
-    for warning in scans.report.notices():
-        say(f"warning: {warning}", quiet)
-    compiled = announce_compiling("match_and_count", quiet)
-    with progress("mapping", len(scans), quiet) as advance:
-
-        def report(done: int, keyframes: int, loops: int) -> None:
-            last = ", closing up" if done == len(scans) else ""
-            advance(done, f"{keyframes} keyframes, {loops} loops{last}")
-
-        slam, graph = map_log(scans, reading, options, threads, report)
-    for warning in notices(slam):
-        say(f"warning: {warning}", quiet)
-    summary: list[Row] = [
-        ("scans", [f"{len(scans)} in {float(scans.times[-1] - scans.times[0]):.1f} s"]),
-        *_graph_rows(graph),
-    ]
-    if verbose:
-        tracker = slam.tracker
-        summary += [
-            ("tracking", [f"{tracker.restarts} starts from other angles, {tracker.searches} searches"]),
-            ("large loops", [f"{len(slam.places)} keyframes found by search at a place seen before"]),
-        ]
-    return _Run(graph, scans, np.arange(len(scans)), [log], summary, compiled)
-
-
-def _graph_rows(graph: Graph) -> list[Row]:
-    """What a graph is made of, and why loops were refused."""
-    from nscan_cli.slam.run import Counts
-
-    counts = Counts.of(graph)
-    tried, refused = counts.accepted + counts.refused.total(), counts.refused.total()
-    reasons: Counter[str] = Counter()
-    for reason, count in counts.refused.items():
-        # Alike but for a number of scans.
-        reasons[re.sub(r"\d+", "some", reason)] += count
-    return [
-        ("keyframes", [f"{counts.keyframes}"]),
-        ("relations", [f"{counts.pairwise} pairwise, {counts.nscan} nScan"]),
-        (
-            "loops",
-            [f"{tried} tried, {counts.accepted} accepted, {refused} refused" if tried else "none tried"],
-        ),
-        ("refused", [f"{count}: {reason}" for reason, count in reasons.most_common()]),
-    ]
-
-
-def _again(path: str, log_file: str | None, needs_log: bool, threads: int, quiet: bool) -> _Run:
-    """Optimise a saved graph, and refine it where its log is there."""
-    import numpy as np
-
-    from nscan_cli.graph.load import load_graph
-    from nscan_cli.graph.marginals import marginal_covariances
-    from nscan_cli.graph.solve import optimise_graph
-
-    graph = load_graph(path)
-    read = _log_of(path, graph, log_file, needs_log, quiet)
-    before = graph.poses
-    optimum = optimise_graph(graph)
-    if not optimum.converged:
-        say(f"warning: {path}: the optimum was not reached, its relations contradict each other", quiet)
-    scans, rows, inputs, compiled = None, np.arange(0), [path], False
-    if read is None:
-        graph.marginals = marginal_covariances(graph)
-    else:
-        from nscan_cli.slam.again import refine_again
-
-        scans, rows, log_path = read
-        inputs.append(log_path)
-        compiled = announce_compiling("match_and_count", quiet)
-        graph = refine_again(graph, scans, rows, threads)
-    moved = float(np.hypot(*(graph.poses - before)[:, :2].T).max())
-    refined = "" if read is None else ", then refined"
-    outcome = f"energy {optimum.energy:.6g} after {optimum.iterations} iterations{refined}"
-    summary: list[Row] = [
-        *_graph_rows(graph),
-        ("optimised", [outcome]),
-        ("moved", [f"no pose by more than {moved:.3g} m"]),
-    ]
-    return _Run(graph, scans, rows, inputs, summary, compiled)
-
-
-def _log_of(
-    path: str, graph: Graph, log_file: str | None, needed: bool, quiet: bool
-) -> tuple[LaserLog, NDArray[np.int64], str] | None:
-    """The log of a saved graph, the rows of its scans, and its path; None where the graph has none."""
-    from nscan_cli.cli.graph_log import find_log, read_graph_log
-    from nscan_cli.slam.again import can_refine, options_of
-
-    if not can_refine(graph):
-        if needed or log_file is not None:
-            raise WrongUsageError(
-                f"slam: {path} is no graph that slam made from a log; leave out LOG, --map and --carmen"
-            )
-        say(f"{path}: is no graph that slam made from a log: it is optimised only", quiet)
-        return None
-    try:
-        options_of(graph)
-    except ValueError as error:
-        raise InputDataError(
-            label(path), f"provenance.parameters: {error}", "mend it, or write it again"
-        ) from error
-    try:
-        log_file = find_log(path, graph) if log_file is None else log_file
-    except InputMissingError as error:
-        if needed:
-            raise
-        say(f"warning: optimised only, and not refined: {error}", quiet)
-        return None
-    scans, _nodes, rows = read_graph_log(path, graph, log_file, ReadingOptions())
-    return scans, rows, log_file

@@ -5,6 +5,8 @@ from __future__ import annotations
 import textwrap
 from collections.abc import Sequence
 
+from nscan_cli.counting import counted
+
 WIDTH = 80
 Row = tuple[str, Sequence[str]]
 """A title, and the lines beside it; no line, no row."""
@@ -23,3 +25,9 @@ def table(rows: Sequence[Row], width: int | None = WIDTH) -> str:
             shown.append(f"{title:{aside}}{line}")
             title = ""
     return "\n".join(shown)
+
+
+def ended(reason: str | None, iterations: int, evaluations: int) -> str:
+    """How a match ended: converged, or why not (`reason`), and what it took on all its ways."""
+    outcome = "converged" if reason is None else f"not converged ({reason})"
+    return f"{outcome}, {counted(iterations, 'iteration')}, {counted(evaluations, 'evaluation')}"

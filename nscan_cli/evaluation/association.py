@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from nscan_cli.counting import counted
 from nscan_cli.errors import InputDataError
 from nscan_cli.poses import Array
 
@@ -37,7 +38,8 @@ def no_match(result: str, times: Array, reference: str, reference_times: Array) 
     a, b, c, d = times.min(), times.max(), reference_times.min(), reference_times.max()
     problem = (
         f"no stamp of {reference} lies within {TOLERANCE} s of it; "
-        f"the result spans {a:.3f} to {b:.3f} s ({len(times)} poses), "
-        f"the reference {c:.3f} to {d:.3f} s ({len(reference_times)} stamps), {c - a:+.3f} s off at the start"
+        f"the result spans {a:.3f} to {b:.3f} s ({counted(len(times), 'pose')}), "
+        f"the reference {c:.3f} to {d:.3f} s ({counted(len(reference_times), 'stamp')}), "
+        f"{c - a:+.3f} s off at the start"
     )
     return InputDataError(result, problem, "give the reference of this log, in the same clock")

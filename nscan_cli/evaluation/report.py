@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from nscan_cli.counting import counted
 from nscan_cli.evaluation.association import TOLERANCE
 from nscan_cli.evaluation.relations import RelationErrors, Relations
 from nscan_cli.evaluation.statistics import Spread
@@ -41,7 +42,7 @@ class Evaluation:
 
 def as_text(evaluation: Evaluation) -> str:
     """The tables, with a final line feed."""
-    blocks = [f"result     {evaluation.result}: {evaluation.poses} poses"]
+    blocks = [f"result     {evaluation.result}: {counted(evaluation.poses, 'pose')}"]
     if evaluation.relations:
         relations, errors = evaluation.relations
         near = len(errors.used) - errors.exact

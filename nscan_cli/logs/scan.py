@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import functools
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, field
@@ -10,6 +9,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from nscan_cli.counting import counted
 from nscan_cli.errors import WrongUsageError
 from nscan_cli.poses import Array, compose, transform
 
@@ -46,7 +46,7 @@ class LogReport:
     def notices(self) -> list[str]:
         """The warnings, and what was skipped, for commands that do not list it."""
         return [*self.warnings] + [
-            f"{count} records skipped: {reason}, first in {self.skipped_place} {first}"
+            f"{counted(count, 'record')} skipped: {reason}, first in {self.skipped_place} {first}"
             for reason, (count, first) in self.skipped.items()
         ]
 
@@ -106,37 +106,27 @@ class LaserLog:
 
     def points(self, scan: int) -> Array:
         """The usable beams' end points (m, 2) of one row in the robot's frame, in beam order."""
-        ranges = self.ranges[scan]
-        beams = np.flatnonzero(np.isfinite(ranges))
-        directions = _directions(len(ranges), float(self.angle_min[scan]), float(self.angle_increment[scan]))
-        return transform(self.mount, ranges[beams, None] * directions[beams])
+        ends, usable = self._ends(slice(scan, scan + 1))
+        return ends[usable]
 
     def each_points(self, reach: float = math.inf) -> Iterator[Array]:
-        """The end points of each scan's usable beams, in order of time, that are nearer than `reach` (m).
+        """The `points` of each scan, in order of time, that are nearer to the robot than `reach` (m).
 
-        As `points` has them; many scans at a time, which costs a tenth.
+        Many scans at a time, which costs a tenth of one by one.
         """
         for first in range(0, len(self), TOGETHER):
-            rows = slice(first, first + TOGETHER)
-            ranges = self.ranges[rows]
-            angles = self.angle_min[rows, None] + self.angle_increment[rows, None] * np.arange(
-                ranges.shape[1]
-            )
-            finite = np.isfinite(ranges)
-            ends = np.where(finite, ranges, 0.0)[..., None] * np.stack(
-                [np.cos(angles), np.sin(angles)], axis=-1
-            )
-            ends = transform(self.mount, ends)
-            near = finite & (np.hypot(ends[..., 0], ends[..., 1]) < reach)
+            ends, usable = self._ends(slice(first, first + TOGETHER))
+            near = usable & (np.hypot(ends[..., 0], ends[..., 1]) < reach)
             yield from np.split(ends[near], np.cumsum(near.sum(axis=1))[:-1])
+
+    def _ends(self, rows: slice) -> tuple[Array, NDArray[np.bool_]]:
+        """The end points (R, B, 2) of the beams of some rows in the robot's frame, and which are usable."""
+        ranges = self.ranges[rows]
+        angles = self.angle_min[rows, None] + self.angle_increment[rows, None] * np.arange(ranges.shape[1])
+        usable = np.isfinite(ranges)
+        lengths = np.where(usable, ranges, 0.0)[..., None]
+        return transform(self.mount, lengths * np.stack([np.cos(angles), np.sin(angles)], axis=-1)), usable
 
     def laser_pose(self, robot: Array) -> Array:
         """Poses (…, 3) of the laser for poses (…, 3) of the robot."""
         return compose(robot, self.mount)
-
-
-@functools.lru_cache(maxsize=8)
-def _directions(beams: int, first: float, step: float) -> Array:
-    """Unit vectors (B, 2) of the beams in the laser's frame; mostly those of all scans are the same."""
-    angles = first + step * np.arange(beams)
-    return np.stack([np.cos(angles), np.sin(angles)], axis=-1)

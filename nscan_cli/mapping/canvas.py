@@ -30,7 +30,7 @@ Margins = tuple[float, float, float, float]
 """Left, top, right, bottom, units."""
 
 # M. Okabe, K. Ito, "Color Universal Design": distinct to the colour-blind as well.
-ORANGE, SKY, GREEN, YELLOW = (230, 159, 0), (86, 180, 233), (0, 158, 115), (240, 228, 66)
+ORANGE, SKY, GREEN = (230, 159, 0), (86, 180, 233), (0, 158, 115)
 BLUE, VERMILLION, PURPLE = (0, 114, 178), (213, 94, 0), (204, 121, 167)
 BLACK, DIM, WHITE = (20, 20, 20), (110, 110, 110), (255, 255, 255)
 
@@ -46,6 +46,13 @@ CORNERS = 48
 """Of the polygon that is drawn for an ellipse."""
 DOT_CORNERS = 12
 """The same for a small dot."""
+DOTS_AN_INCH = 300
+"""Of pictures for people: a plot of 2400 pixels is printed 20 cm long, with text of 10 points."""
+
+
+def figure_png(picture: Image) -> bytes:
+    """A picture for people as a PNG file that says how large it is to be printed."""
+    return png_bytes(picture, DOTS_AN_INCH)
 
 
 @dataclass(frozen=True)
@@ -242,7 +249,7 @@ class Canvas:
 
     def png(self) -> bytes:
         """The picture as a PNG file."""
-        return png_bytes(self.image())
+        return figure_png(self.image())
 
     def _ovals(self, outlines: Array, ring: Colour | None, inside: Colour) -> None:
         """Polygons (N, corners, 2) in pixels."""

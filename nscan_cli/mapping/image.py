@@ -65,10 +65,13 @@ def map_yaml(image_name: str, grid: OccupancyGrid) -> bytes:
     ).encode()
 
 
-def png_bytes(image: Image) -> bytes:
-    """A picture as a PNG file; the bytes depend on the picture and on Pillow's build alone."""
+def png_bytes(image: Image, dpi: int | None = None) -> bytes:
+    """A picture as a PNG file; the bytes depend on the picture and on Pillow's build alone.
+
+    With `dpi` the file says how large it is to be printed, in dots an inch.
+    """
     file = io.BytesIO()
-    image.save(file, "PNG", compress_type=RUN_LENGTHS)
+    image.save(file, "PNG", compress_type=RUN_LENGTHS, dpi=dpi and (dpi, dpi))
     return file.getvalue()
 
 

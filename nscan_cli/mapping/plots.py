@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from nscan_cli.counting import counted
 from nscan_cli.mapping.axes import Entry, caption
 from nscan_cli.mapping.canvas import BLACK, BLUE, DIM, PURPLE, VERMILLION, Bounds, Canvas, Colour
 from nscan_cli.mapping.ellipses import draw_ellipses
@@ -114,7 +115,7 @@ def plot_nscan(
     order = _order([names[scan] for scan in kept])
     missing = _missing([names[out.scan] for out in left_out], near)
     caption(before, "before", order + missing)
-    outcome = f"{match.joint.iterations} iterations" if match.reason is None else match.reason
+    outcome = counted(match.joint.iterations, "iteration") if match.reason is None else match.reason
     caption(after, f"after: {len(kept)} scans, least overlap {match.overlap.min():.0%}, {outcome}", order)
     return stacked([before.image(), after.image()])
 

@@ -28,6 +28,8 @@ def claimed(folder: str) -> Iterator[Path]:
         lock = os.open(path / LOCK, os.O_CREAT | os.O_RDWR, 0o666)
     except FileNotFoundError as error:
         raise OutputError(f"{folder}: the folder {path.parent} does not exist; create it first") from error
+    except (FileExistsError, NotADirectoryError) as error:
+        raise OutputError(f"{folder}: is no folder; name one, or a new one") from error
     except OSError as error:
         raise OutputError(f"{folder}: cannot be written to: {error.strerror}; choose another") from error
     try:

@@ -57,7 +57,7 @@ def plan(entries: list[Entry], folder: Path, force: bool) -> Plan:
         try:
             hashes = {role: sha256_of(path) for role, path in entry.inputs.items()}
         except NscanError as error:
-            planned.unreadable.append((entry, str(error)))
+            planned.unreadable.append((entry, _with_sources(entry, str(error))))
             continue
         planned.notes[entry.name] = [
             f"{entry.inputs[role].name} is not the file that the manifest means: its SHA-256 is another"
@@ -71,6 +71,13 @@ def plan(entries: list[Entry], folder: Path, force: bool) -> Plan:
             planned.to_do.append((entry, key))
     planned.to_do.sort(key=lambda item: -item[0].inputs["log"].stat().st_size)
     return planned
+
+
+def _with_sources(entry: Entry, error: str) -> str:
+    """The error, and where what is not there can be got."""
+    missing = [role for role, path in entry.inputs.items() if not path.exists()]
+    known = [entry.sources[role] for role in missing if role in entry.sources]
+    return f"{error}; to be had from {' and '.join(known)}" if known else error
 
 
 def carry_out(planned: Plan, folder: Path, engine: Engine, watcher: Watcher) -> None:

@@ -99,7 +99,7 @@ def exponents(rows: list[Row]) -> tuple[float, float]:
 
 def draw(series: dict[str, list[Row]], path: str) -> None:
     """Time over scans, and memory, one above the other."""
-    from nscan_cli.mapping.image import png_bytes
+    from nscan_cli.mapping.canvas import figure_png
     from nscan_cli.mapping.panels import stacked
 
     charts = []
@@ -112,7 +112,7 @@ def draw(series: dict[str, list[Row]], path: str) -> None:
             for name, rows in series.items()
         }
         charts.append(line_chart(lines, "thousand scans", label, "nscan-cli slam, one thread"))
-    Path(path).write_bytes(png_bytes(stacked(charts)))
+    Path(path).write_bytes(figure_png(stacked(charts)))
 
 
 if __name__ == "__main__":

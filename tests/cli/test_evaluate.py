@@ -48,7 +48,7 @@ def test_relations_give_this_table(files: Path, capsys: pytest.CaptureFixture[st
         "                       1                  10                  11    0.100    0.0\n"
     )
     assert max(len(line) for line in out.splitlines()) <= 80
-    assert err == "warning: 1 of 3 relations have a stamp far from every pose\n"
+    assert err == "warning: a stamp is far from every pose in 1 of 3 relations\n"
 
 
 def test_quiet_silences_the_warning(files: Path, capsys: pytest.CaptureFixture[str]):

@@ -59,7 +59,8 @@ def test_text_is_aligned_and_says_the_same(log, capsys):
     text = "\n".join(lines)
     for said in (
         "numbered 0 to 2", "-90° to 90°, 60° a beam", "81.91 m and above", "a path of 7.0 m",
-        "turned by 28.6479°", "1 records: wrong number of values, first in line 4", "1 time stamps",
+        "turned by 28.6479°", "1 record: wrong number of values, first in line 4",
+        "out of order   1 time stamp\n",
         "FLASER, the only laser", "the poses in FLASER", "PARAM",
     ):  # fmt: skip
         assert said in text

@@ -68,7 +68,7 @@ def test_what_is_skipped_is_counted_in_messages(tmp_path, capsys):
         {"reason": reason, "records": 1, "first_message": 3}
     ]
     assert run(["info", str(path)]) == 0
-    assert f"1 records: {reason}, first in message 3" in capsys.readouterr().out
+    assert f"1 record: {reason}, first in message 3" in capsys.readouterr().out
 
 
 @pytest.mark.parametrize(

@@ -2,11 +2,9 @@ from __future__ import annotations
 
 import importlib
 import os
-import shutil
 import signal
 import subprocess
 import sys
-from pathlib import Path
 
 import click
 import pytest
@@ -40,6 +38,16 @@ def test_help_and_version_are_no_failures(capsys):
     assert all(name in listed for name in COMMANDS)
     assert run(["--version"]) == 0
     assert __version__ in capsys.readouterr().out
+
+
+def test_the_command_has_the_garbage_collection_look_through_new_objects_only():
+    script = (
+        "import atexit, gc, sys; from nscan_cli.cli import main as frame; sys.argv[1:] = ['--version']; "
+        "told = lambda: print(gc.get_threshold()[0] == frame.OBJECTS, gc.get_freeze_count() > 0); "
+        "atexit.register(told); frame.main()"
+    )
+    done = subprocess.run([sys.executable, "-c", script], check=True, capture_output=True, text=True)
+    assert done.stdout.splitlines() == [f"nscan-cli, version {__version__}", "True True"]
 
 
 def test_every_command_is_there_under_its_name():
@@ -166,57 +174,3 @@ def test_a_standard_output_without_room_is_code_73():
         _out, err = process.communicate(timeout=20)
     assert process.returncode == 73
     assert err == b"nscan-cli: standard output: cannot be written: No space left on device\n"
-
-
-def completed(shell: str, line: str, folder: Path) -> str:
-    """What a shell is told when it asks how a line goes on."""
-    words = line.split(" ")
-    asked = {
-        "COMP_WORDS": line,
-        "COMP_CWORD": str(len(words) - 1),
-        "_NSCAN_CLI_COMPLETE": f"{shell}_complete",
-    }
-    if shell == "fish":
-        asked["COMP_CWORD"] = words[-1]
-    environment = {**os.environ, **asked}
-    process = python_m(stdout=subprocess.PIPE, env=environment, cwd=folder)
-    out, err = process.communicate(timeout=20)
-    assert (process.returncode, err) == (0, b"")
-    return out.decode()
-
-
-@pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
-def test_shells_complete_commands_options_and_choices(shell, tmp_path):
-    source = {**os.environ, "_NSCAN_CLI_COMPLETE": f"{shell}_source"}
-    out, err = python_m(stdout=subprocess.PIPE, env=source).communicate(timeout=20)
-    assert b"_NSCAN_CLI_COMPLETE" in out
-    assert err == b""
-    for line, offered, others in (
-        ("nscan-cli s", "slam", "render"),
-        ("nscan-cli slam --ma", "--map", "--from"),
-        ("nscan-cli slam --relations n", "nscan", "pairwise"),
-    ):
-        answer = completed(shell, line, tmp_path)
-        assert offered in answer
-        assert others not in answer
-
-
-def test_shells_complete_the_names_of_logs_and_outputs(tmp_path):
-    for line in ("nscan-cli info off", "nscan-cli slam office.log -o off", "nscan-cli evaluate off"):
-        assert completed("bash", line, tmp_path) == "file,off\n"
-
-
-@pytest.mark.skipif(shutil.which("bash") is None, reason="no bash")
-def test_the_completion_for_bash_works_in_bash(tmp_path):
-    """With the line that the README gives, and an nscan-cli in the path."""
-    tool = tmp_path / "nscan-cli"
-    tool.write_text(f'#!/bin/sh\nexec "{sys.executable}" -m nscan_cli "$@"\n')
-    tool.chmod(0o755)
-    script = (
-        'eval "$(_NSCAN_CLI_COMPLETE=bash_source nscan-cli)"\n'
-        "COMP_WORDS=(nscan-cli sl); COMP_CWORD=1; _nscan_cli_completion nscan-cli sl nscan-cli\n"
-        'echo "${COMPREPLY[@]}"\n'
-    )
-    environment = {**os.environ, "PATH": f"{tmp_path}:{os.environ['PATH']}"}
-    done = subprocess.run(["bash", "-c", script], env=environment, capture_output=True, text=True, check=True)
-    assert (done.stdout, done.stderr) == ("slam\n", "")

@@ -136,7 +136,7 @@ def test_force(manifest, first, tmp_path, capsys):
         (["kuemmerle", "-o", "out"], 2, "nightly: kuemmerle has no logs of its own; give their folder with"),
         (["kuemmerle", "-o", "out", "--data", "nowhere"], 66, "--data nowhere: is no folder; give that"),
         (["fine.toml", "-o", "no/out"], 73, "no/out: the folder no does not exist; create it first"),
-        (["fine.toml", "-o", "fine.toml"], 73, "fine.toml: cannot be written to"),
+        (["fine.toml", "-o", "fine.toml"], 73, "fine.toml: is no folder; name one, or a new one"),
         (["fine.toml", "-o", "out", "--scheduler", "x"], 2, "--scheduler x: is no address of the form tcp://"),
         (["fine.toml"], 2, "nightly: Missing option '-o'"),
     ],
@@ -162,6 +162,7 @@ def test_where_no_log_is_there_it_is_said_where_to_get_them(tmp_path, capsys):
     assert error.startswith("nscan-cli: kuemmerle: none of its logs is there")
     assert [line.partition(":")[0] for line in lines][:4] == ["intel", "fr079", "mit-csail", "mit-killian"]
     assert all("is not there, skipped; to be had from http" in line for line in lines)
+    assert all(line.endswith(".relations") for line in lines[:4])
     assert list(tmp_path.iterdir()) == []
 
 

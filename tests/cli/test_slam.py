@@ -10,7 +10,6 @@ import os
 import re
 import shutil
 import subprocess
-import tomllib
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -43,13 +42,6 @@ def everything(tmp_path_factory: pytest.TempPathFactory) -> Path:
     arguments = [part for option, name in files.items() for part in (option, str(folder / name))]
     assert run(["slam", *SHORT, "-q", *arguments]) == 0
     return folder
-
-
-@pytest.fixture
-def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """An empty folder to work in."""
-    monkeypatch.chdir(tmp_path)
-    return tmp_path
 
 
 def document_of(path: Path) -> dict[str, Any]:
@@ -192,115 +184,6 @@ def test_the_log_may_come_from_standard_input(folder, everything, monkeypatch):
     found, named = (document_of(path) for path in (folder / "graph.json", everything / "graph.json"))
     assert found["provenance"]["inputs"][0]["name"] == "standard input"
     assert found["nodes"] == named["nodes"]
-
-
-def test_the_summary(folder, capsys):
-    assert run(["slam", SAMPLE, "--every", "10", "-o", "graph.json"]) == 0
-    out, err = capsys.readouterr()
-    assert out == ""
-    graph = read_graph("graph.json")
-    accepted = sum(loop.accepted for loop in graph.loops)
-    refused = len(graph.loops) - accepted
-    lines = err.splitlines()
-    assert max(map(len, lines)) <= 80
-    said = {line[:11].strip(): line[11:] for line in lines if line[:11].strip()}
-    assert list(said) == ["scans", "keyframes", "relations", "loops", "refused", "time", "written"]
-    assert said["scans"] == "252 in 502.0 s"
-    assert said["keyframes"] == f"{len(graph.keyframes)}"
-    assert said["relations"] == f"{len(graph.pairwise)} pairwise, {len(graph.nscan)} nScan"
-    assert len(graph.loops) > 20
-    assert said["loops"] == f"{len(graph.loops)} tried, {accepted} accepted, {refused} refused"
-    why = [re.match(r"(?:refused)? +(\d+): .", line) for line in lines]
-    assert sum(int(match[1]) for match in why if match) == refused
-    assert re.fullmatch(r"[\d.]+ s, \d+ scans a second, \d+ times real time", said["time"])
-    assert said["written"] == "graph.json"
-
-
-def test_more_is_said_when_asked_and_nothing_with_q(folder, capsys):
-    assert run(["slam", *SHORT, "-v", "-o", "graph.json"]) == 0
-    err = capsys.readouterr().err
-    assert re.search(r"^tracking +\d+ starts from other angles, \d+ searches$", err, re.MULTILINE)
-    assert re.search(r"^large loops +\d+ keyframes found by search", err, re.MULTILINE)
-    assert run(["slam", *SHORT, "-q", "-o", "graph.json"]) == 0
-    assert capsys.readouterr() == ("", "")
-
-
-def test_a_graph_is_not_poured_over_a_terminal_unasked(folder, capsys, monkeypatch):
-    monkeypatch.setattr("sys.stdout.isatty", lambda: True)
-    assert run(["slam", *SHORT]) == 2
-    out, err = capsys.readouterr()
-    assert out == ""
-    assert err == "nscan-cli: slam: the graph is long; give -o GRAPH.json, or -o - to see it here\n"
-
-
-def test_the_progress_has_rate_keyframes_loops_and_time_left(folder, monkeypatch, capsys):
-    """And is there on a terminal only: the other tests see no such line."""
-    monkeypatch.setattr("sys.stderr.isatty", lambda: True)
-    monkeypatch.setenv("COLUMNS", "100")
-    monkeypatch.setenv("TERM", "xterm")
-    assert run(["slam", *SHORT, "--map", "map.png", "-o", "graph.json"]) == 0
-    shown = re.sub(r"\x1b\[[\d;?]*[a-zA-Z]", "", capsys.readouterr().err)
-    assert re.search(r"mapping .*201/201 .*\d+ keyframes, \d+ loops, closing up.* \d:\d\d:\d\d", shown)
-
-
-def test_without_odometry(folder):
-    assert run(["slam", *SHORT, "--no-odometry", "-o", "graph.json", "-q"]) == 0
-    document = document_of(folder / "graph.json")
-    validate(document)
-    assert not any("odometry" in node for node in document["nodes"])
-    assert document["provenance"]["parameters"]["reading"]["odometry"] is False
-
-
-def test_max_scans_bounds_the_relations(folder):
-    assert run(["slam", *SHORT, "--max-scans", "4", "-o", "graph.json", "-q"]) == 0
-    graph = read_graph("graph.json")
-    assert graph.provenance["parameters"]["slam"]["nscan"]["max_scans"] == 4
-    assert {len(relation.nodes) for relation in graph.nscan} == {4}
-
-
-def test_relations_of_one_kind(folder):
-    assert run(["slam", *SHORT, "--relations", "pairwise", "-o", "pairwise.json", "-q"]) == 0
-    assert run(["slam", *SHORT, "--relations", "nscan", "-o", "nscan.json", "-q"]) == 0
-    for kind in ("pairwise", "nscan"):
-        validate(document_of(folder / f"{kind}.json"))
-        assert read_graph(f"{kind}.json").provenance["parameters"]["slam"]["relations"] == kind
-    pairwise, nscan = read_graph("pairwise.json"), read_graph("nscan.json")
-    assert pairwise.nscan == []
-    assert len(pairwise.pairwise) > 1.5 * len(pairwise.keyframes)
-    assert len(nscan.nscan) >= 1
-    assert len(nscan.pairwise) < len(nscan.keyframes) - 1
-
-
-def test_no_loops(folder):
-    assert run(["slam", SAMPLE, "--every", "10", "--no-loops", "-o", "graph.json", "-q"]) == 0
-    graph = read_graph("graph.json")
-    assert graph.provenance["parameters"]["slam"]["nscan"]["loops"] is False
-    assert graph.loops == []
-    assert {relation.origin for relation in graph.nscan} == {"nscan"}
-
-
-def test_config_is_dumped_and_read_back(folder, capsys):
-    given = ["--max-scans", "4", "--map", "map.png", "--every", "7", "--mount", "0.1,0,90"]
-    assert run(["slam", SAMPLE, *given, "--dump-config"]) == 0
-    dumped = capsys.readouterr().out
-    options = tomllib.loads(dumped)["slam"]
-    assert (options["max-scans"], options["map"], options["every"]) == (4, "map.png", 7)
-    assert options["output"] == "-"
-    assert list(folder.iterdir()) == []
-    (folder / "slam.toml").write_text(dumped)
-    assert run(["slam", SAMPLE, "--config", "slam.toml", "--dump-config"]) == 0
-    assert capsys.readouterr().out == dumped
-    # A flag is stronger than the file, the file than the default.
-    assert run(["slam", SAMPLE, "--config", "slam.toml", "--max-scans", "5", "--dump-config"]) == 0
-    assert tomllib.loads(capsys.readouterr().out)["slam"] == {**options, "max-scans": 5}
-
-
-def test_config_takes_effect(folder):
-    (folder / "slam.toml").write_text('output = "graph.json"\n[slam]\nmax-scans = 3\nend = 20.0\n')
-    assert run(["slam", SAMPLE, "--config", "slam.toml", "-q"]) == 0
-    graph = read_graph("graph.json")
-    assert len(graph) == 101
-    assert {len(relation.nodes) for relation in graph.nscan} == {3}
 
 
 def test_the_same_bytes_every_time(folder, everything):

@@ -2,22 +2,12 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import pytest
 
 from nscan_cli.cli.main import run
 from nscan_cli.graph.json_file import write_graph
 from tests.cli.room_log import ALL_OUTPUTS, room_log
 from tests.graph.small_graph import small_graph
-
-
-@pytest.fixture
-def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """An empty folder to work in."""
-    monkeypatch.chdir(tmp_path)
-    return tmp_path
-
 
 PNG = b"\x89PNG\r\n\x1a\n" + bytes(40)
 

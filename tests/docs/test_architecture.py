@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import itertools
 import re
 from pathlib import Path
 
@@ -16,6 +17,8 @@ ROW = re.compile(
     r"^\| (\(\d[^|]*|III[^|]*|V[^|]*) \| [^|]+ \| \[([\w/.]+)\]\(([^)]+)\) \| `(\w+)` \|$", re.MULTILINE
 )
 ROWS = ROW.findall(PAGE)
+PICTURE = blocks("docs/architecture.md", "mermaid")[0]
+ARROW = re.compile(r"\s*(?:-->|-- .*? -->|-\. .*? \.->)\s*")
 NAMED = re.compile(r"\beqs?\. ((?:\(\d+\)(?:, | and | to )?)+)", re.IGNORECASE)
 
 
@@ -58,13 +61,81 @@ def test_what_the_code_says_of_equations_is_in_the_table():
 
 
 def test_the_picture_names_the_packages_that_there_are():
-    (picture,) = blocks("docs/architecture.md", "mermaid")
     packages = {path.parent.name for path in PACKAGE.glob("*/__init__.py")}
-    drawn = set(re.findall(r"\b(\w+)/", picture))
+    drawn = set(re.findall(r"\b(\w+)/", PICTURE))
     assert drawn <= packages
     assert packages - drawn == {"cli", "nightly"}
-    for module in re.findall(r"\b(\w+\.py)", picture):
+    for module in re.findall(r"\b(\w+\.py)", PICTURE):
         assert list(PACKAGE.glob(f"*/{module}")), module
+
+
+def imports() -> set[tuple[str, str]]:
+    """(a, b) where package a imports of package b; a module beside the packages stands for itself."""
+    found = set()
+    for path in PACKAGE.rglob("*.py"):
+        importer = path.relative_to(PACKAGE).parts[0].removesuffix(".py")
+        for node in ast.walk(ast.parse(path.read_text())):
+            names: list[str] = []
+            if isinstance(node, ast.ImportFrom) and node.module:
+                names = [f"{node.module}.{alias.name}" for alias in node.names]
+            elif isinstance(node, ast.Import):
+                names = [alias.name for alias in node.names]
+            for name in names:
+                top, _, rest = name.partition(".")
+                if top == "nscan_cli" and rest.partition(".")[0] != importer:
+                    found.add((importer, rest.partition(".")[0]))
+    return found
+
+
+def test_imports_go_one_way():
+    """In the order that CONTRIBUTING.md gives."""
+    (line,) = re.findall(r"Imports go one way: ([\w → ]+);", (ROOT / "CONTRIBUTING.md").read_text())
+    order = {name: rank for rank, name in enumerate(line.split(" → "))}
+    packages = {path.parent.name for path in PACKAGE.glob("*/__init__.py")}
+    assert order.keys() == packages
+    for importer, imported in imports():
+        if imported in packages and importer != "__main__":
+            # The modules beside the packages take types at most, of what a log is.
+            assert order[imported] < order.get(importer, 1), f"{importer} imports {imported}"
+
+
+def drawn_between_packages() -> set[tuple[str, str]]:
+    """(a, b) where an arrow of the picture goes from a node of package a to one of package b."""
+    package = dict(re.findall(r'(\w+)\["<b>(\w+)/</b>', PICTURE))
+    inside = PICTURE.partition("subgraph")[2].partition("\n    end")[0]
+    package |= dict.fromkeys(re.findall(r'^ +(\w+)\["', inside, re.MULTILINE), "slam")
+    found = set()
+    for line in PICTURE.splitlines():
+        groups = [re.findall(r"(?:^|& )\s*(\w+)", part) for part in ARROW.split(line.strip())]
+        for sources, targets in itertools.pairwise(groups):
+            found |= {
+                (package[source], package[target])
+                for source in sources
+                for target in targets
+                if source in package and target in package and package[source] != package[target]
+            }
+    return found
+
+
+def test_the_picture_is_true_to_the_imports():
+    """Of two packages with an arrow between them one imports the other, and the other way round.
+
+    Types of a log travel with everything and are drawn where scans do. Graphs and results reach others as
+    files or by a caller, whose arrows begin in slam/: who takes them imports graph/.
+    """
+    real = {frozenset(pair) for pair in imports()}
+    drawn = {frozenset(pair) for pair in drawn_between_packages()}
+    by_callers = {frozenset(("slam", taker)) for taker in ("mapping", "exports")}
+    assert by_callers <= drawn
+    assert drawn - by_callers <= real
+    packages = set().union(*drawn)
+    untold = {pair for pair in real - drawn if pair <= packages and "logs" not in pair}
+    assert untold == {frozenset(("graph", taker)) for taker in ("mapping", "exports", "evaluation")}
+
+
+def test_the_modules_beside_the_packages_are_named():
+    beside = {path.name for path in PACKAGE.glob("*.py") if not path.name.startswith("__")}
+    assert beside == {name for name in re.findall(r"`(\w+\.py)`", PAGE) if (PACKAGE / name).exists()}
 
 
 def test_every_module_says_what_it_is():

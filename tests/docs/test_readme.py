@@ -3,7 +3,7 @@
 What stands for what: `sample_logs/` is a copy of that folder, with a manifest of its two smallest logs alone.
 `intel.log.gz`, a log that is not in the repository, is made of 70 s of the office log after 3000 scans of
 standing still, and `intel.relations` of its true poses. `pip install` and `make` are not run: their targets
-are looked up, and the lines for shells are tested in tests/cli/test_main.py.
+are looked up, and the lines for shells are tested in tests/cli/test_completion.py.
 """
 
 from __future__ import annotations

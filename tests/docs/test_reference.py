@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 import shlex
 from pathlib import Path
@@ -128,3 +129,17 @@ def test_the_help_has_sections_in_order(capsys):
     assert run(["slam", "--help"]) == 0
     titles = [line for line in capsys.readouterr().out.splitlines() if re.fullmatch(r"\w.*:", line)]
     assert titles == ["Arguments:", "Options:", "Reading the log:", "For all commands:", "Examples:"]
+
+
+def test_every_key_of_a_match_is_told_and_no_other(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    log = str(ROOT / "sample_logs" / "corridor_and_room.log.gz")
+    assert run(["match", log, "--reference", "100", "--scan", "104", "-o", "match.json", "-q"]) == 0
+    assert run(["nscan", log, "--scans", "100-108:4", "-o", "nscan.json", "-q"]) == 0
+    written = {name: set(json.loads(Path(f"{name}.json").read_text())) for name in ("match", "nscan")}
+    chapter = PAGE.partition("## Results of match and nscan\n")[2].partition("\n## ")[0]
+    told: dict[str, set[str]] = {"match": set(), "nscan": set()}
+    for keys, of in re.findall(r"^\| (`.*?`) \| (\S+) \| ", chapter, re.MULTILINE):
+        for name in told if of == "both" else [of.strip("`")]:
+            told[name] |= set(re.findall(r"`(\w+)`", keys))
+    assert told == written

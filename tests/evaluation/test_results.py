@@ -87,7 +87,7 @@ def test_records_that_were_skipped_are_told(tmp_path: Path):
     notices: list[str] = []
     load_trajectory(write(tmp_path, LOG.replace("2.0 3.0 2.0", "2.0 x 2.0").encode()), notices=notices)
     assert len(notices) == 1
-    assert "1 records skipped: a value is not a number, first in line 3" in notices[0]
+    assert "1 record skipped: a value is not a number, first in line 3" in notices[0]
 
 
 def test_what_a_truncated_file_still_has_can_be_measured(tmp_path: Path):

@@ -44,7 +44,7 @@ def test_the_commands_take_it_and_their_messages_name_it(with_csv, tmp_path, mon
     assert run(["info", "log.csv"]) == 0
     out = capsys.readouterr().out
     assert "format         CSV\n" in out
-    assert "1 records: a value is not a number, first in line 7" in out
+    assert "1 record: a value is not a number, first in line 7" in out
     assert run(["info", "log.csv", "--strict"]) == 65
     assert "log.csv, line 7: a value is not a number" in capsys.readouterr().err
     (tmp_path / "letter").write_text("Dear all,\n")

@@ -134,14 +134,18 @@ def test_a_history_that_is_damaged_begins_anew(entry, nights):
 def test_logs_that_are_absent_or_unreadable_do_not_reach_the_engine(entry, nights, tmp_path):
     absent = Entry("b", {"log": tmp_path / "b.log"})
     folder = Entry("c", {"log": tmp_path})
-    lost = Entry("d", {"log": tmp_path / "a.log", "relations": tmp_path / "d.relations"})
+    sources = {"log": "https://example.org/a.log", "relations": "https://example.org/d.relations"}
+    inputs = {"log": tmp_path / "a.log", "relations": tmp_path / "d.relations"}
+    lost = Entry("d", inputs, sources=sources)
     planned = plan([absent, folder, lost, entry], nights, False)
     assert planned.absent == [absent]
     assert [each.name for each, _reason in planned.unreadable] == ["c", "d"]
     fake = Fake(good())
     carry_out(planned, nights, fake, Silent())
     assert fake.done == ["a"]
-    assert "d.relations: no such file" in read_nights(nights / "d")[0]["reason"]
+    reason = read_nights(nights / "d")[0]["reason"]
+    assert "d.relations: no such file" in reason
+    assert reason.endswith("; to be had from https://example.org/d.relations")
     assert not (nights / "b").exists()
 
 

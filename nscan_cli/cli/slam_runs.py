@@ -1,0 +1,170 @@
+"""The two ways in which `slam` comes to a graph: from a log, and from a saved graph."""
+
+from __future__ import annotations
+
+import dataclasses
+import re
+from collections import Counter
+from typing import TYPE_CHECKING
+
+from nscan_cli.cli.progress import announce_compiling, progress, say
+from nscan_cli.cli.summary import Row
+from nscan_cli.counting import counted
+from nscan_cli.errors import InputDataError, InputMissingError, WrongUsageError
+from nscan_cli.inputs import label
+from nscan_cli.logs.options import ReadingOptions
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from nscan_cli.graph.model import Graph
+    from nscan_cli.logs.scan import LaserLog
+    from nscan_cli.slam.options import SlamOptions
+
+
+@dataclasses.dataclass(frozen=True)
+class Run:
+    """What there is to write and to say."""
+
+    graph: Graph
+    scans: LaserLog | None
+    """The graph's log, where there is one."""
+    rows: NDArray[np.int64]
+    """(N,) the rows of its scans."""
+    inputs: list[str]
+    """The paths that were read."""
+    summary: list[Row]
+    compiled: bool = False
+    """Whether the kernels had to be compiled first."""
+
+
+def map_whole(
+    log: str, reading: ReadingOptions, options: SlamOptions, threads: int, quiet: bool, verbose: int
+) -> Run:
+    """Run the whole loop over a log."""
+    import numpy as np
+
+    from nscan_cli.logs.load import read_log
+    from nscan_cli.slam.run import map_log, notices
+
+    scans = read_log(log, reading)
+    for warning in scans.report.notices():
+        say(f"warning: {warning}", quiet)
+    compiled = announce_compiling("match_and_count", quiet)
+    with progress("mapping", len(scans), quiet) as bar:
+
+        def report(done: int, keyframes: int, loops: int) -> None:
+            bar.advance(done, f"{counted(keyframes, 'keyframe')}, {counted(loops, 'loop')}")
+            if done == len(scans):
+                # The last optimisation, and matches that are made again until nothing moves.
+                bar.begin("closing up and refining", None)
+
+        slam, graph = map_log(scans, reading, options, threads, report)
+    for warning in notices(slam):
+        say(f"warning: {warning}", quiet)
+    summary: list[Row] = [
+        ("scans", [f"{len(scans)} in {float(scans.times[-1] - scans.times[0]):.1f} s"]),
+        *_graph_rows(graph),
+    ]
+    if verbose:
+        starts, searches = counted(slam.tracker.restarts, "start"), counted(slam.tracker.searches, "search")
+        places = counted(len(slam.places), "keyframe")
+        summary += [
+            ("tracking", [f"{starts} from other angles, {searches}"]),
+            ("large loops", [f"{places} found by search at a place seen before"]),
+        ]
+    return Run(graph, scans, np.arange(len(scans)), [log], summary, compiled)
+
+
+def _graph_rows(graph: Graph) -> list[Row]:
+    """What a graph is made of, and why loops were refused."""
+    from nscan_cli.slam.run import Counts
+
+    counts = Counts.of(graph)
+    tried, refused = counts.accepted + counts.refused.total(), counts.refused.total()
+    reasons: Counter[str] = Counter()
+    for reason, count in counts.refused.items():
+        reasons[without_numbers(reason)] += count
+    return [
+        ("keyframes", [f"{counts.keyframes}"]),
+        ("relations", [f"{counts.pairwise} pairwise, {counts.nscan} nScan"]),
+        (
+            "loops",
+            [f"{tried} tried, {counts.accepted} accepted, {refused} refused" if tried else "none tried"],
+        ),
+        ("refused", [f"{count}: {reason}" for reason, count in reasons.most_common()]),
+    ]
+
+
+def without_numbers(reason: str) -> str:
+    """The reason as all loops have it that are alike but for a number of scans."""
+    reason = re.sub(r"\d+ of \d+ scans", "some of the scans", reason)
+    return re.sub(r"(all )?\d+ scans?\b", "some scans", reason)
+
+
+def refine_saved(path: str, log_file: str | None, needs_log: bool, threads: int, quiet: bool) -> Run:
+    """Optimise a saved graph, and refine it where its log is there."""
+    import numpy as np
+
+    from nscan_cli.graph.load import load_graph
+    from nscan_cli.graph.marginals import marginal_covariances
+    from nscan_cli.graph.solve import optimise_graph
+
+    graph = load_graph(path)
+    read = _log_of(path, graph, log_file, needs_log, quiet)
+    before = graph.poses
+    optimum = optimise_graph(graph)
+    if not optimum.converged:
+        say(f"warning: {path}: the optimum was not reached, its relations contradict each other", quiet)
+    scans, rows, inputs, compiled = None, np.arange(0), [path], False
+    if read is None:
+        graph.marginals = marginal_covariances(graph)
+    else:
+        from nscan_cli.slam.again import refine_again
+
+        scans, rows, log_path = read
+        inputs.append(log_path)
+        compiled = announce_compiling("match_and_count", quiet)
+        with progress("refining", None, quiet):
+            graph = refine_again(graph, scans, rows, threads)
+    moved = float(np.hypot(*(graph.poses - before)[:, :2].T).max())
+    refined = "" if read is None else ", then refined"
+    outcome = f"energy {optimum.energy:.6g} after {counted(optimum.iterations, 'iteration')}{refined}"
+    summary: list[Row] = [
+        *_graph_rows(graph),
+        ("optimised", [outcome]),
+        ("moved", [f"no pose by more than {moved:.3g} m"]),
+    ]
+    return Run(graph, scans, rows, inputs, summary, compiled)
+
+
+def _log_of(
+    path: str, graph: Graph, log_file: str | None, needed: bool, quiet: bool
+) -> tuple[LaserLog, NDArray[np.int64], str] | None:
+    """The log of a saved graph, the rows of its scans, and its path; None where the graph has none."""
+    from nscan_cli.cli.graph_log import find_log, read_graph_log
+    from nscan_cli.slam.again import can_refine, options_of
+
+    if not can_refine(graph):
+        if needed or log_file is not None:
+            raise WrongUsageError(
+                f"slam: {path} is no graph that slam made from a log; leave out LOG, --map and --carmen"
+            )
+        say(f"{path}: is no graph that slam made from a log: it is optimised only", quiet)
+        return None
+    try:
+        options_of(graph)
+    except ValueError as error:
+        raise InputDataError(
+            label(path), f"provenance.parameters: {error}", "mend it, or write it again"
+        ) from error
+    try:
+        log_file = find_log(path, graph) if log_file is None else log_file
+    except InputMissingError as error:
+        if needed:
+            raise
+        say(f"warning: optimised only, and not refined: {error}", quiet)
+        return None
+    scans, _nodes, rows = read_graph_log(path, graph, log_file, ReadingOptions())
+    return scans, rows, log_file
