@@ -125,6 +125,9 @@ KEYS = (
     ("iterations, evaluations", "both",
      "of all stages, and of all ways that were tried; `max_iterations` of the parameters holds for one "
      "stage"),
+    ("unsettled_stages", "both",
+     "stages before the last that did not settle within their iterations: the match may have converged at a "
+     "wrong place"),
     ("searched", "`nscan`", "whether the scans were placed by search"),
     ("converged, reason", "both",
      "whether the last stage, that of the energy itself, ended at a minimum within its iterations, and if "

@@ -2,8 +2,14 @@
 
 from __future__ import annotations
 
+import ast
+import itertools
+import re
+from pathlib import Path
+
 import pytest
 
+from nscan_cli import counting
 from nscan_cli.counting import counted
 
 
@@ -20,3 +26,42 @@ from nscan_cli.counting import counted
 )
 def test_counted(count, thing, said):
     assert counted(count, thing) == said
+
+
+PACKAGE = Path(counting.__file__).parent
+THINGS = re.compile(
+    r" (scans|records|messages|iterations|evaluations|keyframes|poses|loops|pairs|steps|stamps)\b"
+)
+
+NEVER_ONE = {
+    ("cli/night_lines.py", " scans, "): "so many of so many",
+    ("cli/scan_spec.py", " scans"): "a limit",
+    ("cli/slam.py", " scans a second, "): "a rate",
+    ("evaluation/report.py", " poses match within "): "a trajectory is aligned by several",
+    ("graph/json_fields.py", " poses of three "): "of a joint relation",
+    ("logs/assemble.py", " scans of up to "): "beyond a limit",
+    ("logs/carmen.py", " records can be read: "): "none of so many",
+    ("logs/carmen.py", " records"): "a tag",
+    ("logs/carmen.py", " scans; --laser can be "): "a tag",
+    ("logs/corrected.py", " records"): "a tag",
+    ("logs/mcap_records.py", " messages on "): "so many of so many",
+    ("mapping/plots.py", " scans, least overlap "): "of a joint match",
+    ("slam/nearby.py", " scans hang together"): "so many of so many",
+}
+
+
+def uncounted() -> set[tuple[str, str]]:
+    """The file and the text after a number, wherever a message has a thing in the plural there."""
+    found = set()
+    for path in PACKAGE.rglob("*.py"):
+        for node in ast.walk(ast.parse(path.read_text())):
+            if isinstance(node, ast.JoinedStr):
+                for value, text in itertools.pairwise(node.values):
+                    after = str(text.value) if isinstance(text, ast.Constant) else ""
+                    if isinstance(value, ast.FormattedValue) and THINGS.match(after):
+                        found.add((path.relative_to(PACKAGE).as_posix(), after))
+    return found
+
+
+def test_no_message_counts_by_itself_what_there_may_be_one_of():
+    assert uncounted() == NEVER_ONE.keys()

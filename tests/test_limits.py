@@ -178,7 +178,7 @@ def test_poses_beyond_reason_are_skipped(tmp_path, value):
 def test_stamps_a_century_back_are_times_and_beyond_reason_are_none(tmp_path):
     log = read(tmp_path, *(flaser(stamp) for stamp in ("1e9", "-2155760000", "1e12", "1_0", "2e9")))
     assert log.times[[0, -1]].tolist() == [-2155760000.0, 2e9]
-    assert any("2 scans have no usable time stamp" in warning for warning in log.report.warnings)
+    assert any("2 scans without a usable time stamp" in warning for warning in log.report.warnings)
 
 
 def changed_graph(path: Path, **values: object) -> str:

@@ -165,6 +165,7 @@ def _document(
             "overlap": six_digits(match.overlap),
             "iterations": match.iterations,
             "evaluations": match.evaluations,
+            "unsettled_stages": match.unsettled,
             "converged": match.converged,
             "reason": match.reason,
         },
@@ -191,5 +192,5 @@ def _summary(reference: int, scan: int, match: PairMatch) -> list[Row]:
         ("sigma", [known]),
         ("weakest", [f"{least} {along}"]),
         ("overlap", [f"{match.overlap:.0%}"]),
-        ("match", [ended(match.reason, match.iterations, match.evaluations)]),
+        ("match", ended(match.reason, match.iterations, match.evaluations, match.unsettled)),
     ]  # fmt: skip

@@ -188,6 +188,7 @@ def _fields(numbers: tuple[int, ...], match: NScanMatch, left_out: list[LeftOut]
         "decrement": None if match.decrement is None else six_digits(match.decrement),
         "iterations": joint.iterations,
         "evaluations": joint.evaluations,
+        "unsettled_stages": joint.unsettled,
         "searched": joint.searched,
         "converged": match.reason is None,
         "reason": match.reason,
@@ -218,7 +219,7 @@ def _summary(numbers: tuple[int, ...], match: NScanMatch, left_out: list[LeftOut
     return [
         ("scans", [f"{len(match.kept)} of {len(numbers)}, matched in {counted(len(match.pairs), 'pair')}"]),
         ("overlap", [f"{match.overlap.min():.0%} at least"]),
-        ("match", [ended(match.reason, joint.iterations, joint.evaluations)]),
+        ("match", ended(match.reason, joint.iterations, joint.evaluations, joint.unsettled)),
         ("placed", [searched] if joint.searched else []),
         ("held weakly", [*weak[:NAMED], *more]),
         ("left out", [f"scan {numbers[out.scan]} {out.reason}" for out in left_out]),

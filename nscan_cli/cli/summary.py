@@ -27,7 +27,11 @@ def table(rows: Sequence[Row], width: int | None = WIDTH) -> str:
     return "\n".join(shown)
 
 
-def ended(reason: str | None, iterations: int, evaluations: int) -> str:
-    """How a match ended: converged, or why not (`reason`), and what it took on all its ways."""
+def ended(reason: str | None, iterations: int, evaluations: int, unsettled: int) -> list[str]:
+    """How a match ended: converged, or why not (`reason`), what it took, and what was cut off on its way."""
     outcome = "converged" if reason is None else f"not converged ({reason})"
-    return f"{outcome}, {counted(iterations, 'iteration')}, {counted(evaluations, 'evaluation')}"
+    cut = f"{counted(unsettled, 'stage')} before the last did not settle: the place is less sure"
+    return [
+        f"{outcome}, {counted(iterations, 'iteration')}, {counted(evaluations, 'evaluation')}",
+        *([cut] if unsettled else []),
+    ]

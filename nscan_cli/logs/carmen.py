@@ -7,6 +7,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from nscan_cli.counting import counted
 from nscan_cli.errors import InputDataError, WrongUsageError
 from nscan_cli.logs import carmen_records, corrected, order
 from nscan_cli.logs.assemble import Findings, Motion, RawScans, laser_log
@@ -58,7 +59,9 @@ def read(data: bytes, file: str, source: Source, options: ReadingOptions) -> Las
     if strange:
         kinds = ", ".join(f"{name} ({count})" for name, count in list(strange.items())[:MOST_KINDS])
         more = ", …" if len(strange) > MOST_KINDS else ""
-        warnings.append(f"{sum(strange.values())} records of kinds unknown to CARMEN: {kinds}{more}")
+        warnings.append(
+            f"{counted(sum(strange.values()), 'record')} of kinds unknown to CARMEN: {kinds}{more}"
+        )
     scans = carmen_records.scans(tag, lines[tag], skips)
     if not scans.stamps:
         reason, (_, first) = next(iter(skips.reasons.items()))

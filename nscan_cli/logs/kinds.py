@@ -63,7 +63,7 @@ MAGIC = (
 """What the first bytes say."""
 
 TEXT = (
-    (rb"\[[\w.-]+\]\s*$", "TOML or INI text"),
+    (rb"\[{1,2}[\w.-]+\]{1,2}\s*$", "TOML or INI text"),
     (rb'\{"format": ?"nscan-pose-graph"', "a pose graph (JSON)"),
     (rb"[{\[]", "JSON text"),
     (rb"<", "HTML or XML text"),

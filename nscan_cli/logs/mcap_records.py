@@ -19,6 +19,7 @@ from mcap.data_stream import ReadDataStream
 from mcap.exceptions import McapError
 from mcap.opcode import Opcode
 
+from nscan_cli.counting import counted
 from nscan_cli.errors import InputDataError
 from nscan_cli.limits import INPUT, MB
 from nscan_cli.logs.recording import DAMAGED, WANTED, Channel, Message, Recording, ros_name
@@ -109,7 +110,9 @@ class _Reader:
                 self._lost(None, f"{read} of {given} messages on {channel.topic} are readable")
         missing = 0 if counts is None else sum(n for key, n in counts.items() if key not in self.channels)
         if missing:
-            self._lost(None, f"{missing} messages on channels that it does not define are not readable")
+            self._lost(
+                None, f"{counted(missing, 'message')} not readable, on channels that it does not define"
+            )
         if self.recording.warnings:
             self.recording.checksums = "some do not fit, or cannot be checked"
         else:

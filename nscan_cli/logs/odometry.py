@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from nscan_cli.counting import counted
 from nscan_cli.poses import Array, wrap
 
 
@@ -18,7 +19,7 @@ def interpolated(times: Array, at: Array, poses: Array, name: str, warnings: lis
         warnings.append(f"no scan lies between the first {name} and the last: no odometry")
         return None
     if outside:
-        warnings.append(f"{outside} scans lie before the first {name} or after the last")
+        warnings.append(f"{counted(outside, 'scan')} before the first {name} or after the last")
     angles = np.unwrap(poses[:, 2])
     columns = (poses[:, 0], poses[:, 1], angles)
     found = np.stack([np.interp(times, at, column) for column in columns], axis=-1)

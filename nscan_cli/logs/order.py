@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from nscan_cli.counting import counted
 from nscan_cli.errors import WrongUsageError
 from nscan_cli.limits import TIME
 from nscan_cli.logs.options import ReadingOptions
@@ -66,7 +67,9 @@ def by_time(stamps: list[str]) -> Order:
         times[~good] = np.interp(places[~good], places[good], times[good])
         for row in np.flatnonzero(~good):
             texts[row] = f"{times[row]:.6f}"
-        warnings.append(f"{np.sum(~good)} scans have no usable time stamp; it was filled in between others")
+        warnings.append(
+            f"{counted(int(np.sum(~good)), 'scan')} without a usable time stamp: filled in between others"
+        )
     for since, by in _set_back(times):
         times[since:] += by
         texts[since:] = [f"{time:.6f}" for time in times[since:]]
@@ -75,7 +78,7 @@ def by_time(stamps: list[str]) -> Order:
         )
     backward = int(np.sum(np.diff(times) < 0))
     if backward:
-        warnings.append(f"{backward} time stamps step back; the scans are sorted by time")
+        warnings.append(f"{counted(backward, 'step')} back in time; the scans are sorted by time")
     rows = np.argsort(times, kind="stable")
     return Order(rows, times[rows], [texts[row] for row in rows], backward, False, warnings)
 

@@ -6,6 +6,7 @@ import re
 
 import numpy as np
 
+from nscan_cli.counting import counted
 from nscan_cli.errors import InputDataError, WrongUsageError
 from nscan_cli.logs import order, player_records
 from nscan_cli.logs.assemble import Findings, Motion, laser_log
@@ -79,7 +80,7 @@ def _chosen(
     for (device, kind), found in sorted(lines.items()):
         if device.split(":")[-2] in interfaces and kind in DATA:
             counts[device] = counts.get(device, 0) + len(found)
-    listed = ", ".join(f"{device} ({count} records)" for device, count in counts.items())
+    listed = ", ".join(f"{device} ({counted(count, 'record')})" for device, count in counts.items())
     if asked is not None:
         if asked not in counts:
             raise WrongUsageError(f"{file}: has no {asked}; --{option} can be {listed or 'left out'}")

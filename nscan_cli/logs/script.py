@@ -11,6 +11,7 @@ import re
 
 import numpy as np
 
+from nscan_cli.counting import counted
 from nscan_cli.errors import InputDataError, WrongUsageError
 from nscan_cli.limits import KINDS
 from nscan_cli.logs import order
@@ -49,7 +50,7 @@ def read(data: bytes, file: str, source: Source, options: ReadingOptions) -> Las
     lines = _lines(data, skips)
     findings = Findings(skips, {tag: len(found) for tag, found in lines.items()})
     lasers = [tag for tag in lines if tag.startswith("LASER-RANGE:")]
-    listed = ", ".join(f"{tag} ({len(lines[tag])} records)" for tag in lasers)
+    listed = ", ".join(f"{tag} ({counted(len(lines[tag]), 'record')})" for tag in lasers)
     if not lasers:
         raise InputDataError(file, "has no LASER-RANGE record", "give a log with laser scans")
     if options.laser is not None and options.laser not in lasers:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from nscan_cli.counting import counted
 from nscan_cli.errors import InputDataError, WrongUsageError
 from nscan_cli.logs.options import ReadingOptions
 from nscan_cli.logs.recording import ODOMETRY, SCANS, TRANSFORMS, Recording
@@ -64,4 +65,6 @@ def _unfit(recording: Recording, topic: str) -> str:
 
 
 def _said(topics: dict[str, int]) -> str:
-    return ", ".join(f"{topic} ({count} messages)" for topic, count in topics.items()) or "left out"
+    return (
+        ", ".join(f"{topic} ({counted(count, 'message')})" for topic, count in topics.items()) or "left out"
+    )

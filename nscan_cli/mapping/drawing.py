@@ -161,7 +161,8 @@ def _points_of_occupied_cells(
     log: LaserLog, rows: NDArray[np.int64], poses: Array, grid: OccupancyGrid
 ) -> Array:
     """(M, 2) the end points of the beams, m, that lie in occupied cells."""
-    points = np.concatenate([transform(pose, log.points(row)) for row, pose in zip(rows, poses, strict=True)])
+    seen = list(log.each_points())
+    points = np.concatenate([transform(pose, seen[row]) for row, pose in zip(rows, poses, strict=True)])
     columns, lines = np.floor((points - np.array(grid.origin)) / grid.resolution).astype(np.int64).T
     height, width = grid.shape
     inside = (columns >= 0) & (columns < width) & (lines >= 0) & (lines < height)

@@ -75,6 +75,8 @@ class JointMatch:
     evaluations: int
     last_iterations: int
     """Those of the iterations that were done in the last stage."""
+    unsettled: int
+    """Stages of the way here before the last that did not settle within their iterations."""
     converged: bool
     searched: bool = False
     """Whether the scans were placed by search, because the start led nowhere."""
@@ -91,6 +93,8 @@ class Way(NamedTuple):
     poses: Array
     iterations: int
     evaluations: int
+    unsettled: int
+    """Stages that did not settle."""
 
 
 def match_jointly(problem: JointProblem, start: Array, options: JointOptions) -> JointMatch:
@@ -145,10 +149,10 @@ def _approach(
     pairs_at: PairsAt | None = None,
 ) -> Way:
     poses = start.copy()
-    iterations = evaluations = 0
+    iterations = evaluations = unsettled = 0
     for widening in widenings:
         near = options.near if widening < 1.0 else 0.5 * options.near
-        _, steps, evaluated, _ = _descend(
+        _, steps, evaluated, settled = _descend(
             _at(problem, pairs_at, poses),
             poses,
             widening,
@@ -162,7 +166,8 @@ def _approach(
         )
         iterations += steps
         evaluations += evaluated
-    return Way(poses, iterations, evaluations)
+        unsettled += not settled
+    return Way(poses, iterations, evaluations, unsettled)
 
 
 def _finish(problem: JointProblem, way: Way, options: JointOptions, neutral: bool) -> JointMatch:
@@ -196,6 +201,7 @@ def _finish(problem: JointProblem, way: Way, options: JointOptions, neutral: boo
         iterations=way.iterations + last,
         evaluations=way.evaluations + evaluated,
         last_iterations=last,
+        unsettled=way.unsettled,
         converged=converged,
     )
 

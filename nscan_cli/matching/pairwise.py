@@ -76,6 +76,9 @@ class PairMatch:
     """Share of the scan's points that lie on a Gaussian of the reference."""
     iterations: int
     evaluations: int
+    """These of all stages."""
+    unsettled: int
+    """Stages before the last that did not settle within their iterations: where they led is less sure."""
     reason: str | None
     """Why the match did not converge; None when it did."""
 
@@ -117,21 +120,22 @@ def match_pair(
     prior = prior or Prior(np.zeros(3), np.zeros((3, 3)))
     problem = PairProblem(reference.grid, reference.half, points, options.scale, prior)
     pose, hessian, gradient, out = start.copy(), np.empty((3, 3)), np.empty(3), np.empty(OUT)
-    iterations, evaluations, last, settled = 0, 1, 0, False
-    # The last stage by itself: only its end tells whether the match has converged.
-    for stages in (options.widenings[:-1], options.widenings[-1:]):
-        _, _, last, evaluated, settled = minimise(
-            problem, pose, np.array(stages), options.max_iterations, options.tolerance, hessian
+    iterations, evaluations, last, settled = 0, 1, 0, [True]
+    # One by one: the end of the last tells whether the match has converged.
+    for widening in options.widenings:
+        _, _, last, evaluated, ended = minimise(
+            problem, pose, np.array([widening]), options.max_iterations, options.tolerance, hessian
         )
         iterations += last
         evaluations += evaluated
+        settled.append(ended)
     objective(problem, begin(points), pose, 1.0, 1.0, out, gradient, hessian)
     overlap = inlier_share(reference.grid, reference.half, points, pose, INLIER_BOUND)
     covariance = covariance_of(hessian)
     reason = None
     if overlap < LEAST_OVERLAP:
         reason = NO_OVERLAP
-    elif not settled:
+    elif not settled[-1]:
         reason = STEP_LIMIT if last == options.max_iterations else NO_DESCENT
     elif covariance is None:
         reason = INDEFINITE
@@ -149,5 +153,6 @@ def match_pair(
         overlap=overlap,
         iterations=iterations,
         evaluations=evaluations,
+        unsettled=settled[:-1].count(False),
         reason=reason,
     )

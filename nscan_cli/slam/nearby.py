@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nscan_cli.compiled import kernel
+from nscan_cli.counting import counted
 from nscan_cli.graph.model import Loop, NScan, Pairwise
 from nscan_cli.matching.joint import JointMatch, JointOptions, match_jointly
 from nscan_cli.matching.joint_energy import JointProblem, Priors, all_pairs, no_priors
@@ -147,7 +148,7 @@ def _match_held(
         closed = bool(seen_before[kept].any())
         relation = _relation(keyframes, members, at, match, "loop" if closed else "nscan", score)
         whole = len(kept) == len(tried)
-        reason = "" if whole else f"{len(tried) - len(kept)} scans left out"
+        reason = "" if whole else f"{counted(len(tried) - len(kept), 'scan')} left out"
         used, before = (members, seen_before[kept]) if closed else (tried, seen_before)
         loop = verdict(keyframes, used, before, centre, closed, reason, score)
         return Nearby((), relation, loop, moved_by(poses[members], match.poses, at), whole)

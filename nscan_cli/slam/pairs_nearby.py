@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from nscan_cli.counting import counted
 from nscan_cli.graph.model import Pairwise
 from nscan_cli.matching.newton import PairProblem, minimise
 from nscan_cli.matching.overlap import INLIER_BOUND
@@ -55,9 +56,9 @@ def match_pairs_nearby(route: Route, centre: int, options: NScanOptions) -> Near
     )
     closed, whole = bool((kept & seen_before).any()), bool(kept.all())
     if closed:
-        reason = "" if whole else f"{(~kept).sum()} scans left out"
+        reason = "" if whole else f"{counted(int((~kept).sum()), 'scan')} left out"
     else:
-        reason = f"too little overlap with all {seen_before.sum()} scans of another visit"
+        reason = f"too little overlap with {counted(int(seen_before.sum()), 'scan')} of another visit"
     best = float(overlaps[seen_before].max(initial=0.0))
     used = kept if closed else np.ones(len(tried), dtype=bool)
     loop = verdict(keyframes, tried[used], seen_before[used], centre, closed, reason, best)

@@ -24,7 +24,7 @@ CORRIDOR = str(Path(SAMPLE).with_name("corridor_and_room.log.gz"))
 KEYS = [
     "format", "version", "units", "provenance", "reference", "scan", "initial", "pose", "energy",
     "gradient_norm", "decrement", "hessian", "covariance", "eigenvalues", "weakest", "overlap", "iterations",
-    "evaluations", "converged", "reason",
+    "evaluations", "unsettled_stages", "converged", "reason",
 ]  # fmt: skip
 
 
@@ -253,3 +253,12 @@ def test_a_real_log(capsys):
     assert document["overlap"] > 0.7
     assert document["weakest"]["sigma"] < 0.1
     np.testing.assert_allclose(document["pose"][:2], document["initial"][:2], atol=0.15)
+
+
+def test_a_stage_that_was_cut_off_is_told_though_the_match_has_converged(capsys):
+    """Half a metre off by the truth: the place is a minimum, but the way there was cut at 50 iterations."""
+    arguments = ["--reference", "553", "--scan", "567", "--initial=-0.4,0.1,155", "--prior", "none"]
+    document, said = matched(capsys, SAMPLE, *arguments)
+    assert np.hypot(*off(document, SAMPLE)[:2]) > 0.4
+    assert (document["converged"], document["reason"], document["unsettled_stages"]) == (True, None, 1)
+    assert said[-1].strip() == "1 stage before the last did not settle: the place is less sure"

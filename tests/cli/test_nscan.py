@@ -28,8 +28,8 @@ SPEC = "2000-2024:8"
 SCANS = [2000, 2008, 2016, 2024]
 KEYS = [
     "format", "version", "units", "provenance", "relation", "covariance", "energy", "gradient_norm",
-    "decrement", "iterations", "evaluations", "searched", "converged", "reason", "pairs", "overlap",
-    "weakest", "left_out",
+    "decrement", "iterations", "evaluations", "unsettled_stages", "searched", "converged", "reason",
+    "pairs", "overlap", "weakest", "left_out",
 ]  # fmt: skip
 
 

@@ -293,4 +293,4 @@ def test_six_digit_times_alone_are_no_sign_of_correction(tmp_path):
 def test_records_of_unknown_kinds_are_told(tmp_path):
     log = read(tmp_path, flaser(1), flaser(2).replace("FLASER", "FLASEQ"), flaser(3), "SONAR 1 2 3 h 4")
     assert len(log) == 2
-    assert log.report.warnings[0] == "1 records of kinds unknown to CARMEN: FLASEQ (1)"
+    assert log.report.warnings[0] == "1 record of kinds unknown to CARMEN: FLASEQ (1)"

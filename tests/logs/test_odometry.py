@@ -34,7 +34,7 @@ def test_outside_the_ends_hold_and_are_told():
     )
     assert found is not None
     np.testing.assert_allclose(found[:, 0], [1, 1.5, 2])
-    assert warnings == ["2 scans lie before the first record or after the last"]
+    assert warnings == ["2 scans before the first record or after the last"]
 
 
 def test_none_inside_is_no_odometry():

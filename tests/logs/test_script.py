@@ -56,7 +56,7 @@ def test_malformed_records_are_counted(tmp_path):
 
 def test_several_lasers_have_to_be_chosen_from(tmp_path):
     second = LINES[2].replace(" 0 5 ", " 1 5 ").replace("100 200.5", "700 200.5")
-    with pytest.raises(WrongUsageError, match=r"LASER-RANGE:0 \(1 records\), LASER-RANGE:1 .*--laser"):
+    with pytest.raises(WrongUsageError, match=r"LASER-RANGE:0 \(1 record\), LASER-RANGE:1 .*--laser"):
         read(tmp_path, *LINES, second)
     log = read(tmp_path, *LINES, second, options=ReadingOptions(laser="LASER-RANGE:1", mount=(0.1, 0, 0)))
     assert log.ranges[0, 0] == 7.0

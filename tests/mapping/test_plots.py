@@ -52,7 +52,7 @@ def pair_match(pose: np.ndarray, covariance: np.ndarray | None, reason: str | No
     return PairMatch(
         pose=pose, energy=-1.0, gradient_norm=0.0, decrement=0.0, hessian=np.eye(3), covariance=covariance,
         eigenvalues=np.ones(3), weakest=Weakest(0.0, 0.1), overlap=0.9, iterations=5, evaluations=6,
-        reason=reason,
+        unsettled=0, reason=reason,
     )  # fmt: skip
 
 
@@ -145,7 +145,7 @@ def test_wide_scans_are_stacked():
 
 def nscan_of(kept: tuple[int, ...], poses: np.ndarray) -> NScanMatch:
     n = len(kept)
-    joint = JointMatch(poses, np.zeros(3 * n), np.eye(3 * n), all_pairs(n), -1.0, 5, 6, 3, True)
+    joint = JointMatch(poses, np.zeros(3 * n), np.eye(3 * n), all_pairs(n), -1.0, 5, 6, 3, 0, True)
     return NScanMatch(kept, 0, joint, poses, -1.0, None, None, joint.pairs, np.full(n, 0.9), (), None)
 
 

@@ -129,3 +129,12 @@ def test_fig_3_is_known_jointly_where_its_pairs_are_not(noise, factor):
         assert smallest > factor * values[0]
         off = np.degrees(weakest_translation(pair).direction) - direction
         assert abs((off + 90) % 180 - 90) < 5
+
+
+def test_stages_that_are_cut_off_on_the_way_are_counted():
+    problem = office_problem((300, 304, 308))
+    start = problem.truth + np.array([[0.0, 0.0, 0.0], [0.1, 0.05, 0.05], [-0.1, 0.1, -0.05]])
+    for most, unsettled in ((30, 0), (1, 3)):
+        options = JointOptions(approach_iterations=most)
+        match = match_jointly(problem.joint(), start, options)
+        assert (match.converged, match.unsettled) == (True, unsettled)

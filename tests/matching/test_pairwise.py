@@ -1,11 +1,13 @@
 from __future__ import annotations
 
 import dataclasses
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from nscan_cli.errors import InputDataError
+from nscan_cli.logs.load import read_log
 from nscan_cli.matching.pairwise import (
     HELD,
     NO_OVERLAP,
@@ -23,6 +25,7 @@ from tests.simulation.laser import Laser
 from tests.simulation.scenes import corridor_and_room, office
 
 ROWS = range(0, 2400, 100)
+SAMPLE = Path(__file__).resolve().parents[2] / "sample_logs" / "office.log.gz"
 
 
 def pair_matches(noise: bool) -> list[tuple[PairMatch, Array]]:
@@ -138,6 +141,20 @@ def test_too_few_steps_are_named():
     match = match_pair(scans.ndts[0], scans.points[1], start, None, hurried)
     assert match.reason == STEP_LIMIT
     assert (match.iterations, match.evaluations) == (3, 7)
+
+
+def test_a_stage_that_is_cut_off_on_the_way_is_counted():
+    """From this start, turned by 155°, the first stage circles; the match converges, and at a wrong place."""
+    log = read_log(str(SAMPLE))
+    ndt, points = scan_ndt(matched_points(log, 553, OPTIONS), OPTIONS), matched_points(log, 567, OPTIONS)
+    start = np.array([-0.4, 0.1, np.radians(155)])
+    match = match_pair(ndt, points, start, None, OPTIONS)
+    assert (match.converged, match.unsettled) == (True, 1)
+    for options in (
+        dataclasses.replace(OPTIONS, max_iterations=5000),
+        dataclasses.replace(OPTIONS, widenings=OPTIONS.widenings[-1:]),
+    ):
+        assert match_pair(ndt, points, start, None, options).unsettled == 0
 
 
 def test_a_border_that_holds_the_match_is_reported():

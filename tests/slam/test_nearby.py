@@ -203,7 +203,7 @@ def test_a_foreign_scan_is_left_out_and_named_in_the_reason():
     assert 300 not in found.nscan.nodes
     assert not found.whole
     assert found.loop is not None
-    assert (found.loop.accepted, found.loop.reason) == (True, "1 scans left out")
+    assert (found.loop.accepted, found.loop.reason) == (True, "1 scan left out")
     errors = off_truth(found)
     assert np.hypot(errors[:, 0], errors[:, 1]).max() < 0.04
 

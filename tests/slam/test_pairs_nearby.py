@@ -52,7 +52,7 @@ def test_every_match_is_a_relation_near_the_truth_of_its_own():
         assert abs(off_truth(relation)[2]) < np.radians(0.7)
     assert found.loop is not None
     assert found.loop.nodes == (OLD[0], NEW[-1])
-    assert (found.loop.accepted, found.loop.reason) == (True, "1 scans left out")
+    assert (found.loop.accepted, found.loop.reason) == (True, "1 scan left out")
     assert found.loop.score == max(r.score for r in found.pairwise if r.origin == "loop")
     assert found.moved == pytest.approx(np.hypot(*OFF[:2]), abs=0.1)
 
@@ -113,7 +113,7 @@ def test_when_nothing_of_another_visit_overlaps_the_loop_is_refused_with_a_reaso
     assert found.loop is not None
     assert found.loop.nodes == (OLD[0], NEW[-1])
     assert not found.loop.accepted
-    assert found.loop.reason == f"too little overlap with all {len(OLD)} scans of another visit"
+    assert found.loop.reason == f"too little overlap with {len(OLD)} scans of another visit"
     assert 0 < found.loop.score < NScanOptions().overlap
 
 
