@@ -31,15 +31,28 @@ def kernel(function: Function) -> Function:
     return _compiled(function, {"contract"})
 
 
+def lean_kernel(function: Function) -> Function:
+    """The same for what is called in the loops of other kernels: it makes no arrays.
+
+    It counts no references to the arrays that it is given: in a loop that takes longer than the work.
+    """
+    return _compiled(function, {"contract"}, _nrt=False)
+
+
+def inlined_kernel(function: Function) -> Function:
+    """The same for what gives lean kernels a part of their arrays: it becomes part of them."""
+    return _compiled(function, {"contract"}, inline="always")
+
+
 def summing_kernel(function: Function) -> Function:
-    """The same for a loop that does nothing but sum: its terms may be summed in lanes, side by side.
+    """A lean kernel whose loop does nothing but sum: its terms may be summed in lanes, side by side.
 
     How many lanes there are depends on the processor, on nothing else.
     """
-    return _compiled(function, {"contract", "reassoc", "nsz"})
+    return _compiled(function, {"contract", "reassoc", "nsz"}, _nrt=False)
 
 
-def _compiled(function: Function, fastmath: set[str]) -> Function:
+def _compiled(function: Function, fastmath: set[str], **options: Any) -> Function:
     import numba
 
     config: Any = numba.config
@@ -49,7 +62,7 @@ def _compiled(function: Function, fastmath: set[str]) -> Function:
     configured, config.CACHE_DIR = config.CACHE_DIR, "" if folder is None else str(folder)
     try:
         compile_lazily = numba.njit(
-            cache=folder is not None, nogil=True, error_model="numpy", fastmath=fastmath
+            cache=folder is not None, nogil=True, error_model="numpy", fastmath=fastmath, **options
         )
         compiled = compile_lazily(function)
     finally:

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from nscan_cli.compiled import kernel
+from nscan_cli.compiled import kernel, lean_kernel
 from nscan_cli.matching.planar import relative_pose
 from nscan_cli.matching.scans import Scans, most_points, scan_grid, scan_points
 from nscan_cli.ndt.energy import OUT, accumulate, unpack
@@ -44,6 +44,21 @@ class JointProblem(NamedTuple):
     priors: Priors
     scale: float
     """What E is multiplied with to be a negative log likelihood."""
+
+
+class Room(NamedTuple):
+    """Room for one pair after the other."""
+
+    u: Array
+    """(3,) p_j ⊖ p_i"""
+    g: Array
+    """(3,) gradient of E_ij in u."""
+    h: Array
+    """(3, 3) Hessian."""
+    out: Array
+    """(OUT,) both as an evaluation gives them."""
+    met: Array
+    """See room_to_meet."""
 
 
 class JointEnergy(NamedTuple):
@@ -87,7 +102,7 @@ def pair_energies(problem: JointProblem, poses: Array, share: float = COVERING, 
     that it meets. Its derivatives are the same. With a stride only every so-manyth point is counted.
     """
     values = np.zeros((len(poses), len(poses)))
-    _each_pair(problem, poses, share, stride, values)
+    _each_pair(problem, poses, share, stride, _room(problem.scans, stride), values)
     return values
 
 
@@ -96,6 +111,12 @@ def neutral_energy(problem: JointProblem, poses: Array, share: float = COVERING,
     n = len(poses)
     of_priors = _add_priors(problem.priors, poses, 0.0, np.zeros(3 * n), np.zeros((3 * n, 3 * n)))
     return float(pair_energies(problem, poses, share, stride).sum() + of_priors)
+
+
+@kernel
+def _room(scans: Scans, stride: int) -> Room:
+    met = room_to_meet(most_points(scans), stride)
+    return Room(np.empty(3), np.empty(3), np.empty((3, 3)), np.empty(OUT), met)
 
 
 @kernel
@@ -115,16 +136,16 @@ def evaluate(
     """
     gradient[:] = 0.0
     hessian[:, :] = 0.0
-    value = _add_pairs(
-        problem, poses, widening, curvature, NEUTRAL if neutral else 0.0, stride, gradient, hessian
-    )
+    share, room = NEUTRAL if neutral else 0.0, _room(problem.scans, stride)
+    value = _add_pairs(problem, poses, widening, curvature, share, stride, room, gradient, hessian)
     return float(value + _add_priors(problem.priors, poses, curvature, gradient, hessian))
 
 
-@kernel
-def _each_pair(problem: JointProblem, poses: Array, share: float, stride: int, values: Array) -> None:
-    scans = problem.scans
-    u, out, met = np.empty(3), np.empty(OUT), room_to_meet(most_points(scans), stride)
+@lean_kernel
+def _each_pair(
+    problem: JointProblem, poses: Array, share: float, stride: int, room: Room, values: Array
+) -> None:
+    scans, u = problem.scans, room.u
     for pair in range(problem.pairs.shape[0]):
         i, j = problem.pairs[pair, 0], problem.pairs[pair, 1]
         relative_pose(poses[j], poses[i], u)
@@ -139,13 +160,13 @@ def _each_pair(problem: JointProblem, poses: Array, share: float, stride: int, v
             0.0,
             share * scans.usual[i],
             stride,
-            met,
-            out,
+            room.met,
+            room.out,
         )
-        values[i, j] = stride * problem.scale * out[0]
+        values[i, j] = stride * problem.scale * room.out[0]
 
 
-@kernel
+@lean_kernel
 def _add_pairs(
     problem: JointProblem,
     poses: Array,
@@ -153,12 +174,12 @@ def _add_pairs(
     curvature: float,
     neutral: float,
     stride: int,
+    room: Room,
     gradient: Array,
     hessian: Array,
 ) -> float:
     scans, pairs, scale = problem.scans, problem.pairs, stride * problem.scale
-    out, met = np.empty(OUT), room_to_meet(most_points(scans), stride)
-    u, g, h = np.empty(3), np.empty(3), np.empty((3, 3))
+    u, g, h, out, met = room
     value = 0.0
     for pair in range(pairs.shape[0]):
         i, j = pairs[pair, 0], pairs[pair, 1]
@@ -198,7 +219,7 @@ def _add_priors(priors: Priors, poses: Array, curvature: float, gradient: Array,
     return value
 
 
-@kernel
+@lean_kernel
 def _chain(
     i: int,
     j: int,
@@ -244,7 +265,7 @@ def _chain(
     _add_row(hessian, i + 2, j, rx, ry, w_column - h[2, 2])
 
 
-@kernel
+@lean_kernel
 def _add_symmetric(
     matrix: Array, at: int, xx: float, xy: float, xp: float, yy: float, yp: float, pp: float
 ) -> None:
@@ -260,7 +281,7 @@ def _add_symmetric(
     matrix[at + 2, at + 2] += pp
 
 
-@kernel
+@lean_kernel
 def _add_row(matrix: Array, row: int, column: int, x: float, y: float, p: float) -> None:
     """Add a row (3,) of a block, and as a column what mirrors it."""
     matrix[row, column] += x

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from nscan_cli.compiled import kernel
+from nscan_cli.compiled import lean_kernel
 from nscan_cli.poses import Array
 
 
-@kernel
+@lean_kernel
 def solve_definite(matrix: Array, right: Array, out: Array) -> bool:
     """Solve a symmetric positive definite system (m, m) by Cholesky; False when it is not definite.
 

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from nscan_cli.compiled import kernel
+from nscan_cli.compiled import kernel, lean_kernel
 from nscan_cli.matching.linear import solve_definite
 from nscan_cli.matching.priors import Prior
 from nscan_cli.ndt.energy import OUT, sum_meeting, unpack
@@ -39,7 +39,7 @@ class PairProblem(NamedTuple):
     """(14), of mean z and information P."""
 
 
-@kernel
+@lean_kernel
 def objective(
     problem: PairProblem,
     meeting: Meeting,

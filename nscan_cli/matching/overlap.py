@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from nscan_cli.compiled import kernel
+from nscan_cli.compiled import lean_kernel
 from nscan_cli.matching.planar import relative_pose
 from nscan_cli.matching.scans import Scans, scan_grid, scan_points
 from nscan_cli.ndt.energy import find_inliers
@@ -35,17 +35,20 @@ def overlaps(scans: Scans, poses: Array) -> Overlaps:
     """The overlaps of n scans at the poses (n, 3)."""
     n = len(poses)
     shares = Overlaps(np.zeros((n, n)), np.zeros(n))
-    _count(scans, poses, shares.pairs, shares.scans)
+    seen = np.empty(np.diff(scans.point_starts).max(initial=0), dtype=np.bool_)
+    _count(scans, poses, np.empty(3), seen, shares.pairs, shares.scans)
     return shares
 
 
-@kernel
-def _count(scans: Scans, poses: Array, pairs: Array, shares: Array) -> None:
+@lean_kernel
+def _count(
+    scans: Scans, poses: Array, u: Array, seen: NDArray[np.bool_], pairs: Array, shares: Array
+) -> None:
+    """Write both shares; `u` (3,) and `seen`, of the points of any scan, are room."""
     n = poses.shape[0]
-    u = np.empty(3)
     for j in range(n):
         points = scan_points(scans, j)
-        seen = np.zeros(points.shape[0], dtype=np.bool_)
+        seen[:] = False
         weight = 1.0 / max(points.shape[0], 1)
         for i in range(n):
             if i == j:

@@ -10,7 +10,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from nscan_cli.compiled import kernel
+from nscan_cli.compiled import lean_kernel
 from nscan_cli.matching.joint_energy import all_pairs
 from nscan_cli.matching.planar import relative_pose
 from nscan_cli.matching.scans import Scans, scan_grid, scan_points
@@ -45,10 +45,10 @@ def index_set(kind: Kind, scans: Scans, poses: Array) -> NDArray[np.int64]:
         return all_pairs(n)
     shares = np.zeros((n, n))
     if kind == "visible":
-        _see(scans, poses, shares)
+        _see(scans, poses, np.empty(3), shares)
         linked = shares > 0.0
     else:
-        _meet(scans, poses, shares)
+        _meet(scans, poses, np.empty(3), shares)
         linked = shares >= LEAST_SHARE
         both = np.maximum(shares, shares.T)
         nearest = both.argmax(axis=1)
@@ -56,11 +56,10 @@ def index_set(kind: Kind, scans: Scans, poses: Array) -> NDArray[np.int64]:
     return np.ascontiguousarray(np.argwhere(linked | linked.T), dtype=np.int64)
 
 
-@kernel
-def _see(scans: Scans, poses: Array, shares: Array) -> None:
-    """Write 1 to shares (n, n) at [i, j] where scan i saw the position of scan j."""
+@lean_kernel
+def _see(scans: Scans, poses: Array, u: Array, shares: Array) -> None:
+    """Write 1 to shares (n, n) at [i, j] where scan i saw the position of scan j; u (3,) is room."""
     n = poses.shape[0]
-    u = np.empty(3)
     for i in range(n):
         points = scan_points(scans, i)
         for j in range(n):
@@ -83,14 +82,13 @@ def _see(scans: Scans, poses: Array, shares: Array) -> None:
                 shares[i, j] = 1.0
 
 
-@kernel
-def _meet(scans: Scans, poses: Array, shares: Array) -> None:
+@lean_kernel
+def _meet(scans: Scans, poses: Array, u: Array, shares: Array) -> None:
     """Write to shares (n, n) at [i, j] how much of scan j falls into cells where scan i has a Gaussian.
 
-    One that a beam would hit from behind does not count.
+    One that a beam would hit from behind does not count. `u` (3,) is room.
     """
     n = poses.shape[0]
-    u = np.empty(3)
     for j in range(n):
         points = scan_points(scans, j)[::EVERY]
         weight = 1.0 / max(points.shape[0], 1)

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from nscan_cli.compiled import kernel
+from nscan_cli.compiled import lean_kernel
 from nscan_cli.poses import Array
 
 
-@kernel
+@lean_kernel
 def relative_pose(a: Array, b: Array, out: Array) -> None:
     """Eq. (2), a ⊖ b; the angle is left as it is."""
     cos, sin = np.cos(b[2]), np.sin(b[2])
@@ -16,7 +16,7 @@ def relative_pose(a: Array, b: Array, out: Array) -> None:
     out[0], out[1], out[2] = cos * dx + sin * dy, cos * dy - sin * dx, a[2] - b[2]
 
 
-@kernel
+@lean_kernel
 def composed_pose(a: Array, b: Array, out: Array) -> None:
     """a ⊕ b; the angle is left as it is."""
     cos, sin = np.cos(a[2]), np.sin(a[2])
@@ -24,7 +24,7 @@ def composed_pose(a: Array, b: Array, out: Array) -> None:
     out[0], out[1], out[2] = x, y, a[2] + b[2]
 
 
-@kernel
+@lean_kernel
 def wrapped(angle: float) -> float:
     """The angle (rad) normalised to (−π, π]."""
     return float(angle - 2 * np.pi * np.ceil((angle - np.pi) / (2 * np.pi)))

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from nscan_cli.compiled import kernel
+from nscan_cli.compiled import inlined_kernel, kernel
 from nscan_cli.ndt.energy import OUT, accumulate
 from nscan_cli.ndt.grid import Ndt
 from nscan_cli.ndt.meeting import room_to_meet
@@ -63,7 +63,7 @@ def lay_out(ndts: Sequence[Ndt], points: Sequence[Array], neutral: bool = True) 
     )
 
 
-@kernel
+@inlined_kernel
 def scan_grid(scans: Scans, i: int) -> Grid:
     """The NDT of scan i."""
     t0, t1 = scans.table_starts[i], scans.table_starts[i + 1]
@@ -73,7 +73,7 @@ def scan_grid(scans: Scans, i: int) -> Grid:
     return Grid(grid.table[t0:t1], grid.keys[r0:r1], grid.links[r0:r1], grid.sums, grid.gaussians[g0:g1])
 
 
-@kernel
+@inlined_kernel
 def scan_points(scans: Scans, i: int) -> Array:
     """The points (m, 2) of scan i in its own frame."""
     return scans.points[scans.point_starts[i] : scans.point_starts[i + 1]]

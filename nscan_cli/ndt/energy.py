@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from nscan_cli.compiled import kernel, summing_kernel
+from nscan_cli.compiled import kernel, lean_kernel, summing_kernel
 from nscan_cli.ndt.grid import Ndt
 from nscan_cli.ndt.meeting import BLOCKS, Meeting, meet, room_to_meet
 from nscan_cli.ndt.table import Grid, find_row, pack
@@ -31,7 +31,7 @@ LN2_HIGH, LN2_LOW = 0.6931471803691238, 1.9082149292705877e-10
 """ln 2 in two parts, of which the first times a whole number is exact."""
 
 
-@kernel
+@lean_kernel
 def accumulate(
     grid: Grid,
     half: float,
@@ -128,7 +128,7 @@ def _terms(
     )
 
 
-@kernel
+@lean_kernel
 def _exp(t: float) -> float:
     """eᵗ for −700 ≤ t ≤ 0, to 10⁻¹⁴ of it: 2ⁿ eʳ with |r| ≤ ½ ln 2, and eʳ by its series."""
     n = np.floor(t * LOG2_E + 0.5)
@@ -139,7 +139,7 @@ def _exp(t: float) -> float:
     return float(series * np.int64((np.int64(n) + 1023) << 52).view(np.float64))
 
 
-@kernel
+@lean_kernel
 def unpack(out: Array, scale: float, gradient: Array, hessian: Array) -> None:
     """Write gradient (3,) and Hessian (3, 3) of scale · E from the numbers (10,) of an evaluation."""
     index = 4
@@ -158,7 +158,7 @@ def inlier_share(grid: Grid, half: float, points: Array, pose: Array, bound: flo
     return float(find_inliers(grid, half, points, pose, bound, inliers) / max(points.shape[0], 1))
 
 
-@kernel
+@lean_kernel
 def find_inliers(
     grid: Grid, half: float, points: Array, pose: Array, bound: float, inliers: NDArray[np.bool_]
 ) -> int:

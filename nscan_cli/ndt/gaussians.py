@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from nscan_cli.compiled import kernel
+from nscan_cli.compiled import lean_kernel
 from nscan_cli.ndt.table import HALF_KEY, Grid, find_row
 
 ONE_SIDED = 0.2
@@ -25,7 +25,7 @@ SAME_DIRECTION = 0.9
 """Cosine of twice the angle by which the direction from a larger block may differ."""
 
 
-@kernel
+@lean_kernel
 def make_gaussian(grid: Grid, row: int, half: float, minimum: float, floor: float, straight: bool) -> None:
     """Mean, inverse covariance and side of the block of four lattice cells whose lower left one is `row`.
 
@@ -72,7 +72,7 @@ def make_gaussian(grid: Grid, row: int, half: float, minimum: float, floor: floa
         gaussian[5], gaussian[6] = side * nx, side * ny
 
 
-@kernel
+@lean_kernel
 def _moments(
     grid: Grid, key: int, first: int, end: int, half: float
 ) -> tuple[float, float, float, float, float, float, float, float]:
@@ -103,7 +103,7 @@ def _moments(
     return n, mx, my, sxx / n - mx * mx, sxy / n - mx * my, syy / n - my * my, fx / n, fy / n
 
 
-@kernel
+@lean_kernel
 def _doubled(xx: float, xy: float, yy: float, radius: float) -> tuple[float, float]:
     """Cosine and sine of twice the angle of a covariance's long axis."""
     if radius > 0.0:

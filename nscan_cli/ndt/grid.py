@@ -14,7 +14,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from nscan_cli.compiled import kernel
+from nscan_cli.compiled import kernel, lean_kernel
 from nscan_cli.ndt.gaussians import make_gaussian
 from nscan_cli.ndt.table import Grid, find_row, insert, pack, rehash
 from nscan_cli.poses import Array
@@ -23,7 +23,7 @@ NEW_NEIGHBOURS = 9
 """A point in new land creates at most its own lattice cell and the eight around it."""
 
 
-@kernel
+@lean_kernel
 def add_points(
     grid: Grid, rows: int, half: float, points: Array, pose: Array, sign: float, touched: NDArray[np.int32]
 ) -> int:
@@ -43,7 +43,7 @@ def add_points(
         if pack(ix, iy) != key:
             key = pack(ix, iy)
             row = find_row(grid, key)
-            if row < 0 or grid.links[row].min() < 0:
+            if row < 0 or not _is_settled(grid, row):
                 row, rows = _settle(grid, rows, ix, iy)
         touched[k] = row
         dx, dy = x - (ix + 0.5) * half, y - (iy + 0.5) * half
@@ -132,7 +132,13 @@ def change(
     return rows
 
 
-@kernel
+@lean_kernel
+def _is_settled(grid: Grid, row: int) -> bool:
+    links = grid.links
+    return bool(links[row, 0] >= 0 and links[row, 1] >= 0 and links[row, 2] >= 0 and links[row, 3] >= 0)
+
+
+@lean_kernel
 def _settle(grid: Grid, rows: int, ix: int, iy: int) -> tuple[int, int]:
     """Make a lattice cell that gets its first point, and all cells that share a Gaussian with it."""
     centre = -1

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from nscan_cli.compiled import kernel
+from nscan_cli.compiled import kernel, lean_kernel
 from nscan_cli.ndt.table import Grid, find_row, pack
 from nscan_cli.poses import Array
 
@@ -24,7 +24,7 @@ def room_to_meet(points: int, stride: int) -> Array:
     return np.empty((MET, BLOCKS * (points // stride + 1)))
 
 
-@kernel
+@lean_kernel
 def meet(
     grid: Grid, half: float, points: Array, x: float, y: float, phi: float, stride: int, met: Array
 ) -> int:
@@ -87,7 +87,7 @@ def begin(points: Array) -> Meeting:
     return meeting
 
 
-@kernel
+@lean_kernel
 def meet_again(grid: Grid, half: float, meeting: Meeting, x: float, y: float, phi: float) -> None:
     """Move the points to the pose (x, y, phi), and look up what those meet that get into another cell."""
     cells, cells_now = meeting.cells, meeting.cells_now
@@ -108,7 +108,7 @@ def meet_again(grid: Grid, half: float, meeting: Meeting, x: float, y: float, ph
                     meeting.gaussians[block, number, k] = gaussian[number]
 
 
-@kernel
+@lean_kernel
 def _move(
     points: Array,
     x: float,

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from nscan_cli.compiled import kernel
+from nscan_cli.compiled import lean_kernel
 from nscan_cli.poses import Array
 
 HALF_KEY = 1 << 30
@@ -35,7 +35,7 @@ class Grid(NamedTuple):
     of the side that it shows, 0 where it was seen from both."""
 
 
-@kernel
+@lean_kernel
 def find_row(grid: Grid, key: int) -> int:
     """The row of a packed key, or −1."""
     mask = grid.table.shape[0] - 1
@@ -47,19 +47,19 @@ def find_row(grid: Grid, key: int) -> int:
         slot = (slot + 1) & mask
 
 
-@kernel
+@lean_kernel
 def pack(ix: int, iy: int) -> int:
     """One key for the lattice cell (ix, iy)."""
     return (ix + HALF_KEY) * (2 * HALF_KEY) + (iy + HALF_KEY)
 
 
-@kernel
+@lean_kernel
 def _hash(key: int) -> int:
     mixed = np.uint64(key) * np.uint64(0x9E3779B97F4A7C15)
     return int(mixed >> np.uint64(33))
 
 
-@kernel
+@lean_kernel
 def insert(grid: Grid, rows: int, key: int) -> tuple[int, int]:
     """The row of a key, made when it is new; and the number of rows then."""
     mask = grid.table.shape[0] - 1
@@ -77,7 +77,7 @@ def insert(grid: Grid, rows: int, key: int) -> tuple[int, int]:
     return rows, rows + 1
 
 
-@kernel
+@lean_kernel
 def rehash(grid: Grid, rows: int) -> None:
     """Enter the first `rows` keys into an empty table."""
     mask = grid.table.shape[0] - 1

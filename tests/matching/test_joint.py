@@ -1,14 +1,20 @@
 from __future__ import annotations
 
+import sys
+
 import numpy as np
 import pytest
 
 from nscan_cli.matching.gauge import FREE, gauge_directions, newton_step
 from nscan_cli.matching.joint import JointOptions, match_jointly
-from nscan_cli.matching.joint_energy import Priors, joint_energy
+from nscan_cli.matching.joint_energy import JointProblem, Priors, all_pairs, joint_energy, no_priors
+from nscan_cli.matching.overlap import overlaps
+from nscan_cli.matching.scans import lay_out
 from nscan_cli.matching.uncertainty import weakest_translation
+from nscan_cli.ndt.grid import Ndt
 from nscan_cli.poses import relative
 from tests.matching.problems import Problem, errors, fig_3, near, office_problem
+from tests.ndt.rooms import room
 
 NOISE = 0.015
 """Standard deviation (m) of the simulated laser's ranges."""
@@ -138,3 +144,28 @@ def test_stages_that_are_cut_off_on_the_way_are_counted():
         options = JointOptions(approach_iterations=most)
         match = match_jointly(problem.joint(), start, options)
         assert (match.converged, match.unsettled) == (True, unsettled)
+
+
+def test_lean_kernels_keep_no_reference_and_give_none_back():
+    """What they are given is counted by nobody in between: after many calls all is owned as before."""
+    ndts, points, poses = [Ndt(0.5), Ndt(0.5)], [room(1), room(2)], np.array([[0.0, 0, 0], [0.1, 0, 0.05]])
+    for ndt, part in zip(ndts, points, strict=True):
+        ndt.add(part, np.zeros(3))
+        ndt.compact()
+    problem = JointProblem(lay_out(ndts, points), all_pairs(2), no_priors(), 1.0)
+    arrays = [
+        np.asarray(array) for array in (*problem.scans.grid, problem.scans.points, problem.pairs, poses)
+    ]
+
+    def owned() -> list[int]:
+        return [sys.getrefcount(array) for array in arrays]
+
+    joint_energy(problem, poses)
+    overlaps(problem.scans, poses)
+    before, values = owned(), [array.copy() for array in arrays]
+    for _ in range(100):
+        joint_energy(problem, poses)
+        overlaps(problem.scans, poses)
+    assert owned() == before
+    for array, value in zip(arrays, values, strict=True):
+        np.testing.assert_array_equal(array, value)

@@ -99,7 +99,7 @@ def test_overlap_is_the_share_of_points_in_cells_with_gaussians(ten):
     """Against a count in plain Python of every third point; sides are taken from the Gaussians."""
     scans = ten.joint().scans
     shares = np.zeros((10, 10))
-    pairs._meet(scans, ten.truth, shares)
+    pairs._meet(scans, ten.truth, np.empty(3), shares)
     for i in range(10):
         grid, half = ten.ndts[i].grid, ten.ndts[i].half
         for j in range(10):
