@@ -83,7 +83,7 @@ def command(
             from nscan_cli.cli.night_lines import night_lines
 
             if scheduler is None:
-                announce_compiling("match_and_count", quiet)
+                announce_compiling("follow", quiet)
             names = [entry.name for entry, _key in planned.to_do]
             with night_lines(names, quiet) as lines:
                 carry_out(planned, folder, _engine(jobs, scheduler, timeout), lines)

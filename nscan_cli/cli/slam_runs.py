@@ -51,7 +51,7 @@ def map_whole(
     scans = read_log(log, reading)
     for warning in scans.report.notices():
         say(f"warning: {warning}", quiet)
-    compiled = announce_compiling("match_and_count", quiet)
+    compiled = announce_compiling("follow", quiet)
     with progress("mapping", len(scans), quiet) as bar:
 
         def report(done: int, keyframes: int, loops: int) -> None:
@@ -125,7 +125,7 @@ def refine_saved(path: str, log_file: str | None, needs_log: bool, threads: int,
 
         scans, rows, log_path = read
         inputs.append(log_path)
-        compiled = announce_compiling("match_and_count", quiet)
+        compiled = announce_compiling("follow", quiet)
         with progress("refining", None, quiet):
             graph = refine_again(graph, scans, rows, threads)
     moved = float(np.hypot(*(graph.poses - before)[:, :2].T).max())

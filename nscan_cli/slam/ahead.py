@@ -33,12 +33,16 @@ class _Begun(NamedTuple):
 
 
 class Ahead:
-    """The matches about the keyframes to come. To be used with `with`; with one thread none is begun."""
+    """The matches about the keyframes to come. To be used with `with`; none is begun until it is opened."""
 
-    def __init__(self, match: MatchNearby, options: NScanOptions, threads: int) -> None:
+    def __init__(self, match: MatchNearby, options: NScanOptions) -> None:
         self._match, self._options = match, options
-        self._pool = ThreadPoolExecutor(1) if threads > 1 else None
+        self._pool: ThreadPoolExecutor | None = None
         self._begun: dict[int, _Begun] = {}
+
+    def open(self) -> None:
+        """From now on another thread has the time to make them."""
+        self._pool = ThreadPoolExecutor(1)
 
     def match(self, route: Route, centre: int) -> Nearby | None:
         """The match about keyframe `centre`, whether it has been begun or not."""

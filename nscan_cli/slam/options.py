@@ -47,7 +47,9 @@ class TrackingOptions:
     inlier_share: float = 0.8
     """With fewer inliers the match starts again from other angles: one that is off by 12° can have 0.7."""
     turns: tuple[tuple[float, ...], ...] = ((0.1, 0.2), (0.4, 0.7), (1.0, 1.3))
-    """Angles (rad, to both sides) to start again from; a later ring when those before did not help."""
+    """Angles (rad, to both sides) to start again from; a later ring when those before did not help,"""
+    far_share: float = 0.5
+    """and there are fewer inliers than that: outdoors most scans have few."""
     odometry: MotionModel = field(default_factory=MotionModel)
     steady_scans: int = 5
     """Without odometry a scan is expected to move as these did on average: stamps and motion jitter."""

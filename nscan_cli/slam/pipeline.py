@@ -61,7 +61,7 @@ class Slam:
         self.anchors: list[int] = []
         self.breaks: list[int] = []
         self.match: MatchNearby = match_pairs_nearby if options.relations == "pairwise" else match_nearby
-        self.ahead = Ahead(self.match, options.nscan, threads)
+        self.ahead = Ahead(self.match, options.nscan)
         self.way: list[Pairwise] = []
         self.route = Route([], [], np.zeros(0), np.zeros((0, 3)))
         self.pairs: list[Pairwise] = []
@@ -81,6 +81,8 @@ class Slam:
                     if self.settle(scan):
                         beside(self.grow, len(self.keyframes) - 1)
                 report(scans[-1].row + 1, len(self.keyframes))
+            if self.threads > 1:
+                self.ahead.open()
         self.keyframes.finish_last()
         self.grow(len(self.keyframes))
         for centre in range(len(self.keyframes) - self.options.nscan.behind, len(self.keyframes)):

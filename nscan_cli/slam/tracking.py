@@ -101,11 +101,11 @@ class Tracker:
         It is searched with fewer inliers than `least`.
         """
         start = self._prior.mean
-        for ring in self.options.turns:
-            if match.inliers >= self.options.inlier_share:
+        for ring, turns in enumerate(self.options.turns):
+            if match.inliers >= (self.options.far_share if ring else self.options.inlier_share):
                 break
             self.restarts += 1
-            for turn in (sign * angle for angle in ring for sign in (1, -1)):
+            for turn in (sign * angle for angle in turns for sign in (1, -1)):
                 candidate = self._match(points, start + np.array([0.0, 0.0, turn]))
                 # From elsewhere it may slide along a corridor; a wrong turn shows in what then fits.
                 if candidate.inliers > match.inliers + CLEARLY:

@@ -57,7 +57,8 @@ def let_finish(ahead: Ahead) -> None:
 def test_what_is_due_next_is_begun_as_if_every_match_related_all():
     """Around 6 all pairs of 4 to 8 are: keyframe 7 misses one of its four (with 9), 8 two (9 and 10)."""
     matches, (route, coming) = Matches(), straight(10)
-    with Ahead(matches, OPTIONS, 2) as ahead:
+    with Ahead(matches, OPTIONS) as ahead:
+        ahead.open()
         ahead.begin(route, coming, 6, [4, 5, 6, 7, 8], Coverage())
         ahead.begin(route, coming, 6, [4, 5, 6, 7, 8], Coverage())
         let_finish(ahead)
@@ -69,7 +70,8 @@ def test_what_is_due_next_is_begun_as_if_every_match_related_all():
 
 def test_a_match_counts_if_the_graph_lies_as_it_was_assumed():
     matches, (route, coming) = Matches(), straight(10)
-    with Ahead(matches, OPTIONS, 2) as ahead:
+    with Ahead(matches, OPTIONS) as ahead:
+        ahead.open()
         ahead.begin(route, coming, 6, [4, 5, 6, 7, 8], Coverage())
         let_finish(ahead)
         longer = extended(route, coming[0][:2], coming[1][:2])
@@ -86,7 +88,8 @@ def test_a_match_counts_if_the_graph_lies_as_it_was_assumed():
 
 def test_what_the_graph_has_left_behind_is_begun_anew():
     matches, (route, coming) = Matches(), straight(10)
-    with Ahead(matches, OPTIONS, 2) as ahead:
+    with Ahead(matches, OPTIONS) as ahead:
+        ahead.open()
         ahead.begin(route, coming, 6, [4, 5, 6, 7, 8], Coverage())
         route.poses[9, 1] = 0.5
         ahead.begin(route, coming, 6, [4, 5, 6, 7, 8], Coverage())
@@ -96,9 +99,9 @@ def test_what_the_graph_has_left_behind_is_begun_anew():
     assert len(matches.made) >= 2
 
 
-def test_with_one_thread_none_is_begun():
+def test_before_it_is_opened_none_is_begun():
     matches, (route, coming) = Matches(), straight(10)
-    with Ahead(matches, OPTIONS, 1) as ahead:
+    with Ahead(matches, OPTIONS) as ahead:
         ahead.begin(route, coming, 6, [4, 5, 6, 7, 8], Coverage())
         assert matches.made == []
         ahead.match(route, 6)
@@ -110,7 +113,8 @@ def test_an_error_is_raised_at_its_turn():
         raise ZeroDivisionError
 
     route, coming = straight(10)
-    with Ahead(fail, OPTIONS, 2) as ahead:
+    with Ahead(fail, OPTIONS) as ahead:
+        ahead.open()
         ahead.begin(route, coming, 6, [4, 5, 6, 7, 8], Coverage())
         with pytest.raises(ZeroDivisionError):
             ahead.match(extended(route, coming[0][:2], coming[1][:2]), 8)

@@ -218,3 +218,19 @@ def test_scans_are_found_where_they_are_however_many_come_at_a_time(odometry):
             for name in ("pose", "hessian", "expected", "inliers", "path", "joined"):
                 np.testing.assert_array_equal(getattr(one, name), getattr(other, name))
         assert tracker.restarts > 0 or not odometry
+
+
+@pytest.mark.parametrize(("strange", "rings"), [(0.2, 1), (0.5, 3)])
+def test_far_angles_are_tried_when_most_points_of_a_scan_are_none_of_the_map(strange, rings):
+    """Leaves and people are no reason to doubt the angle by more than some degrees.
+
+    Of the points of one scan alone 68 % lie on Gaussians of five points or more.
+    """
+    points = room(1).copy()
+    gone = np.arange(len(points)) % 20 < 20 * strange
+    points[gone] = np.random.default_rng(3).uniform(20, 30, (np.count_nonzero(gone), 2))
+    tracker, odometry = Tracker(TrackingOptions()), np.zeros((2, 3))
+    found = tracker.track([room(1), points], odometry)[1]
+    assert found.inliers == pytest.approx(0.68 * (1 - strange), abs=0.05)
+    assert tracker.restarts == rings
+    np.testing.assert_allclose(found.pose, 0, atol=0.02)
