@@ -35,14 +35,14 @@ class _Begun(NamedTuple):
 class Ahead:
     """The matches about the keyframes to come. To be used with `with`; none is begun until it is opened."""
 
-    def __init__(self, match: MatchNearby, options: NScanOptions) -> None:
-        self._match, self._options = match, options
+    def __init__(self, match: MatchNearby, options: NScanOptions, threads: int) -> None:
+        self._match, self._options, self._threads = match, options, threads
         self._pool: ThreadPoolExecutor | None = None
         self._begun: dict[int, _Begun] = {}
 
     def open(self) -> None:
-        """From now on another thread has the time to make them."""
-        self._pool = ThreadPoolExecutor(1)
+        """From now on another thread, if there is one, has the time to make them: tracking is through."""
+        self._pool = ThreadPoolExecutor(1) if self._threads > 1 else None
 
     def match(self, route: Route, centre: int) -> Nearby | None:
         """The match about keyframe `centre`, whether it has been begun or not."""

@@ -61,7 +61,7 @@ class Slam:
         self.anchors: list[int] = []
         self.breaks: list[int] = []
         self.match: MatchNearby = match_pairs_nearby if options.relations == "pairwise" else match_nearby
-        self.ahead = Ahead(self.match, options.nscan)
+        self.ahead = Ahead(self.match, options.nscan, threads)
         self.way: list[Pairwise] = []
         self.route = Route([], [], np.zeros(0), np.zeros((0, 3)))
         self.pairs: list[Pairwise] = []
@@ -81,8 +81,7 @@ class Slam:
                     if self.settle(scan):
                         beside(self.grow, len(self.keyframes) - 1)
                 report(scans[-1].row + 1, len(self.keyframes))
-            if self.threads > 1:
-                self.ahead.open()
+            self.ahead.open()
         self.keyframes.finish_last()
         self.grow(len(self.keyframes))
         for centre in range(len(self.keyframes) - self.options.nscan.behind, len(self.keyframes)):
@@ -266,8 +265,7 @@ class Slam:
 
         With `among` (m,) only of these, whose places among them are the energy's.
         """
-        relations: list[Relation] = [*self.pairs, *self.nscan]
-        way, loops = self.closing.way, [each for each in relations if each.origin == "loop"]
+        way, loops = self.closing.way, [each for each in self.relations if each.origin == "loop"]
         if among is None:
             return self.energies.whole(self.route, [*way, *loops], fixed)
         return self.energies.part(self.route, way, loops, fixed, among)

@@ -57,7 +57,7 @@ def let_finish(ahead: Ahead) -> None:
 def test_what_is_due_next_is_begun_as_if_every_match_related_all():
     """Around 6 all pairs of 4 to 8 are: keyframe 7 misses one of its four (with 9), 8 two (9 and 10)."""
     matches, (route, coming) = Matches(), straight(10)
-    with Ahead(matches, OPTIONS) as ahead:
+    with Ahead(matches, OPTIONS, 2) as ahead:
         ahead.open()
         ahead.begin(route, coming, 6, [4, 5, 6, 7, 8], Coverage())
         ahead.begin(route, coming, 6, [4, 5, 6, 7, 8], Coverage())
@@ -70,7 +70,7 @@ def test_what_is_due_next_is_begun_as_if_every_match_related_all():
 
 def test_a_match_counts_if_the_graph_lies_as_it_was_assumed():
     matches, (route, coming) = Matches(), straight(10)
-    with Ahead(matches, OPTIONS) as ahead:
+    with Ahead(matches, OPTIONS, 2) as ahead:
         ahead.open()
         ahead.begin(route, coming, 6, [4, 5, 6, 7, 8], Coverage())
         let_finish(ahead)
@@ -88,7 +88,7 @@ def test_a_match_counts_if_the_graph_lies_as_it_was_assumed():
 
 def test_what_the_graph_has_left_behind_is_begun_anew():
     matches, (route, coming) = Matches(), straight(10)
-    with Ahead(matches, OPTIONS) as ahead:
+    with Ahead(matches, OPTIONS, 2) as ahead:
         ahead.open()
         ahead.begin(route, coming, 6, [4, 5, 6, 7, 8], Coverage())
         route.poses[9, 1] = 0.5
@@ -99,13 +99,16 @@ def test_what_the_graph_has_left_behind_is_begun_anew():
     assert len(matches.made) >= 2
 
 
-def test_before_it_is_opened_none_is_begun():
-    matches, (route, coming) = Matches(), straight(10)
-    with Ahead(matches, OPTIONS) as ahead:
-        ahead.begin(route, coming, 6, [4, 5, 6, 7, 8], Coverage())
-        assert matches.made == []
-        ahead.match(route, 6)
-    assert [centre for _, centre, _ in matches.made] == [6]
+def test_with_one_thread_or_before_it_is_opened_none_is_begun():
+    for threads in (1, 2):
+        matches, (route, coming) = Matches(), straight(10)
+        with Ahead(matches, OPTIONS, threads) as ahead:
+            if threads == 1:
+                ahead.open()
+            ahead.begin(route, coming, 6, [4, 5, 6, 7, 8], Coverage())
+            assert matches.made == []
+            ahead.match(route, 6)
+        assert [centre for _, centre, _ in matches.made] == [6]
 
 
 def test_an_error_is_raised_at_its_turn():
@@ -113,7 +116,7 @@ def test_an_error_is_raised_at_its_turn():
         raise ZeroDivisionError
 
     route, coming = straight(10)
-    with Ahead(fail, OPTIONS) as ahead:
+    with Ahead(fail, OPTIONS, 2) as ahead:
         ahead.open()
         ahead.begin(route, coming, 6, [4, 5, 6, 7, 8], Coverage())
         with pytest.raises(ZeroDivisionError):
