@@ -101,3 +101,4 @@ class Ahead:
     ) -> None:
         if self._pool is not None:
             self._pool.shutdown(wait=kind is not KeyboardInterrupt, cancel_futures=True)
+            self._pool = None

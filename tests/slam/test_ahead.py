@@ -111,6 +111,19 @@ def test_with_one_thread_or_before_it_is_opened_none_is_begun():
         assert [centre for _, centre, _ in matches.made] == [6]
 
 
+def test_in_the_end_what_was_begun_is_there_or_made_and_no_more_is_begun():
+    matches, (route, coming) = Matches(), straight(10)
+    with Ahead(matches, OPTIONS, 2) as ahead:
+        ahead.open()
+        ahead.begin(route, coming, 6, [4, 5, 6, 7, 8], Coverage())
+    ahead.begin(route, coming, 6, [4, 5, 6, 7, 8], Coverage())
+    for centre, joining in ((8, 2), (10, 4)):
+        found = ahead.match(extended(route, coming[0][:joining], coming[1][:joining]), centre)
+        assert found is not None
+        assert found.moved == centre
+    assert sorted(centre for _, centre, _ in matches.made) == [8, 10]
+
+
 def test_an_error_is_raised_at_its_turn():
     def fail(route: Route, centre: int, options: NScanOptions) -> Nearby | None:
         raise ZeroDivisionError
