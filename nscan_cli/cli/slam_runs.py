@@ -125,7 +125,7 @@ def refine_saved(path: str, log_file: str | None, needs_log: bool, threads: int,
 
         scans, rows, log_path = read
         inputs.append(log_path)
-        compiled = announce_compiling("follow", quiet)
+        compiled = announce_compiling("_descend", quiet)
         with progress("refining", None, quiet):
             graph = refine_again(graph, scans, rows, threads)
     moved = float(np.hypot(*(graph.poses - before)[:, :2].T).max())

@@ -62,7 +62,7 @@ class Slam:
         self.breaks: list[int] = []
         self.match: MatchNearby = match_pairs_nearby if options.relations == "pairwise" else match_nearby
         self.ahead = Ahead(self.match, options.nscan, threads)
-        self.way: list[Pairwise] = []
+        self.steps: list[Pairwise] = []
         self.route = Route([], [], np.zeros(0), np.zeros((0, 3)))
         self.pairs: list[Pairwise] = []
         self.nscan: list[NScan] = []
@@ -124,7 +124,7 @@ class Slam:
             keyframe = self.keyframes.add(scan.row, scan.points, scan.tracked)
             if len(self.keyframes) > 1:
                 before = self.keyframes.list[-2]
-                self.way.append(relation_between(before, keyframe, self.options.keyframes))
+                self.steps.append(relation_between(before, keyframe, self.options.keyframes))
         else:
             self.keyframes.attach(scan.points, scan.tracked)
         self.tracked.append(scan.tracked.pose)
@@ -143,7 +143,7 @@ class Slam:
         if not before:
             self.route = Route([keyframe], [], np.array([path]), np.zeros((1, 3)))
             return
-        relation = self.way[before - 1]
+        relation = self.steps[before - 1]
         self.closing.extend(relation, path - float(self.route.paths[-1]))
         self.route = extended(self.route, [keyframe], [relation])
 
@@ -158,7 +158,7 @@ class Slam:
             return
         # One more may be there that is not whole.
         whole, known = len(self.keyframes) - 1, len(self.poses)
-        coming = self.keyframes.list[known:whole], self.way[known - 1 : whole - 1]
+        coming = self.keyframes.list[known:whole], self.steps[known - 1 : whole - 1]
         self.ahead.begin(route, coming, centre, others, self.covered)
         nearby = self.match_unless_doubted(centre)
         self.covered.add(node, others, nearby)
