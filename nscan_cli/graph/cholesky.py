@@ -1,8 +1,7 @@
 """Sparse Cholesky factorisation of symmetric matrices made of 3 × 3 blocks, one row of blocks a node.
 
-A = LLᵗ in an order of little fill. Columns of blocks lie end to end, the diagonal block first, then
-the others in increasing row. The factor tells which directions the matrix does not hold, and gives the
-diagonal blocks of the inverse without the rest of it (Takahashi, Fagan, Chin 1973; Erisman, Tinney 1975).
+A = LLᵗ in an order of little fill, supernode by supernode: its columns make a dense panel, one after another,
+with the rows of its own columns first. The factor tells which directions the matrix does not hold.
 """
 
 from __future__ import annotations
@@ -12,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from nscan_cli.compiled import kernel
+from nscan_cli.compiled import inlined_kernel, kernel, lean_kernel, summing_kernel
 from nscan_cli.graph.pattern import Indices, Pattern
 from nscan_cli.poses import Array
 
@@ -28,8 +27,8 @@ class Factor(NamedTuple):
     """L, and the directions that the matrix does not hold."""
 
     pattern: Pattern
-    blocks: Array
-    """(B, 3, 3)"""
+    panels: Array
+    """Those of all supernodes, end to end; what lies above the diagonal is 0."""
     loose: NDArray[np.bool_]
     """(F, 3) by row: the pivot was not positive, and the diagonal entry was put in its place."""
     diagonal: Array
@@ -38,11 +37,9 @@ class Factor(NamedTuple):
 
 def factorise(pattern: Pattern, blocks: Array) -> Factor:
     """The factor of the matrix whose lower triangle is in blocks (B, 3, 3), which are left as they are."""
-    factor = blocks.copy()
     diagonal = np.diagonal(blocks[pattern.starts[:-1]], axis1=1, axis2=2)
     loose = np.zeros((len(pattern.place), 3), dtype=np.bool_)
-    _factorise(pattern.starts, pattern.rows, factor, loose)
-    return Factor(pattern, factor, loose, diagonal)
+    return Factor(pattern, _factorise(pattern, blocks, loose), loose, diagonal)
 
 
 def solve(factor: Factor, right: Array) -> Array:
@@ -50,8 +47,9 @@ def solve(factor: Factor, right: Array) -> Array:
     place = factor.pattern.place
     x = np.empty((len(place), 3))
     x[place] = right
-    _solve_lower(factor.pattern.starts, factor.pattern.rows, factor.blocks, x)
-    _solve_upper(factor.pattern.starts, factor.pattern.rows, factor.blocks, x)
+    flat, gathered = x.reshape(-1), np.empty(x.size)
+    _solve_lower(factor.pattern, factor.panels, flat, gathered)
+    _solve_upper(factor.pattern, factor.panels, flat, gathered)
     return x[place]
 
 
@@ -64,11 +62,11 @@ def loose_nodes(factor: Factor, share: float = 1e-6) -> NDArray[np.bool_]:
     """
     pattern = factor.pattern
     found = np.zeros(len(pattern.place), dtype=np.bool_)
-    pivots = np.diagonal(factor.blocks[pattern.starts[:-1]], axis1=1, axis2=2) ** 2
+    pivots = _diagonal(pattern, factor.panels) ** 2
     for row, component in np.argwhere(factor.loose | (pivots < SUSPICIOUS_PIVOT * factor.diagonal)):
         v = np.zeros((len(found), 3))
         v[row, component] = 1.0
-        _solve_upper(pattern.starts, pattern.rows, factor.blocks, v)
+        _solve_upper(pattern, factor.panels, v.reshape(-1), np.empty(v.size))
         v /= v[row, component]
         part = v**2 * np.where(factor.diagonal > 0, factor.diagonal, 1.0)
         if factor.loose[row, component] or pivots[row, component] < LEAST_CURVATURE * part.sum():
@@ -76,168 +74,185 @@ def loose_nodes(factor: Factor, share: float = 1e-6) -> NDArray[np.bool_]:
     return found[pattern.place]
 
 
-def inverse_diagonal(factor: Factor) -> Array:
-    """The diagonal blocks (F, 3, 3) of the inverse, by node; the matrix has to hold every direction."""
-    pattern = factor.pattern
-    inverse = np.empty_like(factor.blocks)
-    _invert_on_pattern(pattern.starts, pattern.rows, factor.blocks, inverse)
-    diagonal = inverse[pattern.starts[pattern.place]]
-    return 0.5 * (diagonal + diagonal.transpose(0, 2, 1))
+@inlined_kernel
+def panel_of(pattern: Pattern, panels: Array, supernode: int) -> Array:
+    """The panel (3 w, 3 h) of a supernode, its columns of numbers one after the other."""
+    width = 3 * (pattern.supernodes[supernode + 1] - pattern.supernodes[supernode])
+    return panels[pattern.panels[supernode] : pattern.panels[supernode + 1]].reshape(width, -1)
+
+
+@inlined_kernel
+def rows_of(pattern: Pattern, supernode: int) -> Indices:
+    """(h,) the rows of blocks of a supernode's panel, its own first."""
+    first = pattern.supernodes[supernode]
+    return pattern.rows[pattern.starts[first] : pattern.starts[first + 1]]
 
 
 @kernel
-def _factorise(starts: Indices, rows: Indices, blocks: Array, loose: NDArray[np.bool_]) -> None:
-    """Left-looking, in place: column by column, minus what the columns before it bring."""
-    nodes = starts.shape[0] - 1
-    # first[j]: the columns whose next row to be used is j, linked by `following`; at[k]: where that is.
-    first, following, at = np.full(nodes, -1), np.full(nodes, -1), np.zeros(nodes, dtype=np.int64)
-    where = np.zeros(nodes, dtype=np.int64)
-    for j in range(nodes):
-        start, end = starts[j], starts[j + 1]
-        for p in range(start, end):
+def _factorise(pattern: Pattern, blocks: Array, loose: NDArray[np.bool_]) -> Array:
+    """Left-looking: panel by panel, minus what the panels before it bring."""
+    supernodes, starts = pattern.supernodes, pattern.starts
+    count, nodes = supernodes.shape[0] - 1, starts.shape[0] - 1
+    panels = np.zeros(pattern.panels[count])
+    # first[j]: the supernodes whose next row to be used is one of j's, linked by `following`; at[k]: which.
+    first, following, at = np.full(count, -1), np.full(count, -1), np.zeros(count, dtype=np.int64)
+    owner, where = np.zeros(nodes, dtype=np.int64), np.zeros(nodes, dtype=np.int64)
+    for j in range(count):
+        owner[supernodes[j] : supernodes[j + 1]] = j
+    product, least, loose_numbers = np.zeros((3, 3 * nodes)), np.zeros(3 * nodes), loose.reshape(-1)
+    for j in range(count):
+        begin, end = supernodes[j], supernodes[j + 1]
+        rows, panel = rows_of(pattern, j), panel_of(pattern, panels, j)
+        for p in range(rows.shape[0]):
             where[rows[p]] = p
-        least = LEAST_PIVOT * np.diag(blocks[start])
+        _lay_in(blocks[starts[begin] : starts[end]], panel)
+        for i in range(panel.shape[0]):
+            least[i] = LEAST_PIVOT * panel[i, i]
         k = first[j]
         while k >= 0:
-            after = following[k]
-            source = at[k]
-            for p in range(source, starts[k + 1]):
-                _subtract_product(blocks, where[rows[p]], p, source)
-            if source + 1 < starts[k + 1]:
-                at[k] = source + 1
-                row = rows[source + 1]
-                following[k], first[row] = first[row], k
+            after, others, other = following[k], rows_of(pattern, k), panel_of(pattern, panels, k)
+            source, height = at[k], others.shape[0]
+            while source < height and others[source] < end:
+                column = 3 * (others[source] - begin)
+                _subtract_panel(other, others, source, where, column, panel, product)
+                source += 1
+            if source < height:
+                parent, at[k] = owner[others[source]], source
+                following[k], first[parent] = first[parent], k
             k = after
-        _factorise_block(blocks[start], least, loose[j])
-        for p in range(start + 1, end):
-            _divide(blocks[p], blocks[start])
-        if start + 1 < end:
-            at[j] = start + 1
-            row = rows[start + 1]
-            following[j], first[row] = first[row], j
+        _factorise_panel(panel, least, loose_numbers[3 * begin : 3 * end])
+        if rows.shape[0] > end - begin:
+            parent, at[j] = owner[rows[end - begin]], end - begin
+            following[j], first[parent] = first[parent], j
+    return panels
 
 
-@kernel
-def _subtract_product(blocks: Array, target: int, left: int, right: int) -> None:
-    """blocks[target] −= blocks[left] blocks[right]ᵗ"""
-    for b in range(3):
-        r0, r1, r2 = blocks[right, b, 0], blocks[right, b, 1], blocks[right, b, 2]
-        for a in range(3):
-            blocks[target, a, b] -= (
-                blocks[left, a, 0] * r0 + blocks[left, a, 1] * r1 + blocks[left, a, 2] * r2
-            )
-
-
-@kernel
-def _factorise_block(block: Array, least: Array, loose: NDArray[np.bool_]) -> None:
-    """Cholesky of one block, in place, with zeros above the diagonal."""
-    for a in range(3):
-        for b in range(a + 1):
-            rest = block[a, b]
-            for k in range(b):
-                rest -= block[a, k] * block[b, k]
-            if b < a:
-                block[a, b] = rest / block[b, b]
-            elif rest > least[a]:
-                block[a, a] = np.sqrt(rest)
-            else:
-                loose[a] = True
-                block[a, a] = np.sqrt(least[a] / LEAST_PIVOT) if least[a] > 0 else 1.0
-        for b in range(a + 1, 3):
-            block[a, b] = 0.0
-
-
-@kernel
-def _divide(block: Array, lower: Array) -> None:
-    """block ← block lower⁻ᵗ"""
-    for a in range(3):
-        x = block[a, 0] / lower[0, 0]
-        y = (block[a, 1] - x * lower[1, 0]) / lower[1, 1]
-        z = (block[a, 2] - x * lower[2, 0] - y * lower[2, 1]) / lower[2, 2]
-        block[a, 0], block[a, 1], block[a, 2] = x, y, z
-
-
-@kernel
-def _solve_lower(starts: Indices, rows: Indices, blocks: Array, x: Array) -> None:
-    for j in range(starts.shape[0] - 1):
-        for a in range(3):
-            for b in range(a):
-                x[j, a] -= blocks[starts[j], a, b] * x[j, b]
-            x[j, a] /= blocks[starts[j], a, a]
-        for p in range(starts[j] + 1, starts[j + 1]):
+@lean_kernel
+def _lay_in(blocks: Array, panel: Array) -> None:
+    """The blocks of a supernode's columns, as they lie in the matrix, into its panel."""
+    p, height = 0, panel.shape[1] // 3
+    for column in range(panel.shape[0] // 3):
+        for row in range(column, height):
             for a in range(3):
                 for b in range(3):
-                    x[rows[p], a] -= blocks[p, a, b] * x[j, b]
+                    panel[3 * column + b, 3 * row + a] = blocks[p, a, b]
+            p += 1
 
 
-@kernel
-def _solve_upper(starts: Indices, rows: Indices, blocks: Array, x: Array) -> None:
-    for j in range(starts.shape[0] - 2, -1, -1):
-        for p in range(starts[j] + 1, starts[j + 1]):
-            for a in range(3):
-                for b in range(3):
-                    x[j, b] -= blocks[p, a, b] * x[rows[p], a]
-        for a in range(2, -1, -1):
-            for b in range(a + 1, 3):
-                x[j, a] -= blocks[starts[j], b, a] * x[j, b]
-            x[j, a] /= blocks[starts[j], a, a]
-
-
-@kernel
-def _invert_on_pattern(starts: Indices, rows: Indices, factor: Array, inverse: Array) -> None:
-    """The blocks Z of the inverse where the factor has any, from the last column to the first.
-
-    With M_k = L_kj L_jj⁻¹: Z_ij = −Σ Z_ik M_k and Z_jj = (L_jj L_jjᵗ)⁻¹ − Σ Z_kjᵗ M_k, sums over the rows
-    k below j. Any two of these rows share a block of the factor, so all that is needed is there.
-    """
-    nodes = starts.shape[0] - 1
-    where = np.full(nodes, -1)
-    m, inverted = np.empty((nodes, 3, 3)), np.zeros((1, 3, 3))
-    for j in range(nodes - 1, -1, -1):
-        first, end = starts[j] + 1, starts[j + 1]
-        inverse[first - 1 : end] = 0.0
-        _invert_lower(factor[first - 1], inverted[0])
-        m[: end - first] = 0.0
-        for p in range(first, end):
-            where[rows[p]] = p
-            _add_product(m, p - first, factor, p, inverted, 0, 1.0)
-        for p in range(first, end):
-            column = rows[p]
-            _add_product(inverse, p, inverse, starts[column], m, p - first, -1.0)
-            for q in range(starts[column] + 1, starts[column + 1]):
-                target = where[rows[q]]
-                if target >= 0:
-                    _add_product(inverse, target, inverse, q, m, p - first, -1.0)
-                    _add_transposed_product(inverse, p, inverse, q, m, target - first, -1.0)
-        _add_transposed_product(inverse, first - 1, inverted, 0, inverted, 0, 1.0)
-        for p in range(first, end):
-            _add_transposed_product(inverse, first - 1, inverse, p, m, p - first, -1.0)
-            where[rows[p]] = -1
-
-
-@kernel
-def _invert_lower(lower: Array, out: Array) -> None:
-    out[0, 0], out[1, 1], out[2, 2] = 1 / lower[0, 0], 1 / lower[1, 1], 1 / lower[2, 2]
-    out[1, 0] = -lower[1, 0] * out[0, 0] * out[1, 1]
-    out[2, 1] = -lower[2, 1] * out[1, 1] * out[2, 2]
-    out[2, 0] = -(lower[2, 0] * out[0, 0] + lower[2, 1] * out[1, 0]) * out[2, 2]
-
-
-@kernel
-def _add_product(out: Array, o: int, left: Array, p: int, right: Array, q: int, factor: float) -> None:
-    """out[o] += factor left[p] right[q]"""
-    for a in range(3):
-        l0, l1, l2 = factor * left[p, a, 0], factor * left[p, a, 1], factor * left[p, a, 2]
-        for b in range(3):
-            out[o, a, b] += l0 * right[q, 0, b] + l1 * right[q, 1, b] + l2 * right[q, 2, b]
-
-
-@kernel
-def _add_transposed_product(
-    out: Array, o: int, left: Array, p: int, right: Array, q: int, factor: float
+@lean_kernel
+def subtract_products(
+    factors: Array, column: int, source: Array, k: int, begin: int, out: Array, target: int
 ) -> None:
-    """out[o] += factor left[p]ᵗ right[q]"""
-    for a in range(3):
-        l0, l1, l2 = factor * left[p, 0, a], factor * left[p, 1, a], factor * left[p, 2, a]
+    """out[target + b, i] −= Σ factors[k + a, column + b] source[k + a, i] over a < 3; b < 3, i ≥ `begin`."""
+    x0, x1, x2 = factors[k, column], factors[k + 1, column], factors[k + 2, column]
+    y0, y1, y2 = factors[k, column + 1], factors[k + 1, column + 1], factors[k + 2, column + 1]
+    z0, z1, z2 = factors[k, column + 2], factors[k + 1, column + 2], factors[k + 2, column + 2]
+    for i in range(begin, source.shape[1]):
+        u, v, w = source[k, i], source[k + 1, i], source[k + 2, i]
+        out[target, i] -= x0 * u + x1 * v + x2 * w
+        out[target + 1, i] -= y0 * u + y1 * v + y2 * w
+        out[target + 2, i] -= z0 * u + z1 * v + z2 * w
+
+
+@lean_kernel
+def _subtract_panel(
+    other: Array, rows: Indices, source: int, where: Indices, column: int, panel: Array, product: Array
+) -> None:
+    """Take from three columns of a panel what another one brings that has them as its rows `source`."""
+    product[:, 3 * source : other.shape[1]] = 0.0
+    for k in range(0, other.shape[0], 3):
+        subtract_products(other, 3 * source, other, k, 3 * source, product, 0)
+    for p in range(source, rows.shape[0]):
+        row = 3 * where[rows[p]]
         for b in range(3):
-            out[o, a, b] += l0 * right[q, 0, b] + l1 * right[q, 1, b] + l2 * right[q, 2, b]
+            for a in range(3):
+                panel[column + b, row + a] += product[b, 3 * p + a]
+
+
+@lean_kernel
+def _factorise_panel(panel: Array, least: Array, loose: NDArray[np.bool_]) -> None:
+    """Three columns after the other, minus what those before them bring; pivots are more than `least`."""
+    height = panel.shape[1]
+    for j in range(0, panel.shape[0], 3):
+        for k in range(0, j, 3):
+            subtract_products(panel, j, panel, k, j, panel, j)
+        for column in range(j, j + 3):
+            for k in range(j, column):
+                factor = panel[k, column]
+                for i in range(column, height):
+                    panel[column, i] -= factor * panel[k, i]
+            pivot = panel[column, column]
+            if pivot > least[column]:
+                pivot = np.sqrt(pivot)
+                for i in range(column + 1, height):
+                    panel[column, i] /= pivot
+            else:
+                loose[column] = True
+                pivot = np.sqrt(least[column] / LEAST_PIVOT) if least[column] > 0 else 1.0
+                for i in range(column + 1, height):
+                    panel[column, i] /= pivot
+            panel[column, column] = pivot
+            panel[column, j:column] = 0.0
+
+
+@lean_kernel
+def _solve_lower(pattern: Pattern, panels: Array, x: Array, gathered: Array) -> None:
+    """In place; x and room for as much, `gathered`, are (3 F,) by row."""
+    for j in range(pattern.supernodes.shape[0] - 1):
+        rows, panel = rows_of(pattern, j), panel_of(pattern, panels, j)
+        width, height, begin = panel.shape[0], panel.shape[1], 3 * rows[0]
+        for i in range(height):
+            gathered[i] = x[begin + i] if i < width else 0.0
+        for k in range(0, width, 3):
+            u = gathered[k] / panel[k, k]
+            v = (gathered[k + 1] - panel[k, k + 1] * u) / panel[k + 1, k + 1]
+            w = gathered[k + 2] - panel[k, k + 2] * u - panel[k + 1, k + 2] * v
+            w /= panel[k + 2, k + 2]
+            gathered[k], gathered[k + 1], gathered[k + 2] = u, v, w
+            for i in range(k + 3, height):
+                gathered[i] -= panel[k, i] * u + panel[k + 1, i] * v + panel[k + 2, i] * w
+        for i in range(width):
+            x[begin + i] = gathered[i]
+        for p in range(width // 3, rows.shape[0]):
+            for a in range(3):
+                x[3 * rows[p] + a] += gathered[3 * p + a]
+
+
+@lean_kernel
+def _solve_upper(pattern: Pattern, panels: Array, x: Array, gathered: Array) -> None:
+    """The same for Lᵗ."""
+    for j in range(pattern.supernodes.shape[0] - 2, -1, -1):
+        rows, panel = rows_of(pattern, j), panel_of(pattern, panels, j)
+        for p in range(rows.shape[0]):
+            for a in range(3):
+                gathered[3 * p + a] = x[3 * rows[p] + a]
+        for k in range(panel.shape[0] - 3, -1, -3):
+            u, v, w = _dots(panel, k, gathered)
+            w = (gathered[k + 2] - w) / panel[k + 2, k + 2]
+            v = (gathered[k + 1] - v - panel[k + 1, k + 2] * w) / panel[k + 1, k + 1]
+            u = (gathered[k] - u - panel[k, k + 1] * v - panel[k, k + 2] * w) / panel[k, k]
+            gathered[k], gathered[k + 1], gathered[k + 2] = u, v, w
+        for i in range(panel.shape[0]):
+            x[3 * rows[0] + i] = gathered[i]
+
+
+@summing_kernel
+def _dots(panel: Array, k: int, x: Array) -> tuple[float, float, float]:
+    """Of what is below a block of three columns with as much of x."""
+    u, v, w = 0.0, 0.0, 0.0
+    for i in range(k + 3, panel.shape[1]):
+        u += panel[k, i] * x[i]
+        v += panel[k + 1, i] * x[i]
+        w += panel[k + 2, i] * x[i]
+    return u, v, w
+
+
+@kernel
+def _diagonal(pattern: Pattern, panels: Array) -> Array:
+    """(F, 3) that of the factor, by row."""
+    diagonal = np.empty((pattern.place.shape[0], 3))
+    for j in range(pattern.supernodes.shape[0] - 1):
+        rows, panel = rows_of(pattern, j), panel_of(pattern, panels, j)
+        for column in range(panel.shape[0]):
+            diagonal[rows[column // 3], column % 3] = panel[column, column]
+    return diagonal

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from nscan_cli.graph.cholesky import inverse_diagonal, loose_nodes
+from nscan_cli.graph.cholesky import loose_nodes
 from nscan_cli.graph.information import information
+from nscan_cli.graph.inverse import inverse_diagonal
 from nscan_cli.graph.model import Graph
 from nscan_cli.graph.solve import components
 from nscan_cli.poses import Array

@@ -1,4 +1,8 @@
-"""Where the factor of a sparse symmetric matrix of 3 × 3 blocks has blocks, in an order of little fill."""
+"""Where the factor of a sparse symmetric matrix of 3 × 3 blocks has blocks, in an order of little fill.
+
+Columns that follow each other with blocks in the same rows make a supernode (C. Ashcraft, R. Grimes, "The
+influence of relaxed supernode partitions on the multifrontal method", 1989): a dense panel of the factor.
+"""
 
 from __future__ import annotations
 
@@ -21,6 +25,10 @@ class Pattern(NamedTuple):
     """(F + 1,) where the blocks of each column begin."""
     rows: Indices
     """(B,) the row of each block."""
+    supernodes: Indices
+    """(N + 1,) the first column of each supernode."""
+    panels: Indices
+    """(N + 1,) where the panel of each supernode begins: 9 w h numbers, of w columns and h rows of blocks."""
 
 
 def find_pattern(edges: Indices, nodes: int) -> Pattern:
@@ -29,11 +37,19 @@ def find_pattern(edges: Indices, nodes: int) -> Pattern:
     An edge with a node of −1 is none.
     """
     if nodes == 0:
-        return Pattern(np.empty(0, np.int64), np.zeros(1, np.int64), np.empty(0, np.int64))
+        none = np.zeros(1, np.int64)
+        return Pattern(none[:0], none, none[:0], none, none)
     indptr, indices = _adjacency(edges, nodes)
     place = _order_of_little_fill(indptr, indices)
     starts, rows = _fill(indptr, indices, place, np.argsort(place))
-    return Pattern(place, starts, rows)
+    heights = np.diff(starts)
+    # The rows of a column are those of the one before, less one, when there are as many and it is the first
+    # of them.
+    next_row = rows[np.minimum(starts[:-1] + 1, len(rows) - 1)]
+    goes_on = (heights[:-1] == heights[1:] + 1) & (next_row[:-1] == np.arange(1, nodes))
+    supernodes = np.concatenate([[0], np.flatnonzero(~goes_on) + 1, [nodes]])
+    numbers = 9 * np.diff(supernodes) * heights[supernodes[:-1]]
+    return Pattern(place, starts, rows, supernodes, np.concatenate([[0], np.cumsum(numbers)]))
 
 
 @kernel

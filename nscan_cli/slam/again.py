@@ -18,7 +18,7 @@ from nscan_cli.logs.scan import LaserLog
 from nscan_cli.matching.priors import odometry_prior
 from nscan_cli.poses import relative
 from nscan_cli.slam.closing import NO_SECOND
-from nscan_cli.slam.keyframes import route
+from nscan_cli.slam.keyframes import route_of
 from nscan_cli.slam.nearby import Nearby
 from nscan_cli.slam.options import Relations, SlamOptions
 from nscan_cli.slam.pipeline import Slam
@@ -58,7 +58,7 @@ def refine_again(graph: Graph, log: LaserLog, rows: NDArray[np.int64], threads: 
     slam = Slam(_scans(log, rows), options, threads)
     _lay_out(slam, graph)
     chain = _chain(graph, options)
-    slam.route = route(slam.keyframes.list, chain, graph.poses[graph.keyframes])
+    slam.route = route_of(slam.keyframes.list, chain, graph.poses[graph.keyframes])
     in_chain = {id(relation) for relation in chain}
     slam.pairs = [pair for pair in graph.pairwise if id(pair) not in in_chain]
     slam.nscan, slam.others = list(graph.nscan), list(graph.others)

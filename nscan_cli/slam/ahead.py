@@ -80,7 +80,7 @@ class Ahead:
             joining = keyframe + behind + 1 - len(route.poses)
             longer = extended(route, coming[0][:joining], coming[1][:joining])
             tried, _ = choose_nearby(longer.poses, longer.paths, keyframe, self._options)
-            nodes = longer.rows(tried.tolist())
+            nodes = longer.rows[tried].tolist()
             if assumed.share(longer.keyframes[keyframe].row, nodes) < self._options.covered:
                 assumed.relate(nodes)
                 match = self._pool.submit(self._match, longer, keyframe, self._options)

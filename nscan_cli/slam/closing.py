@@ -8,45 +8,43 @@ start must stand the search too.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from nscan_cli.graph.model import Loop, Pairwise
-from nscan_cli.graph.system import GraphEnergy
+from nscan_cli.graph.relation import Relation
 from nscan_cli.matching.search import SearchOptions
 from nscan_cli.poses import Array, compose, wrap
+from nscan_cli.slam.energies import Energies
 from nscan_cli.slam.keyframes import Route
 from nscan_cli.slam.nearby import MatchNearby, Nearby
 from nscan_cli.slam.options import ClosingOptions, NScanOptions
 from nscan_cli.slam.place import Place, find_place, why_doubted
+from nscan_cli.slam.surest_way import Linked, surest_ways
 from nscan_cli.slam.whereabouts import Reach, Whereabouts, with_slips
 
 NO_SECOND = "no second keyframe finds the same"
 LOST = "tracking has broken since: the place must be searched"
 
 Indices = NDArray[np.int64]
-
-
-class Energy(Protocol):
-    """What loops and the way say of the keyframes, with one of them held."""
-
-    def __call__(self, fixed: int, among: Indices | None = None) -> GraphEnergy:
-        """Of all keyframes, or of some (m,) alone."""
+Loops = Callable[[], list[Relation]]
 
 
 class Closing:
-    """The search for large loops, keyframe by keyframe."""
+    """The search for large loops, keyframe by keyframe; `energies` makes those of the graph."""
 
-    def __init__(self, options: ClosingOptions, nscan: NScanOptions, match: MatchNearby) -> None:
-        self.options, self.nscan, self.match = options, nscan, match
+    def __init__(
+        self, options: ClosingOptions, nscan: NScanOptions, match: MatchNearby, energies: Energies
+    ) -> None:
+        self.options, self.nscan, self.match, self.energies = options, nscan, match, energies
         self.way: list[Pairwise] = []
         """The chain, with slips allowed for."""
         self._refused: list[Loop] = []
         self._waiting: list[Place] = []
-        self._whereabouts = Whereabouts()
+        self._whereabouts, self._linked = Whereabouts(), Linked()
         self._searched = -np.inf
 
     def extend(self, relation: Pairwise, length: float) -> None:
@@ -58,12 +56,12 @@ class Closing:
         route: Route,
         centre: int,
         left_out: Indices,
-        energy: Energy,
+        loops: Loops,
     ) -> list[Place]:
         """The places of a keyframe, and of those before that agree with it, if they are enough, or none.
 
         `left_out` (m,) are keyframes of another visit that the joint match about `centre` was tried with.
-        `energy` gives that of the graph of `way` and all loops, with a keyframe held.
+        `loops` gives the relations that close loops so far.
         """
         paths, poses = route.paths, route.poses
         if paths[centre] - self._searched < self.options.step:
@@ -71,9 +69,9 @@ class Closing:
         reach = self._whereabouts.bound(centre, self.way, poses)
         near = self._near(route, centre, reach)
         if len(near) and not len(left_out):
-            near = self._near(route, centre, self._whereabouts.narrow(centre, energy, poses))
+            near = self._near(route, centre, self._narrow(route, centre, loops))
         if len(near) or len(left_out):
-            reach = self._whereabouts.ask(centre, energy, poses)
+            reach = self._ask(route, centre, loops)
             near = np.union1d(self._near(route, centre, reach), left_out).astype(np.int64)
         if not len(near):
             return []
@@ -94,22 +92,22 @@ class Closing:
         route: Route,
         centre: int,
         nearby: Nearby,
-        energy: Energy,
+        loops: Loops,
     ) -> str | None:
         """Why the place is not sure that the joint match about `centre` has in an earlier visit, or None.
 
         Arguments as for close. A match that began near enough, or closes no loop, is not doubted.
         """
         poses = route.poses
-        tie = nearby.tie(route.keyframes[centre].row)
+        tie = nearby.tie(int(route.rows[centre]))
         if tie is None:
             return None
-        old = route.rows(range(len(poses))).index(tie[0])
+        old = int(np.searchsorted(route.rows, tie[0]))
         if not self._may_be_off(self._whereabouts.bound(centre, self.way, poses), old):
             return None
-        if not self._may_be_off(self._whereabouts.narrow(centre, energy, poses), old):
+        if not self._may_be_off(self._narrow(route, centre, loops), old):
             return None
-        reach = self._whereabouts.ask(centre, energy, poses)
+        reach = self._ask(route, centre, loops)
         if not self._may_be_off(reach, old):
             return None
         if self.is_lost(reach)[old]:
@@ -117,6 +115,16 @@ class Closing:
         window, earlier = self._visit(route, centre, old, reach)
         pose = compose(poses[old], tie[1])
         return why_doubted(route, centre, pose, earlier, window, self.options)
+
+    def _narrow(self, route: Route, centre: int, loops: Loops) -> Reach:
+        """A bound on the reach again, by the surest ways."""
+        links = self._linked.links(route, self.way, loops())
+        return self._whereabouts.narrow(centre, surest_ways(links, route.poses, centre))
+
+    def _ask(self, route: Route, centre: int, loops: Loops) -> Reach:
+        """The reach, by the graph of the way and all loops."""
+        energy = self.energies.of(route, [*self.way, *loops()], centre)
+        return self._whereabouts.ask(energy, route.poses)
 
     def is_lost(self, reach: Reach) -> NDArray[np.bool_]:
         """Which keyframes (K,) the graph does not know even the direction of: the track has broken since."""

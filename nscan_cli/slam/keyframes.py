@@ -14,6 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from nscan_cli.graph.model import Pairwise
+from nscan_cli.graph.pattern import Indices
 from nscan_cli.ndt.grid import Ndt
 from nscan_cli.poses import Array, compose, relative
 from nscan_cli.slam.options import GaussianOptions, KeyframeOptions
@@ -40,16 +41,14 @@ class Route(NamedTuple):
     """K keyframes along the path, and where the graph has them."""
 
     keyframes: Sequence[Keyframe]
+    rows: Indices
+    """(K,) theirs in the log, which are the ids of their nodes."""
     chain: Sequence[Pairwise]
     """The relations of tracking: `chain[k]` leads from keyframe k to k + 1."""
     paths: Array
     """(K,) the length of path up to each, m."""
     poses: Array
     """(K, 3) global ones."""
-
-    def rows(self, indices: Iterable[int]) -> list[int]:
-        """Those of some keyframes in the log."""
-        return [self.keyframes[k].row for k in indices]
 
 
 def points_per_cell(keyframes: Iterable[Keyframe]) -> float:
@@ -62,11 +61,12 @@ def _count_cells(points: Array, side: float) -> int:
     return len(np.unique(np.floor(points / side) @ np.array([1.0, 1j])))
 
 
-def route(keyframes: Sequence[Keyframe], chain: Sequence[Pairwise], poses: Array) -> Route:
+def route_of(keyframes: Sequence[Keyframe], chain: Sequence[Pairwise], poses: Array) -> Route:
     """The route of as many keyframes as there are poses (K, 3)."""
     keyframes = keyframes[: len(poses)]
+    rows = np.array([keyframe.row for keyframe in keyframes], dtype=np.int64)
     paths = np.array([keyframe.tracked.path for keyframe in keyframes])
-    return Route(keyframes, chain[: max(len(poses) - 1, 0)], paths, poses)
+    return Route(keyframes, rows, chain[: max(len(poses) - 1, 0)], paths, poses)
 
 
 def extended(route: Route, keyframes: Sequence[Keyframe], chain: Sequence[Pairwise]) -> Route:
@@ -76,6 +76,7 @@ def extended(route: Route, keyframes: Sequence[Keyframe], chain: Sequence[Pairwi
         poses.append(compose(poses[-1], relation.measurement))
     return Route(
         [*route.keyframes, *keyframes],
+        np.append(route.rows, [keyframe.row for keyframe in keyframes]).astype(np.int64),
         [*route.chain, *chain],
         np.append(route.paths, [keyframe.tracked.path for keyframe in keyframes]),
         np.vstack([route.poses, *poses[1:]]),

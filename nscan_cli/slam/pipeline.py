@@ -14,7 +14,6 @@ from nscan_cli.graph.optimise import optimise
 from nscan_cli.graph.pattern import Indices
 from nscan_cli.graph.relation import Relation
 from nscan_cli.graph.robust import contradicting
-from nscan_cli.graph.system import GraphEnergy
 from nscan_cli.logs.scan import LaserLog
 from nscan_cli.poses import Array
 from nscan_cli.slam.ahead import Ahead
@@ -23,7 +22,7 @@ from nscan_cli.slam.closing import Closing
 from nscan_cli.slam.coverage import Coverage
 from nscan_cli.slam.energies import Energies
 from nscan_cli.slam.following import Followed, Follower, Sensed
-from nscan_cli.slam.keyframes import Keyframe, Keyframes, Route, extended, relation_between
+from nscan_cli.slam.keyframes import Keyframe, Keyframes, extended, relation_between, route_of
 from nscan_cli.slam.nearby import MatchNearby, Nearby, choose_nearby, match_nearby
 from nscan_cli.slam.options import SlamOptions
 from nscan_cli.slam.pairs_nearby import match_pairs_nearby
@@ -63,13 +62,13 @@ class Slam:
         self.match: MatchNearby = match_pairs_nearby if options.relations == "pairwise" else match_nearby
         self.ahead = Ahead(self.match, options.nscan, threads)
         self.steps: list[Pairwise] = []
-        self.route = Route([], [], np.zeros(0), np.zeros((0, 3)))
+        self.route = route_of([], [], np.zeros((0, 3)))
         self.pairs: list[Pairwise] = []
         self.nscan: list[NScan] = []
         self.others: list[Relation] = []
         self.loops: list[Loop] = []
         self.energies, self.covered = Energies(len(log)), Coverage()
-        self.closing = Closing(options.closing, options.nscan, self.match)
+        self.closing = Closing(options.closing, options.nscan, self.match, self.energies)
         self.places: list[Place] = []
         self._moved, self._optimised = 0.0, 0
 
@@ -141,7 +140,7 @@ class Slam:
         """Step 2: a new keyframe, with its relation to the one before."""
         before, path = len(self.poses), keyframe.tracked.path
         if not before:
-            self.route = Route([keyframe], [], np.array([path]), np.zeros((1, 3)))
+            self.route = route_of([keyframe], [], np.zeros((1, 3)))
             return
         relation = self.steps[before - 1]
         self.closing.extend(relation, path - float(self.route.paths[-1]))
@@ -153,7 +152,7 @@ class Slam:
             return
         route, options = self.route, self.options.nscan
         tried, seen_before = choose_nearby(route.poses, route.paths, centre, options)
-        node, others = route.keyframes[centre].row, route.rows(tried.tolist())
+        node, others = int(route.rows[centre]), route.rows[tried].tolist()
         if self.covered.share(node, others) >= options.covered:
             return
         # One more may be there that is not whole.
@@ -183,7 +182,7 @@ class Slam:
         nearby = self.ahead.match(self.route, centre)
         if nearby is None or nearby.loop is None:
             return nearby
-        reason = self.closing.why_doubted(self.route, centre, nearby, self._known)
+        reason = self.closing.why_doubted(self.route, centre, nearby, self.closed)
         if reason is None:
             return nearby
         loop = dataclasses.replace(nearby.loop, accepted=False, reason=reason)
@@ -193,7 +192,7 @@ class Slam:
 
     def close_loops(self, centre: int, left_out: Indices) -> None:
         """Step 4: a keyframe searched where its place may be farther off than a joint match finds it."""
-        places = self.closing.close(self.route, centre, left_out, self._known)
+        places = self.closing.close(self.route, centre, left_out, self.closed)
         if not places:
             return
         self.route = piece_moved(self.route, places[-1], self.breaks)
@@ -229,7 +228,7 @@ class Slam:
     def reject(self) -> None:
         """Loops that contradict the rest of the graph are taken back."""
         relations = self.relations
-        energy = self.energies.whole(self.route, relations)
+        energy = self.energies.of(self.route, relations)
         doubted = np.array([relation.origin == "loop" for relation in relations], dtype=np.bool_)
         wrong = contradicting(energy, self.poses, doubted)
         if not wrong.any():
@@ -252,7 +251,7 @@ class Slam:
         self._moved, self._optimised = 0.0, len(self.poses)
         if len(self.poses) < 2:
             return
-        energy = self.energies.whole(self.route, self.relations)
+        energy = self.energies.of(self.route, self.relations)
         self.route = self.route._replace(poses=optimise(energy, self.poses, max_iterations, tolerance).poses)
 
     @property
@@ -260,20 +259,14 @@ class Slam:
         """(K, 3) where the graph has the keyframes."""
         return self.route.poses
 
-    def _known(self, fixed: int, among: Indices | None = None) -> GraphEnergy:
-        """What loops and the way say of how the keyframes lie to one of them, slips allowed for.
-
-        With `among` (m,) only of these, whose places among them are the energy's.
-        """
-        way, loops = self.closing.way, [each for each in self.relations if each.origin == "loop"]
-        if among is None:
-            return self.energies.whole(self.route, [*way, *loops], fixed)
-        return self.energies.part(self.route, way, loops, fixed, among)
-
     @property
     def relations(self) -> list[Relation]:
         """All relations of the graph, in its order."""
         return [*self.pairwise, *self.nscan, *self.others]
+
+    def closed(self) -> list[Relation]:
+        """Those that close loops."""
+        return [relation for relation in self.relations if relation.origin == "loop"]
 
     @property
     def pairwise(self) -> list[Pairwise]:

@@ -97,7 +97,7 @@ def find_place(
     tie = None if nearby is None else nearby.tie(keyframes[centre].row)
     if nearby is None or tie is None:
         return Loop(nodes, False, NO_MATCH, found.score)
-    old = route.rows(range(len(poses))).index(tie[0])
+    old = int(np.searchsorted(route.rows, tie[0]))
     off = compose(moved[old], tie[1]) - found.pose
     if np.hypot(off[0], off[1]) > closing.settled:
         return Loop(nodes, False, ELSEWHERE, found.score)
@@ -142,7 +142,7 @@ def _sought(
 
     None when one of them has no points.
     """
-    keyframes, _, paths, poses = route
+    keyframes, paths, poses = route.keyframes, route.paths, route.poses
     beside = np.flatnonzero(np.abs(paths - paths[centre]) <= closing.beside)
     scan = _cloud(keyframes, beside, relative(poses[beside], poses[centre]))
     cloud = _cloud(keyframes, earlier, poses[earlier])

@@ -51,7 +51,7 @@ class Refinement:
                 self._threads, lambda centre: self._match(route, centre, self._options_of(centre)), chosen
             )
             for (centre, tried), nearby in zip(chosen.items(), found, strict=True):
-                self._covered.add(route.keyframes[centre].row, route.rows(tried.tolist()), nearby)
+                self._covered.add(int(route.rows[centre]), route.rows[tried].tolist(), nearby)
                 self._starts[centre] = tried, relative(poses[tried], poses[centre])
                 self._found[centre] = nearby
             waiting = [centre for centre in waiting if centre not in chosen]
@@ -67,7 +67,7 @@ class Refinement:
         for centre in waiting:
             options = self._options_of(centre)
             tried, _ = choose_nearby(route.poses, route.paths, centre, options)
-            node, others = route.keyframes[centre].row, route.rows(tried.tolist())
+            node, others = int(route.rows[centre]), route.rows[tried].tolist()
             needed = self._starts[centre] is not None or centre in self._wider
             if needed or covered.share(node, others) < options.covered:
                 chosen[centre] = tried

@@ -2,21 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 
 from nscan_cli.compiled import kernel
-from nscan_cli.graph.cholesky import Factor, factorise, inverse_diagonal, loose_nodes, solve
+from nscan_cli.graph.cholesky import Factor, factorise, solve
+from nscan_cli.graph.inverse import inverse_diagonal
 from nscan_cli.graph.model import Pairwise
 from nscan_cli.graph.pattern import Indices
 from nscan_cli.graph.system import GraphEnergy
 from nscan_cli.poses import Array
-
-AROUND = 45.0
-"""m; the part of the graph that is asked first. A search looks no farther than 30 m."""
 
 
 class Reach(NamedTuple):
@@ -100,20 +98,6 @@ def _greatest(xx: Array, xy: Array, yy: Array) -> Array:
     return np.maximum(0.5 * (xx + yy) + np.hypot(0.5 * (xx - yy), xy), 0.0)
 
 
-def at_most(energy: GraphEnergy, poses: Array) -> Reach:
-    """Of a part of a graph that may be in pieces, from the fixed one: infinite where nothing holds it.
-
-    What the rest of the graph knows besides makes the true values smaller, never larger.
-    """
-    system = energy.evaluate(poses, exact=False)
-    factor = factorise(energy.pattern, 0.5 * system.hessian)
-    held = ~loose_nodes(factor)
-    distance, angle = np.full(len(poses), np.inf), np.full(len(poses), np.inf)
-    distance[energy.fixed] = angle[energy.fixed] = 0.0
-    distance[energy.free[held]], angle[energy.free[held]] = _reach(inverse_diagonal(factor)[held])
-    return Reach(distance, angle)
-
-
 class Whereabouts:
     """The reach of all keyframes from one that moves on, without asking the whole graph each time.
 
@@ -126,10 +110,10 @@ class Whereabouts:
         self._reach = Reach(np.zeros(1), np.zeros(1))
         self._known: Known | None = None
 
-    def ask(self, origin: int, energy: Callable[[int], GraphEnergy], poses: Array) -> Reach:
-        """The reach (K,) from keyframe `origin`; `energy` gives the graph's with a keyframe held."""
-        self._known = known(energy(origin), poses)
-        self._origin, self._reach = origin, self._known.reach()
+    def ask(self, energy: GraphEnergy, poses: Array) -> Reach:
+        """The reach (K,) from the keyframe that the graph's energy holds."""
+        self._known = known(energy, poses)
+        self._origin, self._reach = energy.fixed, self._known.reach()
         return self._reach
 
     def asked_from(self, other: int) -> Reach:
@@ -137,21 +121,11 @@ class Whereabouts:
         assert self._known is not None
         return self._known.seen_from(other)
 
-    def narrow(self, origin: int, energy: Callable[[int, Indices], GraphEnergy], poses: Array) -> Reach:
-        """A bound again, by what is known of the keyframes around alone; `origin` as last for `bound`.
-
-        The same one where these are most of the graph: then it is as well to ask that.
-
-        `energy` gives that of the graph of some keyframes (m,) with one of them held.
-        """
-        around = np.flatnonzero(np.hypot(*(poses[:, :2] - poses[origin, :2]).T) <= AROUND)
-        if 2 * len(around) > len(poses):
-            return self._reach
-        local = at_most(energy(origin, around), poses[around])
-        distance, angle = self._reach.distance.copy(), self._reach.angle.copy()
-        distance[around] = np.minimum(distance[around], local.distance)
-        angle[around] = np.minimum(angle[around], local.angle)
-        self._reach = Reach(distance, angle)
+    def narrow(self, origin: int, covariances: Array) -> Reach:
+        """A bound again, by covariances (K, 3, 3) from `origin`, as last for `bound`, none too little."""
+        reach = _reach(covariances)
+        distance = np.minimum(self._reach.distance, reach.distance)
+        self._origin, self._reach = origin, Reach(distance, np.minimum(self._reach.angle, reach.angle))
         return self._reach
 
     def bound(self, origin: int, way: Sequence[Pairwise], poses: Array) -> Reach:

@@ -1,11 +1,14 @@
 from __future__ import annotations
 
+import itertools
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from nscan_cli.graph.cholesky import Factor, factorise, inverse_diagonal, loose_nodes, solve
+from nscan_cli.graph.cholesky import Factor, factorise, loose_nodes, solve
+from nscan_cli.graph.inverse import inverse_diagonal
 from nscan_cli.graph.pattern import block_targets, find_pattern
 from nscan_cli.poses import Array
 
@@ -53,6 +56,25 @@ def test_solves_and_inverts_like_a_dense_matrix(case: tuple[Array, list[tuple[in
     )
     inverse = np.linalg.inv(matrix).reshape(nodes, 3, nodes, 3)[np.arange(nodes), :, np.arange(nodes)]
     np.testing.assert_allclose(inverse_diagonal(factor), inverse, rtol=1e-9, atol=1e-12)
+
+
+def test_panels_of_any_width_and_height():
+    """Rooms of 1 to 30 nodes that all see each other, along a corridor, and the corridor twice."""
+    rng = np.random.default_rng(7)
+    sizes = [1, 2, 3, 5, 8, 13, 30, 4]
+    starts = np.concatenate([[0], np.cumsum(sizes)])
+    edges = [(a, b) for s, e in itertools.pairwise(starts.tolist()) for a in range(s, e) for b in range(s, a)]
+    edges += [(int(a), int(b)) for a, b in itertools.pairwise(starts[:-1])]
+    edges += [(int(e) - 1, int(s)) for s, e in zip(starts[:-3], starts[3:], strict=True)]
+    matrix = random_matrix(int(starts[-1]), edges, rng)
+    factor, right = factor_of(matrix, edges), rng.normal(size=(int(starts[-1]), 3))
+    assert np.diff(factor.pattern.supernodes).max() > 20
+    np.testing.assert_allclose(
+        solve(factor, right).ravel(), np.linalg.solve(matrix, right.ravel()), rtol=1e-8
+    )
+    dense = np.linalg.inv(matrix).reshape(len(right), 3, len(right), 3)
+    inverse = dense[np.arange(len(right)), :, np.arange(len(right))]
+    np.testing.assert_allclose(inverse_diagonal(factor), inverse, rtol=1e-8, atol=1e-12)
 
 
 def test_a_long_ring_fills_little():

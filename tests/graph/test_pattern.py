@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+
 import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -35,6 +37,17 @@ def test_the_pattern_is_that_of_the_elimination(drawn):
     for k in range(nodes):
         rows = pattern.rows[pattern.starts[k] : pattern.starts[k + 1]]
         np.testing.assert_array_equal(rows, np.flatnonzero(there[:, k] & (np.arange(nodes) >= k)))
+    assert pattern.supernodes[0] == 0
+    assert pattern.supernodes[-1] == nodes
+    for n, (first, end) in enumerate(itertools.pairwise(pattern.supernodes.tolist())):
+        assert end > first
+        block = there[:, first:end] & (np.arange(nodes)[:, None] >= first)
+        height = np.count_nonzero(block[:, 0])
+        assert pattern.panels[n + 1] - pattern.panels[n] == 9 * (end - first) * height
+        for column in range(first, end):
+            # One row of blocks less each time: a dense triangle, and the same rows below it.
+            rows = np.flatnonzero(there[:, column] & (np.arange(nodes) >= column))
+            np.testing.assert_array_equal(rows, np.flatnonzero(block[:, 0])[column - first :])
     for (a, b), target in zip(pairs, block_targets(named, pattern).tolist(), strict=True):
         assert (target == -1) == (a < 0 or b < 0)
         if target >= 0:

@@ -10,11 +10,10 @@ from typing import NamedTuple
 import numpy as np
 
 from nscan_cli.graph.model import Pairwise
-from nscan_cli.graph.system import GraphEnergy
 from nscan_cli.logs.scan import LaserLog
 from nscan_cli.poses import Array, compose, relative
-from nscan_cli.slam.closing import Closing, Energy, Indices
-from nscan_cli.slam.keyframes import Keyframe, Keyframes, relation_between, route
+from nscan_cli.slam.closing import Closing
+from nscan_cli.slam.keyframes import Keyframe, Keyframes, relation_between, route_of
 from nscan_cli.slam.options import KeyframeOptions, NScanOptions
 from nscan_cli.slam.place import Place
 from nscan_cli.slam.tracking import Tracked
@@ -179,19 +178,6 @@ def twin_drive(apart: float = TWIN) -> Driven:
     return driven(twin_corridors(), truth, np.concatenate([x + 12.0, x + 76.0]))
 
 
-def energy_of_way(closing: Closing, size: int) -> Energy:
-    """What the way alone says of the first `size` keyframes, every ROWS rows."""
-
-    def energy(fixed: int, among: Indices | None = None) -> GraphEnergy:
-        keyframes = np.arange(size) if among is None else among
-        positions = np.full(ROWS * size, -1)
-        positions[ROWS * keyframes] = np.arange(len(keyframes))
-        way = [closing.way[k] for k in keyframes[:-1][np.diff(keyframes) == 1].tolist()]
-        return GraphEnergy(len(keyframes), way, positions, int(np.searchsorted(keyframes, fixed)))
-
-    return energy
-
-
 def closed_along(
     closing: Closing, drive: Driven, until: int | None = None, left_out: Sequence[int] = ()
 ) -> list[tuple[int, list[Place]]]:
@@ -209,9 +195,8 @@ def closed_along(
         if centre < 0:
             continue
 
-        energy = energy_of_way(closing, size)
         out = others[others < centre]
-        places = closing.close(route(keyframes, chain, poses[:size]), centre, out, energy)
+        places = closing.close(route_of(keyframes, chain, poses[:size]), centre, out, list)
         if places:
             found.append((centre, places))
     return found

@@ -11,7 +11,7 @@ from nscan_cli.graph.model import Pairwise
 from nscan_cli.ndt.grid import Ndt
 from nscan_cli.slam.ahead import AHEAD, Ahead
 from nscan_cli.slam.coverage import Coverage
-from nscan_cli.slam.keyframes import Keyframe, Route, extended
+from nscan_cli.slam.keyframes import Keyframe, Route, extended, route_of
 from nscan_cli.slam.nearby import Nearby
 from nscan_cli.slam.options import NScanOptions
 from nscan_cli.slam.tracking import Tracked
@@ -32,7 +32,7 @@ def straight(size: int) -> tuple[Route, tuple[list[Keyframe], list[Pairwise]]]:
     keyframes = [keyframe(k) for k in range(SIZE)]
     step = np.array([1.0, 0.0, 0.0])
     chain = [Pairwise((k, k + 1), step, np.eye(3), "track") for k in range(SIZE - 1)]
-    first = Route(keyframes[:1], [], np.zeros(1), np.zeros((1, 3)))
+    first = route_of(keyframes[:1], [], np.zeros((1, 3)))
     return extended(first, keyframes[1:size], chain[: size - 1]), (keyframes[size:], chain[size - 1 :])
 
 

@@ -10,7 +10,8 @@ import pytest
 from nscan_cli.graph.model import Loop, Pairwise
 from nscan_cli.poses import compose, relative
 from nscan_cli.slam.closing import NO_SECOND, Closing
-from nscan_cli.slam.keyframes import route
+from nscan_cli.slam.energies import Energies
+from nscan_cli.slam.keyframes import route_of
 from nscan_cli.slam.nearby import Nearby, match_nearby
 from nscan_cli.slam.options import ClosingOptions, NScanOptions
 from nscan_cli.slam.place import AMBIGUOUS, OUTDONE, TOO_LITTLE
@@ -19,7 +20,6 @@ from tests.slam.drives import (
     ROWS,
     Driven,
     closed_along,
-    energy_of_way,
     like_doors_drive,
     round_drive,
     twin_drive,
@@ -39,7 +39,7 @@ NEVER = ClosingOptions(score=1.1)
 
 
 def closing(options: ClosingOptions = ClosingOptions()) -> Closing:  # noqa: B008
-    return Closing(options, NSCAN, match_nearby)
+    return Closing(options, NSCAN, match_nearby, Energies(ROWS * len(round_drive().keyframes)))
 
 
 def bent(slip: tuple[float, float, float] = ACROSS) -> Driven:
@@ -145,9 +145,8 @@ def doubted(off: tuple[float, float, float], options: ClosingOptions, origin: st
     nearby = Nearby(
         (Pairwise(nodes, measured, np.eye(3), origin),), None, Loop(nodes, True, "", 0.7), 0.0, True
     )
-    energy = energy_of_way(tried, centre + 1)
-    known = route(drive.keyframes, drive.chain, drive.truth[: centre + 1])
-    return tried.why_doubted(known, centre, nearby, energy)
+    known = route_of(drive.keyframes, drive.chain, drive.truth[: centre + 1])
+    return tried.why_doubted(known, centre, nearby, list)
 
 
 def test_a_loop_from_a_poor_start_must_stand_a_search():

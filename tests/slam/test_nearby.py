@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from nscan_cli.matching.gauge import gauge_directions
 from nscan_cli.poses import Array, compose, relative, wrap
-from nscan_cli.slam.keyframes import Keyframe, route
+from nscan_cli.slam.keyframes import Keyframe, route_of
 from nscan_cli.slam.nearby import Nearby, choose_nearby, match_nearby
 from nscan_cli.slam.options import NScanOptions
 from tests.matching.problems import office_truth
@@ -123,7 +123,7 @@ def matched(
     centre = poses[new].mean(axis=0) * [1, 1, 0]
     poses[new] = compose(compose(centre, off), relative(poses[new], centre))
     pairwise = [relation_to_previous(keyframes[: k + 2]) for k in range(len(keyframes) - 1)]
-    found = match_nearby(route(keyframes, pairwise, poses), len(keyframes) - 1, options)
+    found = match_nearby(route_of(keyframes, pairwise, poses), len(keyframes) - 1, options)
     assert found is not None
     return found
 
@@ -177,7 +177,7 @@ def test_without_a_revisit_the_relation_closes_no_loop():
     keyframes = revisit()[: len(OLD)]
     truth = office_truth()[list(OLD)]
     pairwise = [relation_to_previous(keyframes[: k + 2]) for k in range(len(keyframes) - 1)]
-    found = match_nearby(route(keyframes, pairwise, truth), len(OLD) - 1, NScanOptions())
+    found = match_nearby(route_of(keyframes, pairwise, truth), len(OLD) - 1, NScanOptions())
     assert found is not None
     assert found.nscan is not None
     assert (found.loop, found.nscan.origin) == (None, "nscan")
@@ -236,6 +236,6 @@ def test_when_all_that_was_seen_before_is_left_out_no_loop_is_closed():
 
 def test_two_keyframes_are_too_few():
     keyframes = revisit()[:2]
-    two = route(keyframes, [relation_to_previous(keyframes)], office_truth()[[280, 290]])
+    two = route_of(keyframes, [relation_to_previous(keyframes)], office_truth()[[280, 290]])
     assert match_nearby(two, 1, NScanOptions()) is None
-    assert match_nearby(route(keyframes, [], office_truth()[[280]]), 0, NScanOptions()) is None
+    assert match_nearby(route_of(keyframes, [], office_truth()[[280]]), 0, NScanOptions()) is None

@@ -10,7 +10,7 @@ import pytest
 from nscan_cli.graph.model import Pairwise
 from nscan_cli.ndt.energy import energy
 from nscan_cli.poses import Array, compose, relative, wrap
-from nscan_cli.slam.keyframes import Keyframe, route
+from nscan_cli.slam.keyframes import Keyframe, route_of
 from nscan_cli.slam.nearby import Nearby
 from nscan_cli.slam.options import NScanOptions
 from nscan_cli.slam.pairs_nearby import match_pairs_nearby
@@ -28,7 +28,7 @@ def matched(keyframes: list[Keyframe], off: Array = OFF, centre: int = len(ROWS)
     middle = poses[new].mean(axis=0) * [1, 1, 0]
     poses[new] = compose(compose(middle, off), relative(poses[new], middle))
     links = [relation_to_previous(keyframes[: k + 2]) for k in range(len(keyframes) - 1)]
-    found = match_pairs_nearby(route(keyframes, links, poses), centre, NScanOptions())
+    found = match_pairs_nearby(route_of(keyframes, links, poses), centre, NScanOptions())
     assert found is not None
     return found
 
@@ -88,7 +88,7 @@ def test_the_chain_holds_two_that_follow_each_other(centre):
     links = [relation_to_previous(keyframes[: k + 2]) for k in range(len(keyframes) - 1)]
     wrong = compose(links[-1].measurement, np.array([0.05, 0.03, 0.01]))
     links[-1] = dataclasses.replace(links[-1], measurement=wrong, information=np.diag([1e9, 1e9, 1e9]))
-    found = match_pairs_nearby(route(keyframes, links, truth), centre, NScanOptions())
+    found = match_pairs_nearby(route_of(keyframes, links, truth), centre, NScanOptions())
     assert found is not None
     held = {relation.nodes: relation for relation in found.pairwise}
     if centre == len(ROWS) - 1:
@@ -119,4 +119,4 @@ def test_when_nothing_of_another_visit_overlaps_the_loop_is_refused_with_a_reaso
 
 def test_a_keyframe_alone_is_matched_with_nothing():
     keyframes = revisit()[:1]
-    assert match_pairs_nearby(route(keyframes, [], office_truth()[[280]]), 0, NScanOptions()) is None
+    assert match_pairs_nearby(route_of(keyframes, [], office_truth()[[280]]), 0, NScanOptions()) is None

@@ -10,7 +10,7 @@ import pytest
 from nscan_cli.graph.model import Loop
 from nscan_cli.matching.search import SearchOptions
 from nscan_cli.poses import Array, compose, relative, wrap
-from nscan_cli.slam.keyframes import Keyframe, route
+from nscan_cli.slam.keyframes import Keyframe, route_of
 from nscan_cli.slam.nearby import MatchNearby, Nearby, match_nearby
 from nscan_cli.slam.options import ClosingOptions, NScanOptions
 from nscan_cli.slam.pairs_nearby import match_pairs_nearby
@@ -51,7 +51,7 @@ def found(
     drive = drive or round_drive()
     poses = moved(drive, centre, off)
     return find_place(
-        route(drive.keyframes, drive.chain, poses), centre, EARLIER, window, match, closing, NSCAN
+        route_of(drive.keyframes, drive.chain, poses), centre, EARLIER, window, match, closing, NSCAN
     )
 
 
@@ -85,7 +85,7 @@ def test_the_place_is_found_from_three_metres_away(off, match):
 def test_from_there_a_joint_match_alone_does_not_find_it(off):
     drive = round_drive()
     poses = moved(drive, CENTRE, off)
-    nearby = match_nearby(route(drive.keyframes, drive.chain, poses), CENTRE, NSCAN)
+    nearby = match_nearby(route_of(drive.keyframes, drive.chain, poses), CENTRE, NSCAN)
     assert nearby is not None
     assert nearby.tie(ROWS * CENTRE) is None
 

@@ -128,7 +128,7 @@ def test_from_any_keyframe_it_is_as_if_that_one_were_held(seed, held):
 
 def test_what_was_asked_can_be_seen_from_another_keyframe():
     walked, whereabouts = walk(4, 9, loops=2), Whereabouts()
-    whereabouts.ask(8, walked.energy, walked.poses)
+    whereabouts.ask(walked.energy(8), walked.poses)
     found, direct = whereabouts.asked_from(3), seen_from(walked.energy(3), walked.poses)
     np.testing.assert_allclose(found.distance, direct.distance, rtol=1e-8, atol=1e-12)
 
@@ -175,7 +175,7 @@ def asked_and_bound(walked: Walk, origin: int, now: int, ahead: int = 0) -> tupl
         walked.until(origin + ahead + 1),
         walked.until(now + ahead + 1),
     )
-    whereabouts.ask(origin, before.energy, before.poses)
+    whereabouts.ask(before.energy(origin), before.poses)
     bound = whereabouts.bound(now, after.way, after.poses)
     answer = seen_from(after.energy(now), after.poses)
     return Reach(bound.distance[:now], bound.angle[:now]), Reach(answer.distance[:now], answer.angle[:now])
@@ -184,7 +184,7 @@ def asked_and_bound(walked: Walk, origin: int, now: int, ahead: int = 0) -> tupl
 def test_the_bound_is_the_answer_itself_at_first():
     walked = walk(5, 8, loops=2)
     whereabouts = Whereabouts()
-    asked = whereabouts.ask(7, walked.energy, walked.poses)
+    asked = whereabouts.ask(walked.energy(7), walked.poses)
     bound = whereabouts.bound(7, walked.way, walked.poses)
     np.testing.assert_allclose(bound.distance, asked.distance, rtol=1e-12)
     np.testing.assert_allclose(bound.angle, asked.angle, rtol=1e-12)
