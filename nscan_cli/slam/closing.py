@@ -114,7 +114,8 @@ class Closing:
             return LOST
         window, earlier = self._visit(route, centre, old, reach)
         pose = compose(poses[old], tie[1])
-        return why_doubted(route, centre, pose, earlier, window, self.options)
+        joint = None if nearby.nscan is None else self.nscan
+        return why_doubted(route, centre, pose, earlier, window, self.options, joint)
 
     def _narrow(self, route: Route, centre: int, loops: Loops) -> Reach:
         """A bound on the reach again, by the surest ways."""

@@ -15,7 +15,7 @@ from nscan_cli.matching.joint import JointMatch, JointOptions, match_jointly
 from nscan_cli.matching.joint_energy import JointProblem, Priors, all_pairs, no_priors
 from nscan_cli.matching.overlap import held_together, overlaps, weakest_link
 from nscan_cli.matching.scans import Scans, lay_out
-from nscan_cli.poses import Array, relative
+from nscan_cli.poses import Array, compose, relative
 from nscan_cli.slam.keyframes import Keyframe, Route, points_per_cell
 from nscan_cli.slam.options import NScanOptions
 
@@ -113,6 +113,29 @@ def match_nearby(route: Route, centre: int, options: NScanOptions) -> Nearby | N
         if nearby.whole and nearby.moved < options.settled:
             break
     return nearby
+
+
+def match_at(
+    route: Route, centre: int, places: Sequence[Array], options: NScanOptions
+) -> list[tuple[float, Array]]:
+    """Joint matches from several places (3,) of the centre: the energy of each, and where the centre is then.
+
+    This visit is moved to each place as a whole, others stay. All are of the same scans, those that are near
+    at any of the places, so that the lowest energy tells which place is right.
+    """
+    visit = np.abs(route.paths - route.paths[centre]) <= options.recent
+    starts = [route.poses.copy() for _ in places]
+    for start, place in zip(starts, places, strict=True):
+        start[visit] = compose(place, relative(start[visit], route.poses[centre]))
+    near = [choose_nearby(start, route.paths, centre, options)[0] for start in starts]
+    members = np.unique(np.concatenate(near))
+    scans, old = _laid_out(route.keyframes, members), int(np.argmin(visit[members]))
+    at, held = int(np.searchsorted(members, centre)), route.poses[members[old]]
+    found = []
+    for start in starts:
+        match = _match(scans, members, route, start[members], options.widenings, options)
+        found.append((match.energy, compose(held, relative(match.poses[at], match.poses[old]))))
+    return found
 
 
 def _match_held(

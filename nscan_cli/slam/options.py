@@ -45,7 +45,8 @@ class TrackingOptions:
     inlier_bound: float = 9.0
     """A point within this squared Mahalanobis distance of a Gaussian is an inlier."""
     inlier_share: float = 0.8
-    """With fewer inliers the match starts again from other angles: one that is off by 12° can have 0.7."""
+    """With fewer inliers the match starts again from other angles: one that is off by 12° can have 0.7. So it
+    does, where there is odometry, with clearly fewer than the scan before had."""
     turns: tuple[tuple[float, ...], ...] = ((0.1, 0.2), (0.4, 0.7), (1.0, 1.3))
     """Angles (rad, to both sides) to start again from; a later ring when those before did not help,"""
     far_share: float = 0.5

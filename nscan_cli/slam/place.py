@@ -18,7 +18,7 @@ from nscan_cli.graph.model import Loop
 from nscan_cli.matching.search import Field, Search, SearchOptions, likelihood_field, search
 from nscan_cli.poses import Array, compose, relative
 from nscan_cli.slam.keyframes import Keyframe, Route
-from nscan_cli.slam.nearby import MatchNearby, Nearby
+from nscan_cli.slam.nearby import MatchNearby, Nearby, match_at
 from nscan_cli.slam.options import ClosingOptions, NScanOptions
 
 AMBIGUOUS = "another place fits as well"
@@ -111,10 +111,14 @@ def why_doubted(
     earlier: NDArray[np.int64],
     window: SearchOptions,
     closing: ClosingOptions,
+    nscan: NScanOptions | None,
 ) -> str | None:
     """Why keyframe `centre` may lie elsewhere among the `earlier` ones (m,) than at `pose` (3,), or None.
 
-    A joint match ends at the optimum that is next. Along a corridor there is one at every door.
+    A joint match ends at the optimum that is next. Along a corridor there is one at every door. Where the
+    search finds another place that fits about as well, a joint match from there, of the same scans, decides:
+    by the energy both ways, and exact to the centimetre, where the search has points in cells. Without
+    `nscan`, for single matches, the search has the last word.
     """
     sought = _sought(route, centre, earlier, window, closing)
     if sought is None:
@@ -124,11 +128,17 @@ def why_doubted(
     here = search(field, scan, pose, closing.score, cells)
     if here is None:
         return TOO_LITTLE
-    return (
-        None
-        if search(field, scan, route.poses[centre], here.score / closing.rival, window) is None
-        else OUTDONE
-    )
+    about = Search(field, scan, route.poses[centre], window)
+    if about.best(here.score / closing.rival) is not None:
+        return OUTDONE
+    if nscan is None:
+        return None
+    other = about.best(closing.rival * here.score, without=(pose, closing.agree))
+    if other is None:
+        return None
+    (energy, _), (other_energy, there) = match_at(route, centre, (pose, other.pose), nscan)
+    is_elsewhere = np.hypot(*(there - pose)[:2]) > closing.agree
+    return OUTDONE if is_elsewhere and other_energy < energy else None
 
 
 def _sought(

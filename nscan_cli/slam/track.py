@@ -23,6 +23,8 @@ from nscan_cli.slam.options import TrackingOptions
 SCANS, OLDEST, KNOWN, ROWS = 0, 1, 2, 3
 """What is counted: scans that have joined the map, the oldest of them that it still holds, the last poses
 that are known, and the rows of the grid."""
+CLEARLY = 0.05
+"""By so many inliers more the match from another start must be better."""
 
 
 class Settings(NamedTuple):
@@ -83,13 +85,15 @@ class Track(NamedTuple):
     """(4,) SCANS, OLDEST, KNOWN and ROWS"""
     path: Array
     """(1,) length of the path, m."""
+    inliers: Array
+    """(1,) share of inliers of the last scan."""
 
     @classmethod
     def begin(cls, last: int) -> Track:
         """A track that has not begun, of which so many last poses will be known."""
         scans = np.zeros((0, 2)), np.zeros(1, dtype=np.int64), np.zeros((0, 4))
-        counts = np.zeros(4, dtype=np.int64)
-        return cls(np.zeros((last, 3)), np.full(3, np.nan), np.zeros(3), *scans, counts, np.zeros(1))
+        counts, (path, inliers) = np.zeros(4, dtype=np.int64), np.zeros((2, 1))
+        return cls(np.zeros((last, 3)), np.full(3, np.nan), np.zeros(3), *scans, counts, path, inliers)
 
     def with_room(self, scans: int, points: int) -> Track:
         """The track with room for so many more scans, and points of them, in its map."""
@@ -186,6 +190,17 @@ def predict(track: Track, settings: Settings, odometry: Array, prior: Prior) -> 
 
 
 @kernel
+def least_share(track: Track, settings: Settings) -> float:
+    """With fewer inliers the next scan is matched from other angles too.
+
+    One that is off sideways can have four fifths of them: what tells is that the scan before had more.
+    Without odometry more than the angle is a guess.
+    """
+    before = track.inliers[0] if np.isfinite(track.odometry[0]) else 0.0
+    return max(settings.inlier_share, float(before) - CLEARLY)
+
+
+@kernel
 def take(
     track: Track,
     grid: Grid,
@@ -215,6 +230,7 @@ def take(
         track.poses[row] = track.poses[row + 1]
     track.poses[-1], track.odometry[:] = pose, odometry
     counts[KNOWN] = min(counts[KNOWN] + 1, track.poses.shape[0])
+    track.inliers[0] = found.inliers[k]
     found.paths[k], found.joined[k] = track.path[0], joins
     found.expected[k] = 0.0
     for a in range(3):
@@ -277,7 +293,7 @@ def follow(
             found.values[k], found.inliers[k] = match_and_count(
                 grid, settings, scan, prior, found.poses[k], found.hessians[k]
             )
-            if not found.inliers[k] >= settings.inlier_share:
+            if not found.inliers[k] >= least_share(track, settings):
                 return k
         take(track, grid, settings, scan, odometry[k], prior, found, k)
     return len(ends) - 1

@@ -18,12 +18,20 @@ from nscan_cli.matching.search import likelihood_field, search
 from nscan_cli.ndt.grid import Ndt
 from nscan_cli.poses import Array
 from nscan_cli.slam.options import TrackingOptions
-from nscan_cli.slam.track import ROWS, Found, Settings, Track, follow, match_and_count, take
+from nscan_cli.slam.track import (
+    CLEARLY,
+    ROWS,
+    Found,
+    Settings,
+    Track,
+    follow,
+    least_share,
+    match_and_count,
+    take,
+)
 
 RECENT = 5.0
 """A lost scan is searched among those of the last stretch of path, m."""
-CLEARLY = 0.05
-"""By so many inliers more the match from another start must be better."""
 LEAST_SCORE = 0.3
 """What a search must find at least; with fewer inliers a scan is lost, whatever the odometry says."""
 
@@ -100,9 +108,9 @@ class Tracker:
 
         It is searched with fewer inliers than `least`.
         """
-        start = self._prior.mean
+        start, enough = self._prior.mean, least_share(self._track, self._settings)
         for ring, turns in enumerate(self.options.turns):
-            if match.inliers >= (self.options.far_share if ring else self.options.inlier_share):
+            if match.inliers >= (self.options.far_share if ring else enough):
                 break
             self.restarts += 1
             for turn in (sign * angle for angle in turns for sign in (1, -1)):

@@ -128,8 +128,11 @@ def slipped_round(slip: Sequence[float], seed: int = 5, max_range: float = 30.0)
     return dataclasses.replace(without_returns(log, blind), odometry=odometry)
 
 
-def like_doors(period: float = 3.0) -> Scene:
-    """A corridor 120 m long with a pair of equal niches every 3 m: a step of 3 m changes nothing."""
+def like_doors(period: float = 3.0, cabinets: Sequence[float] = ()) -> Scene:
+    """A corridor 120 m long with a pair of equal niches every 3 m: a step of 3 m changes nothing.
+
+    Unless there are `cabinets`, each at so many m along it.
+    """
     floor = Builder()
     for side in (-1.1, 1.1):
         outwards = np.sign(side) * 0.6
@@ -138,17 +141,23 @@ def like_doors(period: float = 3.0) -> Scene:
             floor.line(x + period - 1.0, side, x + period - 1.0, side + outwards)
             floor.line(x + period - 1.0, side + outwards, x + period, side + outwards)
             floor.line(x + period, side + outwards, x + period, side)
+    for x in cabinets:
+        floor.box(x, 0.7, x + 0.5, 1.1)
     return Scene("like_doors", floor.world(), np.array([(-20.0, 0.0), (20.0, 0.0)]))
 
 
+CABINETS = (-5.2, 1.1)
+"""m along the corridor of like_doors(): they tell its doors apart, by little of what is seen."""
+
+
 @functools.cache
-def like_doors_drive() -> Driven:
+def like_doors_drive(cabinets: tuple[float, ...] = ()) -> Driven:
     """Twice along 24 m of the corridor of like_doors(), with 40 m of way between that saw nothing of it."""
     x = np.arange(0.0, 24.0, 1.5) - 12.0
     truth = np.zeros((2 * len(x), 3))
     truth[:, 0] = np.concatenate([x, x + 0.4])
     paths = np.concatenate([x + 12.0, x + 76.0])
-    return driven(like_doors(), truth, paths)
+    return driven(like_doors(cabinets=cabinets), truth, paths)
 
 
 TWIN = 5.8

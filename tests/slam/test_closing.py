@@ -14,8 +14,10 @@ from nscan_cli.slam.energies import Energies
 from nscan_cli.slam.keyframes import route_of
 from nscan_cli.slam.nearby import Nearby, match_nearby
 from nscan_cli.slam.options import ClosingOptions, NScanOptions
+from nscan_cli.slam.pairs_nearby import match_pairs_nearby
 from nscan_cli.slam.place import AMBIGUOUS, OUTDONE, TOO_LITTLE
 from tests.slam.drives import (
+    CABINETS,
     ROUND,
     ROWS,
     Driven,
@@ -157,3 +159,19 @@ def test_a_loop_from_a_poor_start_must_stand_a_search():
     assert doubted((0.0, 0.0, 0.4), options) == TOO_LITTLE
     assert doubted((2.0, 0.0, 0.0), options, "track") is None
     assert doubted((2.0, 0.0, 0.0), ClosingOptions(drift=1e-4, drift_angle=1e-5)) is None
+
+
+@pytest.mark.parametrize(
+    ("match", "reason"), [(match_nearby, OUTDONE), (match_pairs_nearby, None)], ids=["joint", "pairs"]
+)
+def test_of_doors_hardly_told_apart_a_joint_match_is_compared_with_another(match, reason):
+    """The way has slipped by a door, which a search sees in a tenth of the points; single matches stay."""
+    doors, tried, centre = like_doors_drive(CABINETS).bent(15, (3.0, 0.0, 0.0)), closing(), 20
+    for k, relation in enumerate(doors.chain[: centre + 3]):
+        tried.extend(relation, doors.keyframes[k + 1].tracked.path - doors.keyframes[k].tracked.path)
+    known = route_of(doors.keyframes, doors.chain, doors.poses[: centre + 4])
+    nearby = match(known, centre, NSCAN)
+    assert nearby is not None
+    assert nearby.loop is not None
+    assert nearby.loop.accepted
+    assert tried.why_doubted(known, centre, nearby, list) == reason

@@ -13,11 +13,11 @@ from hypothesis import strategies as st
 from nscan_cli.matching.gauge import gauge_directions
 from nscan_cli.poses import Array, compose, relative, wrap
 from nscan_cli.slam.keyframes import Keyframe, route_of
-from nscan_cli.slam.nearby import Nearby, choose_nearby, match_nearby
+from nscan_cli.slam.nearby import Nearby, choose_nearby, match_at, match_nearby
 from nscan_cli.slam.options import NScanOptions
 from tests.matching.problems import office_truth
 from tests.simulation.scenes import office
-from tests.slam.drives import keyframe_of, path_of, relation_to_previous
+from tests.slam.drives import CABINETS, keyframe_of, like_doors_drive, path_of, relation_to_previous
 
 OPTIONS = NScanOptions(max_scans=6, radius=5.0, recent=20.0)
 
@@ -239,3 +239,21 @@ def test_two_keyframes_are_too_few():
     two = route_of(keyframes, [relation_to_previous(keyframes)], office_truth()[[280, 290]])
     assert match_nearby(two, 1, NScanOptions()) is None
     assert match_nearby(route_of(keyframes, [], office_truth()[[280]]), 0, NScanOptions()) is None
+
+
+def test_places_are_compared_by_the_same_scans_whichever_the_graph_has():
+    """The true place and one a door off, with this visit at either, and asked for in either order."""
+    doors, centre = like_doors_drive(CABINETS), 20
+    paths = np.array([keyframe.tracked.path for keyframe in doors.keyframes])
+    wrong, visit = doors.truth.copy(), paths > 40.0
+    wrong[visit] += [3.0, 0.0, 0.0]
+    places = doors.truth[centre], wrong[centre]
+    (right_energy, right), (wrong_energy, off) = match_at(
+        route_of(doors.keyframes, doors.chain, doors.truth), centre, places, NScanOptions()
+    )
+    np.testing.assert_allclose(right, places[0], atol=0.03)
+    np.testing.assert_allclose(off, places[1], atol=0.06)
+    # Of a door's match a tenth is at the cabinets.
+    assert right_energy < 1.1 * wrong_energy
+    other, one = match_at(route_of(doors.keyframes, doors.chain, wrong), centre, places[::-1], NScanOptions())
+    assert [one[0], other[0]] == pytest.approx([right_energy, wrong_energy], rel=1e-3)
