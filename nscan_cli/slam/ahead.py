@@ -14,10 +14,9 @@ from typing import NamedTuple
 import numpy as np
 
 from nscan_cli.graph.model import Pairwise
-from nscan_cli.poses import Array
 from nscan_cli.slam.coverage import Coverage
 from nscan_cli.slam.keyframes import Keyframe, Route, extended
-from nscan_cli.slam.nearby import MatchNearby, Nearby, choose_nearby
+from nscan_cli.slam.nearby import MatchNearby, Near, Nearby, choose_nearby
 from nscan_cli.slam.options import NScanOptions
 
 AHEAD = 2
@@ -25,10 +24,9 @@ AHEAD = 2
 
 
 class _Begun(NamedTuple):
-    poses: Array
-    """(k, 3) of the route it is made with."""
-    nodes: list[int]
-    """What it is tried with."""
+    route: Route
+    """What it is made with."""
+    near: Near
     match: Future[Nearby | None]
 
 
@@ -48,7 +46,7 @@ class Ahead:
         """The match about keyframe `centre`, whether it has been begun or not."""
         begun = self._begun.pop(centre, None)
         # What waits still is as well made here.
-        if begun is None or not np.array_equal(begun.poses, route.poses) or begun.match.cancel():
+        if begun is None or not np.array_equal(begun.route.poses, route.poses) or begun.match.cancel():
             return self._match(route, centre, self._options)
         return begun.match.result()
 
@@ -57,10 +55,10 @@ class Ahead:
         route: Route,
         coming: tuple[Sequence[Keyframe], Sequence[Pairwise]],
         centre: int,
-        others: Sequence[int],
+        near: Near,
         covered: Coverage,
     ) -> None:
-        """Begin what comes after the match of keyframe `centre` with the `others`, nodes of the graph.
+        """Begin what comes after the match of keyframe `centre` with those `near`.
 
         `coming` are the keyframes that will join the route next, with their relations of tracking. Every
         match is taken to relate all that it is tried with.
@@ -68,10 +66,10 @@ class Ahead:
         if self._pool is None:
             return
         assumed = Coverage(beneath=covered)
-        assumed.relate(others)
+        assumed.assume(route, centre, near)
         self._drop_outdated(route, centre)
-        for begun in self._begun.values():
-            assumed.relate(begun.nodes)
+        for other, begun in self._begun.items():
+            assumed.assume(begun.route, other, begun.near)
         behind = self._options.behind
         following = range(max([centre, *self._begun]) + 1, len(route.poses) + len(coming[0]) - behind)
         for keyframe in following:
@@ -79,17 +77,16 @@ class Ahead:
                 return
             joining = keyframe + behind + 1 - len(route.poses)
             longer = extended(route, coming[0][:joining], coming[1][:joining])
-            tried, _ = choose_nearby(longer.poses, longer.paths, keyframe, self._options)
-            nodes = longer.rows[tried].tolist()
-            if assumed.share(longer.keyframes[keyframe].row, nodes) < self._options.covered:
-                assumed.relate(nodes)
+            near = choose_nearby(longer.poses, longer.paths, keyframe, self._options)
+            if assumed.is_due(longer, keyframe, near, self._options):
+                assumed.assume(longer, keyframe, near)
                 match = self._pool.submit(self._match, longer, keyframe, self._options)
-                self._begun[keyframe] = _Begun(longer.poses, nodes, match)
+                self._begun[keyframe] = _Begun(longer, near, match)
 
     def _drop_outdated(self, route: Route, centre: int) -> None:
         """Forget what is past, and what was begun before the graph moved."""
         for keyframe, begun in list(self._begun.items()):
-            if keyframe < centre or not np.array_equal(begun.poses[: len(route.poses)], route.poses):
+            if keyframe < centre or not np.array_equal(begun.route.poses[: len(route.poses)], route.poses):
                 begun.match.cancel()
                 del self._begun[keyframe]
 

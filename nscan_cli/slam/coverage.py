@@ -5,7 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterable
 from itertools import combinations
 
-from nscan_cli.slam.nearby import Nearby
+from nscan_cli.slam.keyframes import Route
+from nscan_cli.slam.nearby import Near, Nearby
+from nscan_cli.slam.options import NScanOptions
 
 
 class Coverage:
@@ -13,24 +15,52 @@ class Coverage:
 
     def __init__(self, beneath: Coverage | None = None) -> None:
         self._pairs: set[tuple[int, int]] = set()
-        self._beneath = set() if beneath is None else beneath._pairs
+        self._closed: set[int] = set()
+        self._beneath = beneath
+
+    def is_due(self, route: Route, centre: int, near: Near, options: NScanOptions) -> bool:
+        """Whether a match about `centre` with the keyframes near would tell something new.
+
+        Not where other matches hold most of its pairs. Nor, from the third visit on, when a joint match that
+        closed a loop has a centre so near along the path that both would take in some of the same keyframes
+        of this visit: going round and round, the graph would become no better, and ever harder to solve.
+        """
+        if near.visits > 1:
+            half = options.max_scans // 2
+            beside = route.rows[max(centre - half + 1, 0) : centre + half].tolist()
+            if any(self._has_closed(node) for node in beside):
+                return False
+        return self.share(int(route.rows[centre]), route.rows[near.tried].tolist()) < options.covered
 
     def share(self, centre: int, others: Iterable[int]) -> float:
         """The share of the pairs of `centre` with each of the others that are there; 1 without any other."""
         pairs = _pairs(centre, others)
-        return (
-            sum(pair in self._pairs or pair in self._beneath for pair in pairs) / len(pairs) if pairs else 1.0
-        )
+        return sum(self._has(pair) for pair in pairs) / len(pairs) if pairs else 1.0
 
     def add(self, centre: int, others: Iterable[int], nearby: Nearby | None) -> None:
         """A match of `centre` with all others that was tried, and what it related."""
         self._pairs.update(_pairs(centre, others))
-        for relation in [] if nearby is None else nearby.relations:
-            self.relate(relation.nodes)
+        if nearby is None:
+            return
+        for relation in nearby.relations:
+            self._relate(relation.nodes)
+        if nearby.nscan is not None and nearby.nscan.origin == "loop":
+            self._closed.add(centre)
 
-    def relate(self, nodes: Iterable[int]) -> None:
-        """Every keyframe has been matched with every other."""
+    def assume(self, route: Route, centre: int, near: Near) -> None:
+        """A match of `centre` that is to be made, as if it related all that are near."""
+        self._relate(route.rows[near.tried].tolist())
+        if near.seen_before.any():
+            self._closed.add(int(route.rows[centre]))
+
+    def _relate(self, nodes: Iterable[int]) -> None:
         self._pairs.update(combinations(sorted(set(nodes)), 2))
+
+    def _has(self, pair: tuple[int, int]) -> bool:
+        return pair in self._pairs or (self._beneath is not None and self._beneath._has(pair))
+
+    def _has_closed(self, node: int) -> bool:
+        return node in self._closed or (self._beneath is not None and self._beneath._has_closed(node))
 
 
 def _pairs(centre: int, others: Iterable[int]) -> list[tuple[int, int]]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -65,10 +66,19 @@ MatchNearby = Callable[[Route, int, NScanOptions], Nearby | None]
 """Step 3, jointly or in pairs: match_nearby tells the arguments."""
 
 
-def choose_nearby(
-    poses: Array, paths: Array, centre: int, options: NScanOptions
-) -> tuple[Indices, NDArray[np.bool_]]:
-    """The keyframes (n,) for a match about `centre`, increasing, and which are of another visit.
+class Near(NamedTuple):
+    """The keyframes for a match."""
+
+    tried: Indices
+    """(n,), increasing."""
+    seen_before: NDArray[np.bool_]
+    """(n,) which are of another visit."""
+    visits: int
+    """How often the path came by here before."""
+
+
+def choose_nearby(poses: Array, paths: Array, centre: int, options: NScanOptions) -> Near:
+    """The keyframes for a match about `centre`.
 
     Poses (K, 3) are global ones, paths (K,) lengths of path. Of the keyframes within the radius, those
     nearest are taken; half of the places are kept for other visits, further along the path or back,
@@ -78,10 +88,16 @@ def choose_nearby(
     near = near[np.argsort(distances, kind="stable")]
     before = np.abs(paths[centre] - paths[near]) > options.recent
     old, recent = near[before & options.loops], near[~before]
+    visits = _visits(paths[np.sort(old[old < centre])], options.recent)
     recent = recent[: options.max_scans - min(len(old), options.max_scans // 2)]
     old = old[: options.max_scans - len(recent)]
     chosen = np.sort(np.concatenate([old, recent]))
-    return chosen, np.abs(paths[centre] - paths[chosen]) > options.recent
+    return Near(chosen, np.abs(paths[centre] - paths[chosen]) > options.recent, visits)
+
+
+def _visits(paths: Array, recent: float) -> int:
+    """The parts of increasing lengths of path (k,), with more than `recent` (m) in between."""
+    return int(np.count_nonzero(np.diff(paths) > recent)) + (len(paths) > 0)
 
 
 @kernel
@@ -105,7 +121,7 @@ def match_nearby(route: Route, centre: int, options: NScanOptions) -> Nearby | N
     Scans that do not hang together with the `centre` by overlaps are left out, and the others matched
     again. None when there are too few keyframes near.
     """
-    tried, seen_before = choose_nearby(route.poses, route.paths, centre, options)
+    tried, seen_before, _ = choose_nearby(route.poses, route.paths, centre, options)
     if len(tried) < LEAST_SCANS:
         return None
     for widenings in options.attempts:
@@ -127,7 +143,7 @@ def match_at(
     starts = [route.poses.copy() for _ in places]
     for start, place in zip(starts, places, strict=True):
         start[visit] = compose(place, relative(start[visit], route.poses[centre]))
-    near = [choose_nearby(start, route.paths, centre, options)[0] for start in starts]
+    near = [choose_nearby(start, route.paths, centre, options).tried for start in starts]
     members = np.unique(np.concatenate(near))
     scans, old = _laid_out(route.keyframes, members), int(np.argmin(visit[members]))
     at, held = int(np.searchsorted(members, centre)), route.poses[members[old]]

@@ -42,7 +42,7 @@ def match_pairs_nearby(route: Route, centre: int, options: NScanOptions) -> Near
     is. None when no other keyframe is near.
     """
     keyframes = route.keyframes
-    chosen, before = choose_nearby(route.poses, route.paths, centre, options)
+    chosen, before, _ = choose_nearby(route.poses, route.paths, centre, options)
     tried, seen_before = chosen[chosen != centre], before[chosen != centre]
     if len(tried) == 0:
         return None

@@ -151,16 +151,15 @@ class Slam:
         if centre < 0:
             return
         route, options = self.route, self.options.nscan
-        tried, seen_before = choose_nearby(route.poses, route.paths, centre, options)
-        node, others = int(route.rows[centre]), route.rows[tried].tolist()
-        if self.covered.share(node, others) >= options.covered:
+        near = choose_nearby(route.poses, route.paths, centre, options)
+        if not self.covered.is_due(route, centre, near, options):
             return
         # One more may be there that is not whole.
         whole, known = len(self.keyframes) - 1, len(self.poses)
         coming = self.keyframes.list[known:whole], self.steps[known - 1 : whole - 1]
-        self.ahead.begin(route, coming, centre, others, self.covered)
+        self.ahead.begin(route, coming, centre, near, self.covered)
         nearby = self.match_unless_doubted(centre)
-        self.covered.add(node, others, nearby)
+        self.covered.add(int(route.rows[centre]), route.rows[near.tried].tolist(), nearby)
         if nearby is not None:
             self.take(nearby)
             if self._moved > self.options.optimise_after and self._has_grown():
@@ -170,7 +169,7 @@ class Slam:
         # was not seen: there a search says no more than the match.
         if options.loops and not (loop is not None and loop.reason == TOO_LITTLE):
             refused = loop is not None and not loop.accepted
-            self.close_loops(centre, tried[seen_before & refused])
+            self.close_loops(centre, near.tried[near.seen_before & refused])
 
     def _has_grown(self) -> bool:
         """Whether the graph has grown by so much since it was optimised that it is worth another time."""

@@ -66,12 +66,11 @@ class Refinement:
         chosen, covered = {}, Coverage(beneath=self._covered)
         for centre in waiting:
             options = self._options_of(centre)
-            tried, _ = choose_nearby(route.poses, route.paths, centre, options)
-            node, others = int(route.rows[centre]), route.rows[tried].tolist()
+            near = choose_nearby(route.poses, route.paths, centre, options)
             needed = self._starts[centre] is not None or centre in self._wider
-            if needed or covered.share(node, others) < options.covered:
-                chosen[centre] = tried
-                covered.relate([node, *others])
+            if needed or covered.is_due(route, centre, near, options):
+                chosen[centre] = near.tried
+                covered.assume(route, centre, near)
         return chosen
 
     def _options_of(self, centre: int) -> NScanOptions:

@@ -12,7 +12,7 @@ from nscan_cli.ndt.grid import Ndt
 from nscan_cli.slam.ahead import AHEAD, Ahead
 from nscan_cli.slam.coverage import Coverage
 from nscan_cli.slam.keyframes import Keyframe, Route, extended, route_of
-from nscan_cli.slam.nearby import Nearby
+from nscan_cli.slam.nearby import Near, Nearby
 from nscan_cli.slam.options import NScanOptions
 from nscan_cli.slam.tracking import Tracked
 
@@ -53,7 +53,8 @@ class Matches:
 
 def begin(ahead: Ahead, route: Route, coming: tuple[list[Keyframe], list[Pairwise]]) -> None:
     """What comes after the match of keyframe 6 with its neighbours."""
-    ahead.begin(route, coming, 6, [4, 5, 6, 7, 8], Coverage())
+    near = Near(np.arange(4, 9), np.zeros(5, dtype=np.bool_), 0)
+    ahead.begin(route, coming, 6, near, Coverage())
 
 
 def let_finish(ahead: Ahead) -> None:

@@ -5,11 +5,13 @@ from __future__ import annotations
 import dataclasses
 
 import numpy as np
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from nscan_cli.graph.model import NScan, Pairwise
 from nscan_cli.slam.coverage import Coverage
+from nscan_cli.slam.keyframes import Route
 from nscan_cli.slam.nearby import Nearby, choose_nearby
 from nscan_cli.slam.options import NScanOptions, SlamOptions
 from tests.slam.runs import Mapped, mapped, mapped_office, office_log, part
@@ -80,6 +82,51 @@ def test_the_share_is_that_of_the_pairs_in_some_match(matches, centre, others):
     assert covered.share(centre, others) == (sum(pairs) / len(pairs) if pairs else 1.0)
 
 
+def seven_rounds(of: int) -> Route:
+    """Seven times the same way of so many keyframes, 2 m apart."""
+    k = np.arange(7 * of)
+    poses = np.stack([2.0 * (k % of), np.zeros(len(k)), np.zeros(len(k))], axis=1)
+    return Route([], 10 * k, [], 30.0 * (k // of) + 2.0 * k, poses)
+
+
+def due(route: Route, covered: Coverage, centre: int) -> bool:
+    options = NScanOptions()
+    near = choose_nearby(route.poses, route.paths, centre, options)
+    return covered.is_due(route, centre, near, options)
+
+
+@pytest.mark.parametrize(("round_", "after"), [(0, 1), (1, 1), (2, 5), (6, 5)])
+def test_from_the_third_visit_on_one_match_a_window_is_due(round_, after):
+    """After a joint match that closes a loop: it has places for five keyframes of a visit."""
+    route, covered = seven_rounds(40), Coverage()
+    first = 40 * round_ + 10
+    closed = NScan((10 * first,), np.zeros((1, 3)), np.zeros((3, 3)), 0, "loop")
+    covered.add(10 * first, [], Nearby((), closed, None, 0.0, True))
+    assert [due(route, covered, first + k) for k in range(1, 6)] == [k >= after for k in range(1, 6)]
+    assert due(route, covered, first - 4) == (after == 1)
+
+
+def test_a_match_that_closes_no_loop_spares_none():
+    route, covered = seven_rounds(40), Coverage()
+    covered.add(10 * 210, [], joint(10 * 210))
+    assert due(route, covered, 211)
+    covered.add(10 * 210, [], None)
+    assert due(route, covered, 211)
+
+
+def test_what_is_assumed_counts_and_leaves_the_coverage_beneath_as_it_was():
+    route, covered = seven_rounds(40), Coverage()
+    above, options = Coverage(beneath=covered), NScanOptions()
+    near = choose_nearby(route.poses, route.paths, 210, options)
+    above.assume(route, 210, near)
+    assert above.share(10 * 210, (10 * near.tried).tolist()) == 1.0
+    assert not due(route, above, 212)
+    assert due(route, covered, 212)
+    over = Coverage(beneath=above)
+    assert not due(route, over, 212)
+    assert over.share(10 * 210, (10 * near.tried).tolist()) == 1.0
+
+
 def centres(run: Mapped) -> set[int]:
     return {relation.nodes[relation.fixed] for relation in run.graph.nscan}
 
@@ -107,7 +154,7 @@ def test_yet_each_keyframe_is_a_centre_or_others_hold_its_pairs():
         covered.add(relation.nodes[relation.fixed], [], joint(*relation.nodes))
     shares = np.zeros(len(rows))
     for k in range(len(rows)):
-        near, _ = choose_nearby(office.slam.poses, paths, k, options)
+        near, *_ = choose_nearby(office.slam.poses, paths, k, options)
         shares[k] = covered.share(rows[k], [rows[other] for other in near])
     assert (shares > 0).all()
     held = (shares >= options.covered) | np.isin(rows, list(centres(office)))

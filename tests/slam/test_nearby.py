@@ -27,26 +27,35 @@ def along(*x: float) -> Array:
     return np.stack([np.array(x), np.zeros(len(x)), np.zeros(len(x))], axis=1)
 
 
+def test_visits_are_parts_of_the_path_that_came_by_before():
+    """Four times along 20 m, from one time to the next 100 m of path; keyframes 2 m apart."""
+    k = np.arange(44)
+    poses = np.stack([2.0 * (k % 11), np.zeros(44), np.zeros(44)], axis=1)
+    paths = (100.0 * (k // 11) + poses[:, 0]).astype(np.float64)
+    assert [choose_nearby(poses, paths, centre, OPTIONS).visits for centre in (5, 16, 27, 38)] == [0, 1, 2, 3]
+    assert choose_nearby(poses, paths, 38, dataclasses.replace(OPTIONS, loops=False)).visits == 0
+
+
 def test_the_nearest_within_the_radius_are_chosen_in_order_of_time():
     poses = along(7, 4, 3, 2, 1, 0, -1, -2, 0)
-    chosen, seen = choose_nearby(poses, np.arange(9.0), 8, dataclasses.replace(OPTIONS, radius=3.0))
+    chosen, seen, _ = choose_nearby(poses, np.arange(9.0), 8, dataclasses.replace(OPTIONS, radius=3.0))
     assert (chosen.tolist(), seen.tolist()) == ([3, 4, 5, 6, 7, 8], [False] * 6)
-    chosen, _ = choose_nearby(poses, np.arange(9.0), 8, dataclasses.replace(OPTIONS, radius=1.0))
+    chosen, *_ = choose_nearby(poses, np.arange(9.0), 8, dataclasses.replace(OPTIONS, radius=1.0))
     assert chosen.tolist() == [4, 5, 6, 8]
 
 
 def test_keyframes_after_the_centre_take_part_and_are_of_another_visit_when_far_along_the_path():
     poses, paths = along(0, 1, 2, 0.1, 0.2), np.array([0.0, 1, 2, 3, 30])
-    chosen, seen = choose_nearby(poses, paths, 2, OPTIONS)
+    chosen, seen, _ = choose_nearby(poses, paths, 2, OPTIONS)
     assert (chosen.tolist(), seen.tolist()) == ([0, 1, 2, 3, 4], [False] * 4 + [True])
 
 
 def test_without_loops_other_visits_leave_their_places_to_this_one():
     poses = along(2.0, 2.1, *(0.1 * np.arange(8)[::-1]), 2.2)
     paths = np.array([0.0, 0.1, *(50 + np.arange(8)), 100])
-    chosen, seen = choose_nearby(poses, paths, 9, OPTIONS)
+    chosen, seen, _ = choose_nearby(poses, paths, 9, OPTIONS)
     assert (chosen.tolist(), seen.tolist()) == ([0, 1, 7, 8, 9, 10], [True, True, False, False, False, True])
-    chosen, seen = choose_nearby(poses, paths, 9, dataclasses.replace(OPTIONS, loops=False))
+    chosen, seen, _ = choose_nearby(poses, paths, 9, dataclasses.replace(OPTIONS, loops=False))
     assert (chosen.tolist(), seen.tolist()) == ([4, 5, 6, 7, 8, 9], [False] * 6)
 
 
@@ -58,7 +67,7 @@ def test_half_of_the_places_are_kept_for_what_was_seen_before(old, recent, chose
     """The old ones are farther than all recent ones, and yet three come in; the rest fills up."""
     poses = along(*(2 + 0.1 * np.arange(old)), *(0.1 * np.arange(recent)[::-1]))
     paths = np.concatenate([np.arange(old) * 0.1, 50 + np.arange(recent) * 0.1])
-    chosen, seen = choose_nearby(poses, paths, old + recent - 1, OPTIONS)
+    chosen, seen, _ = choose_nearby(poses, paths, old + recent - 1, OPTIONS)
     assert (seen == (chosen < old)).all()
     assert (chosen < old).sum() == chosen_old
     assert (chosen >= old).sum() == chosen_recent
@@ -74,7 +83,7 @@ def test_what_is_chosen_is_near_not_too_much_and_has_the_centre(count, seed, mos
     poses, paths = rng.uniform(-5, 5, (count, 3)), np.cumsum(rng.uniform(0, 3, count))
     centre = int(rng.integers(count))
     options = dataclasses.replace(OPTIONS, max_scans=most, loops=loops)
-    chosen, seen = choose_nearby(poses, paths, centre, options)
+    chosen, seen, _ = choose_nearby(poses, paths, centre, options)
     assert centre in chosen
     assert (np.diff(chosen) > 0).all()
     near = np.hypot(*(poses[:, :2] - poses[centre, :2]).T) <= 5
