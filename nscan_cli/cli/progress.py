@@ -24,7 +24,7 @@ def announce_compiling(kernel: str, quiet: bool) -> bool:
 
     compiling = compiled.first_compile(kernel)
     if compiling:
-        say("compiling the kernels, once for this version on this machine: about 40 s", quiet)
+        say("compiling the kernels, once for this version on this machine: about 45 s", quiet)
     return compiling
 
 
