@@ -184,13 +184,11 @@ def _factorise_panel(panel: Array, least: Array, loose: NDArray[np.bool_]) -> No
             pivot = panel[column, column]
             if pivot > least[column]:
                 pivot = np.sqrt(pivot)
-                for i in range(column + 1, height):
-                    panel[column, i] /= pivot
             else:
                 loose[column] = True
                 pivot = np.sqrt(least[column] / LEAST_PIVOT) if least[column] > 0 else 1.0
-                for i in range(column + 1, height):
-                    panel[column, i] /= pivot
+            for i in range(column + 1, height):
+                panel[column, i] /= pivot
             panel[column, column] = pivot
             panel[column, j:column] = 0.0
 

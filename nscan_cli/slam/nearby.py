@@ -131,6 +131,19 @@ def match_nearby(route: Route, centre: int, options: NScanOptions) -> Nearby | N
     return nearby
 
 
+def of_this_visit(route: Route, centre: int, options: NScanOptions) -> NDArray[np.bool_]:
+    """(K,) whether the path came by not long before or after keyframe `centre`."""
+    this: NDArray[np.bool_] = np.abs(route.paths - route.paths[centre]) <= options.recent
+    return this
+
+
+def visit_moved(route: Route, centre: int, place: Array, options: NScanOptions) -> Array:
+    """The poses (K, 3) with keyframe `centre` at a place (3,), and its visit moved with it as a whole."""
+    moved, visit = route.poses.copy(), of_this_visit(route, centre, options)
+    moved[visit] = compose(place, relative(moved[visit], route.poses[centre]))
+    return moved
+
+
 def match_at(
     route: Route, centre: int, places: Sequence[Array], options: NScanOptions
 ) -> list[tuple[float, Array]]:
@@ -139,13 +152,11 @@ def match_at(
     This visit is moved to each place as a whole, others stay. All are of the same scans, those that are near
     at any of the places, so that the lowest energy tells which place is right.
     """
-    visit = np.abs(route.paths - route.paths[centre]) <= options.recent
-    starts = [route.poses.copy() for _ in places]
-    for start, place in zip(starts, places, strict=True):
-        start[visit] = compose(place, relative(start[visit], route.poses[centre]))
+    starts = [visit_moved(route, centre, place, options) for place in places]
     near = [choose_nearby(start, route.paths, centre, options).tried for start in starts]
     members = np.unique(np.concatenate(near))
-    scans, old = _laid_out(route.keyframes, members), int(np.argmin(visit[members]))
+    visit = of_this_visit(route, centre, options)[members]
+    scans, old = _laid_out(route.keyframes, members), int(np.argmin(visit))
     at, held = int(np.searchsorted(members, centre)), route.poses[members[old]]
     found = []
     for start in starts:

@@ -18,7 +18,7 @@ from nscan_cli.graph.model import Loop
 from nscan_cli.matching.search import Field, Search, SearchOptions, likelihood_field, search
 from nscan_cli.poses import Array, compose, relative
 from nscan_cli.slam.keyframes import Keyframe, Route
-from nscan_cli.slam.nearby import MatchNearby, Nearby, match_at
+from nscan_cli.slam.nearby import MatchNearby, Nearby, match_at, visit_moved
 from nscan_cli.slam.options import ClosingOptions, NScanOptions
 
 AMBIGUOUS = "another place fits as well"
@@ -89,8 +89,7 @@ def find_place(
     nodes = keyframes[int(earlier[0])].row, keyframes[centre].row
     if about.best(closing.rival * found.score, without=(found.pose, closing.apart)) is not None:
         return Loop(nodes, False, AMBIGUOUS, found.score)
-    moved, visit = poses.copy(), np.abs(route.paths - route.paths[centre]) <= nscan.recent
-    moved[visit] = compose(found.pose, relative(poses[visit], poses[centre]))
+    moved = visit_moved(route, centre, found.pose, nscan)
     away = np.hypot(*(poses[earlier, :2] - found.pose[:2]).T).min()
     radius = max(nscan.radius, float(away) + nscan.radius)
     nearby = match(route._replace(poses=moved), centre, replace(nscan, radius=radius))
