@@ -14,7 +14,7 @@ from nscan_cli.compiled import lean_kernel
 from nscan_cli.matching.joint_energy import all_pairs
 from nscan_cli.matching.planar import relative_pose
 from nscan_cli.matching.scans import Scans, scan_grid, scan_points
-from nscan_cli.ndt.table import find_row, pack
+from nscan_cli.ndt.table import find_row, pack, shown
 from nscan_cli.poses import Array
 
 Kind = Literal["all", "visible", "overlap"]
@@ -107,6 +107,6 @@ def _meet(scans: Scans, poses: Array, u: Array, shares: Array) -> None:
                     continue
                 for link in grid.links[row]:
                     # Blocks with too few points have no Gaussian, nor a link to one; see Ndt.compact.
-                    if link >= 0 and grid.gaussians[link, 5] * rx + grid.gaussians[link, 6] * ry <= 0.0:
+                    if shown(grid, link, rx, ry) >= 0:
                         shares[i, j] += weight
                         break

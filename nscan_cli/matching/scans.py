@@ -47,7 +47,9 @@ def lay_out(ndts: Sequence[Ndt], points: Sequence[Array], neutral: bool = True) 
     links = np.concatenate([ndt.grid.links[: ndt.rows] for ndt in ndts])
     gaussians = [ndt.grid.gaussians for ndt in ndts]
     # The sums are for growing; matching needs the Gaussians alone.
-    grid = Grid(np.concatenate(tables), keys, links, np.empty((0, 8)), np.concatenate(gaussians))
+    grid = Grid(
+        np.concatenate(tables), keys, links, np.empty((0, 2)), np.empty((0, 2, 8)), np.concatenate(gaussians)
+    )
     own = np.full(len(ndts), np.nan)
     if neutral:
         own[:] = [_own_mean(ndt.grid, ndt.half, part) for ndt, part in zip(ndts, points, strict=True)]
@@ -70,7 +72,9 @@ def scan_grid(scans: Scans, i: int) -> Grid:
     r0, r1 = scans.row_starts[i], scans.row_starts[i + 1]
     g0, g1 = scans.gaussian_starts[i], scans.gaussian_starts[i + 1]
     grid = scans.grid
-    return Grid(grid.table[t0:t1], grid.keys[r0:r1], grid.links[r0:r1], grid.sums, grid.gaussians[g0:g1])
+    return Grid(
+        grid.table[t0:t1], grid.keys[r0:r1], grid.links[r0:r1], grid.facing, grid.sums, grid.gaussians[g0:g1]
+    )
 
 
 @inlined_kernel

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from nscan_cli.compiled import kernel, lean_kernel, summing_kernel
 from nscan_cli.ndt.grid import Ndt
 from nscan_cli.ndt.meeting import BLOCKS, Meeting, meet, room_to_meet
-from nscan_cli.ndt.table import Grid, find_row, pack
+from nscan_cli.ndt.table import Grid, find_row, pack, shown
 from nscan_cli.poses import Array
 
 Vector = tuple[float, float]
@@ -178,12 +178,10 @@ def find_inliers(
         if row < 0:
             continue
         for block in range(4):
-            link = grid.links[row, block]
-            if link < 0 or grid.gaussians[link, 2] == 0.0:
+            link = shown(grid, grid.links[row, block], rx, ry)
+            if link < 0:
                 continue
             gaussian = grid.gaussians[link]
-            if gaussian[5] * rx + gaussian[6] * ry > 0.0:
-                continue
             vx, vy = px - gaussian[0], py - gaussian[1]
             if gaussian[2] * vx * vx + 2 * gaussian[3] * vx * vy + gaussian[4] * vy * vy < bound:
                 inliers[k] = True

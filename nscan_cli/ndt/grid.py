@@ -21,6 +21,10 @@ from nscan_cli.poses import Array
 
 NEW_NEIGHBOURS = 9
 """A point in new land creates at most its own lattice cell and the eight around it."""
+BESIDE = 10
+"""Of the points of a scan so many to each side are asked how the wall runs at one of them:"""
+LEAST_APART, MOST_APART = 0.1, 0.5
+"""the first that is so far (m) off; nearer ones differ by noise, farther ones are of something else."""
 
 
 @lean_kernel
@@ -46,19 +50,24 @@ def add_points(
             if row < 0 or not _is_settled(grid, row):
                 row, rows = _settle(grid, rows, ix, iy)
         touched[k] = row
+        facing, sums = grid.facing[row], grid.sums[row]
+        # What is subtracted finds the part that it was added to: an empty cell alone chooses anew.
+        if sums[0, 0] + sums[1, 0] < 0.5:
+            tx, ty = _tangent(points, k)
+            facing[0], facing[1] = -(sin * tx + cos * ty), cos * tx - sin * ty
+        part = sums[1 if facing[0] * bx + facing[1] * by > 0.0 else 0]
         dx, dy = x - (ix + 0.5) * half, y - (iy + 0.5) * half
-        sums = grid.sums[row]
-        sums[0] += sign
-        sums[1] += sign * dx
-        sums[2] += sign * dy
-        sums[3] += sign * dx * dx
-        sums[4] += sign * dx * dy
-        sums[5] += sign * dy * dy
         per_length = sign / max(np.sqrt(bx * bx + by * by), 1e-9)
-        sums[6] += per_length * bx
-        sums[7] += per_length * by
-        if sums[0] < 0.5:
-            sums[:] = 0.0
+        part[0] += sign
+        part[1] += sign * dx
+        part[2] += sign * dy
+        part[3] += sign * dx * dx
+        part[4] += sign * dx * dy
+        part[5] += sign * dy * dy
+        part[6] += per_length * bx
+        part[7] += per_length * by
+        if part[0] < 0.5:
+            part[:] = 0.0
     return rows
 
 
@@ -130,6 +139,28 @@ def change(
     rows = add_points(grid, rows, half, points, pose, sign, touched)
     make_gaussians(grid, rows, touched, half, minimum, floor, straight)
     return rows
+
+
+@lean_kernel
+def _tangent(points: Array, k: int) -> tuple[float, float]:
+    """Along what point k of a scan (m, 2) lies on: from the points beside it, or across its beam."""
+    x, y = points[k, 0], points[k, 1]
+    tx = ty = 0.0
+    for step in (-1, 1):
+        for beside in range(1, BESIDE + 1):
+            other = k + step * beside
+            if other < 0 or other >= points.shape[0]:
+                break
+            dx, dy = points[other, 0] - x, points[other, 1] - y
+            apart = dx * dx + dy * dy
+            if apart > LEAST_APART * LEAST_APART:
+                if apart < MOST_APART * MOST_APART:
+                    tx += step * dx
+                    ty += step * dy
+                break
+    if tx == 0.0 and ty == 0.0:
+        return -y, x
+    return tx, ty
 
 
 @lean_kernel
@@ -224,15 +255,21 @@ class Ndt:
         if rows <= capacity:
             return
         old, self.grid = self.grid, _empty(max(rows, 2 * capacity))
-        for name in ("keys", "links", "sums", "gaussians"):
+        for name in ("keys", "links", "facing", "sums", "gaussians"):
             getattr(self.grid, name)[: self.rows] = getattr(old, name)[: self.rows]
+        fronts, backs = self._faces()
+        backs[:] = old.gaussians[capacity : capacity + self.rows]
+        fronts[:, 7] += (len(self.grid.keys) - capacity) * (fronts[:, 7] > 0)
         rehash(self.grid, self.rows)
 
     def compact(self) -> None:
         """Make all Gaussians, and give back what only growing needs; nothing can be added any more."""
         self.make()
-        grid, rows = self.grid, self.rows
-        usable = grid.gaussians[:rows, 2] != 0.0
+        grid, rows, (fronts, backs) = self.grid, self.rows, self._faces()
+        usable, two_faced = fronts[:, 2] != 0.0, fronts[:, 7] > 0.0
+        gaussians = np.concatenate([fronts[usable], backs[two_faced]])
+        count = np.count_nonzero(usable)
+        gaussians[np.flatnonzero(two_faced[usable]), 7] = np.arange(count, len(gaussians))
         # −1 as an index finds the last entry: no Gaussian.
         places = np.append(np.where(usable, np.cumsum(usable) - 1, -1), -1).astype(np.int32)
         links = places[grid.links[:rows]]
@@ -240,12 +277,17 @@ class Ndt:
         self.rows = int(np.count_nonzero(kept))
         table = np.full(_table_size(self.rows), -1, dtype=np.int32)
         self.grid = Grid(
-            table, grid.keys[:rows][kept], links[kept], np.empty((0, 8)), grid.gaussians[:rows][usable]
+            table, grid.keys[:rows][kept], links[kept], np.empty((0, 2)), np.empty((0, 2, 8)), gaussians
         )
         rehash(self.grid, self.rows)
 
+    def _faces(self) -> tuple[Array, Array]:
+        """The Gaussians (rows, 8) of a grid that grows, and those of the other faces of walls."""
+        capacity = len(self.grid.keys)
+        return self.grid.gaussians[: self.rows], self.grid.gaussians[capacity : capacity + self.rows]
+
     def gaussian_count(self) -> int:
-        """How many Gaussians have points enough."""
+        """How many Gaussians have points enough; two where a wall has two faces."""
         return int(np.count_nonzero(self.grid.gaussians[:, 2]))
 
 
@@ -254,8 +296,9 @@ def _empty(capacity: int) -> Grid:
         table=np.full(_table_size(capacity), -1, dtype=np.int32),
         keys=np.empty(capacity, dtype=np.int64),
         links=np.empty((capacity, 4), dtype=np.int32),
-        sums=np.empty((capacity, 8)),
-        gaussians=np.zeros((capacity, 7)),
+        facing=np.empty((capacity, 2)),
+        sums=np.empty((capacity, 2, 8)),
+        gaussians=np.zeros((2 * capacity, 8)),
     )
 
 

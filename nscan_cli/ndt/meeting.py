@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from nscan_cli.compiled import kernel, lean_kernel
-from nscan_cli.ndt.table import Grid, find_row, pack
+from nscan_cli.ndt.table import Grid, find_row, pack, shown
 from nscan_cli.poses import Array
 
 BLOCKS = 4
@@ -45,12 +45,10 @@ def meet(
         if row < 0:
             continue
         for block in range(BLOCKS):
-            link = grid.links[row, block]
+            link = shown(grid, grid.links[row, block], rx, ry)
             if link < 0:
                 continue
             gaussian = grid.gaussians[link]
-            if gaussian[2] == 0.0 or gaussian[5] * rx + gaussian[6] * ry > 0.0:
-                continue
             # Unsigned, so that nobody asks whether it counts from the end.
             c = np.uint64(count)
             met[0, c], met[1, c] = rx, ry
@@ -100,6 +98,7 @@ def meet_again(grid: Grid, half: float, meeting: Meeting, x: float, y: float, ph
             row = find_row(grid, pack(int(ix), int(iy)))
             for block in range(BLOCKS):
                 link = -1 if row < 0 else grid.links[row, block]
+                link = shown(grid, link, meeting.moved[0, k], meeting.moved[1, k])
                 if link < 0:
                     meeting.gaussians[block, :, k] = 0.0
                     continue

@@ -18,7 +18,8 @@ class Grid(NamedTuple):
     """The arrays of an NDT as the kernels take them. R rows, one for each lattice cell that was touched.
 
     While it grows, row r stands for its lattice cell and for the Gaussian of the block whose lower left
-    cell it is; a compact one has the Gaussians that can be used and the cells that meet one.
+    cell it is, and row R + r of the Gaussians for the other face of a wall there; a compact one has the
+    Gaussians that can be used and the cells that meet one.
     """
 
     table: NDArray[np.int32]
@@ -27,12 +28,16 @@ class Grid(NamedTuple):
     """(R,) packed lattice coordinates."""
     links: NDArray[np.int32]
     """(R, 4) rows of the Gaussians of the four blocks that the lattice cell is part of, or −1."""
+    facing: Array
+    """(R, 2) across what is in a lattice cell: beams against it count to the first part, others to the
+    second."""
     sums: Array
-    """(R, 8) n, Σx, Σy, Σx², Σxy, Σy² about the centre of the lattice cell, and the sum of the unit vectors
-    along the beams."""
+    """(R, 2, 8) of both parts n, Σx, Σy, Σx², Σxy, Σy² about the centre of the lattice cell, and the sum of
+    the unit vectors along the beams."""
     gaussians: Array
-    """(G, 7) mean x, y; Σ⁻¹ as (xx, xy, yy), 0 where a Gaussian has too few points; and the normal (x, y)
-    of the side that it shows, 0 where it was seen from both."""
+    """(G, 8) mean x, y; Σ⁻¹ as (xx, xy, yy), 0 where a Gaussian has too few points; the normal (x, y) of the
+    face that it shows, 0 where it was seen from both sides; and the row of the one that shows the other
+    face, or 0."""
 
 
 @lean_kernel
@@ -45,6 +50,22 @@ def find_row(grid: Grid, key: int) -> int:
         if row < 0 or grid.keys[row] == key:
             return int(row)
         slot = (slot + 1) & mask
+
+
+@lean_kernel
+def shown(grid: Grid, link: int, beam_x: float, beam_y: float) -> int:
+    """The row of the Gaussian that shows its face to a beam of that direction, or −1.
+
+    `link` is the row of its block's Gaussian, or −1.
+    """
+    if link < 0 or grid.gaussians[link, 2] == 0.0:
+        return -1
+    if grid.gaussians[link, 5] * beam_x + grid.gaussians[link, 6] * beam_y <= 0.0:
+        return link
+    other = int(grid.gaussians[link, 7])
+    if other > 0 and grid.gaussians[other, 5] * beam_x + grid.gaussians[other, 6] * beam_y <= 0.0:
+        return other
+    return -1
 
 
 @lean_kernel
@@ -72,7 +93,7 @@ def insert(grid: Grid, rows: int, key: int) -> tuple[int, int]:
     grid.table[slot] = rows
     grid.keys[rows] = key
     grid.links[rows, :] = -1
-    grid.sums[rows, :] = 0.0
+    grid.sums[rows, :, :] = 0.0
     grid.gaussians[rows, :] = 0.0
     return rows, rows + 1
 

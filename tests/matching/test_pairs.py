@@ -11,7 +11,7 @@ from nscan_cli.matching.joint import JointOptions, match_near_and_far
 from nscan_cli.matching.joint_energy import all_pairs
 from nscan_cli.matching.pairs import BESIDE, index_set
 from nscan_cli.ndt.table import find_row, pack
-from nscan_cli.poses import relative, transform
+from nscan_cli.poses import Array, relative, transform
 from tests.matching.problems import Problem, errors, fig_3, near, office_problem
 from tests.simulation.scenes import office
 from tests.simulation.world import World
@@ -95,6 +95,13 @@ def test_a_position_at_hand_is_visible_however_the_robot_is_turned(ten):
     assert {(0, 1), (0, 2), (1, 2)} <= found
 
 
+def faces(gaussians: Array, link: int, beam: Array) -> bool:
+    """Whether a Gaussian, or that of the wall's other face, shows its side to a beam (2,)."""
+    other = int(gaussians[link, 7])
+    rows = [link, other] if other else [link]
+    return any(gaussians[row, 5:7] @ beam <= 0 for row in rows)
+
+
 def test_overlap_is_the_share_of_points_in_cells_with_gaussians(ten):
     """Against a count in plain Python of every third point; sides are taken from the Gaussians."""
     scans = ten.joint().scans
@@ -110,7 +117,7 @@ def test_overlap_is_the_share_of_points_in_cells_with_gaussians(ten):
             for (x, y), beam in zip(moved, beams, strict=True):
                 row = find_row(grid, pack(int(np.floor(x / half)), int(np.floor(y / half))))
                 links = grid.links[row] if row >= 0 else []
-                hits += any(link >= 0 and grid.gaussians[link, 5:] @ beam <= 0 for link in links)
+                hits += any(link >= 0 and faces(grid.gaussians, link, beam) for link in links)
             assert shares[i, j] == pytest.approx(hits / len(points) if i != j else 0.0)
 
 

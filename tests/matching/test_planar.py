@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from nscan_cli.matching.planar import composed_pose, relative_pose, wrapped
@@ -12,6 +12,7 @@ numbers = st.floats(-100, 100)
 poses = st.tuples(numbers, numbers, st.floats(-10, 10)).map(np.array)
 
 
+@settings(deadline=None)
 @given(poses, poses)
 def test_the_kernels_say_what_the_functions_for_arrays_say(a, b):
     out = np.empty(3)
