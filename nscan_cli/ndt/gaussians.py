@@ -34,14 +34,16 @@ SAME_DIRECTION = 0.9
 
 
 @lean_kernel
-def make_gaussian(grid: Grid, row: int, half: float, minimum: float, floor: float, straight: bool) -> None:
+def make_gaussian(
+    grid: Grid, row: int, half: float, minimum: float, floor: float, straight: bool, faces: bool
+) -> None:
     """Mean, inverse covariance and side of the block of four lattice cells whose lower left one is `row`.
 
-    Two of them, where the points lie on two faces of a wall. With `straight` a piece of wall takes its
-    direction from the block of twice the size around it, where the points there lie as flat as its own, and
-    holds points along itself still less. A direction that is off by the noise of its few points tells a way
-    along the wall that nobody knows, and eight times less from twice the length. It takes neighbours that
-    are there before the Gaussian is made.
+    With `faces` two of them, where the points lie on two faces of a wall. With `straight` a piece of wall
+    takes its direction from the block of twice the size around it, where the points there lie as flat as its
+    own, and holds points along itself still less. A direction that is off by the noise of its few points
+    tells a way along the wall that nobody knows, and eight times less from twice the length. It takes
+    neighbours that are there before the Gaussian is made.
     """
     key, gaussian, other = grid.keys[row], grid.gaussians[row], grid.keys.shape[0] + row
     if gaussian[7] > 0.0:
@@ -51,8 +53,8 @@ def make_gaussian(grid: Grid, row: int, half: float, minimum: float, floor: floa
     whole = _block(grid, cells, half, 0.0, 0.0)
     if whole[0] < minimum:
         return
-    nx, ny = _normal(_within(grid, cells))
-    behind = _block(grid, cells, half, nx, ny)
+    nx, ny = _normal(_within(grid, cells)) if faces else (0.0, 0.0)
+    behind = _block(grid, cells, half, nx, ny) if faces else whole
     if 0.0 < behind[0] < whole[0]:
         before = _block(grid, cells, half, -nx, -ny)
         are_faces = (

@@ -17,14 +17,11 @@ from numpy.typing import NDArray
 from nscan_cli.compiled import kernel, lean_kernel
 from nscan_cli.ndt.gaussians import make_gaussian
 from nscan_cli.ndt.table import Grid, find_row, insert, pack, rehash
+from nscan_cli.ndt.tangent import tangent
 from nscan_cli.poses import Array
 
 NEW_NEIGHBOURS = 9
 """A point in new land creates at most its own lattice cell and the eight around it."""
-BESIDE = 10
-"""Of the points of a scan so many to each side are asked how the wall runs at one of them:"""
-LEAST_APART, MOST_APART = 0.1, 0.5
-"""the first that is so far (m) off; nearer ones differ by noise, farther ones are of something else."""
 
 
 @lean_kernel
@@ -53,7 +50,7 @@ def add_points(
         facing, sums = grid.facing[row], grid.sums[row]
         # What is subtracted finds the part that it was added to: an empty cell alone chooses anew.
         if sums[0, 0] + sums[1, 0] < 0.5:
-            tx, ty = _tangent(points, k)
+            tx, ty = tangent(points, k)
             facing[0], facing[1] = -(sin * tx + cos * ty), cos * tx - sin * ty
         part = sums[1 if facing[0] * bx + facing[1] * by > 0.0 else 0]
         dx, dy = x - (ix + 0.5) * half, y - (iy + 0.5) * half
@@ -103,11 +100,12 @@ def make_gaussians(
     minimum: float,
     floor: float,
     straight: bool,
+    faces: bool,
 ) -> None:
     """Make the Gaussians of all lattice cells in `touched` (m,), of the first `rows`.
 
     From at least `minimum` points, with a standard deviation of at least `floor` (m) and a smaller
-    eigenvalue of at least 0.001 of the larger ([19]); `straight` as in make_gaussian.
+    eigenvalue of at least 0.001 of the larger ([19]); `straight` and `faces` as in make_gaussian.
     """
     made = np.zeros(rows, dtype=np.bool_)
     previous = -1
@@ -119,7 +117,7 @@ def make_gaussians(
             row = grid.links[previous, block]
             if row >= 0 and not made[row]:
                 made[row] = True
-                make_gaussian(grid, row, half, minimum, floor, straight)
+                make_gaussian(grid, row, half, minimum, floor, straight, faces)
 
 
 @kernel
@@ -133,34 +131,13 @@ def change(
     minimum: float,
     floor: float,
     straight: bool,
+    faces: bool,
 ) -> int:
     """Both: the sums, and the Gaussians made of them."""
     touched = np.empty(points.shape[0], dtype=np.int32)
     rows = add_points(grid, rows, half, points, pose, sign, touched)
-    make_gaussians(grid, rows, touched, half, minimum, floor, straight)
+    make_gaussians(grid, rows, touched, half, minimum, floor, straight, faces)
     return rows
-
-
-@lean_kernel
-def _tangent(points: Array, k: int) -> tuple[float, float]:
-    """Along what point k of a scan (m, 2) lies on: from the points beside it, or across its beam."""
-    x, y = points[k, 0], points[k, 1]
-    tx = ty = 0.0
-    for step in (-1, 1):
-        for beside in range(1, BESIDE + 1):
-            other = k + step * beside
-            if other < 0 or other >= points.shape[0]:
-                break
-            dx, dy = points[other, 0] - x, points[other, 1] - y
-            apart = dx * dx + dy * dy
-            if apart > LEAST_APART * LEAST_APART:
-                if apart < MOST_APART * MOST_APART:
-                    tx += step * dx
-                    ty += step * dy
-                break
-    if tx == 0.0 and ty == 0.0:
-        return -y, x
-    return tx, ty
 
 
 @lean_kernel
@@ -233,7 +210,8 @@ class Ndt:
     def make(self) -> None:
         """Make all Gaussians of the points gathered."""
         touched = np.arange(self.rows, dtype=np.int32)
-        make_gaussians(self.grid, self.rows, touched, self.half, self.minimum, self.floor, self.straight)
+        grid, half, minimum, floor = self.grid, self.half, self.minimum, self.floor
+        make_gaussians(grid, self.rows, touched, half, minimum, floor, self.straight, True)
 
     def _change(self, points: Array, pose: Array, sign: float) -> None:
         self.reserve(len(points))
@@ -247,6 +225,7 @@ class Ndt:
             self.minimum,
             self.floor,
             self.straight,
+            True,
         )
 
     def reserve(self, points: int) -> None:

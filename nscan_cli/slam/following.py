@@ -14,6 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from nscan_cli.poses import Array, compose, relative, transform
+from nscan_cli.slam.first_scan import PATH, place_first
 from nscan_cli.slam.options import BreakOptions, TrackingOptions
 from nscan_cli.slam.tracking import Tracked, Tracker
 
@@ -48,11 +49,15 @@ class Followed:
 
 
 class Follower:
-    """Follows the robot piece by piece. The poses of all pieces are in one frame, as odometry guesses it."""
+    """Follows the robot piece by piece. The poses of all pieces are in one frame, as odometry guesses it.
 
-    def __init__(self, options: TrackingOptions, breaking: BreakOptions) -> None:
-        self.options, self.breaking = options, breaking
-        self._tracker = Tracker(options)
+    `odometry` tells whether the scans have any. Without it each face of a wall on the map is no Gaussian of
+    its own: exact ones hold the robot where it is in corridors that come into view, as nothing else does.
+    """
+
+    def __init__(self, options: TrackingOptions, breaking: BreakOptions, odometry: bool = True) -> None:
+        self.options, self.breaking, self._faces = options, breaking, odometry
+        self._tracker = Tracker(options, self._faces)
         self._restarts = self._searches = 0
         self._origin: Array | None = None
         """Where the piece begins, unless it is the first."""
@@ -61,6 +66,8 @@ class Follower:
         """The last settled scan that saw enough."""
         self._last: Followed | None = None
         self._doubted: list[Followed] = []
+        self._young: list[Followed] | None = []
+        """The scans that a piece has begun with, until there are enough to place the first."""
 
     @property
     def restarts(self) -> int:
@@ -92,12 +99,16 @@ class Follower:
             return []
         self._doubted.append(scan)
         if self._goes_on(scan):
-            return self.finish()
+            return self._believe()
         if len(self._doubted) <= self.breaking.patience:
             return []
-        return self._break() or self.finish()
+        return self._break() or self._believe()
 
     def finish(self) -> list[Followed]:
+        """The last scans, which nothing settles any more."""
+        return self._believe() + self._grow_up()
+
+    def _believe(self) -> list[Followed]:
         """The scans that were doubted, as they were tracked."""
         scans, self._doubted = self._doubted, []
         return self._settle(scans)
@@ -130,7 +141,21 @@ class Follower:
             self._last = scan
             if len(scan.points) >= LEAST_BEARINGS:
                 self._seen = scan
-        return scans
+        if self._young is None:
+            return scans
+        self._young += scans
+        is_enough = scans and scans[-1].tracked.path - self._young[0].tracked.path > PATH
+        return self._grow_up() if is_enough else []
+
+    def _grow_up(self) -> list[Followed]:
+        """The scans that the piece has begun with, the first where the others have it."""
+        young, self._young = self._young, None
+        if not young:
+            return []
+        first, *others = young
+        scans, after = [scan.points for scan in others], [scan.tracked for scan in others]
+        placed = place_first(first.tracked, first.points, scans, after, self.options)
+        return [replace(first, tracked=placed), *others]
 
     def _is_doubted(self, scan: Followed) -> bool:
         """Whether a scan that sees enough was matched poorly, and sees other things than the one before."""
@@ -164,7 +189,7 @@ class Follower:
         first, guess = doubted[0], last.tracked.pose
         if first.odometry is not None and last.odometry is not None:
             guess = compose(guess, relative(first.odometry, last.odometry))
-        self._tracker, self._origin = Tracker(self.options), guess
+        self._tracker, self._origin = Tracker(self.options, self._faces), guess
         is_known = self._has_come_far(first)
         self._path = last.tracked.path
         self._path += float(np.hypot(*(guess - last.tracked.pose)[:2])) if is_known else self.breaking.path
@@ -179,8 +204,8 @@ class Follower:
         expected = first.tracked.expected if is_known else wide
         begins = replace(piece[0].tracked, expected=expected, inliers=0.0)
         piece[0] = replace(piece[0], tracked=begins, begins=True, breaks=not is_known)
-        self._doubted = []
-        return self._settle(piece)
+        before, self._young, self._doubted = self._grow_up(), [], []
+        return before + self._settle(piece)
 
 
 def alike(points: Array, others: Array, breaking: BreakOptions) -> float | None:

@@ -82,22 +82,28 @@ def choose_nearby(poses: Array, paths: Array, centre: int, options: NScanOptions
 
     Poses (K, 3) are global ones, paths (K,) lengths of path. Of the keyframes within the radius, those
     nearest are taken; half of the places are kept for other visits, further along the path or back,
-    unless the options leave these out.
+    unless the options leave these out. Of these the first take part: going round and round, what had other
+    corridors in view would else make room for what sees the same once more.
     """
     near, distances = _within(poses, centre, options.radius)
-    near = near[np.argsort(distances, kind="stable")]
     before = np.abs(paths[centre] - paths[near]) > options.recent
-    old, recent = near[before & options.loops], near[~before]
-    visits = _visits(paths[np.sort(old[old < centre])], options.recent)
-    recent = recent[: options.max_scans - min(len(old), options.max_scans // 2)]
-    old = old[: options.max_scans - len(recent)]
-    chosen = np.sort(np.concatenate([old, recent]))
+    visits, old = 0, before & options.loops
+    if old.any():
+        numbers = _visit_numbers(paths[near[old]], options.recent)
+        visits = int(numbers[near[old] < centre].max(initial=-1)) + 1
+        old[old] = numbers < options.first_visits
+    by_distance = np.argsort(distances, kind="stable")
+    recent, others = (near[by_distance[mask[by_distance]]] for mask in (~before, old))
+    recent = recent[: options.max_scans - min(len(others), options.max_scans // 2)]
+    others = others[: options.max_scans - len(recent)]
+    chosen = np.sort(np.concatenate([others, recent]))
     return Near(chosen, np.abs(paths[centre] - paths[chosen]) > options.recent, visits)
 
 
-def _visits(paths: Array, recent: float) -> int:
-    """The parts of increasing lengths of path (k,), with more than `recent` (m) in between."""
-    return int(np.count_nonzero(np.diff(paths) > recent)) + (len(paths) > 0)
+def _visit_numbers(paths: Array, recent: float) -> Indices:
+    """(k,) which visit each of increasing lengths of path (k,) is of: more than `recent` (m) in between."""
+    numbers: Indices = np.concatenate([[0], np.cumsum(np.diff(paths) > recent)])
+    return numbers
 
 
 @kernel

@@ -115,7 +115,9 @@ class NScanOptions:
     radius: float = 5.0
     """How near (m) a keyframe must be to take part."""
     recent: float = 20.0
-    """Keyframes further back along the path (m) count as seen before; half of the places go to them."""
+    """Keyframes further back along the path (m) count as seen before; half of the places go to them,"""
+    first_visits: int = 3
+    """those of so many visits, the first ones."""
     covered: float = 0.7
     """No match is made about a keyframe when others hold so many of its pairs already."""
     behind: int = 3

@@ -48,7 +48,7 @@ class Slam:
 
     def __init__(self, log: LaserLog, options: SlamOptions, threads: int = 1) -> None:
         self.log, self.options, self.threads = log, options, threads
-        self.tracker = Follower(options.tracking, options.breaks)
+        self.tracker = Follower(options.tracking, options.breaks, log.odometry is not None)
         self.odometry, self.jumps = log.odometry, np.zeros(0, dtype=np.int64)
         if log.odometry is not None:
             self.odometry, self.jumps = believed_odometry(log.odometry, log.times)

@@ -34,6 +34,7 @@ class Settings(NamedTuple):
     """Side (m) of a lattice cell of the map."""
     minimum: float
     floor: float
+    faces: bool  # of walls: see make_gaussian
     window: float
     step: float
     widenings: Array
@@ -46,13 +47,14 @@ class Settings(NamedTuple):
     steady_motion: Motion
 
     @classmethod
-    def of(cls, options: TrackingOptions) -> Settings:
+    def of(cls, options: TrackingOptions, faces: bool = True) -> Settings:
         """Those of the options."""
         gaussians = options.gaussians
         return cls(
             0.5 * gaussians.cell,
             float(gaussians.minimum),
             gaussians.floor,
+            faces,
             options.window,
             options.step,
             np.array(options.widenings),
@@ -258,8 +260,9 @@ def _join(track: Track, grid: Grid, settings: Settings, points: Array, pose: Arr
 def _change(track: Track, grid: Grid, settings: Settings, scan: int, sign: float) -> None:
     half, minimum, floor = settings.half, settings.minimum, settings.floor
     points, pose = track.points[track.ends[scan] : track.ends[scan + 1]], track.placed[scan, :3]
-    rows = track.counts[ROWS]
-    track.counts[ROWS] = change(grid, rows, half, points, pose, sign, minimum, floor, False)
+    track.counts[ROWS] = change(
+        grid, track.counts[ROWS], half, points, pose, sign, minimum, floor, False, settings.faces
+    )
 
 
 @kernel

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
+from itertools import combinations
 
 import numpy as np
 
@@ -94,27 +95,22 @@ def energy_of(poses: Array, pairwise: list[Pairwise], nscan: list[NScan], fixed:
     return GraphEnergy(len(poses), [*pairwise, *nscan], np.arange(len(poses)), fixed)
 
 
-def each_scan_once(pairwise: list[Pairwise], nscan: list[NScan]) -> tuple[list[Pairwise], list[NScan]]:
-    """The relations as marginals weigh them: by the mean of 1 / m over their scans.
+def each_pair_once(pairwise: list[Pairwise], nscan: list[NScan]) -> tuple[list[Pairwise], list[NScan]]:
+    """The relations as marginals weigh them: by the mean of 1 / m over their pairs of nodes.
 
-    m is in how many relations a scan is: for a pairwise one, itself and the nScan ones.
+    m is in how many relations a pair is: for a pairwise one, itself and the nScan ones.
     """
 
-    def among(node: int, relations: Sequence[Pairwise | NScan]) -> int:
-        return sum(node in relation.nodes for relation in relations)
+    def among(pair: Sequence[int], relations: Sequence[Pairwise | NScan]) -> int:
+        return sum(set(pair) <= set(relation.nodes) for relation in relations)
 
-    def mean_share(counts: list[int]) -> float:
-        return float(np.mean(1.0 / np.array(counts)))
+    def share(relation: NScan) -> float:
+        both: list[Pairwise | NScan] = [*nscan, *pairwise]
+        return float(np.mean([1.0 / among(pair, both) for pair in combinations(relation.nodes, 2)]))
 
     return (
-        [
-            replace(r, information=r.information * mean_share([1 + among(a, nscan) for a in r.nodes]))
-            for r in pairwise
-        ],
-        [
-            replace(r, hessian=r.hessian * mean_share([among(a, [*nscan, *pairwise]) for a in r.nodes]))
-            for r in nscan
-        ],
+        [replace(r, information=r.information / (1 + among(r.nodes, nscan))) for r in pairwise],
+        [replace(r, hessian=r.hessian * share(r)) for r in nscan],
     )
 
 

@@ -9,7 +9,7 @@ from nscan_cli.graph.between import ATTACHED, Between
 from nscan_cli.graph.model import Graph, Pairwise
 from nscan_cli.graph.solve import optimise_graph
 from nscan_cli.poses import Array, compose, relative, relative_jacobians
-from tests.graph.simulated import dense_matrix, each_scan_once, energy_of, graph_of, mixed_ring
+from tests.graph.simulated import dense_matrix, each_pair_once, energy_of, graph_of, mixed_ring
 
 CHOSEN = (0, 3, 4, 11, 25)
 
@@ -23,7 +23,7 @@ def ring() -> Graph:
 
 def dense(graph: Graph, held: int) -> Array:
     """(K, 3, K, 3) covariance of the keyframes' poses with one of them held."""
-    energy = energy_of(graph.poses, *each_scan_once(graph.pairwise, graph.nscan), held)
+    energy = energy_of(graph.poses, *each_pair_once(graph.pairwise, graph.nscan), held)
     information = 0.5 * dense_matrix(energy, energy.evaluate(graph.poses, exact=False).hessian)
     count = len(graph)
     free = np.delete(np.arange(count), held)

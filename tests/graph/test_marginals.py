@@ -13,7 +13,7 @@ from tests.graph.simulated import (
     SIGMA,
     dense_matrix,
     disturbed,
-    each_scan_once,
+    each_pair_once,
     energy_of,
     graph_of,
     mixed_ring,
@@ -28,7 +28,7 @@ def test_they_are_the_blocks_of_the_dense_inverse():
     truth, pairwise, nscan = mixed_ring(30, noise=1.0)
     graph = graph_of(truth, pairwise, nscan)
     optimise_graph(graph)
-    energy = energy_of(truth, *each_scan_once(pairwise, nscan))
+    energy = energy_of(truth, *each_pair_once(pairwise, nscan))
     information = 0.5 * dense_matrix(energy, energy.evaluate(graph.poses, exact=False).hessian)
     blocks = np.linalg.inv(information).reshape(29, 3, 29, 3)
     marginals = marginal_covariances(graph)

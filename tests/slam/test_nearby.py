@@ -36,6 +36,25 @@ def test_visits_are_parts_of_the_path_that_came_by_before():
     assert choose_nearby(poses, paths, 38, dataclasses.replace(OPTIONS, loops=False)).visits == 0
 
 
+def test_of_other_visits_the_first_take_part():
+    """Six times along the same way, a little nearer each time."""
+    k = np.arange(66)
+    poses = np.stack([2.0 * (k % 11), 0.01 * (5.0 - k // 11), np.zeros(66)], axis=1)
+    paths = (100.0 * (k // 11) + poses[:, 0]).astype(np.float64)
+
+    def visits_beside(centre: int, options: NScanOptions) -> set[int]:
+        near = choose_nearby(poses, paths, centre, options)
+        return set((near.tried[near.seen_before] // 11).tolist())
+
+    all_of_them = dataclasses.replace(OPTIONS, first_visits=99)
+    assert visits_beside(60, all_of_them) == {2, 3, 4}
+    assert visits_beside(60, OPTIONS) == {0, 1, 2}
+    assert visits_beside(60, dataclasses.replace(OPTIONS, first_visits=1)) == {0}
+    # Those that come later count, too, where there are not so many before.
+    assert visits_beside(5, OPTIONS) == {1, 2, 3}
+    assert visits_beside(16, OPTIONS) == {0, 2, 3}
+
+
 def test_the_nearest_within_the_radius_are_chosen_in_order_of_time():
     poses = along(7, 4, 3, 2, 1, 0, -1, -2, 0)
     chosen, seen, _ = choose_nearby(poses, np.arange(9.0), 8, dataclasses.replace(OPTIONS, radius=3.0))
