@@ -15,8 +15,7 @@ SEEDS = (1, 2, 3)
 def test_the_marginals_of_the_office_are_calibrated():
     """The error squared of all keyframes in units of their covariance, per degree of freedom.
 
-    The noise of the scans and of the odometry is drawn anew for each drive of 246 m. Without counting every
-    scan once it is 5.4.
+    The noise of the scans and of the odometry is drawn anew for each drive of 246 m. Measured: 0.9.
     """
     squared = []
     for seed in SEEDS:
