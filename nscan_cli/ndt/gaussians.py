@@ -25,6 +25,8 @@ Cells = tuple[int, int, int, int]
 Moments = tuple[float, float, float, float, float, float, float, float]
 """Number of points, their mean (x, y), covariance (xx, xy, yy), and the mean unit vector along the beams; or,
 before they are divided by the number, the sums."""
+NOTHING = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+"""The moments of no points."""
 ONE_SIDED = 0.2
 """A Gaussian shows one side when its beams run through it by so much of their length on average."""
 THIN = 10.0
@@ -53,18 +55,12 @@ def make_gaussian(
     whole = _block(grid, cells, half, 0.0, 0.0)
     if whole[0] < minimum:
         return
-    nx, ny = _normal(_within(grid, cells)) if faces else (0.0, 0.0)
-    behind = _block(grid, cells, half, nx, ny) if faces else whole
-    if 0.0 < behind[0] < whole[0]:
-        before = _block(grid, cells, half, -nx, -ny)
-        are_faces = (
-            before[6] * nx + before[7] * ny < -ONE_SIDED and behind[6] * nx + behind[7] * ny > ONE_SIDED
-        )
-        if are_faces and max(before[0], behind[0]) >= minimum:
-            if min(before[0], behind[0]) >= minimum:
-                gaussian[7] = other
-                _shape(grid, key, behind, half, floor, straight, grid.gaussians[other])
-            whole = before if before[0] >= minimum else behind
+    before, behind = _two_faces(grid, cells, half, whole[0]) if faces else (NOTHING, NOTHING)
+    if min(before[0], behind[0]) >= minimum:
+        gaussian[7] = other
+        _shape(grid, key, behind, half, floor, straight, grid.gaussians[other])
+    if max(before[0], behind[0]) >= minimum:
+        whole = before if before[0] >= minimum else behind
     _shape(grid, key, whole, half, floor, straight, gaussian)
 
 
@@ -108,6 +104,22 @@ def _shape(
 
 
 @lean_kernel
+def _two_faces(grid: Grid, cells: Cells, half: float, count: float) -> tuple[Moments, Moments]:
+    """Of the points on one face of a wall, and of those on the other; nothing where there are not two.
+
+    `count` is the number of all points of the block.
+    """
+    nx, ny = _normal(_within(grid, cells))
+    behind = _block(grid, cells, half, nx, ny)
+    if not 0.0 < behind[0] < count:
+        return NOTHING, NOTHING
+    before = _block(grid, cells, half, -nx, -ny)
+    if before[6] * nx + before[7] * ny < -ONE_SIDED and behind[6] * nx + behind[7] * ny > ONE_SIDED:
+        return before, behind
+    return NOTHING, NOTHING
+
+
+@lean_kernel
 def _cells(grid: Grid, key: int, row: int) -> Cells:
     """Those of the block whose lower left cell is `row`."""
     return (
@@ -121,7 +133,7 @@ def _cells(grid: Grid, key: int, row: int) -> Cells:
 @lean_kernel
 def _block(grid: Grid, cells: Cells, half: float, nx: float, ny: float) -> Moments:
     """Of a block, from the centre of its first cell; only of the parts whose beams run along (nx, ny)."""
-    sums = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    sums = NOTHING
     for at in range(4):
         if cells[at] < 0:
             continue
@@ -150,7 +162,7 @@ def _within(grid: Grid, cells: Cells) -> Moments:
 @lean_kernel
 def _around(grid: Grid, key: int, around: int, half: float) -> Moments:
     """Of a block and so many lattice cells around it, from the centre of the cell of `key`."""
-    sums = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    sums = NOTHING
     for oy in range(-around, 2 + around):
         for ox in range(-around, 2 + around):
             cell = find_row(grid, key + ox * 2 * HALF_KEY + oy)

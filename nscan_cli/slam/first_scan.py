@@ -17,7 +17,8 @@ from nscan_cli.matching.priors import Prior
 from nscan_cli.ndt.grid import Ndt
 from nscan_cli.poses import Array
 from nscan_cli.slam.options import TrackingOptions
-from nscan_cli.slam.track import Settings, match_and_count
+from nscan_cli.slam.settings import Settings
+from nscan_cli.slam.track import match_and_count
 
 if TYPE_CHECKING:
     from nscan_cli.slam.tracking import Tracked

@@ -13,59 +13,18 @@ from numpy.typing import NDArray
 from nscan_cli.compiled import kernel
 from nscan_cli.matching.newton import PairProblem, minimise
 from nscan_cli.matching.planar import composed_pose, relative_pose, wrapped
-from nscan_cli.matching.priors import Motion, Prior, sigmas
+from nscan_cli.matching.priors import Prior, sigmas
 from nscan_cli.ndt.energy import inlier_share
 from nscan_cli.ndt.grid import NEW_NEIGHBOURS, change
 from nscan_cli.ndt.table import Grid
 from nscan_cli.poses import Array, transform
-from nscan_cli.slam.options import TrackingOptions
+from nscan_cli.slam.settings import Settings
 
 SCANS, OLDEST, KNOWN, ROWS = 0, 1, 2, 3
 """What is counted: scans that have joined the map, the oldest of them that it still holds, the last poses
 that are known, and the rows of the grid."""
 CLEARLY = 0.05
 """By so many inliers more the match from another start must be better."""
-
-
-class Settings(NamedTuple):
-    """The tracker's options as the kernels take them; see TrackingOptions."""
-
-    half: float
-    """Side (m) of a lattice cell of the map."""
-    minimum: float
-    floor: float
-    faces: bool  # of walls: see make_gaussian
-    window: float
-    step: float
-    widenings: Array
-    max_iterations: int
-    tolerance: float
-    scale: float
-    inlier_bound: float
-    inlier_share: float
-    odometry: Motion
-    steady_motion: Motion
-
-    @classmethod
-    def of(cls, options: TrackingOptions, faces: bool = True) -> Settings:
-        """Those of the options."""
-        gaussians = options.gaussians
-        return cls(
-            0.5 * gaussians.cell,
-            float(gaussians.minimum),
-            gaussians.floor,
-            faces,
-            options.window,
-            options.step,
-            np.array(options.widenings),
-            options.max_iterations,
-            options.tolerance,
-            options.scale,
-            options.inlier_bound,
-            options.inlier_share,
-            Motion.of(options.odometry),
-            Motion.of(options.steady_motion),
-        )
 
 
 class Track(NamedTuple):

@@ -18,11 +18,11 @@ from nscan_cli.matching.search import likelihood_field, search
 from nscan_cli.ndt.grid import Ndt
 from nscan_cli.poses import Array
 from nscan_cli.slam.options import TrackingOptions
+from nscan_cli.slam.settings import Settings
 from nscan_cli.slam.track import (
     CLEARLY,
     ROWS,
     Found,
-    Settings,
     Track,
     follow,
     least_share,

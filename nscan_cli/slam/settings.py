@@ -1,0 +1,52 @@
+"""The parameters of tracking as its kernels take them."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from nscan_cli.matching.priors import Motion
+from nscan_cli.poses import Array
+from nscan_cli.slam.options import TrackingOptions
+
+
+class Settings(NamedTuple):
+    """The tracker's options as the kernels take them; see TrackingOptions."""
+
+    half: float
+    """Side (m) of a lattice cell of the map."""
+    minimum: float
+    floor: float
+    faces: bool  # of walls: see make_gaussian
+    window: float
+    step: float
+    widenings: Array
+    max_iterations: int
+    tolerance: float
+    scale: float
+    inlier_bound: float
+    inlier_share: float
+    odometry: Motion
+    steady_motion: Motion
+
+    @classmethod
+    def of(cls, options: TrackingOptions, faces: bool = True) -> Settings:
+        """Those of the options."""
+        gaussians = options.gaussians
+        return cls(
+            0.5 * gaussians.cell,
+            float(gaussians.minimum),
+            gaussians.floor,
+            faces,
+            options.window,
+            options.step,
+            np.array(options.widenings),
+            options.max_iterations,
+            options.tolerance,
+            options.scale,
+            options.inlier_bound,
+            options.inlier_share,
+            Motion.of(options.odometry),
+            Motion.of(options.steady_motion),
+        )
