@@ -22,7 +22,8 @@ def test_max_scans_bounds_the_relations(folder):
     assert run(["slam", *SHORT, "--max-scans", "4", "-o", "graph.json", "-q"]) == 0
     graph = read_graph("graph.json")
     assert graph.provenance["parameters"]["slam"]["nscan"]["max_scans"] == 4
-    assert max(len(relation.nodes) for relation in graph.nscan) == 4
+    # Three where one scan did not hang together with the others.
+    assert {len(relation.nodes) for relation in graph.nscan} == {3, 4}
 
 
 def test_relations_of_one_kind(folder):
