@@ -10,11 +10,13 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from nscan_cli.compiled import kernel
+from nscan_cli.compiled import kernel, lean_kernel
 from nscan_cli.poses import Array
 
 TILE = 32
 """Cells along the side of a tile."""
+NEVER = 1 << 62
+"""Where a ray crosses no border of this kind."""
 
 
 class Tiles(NamedTuple):
@@ -84,6 +86,7 @@ def extent(scans: Scans, reach: float) -> tuple[float, float, float, float]:
 def _cast(scans: Scans, reach: float, resolution: float, left: int, bottom: int, tiles: Tiles) -> None:
     """Add the beams of all scans to the counts of the tiles."""
     rows, ranges, angle_min, angle_increment, lasers = scans
+    counts = tiles.counts.reshape(-1)
     used = 0
     for k in range(len(rows)):
         row = rows[k]
@@ -96,53 +99,71 @@ def _cast(scans: Scans, reach: float, resolution: float, left: int, bottom: int,
             angle = lasers[k, 2] + angle_min[row] + beam * angle_increment[row]
             length = min(r, reach) / resolution
             end_x, end_y = x + length * np.cos(angle), y + length * np.sin(angle)
-            used = _pass(x, y, end_x, end_y, tiles, used)
+            used = _pass(x, y, end_x, end_y, tiles.numbers, counts, used)
             if r <= reach:
-                line, column = int(end_y), int(end_x)
-                used = _met(tiles.numbers, line // TILE, column // TILE, used)
-                tile = tiles.numbers[line // TILE, column // TILE]
-                tiles.counts[tile, 0, line % TILE, column % TILE] += 1
+                hit, used = _hits(tiles.numbers, int(end_y), int(end_x), used)
+                counts[np.uint64(hit)] += 1
 
 
-@kernel
-def _met(numbers: NDArray[np.int32], row: int, column: int, used: int) -> int:
-    """Give a tile its number if it has none; returns how many have one."""
-    if numbers[row, column] < 0:
-        numbers[row, column] = used
-        return used + 1
-    return used
+@lean_kernel
+def _hits(numbers: NDArray[np.int32], line: int, column: int, used: int) -> tuple[int, int]:
+    """Where a cell's hits are counted; its tile gets a number if it has none. How many have one."""
+    row, place = np.uint64(line // TILE), np.uint64(column // TILE)
+    if numbers[row, place] < 0:
+        numbers[row, place] = used
+        used += 1
+    return int(numbers[row, place]) * 2 * TILE * TILE + line % TILE * TILE + column % TILE, used
 
 
-@kernel
-def _pass(x: float, y: float, end_x: float, end_y: float, tiles: Tiles, used: int) -> int:
+@lean_kernel
+def _pass(
+    x: float,
+    y: float,
+    end_x: float,
+    end_y: float,
+    numbers: NDArray[np.int32],
+    counts: NDArray[np.int32],
+    used: int,
+) -> int:
     """Count the cells from (x, y) up to, and without, the cell of the end as missed; in cells.
 
-    Returns how many tiles are used.
-
-    `t` grows from 0 to 1 along the ray; a ray through a corner takes the step in y first.
+    Returns how many tiles are used. A ray through a corner takes the step in y first.
     """
     column, line = int(x), int(y)
     dx, dy = end_x - x, end_y - y
     steps_x, steps_y = abs(int(end_x) - column), abs(int(end_y) - line)
     step_x, step_y = (1 if dx > 0 else -1), (1 if dy > 0 else -1)
-    between_x = 1 / abs(dx) if steps_x > 0 else np.inf
-    between_y = 1 / abs(dy) if steps_y > 0 else np.inf
-    next_x = ((column + 1 - x) if dx > 0 else (x - column)) * between_x if steps_x > 0 else np.inf
-    next_y = ((line + 1 - y) if dy > 0 else (y - line)) * between_y if steps_y > 0 else np.inf
-    tile, tile_row, tile_column = -1, -1, -1
-    while steps_x + steps_y > 0:
-        if line // TILE != tile_row or column // TILE != tile_column:
-            tile_row, tile_column = line // TILE, column // TILE
-            used = _met(tiles.numbers, tile_row, tile_column, used)
-            tile = tiles.numbers[tile_row, tile_column]
-        tiles.counts[tile, 1, line % TILE, column % TILE] += 1
-        # The counts of steps decide at the end, so that rounding never leads past the cell of the end.
-        if steps_y == 0 or (steps_x > 0 and next_x < next_y):
-            column += step_x
-            next_x += between_x
-            steps_x -= 1
+    # Where the ray crosses the next borders, from 0 to 1 along it, and how far apart they are.
+    between_x, between_y = _fixed(1 / abs(dx)), _fixed(1 / abs(dy))
+    next_x = _fixed((column + 1 - x if dx > 0 else x - column) / abs(dx)) if steps_x > 0 else NEVER
+    next_y = _fixed((line + 1 - y if dy > 0 else y - line) / abs(dy)) if steps_y > 0 else NEVER
+    left = steps_x + steps_y
+    while left > 0:
+        at, used = _hits(numbers, line, column, used)
+        at += TILE * TILE
+        # The steps one way that lead out of the tile, and those the other way before.
+        steps_x = TILE - column % TILE if dx > 0 else column % TILE + 1
+        steps_y = TILE - line % TILE if dy > 0 else line % TILE + 1
+        out_x, out_y = next_x + (steps_x - 1) * between_x, next_y + (steps_y - 1) * between_y
+        if out_x < out_y:
+            steps_y = (out_x - next_y) // between_y + 1 if next_y <= out_x else 0
         else:
-            line += step_y
-            next_y += between_y
-            steps_y -= 1
+            steps_x = (out_y - next_x - 1) // between_x + 1 if next_x < out_y else 0
+        for _ in range(min(steps_x + steps_y, left)):
+            counts[np.uint64(at)] += 1
+            # All bits are set where x comes first. As a comparison it would be made a branch, which nobody
+            # can foresee, and take twice the time.
+            sideways = int(np.int64(np.uint64(next_x) - np.uint64(next_y))) >> 63
+            at += (step_x & sideways) + (TILE * step_y & ~sideways)
+            next_x += between_x & sideways
+            next_y += between_y & ~sideways
+        left -= steps_x + steps_y
+        column += steps_x * step_x
+        line += steps_y * step_y
     return used
+
+
+@lean_kernel
+def _fixed(t: float) -> int:
+    """A place along a ray in units of 2⁻⁵²; what is far beyond its end is somewhere beyond."""
+    return int(min(t, 16.0) * 4503599627370496.0)

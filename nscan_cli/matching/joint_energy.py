@@ -15,7 +15,7 @@ from nscan_cli.compiled import kernel, lean_kernel
 from nscan_cli.matching.planar import relative_pose
 from nscan_cli.matching.scans import Scans, most_points, scan_grid, scan_points
 from nscan_cli.ndt.energy import OUT, accumulate, unpack
-from nscan_cli.ndt.meeting import room_to_meet
+from nscan_cli.ndt.meeting import RoomToMeet, room_to_meet
 from nscan_cli.poses import Array
 
 NEUTRAL = 1.0
@@ -57,8 +57,8 @@ class Room(NamedTuple):
     """(3, 3) Hessian."""
     out: Array
     """(OUT,) both as an evaluation gives them."""
-    met: Array
-    """See room_to_meet."""
+    met: RoomToMeet
+    """Of the points."""
 
 
 class JointEnergy(NamedTuple):

@@ -14,7 +14,7 @@ from nscan_cli.compiled import kernel, lean_kernel
 from nscan_cli.matching.linear import solve_definite
 from nscan_cli.matching.priors import Prior
 from nscan_cli.ndt.energy import OUT, sum_meeting, unpack
-from nscan_cli.ndt.meeting import Meeting, begin, meet_again
+from nscan_cli.ndt.meeting import Meeting, meet_again
 from nscan_cli.ndt.table import Grid
 from nscan_cli.poses import Array
 
@@ -31,8 +31,8 @@ class PairProblem(NamedTuple):
     grid: Grid
     half: float
     """Side (m) of a lattice cell."""
-    points: Array
-    """(m, 2)"""
+    meeting: Meeting
+    """Of the points (m, 2); it moves with the pose."""
     scale: float
     """What E is multiplied with to be a negative log likelihood."""
     prior: Prior
@@ -42,7 +42,6 @@ class PairProblem(NamedTuple):
 @lean_kernel
 def objective(
     problem: PairProblem,
-    meeting: Meeting,
     pose: Array,
     widening: float,
     curvature: float,
@@ -52,6 +51,7 @@ def objective(
 ) -> float:
     """The objective at `pose`, to which the meeting of the points moves; writes its gradient (3,) and Hessian
     (3, 3), and E's own into out (10,)."""
+    meeting = problem.meeting
     meet_again(problem.grid, problem.half, meeting, pose[0], pose[1], pose[2])
     sum_meeting(meeting, widening, curvature, out)
     unpack(out, problem.scale, gradient, hessian)
@@ -85,14 +85,13 @@ def minimise(
     semi-definite Hessian of the objective (3, 3). Returns the objective's and E's value, iterations,
     evaluations, and whether the last stage converged. Hessian and values are those before that last step.
     """
-    meeting = begin(problem.points)
     out, trial_out = np.empty(OUT), np.empty(OUT)
     gradient, step, trial = np.empty(3), np.empty(3), np.empty(3)
     trial_gradient, trial_hessian, damped = np.empty(3), np.empty((3, 3)), np.empty((3, 3))
     value, iterations, evaluations, converged = 0.0, 0, 0, False
     for stage in range(widenings.shape[0]):
         widening = widenings[stage]
-        value = objective(problem, meeting, pose, widening, 0.0, out, gradient, hessian)
+        value = objective(problem, pose, widening, 0.0, out, gradient, hessian)
         evaluations += 1
         damping = FIRST_DAMPING
         converged = False
@@ -110,9 +109,7 @@ def minimise(
                 pose[:] = trial
                 converged = True
                 break
-            trial_value = objective(
-                problem, meeting, trial, widening, 0.0, trial_out, trial_gradient, trial_hessian
-            )
+            trial_value = objective(problem, trial, widening, 0.0, trial_out, trial_gradient, trial_hessian)
             evaluations += 1
             if trial_value <= value:
                 pose[:], value, out[:] = trial, trial_value, trial_out

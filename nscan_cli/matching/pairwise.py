@@ -118,7 +118,7 @@ def match_pair(
     cells, so a minimum may be a place where the gradient is not zero: `decrement` tells how much.
     """
     prior = prior or Prior(np.zeros(3), np.zeros((3, 3)))
-    problem = PairProblem(reference.grid, reference.half, points, options.scale, prior)
+    problem = PairProblem(reference.grid, reference.half, begin(points), options.scale, prior)
     pose, hessian, gradient, out = start.copy(), np.empty((3, 3)), np.empty(3), np.empty(OUT)
     iterations, evaluations, last, settled = 0, 1, 0, [True]
     # One by one: the end of the last tells whether the match has converged.
@@ -129,7 +129,7 @@ def match_pair(
         iterations += last
         evaluations += evaluated
         settled.append(ended)
-    objective(problem, begin(points), pose, 1.0, 1.0, out, gradient, hessian)
+    objective(problem, pose, 1.0, 1.0, out, gradient, hessian)
     overlap = inlier_share(reference.grid, reference.half, points, pose, INLIER_BOUND)
     covariance = covariance_of(hessian)
     reason = None

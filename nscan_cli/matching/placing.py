@@ -20,6 +20,7 @@ from nscan_cli.matching.pairwise import PairOptions
 from nscan_cli.matching.priors import Prior
 from nscan_cli.matching.search import Field, Found, SearchOptions, likelihood_field, search
 from nscan_cli.ndt.grid import Ndt
+from nscan_cli.ndt.meeting import begin
 from nscan_cli.poses import Array, compose, relative, transform
 
 LEVER = 2.0
@@ -150,7 +151,7 @@ class Placing:
         for other in placed:
             ndt.add(self.points[other], poses[other])
         none = Prior(np.zeros(3), np.zeros((3, 3)))
-        problem = PairProblem(ndt.grid, ndt.half, self.points[scan], options.scale, none)
+        problem = PairProblem(ndt.grid, ndt.half, begin(self.points[scan]), options.scale, none)
         minimise(problem, pose, WIDENINGS, options.max_iterations, options.tolerance, np.empty((3, 3)))
         return pose
 

@@ -91,10 +91,10 @@ def most_points(scans: Scans) -> int:
 
 @kernel
 def _own_mean(grid: Grid, half: float, points: Array) -> float:
-    out, met = np.empty(OUT), room_to_meet(points.shape[0], 1)
-    accumulate(grid, half, points, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 1, met, out)
+    out, room = np.empty(OUT), room_to_meet(points.shape[0], 1)
+    accumulate(grid, half, points, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 1, room, out)
     energy = out[0]
-    accumulate(grid, half, points, 0.0, 0.0, 0.0, 1.0, 0.0, 1.0, 1, met, out)
+    accumulate(grid, half, points, 0.0, 0.0, 0.0, 1.0, 0.0, 1.0, 1, room, out)
     # The difference is the number of Gaussians met.
     return float(-energy / max(out[0] - energy, 1.0))
 

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from nscan_cli.compiled import kernel, lean_kernel, summing_kernel
 from nscan_cli.ndt.grid import Ndt
-from nscan_cli.ndt.meeting import BLOCKS, Meeting, meet, room_to_meet
+from nscan_cli.ndt.meeting import BLOCKS, Meeting, RoomToMeet, meet, room_to_meet
 from nscan_cli.ndt.table import Grid, find_row, pack, shown
 from nscan_cli.poses import Array
 
@@ -43,7 +43,7 @@ def accumulate(
     curvature: float,
     baseline: float,
     stride: int,
-    met: Array,
+    room: RoomToMeet,
     out: Array,
 ) -> None:
     """Write E, gradient and Hessian at the pose u = (x, y, phi) of points (m, 2) into out (10,).
@@ -51,10 +51,10 @@ def accumulate(
     With `curvature` 1 the Hessian is exact; with 0 its two terms that can be negative are left out, so
     that it is positive semi-definite everywhere. `baseline` is what every Gaussian that a point meets
     costs, well hit or not; it only counts when energies are compared. Of the points, every so-manyth
-    counts by `stride`. `met` is room to work in; see room_to_meet.
+    counts by `stride`. `room` is to work in.
     """
-    count = meet(grid, half, points, x, y, phi, stride, met)
-    _sum(met, count, widening, curvature, baseline, out)
+    count = meet(grid, half, points, x, y, phi, stride, room)
+    _sum(room.met, count, widening, curvature, baseline, out)
 
 
 @summing_kernel
@@ -205,8 +205,8 @@ def energy(ndt: Ndt, points: Array, pose: Array, widening: float = 1.0, exact: b
     """
     out = np.empty(OUT)
     x, y, phi = (float(part) for part in pose)
-    met = room_to_meet(len(points), 1)
-    accumulate(ndt.grid, ndt.half, points, x, y, phi, widening, float(exact), 0.0, 1, met, out)
+    room = room_to_meet(len(points), 1)
+    accumulate(ndt.grid, ndt.half, points, x, y, phi, widening, float(exact), 0.0, 1, room, out)
     gradient, hessian = np.empty(3), np.empty((3, 3))
     unpack(out, 1.0, gradient, hessian)
     return Energy(float(out[0]), gradient, hessian)

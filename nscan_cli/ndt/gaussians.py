@@ -55,7 +55,7 @@ def make_gaussian(
     whole = _block(grid, cells, half, 0.0, 0.0)
     if whole[0] < minimum:
         return
-    before, behind = _two_faces(grid, cells, half, whole[0]) if faces else (NOTHING, NOTHING)
+    before, behind = _two_faces(grid, cells, half) if faces else (NOTHING, NOTHING)
     if min(before[0], behind[0]) >= minimum:
         gaussian[7] = other
         _shape(grid, key, behind, half, floor, straight, grid.gaussians[other])
@@ -104,18 +104,23 @@ def _shape(
 
 
 @lean_kernel
-def _two_faces(grid: Grid, cells: Cells, half: float, count: float) -> tuple[Moments, Moments]:
-    """Of the points on one face of a wall, and of those on the other; nothing where there are not two.
-
-    `count` is the number of all points of the block.
-    """
+def _two_faces(grid: Grid, cells: Cells, half: float) -> tuple[Moments, Moments]:
+    """Of the points on one face of a wall, and of those on the other; nothing where there are not two."""
     nx, ny = _normal(_within(grid, cells))
-    behind = _block(grid, cells, half, nx, ny)
-    if not 0.0 < behind[0] < count:
-        return NOTHING, NOTHING
-    before = _block(grid, cells, half, -nx, -ny)
-    if before[6] * nx + before[7] * ny < -ONE_SIDED and behind[6] * nx + behind[7] * ny > ONE_SIDED:
-        return before, behind
+    # Mostly all beams come from one side: that is seen before any moments are summed.
+    number_before = number_behind = against = along = 0.0
+    for at in range(4):
+        for side in range(2 if cells[at] >= 0 else 0):
+            part = grid.sums[cells[at], side]
+            through = part[6] * nx + part[7] * ny
+            if through >= 0.0:
+                number_behind += part[0]
+                along += through
+            else:
+                number_before += part[0]
+                against -= through
+    if against > ONE_SIDED * number_before and along > ONE_SIDED * number_behind:
+        return _block(grid, cells, half, -nx, -ny), _block(grid, cells, half, nx, ny)
     return NOTHING, NOTHING
 
 

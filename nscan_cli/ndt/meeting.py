@@ -13,37 +13,49 @@ from nscan_cli.poses import Array
 BLOCKS = 4
 """A point meets at most so many."""
 MET = 7
-"""Numbers of a point that meets a Gaussian: R(φ) x, v, and Σ⁻¹ as (xx, xy, yy)."""
+"""Numbers of a point that meets a Gaussian; see RoomToMeet."""
 GAUSSIAN = 7
 """Numbers of a Gaussian; see Grid."""
 
 
+class RoomToMeet(NamedTuple):
+    """Room for n points and what they meet."""
+
+    moved: Array
+    """(4, n) R(φ) x, and the lattice coordinates of x'."""
+    met: Array
+    """(7, 4 n) of each point on each Gaussian: R(φ) x, v, and Σ⁻¹ as (xx, xy, yy)."""
+
+
 @kernel
-def room_to_meet(points: int, stride: int) -> Array:
-    """Room for what so many points meet; see meet."""
-    return np.empty((MET, BLOCKS * (points // stride + 1)))
+def room_to_meet(points: int, stride: int) -> RoomToMeet:
+    """Room for so many points, of which every so-manyth counts by `stride`."""
+    n = (points + stride - 1) // stride
+    return RoomToMeet(np.empty((4, n)), np.empty((MET, BLOCKS * n)))
 
 
 @lean_kernel
 def meet(
-    grid: Grid, half: float, points: Array, x: float, y: float, phi: float, stride: int, met: Array
+    grid: Grid, half: float, points: Array, x: float, y: float, phi: float, stride: int, room: RoomToMeet
 ) -> int:
-    """Write the numbers of every point that meets a Gaussian to the columns of `met` (7, …); how many do.
+    """Write the numbers of every point that meets a Gaussian to the columns of `room.met`; how many do.
 
-    Of the points, every so-manyth counts by `stride`.
+    Of the points (m, 2), every so-manyth counts by `stride`.
     """
-    cos, sin = np.cos(phi), np.sin(phi)
+    moved, met = room.moved, room.met
+    n = (points.shape[0] + stride - 1) // stride
+    # All at first, side by side in lanes: where a look-up ends nobody can foresee, and what comes after it
+    # waits.
+    _place(points, x, y, np.cos(phi), np.sin(phi), half, stride, n, moved)
     count, row, key = 0, -1, -1
-    for k in range(0, points.shape[0], stride):
-        rx = cos * points[k, 0] - sin * points[k, 1]
-        ry = sin * points[k, 0] + cos * points[k, 1]
-        px, py = rx + x, ry + y
-        cell = pack(int(np.floor(px / half)), int(np.floor(py / half)))
+    for k in range(n):
+        cell = pack(int(moved[2, k]), int(moved[3, k]))
         # Neighbouring beams mostly fall into the same cell.
         if cell != key:
             key, row = cell, find_row(grid, cell)
         if row < 0:
             continue
+        rx, ry = moved[0, k], moved[1, k]
         for block in range(BLOCKS):
             link = shown(grid, grid.links[row, block], rx, ry)
             if link < 0:
@@ -52,10 +64,23 @@ def meet(
             # Unsigned, so that nobody asks whether it counts from the end.
             c = np.uint64(count)
             met[0, c], met[1, c] = rx, ry
-            met[2, c], met[3, c] = px - gaussian[0], py - gaussian[1]
+            met[2, c], met[3, c] = rx + x - gaussian[0], ry + y - gaussian[1]
             met[4, c], met[5, c], met[6, c] = gaussian[2], gaussian[3], gaussian[4]
             count += 1
     return count
+
+
+@lean_kernel
+def _place(
+    points: Array, x: float, y: float, cos: float, sin: float, half: float, stride: int, n: int, moved: Array
+) -> None:
+    """Write where n points and their cells are; see RoomToMeet."""
+    for k in range(n):
+        at = np.uint64(k * stride)
+        rx = cos * points[at, 0] - sin * points[at, 1]
+        ry = sin * points[at, 0] + cos * points[at, 1]
+        moved[0, k], moved[1, k] = rx, ry
+        moved[2, k], moved[3, k] = np.floor((rx + x) / half), np.floor((ry + y) / half)
 
 
 class Meeting(NamedTuple):
@@ -105,6 +130,23 @@ def meet_again(grid: Grid, half: float, meeting: Meeting, x: float, y: float, ph
                 gaussian = grid.gaussians[link]
                 for number in range(GAUSSIAN):
                     meeting.gaussians[block, number, k] = gaussian[number]
+
+
+@lean_kernel
+def count_inliers(meeting: Meeting, bound: float) -> int:
+    """How many points are within a Mahalanobis distance² of `bound` of a Gaussian that they meet."""
+    moved, gaussians = meeting.moved, meeting.gaussians
+    count = 0
+    for k in range(moved.shape[1]):
+        on = False
+        for block in range(BLOCKS):
+            vx, vy = moved[2, k] - gaussians[block, 0, k], moved[3, k] - gaussians[block, 1, k]
+            xx, xy, yy = gaussians[block, 2, k], gaussians[block, 3, k], gaussians[block, 4, k]
+            shows = gaussians[block, 5, k] * moved[0, k] + gaussians[block, 6, k] * moved[1, k] <= 0.0
+            # Without `and`, which would be a branch.
+            on |= shows & (xx > 0.0) & (xx * vx * vx + 2 * xy * vx * vy + yy * vy * vy < bound)
+        count += on
+    return count
 
 
 @lean_kernel

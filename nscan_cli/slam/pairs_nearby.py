@@ -17,6 +17,7 @@ from nscan_cli.matching.newton import PairProblem, minimise
 from nscan_cli.matching.overlap import INLIER_BOUND
 from nscan_cli.matching.priors import Prior
 from nscan_cli.ndt.energy import energy, inlier_share
+from nscan_cli.ndt.meeting import begin
 from nscan_cli.poses import Array, inverse, relative, relative_jacobians, wrap
 from nscan_cli.slam.keyframes import Keyframe, Route
 from nscan_cli.slam.nearby import Nearby, choose_nearby, moved_by, scale_of, verdict
@@ -72,10 +73,10 @@ def _match(route: Route, other: int, centre: int, options: NScanOptions) -> _Sin
     reference, points = keyframes[other].ndt, keyframes[centre].points
     prior = _prior(route.chain, other, centre)
     scale = scale_of([keyframes[centre]], options)
-    problem = PairProblem(reference.grid, reference.half, points, scale, prior)
     start, origin = relative(poses[centre], poses[other]), np.zeros(3)
     for widenings in options.attempts:
         pose, hessian = start.copy(), np.empty((3, 3))
+        problem = PairProblem(reference.grid, reference.half, begin(points), scale, prior)
         minimise(problem, pose, np.array(widenings), options.max_iterations, options.tolerance, hessian)
         pose[2] = wrap(pose[2])
         moved = moved_by(np.stack([origin, start]), np.stack([origin, pose]), 1)

@@ -14,8 +14,8 @@ from nscan_cli.compiled import kernel
 from nscan_cli.matching.newton import PairProblem, minimise
 from nscan_cli.matching.planar import composed_pose, relative_pose, wrapped
 from nscan_cli.matching.priors import Prior, sigmas
-from nscan_cli.ndt.energy import inlier_share
 from nscan_cli.ndt.grid import NEW_NEIGHBOURS, change
+from nscan_cli.ndt.meeting import begin, count_inliers, meet_again
 from nscan_cli.ndt.table import Grid
 from nscan_cli.poses import Array, transform
 from nscan_cli.slam.settings import Settings
@@ -118,11 +118,13 @@ def match_and_count(
     Writes the Hessian (3, 3) of the objective.
     """
     half, scale, widenings = settings.half, settings.scale, settings.widenings
-    problem = PairProblem(grid, half, points, scale, prior)
+    meeting = begin(points)
+    problem = PairProblem(grid, half, meeting, scale, prior)
     value, _, _, _, _ = minimise(
         problem, pose, widenings, settings.max_iterations, settings.tolerance, hessian
     )
-    return value, inlier_share(grid, half, points, pose, settings.inlier_bound)
+    meet_again(grid, half, meeting, pose[0], pose[1], pose[2])
+    return value, count_inliers(meeting, settings.inlier_bound) / max(points.shape[0], 1)
 
 
 @kernel

@@ -26,14 +26,14 @@ def ndt_of(points: Array) -> Ndt:
 
 def evaluate(ndt: Ndt, points: Array, pose: Array, curvature: float = 1.0) -> tuple[float, Array, Array]:
     gradient, hessian = np.empty(3), np.empty((3, 3))
-    problem = PairProblem(ndt.grid, ndt.half, points, SCALE, Prior(MEAN, INFORMATION))
-    value = objective(problem, begin(points), pose, 1.0, curvature, np.empty(OUT), gradient, hessian)
+    problem = PairProblem(ndt.grid, ndt.half, begin(points), SCALE, Prior(MEAN, INFORMATION))
+    value = objective(problem, pose, 1.0, curvature, np.empty(OUT), gradient, hessian)
     return value, gradient, hessian
 
 
 def run(ndt: Ndt, points: Array, start: Array, mean: Array, information: Array):
     pose, hessian = start.copy(), np.empty((3, 3))
-    problem = PairProblem(ndt.grid, ndt.half, points, SCALE, Prior(mean, information))
+    problem = PairProblem(ndt.grid, ndt.half, begin(points), SCALE, Prior(mean, information))
     outcome = minimise(problem, pose, np.array([0.05, 0.3, 1.0]), 30, 1e-6, hessian)
     return pose, hessian, outcome
 

@@ -3,9 +3,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from nscan_cli.ndt.energy import OUT, accumulate, sum_meeting
+from nscan_cli.ndt.energy import OUT, accumulate, inlier_share, sum_meeting
 from nscan_cli.ndt.grid import Ndt
-from nscan_cli.ndt.meeting import begin, meet_again, room_to_meet
+from nscan_cli.ndt.meeting import begin, count_inliers, meet_again, room_to_meet
 from tests.ndt.rooms import room
 
 
@@ -36,12 +36,27 @@ def test_what_was_kept_on_the_way_says_the_same_as_what_is_looked_up_anew(step, 
     assert counted >= 20
 
 
+def test_inliers_of_a_meeting_are_those_that_are_looked_up_anew():
+    ndt, points = outside_in(3), room(7)
+    rng, counts = np.random.default_rng(6), set()
+    for _ in range(20):
+        pose = rng.uniform(-0.3, 0.3, 3)
+        meeting = begin(points)
+        meet_again(ndt.grid, ndt.half, meeting, *pose)
+        counts.add(count_inliers(meeting, 9.0))
+        assert count_inliers(meeting, 9.0) / len(points) == inlier_share(
+            ndt.grid, ndt.half, points, pose, 9.0
+        )
+    assert len(counts) > 10
+
+
 def test_no_points_meet_nothing():
     ndt, out = outside_in(1), np.empty(OUT)
     meeting = begin(np.empty((0, 2)))
     meet_again(ndt.grid, ndt.half, meeting, 0.0, 0.0, 0.0)
     sum_meeting(meeting, 1.0, 1.0, out)
     assert (out == 0.0).all()
+    assert count_inliers(meeting, 9.0) == 0
 
 
 def test_poses_that_are_not_numbers_meet_nothing():
