@@ -122,7 +122,11 @@ class LaserLog:
     def _ends(self, rows: slice) -> tuple[Array, NDArray[np.bool_]]:
         """The end points (R, B, 2) of the beams of some rows in the robot's frame, and which are usable."""
         ranges = self.ranges[rows]
-        angles = self.angle_min[rows, None] + self.angle_increment[rows, None] * np.arange(ranges.shape[1])
+        first, between = self.angle_min[rows], self.angle_increment[rows]
+        if (first == first[0]).all() and (between == between[0]).all():
+            # Mostly all scans have the same angles: a scan's cosines do for all.
+            first, between = first[:1], between[:1]
+        angles = first[:, None] + between[:, None] * np.arange(ranges.shape[1])
         usable = np.isfinite(ranges)
         lengths = np.where(usable, ranges, 0.0)[..., None]
         return transform(self.mount, lengths * np.stack([np.cos(angles), np.sin(angles)], axis=-1)), usable

@@ -15,8 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nscan_cli.compiled import kernel, lean_kernel
+from nscan_cli.ndt.compact import compacted
 from nscan_cli.ndt.gaussians import make_gaussian
-from nscan_cli.ndt.table import Grid, find_row, insert, pack, rehash
+from nscan_cli.ndt.table import Grid, find_row, insert, pack, rehash, table_size
 from nscan_cli.ndt.tangent import tangent
 from nscan_cli.poses import Array
 
@@ -244,21 +245,8 @@ class Ndt:
     def compact(self) -> None:
         """Make all Gaussians, and give back what only growing needs; nothing can be added any more."""
         self.make()
-        grid, rows, (fronts, backs) = self.grid, self.rows, self._faces()
-        usable, two_faced = fronts[:, 2] != 0.0, fronts[:, 7] > 0.0
-        gaussians = np.concatenate([fronts[usable], backs[two_faced]])
-        count = np.count_nonzero(usable)
-        gaussians[np.flatnonzero(two_faced[usable]), 7] = np.arange(count, len(gaussians))
-        # −1 as an index finds the last entry: no Gaussian.
-        places = np.append(np.where(usable, np.cumsum(usable) - 1, -1), -1).astype(np.int32)
-        links = places[grid.links[:rows]]
-        kept = (links >= 0).any(axis=1)
-        self.rows = int(np.count_nonzero(kept))
-        table = np.full(_table_size(self.rows), -1, dtype=np.int32)
-        self.grid = Grid(
-            table, grid.keys[:rows][kept], links[kept], np.empty((0, 2)), np.empty((0, 2, 8)), gaussians
-        )
-        rehash(self.grid, self.rows)
+        self.grid = compacted(self.grid, self.rows)
+        self.rows = len(self.grid.keys)
 
     def _faces(self) -> tuple[Array, Array]:
         """The Gaussians (rows, 8) of a grid that grows, and those of the other faces of walls."""
@@ -272,14 +260,10 @@ class Ndt:
 
 def _empty(capacity: int) -> Grid:
     return Grid(
-        table=np.full(_table_size(capacity), -1, dtype=np.int32),
+        table=np.full(table_size(capacity), -1, dtype=np.int32),
         keys=np.empty(capacity, dtype=np.int64),
         links=np.empty((capacity, 4), dtype=np.int32),
         facing=np.empty((capacity, 2)),
         sums=np.empty((capacity, 2, 8)),
         gaussians=np.zeros((2 * capacity, 8)),
     )
-
-
-def _table_size(rows: int) -> int:
-    return 1 << max(2 * rows - 1, 1).bit_length()

@@ -41,6 +41,15 @@ class Grid(NamedTuple):
 
 
 @lean_kernel
+def table_size(rows: int) -> int:
+    """Slots for so many rows: twice to four times as many, a power of two."""
+    size = 2
+    while size < 2 * rows:
+        size *= 2
+    return size
+
+
+@lean_kernel
 def find_row(grid: Grid, key: int) -> int:
     """The row of a packed key, or −1."""
     mask = grid.table.shape[0] - 1

@@ -20,6 +20,9 @@ from nscan_cli.poses import Array, compose, relative
 from nscan_cli.slam.options import GaussianOptions, KeyframeOptions
 from nscan_cli.slam.tracking import Tracked
 
+ROOM = 16
+"""Lattice cells for each point of a scan that an NDT has room for at first. Most need no more."""
+
 
 @dataclass(frozen=True)
 class Keyframe:
@@ -127,10 +130,9 @@ class Keyframes:
             # Of its own: else it would keep those of the scans around it, which were made together.
             points.copy(),
             _count_cells(points, 0.5 * gaussians.cell),
-            Ndt(gaussians.cell, gaussians.minimum, gaussians.floor, 1024),
+            Ndt(gaussians.cell, gaussians.minimum, gaussians.floor, ROOM * len(points)),
         )
-        keyframe.ndt.gather([points], np.zeros((1, 3)))
-        self._grow(keyframe)
+        self._grow(keyframe, [points])
         self.finish_last()
         self._since, self._expected = [], np.zeros((3, 3))
         self.list.append(keyframe)
@@ -148,9 +150,11 @@ class Keyframes:
             self._grow(self.list[-1])
             self.list[-1].ndt.compact()
 
-    def _grow(self, keyframe: Keyframe) -> None:
+    def _grow(self, keyframe: Keyframe, own: Sequence[Array] = ()) -> None:
+        """Add its `own` points to a keyframe's Gaussians, and those of the scans since the last one."""
         poses = np.array([tracked.pose for _, tracked in self._since]).reshape(-1, 3)
-        keyframe.ndt.gather([points for points, _ in self._since], relative(poses, keyframe.tracked.pose))
+        poses = np.vstack([np.zeros((len(own), 3)), relative(poses, keyframe.tracked.pose)])
+        keyframe.ndt.gather([*own, *(points for points, _ in self._since)], poses)
 
 
 def relation_between(before: Keyframe, last: Keyframe, options: KeyframeOptions) -> Pairwise:

@@ -7,7 +7,7 @@ and those about what has moved are matched again.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -16,7 +16,7 @@ from nscan_cli.graph.model import Loop, NScan, Pairwise
 from nscan_cli.poses import Array, relative, wrap
 from nscan_cli.slam.coverage import Coverage
 from nscan_cli.slam.keyframes import Route
-from nscan_cli.slam.nearby import Indices, MatchNearby, Nearby, choose_nearby
+from nscan_cli.slam.nearby import Indices, MatchNearby, Near, Nearby, choose_nearby
 from nscan_cli.slam.options import NScanOptions
 from nscan_cli.threads import in_threads
 
@@ -45,7 +45,11 @@ class Refinement:
         are matched side by side.
         """
         route, matched = self._route._replace(poses=poses), 0
-        waiting = [k for k in range(len(poses)) if self._has_moved(k, poses, moved)]
+        waiting = {
+            k: choose_nearby(poses, route.paths, k, self._options_of(k))
+            for k in range(len(poses))
+            if self._has_moved(k, poses, moved)
+        }
         while chosen := self._uncovered(route, waiting):
             found = in_threads(
                 self._threads, lambda centre: self._match(route, centre, self._options_of(centre)), chosen
@@ -54,21 +58,19 @@ class Refinement:
                 self._covered.add(int(route.rows[centre]), route.rows[tried].tolist(), nearby)
                 self._starts[centre] = tried, relative(poses[tried], poses[centre])
                 self._found[centre] = nearby
-            waiting = [centre for centre in waiting if centre not in chosen]
+            waiting = {centre: near for centre, near in waiting.items() if centre not in chosen}
             matched += len(chosen)
         return matched
 
-    def _uncovered(self, route: Route, waiting: Sequence[int]) -> dict[int, Indices]:
-        """The centres to match next, with the keyframes (n,) near each.
+    def _uncovered(self, route: Route, waiting: Mapping[int, Near]) -> dict[int, Indices]:
+        """The centres to match next of those that wait, with the keyframes (n,) near each.
 
         As if every match related all that it is tried with; where one does not, the next choice makes up.
         """
         chosen, covered = {}, Coverage(beneath=self._covered)
-        for centre in waiting:
-            options = self._options_of(centre)
-            near = choose_nearby(route.poses, route.paths, centre, options)
+        for centre, near in waiting.items():
             needed = self._starts[centre] is not None or centre in self._wider
-            if needed or covered.is_due(route, centre, near, options):
+            if needed or covered.is_due(route, centre, near, self._options):
                 chosen[centre] = near.tried
                 covered.assume(route, centre, near)
         return chosen
