@@ -46,7 +46,7 @@ def map_whole(
     import numpy as np
 
     from nscan_cli.logs.load import read_log
-    from nscan_cli.slam.run import map_log, notices
+    from nscan_cli.slam.run import map_log
 
     scans = read_log(log, reading)
     for warning in scans.report.notices():
@@ -61,7 +61,7 @@ def map_whole(
                 bar.begin("closing up and refining", None)
 
         slam, graph = map_log(scans, reading, options, threads, report)
-    for warning in notices(slam):
+    for warning in graph.provenance["notices"]:
         say(f"warning: {warning}", quiet)
     summary: list[Row] = [
         ("scans", [f"{len(scans)} in {float(scans.times[-1] - scans.times[0]):.1f} s"]),

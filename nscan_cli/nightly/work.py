@@ -53,7 +53,7 @@ def work(task: dict[str, Any], outputs: Path, report: Callable[[int, int, int], 
     from nscan_cli.mapping.image import map_png, map_yaml
     from nscan_cli.mapping.occupancy import occupancy_grid
     from nscan_cli.nightly.preview import preview
-    from nscan_cli.slam.run import Counts, map_log, notices, slam_options
+    from nscan_cli.slam.run import Counts, map_log, slam_options
 
     began = time.perf_counter()
     reading, mapping = reading_of(task["reading"]), task["mapping"]
@@ -61,7 +61,7 @@ def work(task: dict[str, Any], outputs: Path, report: Callable[[int, int, int], 
         mapping.get("max-scans"), mapping.get("relations"), not mapping.get("no-loops", False)
     )
     log = read_log(task["inputs"]["log"], reading)
-    slam, graph = map_log(
+    _, graph = map_log(
         log,
         reading,
         options,
@@ -85,7 +85,7 @@ def work(task: dict[str, Any], outputs: Path, report: Callable[[int, int, int], 
         "pairwise": made.pairwise,
         "nscan": made.nscan,
         "loops": {"accepted": made.accepted, "refused": made.refused.total()},
-        "warnings": log.report.notices() + notices(slam),
+        "warnings": log.report.notices() + graph.provenance["notices"],
     }
     evaluation = _evaluation(task["inputs"], str(outputs / "graph.json"))
     return {"counts": counts, "evaluation": evaluation, "times": {"seconds": round(seconds, 3)}}

@@ -55,7 +55,11 @@ def hanging(log: LaserLog, odometry: Array | None) -> NDArray[np.int64]:
     """
     if odometry is None or len(log) < 2:
         return np.zeros(0, dtype=np.int64)
-    moves = (np.abs(relative(odometry[1:], odometry[:-1])) > MOVES).any(axis=1)
+    return repeating(log, np.abs(relative(odometry[1:], odometry[:-1])).max(axis=1) > MOVES)
+
+
+def repeating(log: LaserLog, moves: NDArray[np.bool_]) -> NDArray[np.int64]:
+    """Of the rows to which the robot `moves` (S − 1,), those (H,) whose readings repeat those before."""
     # A few beams tell nearly all of them apart.
     rows = np.flatnonzero(moves & _same(log.ranges[:, ::SOME])) + 1
     repeats = np.array([_same(log.ranges[row - 1 : row + 1])[0] for row in rows.tolist()], dtype=np.bool_)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -12,11 +12,9 @@ from nscan_cli.graph.model import Graph
 from nscan_cli.logs.options import ReadingOptions
 from nscan_cli.logs.scan import LaserLog
 from nscan_cli.provenance import provenance_of
+from nscan_cli.slam.notices import notices
 from nscan_cli.slam.options import NScanOptions, Relations, SlamOptions
 from nscan_cli.slam.pipeline import Slam
-
-MOST_NAMED = 10
-"""Scans that a notice names."""
 
 Report = Callable[[int, int, int], None]
 """Called with the scans done, the keyframes, and the loops that are accepted so far."""
@@ -40,29 +38,6 @@ class Counts:
         refused = Counter(loop.reason for loop in graph.loops if not loop.accepted)
         accepted = len(graph.loops) - refused.total()
         return cls(len(graph.keyframes), len(graph.pairwise), len(graph.nscan), accepted, refused)
-
-
-def notices(slam: Slam) -> list[str]:
-    """What went wrong on the way, as whole sentences for the user."""
-    log, found = slam.log, []
-    if slam.breaks:
-        found.append(f"tracking broke at {_scans(log, slam.breaks)}; of the way there nothing is known")
-    if len(slam.jumps):
-        found.append(
-            f"the odometry jumps at {_scans(log, slam.jumps.tolist())}; these steps are not believed"
-        )
-    if slam.hanging:
-        found.append(
-            f"the laser repeats itself at {_scans(log, sorted(slam.hanging))}; these are not matched"
-        )
-    return found
-
-
-def _scans(log: LaserLog, rows: Sequence[int]) -> str:
-    """The numbers of the scans in some rows, of many the first."""
-    some = ", ".join(str(log.numbers[row]) for row in rows[:MOST_NAMED])
-    more = "" if len(rows) <= MOST_NAMED else f" and {len(rows) - MOST_NAMED} more"
-    return f"scan{'s' if len(rows) > 1 else ''} {some}{more}"
 
 
 def slam_options(
@@ -95,5 +70,5 @@ def map_log(
         "reading": dataclasses.asdict(reading),
         "slam": dataclasses.asdict(options),
     }
-    graph.provenance = provenance_of([log.source], parameters)
+    graph.provenance = {**provenance_of([log.source], parameters), "notices": notices(slam)}
     return slam, graph

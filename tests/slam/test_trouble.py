@@ -15,8 +15,8 @@ from nscan_cli.logs.options import ReadingOptions
 from nscan_cli.logs.scan import LaserLog
 from nscan_cli.poses import Array, relative
 from nscan_cli.slam.believed import believed_odometry, hanging
+from nscan_cli.slam.notices import notices
 from nscan_cli.slam.options import BreakOptions
-from nscan_cli.slam.run import notices
 from tests.data import data_file
 from tests.simulation import trouble
 from tests.slam import troubles

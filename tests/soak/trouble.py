@@ -17,6 +17,7 @@ import numpy as np
 from nscan_cli.logs.load import read_log
 from nscan_cli.logs.options import ReadingOptions
 from nscan_cli.logs.scan import LaserLog
+from nscan_cli.slam.notices import notices
 from tests.data import find_data
 from tests.slam import troubles
 from tests.slam.drives import round_scene
@@ -51,6 +52,14 @@ REAL: dict[str, tuple[ReadingOptions, dict[str, Make]]] = {
 }
 
 
+TOLD = {
+    "there are no scans": "scans are missing",
+    "disagree": "odometry and scans disagree",
+    "it hangs, or": "the laser hangs, or the robot stands",
+}
+"""Words of a notice → what the table says of it."""
+
+
 def _row(name: str, case: Case) -> None:
     found = mapped(case.log)
     slam, graph = found.slam, found.graph
@@ -61,6 +70,7 @@ def _row(name: str, case: Case) -> None:
         if what
     ]
     said += [f"{len(slam.hanging)} scans of a laser that hangs"] if slam.hanging else []
+    said += [short for words, short in TOLD.items() if any(words in notice for notice in notices(slam))]
     accepted = sum(loop.accepted for loop in graph.loops)
     print(
         f"| {name} | {'; '.join(said) or '–'} | {accepted} of {len(graph.loops)} "

@@ -1,0 +1,82 @@
+"""What a user should know of the way that a log was mapped: what broke, and what was not believed."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from nscan_cli.counting import counted
+from nscan_cli.logs.scan import LaserLog
+from nscan_cli.poses import relative
+from nscan_cli.slam.believed import repeating
+from nscan_cli.slam.disagreement import disagreements
+from nscan_cli.slam.pipeline import Slam
+
+MOST_NAMED = 10
+"""Scans or stretches that a notice names."""
+
+PAUSE = 3.0
+"""Scans are missing when the next one comes after so many times the usual period."""
+
+
+def notices(slam: Slam) -> list[str]:
+    """What went wrong on the way, as whole sentences."""
+    log, found = slam.log, []
+    if slam.breaks:
+        found.append(f"tracking broke at {_scans(log, slam.breaks)}; of the way there nothing is known")
+    if len(slam.jumps):
+        found.append(
+            f"the odometry jumps at {_scans(log, slam.jumps.tolist())}; these steps are not believed"
+        )
+    if slam.hanging:
+        found.append(
+            f"the laser repeats itself at {_scans(log, sorted(slam.hanging))}; these are not matched"
+        )
+    return found + (_without_odometry(slam) if slam.odometry is None else _of_odometry(slam))
+
+
+def _of_odometry(slam: Slam) -> list[str]:
+    """Gaps that odometry alone leads over, and where it contradicts the scans."""
+    log, odometry, route = slam.log, slam.odometry, slam.route
+    assert odometry is not None
+    found, far, turned = [], slam.options.breaks.far, slam.options.breaks.far_turned
+    steps, periods = relative(odometry[1:], odometry[:-1]), np.diff(log.times)
+    came_far = (np.hypot(steps[:, 0], steps[:, 1]) > far) | (np.abs(steps[:, 2]) > turned)
+    usual = float(np.median(periods)) if len(periods) else 0.0
+    gaps = (np.flatnonzero(came_far & (periods > PAUSE * usual)) + 1).tolist()
+    if gaps:
+        found.append(
+            f"there are no scans on the way to {_scans(log, gaps)}, "
+            f"by odometry more than {far:g} m or {turned:g} rad"
+        )
+    apart = disagreements(route.rows, route.poses, odometry, slam.breaks)
+    if apart:
+        some = "; ".join(
+            f"{each.by_odometry:.1f} m and {each.by_scans:.1f} m from scan {log.numbers[each.first]} "
+            f"to {log.numbers[each.last]}"
+            for each in apart[:MOST_NAMED]
+        )
+        more = "" if len(apart) <= MOST_NAMED else f"; and {counted(len(apart) - MOST_NAMED, 'more stretch')}"
+        found.append(
+            f"odometry and scans disagree about the way: {some}{more}; "
+            "wheels have spun there, or tracking has slipped"
+        )
+    return found
+
+
+def _without_odometry(slam: Slam) -> list[str]:
+    same = repeating(slam.log, np.ones(max(len(slam.log) - 1, 0), dtype=np.bool_)).tolist()
+    if not same:
+        return []
+    return [
+        f"the laser repeats itself at {_scans(slam.log, same)}: it hangs, or the robot stands; "
+        "without odometry it counts as standing"
+    ]
+
+
+def _scans(log: LaserLog, rows: Sequence[int]) -> str:
+    """The numbers of the scans in some rows, of many the first."""
+    some = ", ".join(str(log.numbers[row]) for row in rows[:MOST_NAMED])
+    more = "" if len(rows) <= MOST_NAMED else f" and {len(rows) - MOST_NAMED} more"
+    return f"scan{'s' if len(rows) > 1 else ''} {some}{more}"

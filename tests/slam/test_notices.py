@@ -1,0 +1,75 @@
+"""What a user is told of the way that a log was mapped."""
+
+from __future__ import annotations
+
+import functools
+import json
+import re
+
+import pytest
+
+from nscan_cli.graph.json_file import write_graph
+from nscan_cli.logs.options import ReadingOptions
+from nscan_cli.logs.scan import LaserLog
+from nscan_cli.slam.notices import notices
+from nscan_cli.slam.options import SlamOptions
+from nscan_cli.slam.run import map_log
+from tests.data import data_file
+from tests.slam.drives import round_scene
+from tests.slam.runs import mapped
+from tests.slam.troubles import ROUND, without_odometry
+
+
+@functools.cache
+def simulated() -> LaserLog:
+    return round_scene().record(5).log()
+
+
+@pytest.mark.parametrize(
+    ("trouble", "odometry", "told"),
+    [
+        (
+            "someone who walks along",
+            True,
+            r"odometry and scans disagree about the way: 1\d\.\d m and \d\.\d m",
+        ),
+        (
+            "3 s of scans dropped",
+            True,
+            r"no scans on the way to scan 187, by odometry more than 2 m or 1 rad",
+        ),
+        ("laser frozen for 8 m", False, r"repeats itself at scans 187, .* it hangs, or the robot stands"),
+    ],
+)
+def test_trouble_that_the_graph_hides_is_told(trouble, odometry, told):
+    made = ROUND[trouble](simulated())
+    said = notices(mapped((made if odometry else without_odometry(made)).log).slam)
+    assert re.search(told, said[-1])
+
+
+@pytest.mark.parametrize("odometry", [True, False])
+def test_of_a_sound_drive_there_is_nothing_to_tell(odometry):
+    made = ROUND["none"](simulated())
+    assert notices(mapped((made if odometry else without_odometry(made)).log).slam) == []
+
+
+def test_the_graph_keeps_what_was_told():
+    log = ROUND["carried by 5 m"](simulated()).log
+    _, graph = map_log(log, ReadingOptions(), SlamOptions(), 1, lambda *done: None)
+    told = json.loads(write_graph(graph))["provenance"]["notices"]
+    assert [re.sub(r"\d+", "n", notice) for notice in told] == [
+        "tracking broke at scan n; of the way there nothing is known"
+    ]
+
+
+def test_wheels_that_spin_in_a_real_log_are_told():
+    """fr079 has 4.6 m of odometry over 1.5 m of way, from scan 1375 to 1431."""
+    from nscan_cli.logs.load import read_log
+
+    log = read_log(str(data_file("fr079.log.gz")), ReadingOptions(start=0.0, end=400.0))
+    (told,) = notices(mapped(log).slam)
+    lengths = re.search(r"disagree about the way: (\S+) m and (\S+) m from scan (\d+) to (\d+)", told)
+    assert lengths is not None
+    by_odometry, by_scans, first, last = map(float, lengths.groups())
+    assert by_odometry - by_scans == pytest.approx(3.0, abs=0.5)
+    assert first <= 1375 <= 1431 <= last
