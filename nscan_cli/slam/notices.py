@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from nscan_cli.counting import counted
+from nscan_cli.graph.robust import chi2_by_three
 from nscan_cli.logs.scan import LaserLog
 from nscan_cli.poses import relative
 from nscan_cli.slam.believed import repeating
@@ -18,6 +19,10 @@ MOST_NAMED = 10
 
 PAUSE = 3.0
 """Scans are missing when the next one comes after so many times the usual period."""
+
+EXPECTED = 3.0
+"""Mean of χ² for three degrees of freedom. That of all relations is below 1 on sound logs; a loop joins what
+has drifted, and twice as much is no sign of a mistake."""
 
 
 def notices(slam: Slam) -> list[str]:
@@ -33,7 +38,8 @@ def notices(slam: Slam) -> list[str]:
         found.append(
             f"the laser repeats itself at {_scans(log, sorted(slam.hanging))}; these are not matched"
         )
-    return found + (_without_odometry(slam) if slam.odometry is None else _of_odometry(slam))
+    found += _without_odometry(slam) if slam.odometry is None else _of_odometry(slam)
+    return found + _contradictions(slam)
 
 
 def _of_odometry(slam: Slam) -> list[str]:
@@ -72,6 +78,23 @@ def _without_odometry(slam: Slam) -> list[str]:
     return [
         f"the laser repeats itself at {_scans(slam.log, same)}: it hangs, or the robot stands; "
         "without odometry it counts as standing"
+    ]
+
+
+def _contradictions(slam: Slam) -> list[str]:
+    """Whether the relations of the graph fit together as their information says they should."""
+    relations = slam.relations
+    if not relations:
+        return []
+    chi2 = chi2_by_three(slam.energies.of(slam.route, relations), slam.poses)
+    loops = chi2[[relation.origin == "loop" for relation in relations]]
+    mean, of_loops = float(chi2.mean()), float(loops.mean()) if len(loops) else 0.0
+    if mean <= EXPECTED and of_loops <= 2 * EXPECTED:
+        return []
+    nodes = relations[int(np.argmax(chi2))].nodes
+    return [
+        f"relations contradict each other: their mean χ² is {mean:.1f}, that of loops {of_loops:.1f}, "
+        f"for {EXPECTED:g} degrees of freedom; the map may be wrong, at {_scans(slam.log, nodes)} above all"
     ]
 
 

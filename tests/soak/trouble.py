@@ -55,6 +55,7 @@ REAL: dict[str, tuple[ReadingOptions, dict[str, Make]]] = {
 TOLD = {
     "there are no scans": "scans are missing",
     "disagree": "odometry and scans disagree",
+    "contradict": "relations contradict each other",
     "it hangs, or": "the laser hangs, or the robot stands",
 }
 """Words of a notice → what the table says of it."""
