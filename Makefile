@@ -4,7 +4,7 @@ VENV := .venv
 RUN := $(VENV)/bin
 READY := $(VENV)/.ready
 
-.PHONY: map test lint samples figures reference bench growth robustness soak lowest lock clean
+.PHONY: map test lint samples figures pictures reference bench growth robustness soak lowest lock clean
 
 map: $(READY)
 	mkdir -p out
@@ -23,6 +23,9 @@ samples: $(READY)
 
 figures: $(READY)
 	$(RUN)/python -m tests.experiments docs/pictures
+
+pictures: $(READY)
+	$(RUN)/python -m tests.pictures docs/pictures
 
 reference: $(READY)
 	$(RUN)/python -m tests.reference docs/reference.md

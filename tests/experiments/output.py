@@ -31,11 +31,11 @@ def write_reports(reports: Sequence[Report], folder: Path) -> list[Path]:
     return paths
 
 
-def small_png(picture: Image) -> bytes:
-    """A picture reduced to the size of a page, with a palette."""
+def small_png(picture: Image, width: int | None = None) -> bytes:
+    """A picture reduced to the size of a page, or to another width, with a palette."""
     from PIL import Image
 
-    factor = min(WIDTH / picture.width, HEIGHT / picture.height)
+    factor = min((width or WIDTH) / picture.width, HEIGHT / picture.height)
     size = (round(factor * picture.width), round(factor * picture.height))
     small = picture.resize(size, Image.Resampling.LANCZOS)
     # The median cut would drop colours that only a few pixels have.
