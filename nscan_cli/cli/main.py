@@ -71,7 +71,7 @@ def cli() -> None:
     """Turn 2D laser logs into globally consistent maps by nScan-Matching.
 
     Results go to files, or to standard output with -o -; what people read goes to standard error.
-    nscan-cli COMMAND --help tells about a command, docs/reference.md about all.
+    nscan-cli COMMAND --help tells about a command.
     """
 
 
