@@ -134,12 +134,23 @@ def run(arguments: list[str]) -> int:
         _say("there is not enough memory for this; see --every, --start and --end", verbose)
         return InputDataError.exit_code
     except Exception as error:
+        if _is_interrupt(error):
+            # As click does, which ends the line in which a terminal shows ^C.
+            print(file=sys.stderr)
+            return INTERRUPTED
         if isinstance(error, OSError) and error.errno in NO_ROOM and error.filename is None:
             _say(f"standard output: cannot be written: {error.strerror}", verbose)
             return OutputError.exit_code
         hint = "" if verbose else "; -vv shows where"
         _say(f"internal error, please report it: {type(error).__name__}: {error}{hint}", verbose)
         return INTERNAL_ERROR
+
+
+def _is_interrupt(error: BaseException | None) -> bool:
+    """Whether Ctrl-C is behind an error: Python wraps one that comes while a class is made."""
+    while error is not None and not isinstance(error, KeyboardInterrupt):
+        error = error.__cause__ or error.__context__
+    return error is not None
 
 
 def _usage(error: click.ClickException) -> str:

@@ -122,10 +122,30 @@ def test_a_bug_is_code_1_and_shows_no_traceback_unasked(failing, capsys):
     )
 
 
+def _from_an_interrupt() -> RuntimeError:
+    """What Python makes of an interrupt that comes while a class is made, as in imports."""
+
+    class Interrupting:
+        def __set_name__(self, owner: type, name: str) -> None:
+            raise KeyboardInterrupt
+
+    try:
+        type("Made", (), {"attribute": Interrupting()})
+    except RuntimeError as error:
+        return error
+    except KeyboardInterrupt as error:
+        # From Python 3.12 on it comes through as it is.
+        wrapped = RuntimeError("wrapped")
+        wrapped.__cause__ = error
+        return wrapped
+    raise AssertionError("nothing was raised")
+
+
 @pytest.mark.parametrize(
     ("error", "code"),
     [
         (KeyboardInterrupt(), 130),
+        (_from_an_interrupt(), 130),
         (BrokenPipeError(32, "Broken pipe"), 141),
         (OSError(28, "No space left on device"), 73),
         (OSError(28, "No space left on device", "somewhere"), 1),
