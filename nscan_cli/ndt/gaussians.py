@@ -17,7 +17,7 @@ from __future__ import annotations
 import numpy as np
 
 from nscan_cli.compiled import lean_kernel
-from nscan_cli.ndt.table import HALF_KEY, Grid, find_row
+from nscan_cli.ndt.table import HALF_KEY, Grid, find_row, unpack
 from nscan_cli.poses import Array
 
 Cells = tuple[int, int, int, int]
@@ -90,7 +90,7 @@ def _shape(
                     nx, ny = _normal(wide)
                     break
     mean, half_gap = 0.5 * (along + 1 / small), 0.5 * (along - 1 / small)
-    ix, iy = key // (2 * HALF_KEY) - HALF_KEY, key % (2 * HALF_KEY) - HALF_KEY
+    ix, iy = unpack(key)
     gaussian[0] = (ix + 0.5) * half + mx
     gaussian[1] = (iy + 0.5) * half + my
     gaussian[2] = mean + half_gap * c2

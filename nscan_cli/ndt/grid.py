@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from nscan_cli.compiled import kernel, lean_kernel
 from nscan_cli.ndt.compact import compacted
 from nscan_cli.ndt.gaussians import make_gaussian
-from nscan_cli.ndt.table import Grid, find_row, insert, pack, rehash, table_size
+from nscan_cli.ndt.table import Grid, find_row, insert, pack, table_size, unpack
 from nscan_cli.ndt.tangent import tangent
 from nscan_cli.poses import Array
 
@@ -164,6 +164,29 @@ def _settle(grid: Grid, rows: int, ix: int, iy: int) -> tuple[int, int]:
     return centre, rows
 
 
+@kernel
+def take_over(old: Grid, rows: int, new: Grid) -> int:
+    """Enter what is in the first `rows` of a grid into an empty one, which has room; returns its rows.
+
+    Cells without points, far from any that has some, are left behind. A map that moves on would else grow.
+    """
+    count = 0
+    for row in range(rows):
+        if old.sums[row, 0, 0] + old.sums[row, 1, 0] > 0.5:
+            ix, iy = unpack(old.keys[row])
+            centre, count = _settle(new, count, ix, iy)
+            new.facing[centre], new.sums[centre] = old.facing[row], old.sums[row]
+    for row in range(count):
+        before = find_row(old, new.keys[row])
+        gaussian = new.gaussians[row]
+        gaussian[:] = old.gaussians[before]
+        if gaussian[7] > 0.0:
+            other = new.keys.shape[0] + row
+            new.gaussians[other] = old.gaussians[old.keys.shape[0] + before]
+            gaussian[7] = other
+    return count
+
+
 class Ndt:
     """A normal distributions transform that grows and shrinks by the points of scans.
 
@@ -230,28 +253,24 @@ class Ndt:
         )
 
     def reserve(self, points: int) -> None:
-        """Make room for so many more points."""
-        rows, capacity = self.rows + NEW_NEIGHBOURS * points, len(self.grid.keys)
-        if rows <= capacity:
+        """Make room for so many more points. Cells that have become empty go first."""
+        room, capacity = NEW_NEIGHBOURS * points, len(self.grid.keys)
+        if self.rows + room <= capacity:
             return
-        old, self.grid = self.grid, _empty(max(rows, 2 * capacity))
-        for name in ("keys", "links", "facing", "sums", "gaussians"):
-            getattr(self.grid, name)[: self.rows] = getattr(old, name)[: self.rows]
-        fronts, backs = self._faces()
-        backs[:] = old.gaussians[capacity : capacity + self.rows]
-        fronts[:, 7] += (len(self.grid.keys) - capacity) * (fronts[:, 7] > 0)
-        rehash(self.grid, self.rows)
+        self._renew(capacity)
+        # Half must be free, or it would have to be done again before long.
+        if self.rows + room > capacity // 2:
+            self._renew(2 * max(self.rows + room, capacity))
+
+    def _renew(self, capacity: int) -> None:
+        old, self.grid = self.grid, _empty(capacity)
+        self.rows = take_over(old, self.rows, self.grid)
 
     def compact(self) -> None:
         """Make all Gaussians, and give back what only growing needs; nothing can be added any more."""
         self.make()
         self.grid = compacted(self.grid, self.rows)
         self.rows = len(self.grid.keys)
-
-    def _faces(self) -> tuple[Array, Array]:
-        """The Gaussians (rows, 8) of a grid that grows, and those of the other faces of walls."""
-        capacity = len(self.grid.keys)
-        return self.grid.gaussians[: self.rows], self.grid.gaussians[capacity : capacity + self.rows]
 
     def gaussian_count(self) -> int:
         """How many Gaussians have points enough; two where a wall has two faces."""

@@ -84,6 +84,12 @@ def pack(ix: int, iy: int) -> int:
 
 
 @lean_kernel
+def unpack(key: int) -> tuple[int, int]:
+    """The lattice cell (ix, iy) of a key."""
+    return key // (2 * HALF_KEY) - HALF_KEY, key % (2 * HALF_KEY) - HALF_KEY
+
+
+@lean_kernel
 def _hash(key: int) -> int:
     mixed = np.uint64(key) * np.uint64(0x9E3779B97F4A7C15)
     return int(mixed >> np.uint64(33))

@@ -89,6 +89,7 @@ class Tracker:
         found, k = Found.room(n), 0
         while k < n:
             self.map.reserve(len(scans[k]))
+            self._track.counts[ROWS] = self.map.rows
             track, grid, settings, prior = self._track, self.map.grid, self._settings, self._prior
             k = follow(track, grid, settings, points, ends, odometry, k, prior, found)
             if k < n and np.isfinite(found.inliers[k]):

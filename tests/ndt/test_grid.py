@@ -148,3 +148,19 @@ def test_nothing_added_is_nothing():
     ndt = grown(np.empty((0, 2)))
     assert ndt.gaussian_count() == 0
     assert energy(ndt, room(1), HERE).value == 0.0
+
+
+def test_a_map_that_moves_on_leaves_behind_what_is_empty():
+    """It says the same, to the bit, as one that has room for all cells that it was ever in."""
+    small, large = Ndt(0.5, capacity=16), Ndt(0.5, capacity=1 << 17)
+    poses = [np.array([3.0 * k, 0.5 * k, 0.1 * k]) for k in range(40)]
+    sizes = []
+    for k, pose in enumerate(poses):
+        for ndt in (small, large):
+            ndt.add(room(k), pose)
+            if k >= 3:
+                ndt.subtract(room(k - 3), poses[k - 3])
+        assert energy(small, room(k), pose + 0.01).value == energy(large, room(k), pose + 0.01).value < -10.0
+        sizes.append(len(small.grid.keys))
+    assert small.gaussian_count() == large.gaussian_count()
+    assert sizes[-1] == sizes[10] < large.rows // 2
