@@ -9,6 +9,7 @@ import re
 import pytest
 
 from nscan_cli.graph.json_file import write_graph
+from nscan_cli.logs.load import read_log
 from nscan_cli.logs.options import ReadingOptions
 from nscan_cli.logs.scan import LaserLog
 from nscan_cli.slam.notices import notices
@@ -69,8 +70,6 @@ def test_the_graph_keeps_what_was_told():
 
 def test_wheels_that_spin_in_a_real_log_are_told():
     """fr079 has 4.6 m of odometry over 1.5 m of way, from scan 1375 to 1431."""
-    from nscan_cli.logs.load import read_log
-
     log = read_log(str(data_file("fr079.log.gz")), ReadingOptions(start=0.0, end=400.0))
     (told,) = notices(mapped(log).slam)
     lengths = re.search(r"disagree about the way: (\S+) m and (\S+) m from scan (\d+) to (\d+)", told)

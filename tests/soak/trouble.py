@@ -71,7 +71,8 @@ def _row(name: str, case: Case) -> None:
         if what
     ]
     said += [f"{len(slam.hanging)} scans of a laser that hangs"] if slam.hanging else []
-    said += [short for words, short in TOLD.items() if any(words in notice for notice in notices(slam))]
+    told = " ".join(notices(slam))
+    said += [short for words, short in TOLD.items() if words in told]
     accepted = sum(loop.accepted for loop in graph.loops)
     print(
         f"| {name} | {'; '.join(said) or '–'} | {accepted} of {len(graph.loops)} "
