@@ -11,6 +11,7 @@ import numpy as np
 from nscan_cli.compiled import kernel, lean_kernel
 from nscan_cli.graph.cholesky import Factor, panel_of, rows_of, subtract_products
 from nscan_cli.graph.pattern import Indices, Pattern
+from nscan_cli.ndt.assign import assign_rows
 from nscan_cli.poses import Array
 
 
@@ -55,9 +56,9 @@ def _invert_on_pattern(pattern: Pattern, factor: Array) -> Array:
         for column in range(width - 3, -1, -3):
             _invert_columns(panel, column, dense, m)
         found = panel_of(pattern, inverse, j)
-        found[:] = dense[:width]
+        assign_rows(found, dense)
         for p in range(width // 3):
-            diagonal[rows[p]] = dense[3 * p : 3 * p + 3, 3 * p : 3 * p + 3]
+            assign_rows(diagonal[rows[p]], dense[3 * p : 3 * p + 3, 3 * p : 3 * p + 3])
     return diagonal
 
 

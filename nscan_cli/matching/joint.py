@@ -22,6 +22,7 @@ from nscan_cli.matching.joint_energy import (
 )
 from nscan_cli.matching.overlap import SOUND_OVERLAP, overlaps, weakest_link
 from nscan_cli.matching.unheld import back_to_priors
+from nscan_cli.ndt.assign import assign, assign_rows
 from nscan_cli.poses import Array, wrap
 
 FIRST_DAMPING = 1e-3
@@ -234,7 +235,7 @@ def _descend(
     Writes gradient (3n,) and Hessian (3n, 3n) at the poses.
     """
     trial_gradient, trial_hessian = np.empty_like(gradient), np.empty_like(hessian)
-    step = np.empty_like(poses)
+    step, trial = np.empty_like(poses), np.empty_like(poses)
     curvature = 1.0 if exact else 0.0
     value = evaluate(problem, poses, widening, curvature, neutral, stride, gradient, hessian)
     iterations, evaluations, damping, converged = 0, 1, FIRST_DAMPING, False
@@ -249,14 +250,19 @@ def _descend(
             damping *= 10
             continue
         iterations += 1
-        trial = poses + step
-        converged = bool(np.abs(step).max() < tolerance)
+        longest = 0.0
+        for i in range(poses.shape[0]):
+            for a in range(3):
+                trial[i, a] = poses[i, a] + step[i, a]
+                longest = max(longest, abs(step[i, a]))
+        converged = longest < tolerance
         there = evaluate(problem, trial, widening, curvature, neutral, stride, trial_gradient, trial_hessian)
         evaluations += 1
         if there <= value:
-            poses[:, :] = trial
             value = there
-            gradient[:], hessian[:, :] = trial_gradient, trial_hessian
+            assign_rows(poses, trial)
+            assign(gradient, trial_gradient)
+            assign_rows(hessian, trial_hessian)
             damping = max(0.1 * damping, LEAST_DAMPING)
         else:
             damping *= 10

@@ -206,15 +206,19 @@ def _add_pairs(
 
 @kernel
 def _add_priors(priors: Priors, poses: Array, curvature: float, gradient: Array, hessian: Array) -> float:
-    u, g = np.empty(3), np.empty(3)
+    u, g, difference = np.empty(3), np.empty(3), np.empty(3)
     value = 0.0
     for q in range(priors.pairs.shape[0]):
         i, j = priors.pairs[q, 0], priors.pairs[q, 1]
         relative_pose(poses[j], poses[i], u)
-        difference = u - priors.means[q]
+        for a in range(3):
+            difference[a] = u[a] - priors.means[q, a]
         difference[2] -= 2 * np.pi * np.round(difference[2] / (2 * np.pi))
-        g[:] = priors.information[q] @ difference
-        value += 0.5 * (difference @ g)
+        for a in range(3):
+            g[a] = 0.0
+            for b in range(3):
+                g[a] += priors.information[q, a, b] * difference[b]
+            value += 0.5 * difference[a] * g[a]
         _chain(i, j, poses[i, 2], u, g, priors.information[q], curvature, gradient, hessian)
     return value
 

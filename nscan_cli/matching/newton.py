@@ -13,6 +13,7 @@ import numpy as np
 from nscan_cli.compiled import kernel, lean_kernel
 from nscan_cli.matching.linear import solve_definite
 from nscan_cli.matching.priors import Prior
+from nscan_cli.ndt.assign import assign, assign_rows
 from nscan_cli.ndt.energy import OUT, sum_meeting, unpack
 from nscan_cli.ndt.meeting import Meeting, meet_again
 from nscan_cli.ndt.table import Grid
@@ -97,23 +98,27 @@ def minimise(
         converged = False
         for _ in range(max_iterations):
             iterations += 1
-            damped[:, :] = hessian
+            assign_rows(damped, hessian)
             for a in range(3):
                 damped[a, a] += damping * hessian[a, a] + 1e-12
             if not solve_definite(damped, gradient, step):
                 break
-            trial[:] = pose - step
+            for a in range(3):
+                trial[a] = pose[a] - step[a]
             length = max(abs(step[0]), abs(step[1]), abs(step[2]))
             if length < tolerance and damping <= FIRST_DAMPING:
                 # So near that the value and the Hessian are known well enough.
-                pose[:] = trial
+                assign(pose, trial)
                 converged = True
                 break
             trial_value = objective(problem, trial, widening, 0.0, trial_out, trial_gradient, trial_hessian)
             evaluations += 1
             if trial_value <= value:
-                pose[:], value, out[:] = trial, trial_value, trial_out
-                gradient[:], hessian[:, :] = trial_gradient, trial_hessian
+                value = trial_value
+                assign(pose, trial)
+                assign(out, trial_out)
+                assign(gradient, trial_gradient)
+                assign_rows(hessian, trial_hessian)
                 damping = max(damping * 0.1, LEAST_DAMPING)
             else:
                 damping *= 10.0

@@ -86,7 +86,10 @@ def scan_points(scans: Scans, i: int) -> Array:
 @kernel
 def most_points(scans: Scans) -> int:
     """Those of the scan that has most."""
-    return int(np.diff(scans.point_starts).max())
+    most, starts = 0, scans.point_starts
+    for i in range(starts.shape[0] - 1):
+        most = max(most, starts[i + 1] - starts[i])
+    return int(most)
 
 
 @kernel

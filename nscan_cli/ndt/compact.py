@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from nscan_cli.compiled import kernel
+from nscan_cli.ndt.assign import assign
 from nscan_cli.ndt.table import Grid, rehash, table_size
 
 
@@ -25,10 +26,10 @@ def compacted(grid: Grid, rows: int) -> Grid:
     for row in range(rows):
         if places[row] >= 0:
             gaussian = gaussians[places[row]]
-            gaussian[:] = grid.gaussians[row]
+            assign(gaussian, grid.gaussians[row])
             if gaussian[7] > 0.0:
                 gaussian[7] = back
-                gaussians[back] = grid.gaussians[capacity + row]
+                assign(gaussians[back], grid.gaussians[capacity + row])
                 back += 1
     keys, links, kept = np.empty(rows, dtype=np.int64), np.empty((rows, 4), dtype=np.int32), 0
     for row in range(rows):

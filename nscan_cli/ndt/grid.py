@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nscan_cli.compiled import kernel, lean_kernel
+from nscan_cli.ndt.assign import assign, assign_rows
 from nscan_cli.ndt.compact import compacted
 from nscan_cli.ndt.gaussians import make_gaussian
 from nscan_cli.ndt.table import Grid, find_row, insert, pack, table_size, unpack
@@ -175,14 +176,15 @@ def take_over(old: Grid, rows: int, new: Grid) -> int:
         if old.sums[row, 0, 0] + old.sums[row, 1, 0] > 0.5:
             ix, iy = unpack(old.keys[row])
             centre, count = _settle(new, count, ix, iy)
-            new.facing[centre], new.sums[centre] = old.facing[row], old.sums[row]
+            assign(new.facing[centre], old.facing[row])
+            assign_rows(new.sums[centre], old.sums[row])
     for row in range(count):
         before = find_row(old, new.keys[row])
         gaussian = new.gaussians[row]
-        gaussian[:] = old.gaussians[before]
+        assign(gaussian, old.gaussians[before])
         if gaussian[7] > 0.0:
             other = new.keys.shape[0] + row
-            new.gaussians[other] = old.gaussians[old.keys.shape[0] + before]
+            assign(new.gaussians[other], old.gaussians[old.keys.shape[0] + before])
             gaussian[7] = other
     return count
 

@@ -106,7 +106,8 @@ def begin(points: Array) -> Meeting:
     meeting = Meeting(
         np.empty((2, m)), cells, np.empty((2, m)), np.empty((4, m)), np.empty((BLOCKS, GAUSSIAN, m))
     )
-    meeting.points[:, :] = points.T
+    for k in range(m):
+        meeting.points[0, k], meeting.points[1, k] = points[k, 0], points[k, 1]
     return meeting
 
 

@@ -14,6 +14,7 @@ from nscan_cli.compiled import kernel
 from nscan_cli.matching.newton import PairProblem, minimise
 from nscan_cli.matching.planar import composed_pose, relative_pose, wrapped
 from nscan_cli.matching.priors import Prior, sigmas
+from nscan_cli.ndt.assign import assign, assign_rows
 from nscan_cli.ndt.grid import NEW_NEIGHBOURS, change
 from nscan_cli.ndt.meeting import begin, count_inliers, meet_again
 from nscan_cli.ndt.table import Grid
@@ -187,11 +188,12 @@ def take(
     joins = nothing_seen or distance > settings.step or abs(wrapped(step[2])) > settings.step
     if joins:
         track.path[0] += distance
-        track.joined[:] = pose
+        assign(track.joined, pose)
         _join(track, grid, settings, points, pose)
     for row in range(track.poses.shape[0] - 1):
-        track.poses[row] = track.poses[row + 1]
-    track.poses[-1], track.odometry[:] = pose, odometry
+        assign(track.poses[row], track.poses[row + 1])
+    assign(track.poses[-1], pose)
+    assign(track.odometry, odometry)
     counts[KNOWN] = min(counts[KNOWN] + 1, track.poses.shape[0])
     track.inliers[0] = found.inliers[k]
     found.paths[k], found.joined[k] = track.path[0], joins
@@ -207,9 +209,10 @@ def take(
 def _join(track: Track, grid: Grid, settings: Settings, points: Array, pose: Array) -> None:
     counts, newest = track.counts, track.counts[SCANS]
     first = track.ends[newest]
-    track.points[first : first + points.shape[0]] = points
+    assign_rows(track.points[first : first + points.shape[0]], points)
     track.ends[newest + 1] = first + points.shape[0]
-    track.placed[newest, :3], track.placed[newest, 3] = pose, track.path[0]
+    assign(track.placed[newest, :3], pose)
+    track.placed[newest, 3] = track.path[0]
     counts[SCANS] += 1
     _change(track, grid, settings, newest, 1.0)
     while track.placed[counts[OLDEST], 3] < track.path[0] - settings.window:
@@ -253,7 +256,7 @@ def follow(
             found.poses[k], found.hessians[k], found.inliers[k] = 0.0, 0.0, 1.0
         else:
             predict(track, settings, odometry[k], prior)
-            found.poses[k] = prior.mean
+            assign(found.poses[k], prior.mean)
             found.values[k], found.inliers[k] = match_and_count(
                 grid, settings, scan, prior, found.poses[k], found.hessians[k]
             )

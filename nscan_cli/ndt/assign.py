@@ -1,0 +1,25 @@
+"""Arrays assigned by loops.
+
+numba checks the shapes of `a[:] = b` and brings the code of its error message, texts and lists and all, into
+every kernel that has one.
+"""
+
+from __future__ import annotations
+
+from nscan_cli.compiled import lean_kernel
+from nscan_cli.poses import Array
+
+
+@lean_kernel
+def assign(target: Array, source: Array) -> None:
+    """The numbers of `source` (n,) into `target` (n,)."""
+    for k in range(target.shape[0]):
+        target[k] = source[k]
+
+
+@lean_kernel
+def assign_rows(target: Array, source: Array) -> None:
+    """The numbers of `source` (n, m) into `target` (n, m)."""
+    for row in range(target.shape[0]):
+        for k in range(target.shape[1]):
+            target[row, k] = source[row, k]
