@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nscan_cli.compiled import kernel
+from nscan_cli.graph.ordering import order_of_little_fill
 
 Indices = NDArray[np.int64]
 
@@ -40,7 +41,7 @@ def find_pattern(edges: Indices, nodes: int) -> Pattern:
         none = np.zeros(1, np.int64)
         return Pattern(none[:0], none, none[:0], none, none)
     indptr, indices = _adjacency(edges, nodes)
-    place = _order_of_little_fill(indptr, indices)
+    place = order_of_little_fill(indptr, indices)
     starts, rows = _fill(indptr, indices, place, np.argsort(place))
     heights = np.diff(starts)
     # The rows of a column are those of the one before, less one, when there are as many and it is the first
@@ -90,7 +91,8 @@ def _adjacency(edges: Indices, nodes: int) -> tuple[Indices, Indices]:
         ends[node] += ends[node - 1]
     # As often as they are named, in any order; then, of each node in order, to its neighbours: sorted.
     starts = np.zeros(nodes + 1, dtype=np.int64)
-    starts[1:] = ends
+    for node in range(nodes):
+        starts[node + 1] = ends[node]
     at, named = starts[:-1].copy(), np.empty(starts[nodes], dtype=np.int64)
     for node in range(nodes):
         named[at[node]] = node
@@ -115,21 +117,6 @@ def _adjacency(edges: Indices, nodes: int) -> tuple[Indices, Indices]:
             indices[begin + p] = indices[starts[node] + p]
         indptr[node + 1] = begin + count
     return indptr, indices[: indptr[nodes]].copy()
-
-
-def _order_of_little_fill(indptr: Indices, indices: Indices) -> Indices:
-    """Minimum degree, as SuperLU finds it for a matrix of the same pattern with one number a block."""
-    from scipy.sparse import csc_array
-    from scipy.sparse.linalg import splu
-
-    degrees = np.diff(indptr)
-    nodes = len(degrees)
-    # Diagonally dominant, so that nothing is pivoted.
-    coupling = np.where(indices == np.repeat(np.arange(nodes), degrees), np.repeat(degrees, degrees), -1.0)
-    matrix = csc_array((coupling, indices, indptr), shape=(nodes, nodes))
-    factor = splu(matrix, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
-    place: Indices = factor.perm_c.astype(np.int64)
-    return place
 
 
 @kernel

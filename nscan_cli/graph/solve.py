@@ -5,8 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
 from nscan_cli.graph.initialise import chordal_start
 from nscan_cli.graph.model import Graph
@@ -81,14 +79,21 @@ def optimise_graph(graph: Graph, max_iterations: int = 1000, tolerance: float = 
 def components(graph: Graph) -> list[Component]:
     """The connected parts of the graph, in order of their first keyframes."""
     relations = graph.relations
-    links = [(relation.nodes[0], node) for relation in relations for node in relation.nodes[1:]]
-    a, b = np.array(links, dtype=np.int64).reshape(-1, 2).T
-    matrix = coo_array((np.ones(len(a)), (a, b)), shape=(len(graph), len(graph)))
-    _, labels = connected_components(matrix, directed=False)
+    labels = list(range(len(graph)))
+
+    def label(node: int) -> int:
+        while labels[node] != node:
+            labels[node] = node = labels[labels[node]]
+        return node
+
+    for relation in relations:
+        first = label(relation.nodes[0])
+        for node in relation.nodes[1:]:
+            labels[label(node)] = first
     keyframes = graph.keyframes
     parts: dict[int, tuple[list[int], list[Relation]]] = {}
     for keyframe in keyframes:
-        parts.setdefault(int(labels[keyframe]), ([], []))[0].append(int(keyframe))
+        parts.setdefault(label(int(keyframe)), ([], []))[0].append(int(keyframe))
     for relation in relations:
-        parts[int(labels[relation.nodes[0]])][1].append(relation)
+        parts[label(relation.nodes[0])][1].append(relation)
     return [Component(np.array(ids, dtype=np.int64), relations) for ids, relations in parts.values()]
