@@ -111,7 +111,7 @@ def _lay_out(slam: Slam, graph: Graph) -> None:
             slam.keyframes.attach(points, tracked)
         slam.tracked.append(pose)
         slam.anchors.append(anchor)
-    slam.keyframes.finish_last()
+    slam.keyframes.part()
 
 
 def _breaks(graph: Graph, options: SlamOptions) -> set[int]:

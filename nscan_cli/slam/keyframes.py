@@ -24,7 +24,7 @@ ROOM = 16
 """Lattice cells for each point of a scan that an NDT has room for at first. Most need no more."""
 
 
-@dataclass(frozen=True)
+@dataclass
 class Keyframe:
     """A scan of the graph."""
 
@@ -37,7 +37,25 @@ class Keyframe:
     """(m, 2) in the robot's frame."""
     cells: int
     """How many lattice cells of the NDT its points fall into."""
-    ndt: Ndt
+    gaussians: GaussianOptions
+    around: list[tuple[Array, Tracked]]
+    """What the NDT is to be made of: the points of the scans around, its own first."""
+    _ndt: Ndt | None = None
+
+    @property
+    def ndt(self) -> Ndt:
+        """Made when it is first asked for; then no scan can join it any more."""
+        around = self.around
+        if self._ndt is None:
+            poses = relative(np.array([tracked.pose for _, tracked in around]), self.tracked.pose)
+            ndt = Ndt(
+                self.gaussians.cell, self.gaussians.minimum, self.gaussians.floor, ROOM * len(self.points)
+            )
+            ndt.gather([points for points, _ in around], poses)
+            ndt.compact()
+            # In this order: another thread that makes it too has what it needs.
+            self._ndt, self.around = ndt, []
+        return self._ndt
 
 
 class Route(NamedTuple):
@@ -118,43 +136,27 @@ class Keyframes:
         """Let a scan between keyframes add to the Gaussians of both."""
         self._expected += tracked.expected
         if tracked.joined:
-            self._since.append((points, tracked))
+            # Of its own: else it would keep those of the scans around it, which were made together.
+            self._since.append((points.copy(), tracked))
 
     def add(self, row: int, points: Array, tracked: Tracked) -> Keyframe:
-        """Make a scan a keyframe; the one before has its Gaussians whole then."""
-        gaussians = self.gaussians
+        """Make a scan a keyframe; the one before has all its scans then."""
+        points, since = points.copy(), self._since
+        self.part()
+        cells = _count_cells(points, 0.5 * self.gaussians.cell)
+        around = [(points, tracked), *since]
         keyframe = Keyframe(
-            row,
-            tracked,
-            self._expected + tracked.expected,
-            # Of its own: else it would keep those of the scans around it, which were made together.
-            points.copy(),
-            _count_cells(points, 0.5 * gaussians.cell),
-            Ndt(gaussians.cell, gaussians.minimum, gaussians.floor, ROOM * len(points)),
+            row, tracked, self._expected + tracked.expected, points, cells, self.gaussians, around
         )
-        self._grow(keyframe, [points])
-        self.finish_last()
-        self._since, self._expected = [], np.zeros((3, 3))
+        self._expected = np.zeros((3, 3))
         self.list.append(keyframe)
         return keyframe
 
     def part(self) -> None:
-        """The track begins anew: the next keyframe sees none of the scans since the last."""
+        """The scans since the last keyframe belong to it alone: the track ends, or begins anew."""
         if self.list:
-            self._grow(self.list[-1])
+            self.list[-1].around.extend(self._since)
         self._since = []
-
-    def finish_last(self) -> None:
-        """Give the last keyframe the scans since; nothing is added to it any more."""
-        if self.list:
-            self._grow(self.list[-1])
-            self.list[-1].ndt.compact()
-
-    def _grow(self, keyframe: Keyframe, own: Sequence[Array] = ()) -> None:
-        """Add its `own` points to a keyframe's Gaussians, and those of the scans since the last one."""
-        poses = np.array([tracked.pose for _, tracked in self._since]).reshape(-1, 3)
-        poses = np.vstack([np.zeros((len(own), 3)), relative(poses, keyframe.tracked.pose)])
-        keyframe.ndt.gather([*own, *(points for points, _ in self._since)], poses)
 
 
 def relation_between(before: Keyframe, last: Keyframe, options: KeyframeOptions) -> Pairwise:

@@ -81,7 +81,7 @@ class Slam:
                         beside(self.grow, len(self.keyframes) - 1)
                 report(scans[-1].row + 1, len(self.keyframes))
             self.ahead.open()
-        self.keyframes.finish_last()
+        self.keyframes.part()
         self.grow(len(self.keyframes))
         for centre in range(len(self.keyframes) - self.options.nscan.behind, len(self.keyframes)):
             self.match_nearby(centre)

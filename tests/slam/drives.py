@@ -40,7 +40,7 @@ def keyframe_of(scene: Scene, row: int, pose: Array, path: float, seen: Array) -
     found.add(row, log.points(0), scans[0])
     for k in range(1, len(scans)):
         found.attach(log.points(k), scans[k])
-    found.finish_last()
+    found.part()
     return found.list[0]
 
 

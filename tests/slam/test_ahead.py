@@ -8,12 +8,11 @@ import numpy as np
 import pytest
 
 from nscan_cli.graph.model import Pairwise
-from nscan_cli.ndt.grid import Ndt
 from nscan_cli.slam.ahead import AHEAD, Ahead
 from nscan_cli.slam.coverage import Coverage
 from nscan_cli.slam.keyframes import Keyframe, Route, extended, route_of
 from nscan_cli.slam.nearby import Near, Nearby
-from nscan_cli.slam.options import NScanOptions
+from nscan_cli.slam.options import GaussianOptions, NScanOptions
 from nscan_cli.slam.tracking import Tracked
 
 OPTIONS = NScanOptions(radius=2.5)
@@ -24,7 +23,7 @@ SIZE = 20
 def keyframe(k: int) -> Keyframe:
     """The k-th, 1 m further along a straight line."""
     tracked = Tracked(np.array([k, 0.0, 0.0]), np.eye(3), np.eye(3), 1.0, float(k), True)
-    return Keyframe(k, tracked, np.eye(3), np.empty((0, 2)), 0, Ndt(0.5))
+    return Keyframe(k, tracked, np.eye(3), np.empty((0, 2)), 0, GaussianOptions(), [])
 
 
 def straight(size: int) -> tuple[Route, tuple[list[Keyframe], list[Pairwise]]]:

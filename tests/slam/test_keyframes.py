@@ -80,7 +80,7 @@ def test_a_keyframes_gaussians_are_of_the_scans_between_its_neighbours():
         else:
             # The tracker's map does not want every scan, and nor do the keyframes.
             found.attach(room(k), tracked(pose, joined=k != 4))
-    found.finish_last()
+    found.part()
     around = {0: (0, 1, 2), 3: (1, 2, 3, 5), 6: (5, 6, 7, 8)}
     assert [keyframe.row for keyframe in found.list] == list(around)
     for keyframe in found.list:
@@ -99,7 +99,7 @@ def test_a_keyframes_gaussians_are_of_the_scans_between_its_neighbours():
 
 def test_finishing_no_keyframes_is_nothing():
     found = Keyframes(OPTIONS, GAUSSIANS)
-    found.finish_last()
+    found.part()
     assert len(found) == 0
 
 
