@@ -60,6 +60,8 @@ lock: $(READY)
 $(READY): pyproject.toml
 	$(PYTHON) -m venv $(VENV)
 	$(RUN)/python -m pip install --quiet --disable-pip-version-check --editable '.[test]'
+	# Where Python may write no bytecode, every run would else compile the package first.
+	$(RUN)/python -m compileall -q nscan_cli
 	touch $@
 
 clean:

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import ast
 import json
 import os
 import shutil
@@ -174,3 +175,23 @@ def test_kernels_run_where_nothing_can_be_kept(places, monkeypatch):
         return 2 * number
 
     assert twice(1.5) == 3.0
+
+
+def kernels() -> Iterator[tuple[str, ast.FunctionDef]]:
+    """All functions of the package that are compiled."""
+    for path in sorted(Path(compiled.__file__).parent.rglob("*.py")):
+        for node in ast.walk(ast.parse(path.read_text())):
+            if isinstance(node, ast.FunctionDef) and any(
+                isinstance(each, ast.Name) and each.id.endswith("kernel") for each in node.decorator_list
+            ):
+                yield f"{path.stem}.{node.name}", node
+
+
+def test_no_kernel_needs_scipy():
+    """numba compiles products of matrices only where SciPy is installed, and nothing installs it."""
+    found = dict(kernels())
+    assert len(found) > 50
+    for name, function in found.items():
+        for node in ast.walk(function):
+            assert not isinstance(node, ast.MatMult), name
+            assert not (isinstance(node, ast.Attribute) and node.attr in ("dot", "linalg")), name

@@ -108,6 +108,10 @@ def run(arguments: list[str]) -> int:
     for library in ("OPENBLAS", "MKL", "OMP"):
         os.environ.setdefault(f"{library}_NUM_THREADS", "1")
     try:
+        if COMPLETION in os.environ:
+            from nscan_cli.cli.completion import complete_whole_words
+
+            complete_whole_words()
         outcome = cli.main(arguments, prog_name="nscan-cli", complete_var=COMPLETION, standalone_mode=False)
         if sys.stdout is not None:
             sys.stdout.flush()

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nscan_cli.compiled import kernel, lean_kernel
+from nscan_cli.matching.linear import multiply
 from nscan_cli.matching.planar import relative_pose
 from nscan_cli.matching.scans import Scans, most_points, scan_grid, scan_points
 from nscan_cli.ndt.energy import OUT, accumulate, unpack
@@ -214,11 +215,8 @@ def _add_priors(priors: Priors, poses: Array, curvature: float, gradient: Array,
         for a in range(3):
             difference[a] = u[a] - priors.means[q, a]
         difference[2] -= 2 * np.pi * np.round(difference[2] / (2 * np.pi))
-        for a in range(3):
-            g[a] = 0.0
-            for b in range(3):
-                g[a] += priors.information[q, a, b] * difference[b]
-            value += 0.5 * difference[a] * g[a]
+        multiply(priors.information[q], difference, g)
+        value += 0.5 * (difference[0] * g[0] + difference[1] * g[1] + difference[2] * g[2])
         _chain(i, j, poses[i, 2], u, g, priors.information[q], curvature, gradient, hessian)
     return value
 

@@ -1,4 +1,4 @@
-"""Small dense systems, solved inside the kernels."""
+"""Small dense matrices inside the kernels, where numba's own products would need SciPy."""
 
 from __future__ import annotations
 
@@ -6,6 +6,16 @@ import numpy as np
 
 from nscan_cli.compiled import lean_kernel
 from nscan_cli.poses import Array
+
+
+@lean_kernel
+def multiply(matrix: Array, vector: Array, out: Array) -> None:
+    """Write the product (m,) of a matrix (m, n) and a vector (n,)."""
+    for i in range(matrix.shape[0]):
+        total = 0.0
+        for k in range(matrix.shape[1]):
+            total += matrix[i, k] * vector[k]
+        out[i] = total
 
 
 @lean_kernel

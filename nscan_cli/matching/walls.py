@@ -16,7 +16,9 @@ from numpy.typing import NDArray
 
 from nscan_cli.compiled import kernel
 from nscan_cli.matching.gauge import gauge_of, newton_step
+from nscan_cli.matching.linear import multiply
 from nscan_cli.matching.scans import Scans
+from nscan_cli.ndt.assign import assign
 from nscan_cli.poses import Array, wrap
 
 CELL = 0.25
@@ -66,12 +68,12 @@ def fit_to_walls(scans: Scans, poses: Array, hessian: Array, fixed: int | None) 
 @kernel
 def _fit(scans: Scans, poses: Array, hessian: Array, fixed: int) -> None:
     """Minimise Σ d² / σ² over the points on walls + ½ Δᵗ (HELD · H) Δ, from the poses (n, 3) in place."""
-    start, step = poses.copy(), np.empty((poses.shape[0], 3))
+    start, step, gradient = poses.copy(), np.empty_like(poses), np.empty(poses.size)
     for _ in range(STEPS):
         cloud = _cloud(scans, poses)
         members, ends = common_walls(cloud)
         known = HELD * hessian
-        gradient = known @ (poses - start).ravel()
+        multiply(known, (poses - start).ravel(), gradient)
         first = 0
         for end in ends:
             _add_wall(cloud, members[first:end], gradient, known)
@@ -124,7 +126,7 @@ def common_walls(cloud: Cloud) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
             taken[first:end] = True
             for a, b in ((0, front), (front, front + back)):
                 if b - a >= LEAST_POINTS and (cloud.scans[sides[a:b]] != cloud.scans[sides[a]]).any():
-                    members[count : count + b - a] = sides[a:b]
+                    assign(members[count : count + b - a], sides[a:b])
                     count += b - a
                     ends[walls] = count
                     walls += 1

@@ -6,19 +6,22 @@ every kernel that has one.
 
 from __future__ import annotations
 
+from typing import Any
+
+from numpy.typing import NDArray
+
 from nscan_cli.compiled import lean_kernel
-from nscan_cli.poses import Array
 
 
 @lean_kernel
-def assign(target: Array, source: Array) -> None:
+def assign(target: NDArray[Any], source: NDArray[Any]) -> None:
     """The numbers of `source` (n,) into `target` (n,)."""
     for k in range(target.shape[0]):
         target[k] = source[k]
 
 
 @lean_kernel
-def assign_rows(target: Array, source: Array) -> None:
+def assign_rows(target: NDArray[Any], source: NDArray[Any]) -> None:
     """The numbers of `source` (n, m) into `target` (n, m)."""
     for row in range(target.shape[0]):
         for k in range(target.shape[1]):

@@ -125,6 +125,9 @@ def test_bash_completes(environment, robots):
         ("nscan-cli sl", ["slam"]),
         ("nscan-cli slam --ma", ["--map", "--max-range", "--max-scans"]),
         ("nscan-cli slam --relations n", ["nscan"]),
+        ("nscan-cli slam --relations=n", ["--relations=nscan"]),
+        ("nscan-cli slam --map=offi", ["--map=office.json", "--map=office.log.gz"]),
+        ("nscan-cli nightly radish --output=ni", ["--output=nights/"]),
         ("nscan-cli info off", ["office.json", "office.log.gz"]),
         ("nscan-cli slam office.log.gz -o office.j", ["office.json"]),
         ("nscan-cli nightly radish -o ni", ["nights/"]),
@@ -146,6 +149,8 @@ def test_fish_completes(line, offered, environment, robots):
     [
         ("nscan-cli sl", "nscan-cli slam "),
         ("nscan-cli slam --map m --relations n", "--relations nscan "),
+        ("nscan-cli slam --relations=n", "--relations=nscan "),
+        ("nscan-cli slam --carmen=office.l", "--carmen=office.log.gz "),
         ("nscan-cli slam --dep", "--depfile "),
         ("nscan-cli info office.l", "info office.log.gz "),
         ("nscan-cli nightly radish -o ni", "-o nights/"),
