@@ -19,8 +19,8 @@ from nscan_cli.graph.json_file import write_graph
 from nscan_cli.graph.model import Graph
 from nscan_cli.graph.tum import write_tum
 from nscan_cli.logs.scan import LaserLog
-from nscan_cli.mapping.image import map_yaml
-from nscan_cli.mapping.occupancy import OccupancyGrid, occupancy_grid
+from nscan_cli.mapping.image import MapImage, gray, map_yaml
+from nscan_cli.mapping.occupancy import occupancy_grid
 from tests.cli.room_log import room_log
 from tests.graph.small_graph import small_graph
 from tests.logs.lines import read
@@ -97,7 +97,7 @@ def test_exports(log, value):
     with pytest.raises(NotFiniteError):
         recording(log, rows, rows, with_wrong_pose(value), grid)
     with pytest.raises(NotFiniteError):
-        map_yaml("map.png", OccupancyGrid(grid.hits, grid.misses, 0.05, (value, 0.0)))
+        map_yaml("map.png", MapImage(gray(grid), 0.05, (value, 0.0)))
 
 
 def test_stamps_that_ros_has_no_room_for_are_wrong_usage(log):

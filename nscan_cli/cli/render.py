@@ -19,7 +19,7 @@ from nscan_cli.logs.options import ReadingOptions
 from nscan_cli.outputs import check_writable, is_device, write_whole
 
 if TYPE_CHECKING:
-    from nscan_cli.mapping.occupancy import OccupancyGrid
+    from nscan_cli.mapping.image import MapImage
 
 
 @subcommand(
@@ -102,7 +102,9 @@ def command(
             canvas = draw_over_map(grid, whole, overlays)
         write_whole(output, canvas.png())
     else:
-        write_map(output, grid, yaml)
+        from nscan_cli.mapping.image import map_image
+
+        write_map(output, map_image(grid), yaml)
     if mcap is not None:
         from nscan_cli.exports.mcap import recording
 
@@ -128,13 +130,13 @@ def check_map_outputs(output: str, yaml: bool) -> None:
         check_writable(yaml_path(output))
 
 
-def write_map(output: str, grid: OccupancyGrid, yaml: bool) -> None:
+def write_map(output: str, image: MapImage, yaml: bool) -> None:
     """Write a map for map_server, and with `yaml` the YAML beside it, which a loader looks for last."""
     from nscan_cli.mapping.image import map_png, map_yaml
 
-    write_whole(output, map_png(grid))
+    write_whole(output, map_png(image))
     if yaml:
-        write_whole(yaml_path(output), map_yaml(Path(output).name, grid))
+        write_whole(yaml_path(output), map_yaml(Path(output).name, image))
 
 
 def yaml_path(output: str) -> str:

@@ -123,10 +123,12 @@ def command(
     outputs = Outputs(output, map_file, trajectory, g2o, carmen, depfile)
     outputs.check([path for path in (from_file, log) if path is not None])
     from nscan_cli.cli.slam_runs import map_whole, refine_saved
+    from nscan_cli.memory import share_one_heap
     from nscan_cli.slam.run import slam_options
     from nscan_cli.threads import available_threads
 
     threads = threads or available_threads()
+    share_one_heap()
     began = time.perf_counter()
     if from_file is None:
         assert log is not None

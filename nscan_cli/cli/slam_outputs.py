@@ -20,6 +20,8 @@ if TYPE_CHECKING:
 
     from nscan_cli.graph.model import Graph
     from nscan_cli.logs.scan import LaserLog
+    from nscan_cli.mapping.image import MapImage
+    from nscan_cli.poses import Array
 
 
 @dataclass(frozen=True)
@@ -77,7 +79,6 @@ class Outputs:
     ) -> None:
         """Write all; `rows` (N,) are those of the graph's scans, `inputs` what the depfile names."""
         from nscan_cli.graph.json_file import write_graph
-        from nscan_cli.mapping.occupancy import occupancy_grid
         from nscan_cli.memory import give_back
         from nscan_cli.threads import meanwhile
 
@@ -88,9 +89,9 @@ class Outputs:
             raise InputDataError(
                 label(inputs[0]), problem, f"look for jumps, or set {DISTANCE.variable} higher"
             )
-        grid = None
+        image = None
         if scans is not None and self.map is not None:
-            grid = meanwhile(threads, partial(occupancy_grid, scans, rows, graph.poses))
+            image = meanwhile(threads, partial(_drawn, scans, rows, graph.poses))
         write_whole(self.graph, write_graph(graph))
         if self.trajectory is not None:
             from nscan_cli.graph.tum import write_tum
@@ -104,9 +105,9 @@ class Outputs:
             from nscan_cli.exports.carmen import corrected_log
 
             write_whole(self.carmen, corrected_log(scans, rows, graph.poses))
-        if grid is not None and self.map is not None:
+        if image is not None and self.map is not None:
             # Last, since it may be refused for its size: the rest is then there.
-            write_map(self.map, grid(), yaml=True)
+            write_map(self.map, image(), yaml=True)
         if self.depfile is not None:
             write_whole(self.depfile, self._rule(inputs))
 
@@ -120,3 +121,14 @@ class Outputs:
         # Standard input is no file that make could look for.
         prerequisites = "".join(f" {escaped(path)}" for path in inputs if path != "-")
         return f"{targets}:{prerequisites}\n".encode()
+
+
+def _drawn(scans: LaserLog, rows: NDArray[np.int64], poses: Array) -> MapImage:
+    """The map; the counts that it is made of, and what else came before, make room for it."""
+    from nscan_cli.mapping.image import map_image
+    from nscan_cli.mapping.occupancy import occupancy_grid
+    from nscan_cli.memory import trim
+
+    grid = occupancy_grid(scans, rows, poses)
+    trim()
+    return map_image(grid)

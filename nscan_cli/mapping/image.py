@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import io
 import json
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -40,24 +40,40 @@ def gray(grid: OccupancyGrid, grays: dict[int, int] = MAP_GRAYS) -> Gray:
     return cells
 
 
-def map_png(grid: OccupancyGrid) -> bytes:
-    """The map as map_server's PNG: 8-bit gray without alpha, 0 occupied, 205 unknown, 254 free."""
+class MapImage(NamedTuple):
+    """The map that map_server loads, without the counts that it was made of, which take more memory."""
+
+    cells: Gray
+    """(H, W) 0 occupied, 205 unknown, 254 free; row 0 is that of greatest y."""
+    resolution: float
+    """Size of a cell, m."""
+    origin: tuple[float, float]
+    """x, y (m) of the lower left corner."""
+
+
+def map_image(grid: OccupancyGrid) -> MapImage:
+    """That of a grid."""
+    return MapImage(gray(grid), grid.resolution, grid.origin)
+
+
+def map_png(image: MapImage) -> bytes:
+    """The map as map_server's PNG: 8-bit gray without alpha."""
     from PIL import Image
 
-    return png_bytes(Image.fromarray(gray(grid)))
+    return png_bytes(Image.fromarray(image.cells))
 
 
-def map_yaml(image_name: str, grid: OccupancyGrid) -> bytes:
+def map_yaml(image_name: str, image: MapImage) -> bytes:
     """The YAML of the map; `image_name` is the image's name as seen from the YAML's folder.
 
     The origin's yaw is 0: consumers ignore it.
     """
-    check_finite("the origin of the map", grid.origin, grid.resolution)
-    x, y = (_decimal(value) for value in grid.origin)
+    check_finite("the origin of the map", image.origin, image.resolution)
+    x, y = (_decimal(value) for value in image.origin)
     return (
         f"image: {json.dumps(image_name, ensure_ascii=False)}\n"
         "mode: trinary\n"
-        f"resolution: {_decimal(grid.resolution)}\n"
+        f"resolution: {_decimal(image.resolution)}\n"
         f"origin: [{x}, {y}, 0.0]\n"
         "negate: 0\n"
         f"occupied_thresh: {OCCUPIED_THRESHOLD}\n"

@@ -50,7 +50,7 @@ def work(task: dict[str, Any], outputs: Path, report: Callable[[int, int, int], 
     from nscan_cli.graph.json_file import write_graph
     from nscan_cli.graph.tum import write_tum
     from nscan_cli.logs.load import read_log
-    from nscan_cli.mapping.image import map_png, map_yaml
+    from nscan_cli.mapping.image import map_image, map_png, map_yaml
     from nscan_cli.mapping.occupancy import occupancy_grid
     from nscan_cli.nightly.preview import preview
     from nscan_cli.slam.run import Counts, map_log, slam_options
@@ -71,8 +71,9 @@ def work(task: dict[str, Any], outputs: Path, report: Callable[[int, int, int], 
     grid = occupancy_grid(log, np.arange(len(log)), graph.poses)
     (outputs / "graph.json").write_bytes(write_graph(graph))
     (outputs / "trajectory.tum").write_bytes(write_tum(graph.stamps, graph.poses))
-    (outputs / "map.png").write_bytes(map_png(grid))
-    (outputs / "map.yaml").write_bytes(map_yaml("map.png", grid))
+    image = map_image(grid)
+    (outputs / "map.png").write_bytes(map_png(image))
+    (outputs / "map.yaml").write_bytes(map_yaml("map.png", image))
     seconds = time.perf_counter() - began
     picture, overlay = preview(grid, graph)
     (outputs / "preview.png").write_bytes(picture)

@@ -18,6 +18,10 @@ class Energies:
     def __init__(self, scans: int) -> None:
         self._scans, self._terms = scans, Terms()
 
+    def forget(self) -> None:
+        """Keep no terms any more: the relations that they are of have been replaced."""
+        self._terms = Terms()
+
     def of(self, route: Route, relations: Sequence[Relation], fixed: int = 0) -> GraphEnergy:
         """That of all keyframes with keyframe `fixed` held."""
         positions = np.full(self._scans, -1)

@@ -105,8 +105,12 @@ class Follower:
         return self._break() or self._believe()
 
     def finish(self) -> list[Followed]:
-        """The last scans, which nothing settles any more."""
-        return self._believe() + self._grow_up()
+        """The last scans, which nothing settles any more. Nothing can be tracked after them."""
+        settled = self._believe() + self._grow_up()
+        self._restarts, self._searches = self.restarts, self.searches
+        # The map of the last metres is large, and of no use any more.
+        self._tracker = Tracker(self.options, self._faces)
+        return settled
 
     def _believe(self) -> list[Followed]:
         """The scans that were doubted, as they were tracked."""

@@ -136,12 +136,12 @@ class Keyframes:
         """Let a scan between keyframes add to the Gaussians of both."""
         self._expected += tracked.expected
         if tracked.joined:
-            # Of its own: else it would keep those of the scans around it, which were made together.
             self._since.append((points.copy(), tracked))
 
     def add(self, row: int, points: Array, tracked: Tracked) -> Keyframe:
         """Make a scan a keyframe; the one before has all its scans then."""
-        points, since = points.copy(), self._since
+        # Of its own: else it would keep what the scans around it have, which were tracked together.
+        points, tracked, since = points.copy(), tracked.copy(), self._since
         self.part()
         cells = _count_cells(points, 0.5 * self.gaussians.cell)
         around = [(points, tracked), *since]

@@ -88,6 +88,7 @@ class Slam:
         self.optimise(max_iterations=100, tolerance=1e-6)
         self.reject()
         self.refine()
+        self.energies.forget()
         graph = self.graph()
         graph.marginals = marginal_covariances(graph)
         return graph
@@ -220,6 +221,7 @@ class Slam:
             if not refinement.sweep(self.poses, options.refined):
                 break
             self.pairs, self.nscan = refinement.relations()
+            self.energies.forget()
             self.loops = refinement.loops()
             self.optimise(max_iterations=100, tolerance=1e-6)
             self.reject()

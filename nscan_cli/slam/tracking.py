@@ -7,7 +7,7 @@ loops later correct in the graph never tears it.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from operator import attrgetter
 from typing import NamedTuple
 
@@ -52,6 +52,12 @@ class Tracked:
     """Length of the path up to here, m."""
     joined: bool
     """Whether the scan's points joined the map."""
+
+    def copy(self) -> Tracked:
+        """The same with arrays of its own."""
+        return replace(
+            self, pose=self.pose.copy(), hessian=self.hessian.copy(), expected=self.expected.copy()
+        )
 
 
 class Match(NamedTuple):

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from nscan_cli.mapping.image import map_png, map_yaml
+from nscan_cli.mapping.image import map_image, map_png, map_yaml
 from nscan_cli.mapping.occupancy import FREE, OCCUPIED, UNKNOWN, OccupancyGrid
 from tests.mapping.nav2 import load_map
 
@@ -20,8 +20,8 @@ def grid() -> OccupancyGrid:
 
 def test_nav2_loads_the_states_that_were_meant(grid, tmp_path):
     name = 'a: "b" #ü.png'
-    (tmp_path / name).write_bytes(map_png(grid))
-    (tmp_path / "map.yaml").write_bytes(map_yaml(name, grid))
+    (tmp_path / name).write_bytes(map_png(map_image(grid)))
+    (tmp_path / "map.yaml").write_bytes(map_yaml(name, map_image(grid)))
     loaded = load_map(tmp_path / "map.yaml")
     assert loaded.data.tolist() == [[FREE, OCCUPIED, UNKNOWN], [UNKNOWN, FREE, OCCUPIED]]
     assert loaded.data.tolist() == grid.states().tolist()
@@ -33,7 +33,7 @@ def test_nav2_loads_the_states_that_were_meant(grid, tmp_path):
 
 
 def test_the_png_is_8_bit_gray_without_alpha_and_has_the_greatest_y_on_top(grid):
-    png = map_png(grid)
+    png = map_png(map_image(grid))
     assert png[:8] == b"\x89PNG\r\n\x1a\n"
     width, height, depth, colour_type = struct.unpack(">IIBB", png[16:26])
     assert (width, height, depth, colour_type) == (3, 2, 8, 0)
@@ -43,7 +43,7 @@ def test_the_png_is_8_bit_gray_without_alpha_and_has_the_greatest_y_on_top(grid)
 
 def test_names_and_numbers_that_yaml_could_misread_are_safe(grid):
     tiny = OccupancyGrid(grid.hits, grid.misses, 0.001, (1e-5, -0.0))
-    text = map_yaml('a: "b" #ü.png', tiny).decode()
+    text = map_yaml('a: "b" #ü.png', map_image(tiny)).decode()
     assert 'image: "a: \\"b\\" #ü.png"\n' in text
     assert "origin: [0.00001, 0.0, 0.0]\n" in text
     assert "resolution: 0.001\n" in text
@@ -52,4 +52,4 @@ def test_names_and_numbers_that_yaml_could_misread_are_safe(grid):
 def test_the_origin_has_no_rounding_noise(grid):
     cells = OccupancyGrid(grid.hits, grid.misses, 0.05, (-24 * 0.05, 3 * 0.05))
     assert math.isclose(cells.origin[1], 0.15)
-    assert "origin: [-1.2, 0.15, 0.0]" in map_yaml("m.png", cells).decode()
+    assert "origin: [-1.2, 0.15, 0.0]" in map_yaml("m.png", map_image(cells)).decode()

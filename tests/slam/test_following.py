@@ -41,3 +41,14 @@ def test_a_track_breaks_where_it_does_however_many_scans_come_at_a_time(size):
         assert (one.begins, one.breaks) == (other.begins, other.breaks)
         np.testing.assert_array_equal(one.tracked.pose, other.tracked.pose)
         assert one.tracked.path == other.tracked.path
+
+
+def test_when_all_is_tracked_the_map_goes_and_what_was_counted_stays():
+    follower = Follower(TrackingOptions(), BreakOptions())
+    follower.follow(scans())
+    counted = follower.restarts, follower.searches
+    assert counted > (0, 0)
+    assert follower._tracker.map.rows > 0
+    follower.finish()
+    assert follower._tracker.map.rows == 0
+    assert (follower.restarts, follower.searches) == counted

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from concurrent.futures import ThreadPoolExecutor
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -95,6 +97,36 @@ def test_a_keyframes_gaussians_are_of_the_scans_between_its_neighbours():
         np.testing.assert_array_equal(keyframe.points, room(keyframe.row))
         # Nothing is kept that only growing needs.
         assert len(keyframe.ndt.grid.sums) == 0
+
+
+def test_gaussians_are_made_once_by_whatever_thread_asks_and_the_scans_are_let_go():
+    poses = [np.array([0.4 * k, 0.0, 0.0]) for k in range(4)]
+    found = Keyframes(OPTIONS, GAUSSIANS)
+    found.add(0, room(0), tracked(poses[0]))
+    for k in (1, 2, 3):
+        found.attach(room(k), tracked(poses[k]))
+    found.part()
+    (keyframe,) = found.list
+    assert len(keyframe.around) == 4
+    with ThreadPoolExecutor(4) as pool:
+        made = [*pool.map(lambda _: keyframe.ndt, range(8))]
+    assert keyframe.around == []
+    assert keyframe.ndt is keyframe.ndt
+    for ndt in made:
+        np.testing.assert_array_equal(ndt.grid.gaussians, keyframe.ndt.grid.gaussians)
+
+
+def test_a_keyframe_keeps_nothing_of_the_scans_that_were_tracked_with_it():
+    """All that is found for a stretch of scans is made together."""
+    together, several = np.zeros((2, 64, 3, 3)), np.concatenate([room(0), room(1)])
+    scan = Tracked(np.zeros((64, 3))[5], together[0, 5], together[1, 5], 0.9, 0.0, True)
+    found = Keyframes(OPTIONS, GAUSSIANS)
+    keyframe = found.add(0, several[: len(room(0))], scan)
+    for array in (
+        keyframe.points,
+        *(getattr(keyframe.tracked, each) for each in ("pose", "hessian", "expected")),
+    ):
+        assert array.base is None
 
 
 def test_finishing_no_keyframes_is_nothing():
