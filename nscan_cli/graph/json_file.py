@@ -29,6 +29,8 @@ FORMAT = "nscan-pose-graph"
 VERSION = "1.0"
 SCHEMA = "urn:nscan-cli:pose-graph:1.0"
 UNITS = {"length": "m", "angle": "rad", "time": "s"}
+BLOCK = 1000
+"""So many poses are written at a time."""
 NEXT = ",\n"
 """From one record to the next."""
 _compact = json.JSONEncoder(separators=(",", ":"), allow_nan=False, check_circular=False).encode
@@ -117,17 +119,23 @@ def _refuse_constant(constant: str) -> NoReturn:
 
 
 def _node_records(graph: Graph) -> Iterator[dict[str, Any]]:
-    poses = pose_rows(graph.poses)
-    odometry = None if graph.odometry is None else pose_rows(graph.odometry)
+    poses = _each_pose(graph.poses)
+    odometry = None if graph.odometry is None else _each_pose(graph.odometry)
     scans, anchors = graph.scans.tolist(), graph.anchors.tolist()
     for node, stamp in enumerate(graph.stamps):
-        record = {"id": node, "scan": scans[node], "stamp": stamp, "pose": poses[node]}
+        record = {"id": node, "scan": scans[node], "stamp": stamp, "pose": next(poses)}
         if odometry is not None:
-            record["odometry"] = odometry[node]
+            record["odometry"] = next(odometry)
         record["keyframe"] = anchors[node] == node
         if anchors[node] != node:
             record["attached"] = anchors[node]
         yield record
+
+
+def _each_pose(poses: Array) -> Iterator[list[float]]:
+    """The rows of poses (N, 3), not all at once: as lists they take many times the room."""
+    for first in range(0, len(poses), BLOCK):
+        yield from pose_rows(poses[first : first + BLOCK])
 
 
 def _loop_record(loop: Loop) -> dict[str, Any]:
