@@ -107,6 +107,8 @@ def _lay_out(slam: Slam, graph: Graph) -> None:
         tracked = Tracked(pose, nothing, nothing, 1.0, path, joined)
         if anchor == row:
             slam.keyframes.add(row, points, tracked)
+            for whole in slam.keyframes.list[-2:-1]:
+                whole.finish()
         else:
             slam.keyframes.attach(points, tracked)
         slam.tracked.append(pose)

@@ -44,7 +44,11 @@ class Keyframe:
 
     @property
     def ndt(self) -> Ndt:
-        """Made when it is first asked for; then no scan can join it any more."""
+        """The Gaussians of its scans, which are made when they are first asked for."""
+        return self.finish()
+
+    def finish(self) -> Ndt:
+        """Make the Gaussians, unless they are there, and let the scans go; none can join any more."""
         around = self.around
         if self._ndt is None:
             poses = relative(np.array([tracked.pose for _, tracked in around]), self.tracked.pose)

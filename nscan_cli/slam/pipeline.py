@@ -134,6 +134,7 @@ class Slam:
     def grow(self, size: int) -> None:
         """The graph takes in the first `size` keyframes, which are whole, and matches what is due."""
         for keyframe in self.keyframes.list[len(self.poses) : size]:
+            keyframe.finish()
             self.add_keyframe(keyframe)
             self.match_nearby(len(self.poses) - 1 - self.options.nscan.behind)
 
