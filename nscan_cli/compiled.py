@@ -138,7 +138,7 @@ def _sources_hash() -> str:
     """
     package = Path(__file__).parent
     sources = hashlib.sha256(f"{package}\0".encode())
-    for path in sorted(package.glob("*/*.py")):
+    for path in sorted(package.rglob("*.py")):
         text = path.read_bytes()
         if b"nscan_cli.compiled import" in text:
             sources.update(f"{path.relative_to(package)}\0{len(text)}\0".encode() + text)

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from nscan_cli.assign import assign_rows
 from nscan_cli.compiled import kernel
 from nscan_cli.matching.linear import solve_definite
-from nscan_cli.ndt.assign import assign_rows
 from nscan_cli.poses import Array
 
 FREE = -1

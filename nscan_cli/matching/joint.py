@@ -10,6 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from nscan_cli.assign import assign, assign_rows
 from nscan_cli.compiled import kernel
 from nscan_cli.matching.gauge import gauge_of, newton_step
 from nscan_cli.matching.joint_energy import (
@@ -22,7 +23,6 @@ from nscan_cli.matching.joint_energy import (
 )
 from nscan_cli.matching.overlap import SOUND_OVERLAP, overlaps, weakest_link
 from nscan_cli.matching.unheld import back_to_priors
-from nscan_cli.ndt.assign import assign, assign_rows
 from nscan_cli.poses import Array, wrap
 
 FIRST_DAMPING = 1e-3

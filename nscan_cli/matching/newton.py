@@ -10,10 +10,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from nscan_cli.assign import assign, assign_rows
 from nscan_cli.compiled import kernel, lean_kernel
 from nscan_cli.matching.linear import solve_definite
 from nscan_cli.matching.priors import Prior
-from nscan_cli.ndt.assign import assign, assign_rows
 from nscan_cli.ndt.energy import OUT, sum_meeting, unpack
 from nscan_cli.ndt.meeting import Meeting, meet_again
 from nscan_cli.ndt.table import Grid

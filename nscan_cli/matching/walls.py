@@ -14,11 +14,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from nscan_cli.assign import assign
 from nscan_cli.compiled import kernel
 from nscan_cli.matching.gauge import gauge_of, newton_step
 from nscan_cli.matching.linear import multiply
 from nscan_cli.matching.scans import Scans
-from nscan_cli.ndt.assign import assign
 from nscan_cli.poses import Array, wrap
 
 CELL = 0.25

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from nscan_cli.assign import assign
 from nscan_cli.compiled import kernel
-from nscan_cli.ndt.assign import assign
 from nscan_cli.ndt.table import Grid, rehash, table_size
 
 

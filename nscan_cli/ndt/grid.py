@@ -14,8 +14,8 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from nscan_cli.assign import assign, assign_rows
 from nscan_cli.compiled import kernel, lean_kernel
-from nscan_cli.ndt.assign import assign, assign_rows
 from nscan_cli.ndt.compact import compacted
 from nscan_cli.ndt.gaussians import make_gaussian
 from nscan_cli.ndt.table import Grid, find_row, insert, pack, table_size, unpack

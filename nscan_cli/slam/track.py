@@ -10,11 +10,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from nscan_cli.assign import assign, assign_rows
 from nscan_cli.compiled import kernel
 from nscan_cli.matching.newton import PairProblem, minimise
 from nscan_cli.matching.planar import composed_pose, relative_pose, wrapped
 from nscan_cli.matching.priors import Prior, sigmas
-from nscan_cli.ndt.assign import assign, assign_rows
 from nscan_cli.ndt.grid import NEW_NEIGHBOURS, change
 from nscan_cli.ndt.meeting import begin, count_inliers, meet_again
 from nscan_cli.ndt.table import Grid
