@@ -78,7 +78,7 @@ def order_of_little_fill(indptr: Indices, indices: Indices) -> Indices:
     elements = Elements(zero.copy(), zero.copy(), zero.copy(), zero.copy())
     queue, degrees = Queue(none.copy(), none.copy(), none.copy()), zero.copy()
     for node in range(nodes - 1, -1, -1):
-        _leave_out(around, node, node)
+        _leave_out_itself(around, node)
         degrees[node] = around.nodes[node]
         _put(queue, node, degrees[node])
     groups = Groups(none.copy(), np.arange(nodes), none.copy(), none.copy())
@@ -116,11 +116,11 @@ def order_of_little_fill(indptr: Indices, indices: Indices) -> Indices:
 
 
 @lean_kernel
-def _leave_out(around: Around, node: int, name: int) -> None:
-    """Let all that stands in a node's room be the nodes that it touches, but for one name."""
+def _leave_out_itself(around: Around, node: int) -> None:
+    """Let all others that stand in a node's room be the nodes that it touches."""
     low, kept = around.indptr[node], 0
     for p in range(low, around.indptr[node + 1]):
-        if around.names[p] != name:
+        if around.names[p] != node:
             around.names[low + kept] = around.names[p]
             kept += 1
     around.nodes[node] = kept
