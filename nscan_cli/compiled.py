@@ -1,25 +1,27 @@
-"""`kernel`, the decorator of compiled functions, and the folder where their machine code is kept.
+"""`kernel`, the decorator of compiled functions: machine code as kept in the cache folder, or made by numba.
 
-numba keeps compiled functions one by one and notices a change of a function's own file only, not of
-what it calls in other files. So the folder carries a hash of all files with kernels: when one of them
-changes, all are compiled again. A constant that a kernel uses belongs into a file with kernels.
+numba keeps what it has compiled one by one, too: it saves compiling anew what two kernels call.
 """
 
 from __future__ import annotations
 
 import contextlib
 import functools
-import hashlib
-import os
-import stat
-import tempfile
-from collections.abc import Callable, Iterator
-from pathlib import Path
+import threading
+from collections.abc import Callable
 from typing import Any, TypeVar, cast
 
-from nscan_cli import __version__
+import numpy as np
+
+from nscan_cli import machine_code
+from nscan_cli.cache_folder import cache_folder
 
 Function = TypeVar("Function", bound=Callable[..., Any])
+
+C_ORDER, FORTRAN_ORDER, ALIGNED_AND_WRITEABLE = 1, 2, 0x500
+"""Bits of the flags of an array."""
+LOCK = threading.RLock()
+"""Held while kernels are loaded or made."""
 
 
 def kernel(function: Function) -> Function:
@@ -28,7 +30,7 @@ def kernel(function: Function) -> Function:
     No parallel loops, and of fastmath only fused multiply-adds, which change no order: the same bytes come
     out on any number of threads. The interpreter's lock is released, so threads can share the work.
     """
-    return _compiled(function, {"contract"})
+    return cast(Function, Kernel(function, {"contract"}))
 
 
 def lean_kernel(function: Function) -> Function:
@@ -36,12 +38,12 @@ def lean_kernel(function: Function) -> Function:
 
     It counts no references to the arrays that it is given: in a loop that takes longer than the work.
     """
-    return _compiled(function, {"contract"}, _nrt=False)
+    return cast(Function, Kernel(function, {"contract"}, _nrt=False))
 
 
 def inlined_kernel(function: Function) -> Function:
     """The same for what gives lean kernels a part of their arrays: it becomes part of them."""
-    return _compiled(function, {"contract"}, inline="always")
+    return cast(Function, Kernel(function, {"contract"}, inline="always"))
 
 
 def summing_kernel(function: Function) -> Function:
@@ -49,30 +51,94 @@ def summing_kernel(function: Function) -> Function:
 
     How many lanes there are depends on the processor, on nothing else.
     """
-    return _compiled(function, {"contract", "reassoc", "nsz"}, _nrt=False)
+    return cast(Function, Kernel(function, {"contract", "reassoc", "nsz"}, _nrt=False))
 
 
-def _compiled(function: Function, fastmath: set[str], **options: Any) -> Function:
-    import numba
+class Kernel:
+    """A function that takes arrays, numbers and tuples of them, and runs as machine code."""
 
-    config: Any = numba.config
-    folder = cache_folder()
-    # numba picks a function's folder when it is decorated: other users of numba in this process keep
-    # theirs.
-    configured, config.CACHE_DIR = config.CACHE_DIR, "" if folder is None else str(folder)
-    try:
-        compile_lazily = numba.njit(
-            cache=folder is not None, nogil=True, error_model="numpy", fastmath=fastmath, **options
-        )
-        compiled = compile_lazily(function)
-    finally:
-        config.CACHE_DIR = configured
-    _forgive(getattr(compiled, "_cache"))  # noqa: B009, numba's types do not have it
-    return cast(Function, compiled)
+    def __init__(self, function: Callable[..., Any], fastmath: set[str], **options: Any) -> None:
+        functools.update_wrapper(self, function)
+        self.py_func = function
+        self._options = {"nogil": True, "error_model": "numpy", "fastmath": fastmath, **options}
+        self._versions: dict[object, Callable[..., Any]] = {}
+        self._called_by_kernels: Any = None
+
+    def __call__(self, *arguments: Any) -> Any:
+        """What the function returns."""
+        kinds = tuple([_kind(argument) for argument in arguments])
+        version = self._versions.get(kinds)
+        if version is None:
+            with LOCK:
+                version = self._versions[kinds] = self._version(kinds, arguments)
+        return version(*arguments)
+
+    def _version(self, kinds: object, arguments: tuple[Any, ...]) -> Callable[..., Any]:
+        """The kernel for arguments of these kinds."""
+        file = machine_code.kept_in(f"{self.py_func.__module__}.{self.py_func.__qualname__}", kinds)
+        if file is None:
+            return cast(Callable[..., Any], self.dispatcher)
+        version = machine_code.load(file, self.py_func.__name__)
+        if version is None:
+            version = self._dispatcher(arguments)
+            (compiled,) = version.overloads.values()
+            machine_code.keep(file, compiled)
+        return version
+
+    @property
+    def dispatcher(self) -> Any:
+        """What numba makes of the function, with numba's own cache: for the kernels that call it."""
+        with LOCK:
+            if self._called_by_kernels is None:
+                self._called_by_kernels = self._dispatcher()
+                _forgive(getattr(self._called_by_kernels, "_cache", None))
+        return self._called_by_kernels
+
+    def _dispatcher(self, arguments: tuple[Any, ...] | None = None) -> Any:
+        """A function of numba's that compiles this one at its call, or now and only for these arguments."""
+        import numba
+
+        config: Any = numba.config
+        folder = cache_folder() if arguments is None else None
+        signature = None if arguments is None else [tuple(map(numba.typeof, arguments))]
+        # numba picks a function's folder when it is decorated: other users of numba in this process keep
+        # theirs.
+        configured, config.CACHE_DIR = config.CACHE_DIR, str(folder or "")
+        try:
+            return numba.njit(signature, cache=folder is not None, **self._options)(self.py_func)
+        finally:
+            config.CACHE_DIR = configured
+
+    @property
+    def _numba_type_(self) -> Any:
+        """What numba takes a kernel for that another one calls."""
+        return self.dispatcher._numba_type_
+
+    @property
+    def targetoptions(self) -> Any:
+        """Where numba looks whether the kernel becomes part of the one that calls it."""
+        return self.dispatcher.targetoptions
+
+
+def _kind(value: Any) -> object:
+    """What of an argument its machine code depends on."""
+    if isinstance(value, np.ndarray):
+        flags = value.flags.num
+        order = C_ORDER if flags & C_ORDER else flags & FORTRAN_ORDER
+        return value.dtype, value.ndim, order, flags & ALIGNED_AND_WRITEABLE
+    if isinstance(value, tuple):
+        return type(value), *[_kind(each) for each in value]
+    if isinstance(value, float):
+        return float
+    if value is None or isinstance(value, (int, np.generic)):
+        return type(value)
+    raise TypeError(f"kernels take arrays, numbers and tuples of them, not {type(value).__name__}")
 
 
 def _forgive(cache: Any) -> None:
     """Let no folder that is full or damaged stop the work: what cannot be loaded is compiled anew."""
+    if cache is None:
+        return
     load, save = cache.load_overload, cache.save_overload
 
     def load_if_sound(*call: Any) -> Any:
@@ -89,58 +155,3 @@ def _forgive(cache: Any) -> None:
             save(*call)
 
     cache.load_overload, cache.save_overload = load_if_sound, save_if_possible
-
-
-def first_compile(name: str) -> bool:
-    """Whether the kernel `name` is still to be compiled: it is not in the cache folder, or there is none."""
-    folder = cache_folder()
-    return folder is None or next(folder.rglob(f"*.{name}-*.nbi"), None) is None
-
-
-@functools.cache
-def cache_folder() -> Path | None:
-    """The folder for the kernels' machine code; None when no place is writable.
-
-    The first that can be written of: `NUMBA_CACHE_DIR` where it is set, otherwise the user's cache
-    folder; a folder of this user among the temporary files.
-    """
-    key = f"{__version__}-{_sources_hash()}"
-    for place in _places():
-        folder = place / key
-        try:
-            folder.mkdir(parents=True, exist_ok=True)
-            tempfile.TemporaryFile(dir=folder).close()
-        except OSError:
-            continue
-        return folder
-    return None
-
-
-def _places() -> Iterator[Path]:
-    configured = os.environ.get("NUMBA_CACHE_DIR")
-    user = os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache")
-    yield Path(configured or user).absolute() / "nscan-cli"
-    try:
-        private = Path(tempfile.gettempdir()) / f"nscan-cli-{os.getuid()}"
-        private.mkdir(mode=0o700, exist_ok=True)
-        status = private.lstat()
-    except OSError:
-        return
-    # What is loaded from here is run: the folder must not be one that somebody else has laid out.
-    if stat.S_ISDIR(status.st_mode) and status.st_uid == os.getuid() and not status.st_mode & 0o022:
-        yield private
-
-
-def _sources_hash() -> str:
-    """Hash of the package's place, and of the paths and bytes of all its files that import `kernel`.
-
-    Of the place because numba keeps the code of each copy of a file apart.
-    """
-    package = Path(__file__).parent
-    sources = hashlib.sha256(f"{package}\0".encode())
-    for path in sorted(package.rglob("*.py")):
-        text = path.read_bytes()
-        if b"nscan_cli.compiled import" in text:
-            sources.update(f"{path.relative_to(package)}\0{len(text)}\0".encode() + text)
-    sources.update(Path(__file__).read_bytes())
-    return sources.hexdigest()[:16]

@@ -19,10 +19,9 @@ def say(message: str, quiet: bool = False) -> None:
 
 def announce_compiling(kernel: str, quiet: bool) -> bool:
     """Say so where the kernels are still to be compiled, among them one that is needed; whether they are."""
-    # As a whole: what imports names of it counts as a file with kernels, on which their cache hangs.
-    from nscan_cli import compiled
+    from nscan_cli.machine_code import first_compile
 
-    compiling = compiled.first_compile(kernel)
+    compiling = first_compile(kernel)
     if compiling:
         say("compiling the kernels, once for this version on this machine: about 45 s", quiet)
     return compiling

@@ -1,0 +1,216 @@
+"""Machine code that numba has made, kept in files that run without numba.
+
+To import numba, and to let it load what it has kept, takes longer and more memory than to match the scans
+of a short log. But all that its machine code needs is LLVM's loader (llvmlite) and three small libraries
+with the functions that it calls: the one that turns arrays into Python's objects, for instance.
+"""
+
+from __future__ import annotations
+
+import builtins
+import ctypes
+import functools
+import hashlib
+import importlib
+import importlib.machinery
+import importlib.util
+import json
+import os
+import re
+import sys
+import zlib
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+
+from nscan_cli.cache_folder import cache_folder
+from nscan_cli.errors import NscanError
+from nscan_cli.outputs import write_whole
+
+HARMLESS = {"NUMBA_CACHE_DIR", "NUMBA_NUM_THREADS"}
+"""Settings of numba that change nothing in a kernel's machine code."""
+SUFFIX = ".code"
+PICKLED_TYPE = re.compile(rb"\x80\x04\x95.{8}\x8c.([\w.]+)\x94\x8c.(\w+)\x94\x93\x94\.", re.DOTALL)
+"""A class or type as pickle's protocol 4 writes it: by the name of its module and its own."""
+
+
+@functools.cache
+def machine() -> str | None:
+    """What machine code depends on beside its sources: the versions of what makes it, and the processor.
+
+    None where that is left to numba: it is told something special, or is not as it is known here.
+    """
+    if any(name.startswith("NUMBA_") and name not in HARMLESS for name in os.environ):
+        return None
+    try:
+        import llvmlite
+        import llvmlite.binding as llvm
+
+        versions = sys.version, np.__version__, llvmlite.__version__, _numba("_version.py").read_text()
+        processor = llvm.get_host_cpu_name(), llvm.get_host_cpu_features().flatten()
+    except Exception:
+        return None
+    return _digest((versions, processor))
+
+
+def kept_in(name: str, kinds: object) -> Path | None:
+    """The file for the machine code of a kernel for arguments of these kinds; None where nothing is kept."""
+    folder, made_by = cache_folder(), machine()
+    if folder is None or made_by is None:
+        return None
+    return folder / f"{name}-{made_by}-{_digest(kinds)}{SUFFIX}"
+
+
+def first_compile(name: str) -> bool:
+    """Whether the kernel `name` is still to be compiled: it is not in the cache folder, or there is none."""
+    folder = cache_folder()
+    kept = f"*.{name}-*.nbi" if machine() is None else f"*.{name}-{machine()}-*{SUFFIX}"
+    return folder is None or next(folder.rglob(kept), None) is None
+
+
+def _digest(value: object) -> str:
+    return hashlib.sha256(repr(value).encode()).hexdigest()[:16]
+
+
+def keep(file: Path, compiled: Any) -> None:
+    """Write what numba has compiled (a CompileResult) to the file, unless something forbids it.
+
+    The first line says as JSON what the code is called and needs, its check sum is the second, then comes
+    the code.
+    """
+    try:
+        head, code = _parts(compiled)
+        write_whole(str(file), b"%s\n%d\n%s" % (json.dumps(head).encode(), zlib.crc32(code), code))
+    except (NscanError, OSError, AttributeError, TypeError, ValueError):
+        return
+
+
+def _parts(compiled: Any) -> tuple[dict[str, Any], bytes]:
+    """What is to be known of the machine code, and the code."""
+    import llvmlite.binding as llvm
+
+    (_name, _kind, (code, bitcode)), description, *_rest, environments = compiled._reduce()
+    module = llvm.parse_bitcode(bitcode)
+    declared = [each.name for each in (*module.functions, *module.global_variables) if each.is_declaration]
+    return {
+        "function": description.llvm_cpython_wrapper_name,
+        "needs": sorted(name for name in declared if not name.startswith("llvm.")),
+        "environment": description.env_name,
+        "constants": {each.env_name: [_text(value) for value in each.consts] for each in environments}
+        | {description.env_name: [_text(value) for value in compiled.environment.consts]},
+    }, code
+
+
+def _text(constant: Any) -> str:
+    """Of a constant that the code uses as a Python object; only types of arrays are known."""
+    if not isinstance(constant, np.dtype):
+        raise TypeError(constant)
+    return constant.str
+
+
+def load(file: Path, name: str) -> Callable[..., Any] | None:
+    """The function that was kept in the file; None where there is none, or none that can run here."""
+    try:
+        head, check, code = file.read_bytes().split(b"\n", 2)
+        if int(check) != zlib.crc32(code):
+            return None
+        return _linked(json.loads(head), code, name)
+    except Exception:
+        # What is damaged can raise anything; numba compiles it anew.
+        return None
+
+
+def _linked(head: dict[str, Any], code: bytes, name: str) -> Callable[..., Any] | None:
+    """The function of loaded code; None where something that it calls is missing."""
+    import llvmlite.binding as llvm
+
+    engine, dynfunc, _alive = _engine()
+    if any(llvm.address_of_symbol(needed) is None for needed in head["needs"]):
+        return None
+    engine.add_object_file(llvm.ObjectFileRef.from_data(code))
+    engine.finalize_object()
+    environments = {}
+    for environment, constants in head["constants"].items():
+        environments[environment] = made = dynfunc.Environment({})
+        made.consts[:] = [np.dtype(text) for text in constants]
+        place = engine.get_global_value_address(environment)
+        if place:
+            ctypes.c_void_p.from_address(place).value = id(made)
+    address = engine.get_function_address(head["function"])
+    own = environments[head["environment"]]
+    function: Callable[..., Any] = dynfunc.make_function(
+        sys.modules[__name__], name, "machine code", address, own, (engine, environments)
+    )
+    return function
+
+
+@functools.cache
+def _engine() -> tuple[Any, Any, object]:
+    """LLVM's loader, which knows all that machine code calls; numba's library that makes functions."""
+    import llvmlite.binding as llvm
+
+    llvm.initialize_native_target()
+    llvm.initialize_native_asmprinter()
+    dynfunc, helpers = _library("numba._dynfunc"), _library("numba._helperlib")
+    runtime = _library("numba.core.runtime._nrt_python")
+    unpickle = _unpickle()
+    for name, address in _symbols(dynfunc, helpers, runtime):
+        llvm.add_symbol(name, address)
+    llvm.add_symbol("numba_unpickle", ctypes.cast(unpickle, ctypes.c_void_p).value)
+    target = llvm.Target.from_default_triple().create_target_machine(jit=True)
+    return llvm.create_mcjit_compiler(llvm.parse_assembly(""), target), dynfunc, unpickle
+
+
+def _symbols(dynfunc: Any, helpers: Any, runtime: Any) -> Iterator[tuple[str, int]]:
+    """The names that machine code may call, and where they are; as numba itself gives them to LLVM."""
+    yield "_Py_NoneStruct", id(None)
+    for library in (helpers, dynfunc):
+        for name, address in library.c_helpers.items():
+            yield f"numba_{name}", address
+    for name, address in runtime.c_helpers.items():
+        yield name if name.startswith("_") else f"NRT_{name}", address
+    for kind in vars(builtins).values():
+        if isinstance(kind, type) and issubclass(kind, BaseException):
+            yield f"PyExc_{kind.__name__}", id(kind)
+
+
+def _unpickle() -> Any:
+    """C function (data, length, name of the data) → object, for the types of what a kernel returns.
+
+    numba's own does the same, and imports numba. That is left for what is no type: the errors that a
+    kernel raises.
+    """
+
+    @functools.cache
+    def unpickled(data: bytes, name: bytes) -> Any:
+        if found := PICKLED_TYPE.fullmatch(data):
+            module, kind = (part.decode() for part in found.groups())
+            return getattr(importlib.import_module(module), kind)
+        return importlib.import_module("numba.core.serialize")._numba_unpickle(0, data, name)
+
+    return ctypes.PYFUNCTYPE(ctypes.py_object, ctypes.c_void_p, ctypes.c_int, ctypes.c_void_p)(
+        lambda place, length, name: unpickled(ctypes.string_at(place, length), ctypes.string_at(name, 20))
+    )
+
+
+def _numba(*below: str) -> Path:
+    """A path in numba's folder, which is found without an import."""
+    found = importlib.util.find_spec("numba")
+    if found is None or found.origin is None:
+        raise ImportError("numba")
+    return Path(found.origin).parent.joinpath(*below)
+
+
+def _library(name: str) -> ModuleType:
+    """A library of numba's, without its package; with the package it is shared."""
+    if name not in sys.modules:
+        folder = _numba(*name.split(".")[1:-1])
+        found = importlib.machinery.PathFinder.find_spec(name, [str(folder)])
+        if found is None or found.loader is None:
+            raise ImportError(name)
+        module = sys.modules[name] = importlib.util.module_from_spec(found)
+        found.loader.exec_module(module)
+    return sys.modules[name]

@@ -1,0 +1,108 @@
+"""Where the kernels' machine code is kept."""
+
+from __future__ import annotations
+
+import os
+import shutil
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from nscan_cli import cache_folder as folders
+from nscan_cli.cache_folder import cache_folder
+from nscan_cli.compiled import kernel
+from nscan_cli.machine_code import first_compile
+
+
+@pytest.fixture
+def places(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+    """No cache folder is chosen yet, and none is configured but a home and a folder of temporary files."""
+    for variable in ("NUMBA_CACHE_DIR", "XDG_CACHE_HOME"):
+        monkeypatch.delenv(variable, raising=False)
+    (tmp_path / "home").mkdir()
+    (tmp_path / "temporary").mkdir()
+    monkeypatch.setenv("HOME", str(tmp_path / "home"))
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path / "temporary"))
+    cache_folder.cache_clear()
+    yield tmp_path
+    cache_folder.cache_clear()
+
+
+def chosen() -> Path | None:
+    cache_folder.cache_clear()
+    return cache_folder()
+
+
+def unwritable(path: Path) -> str:
+    """A path below a file: not even root can make a folder of it."""
+    path.write_bytes(b"")
+    return str(path / "below")
+
+
+def test_the_users_cache_folder_is_the_place(places, monkeypatch):
+    folder = chosen()
+    assert folder is not None
+    assert folder.parent == places / "home" / ".cache" / "nscan-cli"
+    monkeypatch.setenv("XDG_CACHE_HOME", str(places / "xdg"))
+    folder = chosen()
+    assert folder is not None
+    assert folder.parent == places / "xdg" / "nscan-cli"
+
+
+def test_a_configured_place_goes_first(places, monkeypatch):
+    monkeypatch.setenv("XDG_CACHE_HOME", str(places / "xdg"))
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(places / "numba"))
+    folder = chosen()
+    assert folder is not None
+    assert folder.parent == places / "numba" / "nscan-cli"
+    assert not (places / "xdg").exists()
+
+
+def test_where_no_cache_can_be_written_a_private_temporary_folder_is_used(places, monkeypatch):
+    monkeypatch.setenv("XDG_CACHE_HOME", unwritable(places / "file"))
+    folder = chosen()
+    private = places / "temporary" / f"nscan-cli-{os.getuid()}"
+    assert folder is not None
+    assert folder.parent == private
+    assert private.stat().st_mode & 0o077 == 0
+
+
+def test_a_temporary_folder_that_others_can_write_is_not_trusted(places, monkeypatch):
+    monkeypatch.setenv("XDG_CACHE_HOME", unwritable(places / "file"))
+    private = places / "temporary" / f"nscan-cli-{os.getuid()}"
+    private.mkdir()
+    private.chmod(0o777)
+    assert chosen() is None
+    assert first_compile("_descend")
+    private.rmdir()
+    (places / "elsewhere").mkdir()
+    private.symlink_to(places / "elsewhere")
+    assert chosen() is None
+
+
+def test_a_changed_kernel_file_changes_the_folder_and_no_other_file_does(places, monkeypatch):
+    package = places / "nscan_cli"
+    shutil.copytree(folders.PACKAGE, package)
+    monkeypatch.setattr(folders, "PACKAGE", package)
+    before = chosen()
+    with (package / "cli" / "main.py").open("a") as file:
+        file.write("# changed\n")
+    assert chosen() == before
+    for maker in ("mapping/casting.py", "machine_code.py"):
+        with (package / maker).open("a") as file:
+            file.write("# changed\n")
+        assert chosen() not in (None, before)
+        before = chosen()
+
+
+def test_kernels_run_where_nothing_can_be_kept(places, monkeypatch):
+    monkeypatch.setenv("XDG_CACHE_HOME", unwritable(places / "file"))
+    monkeypatch.setattr("tempfile.tempdir", unwritable(places / "other"))
+    assert chosen() is None
+
+    @kernel
+    def twice(number: float) -> float:
+        return 2 * number
+
+    assert twice(1.5) == 3.0
