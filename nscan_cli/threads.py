@@ -43,6 +43,16 @@ def meanwhile(threads: int, function: Callable[[], Result]) -> Callable[[], Resu
     return future.result
 
 
+def called(function: Callable[[], Result]) -> Future[Result]:
+    """A call that is made here and now, as one that another thread has made: its error is kept in it."""
+    future: Future[Result] = Future()
+    try:
+        future.set_result(function())
+    except Exception as error:
+        future.set_exception(error)
+    return future
+
+
 class Beside:
     """Calls that are made one after another beside the caller's own work; at once if there is one thread.
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
+from functools import partial
 from types import TracebackType
 from typing import NamedTuple
 
@@ -18,6 +19,7 @@ from nscan_cli.slam.coverage import Coverage
 from nscan_cli.slam.keyframes import Keyframe, Route, extended
 from nscan_cli.slam.nearby import MatchNearby, Near, Nearby, choose_nearby
 from nscan_cli.slam.options import NScanOptions
+from nscan_cli.threads import called
 
 AHEAD = 2
 """So many matches are begun ahead of their turn."""
@@ -48,7 +50,17 @@ class Ahead:
         # What waits still is as well made here.
         if begun is None or not np.array_equal(begun.route.poses, route.poses) or begun.match.cancel():
             return self._match(route, centre, self._options)
+        if not begun.match.done():
+            self._make_next()
         return begun.match.result()
+
+    def _make_next(self) -> None:
+        """Make the first match that waits, in the time that another one takes."""
+        for keyframe, (route, near, match) in self._begun.items():
+            if match.cancel():
+                made = called(partial(self._match, route, keyframe, self._options))
+                self._begun[keyframe] = _Begun(route, near, made)
+                return
 
     def begin(
         self,

@@ -141,3 +141,30 @@ def test_an_error_is_raised_at_its_turn():
         begin(ahead, route, coming)
         with pytest.raises(ZeroDivisionError):
             ahead.match(extended(route, coming[0][:2], coming[1][:2]), 8)
+
+
+def test_who_waits_for_a_match_makes_the_next_one():
+    """Keyframe 8 is done when 10 is: with each thread idle while the other works, that would be never."""
+    made: dict[int, int] = {}
+    begun, done = threading.Event(), threading.Event()
+
+    def match(route: Route, centre: int, options: NScanOptions) -> Nearby | None:
+        assert centre not in made
+        made[centre] = threading.get_ident()
+        if centre == 10:
+            done.set()
+        else:
+            begun.set()
+            assert done.wait(60)
+        return Nearby((), None, None, float(centre), True)
+
+    route, coming = straight(10)
+    with Ahead(match, OPTIONS, 2) as ahead:
+        ahead.open()
+        begin(ahead, route, coming)
+        assert begun.wait(60)
+        for centre, joining in ((8, 2), (10, 4)):
+            found = ahead.match(extended(route, coming[0][:joining], coming[1][:joining]), centre)
+            assert found is not None
+            assert found.moved == centre
+    assert made[10] == threading.get_ident() != made[8]
