@@ -20,7 +20,6 @@ from nscan_cli.matching.joint_energy import (
     evaluate,
     neutral_energy,
 )
-from nscan_cli.matching.newton import DAMPED, JUMP
 from nscan_cli.matching.overlap import SOUND_OVERLAP, overlaps, weakest_link
 from nscan_cli.matching.unheld import back_to_priors
 from nscan_cli.poses import Array, wrap
@@ -28,6 +27,8 @@ from nscan_cli.poses import Array, wrap
 FIRST_DAMPING = 1e-3
 LEAST_DAMPING = 1e-8
 GREATEST_DAMPING = 1e4
+DAMPED = 1e-2
+"""After a step that is refused there is at least so much damping: less changes the next one hardly."""
 
 PairsAt = Callable[[Array], NDArray[np.int64]]
 """The index set J (m, 2) at the poses (n, 3)."""
@@ -253,12 +254,11 @@ def _descend(
             damping *= 10
             continue
         iterations += 1
-        longest = squared = 0.0
+        longest = 0.0
         for i in range(poses.shape[0]):
             for a in range(3):
                 trial[i, a] = poses[i, a] + step[i, a]
                 longest = max(longest, abs(step[i, a]))
-                squared -= gradient[3 * i + a] * step[i, a]
         converged = longest < tolerance
         if converged and damping <= FIRST_DAMPING:
             # So near that the value and the derivatives are known well enough.
@@ -274,7 +274,6 @@ def _descend(
             damping = max(0.1 * damping, LEAST_DAMPING)
         else:
             damping = max(damping * 10, DAMPED)
-            converged |= squared < JUMP**2
         if converged or damping > GREATEST_DAMPING:
             break
     return value, iterations, evaluations, converged

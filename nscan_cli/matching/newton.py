@@ -24,11 +24,6 @@ LEAST_DAMPING = 1e-7
 GREATEST_DAMPING = 1e6
 STALLED = 0.1
 """Share of the tolerance below which a damped step ends a stage."""
-DAMPED = 1e-2
-"""After a step that is refused there is at least so much damping: less changes the next one hardly."""
-JUMP = 0.3
-"""Standard deviations; a shorter step that is refused ends a stage. The energy jumps where a point gets
-into another cell, by more than such a step can win: what is refused there is refused again and again."""
 
 
 class PairProblem(NamedTuple):
@@ -87,10 +82,9 @@ def minimise(
 ) -> tuple[float, float, int, int, bool]:
     """Levenberg–Marquardt from `pose` (3,), in place, one stage for each entry of `widenings`.
 
-    A stage ends with a step that moves the pose by less than `tolerance` (m, rad), or with a short one that
-    is refused. Writes the last stage's semi-definite Hessian of the objective (3, 3). Returns the
-    objective's and E's value, iterations, evaluations, and whether the last stage converged. Hessian and
-    values are those before that last step.
+    A stage ends with a step that moves the pose by less than `tolerance` (m, rad). Writes the last stage's
+    semi-definite Hessian of the objective (3, 3). Returns the objective's and E's value, iterations,
+    evaluations, and whether the last stage converged. Hessian and values are those before that last step.
     """
     out, trial_out = np.empty(OUT), np.empty(OUT)
     gradient, step, trial = np.empty(3), np.empty(3), np.empty(3)
@@ -119,8 +113,6 @@ def minimise(
                 break
             trial_value = objective(problem, trial, widening, 0.0, trial_out, trial_gradient, trial_hessian)
             evaluations += 1
-            # A step that is short because it is damped says less.
-            converged = length < STALLED * tolerance
             if trial_value <= value:
                 value = trial_value
                 assign(pose, trial)
@@ -129,10 +121,9 @@ def minimise(
                 assign_rows(hessian, trial_hessian)
                 damping = max(damping * 0.1, LEAST_DAMPING)
             else:
-                damping = max(damping * 10.0, DAMPED)
-                # Half of it is what the step was expected to win.
-                squared = gradient[0] * step[0] + gradient[1] * step[1] + gradient[2] * step[2]
-                converged = converged or squared < JUMP**2
+                damping *= 10.0
+            # A step that is short because it is damped says less.
+            converged = length < STALLED * tolerance
             if converged or damping > GREATEST_DAMPING:
                 break
     return value, out[0], iterations, evaluations, converged

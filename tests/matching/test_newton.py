@@ -89,18 +89,3 @@ def test_a_moved_copy_is_brought_back(seed):
     assert np.abs(pose).max() < 0.03
     assert value == pytest.approx(SCALE * energy)
     assert np.linalg.eigvalsh(hessian)[0] > 0
-
-
-def test_jumps_of_the_energy_end_a_match_soon_and_near_the_minimum():
-    """A scan with noise: its points lie on borders of cells. From other starts it is the same place."""
-    for seed in range(5):
-        rng, points = np.random.default_rng(seed), room(seed)
-        other, found, evaluated = points + rng.normal(0, 0.02, points.shape), [], []
-        for start in rng.uniform(-1, 1, (6, 3)) * [0.1, 0.1, 0.02]:
-            pose, hessian, outcome = run(ndt_of(points), other, start, np.zeros(3), np.zeros((3, 3)))
-            found.append(pose)
-            evaluated.append(outcome[3])
-        off = np.array(found) - np.median(found, axis=0)
-        assert np.sqrt(np.einsum("ki,ij,kj->k", off, hessian, off)).max() < 1.0
-        # Three stages; each may take 30 and one more.
-        assert max(evaluated) < 60
