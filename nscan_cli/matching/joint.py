@@ -18,6 +18,7 @@ from nscan_cli.matching.joint_energy import (
     NEUTRAL,
     JointProblem,
     evaluate,
+    joint_energy,
     neutral_energy,
 )
 from nscan_cli.matching.overlap import SOUND_OVERLAP, overlaps, weakest_link
@@ -27,8 +28,6 @@ from nscan_cli.poses import Array, wrap
 FIRST_DAMPING = 1e-3
 LEAST_DAMPING = 1e-8
 GREATEST_DAMPING = 1e4
-DAMPED = 1e-2
-"""After a step that is refused there is at least so much damping: less changes the next one hardly."""
 
 PairsAt = Callable[[Array], NDArray[np.int64]]
 """The index set J (m, 2) at the poses (n, 3)."""
@@ -50,9 +49,6 @@ class JointOptions:
     """In the last stage."""
     tolerance: float = 1e-4
     """The match has converged when no pose moves by more (m, rad)."""
-    exact_end: bool = True
-    """Energy and derivatives are evaluated at the very end; or else those before the last step do, which is
-    shorter than the tolerance."""
     fixed: int | None = None
     """The scan that stays where it is; None leaves the gauge free (paper, III-D)."""
 
@@ -192,8 +188,9 @@ def _finish(problem: JointProblem, way: Way, options: JointOptions, neutral: boo
         gradient,
         hessian,
     )
-    if neutral or options.exact_end:
-        value = evaluate(problem, poses, 1.0, 1.0, False, 1, gradient, hessian)
+    if neutral:
+        # The derivatives are the same.
+        value = joint_energy(problem, poses).value
         evaluated += 1
     poses[:, 2] = wrap(poses[:, 2])
     return JointMatch(
@@ -235,8 +232,7 @@ def _descend(
 ) -> tuple[float, int, int, bool]:
     """One stage, from the poses (n, 3) in place: the value, iterations, evaluations, whether it converged.
 
-    Writes gradient (3n,) and Hessian (3n, 3n). Both and the value are those before the last step, where that
-    is shorter than the tolerance.
+    Writes gradient (3n,) and Hessian (3n, 3n) at the poses.
     """
     trial_gradient, trial_hessian = np.empty_like(gradient), np.empty_like(hessian)
     step, trial = np.empty_like(poses), np.empty_like(poses)
@@ -260,10 +256,6 @@ def _descend(
                 trial[i, a] = poses[i, a] + step[i, a]
                 longest = max(longest, abs(step[i, a]))
         converged = longest < tolerance
-        if converged and damping <= FIRST_DAMPING:
-            # So near that the value and the derivatives are known well enough.
-            assign_rows(poses, trial)
-            break
         there = evaluate(problem, trial, widening, curvature, neutral, stride, trial_gradient, trial_hessian)
         evaluations += 1
         if there <= value:
@@ -273,7 +265,7 @@ def _descend(
             assign_rows(hessian, trial_hessian)
             damping = max(0.1 * damping, LEAST_DAMPING)
         else:
-            damping = max(damping * 10, DAMPED)
+            damping *= 10
         if converged or damping > GREATEST_DAMPING:
             break
     return value, iterations, evaluations, converged
