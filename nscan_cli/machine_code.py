@@ -8,6 +8,7 @@ with the functions that it calls: the one that turns arrays into Python's object
 from __future__ import annotations
 
 import builtins
+import contextlib
 import ctypes
 import functools
 import hashlib
@@ -41,7 +42,7 @@ PICKLED_TYPE = re.compile(rb"\x80\x04\x95.{8}\x8c.([\w.]+)\x94\x8c.(\w+)\x94\x93
 def machine() -> str | None:
     """What machine code depends on beside its sources: the versions of what makes it, and the processor.
 
-    None where that is left to numba: it is told something special, or is not as it is known here.
+    None where kernels are left to numba: it is told something special, or is not as it is known here.
     """
     if any(name.startswith("NUMBA_") and name not in HARMLESS for name in os.environ):
         return None
@@ -59,15 +60,20 @@ def machine() -> str | None:
 def kept_in(name: str, kinds: object) -> Path | None:
     """The file for the machine code of a kernel for arguments of these kinds; None where nothing is kept."""
     folder, made_by = cache_folder(), machine()
-    if folder is None or made_by is None:
+    if folder is None or made_by is None or _unknown(folder, made_by).exists():
         return None
     return folder / f"{name}-{made_by}-{_digest(kinds)}{SUFFIX}"
 
 
+def _unknown(folder: Path, made_by: str) -> Path:
+    """The file that says: machine code of this numba cannot be kept here."""
+    return folder / f"left-to-numba-{made_by}"
+
+
 def first_compile(name: str) -> bool:
     """Whether the kernel `name` is still to be compiled: it is not in the cache folder, or there is none."""
-    folder = cache_folder()
-    kept = f"*.{name}-*.nbi" if machine() is None else f"*.{name}-{machine()}-*{SUFFIX}"
+    folder, file = cache_folder(), kept_in(name, None)
+    kept = f"*.{name}-*.nbi" if file is None else f"*.{name}-{machine()}-*{SUFFIX}"
     return folder is None or next(folder.rglob(kept), None) is None
 
 
@@ -76,16 +82,19 @@ def _digest(value: object) -> str:
 
 
 def keep(file: Path, compiled: Any) -> None:
-    """Write what numba has compiled (a CompileResult) to the file, unless something forbids it.
+    """Write what numba has compiled (a CompileResult) to the file, where there is room.
 
     The first line says as JSON what the code is called and needs, its check sum is the second, then comes
     the code.
     """
-    try:
-        head, code = _parts(compiled)
-        write_whole(str(file), b"%s\n%d\n%s" % (json.dumps(head).encode(), zlib.crc32(code), code))
-    except (NscanError, OSError, AttributeError, TypeError, ValueError):
-        return
+    with contextlib.suppress(NscanError, OSError):
+        try:
+            head, code = _parts(compiled)
+        except Exception:
+            # Another numba can raise anything. It keeps its code itself, from the next process on.
+            _unknown(file.parent, str(machine())).touch()
+        else:
+            write_whole(str(file), b"%s\n%d\n%s" % (json.dumps(head).encode(), zlib.crc32(code), code))
 
 
 def _parts(compiled: Any) -> tuple[dict[str, Any], bytes]:

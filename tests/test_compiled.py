@@ -190,6 +190,17 @@ def test_what_numba_is_told_holds(whole, setting):
     assert files(whole, "code") == before
 
 
+def test_code_of_an_unknown_numba_is_left_to_its_own_cache(tmp_path):
+    """It has renamed what is asked here: compiled in the first process, kept by numba in the second."""
+    swapped = "import nscan_cli.machine_code as m; m._parts = lambda compiled: compiled._renamed()\n"
+    assert report(tmp_path, swapped)[1:] == [True, False, RESULTS, True]
+    assert report(tmp_path, swapped)[3:] == [RESULTS, True]
+    kept = files(tmp_path, "nbc")
+    assert report(tmp_path, swapped)[1:] == [False, False, RESULTS, True]
+    assert files(tmp_path, "nbc") == kept
+    assert not files(tmp_path, "code")
+
+
 COMMANDS = """
 import sys
 from nscan_cli.cli.main import run

@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nscan_cli.compiled import inlined_kernel, kernel, lean_kernel, summing_kernel
-from nscan_cli.graph.pattern import Indices, Pattern
-from nscan_cli.poses import Array
+from nscan_cli.graph.pattern import Pattern
+from nscan_cli.poses import Array, Indices
 
 LEAST_PIVOT = 1e-12
 """A pivot below this share of the diagonal entry that it comes from counts as none."""

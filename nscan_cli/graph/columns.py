@@ -11,9 +11,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from nscan_cli.graph.pattern import Indices
 from nscan_cli.graph.relation import Relation, Term
-from nscan_cli.poses import Array
+from nscan_cli.poses import Array, Indices
 
 
 class Columns(NamedTuple):

@@ -12,9 +12,9 @@ import numpy as np
 from nscan_cli.graph.cholesky import factorise, solve
 from nscan_cli.graph.columns import Columns
 from nscan_cli.graph.optimise import FIRST_DAMPING, newton_step
-from nscan_cli.graph.pattern import Indices, block_targets
+from nscan_cli.graph.pattern import block_targets
 from nscan_cli.graph.system import GraphEnergy
-from nscan_cli.poses import Array
+from nscan_cli.poses import Array, Indices
 
 LEAST_SHARE = 1e-9
 """What information a direction gets at the least, as a share of the largest, so that all can be solved."""

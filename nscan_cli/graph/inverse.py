@@ -11,8 +11,8 @@ import numpy as np
 from nscan_cli.assign import assign_rows
 from nscan_cli.compiled import kernel, lean_kernel
 from nscan_cli.graph.cholesky import Factor, panel_of, rows_of, subtract_products
-from nscan_cli.graph.pattern import Indices, Pattern
-from nscan_cli.poses import Array
+from nscan_cli.graph.pattern import Pattern
+from nscan_cli.poses import Array, Indices
 
 
 def inverse_diagonal(factor: Factor) -> Array:

@@ -10,11 +10,9 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from nscan_cli.compiled import kernel, lean_kernel
-
-Indices = NDArray[np.int64]
+from nscan_cli.poses import Indices
 
 
 class Around(NamedTuple):

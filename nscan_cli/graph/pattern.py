@@ -9,12 +9,10 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from nscan_cli.compiled import kernel
 from nscan_cli.graph.ordering import order_of_little_fill
-
-Indices = NDArray[np.int64]
+from nscan_cli.poses import Indices
 
 
 class Pattern(NamedTuple):

@@ -9,9 +9,9 @@ import numpy as np
 from nscan_cli.graph.initialise import chordal_start
 from nscan_cli.graph.model import Graph
 from nscan_cli.graph.optimise import Optimum, optimise
-from nscan_cli.graph.pattern import Indices
 from nscan_cli.graph.relation import Relation
 from nscan_cli.graph.system import GraphEnergy
+from nscan_cli.poses import Indices
 
 TRIAL = 100
 """Iterations after which two starts are compared; only the better one goes on."""

@@ -10,10 +10,10 @@ import numpy as np
 
 from nscan_cli.compiled import kernel
 from nscan_cli.graph.columns import Columns, Terms
-from nscan_cli.graph.pattern import Indices, block_targets, find_pattern
+from nscan_cli.graph.pattern import block_targets, find_pattern
 from nscan_cli.graph.relation import Relation
 from nscan_cli.graph.terms import nscan_term, nscan_value
-from nscan_cli.poses import Array
+from nscan_cli.poses import Array, Indices
 
 
 class System(NamedTuple):

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from nscan_cli.graph.model import Loop, Pairwise
 from nscan_cli.graph.relation import Relation
 from nscan_cli.matching.search import SearchOptions
-from nscan_cli.poses import Array, compose, wrap
+from nscan_cli.poses import Array, Indices, compose, wrap
 from nscan_cli.slam.energies import Energies
 from nscan_cli.slam.keyframes import Route
 from nscan_cli.slam.nearby import MatchNearby, Nearby
@@ -29,7 +29,6 @@ from nscan_cli.slam.whereabouts import Reach, Whereabouts, with_slips
 NO_SECOND = "no second keyframe finds the same"
 LOST = "tracking has broken since: the place must be searched"
 
-Indices = NDArray[np.int64]
 Loops = Callable[[], list[Relation]]
 
 

@@ -14,9 +14,8 @@ from typing import NamedTuple
 import numpy as np
 
 from nscan_cli.graph.model import Pairwise
-from nscan_cli.graph.pattern import Indices
 from nscan_cli.ndt.grid import Ndt
-from nscan_cli.poses import Array, compose, relative
+from nscan_cli.poses import Array, Indices, compose, relative
 from nscan_cli.slam.options import GaussianOptions, KeyframeOptions
 from nscan_cli.slam.tracking import Tracked
 

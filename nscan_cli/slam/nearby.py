@@ -16,11 +16,10 @@ from nscan_cli.matching.joint import JointMatch, JointOptions, match_jointly
 from nscan_cli.matching.joint_energy import JointProblem, Priors, all_pairs, no_priors
 from nscan_cli.matching.overlap import held_together, overlaps, weakest_link
 from nscan_cli.matching.scans import Scans, lay_out
-from nscan_cli.poses import Array, compose, relative
+from nscan_cli.poses import Array, Indices, compose, relative
 from nscan_cli.slam.keyframes import Keyframe, Route, points_per_cell
 from nscan_cli.slam.options import NScanOptions
 
-Indices = NDArray[np.int64]
 LEAST_SCANS = 3
 """Two scans are what a pairwise relation is for."""
 POSSIBLE = 0.5

@@ -11,11 +11,10 @@ import numpy as np
 from nscan_cli.graph.marginals import marginal_covariances
 from nscan_cli.graph.model import Graph, Loop, NScan, Pairwise
 from nscan_cli.graph.optimise import optimise
-from nscan_cli.graph.pattern import Indices
 from nscan_cli.graph.relation import Relation
 from nscan_cli.graph.robust import contradicting
 from nscan_cli.logs.scan import LaserLog
-from nscan_cli.poses import Array
+from nscan_cli.poses import Array, Indices
 from nscan_cli.slam.ahead import Ahead
 from nscan_cli.slam.believed import believed_odometry, hanging
 from nscan_cli.slam.closing import Closing

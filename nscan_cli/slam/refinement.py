@@ -13,10 +13,10 @@ from dataclasses import replace
 import numpy as np
 
 from nscan_cli.graph.model import Loop, NScan, Pairwise
-from nscan_cli.poses import Array, relative, wrap
+from nscan_cli.poses import Array, Indices, relative, wrap
 from nscan_cli.slam.coverage import Coverage
 from nscan_cli.slam.keyframes import Route
-from nscan_cli.slam.nearby import Indices, MatchNearby, Near, Nearby, choose_nearby
+from nscan_cli.slam.nearby import MatchNearby, Near, Nearby, choose_nearby
 from nscan_cli.slam.options import NScanOptions
 from nscan_cli.threads import in_threads
 

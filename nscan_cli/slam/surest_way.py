@@ -13,9 +13,8 @@ import numpy as np
 
 from nscan_cli.compiled import kernel
 from nscan_cli.graph.model import Pairwise
-from nscan_cli.graph.pattern import Indices
 from nscan_cli.graph.relation import Relation
-from nscan_cli.poses import Array
+from nscan_cli.poses import Array, Indices
 from nscan_cli.slam.keyframes import Route
 
 LEVER = 20.0

@@ -12,9 +12,8 @@ from nscan_cli.compiled import kernel
 from nscan_cli.graph.cholesky import Factor, factorise, solve
 from nscan_cli.graph.inverse import inverse_diagonal
 from nscan_cli.graph.model import Pairwise
-from nscan_cli.graph.pattern import Indices
 from nscan_cli.graph.system import GraphEnergy
-from nscan_cli.poses import Array
+from nscan_cli.poses import Array, Indices
 
 
 class Reach(NamedTuple):

@@ -22,9 +22,9 @@ from nscan_cli.graph.optimise import (
     Optimum,
     newton_step,
 )
-from nscan_cli.graph.pattern import Indices, Pattern, block_targets
+from nscan_cli.graph.pattern import Pattern, block_targets
 from nscan_cli.graph.system import GraphEnergy, System
-from nscan_cli.poses import Array
+from nscan_cli.poses import Array, Indices
 from tests.experiments.mappings import Mapping, Relations, differences, grouped
 
 MAX_ITERATIONS, TOLERANCE = 200, 1e-6

@@ -9,8 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from nscan_cli.graph.model import NScan
-from nscan_cli.graph.pattern import Indices
-from nscan_cli.poses import Array, compose, inverse, wrap
+from nscan_cli.poses import Array, Indices, compose, inverse, wrap
 
 GRID = np.linspace(-np.pi, np.pi, 361)
 """Angles, from the mean one, among which the optimal one is sought."""

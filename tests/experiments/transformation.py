@@ -15,9 +15,8 @@ import numpy as np
 
 from nscan_cli.graph.model import Graph, NScan, Pairwise
 from nscan_cli.graph.optimise import Optimum, optimise
-from nscan_cli.graph.pattern import Indices
 from nscan_cli.logs.load import read_log
-from nscan_cli.poses import Array, compose, relative
+from nscan_cli.poses import Array, Indices, compose, relative
 from nscan_cli.slam.options import SlamOptions
 from nscan_cli.slam.pipeline import Slam
 from tests.data import find_data

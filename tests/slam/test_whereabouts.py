@@ -10,9 +10,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from nscan_cli.graph.model import NScan, Pairwise
-from nscan_cli.graph.pattern import Indices
 from nscan_cli.graph.system import GraphEnergy
-from nscan_cli.poses import Array, compose, relative, relative_jacobians
+from nscan_cli.poses import Array, Indices, compose, relative, relative_jacobians
 from nscan_cli.slam.whereabouts import Reach, Whereabouts, known, with_slips
 
 
