@@ -9,9 +9,10 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from nscan_cli.compiled import kernel
 from nscan_cli.counting import counted
 from nscan_cli.errors import WrongUsageError
-from nscan_cli.poses import Array, compose, transform
+from nscan_cli.poses import Array, Indices, compose, transform
 
 TOGETHER = 256
 """Scans whose points are computed at once."""
@@ -116,8 +117,11 @@ class LaserLog:
         """
         for first in range(0, len(self), TOGETHER):
             ends, usable = self._ends(slice(first, first + TOGETHER))
-            near = usable & (np.hypot(ends[..., 0], ends[..., 1]) < reach)
-            yield from np.split(ends[near], np.cumsum(near.sum(axis=1))[:-1])
+            points, stops = _near(ends, usable, reach)
+            begin = 0
+            for stop in stops.tolist():
+                yield points[begin:stop]
+                begin = stop
 
     def _ends(self, rows: slice) -> tuple[Array, NDArray[np.bool_]]:
         """The end points (R, B, 2) of the beams of some rows in the robot's frame, and which are usable."""
@@ -134,3 +138,18 @@ class LaserLog:
     def laser_pose(self, robot: Array) -> Array:
         """Poses (…, 3) of the laser for poses (…, 3) of the robot."""
         return compose(robot, self.mount)
+
+
+@kernel
+def _near(ends: Array, usable: NDArray[np.bool_], reach: float) -> tuple[Array, Indices]:
+    """The usable end points (m, 2) nearer than `reach` (m) of all (R, B, 2), and where each row ends (R,)."""
+    points, stops = np.empty((ends.shape[0] * ends.shape[1], 2)), np.empty(ends.shape[0], dtype=np.int64)
+    m = 0
+    for row in range(ends.shape[0]):
+        for beam in range(ends.shape[1]):
+            x, y = ends[row, beam, 0], ends[row, beam, 1]
+            if usable[row, beam] and np.hypot(x, y) < reach:
+                points[m, 0], points[m, 1] = x, y
+                m += 1
+        stops[row] = m
+    return points[:m], stops

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from nscan_cli.compiled import lean_kernel
+from nscan_cli.compiled import kernel, lean_kernel
 from nscan_cli.matching.planar import relative_pose
 from nscan_cli.matching.scans import Scans, scan_grid, scan_points
 from nscan_cli.ndt.energy import find_inliers
@@ -60,26 +60,35 @@ def _count(
         shares[j] = weight * seen.sum()
 
 
+@kernel
 def held_together(pairs: Array, least: float, scan: int) -> NDArray[np.bool_]:
     """(n,) the scans that hang together with `scan` by overlaps (n, n) of at least `least` either way."""
-    linked = np.maximum(pairs, pairs.T) >= least
-    reached = np.zeros(len(pairs), dtype=bool)
-    reached[scan] = True
-    while True:
-        further = reached | linked[reached].any(axis=0)
-        if (further == reached).all():
-            return reached
-        reached = further
+    n = pairs.shape[0]
+    reached = np.zeros(n, dtype=np.bool_)
+    waiting = np.empty(n, dtype=np.int64)
+    reached[scan], waiting[0], count = True, scan, 1
+    while count > 0:
+        count -= 1
+        i = waiting[count]
+        for j in range(n):
+            if not reached[j] and max(pairs[i, j], pairs[j, i]) >= least:
+                reached[j], waiting[count] = True, j
+                count += 1
+    return reached
 
 
+@kernel
 def weakest_link(pairs: Array) -> float:
     """The least overlap on the tree of greatest overlaps (n, n) that connects all scans, 0 for one scan."""
-    links = np.maximum(pairs, pairs.T)
-    best, weakest = links[0].copy(), np.inf
-    reached = np.arange(len(links)) == 0
-    for _ in range(len(links) - 1):
-        following = int(np.argmax(np.where(reached, -1.0, best)))
-        weakest = min(weakest, float(best[following]))
-        reached[following] = True
-        best = np.maximum(best, links[following])
-    return weakest if len(links) > 1 else 0.0
+    n = pairs.shape[0]
+    reached, best = np.zeros(n, dtype=np.bool_), np.zeros(n)
+    weakest, last = np.inf, 0
+    for _ in range(n - 1):
+        reached[last] = True
+        following = -1
+        for j in range(n):
+            best[j] = max(best[j], pairs[last, j], pairs[j, last])
+            if not reached[j] and (following < 0 or best[j] > best[following]):
+                following = j
+        weakest, last = min(weakest, best[following]), following
+    return weakest if n > 1 else 0.0

@@ -84,40 +84,60 @@ def choose_nearby(poses: Array, paths: Array, centre: int, options: NScanOptions
     unless the options leave these out. Of these the first take part: going round and round, what had other
     corridors in view would else make room for what sees the same once more.
     """
-    near, distances = _within(poses, centre, options.radius)
-    before = np.abs(paths[centre] - paths[near]) > options.recent
-    visits, old = 0, before & options.loops
-    if old.any():
-        numbers = _visit_numbers(paths[near[old]], options.recent)
-        visits = int(numbers[near[old] < centre].max(initial=-1)) + 1
-        old[old] = numbers < options.first_visits
-    by_distance = np.argsort(distances, kind="stable")
-    recent, others = (near[by_distance[mask[by_distance]]] for mask in (~before, old))
-    recent = recent[: options.max_scans - min(len(others), options.max_scans // 2)]
-    others = others[: options.max_scans - len(recent)]
-    chosen = np.sort(np.concatenate([others, recent]))
-    return Near(chosen, np.abs(paths[centre] - paths[chosen]) > options.recent, visits)
-
-
-def _visit_numbers(paths: Array, recent: float) -> Indices:
-    """(k,) which visit each of increasing lengths of path (k,) is of: more than `recent` (m) in between."""
-    numbers: Indices = np.concatenate([[0], np.cumsum(np.diff(paths) > recent)])
-    return numbers
+    near = _choose(
+        poses,
+        paths,
+        centre,
+        options.radius,
+        options.recent,
+        options.first_visits if options.loops else 0,
+        options.max_scans,
+    )
+    return Near(*near)
 
 
 @kernel
-def _within(poses: Array, centre: int, radius: float) -> tuple[Indices, Array]:
-    """The keyframes (n,) within the radius (m) of one, increasing, and their distances (n,)."""
+def _choose(
+    poses: Array,
+    paths: Array,
+    centre: int,
+    radius: float,
+    recent: float,
+    first_visits: int,
+    most: int,
+) -> tuple[Indices, NDArray[np.bool_], int]:
+    """What choose_nearby returns. Another visit is one more than `recent` (m) of path away from the last."""
     near, distances = np.empty(len(poses), dtype=np.int64), np.empty(len(poses))
-    n = 0
+    before, left_out = np.empty(len(poses), dtype=np.bool_), np.empty(len(poses), dtype=np.bool_)
+    n = visits = others = 0
+    visit, last = -1, -np.inf
     for k in range(len(poses)):
         dx, dy = poses[k, 0] - poses[centre, 0], poses[k, 1] - poses[centre, 1]
-        if abs(dx) <= radius and abs(dy) <= radius:
-            distance = np.sqrt(dx * dx + dy * dy)
-            if distance <= radius:
-                near[n], distances[n] = k, distance
-                n += 1
-    return near[:n].copy(), distances[:n].copy()
+        if abs(dx) > radius or abs(dy) > radius:
+            continue
+        distance = np.sqrt(dx * dx + dy * dy)
+        if distance > radius:
+            continue
+        near[n], distances[n] = k, distance
+        before[n] = left_out[n] = abs(paths[centre] - paths[k]) > recent
+        if before[n] and first_visits > 0:
+            visit += paths[k] - last > recent
+            last = paths[k]
+            left_out[n] = visit >= first_visits
+            others += not left_out[n]
+            if k < centre:
+                visits = visit + 1
+        n += 1
+    order, chosen = np.argsort(distances[:n], kind="mergesort"), np.zeros(n, dtype=np.bool_)
+    room = most - min(others, most // 2)
+    taken = 0
+    for of_before in (False, True):
+        for at in order:
+            if taken < room and before[at] == of_before and not left_out[at]:
+                chosen[at] = True
+                taken += 1
+        room = most
+    return near[:n][chosen], before[:n][chosen], visits
 
 
 def match_nearby(route: Route, centre: int, options: NScanOptions) -> Nearby | None:
