@@ -26,7 +26,7 @@ STALLED = 0.1
 """Share of the tolerance below which a damped step ends a stage."""
 DAMPED = 1e-2
 """After a step that is refused there is at least so much damping: less changes the next one hardly."""
-SETTLED = 0.04
+SETTLED = 0.02
 """Standard deviations; a shorter step ends the last stage,"""
 NEARLY = 0.3
 """and a stage before it one that is shorter than this and"""
