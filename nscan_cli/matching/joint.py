@@ -49,9 +49,6 @@ class JointOptions:
     """In the last stage."""
     tolerance: float = 1e-4
     """The match has converged when no pose moves by more (m, rad)."""
-    thorough: bool = True
-    """The energy is evaluated where the last step leads, too, which is shorter than the tolerance; or else it
-    and its derivatives are those before that step."""
     fixed: int | None = None
     """The scan that stays where it is; None leaves the gauge free (paper, III-D)."""
 
@@ -166,7 +163,6 @@ def _approach(
             options.gauge,
             options.approach_iterations,
             near,
-            options.thorough,
             *_derivatives(poses),
         )
         iterations += steps
@@ -189,7 +185,6 @@ def _finish(problem: JointProblem, way: Way, options: JointOptions, neutral: boo
         options.gauge,
         options.max_iterations,
         options.tolerance,
-        options.thorough,
         gradient,
         hessian,
     )
@@ -232,14 +227,12 @@ def _descend(
     fixed: int,
     max_iterations: int,
     tolerance: float,
-    thorough: bool,
     gradient: Array,
     hessian: Array,
 ) -> tuple[float, int, int, bool]:
     """One stage, from the poses (n, 3) in place: the value, iterations, evaluations, whether it converged.
 
-    Writes gradient (3n,) and Hessian (3n, 3n) at the poses. When it need not be `thorough`, these and the
-    value are those before the last step.
+    Writes gradient (3n,) and Hessian (3n, 3n) at the poses.
     """
     trial_gradient, trial_hessian = np.empty_like(gradient), np.empty_like(hessian)
     step, trial = np.empty_like(poses), np.empty_like(poses)
@@ -263,10 +256,6 @@ def _descend(
                 trial[i, a] = poses[i, a] + step[i, a]
                 longest = max(longest, abs(step[i, a]))
         converged = longest < tolerance
-        if converged and damping <= FIRST_DAMPING and not thorough:
-            # So near that the value and the derivatives are known well enough.
-            assign_rows(poses, trial)
-            break
         there = evaluate(problem, trial, widening, curvature, neutral, stride, trial_gradient, trial_hessian)
         evaluations += 1
         if there <= value:

@@ -24,17 +24,6 @@ LEAST_DAMPING = 1e-7
 GREATEST_DAMPING = 1e6
 STALLED = 0.1
 """Share of the tolerance below which a damped step ends a stage."""
-DAMPED = 1e-2
-"""After a step that is refused there is at least so much damping: less changes the next one hardly."""
-SETTLED = 0.02
-"""Standard deviations; a shorter step ends the last stage,"""
-NEARLY = 0.3
-"""and a stage before it one that is shorter than this and"""
-NEAR = 1e-3
-"""m, rad."""
-JUMP = 0.3
-"""Standard deviations; a shorter step that is refused ends a stage. The energy jumps where a point gets into
-another cell, by more than such a step can win: what is refused there is refused again and again."""
 
 
 class PairProblem(NamedTuple):
@@ -89,26 +78,20 @@ def minimise(
     widenings: Array,
     max_iterations: int,
     tolerance: float,
-    thorough: bool,
     hessian: Array,
 ) -> tuple[float, float, int, int, bool]:
     """Levenberg–Marquardt from `pose` (3,), in place, one stage for each entry of `widenings`.
 
-    A stage ends with a step that moves the pose by less than `tolerance` (m, rad). Unless it shall be
-    `thorough`, it also ends with one that is short as against what the scan tells: a fifth of the evaluations
-    lead as near to the truth. Writes the last stage's semi-definite Hessian of the objective (3, 3). Returns
-    the objective's and E's value, iterations, evaluations, and whether the last stage converged. Hessian and
-    values are those before that last step.
+    A stage ends with a step that moves the pose by less than `tolerance` (m, rad). Writes the last stage's
+    semi-definite Hessian of the objective (3, 3). Returns the objective's and E's value, iterations,
+    evaluations, and whether the last stage converged. Hessian and values are those before that last step.
     """
     out, trial_out = np.empty(OUT), np.empty(OUT)
     gradient, step, trial = np.empty(3), np.empty(3), np.empty(3)
     trial_gradient, trial_hessian, damped = np.empty(3), np.empty((3, 3)), np.empty((3, 3))
-    jump, damped_least = (0.0, 0.0) if thorough else (JUMP, DAMPED)
     value, iterations, evaluations, converged = 0.0, 0, 0, False
     for stage in range(widenings.shape[0]):
-        widening, settled, near = widenings[stage], 0.0, 0.0
-        if not thorough:
-            settled, near = (NEARLY, NEAR) if stage < widenings.shape[0] - 1 else (SETTLED, np.inf)
+        widening = widenings[stage]
         value = objective(problem, pose, widening, 0.0, out, gradient, hessian)
         evaluations += 1
         damping = FIRST_DAMPING
@@ -123,18 +106,13 @@ def minimise(
             for a in range(3):
                 trial[a] = pose[a] - step[a]
             length = max(abs(step[0]), abs(step[1]), abs(step[2]))
-            # In standard deviations; half its square is what the step is expected to win.
-            squared = gradient[0] * step[0] + gradient[1] * step[1] + gradient[2] * step[2]
-            is_short = length < tolerance or (length < near and squared < settled**2)
-            if is_short and damping <= FIRST_DAMPING:
+            if length < tolerance and damping <= FIRST_DAMPING:
                 # So near that the value and the Hessian are known well enough.
                 assign(pose, trial)
                 converged = True
                 break
             trial_value = objective(problem, trial, widening, 0.0, trial_out, trial_gradient, trial_hessian)
             evaluations += 1
-            # A step that is short because it is damped says less.
-            converged = length < STALLED * tolerance
             if trial_value <= value:
                 value = trial_value
                 assign(pose, trial)
@@ -143,8 +121,9 @@ def minimise(
                 assign_rows(hessian, trial_hessian)
                 damping = max(damping * 0.1, LEAST_DAMPING)
             else:
-                damping = max(damping * 10.0, damped_least)
-                converged = converged or squared < jump**2
+                damping *= 10.0
+            # A step that is short because it is damped says less.
+            converged = length < STALLED * tolerance
             if converged or damping > GREATEST_DAMPING:
                 break
     return value, out[0], iterations, evaluations, converged

@@ -260,7 +260,6 @@ def _match(
         near=NEAR,
         max_iterations=options.max_iterations,
         tolerance=options.tolerance,
-        thorough=False,
     )
     scale = scale_of([route.keyframes[k] for k in members], options)
     return match_jointly(JointProblem(scans, all_pairs(len(members)), priors, scale), start, joint)

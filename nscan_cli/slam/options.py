@@ -101,9 +101,7 @@ class KeyframeOptions:
     information_scale: float = 0.8
     """The Hessian of tracking is weighed by so much: neighbouring scans make the same errors."""
     drift: float = 0.0025
-    """Standard deviation m/√m that no match shows;"""
-    drift_alone: float = 0.02
-    """and without odometry, where a bare corridor holds the robot back by a tenth and more."""
+    """Standard deviation m/√m that no match shows."""
     drift_angle: float = 0.001
     """rad/√m"""
 

@@ -77,7 +77,7 @@ def _match(route: Route, other: int, centre: int, options: NScanOptions) -> _Sin
     for widenings in options.attempts:
         pose, hessian = start.copy(), np.empty((3, 3))
         problem = PairProblem(reference.grid, reference.half, begin(points), scale, prior)
-        minimise(problem, pose, np.array(widenings), options.max_iterations, options.tolerance, True, hessian)
+        minimise(problem, pose, np.array(widenings), options.max_iterations, options.tolerance, hessian)
         pose[2] = wrap(pose[2])
         moved = moved_by(np.stack([origin, start]), np.stack([origin, pose]), 1)
         overlap = _overlap(keyframes[other], keyframes[centre], pose)

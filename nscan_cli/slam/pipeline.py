@@ -54,10 +54,7 @@ class Slam:
         self.hanging = frozenset(hanging(log, self.odometry).tolist())
         seen = log.ranges[log.ranges < options.tracking.reach]
         median_range = float(np.median(seen)) if len(seen) else 0.0
-        keyframes = options.keyframes
-        if log.odometry is None:
-            keyframes = dataclasses.replace(keyframes, drift=keyframes.drift_alone)
-        self.keyframes = Keyframes(keyframes, options.nscan.gaussians, median_range)
+        self.keyframes = Keyframes(options.keyframes, options.nscan.gaussians, median_range)
         self.tracked: list[Array] = []
         self.anchors: list[int] = []
         self.breaks: list[int] = []
@@ -126,7 +123,7 @@ class Slam:
             keyframe = self.keyframes.add(scan.row, scan.points, scan.tracked)
             if len(self.keyframes) > 1:
                 before = self.keyframes.list[-2]
-                self.steps.append(relation_between(before, keyframe, self.keyframes.options))
+                self.steps.append(relation_between(before, keyframe, self.options.keyframes))
         else:
             self.keyframes.attach(scan.points, scan.tracked)
         self.tracked.append(scan.tracked.pose)

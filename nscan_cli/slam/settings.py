@@ -18,16 +18,12 @@ class Settings(NamedTuple):
     """Side (m) of a lattice cell of the map."""
     minimum: float
     floor: float
-    faces: bool
-    """Whether each face of a wall on the map is a Gaussian of its own. Without odometry none is: exact ones
-    hold the robot where it is in corridors that come into view, as nothing else does."""
+    faces: bool  # of walls: see make_gaussian
     window: float
     step: float
     widenings: Array
     max_iterations: int
     tolerance: float
-    thorough: bool
-    """As in minimise. Without odometry a start is a guess, and now and then the longer way the right one."""
     scale: float
     inlier_bound: float
     inlier_share: float
@@ -35,20 +31,19 @@ class Settings(NamedTuple):
     steady_motion: Motion
 
     @classmethod
-    def of(cls, options: TrackingOptions, odometry: bool = True) -> Settings:
-        """Those of the options, for scans with odometry or without."""
+    def of(cls, options: TrackingOptions, faces: bool = True) -> Settings:
+        """Those of the options."""
         gaussians = options.gaussians
         return cls(
             0.5 * gaussians.cell,
             float(gaussians.minimum),
             gaussians.floor,
-            odometry,
+            faces,
             options.window,
             options.step,
             np.array(options.widenings),
             options.max_iterations,
             options.tolerance,
-            not odometry,
             options.scale,
             options.inlier_bound,
             options.inlier_share,

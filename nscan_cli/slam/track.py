@@ -122,7 +122,7 @@ def match_and_count(
     meeting = begin(points)
     problem = PairProblem(grid, half, meeting, scale, prior)
     value, _, _, _, _ = minimise(
-        problem, pose, widenings, settings.max_iterations, settings.tolerance, settings.thorough, hessian
+        problem, pose, widenings, settings.max_iterations, settings.tolerance, hessian
     )
     meet_again(grid, half, meeting, pose[0], pose[1], pose[2])
     return value, count_inliers(meeting, settings.inlier_bound) / max(points.shape[0], 1)

@@ -74,14 +74,14 @@ class Match(NamedTuple):
 
 
 class Tracker:
-    """Follows the robot from scan to scan; `odometry` tells whether there is any."""
+    """Follows the robot from scan to scan; `faces` as in Settings."""
 
-    def __init__(self, options: TrackingOptions, odometry: bool = True) -> None:
+    def __init__(self, options: TrackingOptions, faces: bool = True) -> None:
         self.options = options
         gaussians = options.gaussians
         self.map = Ndt(gaussians.cell, gaussians.minimum, gaussians.floor, capacity=1 << 14)
         self.restarts = self.searches = 0
-        self._settings = Settings.of(options, odometry)
+        self._settings = Settings.of(options, faces)
         self._track = Track.begin(options.steady_scans + 1)
         self._prior = Prior(np.zeros(3), np.zeros((3, 3)))
 
