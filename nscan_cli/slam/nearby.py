@@ -84,16 +84,8 @@ def choose_nearby(poses: Array, paths: Array, centre: int, options: NScanOptions
     unless the options leave these out. Of these the first take part: going round and round, what had other
     corridors in view would else make room for what sees the same once more.
     """
-    near = _choose(
-        poses,
-        paths,
-        centre,
-        options.radius,
-        options.recent,
-        options.first_visits if options.loops else 0,
-        options.max_scans,
-    )
-    return Near(*near)
+    first = options.first_visits if options.loops else 0
+    return Near(*_choose(poses, paths, centre, options.radius, options.recent, first, options.max_scans))
 
 
 @kernel
