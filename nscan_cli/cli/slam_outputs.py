@@ -91,7 +91,7 @@ class Outputs:
             )
         image = None
         if scans is not None and self.map is not None:
-            image = meanwhile(threads, partial(_drawn, scans, rows, graph.poses))
+            image = meanwhile(threads, partial(_drawn, scans, rows, graph.poses, threads))
         write_whole(self.graph, write_graph(graph))
         if self.trajectory is not None:
             from nscan_cli.graph.tum import write_tum
@@ -123,12 +123,12 @@ class Outputs:
         return f"{targets}:{prerequisites}\n".encode()
 
 
-def _drawn(scans: LaserLog, rows: NDArray[np.int64], poses: Array) -> MapImage:
+def _drawn(scans: LaserLog, rows: NDArray[np.int64], poses: Array, threads: int) -> MapImage:
     """The map; the counts that it is made of, and what else came before, make room for it."""
     from nscan_cli.mapping.image import map_image
     from nscan_cli.mapping.occupancy import occupancy_grid
     from nscan_cli.memory import trim
 
-    grid = occupancy_grid(scans, rows, poses)
+    grid = occupancy_grid(scans, rows, poses, threads=threads)
     trim()
     return map_image(grid)

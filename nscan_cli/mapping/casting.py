@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from nscan_cli.compiled import kernel, lean_kernel
 from nscan_cli.poses import Array
+from nscan_cli.threads import in_threads
 
 TILE = 32
 """Cells along the side of a tile."""
@@ -44,17 +45,31 @@ class Scans(NamedTuple):
 
 
 def counted(
-    scans: Scans, reach: float, shape: tuple[int, int], resolution: float, left: int, bottom: int
+    scans: Scans,
+    reach: float,
+    shape: tuple[int, int],
+    resolution: float,
+    left: int,
+    bottom: int,
+    threads: int,
 ) -> Tiles:
     """How the beams of all scans, up to `reach` (m), meet the cells of a grid of `shape` (H, W).
 
     Its cell (0, 0) has its lower left corner at (left, bottom) · resolution; no beam may leave it.
     """
-    index = np.full((-(-shape[0] // TILE), -(-shape[1] // TILE)), -1, dtype=np.int32)
-    # There is room for all tiles, but only those that are written to take any memory: the first ones.
-    counts = np.zeros((index.size, 2, TILE, TILE), dtype=np.int32)
-    _cast(scans, reach, resolution, left, bottom, Tiles(index, counts))
-    return Tiles(index, counts)
+
+    def cast(some: NDArray[np.int64]) -> Tiles:
+        index = np.full((-(-shape[0] // TILE), -(-shape[1] // TILE)), -1, dtype=np.int32)
+        # There is room for all tiles, but only those that are written to take any memory: the first ones.
+        tiles = Tiles(index, np.zeros((index.size, 2, TILE, TILE), dtype=np.int32))
+        part = scans._replace(rows=scans.rows[some], lasers=scans.lasers[some])
+        _cast(part, reach, resolution, left, bottom, tiles)
+        return tiles
+
+    whole, *others = in_threads(threads, cast, np.array_split(np.arange(len(scans.rows)), threads))
+    for tiles in others:
+        _add(tiles, whole)
+    return whole
 
 
 @kernel
@@ -103,6 +118,23 @@ def _cast(scans: Scans, reach: float, resolution: float, left: int, bottom: int,
             if r <= reach:
                 hit, used = _hits(tiles.numbers, int(end_y), int(end_x), used)
                 counts[np.uint64(hit)] += 1
+
+
+@kernel
+def _add(tiles: Tiles, whole: Tiles) -> None:
+    """Add the counts of tiles to those of others in the same grid."""
+    counts, sums = tiles.counts.reshape(-1, 2 * TILE * TILE), whole.counts.reshape(-1, 2 * TILE * TILE)
+    used = np.count_nonzero(whole.numbers >= 0)
+    for row in range(tiles.numbers.shape[0]):
+        for column in range(tiles.numbers.shape[1]):
+            number = tiles.numbers[row, column]
+            if number < 0:
+                continue
+            if whole.numbers[row, column] < 0:
+                whole.numbers[row, column] = used
+                used += 1
+            for k in range(2 * TILE * TILE):
+                sums[whole.numbers[row, column], k] += counts[number, k]
 
 
 @lean_kernel

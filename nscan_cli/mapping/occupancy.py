@@ -130,7 +130,11 @@ def _tiled(hits: NDArray[np.int32], misses: NDArray[np.int32]) -> Tiles:
 
 
 def occupancy_grid(
-    log: LaserLog, rows: NDArray[np.int64], poses: Array, resolution: float = RESOLUTION
+    log: LaserLog,
+    rows: NDArray[np.int64],
+    poses: Array,
+    resolution: float = RESOLUTION,
+    threads: int = 1,
 ) -> OccupancyGrid:
     """The grid of the scans in `rows` (N,) of the log, taken at the robot's `poses` (N, 3).
 
@@ -157,7 +161,7 @@ def occupancy_grid(
             f"of {resolution:g} m, more than {most:,.0f}; {remedy}, or set {MAP_CELLS.variable} higher"
         )
     shape, corner = (height, width), (left * resolution, bottom * resolution)
-    tiles = counted(scans, REACH, shape, resolution, left, bottom)
+    tiles = counted(scans, REACH, shape, resolution, left, bottom, threads)
     return OccupancyGrid.of_tiles(tiles, shape, resolution, corner)
 
 
