@@ -122,11 +122,11 @@ def _refuse_constant(constant: str) -> NoReturn:
 
 
 def _node_records(graph: Graph) -> Iterator[str]:
-    """The nodes in JSON. There is one for every scan, and an object made of each would take four times as long."""
+    """The nodes in JSON. There is one for every scan, and objects made of them would take four times as long."""
     poses = _each_pose(graph.poses)
-    odometry = itertools.repeat(None) if graph.odometry is None else _each_pose(graph.odometry)
+    odometry = itertools.repeat(None, len(graph)) if graph.odometry is None else _each_pose(graph.odometry)
     scans, anchors = graph.scans.tolist(), graph.anchors.tolist()
-    each = zip(scans, graph.stamps, poses, odometry, anchors)
+    each = zip(scans, graph.stamps, poses, odometry, anchors, strict=True)
     for node, (scan, stamp, (x, y, angle), sensed, anchor) in enumerate(each):
         pose = f'"pose":[{x!r},{y!r},{angle!r}]'
         if sensed is not None:

@@ -99,9 +99,9 @@ def floats(text: bytes) -> Array | None:
 def _plain_decimals(text: NDArray[np.uint8], values: Array) -> int:
     """Write the numbers of a text to `values`: how many, or −1 where it has others than plain decimals.
 
-    Both a whole number below 2⁵³ and a power of ten up to 10²² are exact, and so their quotient is the nearest
-    there is (W. Clinger, "How to Read Floating Point Numbers Accurately", PLDI 1990). Exponents are not
-    plain, and neither are more digits.
+    Both a whole number below 2⁵³ and a power of ten up to 10²² are exact, so that their quotient is the
+    nearest there is (W. Clinger, "How to Read Floating Point Numbers Accurately", PLDI 1990). Exponents are
+    not plain, and neither are more digits.
     """
     powers = np.ones(MOST_PLACES + 1)
     for k in range(MOST_PLACES):

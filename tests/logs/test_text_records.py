@@ -5,7 +5,6 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from nscan_cli.logs import text_records
 from nscan_cli.logs.text_records import LONG, floats
 
 plain = st.from_regex(r"[+-]?([0-9]{1,15}(\.[0-9]{0,6})?|\.[0-9]{1,22})", fullmatch=True)
@@ -50,7 +49,7 @@ def test_numpy_is_asked_only_where_numbers_are_not_plain(monkeypatch: pytest.Mon
     def refuse(*_arguments: object, **_options: object) -> None:
         raise AssertionError("the kernel should have read it")
 
-    monkeypatch.setattr(text_records.np, "fromstring", refuse)
+    monkeypatch.setattr(np, "fromstring", refuse)
     assert floats(long_text(["1076354563.123456", "-0.000", "81.83"], " ")) is not None
     with pytest.raises(AssertionError):
         floats(long_text(["1e5"], " "))
