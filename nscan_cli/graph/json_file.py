@@ -122,7 +122,7 @@ def _refuse_constant(constant: str) -> NoReturn:
 
 
 def _node_records(graph: Graph) -> Iterator[str]:
-    """The nodes in JSON. There is one for every scan, and objects made of them would take four times as long."""
+    """The nodes in JSON. There is one for every scan, and objects made of them would take longer."""
     poses = _each_pose(graph.poses)
     odometry = itertools.repeat(None, len(graph)) if graph.odometry is None else _each_pose(graph.odometry)
     scans, anchors = graph.scans.tolist(), graph.anchors.tolist()
