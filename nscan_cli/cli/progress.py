@@ -23,7 +23,7 @@ def announce_compiling(kernel: str, quiet: bool) -> bool:
 
     compiling = first_compile(kernel)
     if compiling:
-        say("compiling the kernels, once for this version on this machine: about 45 s", quiet)
+        say("compiling the kernels, once for this version on this machine: a minute or two", quiet)
     return compiling
 
 
