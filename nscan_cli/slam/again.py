@@ -17,7 +17,7 @@ from nscan_cli.graph.model import Graph, Pairwise
 from nscan_cli.logs.scan import LaserLog
 from nscan_cli.matching.priors import odometry_prior
 from nscan_cli.poses import relative
-from nscan_cli.slam.closing import NO_SECOND
+from nscan_cli.slam.closing import NO_SECOND, SO_FAR_OFF
 from nscan_cli.slam.keyframes import route_of
 from nscan_cli.slam.nearby import Nearby
 from nscan_cli.slam.options import Relations, SlamOptions
@@ -27,7 +27,7 @@ from nscan_cli.slam.tracking import Tracked
 
 LEAST_VALUE, LARGEST_VALUE, MOST_VALUES = 1e-9, 1e9, 10
 """What a parameter can be, and how many values a list of them can have."""
-SEARCHED = (AMBIGUOUS, ELSEWHERE, NO_MATCH, NO_SECOND)
+SEARCHED = (AMBIGUOUS, ELSEWHERE, NO_MATCH, NO_SECOND, SO_FAR_OFF)
 """Verdicts of the search for large loops, which is not made again: they stay."""
 
 

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from nscan_cli.graph.model import Loop, Pairwise
 from nscan_cli.graph.relation import Relation
 from nscan_cli.matching.search import SearchOptions
-from nscan_cli.poses import Array, Indices, compose, wrap
+from nscan_cli.poses import Array, Indices, compose, relative, wrap
 from nscan_cli.slam.energies import Energies
 from nscan_cli.slam.keyframes import Route
 from nscan_cli.slam.nearby import MatchNearby, Nearby
@@ -27,6 +27,7 @@ from nscan_cli.slam.surest_way import Linked, surest_ways
 from nscan_cli.slam.whereabouts import Reach, Whereabouts, with_slips
 
 NO_SECOND = "no second keyframe finds the same"
+SO_FAR_OFF = "too few keyframes find the same, farther off than the path drifts"
 LOST = "tracking has broken since: the place must be searched"
 
 Loops = Callable[[], list[Relation]]
@@ -42,7 +43,7 @@ class Closing:
         self.way: list[Pairwise] = []
         """The chain, with slips allowed for."""
         self._refused: list[Loop] = []
-        self._waiting: list[Place] = []
+        self._waiting: list[tuple[Place, str]] = []
         self._whereabouts, self._linked = Whereabouts(), Linked()
         self._searched = -np.inf
 
@@ -78,13 +79,29 @@ class Closing:
         place = self._search(route, centre, near, reach)
         if place is None:
             return []
-        agreeing = [*(other for other in self._waiting if self._agree(other, place, route)), place]
-        lost = self.is_lost(reach)[place.old]
-        if len(agreeing) < (self.options.agreeing_lost if lost else self.options.agreeing):
-            self._waiting.append(place)
+        agreeing = [*(other for other, _ in self._waiting if self._agree(other, place, route)), place]
+        reason = self._why_too_few(agreeing, route, reach)
+        if reason is not None:
+            self._waiting.append((place, reason))
             return []
-        self._waiting = [other for other in self._waiting if other not in agreeing]
+        self._waiting = [each for each in self._waiting if each[0] not in agreeing]
         return agreeing
+
+    def _why_too_few(self, agreeing: list[Place], route: Route, reach: Reach) -> str | None:
+        """Why keyframes that agree on a place are too few, or None; `reach` is that of the last of them.
+
+        A place that is farther off than the path drifts is mostly one that looks alike, while the right one
+        has never been seen. What looks alike ends somewhere: scans far apart have to agree there.
+        """
+        options, place, first = self.options, agreeing[-1], agreeing[0]
+        lost = bool(self.is_lost(reach)[place.old])
+        off = relative(route.poses[place.centre], route.poses[place.old]) - place.measured
+        likely = max(options.likely * reach.distance[place.old], options.slip)
+        surprises = not lost and np.hypot(off[0], off[1]) > likely
+        if len(agreeing) < (options.agreeing_lost if lost or surprises else options.agreeing):
+            return SO_FAR_OFF if surprises else NO_SECOND
+        share_scans = route.paths[place.centre] - route.paths[first.centre] < 2 * options.beside
+        return SO_FAR_OFF if surprises and share_scans else None
 
     def why_doubted(
         self,
@@ -141,8 +158,10 @@ class Closing:
 
     def refused(self) -> list[Loop]:
         """The verdicts on what was not accepted."""
-        waiting = [place.nearby.loop for place in self._waiting if place.nearby.loop is not None]
-        return self._refused + [replace(loop, accepted=False, reason=NO_SECOND) for loop in waiting]
+        waiting = [(place.nearby.loop, reason) for place, reason in self._waiting]
+        return self._refused + [
+            replace(loop, accepted=False, reason=reason) for loop, reason in waiting if loop is not None
+        ]
 
     def _near(self, route: Route, centre: int, reach: Reach) -> Indices:
         """The older keyframes that may be near, but may be too far off for a joint match."""

@@ -188,7 +188,11 @@ class ClosingOptions:
     agreeing: int = 2
     """How many keyframes must agree;"""
     agreeing_lost: int = 3
-    """when the track has broken, where rooms alike are not told apart by how far they are."""
+    """when the track has broken, where rooms alike are not told apart by how far they are;"""
+    likely: float = 2.5
+    """or when they are off by more standard deviations than this,"""
+    slip: float = 5.0
+    """and by more (m) than tracking slips: then, too, the first and the last of them may share no scans."""
 
 
 @dataclass(frozen=True)

@@ -9,13 +9,13 @@ import pytest
 
 from nscan_cli.graph.model import Loop, Pairwise
 from nscan_cli.poses import compose, relative
-from nscan_cli.slam.closing import NO_SECOND, Closing
+from nscan_cli.slam.closing import NO_SECOND, SO_FAR_OFF, Closing
 from nscan_cli.slam.energies import Energies
 from nscan_cli.slam.keyframes import route_of
 from nscan_cli.slam.nearby import Nearby, match_nearby
 from nscan_cli.slam.options import ClosingOptions, NScanOptions
 from nscan_cli.slam.pairs_nearby import match_pairs_nearby
-from nscan_cli.slam.place import AMBIGUOUS, OUTDONE, TOO_LITTLE
+from nscan_cli.slam.place import AMBIGUOUS, OUTDONE, TOO_LITTLE, Place
 from tests.slam.drives import (
     CABINETS,
     ROUND,
@@ -132,6 +132,25 @@ def test_a_twin_farther_off_than_tracking_can_be_is_not_taken_for_the_place():
     for place in places:
         off = place.measured - relative(same.truth[place.centre], same.truth[place.old])
         assert np.abs(off[:2]).max() < 0.05
+
+
+def test_what_is_farther_off_than_the_path_drifts_must_be_seen_from_scans_far_apart():
+    """A corridor beside the one driven first: taken for a slip of 9 m, two keyframes 3 m apart would do."""
+    twin, beside = twin_drive(), ClosingOptions().beside
+
+    def span(places: list[Place]) -> float:
+        first, last = (twin.keyframes[place.centre].tracked.path for place in (places[0], places[-1]))
+        return last - first
+
+    hasty = closed_along(closing(ClosingOptions(least=9.0, slip=9.0)), twin)[0][1]
+    assert len(hasty) == 2
+    assert span(hasty) < 2 * beside
+    late = closed_along(closing(ClosingOptions(least=9.0)), twin)[0][1]
+    assert len(late) >= 3
+    assert span(late) >= 2 * beside
+    waits = closing(ClosingOptions(least=9.0))
+    assert closed_along(waits, twin, until=late[-2].centre) == []
+    assert {loop.reason for loop in waits.refused()} == {SO_FAR_OFF}
 
 
 # ----------------------------------------------------------------------------- where is searched
