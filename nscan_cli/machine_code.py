@@ -34,6 +34,8 @@ from nscan_cli.outputs import write_whole
 HARMLESS = {"NUMBA_CACHE_DIR", "NUMBA_NUM_THREADS"}
 """Settings of numba that change nothing in a kernel's machine code."""
 SUFFIX = ".code"
+LEFT = ".left"
+"""Suffix of an empty file that says: this kernel's code cannot be kept here, and is left to numba."""
 PICKLED_TYPE = re.compile(rb"\x80\x04\x95.{8}\x8c.([\w.]+)\x94\x8c.(\w+)\x94\x93\x94\.", re.DOTALL)
 """A class or type as pickle's protocol 4 writes it: by the name of its module and its own."""
 
@@ -58,22 +60,18 @@ def machine() -> str | None:
 
 
 def kept_in(name: str, kinds: object) -> Path | None:
-    """The file for the machine code of a kernel for arguments of these kinds; None where nothing is kept."""
+    """The file for the machine code of a kernel for arguments of these kinds; None where it is not kept."""
     folder, made_by = cache_folder(), machine()
-    if folder is None or made_by is None or _unknown(folder, made_by).exists():
+    if folder is None or made_by is None:
         return None
-    return folder / f"{name}-{made_by}-{_digest(kinds)}{SUFFIX}"
-
-
-def _unknown(folder: Path, made_by: str) -> Path:
-    """The file that says: machine code of this numba cannot be kept here."""
-    return folder / f"left-to-numba-{made_by}"
+    file = folder / f"{name}-{made_by}-{_digest(kinds)}{SUFFIX}"
+    return None if file.with_suffix(LEFT).exists() else file
 
 
 def first_compile(name: str) -> bool:
     """Whether the kernel `name` is still to be compiled: it is not in the cache folder, or there is none."""
     folder, file = cache_folder(), kept_in(name, None)
-    kept = f"*.{name}-*.nbi" if file is None else f"*.{name}-{machine()}-*{SUFFIX}"
+    kept = f"*.{name}-*.nbi" if file is None else f"*.{name}-{machine()}-*"
     return folder is None or next(folder.rglob(kept), None) is None
 
 
@@ -92,7 +90,7 @@ def keep(file: Path, compiled: Any) -> None:
             head, code = _parts(compiled)
         except Exception:
             # Another numba can raise anything. It keeps its code itself, from the next process on.
-            _unknown(file.parent, str(machine())).touch()
+            file.with_suffix(LEFT).touch()
         else:
             write_whole(str(file), b"%s\n%d\n%s" % (json.dumps(head).encode(), zlib.crc32(code), code))
 
