@@ -17,8 +17,8 @@ from nscan_cli.logs.skips import Skips
 from nscan_cli.poses import Array
 
 CHUNK = 1024
-LONG = 1 << 16
-"""Bytes; to load a kernel for less takes longer than the work."""
+LONG = 1 << 19
+"""Bytes, of a chunk of records; to load a kernel for less takes longer than the work."""
 MOST_PLACES = 22
 LARGEST_WHOLE = 2**53 // 10
 TAB, RETURN, SPACE, PLUS, MINUS, POINT, ZERO, NINE = b"\t\r +-.09"
