@@ -24,6 +24,18 @@ LOCK = threading.RLock()
 """Held while kernels are loaded or made."""
 
 
+def bring_up() -> None:
+    """Load what runs kernels, for a command that will need it: what comes before may use kernels, too."""
+    # Another numba than is known, which keeps its code itself, can raise anything.
+    with LOCK, contextlib.suppress(Exception):
+        machine_code.engine()
+
+
+def are_up() -> bool:
+    """Whether kernels run in this process already: LLVM takes room that reading alone may not have."""
+    return machine_code.engine.cache_info().currsize > 0
+
+
 def kernel(function: Function) -> Function:
     """Compile `function` at its first call with numba, or load its machine code from the cache folder.
 

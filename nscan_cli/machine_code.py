@@ -134,28 +134,28 @@ def _linked(head: dict[str, Any], code: bytes, name: str) -> Callable[..., Any] 
     """The function of loaded code; None where something that it calls is missing."""
     import llvmlite.binding as llvm
 
-    engine, dynfunc, _alive = _engine()
+    loader, dynfunc, alive = engine()
     if any(llvm.address_of_symbol(needed) is None for needed in head["needs"]):
         return None
-    engine.add_object_file(llvm.ObjectFileRef.from_data(code))
-    engine.finalize_object()
+    loader.add_object_file(llvm.ObjectFileRef.from_data(code))
+    loader.finalize_object()
     environments = {}
     for environment, constants in head["constants"].items():
         environments[environment] = made = dynfunc.Environment({})
         made.consts[:] = [np.dtype(text) for text in constants]
-        place = engine.get_global_value_address(environment)
+        place = loader.get_global_value_address(environment)
         if place:
             ctypes.c_void_p.from_address(place).value = id(made)
-    address = engine.get_function_address(head["function"])
+    address = loader.get_function_address(head["function"])
     own = environments[head["environment"]]
     function: Callable[..., Any] = dynfunc.make_function(
-        sys.modules[__name__], name, "machine code", address, own, (engine, environments)
+        sys.modules[__name__], name, "machine code", address, own, (loader, alive, environments)
     )
     return function
 
 
 @functools.cache
-def _engine() -> tuple[Any, Any, object]:
+def engine() -> tuple[Any, Any, object]:
     """LLVM's loader, which knows all that machine code calls; numba's library that makes functions."""
     import llvmlite.binding as llvm
 

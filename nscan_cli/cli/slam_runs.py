@@ -45,9 +45,11 @@ def map_whole(
     """Run the whole loop over a log."""
     import numpy as np
 
+    from nscan_cli.compiled import bring_up
     from nscan_cli.logs.load import read_log
     from nscan_cli.slam.run import map_log
 
+    bring_up()
     scans = read_log(log, reading)
     for warning in scans.report.notices():
         say(f"warning: {warning}", quiet)

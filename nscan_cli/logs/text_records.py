@@ -11,14 +11,14 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from nscan_cli.compiled import kernel
+from nscan_cli.compiled import are_up, kernel
 from nscan_cli.limits import BEAMS, DISTANCE
 from nscan_cli.logs.skips import Skips
 from nscan_cli.poses import Array
 
 CHUNK = 1024
-LONG = 1 << 19
-"""Bytes, of a chunk of records; to load a kernel for less takes longer than the work."""
+LONG = 1 << 16
+"""Bytes; to load a kernel for less takes longer than the work."""
 MOST_PLACES = 22
 LARGEST_WHOLE = 2**53 // 10
 TAB, RETURN, SPACE, PLUS, MINUS, POINT, ZERO, NINE = b"\t\r +-.09"
@@ -81,7 +81,7 @@ def _layout(record: tuple[Record, int]) -> tuple[int, int]:
 
 def floats(text: bytes) -> Array | None:
     """All numbers of a text separated by blanks, or None when something else is among them."""
-    if len(text) >= LONG:
+    if len(text) >= LONG and are_up():
         values = np.empty(len(text) // 2 + 1)
         count = _plain_decimals(np.frombuffer(text, dtype=np.uint8), values)
         if count >= 0:

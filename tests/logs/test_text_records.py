@@ -5,6 +5,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from nscan_cli.compiled import bring_up
+from nscan_cli.logs import text_records
 from nscan_cli.logs.text_records import LONG, floats
 
 plain = st.from_regex(r"[+-]?([0-9]{1,15}(\.[0-9]{0,6})?|\.[0-9]{1,22})", fullmatch=True)
@@ -20,6 +22,11 @@ other = st.sampled_from(
 )
 no_number = st.sampled_from(["x", "-", ".", "1.2.3", "--1", "+-1", "1-2", "1,2", "1e", "0x10", "\xa0"])
 blanks = st.text(" \t\n\v\f\r", min_size=1, max_size=3)
+
+
+@pytest.fixture(scope="module", autouse=True)
+def kernels_are_up() -> None:
+    bring_up()
 
 
 def long_text(tokens: list[str], blank: str) -> bytes:
@@ -45,7 +52,9 @@ def test_what_is_no_number_spoils_a_long_text_as_a_short_one(tokens, strange, bl
     assert floats(blank.join([*tokens, strange, "1"]).encode("latin-1")) is None
 
 
-def test_numpy_is_asked_only_where_numbers_are_not_plain(monkeypatch: pytest.MonkeyPatch):
+def test_numpy_is_asked_only_where_numbers_are_not_plain_or_no_kernels_are_up(
+    monkeypatch: pytest.MonkeyPatch,
+):
     def refuse(*_arguments: object, **_options: object) -> None:
         raise AssertionError("the kernel should have read it")
 
@@ -53,3 +62,6 @@ def test_numpy_is_asked_only_where_numbers_are_not_plain(monkeypatch: pytest.Mon
     assert floats(long_text(["1076354563.123456", "-0.000", "81.83"], " ")) is not None
     with pytest.raises(AssertionError):
         floats(long_text(["1e5"], " "))
+    monkeypatch.setattr(text_records, "are_up", lambda: False)
+    with pytest.raises(AssertionError):
+        floats(long_text(["1.5"], " "))
