@@ -29,8 +29,10 @@ def read_graph_log(
     """
     import numpy as np
 
+    from nscan_cli.compiled import bring_up
     from nscan_cli.logs.load import read_log
 
+    bring_up()
     log = read_log(path, _as_tracked(reading, graph_file, graph.provenance))
     sha256 = _source(graph).get("sha256")
     if sha256 is not None and sha256 != log.source.sha256:

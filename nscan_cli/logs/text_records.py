@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from nscan_cli.compiled import are_up, kernel
+from nscan_cli.compiled import are_up, kernel, lean_kernel
 from nscan_cli.limits import BEAMS, DISTANCE
 from nscan_cli.logs.skips import Skips
 from nscan_cli.poses import Array
@@ -108,7 +108,7 @@ def _plain_decimals(text: NDArray[np.uint8], values: Array) -> int:
         powers[k + 1] = 10.0 * powers[k]
     count = at = 0
     while at < len(text):
-        if text[at] == SPACE or TAB <= text[at] <= RETURN:
+        if _is_blank(text[at]):
             at += 1
             continue
         negative = text[at] == MINUS
@@ -125,13 +125,18 @@ def _plain_decimals(text: NDArray[np.uint8], values: Array) -> int:
             at += 1
         places = at - point - 1 if point >= 0 else 0
         digits = at - begin - (point >= 0)
-        ends = at == len(text) or text[at] == SPACE or TAB <= text[at] <= RETURN
+        ends = at == len(text) or _is_blank(text[at])
         if digits == 0 or places > MOST_PLACES or not ends:
             return -1
         value = whole / powers[places]
         values[count] = -value if negative else value
         count += 1
     return count
+
+
+@lean_kernel
+def _is_blank(byte: int) -> bool:
+    return byte == SPACE or TAB <= byte <= RETURN
 
 
 def beam_count(token: bytes, line: int, skips: Skips) -> int | None:

@@ -16,6 +16,8 @@ from nscan_cli.threads import in_threads
 
 TILE = 32
 """Cells along the side of a tile."""
+MOST_PARTS = 4
+"""So many threads cast at most, for each has counts of its own."""
 NEVER = 1 << 62
 """Where a ray crosses no border of this kind."""
 
@@ -66,7 +68,8 @@ def counted(
         _cast(part, reach, resolution, left, bottom, tiles)
         return tiles
 
-    whole, *others = in_threads(threads, cast, np.array_split(np.arange(len(scans.rows)), threads))
+    parts = min(threads, MOST_PARTS)
+    whole, *others = in_threads(parts, cast, np.array_split(np.arange(len(scans.rows)), parts))
     for tiles in others:
         _add(tiles, whole)
     return whole
