@@ -1,8 +1,8 @@
 """One Gaussian of an NDT from the sums of its lattice cells ([19]).
 
-One thing differs from [19]: the inverse of the larger eigenvalue λ is multiplied by a power of the ratio of
-the smaller to the larger. A round Gaussian stays what it is; a piece of wall, long and thin, hardly holds a
-point along itself. How points are spread along a wall says where the beams fell, not where the wall is:
+One thing differs from [19]: the inverse of the larger eigenvalue λ is multiplied by the square of the ratio
+of the smaller to the larger. A round Gaussian stays what it is; a piece of wall, long and thin, hardly holds
+a point along itself. How points are spread along a wall says where the beams fell, not where the wall is:
 taken at its word, it drags the robot back in corridors, and the Hessian claims to know the way along.
 
 Another thing is added: a Gaussian knows from which side it was seen. A wall that is seen from a room and
@@ -43,9 +43,9 @@ def make_gaussian(
 
     With `faces` two of them, where the points lie on two faces of a wall. With `straight` a piece of wall
     takes its direction from the block of twice the size around it, where the points there lie as flat as its
-    own, and holds points along itself still less. A direction that is off by the noise of its few points
-    tells a way along the wall that nobody knows, and eight times less from twice the length. It takes
-    neighbours that are there before the Gaussian is made.
+    own. A direction that is off by the noise of its few points tells a way along the wall that nobody knows,
+    and eight times less from twice the length. It takes neighbours that are there before the Gaussian is
+    made.
     """
     key, gaussian, other = grid.keys[row], grid.gaussians[row], grid.keys.shape[0] + row
     if gaussian[7] > 0.0:
@@ -76,19 +76,17 @@ def _shape(
     small = max(middle - radius, floor * floor, 0.001 * large)
     c2, s2 = _doubled(xx, xy, yy, radius)
     nx, ny = _normal(moments)
-    along = small / (large * large)
-    if straight:
-        along *= small / large
-        if large > THIN * small:
-            for around in (2, 1):
-                wide = _around(grid, key, around, half)
-                _, _, _, xx, xy, yy, _, _ = wide
-                middle, radius = 0.5 * (xx + yy), np.hypot(0.5 * (xx - yy), xy)
-                wide_c2, wide_s2 = _doubled(xx, xy, yy, radius)
-                if middle - radius < small and wide_c2 * c2 + wide_s2 * s2 > SAME_DIRECTION:
-                    c2, s2 = wide_c2, wide_s2
-                    nx, ny = _normal(wide)
-                    break
+    along = small * small / (large * large * large)
+    if straight and large > THIN * small:
+        for around in (2, 1):
+            wide = _around(grid, key, around, half)
+            _, _, _, xx, xy, yy, _, _ = wide
+            middle, radius = 0.5 * (xx + yy), np.hypot(0.5 * (xx - yy), xy)
+            wide_c2, wide_s2 = _doubled(xx, xy, yy, radius)
+            if middle - radius < small and wide_c2 * c2 + wide_s2 * s2 > SAME_DIRECTION:
+                c2, s2 = wide_c2, wide_s2
+                nx, ny = _normal(wide)
+                break
     mean, half_gap = 0.5 * (along + 1 / small), 0.5 * (along - 1 / small)
     ix, iy = unpack(key)
     gaussian[0] = (ix + 0.5) * half + mx

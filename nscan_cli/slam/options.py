@@ -31,7 +31,7 @@ class TrackingOptions:
     gaussians: GaussianOptions = field(default_factory=lambda: GaussianOptions(floor=0.03))
     reach: float = 40.0
     """Longer beams are not matched, m."""
-    window: float = 20.0
+    window: float = 12.0
     """Length of path whose scans the map holds, m."""
     step: float = 0.05
     """A scan joins the map when the robot has moved by so much (m, rad) since the last that did."""

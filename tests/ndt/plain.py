@@ -28,7 +28,7 @@ def gaussians(points: Array, cell: float, minimum: int, floor: float) -> Gaussia
             values, vectors = np.linalg.eigh(np.cov(inside.T, ddof=0))
             large = max(values[1], floor**2)
             small = max(values[0], floor**2, 0.001 * large)
-            inverse = vectors @ np.diag([1 / small, small / large**2]) @ vectors.T
+            inverse = vectors @ np.diag([1 / small, small**2 / large**3]) @ vectors.T
             through = float(beams[here].mean(axis=0) @ vectors[:, 0])
             side = -np.sign(through) * vectors[:, 0] if abs(through) > 0.2 else np.zeros(2)
             found[(*shift, int(at[0]), int(at[1]))] = (inside.mean(axis=0), inverse, side)

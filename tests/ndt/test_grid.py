@@ -68,9 +68,9 @@ def test_a_straight_wall_is_held_across_and_hardly_along():
     gaussian = entries(ndt)[int(pack(0, 0))]
     along = np.var(x)
     assert along == pytest.approx(0.8**2 / 12 * (1 + 2 / 16))
-    # The floor of 0.02 m across; along, the inverse variance times the ratio of the two.
+    # The floor of 0.02 m across; along, the inverse variance times the square of the ratio of the two.
     # Seen from the origin, its side is the one below.
-    expected = np.array([0.5, 0.2, 0.02**2 / along**2, 0.0, 0.02**-2, 0.0, -1.0, 0.0])
+    expected = np.array([0.5, 0.2, 0.02**4 / along**3, 0.0, 0.02**-2, 0.0, -1.0, 0.0])
     np.testing.assert_allclose(np.array(gaussian), expected, atol=1e-9)
 
 
