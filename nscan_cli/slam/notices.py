@@ -66,7 +66,7 @@ def _of_odometry(slam: Slam) -> list[str]:
         more = "" if len(apart) <= MOST_NAMED else f"; and {counted(len(apart) - MOST_NAMED, 'more stretch')}"
         found.append(
             f"odometry and scans disagree about the way: {some}{more}; "
-            "wheels have spun there, or tracking has slipped"
+            "odometry is wrong there, or tracking has slipped"
         )
     return found
 

@@ -92,11 +92,11 @@ class BreakOptions:
 class KeyframeOptions:
     """Step 2: which scans become keyframes, and how well tracking knows the way between two."""
 
-    distance: float = 1.5
+    distance: float = 1.75
     """m, at least."""
     distance_per_range: float = 0.3
     """Times the median range of the log's beams: who sees further sees the same for longer."""
-    turn: float = 0.6
+    turn: float = 0.8
     """rad"""
     information_scale: float = 0.8
     """The Hessian of tracking is weighed by so much: neighbouring scans make the same errors."""

@@ -22,8 +22,10 @@ def test_max_scans_bounds_the_relations(folder):
     assert run(["slam", *SHORT, "--max-scans", "4", "-o", "graph.json", "-q"]) == 0
     graph = read_graph("graph.json")
     assert graph.provenance["parameters"]["slam"]["nscan"]["max_scans"] == 4
-    # Three where one scan did not hang together with the others.
-    assert {len(relation.nodes) for relation in graph.nscan} == {3, 4}
+    # Fewer where scans did not hang together with the others; two make no joint relation.
+    sizes = {len(relation.nodes) for relation in graph.nscan}
+    assert min(sizes) >= 3
+    assert max(sizes) == 4
 
 
 def test_relations_of_one_kind(folder):

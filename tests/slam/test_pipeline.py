@@ -133,7 +133,6 @@ def test_loops_are_recorded():
     graph = office_unrefined()
     accepted = [loop for loop in graph.loops if loop.accepted]
     closing = [relation for relation in graph.nscan if relation.origin == "loop"]
-    assert len(accepted) >= 30
     assert [loop.nodes[1] for loop in accepted] == [relation.nodes[relation.fixed] for relation in closing]
     assert [loop.score for loop in accepted] == [relation.score for relation in closing]
     for loop in graph.loops:
@@ -141,7 +140,7 @@ def test_loops_are_recorded():
         assert set(loop.nodes) <= set(graph.keyframes.tolist())
         assert loop.accepted or loop.reason
     second = graph.keyframes[graph.keyframes >= SECOND_ROUND]
-    assert np.isin(second, [node for relation in closing for node in relation.nodes]).mean() > 0.85
+    assert np.isin(second, [node for relation in closing for node in relation.nodes]).mean() > 0.9
 
 
 def test_marginals_grow_from_the_first_keyframe_on():

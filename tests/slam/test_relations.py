@@ -39,7 +39,7 @@ def test_nscan_keeps_of_the_chain_what_nothing_else_holds_together():
     joined = {
         pair for pair in chain(graph) if any(set(pair) <= set(relation.nodes) for relation in graph.nscan)
     }
-    assert len(joined) > 200
+    assert len(joined) > 0.85 * len(chain(graph))
     assert kept == [pair for pair in chain(graph) if pair not in joined]
     assert optimise_graph(graph).components == 1
 
@@ -74,16 +74,16 @@ def test_pairwise_loops_have_one_verdict_for_each_centre():
         assert loop.accepted or loop.reason
 
 
-# Measured: 300, of which 64 are nScan relations, and 1430.
-@pytest.mark.parametrize(("relations", "least"), [("both", 280), ("pairwise", 1000)])
-def test_without_loops_no_relation_joins_different_visits(relations: Relations, least: int):
+# Measured: 241 of 184 keyframes, of which 58 are nScan relations, and 918.
+@pytest.mark.parametrize(("relations", "least"), [("both", 1.2), ("pairwise", 4.2)])
+def test_without_loops_no_relation_joins_different_visits(relations: Relations, least: float):
     office = mapped_office(True, relations, loops=False)
     paths = {keyframe.row: keyframe.tracked.path for keyframe in office.slam.keyframes.list}
     recent = SlamOptions().nscan.recent
     pairwise, nscan = office.graph.pairwise, office.graph.nscan
     found: list[tuple[tuple[int, ...], int]] = [(relation.nodes, relation.nodes[1]) for relation in pairwise]
     found += [(relation.nodes, relation.nodes[relation.fixed]) for relation in nscan]
-    assert len(found) > least
+    assert len(found) > least * len(office.graph.keyframes)
     for nodes, centre in found:
         assert np.abs([paths[node] - paths[centre] for node in nodes]).max() <= recent
     assert office.graph.loops == []
