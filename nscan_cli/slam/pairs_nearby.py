@@ -34,6 +34,16 @@ class _Single:
     """The greater of the shares of points of one that lie on Gaussians of the other."""
     moved: float
     """How far (m) the match moved the other, seen from the centre."""
+    information: Array
+    """(3, 3) weighed as in nScan relations: the Hessian of the scaled energy, here without the prior."""
+
+    def holds(self, overlap: float) -> bool:
+        """Whether they overlap by so much, and the match knows anything.
+
+        Points of the other may lie on Gaussians of the centre while no point of the centre meets one of the
+        other's.
+        """
+        return self.overlap >= overlap and bool(self.information.any())
 
 
 def match_pairs_nearby(route: Route, centre: int, options: NScanOptions) -> Nearby | None:
@@ -49,9 +59,9 @@ def match_pairs_nearby(route: Route, centre: int, options: NScanOptions) -> Near
         return None
     singles = [_match(route, int(other), centre, options) for other in tried]
     overlaps = np.array([single.overlap for single in singles])
-    kept = overlaps >= options.overlap
+    kept = np.array([single.holds(options.overlap) for single in singles])
     relations = tuple(
-        _relation(keyframes[other], keyframes[centre], single, "loop" if seen else "track", options)
+        _relation(keyframes[other], keyframes[centre], single, "loop" if seen else "track")
         for other, seen, single, keep in zip(tried, seen_before, singles, kept, strict=True)
         if keep
     )
@@ -83,7 +93,8 @@ def _match(route: Route, other: int, centre: int, options: NScanOptions) -> _Sin
         overlap = _overlap(keyframes[other], keyframes[centre], pose)
         if overlap >= options.overlap and moved < options.settled:
             break
-    return _Single(pose, overlap, moved)
+    hessian = energy(reference, points, pose, exact=False).hessian
+    return _Single(pose, overlap, moved, scale * hessian)
 
 
 def _prior(chain: Sequence[Pairwise], other: int, centre: int) -> Prior:
@@ -106,15 +117,11 @@ def _overlap(other: Keyframe, centre: Keyframe, pose: Array) -> float:
     return max(on_other, on_centre)
 
 
-def _relation(
-    other: Keyframe, centre: Keyframe, single: _Single, origin: str, options: NScanOptions
-) -> Pairwise:
-    """Weighed as nScan relations are: by the Hessian of the scaled energy, here without the prior."""
-    hessian = energy(other.ndt, centre.points, single.pose, exact=False).hessian
+def _relation(other: Keyframe, centre: Keyframe, single: _Single, origin: str) -> Pairwise:
     return Pairwise(
         nodes=(other.row, centre.row),
         measurement=single.pose,
-        information=scale_of([centre], options) * hessian,
+        information=single.information,
         origin=origin,
         score=single.overlap,
     )

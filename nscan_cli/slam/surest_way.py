@@ -78,7 +78,7 @@ def _star(relation: Relation) -> Links:
     free = (3 * others[:, None] + np.arange(3)).ravel()
     eigenvalues, vectors = np.linalg.eigh(term.hessian[np.ix_(free, free)])
     # Where it says nothing, no more than rounding.
-    eigenvalues = np.maximum(eigenvalues, 1e-12 * max(eigenvalues[-1], 1e-300))
+    eigenvalues = np.maximum(eigenvalues, 1e-12 * max(eigenvalues[-1], 1.0))
     inverse = ((vectors / eigenvalues) @ vectors.T).reshape(len(others), 3, len(others), 3)
     own = inverse[np.arange(len(others)), :, np.arange(len(others))]
     covariances = np.zeros_like(own)

@@ -14,6 +14,7 @@ from nscan_cli.slam.keyframes import Keyframe, route_of
 from nscan_cli.slam.nearby import Nearby
 from nscan_cli.slam.options import NScanOptions
 from nscan_cli.slam.pairs_nearby import match_pairs_nearby
+from nscan_cli.slam.tracking import Tracked
 from tests.matching.problems import office_truth
 from tests.slam.drives import relation_to_previous
 from tests.slam.test_nearby import BETWEEN, NEW, OLD, ROWS, revisit
@@ -68,6 +69,28 @@ def test_the_information_is_the_scaled_energys_without_the_prior():
         scale = NScanOptions().scale_per_cell * len(cells) / len(centre.points)
         np.testing.assert_allclose(relation.information, scale * there.hessian, rtol=1e-9)
         assert np.linalg.eigvalsh(relation.information)[0] > 0
+
+
+def test_a_match_that_knows_nothing_is_no_relation():
+    """A wall from both sides: only a scan around the centre has seen the face that the other sees."""
+    across = np.linspace(-1.5, 1.5, 61)
+    wall, options = np.column_stack([np.full(61, 2.0), across]), NScanOptions().gaussians
+
+    def at(row: int, pose: list[float], *around: tuple[Array, Tracked]) -> Keyframe:
+        here = Tracked(np.array(pose), np.eye(3), np.eye(3), 1.0, 50.0 * row, True)
+        return Keyframe(row, here, np.eye(3), wall, 13, options, [(wall, here), *around])
+
+    one = at(0, [0.0, 0.0, 0.0])
+    keyframes = [one, at(1, [100.0, 0.0, 0.0]), at(2, [4.0, 0.0, np.pi], (wall, one.tracked))]
+    poses = np.array([keyframe.tracked.pose for keyframe in keyframes])
+    links = [relation_to_previous(keyframes[: k + 2]) for k in range(2)]
+    found = match_pairs_nearby(route_of(keyframes, links, poses), 2, NScanOptions())
+    assert found is not None
+    assert found.pairwise == ()
+    assert found.loop is not None
+    assert not found.loop.accepted
+    # Its overlap is whole, for the other's points lie on the centre's Gaussians.
+    assert found.loop.score == 1.0
 
 
 def test_the_centre_may_be_older_than_those_near_it():

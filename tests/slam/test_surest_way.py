@@ -62,6 +62,12 @@ def test_what_no_relation_leads_to_is_nowhere():
     assert np.isinf(found[4]).all()
 
 
+def test_a_loop_that_says_nothing_is_no_way():
+    open_way = straight(12)
+    loop = Pairwise((0, 11), np.array([22.0, 0, 0]), np.zeros((3, 3)), "loop")
+    np.testing.assert_allclose(bound(open_way._replace(loops=[loop]), 0), bound(open_way, 0))
+
+
 def test_directions_that_a_loop_does_not_hold_are_no_way():
     """Along a corridor: σ of 1 mm across it and nothing along."""
     open_way = straight(12)
