@@ -179,15 +179,19 @@ class Closing:
         near: Indices,
         reach: Reach,
     ) -> Place | None:
-        """Search among the visit that most likely is near."""
+        """Search among the visit that most likely is near, or, when not even the direction is known, all."""
         away = np.hypot(*(route.poses[:, :2] - route.poses[centre, :2]).T)
-        first = int(near[np.argmin(away[near] - self.options.deviations * reach.distance[near])])
-        window, around = self._visit(route, centre, first, reach)
-        found = find_place(route, centre, around, window, self.match, self.options, self.nscan)
-        if isinstance(found, Loop):
-            self._refused.append(found)
-            return None
-        return found
+        places, is_lost = [], self.is_lost(reach)
+        while len(near):
+            first = int(near[np.argmin(away[near] - self.options.deviations * reach.distance[near])])
+            window, around = self._visit(route, centre, first, reach)
+            found = find_place(route, centre, around, window, self.match, self.options, self.nscan)
+            if isinstance(found, Loop):
+                self._refused.append(found)
+            elif found is not None:
+                places.append(found)
+            near = np.setdiff1d(near, [first, *around]) if is_lost[first] else near[:0]
+        return max(places, key=_overlap, default=None)
 
     def _visit(
         self,
@@ -218,3 +222,8 @@ class Closing:
         within = np.hypot(off[0], off[1]) <= self.options.agree
         turned = abs(wrap(off[2])) <= self.options.agree_turn
         return bool(within and turned and paths[other.centre] - paths[one.centre] <= self.options.together)
+
+
+def _overlap(place: Place) -> float:
+    """How well the scans of both visits hang together there."""
+    return 0.0 if place.nearby.loop is None else place.nearby.loop.score

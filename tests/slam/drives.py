@@ -64,10 +64,11 @@ class Driven(NamedTuple):
         chain = self.chain.copy()
         wrong = compose(chain[at].measurement, np.array(slip))
         chain[at] = dataclasses.replace(chain[at], measurement=wrong)
-        return self._replace(chain=chain, poses=_along(chain))
+        return self._replace(chain=chain, poses=along(chain))
 
 
-def _along(chain: Sequence[Pairwise]) -> Array:
+def along(chain: Sequence[Pairwise]) -> Array:
+    """(K, 3) the poses that a chain leads to from the origin."""
     poses = [np.zeros(3)]
     for relation in chain:
         poses.append(compose(poses[-1], relation.measurement))
@@ -83,7 +84,7 @@ def driven(scene: Scene, truth: Array, paths: Array, seen: Array | None = None) 
         for k in range(len(truth))
     ]
     chain = [relation_to_previous(keyframes[: k + 1]) for k in range(1, len(keyframes))]
-    return Driven(keyframes, chain, _along(chain), relative(truth, truth[0]))
+    return Driven(keyframes, chain, along(chain), relative(truth, truth[0]))
 
 
 def round_scene(max_range: float = 30.0) -> Scene:

@@ -13,7 +13,7 @@ from nscan_cli.slam.closing import NO_SECOND, SO_FAR_OFF, Closing
 from nscan_cli.slam.energies import Energies
 from nscan_cli.slam.keyframes import route_of
 from nscan_cli.slam.nearby import Nearby, match_nearby
-from nscan_cli.slam.options import ClosingOptions, NScanOptions
+from nscan_cli.slam.options import BreakOptions, ClosingOptions, NScanOptions
 from nscan_cli.slam.pairs_nearby import match_pairs_nearby
 from nscan_cli.slam.place import AMBIGUOUS, OUTDONE, TOO_LITTLE, Place
 from tests.slam.drives import (
@@ -21,6 +21,7 @@ from tests.slam.drives import (
     ROUND,
     ROWS,
     Driven,
+    along,
     closed_along,
     like_doors_drive,
     round_drive,
@@ -151,6 +152,36 @@ def test_what_is_farther_off_than_the_path_drifts_must_be_seen_from_scans_far_ap
     waits = closing(ClosingOptions(least=9.0))
     assert closed_along(waits, twin, until=late[-2].centre) == []
     assert {loop.reason for loop in waits.refused()} == {SO_FAR_OFF}
+
+
+def test_who_is_lost_is_searched_for_in_all_that_was_seen_before():
+    """A corridor, and then, carried there, once round an office and, carried again, 16 m of it once more.
+
+    The corridor is no less likely than the office, of which nobody knows how it lies to it.
+    """
+    doors, office, breaking = like_doors_drive(), round_drive(), BreakOptions()
+    firsts, size = (0, 9, 54), 9 + len(office.keyframes)
+    keyframes, chain = [], []
+    for k, keyframe in enumerate([*doors.keyframes[:9], *office.keyframes]):
+        pieces = sum(k >= first for first in firsts)
+        path = keyframe.tracked.path + breaking.path * pieces
+        tracked = dataclasses.replace(keyframe.tracked, path=path)
+        keyframes.append(dataclasses.replace(keyframe, row=ROWS * k, tracked=tracked))
+    nothing = np.diag(np.array([breaking.distance, breaking.distance, breaking.turn]) ** -2)
+    carried = Pairwise((0, 0), np.array([30.0, 5.0, 2.0]), nothing, "track")
+    for k, relation in enumerate([*doors.chain[:8], carried, *office.chain]):
+        known = carried if k + 1 in firsts else relation
+        chain.append(dataclasses.replace(known, nodes=(ROWS * k, ROWS * (k + 1))))
+    drive = Driven(keyframes, chain, along(chain), office.truth)
+    lost = Closing(ClosingOptions(), NSCAN, match_nearby, Energies(ROWS * size))
+    found = closed_along(lost, drive)
+    assert found
+    for _, places in found:
+        assert len(places) >= 3
+        for place in places:
+            assert 9 <= place.old < 54 <= place.centre < size
+            off = place.measured - relative(office.truth[place.centre - 9], office.truth[place.old - 9])
+            assert np.abs(off[:2]).max() < 0.05
 
 
 # ----------------------------------------------------------------------------- where is searched
