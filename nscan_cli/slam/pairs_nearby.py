@@ -31,19 +31,14 @@ class _Single:
     pose: Array
     """(3,) of the centre in the other's frame."""
     overlap: float
-    """The greater of the shares of points of one that lie on Gaussians of the other."""
+    """The greater of the shares of points of one that lie on Gaussians of the other.
+
+    0 when no point of the centre meets a Gaussian of the other, whatever the other's points lie on.
+    """
     moved: float
     """How far (m) the match moved the other, seen from the centre."""
     information: Array
     """(3, 3) weighed as in nScan relations: the Hessian of the scaled energy, here without the prior."""
-
-    def holds(self, overlap: float) -> bool:
-        """Whether they overlap by so much, and the match knows anything.
-
-        Points of the other may lie on Gaussians of the centre while no point of the centre meets one of the
-        other's.
-        """
-        return self.overlap >= overlap and bool(self.information.any())
 
 
 def match_pairs_nearby(route: Route, centre: int, options: NScanOptions) -> Nearby | None:
@@ -59,7 +54,7 @@ def match_pairs_nearby(route: Route, centre: int, options: NScanOptions) -> Near
         return None
     singles = [_match(route, int(other), centre, options) for other in tried]
     overlaps = np.array([single.overlap for single in singles])
-    kept = np.array([single.holds(options.overlap) for single in singles])
+    kept = overlaps >= options.overlap
     relations = tuple(
         _relation(keyframes[other], keyframes[centre], single, "loop" if seen else "track")
         for other, seen, single, keep in zip(tried, seen_before, singles, kept, strict=True)
@@ -93,8 +88,8 @@ def _match(route: Route, other: int, centre: int, options: NScanOptions) -> _Sin
         overlap = _overlap(keyframes[other], keyframes[centre], pose)
         if overlap >= options.overlap and moved < options.settled:
             break
-    hessian = energy(reference, points, pose, exact=False).hessian
-    return _Single(pose, overlap, moved, scale * hessian)
+    information = scale * energy(reference, points, pose, exact=False).hessian
+    return _Single(pose, overlap if information.any() else 0.0, moved, information)
 
 
 def _prior(chain: Sequence[Pairwise], other: int, centre: int) -> Prior:
