@@ -53,6 +53,14 @@ def lean_kernel(function: Function) -> Function:
     return cast(Function, Kernel(function, {"contract"}, _nrt=False))
 
 
+def unfolded_kernel(function: Function) -> Function:
+    """A lean kernel whose machine code becomes part of its callers', however long: it may take many arrays.
+
+    To hand over the arrays of an NDT takes a hundred machine words a call.
+    """
+    return cast(Function, Kernel(function, {"contract"}, _nrt=False, forceinline=True))
+
+
 def inlined_kernel(function: Function) -> Function:
     """The same for what gives lean kernels a part of their arrays: it becomes part of them."""
     return cast(Function, Kernel(function, {"contract"}, inline="always"))

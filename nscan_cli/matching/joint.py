@@ -49,6 +49,8 @@ class JointOptions:
     """In the last stage."""
     tolerance: float = 1e-4
     """The match has converged when no pose moves by more (m, rad)."""
+    thorough: bool = True
+    """Whether energy and derivatives are those after the last step, and not those before it."""
     fixed: int | None = None
     """The scan that stays where it is; None leaves the gauge free (paper, III-D)."""
 
@@ -163,6 +165,7 @@ def _approach(
             options.gauge,
             options.approach_iterations,
             near,
+            options.thorough,
             *_derivatives(poses),
         )
         iterations += steps
@@ -185,6 +188,7 @@ def _finish(problem: JointProblem, way: Way, options: JointOptions, neutral: boo
         options.gauge,
         options.max_iterations,
         options.tolerance,
+        options.thorough,
         gradient,
         hessian,
     )
@@ -227,12 +231,13 @@ def _descend(
     fixed: int,
     max_iterations: int,
     tolerance: float,
+    thorough: bool,
     gradient: Array,
     hessian: Array,
 ) -> tuple[float, int, int, bool]:
     """One stage, from the poses (n, 3) in place: the value, iterations, evaluations, whether it converged.
 
-    Writes gradient (3n,) and Hessian (3n, 3n) at the poses.
+    Writes gradient (3n,) and Hessian (3n, 3n) at the poses; `thorough` as in JointOptions.
     """
     trial_gradient, trial_hessian = np.empty_like(gradient), np.empty_like(hessian)
     step, trial = np.empty_like(poses), np.empty_like(poses)
@@ -256,6 +261,9 @@ def _descend(
                 trial[i, a] = poses[i, a] + step[i, a]
                 longest = max(longest, abs(step[i, a]))
         converged = longest < tolerance
+        if converged and not thorough:
+            assign_rows(poses, trial)
+            break
         there = evaluate(problem, trial, widening, curvature, neutral, stride, trial_gradient, trial_hessian)
         evaluations += 1
         if there <= value:

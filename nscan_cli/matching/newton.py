@@ -23,7 +23,7 @@ FIRST_DAMPING = 1e-3
 LEAST_DAMPING = 1e-7
 GREATEST_DAMPING = 1e6
 STALLED = 0.1
-"""Share of the tolerance below which a damped step ends a stage."""
+"""Share of what ends a stage below which a damped step ends it."""
 
 
 class PairProblem(NamedTuple):
@@ -77,12 +77,14 @@ def minimise(
     pose: Array,
     widenings: Array,
     max_iterations: int,
+    near: float,
     tolerance: float,
     hessian: Array,
 ) -> tuple[float, float, int, int, bool]:
     """Levenberg–Marquardt from `pose` (3,), in place, one stage for each entry of `widenings`.
 
-    A stage ends with a step that moves the pose by less than `tolerance` (m, rad). Writes the last stage's
+    The last stage ends with a step that moves the pose by less than `tolerance` (m, rad), those before with
+    one of less than `near`: they only have to lead there. Writes the last stage's
     semi-definite Hessian of the objective (3, 3). Returns the objective's and E's value, iterations,
     evaluations, and whether the last stage converged. Hessian and values are those before that last step.
     """
@@ -91,7 +93,7 @@ def minimise(
     trial_gradient, trial_hessian, damped = np.empty(3), np.empty((3, 3)), np.empty((3, 3))
     value, iterations, evaluations, converged = 0.0, 0, 0, False
     for stage in range(widenings.shape[0]):
-        widening = widenings[stage]
+        widening, enough = widenings[stage], near if stage + 1 < widenings.shape[0] else tolerance
         value = objective(problem, pose, widening, 0.0, out, gradient, hessian)
         evaluations += 1
         damping = FIRST_DAMPING
@@ -106,7 +108,7 @@ def minimise(
             for a in range(3):
                 trial[a] = pose[a] - step[a]
             length = max(abs(step[0]), abs(step[1]), abs(step[2]))
-            if length < tolerance and damping <= FIRST_DAMPING:
+            if length < enough and damping <= FIRST_DAMPING:
                 # So near that the value and the Hessian are known well enough.
                 assign(pose, trial)
                 converged = True
@@ -123,7 +125,7 @@ def minimise(
             else:
                 damping *= 10.0
             # A step that is short because it is damped says less.
-            converged = length < STALLED * tolerance
+            converged = length < STALLED * enough
             if converged or damping > GREATEST_DAMPING:
                 break
     return value, out[0], iterations, evaluations, converged

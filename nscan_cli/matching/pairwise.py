@@ -124,7 +124,13 @@ def match_pair(
     # One by one: the end of the last tells whether the match has converged.
     for widening in options.widenings:
         _, _, last, evaluated, ended = minimise(
-            problem, pose, np.array([widening]), options.max_iterations, options.tolerance, hessian
+            problem,
+            pose,
+            np.array([widening]),
+            options.max_iterations,
+            options.tolerance,
+            options.tolerance,
+            hessian,
         )
         iterations += last
         evaluations += evaluated

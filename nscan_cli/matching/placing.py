@@ -152,7 +152,15 @@ class Placing:
             ndt.add(self.points[other], poses[other])
         none = Prior(np.zeros(3), np.zeros((3, 3)))
         problem = PairProblem(ndt.grid, ndt.half, begin(self.points[scan]), options.scale, none)
-        minimise(problem, pose, WIDENINGS, options.max_iterations, options.tolerance, np.empty((3, 3)))
+        minimise(
+            problem,
+            pose,
+            WIDENINGS,
+            options.max_iterations,
+            options.tolerance,
+            options.tolerance,
+            np.empty((3, 3)),
+        )
         return pose
 
 

@@ -48,7 +48,13 @@ def lay_out(ndts: Sequence[Ndt], points: Sequence[Array], neutral: bool = True) 
     gaussians = [ndt.grid.gaussians for ndt in ndts]
     # The sums are for growing; matching needs the Gaussians alone.
     grid = Grid(
-        np.concatenate(tables), keys, links, np.empty((0, 2)), np.empty((0, 2, 8)), np.concatenate(gaussians)
+        np.concatenate(tables),
+        keys,
+        links,
+        np.empty((0, 2)),
+        np.empty((0, 2, 8)),
+        np.concatenate(gaussians),
+        np.empty(0),
     )
     own = np.full(len(ndts), np.nan)
     if neutral:
@@ -73,7 +79,13 @@ def scan_grid(scans: Scans, i: int) -> Grid:
     g0, g1 = scans.gaussian_starts[i], scans.gaussian_starts[i + 1]
     grid = scans.grid
     return Grid(
-        grid.table[t0:t1], grid.keys[r0:r1], grid.links[r0:r1], grid.facing, grid.sums, grid.gaussians[g0:g1]
+        grid.table[t0:t1],
+        grid.keys[r0:r1],
+        grid.links[r0:r1],
+        grid.facing,
+        grid.sums,
+        grid.gaussians[g0:g1],
+        grid.making,
     )
 
 

@@ -47,6 +47,7 @@ def compacted(grid: Grid, rows: int) -> Grid:
         np.empty((0, 2)),
         np.empty((0, 2, 8)),
         gaussians,
+        np.empty(0),
     )
     rehash(compact, kept)
     return compact

@@ -16,15 +16,17 @@ from __future__ import annotations
 
 import numpy as np
 
-from nscan_cli.compiled import lean_kernel
+from nscan_cli.compiled import lean_kernel, unfolded_kernel
 from nscan_cli.ndt.table import HALF_KEY, Grid, find_row, unpack
 from nscan_cli.poses import Array
 
-Cells = tuple[int, int, int, int]
+Cells = tuple[int | np.int32, int, int, int]
 """Rows of the four lattice cells of a block, or −1."""
 Moments = tuple[float, float, float, float, float, float, float, float]
 """Number of points, their mean (x, y), covariance (xx, xy, yy), and the mean unit vector along the beams; or,
 before they are divided by the number, the sums."""
+Direction = tuple[float, float]
+"""Cosine and sine of twice the angle of a covariance's long axis."""
 NOTHING = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 """The moments of no points."""
 ONE_SIDED = 0.2
@@ -36,57 +38,47 @@ SAME_DIRECTION = 0.9
 
 
 @lean_kernel
-def make_gaussian(
-    grid: Grid, row: int, half: float, minimum: float, floor: float, straight: bool, faces: bool
-) -> None:
+def make_gaussian(grid: Grid, row: int, half: float) -> None:
     """Mean, inverse covariance and side of the block of four lattice cells whose lower left one is `row`.
 
-    With `faces` two of them, where the points lie on two faces of a wall. With `straight` a piece of wall
-    takes its direction from the block of twice the size around it, where the points there lie as flat as its
-    own. A direction that is off by the noise of its few points tells a way along the wall that nobody knows,
-    and eight times less from twice the length. It takes neighbours that are there before the Gaussian is
-    made.
+    With `faces` two of them, where the points lie on two faces of a wall.
     """
     key, gaussian, other = grid.keys[row], grid.gaussians[row], grid.keys.shape[0] + row
     if gaussian[7] > 0.0:
         grid.gaussians[other, 2] = 0.0
     gaussian[:] = 0.0
-    cells = _cells(grid, key, row)
-    whole = _block(grid, cells, half, 0.0, 0.0)
-    if whole[0] < minimum:
-        return
-    before, behind = _two_faces(grid, cells, half) if faces else (NOTHING, NOTHING)
-    if min(before[0], behind[0]) >= minimum:
+    front, back = _faces(grid, row, half)
+    if front[0] > 0.0:
+        _shape(grid, key, front, _long_axis(front), half, gaussian)
+    if back[0] > 0.0:
         gaussian[7] = other
-        _shape(grid, key, behind, half, floor, straight, grid.gaussians[other])
-    if max(before[0], behind[0]) >= minimum:
-        whole = before if before[0] >= minimum else behind
-    _shape(grid, key, whole, half, floor, straight, gaussian)
+        _shape(grid, key, back, _long_axis(back), half, grid.gaussians[other])
 
 
 @lean_kernel
+def straighten(grid: Grid, row: int, half: float) -> None:
+    """Let a piece of wall take its direction from the block of twice the size around it.
+
+    Where the points there lie as flat as its own. A direction that is off by the noise of its few points
+    tells a way along the wall that nobody knows, and eight times less from twice the length.
+    """
+    key, gaussian = grid.keys[row], grid.gaussians[row]
+    front, back = _faces(grid, row, half)
+    if front[0] > 0.0:
+        _shape(grid, key, front, _long_axis_around(grid, key, front, half), half, gaussian)
+    if back[0] > 0.0:
+        other = grid.gaussians[int(gaussian[7])]
+        _shape(grid, key, back, _long_axis_around(grid, key, back, half), half, other)
+
+
+@unfolded_kernel
 def _shape(
-    grid: Grid, key: int, moments: Moments, half: float, floor: float, straight: bool, gaussian: Array
+    grid: Grid, key: int, moments: Moments, long_axis: Direction, half: float, gaussian: Array
 ) -> None:
     """Write the numbers of the Gaussian with some moments about the centre of the cell of `key`."""
-    _, mx, my, xx, xy, yy, fx, fy = moments
-    # Eigenvalues of the 2 × 2 covariance; both are raised to the floor.
-    middle, radius = 0.5 * (xx + yy), np.hypot(0.5 * (xx - yy), xy)
-    large = max(middle + radius, floor * floor)
-    small = max(middle - radius, floor * floor, 0.001 * large)
-    c2, s2 = _doubled(xx, xy, yy, radius)
-    nx, ny = _normal(moments)
+    (_, mx, my, _, _, _, fx, fy), (c2, s2) = moments, long_axis
+    small, large = _eigenvalues(grid, moments)
     along = small * small / (large * large * large)
-    if straight and large > THIN * small:
-        for around in (2, 1):
-            wide = _around(grid, key, around, half)
-            _, _, _, xx, xy, yy, _, _ = wide
-            middle, radius = 0.5 * (xx + yy), np.hypot(0.5 * (xx - yy), xy)
-            wide_c2, wide_s2 = _doubled(xx, xy, yy, radius)
-            if middle - radius < small and wide_c2 * c2 + wide_s2 * s2 > SAME_DIRECTION:
-                c2, s2 = wide_c2, wide_s2
-                nx, ny = _normal(wide)
-                break
     mean, half_gap = 0.5 * (along + 1 / small), 0.5 * (along - 1 / small)
     ix, iy = unpack(key)
     gaussian[0] = (ix + 0.5) * half + mx
@@ -94,6 +86,7 @@ def _shape(
     gaussian[2] = mean + half_gap * c2
     gaussian[3] = half_gap * s2
     gaussian[4] = mean - half_gap * c2
+    nx, ny = _normal(long_axis)
     through = fx * nx + fy * ny
     gaussian[5] = gaussian[6] = 0.0
     if abs(through) > ONE_SIDED:
@@ -102,64 +95,110 @@ def _shape(
 
 
 @lean_kernel
-def _two_faces(grid: Grid, cells: Cells, half: float) -> tuple[Moments, Moments]:
-    """Of the points on one face of a wall, and of those on the other; nothing where there are not two."""
-    nx, ny = _normal(_within(grid, cells))
-    # Mostly all beams come from one side: that is seen before any moments are summed.
+def _eigenvalues(grid: Grid, moments: Moments) -> tuple[float, float]:
+    """Of a covariance, the smaller one first, both raised to the floor."""
+    _, _, _, xx, xy, yy, _, _ = moments
+    middle, radius, floor = 0.5 * (xx + yy), _radius(xx, xy, yy), grid.making[1]
+    large = max(middle + radius, floor * floor)
+    return max(middle - radius, floor * floor, 0.001 * large), large
+
+
+@lean_kernel
+def _long_axis_around(grid: Grid, key: int, moments: Moments, half: float) -> Direction:
+    """The direction of a piece of wall, from around it if possible; see straighten."""
+    long_axis = _long_axis(moments)
+    small, large = _eigenvalues(grid, moments)
+    for around in (2, 1):
+        if large > THIN * small:
+            wide = _around(grid, key, around, half)
+            _, _, _, xx, xy, yy, _, _ = wide
+            c2, s2 = _long_axis(wide)
+            flat = 0.5 * (xx + yy) - _radius(xx, xy, yy) < small
+            if flat and c2 * long_axis[0] + s2 * long_axis[1] > SAME_DIRECTION:
+                return c2, s2
+    return long_axis
+
+
+@unfolded_kernel
+def _faces(grid: Grid, row: int, half: float) -> tuple[Moments, Moments]:
+    """Of the points of the block of `row`, and of those that lie on another face of the wall there.
+
+    Nothing where there are too few.
+    """
+    cells = _cells(grid, grid.keys[row], row)
+    minimum, has_faces = grid.making[0], grid.making[3] > 0.0
+    whole, normal = _block(grid, cells, half)
+    if whole[0] < minimum:
+        return NOTHING, NOTHING
+    if not has_faces or not _are_two(grid, cells, normal):
+        return _divided(whole), NOTHING
+    nx, ny = normal
+    before, behind = _face(grid, cells, half, -nx, -ny), _face(grid, cells, half, nx, ny)
+    if min(before[0], behind[0]) >= minimum:
+        return _divided(before), _divided(behind)
+    if max(before[0], behind[0]) >= minimum:
+        whole = before if before[0] >= minimum else behind
+    return _divided(whole), NOTHING
+
+
+@lean_kernel
+def _block(grid: Grid, cells: Cells, half: float) -> tuple[Moments, tuple[float, float]]:
+    """The sums of a block from the centre of its first cell, and the normal of what is in its cells.
+
+    The latter of each part about its own mean: without what is between two faces.
+    """
+    sums = NOTHING
+    xx = xy = yy = 0.0
+    for at in range(4):
+        for side in range(2 if cells[at] >= 0 else 0):
+            part = grid.sums[cells[at], side]
+            if part[0] > 0.0:
+                sums = _plus(sums, part, (at % 2) * half, (at // 2) * half)
+                per_point = 1.0 / part[0]
+                xx += part[3] - part[1] * part[1] * per_point
+                xy += part[4] - part[1] * part[2] * per_point
+                yy += part[5] - part[2] * part[2] * per_point
+    return sums, _normal(_doubled(xx, xy, yy))
+
+
+@lean_kernel
+def _are_two(grid: Grid, cells: Cells, normal: tuple[float, float]) -> bool:
+    """Whether the beams come from both sides."""
     number_before = number_behind = against = along = 0.0
     for at in range(4):
         for side in range(2 if cells[at] >= 0 else 0):
             part = grid.sums[cells[at], side]
-            through = part[6] * nx + part[7] * ny
+            through = part[6] * normal[0] + part[7] * normal[1]
             if through >= 0.0:
                 number_behind += part[0]
                 along += through
             else:
                 number_before += part[0]
                 against -= through
-    if against > ONE_SIDED * number_before and along > ONE_SIDED * number_behind:
-        return _block(grid, cells, half, -nx, -ny), _block(grid, cells, half, nx, ny)
-    return NOTHING, NOTHING
+    return against > ONE_SIDED * number_before and along > ONE_SIDED * number_behind
+
+
+@lean_kernel
+def _face(grid: Grid, cells: Cells, half: float, nx: float, ny: float) -> Moments:
+    """The sums of the parts of a block whose beams run along (nx, ny), from the centre of its first cell."""
+    sums = NOTHING
+    for at in range(4):
+        for side in range(2 if cells[at] >= 0 else 0):
+            part = grid.sums[cells[at], side]
+            if part[0] > 0.0 and part[6] * nx + part[7] * ny >= 0.0:
+                sums = _plus(sums, part, (at % 2) * half, (at // 2) * half)
+    return sums
 
 
 @lean_kernel
 def _cells(grid: Grid, key: int, row: int) -> Cells:
     """Those of the block whose lower left cell is `row`."""
     return (
-        row,
+        np.int32(row),
         find_row(grid, key + 2 * HALF_KEY),
         find_row(grid, key + 1),
         find_row(grid, key + 2 * HALF_KEY + 1),
     )
-
-
-@lean_kernel
-def _block(grid: Grid, cells: Cells, half: float, nx: float, ny: float) -> Moments:
-    """Of a block, from the centre of its first cell; only of the parts whose beams run along (nx, ny)."""
-    sums = NOTHING
-    for at in range(4):
-        if cells[at] < 0:
-            continue
-        for side in range(2):
-            part = grid.sums[cells[at], side]
-            if part[0] > 0.0 and part[6] * nx + part[7] * ny >= 0.0:
-                sums = _plus(sums, part, (at % 2) * half, (at // 2) * half)
-    return _divided(sums)
-
-
-@lean_kernel
-def _within(grid: Grid, cells: Cells) -> Moments:
-    """Of the parts of a block's lattice cells, each about its own mean: without what is between two faces."""
-    n = xx = xy = yy = 0.0
-    for at in range(4):
-        for side in range(2 if cells[at] >= 0 else 0):
-            part = grid.sums[cells[at], side]
-            if part[0] > 0.0:
-                n += part[0]
-                xx += part[3] - part[1] * part[1] / part[0]
-                xy += part[4] - part[1] * part[2] / part[0]
-                yy += part[5] - part[2] * part[2] / part[0]
-    return n, 0.0, 0.0, xx, xy, yy, 0.0, 0.0
 
 
 @lean_kernel
@@ -201,17 +240,29 @@ def _divided(sums: Moments) -> Moments:
 
 
 @lean_kernel
-def _normal(moments: Moments) -> tuple[float, float]:
-    """The unit eigenvector of a covariance's smaller eigenvalue."""
+def _long_axis(moments: Moments) -> Direction:
+    """That of the moments."""
     _, _, _, xx, xy, yy, _, _ = moments
-    c2, s2 = _doubled(xx, xy, yy, np.hypot(0.5 * (xx - yy), xy))
-    # At a right angle to the long axis, (cos ½β, sin ½β).
-    return -np.copysign(np.sqrt(max(0.5 - 0.5 * c2, 0.0)), s2), np.sqrt(max(0.5 + 0.5 * c2, 0.0))
+    return _doubled(xx, xy, yy)
 
 
 @lean_kernel
-def _doubled(xx: float, xy: float, yy: float, radius: float) -> tuple[float, float]:
-    """Cosine and sine of twice the angle of a covariance's long axis."""
+def _doubled(xx: float, xy: float, yy: float) -> Direction:
+    """That of a covariance."""
+    radius = _radius(xx, xy, yy)
     if radius > 0.0:
         return 0.5 * (xx - yy) / radius, xy / radius
     return 1.0, 0.0
+
+
+@lean_kernel
+def _radius(xx: float, xy: float, yy: float) -> float:
+    """Half of what the eigenvalues of a covariance differ by."""
+    return float(np.sqrt(0.25 * (xx - yy) * (xx - yy) + xy * xy))
+
+
+@lean_kernel
+def _normal(long_axis: Direction) -> tuple[float, float]:
+    """The unit vector at a right angle to the long axis, (cos ½β, sin ½β)."""
+    c2, s2 = long_axis
+    return -np.copysign(np.sqrt(max(0.5 - 0.5 * c2, 0.0)), s2), np.sqrt(max(0.5 + 0.5 * c2, 0.0))

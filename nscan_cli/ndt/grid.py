@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 from nscan_cli.assign import assign, assign_rows
 from nscan_cli.compiled import kernel, lean_kernel
 from nscan_cli.ndt.compact import compacted
-from nscan_cli.ndt.gaussians import make_gaussian
-from nscan_cli.ndt.table import Grid, find_row, insert, pack, table_size, unpack
+from nscan_cli.ndt.gaussians import make_gaussian, straighten
+from nscan_cli.ndt.table import OUTDATED, Grid, find_row, insert, pack, table_size, unpack
 from nscan_cli.ndt.tangent import tangent
 from nscan_cli.poses import Array
 
@@ -94,21 +94,8 @@ def add_scans(
 
 
 @kernel
-def make_gaussians(
-    grid: Grid,
-    rows: int,
-    touched: NDArray[np.int32],
-    half: float,
-    minimum: float,
-    floor: float,
-    straight: bool,
-    faces: bool,
-) -> None:
-    """Make the Gaussians of all lattice cells in `touched` (m,), of the first `rows`.
-
-    From at least `minimum` points, with a standard deviation of at least `floor` (m) and a smaller
-    eigenvalue of at least 0.001 of the larger ([19]); `straight` and `faces` as in make_gaussian.
-    """
+def make_gaussians(grid: Grid, rows: int, touched: NDArray[np.int32], half: float) -> None:
+    """Make the Gaussians of all lattice cells in `touched` (m,), of the first `rows`."""
     made = np.zeros(rows, dtype=np.bool_)
     previous = -1
     for k in range(touched.shape[0]):
@@ -119,7 +106,11 @@ def make_gaussians(
             row = grid.links[previous, block]
             if row >= 0 and not made[row]:
                 made[row] = True
-                make_gaussian(grid, row, half, minimum, floor, straight, faces)
+                make_gaussian(grid, row, half)
+    # On its own: what is done for few scans would slow down what is done for all.
+    for row in range(rows if grid.making[2] > 0.0 else 0):
+        if made[row]:
+            straighten(grid, row, half)
 
 
 @kernel
@@ -130,16 +121,29 @@ def change(
     points: Array,
     pose: Array,
     sign: float,
-    minimum: float,
-    floor: float,
-    straight: bool,
-    faces: bool,
+    at_once: bool,
 ) -> int:
-    """Both: the sums, and the Gaussians made of them."""
+    """Both: the sums, and the Gaussians made of them; when they are met first, if not `at_once`."""
     touched = np.empty(points.shape[0], dtype=np.int32)
     rows = add_points(grid, rows, half, points, pose, sign, touched)
-    make_gaussians(grid, rows, touched, half, minimum, floor, straight, faces)
+    if at_once:
+        make_gaussians(grid, rows, touched, half)
+    else:
+        _outdate_gaussians(grid, touched)
     return rows
+
+
+@lean_kernel
+def _outdate_gaussians(grid: Grid, touched: NDArray[np.int32]) -> None:
+    """Have the Gaussians of all lattice cells in `touched` (m,) made anew when they are met."""
+    previous = -1
+    for k in range(touched.shape[0]):
+        if touched[k] != previous:
+            previous = touched[k]
+            for block in range(4):
+                row = grid.links[previous, block]
+                if row >= 0:
+                    grid.gaussians[row, 2] = OUTDATED
 
 
 @lean_kernel
@@ -193,7 +197,8 @@ class Ndt:
     """A normal distributions transform that grows and shrinks by the points of scans.
 
     `cell` is the side (m) of a Gaussian's cell, `minimum` the least number of points that make a
-    Gaussian, `floor` its least standard deviation (m); `straight` as in make_gaussian.
+    Gaussian, `floor` its least standard deviation (m). With `straight` it is straightened, with `faces`
+    there are two where a wall has two faces; see gaussians.py.
     """
 
     def __init__(
@@ -203,11 +208,10 @@ class Ndt:
         floor: float = 0.02,
         capacity: int = 512,
         straight: bool = False,
+        faces: bool = True,
     ) -> None:
-        self.straight = straight
-        self.cell, self.minimum, self.floor = cell, float(minimum), floor
-        self.rows = 0
-        self.grid = _empty(max(capacity, 16))
+        self.cell, self.rows = cell, 0
+        self.grid = _empty(max(capacity, 16), np.array([minimum, floor, straight, faces], dtype=np.float64))
 
     @property
     def half(self) -> float:
@@ -236,23 +240,11 @@ class Ndt:
     def make(self) -> None:
         """Make all Gaussians of the points gathered."""
         touched = np.arange(self.rows, dtype=np.int32)
-        grid, half, minimum, floor = self.grid, self.half, self.minimum, self.floor
-        make_gaussians(grid, self.rows, touched, half, minimum, floor, self.straight, True)
+        make_gaussians(self.grid, self.rows, touched, self.half)
 
     def _change(self, points: Array, pose: Array, sign: float) -> None:
         self.reserve(len(points))
-        self.rows = change(
-            self.grid,
-            self.rows,
-            self.half,
-            points,
-            pose,
-            sign,
-            self.minimum,
-            self.floor,
-            self.straight,
-            True,
-        )
+        self.rows = change(self.grid, self.rows, self.half, points, pose, sign, True)
 
     def reserve(self, points: int) -> None:
         """Make room for so many more points. Cells that have become empty go first."""
@@ -265,7 +257,7 @@ class Ndt:
             self._renew(2 * max(self.rows + room, capacity))
 
     def _renew(self, capacity: int) -> None:
-        old, self.grid = self.grid, _empty(capacity)
+        old, self.grid = self.grid, _empty(capacity, self.grid.making)
         self.rows = take_over(old, self.rows, self.grid)
 
     def compact(self) -> None:
@@ -279,7 +271,7 @@ class Ndt:
         return int(np.count_nonzero(self.grid.gaussians[:, 2]))
 
 
-def _empty(capacity: int) -> Grid:
+def _empty(capacity: int, making: Array) -> Grid:
     return Grid(
         table=np.full(table_size(capacity), -1, dtype=np.int32),
         keys=np.empty(capacity, dtype=np.int64),
@@ -287,4 +279,5 @@ def _empty(capacity: int) -> Grid:
         facing=np.empty((capacity, 2)),
         sums=np.empty((capacity, 2, 8)),
         gaussians=np.zeros((2 * capacity, 8)),
+        making=making,
     )

@@ -6,8 +6,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from nscan_cli.compiled import kernel, lean_kernel
-from nscan_cli.ndt.table import Grid, find_row, pack, shown
+from nscan_cli.compiled import inlined_kernel, kernel, lean_kernel
+from nscan_cli.ndt.gaussians import make_gaussian
+from nscan_cli.ndt.table import OUTDATED, Grid, find_row, pack, shown
 from nscan_cli.poses import Array
 
 BLOCKS = 4
@@ -113,7 +114,10 @@ def begin(points: Array) -> Meeting:
 
 @lean_kernel
 def meet_again(grid: Grid, half: float, meeting: Meeting, x: float, y: float, phi: float) -> None:
-    """Move the points to the pose (x, y, phi), and look up what those meet that get into another cell."""
+    """Move the points to the pose (x, y, phi), and look up what those meet that get into another cell.
+
+    Gaussians there that are outdated are made anew.
+    """
     cells, cells_now = meeting.cells, meeting.cells_now
     left = _move(meeting.points, x, y, np.cos(phi), np.sin(phi), half, meeting.moved, cells, cells_now)
     # A short step takes no point into another cell, most of the times.
@@ -122,6 +126,8 @@ def meet_again(grid: Grid, half: float, meeting: Meeting, x: float, y: float, ph
         if ix != cells[0, k] or iy != cells[1, k]:
             cells[0, k], cells[1, k] = ix, iy
             row = find_row(grid, pack(int(ix), int(iy)))
+            if row >= 0:
+                _make_outdated(grid, row, half)
             for block in range(BLOCKS):
                 link = -1 if row < 0 else grid.links[row, block]
                 link = shown(grid, link, meeting.moved[0, k], meeting.moved[1, k])
@@ -131,6 +137,15 @@ def meet_again(grid: Grid, half: float, meeting: Meeting, x: float, y: float, ph
                 gaussian = grid.gaussians[link]
                 for number in range(GAUSSIAN):
                     meeting.gaussians[block, number, k] = gaussian[number]
+
+
+@inlined_kernel
+def _make_outdated(grid: Grid, row: int, half: float) -> None:
+    """Make the Gaussians of a lattice cell anew that are outdated."""
+    for block in range(BLOCKS):
+        link = grid.links[row, block]
+        if link >= 0 and grid.gaussians[link, 2] == OUTDATED:
+            make_gaussian(grid, link, half)
 
 
 @lean_kernel

@@ -12,6 +12,8 @@ from nscan_cli.poses import Array
 
 HALF_KEY = 1 << 30
 """Offset that makes lattice coordinates positive in a packed key."""
+OUTDATED = -1.0
+"""In place of the first number of Σ⁻¹: the Gaussian is to be made anew before it is met."""
 
 
 class Grid(NamedTuple):
@@ -38,6 +40,9 @@ class Grid(NamedTuple):
     """(G, 8) mean x, y; Σ⁻¹ as (xx, xy, yy), 0 where a Gaussian has too few points; the normal (x, y) of the
     face that it shows, 0 where it was seen from both sides; and the row of the one that shows the other
     face, or 0."""
+    making: Array
+    """(4,) how Gaussians are made: of at least so many points, with at least this standard deviation (m), and
+    whether they are straight and have faces (0 or 1); see gaussians.py. (0,) in a compact one."""
 
 
 @lean_kernel

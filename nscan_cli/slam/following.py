@@ -51,13 +51,12 @@ class Followed:
 class Follower:
     """Follows the robot piece by piece. The poses of all pieces are in one frame, as odometry guesses it.
 
-    `odometry` tells whether the scans have any. Without it each face of a wall on the map is no Gaussian of
-    its own: exact ones hold the robot where it is in corridors that come into view, as nothing else does.
+    `odometry` tells whether the scans have any.
     """
 
     def __init__(self, options: TrackingOptions, breaking: BreakOptions, odometry: bool = True) -> None:
-        self.options, self.breaking, self._faces = options, breaking, odometry
-        self._tracker = Tracker(options, self._faces)
+        self.options, self.breaking, self._has_odometry = options, breaking, odometry
+        self._tracker = Tracker(options, self._has_odometry)
         self._restarts = self._searches = 0
         self._origin: Array | None = None
         """Where the piece begins, unless it is the first."""
@@ -109,7 +108,7 @@ class Follower:
         settled = self._believe() + self._grow_up()
         self._restarts, self._searches = self.restarts, self.searches
         # The map of the last metres is large, and of no use any more.
-        self._tracker = Tracker(self.options, self._faces)
+        self._tracker = Tracker(self.options, self._has_odometry)
         return settled
 
     def _believe(self) -> list[Followed]:
@@ -193,7 +192,7 @@ class Follower:
         first, guess = doubted[0], last.tracked.pose
         if first.odometry is not None and last.odometry is not None:
             guess = compose(guess, relative(first.odometry, last.odometry))
-        self._tracker, self._origin = Tracker(self.options, self._faces), guess
+        self._tracker, self._origin = Tracker(self.options, self._has_odometry), guess
         is_known = self._has_come_far(first)
         self._path = last.tracked.path
         self._path += float(np.hypot(*(guess - last.tracked.pose)[:2])) if is_known else self.breaking.path

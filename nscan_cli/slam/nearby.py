@@ -142,8 +142,8 @@ def match_nearby(route: Route, centre: int, options: NScanOptions) -> Nearby | N
     if len(tried) < LEAST_SCANS:
         return None
     for widenings in options.attempts:
-        nearby = _match_held(route, tried, seen_before, centre, widenings, options)
-        if nearby.whole and nearby.moved < options.settled:
+        nearby, is_enough = _match_held(route, tried, seen_before, centre, widenings, options)
+        if is_enough and nearby.moved < options.settled:
             break
     return nearby
 
@@ -189,14 +189,19 @@ def _match_held(
     centre: int,
     widenings: tuple[float, ...],
     options: NScanOptions,
-) -> Nearby:
-    """Match jointly, leave out what does not hang together, and match again, until all does."""
+) -> tuple[Nearby, bool]:
+    """Match jointly, leave out what does not hang together, and match again, until all does.
+
+    Returns as well whether other stages can hold no more together: it converged, and all scans took part at
+    first. What was left out after that hardly ever comes back.
+    """
     keyframes, poses = route.keyframes, route.poses
     kept, start, scans = np.arange(len(tried)), poses[tried], _laid_out(keyframes, tried)
     if len(widenings) == 1:
         near = overlaps(scans, start).pairs
         held = held_together(near, POSSIBLE * options.overlap, int(np.searchsorted(tried, centre)))
         kept, start = kept[held], start[held]
+    all_began = len(kept) == len(tried)
     while len(kept) >= LEAST_SCANS:
         members = tried[kept]
         if len(members) < len(scans.point_starts) - 1:
@@ -211,17 +216,17 @@ def _match_held(
         score = weakest_link(shares)
         if not match.converged:
             loop = verdict(keyframes, tried, seen_before, centre, False, "did not converge", score)
-            return Nearby((), None, loop, 0.0, False)
+            return Nearby((), None, loop, 0.0, False), False
         closed = bool(seen_before[kept].any())
         relation = _relation(keyframes, members, at, match, "loop" if closed else "nscan", score)
         whole = len(kept) == len(tried)
         reason = "" if whole else f"{counted(len(tried) - len(kept), 'scan')} left out"
         used, before = (members, seen_before[kept]) if closed else (tried, seen_before)
         loop = verdict(keyframes, used, before, centre, closed, reason, score)
-        return Nearby((), relation, loop, moved_by(poses[members], match.poses, at), whole)
+        return Nearby((), relation, loop, moved_by(poses[members], match.poses, at), whole), all_began
     reason = f"only {len(kept)} of {len(tried)} scans hang together"
     loop = verdict(keyframes, tried, seen_before, centre, False, reason, 0.0)
-    return Nearby((), None, loop, 0.0, False)
+    return Nearby((), None, loop, 0.0, False), all_began
 
 
 def _laid_out(keyframes: Sequence[Keyframe], members: Indices) -> Scans:
@@ -252,6 +257,8 @@ def _match(
         near=NEAR,
         max_iterations=options.max_iterations,
         tolerance=options.tolerance,
+        # The last step is shorter than a millimetre: its end need not be looked at.
+        thorough=False,
     )
     scale = scale_of([route.keyframes[k] for k in members], options)
     return match_jointly(JointProblem(scans, all_pairs(len(members)), priors, scale), start, joint)

@@ -37,8 +37,11 @@ class TrackingOptions:
     """A scan joins the map when the robot has moved by so much (m, rad) since the last that did."""
     widenings: tuple[float, ...] = (0.05, 0.3, 1.0)
     max_iterations: int = 20
+    near: float = 5e-3
+    """m, rad; a wide stage has only to lead to the next one, and with odometry ends with a step that is
+    shorter,"""
     tolerance: float = 1e-4
-    """m, rad"""
+    """the last stage with one that is shorter than this."""
     scale: float = 0.1
     """What the energy is multiplied with against the prior: four Gaussians see each point, and
     neighbouring points hit the same wall."""
@@ -134,7 +137,8 @@ class NScanOptions:
     overlap: float = 0.65
     """Share of inliers, one of the other, that holds two scans together."""
     settled: float = 0.1
-    """When the last stage alone moves a scan further (m), or leaves one out, all stages are run."""
+    """When the last stage alone moves a scan further (m), or one is too far off to take part in it, all
+    stages are run."""
 
     @property
     def attempts(self) -> tuple[tuple[float, ...], ...]:

@@ -78,11 +78,11 @@ def _match(route: Route, other: int, centre: int, options: NScanOptions) -> _Sin
     reference, points = keyframes[other].ndt, keyframes[centre].points
     prior = _prior(route.chain, other, centre)
     scale = scale_of([keyframes[centre]], options)
-    start, origin = relative(poses[centre], poses[other]), np.zeros(3)
+    start, origin, tolerance = relative(poses[centre], poses[other]), np.zeros(3), options.tolerance
     for widenings in options.attempts:
         pose, hessian = start.copy(), np.empty((3, 3))
         problem = PairProblem(reference.grid, reference.half, begin(points), scale, prior)
-        minimise(problem, pose, np.array(widenings), options.max_iterations, options.tolerance, hessian)
+        minimise(problem, pose, np.array(widenings), options.max_iterations, tolerance, tolerance, hessian)
         pose[2] = wrap(pose[2])
         moved = moved_by(np.stack([origin, start]), np.stack([origin, pose]), 1)
         overlap = _overlap(keyframes[other], keyframes[centre], pose)

@@ -16,13 +16,11 @@ class Settings(NamedTuple):
 
     half: float
     """Side (m) of a lattice cell of the map."""
-    minimum: float
-    floor: float
-    faces: bool  # of walls: see make_gaussian
     window: float
     step: float
     widenings: Array
     max_iterations: int
+    near: float
     tolerance: float
     scale: float
     inlier_bound: float
@@ -31,18 +29,15 @@ class Settings(NamedTuple):
     steady_motion: Motion
 
     @classmethod
-    def of(cls, options: TrackingOptions, faces: bool = True) -> Settings:
-        """Those of the options."""
-        gaussians = options.gaussians
+    def of(cls, options: TrackingOptions, odometry: bool = False) -> Settings:
+        """Those of the options, with odometry or without."""
         return cls(
-            0.5 * gaussians.cell,
-            float(gaussians.minimum),
-            gaussians.floor,
-            faces,
+            0.5 * options.gaussians.cell,
             options.window,
             options.step,
             np.array(options.widenings),
             options.max_iterations,
+            options.near if odometry else options.tolerance,
             options.tolerance,
             options.scale,
             options.inlier_bound,

@@ -122,7 +122,7 @@ def match_and_count(
     meeting = begin(points)
     problem = PairProblem(grid, half, meeting, scale, prior)
     value, _, _, _, _ = minimise(
-        problem, pose, widenings, settings.max_iterations, settings.tolerance, hessian
+        problem, pose, widenings, settings.max_iterations, settings.near, settings.tolerance, hessian
     )
     meet_again(grid, half, meeting, pose[0], pose[1], pose[2])
     return value, count_inliers(meeting, settings.inlier_bound) / max(points.shape[0], 1)
@@ -222,11 +222,9 @@ def _join(track: Track, grid: Grid, settings: Settings, points: Array, pose: Arr
 
 @kernel
 def _change(track: Track, grid: Grid, settings: Settings, scan: int, sign: float) -> None:
-    half, minimum, floor = settings.half, settings.minimum, settings.floor
     points, pose = track.points[track.ends[scan] : track.ends[scan + 1]], track.placed[scan, :3]
-    track.counts[ROWS] = change(
-        grid, track.counts[ROWS], half, points, pose, sign, minimum, floor, False, settings.faces
-    )
+    # Half of the Gaussians change again before any point meets them.
+    track.counts[ROWS] = change(grid, track.counts[ROWS], settings.half, points, pose, sign, False)
 
 
 @kernel

@@ -74,14 +74,19 @@ class Match(NamedTuple):
 
 
 class Tracker:
-    """Follows the robot from scan to scan; `faces` as in Settings."""
+    """Follows the robot from scan to scan. `odometry` tells whether there is any.
 
-    def __init__(self, options: TrackingOptions, faces: bool = True) -> None:
+    Without it each face of a wall on the map is no Gaussian of its own: exact ones hold the robot where it is
+    in corridors that come into view, as nothing else does. And the start of a match is a guess: its wide
+    stages are done to their end.
+    """
+
+    def __init__(self, options: TrackingOptions, odometry: bool = True) -> None:
         self.options = options
         gaussians = options.gaussians
-        self.map = Ndt(gaussians.cell, gaussians.minimum, gaussians.floor, capacity=1 << 14)
+        self.map = Ndt(gaussians.cell, gaussians.minimum, gaussians.floor, capacity=1 << 14, faces=odometry)
         self.restarts = self.searches = 0
-        self._settings = Settings.of(options, faces)
+        self._settings = Settings.of(options, odometry)
         self._track = Track.begin(options.steady_scans + 1)
         self._prior = Prior(np.zeros(3), np.zeros((3, 3)))
 

@@ -84,6 +84,19 @@ def test_the_result_is_a_minimum_with_the_gauge_in_its_hessian(five):
     assert np.abs(values[:3]).max() < 1e-3 * values[3]
 
 
+def test_less_thorough_the_last_step_is_taken_without_a_look(five):
+    start = near(five.truth, 4)
+    whole = match_jointly(five.joint(), start, JointOptions(tolerance=1e-3))
+    match = match_jointly(five.joint(), start, JointOptions(tolerance=1e-3, thorough=False))
+    assert match.converged
+    # One evaluation less in each of the four descents.
+    assert match.evaluations <= whole.evaluations - 4
+    assert np.abs(errors(match.poses, whole.poses)).max() < 1e-3
+    assert match.energy == pytest.approx(whole.energy, rel=1e-3)
+    scale = np.abs(whole.hessian).max()
+    np.testing.assert_allclose(match.hessian, whole.hessian, atol=0.02 * scale)
+
+
 def test_off_a_minimum_the_turn_of_all_scans_has_the_curvature_of_its_gradient(five):
     """E stays the same along the circles p(θ) on which all scans turn: p'ᵗ H p' + gᵗ p'' = 0.
 

@@ -31,10 +31,10 @@ def evaluate(ndt: Ndt, points: Array, pose: Array, curvature: float = 1.0) -> tu
     return value, gradient, hessian
 
 
-def run(ndt: Ndt, points: Array, start: Array, mean: Array, information: Array):
+def run(ndt: Ndt, points: Array, start: Array, mean: Array, information: Array, near: float = 1e-6):
     pose, hessian = start.copy(), np.empty((3, 3))
     problem = PairProblem(ndt.grid, ndt.half, begin(points), SCALE, Prior(mean, information))
-    outcome = minimise(problem, pose, np.array([0.05, 0.3, 1.0]), 30, 1e-6, hessian)
+    outcome = minimise(problem, pose, np.array([0.05, 0.3, 1.0]), 30, near, 1e-6, hessian)
     return pose, hessian, outcome
 
 
@@ -89,3 +89,13 @@ def test_a_moved_copy_is_brought_back(seed):
     assert np.abs(pose).max() < 0.03
     assert value == pytest.approx(SCALE * energy)
     assert np.linalg.eigvalsh(hessian)[0] > 0
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_wide_stages_that_end_early_lead_to_a_minimum_as_near_the_truth(seed):
+    start = np.random.default_rng(seed).uniform(-1, 1, 3) * [0.3, 0.3, 0.1]
+    ndt, points = ndt_of(room(seed)), room(seed)
+    whole, _, (*_, evaluations, _) = run(ndt, points, start, np.zeros(3), np.zeros((3, 3)))
+    early, _, (*_, fewer, _) = run(ndt, points, start, np.zeros(3), np.zeros((3, 3)), near=0.01)
+    assert max(np.abs(early).max(), np.abs(whole).max()) < 0.03
+    assert fewer < evaluations

@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 from nscan_cli.ndt.energy import OUT, accumulate, inlier_share, sum_meeting
-from nscan_cli.ndt.grid import Ndt
+from nscan_cli.ndt.grid import Ndt, change
 from nscan_cli.ndt.meeting import begin, count_inliers, meet_again, room_to_meet
+from nscan_cli.ndt.table import OUTDATED
 from tests.ndt.rooms import room
 
 
@@ -48,6 +49,27 @@ def test_inliers_of_a_meeting_are_those_that_are_looked_up_anew():
             ndt.grid, ndt.half, points, pose, 9.0
         )
     assert len(counts) > 10
+
+
+def test_gaussians_that_are_outdated_are_made_when_they_are_met():
+    at_once, later = outside_in(3), outside_in(3)
+    for scan, pose, sign in ((room(5), np.array([0.1, 0.0, 0.02]), 1.0), (room(0), np.zeros(3), -1.0)):
+        for ndt, now in ((at_once, True), (later, False)):
+            ndt.reserve(len(scan))
+            ndt.rows = change(ndt.grid, ndt.rows, ndt.half, scan, pose, sign, now)
+    outdated = np.count_nonzero(later.grid.gaussians[: later.rows, 2] == OUTDATED)
+    points, expected, found = room(7)[:100], np.empty(OUT), np.empty(OUT)
+    for pose in np.random.default_rng(8).uniform(-0.3, 0.3, (10, 3)):
+        for ndt, out in ((at_once, expected), (later, found)):
+            meeting = begin(points)
+            meet_again(ndt.grid, ndt.half, meeting, *pose)
+            sum_meeting(meeting, 1.0, 1.0, out)
+        assert expected[0] < -1.0
+        np.testing.assert_array_equal(found, expected)
+    left = np.count_nonzero(later.grid.gaussians[: later.rows, 2] == OUTDATED)
+    assert 0 < left < outdated
+    later.make()
+    np.testing.assert_array_equal(later.grid.gaussians[: later.rows], at_once.grid.gaussians[: later.rows])
 
 
 def test_no_points_meet_nothing():

@@ -11,7 +11,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from nscan_cli.matching.gauge import gauge_directions
+from nscan_cli.matching.joint import JointMatch, JointOptions, match_jointly
+from nscan_cli.matching.joint_energy import JointProblem
 from nscan_cli.poses import Array, compose, relative, wrap
+from nscan_cli.slam import nearby
 from nscan_cli.slam.keyframes import Keyframe, route_of
 from nscan_cli.slam.nearby import Nearby, choose_nearby, match_at, match_nearby
 from nscan_cli.slam.options import NScanOptions
@@ -234,6 +237,24 @@ def test_a_foreign_scan_is_left_out_and_named_in_the_reason():
     assert (found.loop.accepted, found.loop.reason) == (True, "1 scan left out")
     errors = off_truth(found)
     assert np.hypot(errors[:, 0], errors[:, 1]).max() < 0.04
+
+
+@pytest.mark.parametrize(
+    ("foreign", "overlap", "attempts"),
+    [({}, 0.65, 1), ({}, 0.95, 1), ({300: 1320}, 0.65, 2)],
+    ids=["all hang together", "one takes part and is left out", "one cannot take part"],
+)
+def test_all_stages_are_run_for_what_the_last_one_cannot_try(foreign, overlap, attempts, monkeypatch):
+    stages = []
+
+    def watched(problem: JointProblem, start: Array, options: JointOptions) -> JointMatch:
+        stages.append(len(options.widenings))
+        return match_jointly(problem, start, options)
+
+    monkeypatch.setattr(nearby, "match_jointly", watched)
+    found = matched(revisit(foreign), np.zeros(3), NScanOptions(overlap=overlap))
+    assert found.whole == (overlap == 0.65 and not foreign)
+    assert sorted(set(stages)) == [1, 3][:attempts]
 
 
 def test_a_newest_scan_that_is_foreign_is_refused_with_a_reason():
