@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import sys
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
 from types import TracebackType
 from typing import Any, TypeVar
@@ -53,6 +54,18 @@ def called(function: Callable[[], Result]) -> Future[Result]:
     return future
 
 
+@contextlib.contextmanager
+def short_turns(threads: int) -> Iterator[None]:
+    """Let several threads wait for the interpreter no longer than SWITCH, until it ends."""
+    interval = sys.getswitchinterval()
+    if threads > 1:
+        sys.setswitchinterval(SWITCH)
+    try:
+        yield
+    finally:
+        sys.setswitchinterval(interval)
+
+
 class Beside:
     """Calls that are made one after another beside the caller's own work; at once if there is one thread.
 
@@ -62,7 +75,7 @@ class Beside:
 
     def __init__(self, threads: int) -> None:
         self._pool = ThreadPoolExecutor(1) if threads > 1 else None
-        self._interval = sys.getswitchinterval()
+        self._turns = short_turns(threads)
         self._calls: list[Future[Any]] = []
 
     def __call__(self, function: Callable[[Item], Any], item: Item) -> None:
@@ -75,19 +88,17 @@ class Beside:
         self._calls.append(self._pool.submit(function, item))
 
     def __enter__(self) -> Beside:
-        if self._pool is not None:
-            sys.setswitchinterval(SWITCH)
+        self._turns.__enter__()
         return self
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        if self._pool is None:
-            return
         try:
             for call in self._calls if kind is None else ():
                 call.result()
         finally:
-            sys.setswitchinterval(self._interval)
-            # Who interrupts does not wait for what would be thrown away.
-            self._pool.shutdown(wait=kind is not KeyboardInterrupt, cancel_futures=True)
+            self._turns.__exit__(None, None, None)
+            if self._pool is not None:
+                # Who interrupts does not wait for what would be thrown away.
+                self._pool.shutdown(wait=kind is not KeyboardInterrupt, cancel_futures=True)

@@ -80,7 +80,7 @@ class Outputs:
         """Write all; `rows` (N,) are those of the graph's scans, `inputs` what the depfile names."""
         from nscan_cli.graph.json_file import write_graph
         from nscan_cli.memory import give_back
-        from nscan_cli.threads import meanwhile
+        from nscan_cli.threads import meanwhile, short_turns
 
         give_back()
         farthest = float(abs(graph.poses[:, :2]).max())
@@ -90,9 +90,10 @@ class Outputs:
                 label(inputs[0]), problem, f"look for jumps, or set {DISTANCE.variable} higher"
             )
         image = None
-        if scans is not None and self.map is not None:
-            image = meanwhile(threads, partial(_drawn, scans, rows, graph.poses, threads))
-        write_whole(self.graph, write_graph(graph))
+        with short_turns(threads):
+            if scans is not None and self.map is not None:
+                image = meanwhile(threads, partial(_drawn, scans, rows, graph.poses, threads))
+            write_whole(self.graph, write_graph(graph))
         if self.trajectory is not None:
             from nscan_cli.graph.tum import write_tum
 

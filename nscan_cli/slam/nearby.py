@@ -27,6 +27,8 @@ POSSIBLE = 0.5
 together, it brings none there."""
 NEAR = 5e-3
 """m, rad; with every other point no stage is worth more."""
+STRIDE = 4
+"""From a start that is right to centimetres, every so-manyth point leads to where all points are matched."""
 
 
 @dataclass(frozen=True)
@@ -255,6 +257,7 @@ def _match(
     joint = JointOptions(
         widenings,
         near=NEAR,
+        stride=STRIDE if len(widenings) == 1 else JointOptions.stride,
         max_iterations=options.max_iterations,
         tolerance=options.tolerance,
         # The last step is shorter than a millimetre: its end need not be looked at.
