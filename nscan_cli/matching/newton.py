@@ -84,9 +84,9 @@ def minimise(
     """Levenberg–Marquardt from `pose` (3,), in place, one stage for each entry of `widenings`.
 
     The last stage ends with a step that moves the pose by less than `tolerance` (m, rad), those before with
-    one of less than `near`: they only have to lead there. Writes the last stage's
-    semi-definite Hessian of the objective (3, 3). Returns the objective's and E's value, iterations,
-    evaluations, and whether the last stage converged. Hessian and values are those before that last step.
+    one of less than `near`: they only have to lead there. Writes the last stage's semi-definite Hessian of
+    the objective (3, 3). Returns the objective's and E's value, iterations, evaluations, and whether the last
+    stage converged. Hessian and values are those before that last step.
     """
     out, trial_out = np.empty(OUT), np.empty(OUT)
     gradient, step, trial = np.empty(3), np.empty(3), np.empty(3)

@@ -108,14 +108,15 @@ def _long_axis_around(grid: Grid, key: int, moments: Moments, half: float) -> Di
     """The direction of a piece of wall, from around it if possible; see straighten."""
     long_axis = _long_axis(moments)
     small, large = _eigenvalues(grid, moments)
+    if large <= THIN * small:
+        return long_axis
     for around in (2, 1):
-        if large > THIN * small:
-            wide = _around(grid, key, around, half)
-            _, _, _, xx, xy, yy, _, _ = wide
-            c2, s2 = _long_axis(wide)
-            flat = 0.5 * (xx + yy) - _radius(xx, xy, yy) < small
-            if flat and c2 * long_axis[0] + s2 * long_axis[1] > SAME_DIRECTION:
-                return c2, s2
+        wide = _around(grid, key, around, half)
+        _, _, _, xx, xy, yy, _, _ = wide
+        c2, s2 = _long_axis(wide)
+        flat = 0.5 * (xx + yy) - _radius(xx, xy, yy) < small
+        if flat and c2 * long_axis[0] + s2 * long_axis[1] > SAME_DIRECTION:
+            return c2, s2
     return long_axis
 
 

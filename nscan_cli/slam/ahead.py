@@ -17,7 +17,8 @@ import numpy as np
 from nscan_cli.graph.model import Pairwise
 from nscan_cli.slam.coverage import Coverage
 from nscan_cli.slam.keyframes import Keyframe, Route, extended
-from nscan_cli.slam.nearby import MatchNearby, Near, Nearby, choose_nearby
+from nscan_cli.slam.near import Near, choose_nearby
+from nscan_cli.slam.nearby import MatchNearby, Nearby
 from nscan_cli.slam.options import NScanOptions
 from nscan_cli.threads import called
 

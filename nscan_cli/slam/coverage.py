@@ -6,7 +6,8 @@ from collections.abc import Iterable
 from itertools import combinations
 
 from nscan_cli.slam.keyframes import Route
-from nscan_cli.slam.nearby import Near, Nearby
+from nscan_cli.slam.near import Near
+from nscan_cli.slam.nearby import Nearby
 from nscan_cli.slam.options import NScanOptions
 
 

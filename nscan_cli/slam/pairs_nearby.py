@@ -20,7 +20,8 @@ from nscan_cli.ndt.energy import energy, inlier_share
 from nscan_cli.ndt.meeting import begin
 from nscan_cli.poses import Array, inverse, relative, relative_jacobians, wrap
 from nscan_cli.slam.keyframes import Keyframe, Route
-from nscan_cli.slam.nearby import Nearby, choose_nearby, moved_by, scale_of, verdict
+from nscan_cli.slam.near import choose_nearby
+from nscan_cli.slam.nearby import Nearby, moved_by, scale_of, verdict
 from nscan_cli.slam.options import NScanOptions
 
 

@@ -22,7 +22,8 @@ from nscan_cli.slam.coverage import Coverage
 from nscan_cli.slam.energies import Energies
 from nscan_cli.slam.following import Followed, Follower, Sensed
 from nscan_cli.slam.keyframes import Keyframe, Keyframes, extended, relation_between, route_of
-from nscan_cli.slam.nearby import MatchNearby, Nearby, choose_nearby, match_nearby
+from nscan_cli.slam.near import choose_nearby
+from nscan_cli.slam.nearby import MatchNearby, Nearby, match_nearby
 from nscan_cli.slam.options import SlamOptions
 from nscan_cli.slam.pairs_nearby import match_pairs_nearby
 from nscan_cli.slam.place import TOO_LITTLE, Place, piece_moved

@@ -16,7 +16,8 @@ from nscan_cli.graph.model import Loop, NScan, Pairwise
 from nscan_cli.poses import Array, Indices, relative, wrap
 from nscan_cli.slam.coverage import Coverage
 from nscan_cli.slam.keyframes import Route
-from nscan_cli.slam.nearby import MatchNearby, Near, Nearby, choose_nearby
+from nscan_cli.slam.near import Near, choose_nearby
+from nscan_cli.slam.nearby import MatchNearby, Nearby
 from nscan_cli.slam.options import NScanOptions
 from nscan_cli.threads import in_threads
 

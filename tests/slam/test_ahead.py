@@ -11,7 +11,8 @@ from nscan_cli.graph.model import Pairwise
 from nscan_cli.slam.ahead import AHEAD, Ahead
 from nscan_cli.slam.coverage import Coverage
 from nscan_cli.slam.keyframes import Keyframe, Route, extended, route_of
-from nscan_cli.slam.nearby import Near, Nearby
+from nscan_cli.slam.near import Near
+from nscan_cli.slam.nearby import Nearby
 from nscan_cli.slam.options import GaussianOptions, NScanOptions
 from nscan_cli.slam.tracking import Tracked
 

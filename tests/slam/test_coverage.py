@@ -12,7 +12,8 @@ from hypothesis import strategies as st
 from nscan_cli.graph.model import NScan, Pairwise
 from nscan_cli.slam.coverage import Coverage
 from nscan_cli.slam.keyframes import Route
-from nscan_cli.slam.nearby import Nearby, choose_nearby
+from nscan_cli.slam.near import choose_nearby
+from nscan_cli.slam.nearby import Nearby
 from nscan_cli.slam.options import NScanOptions, SlamOptions
 from tests.slam.runs import Mapped, mapped, mapped_office, office_log, part
 

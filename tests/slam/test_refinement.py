@@ -11,7 +11,8 @@ import pytest
 from nscan_cli.evaluation.trajectory import trajectory_errors
 from nscan_cli.graph.tum import Trajectory
 from nscan_cli.slam.keyframes import Route
-from nscan_cli.slam.nearby import MatchNearby, Nearby, choose_nearby, match_nearby
+from nscan_cli.slam.near import choose_nearby
+from nscan_cli.slam.nearby import MatchNearby, Nearby, match_nearby
 from nscan_cli.slam.options import NScanOptions, Relations, SlamOptions
 from nscan_cli.slam.pairs_nearby import match_pairs_nearby
 from nscan_cli.slam.refinement import Refinement
