@@ -41,7 +41,7 @@ SAME_DIRECTION = 0.9
 def make_gaussian(grid: Grid, row: int, half: float) -> None:
     """Mean, inverse covariance and side of the block of four lattice cells whose lower left one is `row`.
 
-    With `faces` two of them, where the points lie on two faces of a wall.
+    Two of them where the grid has faces, and the points lie on two faces of a wall.
     """
     key, gaussian, other = grid.keys[row], grid.gaussians[row], grid.keys.shape[0] + row
     if gaussian[7] > 0.0:
@@ -96,7 +96,7 @@ def _shape(
 
 @lean_kernel
 def _eigenvalues(grid: Grid, moments: Moments) -> tuple[float, float]:
-    """Of a covariance, the smaller one first, both raised to the floor."""
+    """Of a covariance, the smaller one first; both at least the floor, it 0.001 of the larger ([19])."""
     _, _, _, xx, xy, yy, _, _ = moments
     middle, radius, floor = 0.5 * (xx + yy), _radius(xx, xy, yy), grid.making[1]
     large = max(middle + radius, floor * floor)

@@ -123,7 +123,10 @@ def change(
     sign: float,
     at_once: bool,
 ) -> int:
-    """Both: the sums, and the Gaussians made of them; when they are met first, if not `at_once`."""
+    """Both: the sums, and the Gaussians made of them; when they are met first, if not `at_once`.
+
+    Those that are made later are not straightened.
+    """
     touched = np.empty(points.shape[0], dtype=np.int32)
     rows = add_points(grid, rows, half, points, pose, sign, touched)
     if at_once:

@@ -13,7 +13,8 @@ from nscan_cli.poses import Array
 HALF_KEY = 1 << 30
 """Offset that makes lattice coordinates positive in a packed key."""
 OUTDATED = -1.0
-"""In place of the first number of Σ⁻¹: the Gaussian is to be made anew before it is met."""
+"""In place of the first number of Σ⁻¹: the Gaussian is to be made anew before it is met. `meet_again` does
+so; before anything else looks Gaussians up, `Ndt.make` has to make them all."""
 
 
 class Grid(NamedTuple):

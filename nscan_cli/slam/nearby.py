@@ -25,7 +25,7 @@ POSSIBLE = 0.5
 """The last stage moves scans by centimetres: from less than this share of the overlap that holds two scans
 together, it brings none there."""
 NEAR = 5e-3
-"""m, rad; with every other point no stage is worth more."""
+"""m, rad; of some of the points no stage is worth more."""
 STRIDE = 4
 """From a start that is right to centimetres, every so-manyth point leads to where all points are matched."""
 
