@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from nscan_cli.compiled import kernel
 from nscan_cli.counting import counted
 from nscan_cli.errors import WrongUsageError
-from nscan_cli.poses import Array, Indices, compose, transform
+from nscan_cli.poses import Array, Indices, compose
 
 TOGETHER = 256
 """Scans whose points are computed at once."""
@@ -107,8 +107,8 @@ class LaserLog:
 
     def points(self, scan: int) -> Array:
         """The usable beams' end points (m, 2) of one row in the robot's frame, in beam order."""
-        ends, usable = self._ends(slice(scan, scan + 1))
-        return ends[usable]
+        points, _ = self._points(slice(scan, scan + 1), math.inf)
+        return points
 
     def each_points(self, reach: float = math.inf) -> Iterator[Array]:
         """The `points` of each scan, in order of time, that are nearer to the robot than `reach` (m).
@@ -116,24 +116,21 @@ class LaserLog:
         Many scans at a time, which costs a tenth of one by one.
         """
         for first in range(0, len(self), TOGETHER):
-            ends, usable = self._ends(slice(first, first + TOGETHER))
-            points, stops = _near(ends, usable, reach)
+            points, stops = self._points(slice(first, first + TOGETHER), reach)
             begin = 0
             for stop in stops.tolist():
                 yield points[begin:stop]
                 begin = stop
 
-    def _ends(self, rows: slice) -> tuple[Array, NDArray[np.bool_]]:
-        """The end points (R, B, 2) of the beams of some rows in the robot's frame, and which are usable."""
-        ranges = self.ranges[rows]
+    def _points(self, rows: slice, reach: float) -> tuple[Array, Indices]:
+        """The points (m, 2) of R rows, one after another, and where each row's end (R,)."""
         first, between = self.angle_min[rows], self.angle_increment[rows]
         if (first == first[0]).all() and (between == between[0]).all():
             # Mostly all scans have the same angles: a scan's cosines do for all.
             first, between = first[:1], between[:1]
-        angles = first[:, None] + between[:, None] * np.arange(ranges.shape[1])
-        usable = np.isfinite(ranges)
-        lengths = np.where(usable, ranges, 0.0)[..., None]
-        return transform(self.mount, lengths * np.stack([np.cos(angles), np.sin(angles)], axis=-1)), usable
+        angles = first[:, None] + between[:, None] * np.arange(self.ranges.shape[1])
+        turn = np.array([np.cos(self.mount[2]), np.sin(self.mount[2])])
+        return _end_points(self.ranges[rows], np.cos(angles), np.sin(angles), self.mount, turn, reach)
 
     def laser_pose(self, robot: Array) -> Array:
         """Poses (…, 3) of the laser for poses (…, 3) of the robot."""
@@ -141,14 +138,28 @@ class LaserLog:
 
 
 @kernel
-def _near(ends: Array, usable: NDArray[np.bool_], reach: float) -> tuple[Array, Indices]:
-    """The usable end points (m, 2) nearer than `reach` (m) of all (R, B, 2), and where each row ends (R,)."""
-    points, stops = np.empty((ends.shape[0] * ends.shape[1], 2)), np.empty(ends.shape[0], dtype=np.int64)
+def _end_points(
+    ranges: NDArray[np.float32], cos: Array, sin: Array, mount: Array, turn: Array, reach: float
+) -> tuple[Array, Indices]:
+    """What _points returns of ranges (R, B) in directions of these cosines and sines (1 or R, B).
+
+    `turn` (2,) are those of the mount (3,).
+    """
+    points, stops = (
+        np.empty((ranges.shape[0] * ranges.shape[1], 2)),
+        np.empty(ranges.shape[0], dtype=np.int64),
+    )
     m = 0
-    for row in range(ends.shape[0]):
-        for beam in range(ends.shape[1]):
-            x, y = ends[row, beam, 0], ends[row, beam, 1]
-            if usable[row, beam] and np.hypot(x, y) < reach:
+    for row in range(ranges.shape[0]):
+        angles = row if cos.shape[0] > 1 else 0
+        for beam in range(ranges.shape[1]):
+            length = np.float64(ranges[row, beam])
+            if not np.isfinite(length):
+                continue
+            along, left = length * cos[angles, beam], length * sin[angles, beam]
+            x = turn[0] * along - turn[1] * left + mount[0]
+            y = turn[1] * along + turn[0] * left + mount[1]
+            if np.hypot(x, y) < reach:
                 points[m, 0], points[m, 1] = x, y
                 m += 1
         stops[row] = m

@@ -75,10 +75,15 @@ def no_priors() -> Priors:
     return Priors(np.empty((0, 2), dtype=np.int64), np.empty((0, 3)), np.empty((0, 3, 3)))
 
 
+@kernel
 def all_pairs(n: int) -> NDArray[np.int64]:
     """The index set J of all n (n − 1) ordered pairs, (n (n − 1), 2)."""
-    i, j = np.divmod(np.arange(n * n), n)
-    pairs: NDArray[np.int64] = np.stack([i, j], axis=1)[i != j]
+    pairs, m = np.empty((n * (n - 1), 2), dtype=np.int64), 0
+    for i in range(n):
+        for j in range(n):
+            if i != j:
+                pairs[m, 0], pairs[m, 1] = i, j
+                m += 1
     return pairs
 
 

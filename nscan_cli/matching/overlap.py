@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from nscan_cli.compiled import kernel, lean_kernel
 from nscan_cli.matching.planar import relative_pose
-from nscan_cli.matching.scans import Scans, scan_grid, scan_points
+from nscan_cli.matching.scans import Scans, most_points, scan_grid, scan_points
 from nscan_cli.ndt.energy import find_inliers
 from nscan_cli.poses import Array
 
@@ -33,11 +33,15 @@ class Overlaps(NamedTuple):
 
 def overlaps(scans: Scans, poses: Array) -> Overlaps:
     """The overlaps of n scans at the poses (n, 3)."""
-    n = len(poses)
-    shares = Overlaps(np.zeros((n, n)), np.zeros(n))
-    seen = np.empty(np.diff(scans.point_starts).max(initial=0), dtype=np.bool_)
-    _count(scans, poses, np.empty(3), seen, shares.pairs, shares.scans)
-    return shares
+    return Overlaps(*_overlaps(scans, poses))
+
+
+@kernel
+def _overlaps(scans: Scans, poses: Array) -> tuple[Array, Array]:
+    n = poses.shape[0]
+    pairs, shares = np.zeros((n, n)), np.zeros(n)
+    _count(scans, poses, np.empty(3), np.empty(most_points(scans), dtype=np.bool_), pairs, shares)
+    return pairs, shares
 
 
 @lean_kernel

@@ -64,7 +64,7 @@ def lay_out(ndts: Sequence[Ndt], points: Sequence[Array], neutral: bool = True) 
         _starts([len(table) for table in tables]),
         _starts([ndt.rows for ndt in ndts]),
         _starts([len(part) for part in gaussians]),
-        np.concatenate([np.asarray(part, dtype=np.float64).reshape(-1, 2) for part in points]),
+        np.concatenate(points, dtype=np.float64),
         _starts([len(part) for part in points]),
         ndts[0].half,
         own,
@@ -115,4 +115,4 @@ def _own_mean(grid: Grid, half: float, points: Array) -> float:
 
 
 def _starts(lengths: Sequence[int]) -> NDArray[np.int64]:
-    return np.concatenate([[0], np.cumsum(lengths)]).astype(np.int64)
+    return np.cumsum([0, *lengths], dtype=np.int64)

@@ -18,12 +18,12 @@ from nscan_cli.logs.scan import LaserLog
 from nscan_cli.matching.priors import odometry_prior
 from nscan_cli.poses import relative
 from nscan_cli.slam.closing import NO_SECOND, SO_FAR_OFF
+from nscan_cli.slam.found import Found
 from nscan_cli.slam.keyframes import route_of
 from nscan_cli.slam.nearby import Nearby
 from nscan_cli.slam.options import Relations, SlamOptions
 from nscan_cli.slam.pipeline import Slam
 from nscan_cli.slam.place import AMBIGUOUS, ELSEWHERE, NO_MATCH, Place
-from nscan_cli.slam.tracking import Tracked
 
 LEAST_VALUE, LARGEST_VALUE, MOST_VALUES = 1e-9, 1e9, 10
 """What a parameter can be, and how many values a list of them can have."""
@@ -91,29 +91,38 @@ def _scans(log: LaserLog, rows: NDArray[np.int64]) -> LaserLog:
 
 def _lay_out(slam: Slam, graph: Graph) -> None:
     """The keyframes with their Gaussians, as tracking would have made them at the graph's poses."""
-    step, path, joined_at = slam.options.tracking.step, 0.0, graph.poses[0]
-    nothing, breaks = np.zeros((3, 3)), _breaks(graph, slam.options)
-    scans = zip(slam.points(), graph.poses, graph.anchors.tolist(), strict=True)
-    for row, (points, pose, anchor) in enumerate(scans):
-        moved = relative(pose, joined_at)
-        distance = float(np.hypot(moved[0], moved[1]))
-        joined = row == 0 or distance > step or abs(moved[2]) > step
-        if joined:
-            path, joined_at = path + distance, pose
+    breaks = _breaks(graph, slam.options)
+    found = _as_tracked(graph, breaks, slam.options)
+    for row, (points, anchor) in enumerate(zip(slam.points(), graph.anchors.tolist(), strict=True)):
         if row in breaks:
             slam.keyframes.part()
             slam.breaks.append(row)
-            path += slam.options.breaks.path
-        tracked = Tracked(pose, nothing, nothing, 1.0, path, joined)
         if anchor == row:
-            slam.keyframes.add(row, points, tracked)
+            slam.keyframes.add(row, points, found.scan(row))
             for whole in slam.keyframes.list[-2:-1]:
                 whole.finish()
         else:
-            slam.keyframes.attach(points, tracked)
-        slam.tracked.append(pose)
-        slam.anchors.append(anchor)
+            slam.keyframes.attach([points], found.part(row, row + 1))
+    slam.tracked.append(graph.poses)
     slam.keyframes.part()
+
+
+def _as_tracked(graph: Graph, breaks: set[int], options: SlamOptions) -> Found:
+    """The scans as if tracking had found them at the graph's poses, and knew nothing of how well."""
+    found, step, path = Found.room(len(graph)), options.tracking.step, 0.0
+    found.poses[:], found.values[:], found.inliers[:] = graph.poses, 0.0, 1.0
+    found.hessians[:], found.expected[:] = 0.0, 0.0
+    joined_at = graph.poses[0]
+    for row, pose in enumerate(graph.poses):
+        moved = relative(pose, joined_at)
+        distance = float(np.hypot(moved[0], moved[1]))
+        found.joined[row] = row == 0 or distance > step or abs(moved[2]) > step
+        if found.joined[row]:
+            path, joined_at = path + distance, pose
+        if row in breaks:
+            path += options.breaks.path
+        found.paths[row] = path
+    return found
 
 
 def _breaks(graph: Graph, options: SlamOptions) -> set[int]:

@@ -8,42 +8,37 @@ whole map is then turned by it.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from nscan_cli.matching.priors import Prior
 from nscan_cli.ndt.grid import Ndt
 from nscan_cli.poses import Array
+from nscan_cli.slam.found import Found
 from nscan_cli.slam.options import TrackingOptions
 from nscan_cli.slam.settings import Settings
 from nscan_cli.slam.track import match_and_count
-
-if TYPE_CHECKING:
-    from nscan_cli.slam.tracking import Tracked
 
 PATH = 5.0
 """Those after it are the scans of so much path, m."""
 
 
-def place_first(
-    first: Tracked, points: Array, scans: Sequence[Array], after: Sequence[Tracked], options: TrackingOptions
-) -> Tracked:
-    """The first scan, points (m, 2), where the scans (m, 2) after it have it.
+def place_first(points: Sequence[Array], found: Found, options: TrackingOptions) -> Array:
+    """The pose (3,) of the first of some scans, points (m, 2) each, where the others have it.
 
-    The odometry between it and the next one holds what these leave open. It stays where it was when they
-    do not see what it sees.
+    The odometry between it and the next one holds what these leave open. It stays where it was found when
+    they do not see what it sees.
     """
-    joined = [k for k, tracked in enumerate(after) if tracked.joined]
-    if not joined:
+    first: Array = found.poses[0]
+    joined = np.flatnonzero(found.joined[1:]) + 1
+    if not len(joined):
         return first
     gaussians = options.gaussians
     ndt = Ndt(gaussians.cell, gaussians.minimum, gaussians.floor)
-    ndt.gather([scans[k] for k in joined], np.array([after[k].pose for k in joined]))
+    ndt.gather([points[k] for k in joined.tolist()], found.poses[joined])
     ndt.make()
-    pose, hessian = first.pose.copy(), np.empty((3, 3))
-    step: Array = np.linalg.inv(after[0].expected).astype(np.float64)
-    prior = Prior(first.pose, step)
-    _, inliers = match_and_count(ndt.grid, Settings.of(options), points, prior, pose, hessian)
-    return replace(first, pose=pose) if inliers >= options.inlier_share else first
+    pose, hessian = first.copy(), np.empty((3, 3))
+    step: Array = np.linalg.inv(found.expected[1]).astype(np.float64)
+    prior = Prior(first, step)
+    _, inliers = match_and_count(ndt.grid, Settings.of(options), points[0], prior, pose, hessian)
+    return pose if inliers >= options.inlier_share else first

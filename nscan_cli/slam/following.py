@@ -6,17 +6,18 @@ takes the best match all the same. That it is none shows in what two scans see f
 
 from __future__ import annotations
 
-from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from nscan_cli.poses import Array, compose, relative, transform
 from nscan_cli.slam.first_scan import PATH, place_first
+from nscan_cli.slam.found import Found
 from nscan_cli.slam.options import BreakOptions, TrackingOptions
-from nscan_cli.slam.tracking import Tracked, Tracker
+from nscan_cli.slam.tracking import Tracker
 
 BEARINGS = 180
 """Into so many parts the view is divided."""
@@ -25,27 +26,56 @@ LEAST_BEARINGS = 10
 
 
 class Sensed(NamedTuple):
-    """A scan of the log, and what the odometry says."""
+    """n scans of the log that follow each other, and what the odometry says."""
 
-    row: int
-    points: Array
-    """(m, 2) in the robot's frame."""
+    first: int
+    """The row of the first of them."""
+    points: Sequence[Array]
+    """Those (m, 2) of each, in the robot's frame."""
     odometry: Array | None
-    """(3,) pose of the robot; of all scans or of none."""
+    """(n, 3) poses of the robot; of all scans or of none."""
+
+    def part(self, first: int, end: int) -> Sensed:
+        """The scans from the `first` on, before the `end`."""
+        odometry = None if self.odometry is None else self.odometry[first:end]
+        return Sensed(self.first + first, self.points[first:end], odometry)
+
+    @classmethod
+    def together(cls, parts: Sequence[Sensed]) -> Sensed:
+        """The scans of several, of which each begins where the one before ends."""
+        odometry = [part.odometry for part in parts if part.odometry is not None]
+        points = [points for part in parts for points in part.points]
+        return cls(parts[0].first, points, np.concatenate(odometry) if odometry else None)
 
 
 @dataclass(frozen=True)
 class Followed:
-    """A scan that was tracked; see Sensed."""
+    """Scans that were tracked, as many as were sensed."""
 
-    row: int
-    points: Array
-    odometry: Array | None
-    tracked: Tracked
-    begins: bool
-    """Whether a piece begins with this scan,"""
-    breaks: bool
+    sensed: Sensed
+    found: Found
+    begins: bool = False
+    """Whether a piece begins with the first of the scans,"""
+    breaks: bool = False
     """and nothing is known of the way there: the track has broken."""
+
+    def __len__(self) -> int:
+        return len(self.sensed.points)
+
+    @property
+    def see_enough(self) -> NDArray[np.bool_]:
+        """(n,) which of them see enough to be compared with others."""
+        return np.array([len(points) >= LEAST_BEARINGS for points in self.sensed.points], dtype=np.bool_)
+
+    def part(self, first: int, end: int) -> Followed:
+        """The scans from the `first` on, before the `end`."""
+        sensed, found = self.sensed.part(first, end), self.found.part(first, end)
+        return Followed(sensed, found, self.begins and first == 0, self.breaks and first == 0)
+
+    def one(self, k: int) -> Followed:
+        """One of the scans; counted from the end if k is negative."""
+        k %= len(self)
+        return self.part(k, k + 1)
 
 
 class Follower:
@@ -65,6 +95,7 @@ class Follower:
         """The last settled scan that saw enough."""
         self._last: Followed | None = None
         self._doubted: list[Followed] = []
+        """One by one."""
         self._young: list[Followed] | None = []
         """The scans that a piece has begun with, until there are enough to place the first."""
 
@@ -78,30 +109,44 @@ class Follower:
         """Searches for a scan among the last ones."""
         return self._searches + self._tracker.searches
 
-    def follow(self, scans: Sequence[Sensed]) -> list[Followed]:
+    def follow(self, scans: Sensed) -> list[Followed]:
         """Track the next scans. Returns those, in order, that are settled by it: not those still doubted."""
-        settled, ahead = [], deque(self._track(scans))
+        settled, ahead = [], self._track(scans)
         while ahead:
+            known = 0 if self._doubted else self._known(ahead)
+            if known:
+                settled += self._settle(ahead.part(0, known))
+                ahead = ahead.part(known, len(ahead))
+                continue
             tracker = self._tracker
-            settled += self._take(ahead.popleft())
-            if self._tracker is not tracker:
+            settled += self._doubt(ahead.one(0))
+            ahead = ahead.part(1, len(ahead))
+            if self._tracker is not tracker and ahead:
                 # A new piece has begun, and what was tracked ahead goes on from it.
-                ahead = deque(self._track(ahead))
+                ahead = self._track(ahead.sensed)
         return settled
 
-    def _take(self, scan: Followed) -> list[Followed]:
-        """Settle a scan, doubt it, or find that it puts an end to doubts; returns what is settled by it."""
-        if not self._doubted:
-            if not self._is_doubted(scan):
-                return self._settle([scan])
-            self._doubted.append(scan)
-            return []
+    def _known(self, scans: Followed) -> int:
+        """How many of the scans, from the first on, go on from those before."""
+        enough = scans.see_enough
+        poor = enough & (scans.found.inliers < self.breaking.inlier_share)
+        for k in np.flatnonzero(poor).tolist():
+            before = np.flatnonzero(enough[:k])
+            seen = scans.one(int(before[-1])) if len(before) else self._seen
+            if seen is not None and not self._goes_on(scans.one(k), seen):
+                return int(k)
+        return len(scans)
+
+    def _doubt(self, scan: Followed) -> list[Followed]:
+        """Doubt a scan, or find that it puts an end to doubts; returns what is settled by it."""
+        begins, patient = not self._doubted, len(self._doubted) < self.breaking.patience
         self._doubted.append(scan)
-        if self._goes_on(scan):
-            return self._believe()
-        if len(self._doubted) <= self.breaking.patience:
+        if begins:
             return []
-        return self._break() or self._believe()
+        assert self._seen is not None
+        if self._goes_on(scan, self._seen):
+            return self._believe()
+        return [] if patient else self._break() or self._believe()
 
     def finish(self) -> list[Followed]:
         """The last scans, which nothing settles any more. Nothing can be tracked after them."""
@@ -114,70 +159,62 @@ class Follower:
     def _believe(self) -> list[Followed]:
         """The scans that were doubted, as they were tracked."""
         scans, self._doubted = self._doubted, []
-        return self._settle(scans)
+        return [settled for scan in scans for settled in self._settle(scan)]
 
-    def _track(self, scans: Sequence[Sensed | Followed]) -> list[Followed]:
-        odometry = [scan.odometry for scan in scans if scan.odometry is not None]
-        found = self._tracker.track([scan.points for scan in scans], np.array(odometry) if odometry else None)
-        if self._origin is not None:
-            found = [self._of_the_piece(tracked) for tracked in found]
-        return [
-            Followed(scan.row, scan.points, scan.odometry, tracked, False, False)
-            for scan, tracked in zip(scans, found, strict=True)
-        ]
+    def _track(self, scans: Sensed) -> Followed:
+        found = self._tracker.track(scans.points, scans.odometry)
+        return Followed(scans, found if self._origin is None else self._of_the_piece(found, self._origin))
 
-    def _of_the_piece(self, tracked: Tracked) -> Tracked:
+    def _of_the_piece(self, found: Found, origin: Array) -> Found:
         """What was found in a later piece, in the frame of the first."""
-        assert self._origin is not None
-        c, s = np.cos(self._origin[2]), np.sin(self._origin[2])
+        c, s = np.cos(origin[2]), np.sin(origin[2])
         turn = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
-        return replace(
-            tracked,
-            pose=compose(self._origin, tracked.pose),
-            hessian=turn @ tracked.hessian @ turn.T,
-            expected=turn @ tracked.expected @ turn.T,
-            path=self._path + tracked.path,
+        return found._replace(
+            poses=compose(origin, found.poses),
+            hessians=turn @ found.hessians @ turn.T,
+            expected=turn @ found.expected @ turn.T,
+            paths=self._path + found.paths,
         )
 
-    def _settle(self, scans: list[Followed]) -> list[Followed]:
-        for scan in scans:
-            self._last = scan
-            if len(scan.points) >= LEAST_BEARINGS:
-                self._seen = scan
+    def _settle(self, scans: Followed) -> list[Followed]:
+        self._last = scans.one(-1)
+        seen = np.flatnonzero(scans.see_enough)
+        if len(seen):
+            self._seen = scans.one(int(seen[-1]))
         if self._young is None:
-            return scans
-        self._young += scans
-        is_enough = scans and scans[-1].tracked.path - self._young[0].tracked.path > PATH
-        return self._grow_up() if is_enough else []
+            return [scans]
+        begun = (self._young or [scans])[0].found.paths[0]
+        far = np.flatnonzero(scans.found.paths - begun > PATH)
+        if not len(far):
+            self._young.append(scans)
+            return []
+        enough_by = int(far[0]) + 1
+        self._young.append(scans.part(0, enough_by))
+        later = [scans.part(enough_by, len(scans))] if enough_by < len(scans) else []
+        return self._grow_up() + later
 
     def _grow_up(self) -> list[Followed]:
         """The scans that the piece has begun with, the first where the others have it."""
         young, self._young = self._young, None
         if not young:
             return []
-        first, *others = young
-        scans, after = [scan.points for scan in others], [scan.tracked for scan in others]
-        placed = place_first(first.tracked, first.points, scans, after, self.options)
-        return [replace(first, tracked=placed), *others]
-
-    def _is_doubted(self, scan: Followed) -> bool:
-        """Whether a scan that sees enough was matched poorly, and sees other things than the one before."""
-        poor = len(scan.points) >= LEAST_BEARINGS and scan.tracked.inliers < self.breaking.inlier_share
-        return poor and self._seen is not None and not self._goes_on(scan)
+        first, found = young[0], Found.together(scans.found for scans in young)
+        poses = first.found.poses.copy()
+        poses[0] = place_first([p for scans in young for p in scans.sensed.points], found, self.options)
+        return [replace(first, found=first.found._replace(poses=poses)), *young[1:]]
 
     def _has_come_far(self, scan: Followed) -> bool:
         """Whether a scan may well see other things: the laser was blind, or scans are missing."""
         before = self._seen
-        if before is None or before.odometry is None or scan.odometry is None:
+        if before is None or before.sensed.odometry is None or scan.sensed.odometry is None:
             return False
-        step = relative(scan.odometry, before.odometry)
+        step = relative(scan.sensed.odometry[0], before.sensed.odometry[0])
         return bool(np.hypot(step[0], step[1]) > self.breaking.far or abs(step[2]) > self.breaking.far_turned)
 
-    def _goes_on(self, scan: Followed) -> bool:
-        """Whether a scan sees what the last one saw that was settled."""
-        assert self._seen is not None
-        before = relative(self._seen.tracked.pose, scan.tracked.pose)
-        share = alike(scan.points, transform(before, self._seen.points), self.breaking)
+    def _goes_on(self, scan: Followed, seen: Followed) -> bool:
+        """Whether a scan sees what another one saw that was settled."""
+        before = relative(seen.found.poses[0], scan.found.poses[0])
+        share = alike(scan.sensed.points[0], transform(before, seen.sensed.points[0]), self.breaking)
         return share is not None and share >= self.breaking.alike
 
     def _break(self) -> list[Followed]:
@@ -187,28 +224,29 @@ class Follower:
         is known.
         """
         kept = self._tracker, self._origin, self._path
-        doubted, last = self._doubted, self._last
+        last, first = self._last, self._doubted[0]
         assert last is not None
-        first, guess = doubted[0], last.tracked.pose
-        if first.odometry is not None and last.odometry is not None:
-            guess = compose(guess, relative(first.odometry, last.odometry))
+        guess = origin = last.found.poses[0]
+        if first.sensed.odometry is not None and last.sensed.odometry is not None:
+            guess = compose(origin, relative(first.sensed.odometry[0], last.sensed.odometry[0]))
         self._tracker, self._origin = Tracker(self.options, self._has_odometry), guess
         is_known = self._has_come_far(first)
-        self._path = last.tracked.path
-        self._path += float(np.hypot(*(guess - last.tracked.pose)[:2])) if is_known else self.breaking.path
-        piece = self._track(doubted)
-        if np.median([scan.tracked.inliers for scan in piece[1:]]) < self.breaking.inlier_share:
+        self._path = float(last.found.paths[0])
+        self._path += float(np.hypot(*(guess - origin)[:2])) if is_known else self.breaking.path
+        piece = self._track(Sensed.together([scan.sensed for scan in self._doubted]))
+        if np.median(piece.found.inliers[1:]) < self.breaking.inlier_share:
             self._tracker, self._origin, self._path = kept
             return []
         self._restarts += kept[0].restarts
         self._searches += kept[0].searches
-        distance, turn = self.breaking.distance, self.breaking.turn
-        wide = np.diag([distance, distance, turn]) ** 2
-        expected = first.tracked.expected if is_known else wide
-        begins = replace(piece[0].tracked, expected=expected, inliers=0.0)
-        piece[0] = replace(piece[0], tracked=begins, begins=True, breaks=not is_known)
+        piece.found.inliers[0] = 0.0
+        if not is_known:
+            distance, turn = self.breaking.distance, self.breaking.turn
+            piece.found.expected[0] = np.diag([distance, distance, turn]) ** 2
+        else:
+            piece.found.expected[0] = first.found.expected[0]
         before, self._young, self._doubted = self._grow_up(), [], []
-        return before + self._settle(piece)
+        return before + self._settle(replace(piece, begins=True, breaks=not is_known))
 
 
 def alike(points: Array, others: Array, breaking: BreakOptions) -> float | None:

@@ -6,19 +6,22 @@ motion fill the gaps between the beams. Its points are those of its own scan.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
+from nscan_cli.compiled import kernel
 from nscan_cli.graph.model import Pairwise
+from nscan_cli.matching.planar import wrapped
 from nscan_cli.ndt.grid import Ndt
 from nscan_cli.poses import Array, Indices, compose, relative
+from nscan_cli.slam.found import Found, Tracked
 from nscan_cli.slam.options import GaussianOptions, KeyframeOptions
-from nscan_cli.slam.tracking import Tracked
 
+LATTICE = 2.0**26
+"""More cells than a lattice has in a row."""
 ROOM = 16
 """Lattice cells for each point of a scan that an NDT has room for at first. Most need no more."""
 
@@ -37,8 +40,8 @@ class Keyframe:
     cells: int
     """How many lattice cells of the NDT its points fall into."""
     gaussians: GaussianOptions
-    around: list[tuple[Array, Tracked]]
-    """What the NDT is to be made of: the points of the scans around, its own first."""
+    around: list[tuple[Array, Array]]
+    """What the NDT is to be made of: the points and poses of the scans around, its own first."""
     _ndt: Ndt | None = None
 
     @property
@@ -50,7 +53,7 @@ class Keyframe:
         """Make the Gaussians, unless they are there, and let the scans go; none can join any more."""
         around = self.around
         if self._ndt is None:
-            poses = relative(np.array([tracked.pose for _, tracked in around]), self.tracked.pose)
+            poses = relative(np.array([pose for _, pose in around]), self.tracked.pose)
             ndt = Ndt(
                 self.gaussians.cell, self.gaussians.minimum, self.gaussians.floor, ROOM * len(self.points)
             )
@@ -77,12 +80,33 @@ class Route(NamedTuple):
 
 def points_per_cell(keyframes: Iterable[Keyframe]) -> float:
     """How many points of a scan fall into a lattice cell on average, of those that have any; at least 1."""
-    points, cells = np.sum([(len(each.points), each.cells) for each in keyframes], axis=0)
-    return float(points / cells) if cells else 1.0
+    points = cells = 0
+    for keyframe in keyframes:
+        points, cells = points + len(keyframe.points), cells + keyframe.cells
+    return points / cells if cells else 1.0
 
 
+@kernel
 def _count_cells(points: Array, side: float) -> int:
-    return len(np.unique(np.floor(points / side) @ np.array([1.0, 1j])))
+    """How many cells of one lattice the points (m, 2) fall into."""
+    cells = np.floor(points / side)
+    # No laser sees so far that two cells would have the same number.
+    numbers = np.sort(cells[:, 0] * LATTICE + cells[:, 1])
+    count = 0
+    for k in range(len(numbers)):
+        count += k == 0 or numbers[k] != numbers[k - 1]
+    return count
+
+
+@kernel
+def _next_keyframe(poses: Array, first: int, last: Array, distance: float, turn: float) -> int:
+    """Which of the poses (n, 3), from the `first` on, is the first beyond `distance` (m) or `turn` (rad) of
+    the `last` keyframe's; n if none is."""
+    for k in range(first, len(poses)):
+        away = np.hypot(poses[k, 0] - last[0], poses[k, 1] - last[1])
+        if not (away <= distance and abs(wrapped(poses[k, 2] - last[2])) <= turn):
+            return k
+    return len(poses)
 
 
 def route_of(keyframes: Sequence[Keyframe], chain: Sequence[Pairwise], poses: Array) -> Route:
@@ -100,10 +124,10 @@ def extended(route: Route, keyframes: Sequence[Keyframe], chain: Sequence[Pairwi
         poses.append(compose(poses[-1], relation.measurement))
     return Route(
         [*route.keyframes, *keyframes],
-        np.append(route.rows, [keyframe.row for keyframe in keyframes]).astype(np.int64),
+        np.concatenate([route.rows, [keyframe.row for keyframe in keyframes]], dtype=np.int64),
         [*route.chain, *chain],
-        np.append(route.paths, [keyframe.tracked.path for keyframe in keyframes]),
-        np.vstack([route.poses, *poses[1:]]),
+        np.concatenate([route.paths, [keyframe.tracked.path for keyframe in keyframes]]),
+        np.concatenate([route.poses, np.reshape(poses[1:], (-1, 3))]),
     )
 
 
@@ -119,35 +143,40 @@ class Keyframes:
         self.options, self.gaussians = options, gaussians
         self.distance = max(options.distance, options.distance_per_range * median_range)
         self.list: list[Keyframe] = []
-        self._since: list[tuple[Array, Tracked]] = []
+        self._since: list[tuple[Array, Array]] = []
         self._expected = np.zeros((3, 3))
 
     def __len__(self) -> int:
         return len(self.list)
 
-    def near_enough(self, tracked: Tracked) -> bool:
-        """Whether the last keyframe is near enough to a scan that it need not become one."""
-        if not self.list:
-            return False
-        # Asked for every scan, and arrays of three numbers cost ten times more.
-        x, y, angle = tracked.pose.tolist()
-        last_x, last_y, last_angle = self.list[-1].tracked.pose.tolist()
-        turned = math.remainder(angle - last_angle, 2 * math.pi)
-        return math.hypot(x - last_x, y - last_y) <= self.distance and abs(turned) <= self.options.turn
+    def take(self, row: int, points: Sequence[Array], found: Found, begins: bool = False) -> None:
+        """Take in n scans that follow each other from `row` on, points (m, 2): some become keyframes.
 
-    def attach(self, points: Array, tracked: Tracked) -> None:
-        """Let a scan between keyframes add to the Gaussians of both."""
-        self._expected += tracked.expected
-        if tracked.joined:
-            self._since.append((points.copy(), tracked))
+        So does the first of them where a piece begins.
+        """
+        k, n = 0, len(points)
+        while k < n:
+            new = k
+            if self.list and not (begins and k == 0):
+                last = self.list[-1].tracked.pose
+                new = _next_keyframe(found.poses, k, last, self.distance, self.options.turn)
+            self.attach(points[k:new], found.part(k, new))
+            if new < n:
+                self.add(row + new, points[new], found.scan(new))
+            k = new + 1
+
+    def attach(self, points: Sequence[Array], found: Found) -> None:
+        """Let n scans between keyframes add to the Gaussians of both."""
+        self._expected = np.add.reduce(np.concatenate([self._expected[None], found.expected]))
+        self._since += [(points[k].copy(), found.poses[k]) for k in np.flatnonzero(found.joined).tolist()]
 
     def add(self, row: int, points: Array, tracked: Tracked) -> Keyframe:
         """Make a scan a keyframe; the one before has all its scans then."""
         # Of its own: else it would keep what the scans around it have, which were tracked together.
-        points, tracked, since = points.copy(), tracked.copy(), self._since
+        points, since = points.copy(), self._since
         self.part()
         cells = _count_cells(points, 0.5 * self.gaussians.cell)
-        around = [(points, tracked), *since]
+        around = [(points, tracked.pose), *since]
         keyframe = Keyframe(
             row, tracked, self._expected + tracked.expected, points, cells, self.gaussians, around
         )

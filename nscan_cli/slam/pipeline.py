@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import itertools
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 
 import numpy as np
 
@@ -57,7 +57,6 @@ class Slam:
         median_range = float(np.median(seen)) if len(seen) else 0.0
         self.keyframes = Keyframes(options.keyframes, options.nscan.gaussians, median_range)
         self.tracked: list[Array] = []
-        self.anchors: list[int] = []
         self.breaks: list[int] = []
         self.match: MatchNearby = match_pairs_nearby if options.relations == "pairwise" else match_nearby
         self.ahead = Ahead(self.match, options.nscan, threads)
@@ -76,10 +75,10 @@ class Slam:
         """The paper's loop over all scans, and the last optimisation."""
         with self.ahead, Beside(self.threads) as beside:
             for scans in self.stretches():
-                for scan in self.track(scans):
-                    if self.settle(scan):
+                for followed in self.track(scans):
+                    if self.settle(followed):
                         beside(self.grow, len(self.keyframes) - 1)
-                report(scans[-1].row + 1, len(self.keyframes))
+                report(scans.first + len(scans.points), len(self.keyframes))
             self.ahead.open()
         self.keyframes.part()
         self.grow(len(self.keyframes))
@@ -98,38 +97,35 @@ class Slam:
         for row, points in enumerate(self.log.each_points(self.options.tracking.reach)):
             yield points[:0] if row in self.hanging else points
 
-    def stretches(self) -> Iterator[list[Sensed]]:
+    def stretches(self) -> Iterator[Sensed]:
         """The scans, a stretch of them at a time."""
-        odometry = itertools.repeat(None) if self.odometry is None else self.odometry
-        scans = map(Sensed, itertools.count(), self.points(), odometry)
-        while stretch := list(itertools.islice(scans, STRETCH)):
-            yield stretch
+        points, first = self.points(), 0
+        while stretch := list(itertools.islice(points, STRETCH)):
+            end = first + len(stretch)
+            yield Sensed(first, stretch, None if self.odometry is None else self.odometry[first:end])
+            first = end
 
-    def track(self, scans: Sequence[Sensed]) -> list[Followed]:
+    def track(self, scans: Sensed) -> list[Followed]:
         """Step 1: the poses of the next scans, each by matching it with the map of the last metres.
 
         Returns the scans that are settled by it; with the last one these are all.
         """
         settled = self.tracker.follow(scans)
-        return settled + self.tracker.finish() if scans[-1].row == len(self.log) - 1 else settled
+        is_last = scans.first + len(scans.points) == len(self.log)
+        return settled + self.tracker.finish() if is_last else settled
 
-    def settle(self, scan: Followed) -> bool:
-        """Step 2: whether a scan that was tracked is a new keyframe."""
-        if scan.begins:
+    def settle(self, scans: Followed) -> bool:
+        """Step 2: whether there are new keyframes among scans that were tracked."""
+        first, known = scans.sensed.first, len(self.keyframes)
+        if scans.begins:
             self.keyframes.part()
-        if scan.breaks:
-            self.breaks.append(scan.row)
-        is_new = scan.begins or not self.keyframes.near_enough(scan.tracked)
-        if is_new:
-            keyframe = self.keyframes.add(scan.row, scan.points, scan.tracked)
-            if len(self.keyframes) > 1:
-                before = self.keyframes.list[-2]
-                self.steps.append(relation_between(before, keyframe, self.options.keyframes))
-        else:
-            self.keyframes.attach(scan.points, scan.tracked)
-        self.tracked.append(scan.tracked.pose)
-        self.anchors.append(self.keyframes.list[-1].row)
-        return is_new
+        if scans.breaks:
+            self.breaks.append(first)
+        self.keyframes.take(first, scans.sensed.points, scans.found, scans.begins)
+        for before, new in itertools.pairwise(self.keyframes.list[max(known - 1, 0) :]):
+            self.steps.append(relation_between(before, new, self.options.keyframes))
+        self.tracked.append(scans.found.poses)
+        return len(self.keyframes) > known
 
     def grow(self, size: int) -> None:
         """The graph takes in the first `size` keyframes, which are whole, and matches what is due."""
@@ -280,12 +276,12 @@ class Slam:
 
     def graph(self) -> Graph:
         """Every scan with its pose: a keyframe where the graph put it, the others in between."""
-        anchors = np.array(self.anchors, dtype=np.int64)
         keyframes = np.array([keyframe.row for keyframe in self.keyframes.list], dtype=np.int64)
+        anchors = keyframes[np.searchsorted(keyframes, np.arange(len(self.log)), side="right") - 1]
         return Graph(
             scans=self.log.numbers,
             stamps=list(self.log.stamps),
-            poses=between_keyframes(np.array(self.tracked), keyframes, self.poses, self.breaks),
+            poses=between_keyframes(np.concatenate(self.tracked), keyframes, self.poses, self.breaks),
             odometry=self.log.odometry,
             anchors=anchors,
             pairwise=self.pairwise,

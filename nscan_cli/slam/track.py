@@ -19,6 +19,7 @@ from nscan_cli.ndt.grid import NEW_NEIGHBOURS, change
 from nscan_cli.ndt.meeting import begin, count_inliers, meet_again
 from nscan_cli.ndt.table import Grid
 from nscan_cli.poses import Array, transform
+from nscan_cli.slam.found import Found
 from nscan_cli.slam.settings import Settings
 
 SCANS, OLDEST, KNOWN, ROWS = 0, 1, 2, 3
@@ -81,33 +82,6 @@ class Track(NamedTuple):
                 if self.placed[scan, 3] > self.path[0] - path
             ]
         )
-
-
-class Found(NamedTuple):
-    """What tracking finds of n scans; see Tracked."""
-
-    values: Array
-    """(n,) the objective's."""
-    poses: Array
-    """(n, 3)"""
-    hessians: Array
-    """(n, 3, 3)"""
-    expected: Array
-    """(n, 3, 3)"""
-    inliers: Array
-    """(n,)"""
-    paths: Array
-    """(n,)"""
-    joined: NDArray[np.bool_]
-    """(n,)"""
-
-    @classmethod
-    def room(cls, n: int) -> Found:
-        """For so many scans."""
-        values, inliers, paths = np.empty((3, n))
-        hessians, expected = np.empty((2, n, 3, 3))
-        joined = np.empty(n, dtype=np.bool_)
-        return cls(values, np.empty((n, 3)), hessians, expected, inliers, paths, joined)
 
 
 @kernel
@@ -251,7 +225,7 @@ def follow(
             return k
         if track.counts[KNOWN] == 0:
             prior.mean[:], prior.information[:, :] = 0.0, 0.0
-            found.poses[k], found.hessians[k], found.inliers[k] = 0.0, 0.0, 1.0
+            found.values[k], found.poses[k], found.hessians[k], found.inliers[k] = 0.0, 0.0, 0.0, 1.0
         else:
             predict(track, settings, odometry[k], prior)
             assign(found.poses[k], prior.mean)

@@ -7,7 +7,6 @@ loops later correct in the graph never tears it.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
 from operator import attrgetter
 from typing import NamedTuple
 
@@ -17,47 +16,15 @@ from nscan_cli.matching.priors import Prior
 from nscan_cli.matching.search import likelihood_field, search
 from nscan_cli.ndt.grid import Ndt
 from nscan_cli.poses import Array
+from nscan_cli.slam.found import Found
 from nscan_cli.slam.options import TrackingOptions
 from nscan_cli.slam.settings import Settings
-from nscan_cli.slam.track import (
-    CLEARLY,
-    ROWS,
-    Found,
-    Track,
-    follow,
-    least_share,
-    match_and_count,
-    take,
-)
+from nscan_cli.slam.track import CLEARLY, ROWS, Track, follow, least_share, match_and_count, take
 
 RECENT = 5.0
 """A lost scan is searched among those of the last stretch of path, m."""
 LEAST_SCORE = 0.3
 """What a search must find at least; with fewer inliers a scan is lost, whatever the odometry says."""
-
-
-@dataclass(frozen=True)
-class Tracked:
-    """Where a scan was found."""
-
-    pose: Array
-    """(3,) of the robot in the tracker's frame."""
-    hessian: Array
-    """(3, 3) of scale · E there, without the prior."""
-    expected: Array
-    """(3, 3) covariance of the step to here before the match: the odometry's, or of steady motion."""
-    inliers: float
-    """Share of the points that lie on a Gaussian of the map."""
-    path: float
-    """Length of the path up to here, m."""
-    joined: bool
-    """Whether the scan's points joined the map."""
-
-    def copy(self) -> Tracked:
-        """The same with arrays of its own."""
-        return replace(
-            self, pose=self.pose.copy(), hessian=self.hessian.copy(), expected=self.expected.copy()
-        )
 
 
 class Match(NamedTuple):
@@ -90,7 +57,7 @@ class Tracker:
         self._track = Track.begin(options.steady_scans + 1)
         self._prior = Prior(np.zeros(3), np.zeros((3, 3)))
 
-    def track(self, scans: Sequence[Array], odometry: Array | None) -> list[Tracked]:
+    def track(self, scans: Sequence[Array], odometry: Array | None) -> Found:
         """Where the next n scans are found: points (m, 2) in the robot's frame, odometry (n, 3) or None."""
         n, ends = len(scans), np.cumsum([0, *map(len, scans)])
         points = np.concatenate([np.empty((0, 2)), *scans])
@@ -107,13 +74,11 @@ class Tracker:
                 match = Match(found.values[k], found.poses[k], found.hessians[k], found.inliers[k])
                 least = LEAST_SCORE if np.isfinite(odometry[k, 0]) else self.options.inlier_share
                 match = self._match_elsewhere(scans[k], match, least)
-                found.poses[k], found.hessians[k], found.inliers[k] = match[1:]
+                found.values[k], found.poses[k], found.hessians[k], found.inliers[k] = match
                 take(track, grid, settings, scans[k], odometry[k], prior, found, k)
                 k += 1
             self.map.rows = int(self._track.counts[ROWS])
-        matrices = found.poses, found.hessians, found.expected
-        numbers = found.inliers.tolist(), found.paths.tolist(), found.joined.tolist()
-        return [Tracked(*scan) for scan in zip(*matrices, *numbers, strict=True)]
+        return found
 
     def _match_elsewhere(self, points: Array, match: Match, least: float) -> Match:
         """The best of a match with too few inliers, and of those from other angles, and of a search.

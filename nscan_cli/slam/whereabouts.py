@@ -13,6 +13,7 @@ from nscan_cli.graph.cholesky import Factor, factorise, solve
 from nscan_cli.graph.inverse import inverse_diagonal
 from nscan_cli.graph.model import Pairwise
 from nscan_cli.graph.system import GraphEnergy
+from nscan_cli.matching.linear import inverted
 from nscan_cli.poses import Array, Indices
 
 
@@ -30,9 +31,11 @@ def with_slips(relation: Pairwise, length: float, drift: float, drift_angle: flo
 
     `drift` and `drift_angle` are standard deviations in m/√m and rad/√m.
     """
-    slips = np.diag([drift**2, drift**2, drift_angle**2]) * length
-    covariance: Array = np.linalg.inv(relation.information) + slips
-    return replace(relation, information=np.linalg.inv(covariance).astype(np.float64))
+    covariance = inverted(relation.information)
+    covariance[0, 0] += drift**2 * length
+    covariance[1, 1] += drift**2 * length
+    covariance[2, 2] += drift_angle**2 * length
+    return replace(relation, information=inverted(covariance))
 
 
 class Known(NamedTuple):
@@ -136,7 +139,7 @@ class Whereabouts:
         distance, angle = np.zeros(len(poses)), np.zeros(len(poses))
         distance[:known], angle[:known] = self._reach.distance**2, self._reach.angle**2
         for step in range(self._origin, origin):
-            covariance: Array = np.linalg.inv(way[step].information).astype(np.float64)
+            covariance = inverted(way[step].information)
             _swing(covariance, way[step].measurement, poses, step, distance)
             angle[: step + 1] += covariance[2, 2]
         self._origin, self._reach = origin, Reach(np.sqrt(distance), np.sqrt(angle))

@@ -13,16 +13,16 @@ from nscan_cli.graph.model import Pairwise
 from nscan_cli.logs.scan import LaserLog
 from nscan_cli.poses import Array, compose, relative
 from nscan_cli.slam.closing import Closing
+from nscan_cli.slam.found import Tracked
 from nscan_cli.slam.keyframes import Keyframe, Keyframes, relation_between, route_of
 from nscan_cli.slam.options import KeyframeOptions, NScanOptions
 from nscan_cli.slam.place import Place
-from nscan_cli.slam.tracking import Tracked
 from tests.simulation.drive import Drive
 from tests.simulation.laser import Laser
 from tests.simulation.office import office_world
 from tests.simulation.scenes import Scene
 from tests.simulation.world import Builder
-from tests.slam.runs import truth_of, without_returns
+from tests.slam.runs import found_of, truth_of, without_returns
 
 ROWS = 10
 """From one keyframe's row to the next: rows and keyframes are not to be mixed up."""
@@ -38,8 +38,7 @@ def keyframe_of(scene: Scene, row: int, pose: Array, path: float, seen: Array) -
     scans = [Tracked(place, np.diag([1e5, 1e5, 1e6]), np.eye(3), 0.95, path, True) for place in poses]
     found = Keyframes(KeyframeOptions(), NScanOptions().gaussians)
     found.add(row, log.points(0), scans[0])
-    for k in range(1, len(scans)):
-        found.attach(log.points(k), scans[k])
+    found.attach([log.points(k) for k in range(1, len(scans))], found_of(*scans[1:]))
     found.part()
     return found.list[0]
 

@@ -16,9 +16,10 @@ from nscan_cli.logs.options import ReadingOptions
 from nscan_cli.logs.scan import LaserLog
 from nscan_cli.poses import Array
 from nscan_cli.provenance import provenance_of
+from nscan_cli.slam.found import Found, Tracked
 from nscan_cli.slam.options import NScanOptions, Relations, SlamOptions, TrackingOptions
 from nscan_cli.slam.pipeline import Slam
-from nscan_cli.slam.tracking import Tracked, Tracker
+from nscan_cli.slam.tracking import Tracker
 from tests.data import data_file
 
 SAMPLE = Path(__file__).resolve().parents[2] / "sample_logs" / "office.log.gz"
@@ -102,7 +103,20 @@ def without_returns(log: LaserLog, rows: Rows, reading: float = np.inf) -> Laser
 def tracked(log: LaserLog, options: TrackingOptions | None = None) -> tuple[list[Tracked], Tracker]:
     """Step 1 alone, over a whole log."""
     tracker = Tracker(options or TrackingOptions())
-    return tracker.track([log.points(row) for row in range(len(log))], log.odometry), tracker
+    found = tracker.track([log.points(row) for row in range(len(log))], log.odometry)
+    return scans_of(found), tracker
+
+
+def scans_of(found: Found) -> list[Tracked]:
+    """One by one."""
+    return [found.scan(k) for k in range(len(found.paths))]
+
+
+def found_of(*scans: Tracked) -> Found:
+    """The same as columns; the objective's value is nobody's."""
+    names = ("pose", "hessian", "expected", "inliers", "path", "joined")
+    columns = ([getattr(scan, name) for scan in scans] for name in names)
+    return Found(np.full(len(scans), np.nan), *map(np.array, columns))
 
 
 def poses_of(found: list[Tracked]) -> Array:

@@ -10,11 +10,11 @@ import pytest
 from nscan_cli.graph.model import Pairwise
 from nscan_cli.slam.ahead import AHEAD, Ahead
 from nscan_cli.slam.coverage import Coverage
+from nscan_cli.slam.found import Tracked
 from nscan_cli.slam.keyframes import Keyframe, Route, extended, route_of
 from nscan_cli.slam.near import Near
 from nscan_cli.slam.nearby import Nearby
 from nscan_cli.slam.options import GaussianOptions, NScanOptions
-from nscan_cli.slam.tracking import Tracked
 
 OPTIONS = NScanOptions(radius=2.5)
 """Two keyframes to both sides of one are near."""

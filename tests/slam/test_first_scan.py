@@ -14,7 +14,7 @@ from nscan_cli.slam.following import Followed, Follower, Sensed
 from nscan_cli.slam.options import BreakOptions, TrackingOptions
 from tests.simulation.scenes import office
 from tests.slam.drives import round_scene
-from tests.slam.runs import office_log, part, tracked, truth_of
+from tests.slam.runs import found_of, office_log, part, tracked, truth_of
 from tests.slam.troubles import carried
 
 SCANS = 120
@@ -22,14 +22,13 @@ SCANS = 120
 
 def followed(log: LaserLog) -> list[Followed]:
     follower = Follower(TrackingOptions(), BreakOptions())
-    odometry = [None] * len(log) if log.odometry is None else list(log.odometry)
-    found = follower.follow([Sensed(row, log.points(row), odometry[row]) for row in range(len(log))])
+    found = follower.follow(Sensed(0, [log.points(row) for row in range(len(log))], log.odometry))
     return found + follower.finish()
 
 
 def turned(found: list[Followed], truth: Array, first: int) -> float:
     """How far (rad) a scan is turned against the 20 after it, more than in truth (S, 3)."""
-    poses = np.array([scan.tracked.pose for scan in found])
+    poses = np.concatenate([scans.found.poses for scans in found])
     rows = slice(first + 1, first + 21)
     off = relative(poses[rows], poses[first]) - relative(truth[rows], truth[first])
     return float(np.median(off[:, 2]))
@@ -58,7 +57,7 @@ def test_nor_is_the_first_scan_after_a_break_left_where_it_was():
         made = carried(round_scene().record(seed).log(), 20.0, 28.0)
         log = part(made.log, slice(made.before - 40, made.before + SCANS))
         found = followed(log)
-        first = next(scan.row for scan in found if scan.begins)
+        first = next(scans.sensed.first for scans in found if scans.begins)
         off.append(turned(found, truth_of(log), first))
     assert np.sqrt(np.mean(np.square(off))) < 0.002
 
@@ -67,17 +66,21 @@ def test_it_stays_where_nothing_says_better():
     log = part(office_log(), slice(0, 40))
     found, _ = tracked(log)
     scans, options = [log.points(row) for row in range(len(log))], TrackingOptions()
-    assert place_first(found[0], scans[0], [], [], options) is found[0]
     # A robot that stands still: no scan has joined the map.
     still = [scan for scan in found[1:] if not scan.joined]
-    assert place_first(found[0], scans[0], scans[1 : len(still) + 1], still, options) is found[0]
     # Those after it see something else: they do not have it.
     elsewhere = [scan + np.array([50.0, 0.0]) for scan in scans[1:]]
-    assert place_first(found[0], scans[0], elsewhere, found[1:], options) is found[0]
-    assert place_first(found[0], np.empty((0, 2)), scans[1:], found[1:], options) is found[0]
+    for points, poses in (
+        (scans[:1], found[:1]),
+        (scans[: len(still) + 1], [found[0], *still]),
+        ([scans[0], *elsewhere], found),
+        ([np.empty((0, 2)), *scans[1:]], found),
+    ):
+        np.testing.assert_array_equal(place_first(points, found_of(*poses), options), found[0].pose)
 
 
 def test_a_log_that_ends_at_once_keeps_all_its_scans():
     for count in (1, 2, 5):
         found = followed(part(office_log(), slice(0, count)))
-        assert [scan.row for scan in found] == list(range(count))
+        rows = [scans.sensed.first + k for scans in found for k in range(len(scans))]
+        assert rows == list(range(count))

@@ -13,10 +13,11 @@ from nscan_cli.graph.model import Pairwise
 from nscan_cli.ndt.energy import energy
 from nscan_cli.ndt.grid import Ndt
 from nscan_cli.poses import Array, compose, relative, rotated_information
+from nscan_cli.slam.found import Tracked
 from nscan_cli.slam.keyframes import Keyframes, relation_between
 from nscan_cli.slam.options import GaussianOptions, KeyframeOptions
-from nscan_cli.slam.tracking import Tracked
 from tests.ndt.rooms import room
+from tests.slam.runs import found_of
 
 OPTIONS = KeyframeOptions(distance=1.0, turn=0.5)
 GAUSSIANS = GaussianOptions(cell=1.0, minimum=4)
@@ -26,6 +27,10 @@ HESSIAN = np.array([[9e4, 1e4, 2e3], [1e4, 4e4, -3e3], [2e3, -3e3, 1.6e5]])
 
 def tracked(pose: Array, hessian: Array = HESSIAN, path: float = 0.0, joined: bool = True) -> Tracked:
     return Tracked(np.asarray(pose, dtype=np.float64), hessian, EXPECTED, 0.9, path, joined)
+
+
+def attach(found: Keyframes, seed: int, scan: Tracked) -> None:
+    found.attach([room(seed)], found_of(scan))
 
 
 def keyframes(*poses: Array) -> Keyframes:
@@ -52,11 +57,24 @@ def keyframes(*poses: Array) -> Keyframes:
 def test_near_enough_by_distance_and_by_turn(pose, near):
     """Within 1 m and 0.5 rad of the last keyframe, at (0, 0, 3); the first is far away."""
     found = keyframes(np.array([50.0, 0, 0]), np.array([0.0, 0, 3.0]))
-    assert found.near_enough(tracked(pose)) is near
+    found.take(11, [room(2)], found_of(tracked(pose)))
+    assert [keyframe.row for keyframe in found.list[2:]] == ([] if near else [11])
 
 
-def test_the_first_scan_is_near_no_keyframe():
-    assert not Keyframes(OPTIONS, GAUSSIANS).near_enough(tracked(np.zeros(3)))
+@pytest.mark.parametrize("size", [1, 2, 5, 12])
+def test_the_same_scans_become_keyframes_however_many_are_taken_in_at_a_time(size):
+    """The first, then every third one of 0.4 m each, or where a piece begins; the others lie around them."""
+    found, poses = Keyframes(OPTIONS, GAUSSIANS), [np.array([0.4 * k, 0.0, 0.0]) for k in range(12)]
+    for first in range(0, 12, size):
+        rows = range(first, min(first + size, 12))
+        scans = found_of(*(tracked(poses[k], path=float(k)) for k in rows))
+        found.take(100 + first, [room(k) for k in rows], scans)
+    assert [keyframe.row for keyframe in found.list] == [100, 103, 106, 109]
+    assert [keyframe.tracked.path for keyframe in found.list] == [0.0, 3.0, 6.0, 9.0]
+    assert [len(keyframe.around) for keyframe in found.list] == [3, 5, 5, 3]
+    np.testing.assert_allclose([keyframe.expected for keyframe in found.list[1:]], 3 * [3 * EXPECTED])
+    found.take(112, [room(12)], found_of(tracked(poses[11])), begins=True)
+    assert found.list[-1].row == 112
 
 
 def expected(keyframe: Array, *scans: tuple[int, Array]) -> Ndt:
@@ -81,7 +99,7 @@ def test_a_keyframes_gaussians_are_of_the_scans_between_its_neighbours():
             found.add(k, room(k), tracked(pose))
         else:
             # The tracker's map does not want every scan, and nor do the keyframes.
-            found.attach(room(k), tracked(pose, joined=k != 4))
+            attach(found, k, tracked(pose, joined=k != 4))
     found.part()
     around = {0: (0, 1, 2), 3: (1, 2, 3, 5), 6: (5, 6, 7, 8)}
     assert [keyframe.row for keyframe in found.list] == list(around)
@@ -104,7 +122,7 @@ def test_gaussians_are_made_once_by_whatever_thread_asks_and_the_scans_are_let_g
     found = Keyframes(OPTIONS, GAUSSIANS)
     found.add(0, room(0), tracked(poses[0]))
     for k in (1, 2, 3):
-        found.attach(room(k), tracked(poses[k]))
+        attach(found, k, tracked(poses[k]))
     found.part()
     (keyframe,) = found.list
     assert len(keyframe.around) == 4
@@ -118,15 +136,15 @@ def test_gaussians_are_made_once_by_whatever_thread_asks_and_the_scans_are_let_g
 
 def test_a_keyframe_keeps_nothing_of_the_scans_that_were_tracked_with_it():
     """All that is found for a stretch of scans is made together."""
-    together, several = np.zeros((2, 64, 3, 3)), np.concatenate([room(0), room(1)])
-    scan = Tracked(np.zeros((64, 3))[5], together[0, 5], together[1, 5], 0.9, 0.0, True)
+    several = np.concatenate([room(0), room(1)])
+    scans = [several[: len(room(0))], several[len(room(0)) :]]
     found = Keyframes(OPTIONS, GAUSSIANS)
-    keyframe = found.add(0, several[: len(room(0))], scan)
-    for array in (
-        keyframe.points,
-        *(getattr(keyframe.tracked, each) for each in ("pose", "hessian", "expected")),
-    ):
-        assert array.base is None
+    found.take(0, scans, found_of(tracked(np.zeros(3)), tracked(np.array([5.0, 0.0, 0.0]))))
+    for keyframe, seen in zip(found.list, scans, strict=True):
+        np.testing.assert_array_equal(keyframe.points, seen)
+        scan = keyframe.tracked
+        for array in (keyframe.points, scan.pose, scan.hessian, scan.expected):
+            assert array.base is None
 
 
 def test_finishing_no_keyframes_is_nothing():
@@ -197,8 +215,8 @@ def test_a_match_that_says_nothing_leaves_the_motion_that_was_expected():
     step = Tracked(np.zeros(3), np.zeros((3, 3)), np.diag([0.01, 0.01, 0.0025]), 0.0, 0.0, False)
     found = Keyframes(OPTIONS, GAUSSIANS)
     found.add(0, room(0), step)
-    found.attach(room(1), step)
-    found.attach(room(2), step)
+    attach(found, 1, step)
+    attach(found, 2, step)
     found.add(3, room(3), step)
     covariance = np.linalg.inv(relation_to_previous(found).information)
     np.testing.assert_allclose(covariance, np.diag([0.03, 0.03, 0.0075]), rtol=0.01, atol=1e-9)

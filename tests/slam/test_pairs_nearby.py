@@ -10,11 +10,11 @@ import pytest
 from nscan_cli.graph.model import Pairwise
 from nscan_cli.ndt.energy import energy
 from nscan_cli.poses import Array, compose, relative, wrap
+from nscan_cli.slam.found import Tracked
 from nscan_cli.slam.keyframes import Keyframe, route_of
 from nscan_cli.slam.nearby import Nearby
 from nscan_cli.slam.options import NScanOptions
 from nscan_cli.slam.pairs_nearby import match_pairs_nearby
-from nscan_cli.slam.tracking import Tracked
 from tests.matching.problems import office_truth
 from tests.slam.drives import relation_to_previous
 from tests.slam.test_nearby import BETWEEN, NEW, OLD, ROWS, revisit
@@ -79,12 +79,12 @@ def test_a_match_that_knows_nothing_is_no_relation():
     across = np.linspace(-1.5, 1.5, 61)
     wall, options = np.column_stack([np.full(61, 2.0), across]), NScanOptions().gaussians
 
-    def at(row: int, pose: list[float], *around: tuple[Array, Tracked]) -> Keyframe:
+    def at(row: int, pose: list[float], *around: tuple[Array, Array]) -> Keyframe:
         here = Tracked(np.array(pose), np.eye(3), np.eye(3), 1.0, 50.0 * row, True)
-        return Keyframe(row, here, np.eye(3), wall, 13, options, [(wall, here), *around])
+        return Keyframe(row, here, np.eye(3), wall, 13, options, [(wall, here.pose), *around])
 
     one = at(0, [0.0, 0.0, 0.0])
-    keyframes = [one, at(1, [100.0, 0.0, 0.0]), at(2, [4.0, 0.0, np.pi], (wall, one.tracked))]
+    keyframes = [one, at(1, [100.0, 0.0, 0.0]), at(2, [4.0, 0.0, np.pi], (wall, one.tracked.pose))]
     poses = np.array([keyframe.tracked.pose for keyframe in keyframes])
     links = [relation_to_previous(keyframes[: k + 2]) for k in range(2)]
     found = match_pairs_nearby(route_of(keyframes, links, poses), 2, NScanOptions())

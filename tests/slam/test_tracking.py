@@ -16,14 +16,15 @@ from nscan_cli.logs.scan import LaserLog
 from nscan_cli.matching.search import SearchOptions
 from nscan_cli.ndt.grid import Ndt
 from nscan_cli.poses import Array, compose, relative, transform, wrap
+from nscan_cli.slam.found import Tracked
 from nscan_cli.slam.options import TrackingOptions
 from nscan_cli.slam.track import CLEARLY
-from nscan_cli.slam.tracking import Tracked, Tracker
+from nscan_cli.slam.tracking import Tracker
 from tests.ndt.rooms import room
 from tests.ndt.test_grid import assert_same
 from tests.simulation.scenes import Scene
 from tests.simulation.world import Builder
-from tests.slam.runs import office_log, part, poses_of, tracked, truth_of
+from tests.slam.runs import office_log, part, poses_of, scans_of, tracked, truth_of
 
 STEP = 0.01
 """m"""
@@ -118,7 +119,7 @@ def test_along_a_bare_corridor_the_odometry_holds_and_the_hessian_says_so():
 
 def test_the_first_scan_is_at_the_origin():
     tracker = Tracker(TrackingOptions())
-    (first,) = tracker.track([room(1)], np.array([[7.0, -3.0, 2.0]]))
+    (first,) = scans_of(tracker.track([room(1)], np.array([[7.0, -3.0, 2.0]])))
     np.testing.assert_array_equal(first.pose, 0)
     assert (first.inliers, first.path, first.joined) == (1.0, 0.0, True)
     alone = Ndt(0.5, 5, 0.03)
@@ -135,9 +136,9 @@ def test_a_scan_joins_the_map_when_the_robot_has_moved():
     points = [room(1) - pose[:2] for pose in truth]
     tracker = Tracker(TrackingOptions())
     found = tracker.track(points, truth)
-    assert [scan.joined for scan in found] == [k % 3 == 0 for k in range(10)]
-    assert found[-1].path == pytest.approx(0.216, abs=0.005)
-    assert found[-2].path == found[-3].path == found[-4].path
+    assert found.joined.tolist() == [k % 3 == 0 for k in range(10)]
+    assert found.paths[-1] == pytest.approx(0.216, abs=0.005)
+    assert found.paths[-2] == found.paths[-3] == found.paths[-4]
 
 
 def window_map(found: list[Tracked], log: LaserLog, options: TrackingOptions) -> Ndt:
@@ -205,7 +206,7 @@ def test_without_odometry_a_jump_is_found_by_search():
     for search in (SearchOptions(distance=1.5, turn=1.5), SearchOptions(distance=0.1, turn=0.1)):
         tracker = Tracker(TrackingOptions(steady_search=search))
         scans = [room(1), room(1), transform(relative(np.zeros(3), jump), room(1))]
-        found.append(tracker.track(scans, None)[-1].pose)
+        found.append(tracker.track(scans, None).poses[-1])
     np.testing.assert_allclose(found[0], jump, atol=0.02)
     assert np.abs(found[1] - jump).max() > 0.3
 
@@ -213,7 +214,7 @@ def test_without_odometry_a_jump_is_found_by_search():
 def test_a_scan_without_points_is_not_searched():
     tracker = Tracker(TrackingOptions())
     tracker.track([room(1)], None)
-    assert tracker.track([np.empty((0, 2))], None)[0].inliers == 0.0
+    assert tracker.track([np.empty((0, 2))], None).inliers[0] == 0.0
     assert tracker.searches == 0
 
 
@@ -228,7 +229,8 @@ def test_scans_are_found_where_they_are_however_many_come_at_a_time(odometry):
         tracker, found = Tracker(TrackingOptions()), []
         for first in range(0, len(log), size):
             rows = slice(first, first + size)
-            found += tracker.track(scans[rows], None if log.odometry is None else log.odometry[rows])
+            given = None if log.odometry is None else log.odometry[rows]
+            found += scans_of(tracker.track(scans[rows], given))
         for one, other in zip(found, together, strict=True):
             for name in ("pose", "hessian", "expected", "inliers", "path", "joined"):
                 np.testing.assert_array_equal(getattr(one, name), getattr(other, name))
@@ -245,7 +247,7 @@ def test_far_angles_are_tried_when_most_points_of_a_scan_are_none_of_the_map(str
     gone = np.arange(len(points)) % 20 < 20 * strange
     points[gone] = np.random.default_rng(3).uniform(20, 30, (np.count_nonzero(gone), 2))
     tracker, odometry = Tracker(TrackingOptions()), np.zeros((2, 3))
-    found = tracker.track([room(1), points], odometry)[1]
+    found = tracker.track([room(1), points], odometry).scan(1)
     assert found.inliers == pytest.approx(0.68 * (1 - strange), abs=0.05)
     assert tracker.restarts == rings
     np.testing.assert_allclose(found.pose, 0, atol=0.02)
