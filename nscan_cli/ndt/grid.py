@@ -9,8 +9,6 @@ lets a map follow the robot.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -229,15 +227,14 @@ class Ndt:
         """Take away points that were added with the very same pose."""
         self._change(points, pose, -1.0)
 
-    def gather(self, scans: Sequence[Array], poses: Array) -> None:
-        """Take the points (m, 2) of n scans in, moved by `poses` (n, 3).
+    def gather(self, points: Array, ends: NDArray[np.int64], poses: Array) -> None:
+        """Take in n scans, moved by `poses` (n, 3); scan k has points[ends[k] : ends[k + 1]].
 
         Their Gaussians are left for `make` or `compact`.
         """
-        points = np.concatenate([np.empty((0, 2)), *scans])
-        ends, done = np.cumsum([0, *map(len, scans)]), 0
-        while done < len(scans):
-            self.reserve(len(scans[done]))
+        done = 0
+        while done < len(poses):
+            self.reserve(int(ends[done + 1] - ends[done]))
             done, self.rows = add_scans(self.grid, self.rows, self.half, points, ends, poses, done)
 
     def make(self) -> None:

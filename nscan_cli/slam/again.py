@@ -93,16 +93,17 @@ def _lay_out(slam: Slam, graph: Graph) -> None:
     """The keyframes with their Gaussians, as tracking would have made them at the graph's poses."""
     breaks = _breaks(graph, slam.options)
     found = _as_tracked(graph, breaks, slam.options)
-    for row, (points, anchor) in enumerate(zip(slam.points(), graph.anchors.tolist(), strict=True)):
-        if row in breaks:
-            slam.keyframes.part()
-            slam.breaks.append(row)
-        if anchor == row:
-            slam.keyframes.add(row, points, found.scan(row))
-            for whole in slam.keyframes.list[-2:-1]:
-                whole.finish()
-        else:
-            slam.keyframes.attach([points], found.part(row, row + 1))
+    for scans in slam.stretches():
+        for k, row in enumerate(range(scans.first, scans.first + len(scans))):
+            if row in breaks:
+                slam.keyframes.part()
+                slam.breaks.append(row)
+            if graph.anchors[row] == row:
+                slam.keyframes.add(row, scans.of(k), found.scan(row))
+                for whole in slam.keyframes.list[-2:-1]:
+                    whole.finish()
+            else:
+                slam.keyframes.attach(scans.part(k, k + 1), found.part(row, row + 1))
     slam.tracked.append(graph.poses)
     slam.keyframes.part()
 

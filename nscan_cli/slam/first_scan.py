@@ -7,8 +7,6 @@ whole map is then turned by it.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 
 from nscan_cli.matching.priors import Prior
@@ -16,6 +14,7 @@ from nscan_cli.ndt.grid import Ndt
 from nscan_cli.poses import Array
 from nscan_cli.slam.found import Found
 from nscan_cli.slam.options import TrackingOptions
+from nscan_cli.slam.sensed import Sensed
 from nscan_cli.slam.settings import Settings
 from nscan_cli.slam.track import match_and_count
 
@@ -23,8 +22,8 @@ PATH = 5.0
 """Those after it are the scans of so much path, m."""
 
 
-def place_first(points: Sequence[Array], found: Found, options: TrackingOptions) -> Array:
-    """The pose (3,) of the first of some scans, points (m, 2) each, where the others have it.
+def place_first(scans: Sensed, found: Found, options: TrackingOptions) -> Array:
+    """The pose (3,) of the first of some scans where the others have it.
 
     The odometry between it and the next one holds what these leave open. It stays where it was found when
     they do not see what it sees.
@@ -35,10 +34,10 @@ def place_first(points: Sequence[Array], found: Found, options: TrackingOptions)
         return first
     gaussians = options.gaussians
     ndt = Ndt(gaussians.cell, gaussians.minimum, gaussians.floor)
-    ndt.gather([points[k] for k in joined.tolist()], found.poses[joined])
+    ndt.gather(*scans.chosen(joined), found.poses[joined])
     ndt.make()
     pose, hessian = first.copy(), np.empty((3, 3))
     step: Array = np.linalg.inv(found.expected[1]).astype(np.float64)
     prior = Prior(first, step)
-    _, inliers = match_and_count(ndt.grid, Settings.of(options), points[0], prior, pose, hessian)
+    _, inliers = match_and_count(ndt.grid, Settings.of(options), scans.of(0), prior, pose, hessian)
     return pose if inliers >= options.inlier_share else first

@@ -6,9 +6,7 @@ takes the best match all the same. That it is none shows in what two scans see f
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,35 +15,13 @@ from nscan_cli.poses import Array, compose, relative, transform
 from nscan_cli.slam.first_scan import PATH, place_first
 from nscan_cli.slam.found import Found
 from nscan_cli.slam.options import BreakOptions, TrackingOptions
+from nscan_cli.slam.sensed import Sensed
 from nscan_cli.slam.tracking import Tracker
 
 BEARINGS = 180
 """Into so many parts the view is divided."""
 LEAST_BEARINGS = 10
 """Of these two scans must share so many to be compared."""
-
-
-class Sensed(NamedTuple):
-    """n scans of the log that follow each other, and what the odometry says."""
-
-    first: int
-    """The row of the first of them."""
-    points: Sequence[Array]
-    """Those (m, 2) of each, in the robot's frame."""
-    odometry: Array | None
-    """(n, 3) poses of the robot; of all scans or of none."""
-
-    def part(self, first: int, end: int) -> Sensed:
-        """The scans from the `first` on, before the `end`."""
-        odometry = None if self.odometry is None else self.odometry[first:end]
-        return Sensed(self.first + first, self.points[first:end], odometry)
-
-    @classmethod
-    def together(cls, parts: Sequence[Sensed]) -> Sensed:
-        """The scans of several, of which each begins where the one before ends."""
-        odometry = [part.odometry for part in parts if part.odometry is not None]
-        points = [points for part in parts for points in part.points]
-        return cls(parts[0].first, points, np.concatenate(odometry) if odometry else None)
 
 
 @dataclass(frozen=True)
@@ -60,12 +36,13 @@ class Followed:
     """and nothing is known of the way there: the track has broken."""
 
     def __len__(self) -> int:
-        return len(self.sensed.points)
+        return len(self.sensed)
 
     @property
     def see_enough(self) -> NDArray[np.bool_]:
         """(n,) which of them see enough to be compared with others."""
-        return np.array([len(points) >= LEAST_BEARINGS for points in self.sensed.points], dtype=np.bool_)
+        enough: NDArray[np.bool_] = np.diff(self.sensed.ends) >= LEAST_BEARINGS
+        return enough
 
     def part(self, first: int, end: int) -> Followed:
         """The scans from the `first` on, before the `end`."""
@@ -162,7 +139,7 @@ class Follower:
         return [settled for scan in scans for settled in self._settle(scan)]
 
     def _track(self, scans: Sensed) -> Followed:
-        found = self._tracker.track(scans.points, scans.odometry)
+        found = self._tracker.track(scans)
         return Followed(scans, found if self._origin is None else self._of_the_piece(found, self._origin))
 
     def _of_the_piece(self, found: Found, origin: Array) -> Found:
@@ -200,7 +177,7 @@ class Follower:
             return []
         first, found = young[0], Found.together(scans.found for scans in young)
         poses = first.found.poses.copy()
-        poses[0] = place_first([p for scans in young for p in scans.sensed.points], found, self.options)
+        poses[0] = place_first(Sensed.together([scans.sensed for scans in young]), found, self.options)
         return [replace(first, found=first.found._replace(poses=poses)), *young[1:]]
 
     def _has_come_far(self, scan: Followed) -> bool:
@@ -214,7 +191,7 @@ class Follower:
     def _goes_on(self, scan: Followed, seen: Followed) -> bool:
         """Whether a scan sees what another one saw that was settled."""
         before = relative(seen.found.poses[0], scan.found.poses[0])
-        share = alike(scan.sensed.points[0], transform(before, seen.sensed.points[0]), self.breaking)
+        share = alike(scan.sensed.of(0), transform(before, seen.sensed.of(0)), self.breaking)
         return share is not None and share >= self.breaking.alike
 
     def _break(self) -> list[Followed]:

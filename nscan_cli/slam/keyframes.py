@@ -19,11 +19,23 @@ from nscan_cli.ndt.grid import Ndt
 from nscan_cli.poses import Array, Indices, compose, relative
 from nscan_cli.slam.found import Found, Tracked
 from nscan_cli.slam.options import GaussianOptions, KeyframeOptions
+from nscan_cli.slam.sensed import Sensed
 
 LATTICE = 2.0**26
 """More cells than a lattice has in a row."""
 ROOM = 16
 """Lattice cells for each point of a scan that an NDT has room for at first. Most need no more."""
+
+
+class Placed(NamedTuple):
+    """Scans, with arrays of their own, and where tracking has them."""
+
+    points: Array
+    """(P, 2) one after another, each in its robot's frame."""
+    ends: Indices
+    """(n + 1,) scan k has points[ends[k] : ends[k + 1]]."""
+    poses: Array
+    """(n, 3)"""
 
 
 @dataclass
@@ -40,8 +52,8 @@ class Keyframe:
     cells: int
     """How many lattice cells of the NDT its points fall into."""
     gaussians: GaussianOptions
-    around: list[tuple[Array, Array]]
-    """What the NDT is to be made of: the points and poses of the scans around, its own first."""
+    around: list[Placed]
+    """What the NDT is to be made of: the scans around, its own first."""
     _ndt: Ndt | None = None
 
     @property
@@ -53,11 +65,12 @@ class Keyframe:
         """Make the Gaussians, unless they are there, and let the scans go; none can join any more."""
         around = self.around
         if self._ndt is None:
-            poses = relative(np.array([pose for _, pose in around]), self.tracked.pose)
+            points, ends = laid_end_to_end(around)
+            poses = relative(np.concatenate([scans.poses for scans in around]), self.tracked.pose)
             ndt = Ndt(
                 self.gaussians.cell, self.gaussians.minimum, self.gaussians.floor, ROOM * len(self.points)
             )
-            ndt.gather([points for points, _ in around], poses)
+            ndt.gather(points, ends, poses)
             ndt.compact()
             # In this order: another thread that makes it too has what it needs.
             self._ndt, self.around = ndt, []
@@ -84,6 +97,13 @@ def points_per_cell(keyframes: Iterable[Keyframe]) -> float:
     for keyframe in keyframes:
         points, cells = points + len(keyframe.points), cells + keyframe.cells
     return points / cells if cells else 1.0
+
+
+def laid_end_to_end(parts: Sequence[Placed]) -> tuple[Array, Indices]:
+    """The points (P, 2) of all scans, one after another, and where they end (n + 1,)."""
+    starts = np.cumsum([0, *(len(scans.points) for scans in parts)])
+    ends = [scans.ends[1:] + start for scans, start in zip(parts, starts.tolist(), strict=False)]
+    return np.concatenate([scans.points for scans in parts]), np.concatenate([[0], *ends])
 
 
 @kernel
@@ -143,32 +163,31 @@ class Keyframes:
         self.options, self.gaussians = options, gaussians
         self.distance = max(options.distance, options.distance_per_range * median_range)
         self.list: list[Keyframe] = []
-        self._since: list[tuple[Array, Array]] = []
+        self._since: list[Placed] = []
         self._expected = np.zeros((3, 3))
 
     def __len__(self) -> int:
         return len(self.list)
 
-    def take(self, row: int, points: Sequence[Array], found: Found, begins: bool = False) -> None:
-        """Take in n scans that follow each other from `row` on, points (m, 2): some become keyframes.
-
-        So does the first of them where a piece begins.
-        """
-        k, n = 0, len(points)
+    def take(self, scans: Sensed, found: Found, begins: bool = False) -> None:
+        """Take in scans that were found: some become keyframes, the first of them where a piece begins."""
+        k, n = 0, len(scans)
         while k < n:
             new = k
             if self.list and not (begins and k == 0):
                 last = self.list[-1].tracked.pose
                 new = _next_keyframe(found.poses, k, last, self.distance, self.options.turn)
-            self.attach(points[k:new], found.part(k, new))
+            self.attach(scans.part(k, new), found.part(k, new))
             if new < n:
-                self.add(row + new, points[new], found.scan(new))
+                self.add(scans.first + new, scans.of(new), found.scan(new))
             k = new + 1
 
-    def attach(self, points: Sequence[Array], found: Found) -> None:
-        """Let n scans between keyframes add to the Gaussians of both."""
+    def attach(self, scans: Sensed, found: Found) -> None:
+        """Let scans between keyframes add to the Gaussians of both."""
         self._expected = np.add.reduce(np.concatenate([self._expected[None], found.expected]))
-        self._since += [(points[k].copy(), found.poses[k]) for k in np.flatnonzero(found.joined).tolist()]
+        joined = np.flatnonzero(found.joined)
+        if len(joined):
+            self._since.append(Placed(*scans.chosen(joined), found.poses[joined]))
 
     def add(self, row: int, points: Array, tracked: Tracked) -> Keyframe:
         """Make a scan a keyframe; the one before has all its scans then."""
@@ -176,9 +195,9 @@ class Keyframes:
         points, since = points.copy(), self._since
         self.part()
         cells = _count_cells(points, 0.5 * self.gaussians.cell)
-        around = [(points, tracked.pose), *since]
+        own = Placed(points, np.array([0, len(points)]), tracked.pose[None])
         keyframe = Keyframe(
-            row, tracked, self._expected + tracked.expected, points, cells, self.gaussians, around
+            row, tracked, self._expected + tracked.expected, points, cells, self.gaussians, [own, *since]
         )
         self._expected = np.zeros((3, 3))
         self.list.append(keyframe)

@@ -34,9 +34,9 @@ def notices(slam: Slam) -> list[str]:
         found.append(
             f"the odometry jumps at {_scans(log, slam.jumps.tolist())}; these steps are not believed"
         )
-    if slam.hanging:
+    if len(slam.hanging):
         found.append(
-            f"the laser repeats itself at {_scans(log, sorted(slam.hanging))}; these are not matched"
+            f"the laser repeats itself at {_scans(log, slam.hanging.tolist())}; these are not matched"
         )
     found += _without_odometry(slam) if slam.odometry is None else _of_odometry(slam)
     return found + _contradictions(slam)

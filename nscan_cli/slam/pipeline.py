@@ -20,7 +20,7 @@ from nscan_cli.slam.believed import believed_odometry, hanging
 from nscan_cli.slam.closing import Closing
 from nscan_cli.slam.coverage import Coverage
 from nscan_cli.slam.energies import Energies
-from nscan_cli.slam.following import Followed, Follower, Sensed
+from nscan_cli.slam.following import Followed, Follower
 from nscan_cli.slam.keyframes import Keyframe, Keyframes, extended, relation_between, route_of
 from nscan_cli.slam.near import choose_nearby
 from nscan_cli.slam.nearby import MatchNearby, Nearby, match_nearby
@@ -28,6 +28,7 @@ from nscan_cli.slam.options import SlamOptions
 from nscan_cli.slam.pairs_nearby import match_pairs_nearby
 from nscan_cli.slam.place import TOO_LITTLE, Place, piece_moved
 from nscan_cli.slam.refinement import Refinement
+from nscan_cli.slam.sensed import Sensed
 from nscan_cli.slam.trajectory import between_keyframes
 from nscan_cli.threads import Beside
 
@@ -52,7 +53,7 @@ class Slam:
         self.odometry, self.jumps = log.odometry, np.zeros(0, dtype=np.int64)
         if log.odometry is not None:
             self.odometry, self.jumps = believed_odometry(log.odometry, log.times)
-        self.hanging = frozenset(hanging(log, self.odometry).tolist())
+        self.hanging = hanging(log, self.odometry)
         seen = log.ranges[log.ranges < options.tracking.reach]
         median_range = float(np.median(seen)) if len(seen) else 0.0
         self.keyframes = Keyframes(options.keyframes, options.nscan.gaussians, median_range)
@@ -78,7 +79,7 @@ class Slam:
                 for followed in self.track(scans):
                     if self.settle(followed):
                         beside(self.grow, len(self.keyframes) - 1)
-                report(scans.first + len(scans.points), len(self.keyframes))
+                report(scans.first + len(scans), len(self.keyframes))
             self.ahead.open()
         self.keyframes.part()
         self.grow(len(self.keyframes))
@@ -92,17 +93,20 @@ class Slam:
         graph.marginals = marginal_covariances(graph)
         return graph
 
-    def points(self) -> Iterator[Array]:
-        """The points (m, 2) of each scan that are matched: those within reach, none of a laser that hangs."""
-        for row, points in enumerate(self.log.each_points(self.options.tracking.reach)):
-            yield points[:0] if row in self.hanging else points
-
     def stretches(self) -> Iterator[Sensed]:
-        """The scans, a stretch of them at a time."""
-        points, first = self.points(), 0
-        while stretch := list(itertools.islice(points, STRETCH)):
-            end = first + len(stretch)
-            yield Sensed(first, stretch, None if self.odometry is None else self.odometry[first:end])
+        """The scans, a stretch of them at a time: the points that are matched.
+
+        Those are within reach, and none of a laser that hangs.
+        """
+        first = 0
+        for points, ends in self.log.stretches(STRETCH, self.options.tracking.reach):
+            end = first + len(ends) - 1
+            hangs = np.isin(np.arange(first, end), self.hanging)
+            if hangs.any():
+                sizes = np.diff(ends)
+                points = points[np.repeat(~hangs, sizes)]
+                ends = np.concatenate([[0], np.cumsum(np.where(hangs, 0, sizes))])
+            yield Sensed(first, points, ends, None if self.odometry is None else self.odometry[first:end])
             first = end
 
     def track(self, scans: Sensed) -> list[Followed]:
@@ -111,7 +115,7 @@ class Slam:
         Returns the scans that are settled by it; with the last one these are all.
         """
         settled = self.tracker.follow(scans)
-        is_last = scans.first + len(scans.points) == len(self.log)
+        is_last = scans.first + len(scans) == len(self.log)
         return settled + self.tracker.finish() if is_last else settled
 
     def settle(self, scans: Followed) -> bool:
@@ -121,7 +125,7 @@ class Slam:
             self.keyframes.part()
         if scans.breaks:
             self.breaks.append(first)
-        self.keyframes.take(first, scans.sensed.points, scans.found, scans.begins)
+        self.keyframes.take(scans.sensed, scans.found, scans.begins)
         for before, new in itertools.pairwise(self.keyframes.list[max(known - 1, 0) :]):
             self.steps.append(relation_between(before, new, self.options.keyframes))
         self.tracked.append(scans.found.poses)

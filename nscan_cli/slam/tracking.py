@@ -6,7 +6,6 @@ loops later correct in the graph never tears it.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from operator import attrgetter
 from typing import NamedTuple
 
@@ -18,6 +17,7 @@ from nscan_cli.ndt.grid import Ndt
 from nscan_cli.poses import Array
 from nscan_cli.slam.found import Found
 from nscan_cli.slam.options import TrackingOptions
+from nscan_cli.slam.sensed import Sensed
 from nscan_cli.slam.settings import Settings
 from nscan_cli.slam.track import CLEARLY, ROWS, Track, follow, least_share, match_and_count, take
 
@@ -57,25 +57,24 @@ class Tracker:
         self._track = Track.begin(options.steady_scans + 1)
         self._prior = Prior(np.zeros(3), np.zeros((3, 3)))
 
-    def track(self, scans: Sequence[Array], odometry: Array | None) -> Found:
-        """Where the next n scans are found: points (m, 2) in the robot's frame, odometry (n, 3) or None."""
-        n, ends = len(scans), np.cumsum([0, *map(len, scans)])
-        points = np.concatenate([np.empty((0, 2)), *scans])
-        if odometry is None:
-            odometry = np.full((n, 3), np.nan)
-        self._track = self._track.with_room(n, len(points))
-        found, k = Found.room(n), 0
+    def track(self, scans: Sensed) -> Found:
+        """Where the next scans are found."""
+        n, k = len(scans), 0
+        points, ends = scans.points, scans.ends
+        odometry = np.full((n, 3), np.nan) if scans.odometry is None else scans.odometry
+        self._track = self._track.with_room(n, int(ends[-1] - ends[0]))
+        found = Found.room(n)
         while k < n:
-            self.map.reserve(len(scans[k]))
+            self.map.reserve(int(ends[k + 1] - ends[k]))
             self._track.counts[ROWS] = self.map.rows
             track, grid, settings, prior = self._track, self.map.grid, self._settings, self._prior
             k = follow(track, grid, settings, points, ends, odometry, k, prior, found)
             if k < n and np.isfinite(found.inliers[k]):
                 match = Match(found.values[k], found.poses[k], found.hessians[k], found.inliers[k])
                 least = LEAST_SCORE if np.isfinite(odometry[k, 0]) else self.options.inlier_share
-                match = self._match_elsewhere(scans[k], match, least)
+                match = self._match_elsewhere(scans.of(k), match, least)
                 found.values[k], found.poses[k], found.hessians[k], found.inliers[k] = match
-                take(track, grid, settings, scans[k], odometry[k], prior, found, k)
+                take(track, grid, settings, scans.of(k), odometry[k], prior, found, k)
                 k += 1
             self.map.rows = int(self._track.counts[ROWS])
         return found

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import itertools
 
 import numpy as np
 import pytest
@@ -50,8 +51,15 @@ def test_many_at_a_time_are_the_same_to_the_bit(log):
         np.testing.assert_array_equal(points, log.points(row))
 
 
-def test_points_beyond_the_reach_are_left_out(log):
-    for row, points in enumerate(log.each_points(4.0)):
+@pytest.mark.parametrize("size", [1, 7, SCANS, 10 * SCANS])
+def test_stretches_are_of_so_many_scans_without_the_points_beyond_the_reach(log, size):
+    found = []
+    for points, ends in log.stretches(size, 4.0):
+        assert len(ends) <= size + 1
+        assert (ends[0], ends[-1]) == (0, len(points))
+        found += [points[begin:end] for begin, end in itertools.pairwise(ends)]
+    assert len(found) == SCANS
+    for row, points in enumerate(found):
         whole = log.points(row)
         np.testing.assert_array_equal(points, whole[np.hypot(whole[:, 0], whole[:, 1]) < 4.0])
 

@@ -22,7 +22,7 @@ from tests.simulation.laser import Laser
 from tests.simulation.office import office_world
 from tests.simulation.scenes import Scene
 from tests.simulation.world import Builder
-from tests.slam.runs import found_of, truth_of, without_returns
+from tests.slam.runs import found_of, sensed_in, truth_of, without_returns
 
 ROWS = 10
 """From one keyframe's row to the next: rows and keyframes are not to be mixed up."""
@@ -38,7 +38,7 @@ def keyframe_of(scene: Scene, row: int, pose: Array, path: float, seen: Array) -
     scans = [Tracked(place, np.diag([1e5, 1e5, 1e6]), np.eye(3), 0.95, path, True) for place in poses]
     found = Keyframes(KeyframeOptions(), NScanOptions().gaussians)
     found.add(row, log.points(0), scans[0])
-    found.attach([log.points(k) for k in range(1, len(scans))], found_of(*scans[1:]))
+    found.attach(sensed_in(log).part(1, len(scans)), found_of(*scans[1:]))
     found.part()
     return found.list[0]
 

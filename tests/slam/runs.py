@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import functools
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -19,6 +20,7 @@ from nscan_cli.provenance import provenance_of
 from nscan_cli.slam.found import Found, Tracked
 from nscan_cli.slam.options import NScanOptions, Relations, SlamOptions, TrackingOptions
 from nscan_cli.slam.pipeline import Slam
+from nscan_cli.slam.sensed import Sensed
 from nscan_cli.slam.tracking import Tracker
 from tests.data import data_file
 
@@ -103,8 +105,18 @@ def without_returns(log: LaserLog, rows: Rows, reading: float = np.inf) -> Laser
 def tracked(log: LaserLog, options: TrackingOptions | None = None) -> tuple[list[Tracked], Tracker]:
     """Step 1 alone, over a whole log."""
     tracker = Tracker(options or TrackingOptions())
-    found = tracker.track([log.points(row) for row in range(len(log))], log.odometry)
-    return scans_of(found), tracker
+    return scans_of(tracker.track(sensed_in(log))), tracker
+
+
+def sensed(scans: Sequence[Array], odometry: Array | None = None) -> Sensed:
+    """Scans with points (m, 2) each, as tracking takes them."""
+    ends = np.cumsum([0, *map(len, scans)])
+    return Sensed(0, np.concatenate([np.empty((0, 2)), *scans]), ends, odometry)
+
+
+def sensed_in(log: LaserLog) -> Sensed:
+    """All scans of a log."""
+    return sensed([log.points(row) for row in range(len(log))], log.odometry)
 
 
 def scans_of(found: Found) -> list[Tracked]:

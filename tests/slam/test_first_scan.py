@@ -10,11 +10,11 @@ import pytest
 from nscan_cli.logs.scan import LaserLog
 from nscan_cli.poses import Array, relative
 from nscan_cli.slam.first_scan import place_first
-from nscan_cli.slam.following import Followed, Follower, Sensed
+from nscan_cli.slam.following import Followed, Follower
 from nscan_cli.slam.options import BreakOptions, TrackingOptions
 from tests.simulation.scenes import office
 from tests.slam.drives import round_scene
-from tests.slam.runs import found_of, office_log, part, tracked, truth_of
+from tests.slam.runs import found_of, office_log, part, sensed, sensed_in, tracked, truth_of
 from tests.slam.troubles import carried
 
 SCANS = 120
@@ -22,7 +22,7 @@ SCANS = 120
 
 def followed(log: LaserLog) -> list[Followed]:
     follower = Follower(TrackingOptions(), BreakOptions())
-    found = follower.follow(Sensed(0, [log.points(row) for row in range(len(log))], log.odometry))
+    found = follower.follow(sensed_in(log))
     return found + follower.finish()
 
 
@@ -76,7 +76,7 @@ def test_it_stays_where_nothing_says_better():
         ([scans[0], *elsewhere], found),
         ([np.empty((0, 2)), *scans[1:]], found),
     ):
-        np.testing.assert_array_equal(place_first(points, found_of(*poses), options), found[0].pose)
+        np.testing.assert_array_equal(place_first(sensed(points), found_of(*poses), options), found[0].pose)
 
 
 def test_a_log_that_ends_at_once_keeps_all_its_scans():

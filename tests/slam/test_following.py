@@ -7,10 +7,11 @@ import functools
 import numpy as np
 import pytest
 
-from nscan_cli.slam.following import Followed, Follower, Sensed
+from nscan_cli.slam.following import Followed, Follower
 from nscan_cli.slam.options import BreakOptions, TrackingOptions
+from nscan_cli.slam.sensed import Sensed
 from tests.slam.drives import round_scene
-from tests.slam.runs import part
+from tests.slam.runs import part, sensed_in
 from tests.slam.troubles import carried
 
 
@@ -20,12 +21,12 @@ def scans() -> Sensed:
     made = carried(round_scene().record(5).log(), 20.0, 28.0)
     log = part(made.log, slice(made.before - 40, made.before + 60))
     assert log.odometry is not None
-    return Sensed(0, [log.points(row) for row in range(len(log))], log.odometry)
+    return sensed_in(log)
 
 
 def followed(size: int) -> list[Followed]:
     """All scans, so many at a time; one by one."""
-    follower, found, count = Follower(TrackingOptions(), BreakOptions()), [], len(scans().points)
+    follower, found, count = Follower(TrackingOptions(), BreakOptions()), [], len(scans())
     for first in range(0, count, size):
         found += follower.follow(scans().part(first, min(first + size, count)))
     return [settled.one(k) for settled in found + follower.finish() for k in range(len(settled))]

