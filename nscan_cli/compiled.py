@@ -20,6 +20,8 @@ Function = TypeVar("Function", bound=Callable[..., Any])
 
 C_ORDER, FORTRAN_ORDER, ALIGNED_AND_WRITEABLE = 1, 2, 0x500
 """Bits of the flags of an array."""
+IN_C_ORDER, NOT_IN_C_ORDER = ALIGNED_AND_WRITEABLE | C_ORDER, ALIGNED_AND_WRITEABLE | FORTRAN_ORDER
+"""What of them counts. What is in both orders, as all that has one axis, is in C's."""
 LOCK = threading.RLock()
 """Held while kernels are loaded or made."""
 
@@ -144,8 +146,7 @@ def _kind(value: Any) -> object:
     """What of an argument its machine code depends on."""
     if isinstance(value, np.ndarray):
         flags = value.flags.num
-        order = C_ORDER if flags & C_ORDER else flags & FORTRAN_ORDER
-        return value.dtype, value.ndim, order, flags & ALIGNED_AND_WRITEABLE
+        return value.dtype, value.ndim, flags & (IN_C_ORDER if flags & C_ORDER else NOT_IN_C_ORDER)
     if isinstance(value, tuple):
         return type(value), *[_kind(each) for each in value]
     if isinstance(value, float):

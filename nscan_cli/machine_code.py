@@ -191,16 +191,17 @@ def _unpickle() -> Any:
     kernel raises.
     """
 
+    # By its place in the machine code, which stays where it is: a kernel asks whenever it returns an array.
     @functools.cache
-    def unpickled(data: bytes, name: bytes) -> Any:
+    def unpickled(place: int, length: int, named: int) -> Any:
+        data = ctypes.string_at(place, length)
         if found := PICKLED_TYPE.fullmatch(data):
             module, kind = (part.decode() for part in found.groups())
             return getattr(importlib.import_module(module), kind)
+        name = ctypes.string_at(named, 20)
         return importlib.import_module("numba.core.serialize")._numba_unpickle(0, data, name)
 
-    return ctypes.PYFUNCTYPE(ctypes.py_object, ctypes.c_void_p, ctypes.c_int, ctypes.c_void_p)(
-        lambda place, length, name: unpickled(ctypes.string_at(place, length), ctypes.string_at(name, 20))
-    )
+    return ctypes.PYFUNCTYPE(ctypes.py_object, ctypes.c_void_p, ctypes.c_int, ctypes.c_void_p)(unpickled)
 
 
 def _numba(*below: str) -> Path:

@@ -105,7 +105,7 @@ def command(
     scans = read_log(log, reading)
     rows = [scans.row(number) for number in numbers]
     initial, prior = with_defaults(scans, initial, prior, quiet)
-    announce_compiling("_descend", quiet)
+    announce_compiling("approach_and_finish", quiet)
     options, model = PairOptions(), MotionModel()
     joint = JointOptions(fixed=0 if gauge == "fixed" else None)
     start, priors, sources = _known(scans, numbers, initial, prior, model)

@@ -127,7 +127,7 @@ def refine_saved(path: str, log_file: str | None, needs_log: bool, threads: int,
 
         scans, rows, log_path = read
         inputs.append(log_path)
-        compiled = announce_compiling("_descend", quiet)
+        compiled = announce_compiling("approach_and_finish", quiet)
         with progress("refining", None, quiet):
             graph = refine_again(graph, scans, rows, threads)
     moved = float(np.hypot(*(graph.poses - before)[:, :2].T).max())

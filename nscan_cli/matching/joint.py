@@ -10,24 +10,18 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from nscan_cli.assign import assign, assign_rows
-from nscan_cli.compiled import kernel
-from nscan_cli.matching.gauge import gauge_of, newton_step
+from nscan_cli.matching.descent import approach, approach_and_finish
+from nscan_cli.matching.gauge import gauge_of
 from nscan_cli.matching.joint_energy import (
     COVERING,
     NEUTRAL,
     JointProblem,
-    evaluate,
     joint_energy,
     neutral_energy,
 )
 from nscan_cli.matching.overlap import SOUND_OVERLAP, overlaps, weakest_link
 from nscan_cli.matching.unheld import back_to_priors
 from nscan_cli.poses import Array, wrap
-
-FIRST_DAMPING = 1e-3
-LEAST_DAMPING = 1e-8
-GREATEST_DAMPING = 1e4
 
 PairsAt = Callable[[Array], NDArray[np.int64]]
 """The index set J (m, 2) at the poses (n, 3)."""
@@ -55,9 +49,9 @@ class JointOptions:
     """The scan that stays where it is; None leaves the gauge free (paper, III-D)."""
 
     @property
-    def gauge(self) -> int:
-        """As the kernels take it."""
-        return gauge_of(self.fixed)
+    def of_approach(self) -> tuple[int, int, int, float, bool]:
+        """Stride, gauge, iterations, near and thorough, as the kernels take them."""
+        return self.stride, gauge_of(self.fixed), self.approach_iterations, self.near, self.thorough
 
 
 @dataclass(frozen=True)
@@ -99,6 +93,15 @@ class Way(NamedTuple):
     unsettled: int
     """Stages that did not settle."""
 
+    def further(self, iterations: int, evaluations: int, unsettled: int) -> Way:
+        """The way after so many more; the poses have moved by themselves."""
+        return Way(
+            self.poses,
+            self.iterations + iterations,
+            self.evaluations + evaluations,
+            self.unsettled + unsettled,
+        )
+
 
 def match_jointly(problem: JointProblem, start: Array, options: JointOptions) -> JointMatch:
     """Minimise the joint energy from the poses `start` (n, 3), stage by stage.
@@ -106,8 +109,7 @@ def match_jointly(problem: JointProblem, start: Array, options: JointOptions) ->
     The steps are Newton's, eq. (5) to (8), damped as by Levenberg and Marquardt: with the semi-definite
     part of the Hessian in the wide stages, with the exact one in the last where it is positive definite.
     """
-    way = _approach(problem, start, options, options.widenings, neutral=False)
-    return _finish(problem, way, options, neutral=False)
+    return _finish(problem, Way(start.copy(), 0, 0, 0), options, options.widenings, neutral=False)
 
 
 def match_near_and_far(
@@ -136,7 +138,7 @@ def match_near_and_far(
         iterations=sum(way.iterations for way in ways),
         evaluations=sum(way.evaluations for way in ways) + len(ways),
     )
-    return _finish(_at(problem, pairs_at, best.poses), work, options, neutral=True)
+    return _finish(_at(problem, pairs_at, best.poses), work, options, (), neutral=True)
 
 
 def _judge(problem: JointProblem, options: JointOptions, share: float, way: Way) -> float:
@@ -151,51 +153,35 @@ def _approach(
     neutral: bool,
     pairs_at: PairsAt | None = None,
 ) -> Way:
-    poses = start.copy()
-    iterations = evaluations = unsettled = 0
-    for widening in widenings:
-        near = options.near if widening < 1.0 else 0.5 * options.near
-        _, steps, evaluated, settled = _descend(
-            _at(problem, pairs_at, poses),
-            poses,
-            widening,
-            False,
-            neutral,
-            options.stride,
-            options.gauge,
-            options.approach_iterations,
-            near,
-            options.thorough,
-            *_derivatives(poses),
-        )
-        iterations += steps
-        evaluations += evaluated
-        unsettled += not settled
-    return Way(poses, iterations, evaluations, unsettled)
+    way = Way(start.copy(), 0, 0, 0)
+    for part in [widenings] if pairs_at is None else [(widening,) for widening in widenings]:
+        at = _at(problem, pairs_at, way.poses)
+        way = way.further(*approach(at, way.poses, np.array(part), neutral, *options.of_approach))
+    return way
 
 
-def _finish(problem: JointProblem, way: Way, options: JointOptions, neutral: bool) -> JointMatch:
-    """The last steps, with the exact Hessian."""
-    poses = way.poses
-    gradient, hessian = _derivatives(poses)
-    value, last, evaluated, converged = _descend(
+def _finish(
+    problem: JointProblem, way: Way, options: JointOptions, widenings: tuple[float, ...], neutral: bool
+) -> JointMatch:
+    """What is left of an approach, and the last steps with the exact Hessian."""
+    poses, n = way.poses, len(way.poses)
+    gradient, hessian = np.empty(3 * n), np.empty((3 * n, 3 * n))
+    value, last, converged, *approached = approach_and_finish(
         problem,
         poses,
-        1.0,
-        True,
+        np.array(widenings),
         neutral,
-        1,
-        options.gauge,
+        options.of_approach,
         options.max_iterations,
         options.tolerance,
-        options.thorough,
         gradient,
         hessian,
     )
+    way = way.further(*approached)
     if neutral:
         # The derivatives are the same.
         value = joint_energy(problem, poses).value
-        evaluated += 1
+        way = way.further(0, 1, 0)
     poses[:, 2] = wrap(poses[:, 2])
     return JointMatch(
         poses=poses,
@@ -203,77 +189,13 @@ def _finish(problem: JointProblem, way: Way, options: JointOptions, neutral: boo
         hessian=hessian,
         pairs=problem.pairs,
         energy=value,
-        iterations=way.iterations + last,
-        evaluations=way.evaluations + evaluated,
+        iterations=way.iterations,
+        evaluations=way.evaluations,
         last_iterations=last,
         unsettled=way.unsettled,
         converged=converged,
     )
 
 
-def _derivatives(poses: Array) -> tuple[Array, Array]:
-    """Room for a gradient (3n,) and a Hessian (3n, 3n)."""
-    return np.empty(3 * len(poses)), np.empty((3 * len(poses), 3 * len(poses)))
-
-
 def _at(problem: JointProblem, pairs_at: PairsAt | None, poses: Array) -> JointProblem:
     return problem if pairs_at is None else problem._replace(pairs=pairs_at(poses))
-
-
-@kernel
-def _descend(
-    problem: JointProblem,
-    poses: Array,
-    widening: float,
-    exact: bool,
-    neutral: bool,
-    stride: int,
-    fixed: int,
-    max_iterations: int,
-    tolerance: float,
-    thorough: bool,
-    gradient: Array,
-    hessian: Array,
-) -> tuple[float, int, int, bool]:
-    """One stage, from the poses (n, 3) in place: the value, iterations, evaluations, whether it converged.
-
-    Writes gradient (3n,) and Hessian (3n, 3n) at the poses; `thorough` as in JointOptions.
-    """
-    trial_gradient, trial_hessian = np.empty_like(gradient), np.empty_like(hessian)
-    step, trial = np.empty_like(poses), np.empty_like(poses)
-    curvature = 1.0 if exact else 0.0
-    value = evaluate(problem, poses, widening, curvature, neutral, stride, gradient, hessian)
-    iterations, evaluations, damping, converged = 0, 1, FIRST_DAMPING, False
-    for _ in range(max_iterations):
-        solved = newton_step(gradient, hessian, poses, damping, fixed, step)
-        if not solved and exact:
-            # Not positive definite: go on with the part that is.
-            evaluate(problem, poses, widening, 0.0, neutral, stride, trial_gradient, trial_hessian)
-            evaluations += 1
-            solved = newton_step(gradient, trial_hessian, poses, damping, fixed, step)
-        if not solved:
-            damping *= 10
-            continue
-        iterations += 1
-        longest = 0.0
-        for i in range(poses.shape[0]):
-            for a in range(3):
-                trial[i, a] = poses[i, a] + step[i, a]
-                longest = max(longest, abs(step[i, a]))
-        converged = longest < tolerance
-        if converged and not thorough:
-            assign_rows(poses, trial)
-            break
-        there = evaluate(problem, trial, widening, curvature, neutral, stride, trial_gradient, trial_hessian)
-        evaluations += 1
-        if there <= value:
-            value = there
-            assign_rows(poses, trial)
-            assign(gradient, trial_gradient)
-            assign_rows(hessian, trial_hessian)
-            damping = max(0.1 * damping, LEAST_DAMPING)
-        else:
-            damping *= 10
-        if converged or damping > GREATEST_DAMPING:
-            break
-    return value, iterations, evaluations, converged

@@ -42,18 +42,23 @@ def lay_out(ndts: Sequence[Ndt], points: Sequence[Array], neutral: bool = True) 
 
     Without `neutral` the `usual` is nan: the neutral energy is not to be asked for.
     """
-    tables = [ndt.grid.table for ndt in ndts]
+    sizes = [
+        (len(ndt.grid.table), ndt.rows, len(ndt.grid.gaussians), len(part))
+        for ndt, part in zip(ndts, points, strict=True)
+    ]
+    starts = np.zeros((4, len(ndts) + 1), dtype=np.int64)
+    np.cumsum(np.array(sizes).T, axis=1, out=starts[:, 1:])
+    table_starts, row_starts, gaussian_starts, point_starts = starts
     keys = np.concatenate([ndt.grid.keys[: ndt.rows] for ndt in ndts])
     links = np.concatenate([ndt.grid.links[: ndt.rows] for ndt in ndts])
-    gaussians = [ndt.grid.gaussians for ndt in ndts]
     # The sums are for growing; matching needs the Gaussians alone.
     grid = Grid(
-        np.concatenate(tables),
+        np.concatenate([ndt.grid.table for ndt in ndts]),
         keys,
         links,
         np.empty((0, 2)),
         np.empty((0, 2, 8)),
-        np.concatenate(gaussians),
+        np.concatenate([ndt.grid.gaussians for ndt in ndts]),
         np.empty(0),
     )
     own = np.full(len(ndts), np.nan)
@@ -61,11 +66,11 @@ def lay_out(ndts: Sequence[Ndt], points: Sequence[Array], neutral: bool = True) 
         own[:] = [_own_mean(ndt.grid, ndt.half, part) for ndt, part in zip(ndts, points, strict=True)]
     return Scans(
         grid,
-        _starts([len(table) for table in tables]),
-        _starts([ndt.rows for ndt in ndts]),
-        _starts([len(part) for part in gaussians]),
+        table_starts,
+        row_starts,
+        gaussian_starts,
         np.concatenate(points, dtype=np.float64),
-        _starts([len(part) for part in points]),
+        point_starts,
         ndts[0].half,
         own,
     )
@@ -112,7 +117,3 @@ def _own_mean(grid: Grid, half: float, points: Array) -> float:
     accumulate(grid, half, points, 0.0, 0.0, 0.0, 1.0, 0.0, 1.0, 1, room, out)
     # The difference is the number of Gaussians met.
     return float(-energy / max(out[0] - energy, 1.0))
-
-
-def _starts(lengths: Sequence[int]) -> NDArray[np.int64]:
-    return np.cumsum([0, *lengths], dtype=np.int64)

@@ -194,6 +194,12 @@ def take_over(old: Grid, rows: int, new: Grid) -> int:
     return count
 
 
+@kernel
+def _made_and_compacted(grid: Grid, rows: int, half: float) -> Grid:
+    make_gaussians(grid, rows, np.arange(rows, dtype=np.int32), half)
+    return compacted(grid, rows)
+
+
 class Ndt:
     """A normal distributions transform that grows and shrinks by the points of scans.
 
@@ -262,8 +268,7 @@ class Ndt:
 
     def compact(self) -> None:
         """Make all Gaussians, and give back what only growing needs; nothing can be added any more."""
-        self.make()
-        self.grid = compacted(self.grid, self.rows)
+        self.grid = _made_and_compacted(self.grid, self.rows, self.half)
         self.rows = len(self.grid.keys)
 
     def gaussian_count(self) -> int:

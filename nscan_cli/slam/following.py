@@ -88,9 +88,12 @@ class Follower:
 
     def follow(self, scans: Sensed) -> list[Followed]:
         """Track the next scans. Returns those, in order, that are settled by it: not those still doubted."""
-        settled, ahead = [], self._track(scans)
+        settled: list[Followed] = []
+        ahead = self._track(scans)
         while ahead:
             known = 0 if self._doubted else self._known(ahead)
+            if known == len(ahead):
+                return settled + self._settle(ahead)
             if known:
                 settled += self._settle(ahead.part(0, known))
                 ahead = ahead.part(known, len(ahead))
@@ -105,9 +108,11 @@ class Follower:
 
     def _known(self, scans: Followed) -> int:
         """How many of the scans, from the first on, go on from those before."""
+        poor = scans.found.inliers < self.breaking.inlier_share
+        if not poor.any():
+            return len(scans)
         enough = scans.see_enough
-        poor = enough & (scans.found.inliers < self.breaking.inlier_share)
-        for k in np.flatnonzero(poor).tolist():
+        for k in np.flatnonzero(poor & enough).tolist():
             before = np.flatnonzero(enough[:k])
             seen = scans.one(int(before[-1])) if len(before) else self._seen
             if seen is not None and not self._goes_on(scans.one(k), seen):

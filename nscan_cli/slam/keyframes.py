@@ -6,6 +6,7 @@ motion fill the gaps between the beams. Its points are those of its own scan.
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -32,8 +33,8 @@ class Placed(NamedTuple):
 
     points: Array
     """(P, 2) one after another, each in its robot's frame."""
-    ends: Indices
-    """(n + 1,) scan k has points[ends[k] : ends[k + 1]]."""
+    sizes: Indices
+    """(n,) how many each of them has."""
     poses: Array
     """(n, 3)"""
 
@@ -65,8 +66,9 @@ class Keyframe:
         """Make the Gaussians, unless they are there, and let the scans go; none can join any more."""
         around = self.around
         if self._ndt is None:
-            points, ends = laid_end_to_end(around)
-            poses = relative(np.concatenate([scans.poses for scans in around]), self.tracked.pose)
+            points, sizes, poses = (np.concatenate(columns) for columns in zip(*around, strict=True))
+            ends = np.append(0, np.cumsum(sizes))
+            poses = relative(poses, self.tracked.pose)
             ndt = Ndt(
                 self.gaussians.cell, self.gaussians.minimum, self.gaussians.floor, ROOM * len(self.points)
             )
@@ -97,13 +99,6 @@ def points_per_cell(keyframes: Iterable[Keyframe]) -> float:
     for keyframe in keyframes:
         points, cells = points + len(keyframe.points), cells + keyframe.cells
     return points / cells if cells else 1.0
-
-
-def laid_end_to_end(parts: Sequence[Placed]) -> tuple[Array, Indices]:
-    """The points (P, 2) of all scans, one after another, and where they end (n + 1,)."""
-    starts = np.cumsum([0, *(len(scans.points) for scans in parts)])
-    ends = [scans.ends[1:] + start for scans, start in zip(parts, starts.tolist(), strict=False)]
-    return np.concatenate([scans.points for scans in parts]), np.concatenate([[0], *ends])
 
 
 @kernel
@@ -187,7 +182,8 @@ class Keyframes:
         self._expected = np.add.reduce(np.concatenate([self._expected[None], found.expected]))
         joined = np.flatnonzero(found.joined)
         if len(joined):
-            self._since.append(Placed(*scans.chosen(joined), found.poses[joined]))
+            points, ends = scans.chosen(joined)
+            self._since.append(Placed(points, np.diff(ends), found.poses[joined]))
 
     def add(self, row: int, points: Array, tracked: Tracked) -> Keyframe:
         """Make a scan a keyframe; the one before has all its scans then."""
@@ -195,7 +191,7 @@ class Keyframes:
         points, since = points.copy(), self._since
         self.part()
         cells = _count_cells(points, 0.5 * self.gaussians.cell)
-        own = Placed(points, np.array([0, len(points)]), tracked.pose[None])
+        own = Placed(points, np.array([len(points)]), tracked.pose[None])
         keyframe = Keyframe(
             row, tracked, self._expected + tracked.expected, points, cells, self.gaussians, [own, *since]
         )
@@ -210,22 +206,35 @@ class Keyframes:
         self._since = []
 
 
-def relation_between(before: Keyframe, last: Keyframe, options: KeyframeOptions) -> Pairwise:
-    """The pairwise relation of a keyframe to the one before it, as it was tracked.
+def relations_along(keyframes: Sequence[Keyframe], options: KeyframeOptions) -> list[Pairwise]:
+    """The pairwise relations of K keyframes, each to the one before it, as they were tracked; K − 1.
 
     The information is that of the match, weighed down, and of the motion that was expected; drift that
     no match shows limits it.
     """
-    c, s = np.cos(before.tracked.pose[2]), np.sin(before.tracked.pose[2])
-    rotation = np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
-    information = options.information_scale * rotation @ last.tracked.hessian @ rotation.T
-    length = last.tracked.path - before.tracked.path
-    drift = np.array([options.drift, options.drift, options.drift_angle]) ** 2 * (length + 0.01)
-    covariance = np.linalg.inv(information + np.linalg.inv(last.expected)) + np.diag(drift)
-    return Pairwise(
-        nodes=(before.row, last.row),
-        measurement=relative(last.tracked.pose, before.tracked.pose),
-        information=np.linalg.inv(covariance),
-        origin="track",
-        score=last.tracked.inliers,
-    )
+    if len(keyframes) < 2:
+        return []
+    before, last = [each.tracked for each in keyframes[:-1]], [each.tracked for each in keyframes[1:]]
+    angles = np.array([tracked.pose[2] for tracked in before])
+    rotation = np.zeros((len(before), 3, 3))
+    rotation[:, 0, 0] = rotation[:, 1, 1] = np.cos(angles)
+    rotation[:, 0, 1] = np.sin(angles)
+    rotation[:, 1, 0] = -rotation[:, 0, 1]
+    rotation[:, 2, 2] = 1.0
+    hessians = np.array([tracked.hessian for tracked in last])
+    expected = np.array([each.expected for each in keyframes[1:]])
+    information = options.information_scale * rotation @ hessians @ rotation.transpose(0, 2, 1)
+    lengths = np.array([b.path - a.path for a, b in itertools.pairwise(each.tracked for each in keyframes)])
+    drift = np.array([options.drift, options.drift, options.drift_angle]) ** 2
+    covariances = np.linalg.inv(information + np.linalg.inv(expected))
+    covariances[:, range(3), range(3)] += drift * (lengths[:, None] + 0.01)
+    return [
+        Pairwise(
+            nodes=(a.row, b.row),
+            measurement=relative(b.tracked.pose, a.tracked.pose),
+            information=known,
+            origin="track",
+            score=b.tracked.inliers,
+        )
+        for a, b, known in zip(keyframes[:-1], keyframes[1:], np.linalg.inv(covariances), strict=True)
+    ]

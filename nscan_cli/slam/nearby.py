@@ -8,11 +8,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from nscan_cli.compiled import kernel
 from nscan_cli.counting import counted
 from nscan_cli.graph.model import Loop, NScan, Pairwise
 from nscan_cli.matching.joint import JointMatch, JointOptions, match_jointly
 from nscan_cli.matching.joint_energy import JointProblem, Priors, all_pairs, no_priors
 from nscan_cli.matching.overlap import held_together, overlaps, weakest_link
+from nscan_cli.matching.planar import relative_pose
 from nscan_cli.matching.scans import Scans, lay_out
 from nscan_cli.poses import Array, Indices, compose, relative
 from nscan_cli.slam.keyframes import Keyframe, Route, points_per_cell
@@ -152,7 +154,7 @@ def _match_held(
             loop = verdict(keyframes, tried, seen_before, centre, False, "did not converge", score)
             return Nearby((), None, loop, 0.0, False), False
         closed = bool(seen_before[kept].any())
-        relation = _relation(keyframes, members, at, match, "loop" if closed else "nscan", score)
+        relation = _relation(route.rows[members], at, match, "loop" if closed else "nscan", score)
         whole = len(kept) == len(tried)
         reason = "" if whole else f"{counted(len(tried) - len(kept), 'scan')} left out"
         used, before = (members, seen_before[kept]) if closed else (tried, seen_before)
@@ -164,8 +166,8 @@ def _match_held(
 
 
 def _laid_out(keyframes: Sequence[Keyframe], members: Indices) -> Scans:
-    ndts, points = [keyframes[k].ndt for k in members], [keyframes[k].points for k in members]
-    return lay_out(ndts, points, neutral=False)
+    chosen = [keyframes[k] for k in members.tolist()]
+    return lay_out([each.ndt for each in chosen], [each.points for each in chosen], neutral=False)
 
 
 def _match(
@@ -178,14 +180,16 @@ def _match(
 ) -> JointMatch:
     """The joint match of some keyframes from global poses (n, 3)."""
     consecutive = np.flatnonzero(np.diff(members) == 1)
-    priors = no_priors()
-    if len(consecutive):
-        known = [route.chain[members[k]] for k in consecutive]
-        priors = Priors(
-            np.stack([consecutive, consecutive + 1], axis=1),
+    known = [route.chain[k] for k in members[consecutive].tolist()]
+    priors = (
+        no_priors()
+        if not known
+        else Priors(
+            consecutive[:, None] + np.arange(2),
             np.array([relation.measurement for relation in known]),
             np.array([relation.information for relation in known]),
         )
+    )
     joint = JointOptions(
         widenings,
         near=NEAR,
@@ -195,7 +199,7 @@ def _match(
         # The last step is shorter than a millimetre: its end need not be looked at.
         thorough=False,
     )
-    scale = scale_of([route.keyframes[k] for k in members], options)
+    scale = scale_of([route.keyframes[k] for k in members.tolist()], options)
     return match_jointly(JointProblem(scans, all_pairs(len(members)), priors, scale), start, joint)
 
 
@@ -204,12 +208,10 @@ def scale_of(keyframes: Sequence[Keyframe], options: NScanOptions) -> float:
     return options.scale_per_cell / points_per_cell(keyframes)
 
 
-def _relation(
-    keyframes: Sequence[Keyframe], members: Indices, fixed: int, match: JointMatch, origin: str, score: float
-) -> NScan:
+def _relation(nodes: Indices, fixed: int, match: JointMatch, origin: str, score: float) -> NScan:
     eigenvalues, vectors = np.linalg.eigh(match.hessian)
     return NScan(
-        nodes=tuple(int(keyframes[k].row) for k in members),
+        nodes=tuple(nodes.tolist()),
         poses=match.poses,
         # What is left of negative curvature at the optimum is rounding, or a cell's border.
         hessian=(vectors * np.maximum(eigenvalues, 0.0)) @ vectors.T,
@@ -235,7 +237,12 @@ def verdict(
     return Loop((keyframes[first].row, keyframes[centre].row), accepted, reason, score)
 
 
+@kernel
 def moved_by(before: Array, after: Array, fixed: int) -> float:
     """How far (m) some pose (n, 3) moved, seen from one of them."""
-    shift = relative(after, after[fixed]) - relative(before, before[fixed])
-    return float(np.hypot(shift[:, 0], shift[:, 1]).max())
+    farthest, was, now = 0.0, np.empty(3), np.empty(3)
+    for k in range(len(before)):
+        relative_pose(before[k], before[fixed], was)
+        relative_pose(after[k], after[fixed], now)
+        farthest = max(farthest, np.hypot(now[0] - was[0], now[1] - was[1]))
+    return farthest

@@ -21,7 +21,7 @@ from nscan_cli.slam.closing import Closing
 from nscan_cli.slam.coverage import Coverage
 from nscan_cli.slam.energies import Energies
 from nscan_cli.slam.following import Followed, Follower
-from nscan_cli.slam.keyframes import Keyframe, Keyframes, extended, relation_between, route_of
+from nscan_cli.slam.keyframes import Keyframe, Keyframes, extended, relations_along, route_of
 from nscan_cli.slam.near import choose_nearby
 from nscan_cli.slam.nearby import MatchNearby, Nearby, match_nearby
 from nscan_cli.slam.options import SlamOptions
@@ -34,7 +34,7 @@ from nscan_cli.threads import Beside
 
 CONTRADICTS = "contradicts the rest of the graph"
 
-STRETCH = 64
+STRETCH = 128
 """Scans that are tracked together, before the keyframes among them are looked for."""
 
 Report = Callable[[int, int], None]
@@ -126,8 +126,7 @@ class Slam:
         if scans.breaks:
             self.breaks.append(first)
         self.keyframes.take(scans.sensed, scans.found, scans.begins)
-        for before, new in itertools.pairwise(self.keyframes.list[max(known - 1, 0) :]):
-            self.steps.append(relation_between(before, new, self.options.keyframes))
+        self.steps += relations_along(self.keyframes.list[max(known - 1, 0) :], self.options.keyframes)
         self.tracked.append(scans.found.poses)
         return len(self.keyframes) > known
 

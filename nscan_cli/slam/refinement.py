@@ -12,8 +12,10 @@ from dataclasses import replace
 
 import numpy as np
 
+from nscan_cli.compiled import kernel
 from nscan_cli.graph.model import Loop, NScan, Pairwise
-from nscan_cli.poses import Array, Indices, relative, wrap
+from nscan_cli.matching.planar import relative_pose, wrapped
+from nscan_cli.poses import Array, Indices
 from nscan_cli.slam.coverage import Coverage
 from nscan_cli.slam.keyframes import Route
 from nscan_cli.slam.near import Near, choose_nearby
@@ -57,7 +59,7 @@ class Refinement:
             )
             for (centre, tried), nearby in zip(chosen.items(), found, strict=True):
                 self._covered.add(int(route.rows[centre]), route.rows[tried].tolist(), nearby)
-                self._starts[centre] = tried, relative(poses[tried], poses[centre])
+                self._starts[centre] = tried, poses[tried]
                 self._found[centre] = nearby
             waiting = {centre: near for centre, near in waiting.items() if centre not in chosen}
             matched += len(chosen)
@@ -96,6 +98,16 @@ class Refinement:
         if start is None:
             return True
         tried, before = start
-        shift = relative(poses[tried], poses[centre]) - before
-        shift[:, 2] = wrap(shift[:, 2])
-        return bool(np.abs(shift).max() > moved)
+        return bool(_farthest_moved(before, poses[tried], int(np.searchsorted(tried, centre))) > moved)
+
+
+@kernel
+def _farthest_moved(before: Array, after: Array, centre: int) -> float:
+    """How far (m, rad) some pose (n, 3) moved in x, y or φ, seen from the one of the centre."""
+    farthest, was, now = 0.0, np.empty(3), np.empty(3)
+    for k in range(len(before)):
+        relative_pose(before[k], before[centre], was)
+        relative_pose(after[k], after[centre], now)
+        turned = abs(wrapped(now[2] - was[2]))
+        farthest = max(farthest, abs(now[0] - was[0]), abs(now[1] - was[1]), turned)
+    return farthest

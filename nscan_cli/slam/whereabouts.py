@@ -31,11 +31,17 @@ def with_slips(relation: Pairwise, length: float, drift: float, drift_angle: flo
 
     `drift` and `drift_angle` are standard deviations in m/√m and rad/√m.
     """
-    covariance = inverted(relation.information)
-    covariance[0, 0] += drift**2 * length
-    covariance[1, 1] += drift**2 * length
-    covariance[2, 2] += drift_angle**2 * length
-    return replace(relation, information=inverted(covariance))
+    slips = drift**2 * length, drift**2 * length, drift_angle**2 * length
+    return replace(relation, information=_less(relation.information, slips))
+
+
+@kernel
+def _less(information: Array, slips: tuple[float, float, float]) -> Array:
+    """An information (3, 3) after these variances have been added to what it is the inverse of."""
+    covariance = inverted(information)
+    for a in range(3):
+        covariance[a, a] += slips[a]
+    return inverted(covariance)
 
 
 class Known(NamedTuple):

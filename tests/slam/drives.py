@@ -14,7 +14,7 @@ from nscan_cli.logs.scan import LaserLog
 from nscan_cli.poses import Array, compose, relative
 from nscan_cli.slam.closing import Closing
 from nscan_cli.slam.found import Tracked
-from nscan_cli.slam.keyframes import Keyframe, Keyframes, relation_between, route_of
+from nscan_cli.slam.keyframes import Keyframe, Keyframes, relations_along, route_of
 from nscan_cli.slam.options import KeyframeOptions, NScanOptions
 from nscan_cli.slam.place import Place
 from tests.simulation.drive import Drive
@@ -45,7 +45,8 @@ def keyframe_of(scene: Scene, row: int, pose: Array, path: float, seen: Array) -
 
 def relation_to_previous(keyframes: list[Keyframe]) -> Pairwise:
     """The relation of the last keyframe to the one before."""
-    return relation_between(keyframes[-2], keyframes[-1], KeyframeOptions())
+    (relation,) = relations_along(keyframes[-2:], KeyframeOptions())
+    return relation
 
 
 class Driven(NamedTuple):

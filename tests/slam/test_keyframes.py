@@ -15,7 +15,7 @@ from nscan_cli.ndt.energy import energy
 from nscan_cli.ndt.grid import Ndt
 from nscan_cli.poses import Array, compose, relative, rotated_information
 from nscan_cli.slam.found import Tracked
-from nscan_cli.slam.keyframes import Keyframes, laid_end_to_end, relation_between
+from nscan_cli.slam.keyframes import Keyframes, relations_along
 from nscan_cli.slam.options import GaussianOptions, KeyframeOptions
 from tests.ndt.rooms import room
 from tests.slam.runs import found_of, sensed
@@ -73,10 +73,11 @@ def test_the_same_scans_become_keyframes_however_many_are_taken_in_at_a_time(siz
         found.take(scans.part(*rows), tracks.part(*rows))
     assert [keyframe.row for keyframe in found.list] == [0, 3, 6, 9]
     assert [keyframe.tracked.path for keyframe in found.list] == [0.0, 3.0, 6.0, 9.0]
-    around = [laid_end_to_end(keyframe.around) for keyframe in found.list]
-    for (points, ends), those in zip(around, [(0, 1, 2), (3, 1, 2, 4, 5), (6, 4, 5, 7, 8)], strict=False):
+    for keyframe, those in zip(found.list, [(0, 1, 2), (3, 1, 2, 4, 5), (6, 4, 5, 7, 8)], strict=False):
+        points, sizes, at = map(np.concatenate, zip(*keyframe.around, strict=True))
         np.testing.assert_array_equal(points, np.concatenate([room(k) for k in those]))
-        np.testing.assert_array_equal(ends, np.cumsum([0, *(len(room(k)) for k in those)]))
+        assert sizes.tolist() == [len(room(k)) for k in those]
+        np.testing.assert_array_equal(at, [poses[k] for k in those])
     np.testing.assert_allclose([keyframe.expected for keyframe in found.list[1:]], 3 * [3 * EXPECTED])
     found.take(replace(sensed([room(12)]), first=12), found_of(tracked(poses[11])), begins=True)
     assert found.list[-1].row == 12
@@ -159,7 +160,8 @@ def test_finishing_no_keyframes_is_nothing():
 
 
 def relation_to_previous(found: Keyframes) -> Pairwise:
-    return relation_between(found.list[-2], found.list[-1], found.options)
+    (relation,) = relations_along(found.list[-2:], found.options)
+    return relation
 
 
 def test_the_relation_to_the_previous_keyframe():

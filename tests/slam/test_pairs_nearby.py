@@ -80,7 +80,7 @@ def test_a_match_that_knows_nothing_is_no_relation():
     wall, options = np.column_stack([np.full(61, 2.0), across]), NScanOptions().gaussians
 
     def seen_from(pose: Array) -> Placed:
-        return Placed(wall, np.array([0, len(wall)]), pose[None])
+        return Placed(wall, np.array([len(wall)]), pose[None])
 
     def at(row: int, pose: list[float], *around: Placed) -> Keyframe:
         here = Tracked(np.array(pose), np.eye(3), np.eye(3), 1.0, 50.0 * row, True)
