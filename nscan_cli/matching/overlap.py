@@ -51,17 +51,11 @@ def _count(
     """Write both shares; `u` (3,) and `seen`, of the points of any scan, are room."""
     n = poses.shape[0]
     for j in range(n):
-        points = scan_points(scans, j)
         seen[:] = False
-        weight = 1.0 / max(points.shape[0], 1)
         for i in range(n):
-            if i == j:
-                continue
-            relative_pose(poses[j], poses[i], u)
-            pairs[i, j] = weight * find_inliers(
-                scan_grid(scans, i), scans.half, points, u, INLIER_BOUND, seen
-            )
-        shares[j] = weight * seen.sum()
+            if i != j:
+                pairs[i, j] = _share(scans, poses, i, j, u, seen)
+        shares[j] = seen.sum() / max(scan_points(scans, j).shape[0], 1)
 
 
 @kernel
@@ -79,6 +73,34 @@ def held_together(pairs: Array, least: float, scan: int) -> NDArray[np.bool_]:
                 reached[j], waiting[count] = True, j
                 count += 1
     return reached
+
+
+@kernel
+def held_at(scans: Scans, poses: Array, least: float, scan: int) -> NDArray[np.bool_]:
+    """What held_together says of the overlaps at the poses (n, 3), of which only those needed are counted."""
+    n = poses.shape[0]
+    reached = np.zeros(n, dtype=np.bool_)
+    waiting, u, seen = np.empty(n, dtype=np.int64), np.empty(3), np.empty(most_points(scans), dtype=np.bool_)
+    reached[scan], waiting[0], count = True, scan, 1
+    while count > 0:
+        count -= 1
+        i = waiting[count]
+        for j in range(n):
+            if not reached[j] and (
+                _share(scans, poses, i, j, u, seen) >= least or _share(scans, poses, j, i, u, seen) >= least
+            ):
+                reached[j], waiting[count] = True, j
+                count += 1
+    return reached
+
+
+@lean_kernel
+def _share(scans: Scans, poses: Array, i: int, j: int, u: Array, seen: NDArray[np.bool_]) -> float:
+    """The share of scan j's points on Gaussians of scan i, which are marked; `u` (3,) is room."""
+    points = scan_points(scans, j)
+    relative_pose(poses[j], poses[i], u)
+    count = find_inliers(scan_grid(scans, i), scans.half, points, u, INLIER_BOUND, seen)
+    return float(count / max(points.shape[0], 1))
 
 
 @kernel

@@ -13,7 +13,7 @@ from nscan_cli.counting import counted
 from nscan_cli.graph.model import Loop, NScan, Pairwise
 from nscan_cli.matching.joint import JointMatch, JointOptions, match_jointly
 from nscan_cli.matching.joint_energy import JointProblem, Priors, all_pairs, no_priors
-from nscan_cli.matching.overlap import held_together, overlaps, weakest_link
+from nscan_cli.matching.overlap import held_at, held_together, overlaps, weakest_link
 from nscan_cli.matching.planar import relative_pose
 from nscan_cli.matching.scans import Scans, lay_out
 from nscan_cli.poses import Array, Indices, compose, relative
@@ -134,8 +134,7 @@ def _match_held(
     keyframes, poses = route.keyframes, route.poses
     kept, start, scans = np.arange(len(tried)), poses[tried], _laid_out(keyframes, tried)
     if len(widenings) == 1:
-        near = overlaps(scans, start).pairs
-        held = held_together(near, POSSIBLE * options.overlap, int(np.searchsorted(tried, centre)))
+        held = held_at(scans, start, POSSIBLE * options.overlap, int(np.searchsorted(tried, centre)))
         kept, start = kept[held], start[held]
     all_began = len(kept) == len(tried)
     while len(kept) >= LEAST_SCANS:
