@@ -24,7 +24,8 @@ from nscan_cli.slam.nearby import MatchNearby, Nearby
 from nscan_cli.slam.options import ClosingOptions, NScanOptions
 from nscan_cli.slam.place import Place, find_place, why_doubted
 from nscan_cli.slam.surest_way import Linked, surest_ways
-from nscan_cli.slam.whereabouts import Reach, Whereabouts, with_slips
+from nscan_cli.slam.way import Way
+from nscan_cli.slam.whereabouts import Reach, Whereabouts
 
 NO_SECOND = "no second keyframe finds the same"
 SO_FAR_OFF = "too few keyframes find the same, farther off than the path drifts"
@@ -40,8 +41,7 @@ class Closing:
         self, options: ClosingOptions, nscan: NScanOptions, match: MatchNearby, energies: Energies
     ) -> None:
         self.options, self.nscan, self.match, self.energies = options, nscan, match, energies
-        self.way: list[Pairwise] = []
-        """The chain, with slips allowed for."""
+        self.way = Way(options.drift, options.drift_angle)
         self._refused: list[Loop] = []
         self._waiting: list[tuple[Place, str]] = []
         self._whereabouts, self._linked = Whereabouts(), Linked()
@@ -49,7 +49,7 @@ class Closing:
 
     def extend(self, relation: Pairwise, length: float) -> None:
         """Follow the chain by a relation over a way of `length` (m)."""
-        self.way.append(with_slips(relation, length, self.options.drift, self.options.drift_angle))
+        self.way.extend(relation, length)
 
     def close(
         self,
@@ -140,7 +140,7 @@ class Closing:
 
     def _ask(self, route: Route, centre: int, loops: Loops) -> Reach:
         """The reach, by the graph of the way and all loops."""
-        energy = self.energies.of(route, [*self.way, *loops()], centre)
+        energy = self.energies.of(route, [*self.way.relations, *loops()], centre)
         return self._whereabouts.ask(energy, route.poses)
 
     def is_lost(self, reach: Reach) -> NDArray[np.bool_]:

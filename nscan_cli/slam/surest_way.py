@@ -12,10 +12,10 @@ from typing import NamedTuple
 import numpy as np
 
 from nscan_cli.compiled import kernel
-from nscan_cli.graph.model import Pairwise
 from nscan_cli.graph.relation import Relation
 from nscan_cli.poses import Array, Indices
 from nscan_cli.slam.keyframes import Route
+from nscan_cli.slam.way import Way
 
 LEVER = 20.0
 """m; at this distance the angles of ways count when these are compared."""
@@ -38,7 +38,7 @@ class Linked:
     def __init__(self) -> None:
         self._stars: dict[int, tuple[Relation, Links]] = {}
 
-    def links(self, route: Route, way: Sequence[Pairwise], loops: Sequence[Relation]) -> Links:
+    def links(self, route: Route, way: Way, loops: Sequence[Relation]) -> Links:
         """From each keyframe to the next along the way, and those of all loops."""
         stars = [self._star(loop) for loop in loops]
         held, other = (
@@ -56,14 +56,13 @@ class Linked:
         return kept[1]
 
 
-def _along(way: Sequence[Pairwise], poses: Array) -> Array:
+def _along(way: Way, poses: Array) -> Array:
     """The covariances (len(way), 3, 3) of each keyframe's end of the way, in the global frame."""
     turned = np.zeros((len(way), 3, 3))
     cos, sin = np.cos(poses[: len(way), 2]), np.sin(poses[: len(way), 2])
     turned[:, 0, 0], turned[:, 0, 1], turned[:, 1, 0], turned[:, 1, 1] = cos, -sin, sin, cos
     turned[:, 2, 2] = 1.0
-    information = np.array([relation.information for relation in way]).reshape(-1, 3, 3)
-    along: Array = turned @ np.linalg.inv(information) @ turned.transpose(0, 2, 1)
+    along: Array = turned @ way.covariances @ turned.transpose(0, 2, 1)
     return along
 
 

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -11,10 +9,9 @@ import numpy as np
 from nscan_cli.compiled import kernel
 from nscan_cli.graph.cholesky import Factor, factorise, solve
 from nscan_cli.graph.inverse import inverse_diagonal
-from nscan_cli.graph.model import Pairwise
 from nscan_cli.graph.system import GraphEnergy
-from nscan_cli.matching.linear import inverted
 from nscan_cli.poses import Array, Indices
+from nscan_cli.slam.way import Way
 
 
 class Reach(NamedTuple):
@@ -24,24 +21,6 @@ class Reach(NamedTuple):
     """(K,) m, in the direction in which it is greatest."""
     angle: Array
     """(K,) rad"""
-
-
-def with_slips(relation: Pairwise, length: float, drift: float, drift_angle: float) -> Pairwise:
-    """A relation of tracking over a way of `length` (m) that allows for slips it does not know of.
-
-    `drift` and `drift_angle` are standard deviations in m/√m and rad/√m.
-    """
-    slips = drift**2 * length, drift**2 * length, drift_angle**2 * length
-    return replace(relation, information=_less(relation.information, slips))
-
-
-@kernel
-def _less(information: Array, slips: tuple[float, float, float]) -> Array:
-    """An information (3, 3) after these variances have been added to what it is the inverse of."""
-    covariance = inverted(information)
-    for a in range(3):
-        covariance[a, a] += slips[a]
-    return inverted(covariance)
 
 
 class Known(NamedTuple):
@@ -136,17 +115,14 @@ class Whereabouts:
         self._origin, self._reach = origin, Reach(distance, np.minimum(self._reach.angle, reach.angle))
         return self._reach
 
-    def bound(self, origin: int, way: Sequence[Pairwise], poses: Array) -> Reach:
-        """At most the reach from `origin`, of the keyframes before it; `way[k]` leads from k to k + 1.
-
-        The origin never goes back.
-        """
+    def bound(self, origin: int, way: Way, poses: Array) -> Reach:
+        """At most the reach from `origin`, of the keyframes before it. The origin never goes back."""
         known = len(self._reach.distance)
         distance, angle = np.zeros(len(poses)), np.zeros(len(poses))
         distance[:known], angle[:known] = self._reach.distance**2, self._reach.angle**2
         for step in range(self._origin, origin):
-            covariance = inverted(way[step].information)
-            _swing(covariance, way[step].measurement, poses, step, distance)
+            covariance = way.covariances[step]
+            _swing(covariance, way.relations[step].measurement, poses, step, distance)
             angle[: step + 1] += covariance[2, 2]
         self._origin, self._reach = origin, Reach(np.sqrt(distance), np.sqrt(angle))
         return self._reach

@@ -18,7 +18,7 @@ from tests.matching.problems import OPTIONS, Problem, office_problem
 
 @functools.cache
 def five() -> Problem:
-    """Of one room and the corridor beside it."""
+    """Some hang together, others do not."""
     return office_problem((2000, 2008, 2040, 2100, 2180))
 
 

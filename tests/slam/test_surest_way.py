@@ -11,6 +11,7 @@ from nscan_cli.graph.model import Pairwise
 from nscan_cli.poses import Array
 from nscan_cli.slam.keyframes import Route
 from nscan_cli.slam.surest_way import Linked, surest_ways
+from nscan_cli.slam.way import Way
 from tests.slam.test_whereabouts import Walk, seen_from, straight, walk
 
 
@@ -18,7 +19,7 @@ def bound(walked: Walk, origin: int) -> Array:
     """The covariances (K, 3, 3) along the surest ways."""
     size = len(walked.poses)
     route = Route([], np.arange(size), walked.way, np.zeros(size), walked.poses)
-    links = Linked().links(route, walked.way, [*walked.loops, *walked.nscan])
+    links = Linked().links(route, Way.without_slips(walked.way), [*walked.loops, *walked.nscan])
     return surest_ways(links, walked.poses, origin)
 
 
@@ -56,7 +57,7 @@ def test_a_loop_is_a_shorter_way():
 def test_what_no_relation_leads_to_is_nowhere():
     walked = straight(4)
     route = Route([], np.arange(5), walked.way, np.zeros(5), np.zeros((5, 3)))
-    links = Linked().links(route, walked.way, [])
+    links = Linked().links(route, Way.without_slips(walked.way), [])
     found = surest_ways(links, np.zeros((5, 3)), 0)
     assert np.isfinite(found[:4]).all()
     assert np.isinf(found[4]).all()

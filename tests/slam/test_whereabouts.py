@@ -12,7 +12,8 @@ from hypothesis import strategies as st
 from nscan_cli.graph.model import NScan, Pairwise
 from nscan_cli.graph.system import GraphEnergy
 from nscan_cli.poses import Array, Indices, compose, relative, relative_jacobians
-from nscan_cli.slam.whereabouts import Reach, Whereabouts, known, with_slips
+from nscan_cli.slam.way import Way
+from nscan_cli.slam.whereabouts import Reach, Whereabouts, known
 
 
 def seen_from(energy: GraphEnergy, poses: Array) -> Reach:
@@ -175,7 +176,7 @@ def asked_and_bound(walked: Walk, origin: int, now: int, ahead: int = 0) -> tupl
         walked.until(now + ahead + 1),
     )
     whereabouts.ask(before.energy(origin), before.poses)
-    bound = whereabouts.bound(now, after.way, after.poses)
+    bound = whereabouts.bound(now, Way.without_slips(after.way), after.poses)
     answer = seen_from(after.energy(now), after.poses)
     return Reach(bound.distance[:now], bound.angle[:now]), Reach(answer.distance[:now], answer.angle[:now])
 
@@ -184,7 +185,7 @@ def test_the_bound_is_the_answer_itself_at_first():
     walked = walk(5, 8, loops=2)
     whereabouts = Whereabouts()
     asked = whereabouts.ask(walked.energy(7), walked.poses)
-    bound = whereabouts.bound(7, walked.way, walked.poses)
+    bound = whereabouts.bound(7, Way.without_slips(walked.way), walked.poses)
     np.testing.assert_allclose(bound.distance, asked.distance, rtol=1e-12)
     np.testing.assert_allclose(bound.angle, asked.angle, rtol=1e-12)
 
@@ -210,19 +211,7 @@ def test_nor_is_it_too_great():
 
 def test_before_anything_was_asked_the_first_keyframe_counts_as_known():
     walked = straight(6)
-    bound = Whereabouts().bound(5, walked.way, walked.poses)
+    bound = Whereabouts().bound(5, Way.without_slips(walked.way), walked.poses)
     answer = seen_from(walked.energy(5), walked.poses)
     np.testing.assert_allclose(bound.angle[:5], answer.angle[:5], rtol=1e-6)
     assert (bound.distance[:5] >= (1 - 1e-6) * answer.distance[:5]).all()
-
-
-def test_with_slips_adds_their_variances_by_the_length():
-    """Golden: 4 m with 0.05 m/√m and 0.002 rad/√m are 0.1 m and 0.004 rad."""
-    given = information(np.random.default_rng(4))
-    relation = Pairwise((3, 8), np.array([4.0, 0, 0.1]), given, "track", 0.9)
-    slipping = with_slips(relation, 4.0, 0.05, 0.002)
-    added = np.linalg.inv(slipping.information) - np.linalg.inv(given)
-    np.testing.assert_allclose(added, np.diag([0.1, 0.1, 0.004]) ** 2, rtol=1e-6, atol=1e-12)
-    assert (slipping.nodes, slipping.origin, slipping.score) == ((3, 8), "track", 0.9)
-    np.testing.assert_array_equal(slipping.measurement, relation.measurement)
-    np.testing.assert_allclose(with_slips(relation, 0.0, 0.05, 0.002).information, given, rtol=1e-9)
