@@ -6,6 +6,7 @@ All other relations of the graph can only make it less. It takes a hundredth of 
 from __future__ import annotations
 
 import heapq
+import operator
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -33,27 +34,28 @@ class Links(NamedTuple):
 
 
 class Linked:
-    """The links of a graph that grows; those of loops are kept. A loop is known by being the same object."""
+    """The links of a graph that grows. Those of its loops are kept, as long as new ones come after the
+    others; a loop is known by being the same object."""
 
     def __init__(self) -> None:
-        self._stars: dict[int, tuple[Relation, Links]] = {}
+        self._loops: list[Relation] = []
+        self._links = _of_all([])
 
     def links(self, route: Route, way: Way, loops: Sequence[Relation]) -> Links:
         """From each keyframe to the next along the way, and those of all loops."""
-        stars = [self._star(loop) for loop in loops]
-        held, other = (
-            np.searchsorted(route.rows, np.concatenate([route.rows[:0], *ends]))
-            for ends in ([star.held for star in stars], [star.other for star in stars])
-        )
+        if len(loops) < len(self._loops) or not all(map(operator.is_, self._loops, loops)):
+            self._loops, self._links = [], _of_all([])
+        new = [_star(loop, route.rows) for loop in loops[len(self._loops) :]]
+        if new:
+            self._loops, self._links = [*loops], _of_all([self._links, *new])
         steps = np.arange(len(way))
-        covariances = np.concatenate([_along(way, route.poses), *(star.covariances for star in stars)])
-        return Links(np.concatenate([steps, held]), np.concatenate([steps + 1, other]), covariances)
+        return _of_all([Links(steps, steps + 1, _along(way, route.poses)), self._links])
 
-    def _star(self, loop: Relation) -> Links:
-        kept = self._stars.get(id(loop))
-        if kept is None:
-            kept = self._stars[id(loop)] = loop, _star(loop)
-        return kept[1]
+
+def _of_all(parts: Sequence[Links]) -> Links:
+    """Links one after another."""
+    none = Links(np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64), np.zeros((0, 3, 3)))
+    return Links(*(np.concatenate(columns) for columns in zip(none, *parts, strict=True)))
 
 
 def _along(way: Way, poses: Array) -> Array:
@@ -66,13 +68,15 @@ def _along(way: Way, poses: Array) -> Array:
     return along
 
 
-def _star(relation: Relation) -> Links:
-    """From the pose that carries the mapping to each of the others, by nodes; the same in all directions.
+def _star(relation: Relation, rows: Indices) -> Links:
+    """From the pose that carries the mapping to each of the others; the same in all directions.
+
+    The keyframes of the nodes are those in `rows` (K,).
 
     A covariance is at most twice its diagonal. And a way that comes from one of the others and goes on to
     another has the difference of two that depend on each other: at most twice the sum of their covariances.
     """
-    term, nodes = relation.term(), np.array(relation.nodes)
+    term, nodes = relation.term(), np.searchsorted(rows, relation.nodes)
     others = np.delete(np.arange(len(nodes)), term.fixed)
     free = (3 * others[:, None] + np.arange(3)).ravel()
     eigenvalues, vectors = np.linalg.eigh(term.hessian[np.ix_(free, free)])

@@ -8,6 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from nscan_cli.graph.model import Pairwise
+from nscan_cli.graph.relation import Relation
 from nscan_cli.poses import Array
 from nscan_cli.slam.keyframes import Route
 from nscan_cli.slam.surest_way import Linked, surest_ways
@@ -75,3 +76,16 @@ def test_directions_that_a_loop_does_not_hold_are_no_way():
     loop = Pairwise((0, 11), np.array([22.0, 0, 0]), np.diag([0.0, 1e6, 1e6]), "loop")
     found = bound(open_way._replace(loops=[loop]), 0)
     np.testing.assert_allclose(found, bound(open_way, 0))
+
+
+def test_links_that_are_kept_are_those_that_are_made_anew():
+    """While loops join, and after one has gone."""
+    walked = walk(7, 9, loops=4)
+    size, way = len(walked.poses), Way.without_slips(walked.way)
+    route = Route([], np.arange(size), walked.way, np.zeros(size), walked.poses)
+    loops: list[Relation] = [*walked.nscan, *walked.loops]
+    kept = Linked()
+    for chosen in (loops[:2], loops[:2], loops[:5], loops, loops[1:], loops[:1], []):
+        anew = Linked().links(route, way, chosen)
+        for one, other in zip(kept.links(route, way, chosen), anew, strict=True):
+            np.testing.assert_array_equal(one, other)
