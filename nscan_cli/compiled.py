@@ -102,10 +102,12 @@ class Kernel:
             return cast(Callable[..., Any], self.dispatcher)
         version = machine_code.load(file, self.py_func.__name__)
         if version is None:
-            version = self._dispatcher(arguments)
-            (compiled,) = version.overloads.values()
+            made = self._dispatcher(arguments)
+            (compiled,) = made.overloads.values()
             machine_code.keep(file, compiled)
-        return version
+            # Another process may have been first.
+            version = machine_code.load(file, self.py_func.__name__) or made
+        return cast(Callable[..., Any], version)
 
     @property
     def dispatcher(self) -> Any:

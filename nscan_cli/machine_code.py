@@ -28,8 +28,7 @@ from typing import Any
 import numpy as np
 
 from nscan_cli.cache_folder import cache_folder
-from nscan_cli.errors import NscanError
-from nscan_cli.outputs import write_whole
+from nscan_cli.outputs import write_first
 
 HARMLESS = {"NUMBA_CACHE_DIR", "NUMBA_NUM_THREADS"}
 """Settings of numba that change nothing in a kernel's machine code."""
@@ -80,19 +79,22 @@ def _digest(value: object) -> str:
 
 
 def keep(file: Path, compiled: Any) -> None:
-    """Write what numba has compiled (a CompileResult) to the file, where there is room.
+    """Write what numba has compiled (a CompileResult) to the file, where there is room and it is not there.
+
+    Compiled again, a kernel need not become the same machine code, nor round alike: that follows from the
+    order in which kernels are compiled, too. So what is kept first is what all processes run.
 
     The first line says as JSON what the code is called and needs, its check sum is the second, then comes
     the code.
     """
-    with contextlib.suppress(NscanError, OSError):
+    with contextlib.suppress(OSError):
         try:
             head, code = _parts(compiled)
         except Exception:
             # Another numba can raise anything. It keeps its code itself, from the next process on.
             file.with_suffix(LEFT).touch()
         else:
-            write_whole(str(file), b"%s\n%d\n%s" % (json.dumps(head).encode(), zlib.crc32(code), code))
+            write_first(file, b"%s\n%d\n%s" % (json.dumps(head).encode(), zlib.crc32(code), code))
 
 
 def _parts(compiled: Any) -> tuple[dict[str, Any], bytes]:
@@ -119,15 +121,23 @@ def _text(constant: Any) -> str:
 
 
 def load(file: Path, name: str) -> Callable[..., Any] | None:
-    """The function that was kept in the file; None where there is none, or none that can run here."""
+    """The function that was kept in the file; None where there is none, or none that can run here.
+
+    A damaged file is removed.
+    """
     try:
         head, check, code = file.read_bytes().split(b"\n", 2)
-        if int(check) != zlib.crc32(code):
-            return None
-        return _linked(json.loads(head), code, name)
+        sound = int(check) == zlib.crc32(code)
+        function = _linked(json.loads(head), code, name) if sound else None
+    except (FileNotFoundError, MemoryError):
+        return None
     except Exception:
         # What is damaged can raise anything; numba compiles it anew.
-        return None
+        function = None
+    if function is None:
+        with contextlib.suppress(OSError):
+            file.unlink()
+    return function
 
 
 def _linked(head: dict[str, Any], code: bytes, name: str) -> Callable[..., Any] | None:

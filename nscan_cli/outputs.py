@@ -43,10 +43,7 @@ def whole_file(path: str) -> Iterator[BinaryIO]:
         clear_left_over(target.parent)
         with _temporary(target.parent) as (file, name):
             yield file
-            file.flush()
-            umask = os.umask(0)
-            os.umask(umask)
-            os.fchmod(file.fileno(), 0o666 & ~umask)
+            _finish(file)
             os.fsync(file.fileno())
             os.replace(name, target)
     except BrokenPipeError:
@@ -75,6 +72,14 @@ def _temporary(folder: Path) -> Iterator[tuple[BinaryIO, str]]:
             finally:
                 with contextlib.suppress(FileNotFoundError):
                     os.unlink(name)
+
+
+def _finish(file: BinaryIO) -> None:
+    """Write out what is still held back, and let those read the file who may read any other new one."""
+    file.flush()
+    umask = os.umask(0)
+    os.umask(umask)
+    os.fchmod(file.fileno(), 0o666 & ~umask)
 
 
 def clear_left_over(folder: Path) -> None:
@@ -120,3 +125,18 @@ def write_whole(path: str, data: bytes) -> None:
     """Write `data` to `path` ("-": standard output), whole or not at all. Raises OutputError."""
     with whole_file(path) as file:
         file.write(data)
+
+
+def write_first(path: Path, data: bytes) -> None:
+    """Write `data` whole to a file that nobody has written before; what is there stays. Raises OSError."""
+    clear_left_over(path.parent)
+    with _temporary(path.parent) as (file, name):
+        file.write(data)
+        _finish(file)
+        try:
+            os.link(name, path)
+        except FileExistsError:
+            pass
+        except OSError:
+            # Some file systems know one name for a file only.
+            os.replace(name, path)

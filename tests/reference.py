@@ -100,7 +100,8 @@ WRITTEN = (
     ("FILE", "`slam --depfile`", "`outputs: inputs` for `include` in a Makefile"),
     ("FOLDER", "`nightly -o`", "report.html, report.json, and for each log a folder with graph, trajectory, "
      "map and history"),
-    ("~/.cache/nscan-cli", "all that match", "compiled kernels; may be deleted at any time"),
+    ("~/.cache/nscan-cli", "all that match", "compiled kernels; may be deleted, but compiled anew they may "
+     "round otherwise"),
 )  # fmt: skip
 RESULTS = """\
 What `match` and `nscan` write, one key a line, in m and rad. A matrix is its upper triangle, row by row: a

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from nscan_cli import machine_code
 from nscan_cli.cache_folder import PACKAGE
 from nscan_cli.compiled import Kernel, kernel
 
@@ -252,6 +253,32 @@ def test_an_array_that_cannot_be_written_has_code_of_its_own():
     assert lowest(values) == lowest(values.copy()) == 1.0
     assert isinstance(lowest, Kernel)
     assert len(lowest._versions) == 2
+
+
+def test_all_processes_run_what_was_kept_first(tmp_path, monkeypatch):
+    """Two compile at the same time, and what they make need not round alike: here it differs by one."""
+    monkeypatch.setattr(machine_code, "cache_folder", lambda: tmp_path)
+
+    def made(more: float) -> Any:
+        @kernel
+        def shifted(value: float) -> float:
+            return value + more
+
+        return shifted
+
+    assert made(1.0)(0.0) == 1.0
+    (kept,) = tmp_path.glob(f"*{machine_code.SUFFIX}")
+    first = kept.read_bytes()
+    found = machine_code.load
+
+    def not_yet(file: Path, name: str) -> None:
+        monkeypatch.setattr(machine_code, "load", found)
+
+    monkeypatch.setattr(machine_code, "load", not_yet)
+    assert made(2.0)(0.0) == 1.0
+    assert [path.read_bytes() for path in tmp_path.iterdir()] == [first]
+    kept.unlink()
+    assert made(2.0)(0.0) == 2.0
 
 
 def kernels() -> Iterator[tuple[str, ast.FunctionDef]]:

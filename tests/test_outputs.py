@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import errno
 import os
 import stat
 import subprocess
@@ -10,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from nscan_cli.errors import OutputError
-from nscan_cli.outputs import TEMPORARY, check_writable, whole_file, write_whole
+from nscan_cli.outputs import TEMPORARY, check_writable, whole_file, write_first, write_whole
 
 
 def names(folder: Path) -> list[str]:
@@ -150,3 +151,23 @@ def test_a_closed_standard_output_is_an_output_error(monkeypatch):
     monkeypatch.setattr("sys.stdout", None)
     with pytest.raises(OutputError, match="standard output: is closed"):
         write_whole("-", b"x")
+
+
+def no_second_name(*_names: object) -> None:
+    raise OSError(errno.EPERM, "this file system knows one name for a file")
+
+
+@pytest.mark.parametrize("link", [os.link, no_second_name])
+def test_what_was_written_first_stays(tmp_path, monkeypatch, link):
+    path = tmp_path / "once"
+    monkeypatch.setattr(os, "link", link)
+    umask = os.umask(0o027)
+    try:
+        write_first(path, b"first")
+    finally:
+        os.umask(umask)
+    assert path.stat().st_mode & 0o777 == 0o640
+    monkeypatch.undo()
+    write_first(path, b"second")
+    assert path.read_bytes() == b"first"
+    assert list(tmp_path.iterdir()) == [path]
