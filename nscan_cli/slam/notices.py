@@ -13,6 +13,7 @@ from nscan_cli.poses import relative
 from nscan_cli.slam.believed import repeating
 from nscan_cli.slam.disagreement import disagreements
 from nscan_cli.slam.pipeline import Slam
+from nscan_cli.slam.seen_through import seen_through
 
 MOST_NAMED = 10
 """Scans or stretches that a notice names."""
@@ -23,6 +24,10 @@ PAUSE = 3.0
 EXPECTED = 3.0
 """Mean of χ² for three degrees of freedom. That of all relations is below 1 on sound logs; a loop joins what
 has drifted, and twice as much is no sign of a mistake."""
+
+LOOKED_THROUGH = 0.15
+"""Of what one visit saw, another may look through such a share. On sound logs it is 1 % to 2 % in three
+buildings, 7 % in mit-killian, 8 % in fr-campus; in maps that are metres wrong 26 % and more."""
 
 
 def notices(slam: Slam) -> list[str]:
@@ -39,7 +44,7 @@ def notices(slam: Slam) -> list[str]:
             f"the laser repeats itself at {_scans(log, slam.hanging.tolist())}; these are not matched"
         )
     found += _without_odometry(slam) if slam.odometry is None else _of_odometry(slam)
-    return found + _contradictions(slam)
+    return found + _contradictions(slam) + _looked_through(slam)
 
 
 def _of_odometry(slam: Slam) -> list[str]:
@@ -95,6 +100,18 @@ def _contradictions(slam: Slam) -> list[str]:
     return [
         f"relations contradict each other: their mean χ² is {mean:.1f}, that of loops {of_loops:.1f}, "
         f"for {EXPECTED:g} degrees of freedom; the map may be wrong, at {_scans(slam.log, nodes)} above all"
+    ]
+
+
+def _looked_through(slam: Slam) -> list[str]:
+    """Whether visits of a place contradict each other, however well they match."""
+    worst = seen_through(slam.log, slam.route, slam.options.nscan, slam.threads)
+    if worst is None or worst.share <= LOOKED_THROUGH:
+        return []
+    first, last = slam.log.numbers[[worst.first, worst.last]].tolist()
+    return [
+        f"places do not look as they did before: from scan {first} to {last}, {worst.share:.0%} of what one "
+        "visit saw is looked through from another; the map is wrong there, or much has moved"
     ]
 
 

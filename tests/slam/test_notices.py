@@ -35,18 +35,10 @@ def simulated() -> LaserLog:
             True,
             r"no scans on the way to scan 187, by odometry more than 2 m or 1 rad",
         ),
-        pytest.param(
-            "glass wall, seen within 17° of head-on",
-            False,
-            r"relations contradict each other: their mean χ² is \d+\.\d, that of loops 1\d\.\d",
-            marks=pytest.mark.xfail(
-                strict=True, reason="no relations contradict each other any more; the map is off by 3 m"
-            ),
-        ),
         (
             "laser frozen for 8 m",
             False,
-            r"repeats itself at scans 187, .* it hangs, or the robot stands",
+            r"repeats itself at scans 187, .* it hangs, or the robot stands; .*\nplaces do not look as",
         ),
     ],
 )
@@ -54,6 +46,18 @@ def test_trouble_that_the_graph_hides_is_told(trouble, odometry, told):
     made = ROUND[trouble](simulated())
     said = notices(mapped((made if odometry else without_odometry(made)).log).slam)
     assert re.search(rf"{told}.*\Z", "\n".join(said))
+
+
+@pytest.mark.parametrize("seed", [5, 6, 7, 8])
+def test_a_map_that_a_glass_wall_has_made_6_m_too_short_is_told(seed):
+    """Tracking stands still beside the glass, and in the other corridor the visits match, 6 m off."""
+    drive = round_scene().record(seed).log()
+    made = without_odometry(ROUND["glass wall, seen within 17° of head-on"](drive))
+    said = "\n".join(notices(mapped(made.log).slam))
+    told = re.search(r"as they did before: from scan (\d+) to (\d+), (\d+)% of what one visit saw", said)
+    assert told is not None
+    assert 270 <= int(told[1]) < int(told[2])
+    assert int(told[3]) >= 25
 
 
 @pytest.mark.parametrize("seed", [5, 6, 7, 8])
@@ -67,9 +71,10 @@ def test_of_someone_who_walks_along_it_is_told_that_odometry_and_scans_disagree(
     assert int(told[2]) > 60
 
 
+@pytest.mark.parametrize("trouble", ["none", "people who pass"])
 @pytest.mark.parametrize("odometry", [True, False])
-def test_of_a_sound_drive_there_is_nothing_to_tell(odometry):
-    made = ROUND["none"](simulated())
+def test_of_a_sound_drive_there_is_nothing_to_tell(odometry, trouble):
+    made = ROUND[trouble](simulated())
     assert notices(mapped((made if odometry else without_odometry(made)).log).slam) == []
 
 

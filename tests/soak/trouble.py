@@ -56,6 +56,7 @@ TOLD = {
     "there are no scans": "scans are missing",
     "disagree": "odometry and scans disagree",
     "contradict": "relations contradict each other",
+    "looked through": "places do not look as before",
     "it hangs, or": "the laser hangs, or the robot stands",
 }
 """Words of a notice → what the table says of it."""
