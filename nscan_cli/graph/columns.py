@@ -73,10 +73,10 @@ class Terms:
         return [(k, self._at[slot]) for k, slot in enumerate(slots) if slot in self._at]
 
     def _slots_of(self, relations: Sequence[Relation]) -> Indices:
-        slots = [self._slots.get(id(relation), -1) for relation in relations]
-        if -1 in slots:
-            self._add([relation for relation, slot in zip(relations, slots, strict=True) if slot < 0])
-            slots = [self._slots[id(relation)] for relation in relations]
+        slots = list(map(self._slots.get, map(id, relations)))
+        if None in slots:
+            self._add([relation for relation, slot in zip(relations, slots, strict=True) if slot is None])
+            slots = list(map(self._slots.get, map(id, relations)))
         return np.array(slots, dtype=np.int64)
 
     def _add(self, relations: Sequence[Relation]) -> None:

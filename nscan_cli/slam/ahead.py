@@ -6,7 +6,6 @@ number of threads.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from functools import partial
 from types import TracebackType
@@ -14,9 +13,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from nscan_cli.graph.model import Pairwise
 from nscan_cli.slam.coverage import Coverage
-from nscan_cli.slam.keyframes import Keyframe, Route, extended
+from nscan_cli.slam.keyframes import Route, extended
 from nscan_cli.slam.near import Near, choose_nearby
 from nscan_cli.slam.nearby import MatchNearby, Nearby
 from nscan_cli.slam.options import NScanOptions
@@ -66,14 +64,14 @@ class Ahead:
     def begin(
         self,
         route: Route,
-        coming: tuple[Sequence[Keyframe], Sequence[Pairwise]],
+        whole: int,
         centre: int,
         near: Near,
         covered: Coverage,
     ) -> None:
         """Begin what comes after the match of keyframe `centre` with those `near`.
 
-        `coming` are the keyframes that will join the route next, with their relations of tracking. Every
+        So many keyframes of the route are `whole`; those that the graph does not have yet join it next. Every
         match is taken to relate all that it is tried with.
         """
         if self._pool is None:
@@ -84,12 +82,11 @@ class Ahead:
         for other, begun in self._begun.items():
             assumed.assume(begun.route, other, begun.near)
         behind = self._options.behind
-        following = range(max([centre, *self._begun]) + 1, len(route.poses) + len(coming[0]) - behind)
+        following = range(max([centre, *self._begun]) + 1, max(whole, len(route.poses)) - behind)
         for keyframe in following:
             if len(self._begun.keys() - {centre}) >= AHEAD:
                 return
-            joining = keyframe + behind + 1 - len(route.poses)
-            longer = extended(route, coming[0][:joining], coming[1][:joining])
+            longer = extended(route, keyframe + behind + 1)
             near = choose_nearby(longer.poses, longer.paths, keyframe, self._options)
             if assumed.is_due(longer, keyframe, near, self._options):
                 assumed.assume(longer, keyframe, near)

@@ -36,7 +36,7 @@ class Coverage:
     def share(self, centre: int, others: Iterable[int]) -> float:
         """The share of the pairs of `centre` with each of the others that are there; 1 without any other."""
         pairs = _pairs(centre, others)
-        return sum(self._has(pair) for pair in pairs) / len(pairs) if pairs else 1.0
+        return (len(pairs) - len(self._lacking(pairs))) / len(pairs) if pairs else 1.0
 
     def add(self, centre: int, others: Iterable[int], nearby: Nearby | None) -> None:
         """A match of `centre` with all others that was tried, and what it related."""
@@ -57,12 +57,13 @@ class Coverage:
     def _relate(self, nodes: Iterable[int]) -> None:
         self._pairs.update(combinations(sorted(set(nodes)), 2))
 
-    def _has(self, pair: tuple[int, int]) -> bool:
-        return pair in self._pairs or (self._beneath is not None and self._beneath._has(pair))
+    def _lacking(self, pairs: set[tuple[int, int]]) -> set[tuple[int, int]]:
+        lacking = pairs - self._pairs
+        return lacking if self._beneath is None else self._beneath._lacking(lacking)
 
     def _has_closed(self, node: int) -> bool:
         return node in self._closed or (self._beneath is not None and self._beneath._has_closed(node))
 
 
-def _pairs(centre: int, others: Iterable[int]) -> list[tuple[int, int]]:
-    return [(min(centre, other), max(centre, other)) for other in others if other != centre]
+def _pairs(centre: int, others: Iterable[int]) -> set[tuple[int, int]]:
+    return {(centre, other) if centre < other else (other, centre) for other in others if other != centre}

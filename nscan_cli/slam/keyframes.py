@@ -83,10 +83,11 @@ class Route(NamedTuple):
     """K keyframes along the path, and where the graph has them."""
 
     keyframes: Sequence[Keyframe]
+    """The first K are these; more may follow, which the graph does not have yet."""
     rows: Indices
     """(K,) theirs in the log, which are the ids of their nodes."""
     chain: Sequence[Pairwise]
-    """The relations of tracking: `chain[k]` leads from keyframe k to k + 1."""
+    """The relations of tracking, of what follows too: `chain[k]` leads from keyframe k to k + 1."""
     paths: Array
     """(K,) the length of path up to each, m."""
     poses: Array
@@ -126,23 +127,21 @@ def _next_keyframe(poses: Array, first: int, last: Array, distance: float, turn:
 
 def route_of(keyframes: Sequence[Keyframe], chain: Sequence[Pairwise], poses: Array) -> Route:
     """The route of as many keyframes as there are poses (K, 3)."""
-    keyframes = keyframes[: len(poses)]
-    rows = np.array([keyframe.row for keyframe in keyframes], dtype=np.int64)
-    paths = np.array([keyframe.tracked.path for keyframe in keyframes])
-    return Route(keyframes, rows, chain[: max(len(poses) - 1, 0)], paths, poses)
+    own = keyframes[: len(poses)]
+    rows = np.array([keyframe.row for keyframe in own], dtype=np.int64)
+    return Route(keyframes, rows, chain, np.array([keyframe.tracked.path for keyframe in own]), poses)
 
 
-def extended(route: Route, keyframes: Sequence[Keyframe], chain: Sequence[Pairwise]) -> Route:
-    """The route with more keyframes at its end, where the relations that lead to each of them place them."""
-    poses = [route.poses[-1]]
-    for relation in chain:
+def extended(route: Route, size: int) -> Route:
+    """The route with the next of its keyframes, up to `size` of them, where the chain places them."""
+    known = len(route.poses)
+    new, poses = route.keyframes[known:size], [route.poses[-1]]
+    for relation in route.chain[known - 1 : size - 1]:
         poses.append(compose(poses[-1], relation.measurement))
-    return Route(
-        [*route.keyframes, *keyframes],
-        np.concatenate([route.rows, [keyframe.row for keyframe in keyframes]], dtype=np.int64),
-        [*route.chain, *chain],
-        np.concatenate([route.paths, [keyframe.tracked.path for keyframe in keyframes]]),
-        np.concatenate([route.poses, np.reshape(poses[1:], (-1, 3))]),
+    return route._replace(
+        rows=np.concatenate([route.rows, [keyframe.row for keyframe in new]], dtype=np.int64),
+        paths=np.concatenate([route.paths, [keyframe.tracked.path for keyframe in new]]),
+        poses=np.concatenate([route.poses, np.reshape(poses[1:], (-1, 3))]),
     )
 
 

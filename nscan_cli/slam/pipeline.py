@@ -62,7 +62,7 @@ class Slam:
         self.match: MatchNearby = match_pairs_nearby if options.relations == "pairwise" else match_nearby
         self.ahead = Ahead(self.match, options.nscan, threads)
         self.steps: list[Pairwise] = []
-        self.route = route_of([], [], np.zeros((0, 3)))
+        self.route = route_of(self.keyframes.list, self.steps, np.zeros((0, 3)))
         self.pairs: list[Pairwise] = []
         self.nscan: list[NScan] = []
         self.others: list[Relation] = []
@@ -141,11 +141,10 @@ class Slam:
         """Step 2: a new keyframe, with its relation to the one before."""
         before, path = len(self.poses), keyframe.tracked.path
         if not before:
-            self.route = route_of([keyframe], [], np.zeros((1, 3)))
+            self.route = route_of(self.keyframes.list, self.steps, np.zeros((1, 3)))
             return
-        relation = self.steps[before - 1]
-        self.closing.extend(relation, path - float(self.route.paths[-1]))
-        self.route = extended(self.route, [keyframe], [relation])
+        self.closing.extend(self.steps[before - 1], path - float(self.route.paths[-1]))
+        self.route = extended(self.route, before + 1)
 
     def match_nearby(self, centre: int) -> None:
         """Step 3: a keyframe matched with those near it; the graph follows when it must."""
@@ -156,9 +155,7 @@ class Slam:
         if not self.covered.is_due(route, centre, near, options):
             return
         # One more may be there that is not whole.
-        whole, known = len(self.keyframes) - 1, len(self.poses)
-        coming = self.keyframes.list[known:whole], self.steps[known - 1 : whole - 1]
-        self.ahead.begin(route, coming, centre, near, self.covered)
+        self.ahead.begin(route, len(self.keyframes) - 1, centre, near, self.covered)
         nearby = self.match_unless_doubted(centre)
         self.covered.add(int(route.rows[centre]), route.rows[near.tried].tolist(), nearby)
         if nearby is not None:
@@ -267,15 +264,17 @@ class Slam:
 
     def closed(self) -> list[Relation]:
         """Those that close loops."""
-        return [relation for relation in self.relations if relation.origin == "loop"]
+        matched: list[Relation] = [*self.pairs, *self.nscan, *self.others]
+        return [relation for relation in matched if relation.origin == "loop"]
 
     @property
     def pairwise(self) -> list[Pairwise]:
         """The pairwise relations of the graph: the chain, or what is needed of it, and single matches."""
+        chain = self.route.chain[: max(len(self.poses) - 1, 0)]
         if self.options.relations != "nscan":
-            return [*self.route.chain, *self.pairs]
+            return [*chain, *self.pairs]
         joined = {pair for relation in self.nscan for pair in itertools.pairwise(relation.nodes)}
-        return [relation for relation in self.route.chain if relation.nodes not in joined]
+        return [relation for relation in chain if relation.nodes not in joined]
 
     def graph(self) -> Graph:
         """Every scan with its pose: a keyframe where the graph put it, the others in between."""

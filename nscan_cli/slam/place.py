@@ -54,7 +54,7 @@ def piece_moved(route: Route, place: Place, breaks: Sequence[int]) -> Route:
 
     `breaks` are rows of the log, increasing. The graph would find it too, but hardly from half a turn away.
     """
-    rows = [keyframe.row for keyframe in route.keyframes]
+    rows = route.rows.tolist()
     begins = [row for row in breaks if rows[place.old] < row <= rows[place.centre]]
     if not begins:
         return route

@@ -38,8 +38,8 @@ class Refinement:
         """Take the radius (m) about some centres that is `wider`: where large loops were closed."""
         self._route, self._options, self._match, self._threads = route, options, match, threads
         self._wider, self._covered = wider, Coverage()
-        self._found: list[Nearby | None] = [None] * len(route.keyframes)
-        self._starts: list[tuple[Indices, Array] | None] = [None] * len(route.keyframes)
+        self._found: list[Nearby | None] = [None] * len(route.poses)
+        self._starts: list[tuple[Indices, Array] | None] = [None] * len(route.poses)
 
     def sweep(self, poses: Array, moved: float) -> int:
         """Match again about the keyframes whose neighbours have moved by more than `moved` (m, rad).

@@ -72,7 +72,7 @@ def seen_through(log: LaserLog, route: Route, options: NScanOptions, threads: in
     if not len(rows) or log.ranges.shape[1] < 2:
         return None
     to_laser = inverse(log.mount)
-    points = [transform(to_laser, keyframe.points) for keyframe in route.keyframes]
+    points = [transform(to_laser, keyframe.points) for keyframe in route.keyframes[: len(route.poses)]]
     views = Views(
         log.laser_pose(route.poses),
         route.paths,
