@@ -25,12 +25,18 @@ class Settings(NamedTuple):
     scale: float
     inlier_bound: float
     inlier_share: float
+    far_share: float
+    turns: Array
+    """(rings, angles), with nan where a ring has fewer."""
     odometry: Motion
     steady_motion: Motion
 
     @classmethod
     def of(cls, options: TrackingOptions, odometry: bool = False) -> Settings:
         """Those of the options, with odometry or without."""
+        turns = np.full((len(options.turns), max(map(len, options.turns), default=0)), np.nan)
+        for ring, angles in zip(turns, options.turns, strict=True):
+            ring[: len(angles)] = angles
         return cls(
             0.5 * options.gaussians.cell,
             options.window,
@@ -42,6 +48,8 @@ class Settings(NamedTuple):
             options.scale,
             options.inlier_bound,
             options.inlier_share,
+            options.far_share,
+            turns,
             Motion.of(options.odometry),
             Motion.of(options.steady_motion),
         )

@@ -22,11 +22,13 @@ from nscan_cli.poses import Array, transform
 from nscan_cli.slam.found import Found
 from nscan_cli.slam.settings import Settings
 
-SCANS, OLDEST, KNOWN, ROWS = 0, 1, 2, 3
+SCANS, OLDEST, KNOWN, ROWS, RESTARTS = 0, 1, 2, 3, 4
 """What is counted: scans that have joined the map, the oldest of them that it still holds, the last poses
-that are known, and the rows of the grid."""
+that are known, the rows of the grid, and how often scans were matched from more angles."""
 CLEARLY = 0.05
 """By so many inliers more the match from another start must be better."""
+LEAST_SCORE = 0.3
+"""What a search must find at least; with fewer inliers a scan is lost, whatever the odometry says."""
 
 
 class Track(NamedTuple):
@@ -45,7 +47,7 @@ class Track(NamedTuple):
     placed: Array
     """(W, 4) its pose, and the path (m) up to there."""
     counts: NDArray[np.int64]
-    """(4,) SCANS, OLDEST, KNOWN and ROWS"""
+    """(5,) SCANS, OLDEST, KNOWN, ROWS and RESTARTS"""
     path: Array
     """(1,) length of the path, m."""
     inliers: Array
@@ -55,7 +57,7 @@ class Track(NamedTuple):
     def begin(cls, last: int) -> Track:
         """A track that has not begun, of which so many last poses will be known."""
         scans = np.zeros((0, 2)), np.zeros(1, dtype=np.int64), np.zeros((0, 4))
-        counts, (path, inliers) = np.zeros(4, dtype=np.int64), np.zeros((2, 1))
+        counts, (path, inliers) = np.zeros(5, dtype=np.int64), np.zeros((2, 1))
         return cls(np.zeros((last, 3)), np.full(3, np.nan), np.zeros(3), *scans, counts, path, inliers)
 
     def with_room(self, scans: int, points: int) -> Track:
@@ -100,6 +102,40 @@ def match_and_count(
     )
     meet_again(grid, half, meeting, pose[0], pose[1], pose[2])
     return value, count_inliers(meeting, settings.inlier_bound) / max(points.shape[0], 1)
+
+
+@kernel
+def match_turned(
+    grid: Grid,
+    settings: Settings,
+    points: Array,
+    prior: Prior,
+    enough: float,
+    counts: NDArray[np.int64],
+    found: Found,
+    k: int,
+) -> None:
+    """Match scan k, which has fewer inliers than are `enough` where it was found, from other angles too.
+
+    What clearly more points fit takes its place if its objective is lower as well.
+    """
+    pose, hessian = np.empty(3), np.empty((3, 3))
+    for ring in range(settings.turns.shape[0]):
+        if found.inliers[k] >= (settings.far_share if ring > 0 else enough):
+            break
+        counts[RESTARTS] += 1
+        for turn in settings.turns[ring]:
+            for sign in (1.0, -1.0):
+                if np.isnan(turn):
+                    continue
+                assign(pose, prior.mean)
+                pose[2] += sign * turn
+                value, inliers = match_and_count(grid, settings, points, prior, pose, hessian)
+                # From elsewhere it may slide along a corridor; a wrong turn shows in what then fits.
+                if inliers > found.inliers[k] + CLEARLY and value < found.values[k]:
+                    found.values[k], found.inliers[k] = value, inliers
+                    assign(found.poses[k], pose)
+                    assign_rows(found.hessians[k], hessian)
 
 
 @kernel
@@ -216,7 +252,8 @@ def follow(
     """Track scans from the `first` on, and return the next one, which is not settled.
 
     Scan k has points[ends[k] : ends[k + 1]] and odometry[k], nan where there is none. The one that is not
-    settled has too few inliers where it was `found`; or they are nan: there is no room for it in the grid.
+    settled has so few inliers where it was `found` that it is to be searched; or they are nan: there is no
+    room for it in the grid.
     """
     for k in range(first, ends.shape[0] - 1):
         scan = points[ends[k] : ends[k + 1]]
@@ -232,7 +269,10 @@ def follow(
             found.values[k], found.inliers[k] = match_and_count(
                 grid, settings, scan, prior, found.poses[k], found.hessians[k]
             )
-            if not found.inliers[k] >= least_share(track, settings):
-                return k
+            enough = least_share(track, settings)
+            if found.inliers[k] < enough:
+                match_turned(grid, settings, scan, prior, enough, track.counts, found, k)
+                if found.inliers[k] < (LEAST_SCORE if np.isfinite(odometry[k, 0]) else settings.inlier_share):
+                    return k
         take(track, grid, settings, scan, odometry[k], prior, found, k)
     return len(ends) - 1

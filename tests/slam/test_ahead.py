@@ -27,13 +27,12 @@ def keyframe(k: int) -> Keyframe:
     return Keyframe(k, tracked, np.eye(3), np.empty((0, 2)), 0, GaussianOptions(), [])
 
 
-def straight(size: int) -> tuple[Route, tuple[list[Keyframe], list[Pairwise]]]:
-    """A route of so many keyframes, and those of twenty in all that are still to come."""
+def straight(size: int) -> Route:
+    """A route of the first of twenty keyframes, so many."""
     keyframes = [keyframe(k) for k in range(SIZE)]
     step = np.array([1.0, 0.0, 0.0])
     chain = [Pairwise((k, k + 1), step, np.eye(3), "track") for k in range(SIZE - 1)]
-    first = route_of(keyframes[:1], [], np.zeros((1, 3)))
-    return extended(first, keyframes[1:size], chain[: size - 1]), (keyframes[size:], chain[size - 1 :])
+    return extended(route_of(keyframes, chain, np.zeros((1, 3))), size)
 
 
 class Matches:
@@ -51,10 +50,10 @@ class Matches:
         return Nearby((), None, None, float(centre), True)
 
 
-def begin(ahead: Ahead, route: Route, coming: tuple[list[Keyframe], list[Pairwise]]) -> None:
+def begin(ahead: Ahead, route: Route) -> None:
     """What comes after the match of keyframe 6 with its neighbours."""
     near = Near(np.arange(4, 9), np.zeros(5, dtype=np.bool_), 0)
-    ahead.begin(route, coming, 6, near, Coverage())
+    ahead.begin(route, SIZE, 6, near, Coverage())
 
 
 def let_finish(ahead: Ahead) -> None:
@@ -65,11 +64,11 @@ def let_finish(ahead: Ahead) -> None:
 
 def test_what_is_due_next_is_begun_as_if_every_match_related_all():
     """Around 6 all pairs of 4 to 8 are: keyframe 7 misses one of its four (with 9), 8 two (9 and 10)."""
-    matches, (route, coming) = Matches(), straight(10)
+    matches, route = Matches(), straight(10)
     with Ahead(matches, OPTIONS, 2) as ahead:
         ahead.open()
-        begin(ahead, route, coming)
-        begin(ahead, route, coming)
+        begin(ahead, route)
+        begin(ahead, route)
         let_finish(ahead)
     begun = [(centre, size) for _, centre, size in matches.made]
     # Each with the route as it will be at its turn, three keyframes further than the centre.
@@ -78,17 +77,17 @@ def test_what_is_due_next_is_begun_as_if_every_match_related_all():
 
 
 def test_a_match_counts_if_the_graph_lies_as_it_was_assumed():
-    matches, (route, coming) = Matches(), straight(10)
+    matches, route = Matches(), straight(10)
     with Ahead(matches, OPTIONS, 2) as ahead:
         ahead.open()
-        begin(ahead, route, coming)
+        begin(ahead, route)
         let_finish(ahead)
-        longer = extended(route, coming[0][:2], coming[1][:2])
+        longer = extended(route, 12)
         found = ahead.match(longer, 8)
         assert found is not None
         assert found.moved == 8.0
         assert [centre for _, centre, _ in matches.made] == [8, 10]
-        moved = extended(longer, coming[0][2:4], coming[1][2:4])
+        moved = extended(longer, 14)
         moved.poses[3, 0] += 1e-12
         ahead.match(moved, 10)
     assert [centre for _, centre, _ in matches.made] == [8, 10, 10]
@@ -96,12 +95,12 @@ def test_a_match_counts_if_the_graph_lies_as_it_was_assumed():
 
 
 def test_what_the_graph_has_left_behind_is_begun_anew():
-    matches, (route, coming) = Matches(), straight(10)
+    matches, route = Matches(), straight(10)
     with Ahead(matches, OPTIONS, 2) as ahead:
         ahead.open()
-        begin(ahead, route, coming)
+        begin(ahead, route)
         route.poses[9, 1] = 0.5
-        begin(ahead, route, coming)
+        begin(ahead, route)
         let_finish(ahead)
     # As the graph lies now, whatever had been made before it moved.
     assert matches.aside[-2:] == [(8, 0.5), (10, 0.5)]
@@ -109,24 +108,24 @@ def test_what_the_graph_has_left_behind_is_begun_anew():
 
 def test_with_one_thread_or_before_it_is_opened_none_is_begun():
     for threads in (1, 2):
-        matches, (route, coming) = Matches(), straight(10)
+        matches, route = Matches(), straight(10)
         with Ahead(matches, OPTIONS, threads) as ahead:
             if threads == 1:
                 ahead.open()
-            begin(ahead, route, coming)
+            begin(ahead, route)
             assert matches.made == []
             ahead.match(route, 6)
         assert [centre for _, centre, _ in matches.made] == [6]
 
 
 def test_in_the_end_what_was_begun_is_there_or_made_and_no_more_is_begun():
-    matches, (route, coming) = Matches(), straight(10)
+    matches, route = Matches(), straight(10)
     with Ahead(matches, OPTIONS, 2) as ahead:
         ahead.open()
-        begin(ahead, route, coming)
-    begin(ahead, route, coming)
-    for centre, joining in ((8, 2), (10, 4)):
-        found = ahead.match(extended(route, coming[0][:joining], coming[1][:joining]), centre)
+        begin(ahead, route)
+    begin(ahead, route)
+    for centre, size in ((8, 12), (10, 14)):
+        found = ahead.match(extended(route, size), centre)
         assert found is not None
         assert found.moved == centre
     assert sorted(centre for _, centre, _ in matches.made) == [8, 10]
@@ -136,12 +135,12 @@ def test_an_error_is_raised_at_its_turn():
     def fail(route: Route, centre: int, options: NScanOptions) -> Nearby | None:
         raise ZeroDivisionError
 
-    route, coming = straight(10)
+    route = straight(10)
     with Ahead(fail, OPTIONS, 2) as ahead:
         ahead.open()
-        begin(ahead, route, coming)
+        begin(ahead, route)
         with pytest.raises(ZeroDivisionError):
-            ahead.match(extended(route, coming[0][:2], coming[1][:2]), 8)
+            ahead.match(extended(route, 12), 8)
 
 
 def test_who_waits_for_a_match_makes_the_next_one():
@@ -159,13 +158,13 @@ def test_who_waits_for_a_match_makes_the_next_one():
             assert done.wait(60)
         return Nearby((), None, None, float(centre), True)
 
-    route, coming = straight(10)
+    route = straight(10)
     with Ahead(match, OPTIONS, 2) as ahead:
         ahead.open()
-        begin(ahead, route, coming)
+        begin(ahead, route)
         assert begun.wait(60)
-        for centre, joining in ((8, 2), (10, 4)):
-            found = ahead.match(extended(route, coming[0][:joining], coming[1][:joining]), centre)
+        for centre, size in ((8, 12), (10, 14)):
+            found = ahead.match(extended(route, size), centre)
             assert found is not None
             assert found.moved == centre
     assert made[10] == threading.get_ident() != made[8]
