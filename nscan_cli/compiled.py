@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import contextlib
 import functools
+import operator
 import threading
 from collections.abc import Callable
 from typing import Any, TypeVar, cast
@@ -22,6 +23,8 @@ C_ORDER, FORTRAN_ORDER, ALIGNED_AND_WRITEABLE = 1, 2, 0x500
 """Bits of the flags of an array."""
 IN_C_ORDER, NOT_IN_C_ORDER = ALIGNED_AND_WRITEABLE | C_ORDER, ALIGNED_AND_WRITEABLE | FORTRAN_ORDER
 """What of them counts. What is in both orders, as all that has one axis, is in C's."""
+LOOK = operator.attrgetter("dtype", "ndim", "flags.num")
+"""Of an array. Flags that do not count are among them."""
 LOCK = threading.RLock()
 """Held while kernels are loaded or made."""
 
@@ -84,16 +87,25 @@ class Kernel:
         self.py_func = function
         self._options = {"nogil": True, "error_model": "numpy", "fastmath": fastmath, **options}
         self._versions: dict[object, Callable[..., Any]] = {}
+        """By the kinds of the arguments; by their looks, of which several are of the same kinds, below."""
+        self._by_looks: dict[object, Callable[..., Any]] = {}
         self._called_by_kernels: Any = None
 
     def __call__(self, *arguments: Any) -> Any:
         """What the function returns."""
-        kinds = tuple([_kind(argument) for argument in arguments])
-        version = self._versions.get(kinds)
+        looks = tuple([LOOK(each) if type(each) is np.ndarray else _look(each) for each in arguments])
+        version = self._by_looks.get(looks)
         if version is None:
-            with LOCK:
-                version = self._versions[kinds] = self._version(kinds, arguments)
+            version = self._by_looks[looks] = self._by_kinds(arguments)
         return version(*arguments)
+
+    def _by_kinds(self, arguments: tuple[Any, ...]) -> Callable[..., Any]:
+        """The kernel for such arguments, which may be there already."""
+        kinds = tuple([_kind(argument) for argument in arguments])
+        with LOCK:
+            if kinds not in self._versions:
+                self._versions[kinds] = self._version(kinds, arguments)
+            return self._versions[kinds]
 
     def _version(self, kinds: object, arguments: tuple[Any, ...]) -> Callable[..., Any]:
         """The kernel for arguments of these kinds."""
@@ -142,6 +154,15 @@ class Kernel:
     def targetoptions(self) -> Any:
         """Where numba looks whether the kernel becomes part of the one that calls it."""
         return self.dispatcher.targetoptions
+
+
+def _look(value: Any) -> object:
+    """What tells arguments of other kinds apart, and can be had in less time than the kind."""
+    if isinstance(value, np.ndarray):
+        return LOOK(value)
+    if isinstance(value, tuple):
+        return type(value), *[LOOK(each) if type(each) is np.ndarray else _look(each) for each in value]
+    return type(value)
 
 
 def _kind(value: Any) -> object:

@@ -255,6 +255,18 @@ def test_an_array_that_cannot_be_written_has_code_of_its_own():
     assert len(lowest._versions) == 2
 
 
+def test_arrays_that_only_look_different_have_the_same_code():
+    @kernel
+    def greatest(values: Any) -> Any:
+        return values.max()
+
+    values = np.array([2.0, 1.0])
+    assert greatest(values) == greatest(values[:]) == 2.0
+    assert isinstance(greatest, Kernel)
+    assert len(greatest._by_looks) == 2
+    assert len(greatest._versions) == 1
+
+
 def test_all_processes_run_what_was_kept_first(tmp_path, monkeypatch):
     """Two compile at the same time, and what they make need not round alike: here it differs by one."""
     monkeypatch.setattr(machine_code, "cache_folder", lambda: tmp_path)

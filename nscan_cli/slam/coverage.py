@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from itertools import combinations
+from collections import defaultdict
+from collections.abc import Collection, Iterable
 
 from nscan_cli.slam.keyframes import Route
 from nscan_cli.slam.near import Near
@@ -15,7 +15,7 @@ class Coverage:
     """Pairs of keyframes, by their nodes; those of the coverage `beneath` too, to which nothing is added."""
 
     def __init__(self, beneath: Coverage | None = None) -> None:
-        self._pairs: set[tuple[int, int]] = set()
+        self._partners: defaultdict[int, set[int]] = defaultdict(set)
         self._closed: set[int] = set()
         self._beneath = beneath
 
@@ -29,18 +29,20 @@ class Coverage:
         if near.visits > 1:
             half = options.max_scans // 2
             beside = route.rows[max(centre - half + 1, 0) : centre + half].tolist()
-            if any(self._has_closed(node) for node in beside):
+            if self._has_closed(beside):
                 return False
         return self.share(int(route.rows[centre]), route.rows[near.tried].tolist()) < options.covered
 
     def share(self, centre: int, others: Iterable[int]) -> float:
         """The share of the pairs of `centre` with each of the others that are there; 1 without any other."""
-        pairs = _pairs(centre, others)
-        return (len(pairs) - len(self._lacking(pairs))) / len(pairs) if pairs else 1.0
+        others = {*others} - {centre}
+        return 1.0 if not others else (len(others) - len(self._lacking(centre, others))) / len(others)
 
-    def add(self, centre: int, others: Iterable[int], nearby: Nearby | None) -> None:
+    def add(self, centre: int, others: Collection[int], nearby: Nearby | None) -> None:
         """A match of `centre` with all others that was tried, and what it related."""
-        self._pairs.update(_pairs(centre, others))
+        self._partners[centre].update(others)
+        for other in others:
+            self._partners[other].add(centre)
         if nearby is None:
             return
         for relation in nearby.relations:
@@ -54,16 +56,14 @@ class Coverage:
         if near.seen_before.any():
             self._closed.add(int(route.rows[centre]))
 
-    def _relate(self, nodes: Iterable[int]) -> None:
-        self._pairs.update(combinations(sorted(set(nodes)), 2))
+    def _relate(self, nodes: Collection[int]) -> None:
+        for node in nodes:
+            self._partners[node].update(nodes)
 
-    def _lacking(self, pairs: set[tuple[int, int]]) -> set[tuple[int, int]]:
-        lacking = pairs - self._pairs
-        return lacking if self._beneath is None else self._beneath._lacking(lacking)
+    def _lacking(self, centre: int, others: set[int]) -> set[int]:
+        lacking = others - self._partners.get(centre, set())
+        return lacking if self._beneath is None else self._beneath._lacking(centre, lacking)
 
-    def _has_closed(self, node: int) -> bool:
-        return node in self._closed or (self._beneath is not None and self._beneath._has_closed(node))
-
-
-def _pairs(centre: int, others: Iterable[int]) -> set[tuple[int, int]]:
-    return {(centre, other) if centre < other else (other, centre) for other in others if other != centre}
+    def _has_closed(self, nodes: Iterable[int]) -> bool:
+        here = not self._closed.isdisjoint(nodes)
+        return here or (self._beneath is not None and self._beneath._has_closed(nodes))
