@@ -103,10 +103,8 @@ def matched_points(log: LaserLog, row: int, options: PairOptions) -> Array:
 
 def scan_ndt(points: Array, options: PairOptions) -> Ndt:
     """The NDT of one scan's points (m, 2), in the frame that they are given in."""
-    ndt = Ndt(options.cell, options.minimum, options.floor, straight=True)
-    ndt.gather(points, np.array([0, len(points)]), np.zeros((1, 3)))
-    ndt.compact()
-    return ndt
+    ends, poses = np.array([0, len(points)]), np.zeros((1, 3))
+    return Ndt.of_scans(points, ends, poses, options.cell, options.minimum, options.floor, straight=True)
 
 
 def match_pair(

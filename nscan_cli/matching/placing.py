@@ -147,7 +147,7 @@ class Placing:
     def _exact(self, scan: int, pose: Array, placed: Sequence[int], poses: Array) -> Array:
         """The pose (3,) matched with the NDT of all placed scans."""
         options, pose = self.options, pose.copy()
-        ndt = Ndt(options.cell, options.minimum, options.floor)
+        ndt = Ndt.empty(options.cell, options.minimum, options.floor)
         for other in placed:
             ndt.add(self.points[other], poses[other])
         none = Prior(np.zeros(3), np.zeros((3, 3)))

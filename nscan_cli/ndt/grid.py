@@ -9,6 +9,8 @@ lets a map follow the robot.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -16,12 +18,14 @@ from nscan_cli.assign import assign, assign_rows
 from nscan_cli.compiled import kernel, lean_kernel
 from nscan_cli.ndt.compact import compacted
 from nscan_cli.ndt.gaussians import make_gaussian, straighten
-from nscan_cli.ndt.table import OUTDATED, Grid, find_row, insert, pack, table_size, unpack
+from nscan_cli.ndt.table import OUTDATED, Grid, empty_grid, find_row, insert, pack, unpack
 from nscan_cli.ndt.tangent import tangent
 from nscan_cli.poses import Array
 
 NEW_NEIGHBOURS = 9
 """A point in new land creates at most its own lattice cell and the eight around it."""
+LEAST_CAPACITY = 512
+"""Rows that an NDT has at first, unless it is known to need more."""
 
 
 @lean_kernel
@@ -66,29 +70,6 @@ def add_points(
         if part[0] < 0.5:
             part[:] = 0.0
     return rows
-
-
-@kernel
-def add_scans(
-    grid: Grid,
-    rows: int,
-    half: float,
-    points: Array,
-    ends: NDArray[np.int64],
-    poses: Array,
-    first: int,
-) -> tuple[int, int]:
-    """Add scans from the `first` on, as long as there is room: the next one, and the number of rows.
-
-    Scan k has points[ends[k] : ends[k + 1]], moved by poses[k].
-    """
-    touched = np.empty(points.shape[0], dtype=np.int32)
-    for k in range(first, poses.shape[0]):
-        scan = points[ends[k] : ends[k + 1]]
-        if rows + NEW_NEIGHBOURS * scan.shape[0] > grid.keys.shape[0]:
-            return k, rows
-        rows = add_points(grid, rows, half, scan, poses[k], 1.0, touched)
-    return poses.shape[0], rows
 
 
 @kernel
@@ -195,30 +176,104 @@ def take_over(old: Grid, rows: int, new: Grid) -> int:
 
 
 @kernel
-def _made_and_compacted(grid: Grid, rows: int, half: float) -> Grid:
+def _renewed(old: Grid, rows: int, capacity: int) -> tuple[Grid, int]:
+    """What is in the first `rows` of a grid in a new one, and its number of rows."""
+    new = empty_grid(capacity, old.making)
+    return new, take_over(old, rows, new)
+
+
+@kernel
+def with_room(grid: Grid, rows: int, points: int) -> tuple[Grid, int]:
+    """The grid, or a new one that has room for so many more points. Cells that have become empty go first."""
+    room, capacity = NEW_NEIGHBOURS * points, grid.keys.shape[0]
+    if rows + room <= capacity:
+        return grid, rows
+    grid, rows = _renewed(grid, rows, capacity)
+    # Half must be free, or it would have to be done again before long.
+    if rows + room > capacity // 2:
+        grid, rows = _renewed(grid, rows, 2 * max(rows + room, capacity))
+    return grid, rows
+
+
+@kernel
+def gathered(
+    grid: Grid, rows: int, half: float, points: Array, ends: NDArray[np.int64], poses: Array
+) -> tuple[Grid, int]:
+    """The grid, and its number of rows, with n scans added, moved by `poses` (n, 3).
+
+    Scan k has points[ends[k] : ends[k + 1]]. The Gaussians are left to be made.
+    """
+    touched = np.empty(points.shape[0], dtype=np.int32)
+    for k in range(poses.shape[0]):
+        scan = points[ends[k] : ends[k + 1]]
+        grid, rows = with_room(grid, rows, scan.shape[0])
+        rows = add_points(grid, rows, half, scan, poses[k], 1.0, touched)
+    return grid, rows
+
+
+@kernel
+def make_all(grid: Grid, rows: int, half: float) -> None:
+    """Make the Gaussians of all lattice cells in the first `rows`."""
     make_gaussians(grid, rows, np.arange(rows, dtype=np.int32), half)
+
+
+@kernel
+def _compact_grid(
+    points: Array, ends: NDArray[np.int64], poses: Array, half: float, capacity: int, making: Array
+) -> Grid:
+    """What is left of a grid that n scans were added to: see `of_scans`."""
+    grid, rows = gathered(empty_grid(capacity, making), 0, half, points, ends, poses)
+    make_all(grid, rows, half)
     return compacted(grid, rows)
 
 
+@dataclass(eq=False)
 class Ndt:
-    """A normal distributions transform that grows and shrinks by the points of scans.
+    """A normal distributions transform of the points of scans, in cells of a side (m)."""
 
-    `cell` is the side (m) of a Gaussian's cell, `minimum` the least number of points that make a
-    Gaussian, `floor` its least standard deviation (m). With `straight` it is straightened, with `faces`
-    there are two where a wall has two faces; see gaussians.py.
-    """
+    cell: float
+    grid: Grid
+    rows: int
+    """So many rows of the grid are in use."""
 
-    def __init__(
-        self,
+    @classmethod
+    def empty(
+        cls,
         cell: float,
         minimum: int = 3,
         floor: float = 0.02,
-        capacity: int = 512,
+        capacity: int = LEAST_CAPACITY,
         straight: bool = False,
         faces: bool = True,
-    ) -> None:
-        self.cell, self.rows = cell, 0
-        self.grid = _empty(max(capacity, 16), np.array([minimum, floor, straight, faces], dtype=np.float64))
+    ) -> Ndt:
+        """One that grows and shrinks by scans.
+
+        `minimum` is the least number of points that make a Gaussian, `floor` its least standard deviation
+        (m). With `straight` it is straightened, with `faces` there are two where a wall has two faces; see
+        gaussians.py.
+        """
+        return cls(cell, empty_grid(capacity, _making(minimum, floor, straight, faces)), 0)
+
+    @classmethod
+    def of_scans(
+        cls,
+        points: Array,
+        ends: NDArray[np.int64],
+        poses: Array,
+        cell: float,
+        minimum: int,
+        floor: float,
+        capacity: int = LEAST_CAPACITY,
+        straight: bool = False,
+    ) -> Ndt:
+        """That of n scans, moved by `poses` (n, 3), with nothing in it but what matching needs.
+
+        Scan k has points[ends[k] : ends[k + 1]]. Nothing can be added any more. Other arguments as for
+        `empty`.
+        """
+        making = _making(minimum, floor, straight, faces=True)
+        grid = _compact_grid(points, ends, poses, 0.5 * cell, capacity, making)
+        return cls(cell, grid, len(grid.keys))
 
     @property
     def half(self) -> float:
@@ -233,56 +288,22 @@ class Ndt:
         """Take away points that were added with the very same pose."""
         self._change(points, pose, -1.0)
 
-    def gather(self, points: Array, ends: NDArray[np.int64], poses: Array) -> None:
-        """Take in n scans, moved by `poses` (n, 3); scan k has points[ends[k] : ends[k + 1]].
-
-        Their Gaussians are left for `make` or `compact`.
-        """
-        done = 0
-        while done < len(poses):
-            self.reserve(int(ends[done + 1] - ends[done]))
-            done, self.rows = add_scans(self.grid, self.rows, self.half, points, ends, poses, done)
-
     def make(self) -> None:
-        """Make all Gaussians of the points gathered."""
-        touched = np.arange(self.rows, dtype=np.int32)
-        make_gaussians(self.grid, self.rows, touched, self.half)
+        """Make all Gaussians that are outdated."""
+        make_all(self.grid, self.rows, self.half)
 
     def _change(self, points: Array, pose: Array, sign: float) -> None:
         self.reserve(len(points))
         self.rows = change(self.grid, self.rows, self.half, points, pose, sign, True)
 
     def reserve(self, points: int) -> None:
-        """Make room for so many more points. Cells that have become empty go first."""
-        room, capacity = NEW_NEIGHBOURS * points, len(self.grid.keys)
-        if self.rows + room <= capacity:
-            return
-        self._renew(capacity)
-        # Half must be free, or it would have to be done again before long.
-        if self.rows + room > capacity // 2:
-            self._renew(2 * max(self.rows + room, capacity))
-
-    def _renew(self, capacity: int) -> None:
-        old, self.grid = self.grid, _empty(capacity, self.grid.making)
-        self.rows = take_over(old, self.rows, self.grid)
-
-    def compact(self) -> None:
-        """Make all Gaussians, and give back what only growing needs; nothing can be added any more."""
-        self.grid = _made_and_compacted(self.grid, self.rows, self.half)
-        self.rows = len(self.grid.keys)
+        """Make room for so many more points."""
+        self.grid, self.rows = with_room(self.grid, self.rows, points)
 
     def gaussian_count(self) -> int:
         """How many Gaussians have points enough; two where a wall has two faces."""
         return int(np.count_nonzero(self.grid.gaussians[:, 2]))
 
 
-def _empty(capacity: int, making: Array) -> Grid:
-    return Grid(
-        table=np.full(table_size(capacity), -1, dtype=np.int32),
-        keys=np.empty(capacity, dtype=np.int64),
-        links=np.empty((capacity, 4), dtype=np.int32),
-        facing=np.empty((capacity, 2)),
-        sums=np.empty((capacity, 2, 8)),
-        gaussians=np.zeros((2 * capacity, 8)),
-        making=making,
-    )
+def _making(minimum: int, floor: float, straight: bool, faces: bool) -> Array:
+    return np.array([minimum, floor, straight, faces], dtype=np.float64)

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from nscan_cli.compiled import lean_kernel
+from nscan_cli.compiled import kernel, lean_kernel
 from nscan_cli.poses import Array
 
 HALF_KEY = 1 << 30
@@ -53,6 +53,21 @@ def table_size(rows: int) -> int:
     while size < 2 * rows:
         size *= 2
     return size
+
+
+@kernel
+def empty_grid(capacity: int, making: Array) -> Grid:
+    """One with room for so many rows."""
+    rows = max(capacity, 16)
+    return Grid(
+        np.full(table_size(rows), -1, dtype=np.int32),
+        np.empty(rows, dtype=np.int64),
+        np.empty((rows, 4), dtype=np.int32),
+        np.empty((rows, 2)),
+        np.empty((rows, 2, 8)),
+        np.zeros((2 * rows, 8)),
+        making,
+    )
 
 
 @lean_kernel

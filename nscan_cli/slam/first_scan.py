@@ -33,9 +33,8 @@ def place_first(scans: Sensed, found: Found, options: TrackingOptions) -> Array:
     if not len(joined):
         return first
     gaussians = options.gaussians
-    ndt = Ndt(gaussians.cell, gaussians.minimum, gaussians.floor)
-    ndt.gather(*scans.chosen(joined), found.poses[joined])
-    ndt.make()
+    points, ends = scans.chosen(joined)
+    ndt = Ndt.of_scans(points, ends, found.poses[joined], gaussians.cell, gaussians.minimum, gaussians.floor)
     pose, hessian = first.copy(), np.empty((3, 3))
     step: Array = np.linalg.inv(found.expected[1]).astype(np.float64)
     prior = Prior(first, step)

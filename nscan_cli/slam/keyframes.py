@@ -68,12 +68,8 @@ class Keyframe:
         if self._ndt is None:
             points, sizes, poses = (np.concatenate(columns) for columns in zip(*around, strict=True))
             ends = np.append(0, np.cumsum(sizes))
-            poses = relative(poses, self.tracked.pose)
-            ndt = Ndt(
-                self.gaussians.cell, self.gaussians.minimum, self.gaussians.floor, ROOM * len(self.points)
-            )
-            ndt.gather(points, ends, poses)
-            ndt.compact()
+            poses, own, room = relative(poses, self.tracked.pose), self.gaussians, ROOM * len(self.points)
+            ndt = Ndt.of_scans(points, ends, poses, own.cell, own.minimum, own.floor, room)
             # In this order: another thread that makes it too has what it needs.
             self._ndt, self.around = ndt, []
         return self._ndt

@@ -33,7 +33,9 @@ class Tracker:
     def __init__(self, options: TrackingOptions, odometry: bool = True) -> None:
         self.options = options
         gaussians = options.gaussians
-        self.map = Ndt(gaussians.cell, gaussians.minimum, gaussians.floor, capacity=1 << 14, faces=odometry)
+        self.map = Ndt.empty(
+            gaussians.cell, gaussians.minimum, gaussians.floor, capacity=1 << 14, faces=odometry
+        )
         self.searches = 0
         self._settings = Settings.of(options, odometry)
         self._track = Track.begin(options.steady_scans + 1)

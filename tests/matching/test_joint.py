@@ -161,10 +161,8 @@ def test_stages_that_are_cut_off_on_the_way_are_counted():
 
 def test_lean_kernels_keep_no_reference_and_give_none_back():
     """What they are given is counted by nobody in between: after many calls all is owned as before."""
-    ndts, points, poses = [Ndt(0.5), Ndt(0.5)], [room(1), room(2)], np.array([[0.0, 0, 0], [0.1, 0, 0.05]])
-    for ndt, part in zip(ndts, points, strict=True):
-        ndt.add(part, np.zeros(3))
-        ndt.compact()
+    points, poses = [room(1), room(2)], np.array([[0.0, 0, 0], [0.1, 0, 0.05]])
+    ndts = [Ndt.of_scans(part, np.array([0, len(part)]), np.zeros((1, 3)), 0.5, 3, 0.02) for part in points]
     problem = JointProblem(lay_out(ndts, points), all_pairs(2), no_priors(), 1.0)
     arrays = [
         np.asarray(array) for array in (*problem.scans.grid, problem.scans.points, problem.pairs, poses)

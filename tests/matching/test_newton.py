@@ -19,7 +19,7 @@ SCALE = 0.1
 
 
 def ndt_of(points: Array) -> Ndt:
-    ndt = Ndt(1.0)
+    ndt = Ndt.empty(1.0)
     ndt.add(points, np.zeros(3))
     return ndt
 

@@ -14,7 +14,7 @@ STEPS = np.array([1e-5, 1e-5, 2e-6])
 
 
 def ndt_of(points: Array, cell: float = 1.0) -> Ndt:
-    ndt = Ndt(cell)
+    ndt = Ndt.empty(cell)
     ndt.add(points, np.zeros(3))
     return ndt
 

@@ -38,7 +38,7 @@ def relative_points(points: Array, pose: Array) -> Array:
 
 def added(*faces: tuple[Array, Array], frame: Array = FRAMES[0], minimum: int = 5) -> Ndt:
     """The NDT of faces, each seen from a pose."""
-    ndt = Ndt(1.0, minimum, 0.02, 16)
+    ndt = Ndt.empty(1.0, minimum, 0.02, 16)
     for points, pose in faces:
         ndt.add(seen(points, pose), compose(frame, pose))
     return ndt
@@ -129,8 +129,10 @@ def test_growing_and_compacting_keep_both_faces():
     assert [energy(ndt, *scan).value for scan in scans] == before
     ndt.add(np.array([[30.0, 30.0]]), np.zeros(3))
     assert [energy(ndt, *scan).value for scan in scans] == before
-    ndt.compact()
-    assert [energy(ndt, *scan).value for scan in scans] == before
+    ends, at = np.cumsum([0, *(len(points) for points, _ in scans)]), np.array([pose for _, pose in scans])
+    points = np.concatenate([points for points, _ in scans])
+    compact = Ndt.of_scans(points, ends, at, 1.0, 5, 0.02, capacity=16)
+    assert [energy(compact, *scan).value for scan in scans] == before
 
 
 @pytest.mark.parametrize(("points", "pose"), [FRONT, BACK], ids=["south", "north"])

@@ -16,7 +16,7 @@ PROBE = np.array([0.1, -0.05, 0.04])
 
 
 def grown(points, cell=1.0, minimum=3, floor=0.02, capacity=512, pose=HERE) -> Ndt:
-    ndt = Ndt(cell, minimum, floor, capacity)
+    ndt = Ndt.empty(cell, minimum, floor, capacity)
     ndt.add(points, pose)
     return ndt
 
@@ -123,7 +123,7 @@ def test_subtracting_takes_back_what_was_added():
 
 def test_capacity_grows_with_the_points():
     points = np.concatenate([transform(pose, room(5)) for pose in np.arange(30).reshape(10, 3) - 15.0])
-    small, large = Ndt(1.0, capacity=16), grown(points, capacity=1 << 14)
+    small, large = Ndt.empty(1.0, capacity=16), grown(points, capacity=1 << 14)
     for part in np.array_split(points, 50):
         small.add(part, HERE)
     assert len(small.grid.keys) > 500
@@ -135,13 +135,31 @@ def test_capacity_grows_with_the_points():
 
 
 def test_compacting_keeps_the_energy_in_less_memory():
-    ndt = grown(room(6), capacity=4096)
-    before, bytes_before = energy(ndt, room(7), PROBE), sum(part.nbytes for part in ndt.grid)
-    ndt.compact()
-    after = energy(ndt, room(7), PROBE)
+    points = room(6)
+    large = grown(points, capacity=4096)
+    compact = Ndt.of_scans(points, np.array([0, len(points)]), HERE[None], 1.0, 3, 0.02, capacity=4096)
+    before, after = energy(large, room(7), PROBE), energy(compact, room(7), PROBE)
     assert after.value == before.value
     np.testing.assert_array_equal(after.hessian, before.hessian)
-    assert sum(part.nbytes for part in ndt.grid) < bytes_before / 2
+    assert sum(part.nbytes for part in compact.grid) < sum(part.nbytes for part in large.grid) / 2
+
+
+def test_scans_taken_together_are_as_if_added_one_by_one():
+    """Whatever the room that there is at first: where none is left, cells are entered into a greater grid."""
+    scans = [room(seed) for seed in range(12)]
+    poses = np.array([[3.0 * k, 0.5 * k, 0.1 * k] for k in range(12)])
+    grown_by_each = Ndt.empty(0.5, capacity=16)
+    for points, pose in zip(scans, poses, strict=True):
+        grown_by_each.add(points, pose)
+    ends = np.cumsum([0, *map(len, scans)])
+    for capacity in (16, 1 << 15):
+        together = Ndt.of_scans(np.concatenate(scans), ends, poses, 0.5, 3, 0.02, capacity)
+        assert together.rows == len(together.grid.keys) < grown_by_each.rows
+        assert together.gaussian_count() == grown_by_each.gaussian_count()
+        for points, pose in zip(scans, poses, strict=True):
+            expected, found = (energy(ndt, points, pose + PROBE) for ndt in (grown_by_each, together))
+            assert found.value == pytest.approx(expected.value, rel=1e-12)
+            np.testing.assert_allclose(found.hessian, expected.hessian, rtol=1e-9, atol=1e-6)
 
 
 def test_nothing_added_is_nothing():
@@ -152,7 +170,7 @@ def test_nothing_added_is_nothing():
 
 def test_a_map_that_moves_on_leaves_behind_what_is_empty():
     """It says the same, to the bit, as one that has room for all cells that it was ever in."""
-    small, large = Ndt(0.5, capacity=16), Ndt(0.5, capacity=1 << 17)
+    small, large = Ndt.empty(0.5, capacity=16), Ndt.empty(0.5, capacity=1 << 17)
     poses = [np.array([3.0 * k, 0.5 * k, 0.1 * k]) for k in range(40)]
     sizes = []
     for k, pose in enumerate(poses):

@@ -12,7 +12,7 @@ from tests.ndt.rooms import room
 
 def outside_in(count: int) -> Ndt:
     """An NDT whose walls are seen from one side, as a robot in the middle does."""
-    ndt = Ndt(0.5)
+    ndt = Ndt.empty(0.5)
     for seed in range(count):
         ndt.add(room(seed), np.array([0.02 * seed, 0.0, 0.01 * seed]))
     return ndt

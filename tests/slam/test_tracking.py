@@ -122,7 +122,7 @@ def test_the_first_scan_is_at_the_origin():
     (first,) = scans_of(tracker.track(sensed([room(1)], np.array([[7.0, -3.0, 2.0]]))))
     np.testing.assert_array_equal(first.pose, 0)
     assert (first.inliers, first.path, first.joined) == (1.0, 0.0, True)
-    alone = Ndt(0.5, 5, 0.03)
+    alone = Ndt.empty(0.5, 5, 0.03)
     alone.add(room(1), np.zeros(3))
     # Tracking makes the Gaussians that it meets, and no others.
     tracker.map.make()
@@ -144,7 +144,7 @@ def test_a_scan_joins_the_map_when_the_robot_has_moved():
 def window_map(found: list[Tracked], log: LaserLog, options: TrackingOptions) -> Ndt:
     """The NDT of just the scans that joined within the window's length of path."""
     gaussians = options.gaussians
-    ndt = Ndt(gaussians.cell, gaussians.minimum, gaussians.floor)
+    ndt = Ndt.empty(gaussians.cell, gaussians.minimum, gaussians.floor)
     for row, scan in enumerate(found):
         if scan.joined and scan.path >= found[-1].path - options.window:
             ndt.add(log.points(row), scan.pose)
