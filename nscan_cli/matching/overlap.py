@@ -76,6 +76,13 @@ def held_together(pairs: Array, least: float, scan: int) -> NDArray[np.bool_]:
 
 
 @kernel
+def hold(scans: Scans, poses: Array, least: float, scan: int) -> tuple[NDArray[np.bool_], float]:
+    """What held_together says of the overlaps at the poses (n, 3), and their weakest link."""
+    pairs, _ = _overlaps(scans, poses)
+    return held_together(pairs, least, scan), weakest_link(pairs)
+
+
+@kernel
 def held_at(scans: Scans, poses: Array, least: float, scan: int) -> NDArray[np.bool_]:
     """What held_together says of the overlaps at the poses (n, 3), of which only those needed are counted."""
     n = poses.shape[0]

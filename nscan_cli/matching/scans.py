@@ -21,16 +21,10 @@ class Scans(NamedTuple):
 
     grid: Grid
     """The arrays of all NDTs, one behind the other; rows count from the start of their own NDT."""
-    table_starts: NDArray[np.int64]
-    """(n + 1,)"""
-    row_starts: NDArray[np.int64]
-    """(n + 1,)"""
-    gaussian_starts: NDArray[np.int64]
-    """(n + 1,)"""
     points: Array
     """(Σ m, 2) the points of all scans, each in its own frame."""
-    point_starts: NDArray[np.int64]
-    """(n + 1,)"""
+    starts: NDArray[np.int64]
+    """(4, n + 1) where each scan's slots of the table begin, its rows, its Gaussians and its points."""
     half: float
     """Side (m) of a lattice cell, the same for all."""
     usual: Array
@@ -47,8 +41,7 @@ def lay_out(ndts: Sequence[Ndt], points: Sequence[Array], neutral: bool = True) 
         for ndt, part in zip(ndts, points, strict=True)
     ]
     starts = np.zeros((4, len(ndts) + 1), dtype=np.int64)
-    np.cumsum(np.array(sizes).T, axis=1, out=starts[:, 1:])
-    table_starts, row_starts, gaussian_starts, point_starts = starts
+    np.array(sizes).T.cumsum(axis=1, out=starts[:, 1:])
     keys = np.concatenate([ndt.grid.keys[: ndt.rows] for ndt in ndts])
     links = np.concatenate([ndt.grid.links[: ndt.rows] for ndt in ndts])
     # The sums are for growing; matching needs the Gaussians alone.
@@ -64,25 +57,16 @@ def lay_out(ndts: Sequence[Ndt], points: Sequence[Array], neutral: bool = True) 
     own = np.full(len(ndts), np.nan)
     if neutral:
         own[:] = [_own_mean(ndt.grid, ndt.half, part) for ndt, part in zip(ndts, points, strict=True)]
-    return Scans(
-        grid,
-        table_starts,
-        row_starts,
-        gaussian_starts,
-        np.concatenate(points, dtype=np.float64),
-        point_starts,
-        ndts[0].half,
-        own,
-    )
+    return Scans(grid, np.concatenate(points, dtype=np.float64), starts, ndts[0].half, own)
 
 
 @inlined_kernel
 def scan_grid(scans: Scans, i: int) -> Grid:
     """The NDT of scan i."""
-    t0, t1 = scans.table_starts[i], scans.table_starts[i + 1]
-    r0, r1 = scans.row_starts[i], scans.row_starts[i + 1]
-    g0, g1 = scans.gaussian_starts[i], scans.gaussian_starts[i + 1]
-    grid = scans.grid
+    grid, starts = scans.grid, scans.starts
+    t0, t1 = starts[0, i], starts[0, i + 1]
+    r0, r1 = starts[1, i], starts[1, i + 1]
+    g0, g1 = starts[2, i], starts[2, i + 1]
     return Grid(
         grid.table[t0:t1],
         grid.keys[r0:r1],
@@ -97,15 +81,15 @@ def scan_grid(scans: Scans, i: int) -> Grid:
 @inlined_kernel
 def scan_points(scans: Scans, i: int) -> Array:
     """The points (m, 2) of scan i in its own frame."""
-    return scans.points[scans.point_starts[i] : scans.point_starts[i + 1]]
+    return scans.points[scans.starts[3, i] : scans.starts[3, i + 1]]
 
 
 @kernel
 def most_points(scans: Scans) -> int:
     """Those of the scan that has most."""
-    most, starts = 0, scans.point_starts
-    for i in range(starts.shape[0] - 1):
-        most = max(most, starts[i + 1] - starts[i])
+    most, starts = 0, scans.starts
+    for i in range(starts.shape[1] - 1):
+        most = max(most, starts[3, i + 1] - starts[3, i])
     return int(most)
 
 

@@ -89,7 +89,7 @@ def _cloud(scans: Scans, poses: Array) -> Cloud:
     of_scan = np.empty(points.shape[0], dtype=np.int64)
     for i in range(poses.shape[0]):
         cos, sin = np.cos(poses[i, 2]), np.sin(poses[i, 2])
-        for k in range(scans.point_starts[i], scans.point_starts[i + 1]):
+        for k in range(scans.starts[3, i], scans.starts[3, i + 1]):
             arms[k, 0] = cos * scans.points[k, 0] - sin * scans.points[k, 1]
             arms[k, 1] = sin * scans.points[k, 0] + cos * scans.points[k, 1]
             points[k, 0], points[k, 1] = arms[k, 0] + poses[i, 0], arms[k, 1] + poses[i, 1]

@@ -94,16 +94,17 @@ def _lay_out(slam: Slam, graph: Graph) -> None:
     breaks = _breaks(graph, slam.options)
     found = _as_tracked(graph, breaks, slam.options)
     for scans in slam.stretches():
+        those = found.part(scans.first, scans.first + len(scans))
         for k, row in enumerate(range(scans.first, scans.first + len(scans))):
             if row in breaks:
                 slam.keyframes.part()
                 slam.breaks.append(row)
             if graph.anchors[row] == row:
-                slam.keyframes.add(row, scans.of(k), found.scan(row))
+                slam.keyframes.add(row, scans.of(k), those.scan(k))
                 for whole in slam.keyframes.list[-2:-1]:
                     whole.finish()
             else:
-                slam.keyframes.attach(scans.part(k, k + 1), found.part(row, row + 1))
+                slam.keyframes.attach(scans, those, k, k + 1)
     slam.tracked.append(graph.poses)
     slam.keyframes.part()
 

@@ -43,12 +43,12 @@ class Ahead:
         """From now on another thread, if there is one, has the time to make them: tracking is through."""
         self._pool = ThreadPoolExecutor(1) if self._threads > 1 else None
 
-    def match(self, route: Route, centre: int) -> Nearby | None:
-        """The match about keyframe `centre`, whether it has been begun or not."""
+    def match(self, route: Route, centre: int, near: Near) -> Nearby | None:
+        """The match of keyframe `centre` with those `near` it, whether it has been begun or not."""
         begun = self._begun.pop(centre, None)
         # What waits still is as well made here.
         if begun is None or not np.array_equal(begun.route.poses, route.poses) or begun.match.cancel():
-            return self._match(route, centre, self._options)
+            return self._match(route, centre, near, self._options)
         if not begun.match.done():
             self._make_next()
         return begun.match.result()
@@ -57,7 +57,7 @@ class Ahead:
         """Make the first match that waits, in the time that another one takes."""
         for keyframe, (route, near, match) in self._begun.items():
             if match.cancel():
-                made = called(partial(self._match, route, keyframe, self._options))
+                made = called(partial(self._match, route, keyframe, near, self._options))
                 self._begun[keyframe] = _Begun(route, near, made)
                 return
 
@@ -90,7 +90,7 @@ class Ahead:
             near = choose_nearby(longer.poses, longer.paths, keyframe, self._options)
             if assumed.is_due(longer, keyframe, near, self._options):
                 assumed.assume(longer, keyframe, near)
-                match = self._pool.submit(self._match, longer, keyframe, self._options)
+                match = self._pool.submit(self._match, longer, keyframe, near, self._options)
                 self._begun[keyframe] = _Begun(longer, near, match)
 
     def _drop_outdated(self, route: Route, centre: int) -> None:

@@ -111,14 +111,18 @@ def _count_cells(points: Array, side: float) -> int:
 
 
 @kernel
-def _next_keyframe(poses: Array, first: int, last: Array, distance: float, turn: float) -> int:
-    """Which of the poses (n, 3), from the `first` on, is the first beyond `distance` (m) or `turn` (rad) of
-    the `last` keyframe's; n if none is."""
+def _new_keyframes(poses: Array, first: int, before: Array, distance: float, turn: float) -> Indices:
+    """Which of the poses (n, 3), from the `first` on, are those of keyframes.
+
+    Each is the first beyond `distance` (m) or `turn` (rad) of the one before; the first of all, of `before`.
+    """
+    new, count, last = np.empty(len(poses), dtype=np.int64), 0, before
     for k in range(first, len(poses)):
         away = np.hypot(poses[k, 0] - last[0], poses[k, 1] - last[1])
         if not (away <= distance and abs(wrapped(poses[k, 2] - last[2])) <= turn):
-            return k
-    return len(poses)
+            new[count], last = k, poses[k]
+            count += 1
+    return new[:count].copy()
 
 
 def route_of(keyframes: Sequence[Keyframe], chain: Sequence[Pairwise], poses: Array) -> Route:
@@ -161,21 +165,20 @@ class Keyframes:
 
     def take(self, scans: Sensed, found: Found, begins: bool = False) -> None:
         """Take in scans that were found: some become keyframes, the first of them where a piece begins."""
-        k, n = 0, len(scans)
-        while k < n:
-            new = k
-            if self.list and not (begins and k == 0):
-                last = self.list[-1].tracked.pose
-                new = _next_keyframe(found.poses, k, last, self.distance, self.options.turn)
-            self.attach(scans.part(k, new), found.part(k, new))
-            if new < n:
-                self.add(scans.first + new, scans.of(new), found.scan(new))
-            k = new + 1
+        begins |= not self.list
+        before = found.poses[0] if begins else self.list[-1].tracked.pose
+        new = _new_keyframes(found.poses, int(begins), before, self.distance, self.options.turn).tolist()
+        first = 0
+        for k in [0, *new] if begins else new:
+            self.attach(scans, found, first, k)
+            self.add(scans.first + k, scans.of(k), found.scan(k))
+            first = k + 1
+        self.attach(scans, found, first, len(scans))
 
-    def attach(self, scans: Sensed, found: Found) -> None:
-        """Let scans between keyframes add to the Gaussians of both."""
-        self._expected = np.add.reduce(np.concatenate([self._expected[None], found.expected]))
-        joined = np.flatnonzero(found.joined)
+    def attach(self, scans: Sensed, found: Found, first: int, end: int) -> None:
+        """Let those from the `first` on, before the `end`, add to the Gaussians of the keyframes around."""
+        self._expected = np.add.reduce(np.concatenate([self._expected[None], found.expected[first:end]]))
+        joined = first + np.flatnonzero(found.joined[first:end])
         if len(joined):
             points, ends = scans.chosen(joined)
             self._since.append(Placed(points, np.diff(ends), found.poses[joined]))

@@ -13,12 +13,12 @@ from nscan_cli.counting import counted
 from nscan_cli.graph.model import Loop, NScan, Pairwise
 from nscan_cli.matching.joint import JointMatch, JointOptions, match_jointly
 from nscan_cli.matching.joint_energy import JointProblem, Priors, all_pairs, no_priors
-from nscan_cli.matching.overlap import held_at, held_together, overlaps, weakest_link
+from nscan_cli.matching.overlap import held_at, hold
 from nscan_cli.matching.planar import relative_pose
 from nscan_cli.matching.scans import Scans, lay_out
 from nscan_cli.poses import Array, Indices, compose, relative
 from nscan_cli.slam.keyframes import Keyframe, Route, points_per_cell
-from nscan_cli.slam.near import choose_nearby
+from nscan_cli.slam.near import Near, choose_nearby
 from nscan_cli.slam.options import NScanOptions
 
 LEAST_SCANS = 3
@@ -64,21 +64,20 @@ class Nearby:
         return old, relative(poses[nodes.index(centre)], poses[nodes.index(old)])
 
 
-MatchNearby = Callable[[Route, int, NScanOptions], Nearby | None]
+MatchNearby = Callable[[Route, int, Near, NScanOptions], Nearby | None]
 """Step 3, jointly or in pairs: match_nearby tells the arguments."""
 
 
-def match_nearby(route: Route, centre: int, options: NScanOptions) -> Nearby | None:
-    """Match a keyframe jointly with those near it, with the relations of the chain among them as priors.
+def match_nearby(route: Route, centre: int, near: Near, options: NScanOptions) -> Nearby | None:
+    """Match a keyframe jointly with those `near` it, with the relations of the chain among them as priors.
 
     Scans that do not hang together with the `centre` by overlaps are left out, and the others matched
     again. None when there are too few keyframes near.
     """
-    tried, seen_before, _ = choose_nearby(route.poses, route.paths, centre, options)
-    if len(tried) < LEAST_SCANS:
+    if len(near.tried) < LEAST_SCANS:
         return None
     for widenings in options.attempts:
-        nearby, is_enough = _match_held(route, tried, seen_before, centre, widenings, options)
+        nearby, is_enough = _match_held(route, near.tried, near.seen_before, centre, widenings, options)
         if is_enough and nearby.moved < options.settled:
             break
     return nearby
@@ -134,21 +133,19 @@ def _match_held(
     keyframes, poses = route.keyframes, route.poses
     kept, start, scans = np.arange(len(tried)), poses[tried], _laid_out(keyframes, tried)
     if len(widenings) == 1:
-        held = held_at(scans, start, POSSIBLE * options.overlap, int(np.searchsorted(tried, centre)))
+        held = held_at(scans, start, POSSIBLE * options.overlap, int(tried.searchsorted(centre)))
         kept, start = kept[held], start[held]
     all_began = len(kept) == len(tried)
     while len(kept) >= LEAST_SCANS:
         members = tried[kept]
-        if len(members) < len(scans.point_starts) - 1:
+        if len(members) < len(scans.usual):
             scans = _laid_out(keyframes, members)
         match = _match(scans, members, route, start, widenings, options)
-        shares = overlaps(scans, match.poses).pairs
-        at = int(np.searchsorted(members, centre))
-        held = held_together(shares, options.overlap, at)
+        at = int(members.searchsorted(centre))
+        held, score = hold(scans, match.poses, options.overlap, at)
         if not held.all():
             kept, start = kept[held], match.poses[held]
             continue
-        score = weakest_link(shares)
         if not match.converged:
             loop = verdict(keyframes, tried, seen_before, centre, False, "did not converge", score)
             return Nearby((), None, loop, 0.0, False), False
@@ -178,7 +175,7 @@ def _match(
     options: NScanOptions,
 ) -> JointMatch:
     """The joint match of some keyframes from global poses (n, 3)."""
-    consecutive = np.flatnonzero(np.diff(members) == 1)
+    (consecutive,) = np.nonzero(members[1:] == members[:-1] + 1)
     known = [route.chain[k] for k in members[consecutive].tolist()]
     priors = (
         no_priors()

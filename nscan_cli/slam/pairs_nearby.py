@@ -20,7 +20,7 @@ from nscan_cli.ndt.energy import energy, inlier_share
 from nscan_cli.ndt.meeting import begin
 from nscan_cli.poses import Array, inverse, relative, relative_jacobians, wrap
 from nscan_cli.slam.keyframes import Keyframe, Route
-from nscan_cli.slam.near import choose_nearby
+from nscan_cli.slam.near import Near
 from nscan_cli.slam.nearby import Nearby, moved_by, scale_of, verdict
 from nscan_cli.slam.options import NScanOptions
 
@@ -42,15 +42,15 @@ class _Single:
     """(3, 3) weighed as in nScan relations: the Hessian of the scaled energy, here without the prior."""
 
 
-def match_pairs_nearby(route: Route, centre: int, options: NScanOptions) -> Nearby | None:
+def match_pairs_nearby(route: Route, centre: int, near: Near, options: NScanOptions) -> Nearby | None:
     """Match a keyframe with each of those near it, and keep the matches with overlap enough.
 
     Arguments as for match_nearby. A loop is accepted when a match with some keyframe of another visit
     is. None when no other keyframe is near.
     """
     keyframes = route.keyframes
-    chosen, before, _ = choose_nearby(route.poses, route.paths, centre, options)
-    tried, seen_before = chosen[chosen != centre], before[chosen != centre]
+    others = near.tried != centre
+    tried, seen_before = near.tried[others], near.seen_before[others]
     if len(tried) == 0:
         return None
     singles = [_match(route, int(other), centre, options) for other in tried]

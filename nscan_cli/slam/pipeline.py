@@ -22,7 +22,7 @@ from nscan_cli.slam.coverage import Coverage
 from nscan_cli.slam.energies import Energies
 from nscan_cli.slam.following import Followed, Follower
 from nscan_cli.slam.keyframes import Keyframe, Keyframes, extended, relations_along, route_of
-from nscan_cli.slam.near import choose_nearby
+from nscan_cli.slam.near import Near, choose_nearby
 from nscan_cli.slam.nearby import MatchNearby, Nearby, match_nearby
 from nscan_cli.slam.options import SlamOptions
 from nscan_cli.slam.pairs_nearby import match_pairs_nearby
@@ -156,7 +156,7 @@ class Slam:
             return
         # One more may be there that is not whole.
         self.ahead.begin(route, len(self.keyframes) - 1, centre, near, self.covered)
-        nearby = self.match_unless_doubted(centre)
+        nearby = self.match_unless_doubted(centre, near)
         self.covered.add(int(route.rows[centre]), route.rows[near.tried].tolist(), nearby)
         if nearby is not None:
             self.take(nearby)
@@ -173,18 +173,18 @@ class Slam:
         """Whether the graph has grown by so much since it was optimised that it is worth another time."""
         return len(self.poses) - self._optimised >= self.options.optimise_growth * len(self.poses)
 
-    def match_unless_doubted(self, centre: int) -> Nearby | None:
+    def match_unless_doubted(self, centre: int, near: Near) -> Nearby | None:
         """The match of a keyframe with those near it; without other visits if its place there is doubted."""
-        options = self.options.nscan
-        nearby = self.ahead.match(self.route, centre)
+        nearby = self.ahead.match(self.route, centre, near)
         if nearby is None or nearby.loop is None:
             return nearby
         reason = self.closing.why_doubted(self.route, centre, nearby, self.closed)
         if reason is None:
             return nearby
         loop = dataclasses.replace(nearby.loop, accepted=False, reason=reason)
-        alone = dataclasses.replace(options, loops=False)
-        nearby = self.match(self.route, centre, alone)
+        alone = dataclasses.replace(self.options.nscan, loops=False)
+        near = choose_nearby(self.route.poses, self.route.paths, centre, alone)
+        nearby = self.match(self.route, centre, near, alone)
         return None if nearby is None else dataclasses.replace(nearby, loop=loop, whole=False)
 
     def close_loops(self, centre: int, left_out: Indices) -> None:

@@ -18,6 +18,7 @@ from nscan_cli.graph.model import Loop
 from nscan_cli.matching.search import Field, Search, SearchOptions, likelihood_field, search
 from nscan_cli.poses import Array, compose, relative
 from nscan_cli.slam.keyframes import Keyframe, Route
+from nscan_cli.slam.near import choose_nearby
 from nscan_cli.slam.nearby import MatchNearby, Nearby, match_at, visit_moved
 from nscan_cli.slam.options import ClosingOptions, NScanOptions
 
@@ -92,7 +93,9 @@ def find_place(
     moved = visit_moved(route, centre, found.pose, nscan)
     away = np.hypot(*(poses[earlier, :2] - found.pose[:2]).T).min()
     radius = max(nscan.radius, float(away) + nscan.radius)
-    nearby = match(route._replace(poses=moved), centre, replace(nscan, radius=radius))
+    wider = replace(nscan, radius=radius)
+    near = choose_nearby(moved, route.paths, centre, wider)
+    nearby = match(route._replace(poses=moved), centre, near, wider)
     tie = None if nearby is None else nearby.tie(keyframes[centre].row)
     if nearby is None or tie is None:
         return Loop(nodes, False, NO_MATCH, found.score)

@@ -55,18 +55,20 @@ class Refinement:
         }
         while chosen := self._uncovered(route, waiting):
             found = in_threads(
-                self._threads, lambda centre: self._match(route, centre, self._options_of(centre)), chosen
+                self._threads,
+                lambda centre: self._match(route, centre, chosen[centre], self._options_of(centre)),
+                chosen,
             )
-            for (centre, tried), nearby in zip(chosen.items(), found, strict=True):
-                self._covered.add(int(route.rows[centre]), route.rows[tried].tolist(), nearby)
-                self._starts[centre] = tried, poses[tried]
+            for (centre, near), nearby in zip(chosen.items(), found, strict=True):
+                self._covered.add(int(route.rows[centre]), route.rows[near.tried].tolist(), nearby)
+                self._starts[centre] = near.tried, poses[near.tried]
                 self._found[centre] = nearby
             waiting = {centre: near for centre, near in waiting.items() if centre not in chosen}
             matched += len(chosen)
         return matched
 
-    def _uncovered(self, route: Route, waiting: Mapping[int, Near]) -> dict[int, Indices]:
-        """The centres to match next of those that wait, with the keyframes (n,) near each.
+    def _uncovered(self, route: Route, waiting: Mapping[int, Near]) -> dict[int, Near]:
+        """The centres to match next of those that wait, with the keyframes near each.
 
         As if every match related all that it is tried with; where one does not, the next choice makes up.
         """
@@ -74,7 +76,7 @@ class Refinement:
         for centre, near in waiting.items():
             needed = self._starts[centre] is not None or centre in self._wider
             if needed or covered.is_due(route, centre, near, self._options):
-                chosen[centre] = near.tried
+                chosen[centre] = near
                 covered.assume(route, centre, near)
         return chosen
 

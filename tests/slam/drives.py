@@ -14,7 +14,9 @@ from nscan_cli.logs.scan import LaserLog
 from nscan_cli.poses import Array, compose, relative
 from nscan_cli.slam.closing import Closing
 from nscan_cli.slam.found import Tracked
-from nscan_cli.slam.keyframes import Keyframe, Keyframes, relations_along, route_of
+from nscan_cli.slam.keyframes import Keyframe, Keyframes, Route, relations_along, route_of
+from nscan_cli.slam.near import choose_nearby
+from nscan_cli.slam.nearby import MatchNearby, Nearby
 from nscan_cli.slam.options import KeyframeOptions, NScanOptions
 from nscan_cli.slam.place import Place
 from tests.simulation.drive import Drive
@@ -31,6 +33,12 @@ AROUND = np.array([0.0, -0.44, -0.22, 0.22, 0.44])
 BEHIND = NScanOptions().behind
 
 
+def about(match: MatchNearby, route: Route, centre: int, options: NScanOptions) -> Nearby | None:
+    """The match of a keyframe with those near it."""
+    near = choose_nearby(route.poses, route.paths, centre, options)
+    return match(route, centre, near, options)
+
+
 def keyframe_of(scene: Scene, row: int, pose: Array, path: float, seen: Array) -> Keyframe:
     """A keyframe at a pose (3,) that saw what there is to see from poses (n, 3), the first its own."""
     log = scene.record_at(seen, seed=row).log()
@@ -38,7 +46,7 @@ def keyframe_of(scene: Scene, row: int, pose: Array, path: float, seen: Array) -
     scans = [Tracked(place, np.diag([1e5, 1e5, 1e6]), np.eye(3), 0.95, path, True) for place in poses]
     found = Keyframes(KeyframeOptions(), NScanOptions().gaussians)
     found.add(row, log.points(0), scans[0])
-    found.attach(sensed_in(log).part(1, len(scans)), found_of(*scans[1:]))
+    found.attach(sensed_in(log), found_of(*scans), 1, len(scans))
     found.part()
     return found.list[0]
 

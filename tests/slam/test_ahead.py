@@ -12,13 +12,15 @@ from nscan_cli.slam.ahead import AHEAD, Ahead
 from nscan_cli.slam.coverage import Coverage
 from nscan_cli.slam.found import Tracked
 from nscan_cli.slam.keyframes import Keyframe, Route, extended, route_of
-from nscan_cli.slam.near import Near
+from nscan_cli.slam.near import Near, choose_nearby
 from nscan_cli.slam.nearby import Nearby
 from nscan_cli.slam.options import GaussianOptions, NScanOptions
 
 OPTIONS = NScanOptions(radius=2.5)
 """Two keyframes to both sides of one are near."""
 SIZE = 20
+NEAR = Near(np.arange(4, 9), np.zeros(5, dtype=np.bool_), 0)
+"""Those near keyframe 6."""
 
 
 def keyframe(k: int) -> Keyframe:
@@ -44,7 +46,7 @@ class Matches:
         self.aside: list[tuple[int, float]] = []
         """Centre, and y of keyframe 9."""
 
-    def __call__(self, route: Route, centre: int, options: NScanOptions) -> Nearby | None:
+    def __call__(self, route: Route, centre: int, near: Near, options: NScanOptions) -> Nearby | None:
         self.made.append((threading.get_ident(), centre, len(route.poses)))
         self.aside.append((centre, route.poses[9, 1]))
         return Nearby((), None, None, float(centre), True)
@@ -52,8 +54,12 @@ class Matches:
 
 def begin(ahead: Ahead, route: Route) -> None:
     """What comes after the match of keyframe 6 with its neighbours."""
-    near = Near(np.arange(4, 9), np.zeros(5, dtype=np.bool_), 0)
-    ahead.begin(route, SIZE, 6, near, Coverage())
+    ahead.begin(route, SIZE, 6, NEAR, Coverage())
+
+
+def asked(ahead: Ahead, route: Route, centre: int) -> Nearby | None:
+    """The match about a keyframe at its turn."""
+    return ahead.match(route, centre, choose_nearby(route.poses, route.paths, centre, OPTIONS))
 
 
 def let_finish(ahead: Ahead) -> None:
@@ -83,13 +89,13 @@ def test_a_match_counts_if_the_graph_lies_as_it_was_assumed():
         begin(ahead, route)
         let_finish(ahead)
         longer = extended(route, 12)
-        found = ahead.match(longer, 8)
+        found = asked(ahead, longer, 8)
         assert found is not None
         assert found.moved == 8.0
         assert [centre for _, centre, _ in matches.made] == [8, 10]
         moved = extended(longer, 14)
         moved.poses[3, 0] += 1e-12
-        ahead.match(moved, 10)
+        asked(ahead, moved, 10)
     assert [centre for _, centre, _ in matches.made] == [8, 10, 10]
     assert matches.made[-1][0] == threading.get_ident() != matches.made[0][0]
 
@@ -114,7 +120,7 @@ def test_with_one_thread_or_before_it_is_opened_none_is_begun():
                 ahead.open()
             begin(ahead, route)
             assert matches.made == []
-            ahead.match(route, 6)
+            ahead.match(route, 6, NEAR)
         assert [centre for _, centre, _ in matches.made] == [6]
 
 
@@ -125,14 +131,14 @@ def test_in_the_end_what_was_begun_is_there_or_made_and_no_more_is_begun():
         begin(ahead, route)
     begin(ahead, route)
     for centre, size in ((8, 12), (10, 14)):
-        found = ahead.match(extended(route, size), centre)
+        found = asked(ahead, extended(route, size), centre)
         assert found is not None
         assert found.moved == centre
     assert sorted(centre for _, centre, _ in matches.made) == [8, 10]
 
 
 def test_an_error_is_raised_at_its_turn():
-    def fail(route: Route, centre: int, options: NScanOptions) -> Nearby | None:
+    def fail(route: Route, centre: int, near: Near, options: NScanOptions) -> Nearby | None:
         raise ZeroDivisionError
 
     route = straight(10)
@@ -140,7 +146,7 @@ def test_an_error_is_raised_at_its_turn():
         ahead.open()
         begin(ahead, route)
         with pytest.raises(ZeroDivisionError):
-            ahead.match(extended(route, 12), 8)
+            asked(ahead, extended(route, 12), 8)
 
 
 def test_who_waits_for_a_match_makes_the_next_one():
@@ -148,7 +154,7 @@ def test_who_waits_for_a_match_makes_the_next_one():
     made: dict[int, int] = {}
     begun, done = threading.Event(), threading.Event()
 
-    def match(route: Route, centre: int, options: NScanOptions) -> Nearby | None:
+    def match(route: Route, centre: int, near: Near, options: NScanOptions) -> Nearby | None:
         assert centre not in made
         made[centre] = threading.get_ident()
         if centre == 10:
@@ -164,7 +170,7 @@ def test_who_waits_for_a_match_makes_the_next_one():
         begin(ahead, route)
         assert begun.wait(60)
         for centre, size in ((8, 12), (10, 14)):
-            found = ahead.match(extended(route, size), centre)
+            found = asked(ahead, extended(route, size), centre)
             assert found is not None
             assert found.moved == centre
     assert made[10] == threading.get_ident() != made[8]

@@ -21,6 +21,7 @@ from tests.slam.drives import (
     ROUND,
     ROWS,
     Driven,
+    about,
     along,
     closed_along,
     like_doors_drive,
@@ -220,7 +221,7 @@ def test_of_doors_hardly_told_apart_a_joint_match_is_compared_with_another(match
     for k, relation in enumerate(doors.chain[: centre + 3]):
         tried.extend(relation, doors.keyframes[k + 1].tracked.path - doors.keyframes[k].tracked.path)
     known = route_of(doors.keyframes, doors.chain, doors.poses[: centre + 4])
-    nearby = match(known, centre, NSCAN)
+    nearby = about(match, known, centre, NSCAN)
     assert nearby is not None
     assert nearby.loop is not None
     assert nearby.loop.accepted

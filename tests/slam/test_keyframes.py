@@ -31,7 +31,7 @@ def tracked(pose: Array, hessian: Array = HESSIAN, path: float = 0.0, joined: bo
 
 
 def attach(found: Keyframes, seed: int, scan: Tracked) -> None:
-    found.attach(sensed([room(seed)]), found_of(scan))
+    found.attach(sensed([room(seed)]), found_of(scan), 0, 1)
 
 
 def keyframes(*poses: Array) -> Keyframes:

@@ -17,7 +17,7 @@ from nscan_cli.slam.nearby import Nearby, match_at, match_nearby
 from nscan_cli.slam.options import NScanOptions
 from tests.matching.problems import office_truth
 from tests.simulation.scenes import office
-from tests.slam.drives import CABINETS, keyframe_of, like_doors_drive, path_of, relation_to_previous
+from tests.slam.drives import CABINETS, about, keyframe_of, like_doors_drive, path_of, relation_to_previous
 
 OLD, BETWEEN, NEW = (280, 290, 300, 310, 320), (700, 1200), (1880, 1890, 1900, 1910, 1920)
 """Rows of the office: along the corridor to the south; elsewhere; and along it again, 150 m later."""
@@ -53,7 +53,7 @@ def matched(
     centre = poses[new].mean(axis=0) * [1, 1, 0]
     poses[new] = compose(compose(centre, off), relative(poses[new], centre))
     pairwise = [relation_to_previous(keyframes[: k + 2]) for k in range(len(keyframes) - 1)]
-    found = match_nearby(route_of(keyframes, pairwise, poses), len(keyframes) - 1, options)
+    found = about(match_nearby, route_of(keyframes, pairwise, poses), len(keyframes) - 1, options)
     assert found is not None
     return found
 
@@ -107,7 +107,7 @@ def test_without_a_revisit_the_relation_closes_no_loop():
     keyframes = revisit()[: len(OLD)]
     truth = office_truth()[list(OLD)]
     pairwise = [relation_to_previous(keyframes[: k + 2]) for k in range(len(keyframes) - 1)]
-    found = match_nearby(route_of(keyframes, pairwise, truth), len(OLD) - 1, NScanOptions())
+    found = about(match_nearby, route_of(keyframes, pairwise, truth), len(OLD) - 1, NScanOptions())
     assert found is not None
     assert found.nscan is not None
     assert (found.loop, found.nscan.origin) == (None, "nscan")
@@ -185,8 +185,9 @@ def test_when_all_that_was_seen_before_is_left_out_no_loop_is_closed():
 def test_two_keyframes_are_too_few():
     keyframes = revisit()[:2]
     two = route_of(keyframes, [relation_to_previous(keyframes)], office_truth()[[280, 290]])
-    assert match_nearby(two, 1, NScanOptions()) is None
-    assert match_nearby(route_of(keyframes, [], office_truth()[[280]]), 0, NScanOptions()) is None
+    alone = route_of(keyframes, [], office_truth()[[280]])
+    assert about(match_nearby, two, 1, NScanOptions()) is None
+    assert about(match_nearby, alone, 0, NScanOptions()) is None
 
 
 def test_places_are_compared_by_the_same_scans_whichever_the_graph_has():

@@ -16,7 +16,7 @@ from nscan_cli.slam.nearby import Nearby
 from nscan_cli.slam.options import NScanOptions
 from nscan_cli.slam.pairs_nearby import match_pairs_nearby
 from tests.matching.problems import office_truth
-from tests.slam.drives import relation_to_previous
+from tests.slam.drives import about, relation_to_previous
 from tests.slam.test_nearby import BETWEEN, NEW, OLD, ROWS, revisit
 
 OFF = np.array([0.1, 0.1, 0.01])
@@ -29,7 +29,7 @@ def matched(keyframes: list[Keyframe], off: Array = OFF, centre: int = len(ROWS)
     middle = poses[new].mean(axis=0) * [1, 1, 0]
     poses[new] = compose(compose(middle, off), relative(poses[new], middle))
     links = [relation_to_previous(keyframes[: k + 2]) for k in range(len(keyframes) - 1)]
-    found = match_pairs_nearby(route_of(keyframes, links, poses), centre, NScanOptions())
+    found = about(match_pairs_nearby, route_of(keyframes, links, poses), centre, NScanOptions())
     assert found is not None
     return found
 
@@ -90,7 +90,7 @@ def test_a_match_that_knows_nothing_is_no_relation():
     keyframes = [one, at(1, [100.0, 0.0, 0.0]), at(2, [4.0, 0.0, np.pi], seen_from(one.tracked.pose))]
     poses = np.array([keyframe.tracked.pose for keyframe in keyframes])
     links = [relation_to_previous(keyframes[: k + 2]) for k in range(2)]
-    found = match_pairs_nearby(route_of(keyframes, links, poses), 2, NScanOptions())
+    found = about(match_pairs_nearby, route_of(keyframes, links, poses), 2, NScanOptions())
     assert found is not None
     assert found.pairwise == ()
     assert found.loop is not None
@@ -116,7 +116,7 @@ def test_the_chain_holds_two_that_follow_each_other(centre):
     links = [relation_to_previous(keyframes[: k + 2]) for k in range(len(keyframes) - 1)]
     wrong = compose(links[-1].measurement, np.array([0.05, 0.03, 0.01]))
     links[-1] = dataclasses.replace(links[-1], measurement=wrong, information=np.diag([1e9, 1e9, 1e9]))
-    found = match_pairs_nearby(route_of(keyframes, links, truth), centre, NScanOptions())
+    found = about(match_pairs_nearby, route_of(keyframes, links, truth), centre, NScanOptions())
     assert found is not None
     held = {relation.nodes: relation for relation in found.pairwise}
     if centre == len(ROWS) - 1:
@@ -147,4 +147,6 @@ def test_when_nothing_of_another_visit_overlaps_the_loop_is_refused_with_a_reaso
 
 def test_a_keyframe_alone_is_matched_with_nothing():
     keyframes = revisit()[:1]
-    assert match_pairs_nearby(route_of(keyframes, [], office_truth()[[280]]), 0, NScanOptions()) is None
+    assert (
+        about(match_pairs_nearby, route_of(keyframes, [], office_truth()[[280]]), 0, NScanOptions()) is None
+    )

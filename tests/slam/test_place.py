@@ -19,6 +19,7 @@ from tests.slam.drives import (
     CABINETS,
     ROWS,
     Driven,
+    about,
     driven,
     like_doors_drive,
     path_of,
@@ -94,7 +95,7 @@ def test_the_place_is_found_from_three_metres_away(off, match):
 def test_from_there_a_joint_match_alone_does_not_find_it(off):
     drive = round_drive()
     poses = moved(drive, CENTRE, off)
-    nearby = match_nearby(route_of(drive.keyframes, drive.chain, poses), CENTRE, NSCAN)
+    nearby = about(match_nearby, route_of(drive.keyframes, drive.chain, poses), CENTRE, NSCAN)
     assert nearby is not None
     assert nearby.tie(ROWS * CENTRE) is None
 
@@ -156,9 +157,9 @@ def matching(
     """match_nearby, but its relation has the other visit shifted, or there is none; and what it was given."""
     calls = []
 
-    def match(visited, centre, options) -> Nearby | None:
+    def match(visited, centre, near, options) -> Nearby | None:
         calls.append((visited.poses, options))
-        nearby = match_nearby(visited, centre, options)
+        nearby = match_nearby(visited, centre, near, options)
         if shift is None or nearby is None or nearby.nscan is None:
             return None
         local = nearby.nscan.poses.copy()

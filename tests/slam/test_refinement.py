@@ -11,7 +11,7 @@ import pytest
 from nscan_cli.evaluation.trajectory import trajectory_errors
 from nscan_cli.graph.tum import Trajectory
 from nscan_cli.slam.keyframes import Route
-from nscan_cli.slam.near import choose_nearby
+from nscan_cli.slam.near import Near, choose_nearby
 from nscan_cli.slam.nearby import MatchNearby, Nearby, match_nearby
 from nscan_cli.slam.options import NScanOptions, Relations, SlamOptions
 from nscan_cli.slam.pairs_nearby import match_pairs_nearby
@@ -35,9 +35,9 @@ class Recorded:
         self.match = match
         self.made: list[tuple[int, float]] = []
 
-    def __call__(self, visited: Route, centre: int, options: NScanOptions) -> Nearby | None:
+    def __call__(self, visited: Route, centre: int, near: Near, options: NScanOptions) -> Nearby | None:
         self.made.append((centre, options.radius))
-        return self.match(visited, centre, options)
+        return self.match(visited, centre, near, options)
 
     def centres(self) -> list[int]:
         """Those since this was asked last."""
