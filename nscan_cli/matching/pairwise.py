@@ -19,8 +19,8 @@ from nscan_cli.matching.uncertainty import (
     weakest_translation,
 )
 from nscan_cli.ndt.energy import OUT, inlier_share
-from nscan_cli.ndt.grid import Ndt
 from nscan_cli.ndt.meeting import begin
+from nscan_cli.ndt.transform import Ndt
 from nscan_cli.poses import Array, wrap
 
 NO_OVERLAP = "no overlap"

@@ -19,8 +19,8 @@ from nscan_cli.matching.overlap import SOUND_OVERLAP, Overlaps, overlaps, weakes
 from nscan_cli.matching.pairwise import PairOptions
 from nscan_cli.matching.priors import Prior
 from nscan_cli.matching.search import Field, Found, SearchOptions, likelihood_field, search
-from nscan_cli.ndt.grid import Ndt
 from nscan_cli.ndt.meeting import begin
+from nscan_cli.ndt.transform import Ndt
 from nscan_cli.poses import Array, compose, relative, transform
 
 LEVER = 2.0

@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 from nscan_cli.compiled import inlined_kernel, kernel
 from nscan_cli.ndt.energy import OUT, accumulate
-from nscan_cli.ndt.grid import Ndt
 from nscan_cli.ndt.meeting import room_to_meet
 from nscan_cli.ndt.table import Grid
+from nscan_cli.ndt.transform import Ndt
 from nscan_cli.poses import Array
 
 

@@ -13,9 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nscan_cli.compiled import kernel, lean_kernel, summing_kernel
-from nscan_cli.ndt.grid import Ndt
 from nscan_cli.ndt.meeting import BLOCKS, Meeting, RoomToMeet, meet, room_to_meet
 from nscan_cli.ndt.table import Grid, find_row, pack, shown
+from nscan_cli.ndt.transform import Ndt
 from nscan_cli.poses import Array
 
 Vector = tuple[float, float]

@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from nscan_cli.matching.priors import Prior
-from nscan_cli.ndt.grid import Ndt
+from nscan_cli.ndt.transform import Ndt
 from nscan_cli.poses import Array
 from nscan_cli.slam.found import Found
 from nscan_cli.slam.options import TrackingOptions

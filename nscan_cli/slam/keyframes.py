@@ -16,7 +16,7 @@ import numpy as np
 from nscan_cli.compiled import kernel
 from nscan_cli.graph.model import Pairwise
 from nscan_cli.matching.planar import wrapped
-from nscan_cli.ndt.grid import Ndt
+from nscan_cli.ndt.transform import Ndt
 from nscan_cli.poses import Array, Indices, compose, relative
 from nscan_cli.slam.found import Found, Tracked
 from nscan_cli.slam.options import GaussianOptions, KeyframeOptions

@@ -12,7 +12,7 @@ from nscan_cli.logs.scan import LaserLog
 from nscan_cli.matching.overlap import overlaps, weakest_link
 from nscan_cli.matching.pairwise import matched_points, scan_ndt
 from nscan_cli.matching.scans import lay_out
-from nscan_cli.ndt.grid import Ndt
+from nscan_cli.ndt.transform import Ndt
 from nscan_cli.poses import Array, relative, wrap
 from tests.experiments.reference import ReferenceLog
 from tests.matching.problems import OPTIONS

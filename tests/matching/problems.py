@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from nscan_cli.matching.joint_energy import JointProblem, Priors, all_pairs, no_priors
 from nscan_cli.matching.pairwise import PairOptions, matched_points, scan_ndt
 from nscan_cli.matching.scans import lay_out
-from nscan_cli.ndt.grid import Ndt
+from nscan_cli.ndt.transform import Ndt
 from nscan_cli.poses import Array, relative, wrap
 from tests.simulation.laser import exact
 from tests.simulation.scenes import FIG_3, Scene, corridor_and_room, office

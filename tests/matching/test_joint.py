@@ -11,7 +11,7 @@ from nscan_cli.matching.joint_energy import JointProblem, Priors, all_pairs, joi
 from nscan_cli.matching.overlap import overlaps
 from nscan_cli.matching.scans import lay_out
 from nscan_cli.matching.uncertainty import weakest_translation
-from nscan_cli.ndt.grid import Ndt
+from nscan_cli.ndt.transform import Ndt
 from nscan_cli.poses import relative
 from tests.matching.problems import Problem, errors, fig_3, near, office_problem
 from tests.ndt.rooms import room

@@ -6,8 +6,8 @@ import pytest
 from nscan_cli.matching.newton import PairProblem, minimise, objective
 from nscan_cli.matching.priors import Prior
 from nscan_cli.ndt.energy import OUT
-from nscan_cli.ndt.grid import Ndt
 from nscan_cli.ndt.meeting import begin
+from nscan_cli.ndt.transform import Ndt
 from nscan_cli.poses import Array
 from tests.ndt import plain
 from tests.ndt.differences import derivative

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from nscan_cli.ndt.energy import energy, inlier_share
-from nscan_cli.ndt.grid import Ndt
+from nscan_cli.ndt.transform import Ndt
 from nscan_cli.poses import Array
 from tests.ndt import plain
 from tests.ndt.differences import derivative

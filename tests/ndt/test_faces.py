@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from nscan_cli.ndt.energy import OUT, accumulate, energy, inlier_share, sum_meeting
-from nscan_cli.ndt.grid import Ndt
 from nscan_cli.ndt.meeting import begin, meet_again, room_to_meet
+from nscan_cli.ndt.transform import Ndt
 from nscan_cli.poses import Array, compose, relative, transform
 from tests.ndt.test_grid import assert_same, entries
 

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from nscan_cli.ndt.energy import energy, inlier_share
-from nscan_cli.ndt.grid import Ndt
 from nscan_cli.ndt.table import find_row, pack
+from nscan_cli.ndt.transform import Ndt
 from nscan_cli.poses import relative, transform
 from tests.ndt import plain
 from tests.ndt.rooms import room

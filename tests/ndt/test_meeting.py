@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 
 from nscan_cli.ndt.energy import OUT, accumulate, inlier_share, sum_meeting
-from nscan_cli.ndt.grid import Ndt, change
+from nscan_cli.ndt.grid import change
 from nscan_cli.ndt.meeting import begin, count_inliers, meet_again, room_to_meet
 from nscan_cli.ndt.table import OUTDATED
+from nscan_cli.ndt.transform import Ndt
 from tests.ndt.rooms import room
 
 

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from nscan_cli.graph.model import Pairwise
 from nscan_cli.ndt.energy import energy
-from nscan_cli.ndt.grid import Ndt
+from nscan_cli.ndt.transform import Ndt
 from nscan_cli.poses import Array, compose, relative, rotated_information
 from nscan_cli.slam.found import Tracked
 from nscan_cli.slam.keyframes import Keyframes, relations_along

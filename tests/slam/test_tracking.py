@@ -14,7 +14,7 @@ import pytest
 
 from nscan_cli.logs.scan import LaserLog
 from nscan_cli.matching.search import SearchOptions
-from nscan_cli.ndt.grid import Ndt
+from nscan_cli.ndt.transform import Ndt
 from nscan_cli.poses import Array, compose, relative, transform, wrap
 from nscan_cli.slam.found import Tracked
 from nscan_cli.slam.options import TrackingOptions
