@@ -128,7 +128,7 @@ def load(file: Path, name: str) -> Callable[..., Any] | None:
     try:
         head, check, code = file.read_bytes().split(b"\n", 2)
         sound = int(check) == zlib.crc32(code)
-        function = _linked(json.loads(head), code, name) if sound else None
+        function = _once_linked(json.loads(head), check, code, name) if sound else None
     except (FileNotFoundError, MemoryError):
         return None
     except Exception:
@@ -140,11 +140,22 @@ def load(file: Path, name: str) -> Callable[..., Any] | None:
     return function
 
 
+def _once_linked(head: dict[str, Any], check: bytes, code: bytes, name: str) -> Callable[..., Any] | None:
+    """The function of the code, which is loaded once: loaded again, one would have what the other needs."""
+    linked, known_by = engine()[-1], (head["function"], check)
+    if known_by not in linked:
+        function = _linked(head, code, name)
+        if function is None:
+            return None
+        linked[known_by] = function
+    return linked[known_by]
+
+
 def _linked(head: dict[str, Any], code: bytes, name: str) -> Callable[..., Any] | None:
     """The function of loaded code; None where something that it calls is missing."""
     import llvmlite.binding as llvm
 
-    loader, dynfunc, alive = engine()
+    loader, dynfunc, alive, _ = engine()
     if any(llvm.address_of_symbol(needed) is None for needed in head["needs"]):
         return None
     loader.add_object_file(llvm.ObjectFileRef.from_data(code))
@@ -165,8 +176,8 @@ def _linked(head: dict[str, Any], code: bytes, name: str) -> Callable[..., Any] 
 
 
 @functools.cache
-def engine() -> tuple[Any, Any, object]:
-    """LLVM's loader, which knows all that machine code calls; numba's library that makes functions."""
+def engine() -> tuple[Any, Any, object, dict[object, Callable[..., Any]]]:
+    """LLVM's loader, which knows all that machine code calls; numba's maker of functions; those made."""
     import llvmlite.binding as llvm
 
     llvm.initialize_native_target()
@@ -178,7 +189,7 @@ def engine() -> tuple[Any, Any, object]:
         llvm.add_symbol(name, address)
     llvm.add_symbol("numba_unpickle", ctypes.cast(unpickle, ctypes.c_void_p).value)
     target = llvm.Target.from_default_triple().create_target_machine(jit=True)
-    return llvm.create_mcjit_compiler(llvm.parse_assembly(""), target), dynfunc, unpickle
+    return llvm.create_mcjit_compiler(llvm.parse_assembly(""), target), dynfunc, unpickle, {}
 
 
 def _symbols(dynfunc: Any, helpers: Any, runtime: Any) -> Iterator[tuple[str, int]]:

@@ -290,6 +290,25 @@ def test_all_processes_run_what_was_kept_first(tmp_path, monkeypatch):
     assert made(2.0)(0.0) == 2.0
 
 
+def test_machine_code_is_loaded_once(tmp_path, monkeypatch):
+    """Loaded again, it would stand beside itself with the same names, and each use what the other has."""
+    monkeypatch.setattr(machine_code, "cache_folder", lambda: tmp_path)
+
+    @kernel
+    def both(values: Any) -> Any:
+        return values, values + 1.0
+
+    numbers = np.arange(3.0)
+    both(numbers)
+    assert isinstance(both, Kernel)
+    (kept,), (first,) = tmp_path.glob(f"*{machine_code.SUFFIX}"), both._versions.values()
+    assert machine_code.load(kept, "both") is first
+    both._versions.clear()
+    both._by_looks.clear()
+    np.testing.assert_array_equal(both(numbers)[1], [1.0, 2.0, 3.0])
+    assert list(both._versions.values()) == [first]
+
+
 def kernels() -> Iterator[tuple[str, ast.FunctionDef]]:
     """All functions of the package that are compiled."""
     for path in sorted(PACKAGE.rglob("*.py")):

@@ -1,16 +1,21 @@
 """Where the time of a run goes: `python -m tests.benchmarks.profile LOG ...`, on one thread.
 
 Of the SLAM loop alone, without reading and writing: the time in each kernel, and what is left, that of the
-interpreter and of NumPy. `--runs N` does it again and again, for a profiler that tells these two apart.
+interpreter and of NumPy. With `--perf` these two are told apart, as perf samples the runs once more.
 """
 
 from __future__ import annotations
 
 import argparse
 import gc
+import os
+import signal
+import subprocess
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import pytest
@@ -25,6 +30,7 @@ from tests.experiments.output import table
 
 NAMED = 8
 """Kernels that are named, those that take longest."""
+NAMED_LIBRARIES = 4
 
 
 @dataclass
@@ -44,27 +50,28 @@ class Spent:
 def spent(log: LaserLog, runs: int) -> Spent:
     """Of the best of some runs; what was loaded before counts nowhere."""
     times = Spent()
-    version = Kernel._version
 
-    def timed(kernel: Kernel, kinds: object, arguments: tuple[Any, ...]) -> Callable[..., Any]:
-        compiled, name = version(kernel, kinds, arguments), kernel.py_func.__name__
-
+    def timed(name: str, version: Callable[..., Any]) -> Callable[..., Any]:
         def call(*given: Any) -> Any:
             begun = time.perf_counter()
-            result = compiled(*given)
+            result = version(*given)
             times.kernels[name] = times.kernels.get(name, 0.0) + time.perf_counter() - begun
             times.calls += 1
             return result
 
         return call
 
+    # All that it takes is loaded then.
+    Slam(log, SlamOptions()).run(lambda *done: None)
     best = None
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(Kernel, "_version", timed)
-        for kernel in [each for each in gc.get_objects() if isinstance(each, Kernel)]:
-            patch.setattr(kernel, "_versions", {})
+        for kernel in [each for each in gc.get_objects() if type(each) is Kernel]:
+            versions = {
+                kinds: timed(kernel.py_func.__name__, each) for kinds, each in kernel._versions.items()
+            }
+            patch.setattr(kernel, "_versions", versions)
             patch.setattr(kernel, "_by_looks", {})
-        for _ in range(runs + 1):
+        for _ in range(runs):
             before, times = best, Spent()
             begun = time.perf_counter()
             Slam(log, SlamOptions()).run(lambda *done: None)
@@ -85,17 +92,44 @@ def rows_of(name: str, times: Spent) -> list[list[str]]:
     ]
 
 
+def libraries(log: LaserLog, runs: int) -> list[tuple[str, str]]:
+    """What shares of some runs the libraries have where most time goes, as perf samples them."""
+    with TemporaryDirectory() as folder:
+        samples = str(Path(folder, "perf.data"))
+        attach = ["perf", "record", "-q", "-F", "2000", "-o", samples, "-p", str(os.getpid())]
+        with subprocess.Popen(attach, stderr=subprocess.DEVNULL) as recorder:
+            # It says nowhere that it has begun.
+            time.sleep(1)
+            for _ in range(runs):
+                Slam(log, SlamOptions()).run(lambda *done: None)
+            recorder.send_signal(signal.SIGINT)
+        report = subprocess.run(
+            ["perf", "report", "-i", samples, "--sort", "dso", "--stdio"],
+            check=True,
+            capture_output=True,
+            text=True,
+        )
+    lines = [line.split() for line in report.stdout.splitlines() if "%" in line]
+    return [(library, share) for share, library, *_ in lines[:NAMED_LIBRARIES]]
+
+
 def main() -> None:
     """Print a table."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("logs", nargs="+")
     parser.add_argument("--runs", type=int, default=5)
+    parser.add_argument("--perf", action="store_true", help="sample the libraries, too")
     options = parser.parse_args()
     gc.set_threshold(OBJECTS)
     rows: list[list[str]] = []
     for path in options.logs:
         log = read_log(path)
         rows += rows_of(log.source.name, spent(log, options.runs))
+        if options.perf:
+            rows += [
+                [log.source.name, f"in {library}", "", share]
+                for library, share in libraries(log, options.runs)
+            ]
     print(table(["log", "where", "ms", "share"], rows))
 
 
