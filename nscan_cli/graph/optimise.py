@@ -70,7 +70,7 @@ def optimise(
 
 
 def newton_step(pattern: Pattern, system: System, damping: float = 0.0) -> Array | None:
-    """The step (K − 1, 3) of the free poses; None when the damped Hessian is not positive definite."""
+    """The step (F, 3) of the free poses; None when the damped Hessian is not positive definite."""
     matrix = system.hessian
     if damping:
         matrix = matrix.copy()

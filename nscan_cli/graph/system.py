@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from nscan_cli.compiled import kernel
 from nscan_cli.graph.columns import Columns, Terms
@@ -17,13 +18,13 @@ from nscan_cli.poses import Array, Indices
 
 
 class System(NamedTuple):
-    """The energy at some poses and its derivatives by the free poses: all but the fixed one, in order."""
+    """The energy at some poses and its derivatives by the free poses: all but those held, in order."""
 
     value: float
     terms: Array
     """(Q,) what each relation gives: χ² at the poses."""
     gradient: Array
-    """(K − 1, 3)"""
+    """(F, 3)"""
     hessian: Array
     """(B, 3, 3) the lower triangle, in the blocks of the factor's pattern."""
 
@@ -38,22 +39,26 @@ class GraphEnergy:
         positions: Indices,
         fixed: int = 0,
         terms: Terms | None = None,
+        free: NDArray[np.bool_] | None = None,
     ) -> None:
         """Take relations between node ids; `positions[id]` is a node's place among the `nodes` poses.
 
-        The pose at place `fixed` is held where it is. With `terms`, those of the relations are kept there.
+        The pose at place `fixed` is held where it is, and so are those that are not `free` (K,), if given.
+        With `terms`, those of the relations are kept there.
         """
         terms = terms or Terms()
         self.columns = terms.columns(relations, positions)
         self._not_linear = terms.not_linear(relations)
         self.fixed = fixed
-        self.free: Indices = np.delete(np.arange(nodes), fixed)
-        """(K − 1,) the places of the poses that can move."""
+        can_move = np.ones(nodes, dtype=np.bool_) if free is None else free.copy()
+        can_move[fixed] = False
+        self.free: Indices = np.flatnonzero(can_move)
+        """(F,) the places of the poses that can move."""
         self.free_row: Indices = np.full(nodes, -1)
-        """(K,) the place of a pose among those; −1 for the fixed one."""
-        self.free_row[self.free] = np.arange(nodes - 1)
+        """(K,) the place of a pose among those; −1 for one that is held."""
+        self.free_row[self.free] = np.arange(len(self.free))
         edges = _edges(self.columns, self.free_row)
-        self.pattern = find_pattern(edges, nodes - 1)
+        self.pattern = find_pattern(edges, len(self.free))
         self._targets = block_targets(edges, self.pattern)
 
     def weighted(self, weights: Array) -> GraphEnergy:
@@ -95,7 +100,7 @@ class GraphEnergy:
 
 @kernel
 def _edges(columns: Columns, free_row: Indices) -> Indices:
-    """The blocks of the lower triangle of each term, in order, as pairs of rows; −1 is the fixed pose."""
+    """The blocks of the lower triangle of each term, in order, as pairs of rows; −1 is a pose held."""
     sizes = columns.starts[1:] - columns.starts[:-1]
     edges = np.empty(((sizes * (sizes + 1)).sum() // 2, 2), dtype=np.int64)
     e = 0

@@ -22,8 +22,9 @@ from nscan_cli.slam.energies import Energies
 from nscan_cli.slam.keyframes import Route
 from nscan_cli.slam.nearby import MatchNearby, Nearby
 from nscan_cli.slam.options import ClosingOptions, NScanOptions
+from nscan_cli.slam.part import Part, nearest, without_others
 from nscan_cli.slam.place import Place, find_place, why_doubted
-from nscan_cli.slam.surest_way import Linked, surest_ways
+from nscan_cli.slam.surest_way import Linked, on_the_ways, surest_ways
 from nscan_cli.slam.way import Way
 from nscan_cli.slam.whereabouts import Reach, Whereabouts
 
@@ -63,19 +64,19 @@ class Closing:
         `left_out` (m,) are keyframes of another visit that the joint match about `centre` was tried with.
         `loops` gives the relations that close loops so far.
         """
-        paths, poses = route.paths, route.poses
-        if paths[centre] - self._searched < self.options.step:
+        if route.paths[centre] - self._searched < self.options.step:
             return []
-        reach = self._whereabouts.bound(centre, self.way, poses)
-        near = self._near(route, centre, reach)
-        if len(near) and not len(left_out):
-            near = self._near(route, centre, self._narrow(route, centre, loops))
-        if len(near) or len(left_out):
-            reach = self._ask(route, centre, loops)
-            near = np.union1d(self._near(route, centre, reach), left_out).astype(np.int64)
+        bound = self._whereabouts.bound(centre, self.way, route.poses)
+        if not len(self._near(route, centre, bound)) and not len(left_out):
+            return []
+        bound, before = self._narrow(route, centre, loops)
+        if not len(self._near(route, centre, bound)) and not len(left_out):
+            return []
+        reach = self._ask(route, centre, bound, before, loops)
+        near = np.union1d(self._near(route, centre, reach), left_out).astype(np.int64)
         if not len(near):
             return []
-        self._searched = paths[centre]
+        self._searched = route.paths[centre]
         place = self._search(route, centre, near, reach)
         if place is None:
             return []
@@ -121,9 +122,10 @@ class Closing:
         old = int(np.searchsorted(route.rows, tie[0]))
         if not self._may_be_off(self._whereabouts.bound(centre, self.way, poses), old):
             return None
-        if not self._may_be_off(self._narrow(route, centre, loops), old):
+        bound, before = self._narrow(route, centre, loops)
+        if not self._may_be_off(bound, old):
             return None
-        reach = self._ask(route, centre, loops)
+        reach = self._ask(route, centre, bound, before, loops)
         if not self._may_be_off(reach, old):
             return None
         if self.is_lost(reach)[old]:
@@ -133,14 +135,23 @@ class Closing:
         joint = None if nearby.nscan is None else self.nscan
         return why_doubted(route, centre, pose, earlier, window, self.options, joint)
 
-    def _narrow(self, route: Route, centre: int, loops: Loops) -> Reach:
-        """A bound on the reach again, by the surest ways."""
+    def _narrow(self, route: Route, centre: int, loops: Loops) -> tuple[Reach, Indices]:
+        """A bound on the reach again, by the surest ways; and what is before each (K,) on its way."""
         links = self._linked.links(route, self.way, loops())
-        return self._whereabouts.narrow(centre, surest_ways(links, route.poses, centre))
+        covariances, before = surest_ways(links, route.poses, centre)
+        return self._whereabouts.narrow(centre, covariances), before
 
-    def _ask(self, route: Route, centre: int, loops: Loops) -> Reach:
-        """The reach, by the graph of the way and all loops."""
-        energy = self.energies.of(route, [*self.way.relations, *loops()], centre)
+    def _ask(self, route: Route, centre: int, bound: Reach, before: Indices, loops: Loops) -> Reach:
+        """The reach, by the graph of the way and all loops.
+
+        Of a large one, by what is nearest, and by the surest ways to all that may be searched.
+        """
+        part = Part([*self.way.relations, *loops()])
+        if len(route.rows) > self.options.asked:
+            wanted = nearest(route.poses, centre, centre + 1, self.options.asked)
+            wanted |= _away(route, centre) <= self.options.around + self._farthest(bound)
+            part = without_others(route, self.way.relations, loops(), on_the_ways(before, wanted))
+        energy = self.energies.of(route, part.relations, centre, part.free)
         return self._whereabouts.ask(energy, route.poses)
 
     def is_lost(self, reach: Reach) -> NDArray[np.bool_]:
@@ -165,8 +176,7 @@ class Closing:
 
     def _near(self, route: Route, centre: int, reach: Reach) -> Indices:
         """The older keyframes that may be near, but may be too far off for a joint match."""
-        paths, poses = route.paths, route.poses
-        options, away = self.options, np.hypot(*(poses[:, :2] - poses[centre, :2]).T)
+        options, paths, away = self.options, route.paths, _away(route, centre)
         bound = options.deviations * reach.distance
         may_be = away <= self.nscan.radius + np.minimum(bound, self._farthest(reach))
         older = paths[centre] - paths > self.nscan.recent
@@ -180,7 +190,7 @@ class Closing:
         reach: Reach,
     ) -> Place | None:
         """Search among the visit that most likely is near, or, when not even the direction is known, all."""
-        away = np.hypot(*(route.poses[:, :2] - route.poses[centre, :2]).T)
+        away = _away(route, centre)
         places, is_lost = [], self.is_lost(reach)
         while len(near):
             first = int(near[np.argmin(away[near] - self.options.deviations * reach.distance[near])])
@@ -205,8 +215,7 @@ class Closing:
         These are what the graph knows well as seen from the first: the map that they make is in one piece.
         `reach` is that from the centre, for which the graph was asked last.
         """
-        options, paths, poses = self.options, route.paths, route.poses
-        away = np.hypot(*(poses[:, :2] - poses[centre, :2]).T)
+        options, paths, away = self.options, route.paths, _away(route, centre)
         farthest = min(float(self._farthest(reach)[first]), max(float(away.max()), options.farthest))
         distance = max(options.deviations * reach.distance[first], options.least)
         turn = max(options.deviations * reach.angle[first], options.least_turn)
@@ -222,6 +231,12 @@ class Closing:
         within = np.hypot(off[0], off[1]) <= self.options.agree
         turned = abs(wrap(off[2])) <= self.options.agree_turn
         return bool(within and turned and paths[other.centre] - paths[one.centre] <= self.options.together)
+
+
+def _away(route: Route, centre: int) -> Array:
+    """(K,) how far keyframes lie from one of them, m."""
+    away: Array = np.hypot(*(route.poses[:, :2] - route.poses[centre, :2]).T)
+    return away
 
 
 def _overlap(place: Place) -> float:

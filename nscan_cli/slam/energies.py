@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from nscan_cli.graph.columns import Terms
 from nscan_cli.graph.relation import Relation
@@ -22,8 +23,14 @@ class Energies:
         """Keep no terms any more: the relations that they are of have been replaced."""
         self._terms = Terms()
 
-    def of(self, route: Route, relations: Sequence[Relation], fixed: int = 0) -> GraphEnergy:
-        """That of all keyframes with keyframe `fixed` held."""
+    def of(
+        self,
+        route: Route,
+        relations: Sequence[Relation],
+        fixed: int = 0,
+        free: NDArray[np.bool_] | None = None,
+    ) -> GraphEnergy:
+        """That of all keyframes with keyframe `fixed` held, and those that are not `free` (K,), if given."""
         positions = np.full(self._scans, -1)
         positions[route.rows] = np.arange(len(route.rows))
-        return GraphEnergy(len(route.rows), relations, positions, fixed, self._terms)
+        return GraphEnergy(len(route.rows), relations, positions, fixed, self._terms, free)

@@ -162,6 +162,9 @@ class ClosingOptions:
     """A keyframe may be off by so many standard deviations."""
     settled: float = 1.0
     """By no more than this (m) a joint match finds the place itself."""
+    asked: int = 500
+    """The graph is asked how far off a keyframe may be: of a large one the part nearest to it, of so many
+    keyframes, with the ways to all that may be searched."""
     step: float = 3.0
     """From one search to the next, m of path."""
     search: SearchOptions = field(default_factory=lambda: SearchOptions(beams=180))
@@ -200,6 +203,20 @@ class ClosingOptions:
 
 
 @dataclass(frozen=True)
+class GrowthOptions:
+    """Step 5 while the graph grows: when it is optimised, and how much of it."""
+
+    moved: float = 0.1
+    """When joint matches have moved scans by so much in all, m,"""
+    new: float = 0.01
+    """and so large a share of its keyframes is new:"""
+    most: int = 500
+    """the keyframes that lie nearest to these, so many,"""
+    new_of_all: float = 0.1
+    """and all when so large a share is new since all were."""
+
+
+@dataclass(frozen=True)
 class SlamOptions:
     """All of them."""
 
@@ -208,14 +225,11 @@ class SlamOptions:
     keyframes: KeyframeOptions = field(default_factory=KeyframeOptions)
     nscan: NScanOptions = field(default_factory=NScanOptions)
     closing: ClosingOptions = field(default_factory=ClosingOptions)
+    growth: GrowthOptions = field(default_factory=GrowthOptions)
     relations: Relations = "both"
     """both: the chain of pairwise relations from tracking, and nScan relations of joint matches. nscan: of
     the chain only what no nScan relation holds together. pairwise: the chain, and each scan near a keyframe
     matched with it alone."""
-    optimise_after: float = 0.1
-    """The graph is optimised when joint matches have moved scans by so much in all, m."""
-    optimise_growth: float = 0.01
-    """And only when so large a share of its keyframes is new: in all, that takes time in proportion."""
     refinements: int = 2
     """Most sweeps of joint matches from the final poses."""
     refined: float = 0.02

@@ -21,11 +21,13 @@ from nscan_cli.slam.closing import Closing
 from nscan_cli.slam.coverage import Coverage
 from nscan_cli.slam.energies import Energies
 from nscan_cli.slam.following import Followed, Follower
+from nscan_cli.slam.growth import Growth
 from nscan_cli.slam.keyframes import Keyframe, Keyframes, extended, relations_along, route_of
 from nscan_cli.slam.near import Near, choose_nearby
 from nscan_cli.slam.nearby import MatchNearby, Nearby, match_nearby
 from nscan_cli.slam.options import SlamOptions
 from nscan_cli.slam.pairs_nearby import match_pairs_nearby
+from nscan_cli.slam.part import Part
 from nscan_cli.slam.place import TOO_LITTLE, Place, piece_moved
 from nscan_cli.slam.refinement import Refinement
 from nscan_cli.slam.sensed import Sensed
@@ -70,7 +72,7 @@ class Slam:
         self.energies, self.covered = Energies(len(log)), Coverage()
         self.closing = Closing(options.closing, options.nscan, self.match, self.energies)
         self.places: list[Place] = []
-        self._moved, self._optimised = 0.0, 0
+        self.growth = Growth(options.growth)
 
     def run(self, report: Report) -> Graph:
         """The paper's loop over all scans, and the last optimisation."""
@@ -160,18 +162,15 @@ class Slam:
         self.covered.add(int(route.rows[centre]), route.rows[near.tried].tolist(), nearby)
         if nearby is not None:
             self.take(nearby)
-            if self._moved > self.options.optimise_after and self._has_grown():
-                self.optimise(max_iterations=10, tolerance=1e-3)
+            if self.growth.is_due(len(self.poses)):
+                due = self.growth.due(self.route, self.relations)
+                self.optimise(max_iterations=10, tolerance=1e-3, part=due)
         loop = None if nearby is None else nearby.loop
         # At the border of an earlier visit a place well inside fits better than the right one, half of which
         # was not seen: there a search says no more than the match.
         if options.loops and not (loop is not None and loop.reason == TOO_LITTLE):
             refused = loop is not None and not loop.accepted
             self.close_loops(centre, near.tried[near.seen_before & refused])
-
-    def _has_grown(self) -> bool:
-        """Whether the graph has grown by so much since it was optimised that it is worth another time."""
-        return len(self.poses) - self._optimised >= self.options.optimise_growth * len(self.poses)
 
     def match_unless_doubted(self, centre: int, near: Near) -> Nearby | None:
         """The match of a keyframe with those near it; without other visits if its place there is doubted."""
@@ -205,7 +204,7 @@ class Slam:
         self.pairs.extend(nearby.pairwise)
         if nearby.nscan is not None:
             self.nscan.append(nearby.nscan)
-        self._moved += nearby.moved
+        self.growth.matched(nearby.moved)
 
     def refine(self) -> None:
         """Step 6: the matches again, until they move nothing that was matched."""
@@ -244,12 +243,13 @@ class Slam:
         ]
         self.optimise(max_iterations=100, tolerance=1e-6)
 
-    def optimise(self, max_iterations: int, tolerance: float) -> None:
-        """Step 5: the global poses of all keyframes from all relations (paper, IV)."""
-        self._moved, self._optimised = 0.0, len(self.poses)
+    def optimise(self, max_iterations: int, tolerance: float, part: Part | None = None) -> None:
+        """Step 5: the global poses of all keyframes, or of a part, from all relations (paper, IV)."""
+        part = Part(self.relations) if part is None else part
+        self.growth.optimised(len(self.poses), part)
         if len(self.poses) < 2:
             return
-        energy = self.energies.of(self.route, self.relations)
+        energy = self.energies.of(self.route, part.relations, 0, part.free)
         self.route = self.route._replace(poses=optimise(energy, self.poses, max_iterations, tolerance).poses)
 
     @property

@@ -11,6 +11,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from nscan_cli.compiled import kernel
 from nscan_cli.graph.relation import Relation
@@ -91,14 +92,17 @@ def _star(relation: Relation, rows: Indices) -> Links:
 
 
 @kernel
-def surest_ways(links: Links, poses: Array, origin: int) -> Array:
-    """The covariances (K, 3, 3) of poses (K, 3) along the surest way to each from one; inf without any.
+def surest_ways(links: Links, poses: Array, origin: int) -> tuple[Array, Indices]:
+    """The surest way from one pose to each of all (K, 3): covariances (K, 3, 3) along it; inf without any.
+
+    And (K,) which one is before each on its way, −1 where none is.
 
     E. Dijkstra, "A note on two problems in connexion with graphs", 1959.
     """
     starts, incident = _incident(links, len(poses))
     covariances, best = np.full((len(poses), 3, 3), np.inf), np.full(len(poses), np.inf)
     by, done = np.full(len(poses), -1), np.zeros(len(poses), dtype=np.bool_)
+    before = np.full(len(poses), -1)
     covariances[origin], best[origin] = 0.0, 0.0
     waiting = [(0.0, origin)]
     while len(waiting):
@@ -107,6 +111,7 @@ def surest_ways(links: Links, poses: Array, origin: int) -> Array:
             continue
         done[here] = True
         if by[here] >= 0:
+            before[here] = links.held[by[here]] + links.other[by[here]] - here
             _follow(links, by[here], here, poses, covariances)
         for link in incident[starts[here] : starts[here + 1]]:
             there, own = links.held[link] + links.other[link] - here, links.covariances[link]
@@ -114,7 +119,19 @@ def surest_ways(links: Links, poses: Array, origin: int) -> Array:
             if farther < best[there]:
                 best[there], by[there] = farther, link
                 heapq.heappush(waiting, (farther, there))
-    return covariances
+    return covariances, before
+
+
+@kernel
+def on_the_ways(before: Indices, wanted: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Those wanted (K,) and all on the ways to them; `before` (K,) as surest_ways has it."""
+    on = wanted.copy()
+    for k in range(len(before)):
+        here = k
+        while wanted[k] and before[here] >= 0 and not on[before[here]]:
+            here = before[here]
+            on[here] = True
+    return on
 
 
 @kernel

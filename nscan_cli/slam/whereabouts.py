@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from nscan_cli.compiled import kernel
-from nscan_cli.graph.cholesky import Factor, factorise, solve
+from nscan_cli.graph.cholesky import Factor, factorise, loose_nodes, solve
 from nscan_cli.graph.inverse import inverse_diagonal
 from nscan_cli.graph.system import GraphEnergy
 from nscan_cli.poses import Array, Indices
@@ -30,10 +30,10 @@ class Known(NamedTuple):
     poses: Array
     """(K, 3)"""
     free: Indices
-    """(K − 1,) all but the held one, in the factor's order."""
+    """(F,) those that were asked for, the held one not among them, in the factor's order."""
     factor: Factor
     covariances: Array
-    """(K, 3, 3), 0 for the held one."""
+    """(K, 3, 3), 0 for the held one, inf for those that were not asked for, or that nothing holds."""
 
     def reach(self) -> Reach:
         """As seen from the held one."""
@@ -69,15 +69,21 @@ def known(energy: GraphEnergy, poses: Array) -> Known:
     As in marginal_covariances, the information is half the Hessian's Gauss–Newton part.
     """
     factor = factorise(energy.pattern, 0.5 * energy.evaluate(poses, exact=False).hessian)
-    covariances = np.zeros((len(poses), 3, 3))
-    covariances[energy.free] = inverse_diagonal(factor)
+    covariances = np.full((len(poses), 3, 3), np.inf)
+    covariances[energy.fixed], covariances[energy.free] = 0.0, inverse_diagonal(factor)
+    if factor.loose.any():
+        covariances[energy.free[loose_nodes(factor)]] = np.inf
     return Known(energy.fixed, poses, energy.free, factor, covariances)
 
 
 def _reach(covariances: Array) -> Reach:
-    """Of covariances (K, 3, 3)."""
-    distance = np.sqrt(_greatest(covariances[:, 0, 0], covariances[:, 0, 1], covariances[:, 1, 1]))
-    return Reach(distance, np.sqrt(np.maximum(covariances[:, 2, 2], 0.0)))
+    """Of covariances (K, 3, 3); inf where they are."""
+    known = np.isfinite(covariances[:, 0, 0])
+    distance, angle = np.full((2, len(covariances)), np.inf)
+    xx, xy, yy = covariances[known, 0, 0], covariances[known, 0, 1], covariances[known, 1, 1]
+    distance[known] = np.sqrt(_greatest(xx, xy, yy))
+    angle[known] = np.sqrt(np.maximum(covariances[known, 2, 2], 0.0))
+    return Reach(distance, angle)
 
 
 def _greatest(xx: Array, xy: Array, yy: Array) -> Array:
@@ -98,10 +104,16 @@ class Whereabouts:
         self._known: Known | None = None
 
     def ask(self, energy: GraphEnergy, poses: Array) -> Reach:
-        """The reach (K,) from the keyframe that the graph's energy holds."""
+        """The reach (K,) from the keyframe at which the graph's energy is fixed.
+
+        Where others are held too, theirs is the bound from that keyframe as it is.
+        """
         self._known = known(energy, poses)
-        self._origin, self._reach = energy.fixed, self._known.reach()
-        return self._reach
+        reach = self._known.reach()
+        if len(energy.free) < len(poses) - 1:
+            reach = Reach(*np.where(np.isinf(reach), self._reach, reach))
+        self._origin, self._reach = energy.fixed, reach
+        return reach
 
     def asked_from(self, other: int) -> Reach:
         """The reach (K,) from another keyframe, by the graph that was asked last."""

@@ -21,7 +21,7 @@ def bound(walked: Walk, origin: int) -> Array:
     size = len(walked.poses)
     route = Route([], np.arange(size), walked.way, np.zeros(size), walked.poses)
     links = Linked().links(route, Way.without_slips(walked.way), [*walked.loops, *walked.nscan])
-    return surest_ways(links, walked.poses, origin)
+    return surest_ways(links, walked.poses, origin)[0]
 
 
 @given(st.integers(0, 10**6), st.integers(3, 9), st.integers(0, 6), st.data())
@@ -59,7 +59,8 @@ def test_what_no_relation_leads_to_is_nowhere():
     walked = straight(4)
     route = Route([], np.arange(5), walked.way, np.zeros(5), np.zeros((5, 3)))
     links = Linked().links(route, Way.without_slips(walked.way), [])
-    found = surest_ways(links, np.zeros((5, 3)), 0)
+    found, before = surest_ways(links, np.zeros((5, 3)), 0)
+    np.testing.assert_array_equal(before, [-1, 0, 1, 2, -1])
     assert np.isfinite(found[:4]).all()
     assert np.isinf(found[4]).all()
 
