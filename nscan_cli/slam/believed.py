@@ -26,26 +26,35 @@ def believed_odometry(odometry: Array, times: Array) -> tuple[Array, NDArray[np.
     Where it is reset, wraps round or has a wrong value, the robot is taken to drive on as in the step
     before, and what follows goes on from there. After a pause a robot may have come as much farther.
     """
-    none = np.zeros(0, dtype=np.int64)
-    if len(odometry) < 2:
-        return odometry, none
-    steps = relative(odometry[1:], odometry[:-1])
-    distances, turns = np.hypot(steps[:, 0], steps[:, 1]), np.abs(steps[:, 2])
-    periods = np.diff(times)
-    pauses = np.maximum(periods / max(float(np.median(periods)), MOVES), 1.0)
-    jumps = np.zeros(len(steps), dtype=np.bool_)
-    for size in (distances, turns):
-        moving = size[size > MOVES]
-        if len(moving):
-            jumps |= size > np.maximum(TIMES * np.quantile(moving, USUAL, method="lower"), LEAST) * pauses
-    if not jumps.any():
-        return odometry, none
-    mended = odometry.copy()
-    for row, jump in enumerate(jumps.tolist()):
+    jumps = jumps_of(odometry, times)
+    if not len(jumps):
+        return odometry, jumps
+    steps, mended = relative(odometry[1:], odometry[:-1]), odometry.copy()
+    jumped = np.isin(np.arange(1, len(odometry)), jumps)
+    for row, jump in enumerate(jumped.tolist()):
         if jump:
             steps[row] = steps[row - 1] if row else 0.0
         mended[row + 1] = compose(mended[row], steps[row])
-    return mended, np.flatnonzero(jumps) + 1
+    return mended, jumps
+
+
+def jumps_of(poses: Array, times: Array | None = None) -> NDArray[np.int64]:
+    """The rows (J,) to which poses (S, 3) jump, by more than the robot goes in all its other steps.
+
+    With times (S,) in s it may go as much farther in a pause.
+    """
+    if len(poses) < 2:
+        return np.zeros(0, dtype=np.int64)
+    steps, pauses = relative(poses[1:], poses[:-1]), np.ones(len(poses) - 1)
+    if times is not None:
+        periods = np.diff(times)
+        pauses = np.maximum(periods / max(float(np.median(periods)), MOVES), 1.0)
+    jumps = np.zeros(len(steps), dtype=np.bool_)
+    for size in (np.hypot(steps[:, 0], steps[:, 1]), np.abs(steps[:, 2])):
+        moving = size[size > MOVES]
+        if len(moving):
+            jumps |= size > np.maximum(TIMES * np.quantile(moving, USUAL, method="lower"), LEAST) * pauses
+    return np.flatnonzero(jumps) + 1
 
 
 def hanging(log: LaserLog, odometry: Array | None) -> NDArray[np.int64]:

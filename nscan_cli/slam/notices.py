@@ -10,7 +10,7 @@ from nscan_cli.counting import counted
 from nscan_cli.graph.robust import chi2_by_three
 from nscan_cli.logs.scan import LaserLog
 from nscan_cli.poses import relative
-from nscan_cli.slam.believed import repeating
+from nscan_cli.slam.believed import jumps_of, repeating
 from nscan_cli.slam.disagreement import disagreements
 from nscan_cli.slam.pipeline import Slam
 from nscan_cli.slam.seen_through import seen_through
@@ -77,13 +77,21 @@ def _of_odometry(slam: Slam) -> list[str]:
 
 
 def _without_odometry(slam: Slam) -> list[str]:
-    same = repeating(slam.log, np.ones(max(len(slam.log) - 1, 0), dtype=np.bool_)).tolist()
-    if not same:
-        return []
-    return [
-        f"the laser repeats itself at {_scans(slam.log, same)}: it hangs, or the robot stands; "
-        "without odometry it counts as standing"
-    ]
+    """Where the robot may have gone on unseen, and where it came farther than it can."""
+    log, found = slam.log, []
+    same = repeating(log, np.ones(max(len(log) - 1, 0), dtype=np.bool_)).tolist()
+    if same:
+        found.append(
+            f"the laser repeats itself at {_scans(log, same)}: it hangs, or the robot stands; "
+            "without odometry it counts as standing"
+        )
+    jumps = np.setdiff1d(jumps_of(np.concatenate(slam.tracked)), slam.breaks).tolist()
+    if jumps:
+        found.append(
+            f"the scans jump at {_scans(log, jumps)}, farther than the robot drives from one to the next: "
+            "scans are missing, it was carried, or tracking has slipped; how far it came is not known"
+        )
+    return found
 
 
 def _contradictions(slam: Slam) -> list[str]:

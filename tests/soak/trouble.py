@@ -57,6 +57,7 @@ TOLD = {
     "disagree": "odometry and scans disagree",
     "contradict": "relations contradict each other",
     "looked through": "places do not look as before",
+    "the scans jump": "the scans jump",
     "it hangs, or": "the laser hangs, or the robot stands",
 }
 """Words of a notice → what the table says of it."""
