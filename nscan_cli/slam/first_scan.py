@@ -19,7 +19,9 @@ from nscan_cli.slam.settings import Settings
 from nscan_cli.slam.track import match_and_count
 
 PATH = 5.0
-"""Those after it are the scans of so much path, m."""
+"""Those after it are the scans of so much path, m,"""
+SCANS = 2_000
+"""and no more than these: a robot may stand for hours."""
 
 
 def place_first(scans: Sensed, found: Found, options: TrackingOptions) -> Array:

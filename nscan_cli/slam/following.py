@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nscan_cli.poses import Array, compose, relative, transform
-from nscan_cli.slam.first_scan import PATH, place_first
+from nscan_cli.slam.first_scan import PATH, SCANS, place_first
 from nscan_cli.slam.found import Found
 from nscan_cli.slam.options import BreakOptions, TrackingOptions
 from nscan_cli.slam.sensed import Sensed
@@ -169,7 +169,7 @@ class Follower:
         far = np.flatnonzero(scans.found.paths - begun > PATH)
         if not len(far):
             self._young.append(scans)
-            return []
+            return self._grow_up() if sum(map(len, self._young)) >= SCANS else []
         enough_by = int(far[0]) + 1
         self._young.append(scans.part(0, enough_by))
         later = [scans.part(enough_by, len(scans))] if enough_by < len(scans) else []

@@ -7,12 +7,13 @@ import functools
 import numpy as np
 import pytest
 
+from nscan_cli.slam.first_scan import SCANS
 from nscan_cli.slam.following import Followed, Follower
 from nscan_cli.slam.options import BreakOptions, TrackingOptions
 from nscan_cli.slam.sensed import Sensed
 from tests.slam.drives import round_scene
 from tests.slam.runs import part, sensed_in
-from tests.slam.troubles import carried
+from tests.slam.troubles import carried, standing
 
 
 @functools.cache
@@ -53,3 +54,12 @@ def test_when_all_is_tracked_the_map_goes_and_what_was_counted_stays():
     follower.finish()
     assert follower._tracker.map.rows == 0
     assert (follower.restarts, follower.searches) == counted
+
+
+def test_of_a_robot_that_stands_few_scans_wait_for_it_to_drive():
+    """They would be kept for hours: the first scan of a piece is placed by those of its first metres."""
+    log = standing(SCANS + 200)
+    follower, settled = Follower(TrackingOptions(), BreakOptions(), odometry=False), 0
+    for first in range(0, len(log), 100):
+        settled += sum(map(len, follower.follow(sensed_in(part(log, slice(first, first + 100))))))
+        assert settled == (0 if first + 100 < SCANS else first + 100)
