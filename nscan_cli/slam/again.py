@@ -113,7 +113,7 @@ def _as_tracked(graph: Graph, breaks: set[int], options: SlamOptions) -> Found:
     """The scans as if tracking had found them at the graph's poses, and knew nothing of how well."""
     found, step, path = Found.room(len(graph)), options.tracking.step, 0.0
     found.poses[:], found.values[:], found.inliers[:] = graph.poses, 0.0, 1.0
-    found.hessians[:], found.expected[:] = 0.0, 0.0
+    found.hessians[:], found.expected[:], found.off[:] = 0.0, 0.0, 0.0
     joined_at = graph.poses[0]
     for row, pose in enumerate(graph.poses):
         moved = relative(pose, joined_at)

@@ -28,6 +28,8 @@ class Tracked:
     """Length of the path up to here, m."""
     joined: bool
     """Whether the scan's points joined the map."""
+    off: float = 0.0
+    """How far it lies off where the odometry has it, in standard deviations of the place; 0 without any."""
 
 
 class Found(NamedTuple):
@@ -47,14 +49,16 @@ class Found(NamedTuple):
     """(n,)"""
     joined: NDArray[np.bool_]
     """(n,)"""
+    off: Array
+    """(n,)"""
 
     @classmethod
     def room(cls, n: int) -> Found:
         """For so many scans."""
-        values, inliers, paths = np.empty((3, n))
+        values, inliers, paths, off = np.empty((4, n))
         hessians, expected = np.empty((2, n, 3, 3))
         joined = np.empty(n, dtype=np.bool_)
-        return cls(values, np.empty((n, 3)), hessians, expected, inliers, paths, joined)
+        return cls(values, np.empty((n, 3)), hessians, expected, inliers, paths, joined, off)
 
     @classmethod
     def together(cls, parts: Iterable[Found]) -> Found:
@@ -75,4 +79,5 @@ class Found(NamedTuple):
             float(self.inliers[k]),
             float(self.paths[k]),
             bool(self.joined[k]),
+            float(self.off[k]),
         )

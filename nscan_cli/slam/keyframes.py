@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from nscan_cli.compiled import kernel
 from nscan_cli.graph.model import Pairwise
@@ -21,6 +22,7 @@ from nscan_cli.poses import Array, Indices, compose, relative
 from nscan_cli.slam.found import Found, Tracked
 from nscan_cli.slam.options import GaussianOptions, KeyframeOptions
 from nscan_cli.slam.sensed import Sensed
+from nscan_cli.slam.slips import Slips
 
 LATTICE = 2.0**26
 """More cells than a lattice has in a row."""
@@ -111,15 +113,25 @@ def _count_cells(points: Array, side: float) -> int:
 
 
 @kernel
-def _new_keyframes(poses: Array, first: int, before: Array, distance: float, turn: float) -> Indices:
+def _new_keyframes(
+    poses: Array,
+    slipped: NDArray[np.bool_],
+    first: int,
+    before: Array,
+    distance: float,
+    turn: float,
+    patience: float,
+) -> Indices:
     """Which of the poses (n, 3), from the `first` on, are those of keyframes.
 
     Each is the first beyond `distance` (m) or `turn` (rad) of the one before; the first of all, of `before`.
+    Where a scan may have slipped, beyond so many times as much as `patience` says.
     """
     new, count, last = np.empty(len(poses), dtype=np.int64), 0, before
     for k in range(first, len(poses)):
         away = np.hypot(poses[k, 0] - last[0], poses[k, 1] - last[1])
-        if not (away <= distance and abs(wrapped(poses[k, 2] - last[2])) <= turn):
+        times = patience if slipped[k] else 1.0
+        if not (away <= times * distance and abs(wrapped(poses[k, 2] - last[2])) <= times * turn):
             new[count], last = k, poses[k]
             count += 1
     return new[:count].copy()
@@ -157,6 +169,7 @@ class Keyframes:
         self.options, self.gaussians = options, gaussians
         self.distance = max(options.distance, options.distance_per_range * median_range)
         self.list: list[Keyframe] = []
+        self._slips = Slips(options.slipped)
         self._since: list[Placed] = []
         self._expected = np.zeros((3, 3))
 
@@ -167,7 +180,10 @@ class Keyframes:
         """Take in scans that were found: some become keyframes, the first of them where a piece begins."""
         begins |= not self.list
         before = found.poses[0] if begins else self.list[-1].tracked.pose
-        new = _new_keyframes(found.poses, int(begins), before, self.distance, self.options.turn).tolist()
+        slipped, turn, patience = self._slips.among(found), self.options.turn, self.options.patience
+        new = _new_keyframes(
+            found.poses, slipped, int(begins), before, self.distance, turn, patience
+        ).tolist()
         first = 0
         for k in [0, *new] if begins else new:
             self.attach(scans, found, first, k)

@@ -101,6 +101,10 @@ class KeyframeOptions:
     """Times the median range of the log's beams: who sees further sees the same for longer."""
     turn: float = 0.8
     """rad"""
+    slipped: float = 1.5
+    """So many standard deviations off the odometry a scan may have slipped, if less of it fits:"""
+    patience: float = 2.0
+    """it is a keyframe only when it is so many times farther from the last."""
     information_scale: float = 0.8
     """The Hessian of tracking is weighed by so much: neighbouring scans make the same errors."""
     drift: float = 0.0025

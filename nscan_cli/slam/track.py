@@ -203,6 +203,10 @@ def take(
     for row in range(track.poses.shape[0] - 1):
         assign(track.poses[row], track.poses[row + 1])
     assign(track.poses[-1], pose)
+    found.off[k] = 0.0
+    if np.isfinite(odometry[0]) and np.isfinite(track.odometry[0]):
+        off = np.hypot(pose[0] - prior.mean[0], pose[1] - prior.mean[1])
+        found.off[k] = off * np.sqrt(prior.information[0, 0])
     assign(track.odometry, odometry)
     counts[KNOWN] = min(counts[KNOWN] + 1, track.poses.shape[0])
     track.inliers[0] = found.inliers[k]

@@ -126,7 +126,7 @@ def scans_of(found: Found) -> list[Tracked]:
 
 def found_of(*scans: Tracked) -> Found:
     """The same as columns; the objective's value is nobody's."""
-    names = ("pose", "hessian", "expected", "inliers", "path", "joined")
+    names = ("pose", "hessian", "expected", "inliers", "path", "joined", "off")
     columns = ([getattr(scan, name) for scan in scans] for name in names)
     return Found(np.full(len(scans), np.nan), *map(np.array, columns))
 
