@@ -84,7 +84,7 @@ class JointMatch:
         return float(np.linalg.norm(self.gradient))
 
 
-class Way(NamedTuple):
+class Approached(NamedTuple):
     """Where an approach has come."""
 
     poses: Array
@@ -93,9 +93,9 @@ class Way(NamedTuple):
     unsettled: int
     """Stages that did not settle."""
 
-    def further(self, iterations: int, evaluations: int, unsettled: int) -> Way:
+    def further(self, iterations: int, evaluations: int, unsettled: int) -> Approached:
         """The way after so many more; the poses have moved by themselves."""
-        return Way(
+        return Approached(
             self.poses,
             self.iterations + iterations,
             self.evaluations + evaluations,
@@ -109,7 +109,7 @@ def match_jointly(problem: JointProblem, start: Array, options: JointOptions) ->
     The steps are Newton's, eq. (5) to (8), damped as by Levenberg and Marquardt: with the semi-definite
     part of the Hessian in the wide stages, with the exact one in the last where it is positive definite.
     """
-    return _finish(problem, Way(start.copy(), 0, 0, 0), options, options.widenings, neutral=False)
+    return _finish(problem, Approached(start.copy(), 0, 0, 0), options, options.widenings, neutral=False)
 
 
 def match_near_and_far(
@@ -141,7 +141,7 @@ def match_near_and_far(
     return _finish(_at(problem, pairs_at, best.poses), work, options, (), neutral=True)
 
 
-def _judge(problem: JointProblem, options: JointOptions, share: float, way: Way) -> float:
+def _judge(problem: JointProblem, options: JointOptions, share: float, way: Approached) -> float:
     return neutral_energy(problem, way.poses, share, options.stride)
 
 
@@ -152,8 +152,8 @@ def _approach(
     widenings: tuple[float, ...],
     neutral: bool,
     pairs_at: PairsAt | None = None,
-) -> Way:
-    way = Way(start.copy(), 0, 0, 0)
+) -> Approached:
+    way = Approached(start.copy(), 0, 0, 0)
     for part in [widenings] if pairs_at is None else [(widening,) for widening in widenings]:
         at = _at(problem, pairs_at, way.poses)
         way = way.further(*approach(at, way.poses, np.array(part), neutral, *options.of_approach))
@@ -161,7 +161,7 @@ def _approach(
 
 
 def _finish(
-    problem: JointProblem, way: Way, options: JointOptions, widenings: tuple[float, ...], neutral: bool
+    problem: JointProblem, way: Approached, options: JointOptions, widenings: tuple[float, ...], neutral: bool
 ) -> JointMatch:
     """What is left of an approach, and the last steps with the exact Hessian."""
     poses, n = way.poses, len(way.poses)

@@ -18,7 +18,7 @@ from nscan_cli.matching.newton import PairProblem, minimise
 from nscan_cli.matching.overlap import SOUND_OVERLAP, Overlaps, overlaps, weakest_link
 from nscan_cli.matching.pairwise import PairOptions
 from nscan_cli.matching.priors import Prior
-from nscan_cli.matching.search import Field, Found, SearchOptions, likelihood_field, search
+from nscan_cli.matching.search import Field, SearchOptions, Spot, likelihood_field, search
 from nscan_cli.ndt.meeting import begin
 from nscan_cli.ndt.transform import Ndt
 from nscan_cli.poses import Array, compose, relative, transform
@@ -101,7 +101,7 @@ class Placing:
         placed, left = [first], [scan for scan in range(len(poses)) if scan != first]
         while left:
             field = likelihood_field(self._cloud(placed, poses), self.window)
-            best: tuple[int, Found] | None = None
+            best: tuple[int, Spot] | None = None
             for scan in left:
                 least = best[1].score if best else 0.0
                 found = self._search(scan, field, placed, poses, least)
@@ -139,7 +139,7 @@ class Placing:
 
     def _search(
         self, scan: int, field: Field, placed: Sequence[int], poses: Array, least: float
-    ) -> Found | None:
+    ) -> Spot | None:
         """Search a scan about where it lies if the placed ones have moved as a whole from their start."""
         expected = compose(_motion(self.start[placed], poses[placed]), self.start[scan])
         return search(field, self.points[scan], expected, least, self.window)

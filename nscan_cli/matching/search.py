@@ -59,7 +59,7 @@ class Field(NamedTuple):
     cell: float
 
 
-class Found(NamedTuple):
+class Spot(NamedTuple):
     """The best pose of a search."""
 
     score: float
@@ -100,7 +100,7 @@ class Search:
         self._cells = _cells(field, chosen, centre, self._angles)
         self._bounds = _tile_bounds(field.coarsest, self._cells, self._reach)
 
-    def best(self, least: float, without: tuple[Array, float] | None = None) -> Found | None:
+    def best(self, least: float, without: tuple[Array, float] | None = None) -> Spot | None:
         """The best pose, if it scores more than `least`.
 
         `without` is a place, as a pose (3,) and a distance (m) from it, where none is looked for.
@@ -119,10 +119,10 @@ class Search:
             away,
             pose,
         )
-        return Found(score, pose) if score > least else None
+        return Spot(score, pose) if score > least else None
 
 
-def search(field: Field, points: Array, centre: Array, least: float, options: SearchOptions) -> Found | None:
+def search(field: Field, points: Array, centre: Array, least: float, options: SearchOptions) -> Spot | None:
     """The best pose of a scan with points (m, 2) about `centre` (3,), if it scores more than `least`."""
     return Search(field, points, centre, options).best(least)
 

@@ -17,7 +17,7 @@ from __future__ import annotations
 import numpy as np
 
 from nscan_cli.compiled import lean_kernel, unfolded_kernel
-from nscan_cli.ndt.table import HALF_KEY, Grid, find_row, unpack
+from nscan_cli.ndt.table import FACES, FLOOR, HALF_KEY, MINIMUM, Grid, find_row, unpack
 from nscan_cli.poses import Array
 
 Cells = tuple[int | np.int32, int, int, int]
@@ -98,7 +98,7 @@ def _shape(
 def _eigenvalues(grid: Grid, moments: Moments) -> tuple[float, float]:
     """Of a covariance, the smaller one first; both at least the floor, it 0.001 of the larger ([19])."""
     _, _, _, xx, xy, yy, _, _ = moments
-    middle, radius, floor = 0.5 * (xx + yy), _radius(xx, xy, yy), grid.making[1]
+    middle, radius, floor = 0.5 * (xx + yy), _radius(xx, xy, yy), grid.making[FLOOR]
     large = max(middle + radius, floor * floor)
     return max(middle - radius, floor * floor, 0.001 * large), large
 
@@ -127,7 +127,7 @@ def _faces(grid: Grid, row: int, half: float) -> tuple[Moments, Moments]:
     Nothing where there are too few.
     """
     cells = _cells(grid, grid.keys[row], row)
-    minimum, has_faces = grid.making[0], grid.making[3] > 0.0
+    minimum, has_faces = grid.making[MINIMUM], grid.making[FACES] > 0.0
     whole, normal = _block(grid, cells, half)
     if whole[0] < minimum:
         return NOTHING, NOTHING

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from nscan_cli.assign import assign, assign_rows
 from nscan_cli.compiled import kernel, lean_kernel
 from nscan_cli.ndt.gaussians import make_gaussian, straighten
-from nscan_cli.ndt.table import OUTDATED, Grid, empty_grid, find_row, insert, pack, unpack
+from nscan_cli.ndt.table import OUTDATED, STRAIGHT, Grid, empty_grid, find_row, insert, pack, unpack
 from nscan_cli.ndt.tangent import tangent
 from nscan_cli.poses import Array
 
@@ -82,7 +82,7 @@ def make_gaussians(grid: Grid, rows: int, touched: NDArray[np.int32], half: floa
                 made[row] = True
                 make_gaussian(grid, row, half)
     # On its own: what is done for few scans would slow down what is done for all.
-    for row in range(rows if grid.making[2] > 0.0 else 0):
+    for row in range(rows if grid.making[STRAIGHT] > 0.0 else 0):
         if made[row]:
             straighten(grid, row, half)
 

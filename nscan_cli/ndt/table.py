@@ -17,6 +17,11 @@ OUTDATED = -1.0
 so; before anything else looks Gaussians up, `Ndt.make` has to make them all."""
 
 
+MINIMUM, FLOOR, STRAIGHT, FACES = 0, 1, 2, 3
+"""How Gaussians are made: of at least so many points, with at least this standard deviation (m), and whether
+they are straight and have faces (0 or 1); see gaussians.py."""
+
+
 class Grid(NamedTuple):
     """The arrays of an NDT as the kernels take them. R rows, one for each lattice cell that was touched.
 
@@ -42,8 +47,7 @@ class Grid(NamedTuple):
     face that it shows, 0 where it was seen from both sides; and the row of the one that shows the other
     face, or 0."""
     making: Array
-    """(4,) how Gaussians are made: of at least so many points, with at least this standard deviation (m), and
-    whether they are straight and have faces (0 or 1); see gaussians.py. (0,) in a compact one."""
+    """(4,) MINIMUM, FLOOR, STRAIGHT and FACES; (0,) in a compact one."""
 
 
 @lean_kernel

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from nscan_cli.compiled import kernel
 from nscan_cli.ndt.compact import compacted
 from nscan_cli.ndt.grid import change, gathered, make_all, with_room
-from nscan_cli.ndt.table import Grid, empty_grid
+from nscan_cli.ndt.table import FACES, FLOOR, MINIMUM, STRAIGHT, Grid, empty_grid
 from nscan_cli.poses import Array
 
 LEAST_CAPACITY = 512
@@ -106,4 +106,6 @@ class Ndt:
 
 
 def _making(minimum: int, floor: float, straight: bool, faces: bool) -> Array:
-    return np.array([minimum, floor, straight, faces], dtype=np.float64)
+    making = np.empty(4)
+    making[[MINIMUM, FLOOR, STRAIGHT, FACES]] = minimum, floor, straight, faces
+    return making

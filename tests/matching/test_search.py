@@ -9,9 +9,9 @@ from nscan_cli.matching.search import (
     LEVELS,
     PAD,
     Field,
-    Found,
     Search,
     SearchOptions,
+    Spot,
     likelihood_field,
     search,
 )
@@ -150,7 +150,7 @@ def test_without_a_place_the_best_pose_lies_outside_of_it(two):
     assert Search(field, two.points[1], true, OPTIONS).best(0.0, without=everywhere) is None
 
 
-def assert_found(found: Found | None, wanted: Found) -> None:
+def assert_found(found: Spot | None, wanted: Spot) -> None:
     assert found is not None
     assert found.score == wanted.score
     np.testing.assert_array_equal(found.pose, wanted.pose)
