@@ -14,9 +14,9 @@ from nscan_cli.ndt.transform import Ndt
 from nscan_cli.poses import Array
 from nscan_cli.slam.found import Found
 from nscan_cli.slam.options import TrackingOptions
+from nscan_cli.slam.scan_to_map import match_and_count
 from nscan_cli.slam.sensed import Sensed
 from nscan_cli.slam.settings import Settings
-from nscan_cli.slam.track import match_and_count
 
 PATH = 5.0
 """Those after it are the scans of so much path, m,"""

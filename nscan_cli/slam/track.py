@@ -12,14 +12,14 @@ from numpy.typing import NDArray
 
 from nscan_cli.assign import assign, assign_rows
 from nscan_cli.compiled import kernel
-from nscan_cli.matching.newton import PairProblem, minimise
 from nscan_cli.matching.planar import composed_pose, relative_pose, wrapped
 from nscan_cli.matching.priors import Prior, sigmas
 from nscan_cli.ndt.grid import NEW_NEIGHBOURS, change
-from nscan_cli.ndt.meeting import begin, count_inliers, meet_again
 from nscan_cli.ndt.table import Grid
 from nscan_cli.poses import Array, transform
 from nscan_cli.slam.found import Found
+from nscan_cli.slam.going_on import UNSTEADY, go_on
+from nscan_cli.slam.scan_to_map import match_and_count
 from nscan_cli.slam.settings import Settings
 
 SCANS, OLDEST, KNOWN, ROWS, RESTARTS = 0, 1, 2, 3, 4
@@ -29,6 +29,8 @@ CLEARLY = 0.05
 """By so many inliers more the match from another start must be better."""
 LEAST_SCORE = 0.3
 """What a search must find at least; with fewer inliers a scan is lost, whatever the odometry says."""
+STEADY = 3
+"""From so many poses on there is a motion to go on with."""
 
 
 class Track(NamedTuple):
@@ -52,13 +54,16 @@ class Track(NamedTuple):
     """(1,) length of the path, m."""
     inliers: Array
     """(1,) share of inliers of the last scan."""
+    unsteady: Array
+    """(1,) mean square (m²) of how far scans are found off steady motion."""
 
     @classmethod
     def begin(cls, last: int) -> Track:
         """A track that has not begun, of which so many last poses will be known."""
         scans = np.zeros((0, 2)), np.zeros(1, dtype=np.int64), np.zeros((0, 4))
         counts, (path, inliers) = np.zeros(5, dtype=np.int64), np.zeros((2, 1))
-        return cls(np.zeros((last, 3)), np.full(3, np.nan), np.zeros(3), *scans, counts, path, inliers)
+        robot = np.zeros((last, 3)), np.full(3, np.nan), np.zeros(3)
+        return cls(*robot, *scans, counts, path, inliers, np.array([UNSTEADY**2]))
 
     def with_room(self, scans: int, points: int) -> Track:
         """The track with room for so many more scans, and points of them, in its map."""
@@ -84,24 +89,6 @@ class Track(NamedTuple):
                 if self.placed[scan, 3] > self.path[0] - path
             ]
         )
-
-
-@kernel
-def match_and_count(
-    grid: Grid, settings: Settings, points: Array, prior: Prior, pose: Array, hessian: Array
-) -> tuple[float, float]:
-    """Minimise from `pose` (3,), in place; the objective's value, and the share of inliers there.
-
-    Writes the Hessian (3, 3) of the objective.
-    """
-    half, scale, widenings = settings.half, settings.scale, settings.widenings
-    meeting = begin(points)
-    problem = PairProblem(grid, half, meeting, scale, prior)
-    value, _, _, _, _ = minimise(
-        problem, pose, widenings, settings.max_iterations, settings.near, settings.tolerance, hessian
-    )
-    meet_again(grid, half, meeting, pose[0], pose[1], pose[2])
-    return value, count_inliers(meeting, settings.inlier_bound) / max(points.shape[0], 1)
 
 
 @kernel
@@ -278,5 +265,7 @@ def follow(
                 match_turned(grid, settings, scan, prior, enough, track.counts, found, k)
                 if found.inliers[k] < (LEAST_SCORE if np.isfinite(odometry[k, 0]) else settings.inlier_share):
                     return k
+            if track.counts[KNOWN] >= STEADY and not np.isfinite(odometry[k, 0]):
+                go_on(grid, settings, scan, prior, track.unsteady, found, k)
         take(track, grid, settings, scan, odometry[k], prior, found, k)
     return len(ends) - 1

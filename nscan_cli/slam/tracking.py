@@ -14,9 +14,10 @@ from nscan_cli.ndt.transform import Ndt
 from nscan_cli.poses import Array
 from nscan_cli.slam.found import Found
 from nscan_cli.slam.options import TrackingOptions
+from nscan_cli.slam.scan_to_map import match_and_count
 from nscan_cli.slam.sensed import Sensed
 from nscan_cli.slam.settings import Settings
-from nscan_cli.slam.track import LEAST_SCORE, RESTARTS, ROWS, Track, follow, match_and_count, take
+from nscan_cli.slam.track import LEAST_SCORE, RESTARTS, ROWS, Track, follow, take
 
 RECENT = 5.0
 """A lost scan is searched among those of the last stretch of path, m."""
