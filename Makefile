@@ -4,7 +4,7 @@ VENV := .venv
 RUN := $(VENV)/bin
 READY := $(VENV)/.ready
 
-.PHONY: map test lint samples figures pictures reference bench growth robustness soak lowest lock clean
+.PHONY: map test lint samples figures pictures reference bench growth robustness lasers soak lowest lock clean
 
 map: $(READY)
 	mkdir -p out
@@ -40,6 +40,9 @@ growth: $(READY)
 
 robustness: $(READY)
 	$(RUN)/python -m tests.benchmarks.robustness docs/robustness.md
+
+lasers: $(READY)
+	$(RUN)/python -m tests.benchmarks.lasers docs/lasers.md
 
 soak: $(READY)
 	mkdir -p out

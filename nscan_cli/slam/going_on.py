@@ -28,13 +28,15 @@ from nscan_cli.slam.settings import Settings
 
 WEAK = 0.12
 """A direction is looked into that has less than such a share of the information of the one across it."""
-PLACES, SPAN = 25, 2.5
-"""So many, up to so many standard deviations of steady motion off what is expected."""
+SPAN = 2.5
+"""Up to so many standard deviations of steady motion off what is expected,"""
+APART = 0.03
+"""at places so far apart (m): no wall's Gaussian is narrower."""
 RIVAL = 3.0
 """A scan is matched from another place as well whose objective is lower by so much."""
 TOLD = 0.04
 """m; a scan that tells the way along as well as that is believed."""
-LEAST_UNSTEADY, TIMES = 0.03, 3.0
+LEAST_UNSTEADY, TIMES = 0.03, 3.5
 """How far (m) a scan may be off steady motion at least, and how many times as far as scans usually are;"""
 UNSTEADY, LEARNED = 0.05, 0.02
 """which is so much (m) at first, and each scan that tells has such a share in it."""
@@ -54,13 +56,12 @@ def go_on(
         x, y = pose[0] - prior.mean[0], pose[1] - prior.mean[1]
         unsteady[0] += LEARNED * (0.5 * (x * x + y * y) - unsteady[0])
         return
-    places, values = np.empty(PLACES), np.empty(PLACES)
-    profile(grid, settings, points, prior, pose, along, places, values)
+    places, values = profile(grid, settings, points, prior, pose, along)
     best = np.argmin(values)
     if values[best] < found.values[k] - RIVAL:
         further = places[best] - ahead(pose, prior, along)
         _match_from(grid, settings, points, prior, further, along, found, k)
-    off, untold = ahead(pose, prior, along), max(variance(places, values) - TOLD**2, 0.0)
+    off, untold = ahead(pose, prior, along), max(told_within(places, values, prior) - TOLD**2, 0.0)
     if untold == 0.0:
         unsteady[0] += LEARNED * (off * off - unsteady[0])
     allowed = max(LEAST_UNSTEADY**2, TIMES**2 * unsteady[0])
@@ -93,36 +94,42 @@ def weakest_direction(hessian: Array, along: Array) -> float:
 
 @kernel
 def profile(
-    grid: Grid,
-    settings: Settings,
-    points: Array,
-    prior: Prior,
-    pose: Array,
-    along: Array,
-    places: Array,
-    values: Array,
-) -> None:
-    """Write the objective at PLACES of the line through `pose` (3,) that runs `along` (2,).
+    grid: Grid, settings: Settings, points: Array, prior: Prior, pose: Array, along: Array
+) -> tuple[Array, Array]:
+    """The objective on the line through `pose` (3,) that runs `along` (2,): places (n,) and its values (n,).
 
     The places are how far (m) they lie ahead of what the prior expects.
     """
     problem = PairProblem(grid, settings.half, begin(points), settings.scale, prior)
     out, gradient, hessian, there = np.empty(OUT), np.empty(3), np.empty((3, 3)), pose.copy()
-    widest, own = SPAN / np.sqrt(prior.information[0, 0]), ahead(pose, prior, along)
-    for at in range(PLACES):
-        places[at] = widest * (2 * at / (PLACES - 1) - 1)
+    own, farthest = ahead(pose, prior, along), int(np.ceil(SPAN / np.sqrt(prior.information[0, 0]) / APART))
+    places, values = np.empty(2 * farthest + 1), np.empty(2 * farthest + 1)
+    for at in range(len(places)):
+        places[at] = APART * (at - farthest)
         there[0] = pose[0] + (places[at] - own) * along[0]
         there[1] = pose[1] + (places[at] - own) * along[1]
         values[at] = objective(problem, there, 1.0, 0.0, out, gradient, hessian)
+    return places, values
 
 
 @kernel
-def variance(places: Array, values: Array) -> float:
-    """That of places which are as likely as exp(−value)."""
+def told_within(places: Array, values: Array, prior: Prior) -> float:
+    """The variance (m²) within which a scan itself tells its place, without what the prior has in it."""
+    expected = entropy_power(0.5 * prior.information[0, 0] * places * places)
+    told = 1 / max(entropy_power(values), 1e-12) - 1 / expected
+    return 1 / max(told, 1e-6)
+
+
+@kernel
+def entropy_power(values: Array) -> float:
+    """The variance (m²) of the Gaussian with the entropy of places APART, as likely as exp(−value).
+
+    That of a Gaussian is its variance; a little likelihood far away counts for little.
+    """
     weights = np.exp(values.min() - values)
-    total = weights.sum()
-    mean = (weights * places).sum() / total
-    return float((weights * (places - mean) ** 2).sum() / total)
+    weights /= weights.sum()
+    entropy = np.log(APART) - (weights * np.log(np.maximum(weights, 1e-300))).sum()
+    return float(np.exp(2 * entropy - 1) / (2 * np.pi))
 
 
 @kernel

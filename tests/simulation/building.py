@@ -159,11 +159,19 @@ def first(recording: Recording, scans: int) -> Recording:
     )
 
 
-def drive(place: Building, waypoints: Array, name: str, scans: int | None = None) -> Recording:
+def drive(
+    place: Building,
+    waypoints: Array,
+    name: str,
+    scans: int | None = None,
+    laser: Laser | None = None,
+    how: Drive | None = None,
+    seed: int = SEED,
+) -> Recording:
     """What a robot records on its way through a building; at most the first `scans`."""
-    how, laser = Drive(), Laser()
+    how, laser = how or Drive(), laser or Laser()
     truth = poses(waypoints, how)[:scans]
-    rng = np.random.Generator(np.random.PCG64(SEED))
+    rng = np.random.Generator(np.random.PCG64(seed))
     origins = compose(truth, np.array(laser.mount))
     cells = cells_of(place.world)
     readings = np.empty((len(truth), laser.beams))
