@@ -28,7 +28,7 @@ from nscan_cli.slam.going_on import (
 from nscan_cli.slam.options import TrackingOptions
 from nscan_cli.slam.scan_to_map import match_and_count
 from nscan_cli.slam.settings import Settings
-from tests.benchmarks.lasers import WAY, rms
+from tests.benchmarks.lasers import WAY, rms, turning
 from tests.ndt.rooms import room
 from tests.simulation.building import building, drive
 from tests.simulation.drive import Drive
@@ -181,7 +181,7 @@ def test_from_a_corridor_with_piers_into_a_bare_one(seed):
 LASERS = {
     "91 beams": (Laser(91, -np.pi / 2, np.radians(2), 20.0), Drive()),
     "noise of 5 cm": (Laser(noise=0.05), Drive()),
-    "3.5 m": (Laser(360, 0.0, np.radians(1), 3.5, noise=0.03, dropout=0.05), Drive(speed=0.22)),
+    "6 m": (turning(360, 6.0, 0.03, 0.05), Drive(period=0.18)),
 }
 
 
