@@ -21,6 +21,8 @@ FOOTER_MARGINS = (0.0, 0.0, 0.0, 44.0)
 """What `footer` needs."""
 GAP, BETWEEN = 8.0, 22.0
 """Units from a symbol to its meaning, and from there to the next symbol."""
+LEGIBLE = 0.1
+"""Text is shrunk to no less than such a share of its size, or left out."""
 RAMP_STEPS = 14
 
 
@@ -50,7 +52,10 @@ def caption(canvas: Canvas, title: str, entries: Sequence[Entry]) -> None:
     left, top, right, _bottom = canvas.plot
     # Beside "y (m)".
     start = left + 40 * canvas.unit
-    size = TEXT_SIZE * min(1.0, (right - start) / canvas.text_width(title))
+    shrunk = min(1.0, (right - start) / canvas.text_width(title))
+    if shrunk < LEGIBLE:
+        return
+    size = TEXT_SIZE * shrunk
     x = max(start, (left + right - canvas.text_width(title, size)) / 2)
     canvas.text((x, top - 16 * canvas.unit), title, "ls", size)
 
@@ -83,7 +88,8 @@ def legend(
 ) -> None:
     """Symbols and what they stand for in a line at y, between left and right, all in pixels.
 
-    Smaller where there is little room; `align` is the share of what is left of it that comes first.
+    Smaller where there is little room, and none where nobody could read it; `align` is the share of what is
+    left of it that comes first.
     """
     needed = sum(
         canvas.text_width(entry[2]) + (_symbol_width(entry) + GAP + BETWEEN) * canvas.unit
@@ -91,6 +97,8 @@ def legend(
     )
     needed -= BETWEEN * canvas.unit
     shrunk = min(1.0, (right - left) / max(needed, 1.0))
+    if shrunk < LEGIBLE:
+        return
     size, unit = TEXT_SIZE * shrunk, canvas.unit * shrunk
     x = left + align * (right - left - shrunk * needed)
     for entry in entries:

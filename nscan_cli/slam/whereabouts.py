@@ -47,6 +47,11 @@ class Known(NamedTuple):
         """
         if other == self.held:
             return self.reach()
+        if not np.isfinite(self.covariances[other]).all():
+            # Nothing is known from where nobody knows where it is, but of itself.
+            unknown = np.full_like(self.covariances, np.inf)
+            unknown[other] = 0.0
+            return _reach(unknown)
         with_other, row = np.zeros_like(self.covariances), int(np.searchsorted(self.free, other))
         for component in range(3):
             unit = np.zeros((len(self.free), 3))

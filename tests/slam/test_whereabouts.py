@@ -126,6 +126,17 @@ def test_from_any_keyframe_it_is_as_if_that_one_were_held(seed, held):
         np.testing.assert_allclose(found.angle, direct.angle, rtol=1e-8, atol=1e-12)
 
 
+def test_from_a_keyframe_that_nothing_holds_nothing_is_known_but_of_itself():
+    walked = walk(2, 12, loops=3)
+    asked = known(walked.energy(0), walked.poses)
+    asked.covariances[7] = np.inf
+    with np.errstate(all="raise"):
+        found = asked.seen_from(7)
+    assert (found.distance[7], found.angle[7]) == (0.0, 0.0)
+    assert np.isinf(np.delete(found.distance, 7)).all()
+    assert np.isinf(np.delete(found.angle, 7)).all()
+
+
 def test_what_was_asked_can_be_seen_from_another_keyframe():
     walked, whereabouts = walk(4, 9, loops=2), Whereabouts()
     whereabouts.ask(walked.energy(8), walked.poses)
