@@ -155,9 +155,12 @@ def _linked(head: dict[str, Any], code: bytes, name: str) -> Callable[..., Any] 
     """The function of loaded code; None where something that it calls is missing."""
     import llvmlite.binding as llvm
 
-    loader, dynfunc, alive, _ = engine()
+    target, dynfunc, alive, _ = engine()
     if any(llvm.address_of_symbol(needed) is None for needed in head["needs"]):
         return None
+    # One loader for each: functions inside of two kernels, compiled by two processes, can have the same name,
+    # and one loader for both would run the first of them in the other kernel, too.
+    loader = llvm.create_mcjit_compiler(llvm.parse_assembly(""), target.create_target_machine(jit=True))
     loader.add_object_file(llvm.ObjectFileRef.from_data(code))
     loader.finalize_object()
     environments = {}
@@ -177,7 +180,7 @@ def _linked(head: dict[str, Any], code: bytes, name: str) -> Callable[..., Any] 
 
 @functools.cache
 def engine() -> tuple[Any, Any, object, dict[object, Callable[..., Any]]]:
-    """LLVM's loader, which knows all that machine code calls; numba's maker of functions; those made."""
+    """LLVM's target, which knows all that machine code calls; numba's maker of functions; those made."""
     import llvmlite.binding as llvm
 
     llvm.initialize_native_target()
@@ -188,8 +191,7 @@ def engine() -> tuple[Any, Any, object, dict[object, Callable[..., Any]]]:
     for name, address in _symbols(dynfunc, helpers, runtime):
         llvm.add_symbol(name, address)
     llvm.add_symbol("numba_unpickle", ctypes.cast(unpickle, ctypes.c_void_p).value)
-    target = llvm.Target.from_default_triple().create_target_machine(jit=True)
-    return llvm.create_mcjit_compiler(llvm.parse_assembly(""), target), dynfunc, unpickle, {}
+    return llvm.Target.from_default_triple(), dynfunc, unpickle, {}
 
 
 def _symbols(dynfunc: Any, helpers: Any, runtime: Any) -> Iterator[tuple[str, int]]:
