@@ -156,11 +156,12 @@ def _linked(head: dict[str, Any], code: bytes, name: str) -> Callable[..., Any] 
     import llvmlite.binding as llvm
 
     target, dynfunc, alive, _ = engine()
+    # One loader for each: functions inside of two kernels, compiled by two processes, can have the same name,
+    # and one loader for both would run the first of them in the other kernel, too. The process's own symbols
+    # are found once there is a loader.
+    loader = llvm.create_mcjit_compiler(llvm.parse_assembly(""), target.create_target_machine(jit=True))
     if any(llvm.address_of_symbol(needed) is None for needed in head["needs"]):
         return None
-    # One loader for each: functions inside of two kernels, compiled by two processes, can have the same name,
-    # and one loader for both would run the first of them in the other kernel, too.
-    loader = llvm.create_mcjit_compiler(llvm.parse_assembly(""), target.create_target_machine(jit=True))
     loader.add_object_file(llvm.ObjectFileRef.from_data(code))
     loader.finalize_object()
     environments = {}
