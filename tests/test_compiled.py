@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 import itertools
 import json
+import math
 import os
 import subprocess
 import sys
@@ -93,20 +94,24 @@ RESULTS = [
 ]
 
 
-def report(folder: Path, begin: str = "", **settings: str) -> list[Any]:
-    """What a new process says of kernels that it compiles or loads, with all that is kept in the folder."""
-    (folder / "some_kernels.py").write_text(KERNELS)
+def process(folder: Path, code: str, **settings: str) -> bytes:
+    """What a new process prints, which has the folder's modules, and keeps what it compiles there."""
     kept = {name: value for name, value in os.environ.items() if not name.startswith(("NUMBA_", "XDG_"))}
     places = {
         "NUMBA_CACHE_DIR": str(folder / "cache"),
         "PYTHONPATH": os.pathsep.join([str(folder), str(PACKAGE.parent)]),
     }
     done = subprocess.run(
-        [sys.executable, "-c", begin + REPORT], env={**kept, **places, **settings}, capture_output=True,
-        check=True,
-    )  # fmt: skip
+        [sys.executable, "-c", code], env={**kept, **places, **settings}, capture_output=True, check=True
+    )
     assert not done.stderr
-    answer: list[Any] = json.loads(done.stdout)
+    return done.stdout
+
+
+def report(folder: Path, begin: str = "", **settings: str) -> list[Any]:
+    """What a new process says of kernels that it compiles or loads, with all that is kept in the folder."""
+    (folder / "some_kernels.py").write_text(KERNELS)
+    answer: list[Any] = json.loads(process(folder, begin + REPORT, **settings))
     return answer
 
 
@@ -200,6 +205,49 @@ def test_code_of_an_unknown_numba_is_left_to_its_own_cache(tmp_path):
     assert report(tmp_path, swapped)[1:] == [False, False, RESULTS, True]
     assert files(tmp_path, "nbc") == kept
     assert not files(tmp_path, "code")
+
+
+WAVES = """
+import math
+from nscan_cli.compiled import kernel, lean_kernel
+
+@lean_kernel
+def waves(x):
+    total = 0.0
+    for i in range(9):
+        total += {}
+    return total
+"""
+CALLER = """
+@kernel
+def {}(x):
+    return waves(x), waves(-x), waves(x + 1.0), waves(x - 1.0)
+"""
+
+
+def test_functions_of_the_same_name_in_two_kernels_stay_apart(tmp_path):
+    """numba tells functions apart by counting them, and counts anew in each process."""
+    kinds = {"odd": "math.sin", "even": "math.cos"}
+    modules = {
+        name: WAVES.format(" + ".join(f"{wave}({i}.0 * x + i)" for i in range(1, 30))) + CALLER.format(name)
+        for name, wave in kinds.items()
+    }
+    for name, module in modules.items():
+        # Each is compiled while the other is not there.
+        (tmp_path / "kinds_of_waves.py").write_text(module)
+        process(tmp_path, f"from kinds_of_waves import {name}; {name}(0.5)")
+    assert len(files(tmp_path, "code")) == 2
+    # Both, from what is kept: neither is compiled again.
+    (tmp_path / "kinds_of_waves.py").write_text(modules["odd"] + CALLER.format("even"))
+    both = "import json, sys; from kinds_of_waves import *; found = [odd(0.5), even(0.5)]\n"
+    said = "print(json.dumps([*found, 'numba' in sys.modules]))"
+    *found, imported = json.loads(process(tmp_path, both + said))
+    assert not imported
+    for wave, values in zip((math.sin, math.cos), found, strict=True):
+        wanted = [
+            sum(wave(j * x + i) for i in range(9) for j in range(1, 30)) for x in (0.5, -0.5, 1.5, -0.5)
+        ]
+        np.testing.assert_allclose(values, wanted, rtol=1e-9, atol=1e-9)
 
 
 COMMANDS = """
