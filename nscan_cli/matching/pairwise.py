@@ -20,6 +20,7 @@ from nscan_cli.matching.uncertainty import (
 )
 from nscan_cli.ndt.energy import OUT, inlier_share
 from nscan_cli.ndt.meeting import begin
+from nscan_cli.ndt.table import STRAIGHT
 from nscan_cli.ndt.transform import Ndt
 from nscan_cli.poses import Array, wrap
 
@@ -104,7 +105,7 @@ def matched_points(log: LaserLog, row: int, options: PairOptions) -> Array:
 def scan_ndt(points: Array, options: PairOptions) -> Ndt:
     """The NDT of one scan's points (m, 2), in the frame that they are given in."""
     ends, poses = np.array([0, len(points)]), np.zeros((1, 3))
-    return Ndt.of_scans(points, ends, poses, options.cell, options.minimum, options.floor, straight=True)
+    return Ndt.of_scans(points, ends, poses, options.cell, options.minimum, options.floor, around=STRAIGHT)
 
 
 def match_pair(

@@ -31,10 +31,6 @@ NOTHING = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 """The moments of no points."""
 ONE_SIDED = 0.2
 """A Gaussian shows one side when its beams run through it by so much of their length on average."""
-THIN = 10.0
-"""A Gaussian is a piece of wall when its larger eigenvalue is so many times the smaller one."""
-SAME_DIRECTION = 0.9
-"""Cosine of twice the angle by which the direction from a larger block may differ."""
 
 
 @lean_kernel
@@ -47,37 +43,19 @@ def make_gaussian(grid: Grid, row: int, half: float) -> None:
     if gaussian[7] > 0.0:
         grid.gaussians[other, 2] = 0.0
     gaussian[:] = 0.0
-    front, back = _faces(grid, row, half)
+    front, back = faces(grid, row, half)
     if front[0] > 0.0:
-        _shape(grid, key, front, _long_axis(front), half, gaussian)
+        shape(grid, key, front, long_axis_of(front), half, gaussian)
     if back[0] > 0.0:
         gaussian[7] = other
-        _shape(grid, key, back, _long_axis(back), half, grid.gaussians[other])
-
-
-@lean_kernel
-def straighten(grid: Grid, row: int, half: float) -> None:
-    """Let a piece of wall take its direction from the block of twice the size around it.
-
-    Where the points there lie as flat as its own. A direction that is off by the noise of its few points
-    tells a way along the wall that nobody knows, and eight times less from twice the length.
-    """
-    key, gaussian = grid.keys[row], grid.gaussians[row]
-    front, back = _faces(grid, row, half)
-    if front[0] > 0.0:
-        _shape(grid, key, front, _long_axis_around(grid, key, front, half), half, gaussian)
-    if back[0] > 0.0:
-        other = grid.gaussians[int(gaussian[7])]
-        _shape(grid, key, back, _long_axis_around(grid, key, back, half), half, other)
+        shape(grid, key, back, long_axis_of(back), half, grid.gaussians[other])
 
 
 @unfolded_kernel
-def _shape(
-    grid: Grid, key: int, moments: Moments, long_axis: Direction, half: float, gaussian: Array
-) -> None:
+def shape(grid: Grid, key: int, moments: Moments, long_axis: Direction, half: float, gaussian: Array) -> None:
     """Write the numbers of the Gaussian with some moments about the centre of the cell of `key`."""
     (_, mx, my, _, _, _, fx, fy), (c2, s2) = moments, long_axis
-    small, large = _eigenvalues(grid, moments)
+    small, large = eigenvalues(grid, moments)
     along = small * small / (large * large * large)
     mean, half_gap = 0.5 * (along + 1 / small), 0.5 * (along - 1 / small)
     ix, iy = unpack(key)
@@ -95,33 +73,16 @@ def _shape(
 
 
 @lean_kernel
-def _eigenvalues(grid: Grid, moments: Moments) -> tuple[float, float]:
+def eigenvalues(grid: Grid, moments: Moments) -> tuple[float, float]:
     """Of a covariance, the smaller one first; both at least the floor, it 0.001 of the larger ([19])."""
     _, _, _, xx, xy, yy, _, _ = moments
-    middle, radius, floor = 0.5 * (xx + yy), _radius(xx, xy, yy), grid.making[FLOOR]
+    middle, radius, floor = 0.5 * (xx + yy), radius_of(xx, xy, yy), grid.making[FLOOR]
     large = max(middle + radius, floor * floor)
     return max(middle - radius, floor * floor, 0.001 * large), large
 
 
-@lean_kernel
-def _long_axis_around(grid: Grid, key: int, moments: Moments, half: float) -> Direction:
-    """The direction of a piece of wall, from around it if possible; see straighten."""
-    long_axis = _long_axis(moments)
-    small, large = _eigenvalues(grid, moments)
-    if large <= THIN * small:
-        return long_axis
-    for around in (2, 1):
-        wide = _around(grid, key, around, half)
-        _, _, _, xx, xy, yy, _, _ = wide
-        c2, s2 = _long_axis(wide)
-        flat = 0.5 * (xx + yy) - _radius(xx, xy, yy) < small
-        if flat and c2 * long_axis[0] + s2 * long_axis[1] > SAME_DIRECTION:
-            return c2, s2
-    return long_axis
-
-
 @unfolded_kernel
-def _faces(grid: Grid, row: int, half: float) -> tuple[Moments, Moments]:
+def faces(grid: Grid, row: int, half: float) -> tuple[Moments, Moments]:
     """Of the points of the block of `row`, and of those that lie on another face of the wall there.
 
     Nothing where there are too few.
@@ -132,14 +93,14 @@ def _faces(grid: Grid, row: int, half: float) -> tuple[Moments, Moments]:
     if whole[0] < minimum:
         return NOTHING, NOTHING
     if not has_faces or not _are_two(grid, cells, normal):
-        return _divided(whole), NOTHING
+        return divided(whole), NOTHING
     nx, ny = normal
     before, behind = _face(grid, cells, half, -nx, -ny), _face(grid, cells, half, nx, ny)
     if min(before[0], behind[0]) >= minimum:
-        return _divided(before), _divided(behind)
+        return divided(before), divided(behind)
     if max(before[0], behind[0]) >= minimum:
         whole = before if before[0] >= minimum else behind
-    return _divided(whole), NOTHING
+    return divided(whole), NOTHING
 
 
 @lean_kernel
@@ -154,7 +115,7 @@ def _block(grid: Grid, cells: Cells, half: float) -> tuple[Moments, tuple[float,
         for side in range(2 if cells[at] >= 0 else 0):
             part = grid.sums[cells[at], side]
             if part[0] > 0.0:
-                sums = _plus(sums, part, (at % 2) * half, (at // 2) * half)
+                sums = plus(sums, part, (at % 2) * half, (at // 2) * half)
                 per_point = 1.0 / part[0]
                 xx += part[3] - part[1] * part[1] * per_point
                 xy += part[4] - part[1] * part[2] * per_point
@@ -187,7 +148,7 @@ def _face(grid: Grid, cells: Cells, half: float, nx: float, ny: float) -> Moment
         for side in range(2 if cells[at] >= 0 else 0):
             part = grid.sums[cells[at], side]
             if part[0] > 0.0 and part[6] * nx + part[7] * ny >= 0.0:
-                sums = _plus(sums, part, (at % 2) * half, (at // 2) * half)
+                sums = plus(sums, part, (at % 2) * half, (at // 2) * half)
     return sums
 
 
@@ -203,19 +164,7 @@ def _cells(grid: Grid, key: int, row: int) -> Cells:
 
 
 @lean_kernel
-def _around(grid: Grid, key: int, around: int, half: float) -> Moments:
-    """Of a block and so many lattice cells around it, from the centre of the cell of `key`."""
-    sums = NOTHING
-    for oy in range(-around, 2 + around):
-        for ox in range(-around, 2 + around):
-            cell = find_row(grid, key + ox * 2 * HALF_KEY + oy)
-            for side in range(2 if cell >= 0 else 0):
-                sums = _plus(sums, grid.sums[cell, side], ox * half, oy * half)
-    return _divided(sums)
-
-
-@lean_kernel
-def _plus(sums: Moments, part: Array, dx: float, dy: float) -> Moments:
+def plus(sums: Moments, part: Array, dx: float, dy: float) -> Moments:
     """The sums with a part, whose cell's centre is (dx, dy) off the point that they are about."""
     n, sx, sy, sxx, sxy, syy, fx, fy = sums
     return (
@@ -231,7 +180,7 @@ def _plus(sums: Moments, part: Array, dx: float, dy: float) -> Moments:
 
 
 @lean_kernel
-def _divided(sums: Moments) -> Moments:
+def divided(sums: Moments) -> Moments:
     """The moments of which these are the sums."""
     n, sx, sy, sxx, sxy, syy, fx, fy = sums
     if n == 0.0:
@@ -241,7 +190,7 @@ def _divided(sums: Moments) -> Moments:
 
 
 @lean_kernel
-def _long_axis(moments: Moments) -> Direction:
+def long_axis_of(moments: Moments) -> Direction:
     """That of the moments."""
     _, _, _, xx, xy, yy, _, _ = moments
     return _doubled(xx, xy, yy)
@@ -250,14 +199,14 @@ def _long_axis(moments: Moments) -> Direction:
 @lean_kernel
 def _doubled(xx: float, xy: float, yy: float) -> Direction:
     """That of a covariance."""
-    radius = _radius(xx, xy, yy)
+    radius = radius_of(xx, xy, yy)
     if radius > 0.0:
         return 0.5 * (xx - yy) / radius, xy / radius
     return 1.0, 0.0
 
 
 @lean_kernel
-def _radius(xx: float, xy: float, yy: float) -> float:
+def radius_of(xx: float, xy: float, yy: float) -> float:
     """Half of what the eigenvalues of a covariance differ by."""
     return float(np.sqrt(0.25 * (xx - yy) * (xx - yy) + xy * xy))
 

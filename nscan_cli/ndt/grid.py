@@ -14,8 +14,20 @@ from numpy.typing import NDArray
 
 from nscan_cli.assign import assign, assign_rows
 from nscan_cli.compiled import kernel, lean_kernel
-from nscan_cli.ndt.gaussians import make_gaussian, straighten
-from nscan_cli.ndt.table import OUTDATED, STRAIGHT, Grid, empty_grid, find_row, insert, pack, unpack
+from nscan_cli.ndt.gaussians import make_gaussian
+from nscan_cli.ndt.surroundings import let_go_along, straighten
+from nscan_cli.ndt.table import (
+    AROUND,
+    OPEN,
+    OUTDATED,
+    STRAIGHT,
+    Grid,
+    empty_grid,
+    find_row,
+    insert,
+    pack,
+    unpack,
+)
 from nscan_cli.ndt.tangent import tangent
 from nscan_cli.poses import Array
 
@@ -82,9 +94,12 @@ def make_gaussians(grid: Grid, rows: int, touched: NDArray[np.int32], half: floa
                 made[row] = True
                 make_gaussian(grid, row, half)
     # On its own: what is done for few scans would slow down what is done for all.
-    for row in range(rows if grid.making[STRAIGHT] > 0.0 else 0):
+    for row in range(rows if grid.making[AROUND] == STRAIGHT else 0):
         if made[row]:
             straighten(grid, row, half)
+    for row in range(rows if grid.making[AROUND] == OPEN else 0):
+        if made[row]:
+            let_go_along(grid, row, half)
 
 
 @kernel
@@ -99,7 +114,7 @@ def change(
 ) -> int:
     """Both: the sums, and the Gaussians made of them; when they are met first, if not `at_once`.
 
-    Those that are made later are not straightened.
+    Those that are made later do not know their surroundings.
     """
     touched = np.empty(points.shape[0], dtype=np.int32)
     rows = add_points(grid, rows, half, points, pose, sign, touched)

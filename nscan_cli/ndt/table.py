@@ -17,9 +17,12 @@ OUTDATED = -1.0
 so; before anything else looks Gaussians up, `Ndt.make` has to make them all."""
 
 
-MINIMUM, FLOOR, STRAIGHT, FACES = 0, 1, 2, 3
-"""How Gaussians are made: of at least so many points, with at least this standard deviation (m), and whether
-they are straight and have faces (0 or 1); see gaussians.py."""
+MINIMUM, FLOOR, AROUND, FACES = 0, 1, 2, 3
+"""How Gaussians are made: of at least so many points, with at least this standard deviation (m), what their
+surroundings tell of them, and whether they have faces (0 or 1); see gaussians.py."""
+ALONE, STRAIGHT, OPEN = 0, 1, 2
+"""What surroundings tell: nothing; the direction of a piece of wall; where it ends, and holds nothing along
+itself; see surroundings.py."""
 
 
 class Grid(NamedTuple):
@@ -47,7 +50,7 @@ class Grid(NamedTuple):
     face that it shows, 0 where it was seen from both sides; and the row of the one that shows the other
     face, or 0."""
     making: Array
-    """(4,) MINIMUM, FLOOR, STRAIGHT and FACES; (0,) in a compact one."""
+    """(4,) MINIMUM, FLOOR, AROUND and FACES; (0,) in a compact one."""
 
 
 @lean_kernel

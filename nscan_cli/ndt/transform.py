@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from nscan_cli.compiled import kernel
 from nscan_cli.ndt.compact import compacted
 from nscan_cli.ndt.grid import change, gathered, make_all, with_room
-from nscan_cli.ndt.table import FACES, FLOOR, MINIMUM, STRAIGHT, Grid, empty_grid
+from nscan_cli.ndt.table import ALONE, AROUND, FACES, FLOOR, MINIMUM, Grid, empty_grid
 from nscan_cli.poses import Array
 
 LEAST_CAPACITY = 512
@@ -43,16 +43,16 @@ class Ndt:
         minimum: int = 3,
         floor: float = 0.02,
         capacity: int = LEAST_CAPACITY,
-        straight: bool = False,
+        around: int = ALONE,
         faces: bool = True,
     ) -> Ndt:
         """One that grows and shrinks by scans.
 
         `minimum` is the least number of points that make a Gaussian, `floor` its least standard deviation
-        (m). With `straight` it is straightened, with `faces` there are two where a wall has two faces; see
-        gaussians.py.
+        (m). `around` says what its surroundings tell of it: ALONE, STRAIGHT or OPEN. With `faces` there are
+        two where a wall has two faces; see gaussians.py.
         """
-        return cls(cell, empty_grid(capacity, _making(minimum, floor, straight, faces)), 0)
+        return cls(cell, empty_grid(capacity, _making(minimum, floor, around, faces)), 0)
 
     @classmethod
     def of_scans(
@@ -64,14 +64,14 @@ class Ndt:
         minimum: int,
         floor: float,
         capacity: int = LEAST_CAPACITY,
-        straight: bool = False,
+        around: int = ALONE,
     ) -> Ndt:
         """That of n scans, moved by `poses` (n, 3), with nothing in it but what matching needs.
 
         Scan k has points[ends[k] : ends[k + 1]]. Nothing can be added any more. Other arguments as for
         `empty`.
         """
-        making = _making(minimum, floor, straight, faces=True)
+        making = _making(minimum, floor, around, faces=True)
         grid = _compact_grid(points, ends, poses, 0.5 * cell, capacity, making)
         return cls(cell, grid, len(grid.keys))
 
@@ -105,7 +105,7 @@ class Ndt:
         return int(np.count_nonzero(self.grid.gaussians[:, 2]))
 
 
-def _making(minimum: int, floor: float, straight: bool, faces: bool) -> Array:
+def _making(minimum: int, floor: float, around: int, faces: bool) -> Array:
     making = np.empty(4)
-    making[[MINIMUM, FLOOR, STRAIGHT, FACES]] = minimum, floor, straight, faces
+    making[[MINIMUM, FLOOR, AROUND, FACES]] = minimum, floor, around, faces
     return making

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from nscan_cli.compiled import kernel
 from nscan_cli.graph.model import Pairwise
 from nscan_cli.matching.planar import wrapped
+from nscan_cli.ndt.table import OPEN
 from nscan_cli.ndt.transform import Ndt
 from nscan_cli.poses import Array, Indices, compose, relative
 from nscan_cli.slam.found import Found, Tracked
@@ -71,7 +72,7 @@ class Keyframe:
             points, sizes, poses = (np.concatenate(columns) for columns in zip(*around, strict=True))
             ends = np.append(0, np.cumsum(sizes))
             poses, own, room = relative(poses, self.tracked.pose), self.gaussians, ROOM * len(self.points)
-            ndt = Ndt.of_scans(points, ends, poses, own.cell, own.minimum, own.floor, room)
+            ndt = Ndt.of_scans(points, ends, poses, own.cell, own.minimum, own.floor, room, OPEN)
             # In this order: another thread that makes it too has what it needs.
             self._ndt, self.around = ndt, []
         return self._ndt

@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 
 from nscan_cli.graph.model import Pairwise
 from nscan_cli.ndt.energy import energy
+from nscan_cli.ndt.table import OPEN
 from nscan_cli.ndt.transform import Ndt
 from nscan_cli.poses import Array, compose, relative, rotated_information
 from nscan_cli.slam.found import Tracked
@@ -85,9 +86,11 @@ def test_the_same_scans_become_keyframes_however_many_are_taken_in_at_a_time(siz
 
 def expected(keyframe: Array, *scans: tuple[int, Array]) -> Ndt:
     """The NDT of the scans (seed, pose) seen from a keyframe's pose."""
-    ndt = Ndt.empty(GAUSSIANS.cell, GAUSSIANS.minimum, GAUSSIANS.floor)
+    ndt = Ndt.empty(GAUSSIANS.cell, GAUSSIANS.minimum, GAUSSIANS.floor, around=OPEN)
     for seed, pose in scans:
         ndt.add(room(seed), relative(pose, keyframe))
+    # What was made before the last scan came does not know all its surroundings.
+    ndt.make()
     return ndt
 
 
