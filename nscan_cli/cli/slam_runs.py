@@ -96,7 +96,28 @@ def _graph_rows(graph: Graph) -> list[Row]:
             [f"{tried} tried, {counts.accepted} accepted, {refused} refused" if tried else "none tried"],
         ),
         ("refused", [f"{count}: {reason}" for reason, count in reasons.most_common()]),
+        ("sigma", _sureness(graph)),
     ]
+
+
+def _sureness(graph: Graph) -> list[str]:
+    """How well the graph knows where its keyframes are, in the direction of which it knows least."""
+    import numpy as np
+
+    first = int(graph.keyframes[0])
+    known = {keyframe: covariance for keyframe, covariance in graph.marginals.items() if keyframe != first}
+    unknown, lines = len(graph.keyframes) - 1 - len(known), []
+    if known:
+        positions = np.stack([covariance[:2, :2] for covariance in known.values()])
+        sigmas = np.sqrt(np.maximum(np.linalg.eigvalsh(positions)[:, 1], 0.0))
+        worst = graph.scans[list(known)[int(np.argmax(sigmas))]]
+        lines.append(
+            f"{np.median(sigmas):.2g} m in the median, {sigmas.max():.2g} m at scan {worst}, "
+            f"from scan {graph.scans[first]}"
+        )
+    if unknown:
+        lines.append(f"not known of {counted(unknown, 'keyframe')}")
+    return lines
 
 
 def without_numbers(reason: str) -> str:

@@ -1,4 +1,4 @@
-"""Which relations contradict all others, by graduated non-convexity.
+"""Which relations contradict all others, and a way out of a local minimum, by graduated non-convexity.
 
 Yang, Antonante, Tzoumas, Carlone, "Graduated Non-Convexity for Robust Spatial Perception", RA-L 2020: a
 relation that may be wrong counts by the kernel of Geman and McClure, which begins so wide that the energy is
@@ -23,6 +23,10 @@ STEPS = 5
 """Newton steps at each width."""
 LEAST_WEIGHT = 0.25
 """What a relation at the bound weighs."""
+FITS = 7.8
+"""χ² of three degrees of freedom: its 95 % quantile. In a graph that is folded wrong some have more."""
+EASED_NARROWING, EASED_STEPS = 1.2, 10
+"""On the way out of a fold, where all relations are doubted."""
 
 
 def contradicting(energy: GraphEnergy, poses: Array, doubted: NDArray[np.bool_]) -> NDArray[np.bool_]:
@@ -31,18 +35,38 @@ def contradicting(energy: GraphEnergy, poses: Array, doubted: NDArray[np.bool_])
     The relations are in the energy's order. Nothing is done when all are within the bound already. A
     relation of n scans is judged by its χ² for 3 (n − 1) degrees of freedom, by three.
     """
-    chi2 = chi2_by_three(energy, poses)
-    narrow = float(chi2[doubted].max(initial=0.0)) / BOUND
-    if narrow <= 1.0:
-        return np.zeros(len(doubted), dtype=np.bool_)
-    weights = np.ones(len(doubted))
-    while narrow > 1.0:
-        narrow = max(narrow / NARROWING, 1.0)
-        weights[doubted] = (narrow * BOUND / (narrow * BOUND + chi2[doubted])) ** 2
-        weighted = energy.weighted(weights)
-        poses = optimise(weighted, poses, STEPS, 1e-4).poses
-        chi2 = chi2_by_three(energy, poses)
+    weights, _ = _graduated(energy, poses, doubted, BOUND, NARROWING, STEPS)
     return doubted & (weights < LEAST_WEIGHT)
+
+
+def eased(energy: GraphEnergy, poses: Array) -> Array | None:
+    """Another start (K, 3) where a graph at `poses` (K, 3) may be folded wrong; None where all relations fit.
+
+    In a local minimum most relations bend a little, and a few a lot. Here those that fit least lose their
+    say, so that the others unbend; poses that all relations agree on are found again from there.
+    """
+    all_of_them = np.ones(len(energy.columns.fixed), dtype=np.bool_)
+    weights, eased_poses = _graduated(energy, poses, all_of_them, FITS, EASED_NARROWING, EASED_STEPS)
+    return None if (weights == 1.0).all() else eased_poses
+
+
+def _graduated(
+    energy: GraphEnergy,
+    poses: Array,
+    doubted: NDArray[np.bool_],
+    bound: float,
+    narrowing: float,
+    steps: int,
+) -> tuple[Array, Array]:
+    """The weights (R,) of the relations when the kernel has narrowed to the bound, and the poses (K, 3)."""
+    weights, chi2 = np.ones(len(doubted)), chi2_by_three(energy, poses)
+    narrow = float(chi2[doubted].max(initial=0.0)) / bound
+    while narrow > 1.0:
+        narrow = max(narrow / narrowing, 1.0)
+        weights[doubted] = (narrow * bound / (narrow * bound + chi2[doubted])) ** 2
+        poses = optimise(energy.weighted(weights), poses, steps, 1e-4).poses
+        chi2 = chi2_by_three(energy, poses)
+    return weights, poses
 
 
 def chi2_by_three(energy: GraphEnergy, poses: Array) -> Array:

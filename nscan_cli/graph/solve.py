@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,11 +11,16 @@ from nscan_cli.graph.initialise import chordal_start
 from nscan_cli.graph.model import Graph
 from nscan_cli.graph.optimise import Optimum, optimise
 from nscan_cli.graph.relation import Relation
+from nscan_cli.graph.robust import eased
 from nscan_cli.graph.system import GraphEnergy
-from nscan_cli.poses import Indices
+from nscan_cli.poses import Array, Indices
 
 TRIAL = 100
 """Iterations after which two starts are compared; only the better one goes on."""
+UNFOLDINGS = 5
+"""How often a start is looked for from where a graph may be folded wrong, as long as each leads lower."""
+ROUNDING = 1e-9
+"""Relative; energies that differ by less are the same."""
 
 
 @dataclass(frozen=True)
@@ -46,9 +52,8 @@ class Component:
 def optimise_graph(graph: Graph, max_iterations: int = 1000, tolerance: float = 1e-6) -> GraphOptimum:
     """Move the keyframes to the minimum of the graph's energy, and the attached nodes with them.
 
-    Starts once from the given poses and once from the chordal start, and keeps the lower minimum. The
-    first keyframe of each component stays. Marginals in the graph belonged to the poses before: they
-    are removed.
+    The lowest minimum of several starts is kept. The first keyframe of each component stays. Marginals in
+    the graph belonged to the poses before: they are removed.
     """
     total, iterations, converged = 0.0, 0, True
     parts = components(graph)
@@ -56,24 +61,42 @@ def optimise_graph(graph: Graph, max_iterations: int = 1000, tolerance: float = 
     for part in parts:
         if len(part.keyframes) == 1:
             continue
-        energy = part.energy(len(graph))
-        given = poses[part.keyframes]
-        best: Optimum | None = None
-        for start in (given, chordal_start(energy, given)):
-            found = optimise(energy, start, min(TRIAL, max_iterations), tolerance)
-            iterations += found.iterations
-            if best is None or not best.energy <= found.energy * (1 + 1e-9):
-                best = found
-        assert best is not None
-        if not best.converged:
-            best = optimise(energy, best.poses, max_iterations, tolerance)
-            iterations += best.iterations
-        poses[part.keyframes] = best.poses
-        total += best.energy
-        converged &= best.converged
+        lowest = _lowest(part.energy(len(graph)), poses[part.keyframes], max_iterations, tolerance)
+        poses[part.keyframes] = lowest.poses
+        total += lowest.energy
+        iterations += lowest.iterations
+        converged &= lowest.converged
     graph.move_keyframes(graph.keyframes, poses[graph.keyframes])
     graph.marginals = {}
     return GraphOptimum(total, iterations, converged, len(parts))
+
+
+def _lowest(energy: GraphEnergy, given: Array, max_iterations: int, tolerance: float) -> Optimum:
+    """The lowest minimum: from the poses given (K, 3), from the chordal start, and from where that is eased.
+
+    The iterations are those of all.
+    """
+    iterations = 0
+    best: Optimum | None = None
+    for start in (given, chordal_start(energy, given)):
+        found = optimise(energy, start, min(TRIAL, max_iterations), tolerance)
+        iterations += found.iterations
+        if best is None or not best.energy <= found.energy * (1 + ROUNDING):
+            best = found
+    assert best is not None
+    if not best.converged:
+        best = optimise(energy, best.poses, max_iterations, tolerance)
+        iterations += best.iterations
+    for _ in range(UNFOLDINGS):
+        unbent = eased(energy, best.poses)
+        if unbent is None:
+            break
+        found = optimise(energy, unbent, max_iterations, tolerance)
+        iterations += found.iterations
+        if not found.energy < best.energy * (1 - ROUNDING):
+            break
+        best = found
+    return dataclasses.replace(best, iterations=iterations)
 
 
 def components(graph: Graph) -> list[Component]:

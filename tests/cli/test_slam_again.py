@@ -137,3 +137,24 @@ def test_the_same_bytes_every_time(folder):
     for name in ("a.json", "b.json"):
         assert run(["slam", "--from", "graph.json", str(SAMPLE), "-o", name, "-q"]) == 0
     assert (folder / "a.json").read_bytes() == (folder / "b.json").read_bytes()
+
+
+def test_how_sure_the_keyframes_are_is_said(folder, capsys):
+    """Three in a row, 1 m apart: across, the variances of both steps add up, and that of the first turn.
+
+    √0.04 and √(0.04 + 0.04 + 1/400) are 0.2 and 0.287; of the fourth nobody knows.
+    """
+    (folder / "row.g2o").write_text(
+        "".join(f"VERTEX_SE2 {k} {k} 0 0\n" for k in range(4))
+        + "".join(f"EDGE_SE2 {k} {k + 1} 1 0 0 100 0 0 25 0 400\n" for k in range(2))
+    )
+    assert run(["slam", "--from", "row.g2o", "-o", "row.json"]) == 0
+    said = capsys.readouterr().err
+    assert "sigma      0.24 m in the median, 0.29 m at scan 2, from scan 0\n" in said
+    assert "           not known of 1 keyframe\n" in said
+
+
+def test_a_single_keyframe_is_where_it_is(folder, capsys):
+    (folder / "one.g2o").write_text("VERTEX_SE2 0 0 0 0\n")
+    assert run(["slam", "--from", "one.g2o", "-o", "one.json"]) == 0
+    assert "sigma" not in capsys.readouterr().err

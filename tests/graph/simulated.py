@@ -133,3 +133,31 @@ def dense_matrix(energy: GraphEnergy, blocks: Array) -> Array:
             matrix[b, :, a, :] = blocks[block].T
             matrix[a, :, b, :] = blocks[block]
     return matrix.reshape(3 * nodes, 3 * nodes)
+
+
+def streets(count: int, loops: int, turn_noise: float, seed: int) -> tuple[Array, list[Pairwise]]:
+    """A walk (count, 3) through the streets of a town, 1 m a step, and what is measured on the way.
+
+    At every fifth step it may turn. `loops` relations lead to places next to it that it came by before;
+    noise is 0.1 m, and `turn_noise` (rad) of every turn.
+    """
+    rng = np.random.default_rng(seed)
+    half, poses = 0.3 * np.sqrt(count), [np.zeros(3)]
+    while len(poses) < count:
+        turn = rng.choice([-1, 0, 1]) if len(poses) % 5 == 0 else 0
+        ahead = compose(poses[-1], np.array([1.0, 0.0, turn * np.pi / 2]))
+        inside = np.abs(ahead[:2]).max() <= half
+        poses.append(ahead if inside else compose(poses[-1], np.array([0.0, 0.0, np.pi / 2])))
+    truth = np.array(poses)
+    away = np.abs(truth[:, None, :2] - truth[None, :, :2]).max(axis=2)
+    again = np.argwhere((away < 1.5) & (np.arange(count)[:, None] - np.arange(count) > 10))[:, ::-1]
+    edges = [(k, k + 1) for k in range(count - 1)]
+    edges += [(int(a), int(b)) for a, b in rng.permutation(again)[:loops]]
+    sigma = np.array([0.1, 0.1, turn_noise])
+    relations = [
+        Pairwise(
+            (a, b), relative(truth[b], truth[a]) + sigma * rng.normal(size=3), np.diag(sigma**-2), "loop"
+        )
+        for a, b in edges
+    ]
+    return truth, relations

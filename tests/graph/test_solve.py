@@ -6,11 +6,13 @@ import numpy as np
 import pytest
 
 from nscan_cli.graph.g2o import read_g2o
+from nscan_cli.graph.initialise import chordal_start
 from nscan_cli.graph.model import Graph
+from nscan_cli.graph.optimise import optimise
 from nscan_cli.graph.solve import components, optimise_graph
 from nscan_cli.poses import compose, relative
 from tests.data import data_file
-from tests.graph.simulated import disturbed, energy_of, graph_of, mixed_ring
+from tests.graph.simulated import disturbed, energy_of, graph_of, mixed_ring, streets
 
 
 @pytest.mark.logs
@@ -98,6 +100,21 @@ def test_wild_poses_do_not_matter():
     near, far = graph_of(truth, pairwise, nscan), graph_of(disturbed(truth, 30.0), pairwise, nscan)
     assert optimise_graph(far).energy == pytest.approx(optimise_graph(near).energy, rel=1e-9)
     np.testing.assert_allclose(relative(far.poses, near.poses), 0, atol=1e-5)
+
+
+@pytest.mark.parametrize(("count", "turn_noise", "seed"), [(600, 0.3, 5), (1000, 0.35, 3), (1000, 0.35, 4)])
+def test_a_town_that_the_chordal_start_folds_wrong_is_unfolded(count, turn_noise, seed):
+    """As low as from the true poses; the minimum next to the chordal start is a tenth above that."""
+    truth, pairwise = streets(count, 300, turn_noise, seed)
+    energy = energy_of(truth, pairwise, [])
+    lowest = optimise(energy, truth, max_iterations=1000).energy
+    given = [truth[0]]
+    for relation in pairwise[: count - 1]:
+        given.append(compose(given[-1], relation.measurement))
+    assert optimise(energy, chordal_start(energy, np.array(given))).energy > 1.1 * lowest
+    result = optimise_graph(graph_of(np.array(given), pairwise, []))
+    assert result.converged
+    assert result.energy == pytest.approx(lowest, rel=1e-9)
 
 
 def test_a_graph_of_one_keyframe_without_relations_stays():
