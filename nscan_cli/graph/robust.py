@@ -14,17 +14,17 @@ from nscan_cli.graph.optimise import optimise
 from nscan_cli.graph.system import GraphEnergy
 from nscan_cli.poses import Array
 
-BOUND = 50.0
-"""χ² of three degrees of freedom: three times the 99.9 % quantile, for relations that share scans are not
-as independent as they would have to be."""
+RARE, USUAL = 3.09, 1.645
+"""Standard deviations of a normal number: its 99.9 % and 95 % quantiles, which those of χ² are made of."""
+BOUND = 3.0
+"""Relations contradict the others beyond so many times the 99.9 % quantile of their χ²: those that share
+scans are not as independent as they would have to be."""
 NARROWING = 1.4
 """Factor from one width of the kernel to the next."""
 STEPS = 5
 """Newton steps at each width."""
 LEAST_WEIGHT = 0.25
 """What a relation at the bound weighs."""
-FITS = 7.8
-"""χ² of three degrees of freedom: its 95 % quantile. In a graph that is folded wrong some have more."""
 EASED_NARROWING, EASED_STEPS = 1.2, 10
 """On the way out of a fold, where all relations are doubted."""
 
@@ -32,10 +32,11 @@ EASED_NARROWING, EASED_STEPS = 1.2, 10
 def contradicting(energy: GraphEnergy, poses: Array, doubted: NDArray[np.bool_]) -> NDArray[np.bool_]:
     """Which of the doubted relations (R,) contradict the others; `poses` (K, 3) are at the energy's optimum.
 
-    The relations are in the energy's order. Nothing is done when all are within the bound already. A
-    relation of n scans is judged by its χ² for 3 (n − 1) degrees of freedom, by three.
+    The relations are in the energy's order. Nothing is done when all are within the bound already. Of one of
+    n scans χ² has 3 (n − 1) degrees of freedom.
     """
-    weights, _ = _graduated(energy, poses, doubted, BOUND, NARROWING, STEPS)
+    bounds = BOUND * chi2_quantiles(energy, RARE)
+    weights, _ = _graduated(energy, poses, doubted, bounds, NARROWING, STEPS)
     return doubted & (weights < LEAST_WEIGHT)
 
 
@@ -43,10 +44,13 @@ def eased(energy: GraphEnergy, poses: Array) -> Array | None:
     """Another start (K, 3) where a graph at `poses` (K, 3) may be folded wrong; None where all relations fit.
 
     In a local minimum most relations bend a little, and a few a lot. Here those that fit least lose their
-    say, so that the others unbend; poses that all relations agree on are found again from there.
+    say, so that the others unbend; poses that all relations agree on are found again from there. All fit
+    where the χ² of each is below its 95 % quantile.
     """
     all_of_them = np.ones(len(energy.columns.fixed), dtype=np.bool_)
-    weights, eased_poses = _graduated(energy, poses, all_of_them, FITS, EASED_NARROWING, EASED_STEPS)
+    weights, eased_poses = _graduated(
+        energy, poses, all_of_them, chi2_quantiles(energy, USUAL), EASED_NARROWING, EASED_STEPS
+    )
     return None if (weights == 1.0).all() else eased_poses
 
 
@@ -54,19 +58,31 @@ def _graduated(
     energy: GraphEnergy,
     poses: Array,
     doubted: NDArray[np.bool_],
-    bound: float,
+    bounds: Array,
     narrowing: float,
     steps: int,
 ) -> tuple[Array, Array]:
-    """The weights (R,) of the relations when the kernel has narrowed to the bound, and the poses (K, 3)."""
-    weights, chi2 = np.ones(len(doubted)), chi2_by_three(energy, poses)
-    narrow = float(chi2[doubted].max(initial=0.0)) / bound
+    """The weights (R,) of the relations, and poses (K, 3), when the kernel has narrowed to bounds (R,)."""
+    weights, excess = np.ones(len(doubted)), energy.terms(poses) / bounds
+    narrow = float(excess[doubted].max(initial=0.0))
     while narrow > 1.0:
         narrow = max(narrow / narrowing, 1.0)
-        weights[doubted] = (narrow * bound / (narrow * bound + chi2[doubted])) ** 2
+        weights[doubted] = (narrow / (narrow + excess[doubted])) ** 2
         poses = optimise(energy.weighted(weights), poses, steps, 1e-4).poses
-        chi2 = chi2_by_three(energy, poses)
+        excess = energy.terms(poses) / bounds
     return weights, poses
+
+
+def chi2_quantiles(energy: GraphEnergy, deviations: float) -> Array:
+    """(R,) the quantile of every relation's χ² that is so many standard deviations of a normal number.
+
+    By E. B. Wilson, M. M. Hilferty, "The Distribution of Chi-Square", 1931: within 2 % for three degrees of
+    freedom, and closer for more.
+    """
+    freedom = 3.0 * (np.diff(energy.columns.starts) - 1)
+    spread = 2 / (9 * freedom)
+    quantiles: Array = freedom * (1 - spread + deviations * np.sqrt(spread)) ** 3
+    return quantiles
 
 
 def chi2_by_three(energy: GraphEnergy, poses: Array) -> Array:

@@ -6,10 +6,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.stats import chi2
 
 from nscan_cli.graph.model import NScan, Pairwise
 from nscan_cli.graph.optimise import optimise
-from nscan_cli.graph.robust import BOUND, chi2_by_three, contradicting
+from nscan_cli.graph.robust import BOUND, RARE, USUAL, chi2_by_three, chi2_quantiles, contradicting, eased
 from nscan_cli.poses import relative
 from tests.graph.simulated import (
     energy_of,
@@ -72,11 +73,49 @@ def test_a_wrong_joint_relation_is_found():
     assert np.flatnonzero(contradicting(energy, poses, doubted)).tolist() == [len(doubted) - 1]
 
 
+def test_a_visit_that_is_off_as_a_whole_shows_in_a_relation_of_many_scans():
+    """Six scans, three of either visit, and one of the visits is off by as much as makes a χ² of 200.
+
+    For 15 degrees of freedom that is five times the 99.9 % quantile, 37.7. Divided by five, as if each scan
+    had been off by itself, it would be 40, and within three times the 16.3 of three degrees.
+    """
+    truth = ring(COUNT)
+    rng = np.random.default_rng(5)
+    members = (2, 3, 4, 32, 33, 34)
+    right = [nscan_relation(truth, (a, a + 1, a + 30, a + 31), rng) for a in (0, 6, 12, 18, 24)]
+    joint = nscan_relation(truth, members, rng)
+    shift = np.zeros((6, 3))
+    shift[3:, 0] = 1.0
+    shift *= np.sqrt(200 / (shift.ravel() @ joint.hessian @ shift.ravel()))
+    wrong = replace(joint, poses=joint.poses + shift)
+    chain = pairwise_relations(truth, ring_edges(COUNT)[:-1], rng)
+    energy = energy_of(truth, chain, [*right, wrong])
+    doubted = np.array([False] * len(chain) + [True] * 6)
+    assert energy.terms(truth)[-1] == pytest.approx(200, rel=1e-6)
+    weighed = energy.weighted(np.where(np.arange(len(doubted)) < len(doubted) - 1, 100.0, 1.0))
+    assert np.flatnonzero(contradicting(weighed, truth, doubted)).tolist() == [len(doubted) - 1]
+
+
+def test_quantiles_are_those_of_chi2():
+    truth, pairwise, nscan = mixed_ring(12, noise=1.0)
+    energy = energy_of(truth, pairwise, nscan)
+    freedom = 3 * (np.array([2] * len(pairwise) + [len(relation.nodes) for relation in nscan]) - 1)
+    assert len(set(freedom)) > 1
+    for deviations, share in ((RARE, 0.999), (USUAL, 0.95)):
+        np.testing.assert_allclose(chi2_quantiles(energy, deviations), chi2.ppf(share, freedom), rtol=0.02)
+
+
+def test_where_all_relations_fit_there_is_no_other_start():
+    truth, pairwise, nscan = mixed_ring(12, noise=0.3)
+    energy = energy_of(truth, pairwise, nscan)
+    assert eased(energy, optimise(energy, truth).poses) is None
+
+
 def test_what_is_not_doubted_is_never_named():
     relations, _ = with_loops(3, seed=1)
     energy = energy_of(ring(COUNT), relations, [])
     poses = optimise(energy, ring(COUNT)).poses
-    assert chi2_by_three(energy, poses).max() > BOUND
+    assert (energy.terms(poses) / chi2_quantiles(energy, RARE)).max() > BOUND
     assert not contradicting(energy, poses, np.zeros(len(relations), dtype=bool)).any()
 
 
