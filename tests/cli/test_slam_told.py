@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 
+import numpy as np
 import pytest
 
 from nscan_cli.cli.main import run
@@ -22,7 +23,7 @@ def test_the_summary(folder, capsys):
     lines = [line for line in err.splitlines() if not line.startswith("compiling")]
     assert max(map(len, lines)) <= 80
     said = {line[:11].strip(): line[11:] for line in lines if line[:11].strip()}
-    assert list(said) == ["scans", "keyframes", "relations", "loops", "refused", "time", "written"]
+    assert list(said) == ["scans", "keyframes", "relations", "loops", "refused", "sigma", "time", "written"]
     assert said["scans"] == "252 in 502.0 s"
     assert said["keyframes"] == f"{len(graph.keyframes)}"
     assert said["relations"] == f"{len(graph.pairwise)} pairwise, {len(graph.nscan)} nScan"
@@ -30,6 +31,11 @@ def test_the_summary(folder, capsys):
     assert said["loops"] == f"{len(graph.loops)} tried, {accepted} accepted, {refused} refused"
     why = [re.match(r"(?:refused)? +(\d+): .", line) for line in lines]
     assert sum(int(match[1]) for match in why if match) == refused
+    _first, *others = sorted(graph.marginals)
+    sigmas = [float(np.linalg.norm(graph.marginals[node][:2, :2], 2) ** 0.5) for node in others]
+    worst = graph.scans[others[int(np.argmax(sigmas))]]
+    of_half, most = f"{np.median(sigmas):.2g} m", f"{max(sigmas):.2g} m"
+    assert said["sigma"] == f"{of_half} in the median, {most} at scan {worst}, from scan 0"
     rate = r"\d+ scans a second, \d+ times real time|the kernels' compilation included"
     assert re.fullmatch(rf"[\d.]+ s, ({rate})", said["time"])
     assert said["written"] == "graph.json"
