@@ -27,6 +27,8 @@ LEAST_WEIGHT = 0.25
 """What a relation at the bound weighs."""
 EASED_NARROWING, EASED_STEPS = 1.2, 10
 """On the way out of a fold, where all relations are doubted."""
+MOST_WIDTHS = 12
+"""A kernel that begins so wide that it would take more than this narrows faster."""
 
 
 def contradicting(energy: GraphEnergy, poses: Array, doubted: NDArray[np.bool_]) -> NDArray[np.bool_]:
@@ -65,6 +67,9 @@ def _graduated(
     """The weights (R,) of the relations, and poses (K, 3), when the kernel has narrowed to bounds (R,)."""
     weights, excess = np.ones(len(doubted)), energy.terms(poses) / bounds
     narrow = float(excess[doubted].max(initial=0.0))
+    if not np.isfinite(narrow):
+        return weights, poses
+    narrowing = max(narrowing, narrow ** (1 / MOST_WIDTHS))
     while narrow > 1.0:
         narrow = max(narrow / narrowing, 1.0)
         weights[doubted] = (narrow / (narrow + excess[doubted])) ** 2

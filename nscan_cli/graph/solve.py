@@ -17,7 +17,7 @@ from nscan_cli.poses import Array, Indices
 
 TRIAL = 100
 """Iterations after which two starts are compared; only the better one goes on."""
-UNFOLDINGS = 5
+UNFOLDINGS = 3
 """How often a start is looked for from where a graph may be folded wrong, as long as each leads lower."""
 ROUNDING = 1e-9
 """Relative; energies that differ by less are the same."""

@@ -111,6 +111,14 @@ def test_where_all_relations_fit_there_is_no_other_start():
     assert eased(energy, optimise(energy, truth).poses) is None
 
 
+def test_a_chi2_beyond_all_numbers_is_no_reason_to_narrow_for_ever():
+    truth, pairwise, nscan = mixed_ring(12, noise=0.3)
+    energy = energy_of(truth, pairwise, nscan).weighted(np.full(len(pairwise) + len(nscan), np.inf))
+    assert not np.isfinite(energy.terms(truth)).all()
+    assert eased(energy, truth) is None
+    assert not contradicting(energy, truth, np.ones(len(pairwise) + len(nscan), dtype=bool)).any()
+
+
 def test_what_is_not_doubted_is_never_named():
     relations, _ = with_loops(3, seed=1)
     energy = energy_of(ring(COUNT), relations, [])
