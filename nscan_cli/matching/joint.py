@@ -12,13 +12,8 @@ from numpy.typing import NDArray
 
 from nscan_cli.matching.descent import approach, approach_and_finish
 from nscan_cli.matching.gauge import gauge_of
-from nscan_cli.matching.joint_energy import (
-    COVERING,
-    NEUTRAL,
-    JointProblem,
-    joint_energy,
-    neutral_energy,
-)
+from nscan_cli.matching.joint_energy import NEUTRAL, JointProblem, joint_energy
+from nscan_cli.matching.neutral import COVERING, neutral_energy
 from nscan_cli.matching.overlap import SOUND_OVERLAP, overlaps, weakest_link
 from nscan_cli.matching.unheld import back_to_priors
 from nscan_cli.poses import Array, wrap

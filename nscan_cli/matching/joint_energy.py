@@ -21,8 +21,6 @@ from nscan_cli.poses import Array
 
 NEUTRAL = 1.0
 """Share of the usual s that a point must reach to lower the neutral energy: a perfect match gains nothing."""
-COVERING = 0.78
-"""The same where covering more of each other shall count."""
 
 
 class Priors(NamedTuple):
@@ -100,27 +98,9 @@ def joint_energy(
     return JointEnergy(value, gradient, hessian)
 
 
-def pair_energies(problem: JointProblem, poses: Array, share: float = COVERING, stride: int = 1) -> Array:
-    """The neutral energy of each pair at the poses (n, 3): (n, n), 0 where (i, j) is not in J.
-
-    E rewards every point that meets a Gaussian, so that it falls when scans are slid over each other. The
-    neutral energy takes that reward away: a point counts s less a share of what s usually is on the scan
-    that it meets. Its derivatives are the same. With a stride only every so-manyth point is counted.
-    """
-    values = np.zeros((len(poses), len(poses)))
-    _each_pair(problem, poses, share, stride, _room(problem.scans, stride), values)
-    return values
-
-
-def neutral_energy(problem: JointProblem, poses: Array, share: float = COVERING, stride: int = 1) -> float:
-    """The neutral energy with priors at the poses (n, 3); see pair_energies."""
-    n = len(poses)
-    of_priors = _add_priors(problem.priors, poses, 0.0, np.zeros(3 * n), np.zeros((3 * n, 3 * n)))
-    return float(pair_energies(problem, poses, share, stride).sum() + of_priors)
-
-
 @kernel
-def _room(scans: Scans, stride: int) -> Room:
+def room_for(scans: Scans, stride: int) -> Room:
+    """For any pair of the scans, of whose points every so-manyth counts."""
     met = room_to_meet(most_points(scans), stride)
     return Room(np.empty(3), np.empty(3), np.empty((3, 3)), np.empty(OUT), met)
 
@@ -142,34 +122,9 @@ def evaluate(
     """
     gradient[:] = 0.0
     hessian[:, :] = 0.0
-    share, room = NEUTRAL if neutral else 0.0, _room(problem.scans, stride)
+    share, room = NEUTRAL if neutral else 0.0, room_for(problem.scans, stride)
     value = _add_pairs(problem, poses, widening, curvature, share, stride, room, gradient, hessian)
-    return float(value + _add_priors(problem.priors, poses, curvature, gradient, hessian))
-
-
-@lean_kernel
-def _each_pair(
-    problem: JointProblem, poses: Array, share: float, stride: int, room: Room, values: Array
-) -> None:
-    scans, u = problem.scans, room.u
-    for pair in range(problem.pairs.shape[0]):
-        i, j = problem.pairs[pair, 0], problem.pairs[pair, 1]
-        relative_pose(poses[j], poses[i], u)
-        accumulate(
-            scan_grid(scans, i),
-            scans.half,
-            scan_points(scans, j),
-            u[0],
-            u[1],
-            u[2],
-            1.0,
-            0.0,
-            share * scans.usual[i],
-            stride,
-            room.met,
-            room.out,
-        )
-        values[i, j] = stride * problem.scale * room.out[0]
+    return float(value + add_priors(problem.priors, poses, curvature, gradient, hessian))
 
 
 @lean_kernel
@@ -211,7 +166,8 @@ def _add_pairs(
 
 
 @kernel
-def _add_priors(priors: Priors, poses: Array, curvature: float, gradient: Array, hessian: Array) -> float:
+def add_priors(priors: Priors, poses: Array, curvature: float, gradient: Array, hessian: Array) -> float:
+    """What the priors say at the poses (n, 3); adds it to the gradient (3n,) and the Hessian (3n, 3n)."""
     u, g, difference = np.empty(3), np.empty(3), np.empty(3)
     value = 0.0
     for q in range(priors.pairs.shape[0]):

@@ -13,7 +13,8 @@ from dataclasses import replace
 import numpy as np
 
 from nscan_cli.matching.joint import JointMatch, JointOptions, PairsAt, match_near_and_far
-from nscan_cli.matching.joint_energy import JointProblem, neutral_energy, pair_energies
+from nscan_cli.matching.joint_energy import JointProblem
+from nscan_cli.matching.neutral import neutral_energy, pair_energies
 from nscan_cli.matching.newton import PairProblem, minimise
 from nscan_cli.matching.overlap import SOUND_OVERLAP, Overlaps, overlaps, weakest_link
 from nscan_cli.matching.pairwise import PairOptions

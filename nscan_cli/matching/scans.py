@@ -54,10 +54,14 @@ def lay_out(ndts: Sequence[Ndt], points: Sequence[Array], neutral: bool = True) 
         np.concatenate([ndt.grid.gaussians for ndt in ndts]),
         np.empty(0),
     )
-    own = np.full(len(ndts), np.nan)
-    if neutral:
-        own[:] = [_own_mean(ndt.grid, ndt.half, part) for ndt, part in zip(ndts, points, strict=True)]
-    return Scans(grid, np.concatenate(points, dtype=np.float64), starts, ndts[0].half, own)
+    unknown = np.full(len(ndts), np.nan)
+    scans = Scans(grid, np.concatenate(points, dtype=np.float64), starts, ndts[0].half, unknown)
+    return with_usual(scans) if neutral else scans
+
+
+def with_usual(scans: Scans) -> Scans:
+    """The scans with what is `usual`, so that the neutral energy can be asked for."""
+    return scans._replace(usual=_own_means(scans))
 
 
 @inlined_kernel
@@ -94,10 +98,14 @@ def most_points(scans: Scans) -> int:
 
 
 @kernel
-def _own_mean(grid: Grid, half: float, points: Array) -> float:
-    out, room = np.empty(OUT), room_to_meet(points.shape[0], 1)
-    accumulate(grid, half, points, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 1, room, out)
-    energy = out[0]
-    accumulate(grid, half, points, 0.0, 0.0, 0.0, 1.0, 0.0, 1.0, 1, room, out)
-    # The difference is the number of Gaussians met.
-    return float(-energy / max(out[0] - energy, 1.0))
+def _own_means(scans: Scans) -> Array:
+    """(n,) mean s of each scan's points on its own Gaussians."""
+    means, out, room = np.empty(len(scans.usual)), np.empty(OUT), room_to_meet(most_points(scans), 1)
+    for i in range(len(means)):
+        grid, points = scan_grid(scans, i), scan_points(scans, i)
+        accumulate(grid, scans.half, points, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 1, room, out)
+        energy = out[0]
+        accumulate(grid, scans.half, points, 0.0, 0.0, 0.0, 1.0, 0.0, 1.0, 1, room, out)
+        # The difference is the number of Gaussians met.
+        means[i] = -energy / max(out[0] - energy, 1.0)
+    return means

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from nscan_cli.compiled import kernel
 from nscan_cli.counting import counted
 from nscan_cli.graph.model import Loop, NScan, Pairwise
+from nscan_cli.matching.ambiguity import with_ambiguity
 from nscan_cli.matching.joint import JointMatch, JointOptions, match_jointly
 from nscan_cli.matching.joint_energy import JointProblem, Priors, all_pairs, no_priors
 from nscan_cli.matching.overlap import held_at, hold
@@ -112,7 +113,8 @@ def match_at(
     at, held = int(np.searchsorted(members, centre)), route.poses[members[old]]
     found = []
     for start in starts:
-        match = _match(scans, members, route, start[members], options.widenings, options)
+        problem = _problem(scans, members, route, options)
+        match = match_jointly(problem, start[members], _stages(options.widenings, options))
         found.append((match.energy, compose(held, relative(match.poses[at], match.poses[old]))))
     return found
 
@@ -140,7 +142,8 @@ def _match_held(
         members = tried[kept]
         if len(members) < len(scans.usual):
             scans = _laid_out(keyframes, members)
-        match = _match(scans, members, route, start, widenings, options)
+        problem = _problem(scans, members, route, options)
+        match = match_jointly(problem, start, _stages(widenings, options))
         at = int(members.searchsorted(centre))
         held, score = hold(scans, match.poses, options.overlap, at)
         if not held.all():
@@ -150,7 +153,8 @@ def _match_held(
             loop = verdict(keyframes, tried, seen_before, centre, False, "did not converge", score)
             return Nearby((), None, loop, 0.0, False), False
         closed = bool(seen_before[kept].any())
-        relation = _relation(route.rows[members], at, match, "loop" if closed else "nscan", score)
+        origin = "loop" if closed else "nscan"
+        relation = _relation(route.rows[members], at, problem, match, origin, score)
         whole = len(kept) == len(tried)
         reason = "" if whole else f"{counted(len(tried) - len(kept), 'scan')} left out"
         used, before = (members, seen_before[kept]) if closed else (tried, seen_before)
@@ -166,15 +170,8 @@ def _laid_out(keyframes: Sequence[Keyframe], members: Indices) -> Scans:
     return lay_out([each.ndt for each in chosen], [each.points for each in chosen], neutral=False)
 
 
-def _match(
-    scans: Scans,
-    members: Indices,
-    route: Route,
-    start: Array,
-    widenings: tuple[float, ...],
-    options: NScanOptions,
-) -> JointMatch:
-    """The joint match of some keyframes from global poses (n, 3)."""
+def _problem(scans: Scans, members: Indices, route: Route, options: NScanOptions) -> JointProblem:
+    """The joint energy of some keyframes, with the relations of the chain among them as priors."""
     (consecutive,) = np.nonzero(members[1:] == members[:-1] + 1)
     known = [route.chain[k] for k in members[consecutive].tolist()]
     priors = (
@@ -186,7 +183,12 @@ def _match(
             np.array([relation.information for relation in known]),
         )
     )
-    joint = JointOptions(
+    scale = scale_of([route.keyframes[k] for k in members.tolist()], options)
+    return JointProblem(scans, all_pairs(len(members)), priors, scale)
+
+
+def _stages(widenings: tuple[float, ...], options: NScanOptions) -> JointOptions:
+    return JointOptions(
         widenings,
         near=NEAR,
         stride=STRIDE if len(widenings) == 1 else JointOptions.stride,
@@ -195,8 +197,6 @@ def _match(
         # The last step is shorter than a millimetre: its end need not be looked at.
         thorough=False,
     )
-    scale = scale_of([route.keyframes[k] for k in members.tolist()], options)
-    return match_jointly(JointProblem(scans, all_pairs(len(members)), priors, scale), start, joint)
 
 
 def scale_of(keyframes: Sequence[Keyframe], options: NScanOptions) -> float:
@@ -204,13 +204,16 @@ def scale_of(keyframes: Sequence[Keyframe], options: NScanOptions) -> float:
     return options.scale_per_cell / points_per_cell(keyframes)
 
 
-def _relation(nodes: Indices, fixed: int, match: JointMatch, origin: str, score: float) -> NScan:
+def _relation(
+    nodes: Indices, fixed: int, problem: JointProblem, match: JointMatch, origin: str, score: float
+) -> NScan:
     eigenvalues, vectors = np.linalg.eigh(match.hessian)
+    # What is left of negative curvature at the optimum is rounding, or a cell's border.
+    definite = (vectors * np.maximum(eigenvalues, 0.0)) @ vectors.T
     return NScan(
         nodes=tuple(nodes.tolist()),
         poses=match.poses,
-        # What is left of negative curvature at the optimum is rounding, or a cell's border.
-        hessian=(vectors * np.maximum(eigenvalues, 0.0)) @ vectors.T,
+        hessian=with_ambiguity(problem, match.poses, definite),
         fixed=fixed,
         origin=origin,
         score=score,

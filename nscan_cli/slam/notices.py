@@ -25,10 +25,6 @@ EXPECTED = 3.0
 """Mean of χ² for three degrees of freedom. That of all relations is below 1 on sound logs; a loop joins what
 has drifted, and twice as much is no sign of a mistake."""
 
-LOOKED_THROUGH = 0.15
-"""Of what one visit saw, another may look through such a share. On sound logs it is 1 % to 2 % in three
-buildings, 7 % in mit-killian, 8 % in fr-campus; in maps that are metres wrong 26 % and more."""
-
 
 def notices(slam: Slam) -> list[str]:
     """What went wrong on the way, as whole sentences."""
@@ -114,12 +110,13 @@ def _contradictions(slam: Slam) -> list[str]:
 def _looked_through(slam: Slam) -> list[str]:
     """Whether visits of a place contradict each other, however well they match."""
     worst = seen_through(slam.log, slam.route, slam.options.nscan, slam.threads)
-    if worst is None or worst.share <= LOOKED_THROUGH:
+    if worst is None or worst.share <= worst.most:
         return []
     first, last = slam.log.numbers[[worst.first, worst.last]].tolist()
     return [
-        f"places do not look as they did before: from scan {first} to {last}, {worst.share:.0%} of what one "
-        "visit saw is looked through from another; the map is wrong there, or much has moved"
+        f"places do not look as they did before: from scan {first} to {last}, {worst.share:.1%} of what one "
+        f"visit saw is looked through from another, at most {worst.most:.1%} in a sound map; the map is "
+        "wrong there, or much has moved"
     ]
 
 

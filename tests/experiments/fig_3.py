@@ -18,7 +18,8 @@ from nscan_cli.mapping.canvas import BLUE, GREEN, PURPLE, VERMILLION
 from nscan_cli.mapping.panels import bounds_around, panel, side_by_side, stacked
 from nscan_cli.mapping.symbols import robots
 from nscan_cli.matching.joint import JointMatch, JointOptions, match_near_and_far
-from nscan_cli.matching.joint_energy import JointProblem, Priors, joint_energy, neutral_energy
+from nscan_cli.matching.joint_energy import JointProblem, Priors, joint_energy
+from nscan_cli.matching.neutral import neutral_energy
 from nscan_cli.matching.uncertainty import Weakest, weakest_translation
 from nscan_cli.poses import Array, compose, relative, transform
 from tests.experiments.charts import line_chart
