@@ -12,16 +12,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nscan_cli.poses import Array, compose, relative, transform
+from nscan_cli.slam.alike import LEAST_BEARINGS, alike
 from nscan_cli.slam.first_scan import PATH, SCANS, place_first
 from nscan_cli.slam.found import Found
 from nscan_cli.slam.options import BreakOptions, TrackingOptions
 from nscan_cli.slam.sensed import Sensed
 from nscan_cli.slam.tracking import Tracker
-
-BEARINGS = 180
-"""Into so many parts the view is divided."""
-LEAST_BEARINGS = 10
-"""Of these two scans must share so many to be compared."""
 
 
 @dataclass(frozen=True)
@@ -196,7 +192,8 @@ class Follower:
     def _goes_on(self, scan: Followed, seen: Followed) -> bool:
         """Whether a scan sees what another one saw that was settled."""
         before = relative(seen.found.poses[0], scan.found.poses[0])
-        share = alike(scan.sensed.of(0), transform(before, seen.sensed.of(0)), self.breaking)
+        apart, per_metre = self.breaking.apart, self.breaking.apart_per_metre
+        share = alike(scan.sensed.of(0), transform(before, seen.sensed.of(0)), apart, per_metre)
         return share is not None and share >= self.breaking.alike
 
     def _break(self) -> list[Followed]:
@@ -229,27 +226,3 @@ class Follower:
             piece.found.expected[0] = first.found.expected[0]
         before, self._young, self._doubted = self._grow_up(), [], []
         return before + self._settle(replace(piece, begins=True, breaks=not is_known))
-
-
-def alike(points: Array, others: Array, breaking: BreakOptions) -> float | None:
-    """Share of bearings in which two scans meet the nearest thing at the same range; None: too few to tell.
-
-    Points (m, 2) and (n, 2) in the frame of one of the robot's poses; only bearings in which both meet
-    something count.
-    """
-    one, other = _ranges(points), _ranges(others)
-    both = np.isfinite(one) & np.isfinite(other)
-    if np.count_nonzero(both) < LEAST_BEARINGS:
-        return None
-    near = np.minimum(one[both], other[both])
-    apart = np.abs(one[both] - other[both])
-    return float(np.mean(apart < breaking.apart + breaking.apart_per_metre * near))
-
-
-def _ranges(points: Array) -> Array:
-    """(BEARINGS,) range of the nearest point (m, 2) in each part of the view; inf where there is none."""
-    angles = np.arctan2(points[:, 1], points[:, 0]) + np.pi
-    parts = (angles / (2 * np.pi) * BEARINGS).astype(np.int64) % BEARINGS
-    ranges = np.full(BEARINGS, np.inf)
-    np.minimum.at(ranges, parts, np.hypot(points[:, 0], points[:, 1]))
-    return ranges

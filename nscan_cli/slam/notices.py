@@ -14,6 +14,7 @@ from nscan_cli.slam.believed import jumps_of, repeating
 from nscan_cli.slam.disagreement import disagreements
 from nscan_cli.slam.pipeline import Slam
 from nscan_cli.slam.seen_through import seen_through
+from nscan_cli.slam.unlike import unlike_keyframes
 
 MOST_NAMED = 10
 """Scans or stretches that a notice names."""
@@ -40,7 +41,7 @@ def notices(slam: Slam) -> list[str]:
             f"the laser repeats itself at {_scans(log, slam.hanging.tolist())}; these are not matched"
         )
     found += _without_odometry(slam) if slam.odometry is None else _of_odometry(slam)
-    return found + _contradictions(slam) + _looked_through(slam)
+    return found + _unlike(slam) + _contradictions(slam) + _looked_through(slam)
 
 
 def _of_odometry(slam: Slam) -> list[str]:
@@ -88,6 +89,20 @@ def _without_odometry(slam: Slam) -> list[str]:
             "scans are missing, it was carried, or tracking has slipped; how far it came is not known"
         )
     return found
+
+
+def _unlike(slam: Slam) -> list[str]:
+    """Where tracking may have held on to what goes along."""
+    tracking, breaks = slam.options.tracking, slam.options.breaks
+    poses = np.concatenate(slam.tracked)
+    worst = unlike_keyframes(slam.log, poses, slam.keyframes.list, tracking.reach, breaks, slam.threads)
+    if worst is None:
+        return []
+    first, last = slam.log.numbers[[worst.first, worst.last]].tolist()
+    return [
+        f"scans {first} to {last} see other things than where they were found: the same in {worst.share:.0%} "
+        "of all bearings; someone walks along, or tracking has slipped"
+    ]
 
 
 def _contradictions(slam: Slam) -> list[str]:
