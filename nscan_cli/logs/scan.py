@@ -108,7 +108,7 @@ class LaserLog:
 
     def points(self, scan: int) -> Array:
         """The usable beams' end points (m, 2) of one row in the robot's frame, in beam order."""
-        points, _ = self._points(slice(scan, scan + 1), math.inf)
+        points, _ = self.points_of(slice(scan, scan + 1), math.inf)
         return points
 
     def each_points(self) -> Iterator[Array]:
@@ -123,9 +123,9 @@ class LaserLog:
         One scan after another; ends (n + 1,) tell that scan k has points[ends[k] : ends[k + 1]].
         """
         for first in range(0, len(self), size):
-            yield self._points(slice(first, first + size), reach)
+            yield self.points_of(slice(first, first + size), reach)
 
-    def _points(self, rows: slice, reach: float) -> tuple[Array, Indices]:
+    def points_of(self, rows: slice, reach: float = math.inf) -> tuple[Array, Indices]:
         """The points (m, 2) of R rows, one after another, and where each row's end, as in stretches."""
         first, between = self.angle_min[rows], self.angle_increment[rows]
         if (first == first[0]).all() and (between == between[0]).all():

@@ -19,7 +19,7 @@ from nscan_cli.slam.keyframes import Keyframe
 from nscan_cli.slam.options import BreakOptions
 from nscan_cli.threads import in_threads
 
-AT_A_TIME = 512
+AT_A_TIME = 256
 """Scans that a thread compares."""
 TOGETHER = 10
 """Scans that are judged together: someone who comes close hides what was seen for a moment."""
@@ -77,8 +77,10 @@ def unlike_keyframes(
     shares = np.concatenate(
         in_threads(
             threads,
-            lambda part: _shares(views, part[0] * AT_A_TIME, *part[1], *bounds),
-            list(enumerate(log.stretches(AT_A_TIME, reach))),
+            lambda first: _shares(
+                views, first, *log.points_of(slice(first, first + AT_A_TIME), reach), *bounds
+            ),
+            range(0, len(log), AT_A_TIME),
         )
     )
     told = np.flatnonzero(np.isfinite(shares))

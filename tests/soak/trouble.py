@@ -56,6 +56,7 @@ TOLD = {
     "there are no scans": "scans are missing",
     "disagree": "odometry and scans disagree",
     "contradict": "relations contradict each other",
+    "other things": "scans see other things",
     "looked through": "places do not look as before",
     "the scans jump": "the scans jump",
     "it hangs, or": "the laser hangs, or the robot stands",
