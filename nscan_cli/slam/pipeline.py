@@ -22,6 +22,7 @@ from nscan_cli.slam.coverage import Coverage
 from nscan_cli.slam.energies import Energies
 from nscan_cli.slam.following import Followed, Follower
 from nscan_cli.slam.growth import Growth
+from nscan_cli.slam.in_view import sight
 from nscan_cli.slam.keyframes import Keyframe, Keyframes, extended, relations_along, route_of
 from nscan_cli.slam.near import Near, choose_nearby
 from nscan_cli.slam.nearby import MatchNearby, Nearby, match_nearby
@@ -51,7 +52,9 @@ class Slam:
 
     def __init__(self, log: LaserLog, options: SlamOptions, threads: int = 1) -> None:
         self.log, self.options, self.threads = log, options, threads
-        self.tracker = Follower(options.tracking, options.breaks, log.odometry is not None)
+        tracking = options.tracking
+        seen_by_map = dataclasses.replace(tracking, reach=sight(log, tracking.reach, tracking.gaussians.cell))
+        self.tracker = Follower(seen_by_map, options.breaks, log.odometry is not None)
         self.odometry, self.jumps = log.odometry, np.zeros(0, dtype=np.int64)
         if log.odometry is not None:
             self.odometry, self.jumps = believed_odometry(log.odometry, log.times)

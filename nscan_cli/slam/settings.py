@@ -16,6 +16,8 @@ class Settings(NamedTuple):
 
     half: float
     """Side (m) of a lattice cell of the map."""
+    in_view: float
+    """Up to so far (m) from where a scan was taken it had whole cells in view."""
     window: float
     step: float
     widenings: Array
@@ -39,6 +41,7 @@ class Settings(NamedTuple):
             ring[: len(angles)] = angles
         return cls(
             0.5 * options.gaussians.cell,
+            max(options.reach - options.gaussians.cell, 0.5 * options.reach),
             options.window,
             options.step,
             np.array(options.widenings),

@@ -19,6 +19,7 @@ from nscan_cli.ndt.table import Grid
 from nscan_cli.poses import Array, transform
 from nscan_cli.slam.found import Found
 from nscan_cli.slam.going_on import UNSTEADY, go_on
+from nscan_cli.slam.in_view import in_view
 from nscan_cli.slam.scan_to_map import match_and_count
 from nscan_cli.slam.settings import Settings
 
@@ -123,6 +124,13 @@ def match_turned(
                     found.values[k], found.inliers[k] = value, inliers
                     assign(found.poses[k], pose)
                     assign_rows(found.hessians[k], hessian)
+
+
+@kernel
+def told_points(track: Track, settings: Settings, points: Array, pose: Array) -> Array:
+    """The points of a scan expected at `pose` (3,) of which the map can tell; see in_view."""
+    placed = track.placed[track.counts[OLDEST] : track.counts[SCANS]]
+    return in_view(points, pose, placed, settings.in_view)
 
 
 @kernel
@@ -256,16 +264,17 @@ def follow(
             found.values[k], found.poses[k], found.hessians[k], found.inliers[k] = 0.0, 0.0, 0.0, 1.0
         else:
             predict(track, settings, odometry[k], prior)
+            told = told_points(track, settings, scan, prior.mean)
             assign(found.poses[k], prior.mean)
             found.values[k], found.inliers[k] = match_and_count(
-                grid, settings, scan, prior, found.poses[k], found.hessians[k]
+                grid, settings, told, prior, found.poses[k], found.hessians[k]
             )
             enough = least_share(track, settings)
             if found.inliers[k] < enough:
-                match_turned(grid, settings, scan, prior, enough, track.counts, found, k)
+                match_turned(grid, settings, told, prior, enough, track.counts, found, k)
                 if found.inliers[k] < (LEAST_SCORE if np.isfinite(odometry[k, 0]) else settings.inlier_share):
                     return k
             if track.counts[KNOWN] >= STEADY and not np.isfinite(odometry[k, 0]):
-                go_on(grid, settings, scan, prior, track.unsteady, found, k)
+                go_on(grid, settings, told, prior, track.unsteady, found, k)
         take(track, grid, settings, scan, odometry[k], prior, found, k)
     return len(ends) - 1

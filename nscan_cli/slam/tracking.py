@@ -17,7 +17,7 @@ from nscan_cli.slam.options import TrackingOptions
 from nscan_cli.slam.scan_to_map import match_and_count
 from nscan_cli.slam.sensed import Sensed
 from nscan_cli.slam.settings import Settings
-from nscan_cli.slam.track import LEAST_SCORE, RESTARTS, ROWS, Track, follow, take
+from nscan_cli.slam.track import LEAST_SCORE, RESTARTS, ROWS, Track, follow, take, told_points
 
 RECENT = 5.0
 """A lost scan is searched among those of the last stretch of path, m."""
@@ -77,7 +77,8 @@ class Tracker:
             return
         self.searches += 1
         pose, hessian = place.pose.copy(), np.empty((3, 3))
-        value, inliers = match_and_count(self.map.grid, self._settings, points, self._prior, pose, hessian)
+        told = told_points(self._track, self._settings, points, self._prior.mean)
+        value, inliers = match_and_count(self.map.grid, self._settings, told, self._prior, pose, hessian)
         if value < found.values[k]:
             found.values[k], found.inliers[k] = value, inliers
             found.poses[k], found.hessians[k] = pose, hessian
