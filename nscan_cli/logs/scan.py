@@ -125,7 +125,7 @@ class LaserLog:
         for first in range(0, len(self), size):
             yield self.points_of(slice(first, first + size), reach)
 
-    def points_of(self, rows: slice, reach: float = math.inf) -> tuple[Array, Indices]:
+    def points_of(self, rows: slice, reach: float) -> tuple[Array, Indices]:
         """The points (m, 2) of R rows, one after another, and where each row's end, as in stretches."""
         first, between = self.angle_min[rows], self.angle_increment[rows]
         if (first == first[0]).all() and (between == between[0]).all():

@@ -9,9 +9,9 @@ lost 1.3 % of its way with odometry, and 4 to 10 % without.
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from nscan_cli.compiled import kernel
-from nscan_cli.logs.scan import LaserLog
 from nscan_cli.poses import Array
 
 LONGER = 0.001
@@ -21,12 +21,11 @@ LEAST = 0.01
 lasers of 12 m and more, 2 to 5 % with those of 6 m and less."""
 
 
-def sight(log: LaserLog, reach: float, cell: float) -> float:
-    """How far (m) the laser sees, if its sight ends walls, in cells of a side (m); else infinity.
+def sight(ranges: NDArray[np.float32], cell: float) -> float:
+    """How far (m) a laser with such ranges (m) sees, if its sight ends walls, in cells of a side (m).
 
-    Ranges longer than the `reach` (m) are not matched.
+    Else infinity.
     """
-    ranges = log.ranges[log.ranges < reach]
     if not len(ranges):
         return np.inf
     farthest = float(np.quantile(ranges, 1 - LONGER))

@@ -52,14 +52,13 @@ class Slam:
 
     def __init__(self, log: LaserLog, options: SlamOptions, threads: int = 1) -> None:
         self.log, self.options, self.threads = log, options, threads
-        tracking = options.tracking
-        seen_by_map = dataclasses.replace(tracking, reach=sight(log, tracking.reach, tracking.gaussians.cell))
-        self.tracker = Follower(seen_by_map, options.breaks, log.odometry is not None)
+        seen, cell = log.ranges[log.ranges < options.tracking.reach], options.tracking.gaussians.cell
+        tracking = dataclasses.replace(options.tracking, reach=sight(seen, cell))
+        self.tracker = Follower(tracking, options.breaks, log.odometry is not None)
         self.odometry, self.jumps = log.odometry, np.zeros(0, dtype=np.int64)
         if log.odometry is not None:
             self.odometry, self.jumps = believed_odometry(log.odometry, log.times)
         self.hanging = hanging(log, self.odometry)
-        seen = log.ranges[log.ranges < options.tracking.reach]
         median_range = float(np.median(seen)) if len(seen) else 0.0
         self.keyframes = Keyframes(options.keyframes, options.nscan.gaussians, median_range)
         self.tracked: list[Array] = []
