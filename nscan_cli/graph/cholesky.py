@@ -30,16 +30,16 @@ class Factor(NamedTuple):
     panels: Array
     """Those of all supernodes, end to end; what lies above the diagonal is 0."""
     loose: NDArray[np.bool_]
-    """(F, 3) by row: the pivot was not positive, and the diagonal entry was put in its place."""
+    """(F, 3) by row: the pivot was not positive, and the diagonal entry, or more, was put in its place."""
     diagonal: Array
     """(F, 3) by row: the diagonal of the matrix."""
 
 
 def factorise(pattern: Pattern, blocks: Array) -> Factor:
     """The factor of the matrix whose lower triangle is in blocks (B, 3, 3), which are left as they are."""
-    diagonal = np.diagonal(blocks[pattern.starts[:-1]], axis1=1, axis2=2)
+    diagonal = np.ascontiguousarray(np.diagonal(blocks[pattern.starts[:-1]], axis1=1, axis2=2))
     loose = np.zeros((len(pattern.place), 3), dtype=np.bool_)
-    return Factor(pattern, _factorise(pattern, blocks, loose), loose, diagonal)
+    return Factor(pattern, _factorise(pattern, blocks, diagonal, loose), loose, diagonal)
 
 
 def solve(factor: Factor, right: Array) -> Array:
@@ -89,7 +89,7 @@ def rows_of(pattern: Pattern, supernode: int) -> Indices:
 
 
 @kernel
-def _factorise(pattern: Pattern, blocks: Array, loose: NDArray[np.bool_]) -> Array:
+def _factorise(pattern: Pattern, blocks: Array, diagonal: Array, loose: NDArray[np.bool_]) -> Array:
     """Left-looking: panel by panel, minus what the panels before it bring."""
     supernodes, starts = pattern.supernodes, pattern.starts
     count, nodes = supernodes.shape[0] - 1, starts.shape[0] - 1
@@ -120,7 +120,7 @@ def _factorise(pattern: Pattern, blocks: Array, loose: NDArray[np.bool_]) -> Arr
                 parent, at[k] = owner[others[source]], source
                 following[k], first[parent] = first[parent], k
             k = after
-        _factorise_panel(panel, least, loose_numbers[3 * begin : 3 * end])
+        _factorise_panel(panel, rows, diagonal, least, loose_numbers[3 * begin : 3 * end])
         if rows.shape[0] > end - begin:
             parent, at[j] = owner[rows[end - begin]], end - begin
             following[j], first[parent] = first[parent], j
@@ -170,7 +170,9 @@ def _subtract_panel(
 
 
 @lean_kernel
-def _factorise_panel(panel: Array, least: Array, loose: NDArray[np.bool_]) -> None:
+def _factorise_panel(
+    panel: Array, rows: Indices, diagonal: Array, least: Array, loose: NDArray[np.bool_]
+) -> None:
     """Three columns after the other, minus what those before them bring; pivots are more than `least`."""
     height = panel.shape[1]
     for j in range(0, panel.shape[0], 3):
@@ -186,11 +188,27 @@ def _factorise_panel(panel: Array, least: Array, loose: NDArray[np.bool_]) -> No
                 pivot = np.sqrt(pivot)
             else:
                 loose[column] = True
-                pivot = np.sqrt(least[column] / LEAST_PIVOT) if least[column] > 0 else 1.0
+                pivot = _substitute(panel, rows, diagonal, least[column] / LEAST_PIVOT, column)
             for i in range(column + 1, height):
                 panel[column, i] /= pivot
             panel[column, column] = pivot
             panel[column, j:column] = 0.0
+
+
+@lean_kernel
+def _substitute(panel: Array, rows: Indices, diagonal: Array, own: float, column: int) -> float:
+    """The root of what takes the place of a pivot: its own entry of the matrix's diagonal, or more.
+
+    No entry of L is above the root of the diagonal entry of its row then. In a positive matrix none ever is.
+    In one that is indefinite by rounding they would grow from column to column, beyond all numbers.
+    P. Gill, W. Murray, "Newton-type methods for unconstrained and linearly constrained optimization", 1974.
+    """
+    square = own if own > 0.0 else 1.0
+    for i in range(column + 1, panel.shape[1]):
+        bound = diagonal[rows[i // 3], i % 3]
+        if bound > 0.0:
+            square = max(square, panel[column, i] ** 2 / bound)
+    return float(np.sqrt(square))
 
 
 @lean_kernel

@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 
 from nscan_cli.graph.g2o import read_g2o
+from nscan_cli.graph.information import information
 from nscan_cli.graph.marginals import marginal_covariances
 from nscan_cli.graph.model import Pairwise
-from nscan_cli.graph.solve import optimise_graph
+from nscan_cli.graph.solve import components, optimise_graph
 from nscan_cli.poses import compose, relative, rotated_information, wrap
 from tests.data import data_file
 from tests.graph.simulated import (
@@ -78,6 +79,34 @@ def test_the_same_scans_related_three_times_over_are_known_no_better():
     thrice = marginal_covariances(graph_of(truth, [], [relation] * 3))
     for keyframe in range(1, 4):
         np.testing.assert_allclose(thrice[keyframe], once[keyframe], rtol=1e-9)
+
+
+@pytest.mark.parametrize("step", [1e2, 1e5])
+@pytest.mark.parametrize("seed", [0, 1, 2])
+def test_a_chain_beyond_the_digits_of_its_numbers_has_finite_covariances(step: float, seed: int):
+    """Odometry in the wrong unit: each step leaves the angle open by turns, a few matches hold it well.
+
+    The matrix is indefinite by rounding, and pivot after pivot fails: without a bound the entries of the
+    factor grow until they overflow.
+    """
+    rng, size = np.random.default_rng(seed), 660
+    noise = rng.normal(0, [[0.05 * step], [0.02], [0.05]], (3, size))
+    steps = np.array([step, 0.0, 0.0]) + noise.T
+    poses = [np.zeros(3)]
+    for each in steps:
+        poses.append(compose(poses[-1], each))
+    vague, sure = np.eye(3) / (0.1 * step) ** 2, np.diag([2e5, 2e5, 1e6])
+    pairwise = [Pairwise((a, a + 1), each, vague, "track") for a, each in enumerate(steps)]
+    pairwise += [Pairwise((a, a + 1), steps[a], sure, "track") for a in range(0, size - 1, 50)]
+    graph = graph_of(np.array(poses), pairwise, [])
+    _, factor = information(graph, components(graph)[0])
+    assert factor.loose.any()
+    assert np.abs(factor.panels).max() <= 1.01 * np.sqrt(factor.diagonal.max())
+    marginals = marginal_covariances(graph)
+    assert {0, 1} <= set(marginals)
+    for covariance in marginals.values():
+        assert np.isfinite(covariance).all()
+        assert (np.diagonal(covariance) >= 0).all()
 
 
 def test_keyframes_that_are_not_determined_are_left_out():
