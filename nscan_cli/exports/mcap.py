@@ -2,7 +2,8 @@
 
 The topics: /map (nav_msgs/OccupancyGrid), /path (nav_msgs/Path), /graph (visualization_msgs/MarkerArray)
 and /tf_static once, at the time of the first scan; /scan (sensor_msgs/LaserScan) and /tf for every scan.
-Frames as in REP 105: map, odom where there is odometry, base_link (the robot) and laser.
+Frames as in REP 105: map, odom where there is odometry, base_link (the robot) and laser. What is written once
+is kept for subscribers that come later (transient local), as map_server, tf2 and RViz expect it.
 
 https://mcap.dev/spec, https://mcap.dev/spec/registry (profile ros2, schemas ros2msg, messages cdr)
 """
@@ -41,6 +42,8 @@ TOPICS = {
     "/tf": "tf2_msgs/msg/TFMessage",
     "/scan": "sensor_msgs/msg/LaserScan",
 }
+STREAMS = ("/tf", "/scan")
+"""Topics with a message for every scan; the others have one that stays valid."""
 NANOSECONDS = 10**9
 YEAR = 365.25 * 86400
 """s"""
@@ -94,7 +97,7 @@ class _File:
             for name in dict.fromkeys(TOPICS.values())
         }
         self._channels = {
-            topic: self._writer.register_channel(topic, "cdr", schemas[name])
+            topic: self._writer.register_channel(topic, "cdr", schemas[name], _quality_of_service(topic))
             for topic, name in TOPICS.items()
         }
         self._written = dict.fromkeys(TOPICS, 0)
@@ -109,6 +112,23 @@ class _File:
         """All bytes of the file."""
         self._writer.finish()  # type: ignore[no-untyped-call]
         return self._stream.getvalue()
+
+
+def _quality_of_service(topic: str) -> dict[str, str]:
+    """What the player of rosbag2 offers on a topic, as its recorder keeps it with the channel (YAML).
+
+    Policies are the numbers of rmw, which every version reads; names are read by the later ones alone.
+    """
+    keep_last, reliable, automatic = 1, 1, 1
+    transient_local, volatile = 1, 2
+    depth, durability = (10, volatile) if topic in STREAMS else (1, transient_local)
+    for_ever = "{sec: 9223372036, nsec: 854775807}"
+    profile = (
+        f"- history: {keep_last}\n  depth: {depth}\n  reliability: {reliable}\n  durability: {durability}\n"
+        f"  deadline: {for_ever}\n  lifespan: {for_ever}\n  liveliness: {automatic}\n"
+        f"  liveliness_lease_duration: {for_ever}\n  avoid_ros_namespace_conventions: false\n"
+    )
+    return {"offered_qos_profiles": profile}
 
 
 def _nanoseconds(stamps: Sequence[str]) -> list[int]:

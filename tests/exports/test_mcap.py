@@ -96,6 +96,26 @@ def test_every_topic_is_there_and_every_message_decodes(topics):
     assert counts == {"/map": 1, "/path": 1, "/graph": 1, "/tf_static": 1, "/tf": 5, "/scan": 5}
 
 
+def test_every_channel_says_which_quality_of_service_the_player_offers(run, tmp_path):
+    """As a reader of rosbag2's own format takes it."""
+    from rosbags.highlevel import AnyReader
+    from rosbags.interfaces import ConnectionExtRosbag2, QosDurability, QosHistory, QosReliability
+
+    path = tmp_path / "out.mcap"
+    path.write_bytes(run[2])
+    with AnyReader([path]) as bag:
+        offers = {each.topic: each.ext for each in bag.connections}
+    assert set(offers) == set(TOPICS)
+    for topic, offer in offers.items():
+        assert isinstance(offer, ConnectionExtRosbag2)
+        (profile,) = offer.offered_qos_profiles
+        kept = topic not in ("/tf", "/scan")
+        durability = QosDurability.TRANSIENT_LOCAL if kept else QosDurability.VOLATILE
+        assert (profile.durability, profile.reliability) == (durability, QosReliability.RELIABLE)
+        assert (profile.history, profile.depth >= 1) == (QosHistory.KEEP_LAST, True)
+        assert profile.deadline == profile.lifespan == (9223372036, 854775807)
+
+
 def test_stamps_are_those_of_the_log_to_the_nanosecond(topics):
     expected = [
         976052896784509000,
