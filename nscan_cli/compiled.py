@@ -8,6 +8,7 @@ from __future__ import annotations
 import contextlib
 import functools
 import operator
+import os
 import threading
 from collections.abc import Callable
 from typing import Any, TypeVar, cast
@@ -116,9 +117,8 @@ class Kernel:
         if version is None:
             made = self._dispatcher(arguments)
             (compiled,) = made.overloads.values()
-            machine_code.keep(file, compiled)
             # Another process may have been first.
-            version = machine_code.load(file, self.py_func.__name__) or made
+            version = machine_code.keep(file, self.py_func.__name__, compiled) or made
         return cast(Callable[..., Any], version)
 
     @property
@@ -132,14 +132,14 @@ class Kernel:
 
     def _dispatcher(self, arguments: tuple[Any, ...] | None = None) -> Any:
         """A function of numba's that compiles this one at its call, or now and only for these arguments."""
-        import numba
-
+        numba = _numba()
         config: Any = numba.config
         folder = cache_folder() if arguments is None else None
         signature = None if arguments is None else [tuple(map(numba.typeof, arguments))]
         # numba picks a function's folder when it is decorated: other users of numba in this process keep
         # theirs.
-        configured, config.CACHE_DIR = config.CACHE_DIR, str(folder or "")
+        own = "" if folder is None else str(folder / machine_code.vector_library())
+        configured, config.CACHE_DIR = config.CACHE_DIR, own
         try:
             return numba.njit(signature, cache=folder is not None, **self._options)(self.py_func)
         finally:
@@ -154,6 +154,24 @@ class Kernel:
     def targetoptions(self) -> Any:
         """Where numba looks whether the kernel becomes part of the one that calls it."""
         return self.dispatcher.targetoptions
+
+
+def _numba() -> Any:
+    """numba; where it comes in here, without the vector library that a machine may have.
+
+    With that, sines would round otherwise than on other machines, and kept code would need it.
+    """
+    switch = "NUMBA_DISABLE_INTEL_SVML"
+    before, os.environ[switch] = os.environ.get(switch), "1"
+    try:
+        import numba
+
+        return numba
+    finally:
+        if before is None:
+            del os.environ[switch]
+        else:
+            os.environ[switch] = before
 
 
 def _look(value: Any) -> object:

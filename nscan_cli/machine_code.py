@@ -30,22 +30,33 @@ import numpy as np
 from nscan_cli.cache_folder import cache_folder
 from nscan_cli.outputs import write_first
 
-HARMLESS = {"NUMBA_CACHE_DIR", "NUMBA_NUM_THREADS"}
+HARMLESS = {"NUMBA_CACHE_DIR", "NUMBA_NUM_THREADS", "NUMBA_DISABLE_INTEL_SVML"}
 """Settings of numba that change nothing in a kernel's machine code."""
+SETTINGS = ".numba_config.yaml"
+"""Where numba looks for settings in the current folder."""
 SUFFIX = ".code"
 LEFT = ".left"
 """Suffix of an empty file that says: this kernel's code cannot be kept here, and is left to numba."""
 PICKLED_TYPE = re.compile(rb"\x80\x04\x95.{8}\x8c.([\w.]+)\x94\x8c.(\w+)\x94\x93\x94\.", re.DOTALL)
 """A class or type as pickle's protocol 4 writes it: by the name of its module and its own."""
+MISSING: set[str] = set()
+"""What kept machine code has called in vain in this process: with numba imported, it may be there."""
 
 
-@functools.cache
 def machine() -> str | None:
     """What machine code depends on beside its sources: the versions of what makes it, and the processor.
 
     None where kernels are left to numba: it is told something special, or is not as it is known here.
     """
+    made_by = _made_by()
+    return None if made_by is None else _digest((made_by, vector_library()))
+
+
+@functools.cache
+def _made_by() -> object:
     if any(name.startswith("NUMBA_") and name not in HARMLESS for name in os.environ):
+        return None
+    if os.path.exists(SETTINGS):
         return None
     try:
         import llvmlite
@@ -55,7 +66,16 @@ def machine() -> str | None:
         processor = llvm.get_host_cpu_name(), llvm.get_host_cpu_features().flatten()
     except Exception:
         return None
-    return _digest((versions, processor))
+    return versions, processor
+
+
+def vector_library() -> str:
+    """The library whose functions LLVM puts into loops; "" where there is none.
+
+    numba takes it where somebody else has imported it, in processes of which others need not have it.
+    """
+    config = getattr(sys.modules.get("numba"), "config", None)
+    return "svml" if getattr(config, "USING_SVML", False) else ""
 
 
 def kept_in(name: str, kinds: object) -> Path | None:
@@ -78,23 +98,31 @@ def _digest(value: object) -> str:
     return hashlib.sha256(repr(value).encode()).hexdigest()[:16]
 
 
-def keep(file: Path, compiled: Any) -> None:
+def keep(file: Path, name: str, compiled: Any) -> Callable[..., Any] | None:
     """Write what numba has compiled (a CompileResult) to the file, where there is room and it is not there.
 
-    Compiled again, a kernel need not become the same machine code, nor round alike: that follows from the
-    order in which kernels are compiled, too. So what is kept first is what all processes run.
+    Returns the function that is kept now, None where there is none. Compiled again, a kernel need not become
+    the same machine code, nor round alike: that follows from the order in which kernels are compiled, too.
+    So what is kept first is what all processes run.
 
     The first line says as JSON what the code is called and needs, its check sum is the second, then comes
     the code.
     """
-    with contextlib.suppress(OSError):
-        try:
-            head, code = _parts(compiled)
-        except Exception:
-            # Another numba can raise anything. It keeps its code itself, from the next process on.
+    try:
+        head, code = _parts(compiled)
+        if MISSING.intersection(head["needs"]):
+            raise UnlinkedError
+        write_first(file, b"%s\n%d\n%s" % (json.dumps(head).encode(), zlib.crc32(code), code))
+        return _loaded(file, name)
+    except (OSError, MemoryError):
+        return None
+    except Exception:
+        # Another numba can raise anything, and call what is not there without it. It keeps its code itself,
+        # from the next process on.
+        with contextlib.suppress(OSError):
+            file.unlink(missing_ok=True)
             file.with_suffix(LEFT).touch()
-        else:
-            write_first(file, b"%s\n%d\n%s" % (json.dumps(head).encode(), zlib.crc32(code), code))
+        return None
 
 
 def _parts(compiled: Any) -> tuple[dict[str, Any], bytes]:
@@ -123,36 +151,40 @@ def _text(constant: Any) -> str:
 def load(file: Path, name: str) -> Callable[..., Any] | None:
     """The function that was kept in the file; None where there is none, or none that can run here.
 
-    A damaged file is removed.
+    A file that is damaged, or calls what is not there, is removed.
     """
     try:
-        head, check, code = file.read_bytes().split(b"\n", 2)
-        sound = int(check) == zlib.crc32(code)
-        function = _once_linked(json.loads(head), check, code, name) if sound else None
+        return _loaded(file, name)
     except (FileNotFoundError, MemoryError):
         return None
     except Exception:
         # What is damaged can raise anything; numba compiles it anew.
-        function = None
-    if function is None:
         with contextlib.suppress(OSError):
             file.unlink()
-    return function
+        return None
 
 
-def _once_linked(head: dict[str, Any], check: bytes, code: bytes, name: str) -> Callable[..., Any] | None:
+def _loaded(file: Path, name: str) -> Callable[..., Any]:
+    head, check, code = file.read_bytes().split(b"\n", 2)
+    if int(check) != zlib.crc32(code):
+        raise ValueError("damaged")
+    return _once_linked(json.loads(head), check, code, name)
+
+
+class UnlinkedError(Exception):
+    """Machine code that calls what is not there."""
+
+
+def _once_linked(head: dict[str, Any], check: bytes, code: bytes, name: str) -> Callable[..., Any]:
     """The function of the code, which is loaded once: loaded again, one would have what the other needs."""
     linked, known_by = engine()[-1], (head["function"], check)
     if known_by not in linked:
-        function = _linked(head, code, name)
-        if function is None:
-            return None
-        linked[known_by] = function
+        linked[known_by] = _linked(head, code, name)
     return linked[known_by]
 
 
-def _linked(head: dict[str, Any], code: bytes, name: str) -> Callable[..., Any] | None:
-    """The function of loaded code; None where something that it calls is missing."""
+def _linked(head: dict[str, Any], code: bytes, name: str) -> Callable[..., Any]:
+    """The function of loaded code. Raises UnlinkedError where something that it calls is missing."""
     import llvmlite.binding as llvm
 
     target, dynfunc, alive, _ = engine()
@@ -160,8 +192,9 @@ def _linked(head: dict[str, Any], code: bytes, name: str) -> Callable[..., Any] 
     # and one loader for both would run the first of them in the other kernel, too. The process's own symbols
     # are found once there is a loader.
     loader = llvm.create_mcjit_compiler(llvm.parse_assembly(""), target.create_target_machine(jit=True))
-    if any(llvm.address_of_symbol(needed) is None for needed in head["needs"]):
-        return None
+    if missing := [needed for needed in head["needs"] if llvm.address_of_symbol(needed) is None]:
+        MISSING.update(missing)
+        raise UnlinkedError
     loader.add_object_file(llvm.ObjectFileRef.from_data(code))
     loader.finalize_object()
     environments = {}

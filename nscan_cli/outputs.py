@@ -7,7 +7,6 @@ import fcntl
 import os
 import stat
 import sys
-import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 from typing import BinaryIO
@@ -43,7 +42,7 @@ def whole_file(path: str) -> Iterator[BinaryIO]:
         clear_left_over(target.parent)
         with _temporary(target.parent) as (file, name):
             yield file
-            _finish(file)
+            file.flush()
             os.fsync(file.fileno())
             os.replace(name, target)
     except BrokenPipeError:
@@ -59,7 +58,9 @@ def _temporary(folder: Path) -> Iterator[tuple[BinaryIO, str]]:
     It is locked as long as it is open: by that, others see that somebody is at work on it.
     """
     while True:
-        descriptor, name = tempfile.mkstemp(dir=folder, prefix=TEMPORARY)
+        # A name that nobody can guess, and the rights of any other new file: the umask applies.
+        name = str(folder / f"{TEMPORARY}{os.urandom(8).hex()}")
+        descriptor = os.open(name, os.O_CREAT | os.O_EXCL | os.O_WRONLY | os.O_CLOEXEC, 0o666)
         with os.fdopen(descriptor, "wb") as file:
             try:
                 # Before it is locked, another process may take it for left over.
@@ -72,14 +73,6 @@ def _temporary(folder: Path) -> Iterator[tuple[BinaryIO, str]]:
             finally:
                 with contextlib.suppress(FileNotFoundError):
                     os.unlink(name)
-
-
-def _finish(file: BinaryIO) -> None:
-    """Write out what is still held back, and let those read the file who may read any other new one."""
-    file.flush()
-    umask = os.umask(0)
-    os.umask(umask)
-    os.fchmod(file.fileno(), 0o666 & ~umask)
 
 
 def clear_left_over(folder: Path) -> None:
@@ -132,7 +125,7 @@ def write_first(path: Path, data: bytes) -> None:
     clear_left_over(path.parent)
     with _temporary(path.parent) as (file, name):
         file.write(data)
-        _finish(file)
+        file.flush()
         try:
             os.link(name, path)
         except FileExistsError:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import shutil
+import time
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -94,6 +95,60 @@ def test_a_changed_kernel_file_changes_the_folder_and_no_other_file_does(places,
             file.write("# changed\n")
         assert chosen() not in (None, before)
         before = chosen()
+
+
+def made_by(package: Path, folder: Path) -> Path:
+    """A cache folder as the package at this place has left it."""
+    (folder / "below_0a1b").mkdir(parents=True)
+    for name in ("a.b-01.code", "a.c-01.left", "below_0a1b/f-1.py311.nbi", "below_0a1b/f-1.py311.1.nbc"):
+        (folder / name).write_bytes(b"x")
+    (folder / folders.OWNER).write_bytes(os.fsencode(package))
+    return folder
+
+
+def test_a_new_folder_takes_the_place_of_those_that_nobody_needs(places):
+    """But not of what another copy of the package uses, and of what is not the cache's."""
+    base, elsewhere = places / "home" / ".cache" / "nscan-cli", places / "elsewhere"
+    elsewhere.mkdir()
+    own = made_by(folders.PACKAGE, base / "0.1.0-00000000000000aa")
+    gone = made_by(places / "gone", base / "0.1.0-00000000000000ab")
+    old = made_by(folders.PACKAGE, base / "0.0.9-00000000000000ac")
+    (old / folders.OWNER).unlink()
+    unused, used = (made_by(elsewhere, base / f"1.2.3rc1-00000000000000a{k}") for k in "de")
+    long_ago = time.time() - 31 * 86400
+    os.utime(unused / folders.OWNER, (long_ago, long_ago))
+    mixed = made_by(places / "gone", base / "0.1.0-00000000000000af")
+    (mixed / "below_0a1b" / "notes.txt").write_text("mine")
+    strangers = [made_by(places / "gone", base / "src"), made_by(places / "gone", places / "linked")]
+    link = base / "0.1.0-00000000000000b0"
+    link.symlink_to(places / "linked")
+
+    def files(folder: Path) -> int:
+        return sum(path.is_file() for path in folder.rglob("*"))
+
+    folder = chosen()
+    assert folder is not None
+    assert not any(path.exists() for path in (own, gone, old, unused))
+    assert [path for path in mixed.rglob("*") if path.is_file()] == [mixed / "below_0a1b" / "notes.txt"]
+    assert [files(path) for path in (used, *strangers)] == [5, 5, 5]
+    assert link.is_symlink()
+    # The folder is there: whatever comes beside it is left alone.
+    made_by(folders.PACKAGE, own)
+    assert chosen() == folder
+    assert files(own) == 5
+
+
+def test_a_folder_that_is_used_says_so(places):
+    folder = chosen()
+    assert folder is not None
+    owner = folder / folders.OWNER
+    assert owner.read_bytes() == os.fsencode(folders.PACKAGE)
+    before = owner.stat().st_mtime
+    chosen()
+    assert owner.stat().st_mtime == before
+    os.utime(owner, (before - 2 * 86400, before - 2 * 86400))
+    chosen()
+    assert owner.stat().st_mtime >= before
 
 
 def test_kernels_run_where_nothing_can_be_kept(places, monkeypatch):

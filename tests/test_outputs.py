@@ -171,3 +171,11 @@ def test_what_was_written_first_stays(tmp_path, monkeypatch, link):
     write_first(path, b"second")
     assert path.read_bytes() == b"first"
     assert list(tmp_path.iterdir()) == [path]
+
+
+def test_the_umask_is_left_alone(tmp_path, monkeypatch):
+    """It is the whole process's: what another thread makes meanwhile would have the wrong rights."""
+    monkeypatch.setattr(os, "umask", lambda mask: pytest.fail(f"umask({mask:o})"))
+    write_whole(str(tmp_path / "out.json"), b"x")
+    write_first(tmp_path / "once", b"x")
+    assert names(tmp_path) == ["once", "out.json"]

@@ -80,7 +80,7 @@ def _map(verdict: Verdict, folder: Path) -> list[str]:
     name = verdict.entry.name
     try:
         picture = base64.b64encode((folder / name / "preview.png").read_bytes()).decode()
-        layers = (folder / name / "preview.svg").read_text()
+        layers = (folder / name / "preview.svg").read_text("utf-8")
     except OSError:
         return ['<p class="soft">The map is gone.</p>']
     switches = "".join(

@@ -23,7 +23,9 @@ def page(title: str, verdicts: list[Verdict], folder: Path) -> bytes:
     stamp = "" if when is None else f'<time class="time" datetime="{when}">{_readable(when)}</time>'
     absent = sum(verdict.status == "absent" for verdict in verdicts)
     missing = f"{absent} more {'is' if absent == 1 else 'are'} not there. " if absent else ""
-    style, script = (Path(__file__).with_name(f"page.{ending}").read_text() for ending in ("css", "js"))
+    style, script = (
+        Path(__file__).with_name(f"page.{ending}").read_text("utf-8") for ending in ("css", "js")
+    )
     content = "\n".join(
         [
             "<!DOCTYPE html>",

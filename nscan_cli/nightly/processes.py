@@ -15,6 +15,7 @@ from collections.abc import Generator, Sequence
 from pathlib import Path
 from typing import Any
 
+from nscan_cli.nightly import start
 from nscan_cli.nightly.task import OUTPUTS, RESULT, TASK, Outcome, Report, Task
 
 LIBRARIES = ("OPENBLAS", "MKL", "OMP")
@@ -68,7 +69,7 @@ class Work:
         _lay_out(self.place, task, threads)
         with (self.place / "stderr.txt").open("wb") as errors:
             self.process = subprocess.Popen(
-                [sys.executable, "-m", __package__ + ".work", str(self.place)],
+                command(self.place),
                 stdin=subprocess.PIPE,
                 stdout=subprocess.PIPE,
                 stderr=errors,
@@ -129,8 +130,13 @@ class Work:
         code = self.process.poll()
         if code is not None and code < 0:
             return f"its process was killed by signal {-code}"
-        said = (self.place / "stderr.txt").read_text(errors="replace").strip().splitlines()
+        said = (self.place / "stderr.txt").read_text("utf-8", errors="replace").strip().splitlines()
         return f"its process ended with code {code}" + (f": {said[-1]}" if said else "")
+
+
+def command(place: Path) -> list[str]:
+    """The command line of the process that does what lies in a place of work."""
+    return [sys.executable, "-P", start.__file__, str(place)]
 
 
 def _lay_out(place: Path, task: Task, threads: int) -> None:

@@ -1,6 +1,6 @@
 """One log from its bytes to map and errors, in a process of its own.
 
-It is started as `python -m nscan_cli.nightly.work PLACE`. What it does is what `slam` with --map and
+It is started by `start.py`. What it does is what `slam` with --map and
 --trajectory, and `evaluate`, do. It says how far it is on its standard output, a line of JSON at a time, and
 ends itself when its standard input does: whoever started it is gone then.
 """
@@ -10,7 +10,6 @@ from __future__ import annotations
 import contextlib
 import json
 import os
-import sys
 import threading
 import time
 import traceback
@@ -122,7 +121,3 @@ def _end_with_the_parent() -> None:
         while os.read(0, 1024):
             pass
     os._exit(1)
-
-
-if __name__ == "__main__":
-    main(sys.argv[1])

@@ -110,9 +110,7 @@ def test_a_process_ends_with_whoever_has_started_it(endless, scratch):
     """Its standard input is closed when the parent is gone, however that went."""
     place = scratch / "endless"
     processes._lay_out(place, endless, 1)
-    process = subprocess.Popen(
-        [sys.executable, "-m", "nscan_cli.nightly.work", str(place)], stdin=subprocess.PIPE
-    )
+    process = subprocess.Popen(processes.command(place), stdin=subprocess.PIPE)
     time.sleep(0.5)
     assert process.poll() is None
     process.communicate(timeout=20)
