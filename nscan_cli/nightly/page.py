@@ -49,8 +49,8 @@ def page(title: str, verdicts: list[Verdict], folder: Path) -> bytes:
             *(card(verdict, folder) for verdict in sorted(seen, key=lambda each: ORDER.index(each.status))),
             *absent(never),
             f"<footer>nscan-cli {escape(__version__)}. Errors in metres: the mean on relations (Kümmerle et "
-            "al. 2009), or the RMSE of the ATE against a reference. Worse: by more than 5 % and 0.5 mm, or "
-            "0.01°, since the night before.</footer>",
+            "al. 2009), or the RMSE of the ATE against a reference, after the rigid motion that fits best. "
+            "Worse: by more than 5 % and 0.5 mm, or 0.01°, since the night before.</footer>",
             "</main>",
             f"<script>\n{script}</script>",
             "</body>",
