@@ -6,6 +6,8 @@
 # .errors.json: DATA/NAME.relations, or DATA/NAME.reference.tum, or the log itself for the names in
 # TRUE_POSES. All are made again when what they are made from is newer. With MAX_TRANSLATION=0.05 (m) a
 # larger error is a failure; with -k the other logs go on. Names must not contain spaces.
+#
+# Where to get the logs of Radish: `nscan-cli nightly radish --data FOLDER -o NIGHTS` with an empty FOLDER says.
 
 NSCAN_CLI ?= nscan-cli
 DATA ?= .

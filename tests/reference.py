@@ -60,12 +60,14 @@ no-loops = true
 """
 MANIFEST = """\
 The manifest of `nightly` has a table for every log. All keys but `name` may be left out; without `path`, a
-log of that name and a usual ending is looked for. Paths are relative to the manifest, or to `--data`.
+log of that name and a usual ending is looked for, or the file that `source` ends with. Paths are relative to
+the manifest, or to `--data`. A log that is not there has failed, unless it is optional.
 
 ```toml
 [[log]]
 name = "intel"
-path = "intel.log.gz"
+path = "intel.log.gz"                      # or also = ["intel-lab"], other names to look for
+optional = true                            # left out where it is not there, or unmeasured
 relations = "intel.relations"              # or reference = "intel.tum", or a log with TRUEPOS
 max_translation = 0.02                     # m; a larger error fails the log
 max_rotation = 0.4                         # degrees
@@ -76,7 +78,8 @@ relations_source = "http://example.org/intel.relations"
 sha256 = "9f86d081884c7d659a2feaa0c55ad015a3bf4f1b2b0b822cd15d6c15b0f00a08"  # of the log that bounds are for
 ```
 
-`reference_source`, `relations_sha256` and `reference_sha256` are likewise.
+`reference_source`, `relations_sha256` and `reference_sha256` are likewise. `about` and `published_map` (an
+address) are for the report.
 """
 FILES = """\
 Files appear whole or not at all: they are written under a name that begins with `.nscan-cli.` in the same

@@ -50,10 +50,11 @@ def command(
 ) -> None:
     """Map and measure every log of MANIFEST.toml, and report what changed since the night before.
 
-    The manifests that come with nscan-cli need --data, the folder of their logs; what is not there is
-    listed with the place to get it from. A log is done again when its bytes, its reference, its parameters
-    or the code of nscan-cli have changed, or it failed. Whenever this is stopped, the next call goes on from
-    there.
+    The manifests that come with nscan-cli need --data, the folder of their logs; those that are not there
+    are listed with the place to get them from. In a manifest of your own a log that is not there has failed,
+    unless it is optional. A log is done again when its bytes, its reference, its parameters or the code of
+    nscan-cli have changed, or it failed; the report says why. Whenever this is stopped, the next call goes on
+    from there.
 
     FOLDER/report.html and report.json are the report. Exit code 3 when a log fails or is above its bound.
     """
@@ -74,7 +75,10 @@ def command(
         )
     with claimed(output) as folder:
         planned = plan(entries, folder, force)
-        for entry in planned.absent:
+        if len(planned.absent) > 1:
+            names = ", ".join(entry.name for entry in planned.absent)
+            say(f"not there, skipped: {names}; the report says where to get them", quiet)
+        for entry in planned.absent if len(planned.absent) == 1 else ():
             _say_absent(entry, quiet)
         for name, notes in planned.notes.items():
             for note in notes:

@@ -69,7 +69,6 @@ TEXT = (
     (rb"<", "HTML or XML text"),
     (rb"(VERTEX_SE2|EDGE_SE2|VERTEX2|EDGE2|VERTEX_SE3:QUAT|EDGE_SE3:QUAT)\s", "a pose graph (g2o or TORO)"),
     (rb"(LASER_READING|GFS_\w+)\s", "a GMapping .gfs file"),
-    (rb"(position|laser) \d+ -?\d+(\.\d+)? -?\d+(\.\d+)? ", "a Player log of 2002, older than version 1"),
     (rb"(@SENS|@OPEN|#ROBOT|#LASER)\s", "a BeeSoft .rec log"),
     (rb"(image|resolution):", "a map's YAML file"),
     (rb"([-+.\deE]+[ \t]+){7}[-+.\deE]+\s*$", "a list of eight numbers a line, as of poses or relations"),

@@ -1,4 +1,4 @@
-"""Player text logs, version 1 (Player 1.x) and version 2 (Player 2 and 3), as in the Radish collection."""
+"""Player text logs, as in the Radish collection: of 2002, of Player 1, of Player 2 and 3."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 
 from nscan_cli.counting import counted
 from nscan_cli.errors import InputDataError, WrongUsageError
-from nscan_cli.logs import order, player_records
+from nscan_cli.logs import order, player_bearings, player_records
 from nscan_cli.logs.assemble import Findings, Motion, laser_log
 from nscan_cli.logs.kinds import FIRST_LINE
 from nscan_cli.logs.odometry import interpolated
@@ -19,18 +19,23 @@ from nscan_cli.logs.skips import Skips
 from nscan_cli.poses import Array, wrap
 
 FORMS: tuple[tuple[Version, re.Pattern[bytes]], ...] = (
-    (1, re.compile(rb"\d+\.\d+ +\S+ +\d+ +[a-z]\w* +\d+ +\d+\.\d+(\s|$)")),
-    (2, re.compile(rb"\d+\.\d+ +\S+ +\d+ +[a-z]\w* +\d+ +\d+ +\d+(\s|$)")),
+    (0, re.compile(rb"(laser|position(2d)?)[ \t]+\d+[ \t]+\d+(\.\d+)?(\s|$)")),
+    (1, re.compile(rb"\d+\.\d+[ \t]+\S+[ \t]+\d+[ \t]+[a-z]\w*[ \t]+\d+[ \t]+\d+\.\d+(\s|$)")),
+    (2, re.compile(rb"\d+\.\d+[ \t]+\S+[ \t]+\d+[ \t]+[a-z]\w*[ \t]+\d+[ \t]+\d+[ \t]+\d+(\s|$)")),
 )
-"""Version 1 has the time of the data where version 2 has type and subtype."""
+"""Version 1 has the time of the data where version 2 has type and subtype. In 2002 the interface is first."""
+NAMES: dict[Version, str] = {0: "Player, form of 2002", 1: "Player, version 1", 2: "Player, version 2"}
 ODOMETRY = ("position", "position2d")
 DATA = ("", "1:1", "1:2")
 """The kinds of records that hold scans or poses."""
+BEGINS_AT_ZERO = (
+    "the bearings begin at 0° and are taken as written, 0° ahead; where 90° is ahead give --angle-min -90"
+)
 UNSAID_MOUNT = "the log does not say how the laser is mounted: taken as at the robot's centre; see --mount"
 
 
 def recognises(data: bytes) -> bool:
-    """Whether the first line that is neither blank nor a comment has a Player log's beginning."""
+    """Whether one of the first lines has a Player log's beginning: the first of all may be cut off."""
     return _version(data) is not None
 
 
@@ -41,7 +46,8 @@ def read(data: bytes, file: str, source: Source, options: ReadingOptions) -> Las
     log or have to choose between devices.
     """
     options.refuse_topic(file, "a Player log", "--laser laser:0")
-    version = _version(data) or 1
+    version = _version(data)
+    assert version is not None
     skips = Skips(file, options.strict)
     lines = player_records.lines_by_device(data, version, skips)
     findings = Findings(skips, {_said(key): len(found) for key, found in lines.items()})
@@ -54,19 +60,30 @@ def read(data: bytes, file: str, source: Source, options: ReadingOptions) -> Las
         reason, (_, first) = next(iter(skips.reasons.items()))
         problem = f"no record of {laser} can be read: {reason}"
         raise InputDataError(file, problem, "give a log with whole records", first)
+    if scans.bearings is not None:
+        findings.used["laser"] += f", bearings in {scans.bearings}"
+    if _begin_at_zero(scans):
+        findings.warnings.append(BEGINS_AT_ZERO)
     times = order.by_time(scans.raw.stamps)
     findings.warnings += times.warnings
     mount = _mount(laser, lines, options, findings)
     odometry = _odometry(scans, lines, times, options, findings, file)
-    form, motion = f"Player, version {version}", Motion(odometry)
-    return laser_log(source, form, laser, scans.raw, times, mount, motion, findings, options, file)
+    motion = Motion(odometry)
+    return laser_log(source, NAMES[version], laser, scans.raw, times, mount, motion, findings, options, file)
+
+
+def _begin_at_zero(scans: Scans) -> bool:
+    """Whether the bearings go from 0 to about half a turn, as lasers count that have 90° ahead."""
+    last = scans.raw.angle_min + scans.raw.angle_increment * (scans.raw.ranges.shape[1] - 1)
+    ends = np.degrees(np.array([scans.raw.angle_min, last]))
+    return scans.bearings is not None and bool((ends.min() > -1) & (np.abs(ends.max() - 180) < 30))
 
 
 def _version(data: bytes) -> Version | None:
-    line = FIRST_LINE.search(data, 0, 1 << 16)
-    if b"\0" in data[:512] or line is None:
+    if b"\0" in data[:512]:
         return None
-    return next((version for version, form in FORMS if form.match(line.group(1))), None)
+    lines = (line.group(1) for line in FIRST_LINE.finditer(data, 0, 1 << 16))
+    return next((version for line in lines for version, form in FORMS if form.match(line)), None)
 
 
 def _chosen(
@@ -120,9 +137,8 @@ def _odometry(
         used["odometry"] = "the poses in the scans (1:2)"
         return poses
     device, why = _chosen("odom-topic", options.odom_topic, ODOMETRY, lines, file)
-    values, stamps = player_records.numbers(
-        [] if device is None else lines.get((device, ""), lines.get((device, "1:1"), [])), 7, findings.skips
-    )
+    found = [] if device is None else lines.get((device, ""), lines.get((device, "1:1"), []))
+    values, stamps = player_records.poses(found, findings.skips)
     if not len(values):
         warnings.append("the log has no record of a position device: no odometry")
         used["odometry"] = "none: no pose in the log"
@@ -133,7 +149,11 @@ def _odometry(
         used["odometry"] = "none: no time stamps"
         return None
     used["odometry"] = f"{device}, {why}, interpolated"
-    return interpolated(times.times, moments.times, values[moments.rows, :3], f"record of {device}", warnings)
+    poses = values[moments.rows, :3]
+    if scans.bearings == "degrees" and player_bearings.has_degrees(poses):
+        poses[:, 2] = np.radians(poses[:, 2])
+        used["odometry"] += ", headings in degrees"
+    return interpolated(times.times, moments.times, poses, f"record of {device}", warnings)
 
 
 def _said(key: tuple[str, str]) -> str:

@@ -1,33 +1,40 @@
 """Player text, line by line: which devices there are, and the numbers in their records.
 
 Source of the form: Player, server/drivers/shell/writelog.cc. Version 1: `server_time host port interface
-index data_time payload`. Version 2: `time host robot interface index type subtype payload`. Lengths in m,
-angles in rad; lines that begin with # are comments.
+index data_time payload`. Version 2: `time host robot interface index type subtype payload`. Logs of 2002,
+here version 0, are older than that file: `interface index time payload`. Lengths in m, angles in rad; lines
+that begin with # are comments.
 """
 
 from __future__ import annotations
 
 import io
 import re
+from collections import Counter
 from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 
 from nscan_cli.limits import KINDS
+from nscan_cli.logs import player_bearings
 from nscan_cli.logs.assemble import RawScans, stacked
 from nscan_cli.logs.laser import CARMEN_MAX_RANGE
 from nscan_cli.logs.skips import Skips
 from nscan_cli.logs.text_records import Record, as_text, beam_count, parsed, sound
 from nscan_cli.poses import Array
 
-Version = Literal[1, 2]
+Version = Literal[0, 1, 2]
 Line = tuple[int, bytes, bytes]
 """Number in the file (from 1), time stamp, payload."""
 Lines = dict[tuple[str, str], list[Line]]
 """By device, as in laser:0, and by type and subtype, as in 1:1; these are empty in version 1."""
-ANGLES = {1: slice(-4, -1), 2: slice(-5, -2)}
+PLACES: dict[Version, tuple[int, int, int]] = {0: (3, 0, 2), 1: (6, 3, 5), 2: (7, 3, 0)}
+"""How many fields go before the payload, and which of them the interface and the time stamp are."""
+ANGLES: dict[Version, slice] = {0: slice(-4, -1), 1: slice(-4, -1), 2: slice(-5, -2)}
 """Where first and last direction and step stand in what goes before the ranges."""
+FEWEST = 3
+"""Values of a pose."""
 LONGEST_NUMBER = 10
 """Digits of an index or a type."""
 INTERFACE = re.compile(rb"[a-z]\w*\Z")
@@ -40,6 +47,8 @@ class Scans:
     raw: RawScans
     robot: Array | None
     """(S, 3) pose of the robot in the scans of form 1:2, when all have one."""
+    bearings: str | None = None
+    """Their unit, when the log writes one for each beam."""
 
 
 def lines_by_device(data: bytes, version: Version, skips: Skips) -> Lines:
@@ -48,20 +57,21 @@ def lines_by_device(data: bytes, version: Version, skips: Skips) -> Lines:
     A device is named `interface:index`, with `robot:` (version 1: `port:`) in front where the log has
     several robots, and `host:` where it has several hosts.
     """
-    fields = 6 if version == 1 else 7
+    fields, at, time = PLACES[version]
     found: dict[tuple[bytes, bytes, bytes, bytes, bytes], list[Line]] = {}
     for number, line in enumerate(io.BytesIO(data), 1):
         text = line.strip()
         if not text or text.startswith(b"#"):
             continue
         parts = text.split(None, fields)
-        if len(parts) < fields or not INTERFACE.match(parts[3]) or _number(parts[4]) < 0:
+        if len(parts) < fields or not INTERFACE.match(parts[at]) or _number(parts[at + 1]) < 0:
             skips.add("not a Player record", number)
             continue
         payload = parts[fields] if len(parts) > fields else b""
-        kind = b"" if version == 1 else b"%d:%d" % (_number(parts[5]), _number(parts[6]))
-        stamp = parts[5] if version == 1 else parts[0]
-        key = (parts[1], parts[2], parts[3], parts[4], kind)
+        kind = b"%d:%d" % (_number(parts[5]), _number(parts[6])) if version == 2 else b""
+        host, robot = parts[1:3] if version else (b"", b"")
+        stamp = parts[time]
+        key = (host, robot, parts[at], parts[at + 1], kind)
         if key not in found and len(found) >= KINDS.value:
             skips.add("a device too many", number)
             continue
@@ -78,8 +88,18 @@ def lines_by_device(data: bytes, version: Version, skips: Skips) -> Lines:
     return lines
 
 
+def poses(lines: list[Line], skips: Skips) -> tuple[Array, list[str]]:
+    """Rows (R, V), of which x, y and θ are the first three, with stamps; malformed ones are skipped.
+
+    How many values there are depends on the version and on the device: as many as most of the lines have.
+    """
+    counts = Counter(len(payload.split()) for _, _, payload in lines)
+    (usual, _), *_ = counts.most_common(1) or [(0, 0)]
+    return numbers(lines, max(usual, FEWEST), skips)
+
+
 def numbers(lines: list[Line], count: int, skips: Skips) -> tuple[Array, list[str]]:
-    """Rows (R, count) of a short record such as a position, with stamps; malformed ones are skipped."""
+    """Rows (R, count) of a short record such as a geometry, with stamps; malformed ones are skipped."""
     rows, stamps = [], []
     for record, _, values in parsed([(_record(line), 0) for line in lines], skips):
         if values.size != count:
@@ -96,9 +116,15 @@ def scans(laser: str, lines: Lines, version: Version, skips: Skips) -> Scans:
     """The scans of one laser; malformed ones are skipped.
 
     Version 1: `min max step count`, version 2: `id min max step farthest count`, and in its form 1:2 the
-    robot's pose after the id; then a range and an intensity for each beam.
+    robot's pose after the id; then a range and an intensity for each beam. Or nothing but a range, a bearing
+    and an intensity for each beam, as before version 1 and in some logs of that version.
     """
-    forms = (("", 4),) if version == 1 else (("1:1", 6), ("1:2", 9))
+    if version < 2:
+        unnamed = [_record(line) for line in lines.get((laser, ""), [])]
+        if player_bearings.are_written(unnamed, headed=version == 1):
+            raw, unit = player_bearings.scans(unnamed, skips)
+            return Scans(raw, None, unit)
+    forms = (("1:1", 6), ("1:2", 9)) if version == 2 else (("", 4),)
     rows: list[tuple[Record, Array, Array]] = []
     for kind, head in forms:
         found = lines.get((laser, kind), [])
@@ -112,10 +138,10 @@ def scans(laser: str, lines: Lines, version: Version, skips: Skips) -> Scans:
     heads = [head for _, head, _ in rows]
     posed = bool(heads) and all(len(head) == 9 for head in heads)
     angles = np.array([head[ANGLES[version]] for head in heads]).reshape(-1, 3)
-    if version == 1:
+    if version < 2:
         # Player 1 has hundredths of a degree inside; old files round them to 4 digits of a radian.
         angles = np.radians(np.round(np.degrees(angles), 2))
-    farthest = 0.0 if version == 1 or not heads else max(float(head[-2]) for head in heads)
+    farthest = 0.0 if version < 2 or not heads else max(float(head[-2]) for head in heads)
     raw = RawScans(
         stacked([readings for _, _, readings in rows]),
         angles[:, 0],

@@ -7,6 +7,7 @@ import re
 from html import escape
 from pathlib import Path
 
+from nscan_cli.nightly.manifest import Entry
 from nscan_cli.nightly.plot import history
 from nscan_cli.nightly.verdict import Errors, Status, Verdict
 
@@ -25,14 +26,14 @@ def card(verdict: Verdict, folder: Path) -> str:
     entry, last = verdict.entry, verdict.last
     parts = [
         f'<section class="log {verdict.status}" id="{entry.name}">',
-        f'<header><h2>{entry.name}</h2><span class="chip {verdict.status}">{WORDS[verdict.status]}</span>'
-        "</header>",
+        f"<header><h2>{entry.name}</h2>{chip(verdict)}</header>",
     ]
     if verdict.status != "good":
         parts += [f'<p class="reason">{escape(reason)}</p>' for reason in verdict.reasons]
+    if entry.about:
+        parts.append(f'<p class="about">{escape(entry.about)}</p>')
     if verdict.status == "absent" and "log" in entry.sources:
-        parts.append(f'<p>To be had from <a href="{_link(entry.sources["log"])}">'
-                     f"{escape(entry.sources['log'])}</a></p>")  # fmt: skip
+        parts.append(f"<p>To be had from {_source(entry)}</p>")
     if last is not None and verdict.status in ("failed", "absent"):
         parts.append('<p class="soft">Below: the last night that was done.</p>')
     if last is not None:
@@ -48,6 +49,31 @@ def card(verdict: Verdict, folder: Path) -> str:
     return "\n".join([*parts, "</section>"])
 
 
+def chip(verdict: Verdict) -> str:
+    """What is to be said of the log in a word or two."""
+    if verdict.status == "good" and verdict.errors is None:
+        return '<span class="chip absent">not measured</span>'
+    return f'<span class="chip {verdict.status}">{WORDS[verdict.status]}</span>'
+
+
+def absent(verdicts: list[Verdict]) -> list[str]:
+    """What is not there and never was, in few words, with the places to get it from."""
+    if not verdicts:
+        return []
+    rows = []
+    for verdict in verdicts:
+        entry = verdict.entry
+        about = escape(entry.about)
+        source = ("<br>" if about else "") + _source(entry) if "log" in entry.sources else ""
+        rows.append(f'<dt id="{entry.name}">{entry.name}</dt><dd>{about}{source}</dd>')
+    title = "One more log is" if len(rows) == 1 else f"{len(rows)} more logs are"
+    return [
+        f'<section class="log absent"><h2>{title} not there</h2>',
+        f"<dl>{''.join(rows)}</dl>",
+        "</section>",
+    ]
+
+
 def change(verdict: Verdict) -> str:
     """By how much the error has changed since the night before, in per cent."""
     errors, before = verdict.errors, Errors.of(verdict.before)
@@ -61,18 +87,21 @@ def change(verdict: Verdict) -> str:
 
 
 def seconds(verdict: Verdict) -> str:
-    """How long the log took."""
-    if verdict.last is None:
-        return ""
-    return f'<span class="time">{verdict.last["times"]["seconds"]:.1f} s</span>'
+    """How long the log took; nothing where kernels were compiled meanwhile."""
+    took = None if verdict.last is None else verdict.last["times"]["seconds"]
+    return "" if took is None else f"{took:.1f} s"
 
 
 def real_time(verdict: Verdict) -> str:
     """How much faster than it was recorded."""
-    if verdict.last is None or not verdict.last["counts"]["duration"]:
+    if not seconds(verdict) or verdict.last is None or not verdict.last["counts"]["duration"]:
         return ""
-    took = max(verdict.last["times"]["seconds"], 0.001)
-    return f'<span class="time">{verdict.last["counts"]["duration"] / took:.0f} ×</span>'
+    return f"{verdict.last['counts']['duration'] / max(verdict.last['times']['seconds'], 0.001):.0f} ×"
+
+
+def timed(text: str) -> str:
+    """In an element of the class that has all that differs from call to call."""
+    return f'<span class="time">{text}</span>'
 
 
 def _map(verdict: Verdict, folder: Path) -> list[str]:
@@ -92,6 +121,8 @@ def _map(verdict: Verdict, folder: Path) -> list[str]:
             ("refused", "refused loops", ""),
         )
     )
+    published = verdict.entry.published_map
+    theirs = f'<a href="{_link(published)}">published map</a>' if published else ""
     return [
         '<div class="map">',
         f'<div class="frame"><div class="sheet" style="--aspect:{_aspect(layers):.4f}">'
@@ -101,7 +132,7 @@ def _map(verdict: Verdict, folder: Path) -> list[str]:
         '<span><button type="button" data-zoom="2" aria-label="larger">+</button> '
         '<button type="button" data-zoom="0.5" aria-label="smaller">−</button> '
         '<button type="button" data-zoom="0">fit</button></span>'
-        f'{switches}<a href="{name}/map.png">full size</a></div>',
+        f'{switches}<a href="{name}/map.png">full size</a>{theirs}</div>',
         "</div>",
     ]
 
@@ -113,6 +144,9 @@ def _aspect(layers: str) -> float:
 
 
 def _nights(verdict: Verdict) -> list[str]:
+    """The plot, where there is something to plot."""
+    if all(night["outcome"] == "done" and Errors.of(night) is None for night in verdict.nights):
+        return []
     return ["<h3>Nights</h3>", f'<div class="nights">{history(verdict)}</div>']
 
 
@@ -166,18 +200,42 @@ def _run(verdict: Verdict) -> list[str]:
         ("scans, keyframes", f"{counts['scans']:,}, {counts['keyframes']:,}"),
         ("relations", f"{counts['pairwise']:,} pairwise, {counts['nscan']:,} nScan"),
         ("loops", f"{counts['loops']['accepted']:,} accepted, {counts['loops']['refused']:,} refused"),
-        (
-            "time",
-            f"{seconds(verdict)}, {real_time(verdict)} real time" if real_time(verdict) else seconds(verdict),
-        ),
+        ("time", _time(verdict)),
+        ("made", _made(verdict)),
     ]
     notes = [f'<p class="note">{escape(note)}</p>' for note in verdict.notes]
     return ["<h3>Run</h3>", _list(rows), *notes]
 
 
+def _time(verdict: Verdict) -> str:
+    took, faster = seconds(verdict), real_time(verdict)
+    if not took:
+        return timed("not timed: kernels were compiled meanwhile")
+    return timed(f"{took}, {faster} real time" if faster else took)
+
+
+def _made(verdict: Verdict) -> str:
+    """When, and why it was done although it was done before."""
+    assert verdict.last is not None
+    times = verdict.last["times"]
+    why = "; ".join(times.get("anew", []))
+    anew = f", anew: {escape(why)}" if why else ""
+    return timed(f"{readable(times['finished'])}{anew}")
+
+
+def readable(when: str) -> str:
+    """A time of ISO 8601 for people."""
+    return when.replace("T", " ").replace("Z", " UTC")
+
+
 def _list(rows: list[tuple[str, str]]) -> str:
     cells = "".join(f'<dt>{name}</dt><dd class="number">{value}</dd>' for name, value in rows)
     return f"<dl>{cells}</dl>"
+
+
+def _source(entry: Entry) -> str:
+    source = entry.sources["log"]
+    return f'<a href="{_link(source)}">{escape(source)}</a>'
 
 
 def _link(source: str) -> str:

@@ -7,6 +7,7 @@ import functools
 import hashlib
 import json
 from pathlib import Path
+from typing import Any
 
 from nscan_cli import __version__
 from nscan_cli.errors import InputMissingError
@@ -41,13 +42,19 @@ def sha256_of(path: Path) -> str:
     return hashlib.sha256(read_bytes(str(path))).hexdigest()
 
 
+def made_from(entry: Entry, hashes: dict[str, str]) -> dict[str, Any]:
+    """Inputs and parameters of a log, so that what has changed can be told."""
+    inputs = {role: [path.name, hashes[role]] for role, path in entry.inputs.items()}
+    return {"inputs": inputs, "parameters": entry.parameters.as_table()}
+
+
 def fingerprint(entry: Entry, hashes: dict[str, str]) -> str:
     """The SHA-256 of all that the results of a log follow from; `hashes` are those of its inputs by role."""
-    made_from = {
+    everything = {
         "tool": tool_key(),
         # The names too: the results carry them.
         "inputs": {role: [path.name, hashes[role]] for role, path in entry.inputs.items()},
         "reading": dataclasses.asdict(entry.parameters.reading),
         "mapping": entry.parameters.mapping,
     }
-    return hashlib.sha256(json.dumps(made_from, sort_keys=True).encode()).hexdigest()
+    return hashlib.sha256(json.dumps(everything, sort_keys=True).encode()).hexdigest()

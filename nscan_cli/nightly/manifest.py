@@ -6,8 +6,9 @@ import math
 import re
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 from typing import Any
+from urllib.parse import urlsplit
 
 from nscan_cli.errors import InputDataError, InputMissingError, WrongUsageError
 from nscan_cli.inputs import read_toml
@@ -41,6 +42,12 @@ class Entry:
     """Role → where the file can be got."""
     sha256: dict[str, str] = field(default_factory=dict)
     """Role → SHA-256 of the file that bounds and figures are of."""
+    optional: bool = False
+    """What is not there is left out, and no failure: the log, or what it is measured against."""
+    about: str = ""
+    """What is known of the log, for the report."""
+    published_map: str = ""
+    """Where a map that somebody has published can be seen."""
 
     @property
     def is_there(self) -> bool:
@@ -111,7 +118,7 @@ def _entry(file: str, number: int, table: dict[str, Any], folder: Path) -> Entry
     if bounds and "relations" not in table and "reference" not in table:
         remedy = "give relations or reference too"
         raise InputDataError(place, f"has {bounds[0]}, but nothing to measure against", remedy)
-    inputs = {"log": folder / table["path"] if "path" in table else _by_name(folder, name)}
+    inputs = {"log": folder / table["path"] if "path" in table else _by_name(folder, name, table)}
     inputs.update({role: folder / table[role] for role in ROLES[1:] if role in table})
     return Entry(
         name=name,
@@ -122,6 +129,9 @@ def _entry(file: str, number: int, table: dict[str, Any], folder: Path) -> Entry
         parameters=parameters_from(place, table.get("parameters", {})),
         sources={role: table[_about(role)[0]] for role in ROLES if _about(role)[0] in table},
         sha256={role: table[_about(role)[1]] for role in ROLES if _about(role)[1] in table},
+        optional=table.get("optional", False),
+        about=table.get("about", ""),
+        published_map=table.get("published_map", ""),
     )
 
 
@@ -130,8 +140,13 @@ def _about(role: str) -> tuple[str, str]:
     return ("source", "sha256") if role == "log" else (f"{role}_source", f"{role}_sha256")
 
 
-def _by_name(folder: Path, name: str) -> Path:
-    paths = [folder / (name + ending) for ending in ENDINGS]
+def _by_name(folder: Path, name: str, table: dict[str, Any]) -> Path:
+    """The log of this name, of one of its other names, or as the file at its source is called."""
+    names = [name, *table.get("also", [])]
+    paths = [folder / (each + ending) for each in names for ending in ENDINGS]
+    downloaded = PurePosixPath(urlsplit(table.get("source", "")).path).name
+    if downloaded:
+        paths.append(folder / downloaded)
     return next((path for path in paths if path.exists()), paths[0])
 
 
@@ -162,6 +177,15 @@ def _digest(value: Any) -> str | None:
     )
 
 
+def _names(value: Any) -> str | None:
+    good = isinstance(value, list) and all(isinstance(name, str) and NAME.fullmatch(name) for name in value)
+    return None if good else 'names of files without their endings, as in ["intel-lab"]'
+
+
+def _yes_or_no(value: Any) -> str | None:
+    return None if isinstance(value, bool) else "true or false"
+
+
 def _table(value: Any) -> str | None:
     return None if isinstance(value, dict) else "a table of options, as in { end = 60 }"
 
@@ -169,6 +193,10 @@ def _table(value: Any) -> str | None:
 KEYS: dict[str, Callable[[Any], str | None]] = {
     "name": _text,
     "path": _text,
+    "also": _names,
+    "optional": _yes_or_no,
+    "about": _text,
+    "published_map": _text,
     "relations": _text,
     "reference": _text,
     "max_translation": _number,

@@ -5,15 +5,16 @@ from __future__ import annotations
 import contextlib
 import datetime
 from collections.abc import Callable, Generator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Protocol
+from typing import Any, Protocol
 
 from nscan_cli.errors import NscanError
-from nscan_cli.nightly.fingerprint import fingerprint, sha256_of, tool_key
+from nscan_cli.nightly.anew import reasons
+from nscan_cli.nightly.fingerprint import fingerprint, made_from, sha256_of, tool_key
 from nscan_cli.nightly.folder import folder_of, scratch
 from nscan_cli.nightly.manifest import Entry
-from nscan_cli.nightly.nights import Night, add_night, is_up_to_date
+from nscan_cli.nightly.nights import Night, add_night, is_up_to_date, read_nights
 from nscan_cli.nightly.task import Outcome, Report, Task
 
 
@@ -29,6 +30,10 @@ class Plan:
     """With the reason."""
     notes: dict[str, list[str]] = field(default_factory=dict)
     """Name → what is odd about its inputs."""
+    made_from: dict[str, dict[str, Any]] = field(default_factory=dict)
+    """Name → inputs and parameters."""
+    anew: dict[str, list[str]] = field(default_factory=dict)
+    """Name → why it is to be done although it was done before."""
 
 
 Outcomes = Generator[tuple[Task, Outcome]]
@@ -50,10 +55,15 @@ class Watcher(Protocol):
 def plan(entries: list[Entry], folder: Path, force: bool) -> Plan:
     """What has to be done; with `force` all that is there."""
     planned = Plan()
-    for entry in entries:
-        if not entry.is_there:
-            planned.absent.append(entry)
+    for each in entries:
+        if not each.is_there and each.optional:
+            planned.absent.append(each)
             continue
+        if not each.is_there:
+            reason = f"{each.inputs['log'].name} is not there"
+            planned.unreadable.append((each, _with_sources(each, reason)))
+            continue
+        entry, lacking = _with_what_is_there(each) if each.optional else (each, [])
         try:
             hashes = {role: sha256_of(path) for role, path in entry.inputs.items()}
         except NscanError as error:
@@ -62,15 +72,26 @@ def plan(entries: list[Entry], folder: Path, force: bool) -> Plan:
         planned.notes[entry.name] = [
             f"{entry.inputs[role].name} is not the file that the manifest means: its SHA-256 is another"
             for role, sha256 in entry.sha256.items()
-            if hashes[role] != sha256
-        ]
+            if role in hashes and hashes[role] != sha256
+        ] + lacking
         key = fingerprint(entry, hashes)
+        planned.made_from[entry.name] = made_from(entry, hashes)
         if not force and is_up_to_date(folder / entry.name, key):
             planned.up_to_date.append(entry)
         else:
             planned.to_do.append((entry, key))
+            nights, this = read_nights(folder / entry.name), planned.made_from[entry.name]
+            planned.anew[entry.name] = reasons(nights, key, tool_key(), this, force)
     planned.to_do.sort(key=lambda item: -item[0].inputs["log"].stat().st_size)
     return planned
+
+
+def _with_what_is_there(entry: Entry) -> tuple[Entry, list[str]]:
+    """An optional log without what is not there to measure it against, and what is to be said of that."""
+    inputs = {role: path for role, path in entry.inputs.items() if path.exists()}
+    lacking = [path for role, path in entry.inputs.items() if role not in inputs]
+    notes = [f"{path.name} is not there: there is nothing to measure it against" for path in lacking]
+    return replace(entry, inputs=inputs), [_with_sources(entry, note) for note in notes]
 
 
 def _with_sources(entry: Entry, error: str) -> str:
@@ -87,7 +108,7 @@ def carry_out(planned: Plan, folder: Path, engine: Engine, watcher: Watcher) -> 
     """
     for entry, reason in planned.unreadable:
         # What cannot be read has no hash: never the same as anything.
-        _finish(entry, "", Outcome.failed(reason), folder, watcher)
+        _finish(entry, "", Outcome.failed(reason), planned, folder, watcher)
     entries = {entry.name: (entry, key) for entry, key in planned.to_do}
     if not entries:
         return
@@ -96,17 +117,22 @@ def carry_out(planned: Plan, folder: Path, engine: Engine, watcher: Watcher) -> 
         outcomes = engine(tasks, place, watcher.progress)
         with contextlib.closing(outcomes):
             for task, outcome in outcomes:
-                _finish(*entries[task.name], outcome, folder, watcher)
+                _finish(*entries[task.name], outcome, planned, folder, watcher)
 
 
-def _finish(entry: Entry, key: str, outcome: Outcome, folder: Path, watcher: Watcher) -> None:
+def _finish(entry: Entry, key: str, outcome: Outcome, planned: Plan, folder: Path, watcher: Watcher) -> None:
     now = datetime.datetime.now(datetime.UTC).replace(microsecond=0)
     night: Night = {
         "key": key,
         "tool": tool_key(),
         "outcome": "failed" if "reason" in outcome.result else "done",
+        "made_from": planned.made_from.get(entry.name),
         **{name: value for name, value in outcome.result.items() if name != "times"},
-        "times": {**outcome.result.get("times", {}), "finished": now.isoformat().replace("+00:00", "Z")},
+        "times": {
+            **outcome.result.get("times", {}),
+            "finished": now.isoformat().replace("+00:00", "Z"),
+            "anew": planned.anew.get(entry.name, []),
+        },
     }
     add_night(folder_of(folder, entry.name), night, outcome.files)
     watcher.finished(entry, night)

@@ -12,8 +12,9 @@ from nscan_cli.outputs import write_whole
 FILE = "nights.jsonl"
 
 Night = dict[str, Any]
-"""One line: `key` (the fingerprint), `tool`, `outcome` ("done", or "failed" with `reason`), of what is done
-`counts`, `evaluation` and `outputs` (name → SHA-256), and `times`, all that may differ from call to call."""
+"""One line: `key` (the fingerprint), `tool`, `made_from` (inputs and parameters), `outcome` ("done", or
+"failed" with `reason`), of what is done `counts`, `evaluation` and `outputs` (name → SHA-256), and `times`,
+all that may differ from call to call: among them `anew`, why it was made anew."""
 
 
 def read_nights(folder: Path) -> list[Night]:

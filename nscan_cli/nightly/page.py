@@ -6,7 +6,7 @@ from html import escape
 from pathlib import Path
 
 from nscan_cli import __version__
-from nscan_cli.nightly.card import SIGNS, WORDS, card, change, real_time, seconds
+from nscan_cli.nightly.card import SIGNS, absent, card, change, chip, readable, real_time, seconds, timed
 from nscan_cli.nightly.report import finished
 from nscan_cli.nightly.verdict import ASKING, ORDER, Status, Verdict, headline
 
@@ -20,9 +20,11 @@ def page(title: str, verdicts: list[Verdict], folder: Path) -> bytes:
         (each for each in ORDER if each in {verdict.status for verdict in verdicts}), "good"
     )
     when = finished(verdicts)
-    stamp = "" if when is None else f'<time class="time" datetime="{when}">{_readable(when)}</time>'
-    absent = sum(verdict.status == "absent" for verdict in verdicts)
-    missing = f"{absent} more {'is' if absent == 1 else 'are'} not there. " if absent else ""
+    stamp = "" if when is None else f'<time class="time" datetime="{when}">{readable(when)}</time>'
+    never = [verdict for verdict in verdicts if verdict.status == "absent" and verdict.last is None]
+    seen = [verdict for verdict in verdicts if verdict not in never]
+    count = sum(verdict.status == "absent" for verdict in verdicts)
+    missing = f"{count} more {'is' if count == 1 else 'are'} not there. " if count else ""
     style, script = (
         Path(__file__).with_name(f"page.{ending}").read_text("utf-8") for ending in ("css", "js")
     )
@@ -45,14 +47,12 @@ def page(title: str, verdicts: list[Verdict], folder: Path) -> bytes:
             f'<p class="soft">{missing}{escape(title)} {stamp}</p>',
             "</section>",
             *_to_look_at(verdicts),
-            *_overview(verdicts),
-            *(
-                card(verdict, folder)
-                for verdict in sorted(verdicts, key=lambda each: ORDER.index(each.status))
-            ),
+            *_overview(seen),
+            *(card(verdict, folder) for verdict in sorted(seen, key=lambda each: ORDER.index(each.status))),
+            *absent(never),
             f"<footer>nscan-cli {escape(__version__)}. Errors in metres: the mean on relations (Kümmerle et "
-            "al. 2009), or the RMSE of the ATE against a reference. Worse: by more than 5 % and 0.5 mm, or "
-            "0.01°, since the night before.</footer>",
+            "al. 2009), or the RMSE of the ATE against a reference, after the rigid motion that fits best. "
+            "Worse: by more than 5 % and 0.5 mm, or 0.01°, since the night before.</footer>",
             "</main>",
             f"<script>\n{script}</script>",
             "</body>",
@@ -60,10 +60,6 @@ def page(title: str, verdicts: list[Verdict], folder: Path) -> bytes:
         ]
     )
     return (content + "\n").encode()
-
-
-def _readable(when: str) -> str:
-    return when.replace("T", " ").replace("Z", " UTC")
 
 
 def _to_look_at(verdicts: list[Verdict]) -> list[str]:
@@ -106,14 +102,14 @@ def _row(verdict: Verdict) -> str:
     errors = verdict.errors if is_now else None
     best = min(entry.published.values(), default=None)
     cells = [
-        (f'<span class="chip {verdict.status}">{WORDS[verdict.status]}</span>', ""),
+        (chip(verdict), ""),
         ("" if errors is None else f"{errors.metres:.4f}", "number"),
         (change(verdict) if is_now else "", "number"),
         ("" if entry.max_translation is None else f"{entry.max_translation:g}", "number wide"),
         ("" if best is None else f"{best:.4f}", "number wide"),
         ("" if errors is None else f"{errors.degrees:.2f}°", "number wide"),
-        (seconds(verdict) if is_now else "", "number wide"),
-        (real_time(verdict) if is_now else "", "number wide"),
+        (timed(seconds(verdict)) if is_now else "", "number wide"),
+        (timed(real_time(verdict)) if is_now else "", "number wide"),
     ]
     name = f'<th><a href="#{entry.name}">{entry.name}</a></th>'
     return f"<tr>{name}{''.join(f'<td{_class(kind)}>{text}</td>' for text, kind in cells)}</tr>"

@@ -23,6 +23,21 @@ class Parameters:
     mapping: dict[str, Any] = field(default_factory=dict)
     """max-scans, relations and no-loops, as far as the manifest has them."""
 
+    def as_table(self) -> dict[str, Any]:
+        """As in a manifest, without what has its default."""
+        usual, table = dataclasses.asdict(ReadingOptions()), dict[str, Any]()
+        for name, value in dataclasses.asdict(self.reading).items():
+            key = name.replace("_", "-")
+            if value == usual[name]:
+                continue
+            if key == "odometry":
+                table["no-odometry"] = True
+            elif key == "mount":
+                table[key] = [value[0], value[1], round(math.degrees(value[2]), 9)]
+            else:
+                table[key] = round(math.degrees(value), 9) if key in DEGREES else value
+        return {**table, **self.mapping}
+
 
 def parameters_from(place: str, table: dict[str, Any]) -> Parameters:
     """The parameters of a table of the manifest; `place` says which one in messages.

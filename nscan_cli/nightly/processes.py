@@ -17,6 +17,7 @@ from typing import Any
 
 from nscan_cli.nightly import start
 from nscan_cli.nightly.task import OUTPUTS, RESULT, TASK, Outcome, Report, Task
+from nscan_cli.nightly.warm_up import compile_kernels
 
 LIBRARIES = ("OPENBLAS", "MKL", "OMP")
 """One thread each: there are as many processes as there is work for, and digits depend on how many."""
@@ -36,8 +37,9 @@ def run_all(
 
     Each works in so many `threads`. One that takes longer than `timeout` (s) is stopped. `scratch` is an
     existing folder for what is only needed meanwhile. When the iterator is closed, or an interrupt comes,
-    what is running is killed.
+    what is running is killed. The kernels are compiled before the first one begins.
     """
+    compile_kernels(_environment())
     waiting, running = deque(tasks), set[Work]()
     with selectors.DefaultSelector() as selector:
         try:

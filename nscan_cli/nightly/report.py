@@ -48,6 +48,8 @@ def _log(verdict: Verdict) -> dict[str, Any]:
         "notes": verdict.notes,
         "bounds": {"translation": entry.max_translation, "rotation": entry.max_rotation},
         "published": entry.published,
+        "about": entry.about,
+        "optional": entry.optional,
         "sources": entry.sources,
         "errors": _errors(errors),
         "before": _errors(Errors.of(verdict.before)),

@@ -140,4 +140,10 @@ def headline(verdicts: list[Verdict]) -> str:
         return f"Not good: {of_all} {', '.join(parts)}"
     if parts:
         return f"Within bounds, but {of_all} {parts[0]}"
-    return "The log is good" if there == 1 else f"All {there} logs are good"
+    measured = sum(verdict.status == "good" and verdict.errors is not None for verdict in verdicts)
+    if measured == there:
+        return "The log is good" if there == 1 else f"All {there} logs are good"
+    done = "The log is" if there == 1 else f"All {there} logs are"
+    if measured == 0:
+        return f"{done} mapped; there is nothing to measure {'it' if there == 1 else 'them'} against"
+    return f"{done} mapped; {measured} {'is' if measured == 1 else 'are'} measured, and good"

@@ -88,7 +88,7 @@ def test_what_has_changed_is_done_again_and_compared(manifest, first, tmp_path, 
 
 
 def test_failures_have_their_reasons_and_code_3(manifest, first, tmp_path, capsys):
-    """A damaged log, one that is above its bound, one that is not there; the fourth is fine all the same."""
+    """A damaged log, one above its bound, two that are not there, of which one is optional; one is fine."""
     folder = copy_of(first, tmp_path / "nights")
     logs = tmp_path / "logs"
     logs.mkdir()
@@ -98,16 +98,18 @@ def test_failures_have_their_reasons_and_code_3(manifest, first, tmp_path, capsy
     head, _, tail = text.partition('name = "two"')
     tail = tail.replace("max_translation = 0.5", "max_translation = 0", 1)
     text = f'{head}name = "two"{tail}\n[[log]]\nname = "four"\nsource = "https://example.org/four.log"\n'
+    text += '[[log]]\nname = "five"\nsource = "https://example.org/five.log"\noptional = true\n'
     (logs / "small.toml").write_text(text)
     assert run(["nightly", str(logs / "small.toml"), "-o", str(folder), "-q"]) == 3
-    one, two, last = capsys.readouterr().err.splitlines()
+    one, two, four, last = capsys.readouterr().err.splitlines()
     assert one.startswith("nscan-cli: one: log/one.log: is ")
     assert two.startswith("nscan-cli: two: RMSE of the ATE 0.")
     assert two.endswith(" m is above 0 m")
-    assert last == f"nscan-cli: Not good: of 3 logs 1 failed, 1 above bound; see {folder}/report.html"
+    assert four == ("nscan-cli: four: four.log.gz is not there; to be had from https://example.org/four.log")
+    assert last == f"nscan-cli: Not good: of 4 logs 2 failed, 1 above bound; see {folder}/report.html"
     document = report(folder)
     assert document["good"] is False
-    assert [log["status"] for log in document["logs"]] == ["failed", "above", "good", "absent"]
+    assert [log["status"] for log in document["logs"]] == ["failed", "above", "good", "failed", "absent"]
     # What the last good night has left is still there.
     assert document["logs"][0]["errors"] is not None
     assert (folder / "one" / "map.png").exists()
@@ -115,9 +117,34 @@ def test_failures_have_their_reasons_and_code_3(manifest, first, tmp_path, capsy
     assert run(["nightly", str(logs / "small.toml"), "-o", str(folder)]) == 3
     lines = capsys.readouterr().err.splitlines()
     assert lines[0] == (
-        f"four: {logs}/four.log.gz is not there, skipped; to be had from https://example.org/four.log"
+        f"five: {logs}/five.log.gz is not there, skipped; to be had from https://example.org/five.log"
     )
-    assert [line.partition(":")[0] for line in lines[1:]] == ["one", "nscan-cli", "nscan-cli", "nscan-cli"]
+    said = [line.partition(":")[0] for line in lines[1:]]
+    assert sorted(said) == ["four", "nscan-cli", "nscan-cli", "nscan-cli", "nscan-cli", "one"]
+
+
+def test_optional_logs_that_are_not_there_are_one_line(manifest, first, tmp_path, capsys):
+    folder, logs = copy_of(first, tmp_path / "nights"), tmp_path / "logs"
+    logs.mkdir()
+    write_logs(logs)
+    more = [
+        f'[[log]]\nname = "{name}"\noptional = true\nabout = "Where {name} was <driven>."\n'
+        f'source = "https://example.org/{name}.log"\n'
+        for name in ("four", "five", "six")
+    ]
+    (logs / "small.toml").write_text((logs / "small.toml").read_text() + "".join(more))
+    assert run(["nightly", str(logs / "small.toml"), "-o", str(folder)]) == 0
+    first_line, *_ = capsys.readouterr().err.splitlines()
+    assert first_line == "not there, skipped: four, five, six; the report says where to get them"
+    page = (folder / "report.html").read_text()
+    assert page.count('<section class="log absent">') == 1
+    for name in ("four", "five", "six"):
+        assert f'<dt id="{name}">{name}</dt><dd>Where {name} was &lt;driven&gt;.' in page
+        assert f'<a href="https://example.org/{name}.log">' in page
+        assert f'<a href="#{name}">' not in page
+    assert [log["about"] for log in report(folder)["logs"]][3:] == [
+        f"Where {name} was <driven>." for name in ("four", "five", "six")
+    ]
 
 
 def test_force(manifest, first, tmp_path, capsys):
@@ -161,6 +188,7 @@ def test_where_no_log_is_there_it_is_said_where_to_get_them(tmp_path, capsys):
     *lines, error = capsys.readouterr().err.splitlines()
     assert error.startswith("nscan-cli: kuemmerle: none of its logs is there")
     assert [line.partition(":")[0] for line in lines][:4] == ["intel", "fr079", "mit-csail", "mit-killian"]
+    assert len(lines) == 6
     assert all("is not there, skipped; to be had from http" in line for line in lines)
     assert all(line.endswith(".relations") for line in lines[:4])
     assert list(tmp_path.iterdir()) == []

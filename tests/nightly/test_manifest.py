@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import json
 import math
 from pathlib import Path
 
@@ -7,6 +8,7 @@ import pytest
 
 from nscan_cli.errors import InputDataError, InputMissingError, WrongUsageError
 from nscan_cli.nightly.manifest import Entry, read_manifest, shipped
+from nscan_cli.nightly.parameters import parameters_from
 
 INTEL = """
 [[log]]
@@ -53,6 +55,31 @@ def test_a_log_by_its_name_alone(tmp_path, file):
     assert entry.is_there
 
 
+@pytest.mark.parametrize("file", ["b-2.log.gz", "run02.log.gz", "run02.log.gz.no"])
+def test_a_log_by_another_of_its_names_or_as_its_source_calls_it(tmp_path, file):
+    (tmp_path / file).touch()
+    text = 'name = "b"\nalso = ["b_two", "b-2"]\nsource = "https://example.org/1721.1/62281/run02.log.gz?x=2"'
+    (entry,) = read(tmp_path, f"[[log]]\n{text}")
+    assert entry.inputs["log"] == tmp_path / (file if entry.is_there else "b.log.gz")
+    assert entry.is_there == (file != "run02.log.gz.no")
+
+
+def test_what_is_known_of_a_log(tmp_path):
+    assert not read(tmp_path, INTEL)[0].optional
+    text = 'name = "b"\noptional = true\nabout = "A hall."\npublished_map = "https://example.org/b.png"'
+    (entry,) = read(tmp_path, f"[[log]]\n{text}")
+    assert (entry.optional, entry.about) == (True, "A hall.")
+    assert entry.published_map == "https://example.org/b.png"
+
+
+def test_parameters_as_a_table(tmp_path):
+    table = {"mount": [0.1, 0.0, 90.0], "angle-min": -90.0, "no-odometry": True, "max-scans": 4, "laser": "R"}
+    parameters = parameters_from("", table)
+    assert parameters.as_table() == table
+    assert json.loads(json.dumps(parameters.as_table())) == table
+    assert parameters_from("", {"every": 1, "no-odometry": False}).as_table() == {}
+
+
 def test_parameters_are_options_of_slam(tmp_path):
     parameters = "parameters = { mount = [0.1, 0, 90], angle-min = -90, no-odometry = true, max-scans = 4 }"
     (entry,) = read(tmp_path, f'[[log]]\nname = "a"\n{parameters}')
@@ -75,6 +102,8 @@ def test_parameters_are_options_of_slam(tmp_path):
         ('[[log]]\nname = "a"\npth = "x"', r"log 1 \(a\): has an unknown key 'pth'; known: name, path"),
         ('[[log]]\nname = "a"\n[[log]]\nname = "A"', "two logs have the name A; give each its own"),
         ('[[log]]\nname = "a"\npath = 3', "path is 3; give a text"),
+        ('[[log]]\nname = "a"\noptional = "yes"', "optional is 'yes'; give true or false"),
+        ('[[log]]\nname = "a"\nalso = ["../b"]', "also is .*; give names of files without their endings"),
         (
             '[[log]]\nname = "a"\nrelations = "r"\nmax_translation = -1',
             "max_translation is -1; give a number",
@@ -116,6 +145,19 @@ def test_shipped_manifests_say_where_to_get_every_file(tmp_path, name):
     assert all(entry.inputs["log"].parent == tmp_path for entry in entries)
     assert all(set(entry.sources) == set(entry.inputs) for entry in entries)
     assert all(not entry.is_there for entry in entries)
+    assert all(entry.optional for entry in entries)
+
+
+def test_the_manifest_of_radish_has_the_logs_under_their_names_and_those_of_downloads(tmp_path):
+    names = {"intel_lab": "intel.log.gz", "usc-sal200-021120": "run02.log.gz", "albert-b-laser":
+             "albertb.sm.log.gz", "intel_oregon": "intel-01-sorted.log.gz", "aces": "aces_publicb.log.gz",
+             "nsh_level_a": "nsh_level_a.log.gz", "stanford-gates1": "stanford-gates1.log"}  # fmt: skip
+    for file in names.values():
+        (tmp_path / file).touch()
+    entries = {entry.name: entry for entry in read_manifest("radish", str(tmp_path))}
+    assert len(entries) >= 15
+    assert {name: entries[name].inputs["log"].name for name in names} == names
+    assert all(entry.about for entry in entries.values())
 
 
 def test_the_manifests_that_are_shipped():

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import json
+import re
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 from nscan_cli.nightly import fingerprint
+from nscan_cli.nightly import night as night_module
 from nscan_cli.nightly.manifest import Entry
 from nscan_cli.nightly.night import carry_out, plan
 from nscan_cli.nightly.nights import read_nights
@@ -132,7 +135,7 @@ def test_a_history_that_is_damaged_begins_anew(entry, nights):
 
 
 def test_logs_that_are_absent_or_unreadable_do_not_reach_the_engine(entry, nights, tmp_path):
-    absent = Entry("b", {"log": tmp_path / "b.log"})
+    absent = Entry("b", {"log": tmp_path / "b.log"}, optional=True)
     folder = Entry("c", {"log": tmp_path})
     sources = {"log": "https://example.org/a.log", "relations": "https://example.org/d.relations"}
     inputs = {"log": tmp_path / "a.log", "relations": tmp_path / "d.relations"}
@@ -147,6 +150,74 @@ def test_logs_that_are_absent_or_unreadable_do_not_reach_the_engine(entry, night
     assert "d.relations: no such file" in reason
     assert reason.endswith("; to be had from https://example.org/d.relations")
     assert not (nights / "b").exists()
+
+
+def test_a_log_that_is_not_there_has_failed_unless_it_is_optional(nights, tmp_path):
+    entry = Entry("b", {"log": tmp_path / "b.log"}, sources={"log": "https://example.org/b.log"})
+    planned = plan([entry], nights, False)
+    assert planned.absent == []
+    assert planned.unreadable == [(entry, "b.log is not there; to be had from https://example.org/b.log")]
+    planned = plan([replace(entry, optional=True)], nights, False)
+    assert (planned.absent, planned.unreadable) == ([replace(entry, optional=True)], [])
+
+
+def test_an_optional_log_is_mapped_without_what_is_not_there_to_measure_it(entry, nights, tmp_path):
+    (tmp_path / "a.tum").unlink()
+    sources = {"reference": "https://example.org/a.tum"}
+    optional = replace(entry, optional=True, sources=sources, sha256={"reference": "0" * 64})
+    planned = plan([optional], nights, False)
+    ((planned_entry, _key),) = planned.to_do
+    assert planned_entry.inputs == {"log": tmp_path / "a.log"}
+    assert planned.notes["a"] == [
+        "a.tum is not there: there is nothing to measure it against; to be had from https://example.org/a.tum"
+    ]
+    ((_, reason),) = plan([replace(optional, optional=False)], nights, False).unreadable
+    assert "a.tum: no such file" in reason
+
+
+def why(entry: Entry, folder: Path, force: bool = False) -> list[str]:
+    return plan([entry], folder, force).anew.get("a", ["nothing to do"])
+
+
+def test_why_a_log_is_made_anew(entry, nights, tmp_path, monkeypatch):
+    assert why(entry, nights) == []
+    night(entry, nights, good())
+    assert read_nights(nights / "a")[0]["times"]["anew"] == []
+    assert why(entry, nights) == ["nothing to do"]
+    assert why(entry, nights, force=True) == ["--force"]
+    entry.inputs["log"].write_text("b")
+    entry.inputs["reference"].write_text("u")
+    assert why(entry, nights) == ["the log has changed", "the reference has changed"]
+    entry = replace(entry, parameters=parameters_from("", {"end": 5, "mount": [0.1, 0, 90]}))
+    changes = ["the parameter end is 5.0",
+               "the parameter mount is [0.1, 0.0, 90.0]"]  # fmt: skip
+    assert why(entry, nights)[2:] == changes
+    night(entry, nights, good())
+    assert read_nights(nights / "a")[1]["times"]["anew"][2:] == changes
+    # The same parameters as the history has them are the same.
+    assert why(entry, nights, force=True)[-1] == "--force"
+    (nights / "a" / "map.png").unlink()
+    assert why(entry, nights)[-1] == "results were missing or changed"
+    entry = replace(entry, inputs={"log": entry.inputs["log"].rename(tmp_path / "b.log")})
+    assert why(entry, nights)[:2] == ["the log is called b.log, no longer a.log", "the reference is gone"]
+    night(entry, nights, Outcome.failed("no room"))
+    assert why(entry, nights)[-1] == "it failed the night before"
+    night(entry, nights, good())
+    for module in (fingerprint, night_module):
+        monkeypatch.setattr(module, "tool_key", lambda: "9.0.0-00")
+    (reason,) = why(entry, nights)
+    assert re.fullmatch(r"the code of nscan-cli has changed: 9\.0\.0, no longer [\d.]+\w*", reason)
+
+
+def test_a_history_of_before_this_was_noted(entry, nights):
+    night(entry, nights, good())
+    file = nights / "a" / "nights.jsonl"
+    line = json.loads(file.read_text())
+    del line["made_from"], line["times"]["anew"]
+    file.write_text(json.dumps(line) + "\n")
+    assert why(entry, nights) == ["nothing to do"]
+    entry.inputs["log"].write_text("b")
+    assert why(entry, nights) == ["the log, what it is measured against, or its parameters have changed"]
 
 
 def test_the_largest_log_is_begun_first(nights, tmp_path):

@@ -27,6 +27,9 @@ FAILED = {
 }
 
 
+UNMEASURED = {**done(1.0), "evaluation": None}
+
+
 def judged(
     *nights: Night, translation: float | None = None, rotation: float | None = None, absent: bool = False
 ) -> Verdict:
@@ -63,7 +66,7 @@ def test_the_verdict(found, status, reasons):
 
 
 def test_a_log_without_anything_to_measure_against_is_good_when_it_is_done():
-    assert judged({**done(1.0), "evaluation": None}).status == "good"
+    assert judged(UNMEASURED).status == "good"
 
 
 def test_of_a_trajectory_the_rmse_counts():
@@ -81,6 +84,10 @@ def test_of_a_trajectory_the_rmse_counts():
         ([judged(FAILED), judged(done(2), translation=1), judged(done(1), done(2)), judged(done(1))],
          "Not good: of 4 logs 1 failed, 1 above bound, 1 worse than before"),
         ([judged(FAILED)], "Not good: of 1 log 1 failed"),
+        ([judged(UNMEASURED)], "The log is mapped; there is nothing to measure it against"),
+        ([judged(UNMEASURED)] * 2, "All 2 logs are mapped; there is nothing to measure them against"),
+        ([judged(UNMEASURED)] * 2 + [judged(done(1))], "All 3 logs are mapped; 1 is measured, and good"),
+        ([judged(UNMEASURED)] + [judged(done(1))] * 2, "All 3 logs are mapped; 2 are measured, and good"),
     ],
 )  # fmt: skip
 def test_the_headline(verdicts, line):

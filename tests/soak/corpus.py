@@ -16,6 +16,7 @@ from tests.logs.containers import repacked
 from tests.logs.forms import FORMS
 from tests.logs.recordings import drive
 from tests.logs.test_player import V1, V2
+from tests.logs.test_radish_forms import FORMS as WITH_BEARINGS
 from tests.logs.test_script import LINES
 
 REAL_LINES = 60
@@ -49,10 +50,11 @@ path = "other.mcap"
 def samples() -> dict[str, list[bytes]]:
     """The samples of each form, by its name; what the real logs add where they are there."""
     carmen = [room_log(12).encode(), *_real("fr079.log.gz"), *_real("mit-csail.log.gz")]
+    players = [V1, V2, *(lines for lines, _ in WITH_BEARINGS.values())]
     graph = write_graph(small_graph())
     found = {
         "carmen": carmen,
-        "player": ["\n".join(lines).encode() + b"\n" for lines in (V1, V2)],
+        "player": ["\n".join(lines).encode() + b"\n" for lines in players],
         "script": ["\n".join(LINES * 3).encode()],
         "gzip": [gzip.compress(data, mtime=0) for data in carmen[:2]],
         "json graph": [graph],

@@ -1,0 +1,158 @@
+"""All kernels compiled before the first log of a night, so that no log's time has their compilation in it.
+
+It is started as `python -m nscan_cli.nightly.warm_up`. What it maps is a corridor round a block, driven round
+one and a half times by a robot whose odometry drifts: there are keyframes, joint matches and loops. One side
+is bare, so that the way along it is hardly known.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import fcntl
+import os
+import subprocess
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from nscan_cli import machine_code
+from nscan_cli.cache_folder import cache_folder
+
+if TYPE_CHECKING:
+    from nscan_cli.poses import Array
+
+OUTER, INNER = 9.0, 6.0
+"""m from the middle to the corridor's walls."""
+WAY, STEP, BEAMS = 1.4, 0.3, 181
+"""Times round, m from scan to scan."""
+SIGHT, NO_RETURN, THREADS = 5.0, 81.91, 2
+DRIFT = 0.004
+"""rad, per step."""
+DONE, LOCK = "all", ".compiling"
+"""Files of the cache folder: the first, with the machine in its name, is there when all kernels are."""
+
+
+def compile_kernels(environment: dict[str, str]) -> None:
+    """Compile what the cache folder does not have, in a process that is over then: once on each machine.
+
+    Where no folder is writable nothing is done. What goes wrong, the logs will say.
+    """
+    folder = cache_folder()
+    if folder is None or _is_done(folder):
+        return
+    with contextlib.suppress(OSError), (folder / LOCK).open("w") as lock:
+        # Others wait here for the first, and find it done.
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        if not _is_done(folder):
+            call = [sys.executable, "-P", "-m", __name__]
+            subprocess.run(
+                call, env=environment, check=False, stdin=subprocess.DEVNULL,
+                stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True,
+            )  # fmt: skip
+            _done_file(folder).touch()
+
+
+def kept_kernels() -> set[str]:
+    """The files of the cache folder: one more, and something was compiled meanwhile."""
+    folder = cache_folder()
+    return set() if folder is None else {name for _, _, files in os.walk(folder) for name in files}
+
+
+def _is_done(folder: Path) -> bool:
+    """Whether the kernels were compiled, and not cleared away since."""
+    return _done_file(folder).exists() and not machine_code.first_compile("follow")
+
+
+def _done_file(folder: Path) -> Path:
+    return folder / f"{DONE}-{machine_code.machine()}"
+
+
+def warm_up() -> None:
+    """Do all that is done for a log of a night, so that the kernels are compiled."""
+    import numpy as np
+
+    from nscan_cli import compiled
+    from nscan_cli.logs.load import log_from
+    from nscan_cli.logs.options import ReadingOptions
+    from nscan_cli.mapping.occupancy import occupancy_grid
+    from nscan_cli.slam.run import map_log, slam_options
+
+    compiled.bring_up()
+    drive = drive_as_carmen()
+    for reading in (ReadingOptions(), ReadingOptions(end=20.0, odometry=False)):
+        log = log_from(drive, "warm-up.log", reading)
+        _, graph = map_log(log, reading, slam_options(None, None, True), THREADS, lambda *_progress: None)
+        occupancy_grid(log, np.arange(len(log)), graph.poses, threads=THREADS)
+
+
+def drive_as_carmen() -> bytes:
+    """The drive as a CARMEN log."""
+    import numpy as np
+
+    from nscan_cli.poses import compose, relative
+
+    poses = _way()
+    moves = relative(poses[1:], poses[:-1])
+    moves[:, 2] += DRIFT
+    robot = np.zeros(3)
+    angles = np.radians(np.arange(BEAMS) - BEAMS // 2)
+    lines = []
+    for row, ranges in enumerate(_ranges(poses, angles)):
+        robot = robot if row == 0 else compose(robot, moves[row - 1])
+        pose = " ".join(f"{value:.6f}" for value in robot)
+        values = " ".join(f"{value:.2f}" for value in ranges)
+        lines.append(f"FLASER {BEAMS} {values} {pose} {pose} {0.5 * row:.3f} warm-up 0\n")
+    return "".join(lines).encode()
+
+
+def _way() -> Array:
+    """Poses (S, 3) round the block in the middle of the corridor, turning on the spot at its corners."""
+    import numpy as np
+
+    from nscan_cli.poses import wrap
+
+    half = (OUTER + INNER) / 2
+    side = np.arange(-half, half, STEP)
+    sides = int(np.ceil(4 * WAY))
+    poses = []
+    for number in range(sides):
+        heading = number * np.pi / 2
+        cos, sin = np.cos(heading), np.sin(heading)
+        along = np.array([(cos * x + sin * half, sin * x - cos * half, heading) for x in side])
+        turns = heading + np.radians(np.arange(15, 90, 15))
+        x, y = cos * half + sin * half, sin * half - cos * half
+        poses += [along, np.array([(x, y, turn) for turn in turns])]
+    way = np.concatenate(poses)
+    way[:, 2] = wrap(way[:, 2])
+    return way
+
+
+def _ranges(poses: Array, angles: Array) -> Array:
+    """(S, B) m to the walls of the corridor, with pillars on three of its sides."""
+    import numpy as np
+
+    walls = [*_square(OUTER), *_square(INNER)]
+    for k in range(-8, 9, 2):
+        walls += [((k, OUTER), (k, OUTER - 0.4)), ((OUTER, k), (OUTER - 0.4, k)),
+                  ((-OUTER, k), (0.5 - OUTER, k + 0.3))]  # fmt: skip
+    directions = poses[:, 2:] + angles
+    x, y = np.cos(directions), np.sin(directions)
+    nearest = np.full(directions.shape, NO_RETURN)
+    for (ax, ay), (bx, by) in walls:
+        across = x * (by - ay) - y * (bx - ax)
+        along, left = ax - poses[:, :1], ay - poses[:, 1:2]
+        with np.errstate(divide="ignore", invalid="ignore"):
+            length = (along * (by - ay) - left * (bx - ax)) / across
+            place = (along * y - left * x) / across
+        meets = (length > 0.05) & (place >= 0) & (place <= 1)
+        nearest = np.where(meets, np.minimum(nearest, length), nearest)
+    return np.where(nearest > SIGHT, NO_RETURN, nearest)
+
+
+def _square(half: float) -> list[tuple[tuple[float, float], tuple[float, float]]]:
+    corners = [(-half, -half), (half, -half), (half, half), (-half, half)]
+    return list(zip(corners, [*corners[1:], corners[0]], strict=True))
+
+
+if __name__ == "__main__":
+    warm_up()

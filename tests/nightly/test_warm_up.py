@@ -1,0 +1,117 @@
+"""Kernels are compiled before a night begins, and what is compiled meanwhile spoils no time."""
+
+from __future__ import annotations
+
+import importlib
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from nscan_cli.cli.night_lines import PlainLines
+from nscan_cli.logs.load import log_from
+from nscan_cli.nightly import processes, warm_up, work
+from nscan_cli.nightly.card import card
+from nscan_cli.nightly.manifest import Entry
+from nscan_cli.nightly.task import Task
+from nscan_cli.nightly.verdict import verdict
+from tests.cli.room_log import room_log
+
+
+@pytest.fixture
+def cache(tmp_path, monkeypatch):
+    (tmp_path / "cache").mkdir()
+    monkeypatch.setattr(warm_up, "cache_folder", lambda: tmp_path / "cache")
+    monkeypatch.setattr(warm_up.machine_code, "first_compile", lambda _name: False)
+    return tmp_path / "cache"
+
+
+@pytest.fixture
+def calls(monkeypatch):
+    """The calls of processes, which end at once."""
+    made: list[list[str]] = []
+    monkeypatch.setattr(warm_up.subprocess, "run", lambda call, **_how: made.append(call))
+    return made
+
+
+def test_once_on_each_machine(cache, calls, monkeypatch):
+    warm_up.compile_kernels({})
+    warm_up.compile_kernels({})
+    assert [call[1:] for call in calls] == [["-P", "-m", "nscan_cli.nightly.warm_up"]]
+    # Somebody has cleared the folder.
+    with monkeypatch.context() as patch:
+        patch.setattr(warm_up.machine_code, "first_compile", lambda _name: True)
+        warm_up.compile_kernels({})
+    assert len(calls) == 2
+    # Another processor, or another numba.
+    monkeypatch.setattr(warm_up.machine_code, "machine", lambda: "another")
+    warm_up.compile_kernels({})
+    assert len(calls) == 3
+
+
+def test_where_nothing_can_be_kept_nothing_is_done(calls, monkeypatch):
+    monkeypatch.setattr(warm_up, "cache_folder", lambda: None)
+    warm_up.compile_kernels({})
+    assert calls == []
+    assert warm_up.kept_kernels() == set()
+
+
+def test_before_the_first_log_begins(cache, monkeypatch, tmp_path):
+    order = []
+    monkeypatch.setattr(processes, "compile_kernels", lambda _environment: order.append("kernels"))
+
+    class BegunError(Exception):
+        pass
+
+    def begin(*_arguments):
+        order.append("log")
+        raise BegunError
+
+    monkeypatch.setattr(processes, "Work", begin)
+    with pytest.raises(BegunError):
+        next(processes.run_all([Task("a", {}, {}, {})], 1, None, tmp_path, lambda *_said: None))
+    assert order == ["kernels", "log"]
+
+
+def test_the_drive_has_what_a_night_can_have():
+    log = log_from(warm_up.drive_as_carmen(), "warm-up.log")
+    assert (len(log), log.ranges.shape[1]) == (330, warm_up.BEAMS)
+    assert log.report.skipped == {}
+    assert log.no_return == pytest.approx(warm_up.NO_RETURN)
+    assert np.isfinite(log.ranges).mean() > 0.5
+    # Text that is parsed by a kernel; a way that comes back to where it was.
+    assert log.source.bytes > 1 << 17
+    assert log.odometry is not None
+    assert np.hypot(*np.diff(log.odometry[:, :2], axis=0).T).sum() > 80
+
+
+@pytest.mark.parametrize("compiles", [False, True])
+def test_a_time_with_compilation_in_it_is_none(cache, tmp_path, compiles):
+    # Without it nothing is compiled.
+    importlib.import_module("numba")
+    (tmp_path / "a.log").write_text(room_log(12))
+    (tmp_path / "outputs").mkdir()
+    task = Task.of(Entry("a", {"log": tmp_path / "a.log"}))
+    told = {"inputs": task.inputs, "reading": task.reading, "mapping": {}, "threads": 1}
+
+    def report(*_progress: int) -> None:
+        if compiles:
+            (cache / "follow.code").touch()
+
+    result = work.work(told, tmp_path / "outputs", report)
+    assert (result["times"]["seconds"] is None) == compiles
+
+
+def test_what_is_not_timed_is_said(tmp_path, capsys):
+    night = {
+        "key": "k", "tool": "0.1.0-0", "outcome": "done", "evaluation": None, "outputs": {},
+        "counts": {"scans": 3, "duration": 9.0, "keyframes": 2, "pairwise": 1, "nscan": 0, "warnings": [],
+                   "loops": {"accepted": 0, "refused": 0}},
+        "times": {"seconds": None, "finished": "2026-11-21T03:00:00Z", "anew": ["the log has changed"]},
+    }  # fmt: skip
+    entry = Entry("a", {"log": Path("a.log")})
+    PlainLines(False).finished(entry, night)
+    assert capsys.readouterr().err == "a: not timed: kernels were compiled meanwhile\n"
+    text = card(verdict(entry, [night], [], absent=False), tmp_path)
+    assert '<span class="time">not timed: kernels were compiled meanwhile</span>' in text
+    assert '<span class="time">2026-11-21 03:00:00 UTC, anew: the log has changed</span>' in text
