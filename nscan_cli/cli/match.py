@@ -34,7 +34,10 @@ class StartType(click.ParamType[Any]):
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
         """Check the form; a wrong one is a usage error."""
         if value not in ("odometry", "identity"):
-            PoseType().convert(value, param, ctx)
+            try:
+                PoseType().convert(value, param, ctx)
+            except click.BadParameter as error:
+                self.fail(f"{error.message}, nor odometry or identity", param, ctx)
         return value
 
 
