@@ -28,6 +28,8 @@ LOOK = operator.attrgetter("dtype", "ndim", "flags.num")
 """Of an array. Flags that do not count are among them."""
 LOCK = threading.RLock()
 """Held while kernels are loaded or made."""
+TO_BE_TOLD: list[Callable[[], None]] = []
+"""Who wants to know that this process compiles."""
 
 
 def bring_up() -> None:
@@ -40,6 +42,16 @@ def bring_up() -> None:
 def are_up() -> bool:
     """Whether kernels run in this process already: LLVM takes room that reading alone may not have."""
     return machine_code.engine.cache_info().currsize > 0
+
+
+def tell_when_compiling(tell: Callable[[], None] | None) -> None:
+    """Have `tell` called once, just before this process compiles a kernel; None: nobody wants to know."""
+    TO_BE_TOLD[:] = [] if tell is None else [tell]
+
+
+def _tell() -> None:
+    while TO_BE_TOLD:
+        TO_BE_TOLD.pop()()
 
 
 def kernel(function: Function) -> Function:
@@ -115,6 +127,7 @@ class Kernel:
             return cast(Callable[..., Any], self.dispatcher)
         version = machine_code.load(file, self.py_func.__name__)
         if version is None:
+            _tell()
             made = self._dispatcher(arguments)
             (compiled,) = made.overloads.values()
             # Another process may have been first.
@@ -204,13 +217,16 @@ def _forgive(cache: Any) -> None:
     load, save = cache.load_overload, cache.save_overload
 
     def load_if_sound(*call: Any) -> Any:
+        loaded = None
         try:
-            return load(*call)
+            loaded = load(*call)
         except Exception:
             # What is damaged can raise anything. An empty index takes its place.
             with contextlib.suppress(Exception):
                 cache.flush()
-            return None
+        if loaded is None:
+            _tell()
+        return loaded
 
     def save_if_possible(*call: Any) -> None:
         with contextlib.suppress(OSError):

@@ -47,14 +47,16 @@ file, the place and what helps; `-vv` adds where it arose.
 CONFIG = """\
 An option's value is taken from the command line, else from the environment, else from the TOML file that
 `--config` names, else from the default. In the file, an option has its long name without dashes. Keys at the
-top hold for every command that is given the file, those in a table of a command's name for that one alone; a
-key that the command does not know is an error. `--dump-config` writes the options in force in this form.
+top hold for every command that has such an option, those in a table of a command's name for that one alone.
+What no command knows is an error, and so is a key at the top that means another thing in another command,
+such as `relations`. `--dump-config` writes the options in force in this form.
 
 ```toml
 max-range = 30.0
 mount = [0.1, 0, 0]      # x, y in m, degrees
 
 [slam]
+relations = "both"       # another thing than in [evaluate]
 no-loops = true
 ```
 """
@@ -241,7 +243,7 @@ def _options(command: Subcommand, section: str) -> str:
         extra = parameter.get_help_extra(context)
         limits = "required" if "required" in extra else extra.get("range", "")
         default = extra.get("default", "")
-        variable = f"`{parameter.envvar}`" if isinstance(parameter, Option) else ""
+        variable = f"`{parameter.variables(context)[-1]}`" if isinstance(parameter, Option) else ""
         rows.append((f"`{record[0]}`", default, limits, parameter.help or "", variable))
     return _table(("option", "default", "values", "what it does", "variable"), rows)
 

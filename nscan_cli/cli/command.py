@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import math
 import os
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
@@ -10,6 +11,8 @@ from typing import Any
 import click
 from click.core import ParameterSource
 
+from nscan_cli.cli.wording import value_problem
+from nscan_cli.errors import WrongUsageError
 from nscan_cli.logs.kinds import readable
 
 CONTEXT: dict[str, Any] = {"help_option_names": ["-h", "--help"]}
@@ -18,6 +21,9 @@ PREFIX = "NSCAN_CLI_"
 ARGUMENTS, OWN, READING, COMMON = "Arguments", "Options", "Reading the log", "For all commands"
 SECTIONS = (ARGUMENTS, OWN, READING, COMMON)
 """Of the help, in this order."""
+OWN_MEANINGS = {"initial", "output", "plot", "prior", "reference", "relations", "trajectory"}
+"""Long names of options that mean another thing in another command. What is set for all commands sets none of
+them: neither a variable without the command's name nor a key at the top of a TOML file."""
 FILE = click.Path()
 """A file's name, which a shell can complete; "-" too."""
 
@@ -31,21 +37,36 @@ class Option(click.Option):
     def __init__(self, *args: Any, section: str = OWN, **attributes: Any) -> None:
         super().__init__(*args, **attributes)
         self.section = section
-        self.envvar: str = PREFIX + self.long_name.upper().replace("-", "_")
+        self.envvar: str = PREFIX + _in_capitals(self.long_name)
 
     @property
     def long_name(self) -> str:
         """The name of the option on the command line and in a TOML file, without its dashes."""
         return max(self.opts, key=len).lstrip("-")
 
+    @property
+    def is_shared(self) -> bool:
+        """Whether it means the same in all commands that have it."""
+        return self.long_name not in OWN_MEANINGS
+
     def variables(self, ctx: click.Context) -> list[str]:
-        """Those that set it, the command's own first: an option may mean another thing elsewhere."""
-        command = (ctx.command.name or "").upper()
-        return [f"{PREFIX}{command}_{self.envvar.removeprefix(PREFIX)}", self.envvar]
+        """Those that set it, the command's own first."""
+        own = f"{PREFIX}{_in_capitals(ctx.command.name or '')}_{_in_capitals(self.long_name)}"
+        return [own, self.envvar] if self.is_shared else [own]
 
     def resolve_envvar_value(self, ctx: click.Context) -> str | None:
-        """The value of the first of its variables that is set to something."""
-        return next((value for name in self.variables(ctx) if (value := os.environ.get(name))), None)
+        """The value of the first of its variables that is set to something.
+
+        Raises WrongUsageError where only one is set that would have to mean several things.
+        """
+        variables = self.variables(ctx)
+        value = next((value for name in variables if (value := os.environ.get(name))), None)
+        if value is None and os.environ.get(self.envvar) and not ctx.resilient_parsing:
+            raise WrongUsageError(
+                f"{self.envvar} in the environment: --{self.long_name} means another thing in each command; "
+                f"set {variables[0]} instead"
+            )
+        return value
 
     def consume_value(self, ctx: click.Context, opts: Mapping[str, Any]) -> tuple[Any, ParameterSource]:
         """The value and where it is from, which a message about it has to know."""
@@ -53,12 +74,28 @@ class Option(click.Option):
         ctx.meta[f"{__name__}.{self.name}"] = source
         return value, source
 
+    def type_cast_value(self, ctx: click.Context, value: Any) -> Any:
+        """The value as the command gets it. Raises BadParameter, in our words, also for nan and inf."""
+        try:
+            found = super().type_cast_value(ctx, value)
+        except click.BadParameter as error:
+            problem = value_problem(self.type, value, self.metavar) or error.message
+            raise click.BadParameter(problem, ctx, self) from error
+        if isinstance(found, float) and not math.isfinite(found):
+            raise click.BadParameter(f"{value!r} is not a finite number", ctx, self)
+        return found
+
     def get_error_hint(self, ctx: click.Context | None) -> str:
         """The option as messages name it; the variable where the value is from there."""
         if ctx and ctx.meta.get(f"{__name__}.{self.name}") is ParameterSource.ENVIRONMENT:
             variable = next(name for name in self.variables(ctx) if os.environ.get(name))
             return f"{variable} in the environment"
-        return super().get_error_hint(ctx)
+        return f"--{self.long_name}"
+
+
+def _in_capitals(name: str) -> str:
+    """The part of a variable's name that stands for a command or an option."""
+    return name.upper().replace("-", "_")
 
 
 class Argument(click.Argument):

@@ -37,7 +37,7 @@ DRAWN = 10
 @option("--max-translation", type=click.FloatRange(0), metavar="M",
         help="Exit with 3 when the mean on relations, or the RMSE of the ATE, is above.")  # fmt: skip
 @option("--max-rotation", type=click.FloatRange(0), metavar="DEG", help="The same for the rotation.")
-@option("--json", "as_json", is_flag=True, help="Print JSON (m, degrees).")
+@option("--json", "as_json", is_flag=True, help="Print one JSON object (m, s, degrees).")
 @plot_option("the worst relations (10, or N) over the trajectory, or the error against the reference")
 @reading_options
 @common_options

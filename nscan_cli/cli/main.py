@@ -16,6 +16,7 @@ import click
 from nscan_cli import __version__
 from nscan_cli.cli.command import CONTEXT, write_examples
 from nscan_cli.cli.manual import ENVIRONMENT, EXAMPLES, EXIT_CODES
+from nscan_cli.cli.wording import usage_problem
 from nscan_cli.errors import InputDataError, NscanError, OutputError
 
 COMMANDS = {
@@ -159,7 +160,7 @@ def _is_interrupt(error: BaseException | None) -> bool:
 
 def _usage(error: click.ClickException) -> str:
     """What click says in several lines, in one."""
-    problem = error.format_message().rstrip(".")
+    problem = usage_problem(error)
     context = getattr(error, "ctx", None)
     if context is None:
         return problem

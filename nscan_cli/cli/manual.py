@@ -16,7 +16,8 @@ EXIT_CODES = {
 ENVIRONMENT = {
     "NSCAN_CLI_OPTION": "sets the option --option of every command that has it, dashes as underscores: "
     "NSCAN_CLI_THREADS=2, NSCAN_CLI_NO_ODOMETRY=1; the command line goes before it, --config after it",
-    "NSCAN_CLI_COMMAND_OPTION": "the same for one command alone, such as NSCAN_CLI_SLAM_RELATIONS",
+    "NSCAN_CLI_COMMAND_OPTION": "the same for one command alone, such as NSCAN_CLI_SLAM_RELATIONS; there "
+    "is no other for options that mean another thing in another command",
     "NSCAN_CLI_MAX_LIMIT": "what an input may hold at most, such as NSCAN_CLI_MAX_BEAMS; errors name theirs",
     "NO_COLOR": "if it is set, progress has no colours",
     "NUMBA_CACHE_DIR": "the folder for compiled kernels, in place of the user's cache folder "

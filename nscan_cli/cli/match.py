@@ -11,7 +11,7 @@ import click
 from nscan_cli.cli.command import log_argument, option, result_option, subcommand
 from nscan_cli.cli.options import PoseType, common_options, reading_options
 from nscan_cli.cli.picture import check_plot, plot_option, write_plot
-from nscan_cli.cli.progress import announce_compiling, say
+from nscan_cli.cli.progress import Compiling, say
 from nscan_cli.cli.summary import Row, ended, table
 from nscan_cli.errors import WrongUsageError
 from nscan_cli.logs.options import ReadingOptions
@@ -34,7 +34,10 @@ class StartType(click.ParamType[Any]):
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
         """Check the form; a wrong one is a usage error."""
         if value not in ("odometry", "identity"):
-            PoseType().convert(value, param, ctx)
+            try:
+                PoseType().convert(value, param, ctx)
+            except click.BadParameter as error:
+                self.fail(f"{error.message}, nor odometry or identity", param, ctx)
         return value
 
 
@@ -88,10 +91,10 @@ def command(
     from nscan_cli.matching.pairwise import PairOptions, match_pair, matched_points, scan_ndt
     from nscan_cli.matching.priors import MotionModel, odometry_prior
 
+    Compiling("half a minute", quiet)
     scans = read_log(log, reading)
     rows = scans.row(reference), scans.row(scan)
     initial, prior = with_defaults(scans, initial, prior, quiet)
-    announce_compiling("minimise", quiet)
     options, model = PairOptions(), MotionModel()
     start = _start(scans, rows, initial)
     known = None

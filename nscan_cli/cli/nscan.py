@@ -12,7 +12,7 @@ from nscan_cli.cli.command import FILE, log_argument, option, result_option, sub
 from nscan_cli.cli.match import with_defaults
 from nscan_cli.cli.options import common_options, reading_options
 from nscan_cli.cli.picture import check_plot, plot_option, write_plot
-from nscan_cli.cli.progress import announce_compiling, say
+from nscan_cli.cli.progress import Compiling, say
 from nscan_cli.cli.scan_spec import ScanSpecType
 from nscan_cli.cli.summary import Row, ended, table
 from nscan_cli.counting import counted
@@ -102,10 +102,10 @@ def command(
     from nscan_cli.matching.pairwise import PairOptions, matched_points
     from nscan_cli.matching.priors import MotionModel
 
+    Compiling("half a minute", quiet)
     scans = read_log(log, reading)
     rows = [scans.row(number) for number in numbers]
     initial, prior = with_defaults(scans, initial, prior, quiet)
-    announce_compiling("approach_and_finish", quiet)
     options, model = PairOptions(), MotionModel()
     joint = JointOptions(fixed=0 if gauge == "fixed" else None)
     start, priors, sources = _known(scans, numbers, initial, prior, model)

@@ -10,7 +10,7 @@ from typing import Any
 
 import click
 
-from nscan_cli.cli.command import COMMON, READING, Option, option
+from nscan_cli.cli.command import COMMON, OWN_MEANINGS, READING, Option, option
 from nscan_cli.errors import InputDataError
 from nscan_cli.inputs import read_toml
 from nscan_cli.logs.options import ReadingOptions
@@ -120,8 +120,8 @@ def reading_options(command: Command) -> Command:
 def _read_config(ctx: click.Context, _param: click.Parameter, value: str | None) -> str | None:
     """Take a TOML file as the command's defaults.
 
-    Keys at the top and in the table of the command's name are the command's long options without
-    their dashes; tables of other commands are left alone.
+    Keys at the top and in the table of the command's name are long options without their dashes. At the
+    top, those that only other commands have are left alone, as are the tables of other commands.
     """
     if value is None:
         return None
@@ -129,12 +129,19 @@ def _read_config(ctx: click.Context, _param: click.Parameter, value: str | None)
     from nscan_cli.cli.main import COMMANDS
 
     name = ctx.command.name or ""
-    settings = {key: entry for key, entry in document.items() if key not in COMMANDS}
     own = document.get(name, {})
     if not isinstance(own, dict):
         raise InputDataError(value, f"{name} is no table", f"write [{name}], and its options below")
+    options = {param.long_name: param for param in _parameters(ctx.command)}
+    settings = {key: entry for key, entry in document.items() if key not in COMMANDS}
+    for key in list(settings):
+        if key in OWN_MEANINGS:
+            tables = " or ".join(f"[{command}]" for command in _commands_with(key))
+            problem = f"{key} stands for all commands, and means another thing in each"
+            raise InputDataError(value, problem, f"write it below {tables}")
+        if key not in options and _commands_with(key):
+            del settings[key]
     settings.update(own)
-    options = {param.long_name: param for param in _parameters(ctx)}
     defaults = {}
     for key, entry in settings.items():
         if key not in options:
@@ -152,6 +159,19 @@ def _read_config(ctx: click.Context, _param: click.Parameter, value: str | None)
     return value
 
 
+def _commands_with(key: str) -> list[str]:
+    """The commands that have an option of this long name, which a TOML file can have."""
+    from nscan_cli.cli.main import COMMANDS, cli
+
+    context = click.Context(cli)
+    commands = {name: cli.get_command(context, name) for name in COMMANDS}
+    return [
+        name
+        for name, command in commands.items()
+        if command is not None and key in (param.long_name for param in _parameters(command))
+    ]
+
+
 def _as_typed(entry: Any) -> str:
     """A TOML value as one would type it on the command line. Raises BadParameter for what none would."""
     if isinstance(entry, list):
@@ -161,19 +181,17 @@ def _as_typed(entry: Any) -> str:
     raise click.BadParameter(f"{str(entry)!r} is neither text, number, true, false nor a list of them")
 
 
-def _parameters(ctx: click.Context) -> list[Option]:
-    """The options of the command that a TOML file can have, in the order of --help."""
+def _parameters(command: click.Command) -> list[Option]:
+    """The options of a command that a TOML file can have, in the order of --help."""
     return [
-        param
-        for param in ctx.command.params
-        if isinstance(param, Option) and param.name not in NOT_PARAMETERS
+        param for param in command.params if isinstance(param, Option) and param.name not in NOT_PARAMETERS
     ]
 
 
 def _as_toml(ctx: click.Context) -> str:
     """The command's options in force as a TOML table of its name."""
     lines = [f"[{ctx.command.name}]"]
-    for param in _parameters(ctx):
+    for param in _parameters(ctx.command):
         value = ctx.params.get(param.name or "")
         if value is None or value == ():
             continue

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from nscan_cli.cli.command import FILE, option
 from nscan_cli.cli.options import Command
 from nscan_cli.errors import WrongUsageError
-from nscan_cli.outputs import check_writable, write_whole
+from nscan_cli.outputs import check_writable, is_device, write_whole
 
 if TYPE_CHECKING:
     from PIL.Image import Image
@@ -26,9 +26,15 @@ def plot_option(shows: str) -> Callable[[Command], Command]:
 
 
 def check_png(place: str, path: str) -> None:
-    """Refuse a name that says that the picture is of another format. Raises WrongUsageError."""
-    if Path(path).suffix.lower() in OTHER_FORMATS:
-        raise WrongUsageError(f"{place}: pictures are PNG; name it like {Path(path).stem}.png")
+    """Refuse a name that says that the picture is of another format, or of none. Raises WrongUsageError."""
+    named = Path(path)
+    if named.suffix.lower() in OTHER_FORMATS:
+        raise WrongUsageError(f"{place}: pictures are PNG; name it like {named.stem}.png")
+    # A folder is refused in its own words, where there is nothing to write.
+    is_file = path != "-" and not is_device(path) and not os.path.isdir(path) and named.name
+    if is_file and not named.suffix:
+        name = named.with_name(f"{named.name.strip('.') or 'map'}.png")
+        raise WrongUsageError(f"{place}: the name has no ending; pictures are PNG: name it {name}")
 
 
 def check_plot(plot: str | None, output: str | None, inputs: Sequence[str | None]) -> None:

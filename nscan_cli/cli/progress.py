@@ -7,6 +7,8 @@ import sys
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
+import click
+
 if TYPE_CHECKING:
     from rich.progress import Progress
 
@@ -17,14 +19,41 @@ def say(message: str, quiet: bool = False) -> None:
         print(message, file=sys.stderr)
 
 
+COMPILING = "compiling the kernels, once for this version on this machine"
+
+
 def announce_compiling(kernel: str, quiet: bool) -> bool:
-    """Say so where the kernels are still to be compiled, among them one that is needed; whether they are."""
+    """Say so where the kernels are still to be compiled, among them one that is needed; whether they are.
+
+    This is for kernels of other processes.
+    """
     from nscan_cli.machine_code import first_compile
 
     compiling = first_compile(kernel)
     if compiling:
-        say("compiling the kernels, once for this version on this machine: a minute or two", quiet)
+        say(f"{COMPILING}: a minute or two", quiet)
     return compiling
+
+
+class Compiling:
+    """Whether the running command has compiled kernels since this was made; it is said when that begins.
+
+    `takes` is how long, as people say it.
+    """
+
+    def __init__(self, takes: str, quiet: bool) -> None:
+        from nscan_cli.compiled import tell_when_compiling
+
+        self.has_begun = False
+        self._takes, self._quiet = takes, quiet
+        tell_when_compiling(self._begin)
+        context = click.get_current_context(silent=True)
+        if context is not None:
+            context.call_on_close(lambda: tell_when_compiling(None))
+
+    def _begin(self) -> None:
+        self.has_begun = True
+        say(f"{COMPILING}: {self._takes}", self._quiet)
 
 
 class Bar:

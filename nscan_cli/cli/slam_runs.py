@@ -7,7 +7,7 @@ import re
 from collections import Counter
 from typing import TYPE_CHECKING
 
-from nscan_cli.cli.progress import announce_compiling, progress, say
+from nscan_cli.cli.progress import Compiling, progress, say
 from nscan_cli.cli.summary import Row
 from nscan_cli.counting import counted
 from nscan_cli.errors import InputDataError, InputMissingError, WrongUsageError
@@ -50,10 +50,10 @@ def map_whole(
     from nscan_cli.slam.run import map_log
 
     bring_up()
+    compiling = Compiling("a minute or two", quiet)
     scans = read_log(log, reading)
     for warning in scans.report.notices():
         say(f"warning: {warning}", quiet)
-    compiled = announce_compiling("follow", quiet)
     with progress("mapping", len(scans), quiet) as bar:
 
         def report(done: int, keyframes: int, loops: int) -> None:
@@ -76,7 +76,7 @@ def map_whole(
             ("tracking", [f"{starts} from other angles, {searches}"]),
             ("large loops", [f"{places} found by search at a place seen before"]),
         ]
-    return Run(graph, scans, np.arange(len(scans)), [log], summary, compiled)
+    return Run(graph, scans, np.arange(len(scans)), [log], summary, compiling.has_begun)
 
 
 def _graph_rows(graph: Graph) -> list[Row]:
@@ -134,13 +134,14 @@ def refine_saved(path: str, log_file: str | None, needs_log: bool, threads: int,
     from nscan_cli.graph.marginals import marginal_covariances
     from nscan_cli.graph.solve import optimise_graph
 
+    compiling = Compiling("a minute or two", quiet)
     graph = load_graph(path)
     read = _log_of(path, graph, log_file, needs_log, quiet)
     before = graph.poses
     optimum = optimise_graph(graph)
     if not optimum.converged:
         say(f"warning: {path}: the optimum was not reached, its relations contradict each other", quiet)
-    scans, rows, inputs, compiled = None, np.arange(0), [path], False
+    scans, rows, inputs = None, np.arange(0), [path]
     if read is None:
         graph.marginals = marginal_covariances(graph)
     else:
@@ -148,7 +149,6 @@ def refine_saved(path: str, log_file: str | None, needs_log: bool, threads: int,
 
         scans, rows, log_path = read
         inputs.append(log_path)
-        compiled = announce_compiling("approach_and_finish", quiet)
         with progress("refining", None, quiet):
             graph = refine_again(graph, scans, rows, threads)
     moved = float(np.hypot(*(graph.poses - before)[:, :2].T).max())
@@ -159,7 +159,7 @@ def refine_saved(path: str, log_file: str | None, needs_log: bool, threads: int,
         ("optimised", [outcome]),
         ("moved", [f"no pose by more than {moved:.3g} m"]),
     ]
-    return Run(graph, scans, rows, inputs, summary, compiled)
+    return Run(graph, scans, rows, inputs, summary, compiling.has_begun)
 
 
 def _log_of(

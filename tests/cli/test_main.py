@@ -72,8 +72,7 @@ def test_help_and_version_import_nothing_heavy():
         (["render"], "nscan-cli: render: Missing argument 'GRAPH.json'; see nscan-cli render --help\n"),
         (
             ["render", "g.json", "-o", "m.png", "--style", "oil"],
-            "nscan-cli: render: Invalid value for '--style': 'oil' is not one of 'map_server', 'paper'; "
-            "see nscan-cli render --help\n",
+            "nscan-cli: render: --style: 'oil' is none of map_server, paper; see nscan-cli render --help\n",
         ),
     ],
 )

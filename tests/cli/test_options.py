@@ -22,8 +22,9 @@ def calls(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> list[dict[str, Any
     @subcommand("info")
     @argument("log", tells="a log")
     @option("-o", "--output", default="out.json")
+    @option("--relations")
     @option("--map", "map_file")
-    @option("--resolution", type=click.FloatRange(0, 10), default=0.05)
+    @option("--resolution", type=click.FloatRange(0, 10), default=0.05, metavar="M")
     @option("--yaml/--no-yaml", default=None)
     @reading_options
     @common_options
@@ -98,16 +99,16 @@ def test_a_variable_of_one_command_goes_before_that_of_all(calls, monkeypatch, c
     assert called(calls, "--every", "6")["reading"].every == 6
     monkeypatch.setenv("NSCAN_CLI_INFO_EVERY", "often")
     assert run(["info", "some.log"]) == 2
-    assert "Invalid value for NSCAN_CLI_INFO_EVERY in the environment: 'often'" in capsys.readouterr().err
+    assert "NSCAN_CLI_INFO_EVERY in the environment: 'often' is not a whole number" in capsys.readouterr().err
 
 
 def test_a_wrong_value_in_the_environment_is_said_to_be_there(calls, monkeypatch, capsys):
     monkeypatch.setenv("NSCAN_CLI_EVERY", "x")
     assert run(["info", "some.log"]) == 2
     err = capsys.readouterr().err
-    assert err.startswith("nscan-cli: info: Invalid value for NSCAN_CLI_EVERY in the environment: 'x' is not")
+    assert err.startswith("nscan-cli: info: NSCAN_CLI_EVERY in the environment: 'x' is not")
     assert run(["info", "some.log", "--every", "y"]) == 2
-    assert "Invalid value for '--every'" in capsys.readouterr().err
+    assert "info: --every: 'y' is not a whole number; see" in capsys.readouterr().err
 
 
 def test_the_config_may_come_after_other_options_and_from_the_environment(calls, monkeypatch):
@@ -143,13 +144,15 @@ def test_toml_values_of_every_kind(calls):
         ("no_odometry = true", "info has no option 'no_odometry'"),
         ("info = 3", "info is no table"),
         ("[other]\nresolution = 1", "info has no option 'other'"),
-        ("resolution = 'fine'", "resolution: 'fine' is not a valid float range"),
-        ("resolution = 11", "resolution: 11.0 is not in the range"),
-        ("resolution = true", "resolution: 'True' is not a valid float range"),
+        ("resolution = nan", "resolution: 'nan' is not a finite number"),
+        ("relations = 'both'", "relations stands for all commands, and means another thing in each"),
+        ("resolution = 'fine'", "resolution: 'fine' is not a number"),
+        ("resolution = 11", "resolution: has to be from 0 to 10 (m), and is 11"),
+        ("resolution = true", "resolution: 'True' is not a number"),
         ("resolution = {a = 1}", "resolution: "),
         ("resolution = 2020-01-01", "resolution: '2020-01-01' is neither"),
-        ("every = 1.5", "every: '1.5' is not a valid integer"),
-        ("flip = 3", "flip: '3' is not a valid boolean"),
+        ("every = 1.5", "every: '1.5' is not a whole number"),
+        ("flip = 3", "flip: '3' is neither true nor false"),
         ("mount = 3", "mount: '3' is not of the form X,Y,DEG"),
         ("mount = [1, 2]", "mount: '1,2' is not of the form X,Y,DEG"),
         ("mount = [1, 2, inf]", "mount: '1,2,inf' has a part that is not finite"),

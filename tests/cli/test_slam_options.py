@@ -66,7 +66,7 @@ def test_config_is_dumped_and_read_back(folder, capsys):
 
 
 def test_config_takes_effect(folder):
-    (folder / "slam.toml").write_text('output = "graph.json"\n[slam]\nmax-scans = 3\nend = 20.0\n')
+    (folder / "slam.toml").write_text('end = 20.0\n[slam]\nmax-scans = 3\noutput = "graph.json"\n')
     assert run(["slam", SAMPLE, "--config", "slam.toml", "-q"]) == 0
     graph = read_graph("graph.json")
     assert len(graph) == 101

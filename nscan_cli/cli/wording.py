@@ -1,0 +1,48 @@
+"""What is wrong with a value or a command line, in one line and in words that need no manual of click's."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import click
+
+UNITS = {"M": "m", "DEG": "degrees", "T": "s", "SECONDS": "s"}
+"""Units of numbers, by what the help writes in their place."""
+
+
+def value_problem(kind: click.ParamType[Any], value: Any, metavar: str | None) -> str | None:
+    """What is wrong with a value that a type of click's refuses; None for types that have words of their own.
+
+    `metavar` is what the help writes for the value.
+    """
+    if isinstance(kind, click.Choice):
+        return f"{value!r} is none of {', '.join(map(str, kind.choices))}"
+    if isinstance(kind, click.types.BoolParamType):
+        return f"{value!r} is neither true nor false"
+    whole = isinstance(kind, click.types.IntParamType)
+    if not whole and not isinstance(kind, click.types.FloatParamType):
+        return None
+    try:
+        number = int(value) if whole else float(value)
+    except (ValueError, TypeError, OverflowError):
+        return f"{value!r} is not a {'whole ' if whole else ''}number"
+    unit = UNITS.get(metavar or "")
+    return f"has to be {_bounds(kind)}{f' ({unit})' if unit else ''}, and is {number:g}"
+
+
+def _bounds(kind: Any) -> str:
+    """Between which numbers one of a range has to be."""
+    low, high = kind.min, kind.max
+    if low is not None and high is not None and not kind.min_open and not kind.max_open:
+        return f"from {low:g} to {high:g}"
+    at_least = "" if low is None else f"above {low:g}" if kind.min_open else f"{low:g} or more"
+    at_most = "" if high is None else f"below {high:g}" if kind.max_open else f"{high:g} or less"
+    return " and ".join(bound for bound in (at_least, at_most) if bound)
+
+
+def usage_problem(error: click.ClickException) -> str:
+    """What click says of a command line, which may be several lines, without the end of the sentence."""
+    if isinstance(error, click.BadParameter) and not isinstance(error, click.MissingParameter):
+        place = error.param_hint or (error.param.get_error_hint(error.ctx) if error.param else "")
+        return f"{place}: {error.message.rstrip('.')}".removeprefix(": ")
+    return error.format_message().rstrip(".")

@@ -1,0 +1,74 @@
+"""Compilation is announced when a process compiles, and only then."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from nscan_cli.cache_folder import PACKAGE
+
+KERNELS = """
+from nscan_cli.compiled import kernel, lean_kernel
+
+@lean_kernel
+def doubled(a):
+    return 2 * a
+
+@kernel
+def add(a, b):
+    return a + doubled(b)
+
+@kernel
+def subtract(a, b):
+    return a - doubled(b)
+"""
+COMMAND = """
+import sys
+import click
+from nscan_cli.cli.progress import Compiling
+import some_kernels
+
+@click.command()
+def command():
+    compiling = Compiling("long", quiet="-q" in sys.argv)
+    for name in NAMES:
+        getattr(some_kernels, name)(1.0, 2.0)
+    print(compiling.has_begun)
+
+command.main([], standalone_mode=False)
+some_kernels.add(1, 2)
+"""
+TOLD = "compiling the kernels, once for this version on this machine: long\n"
+
+
+def told(folder: Path, *names: str, quiet: bool = False, **settings: str) -> tuple[str, bool]:
+    """What a new process says that calls these kernels, and whether it knows that it has compiled."""
+    (folder / "some_kernels.py").write_text(KERNELS)
+    kept = {name: value for name, value in os.environ.items() if not name.startswith(("NUMBA_", "XDG_"))}
+    places = {
+        "NUMBA_CACHE_DIR": str(folder / "cache"),
+        "PYTHONPATH": os.pathsep.join([str(folder), str(PACKAGE.parent)]),
+    }
+    code = COMMAND.replace("NAMES", repr(names))
+    done = subprocess.run(
+        [sys.executable, "-c", code, *(["-q"] if quiet else [])],
+        env={**kept, **places, **settings},
+        capture_output=True,
+        check=True,
+        text=True,
+    )
+    return done.stderr, done.stdout == "True\n"
+
+
+@pytest.mark.parametrize("settings", [{}, {"NUMBA_OPT": "2"}], ids=["kept by us", "kept by numba"])
+def test_what_is_kept_is_not_announced(tmp_path: Path, settings: dict[str, str]):
+    # The kernel with whole numbers that is compiled when the command has ended is no matter of its own.
+    assert told(tmp_path, **settings) == ("", False)
+    assert told(tmp_path, "add", **settings) == (TOLD, True)
+    assert told(tmp_path, "add", **settings) == ("", False)
+    assert told(tmp_path, "add", "subtract", quiet=True, **settings) == ("", True)
+    assert told(tmp_path, "subtract", "add", **settings) == ("", False)
