@@ -76,8 +76,8 @@ def command(
     with claimed(output) as folder:
         planned = plan(entries, folder, force)
         if len(planned.absent) > 1:
-            names = ", ".join(entry.name for entry in planned.absent)
-            say(f"not there, skipped: {names}; the report says where to get them", quiet)
+            listed = ", ".join(entry.name for entry in planned.absent)
+            say(f"not there, skipped: {listed}; the report says where to get them", quiet)
         for entry in planned.absent if len(planned.absent) == 1 else ():
             _say_absent(entry, quiet)
         for name, notes in planned.notes.items():

@@ -14,7 +14,7 @@ from nscan_cli.errors import InputDataError, InputMissingError, WrongUsageError
 from nscan_cli.inputs import read_toml
 from nscan_cli.nightly.parameters import Parameters, parameters_from
 
-ENDINGS = (".log.gz", ".log", ".clf.gz", ".clf", ".script.gz", ".script", ".mcap", ".bag")
+ENDINGS = (".log.gz", ".log", ".clf.gz", ".clf", ".script.gz", ".script", ".mcap", ".bag", ".db3")
 """Of a log that the manifest gives by its name alone; the first that is there is taken."""
 NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,99}")
 TAKEN = ("report.html", "report.json")
@@ -142,10 +142,11 @@ def _about(role: str) -> tuple[str, str]:
 
 def _by_name(folder: Path, name: str, table: dict[str, Any]) -> Path:
     """The log of this name, of one of its other names, or as the file at its source is called."""
-    names = [name, *table.get("also", [])]
+    names: list[str] = [name, *table.get("also", [])]
     paths = [folder / (each + ending) for each in names for ending in ENDINGS]
-    downloaded = PurePosixPath(urlsplit(table.get("source", "")).path).name
-    if downloaded:
+    source: str = table.get("source", "")
+    downloaded = PurePosixPath(urlsplit(source).path).name
+    if downloaded.endswith(ENDINGS):
         paths.append(folder / downloaded)
     return next((path for path in paths if path.exists()), paths[0])
 
