@@ -64,6 +64,17 @@ def test_a_log_by_another_of_its_names_or_as_its_source_calls_it(tmp_path, file)
     assert entry.is_there == (file != "run02.log.gz.no")
 
 
+@pytest.mark.parametrize("file", ["b.relations", "b-2.relations", "named.relations"])
+def test_relations_under_a_name_of_the_log(tmp_path, file):
+    (tmp_path / file).touch()
+    text = '[[log]]\nname = "b"\nalso = ["b-2"]\nrelations = "named.relations"'
+    (entry,) = read(tmp_path, f"{text}\noptional = true")
+    assert entry.inputs["relations"] == tmp_path / file
+    # What somebody has named for a log of his own is meant.
+    (entry,) = read(tmp_path, text)
+    assert entry.inputs["relations"] == tmp_path / "named.relations"
+
+
 def test_what_is_known_of_a_log(tmp_path):
     assert not read(tmp_path, INTEL)[0].optional
     text = 'name = "b"\noptional = true\nabout = "A hall."\npublished_map = "https://example.org/b.png"'
