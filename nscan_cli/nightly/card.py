@@ -51,8 +51,9 @@ def card(verdict: Verdict, folder: Path) -> str:
 
 def chip(verdict: Verdict) -> str:
     """What is to be said of the log in a word or two."""
-    if verdict.status == "good" and verdict.errors is None:
-        return '<span class="chip absent">not measured</span>'
+    if verdict.status == "good" and not verdict.is_within_bounds:
+        words = "not measured" if verdict.errors is None else "no bound"
+        return f'<span class="chip absent">{words}</span>'
     return f'<span class="chip {verdict.status}">{WORDS[verdict.status]}</span>'
 
 
