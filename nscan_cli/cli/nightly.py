@@ -65,7 +65,7 @@ def command(
     from nscan_cli.nightly.verdict import headline
 
     entries = read_manifest(manifest, data)
-    if not any(entry.is_there for entry in entries):
+    if all(entry.optional and not entry.is_there for entry in entries):
         for entry in entries:
             if "log" in entry.sources:
                 _say_absent(entry, quiet)
