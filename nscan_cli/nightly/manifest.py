@@ -146,7 +146,7 @@ def _by_name(folder: Path, name: str, table: dict[str, Any]) -> Path:
     source: str = table.get("source", "")
     downloaded = PurePosixPath(urlsplit(source).path).name
     if downloaded.endswith(ENDINGS):
-        paths.append(folder / downloaded)
+        paths += [folder / downloaded, folder / downloaded.removesuffix(".gz")]
     return next((path for path in paths if path.exists()), paths[0])
 
 

@@ -137,7 +137,7 @@ def test_optional_logs_that_are_not_there_are_one_line(manifest, first, tmp_path
     first_line, *_ = capsys.readouterr().err.splitlines()
     assert first_line == "not there, skipped: four, five, six; the report says where to get them"
     page = (folder / "report.html").read_text()
-    assert page.count('<section class="log absent">') == 1
+    assert page.count('<section class="log missing">') == 1
     for name in ("four", "five", "six"):
         assert f'<dt id="{name}">{name}</dt><dd>Where {name} was &lt;driven&gt;.' in page
         assert f'<a href="https://example.org/{name}.log">' in page

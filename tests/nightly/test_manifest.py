@@ -55,7 +55,7 @@ def test_a_log_by_its_name_alone(tmp_path, file):
     assert entry.is_there
 
 
-@pytest.mark.parametrize("file", ["b-2.log.gz", "run02.log.gz", "run02.log.gz.no"])
+@pytest.mark.parametrize("file", ["b-2.log.gz", "run02.log.gz", "run02.log", "run02.log.gz.no"])
 def test_a_log_by_another_of_its_names_or_as_its_source_calls_it(tmp_path, file):
     (tmp_path / file).touch()
     text = 'name = "b"\nalso = ["b_two", "b-2"]\nsource = "https://example.org/1721.1/62281/run02.log.gz?x=2"'
