@@ -152,7 +152,7 @@ def _by_name(folder: Path, name: str, table: dict[str, Any]) -> Path:
 
 def _beside(folder: Path, name: str, table: dict[str, Any], role: str) -> Path:
     """What the log is measured against: as named; of an optional log, also under a name of the log."""
-    named = folder / table[role]
+    named: Path = folder / table[role]
     if not table.get("optional"):
         return named
     paths = [named, *(named.with_name(each + named.suffix) for each in _names_of(name, table))]
