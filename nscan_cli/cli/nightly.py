@@ -65,7 +65,7 @@ def command(
     from nscan_cli.nightly.verdict import headline
 
     entries = read_manifest(manifest, data)
-    if not any(entry.is_there for entry in entries):
+    if all(entry.optional and not entry.is_there for entry in entries):
         for entry in entries:
             if "log" in entry.sources:
                 _say_absent(entry, quiet)
@@ -76,8 +76,8 @@ def command(
     with claimed(output) as folder:
         planned = plan(entries, folder, force)
         if len(planned.absent) > 1:
-            names = ", ".join(entry.name for entry in planned.absent)
-            say(f"not there, skipped: {names}; the report says where to get them", quiet)
+            listed = ", ".join(entry.name for entry in planned.absent)
+            say(f"not there, skipped: {listed}; the report says where to get them", quiet)
         for entry in planned.absent if len(planned.absent) == 1 else ():
             _say_absent(entry, quiet)
         for name, notes in planned.notes.items():

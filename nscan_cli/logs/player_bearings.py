@@ -9,8 +9,9 @@ from collections import Counter
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
-from nscan_cli.logs.assemble import RawScans, stacked
+from nscan_cli.logs.assemble import RawScans, empty_table
 from nscan_cli.logs.bearings import Fan, are_degrees, fan
 from nscan_cli.logs.laser import CARMEN_MAX_RANGE
 from nscan_cli.logs.skips import Skips
@@ -62,7 +63,7 @@ def scans(records: list[Record], skips: Skips) -> tuple[RawScans, str]:
             whole.append((row, found))
     whole = _not_cut_off(whole, skips)
     raw = RawScans(
-        stacked([_in_places(row.ranges, found) for row, found in whole]),
+        _table(whole),
         np.array([found.first for _, found in whole]),
         np.array([found.step for _, found in whole]),
         [row.record.stamp for row, _ in whole],
@@ -128,8 +129,10 @@ def _not_cut_off(whole: list[tuple[Row, Fan]], skips: Skips) -> list[tuple[Row, 
     return kept
 
 
-def _in_places(ranges: Array, found: Fan) -> Array:
-    """The readings by direction; nan where there is none."""
-    row = np.full(int(found.places[-1]) + 1, np.nan)
-    row[found.places] = ranges
-    return row
+def _table(whole: list[tuple[Row, Fan]]) -> NDArray[np.float32]:
+    """The readings (S, B) by direction; nan where there is none. Raises ExceededError."""
+    table = empty_table(len(whole), max((int(found.places[-1]) + 1 for _, found in whole), default=0))
+    with np.errstate(over="ignore", invalid="ignore"):
+        for readings, (row, found) in zip(table, whole, strict=True):
+            readings[found.places] = row.ranges
+    return table

@@ -35,7 +35,7 @@ def card(verdict: Verdict, folder: Path) -> str:
     if verdict.status == "absent" and "log" in entry.sources:
         parts.append(f"<p>To be had from {_source(entry)}</p>")
     if last is not None and verdict.status in ("failed", "absent"):
-        parts.append('<p class="soft">Below: the last night that was done.</p>')
+        parts.append('<p class="about">Below: the last night that was done.</p>')
     if last is not None:
         parts += [
             '<div class="body"><div>',
@@ -51,8 +51,9 @@ def card(verdict: Verdict, folder: Path) -> str:
 
 def chip(verdict: Verdict) -> str:
     """What is to be said of the log in a word or two."""
-    if verdict.status == "good" and verdict.errors is None:
-        return '<span class="chip absent">not measured</span>'
+    if verdict.status == "good" and not verdict.is_within_bounds:
+        words = "not measured" if verdict.errors is None else "no bound"
+        return f'<span class="chip absent">{words}</span>'
     return f'<span class="chip {verdict.status}">{WORDS[verdict.status]}</span>'
 
 
@@ -68,7 +69,7 @@ def absent(verdicts: list[Verdict]) -> list[str]:
         rows.append(f'<dt id="{entry.name}">{entry.name}</dt><dd>{about}{source}</dd>')
     title = "One more log is" if len(rows) == 1 else f"{len(rows)} more logs are"
     return [
-        f'<section class="log absent"><h2>{title} not there</h2>',
+        f'<section class="log missing"><h2>{title} not there</h2>',
         f"<dl>{''.join(rows)}</dl>",
         "</section>",
     ]

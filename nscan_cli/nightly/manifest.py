@@ -14,7 +14,7 @@ from nscan_cli.errors import InputDataError, InputMissingError, WrongUsageError
 from nscan_cli.inputs import read_toml
 from nscan_cli.nightly.parameters import Parameters, parameters_from
 
-ENDINGS = (".log.gz", ".log", ".clf.gz", ".clf", ".script.gz", ".script", ".mcap", ".bag")
+ENDINGS = (".log.gz", ".log", ".clf.gz", ".clf", ".script.gz", ".script", ".mcap", ".bag", ".db3")
 """Of a log that the manifest gives by its name alone; the first that is there is taken."""
 NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,99}")
 TAKEN = ("report.html", "report.json")
@@ -119,7 +119,7 @@ def _entry(file: str, number: int, table: dict[str, Any], folder: Path) -> Entry
         remedy = "give relations or reference too"
         raise InputDataError(place, f"has {bounds[0]}, but nothing to measure against", remedy)
     inputs = {"log": folder / table["path"] if "path" in table else _by_name(folder, name, table)}
-    inputs.update({role: folder / table[role] for role in ROLES[1:] if role in table})
+    inputs.update({role: _beside(folder, name, table, role) for role in ROLES[1:] if role in table})
     return Entry(
         name=name,
         inputs=inputs,
@@ -142,12 +142,25 @@ def _about(role: str) -> tuple[str, str]:
 
 def _by_name(folder: Path, name: str, table: dict[str, Any]) -> Path:
     """The log of this name, of one of its other names, or as the file at its source is called."""
-    names = [name, *table.get("also", [])]
-    paths = [folder / (each + ending) for each in names for ending in ENDINGS]
-    downloaded = PurePosixPath(urlsplit(table.get("source", "")).path).name
-    if downloaded:
-        paths.append(folder / downloaded)
+    paths = [folder / (each + ending) for each in _names_of(name, table) for ending in ENDINGS]
+    source: str = table.get("source", "")
+    downloaded = PurePosixPath(urlsplit(source).path).name
+    if downloaded.endswith(ENDINGS):
+        paths += [folder / downloaded, folder / downloaded.removesuffix(".gz")]
     return next((path for path in paths if path.exists()), paths[0])
+
+
+def _beside(folder: Path, name: str, table: dict[str, Any], role: str) -> Path:
+    """What the log is measured against: as named; of an optional log, also under a name of the log."""
+    named: Path = folder / table[role]
+    if not table.get("optional"):
+        return named
+    paths = [named, *(named.with_name(each + named.suffix) for each in _names_of(name, table))]
+    return next((path for path in paths if path.exists()), named)
+
+
+def _names_of(name: str, table: dict[str, Any]) -> list[str]:
+    return [name, *table.get("also", [])]
 
 
 def _shown(value: Any) -> str:

@@ -6,6 +6,7 @@ from html import escape
 from pathlib import Path
 
 from nscan_cli import __version__
+from nscan_cli.counting import counted
 from nscan_cli.nightly.card import SIGNS, absent, card, change, chip, readable, real_time, seconds, timed
 from nscan_cli.nightly.report import finished
 from nscan_cli.nightly.verdict import ASKING, ORDER, Status, Verdict, headline
@@ -102,7 +103,7 @@ def _row(verdict: Verdict) -> str:
     errors = verdict.errors if is_now else None
     best = min(entry.published.values(), default=None)
     cells = [
-        (chip(verdict), ""),
+        (chip(verdict) + (_notes(verdict) if is_now else ""), ""),
         ("" if errors is None else f"{errors.metres:.4f}", "number"),
         (change(verdict) if is_now else "", "number"),
         ("" if entry.max_translation is None else f"{entry.max_translation:g}", "number wide"),
@@ -113,6 +114,11 @@ def _row(verdict: Verdict) -> str:
     ]
     name = f'<th><a href="#{entry.name}">{entry.name}</a></th>'
     return f"<tr>{name}{''.join(f'<td{_class(kind)}>{text}</td>' for text, kind in cells)}</tr>"
+
+
+def _notes(verdict: Verdict) -> str:
+    """How many notes the card has, for those who do not get down there."""
+    return f' <span class="soft">{counted(len(verdict.notes), "note")}</span>' if verdict.notes else ""
 
 
 def _class(kind: str) -> str:

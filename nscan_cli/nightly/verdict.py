@@ -79,6 +79,12 @@ class Verdict:
         return Errors.of(self.last)
 
     @property
+    def is_within_bounds(self) -> bool:
+        """Whether there is a bound, and a figure that keeps to it."""
+        bounds = (self.entry.max_translation, self.entry.max_rotation)
+        return self.status in ("good", "worse") and self.errors is not None and bounds != (None, None)
+
+    @property
     def is_failure(self) -> bool:
         """Whether a check failed."""
         return self.status in ("failed", "above")
@@ -140,10 +146,11 @@ def headline(verdicts: list[Verdict]) -> str:
         return f"Not good: {of_all} {', '.join(parts)}"
     if parts:
         return f"Within bounds, but {of_all} {parts[0]}"
-    measured = sum(verdict.status == "good" and verdict.errors is not None for verdict in verdicts)
-    if measured == there:
+    within = sum(verdict.is_within_bounds for verdict in verdicts)
+    if within == there:
         return "The log is good" if there == 1 else f"All {there} logs are good"
-    done = "The log is" if there == 1 else f"All {there} logs are"
-    if measured == 0:
-        return f"{done} mapped; there is nothing to measure {'it' if there == 1 else 'them'} against"
-    return f"{done} mapped; {measured} {'is' if measured == 1 else 'are'} measured, and good"
+    if there == 1:
+        return "The log is mapped; there is no bound to hold it against"
+    others = "the others have" if within < there - 1 else "the other one has"
+    of_them = f"{within} within {'its bound' if within == 1 else 'their bounds'}; {others} none"
+    return f"All {there} logs are mapped, {of_them if within else 'without a bound to hold them against'}"

@@ -137,7 +137,7 @@ def test_optional_logs_that_are_not_there_are_one_line(manifest, first, tmp_path
     first_line, *_ = capsys.readouterr().err.splitlines()
     assert first_line == "not there, skipped: four, five, six; the report says where to get them"
     page = (folder / "report.html").read_text()
-    assert page.count('<section class="log absent">') == 1
+    assert page.count('<section class="log missing">') == 1
     for name in ("four", "five", "six"):
         assert f'<dt id="{name}">{name}</dt><dd>Where {name} was &lt;driven&gt;.' in page
         assert f'<a href="https://example.org/{name}.log">' in page
@@ -173,7 +173,7 @@ def test_a_mistake_is_one_line_with_its_code(arguments, code, message, tmp_path,
     if "--scheduler" in arguments:
         pytest.importorskip("distributed")
     Path("bad.toml").write_text('[[log]]\nname = "a"\npth = "x"')
-    Path("empty.toml").write_text('[[log]]\nname = "a"')
+    Path("empty.toml").write_text('[[log]]\nname = "a"\noptional = true')
     Path("fine.toml").write_text('[[log]]\nname = "fine"')
     Path("fine.log").write_text("no log")
     assert run(["nightly", *arguments]) == code
@@ -181,6 +181,15 @@ def test_a_mistake_is_one_line_with_its_code(arguments, code, message, tmp_path,
     assert out == ""
     assert err.startswith(f"nscan-cli: {message}")
     assert err.count("\n") == 1
+
+
+def test_where_no_log_of_ones_own_is_there_the_night_has_failed_and_the_report_says_so(tmp_path, capsys):
+    (tmp_path / "own.toml").write_text('[[log]]\nname = "a"\n[[log]]\nname = "b"\noptional = true')
+    assert run(["nightly", str(tmp_path / "own.toml"), "-o", str(tmp_path / "nights"), "-q"]) == 3
+    first, last = capsys.readouterr().err.splitlines()
+    assert first == "nscan-cli: a: a.log.gz is not there"
+    assert last == f"nscan-cli: Not good: of 1 log 1 failed; see {tmp_path}/nights/report.html"
+    assert [log["status"] for log in report(tmp_path / "nights")["logs"]] == ["failed", "absent"]
 
 
 def test_where_no_log_is_there_it_is_said_where_to_get_them(tmp_path, capsys):

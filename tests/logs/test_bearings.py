@@ -52,8 +52,7 @@ def test_beams_that_were_left_out_leave_gaps():
 
 
 def test_a_whole_turn_goes_on_over_half_a_turn():
-    bearings = (np.arange(360) + 180 + 10) % 360 - 180.0
-    found = fan(bearings, True)
+    found = fan((np.arange(360.0) + 180 + 10) % 360 - 180.0, True)
     assert found is not None
     assert math.degrees(found.first) == pytest.approx(10)
     np.testing.assert_array_equal(found.places, np.arange(360))

@@ -173,6 +173,15 @@ def test_bearings_that_are_not_even_are_named(tmp_path):
         read(tmp_path, f"laser 0 {EPOCH}.5 1.0 nan 0 2.0 0.1 0")
 
 
+def test_gaps_make_no_table_without_bounds(tmp_path, monkeypatch):
+    """A few readings can name a thousand directions: what counts is the table."""
+    monkeypatch.setenv("NSCAN_CLI_MAX_READINGS", "10000")
+    gap = "2.0 0.0000 0 2.0 0.0010 0 2.0 0.0020 0 2.0 1.5000 0"
+    lines = [f"laser 0 {EPOCH + k}.5 {gap}" for k in range(20)]
+    with pytest.raises(InputDataError, match="20 scans of up to 1,501 beams"):
+        read(tmp_path, *lines)
+
+
 def test_positions_with_more_or_fewer_values(tmp_path):
     lines = [line.replace(" 0.25 0.00 0.50 0 ", "") for line in of_2002()]
     lines[3] = lines[3][:-12]

@@ -55,13 +55,24 @@ def test_a_log_by_its_name_alone(tmp_path, file):
     assert entry.is_there
 
 
-@pytest.mark.parametrize("file", ["b-2.log.gz", "run02.log.gz", "run02.log.gz.no"])
+@pytest.mark.parametrize("file", ["b-2.log.gz", "run02.log.gz", "run02.log", "run02.log.gz.no"])
 def test_a_log_by_another_of_its_names_or_as_its_source_calls_it(tmp_path, file):
     (tmp_path / file).touch()
     text = 'name = "b"\nalso = ["b_two", "b-2"]\nsource = "https://example.org/1721.1/62281/run02.log.gz?x=2"'
     (entry,) = read(tmp_path, f"[[log]]\n{text}")
     assert entry.inputs["log"] == tmp_path / (file if entry.is_there else "b.log.gz")
     assert entry.is_there == (file != "run02.log.gz.no")
+
+
+@pytest.mark.parametrize("file", ["b.relations", "b-2.relations", "named.relations"])
+def test_relations_under_a_name_of_the_log(tmp_path, file):
+    (tmp_path / file).touch()
+    text = '[[log]]\nname = "b"\nalso = ["b-2"]\nrelations = "named.relations"'
+    (entry,) = read(tmp_path, f"{text}\noptional = true")
+    assert entry.inputs["relations"] == tmp_path / file
+    # What somebody has named for a log of his own is meant.
+    (entry,) = read(tmp_path, text)
+    assert entry.inputs["relations"] == tmp_path / "named.relations"
 
 
 def test_what_is_known_of_a_log(tmp_path):

@@ -78,16 +78,19 @@ def test_of_a_trajectory_the_rmse_counts():
 @pytest.mark.parametrize(
     ("verdicts", "line"),
     [
-        ([judged(done(1))], "The log is good"),
-        ([judged(done(1))] * 3 + [judged(absent=True)], "All 3 logs are good"),
+        ([judged(done(1), translation=2)], "The log is good"),
+        ([judged(done(1), rotation=2)] * 3 + [judged(absent=True)], "All 3 logs are good"),
         ([judged(done(1)), judged(done(1), done(2))], "Within bounds, but of 2 logs 1 worse than before"),
         ([judged(FAILED), judged(done(2), translation=1), judged(done(1), done(2)), judged(done(1))],
          "Not good: of 4 logs 1 failed, 1 above bound, 1 worse than before"),
         ([judged(FAILED)], "Not good: of 1 log 1 failed"),
-        ([judged(UNMEASURED)], "The log is mapped; there is nothing to measure it against"),
-        ([judged(UNMEASURED)] * 2, "All 2 logs are mapped; there is nothing to measure them against"),
-        ([judged(UNMEASURED)] * 2 + [judged(done(1))], "All 3 logs are mapped; 1 is measured, and good"),
-        ([judged(UNMEASURED)] + [judged(done(1))] * 2, "All 3 logs are mapped; 2 are measured, and good"),
+        ([judged(UNMEASURED, translation=2)], "The log is mapped; there is no bound to hold it against"),
+        ([judged(UNMEASURED), judged(done(1))],
+         "All 2 logs are mapped, without a bound to hold them against"),
+        ([judged(UNMEASURED), judged(done(1)), judged(done(1), translation=2)],
+         "All 3 logs are mapped, 1 within its bound; the others have none"),
+        ([judged(UNMEASURED)] + [judged(done(1), translation=2)] * 2,
+         "All 3 logs are mapped, 2 within their bounds; the other one has none"),
     ],
 )  # fmt: skip
 def test_the_headline(verdicts, line):

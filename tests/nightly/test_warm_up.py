@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import importlib
+import subprocess
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from nscan_cli import machine_code
 from nscan_cli.cli.night_lines import PlainLines
 from nscan_cli.logs.load import log_from
 from nscan_cli.nightly import processes, warm_up, work
@@ -22,7 +24,7 @@ from tests.cli.room_log import room_log
 def cache(tmp_path, monkeypatch):
     (tmp_path / "cache").mkdir()
     monkeypatch.setattr(warm_up, "cache_folder", lambda: tmp_path / "cache")
-    monkeypatch.setattr(warm_up.machine_code, "first_compile", lambda _name: False)
+    monkeypatch.setattr(machine_code, "first_compile", lambda _name: False)
     return tmp_path / "cache"
 
 
@@ -30,7 +32,7 @@ def cache(tmp_path, monkeypatch):
 def calls(monkeypatch):
     """The calls of processes, which end at once."""
     made: list[list[str]] = []
-    monkeypatch.setattr(warm_up.subprocess, "run", lambda call, **_how: made.append(call))
+    monkeypatch.setattr(subprocess, "run", lambda call, **_how: made.append(call))
     return made
 
 
@@ -40,11 +42,11 @@ def test_once_on_each_machine(cache, calls, monkeypatch):
     assert [call[1:] for call in calls] == [["-P", "-m", "nscan_cli.nightly.warm_up"]]
     # Somebody has cleared the folder.
     with monkeypatch.context() as patch:
-        patch.setattr(warm_up.machine_code, "first_compile", lambda _name: True)
+        patch.setattr(machine_code, "first_compile", lambda _name: True)
         warm_up.compile_kernels({})
     assert len(calls) == 2
     # Another processor, or another numba.
-    monkeypatch.setattr(warm_up.machine_code, "machine", lambda: "another")
+    monkeypatch.setattr(machine_code, "machine", lambda: "another")
     warm_up.compile_kernels({})
     assert len(calls) == 3
 
