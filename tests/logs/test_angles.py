@@ -131,6 +131,14 @@ def test_the_field_of_view_of_a_carmen_record_is_looked_at_too(tmp_path):
     assert used_step(lines.read(tmp_path, *scans)) == pytest.approx(STEP)
 
 
+def test_the_angles_of_a_player_record_are_looked_at_too(tmp_path):
+    head = f"16777343 6665 laser 00 001 001 0001 {FIRST:.5f} {LAST:.5f} {STEP / 2:.8f} 20.0 0180"
+    scans = [
+        f"{k}.000 {head} {' '.join(f'{r:.3f} 0' for r in scan)}" for k, scan in enumerate(readings().tolist())
+    ]
+    assert used_step(lines.read(tmp_path, *scans)) == pytest.approx(STEP, rel=1e-5)
+
+
 @pytest.mark.parametrize(("one", "other"), [(STEP, STEP), (0.0, 0.0), (1.0, 2.0)])
 def test_steps_that_walls_cannot_tell_apart(one, other):
     assert straighter(readings(), [one] * 40, [other] * 40) is None
