@@ -31,22 +31,30 @@ def command(log: str, as_json: bool, reading: ReadingOptions, **_common: Any) ->
     """Tell what is in LOG, and what the other commands will use of it.
 
     These are scans, laser, mounting, odometry, what stands for no return, and what was skipped and why.
-    The reading options change what the other commands see in the same way.
+    The reading options change what the other commands see in the same way. A log of which no reading
+    counts is listed too, and then refused, as by the other commands.
     """
     from nscan_cli.logs.load import read_log
 
-    facts = facts_of(read_log(log, reading))
+    scans = read_log(log, reading, even_unusable=True)
+    facts = facts_of(scans)
     click.echo(json.dumps(facts, ensure_ascii=False, allow_nan=False) if as_json else as_text(facts))
+    if scans.report.unusable is not None:
+        raise scans.report.unusable
 
 
 def facts_of(log: LaserLog) -> dict[str, Any]:
     """What `info --json` prints; lengths in m, times in s, angles in degrees, keys always the same."""
     import numpy as np
 
-    beams = log.ranges.shape[1]
+    from nscan_cli.logs.view import beams_lost, field_of_view
+
+    fewest, beams = (int(count) for count in (log.own_beams().min(), log.own_beams().max()))
     steps = np.diff(log.times)
     duration = float(log.times[-1] - log.times[0])
-    first, step = math.degrees(log.angle_min[0]), math.degrees(log.angle_increment[0])
+    first, last, step = (math.degrees(angle) for angle in field_of_view(log))
+    increments = [_degrees(find(log.angle_increment)) for find in (np.min, np.max)]
+    without_return, unusable = beams_lost(log)
     path = None if log.odometry is None else np.diff(log.odometry[:, :2], axis=0)
     return {
         "file": log.source.name,
@@ -58,17 +66,20 @@ def facts_of(log: LaserLog) -> dict[str, Any]:
         "first_scan": int(log.numbers[0]),
         "last_scan": int(log.numbers[-1]),
         "beams": beams,
+        "fewest_beams": fewest,
         "angle_min": round(first, 6),
-        "angle_max": round(first + (beams - 1) * step, 6),
+        "angle_max": round(last, 6),
         "angle_increment": round(step, 6),
+        "angle_increments": increments,
         "start": log.stamps[0],
         "duration": round(duration, 6),
         "rate": round(len(steps) / duration, 3) if duration > 0 else None,
         "longest_gap": round(float(steps.max()), 6) if len(steps) else None,
         "odometry": None if path is None else {"path": round(float(np.hypot(*path.T).sum()), 3)},
         "no_return": log.no_return,
-        "beams_without_return": _share(np.isinf(log.ranges)),
-        "beams_unusable": _share(np.isnan(log.ranges)),
+        "beams_without_return": round(without_return, 6),
+        "beams_unusable": round(unusable, 6),
+        "beams_lost": log.report.lost,
         "mounting": [*(round(float(part), 6) for part in log.mount[:2]), _degrees(log.mount[2])],
         "range_limits": [round(limit, 6) for limit in log.range_limits],
         "used": log.report.used,
@@ -88,6 +99,7 @@ def as_text(facts: dict[str, Any]) -> str:
     odometry, no_return, gap = facts["odometry"], facts["no_return"], facts["longest_gap"]
     x, y, degrees = facts["mounting"]
     low, high = facts["range_limits"]
+    finest, coarsest = facts["angle_increments"]
     used = facts["used"]
     path = "" if odometry is None else f"a path of {odometry['path']:.1f} m"
     rate = "" if facts["rate"] is None else f", {facts['rate']:.3g} a second, longest gap {gap:.3g} s"
@@ -99,13 +111,15 @@ def as_text(facts: dict[str, Any]) -> str:
         ("laser", [f"{facts['laser']}, {used['laser']}"]),
         ("scans", [f"{facts['scans']}, numbered {facts['first_scan']} to {facts['last_scan']}{rate}"]),
         ("duration", [f"{facts['duration']:.1f} s from {facts['start']}"]),
-        ("beams", [f"{facts['beams']}"]),
+        ("beams", [_between(facts["fewest_beams"], facts["beams"])]),
         ("field of view", [f"{facts['angle_min']:g}° to {facts['angle_max']:g}°, "
-                           f"{facts['angle_increment']:g}° a beam"]),
-        ("range limits", [f"{low:g} m to {high:g} m"]),
+                           f"{_between(finest, coarsest, '°')} a beam"]),
+        ("range limits", [f"{low:g} m to {high:g} m",
+                          f"lower: {used['range_min']}", f"upper: {used['range_max']}"]),
         ("no return", ["no such value" if no_return is None else f"{no_return:g} m and above"]),
         ("beams lost", [f"{facts['beams_without_return']:.1%} without return, "
-                        f"{facts['beams_unusable']:.1%} unusable"]),
+                        f"{facts['beams_unusable']:.1%} unusable",
+                        *(f"{count:,} {why}" for why, count in facts["beams_lost"].items())]),
         ("mounting", [f"{x:g} m ahead, {y:g} m to the left, turned by {degrees:g}°",
                       used["mounting"]]),
         ("odometry", [path, used["odometry"]] if path else [used["odometry"]]),
@@ -126,8 +140,8 @@ def _skipped(entry: dict[str, Any]) -> str:
     return f"{counted(entry['records'], 'record')}: {entry['reason']}, first in {place} {first}"
 
 
-def _share(beams: Any) -> float:
-    return round(float(beams.mean()), 6)
+def _between(least: float, most: float, unit: str = "") -> str:
+    return f"{most:g}{unit}" if least == most else f"{least:g}{unit} to {most:g}{unit}"
 
 
 def _degrees(angle: float) -> float:

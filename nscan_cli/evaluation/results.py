@@ -56,7 +56,7 @@ def _load(path: str, options: ReadingOptions, notices: list[str] | None) -> Traj
     is_graph = data.lstrip().startswith(b"{")
     if not is_graph and not _begins_with_numbers(data):
         del data
-        log = log_from(stored, path, replace(options, allow_corrected=True))
+        log = log_from(stored, path, replace(options, allow_corrected=True), even_unusable=True)
         # That its poses are corrected ones is as it should be; what is lost or skipped is not.
         told = log.report.notices()[0 if options.salvage else len(log.report.warnings) :]
         notices += [f"{name}: {notice}" for notice in told]

@@ -42,18 +42,19 @@ def corrected_log(log: LaserLog, rows: NDArray[np.int64], poses: Array) -> bytes
     limit = _limit(log, float(greatest))
     nothing = limit if log.no_return is None else max(np.float32(log.no_return), limit)
     first, step = log.angle_min[rows], log.angle_increment[rows]
-    plain = greatest < CARMEN_MAX_RANGE and _by_convention(first, step, ranges.shape[1])
+    own = log.own_beams()[rows]
+    plain = greatest < CARMEN_MAX_RANGE and _by_convention(first, step, own)
     lines = [HEADER, *_params(log, limit, float(step[0]))]
     lasers = log.laser_pose(poses)
     since = log.times - log.times[0]
-    beams = _texts(ranges, nothing)
+    beams = _texts(ranges, own, nothing)
     for k, row in enumerate(rows.tolist()):
         triples = f"{_pose(lasers[k])} {_pose(poses[k])}"
         end = f"{log.stamps[row]} {OWN_HOST.decode()} {since[row]:.6f}\n"
         if plain:
             lines.append(f"FLASER {next(beams)} {triples} {end}")
         else:
-            fov = step[k] * (ranges.shape[1] - 1)
+            fov = step[k] * (own[k] - 1)
             head = f"0 {float(first[k])!r} {float(fov)!r} {float(step[k])!r} {limit!s} 0 0"
             lines.append(f"ROBOTLASER1 {head} {next(beams)} 0 {triples} 0 0 0 0 0 {end}")
     return "".join(lines).encode()
@@ -67,9 +68,11 @@ def _limit(log: LaserLog, greatest: float) -> np.float32:
     return np.float32(max(CARMEN_MAX_RANGE, math.floor(greatest) + 1.0))
 
 
-def _by_convention(first: Array, step: Array, beams: int) -> bool:
-    """Whether all scans have the directions that CARMEN gives to so many beams."""
-    usual_first, usual_step = beam_angles(beams)
+def _by_convention(first: Array, step: Array, beams: NDArray[np.int64]) -> bool:
+    """Whether all scans have as many beams, and the directions that CARMEN gives to so many."""
+    if (beams != beams[0]).any():
+        return False
+    usual_first, usual_step = beam_angles(int(beams[0]))
     off = np.abs(first - usual_first) + beams * np.abs(step - usual_step)
     return bool((off < SAME_ANGLES).all())
 
@@ -86,12 +89,12 @@ def _params(log: LaserLog, limit: np.float32, step: float) -> Iterator[str]:
         yield f"PARAM {name} {value!s} 0 {OWN_HOST.decode()} 0\n"
 
 
-def _texts(ranges: NDArray[np.float32], nothing: np.float32) -> Iterator[str]:
+def _texts(ranges: NDArray[np.float32], own: NDArray[np.int64], nothing: np.float32) -> Iterator[str]:
     """Of each scan, the number of its beams and their ranges, in the fewest digits that read back."""
     values, places = np.unique(ranges, return_inverse=True, equal_nan=True)
     texts = np.array([_range(value, nothing) for value in values], dtype=object)
-    for scan in places.reshape(ranges.shape):
-        yield f"{len(scan)} {' '.join(texts[scan])}"
+    for scan, beams in zip(places.reshape(ranges.shape), own.tolist(), strict=True):
+        yield f"{beams} {' '.join(texts[scan[:beams]])}"
 
 
 def _range(value: np.float32, nothing: np.float32) -> str:

@@ -124,7 +124,7 @@ def scan_message(ros: Messages, log: LaserLog, row: int, time: int) -> Any:
     """sensor_msgs/LaserScan of one row of the log; its angles and ranges have the 32 bits of ROS."""
     low, high = log.range_limits
     first, step = float(log.angle_min[row]), float(log.angle_increment[row])
-    ranges = log.ranges[row]
+    ranges = log.readings(row)
     return ros.make(
         "sensor_msgs/LaserScan",
         header=ros.header(time, "laser"),

@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from nscan_cli.limits import READINGS
-from nscan_cli.logs.laser import mark_no_returns, no_return_value
+from nscan_cli.logs.angles import beam_directions
+from nscan_cli.logs.laser import mark_no_returns
+from nscan_cli.logs.lost import lost_readings
 from nscan_cli.logs.options import ReadingOptions
 from nscan_cli.logs.order import Order, selection
+from nscan_cli.logs.range_limits import limits_in_force
 from nscan_cli.logs.scan import LaserLog, LogReport, Source
 from nscan_cli.logs.skips import Skips
 from nscan_cli.poses import Array
@@ -29,8 +32,28 @@ class RawScans:
     angle_increment: Array
     """(S,) rad"""
     stamps: list[str]
-    limits: tuple[float, float]
-    """m; a reading at or beyond one of them says nothing, or that nothing was met."""
+    limits: tuple[float | Array, float | Array]
+    """m, of all scans or (S,) of each; a reading at or beyond one of them says nothing, or that nothing was
+    met."""
+    limits_from: tuple[str, str] = ("none in this form of log", "assumed for this form of log")
+    """Where each limit is from."""
+    doubtful: Sequence[tuple[float, str]] = ()
+    """Upper limits (m) that need not be the laser's own, and where each is from."""
+    angle_max: Array | None = None
+    """(S,) rad, the direction of the last beam as the log has it beside the step; nan where it has none."""
+    beams: NDArray[np.int64] | None = None
+    """(S,) how many beams each scan has; None: all have B."""
+
+    def own_beams(self) -> NDArray[np.int64]:
+        """(S,) how many beams each scan has."""
+        if self.beams is not None:
+            return self.beams
+        return np.full(len(self.stamps), self.ranges.shape[1], dtype=np.int64)
+
+    def mirrored(self) -> RawScans:
+        """The same with beams that run the other way round."""
+        last = None if self.angle_max is None else -self.angle_max
+        return replace(self, angle_min=-self.angle_min, angle_increment=-self.angle_increment, angle_max=last)
 
 
 @dataclass
@@ -87,10 +110,14 @@ def laser_log(
     """
     numbers = selection(times.times, options, file)
     rows = times.rows[numbers]
-    no_return, limits = _limits(raw, options)
+    warnings = findings.warnings
+    limits = limits_in_force(raw, options, warnings)
+    angle_min, angle_increment = beam_directions(raw, options, warnings)
+    findings.used |= {"range_min": limits.low_from, "range_max": limits.high_from}
     ranges = raw.ranges if np.array_equal(rows, np.arange(len(raw.stamps))) else raw.ranges[rows]
-    mark_no_returns(ranges, limits)
-    angle_min, angle_increment = _angles(raw, options)
+    beams, limits = raw.own_beams()[rows], limits.of(rows)
+    lost = lost_readings(ranges, beams, limits, file)
+    mark_no_returns(ranges, limits.low, limits.high)
     odometry = motion.odometry
     return LaserLog(
         source=source,
@@ -104,38 +131,19 @@ def laser_log(
         angle_increment=angle_increment[rows],
         mount=mount,
         odometry=None if odometry is None else odometry[numbers],
-        no_return=no_return,
-        range_limits=limits,
+        no_return=limits.no_return,
+        range_limits=limits.whole,
         report=LogReport(
             records=findings.records,
             skipped=findings.skips.reasons,
             skipped_place=findings.skips.place,
             backward_stamps=times.backward,
-            warnings=tuple(findings.warnings),
+            warnings=(*warnings, *lost.warnings),
             used=findings.used,
+            lost=lost.counts,
+            unusable=lost.unusable,
         ),
+        beams=None if (beams == ranges.shape[1]).all() else beams,
         truth_times=motion.truth_times,
         truth=motion.truth,
     )
-
-
-def _angles(raw: RawScans, options: ReadingOptions) -> tuple[Array, Array]:
-    """First direction and step (S,) of each scan, rad, as the user says, else as the log does."""
-    size = len(raw.stamps)
-    first, step = raw.angle_min, raw.angle_increment
-    if options.angle_increment is not None:
-        step = np.full(size, options.angle_increment)
-    if options.angle_min is not None:
-        first = np.full(size, options.angle_min)
-    return (-first, -step) if options.flip else (first, step)
-
-
-def _limits(raw: RawScans, options: ReadingOptions) -> tuple[float | None, tuple[float, float]]:
-    """The no-return value found, and the range limits in force (m)."""
-    low, high = raw.limits
-    no_return = no_return_value(raw.ranges)
-    if options.max_range is not None:
-        high = options.max_range
-    if no_return is not None:
-        high = min(high, no_return)
-    return no_return, (low if options.min_range is None else options.min_range, high)

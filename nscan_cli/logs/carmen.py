@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -81,8 +81,19 @@ def read(data: bytes, file: str, source: Source, options: ReadingOptions) -> Las
     times = order.by_time(scans.stamps)
     warnings += times.warnings
     mount, used["mounting"] = _mount(tag, scans, params, options, warnings)
-    angle_min, angle_increment = _angles(scans)
-    raw = RawScans(scans.ranges, angle_min, angle_increment, scans.stamps, (0.0, _farthest(scans, params)))
+    angle_min, angle_increment, angle_max = _angles(scans)
+    farthest, doubtful = _farthest(tag, scans, params)
+    raw = RawScans(
+        scans.ranges,
+        angle_min,
+        angle_increment,
+        scans.stamps,
+        (0.0, farthest),
+        ("none in a CARMEN log", "CARMEN's greatest range"),
+        doubtful,
+        angle_max,
+        scans.beams,
+    )
     odometry: Array | None = None
     used["odometry"] = "none: --no-odometry"
     if options.odometry:
@@ -176,24 +187,34 @@ def _said(pose: Array) -> str:
     return f"{pose[0]:g} m, {pose[1]:g} m, {np.degrees(pose[2]):g}°"
 
 
-def _angles(scans: Scans) -> tuple[Array, Array]:
-    """First direction and step (S,) of each scan, rad."""
+def _angles(scans: Scans) -> tuple[Array, Array, Array]:
+    """First direction, step and last direction (S,) of each scan, rad; nan for a last one that none says."""
     counts, which = np.unique(scans.beams, return_inverse=True)
     angles = np.array([beam_angles(beams) for beams in counts.tolist()])[which]
+    last = np.full(len(angles), np.nan)
     if scans.head.shape[1]:
         known = scans.head[:, 3] != 0
         angles[known] = scans.head[known][:, (1, 3)]
-    return angles[:, 0], angles[:, 1]
+        last[known] = scans.head[known][:, (1, 2)].sum(axis=1)
+    return angles[:, 0], angles[:, 1], last
 
 
-def _farthest(scans: Scans, params: Mapping[str, float]) -> float:
-    """The range (m) from which on a reading says that nothing was met."""
-    farthest = CARMEN_MAX_RANGE
+def _farthest(
+    tag: str, scans: Scans, params: Mapping[str, float]
+) -> tuple[float, Sequence[tuple[float, str]]]:
+    """The range (m) from which on a reading says that nothing was met, and others that the log names.
+
+    The PARAM is what CARMEN's robot module goes by; people set it to what they navigate with.
+    """
+    named = []
     if scans.head.shape[1] and (scans.head[:, 4] > 0).any():
-        farthest = float(scans.head[:, 4].max())
-    if params.get("robot_front_laser_max", 0) > 0:
-        farthest = min(farthest, params["robot_front_laser_max"])
-    return farthest
+        named.append((float(scans.head[:, 4].max()), f"the greatest range in {tag}"))
+    farthest = max([CARMEN_MAX_RANGE, *(limit for limit, _ in named)])
+    side = "front" if tag in FRONT else "rear"
+    param = f"robot_{side}_laser_max"
+    if tag in (*FRONT, *REAR) and params.get(param, 0) > 0:
+        named.append((params[param], f"PARAM {param}"))
+    return farthest, named
 
 
 def _odometry(

@@ -140,6 +140,7 @@ def _ros_sweep(message: Any) -> Sweep:
         message.range_max,
         ranges,
         None,
+        message.angle_max,
     )
 
 

@@ -32,16 +32,19 @@ UNPACKS = "unpacks to more and more"
 MEND = "fetch the file again, or use what can be read with --salvage"
 
 
-def read_log(path: str, options: ReadingOptions = AS_FOUND) -> LaserLog:
+def read_log(path: str, options: ReadingOptions = AS_FOUND, even_unusable: bool = False) -> LaserLog:
     """The log at `path` ("-": standard input); its kind is found from its content.
 
-    Raises InputMissingError when there is nothing to read, InputDataError when it is no log or a damaged
-    one, WrongUsageError when the options do not fit it.
+    Raises InputMissingError when there is nothing to read, InputDataError when it is no log, a damaged one,
+    or one none of whose readings counts (but with `even_unusable`), WrongUsageError when the options do
+    not fit it.
     """
-    return log_from(read_bytes(path), path, options)
+    return log_from(read_bytes(path), path, options, even_unusable)
 
 
-def log_from(stored: bytes, path: str, options: ReadingOptions = AS_FOUND) -> LaserLog:
+def log_from(
+    stored: bytes, path: str, options: ReadingOptions = AS_FOUND, even_unusable: bool = False
+) -> LaserLog:
     """The log in the bytes that `path` has; raises the same errors."""
     name = label(path)
     source = Source(base_name(path), hashlib.sha256(stored).hexdigest(), len(stored))
@@ -53,6 +56,8 @@ def log_from(stored: bytes, path: str, options: ReadingOptions = AS_FOUND) -> La
         log = _reader(data, name).read(data, name, source, options)
     except ExceededError as error:
         raise InputDataError(name, str(error), error.remedy) from error
+    if log.report.unusable is not None and not even_unusable:
+        raise log.report.unusable
     if lost is None:
         return log
     report = replace(log.report, warnings=(lost, *log.report.warnings))

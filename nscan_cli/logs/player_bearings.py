@@ -68,6 +68,8 @@ def scans(records: list[Record], skips: Skips) -> tuple[RawScans, str]:
         np.array([found.step for _, found in whole]),
         [row.record.stamp for row, _ in whole],
         (0.0, CARMEN_MAX_RANGE),
+        ("none in a Player log", "assumed, as for CARMEN"),
+        beams=np.array([int(found.places[-1]) + 1 for _, found in whole], dtype=np.int64),
     )
     return raw, "degrees" if in_degrees else "rad"
 

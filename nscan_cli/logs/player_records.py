@@ -142,12 +142,17 @@ def scans(laser: str, lines: Lines, version: Version, skips: Skips) -> Scans:
         # Player 1 has hundredths of a degree inside; old files round them to 4 digits of a radian.
         angles = np.radians(np.round(np.degrees(angles), 2))
     farthest = 0.0 if version < 2 or not heads else max(float(head[-2]) for head in heads)
+    named = ((farthest, f"the greatest range in {laser}"),) if farthest > 0 else ()
     raw = RawScans(
         stacked([readings for _, _, readings in rows]),
         angles[:, 0],
         angles[:, 2],
         [record.stamp for record, _, _ in rows],
-        (0.0, farthest if farthest > 0 else CARMEN_MAX_RANGE),
+        (0.0, max(farthest, CARMEN_MAX_RANGE)),
+        ("none in a Player log", "assumed, as for CARMEN"),
+        named,
+        angles[:, 1],
+        np.array([len(readings) for _, _, readings in rows], dtype=np.int64),
     )
     return Scans(raw, np.array([head[1:4] for head in heads]) if posed else None)
 

@@ -11,6 +11,7 @@ from nscan_cli.logs import order, recorded_motion
 from nscan_cli.logs.assemble import Findings, Motion, RawScans, laser_log, stacked
 from nscan_cli.logs.decoding import UNDECODABLE, sweep_decoder
 from nscan_cli.logs.options import ReadingOptions
+from nscan_cli.logs.range_limits import FARTHEST
 from nscan_cli.logs.recording import Channel, Message, Recording
 from nscan_cli.logs.scan import LaserLog, Source
 from nscan_cli.logs.sensed import S, Sweep
@@ -18,9 +19,6 @@ from nscan_cli.logs.skips import Skips
 from nscan_cli.logs.text_records import beams_problem
 from nscan_cli.logs.topics import scan_topic
 from nscan_cli.poses import Array
-
-FARTHEST = 1e4
-"""m; no reading is beyond, and no limit has to be said to be."""
 
 
 def read(recording: Recording, file: str, source: Source, options: ReadingOptions) -> LaserLog:
@@ -47,7 +45,7 @@ def read(recording: Recording, file: str, source: Source, options: ReadingOption
     mount, hanging = recorded_motion.mounting(sweeps, robot, frames, options, findings, file)
     if hanging and not options.flip:
         # Seen from above, the beams of a laser that hangs run clockwise.
-        raw = RawScans(raw.ranges, -raw.angle_min, -raw.angle_increment, raw.stamps, raw.limits)
+        raw = raw.mirrored()
     return laser_log(
         source, recording.form, choice.topic, raw, times, mount, Motion(motion), findings, options, file
     )
@@ -105,29 +103,27 @@ def _written(stamp: int) -> str:
 
 
 def _raw(sweeps: Sequence[Sweep], stamps: list[str]) -> RawScans:
-    """The scans as columns, what lies outside their own limits marked."""
-    ranges = stacked([sweep.ranges for sweep in sweeps])
-    low = _limit([sweep.range_min for sweep in sweeps], 0.0)
-    high = _limit([sweep.range_max for sweep in sweeps], FARTHEST)
-    with np.errstate(invalid="ignore"):
-        for values, outside, mark in ((low, np.less, np.nan), (high, np.greater, np.inf)):
-            if (values != values[0]).any():
-                ranges[outside(ranges, values[:, None].astype(np.float32))] = mark
-    # A reading at a limit counts (sensor_msgs/LaserScan); the limits of a log do not.
-    limits = (
-        max(0.0, float(np.nextafter(np.float32(low.min()), np.float32(-1)))),
-        float(np.nextafter(np.float32(high.max()), np.float32(np.inf))),
-    )
+    """The scans as columns, with their own limits."""
+    low, low_from = _limit("range_min", [sweep.range_min for sweep in sweeps], 0.0)
+    high, high_from = _limit("range_max", [sweep.range_max for sweep in sweeps], FARTHEST)
     return RawScans(
-        ranges,
+        stacked([sweep.ranges for sweep in sweeps]),
         np.array([sweep.angle_min for sweep in sweeps], dtype=np.float64),
         np.array([sweep.angle_increment for sweep in sweeps], dtype=np.float64),
         stamps,
-        limits,
+        # A reading at a limit counts (sensor_msgs/LaserScan); one at those of RawScans does not.
+        (
+            np.maximum(0.0, np.nextafter(low.astype(np.float32), np.float32(-1))),
+            np.nextafter(high.astype(np.float32), np.float32(np.inf)),
+        ),
+        (low_from, high_from),
+        angle_max=np.array([sweep.angle_max for sweep in sweeps], dtype=np.float64),
+        beams=np.array([len(sweep.ranges) for sweep in sweeps], dtype=np.int64),
     )
 
 
-def _limit(values: list[float], unsaid: float) -> Array:
-    """Limits (S,) where they say something: between 0 and FARTHEST."""
+def _limit(name: str, values: list[float], unsaid: float) -> tuple[Array, str]:
+    """Limits (S,) where they say something, between 0 and FARTHEST, and where they are from."""
     found = np.array(values, dtype=np.float64)
-    return np.where((found > 0) & (found < FARTHEST), found, unsaid)
+    says = (found > 0) & (found < FARTHEST)
+    return np.where(says, found, unsaid), f"{name} of the messages" if says.any() else "none in the messages"

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from nscan_cli.compiled import kernel
 from nscan_cli.counting import counted
-from nscan_cli.errors import WrongUsageError
+from nscan_cli.errors import InputDataError, WrongUsageError
 from nscan_cli.poses import Array, Indices, compose
 
 TOGETHER = 256
@@ -43,7 +43,11 @@ class LogReport:
     warnings: tuple[str, ...] = ()
     """Whole sentences for the user."""
     used: dict[str, str] = field(default_factory=dict)
-    """Why it is this "laser", and where "odometry" and "mounting" are from."""
+    """Why it is this "laser", and where "odometry", "mounting", "range_min" and "range_max" are from."""
+    lost: dict[str, int] = field(default_factory=dict)
+    """Why a reading is none that counts → how many there are of them."""
+    unusable: InputDataError | None = None
+    """What is wrong when no reading at all counts."""
 
     def notices(self) -> list[str]:
         """The warnings, and what was skipped, for commands that do not list it."""
@@ -88,6 +92,8 @@ class LaserLog:
     range_limits: tuple[float, float]
     """The effective range limits (m): a beam counts when min < r < max."""
     report: LogReport
+    beams: NDArray[np.int64] | None = None
+    """(S,) how many beams each scan has; None: all have B."""
     truth_times: Array | None = None
     """(T,) seconds of the true poses (TRUEPOS), or None."""
     truth: Array | None = None
@@ -95,6 +101,16 @@ class LaserLog:
 
     def __len__(self) -> int:
         return len(self.stamps)
+
+    def own_beams(self) -> NDArray[np.int64]:
+        """(S,) how many beams each scan has."""
+        if self.beams is not None:
+            return self.beams
+        return np.full(len(self), self.ranges.shape[1], dtype=np.int64)
+
+    def readings(self, row: int) -> NDArray[np.float32]:
+        """The ranges (m) of one row's own beams."""
+        return self.ranges[row] if self.beams is None else self.ranges[row, : self.beams[row]]
 
     def row(self, number: int) -> int:
         """The row of a scan number. Raises WrongUsageError when the log has no such scan."""

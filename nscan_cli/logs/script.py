@@ -119,7 +119,15 @@ def _scans(lines: list[tuple[Record, bytes]], skips: Skips) -> RawScans:
     fov = np.array([views[record.line] for record, _ in rows])
     steps = np.array([max(len(row) - 1, 1) for _, row in rows])
     stamps = [record.stamp for record, _ in rows]
-    return RawScans(stacked([row for _, row in rows]), -fov / 2, fov / steps, stamps, (0.0, CARMEN_MAX_RANGE))
+    return RawScans(
+        stacked([row for _, row in rows]),
+        -fov / 2,
+        fov / steps,
+        stamps,
+        (0.0, CARMEN_MAX_RANGE),
+        ("none in a .script log", "assumed, as for CARMEN"),
+        beams=np.array([len(row) for _, row in rows], dtype=np.int64),
+    )
 
 
 def _odometry(lines: Lines, times: order.Order, options: ReadingOptions, findings: Findings) -> Array | None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any, NamedTuple
 
 from numpy.typing import NDArray
@@ -43,6 +44,8 @@ class Sweep(NamedTuple):
     """(B,) m"""
     pose: Rigid | None
     """Of the laser in `frame`, where the message has one."""
+    angle_max: float = math.nan
+    """rad, where the message says it beside the increment."""
 
 
 class Placed(NamedTuple):

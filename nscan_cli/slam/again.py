@@ -86,6 +86,7 @@ def _scans(log: LaserLog, rows: NDArray[np.int64]) -> LaserLog:
         angle_min=log.angle_min[rows],
         angle_increment=log.angle_increment[rows],
         odometry=None if log.odometry is None else log.odometry[rows],
+        beams=None if log.beams is None else log.beams[rows],
     )
 
 

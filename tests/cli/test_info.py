@@ -10,9 +10,10 @@ from nscan_cli.cli.main import run
 from tests.logs.lines import flaser
 
 KEYS = [
-    "file", "sha256", "bytes", "format", "laser", "scans", "first_scan", "last_scan", "beams", "angle_min",
-    "angle_max", "angle_increment", "start", "duration", "rate", "longest_gap", "odometry", "no_return",
-    "beams_without_return", "beams_unusable", "mounting", "range_limits", "used", "records",
+    "file", "sha256", "bytes", "format", "laser", "scans", "first_scan", "last_scan", "beams", "fewest_beams",
+    "angle_min", "angle_max", "angle_increment", "angle_increments", "start", "duration", "rate",
+    "longest_gap", "odometry", "no_return",
+    "beams_without_return", "beams_unusable", "beams_lost", "mounting", "range_limits", "used", "records",
     "skipped", "backward_stamps", "truth", "warnings",
 ]  # fmt: skip
 
@@ -46,7 +47,12 @@ def test_json(log, capsys):
         "range_limits": [0, 80], "records": {"PARAM": 1, "FLASER": 4, "TRUEPOS": 1},
         "skipped": [{"reason": "wrong number of values", "records": 1, "first_line": 4}],
         "backward_stamps": 1, "truth": 1,
-        "used": {"laser": "the only laser", "mounting": "PARAM", "odometry": "the poses in FLASER"},
+        "used": {
+            "laser": "the only laser", "mounting": "PARAM", "odometry": "the poses in FLASER",
+            "range_min": "none in a CARMEN log", "range_max": "CARMEN's greatest range",
+        },
+        "fewest_beams": 4, "angle_increments": [60, 60],
+        "beams_lost": {"0 or less": 1, "beyond 80 m (CARMEN's greatest range)": 3},
     }  # fmt: skip
     assert {key: facts[key] for key in expected} == expected
 

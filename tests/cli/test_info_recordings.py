@@ -34,6 +34,7 @@ def test_json(recording, capsys):
             "laser": "the only topic with scans", "checksums": "they fit",
             "odometry": "/odom, the only topic with odometry, interpolated",
             "mounting": "tf base_link → laser",
+            "range_min": "range_min of the messages", "range_max": "range_max of the messages",
         },
         "records": {
             "/odom (nav_msgs/msg/Odometry)": 13, "/scan (sensor_msgs/msg/LaserScan)": 12,

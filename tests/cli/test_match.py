@@ -215,7 +215,7 @@ def test_a_plot_that_cannot_be_is_refused_before_the_work(
             "--initial identity",
         ),
         (["--reference", "0", "--scan", "1", "--no-odometry", "--prior", "odometry"], 2, "--prior none"),
-        (["--reference", "0", "--scan", "1", "--max-range", "0.1"], 65, "scan 0 has 0 usable beams"),
+        (["--reference", "0", "--scan", "1", "--max-range", "0.4"], 65, "scan 0 has 0 usable beams"),
         (["--reference", "0", "--scan", "1", "-o", "no/such/folder.json"], 73, "does not exist"),
     ],
 )

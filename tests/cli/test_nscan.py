@@ -224,7 +224,7 @@ def test_the_same_bytes_every_time(tmp_path):
         (["--scans", "1,2", "--initial", "graph.json"], 65, "graph.json: has no pose of scan 2"),
         (["--scans", "1,2", "--initial", "other.json"], 65, "is not a graph of office.log.gz"),
         (["--scans", "1,2", "--initial", "text"], 65, "text, line 1"),
-        (["--scans", "1,2", "--max-range", "0.1"], 65, "scan 1 has 0 usable beams"),
+        (["--scans", "1,2", "--max-range", "0.4"], 65, "scan 1 has 0 usable beams"),
         (["--scans", "1,2", "-o", "no/such.json"], 73, "does not exist"),
     ],
 )

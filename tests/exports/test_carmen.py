@@ -20,6 +20,8 @@ from nscan_cli.poses import Array, relative
 from tests.exports.small_run import POSES, small_log
 from tests.mapping.scenes import log_of
 
+SIGN = "its host is nscan-cli, which writes corrected poses"
+
 CORRECTED = ReadingOptions(allow_corrected=True)
 
 
@@ -28,7 +30,7 @@ def read_back(folder: Path, log: LaserLog, poses: Array = POSES) -> tuple[str, L
     data = corrected_log(log, np.arange(len(log)), poses)
     path = folder / "corrected.log"
     path.write_bytes(data)
-    return data.decode(), read_log(str(path), CORRECTED)
+    return data.decode(), read_log(str(path), CORRECTED, even_unusable=True)
 
 
 def assert_the_same_scans(back: LaserLog, log: LaserLog, poses: Array = POSES) -> None:
@@ -91,6 +93,17 @@ def test_what_flaser_cannot_say_reads_back_too(tmp_path, changes: dict[str, Any]
     assert (back.laser, "\nFLASER" in text) == (("FLASER", True) if plain else ("ROBOTLASER1", False))
 
 
+def test_scans_have_their_own_beams(tmp_path):
+    own = np.array([181, 90, 181, 181, 2])
+    log = dataclasses.replace(small_log(), beams=own)
+    for scan, beams in zip(log.ranges, own, strict=True):
+        scan[beams:] = np.nan
+    _, back = read_back(tmp_path, log)
+    assert_the_same_scans(back, log)
+    assert back.own_beams().tolist() == own.tolist()
+    assert back.report.warnings == (f"the poses are a mapper's result ({SIGN}), used as odometry",)
+
+
 def test_a_laser_that_sees_far_without_a_limit(tmp_path):
     log = dataclasses.replace(small_log(), range_limits=(0.0, float("inf")), no_return=None)
     log.ranges[1, 9] = 123.4
@@ -114,7 +127,8 @@ def test_limits_just_above_a_value_of_32_bits_stay_short(tmp_path):
     """As ROS has them: a beam of the greatest range counts."""
     limits = (0.0, float(np.nextafter(np.float32(3.5), np.float32(4))))
     log = dataclasses.replace(small_log(), range_limits=limits, no_return=None)
-    log.ranges[np.isfinite(log.ranges)] = 3.5
+    log.ranges[np.isfinite(log.ranges)] /= 2.5
+    log.ranges[:, 50] = 3.5
     text, back = read_back(tmp_path, log)
     assert_the_same_scans(back, log)
     assert "PARAM robot_front_laser_max 3.5000002 " in text

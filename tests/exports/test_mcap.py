@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from nscan_cli.exports.mcap import TOPICS, recording
+from nscan_cli.exports.messages import Messages, scan_message
 from nscan_cli.graph.model import Graph
 from nscan_cli.logs.load import read_log
 from nscan_cli.logs.scan import LaserLog
@@ -232,3 +233,10 @@ def test_a_recording_is_a_log_for_slam_too(run, tmp_path, odometry):
         np.testing.assert_allclose(relative(back.odometry, log.odometry), 0, atol=1e-5)
     else:
         assert back.odometry is None
+
+
+def test_a_scan_has_its_own_beams():
+    log = dataclasses.replace(small_log(), beams=np.array([181, 90, 181, 181, 2]))
+    message = scan_message(Messages(), log, 1, 0)
+    assert len(message.ranges) == 90
+    assert message.angle_max == pytest.approx(log.angle_min[1] + 89 * log.angle_increment[1])

@@ -18,9 +18,9 @@ from tests.logs.ros_recordings import ros2
 def read(tmp_path: Path) -> Callable[..., LaserLog]:
     """Reads the bytes of a recording, or messages written in the form ros2, with some reading options."""
 
-    def read_it(written: list[Written] | bytes, **options) -> LaserLog:
+    def read_it(written: list[Written] | bytes, even_unusable: bool = False, **options) -> LaserLog:
         path = tmp_path / "recording"
         path.write_bytes(written if isinstance(written, bytes) else ros2(written))
-        return read_log(str(path), ReadingOptions(**options))
+        return read_log(str(path), ReadingOptions(**options), even_unusable)
 
     return read_it

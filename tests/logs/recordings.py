@@ -24,6 +24,13 @@ class Scan(NamedTuple):
     step: float = 0.5
     range_min: float = 0.1
     range_max: float = 30.0
+    last: float | None = None
+    """rad, what the message says of its last beam; None: where it is."""
+
+    @property
+    def angle_max(self) -> float:
+        end = self.angle_min + self.step * (len(self.ranges) - 1)
+        return end if self.last is None else self.last
 
 
 class Odom(NamedTuple):

@@ -40,7 +40,7 @@ def ros_message(content: Content, with_seq: bool = False, lists: bool = False) -
         return {
             "header": header(content.stamp, content.frame),
             "angle_min": content.angle_min,
-            "angle_max": content.angle_min + content.step * (len(content.ranges) - 1),
+            "angle_max": content.angle_max,
             "angle_increment": content.step,
             "time_increment": 0.0,
             "scan_time": 0.0,
@@ -128,8 +128,15 @@ class Ros1Message:
         content = self.content
         if isinstance(content, Scan):
             ranges = np.asarray(content.ranges, dtype="<f4")
-            end = content.angle_min + content.step * (len(ranges) - 1)
-            numbers = (content.angle_min, end, content.step, 0, 0, content.range_min, content.range_max)
+            numbers = (
+                content.angle_min,
+                content.angle_max,
+                content.step,
+                0,
+                0,
+                content.range_min,
+                content.range_max,
+            )
             out.write(header(content.stamp, content.frame) + struct.pack("<7f", *numbers))
             out.write(struct.pack("<I", len(ranges)) + ranges.tobytes() + struct.pack("<I", 0))
         elif isinstance(content, Odom):

@@ -101,7 +101,7 @@ def test_rawlaser_without_odom_has_no_odometry(tmp_path):
 
 
 def test_odom_without_times_is_no_odometry(tmp_path):
-    scans = [f"RAWLASER1 0 -1.5 3.0 0.5 20 0 0 2 1 2 0 {time}.0 h 0" for time in (1, 2)]
+    scans = [f"RAWLASER1 0 -1.5 0.5 0.5 20 0 0 2 1 2 0 {time}.0 h 0" for time in (1, 2)]
     log = read(tmp_path, *scans, *["ODOM 1 2 0 0 0 0 0 h 0"] * 3, *["TRUEPOS 1 2 0 0 0 0 0 h 0"] * 3)
     assert log.odometry is None
     assert log.truth is None

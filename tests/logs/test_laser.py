@@ -74,7 +74,7 @@ def test_too_little_to_tell(readings):
 
 def test_marks():
     ranges = np.array([[-1, 0, np.nan, 0.5, 0.51, 7.99, 8.0, 81.91, np.inf]], dtype=np.float32)
-    mark_no_returns(ranges, (0.5, 8.0))
+    mark_no_returns(ranges, np.array([0.5]), np.array([8.0]))
     nan, inf = np.nan, np.inf
     expected = [[nan, nan, nan, nan, np.float32(0.51), np.float32(7.99), inf, inf, inf]]
     np.testing.assert_array_equal(ranges, np.array(expected, dtype=np.float32))

@@ -56,6 +56,8 @@ def test_version_1(tmp_path):
         "laser": "the only laser device",
         "odometry": "position:0, the only position2d device, interpolated",
         "mounting": "assumed: at the robot's centre",
+        "range_min": "none in a Player log",
+        "range_max": "assumed, as for CARMEN",
     }
     assert log.report.records == {"sync:0": 1, "position:0": 2, "laser:0": 2}
     assert log.report.skipped == {}

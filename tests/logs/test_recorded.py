@@ -212,7 +212,7 @@ def test_any_readings_are_read_as_the_message_says(read, scans, form):
         Written("/scan", START + k, Scan(START + k * S, np.array(values, dtype=np.float32), "base_link"))
         for k, values in enumerate(scans)
     ]
-    log = read(form(written))
+    log = read(form(written), even_unusable=True)
     low, high = np.float32(0.1), np.float32(30.0)
     for row, values in zip(log.ranges, scans, strict=True):
         readings = np.array(values, dtype=np.float32)
