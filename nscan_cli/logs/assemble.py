@@ -10,6 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nscan_cli.limits import READINGS
+from nscan_cli.logs.choices import Device
+from nscan_cli.logs.frame_names import AS_USUAL, FrameNames
 from nscan_cli.logs.laser import mark_no_returns, no_return_value
 from nscan_cli.logs.options import ReadingOptions
 from nscan_cli.logs.order import Order, selection
@@ -42,6 +44,12 @@ class Findings:
     warnings: list[str] = field(default_factory=list)
     used: dict[str, str] = field(default_factory=dict)
     """Why this laser, odometry and mounting."""
+    lasers: tuple[Device, ...] = ()
+    laser_option: str = "--laser"
+    odometries: tuple[Device, ...] = ()
+    corrected: str = ""
+    """As LogReport has them."""
+    frames: FrameNames = AS_USUAL
 
 
 @dataclass(frozen=True)
@@ -113,9 +121,14 @@ def laser_log(
             backward_stamps=times.backward,
             warnings=tuple(findings.warnings),
             used=findings.used,
+            lasers=findings.lasers,
+            laser_option=findings.laser_option,
+            odometries=findings.odometries,
+            corrected=findings.corrected,
         ),
         truth_times=motion.truth_times,
         truth=motion.truth,
+        frames=findings.frames,
     )
 
 
