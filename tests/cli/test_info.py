@@ -13,7 +13,7 @@ KEYS = [
     "file", "sha256", "bytes", "format", "laser", "scans", "first_scan", "last_scan", "beams", "angle_min",
     "angle_max", "angle_increment", "start", "duration", "rate", "longest_gap", "odometry", "no_return",
     "beams_without_return", "beams_unusable", "mounting", "range_limits", "used", "records",
-    "skipped", "backward_stamps", "truth", "warnings",
+    "skipped", "backward_stamps", "truth", "warnings", "lasers", "odometries", "corrected",
 ]  # fmt: skip
 
 

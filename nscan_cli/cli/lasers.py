@@ -1,0 +1,136 @@
+"""What `info` finds out beyond the laser that is used: the others, and what an option has to choose."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from nscan_cli.counting import counted
+from nscan_cli.errors import NscanError
+from nscan_cli.logs.options import ReadingOptions
+
+if TYPE_CHECKING:
+    from nscan_cli.logs.choices import Device, OpenChoiceError
+    from nscan_cli.logs.recorded_mounting import MountingError
+    from nscan_cli.logs.scan import LaserLog
+
+    Read = Callable[[ReadingOptions], LaserLog]
+
+UNMOUNTED = (0.0, 0.0, 0.0)
+OF_ALL_LASERS = ("file", "sha256", "bytes", "format", "odometry", "used", "records", "truth", "warnings",
+                 "lasers", "odometries", "corrected")  # fmt: skip
+"""Facts that hold also where no laser is chosen."""
+
+
+class Survey(NamedTuple):
+    """A log with all that is in it."""
+
+    log: LaserLog
+    """Of the laser that is used; of the first one, where none is chosen."""
+    lasers: list[dict[str, Any]]
+    """What `info --json` says of each laser."""
+    choices: dict[str, OpenChoiceError]
+    """What an option has to choose, by "laser" and "odometry"."""
+    refused: MountingError | None
+    """Why the other commands do not take the laser."""
+
+    def facts(self, reading: ReadingOptions) -> dict[str, Any]:
+        """What there is beside the log of one laser, and what is to be said of it."""
+        report = self.log.report
+        used = dict(report.used)
+        if report.corrected and reading.odometry and not reading.allow_corrected:
+            used["odometry"] += "; other commands need --allow-corrected or --no-odometry"
+        if self.refused is not None:
+            used["mounting"] = f"refused: {self.refused.problem}"
+        for what, choice in self.choices.items():
+            used[what] = f"several; {choice.remedy}"
+        odometry = self.choices.get("odometry")
+        found = report.odometries if odometry is None else odometry.devices
+        return {
+            "used": used,
+            "lasers": self.lasers,
+            "odometries": [_named(one) for one in found],
+            "corrected": report.corrected or None,
+        }
+
+    def without_unchosen(self, facts: dict[str, Any]) -> dict[str, Any]:
+        """The facts of the log, null where they would be of a laser that nobody chose, or of no mounting."""
+        unknown = {"mounting"} if self.refused is not None else set()
+        if "laser" in self.choices:
+            unknown = facts.keys() - set(OF_ALL_LASERS)
+        return {key: None if key in unknown else value for key, value in facts.items()}
+
+
+def survey_of(path: str, reading: ReadingOptions) -> Survey:
+    """What is in the log at `path`, whatever the user has left open.
+
+    Raises what read_log does but for choices, corrected poses and lasers that are not level or not still.
+    """
+    from nscan_cli.logs.choices import OpenChoiceError
+    from nscan_cli.logs.recorded_mounting import MountingError
+
+    read = _reader(path)
+    options = dataclasses.replace(reading, allow_corrected=True)
+    choices: dict[str, OpenChoiceError] = {}
+    refused: MountingError | None = None
+    log = None
+    while log is None:
+        try:
+            log = read(options)
+        except OpenChoiceError as choice:
+            choices[choice.what] = choice
+            settled: dict[str, Any] = {"odometry": False}
+            if choice.what == "laser":
+                settled = {choice.chooses: choice.devices[0].name, "mount": UNMOUNTED}
+            options = dataclasses.replace(options, **settled)
+        except MountingError as error:
+            refused = error
+            options = dataclasses.replace(options, mount=UNMOUNTED)
+    alone = dataclasses.replace(options, odometry=False, mount=UNMOUNTED)
+    lasers = [_facts_of(laser, log, read, alone) for laser in log.report.lasers]
+    return Survey(log, lasers, choices, refused)
+
+
+def rate_of(log: LaserLog) -> float | None:
+    """Scans a second; None where they take no time."""
+    duration = float(log.times[-1] - log.times[0])
+    return round((len(log) - 1) / duration, 3) if duration > 0 else None
+
+
+def laser_line(laser: dict[str, Any]) -> str:
+    """What `info` says of a laser."""
+    kind = "" if laser["type"] == laser["name"] else f" ({laser['type']})"
+    if laser["problem"] is not None:
+        return f"{laser['name']}{kind}: {counted(laser['records'], 'record')}; {laser['problem']}"
+    rate = "" if laser["rate"] is None else f", {laser['rate']:.3g} a second"
+    return (
+        f"{laser['name']}{kind}: {counted(laser['scans'], 'scan')} of {counted(laser['beams'], 'beam')}{rate}"
+    )
+
+
+def _facts_of(laser: Device, log: LaserLog, read: Read, alone: ReadingOptions) -> dict[str, Any]:
+    """What `info --json` says of a laser: of the log that is read already, or of one that is read for it."""
+    facts = {**_named(laser), "scans": None, "beams": None, "rate": None, "problem": None}
+    try:
+        if laser.name != log.laser:
+            chosen: dict[str, Any] = {log.report.laser_option.removeprefix("--"): laser.name}
+            log = read(dataclasses.replace(alone, **chosen))
+    except NscanError as error:
+        return facts | {"problem": str(error)}
+    return facts | {"scans": len(log), "beams": log.ranges.shape[1], "rate": rate_of(log)}
+
+
+def _named(device: Device) -> dict[str, Any]:
+    return {"name": device.name, "type": device.type, "records": device.records}
+
+
+def _reader(path: str) -> Read:
+    """What reads the log again with other options; standard input is read once."""
+    from nscan_cli.inputs import STANDARD_INPUT, read_bytes
+    from nscan_cli.logs.load import log_from, read_log
+
+    if path != STANDARD_INPUT:
+        return lambda options: read_log(path, options)
+    stored = read_bytes(path)
+    return lambda options: log_from(stored, path, options)
