@@ -7,7 +7,7 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from nscan_cli.counting import counted
-from nscan_cli.errors import NscanError
+from nscan_cli.errors import InputDataError, NscanError
 from nscan_cli.logs.options import ReadingOptions
 
 if TYPE_CHECKING:
@@ -73,6 +73,8 @@ def survey_of(path: str, reading: ReadingOptions) -> Survey:
     read = _reader(path)
     options = dataclasses.replace(reading, allow_corrected=True)
     choices: dict[str, OpenChoiceError] = {}
+    others: list[dict[str, Any]] = []
+    first: dict[str, Any]
     refused: MountingError | None = None
     log = None
     while log is None:
@@ -80,15 +82,24 @@ def survey_of(path: str, reading: ReadingOptions) -> Survey:
             log = read(options)
         except OpenChoiceError as choice:
             choices[choice.what] = choice
-            settled: dict[str, Any] = {"odometry": False}
             if choice.what == "laser":
-                settled = {choice.chooses: choice.devices[0].name, "mount": UNMOUNTED}
-            options = dataclasses.replace(options, **settled)
+                first, *others = [{choice.chooses: one.name, "mount": UNMOUNTED} for one in choice.devices]
+            else:
+                first = {"odometry": False}
+            options = dataclasses.replace(options, **first)
         except MountingError as error:
             refused = error
             options = dataclasses.replace(options, mount=UNMOUNTED)
-    alone = dataclasses.replace(options, odometry=False, mount=UNMOUNTED)
-    lasers = [_facts_of(laser, log, read, alone) for laser in log.report.lasers]
+        except InputDataError:
+            # Where none is chosen, any laser that can be read tells of the whole log.
+            if not others:
+                raise
+            options = dataclasses.replace(options, **others.pop(0))
+    alone = dataclasses.replace(reading, odometry=False)
+    chosen = None if "laser" in choices else log
+    lasers = [_facts_of(laser, log.report.laser_option, chosen, read, alone) for laser in log.report.lasers]
+    if refused is not None:
+        next(one for one in lasers if one["name"] == log.laser)["problem"] = refused.problem
     return Survey(log, lasers, choices, refused)
 
 
@@ -101,21 +112,30 @@ def rate_of(log: LaserLog) -> float | None:
 def laser_line(laser: dict[str, Any]) -> str:
     """What `info` says of a laser."""
     kind = "" if laser["type"] == laser["name"] else f" ({laser['type']})"
-    if laser["problem"] is not None:
-        return f"{laser['name']}{kind}: {counted(laser['records'], 'record')}; {laser['problem']}"
-    rate = "" if laser["rate"] is None else f", {laser['rate']:.3g} a second"
-    return (
-        f"{laser['name']}{kind}: {counted(laser['scans'], 'scan')} of {counted(laser['beams'], 'beam')}{rate}"
-    )
+    said = counted(laser["records"], "record")
+    if laser["scans"] is not None:
+        rate = "" if laser["rate"] is None else f", {laser['rate']:.3g} a second"
+        said = f"{counted(laser['scans'], 'scan')} of {counted(laser['beams'], 'beam')}{rate}"
+    return f"{laser['name']}{kind}: {said}{'' if laser['problem'] is None else '; ' + laser['problem']}"
 
 
-def _facts_of(laser: Device, log: LaserLog, read: Read, alone: ReadingOptions) -> dict[str, Any]:
+def _facts_of(
+    laser: Device, option: str, chosen: LaserLog | None, read: Read, alone: ReadingOptions
+) -> dict[str, Any]:
     """What `info --json` says of a laser: of the log that is read already, or of one that is read for it."""
+    from nscan_cli.logs.recorded_mounting import MountingError
+
     facts = {**_named(laser), "scans": None, "beams": None, "rate": None, "problem": None}
+    own: dict[str, Any] = {option.removeprefix("--"): laser.name}
+    alone = dataclasses.replace(alone, **own)
+    log = chosen if chosen is not None and chosen.laser == laser.name else None
     try:
-        if laser.name != log.laser:
-            chosen: dict[str, Any] = {log.report.laser_option.removeprefix("--"): laser.name}
-            log = read(dataclasses.replace(alone, **chosen))
+        while log is None:
+            try:
+                log = read(alone)
+            except MountingError as error:
+                facts["problem"] = error.problem
+                alone = dataclasses.replace(alone, mount=UNMOUNTED)
     except NscanError as error:
         return facts | {"problem": str(error)}
     return facts | {"scans": len(log), "beams": log.ranges.shape[1], "rate": rate_of(log)}

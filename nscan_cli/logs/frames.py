@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Iterable, Sequence
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +21,15 @@ STILL = 1e-6
 
 Pair = tuple[str, str]
 """Parent and child of a transform."""
+
+
+class Timed(NamedTuple):
+    """Poses over time."""
+
+    times: NDArray[np.int64]
+    """(n,) ns, increasing"""
+    poses: Array
+    """(n, 4, 4)"""
 
 
 class Frames:
@@ -117,6 +127,15 @@ def as_matrices(poses: Sequence[Rigid]) -> tuple[NDArray[np.bool_], Array]:
     found[:, :3, 3] = places[good]
     found[:, 3, 3] = 1.0
     return good, found
+
+
+def over_time(poses: Sequence[Rigid], times: Sequence[int | None]) -> Timed:
+    """The poses that are some and have a time (ns)."""
+    there = [(time, pose) for time, pose in zip(times, poses, strict=True) if time is not None]
+    good, matrices = as_matrices([pose for _, pose in there])
+    found = np.array([time for time, _ in there], dtype=np.int64)[good]
+    order = np.argsort(found, kind="stable")
+    return Timed(found[order], matrices[order])
 
 
 def inverse(matrix: Array) -> Array:

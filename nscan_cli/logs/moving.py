@@ -8,10 +8,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from nscan_cli.logs.frames import Pair, as_matrices, inverse
-from nscan_cli.logs.sensed import Rigid
+from nscan_cli.logs.frames import Pair, Timed, inverse
 from nscan_cli.poses import Array, wrap
 
 MOST_ROCKING = math.radians(5.0)
@@ -23,8 +21,8 @@ MOST_SLIDING = 0.1
 
 LEAST_SAID = 0.001
 """m"""
-Timed = tuple[int, Rigid]
-"""A pose and its time (ns)."""
+AT_ANY_TIME = np.zeros(1, dtype=np.int64)
+"""The one time of a fixed transform."""
 
 
 @dataclass(frozen=True)
@@ -32,15 +30,13 @@ class Link:
     """One transform of a chain, over time."""
 
     name: str
-    times: NDArray[np.int64]
-    """(n,) ns, increasing; one of a fixed transform."""
-    poses: Array
-    """(n, 4, 4)"""
+    timed: Timed
+    """At one time only, if it is fixed."""
 
     @property
     def moves(self) -> bool:
         """Whether it is none that is fixed."""
-        return len(self.times) > 1
+        return len(self.timed.times) > 1
 
 
 @dataclass(frozen=True)
@@ -126,27 +122,16 @@ class Course:
         return float(there.min()) + 0.0, float(there.max()) + 0.0
 
 
-def links(
-    names: Sequence[str], fixed: Mapping[Pair, Array], moving: Mapping[Pair, Sequence[Timed]]
-) -> list[Link]:
+def links(names: Sequence[str], fixed: Mapping[Pair, Array], moving: Mapping[Pair, Timed]) -> list[Link]:
     """The transforms of a chain of frames, each in the direction of the chain."""
     found = []
-    for start, end in itertools.pairwise(names):
-        pair = (start, end) if (start, end) in fixed or (start, end) in moving else (end, start)
-        if pair in fixed:
-            times, poses = np.zeros(1, dtype=np.int64), fixed[pair][None]
-        else:
-            times, poses = over_time(moving[pair])
-        found.append(Link(f"{pair[0]} → {pair[1]}", times, poses if pair == (start, end) else inverse(poses)))
+    for ends in itertools.pairwise(names):
+        pair = ends if ends in fixed or ends in moving else ends[::-1]
+        timed = Timed(AT_ANY_TIME, fixed[pair][None]) if pair in fixed else moving[pair]
+        if pair != ends:
+            timed = timed._replace(poses=inverse(timed.poses))
+        found.append(Link(" → ".join(pair), timed))
     return found
-
-
-def over_time(poses: Sequence[Timed]) -> tuple[NDArray[np.int64], Array]:
-    """Times (n,) and matrices (n, 4, 4) of poses with their times (ns), in order of time."""
-    times = np.array([time for time, _ in poses], dtype=np.int64)
-    good, matrices = as_matrices([pose for _, pose in poses])
-    order = np.argsort(times[good], kind="stable")
-    return times[good][order], matrices[order]
 
 
 def course(chain: Sequence[Link]) -> Course | None:
@@ -157,12 +142,13 @@ def course(chain: Sequence[Link]) -> Course | None:
     movers = [link for link in chain if link.moves]
     if not movers:
         return None
-    times = (
-        movers[0].times if len(movers) == 1 else np.unique(np.concatenate([link.times for link in movers]))
-    )
+    times = movers[0].timed.times
+    if len(movers) > 1:
+        times = np.unique(np.concatenate([link.timed.times for link in movers]))
     there: Array = np.broadcast_to(np.eye(4), (len(times), 4, 4))
     for link in chain:
-        there = there @ link.poses[np.maximum(np.searchsorted(link.times, times, side="right") - 1, 0)]
+        rows = np.searchsorted(link.timed.times, times, side="right") - 1
+        there = there @ link.timed.poses[np.maximum(rows, 0)]
     return Course(there)
 
 

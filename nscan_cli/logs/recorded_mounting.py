@@ -9,8 +9,8 @@ import numpy as np
 
 from nscan_cli.errors import InputDataError
 from nscan_cli.logs.assemble import Findings
-from nscan_cli.logs.frames import LARGEST_TILT, Pair, planar, way
-from nscan_cli.logs.moving import Course, Link, Timed, course, links, over_time
+from nscan_cli.logs.frames import LARGEST_TILT, Pair, Timed, over_time, planar, way
+from nscan_cli.logs.moving import Course, Link, course, links
 from nscan_cli.logs.options import ReadingOptions
 from nscan_cli.logs.sensed import Sweep
 from nscan_cli.logs.transforms import BASES, Transforms, base_of, is_world, robot_of
@@ -58,7 +58,7 @@ def mounting(
     if moved is None:
         matrix: Array = np.eye(4)
         for link in chain:
-            matrix = matrix @ link.poses[0]
+            matrix = matrix @ link.timed.poses[0]
         mount, hanging, tilt = planar(matrix)
         if tilt > LARGEST_TILT:
             problem = f"its laser is tilted by {math.degrees(tilt):.1f}° (tf {' → '.join(names)})"
@@ -103,7 +103,7 @@ def _chain(
     return [], None, f"no transforms lead from {robot or ' or '.join(BASES)} to {scans}"
 
 
-def _tries(transforms: Transforms, robot: str) -> Iterator[tuple[str, Mapping[Pair, Sequence[Timed]]]]:
+def _tries(transforms: Transforms, robot: str) -> Iterator[tuple[str, Mapping[Pair, Timed]]]:
     """The frames to look for the laser from, and the moving transforms to go along beside the fixed ones.
 
     First in those that are fixed by name, then in all that never move, then in those that move. A robot
@@ -128,7 +128,7 @@ def _tries(transforms: Transforms, robot: str) -> Iterator[tuple[str, Mapping[Pa
                     yield name, moving
 
 
-def _on_robot(transforms: Transforms) -> dict[Pair, list[Timed]]:
+def _on_robot(transforms: Transforms) -> dict[Pair, Timed]:
     """The transforms that move and are no robot's own motion."""
     return {pair: rows for pair, rows in transforms.moving().items() if not is_world(pair[0])}
 
@@ -144,12 +144,11 @@ def _hanging_on(pairs: Sequence[Pair], laser: str) -> list[str]:
 
 def _own(sweeps: Sequence[Sweep]) -> list[Link]:
     """The laser's poses in its scans' frame, where the messages have them."""
-    poses = {sweep.pose: sweep.stamp for sweep in sweeps if sweep.pose is not None}
-    if not poses:
-        return []
-    rows = [(sweep.stamp, sweep.pose) for sweep in sweeps if sweep.pose is not None]
-    times, matrices = over_time(rows if len(poses) > 1 else rows[:1])
-    return [Link("the pose in its scans", times, matrices)] if len(times) else []
+    found = [(sweep.stamp, sweep.pose) for sweep in sweeps if sweep.pose is not None]
+    if len({pose for _, pose in found}) == 1:
+        del found[1:]
+    timed = over_time([pose for _, pose in found], [stamp for stamp, _ in found])
+    return [Link("the pose in its scans", timed)] if len(timed.times) else []
 
 
 def _unfit(moved: Course, chain: Sequence[Link], names: Sequence[str], file: str) -> MountingError:

@@ -6,9 +6,9 @@ from collections.abc import Iterator, Sequence
 
 from nscan_cli.logs.clock import stamps_set
 from nscan_cli.logs.decoding import UNDECODABLE, placed_decoder
-from nscan_cli.logs.frames import Frames, Pair, unmoved
+from nscan_cli.logs.frames import Frames, Pair, Timed, over_time, unmoved
 from nscan_cli.logs.recording import TRANSFORMS, Recording
-from nscan_cli.logs.sensed import Placed, Rigid
+from nscan_cli.logs.sensed import Placed
 from nscan_cli.logs.skips import Skips
 
 STATIC = "tf_static"
@@ -44,21 +44,17 @@ class Transforms:
                     self.frames.add(placed)
         return self._others
 
-    def moving(self) -> dict[Pair, list[tuple[int, Rigid]]]:
-        """The transforms that move, with their times (ns)."""
+    def moving(self) -> dict[Pair, Timed]:
+        """The transforms that move, in order of time; without those that are no rigid motions."""
         found: dict[Pair, list[Logged]] = {}
         for one in self.others():
             pair = (one[0].parent, one[0].child)
             if pair not in self.frames.fixed:
                 found.setdefault(pair, []).append(one)
-        return {
-            pair: [
-                (time, one.pose)
-                for (one, _), time in zip(rows, stamps_of(rows), strict=True)
-                if time is not None
-            ]
-            for pair, rows in found.items()
+        moving = {
+            pair: over_time([one.pose for one, _ in rows], stamps_of(rows)) for pair, rows in found.items()
         }
+        return {pair: timed for pair, timed in moving.items() if len(timed.times)}
 
     def _read(self, static: bool) -> Iterator[Logged]:
         for topic in self.recording.topics(TRANSFORMS):

@@ -121,6 +121,36 @@ def test_a_laser_that_cannot_be_read_is_listed_too(tmp_path, capsys):
     assert "/rear (sensor_msgs/msg/LaserScan): 12 records; " in " ".join(capsys.readouterr().out.split())
 
 
+def test_the_first_laser_may_be_the_one_that_cannot_be_read(tmp_path, capsys):
+    written = [
+        one.with_scan(ranges=[]) if one.topic == "/front" else one for one in with_more(("/front", Scan))
+    ]
+    path = tmp_path / "some.mcap"
+    path.write_bytes(ros2(written))
+    assert [one["scans"] for one in facts(capsys, str(path))["lasers"]] == [None, 12]
+
+
+def test_a_laser_beside_one_that_nods(tmp_path, capsys):
+    """As on a PR2: the base's laser is of use, and what the other one does is told where it is listed."""
+    tilt = [
+        one.with_scan(frame="tilt_laser") if one.topic == "/tilt_scan" else one
+        for one in with_more(("/tilt_scan", Scan))
+    ]
+    for k in range(12):
+        at = START + k * PERIOD
+        link = Tf(at, "base_link", "tilt_laser", (0, 0, 1), turned(pitch=0.8 - k * 0.1))
+        tilt.append(Written("/tf", at, (link,)))
+    path = tmp_path / "two.mcap"
+    path.write_bytes(ros2(sorted(tilt, key=lambda one: one.log_time)))
+    moves = "base_link → tilt_laser moves (tf base_link → tilt_laser)"
+    problem = f"its laser nods, from 45.8° down to 17.2° up: {moves}"
+    for arguments in ([], ["--topic", "/scan"]):
+        found = facts(capsys, str(path), *arguments)
+        assert [(one["scans"], one["problem"]) for one in found["lasers"]] == [(12, None), (12, problem)]
+    assert found["used"]["mounting"] == "tf base_link → laser"
+    assert facts(capsys, str(path), "--topic", "/tilt_scan", code=65)["lasers"][1]["problem"] == problem
+
+
 def test_both_lasers_of_a_carmen_log(tmp_path, capsys):
     path = tmp_path / "two.log"
     lines = [flaser(k, (1.0, 2.0)) + "\n" + flaser(k, (1.0, 2.0, 3.0), tag="RLASER") for k in range(3)]

@@ -193,3 +193,12 @@ def test_scans_in_the_robots_frame_need_no_transforms(read):
         log = read(written, **options)
         assert log.report.used["mounting"] == "none: the scans are in the robot's frame, base_link"
         assert log.report.warnings == ()
+
+
+def test_transforms_that_are_none_are_passed_over(read):
+    """A zero quaternion is no rotation: among others it is left out, and alone it leads nowhere."""
+    nothing = (0.0, 0.0, 0.0, 0.0)
+    some = on_moving(lambda k: ((0.0, 0.0, 0.1), nothing if k % 2 else turned(pitch=wave(k, 2))))
+    np.testing.assert_allclose(read(some).mount, (0.3, 0.1, math.pi / 2), atol=2e-3)
+    log = read(on_moving(lambda k: ((0.1 * k, 0.0, 0.0), nothing), robot="other"))
+    assert log.report.used["mounting"] == "assumed: at the robot's centre"
