@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 import math
 from collections.abc import Iterable, Sequence
 from typing import NamedTuple
@@ -49,17 +48,6 @@ class Frames:
     def names(self) -> set[str]:
         """All frames that are known."""
         return {name for pair in self.fixed for name in pair}
-
-    def chain(self, start: str, end: str) -> tuple[list[str], Array] | None:
-        """The frames from `start` to `end` by the fewest transforms, and `end` in `start` (4, 4)."""
-        names = way(self.fixed, start, end)
-        if names is None:
-            return None
-        there: Array = np.eye(4)
-        for pair in itertools.pairwise(names):
-            matrix = self.fixed.get(pair)
-            there = there @ (inverse(self.fixed[pair[::-1]]) if matrix is None else matrix)
-        return names, there
 
 
 def way(pairs: Iterable[Pair], start: str, end: str) -> list[str] | None:

@@ -134,6 +134,14 @@ def links(names: Sequence[str], fixed: Mapping[Pair, Array], moving: Mapping[Pai
     return found
 
 
+def at_rest(chain: Sequence[Link]) -> Array:
+    """Where the last frame of a chain of fixed transforms is in the first (4, 4)."""
+    there: Array = np.eye(4)
+    for link in chain:
+        there = there @ link.timed.poses[0]
+    return there
+
+
 def course(chain: Sequence[Link]) -> Course | None:
     """Where the last frame of a chain is in the first; None when nothing moves.
 

@@ -10,7 +10,7 @@ import numpy as np
 from nscan_cli.errors import InputDataError
 from nscan_cli.logs.assemble import Findings
 from nscan_cli.logs.frames import LARGEST_TILT, Pair, Timed, over_time, planar, way
-from nscan_cli.logs.moving import Course, Link, course, links
+from nscan_cli.logs.moving import Course, Link, at_rest, course, links
 from nscan_cli.logs.options import ReadingOptions
 from nscan_cli.logs.sensed import Sweep
 from nscan_cli.logs.transforms import BASES, Transforms, base_of, is_world, robot_of
@@ -56,10 +56,7 @@ def mounting(
     chain += _own(sweeps)
     moved = course(chain)
     if moved is None:
-        matrix: Array = np.eye(4)
-        for link in chain:
-            matrix = matrix @ link.timed.poses[0]
-        mount, hanging, tilt = planar(matrix)
+        mount, hanging, tilt = planar(at_rest(chain))
         if tilt > LARGEST_TILT:
             problem = f"its laser is tilted by {math.degrees(tilt):.1f}° (tf {' → '.join(names)})"
             raise MountingError(file, problem, "give --mount X,Y,DEG to use its scans as if it were not")
