@@ -12,6 +12,7 @@ from typing import Any
 
 from nscan_cli.errors import InputDataError, InputMissingError
 from nscan_cli.limits import CONFIG, INPUT, MB, ExceededError, Limit
+from nscan_cli.text_encoding import plain
 
 STANDARD_INPUT = "-"
 
@@ -43,6 +44,11 @@ def read_bytes(path: str, limit: Limit = INPUT) -> bytes:
         raise InputMissingError(f"{path!r}: cannot be read: {error}; check the path") from error
 
 
+def read_text(path: str, limit: Limit = INPUT) -> bytes:
+    """The bytes of a text without a byte-order mark; raises also InputDataError for one that is not UTF-8."""
+    return plain(read_bytes(path, limit), label(path))
+
+
 def in_pieces(read: Callable[[int], bytes], limit: Limit, problem: str = "goes on and on") -> bytes:
     """All that can be read from where nobody knows the length. Raises ExceededError beyond the limit."""
     pieces, size, most = [], 0, limit.bytes
@@ -57,7 +63,7 @@ def in_pieces(read: Callable[[int], bytes], limit: Limit, problem: str = "goes o
 def read_toml(path: str, remedy: str) -> dict[str, Any]:
     """The tables of a TOML file. Raises InputMissingError, and InputDataError when it is no TOML."""
     try:
-        return tomllib.loads(read_bytes(path, CONFIG).decode())
+        return tomllib.loads(read_text(path, CONFIG).decode())
     except (ValueError, RecursionError) as error:
         # Not only TOML's own error: bytes that are no text, a number of thousands of digits.
         raise InputDataError(label(path), f"not TOML: {error}", remedy) from error

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from nscan_cli.cli.command import log_argument, option, subcommand
+from nscan_cli.cli.lasers import laser_line, survey_of
 from nscan_cli.cli.options import common_options, reading_options
 from nscan_cli.cli.summary import Row, table
 from nscan_cli.counting import counted
@@ -31,16 +32,15 @@ def command(log: str, as_json: bool, reading: ReadingOptions, **_common: Any) ->
     """Tell what is in LOG, and what the other commands will use of it.
 
     These are scans, laser, mounting, odometry, what stands for no return, and what was skipped and why.
-    The reading options change what the other commands see in the same way. A log of which no reading
-    counts is listed too, and then refused, as by the other commands.
+    The reading options change what the other commands see in the same way. Where the other commands need an
+    option to choose a laser or odometry, all that there are are listed. What they refuse, a laser or a log
+    of which no reading counts, is listed too, and then refused.
     """
-    from nscan_cli.logs.load import read_log
-
-    scans = read_log(log, reading, even_unusable=True)
-    facts = facts_of(scans)
+    survey = survey_of(log, reading)
+    facts = survey.without_unchosen(facts_of(survey.log) | survey.facts(reading))
     click.echo(json.dumps(facts, ensure_ascii=False, allow_nan=False) if as_json else as_text(facts))
-    if scans.report.unusable is not None:
-        raise scans.report.unusable
+    if survey.refused is not None:
+        raise survey.refused
 
 
 def facts_of(log: LaserLog) -> dict[str, Any]:
@@ -91,24 +91,37 @@ def facts_of(log: LaserLog) -> dict[str, Any]:
         "backward_stamps": log.report.backward_stamps,
         "truth": 0 if log.truth is None else len(log.truth),
         "warnings": list(log.report.warnings),
+        "lasers": [],
+        "odometries": [],
+        "corrected": log.report.corrected or None,
     }
 
 
 def as_text(facts: dict[str, Any]) -> str:
     """The facts as aligned lines, one a fact; those that may repeat as several lines."""
-    odometry, no_return, gap = facts["odometry"], facts["no_return"], facts["longest_gap"]
-    x, y, degrees = facts["mounting"]
-    low, high = facts["range_limits"]
-    finest, coarsest = facts["angle_increments"]
+    of_laser = [] if facts["laser"] is None else _of_laser(facts)
+    return table([*_of_file(facts), *of_laser, *_of_whole(facts)])
+
+
+def _of_file(facts: dict[str, Any]) -> list[Row]:
     used = facts["used"]
-    path = "" if odometry is None else f"a path of {odometry['path']:.1f} m"
-    rate = "" if facts["rate"] is None else f", {facts['rate']:.3g} a second, longest gap {gap:.3g} s"
-    rows: list[Row] = [
+    chosen = [used["laser"] if facts["laser"] is None else f"{facts['laser']}, {used['laser']}"]
+    lasers = [laser_line(laser) for laser in facts["lasers"]]
+    return [
         ("log", [f"{facts['file']}, {facts['bytes']} bytes"]),
         ("sha256", [facts["sha256"]]),
         ("format", [facts["format"]]),
         ("checksums", [used["checksums"]] if "checksums" in used else []),
-        ("laser", [f"{facts['laser']}, {used['laser']}"]),
+        ("laser", [*chosen, *(lasers if len(lasers) > 1 else [])]),
+    ]
+
+
+def _of_laser(facts: dict[str, Any]) -> list[Row]:
+    no_return, gap, used = facts["no_return"], facts["longest_gap"], facts["used"]
+    low, high = facts["range_limits"]
+    finest, coarsest = facts["angle_increments"]
+    rate = "" if facts["rate"] is None else f", {facts['rate']:.3g} a second, longest gap {gap:.3g} s"
+    return [
         ("scans", [f"{facts['scans']}, numbered {facts['first_scan']} to {facts['last_scan']}{rate}"]),
         ("duration", [f"{facts['duration']:.1f} s from {facts['start']}"]),
         ("beams", [_between(facts["fewest_beams"], facts["beams"])]),
@@ -120,17 +133,39 @@ def as_text(facts: dict[str, Any]) -> str:
         ("beams lost", [f"{facts['beams_without_return']:.1%} without return, "
                         f"{facts['beams_unusable']:.1%} unusable",
                         *(f"{count:,} {why}" for why, count in facts["beams_lost"].items())]),
-        ("mounting", [f"{x:g} m ahead, {y:g} m to the left, turned by {degrees:g}°",
+        ("mounting", [*([] if facts["mounting"] is None else [_placed(*facts["mounting"])]),
                       used["mounting"]]),
-        ("odometry", [path, used["odometry"]] if path else [used["odometry"]]),
+    ]  # fmt: skip
+
+
+def _of_whole(facts: dict[str, Any]) -> list[Row]:
+    odometry, used, backward = facts["odometry"], facts["used"], facts["backward_stamps"]
+    path = [] if odometry is None else [f"a path of {odometry['path']:.1f} m"]
+    skipped = None if facts["skipped"] is None else [_skipped(entry) for entry in facts["skipped"]]
+    return [
+        ("odometry", [*path, used["odometry"], *_listed(facts["odometries"])]),
         ("truth", [counted(facts["truth"], "pose") if facts["truth"] else "none"]),
         ("records", [f"{count} {tag}" for tag, count in facts["records"].items()]),
-        ("out of order", [counted(facts["backward_stamps"], "time stamp") if facts["backward_stamps"]
-                          else "none"]),
-        ("skipped", [_skipped(entry) for entry in facts["skipped"]] or ["none"]),
+        (
+            "out of order",
+            [] if backward is None else [counted(backward, "time stamp") if backward else "none"],
+        ),
+        ("skipped", [] if skipped is None else skipped or ["none"]),
         ("warnings", facts["warnings"] or ["none"]),
-    ]  # fmt: skip
-    return table(rows)
+    ]
+
+
+def _listed(odometries: list[dict[str, Any]]) -> list[str]:
+    """All odometries, where there are several."""
+    if len(odometries) < 2:
+        return []
+    return [f"{one['name']} ({one['type']}): {counted(one['records'], 'record')}" for one in odometries]
+
+
+def _placed(x: float, y: float, degrees: float) -> str:
+    """A laser's place on the robot (m)."""
+    ahead, left = "ahead" if x >= 0 else "behind", "left" if y >= 0 else "right"
+    return f"{abs(x):g} m {ahead}, {abs(y):g} m to the {left}, turned by {degrees:g}°"
 
 
 def _skipped(entry: dict[str, Any]) -> str:

@@ -22,6 +22,7 @@ from nscan_cli.matching.joint_energy import Priors, no_priors
 from nscan_cli.matching.nscan import PriorsAmong
 from nscan_cli.matching.priors import MotionModel, odometry_prior
 from nscan_cli.poses import Array
+from nscan_cli.text_encoding import plain
 
 OTHER_LOG = "give the graph that was made from this log"
 
@@ -44,6 +45,7 @@ def read_knowledge(path: str, log: LaserLog) -> Knowledge:
     """
     data, name = read_bytes(path, GRAPH), label(path)
     source = Source(base_name(path), hashlib.sha256(data).hexdigest(), len(data))
+    data = plain(data, name)
     if not data.lstrip().startswith(b"{"):
         return Knowledge(parse_tum(data, name), source, name)
     graph = parse_graph(data, name)

@@ -68,7 +68,7 @@ def command(
     people, which robots cannot load: no YAML is written then.
 
     OUT.mcap is a recording of ROS 2 messages on the topics /map, /path, /graph, /scan, /tf and /tf_static;
-    the robot's frame is base_link, that of the result map.
+    the frame of the result is map, and the others are called odom, base_link and laser or as in LOG.
     """
     picture = trajectory or graph or uncertainty or style == "paper"
     if yaml and picture:

@@ -17,7 +17,7 @@ from nscan_cli.errors import InputDataError
 from nscan_cli.evaluation.association import TOLERANCE, nearest, no_match
 from nscan_cli.evaluation.statistics import Spread
 from nscan_cli.graph.tum import Trajectory
-from nscan_cli.inputs import base_name, label, read_bytes
+from nscan_cli.inputs import base_name, label, read_text
 from nscan_cli.limits import DISTANCE, GRAPH, TIME
 from nscan_cli.poses import Array, relative, wrap
 
@@ -89,7 +89,7 @@ def read_relations(path: str) -> Relations:
     stamps: list[tuple[str, str]] = []
     rows: list[list[float]] = []
     lines: list[int] = []
-    for number, line in enumerate(io.BytesIO(read_bytes(path, GRAPH)), start=1):
+    for number, line in enumerate(io.BytesIO(read_text(path, GRAPH)), start=1):
         fields = line.decode("utf-8", errors="replace").split()
         if not fields or fields[0].startswith("#"):
             continue

@@ -2,8 +2,9 @@
 
 The topics: /map (nav_msgs/OccupancyGrid), /path (nav_msgs/Path), /graph (visualization_msgs/MarkerArray)
 and /tf_static once, at the time of the first scan; /scan (sensor_msgs/LaserScan) and /tf for every scan.
-Frames as in REP 105: map, odom where there is odometry, base_link (the robot) and laser. What is written once
-is kept for subscribers that come later (transient local), as map_server, tf2 and RViz expect it.
+Frames as in REP 105: map, odom where there is odometry, base_link (the robot) and laser; where the log
+calls the last three otherwise, so does the recording. What is written
+once is kept for subscribers that come later (transient local), as map_server, tf2 and RViz expect it.
 
 https://mcap.dev/spec, https://mcap.dev/spec/registry (profile ros2, schemas ros2msg, messages cdr)
 """
@@ -30,6 +31,7 @@ from nscan_cli.exports.messages import (
 )
 from nscan_cli.finite import check_finite
 from nscan_cli.graph.model import Graph
+from nscan_cli.logs.frame_names import MAP
 from nscan_cli.logs.scan import LaserLog
 from nscan_cli.mapping.occupancy import OccupancyGrid
 from nscan_cli.poses import compose, inverse
@@ -69,15 +71,18 @@ def recording(
     file.write("/map", map_message(messages, grid, first), first)
     file.write("/path", path_message(messages, graph.poses, stamps), first)
     file.write("/graph", graph_markers(messages, graph, first), first)
-    file.write("/tf_static", transforms(messages, first, [("base_link", "laser", log.mount)]), first)
+    names = log.frames
+    if names.laser != names.robot:
+        link = (names.robot, names.laser, log.mount)
+        file.write("/tf_static", transforms(messages, first, [link]), first)
     robots = graph.poses[nodes]
     odometry = None if graph.odometry is None else graph.odometry[nodes]
     corrections = None if odometry is None else compose(robots, inverse(odometry))
     for k, (row, time) in enumerate(zip(rows.tolist(), times, strict=True)):
         if odometry is None or corrections is None:
-            links = [("map", "base_link", robots[k])]
+            links = [(MAP, names.robot, robots[k])]
         else:
-            links = [("map", "odom", corrections[k]), ("odom", "base_link", odometry[k])]
+            links = [(MAP, names.odometry, corrections[k]), (names.odometry, names.robot, odometry[k])]
         file.write("/tf", transforms(messages, time, links), time)
         file.write("/scan", scan_message(messages, log, row, time), time)
     return file.finished()

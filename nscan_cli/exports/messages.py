@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from nscan_cli.graph.model import Graph
+from nscan_cli.logs.frame_names import MAP
 from nscan_cli.logs.scan import LaserLog
 from nscan_cli.mapping.canvas import BLUE
 from nscan_cli.mapping.edges import EDGE_COLOURS, edges_by_kind
@@ -80,7 +81,7 @@ def map_message(ros: Messages, grid: OccupancyGrid, time: int) -> Any:
     height, width = states.shape
     return ros.make(
         "nav_msgs/OccupancyGrid",
-        header=ros.header(time, "map"),
+        header=ros.header(time, MAP),
         info=ros.make(
             "nav_msgs/MapMetaData",
             map_load_time=ros.stamp(time),
@@ -96,10 +97,10 @@ def map_message(ros: Messages, grid: OccupancyGrid, time: int) -> Any:
 def path_message(ros: Messages, poses: Array, times: Sequence[int]) -> Any:
     """nav_msgs/Path of the robot's poses (N, 3) at N times (ns)."""
     stamped = [
-        ros.make("geometry_msgs/PoseStamped", header=ros.header(time, "map"), pose=ros.pose(*pose))
+        ros.make("geometry_msgs/PoseStamped", header=ros.header(time, MAP), pose=ros.pose(*pose))
         for time, pose in zip(times, poses.tolist(), strict=True)
     ]
-    return ros.make("nav_msgs/Path", header=ros.header(min(times), "map"), poses=stamped)
+    return ros.make("nav_msgs/Path", header=ros.header(min(times), MAP), poses=stamped)
 
 
 def transforms(ros: Messages, time: int, links: Sequence[tuple[str, str, Array]]) -> Any:
@@ -127,7 +128,7 @@ def scan_message(ros: Messages, log: LaserLog, row: int, time: int) -> Any:
     ranges = log.readings(row)
     return ros.make(
         "sensor_msgs/LaserScan",
-        header=ros.header(time, "laser"),
+        header=ros.header(time, log.frames.laser),
         angle_min=first,
         angle_max=first + step * (len(ranges) - 1),
         angle_increment=step,
@@ -161,7 +162,7 @@ def _marker(
     empty = {"header": ros.header(0, ""), "format": "", "data": np.zeros(0, dtype=np.uint8)}
     return ros.make(
         "visualization_msgs/Marker",
-        header=ros.header(time, "map"),
+        header=ros.header(time, MAP),
         ns=name,
         id=0,
         type=kind,

@@ -24,7 +24,7 @@ from nscan_cli.finite import check_finite
 from nscan_cli.graph.model import Graph, Pairwise
 from nscan_cli.graph.relation import Relation
 from nscan_cli.graph.triangles import from_upper_triangle, is_indefinite, upper_triangle
-from nscan_cli.inputs import base_name, label, read_bytes
+from nscan_cli.inputs import base_name, label, read_text
 from nscan_cli.limits import DISTANCE, GRAPH, INFORMATION, KINDS, Limit
 from nscan_cli.logs.scan import Source
 from nscan_cli.poses import Array, compose, inverse, relative, rotated_information
@@ -59,7 +59,7 @@ def read_g2o(path: str) -> Graph:
 
     Raises InputMissingError when the file cannot be read, InputDataError on a malformed line.
     """
-    return parse_g2o(read_bytes(path, GRAPH), path)
+    return parse_g2o(read_text(path, GRAPH), path)
 
 
 def parse_g2o(data: bytes, path: str) -> Graph:

@@ -19,7 +19,7 @@ from nscan_cli.finite import check_finite
 from nscan_cli.graph.json_fields import MalformedError, Record, pose_rows, six_digits, triangle
 from nscan_cli.graph.model import Graph, Loop
 from nscan_cli.graph.relation_types import relation_of, relation_record
-from nscan_cli.inputs import label, read_bytes
+from nscan_cli.inputs import label, read_text
 from nscan_cli.limits import GRAPH, TIME
 from nscan_cli.logs.kinds import FORMS, name_of
 from nscan_cli.logs.load import GZIP
@@ -85,7 +85,7 @@ def read_graph(path: str) -> Graph:
     Raises InputMissingError when the file cannot be read, InputDataError when it is no graph or its
     parts do not fit each other.
     """
-    return parse_graph(read_bytes(path, GRAPH), label(path))
+    return parse_graph(read_text(path, GRAPH), label(path))
 
 
 def parse_graph(data: bytes, name: str) -> Graph:

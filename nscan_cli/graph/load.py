@@ -5,7 +5,7 @@ from __future__ import annotations
 from nscan_cli.graph.g2o import parse_g2o
 from nscan_cli.graph.json_file import parse_graph
 from nscan_cli.graph.model import Graph
-from nscan_cli.inputs import label, read_bytes
+from nscan_cli.inputs import label, read_text
 from nscan_cli.limits import GRAPH
 
 
@@ -14,7 +14,7 @@ def load_graph(path: str) -> Graph:
 
     Raises InputMissingError when there is nothing to read, InputDataError when it is no graph.
     """
-    data = read_bytes(path, GRAPH)
+    data = read_text(path, GRAPH)
     if data.lstrip()[:1] == b"{":
         return parse_graph(data, label(path))
     return parse_g2o(data, path)

@@ -14,7 +14,7 @@ import numpy as np
 
 from nscan_cli.errors import InputDataError
 from nscan_cli.finite import check_finite
-from nscan_cli.inputs import label, read_bytes
+from nscan_cli.inputs import label, read_text
 from nscan_cli.limits import DISTANCE, GRAPH, TIME
 from nscan_cli.poses import Array, wrap
 
@@ -65,7 +65,7 @@ def read_tum(path: str) -> Trajectory:
     z is left out, and of the rotation only the yaw is kept. Raises InputMissingError when the file
     cannot be read, InputDataError on a line that is not of the format or when there is no pose.
     """
-    return parse_tum(read_bytes(path, GRAPH), label(path))
+    return parse_tum(read_text(path, GRAPH), label(path))
 
 
 def parse_tum(data: bytes, name: str) -> Trajectory:

@@ -11,6 +11,8 @@ from numpy.typing import NDArray
 
 from nscan_cli.limits import READINGS
 from nscan_cli.logs.angles import beam_directions
+from nscan_cli.logs.choices import Device
+from nscan_cli.logs.frame_names import AS_USUAL, FrameNames
 from nscan_cli.logs.laser import mark_no_returns
 from nscan_cli.logs.lost import lost_readings
 from nscan_cli.logs.options import ReadingOptions
@@ -65,6 +67,12 @@ class Findings:
     warnings: list[str] = field(default_factory=list)
     used: dict[str, str] = field(default_factory=dict)
     """Why this laser, odometry and mounting."""
+    lasers: tuple[Device, ...] = ()
+    laser_option: str = "--laser"
+    odometries: tuple[Device, ...] = ()
+    corrected: str = ""
+    """As LogReport has them."""
+    frames: FrameNames = AS_USUAL
 
 
 @dataclass(frozen=True)
@@ -142,8 +150,13 @@ def laser_log(
             used=findings.used,
             lost=lost.counts,
             unusable=lost.unusable,
+            lasers=findings.lasers,
+            laser_option=findings.laser_option,
+            odometries=findings.odometries,
+            corrected=findings.corrected,
         ),
         beams=None if (beams == ranges.shape[1]).all() else beams,
         truth_times=motion.truth_times,
         truth=motion.truth,
+        frames=findings.frames,
     )

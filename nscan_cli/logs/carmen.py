@@ -12,6 +12,7 @@ from nscan_cli.errors import InputDataError, WrongUsageError
 from nscan_cli.logs import carmen_records, corrected, order
 from nscan_cli.logs.assemble import Findings, Motion, RawScans, laser_log
 from nscan_cli.logs.carmen_records import Scans
+from nscan_cli.logs.choices import Device
 from nscan_cli.logs.laser import CARMEN_MAX_RANGE, beam_angles, mount_from_poses
 from nscan_cli.logs.odometry import interpolated
 from nscan_cli.logs.options import ReadingOptions
@@ -54,6 +55,7 @@ def read(data: bytes, file: str, source: Source, options: ReadingOptions) -> Las
     findings = Findings(skips, {name: len(found) for name, found in lines.items()})
     warnings, used = findings.warnings, findings.used
     options.refuse_topics(file, "a CARMEN log", "--laser")
+    findings.lasers = tuple(Device(tag, tag, len(lines[tag])) for tag in LASERS if tag in lines)
     tag, used["laser"] = _chosen_laser(lines, options, file, warnings)
     strange = {name: count for name, count in findings.records.items() if not TAGS.fullmatch(name)}
     if strange:
@@ -69,17 +71,16 @@ def read(data: bytes, file: str, source: Source, options: ReadingOptions) -> Las
             file, f"none of its {len(lines[tag])} {tag} records can be read: {reason}",
             "give a log with whole records", first,
         )  # fmt: skip
-    sign = corrected.sign(lines, scans)
-    if sign and not options.allow_corrected:
+    findings.corrected = sign = corrected.sign(lines, scans)
+    if sign and options.odometry and not options.allow_corrected:
         raise InputDataError(
             file, f"its poses are a mapper's result, not odometry ({sign})",
-            "give the raw log, or --allow-corrected to use them as odometry",
+            "give the raw log, or --allow-corrected to use them as odometry, or --no-odometry",
         )  # fmt: skip
     if sign:
-        warnings.append(f"the poses are a mapper's result ({sign}), used as odometry")
+        warnings.append(f"the poses are a mapper's result, not odometry ({sign})")
     params = _params(lines)
-    times = order.by_time(scans.stamps)
-    warnings += times.warnings
+    times, by_logger = _times(lines[tag], scans, warnings)
     mount, used["mounting"] = _mount(tag, scans, params, options, warnings)
     angle_min, angle_increment, angle_max = _angles(scans)
     farthest, doubtful = _farthest(tag, scans, params)
@@ -97,9 +98,21 @@ def read(data: bytes, file: str, source: Source, options: ReadingOptions) -> Las
     odometry: Array | None = None
     used["odometry"] = "none: --no-odometry"
     if options.odometry:
-        odometry, used["odometry"] = _odometry(tag, scans, times, lines, skips, warnings)
-    motion = Motion(odometry, *_truth(lines, skips, warnings))
+        odometry, used["odometry"] = _odometry(tag, scans, times, by_logger, lines, skips, warnings)
+    motion = Motion(odometry, *_truth(lines, by_logger, skips, warnings))
     return laser_log(source, "CARMEN", tag, raw, times, mount, motion, findings, options, file)
+
+
+def _times(lines: list[tuple[int, bytes]], scans: Scans, warnings: list[str]) -> tuple[order.Order, bool]:
+    """The scans in order of time, and whether it is that of the logger: only where their own say nothing."""
+    times = order.by_time(scans.stamps)
+    if times.nominal or not times.times.any():
+        logged = order.by_time(carmen_records.logger_stamps(lines, scans))
+        if not logged.nominal and logged.times[-1] > logged.times[0]:
+            warnings += ["the scans' own time stamps say nothing: the logger's are used", *logged.warnings]
+            return logged, True
+    warnings += times.warnings
+    return times, False
 
 
 def _chosen_laser(lines: Lines, options: ReadingOptions, file: str, warnings: list[str]) -> tuple[str, str]:
@@ -218,7 +231,13 @@ def _farthest(
 
 
 def _odometry(
-    tag: str, scans: Scans, times: order.Order, lines: Lines, skips: Skips, warnings: list[str]
+    tag: str,
+    scans: Scans,
+    times: order.Order,
+    by_logger: bool,
+    lines: Lines,
+    skips: Skips,
+    warnings: list[str],
 ) -> tuple[Array | None, str]:
     """Poses of the robot (S, 3) in order of time, and why: the record's own, else of the ODOM lines."""
     if scans.robot.shape[1]:
@@ -228,7 +247,7 @@ def _odometry(
         poses = scans.robot[times.rows]
         poses[:, 2] = wrap(poses[:, 2])
         return poses, f"the poses in {tag}"
-    values, stamps, _ = carmen_records.numbers(lines.get("ODOM", []), 6, skips)
+    values, stamps, _ = carmen_records.numbers(lines.get("ODOM", []), 6, skips, by_logger=by_logger)
     if not len(values):
         warnings.append(f"{tag} carries no pose and the log has no ODOM record: no odometry")
         return None, "none: no pose in the log"
@@ -240,9 +259,11 @@ def _odometry(
     return found, "none: at other times" if found is None else "ODOM records, interpolated"
 
 
-def _truth(lines: Lines, skips: Skips, warnings: list[str]) -> tuple[Array | None, Array | None]:
+def _truth(
+    lines: Lines, by_logger: bool, skips: Skips, warnings: list[str]
+) -> tuple[Array | None, Array | None]:
     """Times (T,) and true poses (T, 3) of the TRUEPOS records, sorted by time."""
-    values, stamps, _ = carmen_records.numbers(lines.get("TRUEPOS", []), 6, skips)
+    values, stamps, _ = carmen_records.numbers(lines.get("TRUEPOS", []), 6, skips, by_logger=by_logger)
     if not len(values):
         return None, None
     moments = order.by_time(stamps)

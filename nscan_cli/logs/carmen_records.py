@@ -74,12 +74,12 @@ def lines_by_tag(data: bytes, skips: Skips) -> dict[str, list[tuple[int, bytes]]
 
 
 def numbers(
-    lines: list[tuple[int, bytes]], count: int, skips: Skips, stamped: bool = True
+    lines: list[tuple[int, bytes]], count: int, skips: Skips, stamped: bool = True, by_logger: bool = False
 ) -> tuple[Array, list[str], list[int]]:
     """Rows (R, count) of a short record such as ODOM, with stamps and line numbers.
 
-    `stamped`: a line without trailer is of no use. Lines of another length or with a value out of
-    bounds are skipped.
+    `stamped`: a line without trailer is of no use. `by_logger`: the stamps are the logger's. Lines of
+    another length or with a value out of bounds are skipped.
     """
     rows, stamps, places = [], [], []
     for number, text in lines:
@@ -96,9 +96,18 @@ def numbers(
             skips.add("a value is out of bounds", number)
             continue
         rows.append(row)
-        stamps.append(as_text(tokens[count]) if len(tokens) > count else "")
+        stamps.append(as_text(tokens[-1 if by_logger else count]) if len(tokens) > count else "")
         places.append(number)
     return np.array(rows, dtype=np.float64).reshape(-1, count), stamps, places
+
+
+def logger_stamps(lines: list[tuple[int, bytes]], scans: Scans) -> list[str]:
+    """When the scans were logged: the end of their lines; empty for those without a trailer."""
+    ends = dict(lines)
+    return [
+        as_text(ends[line].split()[-1]) if stamp else ""
+        for line, stamp in zip(scans.lines, scans.stamps, strict=True)
+    ]
 
 
 def scans(tag: str, lines: list[tuple[int, bytes]], skips: Skips) -> Scans:

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
+from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from nscan_cli.limits import DISTANCE
 from nscan_cli.logs.sensed import Placed, Rigid
@@ -16,11 +18,24 @@ STILL = 1e-6
 """m and quaternion units; a transform that moves less is fixed."""
 
 
+Pair = tuple[str, str]
+"""Parent and child of a transform."""
+
+
+class Timed(NamedTuple):
+    """Poses over time."""
+
+    times: NDArray[np.int64]
+    """(n,) ns, increasing"""
+    poses: Array
+    """(n, 4, 4)"""
+
+
 class Frames:
     """Transforms (4, 4) between frames that do not move against each other."""
 
     def __init__(self) -> None:
-        self.fixed: dict[tuple[str, str], Array] = {}
+        self.fixed: dict[Pair, Array] = {}
 
     def add(self, placed: Placed) -> bool:
         """Take up a transform; a later one of the same frames holds. False when it is no rigid motion."""
@@ -34,21 +49,21 @@ class Frames:
         """All frames that are known."""
         return {name for pair in self.fixed for name in pair}
 
-    def chain(self, start: str, end: str) -> tuple[list[str], Array] | None:
-        """The frames from `start` to `end` by the fewest transforms, and `end` in `start` (4, 4)."""
-        ways: dict[str, tuple[list[str], Array]] = {start: ([start], np.eye(4))}
-        edges: dict[str, list[tuple[str, Array]]] = {}
-        for (parent, child), matrix in self.fixed.items():
-            edges.setdefault(parent, []).append((child, matrix))
-            edges.setdefault(child, []).append((parent, inverse(matrix)))
-        queue = [start]
-        for name in queue:
-            names, there = ways[name]
-            for other, matrix in edges.get(name, []):
-                if other not in ways:
-                    ways[other] = ([*names, other], there @ matrix)
-                    queue.append(other)
-        return ways.get(end)
+
+def way(pairs: Iterable[Pair], start: str, end: str) -> list[str] | None:
+    """The frames from `start` to `end` by the fewest of the transforms between pairs of frames."""
+    neighbours: dict[str, list[str]] = {}
+    for parent, child in pairs:
+        neighbours.setdefault(parent, []).append(child)
+        neighbours.setdefault(child, []).append(parent)
+    ways = {start: [start]}
+    queue = [start]
+    for name in queue:
+        for other in neighbours.get(name, []):
+            if other not in ways:
+                ways[other] = [*ways[name], other]
+                queue.append(other)
+    return ways.get(end)
 
 
 def unmoved(transforms: Iterable[Placed]) -> list[Placed]:
@@ -68,26 +83,56 @@ def unmoved(transforms: Iterable[Placed]) -> list[Placed]:
 
 def as_matrix(pose: Rigid) -> Array | None:
     """A pose as a matrix (4, 4); None when it has a value that is none or its quaternion is zero."""
-    x, y, z, w = pose.rotation
-    norm = math.sqrt(x * x + y * y + z * z + w * w)
-    if not 1e-3 < norm < 1e3 or not all(abs(part) < DISTANCE.value for part in pose.translation):
-        return None
-    x, y, z, w = x / norm, y / norm, z / norm, w / norm
-    matrix = np.eye(4)
-    matrix[:3, :3] = [
-        [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
-        [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
-        [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
-    ]
-    matrix[:3, 3] = pose.translation
-    return matrix
+    _, found = as_matrices([pose])
+    return found[0] if len(found) else None
+
+
+def as_matrices(poses: Sequence[Rigid]) -> tuple[NDArray[np.bool_], Array]:
+    """Which of n poses (n,) are some, as as_matrix has it, and these as matrices (m, 4, 4)."""
+    places = np.array([pose.translation for pose in poses], dtype=np.float64).reshape(-1, 3)
+    turns = np.array([pose.rotation for pose in poses], dtype=np.float64).reshape(-1, 4)
+    with np.errstate(invalid="ignore", over="ignore"):
+        x, y, z, w = turns.T
+        norm = np.sqrt(x * x + y * y + z * z + w * w)
+        good = (norm > 1e-3) & (norm < 1e3) & (np.abs(places) < DISTANCE.value).all(axis=1)
+    x, y, z, w = (turns[good] / norm[good, None]).T
+    found = np.zeros((len(x), 4, 4))
+    found[:, 0, 0], found[:, 0, 1], found[:, 0, 2] = (
+        1 - 2 * (y * y + z * z),
+        2 * (x * y - z * w),
+        2 * (x * z + y * w),
+    )
+    found[:, 1, 0], found[:, 1, 1], found[:, 1, 2] = (
+        2 * (x * y + z * w),
+        1 - 2 * (x * x + z * z),
+        2 * (y * z - x * w),
+    )
+    found[:, 2, 0], found[:, 2, 1], found[:, 2, 2] = (
+        2 * (x * z - y * w),
+        2 * (y * z + x * w),
+        1 - 2 * (x * x + y * y),
+    )
+    found[:, :3, 3] = places[good]
+    found[:, 3, 3] = 1.0
+    return good, found
+
+
+def over_time(poses: Sequence[Rigid], times: Sequence[int | None]) -> Timed:
+    """The poses that are some and have a time (ns)."""
+    there = [(time, pose) for time, pose in zip(times, poses, strict=True) if time is not None]
+    good, matrices = as_matrices([pose for _, pose in there])
+    found = np.array([time for time, _ in there], dtype=np.int64)[good]
+    order = np.argsort(found, kind="stable")
+    return Timed(found[order], matrices[order])
 
 
 def inverse(matrix: Array) -> Array:
-    """The inverse (4, 4) of a rigid motion."""
-    found = np.eye(4)
-    found[:3, :3] = matrix[:3, :3].T
-    found[:3, 3] = -matrix[:3, :3].T @ matrix[:3, 3]
+    """The inverse (…, 4, 4) of rigid motions."""
+    found = np.zeros_like(matrix)
+    turn = np.swapaxes(matrix[..., :3, :3], -1, -2)
+    found[..., :3, :3] = turn
+    found[..., :3, 3] = -(turn @ matrix[..., :3, 3:])[..., 0]
+    found[..., 3, 3] = 1.0
     return found
 
 

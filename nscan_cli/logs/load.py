@@ -15,6 +15,7 @@ from nscan_cli.limits import INPUT, ExceededError
 from nscan_cli.logs.kinds import FORMS, name_of, readable
 from nscan_cli.logs.options import ReadingOptions
 from nscan_cli.logs.scan import LaserLog, Source
+from nscan_cli.text_encoding import plain
 
 
 class Reader(Protocol):
@@ -70,9 +71,10 @@ def content_of(stored: bytes, path: str, salvage: bool) -> tuple[bytes, str | No
     Raises InputDataError.
     """
     try:
-        return salvaged(stored) if salvage else (unpacked(stored, label(path)), None)
+        content, lost = salvaged(stored) if salvage else (unpacked(stored, label(path)), None)
     except ExceededError as error:
         raise InputDataError(label(path), str(error), error.remedy) from error
+    return plain(content, label(path)), lost
 
 
 def _reader(data: bytes, name: str) -> Reader:

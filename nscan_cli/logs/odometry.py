@@ -16,10 +16,15 @@ def interpolated(times: Array, at: Array, poses: Array, name: str, warnings: lis
     """
     outside = int(np.sum((times < at[0]) | (times > at[-1])))
     if outside == len(times):
-        warnings.append(f"no scan lies between the first {name} and the last: no odometry")
+        warnings.append(
+            f"no scan lies between the first {name} and the last: these are from {at[0]:.3f} s to "
+            f"{at[-1]:.3f} s, the scans from {times[0]:.3f} s to {times[-1]:.3f} s: no odometry"
+        )
         return None
     if outside:
-        warnings.append(f"{counted(outside, 'scan')} before the first {name} or after the last")
+        warnings.append(
+            f"{counted(outside, 'scan')} before the first {name} or after the last, which is taken for them"
+        )
     angles = np.unwrap(poses[:, 2])
     columns = (poses[:, 0], poses[:, 1], angles)
     found = np.stack([np.interp(times, at, column) for column in columns], axis=-1)

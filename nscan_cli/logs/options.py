@@ -17,7 +17,7 @@ class ReadingOptions:
     topic: str | None = None
     """Topic of the laser in a recording."""
     odom_topic: str | None = None
-    """Topic, or device of a Player log, of the odometry."""
+    """Topic of the odometry, a frame that tf places in odom, or a device of a Player log."""
     mount: tuple[float, float, float] | None = None
     """x, y (m), θ (rad)."""
     flip: bool = False

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
+from typing import Literal
 
 import numpy as np
 
-from nscan_cli.counting import counted
 from nscan_cli.errors import InputDataError, WrongUsageError
 from nscan_cli.logs import order, player_bearings, player_records
 from nscan_cli.logs.assemble import Findings, Motion, laser_log
+from nscan_cli.logs.choices import Device, OpenChoiceError, listed
 from nscan_cli.logs.kinds import FIRST_LINE
 from nscan_cli.logs.odometry import interpolated
 from nscan_cli.logs.options import ReadingOptions
@@ -25,6 +27,7 @@ FORMS: tuple[tuple[Version, re.Pattern[bytes]], ...] = (
 )
 """Version 1 has the time of the data where version 2 has type and subtype. In 2002 the interface is first."""
 NAMES: dict[Version, str] = {0: "Player, form of 2002", 1: "Player, version 1", 2: "Player, version 2"}
+LASER = ("laser",)
 ODOMETRY = ("position", "position2d")
 DATA = ("", "1:1", "1:2")
 """The kinds of records that hold scans or poses."""
@@ -51,7 +54,9 @@ def read(data: bytes, file: str, source: Source, options: ReadingOptions) -> Las
     skips = Skips(file, options.strict)
     lines = player_records.lines_by_device(data, version, skips)
     findings = Findings(skips, {_said(key): len(found) for key, found in lines.items()})
-    laser, findings.used["laser"] = _chosen("laser", options.laser, ("laser",), lines, file)
+    lasers = _devices(LASER, lines)
+    findings.lasers, findings.odometries = tuple(lasers), tuple(_devices(ODOMETRY, lines))
+    laser, findings.used["laser"] = _chosen("laser", options.laser, lasers, file)
     if laser is None:
         found = ", ".join(findings.records) or "no record at all"
         raise InputDataError(file, f"has no laser scans, only {found}", "give a log of a laser device")
@@ -86,25 +91,32 @@ def _version(data: bytes) -> Version | None:
     return next((version for line in lines for version, form in FORMS if form.match(line)), None)
 
 
-def _chosen(
-    option: str, asked: str | None, interfaces: tuple[str, ...], lines: Lines, file: str
-) -> tuple[str | None, str]:
-    """The device to use of some interfaces, and why; None when there is none.
-
-    Raises WrongUsageError when the one asked for is not there, or there are several and none is asked for.
-    """
+def _devices(interfaces: tuple[str, ...], lines: Lines) -> list[Device]:
+    """The devices of some interfaces that have records of scans or poses."""
     counts: dict[str, int] = {}
     for (device, kind), found in sorted(lines.items()):
         if device.split(":")[-2] in interfaces and kind in DATA:
             counts[device] = counts.get(device, 0) + len(found)
-    listed = ", ".join(f"{device} ({counted(count, 'record')})" for device, count in counts.items())
+    return [Device(device, device.split(":")[-2], count) for device, count in counts.items()]
+
+
+def _chosen(
+    what: Literal["laser", "odometry"], asked: str | None, there: Sequence[Device], file: str
+) -> tuple[str | None, str]:
+    """The device to use, and why; None when there is none.
+
+    Raises WrongUsageError when the one asked for is not there, OpenChoiceError when there are several and
+    none is asked for.
+    """
+    option = "--laser" if what == "laser" else "--odom-topic"
+    said = listed(there, "record") or "left out"
     if asked is not None:
-        if asked not in counts:
-            raise WrongUsageError(f"{file}: has no {asked}; --{option} can be {listed or 'left out'}")
-        return asked, f"chosen by --{option}"
-    if len(counts) > 1:
-        raise WrongUsageError(f"{file}: has several such devices, {listed}; choose one by --{option}")
-    return next(iter(counts), None), f"the only {interfaces[-1]} device"
+        if asked not in [device.name for device in there]:
+            raise WrongUsageError(f"{file}: has no {asked}; {option} can be {said}")
+        return asked, f"chosen by {option}"
+    if len(there) > 1:
+        raise OpenChoiceError(file, what, there, option, "record")
+    return (there[0].name, f"the only {there[0].type} device") if there else (None, "")
 
 
 def _mount(laser: str, lines: Lines, options: ReadingOptions, findings: Findings) -> Array:
@@ -136,7 +148,7 @@ def _odometry(
         poses[:, 2] = wrap(poses[:, 2])
         used["odometry"] = "the poses in the scans (1:2)"
         return poses
-    device, why = _chosen("odom-topic", options.odom_topic, ODOMETRY, lines, file)
+    device, why = _chosen("odometry", options.odom_topic, findings.odometries, file)
     found = [] if device is None else lines.get((device, ""), lines.get((device, "1:1"), []))
     values, stamps = player_records.poses(found, findings.skips)
     if not len(values):

@@ -9,15 +9,19 @@ import numpy as np
 from nscan_cli.errors import InputDataError, WrongUsageError
 from nscan_cli.logs import order, recorded_motion
 from nscan_cli.logs.assemble import Findings, Motion, RawScans, laser_log, stacked
+from nscan_cli.logs.clock import is_clock, stamps_set
 from nscan_cli.logs.decoding import UNDECODABLE, sweep_decoder
+from nscan_cli.logs.frame_names import frame_names
 from nscan_cli.logs.options import ReadingOptions
 from nscan_cli.logs.range_limits import FARTHEST
-from nscan_cli.logs.recording import Channel, Message, Recording
+from nscan_cli.logs.recorded_mounting import mounting
+from nscan_cli.logs.recording import ODOMETRY, SCANS, Channel, Message, Recording
 from nscan_cli.logs.scan import LaserLog, Source
 from nscan_cli.logs.sensed import S, Sweep
 from nscan_cli.logs.skips import Skips
 from nscan_cli.logs.text_records import beams_problem
-from nscan_cli.logs.topics import scan_topic
+from nscan_cli.logs.topics import devices, scan_topic
+from nscan_cli.logs.transforms import Transforms
 from nscan_cli.poses import Array
 
 
@@ -33,21 +37,26 @@ def read(recording: Recording, file: str, source: Source, options: ReadingOption
     skips = Skips(file, options.strict, place="message")
     findings = Findings(skips, recording.listed(), recording.warnings)
     findings.used = {"laser": choice.why, "checksums": recording.checksums}
+    findings.lasers, findings.laser_option = tuple(devices(recording, SCANS)), "--topic"
+    findings.odometries = tuple(devices(recording, ODOMETRY))
     sweeps, messages = _sweeps(recording.messages.get(choice.topic, []), choice.topic, skips, file)
-    header_time = _has_clock([sweep.stamp for sweep in sweeps])
+    stamps = stamps_set([sweep.stamp for sweep in sweeps])
+    header_time = is_clock(stamps)
     if not header_time:
         findings.warnings.append("the scans' own time stamps say nothing: the times of recording are used")
-    stamps = [s.stamp for s in sweeps] if header_time else [message.log_time for message in messages]
+        stamps = [message.log_time for message in messages]
     raw = _raw(sweeps, [_written(stamp) for stamp in stamps])
     times = order.by_time(raw.stamps)
     findings.warnings += times.warnings
-    motion, robot, frames = recorded_motion.odometry(recording, times, header_time, options, findings, file)
-    mount, hanging = recorded_motion.mounting(sweeps, robot, frames, options, findings, file)
+    frames = Transforms(recording, skips, file)
+    motion = recorded_motion.odometry(recording, frames, times, header_time, options, findings, file)
+    mount, hanging, robot = mounting(sweeps, motion.robot, frames, options, findings, file)
+    findings.frames = frame_names(sweeps[0].frame, robot, motion.parent, mount)
     if hanging and not options.flip:
         # Seen from above, the beams of a laser that hangs run clockwise.
         raw = raw.mirrored()
     return laser_log(
-        source, recording.form, choice.topic, raw, times, mount, Motion(motion), findings, options, file
+        source, recording.form, choice.topic, raw, times, mount, Motion(motion.poses), findings, options, file
     )
 
 
@@ -92,14 +101,8 @@ def _problem(sweep: Sweep) -> str:
     return problem
 
 
-def _has_clock(stamps: Sequence[int]) -> bool:
-    """Whether the stamps (ns) of the messages say when these were: most are there, and differ."""
-    there = [stamp for stamp in stamps if stamp > 0]
-    return 2 * len(there) >= len(stamps) and (len(stamps) == 1 or 2 * len(set(there)) >= len(stamps))
-
-
-def _written(stamp: int) -> str:
-    return f"{stamp // S}.{stamp % S:09d}" if stamp > 0 else ""
+def _written(stamp: int | None) -> str:
+    return "" if stamp is None else f"{stamp // S}.{stamp % S:09d}"
 
 
 def _raw(sweeps: Sequence[Sweep], stamps: list[str]) -> RawScans:

@@ -1,212 +1,136 @@
-"""Where the robot was, and how the laser sits on it, from a recording's odometry and transforms."""
+"""Where the robot was, from a recording's odometry and transforms."""
 
 from __future__ import annotations
 
-import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 
-from nscan_cli.errors import InputDataError, WrongUsageError
 from nscan_cli.logs.assemble import Findings
-from nscan_cli.logs.decoding import UNDECODABLE, placed_decoder
-from nscan_cli.logs.frames import LARGEST_TILT, Frames, as_matrix, heading, planar, unmoved
+from nscan_cli.logs.choices import Device, OpenChoiceError
+from nscan_cli.logs.frames import heading
 from nscan_cli.logs.odometry import interpolated
 from nscan_cli.logs.options import ReadingOptions
 from nscan_cli.logs.order import Order
-from nscan_cli.logs.recording import TRANSFORMS, Recording
-from nscan_cli.logs.sensed import Placed, S, Sweep
+from nscan_cli.logs.recording import ODOMETRY, TRANSFORMS, Recording
+from nscan_cli.logs.sensed import S
 from nscan_cli.logs.skips import Skips
-from nscan_cli.logs.topics import odometry_topic
+from nscan_cli.logs.topics import devices, named, odometry_topic
+from nscan_cli.logs.transforms import BASES, ODOM, Logged, Transforms, base_of, decoded, stamps_of
 from nscan_cli.poses import Array
 
-STATIC = "tf_static"
-ODOM = "odom"
-BASES = ("base_footprint", "base_link")
-"""Frames of a robot (ROS REP 105), the one to be preferred first."""
 
+class RobotMotion(NamedTuple):
+    """What a recording says of the robot's motion."""
 
-class Transforms:
-    """The transforms of a recording: those that are fixed by name at once, the others when asked for."""
-
-    def __init__(self, recording: Recording, skips: Skips, file: str) -> None:
-        self.recording, self.skips, self.file = recording, skips, file
-        self.frames = Frames()
-        self.moving: list[tuple[Placed, int]] | None = None
-        for placed, _ in self._read(static=True):
-            self.frames.add(placed)
-
-    def all_moving(self) -> list[tuple[Placed, int]]:
-        """The transforms of all other topics, with the times (ns) when they were recorded.
-
-        Those that never move become fixed ones: ROS 1 sends these again and again.
-        """
-        if self.moving is None:
-            self.moving = list(self._read(static=False))
-            for placed in unmoved(placed for placed, _ in self.moving):
-                if (placed.parent, placed.child) not in self.frames.fixed:
-                    self.frames.add(placed)
-        return self.moving
-
-    def _read(self, static: bool) -> Iterator[tuple[Placed, int]]:
-        for topic in self.recording.topics(TRANSFORMS):
-            if topic.rpartition("/")[2].startswith(STATIC) == static:
-                yield from _decoded(self.recording, topic, self.skips, self.file)
+    poses: Array | None
+    """(S, 3) at the times of the scans, in order of time."""
+    robot: str
+    """The frame that is placed; empty where nothing names it."""
+    parent: str
+    """The frame that it is placed in, likewise."""
 
 
 def odometry(
     recording: Recording,
+    transforms: Transforms,
     times: Order,
     header_time: bool,
     options: ReadingOptions,
     findings: Findings,
     file: str,
-) -> tuple[Array | None, str, Transforms]:
-    """Poses of the robot (S, 3) in order of time or None, the frame of the robot, and the transforms.
+) -> RobotMotion:
+    """The robot's motion by the topic that is asked for, by the only one, or by tf.
 
-    The frame is empty where nothing names it. Raises WrongUsageError when topics have to be chosen.
+    Raises WrongUsageError and OpenChoiceError when topics have to be chosen.
     """
-    transforms = Transforms(recording, findings.skips, file)
     if not options.odometry:
         findings.used["odometry"] = "none: --no-odometry"
-        return None, "", transforms
-    choice = odometry_topic(recording, options, file)
+        return RobotMotion(None, _robot(recording, transforms, findings.skips, file), "")
+    placed = _in_odom(transforms) if _is_no_topic(recording, options.odom_topic) else {}
+    choice = None if options.odom_topic in placed else odometry_topic(recording, options, file)
     if choice is not None:
-        placed = list(_decoded(recording, choice.topic, findings.skips, file))
-        robot = placed[0][0].child if placed else ""
+        rows = list(decoded(recording, choice.topic, findings.skips, file))
         source, why = choice.topic, choice.why
     else:
-        placed, robot = _odometry_in_tf(transforms, file)
-        source = f"tf from {placed[0][0].parent} to {robot}" if placed else ""
+        rows = placed.get(options.odom_topic or "", []) or _odometry_in_tf(transforms, file)
+        source = f"tf from {rows[0][0].parent} to {rows[0][0].child}" if rows else ""
         why = "no topic has odometry" if options.odom_topic is None else f"{options.odom_topic} is asked for"
-    poses = _poses(placed, source or "tf", times, header_time, findings)
+    poses = _poses(rows, source or "tf", times, header_time, findings)
     if poses is not None:
         findings.used["odometry"] = f"{source}, {why}, interpolated"
     else:
-        findings.used["odometry"] = "none in the recording" if not placed else f"none: {source} is of no use"
-        if not placed:
+        findings.used["odometry"] = "none in the recording" if not rows else f"none: {source} is of no use"
+        if not rows:
             findings.warnings.append("no nav_msgs/Odometry, and no transform from odom: no odometry")
-    return poses, robot, transforms
+    if not rows:
+        return RobotMotion(poses, "", "")
+    return RobotMotion(poses, rows[0][0].child, rows[0][0].parent)
 
 
-def mounting(
-    sweeps: Sequence[Sweep],
-    robot: str,
-    transforms: Transforms,
-    options: ReadingOptions,
-    findings: Findings,
-    file: str,
-) -> tuple[Array, bool]:
-    """The laser on the robot, and whether it hangs upside down: as the user says, else by fixed transforms.
+def _robot(recording: Recording, transforms: Transforms, skips: Skips, file: str) -> str:
+    """The robot's frame, as far as all odometry agrees on it."""
+    topics = recording.topics(ODOMETRY)
+    if topics:
+        placed = [next(decoded(recording, topic, skips, file), None) for topic in topics]
+        names = {one[0].child for one in placed if one is not None}
+        return names.pop() if len(names) == 1 else ""
+    try:
+        rows = _odometry_in_tf(transforms, file)
+    except OpenChoiceError:
+        return ""
+    return rows[0][0].child if rows else ""
 
-    Raises InputDataError when the laser is tilted or moves.
+
+def _odometry_in_tf(transforms: Transforms, file: str) -> list[Logged]:
+    """The transforms from odom to the robot.
+
+    Raises OpenChoiceError when several frames are placed in odom and may be the robot.
     """
-    if options.mount is not None:
-        findings.used["mounting"] = "--mount"
-        return np.array(options.mount, dtype=np.float64), False
-    laser = sweeps[0].frame
-    own = {sweep.pose for sweep in sweeps} - {None}
-    if len(own) > 1:
-        raise InputDataError(file, "its laser moves on the robot: its scans have different poses",
-                             "give --mount X,Y,DEG to use them as if it did not")  # fmt: skip
-    found = _chain(transforms, robot, laser)
-    chain, matrix = ([laser], np.eye(4)) if found is None else found
-    if found is None:
-        names = " or ".join([robot] if robot else BASES)
-        findings.used["mounting"] = "assumed: at the robot's centre"
-        findings.warnings.append(
-            f"no transforms lead from {names} to {laser or 'the unnamed frame of the scans'}: "
-            "the laser is taken as at the robot's centre; see --mount"
-        )
-    elif len(chain) == 1:
-        findings.used["mounting"] = f"none: the scans are in the robot's frame, {laser}"
-    else:
-        findings.used["mounting"] = f"tf {' → '.join(chain)}"
-    for pose in own:
-        inside = None if pose is None else as_matrix(pose)
-        matrix = matrix if inside is None else matrix @ inside
-    mount, hanging, tilt = planar(matrix)
-    if tilt > LARGEST_TILT:
-        problem = f"its laser is tilted by {math.degrees(tilt):.1f}° (tf {' → '.join(chain)})"
-        raise InputDataError(file, problem, "give --mount X,Y,DEG to use its scans as if it were not")
-    if hanging:
-        findings.used["mounting"] += ", upside down"
-    return mount, hanging
-
-
-def _chain(transforms: Transforms, robot: str, laser: str) -> tuple[list[str], Array] | None:
-    """The chain from the robot's frame, or what is called so, to the laser's."""
-    frames = transforms.frames
-
-    def found() -> tuple[list[str], Array] | None:
-        bases = [robot] if robot else [n for base in BASES for n in sorted(frames.names()) if _is(n, base)]
-        return next((chain for base in bases if (chain := frames.chain(base, laser)) is not None), None)
-
-    chain = found()
-    if chain is None:
-        transforms.all_moving()
-        chain = found()
-    return chain
-
-
-def _odometry_in_tf(transforms: Transforms, file: str) -> tuple[list[tuple[Placed, int]], str]:
-    """The transforms from odom to the robot, and the robot's frame.
-
-    Raises WrongUsageError when several frames are placed in odom.
-    """
-    rows = [row for row in transforms.all_moving() if _is(row[0].parent, ODOM)]
-    robots = sorted({placed.child for placed, _ in rows})
+    placed = _in_odom(transforms)
+    bases = [name for name in placed if base_of(name) in BASES]
+    robots = bases if len(bases) == 1 else list(placed)
     if len(robots) > 1:
-        bases = [name for name in robots if any(_is(name, base) for base in BASES)]
-        if len(bases) != 1:
-            raise WrongUsageError(
-                f"{file}: tf places several frames in odom, {', '.join(robots)}; "
-                "choose a topic by --odom-topic, or none by --no-odometry"
-            )
-        robots = bases
-    return [row for row in rows if row[0].child in robots], robots[0] if robots else ""
+        found = [Device(name, f"tf from {rows[0][0].parent}", len(rows)) for name, rows in placed.items()]
+        raise OpenChoiceError(file, "odometry", found, "--odom-topic", "transform")
+    return placed[robots[0]] if robots else []
+
+
+def _in_odom(transforms: Transforms) -> dict[str, list[Logged]]:
+    """The transforms from odom, by the frame that they place there."""
+    placed: dict[str, list[Logged]] = {}
+    for row in transforms.others():
+        if base_of(row[0].parent) in ODOM:
+            placed.setdefault(row[0].child, []).append(row)
+    return dict(sorted(placed.items()))
+
+
+def _is_no_topic(recording: Recording, asked: str | None) -> bool:
+    """Whether something else than a topic is asked for as odometry: it may be a frame of tf."""
+    return asked is not None and named(asked, devices(recording, ODOMETRY + TRANSFORMS)) is None
 
 
 def _poses(
-    placed: Sequence[tuple[Placed, int]], source: str, times: Order, header_time: bool, findings: Findings
+    rows: Sequence[Logged], source: str, times: Order, header_time: bool, findings: Findings
 ) -> Array | None:
     """Poses (S, 3) at the times of the scans, by the clock that these have."""
-    rows, stamps = [], []
-    for number, (one, log_time) in enumerate(placed, 1):
+    found, at = [], []
+    stamps = stamps_of(rows) if header_time else [log_time for _, log_time in rows]
+    for number, ((one, _), stamp) in enumerate(zip(rows, stamps, strict=True), 1):
         angle = heading(one.pose)
-        if angle is None:
-            findings.skips.add(f"{source}: not a pose", number)
+        if angle is None or stamp is None:
+            findings.skips.add(f"{source}: {'not a pose' if angle is None else 'without a time'}", number)
             continue
-        rows.append((one.pose.translation[0], one.pose.translation[1], angle))
-        stamps.append((one.stamp if header_time and one.stamp > 0 else log_time) / S)
-    if not rows:
+        found.append((one.pose.translation[0], one.pose.translation[1], angle))
+        at.append(stamp / S)
+    if not found:
         return None
     if times.nominal:
         findings.warnings.append(f"the scans have no times that lead to {source}: no odometry")
         return None
-    at = np.array(stamps)
-    in_order = np.argsort(at, kind="stable")
+    moments = np.array(at)
+    in_order = np.argsort(moments, kind="stable")
     return interpolated(
-        times.times, at[in_order], np.array(rows)[in_order], f"pose of {source}", findings.warnings
+        times.times, moments[in_order], np.array(found)[in_order], f"pose of {source}", findings.warnings
     )
-
-
-def _decoded(recording: Recording, topic: str, skips: Skips, file: str) -> Iterator[tuple[Placed, int]]:
-    """What the messages of a topic place, with the times when they were recorded."""
-    messages = recording.messages.get(topic, [])
-    decoders = {
-        channel: placed_decoder(channel, file) for channel in dict.fromkeys(m.channel for m in messages)
-    }
-    for number, message in enumerate(messages, 1):
-        try:
-            found = decoders[message.channel](message.data)
-        except UNDECODABLE:
-            skips.add(f"{topic}: cannot be decoded", number)
-            continue
-        for placed in found:
-            yield placed, message.log_time
-
-
-def _is(name: str, base: str) -> bool:
-    """Whether a frame is called `base`, whatever robot it is of."""
-    return name.rpartition("/")[2] == base

@@ -13,6 +13,8 @@ from numpy.typing import NDArray
 from nscan_cli.compiled import kernel
 from nscan_cli.counting import counted
 from nscan_cli.errors import InputDataError, WrongUsageError
+from nscan_cli.logs.choices import Device
+from nscan_cli.logs.frame_names import AS_USUAL, FrameNames
 from nscan_cli.poses import Array, Indices, compose
 
 TOGETHER = 256
@@ -48,6 +50,14 @@ class LogReport:
     """Why a reading is none that counts → how many there are of them."""
     unusable: InputDataError | None = None
     """What is wrong when no reading at all counts."""
+    lasers: tuple[Device, ...] = ()
+    """All that the log has, this one too."""
+    laser_option: str = ""
+    """What chooses one of them: "--laser" or "--topic"."""
+    odometries: tuple[Device, ...] = ()
+    """All that --odom-topic can choose."""
+    corrected: str = ""
+    """What tells that the log's poses are a mapper's result; empty where nothing does."""
 
     def notices(self) -> list[str]:
         """The warnings, and what was skipped, for commands that do not list it."""
@@ -98,6 +108,7 @@ class LaserLog:
     """(T,) seconds of the true poses (TRUEPOS), or None."""
     truth: Array | None = None
     """(T, 3) true poses of the robot, or None."""
+    frames: FrameNames = AS_USUAL
 
     def __len__(self) -> int:
         return len(self.stamps)

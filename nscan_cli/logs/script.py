@@ -11,11 +11,11 @@ import re
 
 import numpy as np
 
-from nscan_cli.counting import counted
 from nscan_cli.errors import InputDataError, WrongUsageError
 from nscan_cli.limits import KINDS
 from nscan_cli.logs import order
 from nscan_cli.logs.assemble import Findings, Motion, RawScans, laser_log, stacked
+from nscan_cli.logs.choices import Device, OpenChoiceError, listed
 from nscan_cli.logs.kinds import FIRST_LINE
 from nscan_cli.logs.laser import CARMEN_MAX_RANGE
 from nscan_cli.logs.odometry import interpolated
@@ -29,6 +29,7 @@ BEGIN = re.compile(rb"(POS|LASER-RANGE|LASER-SCAN)\s+\d+\s+\d+[^:]*:")
 RECORD = re.compile(
     rb"(?P<tag>[A-Z][A-Z-]*)\s+(?P<sec>\d{1,12})\s+(?P<usec>\d{1,12})(?P<head>(\s[^:]*)?):(?P<values>.*)\Z"
 )
+LASER = "LASER-RANGE"
 CM = 0.01
 """m"""
 UNUSED = (Record(0, b"", 0, ""), b"")
@@ -49,15 +50,16 @@ def read(data: bytes, file: str, source: Source, options: ReadingOptions) -> Las
     skips = Skips(file, options.strict)
     lines = _lines(data, skips)
     findings = Findings(skips, {tag: len(found) for tag, found in lines.items()})
-    lasers = [tag for tag in lines if tag.startswith("LASER-RANGE:")]
-    listed = ", ".join(f"{tag} ({counted(len(lines[tag]), 'record')})" for tag in lasers)
+    lasers = [Device(tag, LASER, len(found)) for tag, found in lines.items() if tag.startswith(f"{LASER}:")]
+    findings.lasers = tuple(lasers)
+    said = listed(lasers, "record")
     if not lasers:
         raise InputDataError(file, "has no LASER-RANGE record", "give a log with laser scans")
-    if options.laser is not None and options.laser not in lasers:
-        raise WrongUsageError(f"{file}: has no {options.laser}; --laser can be {listed}")
+    if options.laser is not None and options.laser not in [laser.name for laser in lasers]:
+        raise WrongUsageError(f"{file}: has no {options.laser}; --laser can be {said}")
     if options.laser is None and len(lasers) > 1:
-        raise WrongUsageError(f"{file}: has several lasers, {listed}; choose one by --laser")
-    laser = options.laser or lasers[0]
+        raise OpenChoiceError(file, "laser", lasers, "--laser", "record")
+    laser = options.laser or lasers[0].name
     findings.used["laser"] = "chosen by --laser" if options.laser else "the only laser"
     raw = _scans(lines[laser], skips)
     if not raw.stamps:

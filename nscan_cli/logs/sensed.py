@@ -31,7 +31,7 @@ class Sweep(NamedTuple):
     """One scan."""
 
     stamp: int
-    """ns, 0 where the message has none."""
+    """ns; 0 also where it was never set, see clock.stamps_set."""
     frame: str
     angle_min: float
     """rad"""
@@ -52,7 +52,7 @@ class Placed(NamedTuple):
     """The child frame in the parent frame at a time: a transform, or odometry."""
 
     stamp: int
-    """ns, 0 where the message has none."""
+    """ns, likewise."""
     parent: str
     child: str
     pose: Rigid

@@ -14,7 +14,7 @@ KEYS = [
     "angle_min", "angle_max", "angle_increment", "angle_increments", "start", "duration", "rate",
     "longest_gap", "odometry", "no_return",
     "beams_without_return", "beams_unusable", "beams_lost", "mounting", "range_limits", "used", "records",
-    "skipped", "backward_stamps", "truth", "warnings",
+    "skipped", "backward_stamps", "truth", "warnings", "lasers", "odometries", "corrected",
 ]  # fmt: skip
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import io
 import json
 import subprocess
@@ -12,7 +11,7 @@ import pytest
 from mcap.reader import make_reader
 
 from nscan_cli.cli.main import run
-from tests.logs.recordings import Odom, Scan, drive
+from tests.logs.recordings import drive
 from tests.logs.ros_recordings import ros2
 
 
@@ -70,31 +69,6 @@ def test_what_is_skipped_is_counted_in_messages(tmp_path, capsys):
     ]
     assert run(["info", str(path)]) == 0
     assert f"1 record: {reason}, first in message 3" in capsys.readouterr().out
-
-
-@pytest.mark.parametrize(
-    ("arguments", "code", "said"),
-    [
-        ([], 2, "/rear (12 messages), /scan (12 messages); choose one by --topic"),
-        (["--topic", "/scan"], 2, "/odom (13 messages), /wheels (13 messages); choose one by --odom-topic"),
-        (["--topic", "/scan", "--odom-topic", "/wheels"], 0, ""),
-        (["--topic", "/scan", "--no-odometry"], 0, ""),
-        (
-            ["--topic", "/front", "--no-odometry"],
-            2,
-            "has no topic /front; --topic can be /rear (12 messages), /scan",
-        ),
-    ],
-)
-def test_what_is_open_is_settled_by_options(tmp_path, capsys, arguments, code, said):
-    more = [dataclasses.replace(one, topic="/wheels") for one in drive() if isinstance(one.content, Odom)]
-    more += [dataclasses.replace(one, topic="/rear") for one in drive() if isinstance(one.content, Scan)]
-    path = tmp_path / "many.mcap"
-    path.write_bytes(ros2(sorted(drive() + more, key=lambda one: one.log_time)))
-    assert run(["info", str(path), *arguments]) == code
-    error = capsys.readouterr().err
-    assert said in error
-    assert len(error.splitlines()) == (1 if code else 0)
 
 
 def test_a_cut_off_recording(recording, tmp_path, capsys):

@@ -13,6 +13,7 @@ import pytest
 from nscan_cli.exports.mcap import TOPICS, recording
 from nscan_cli.exports.messages import Messages, scan_message
 from nscan_cli.graph.model import Graph
+from nscan_cli.logs.frame_names import FrameNames
 from nscan_cli.logs.load import read_log
 from nscan_cli.logs.scan import LaserLog
 from nscan_cli.mapping.occupancy import OccupancyGrid, occupancy_grid
@@ -240,3 +241,30 @@ def test_a_scan_has_its_own_beams():
     message = scan_message(Messages(), log, 1, 0)
     assert len(message.ranges) == 90
     assert message.angle_max == pytest.approx(log.angle_min[1] + 89 * log.angle_increment[1])
+
+
+@pytest.mark.parametrize(
+    ("names", "links"),
+    [
+        (
+            FrameNames("front", "chassis", "wheels"),
+            {("map", "wheels"), ("wheels", "chassis"), ("chassis", "front")},
+        ),
+        # A laser in the robot's own frame has no transform.
+        (FrameNames("chassis", "chassis", "odom"), {("map", "odom"), ("odom", "chassis")}),
+    ],
+)
+def test_frames_keep_the_names_that_the_log_has(names, links):
+    log = dataclasses.replace(small_log(), frames=names)
+    found = read_back(recording(log, NODES, NODES, small_run_graph(log), grid_of(log)))
+    placed = {
+        (link.header.frame_id, link.child_frame_id)
+        for topic in ("/tf", "/tf_static")
+        for _time, message in found.get(topic, [])
+        for link in message.transforms
+    }
+    assert placed == links
+    assert {message.header.frame_id for _time, message in found["/scan"]} == {names.laser}
+    assert {message.header.frame_id for topic in ("/map", "/path") for _time, message in found[topic]} == {
+        "map"
+    }

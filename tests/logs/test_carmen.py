@@ -294,3 +294,43 @@ def test_records_of_unknown_kinds_are_told(tmp_path):
     log = read(tmp_path, flaser(1), flaser(2).replace("FLASER", "FLASEQ"), flaser(3), "SONAR 1 2 3 h 4")
     assert len(log) == 2
     assert log.report.warnings[0] == "1 record of kinds unknown to CARMEN: FLASEQ (1)"
+
+
+def test_a_corrected_log_can_be_read_without_its_poses(tmp_path):
+    log = read(tmp_path, *CORRECTED["NEFF"], options=ReadingOptions(odometry=False))
+    assert log.odometry is None
+    assert log.report.corrected == "it has NEFF records"
+    assert log.report.warnings[0] == "the poses are a mapper's result, not odometry (it has NEFF records)"
+
+
+def test_where_no_time_was_measured_the_loggers_holds(tmp_path):
+    """PARAM and SYNC have absolute times there, all others seconds since the logger's start."""
+
+    def at(line: str, logged: float) -> str:
+        return f"{line.rsplit(' ', 3)[0]} 0 nohost {logged}"
+
+    log = read(
+        tmp_path,
+        "PARAM robot_width 1 nohost 1096466466.5",
+        "SYNC some 1096466466.9 nohost 1096466466.9",
+        at("ODOM 0 0 0 0 0 0 0 h 0", 1.0),
+        at("RAWLASER1 0 -1.57 3.14 1.57 80 0.01 0 3 1 2 3 0 0 h 0", 1.25),
+        at("RAWLASER1 0 -1.57 3.14 1.57 80 0.01 0 3 1 2 3 0 0 h 0", 1.75),
+        at("ODOM 4 0 0 0 0 0 0 h 0", 2.0),
+        at("TRUEPOS 7 0 0 0 0 0 0 h 0", 1.5),
+    )
+    assert log.stamps == ("1.25", "1.75")
+    assert log.odometry is not None
+    np.testing.assert_allclose(log.odometry[:, 0], [1.0, 3.0])
+    assert log.truth_times is not None
+    assert log.truth_times.tolist() == [1.5]
+    assert "the scans' own time stamps say nothing: the logger's are used" in log.report.warnings
+
+
+def test_times_of_the_logger_that_say_nothing_either(tmp_path):
+    log = read(tmp_path, flaser("0"), flaser("0"), flaser("0"))
+    assert log.stamps == ("0.000000", "0.100000", "0.200000")
+    assert "file order" in log.report.warnings[0]
+    # Without a trailer there is no time of a logger.
+    log = read(tmp_path, "FLASER 2 1 2 0 0 0 0 0 0.5", "FLASER 2 1 2 0 0 0 0 0 0.7")
+    assert log.stamps == ("0.000000", "0.100000")

@@ -64,7 +64,10 @@ def test_the_pose_of_the_scans_is_part_of_the_mounting(read_scans):
     np.testing.assert_array_equal(hanging.angle_min, [1])
     with pytest.raises(InputDataError, match=r"tilted by 5\.7°"):
         read_scans(scan(1, pose=pose(0, 0, 0, 0.1)))
-    with pytest.raises(InputDataError, match=r"its laser moves on the robot.*--mount"):
+    with pytest.raises(
+        InputDataError,
+        match=r"its laser slides, by up to 0.50 m to either side: the pose in its scans moves; .*--mount",
+    ):
         read_scans(scan(1, pose=pose(0, 0, 0)), scan(2, pose=pose(1, 0, 0)))
     moving = read_scans(scan(1, pose=pose(0, 0, 0)), scan(2, pose=pose(1, 0, 0)), mount=(0.0, 0.0, 0.0))
     assert len(moving) == 2

@@ -34,7 +34,7 @@ def test_outside_the_ends_hold_and_are_told():
     )
     assert found is not None
     np.testing.assert_allclose(found[:, 0], [1, 1.5, 2])
-    assert warnings == ["2 scans before the first record or after the last"]
+    assert warnings == ["2 scans before the first record or after the last, which is taken for them"]
 
 
 def test_none_inside_is_no_odometry():
@@ -42,4 +42,7 @@ def test_none_inside_is_no_odometry():
     assert (
         interpolated(np.array([5.0, 6.0]), np.array([1.0, 2.0]), np.zeros((2, 3)), "record", warnings) is None
     )
-    assert warnings == ["no scan lies between the first record and the last: no odometry"]
+    assert warnings == [
+        "no scan lies between the first record and the last: these are from 1.000 s to 2.000 s, "
+        "the scans from 5.000 s to 6.000 s: no odometry"
+    ]

@@ -54,7 +54,7 @@ def test_version_1(tmp_path):
     np.testing.assert_allclose(log.odometry, [[1.1, 0.5, 0.2], [1.15, 0.5, 0.25]], atol=1e-6)
     assert log.report.used == {
         "laser": "the only laser device",
-        "odometry": "position:0, the only position2d device, interpolated",
+        "odometry": "position:0, the only position device, interpolated",
         "mounting": "assumed: at the robot's centre",
         "range_min": "none in a Player log",
         "range_max": "assumed, as for CARMEN",

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from nscan_cli.errors import InputDataError
 from nscan_cli.logs.load import read_log
 from tests.data import data_file
 
@@ -40,3 +41,15 @@ def test_walker_needs_nothing_but_its_path():
     assert log.report.skipped == {}
     finite = log.ranges[np.isfinite(log.ranges)]
     assert 0.12 <= finite.min() <= finite.max() <= 3.5
+
+
+def test_a_laser_that_nods_is_refused_by_name():
+    with pytest.raises(InputDataError, match=r"nods, from 40\.1° down to .*: tilt_base → tilt_axis moves"):
+        read_log(str(data_file("field/tilting.bag")))
+
+
+def test_a_robot_that_rocks():
+    log = read_log(str(data_file("strangers/moving-tf.mcap")))
+    # base_link rocks by ±2° under a laser 0.3 m ahead that looks back.
+    np.testing.assert_allclose(log.mount[:2], (0.3, 0.0), atol=2e-3)
+    assert abs(log.mount[2]) == pytest.approx(np.pi, abs=1e-3)
