@@ -101,7 +101,7 @@ def test_scans_have_their_own_beams(tmp_path):
     _, back = read_back(tmp_path, log)
     assert_the_same_scans(back, log)
     assert back.own_beams().tolist() == own.tolist()
-    assert back.report.warnings == (f"the poses are a mapper's result ({SIGN}), used as odometry",)
+    assert back.report.warnings == (f"the poses are a mapper's result, not odometry ({SIGN})",)
 
 
 def test_a_laser_that_sees_far_without_a_limit(tmp_path):
