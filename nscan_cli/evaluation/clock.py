@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from nscan_cli.evaluation.similarity import fit
 from nscan_cli.graph.tum import Trajectory
 from nscan_cli.poses import Array, wrap
 
@@ -22,6 +23,11 @@ ENOUGH, MOVED = 0.6, 0.5
 """Of the poses within the reference as it is, and of how far it moves meanwhile: so much at any lag."""
 ELSEWHERE, UNIQUE = 1.0, 1.5
 """s from the best lag, from where on the cost has to be so many times higher: robots can drive in circles."""
+
+FEWEST = 20
+"""Poses; of fewer, some lag makes any two paths fit."""
+DRIVEN, WELL = 0.2, 0.1
+"""m (RMS about the mean) that a path has to move by, and of it, what may be left between it and another."""
 
 Cost = Callable[[Array, Array], float]
 """Of poses (N, 3) and those that they should be."""
@@ -74,13 +80,27 @@ class Clocks:
             lag = float(min(np.linspace(lag - step, lag + step, 21).tolist(), key=at))
             step /= 10
         is_unique = not len(others) or at(lag) * UNIQUE < float(others.min())
-        return (lag, at(lag)) if is_unique and abs(lag) >= SMALLEST else None
+        return (lag, at(lag)) if is_unique else None
 
     def _within(self, lag: float) -> NDArray[np.bool_]:
         """Which poses lie between the first and the last of the reference."""
         times = self.times + lag
         inside: NDArray[np.bool_] = (times >= self.reference.times[0]) & (times <= self.reference.times[-1])
         return inside
+
+
+def far_lag(result: Trajectory, reference: Trajectory) -> float | None:
+    """The lag (s) of clocks that have no time in common, where one makes the paths fit without doubt."""
+    middle = float(reference.times[[0, -1]].mean() - result.times[[0, -1]].mean())
+    clocks = Clocks.of(result.times + middle, result.poses, reference)
+    if len(result) < FEWEST or len(reference) < FEWEST:
+        return None
+    found = clocks.best(lambda poses, truth: fit(poses, truth).apart_scaled)
+    if found is None:
+        return None
+    there = fit(*clocks.at(found[0]))
+    fits = there.spread > DRIVEN and there.apart_scaled < WELL * there.spread
+    return middle + found[0] if fits else None
 
 
 def _spread(poses: Array) -> float:

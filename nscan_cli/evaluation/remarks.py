@@ -14,7 +14,7 @@ import numpy as np
 
 from nscan_cli.counting import counted
 from nscan_cli.evaluation.alignment import alignment
-from nscan_cli.evaluation.clock import Clocks
+from nscan_cli.evaluation.clock import DRIVEN, SMALLEST, WELL, Clocks
 from nscan_cli.evaluation.similarity import Fit, Lever, fit, heading_difference, lever
 from nscan_cli.evaluation.trajectory import TrajectoryErrors
 from nscan_cli.graph.tum import Trajectory
@@ -22,10 +22,6 @@ from nscan_cli.poses import Array, compose
 
 BETTER = 3.0
 """How many times nearer positions have to come to each other."""
-WELL = 0.1
-"""Of the reference's spread; no more may be left between the positions."""
-DRIVEN = 0.2
-"""m (RMS about the mean); of a robot that has moved less, positions say nothing of clocks and units."""
 UNITS = {1000.0: "millimetres", 100.0: "centimetres", 1 / 0.3048: "feet", 1 / 0.0254: "inches"}
 UNIT_TOLERANCE, SMALLEST_FACTOR = 0.03, 0.03
 SURE = 5.0
@@ -159,6 +155,7 @@ def _lag_and_lever(clocks: Clocks, found: Lever | None, now: Fit) -> tuple[float
     least = min(
         [now.apart_scaled, *(one[1] for one in (alone, both) if one)] + ([found.apart] if found else [])
     )
+    alone, both = (one if one and abs(one[0]) >= SMALLEST else None for one in (alone, both))
     by_lag = alone if alone and _is_better(alone[1], now.apart_scaled, now) else None
     # What is left then may be but rounding.
     enough = NEARLY * least + EXACT * now.spread

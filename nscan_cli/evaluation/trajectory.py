@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from nscan_cli.errors import InputDataError
 from nscan_cli.evaluation.alignment import Alignment, alignment
 from nscan_cli.evaluation.association import mutual, no_match
+from nscan_cli.evaluation.clock import far_lag
 from nscan_cli.evaluation.statistics import Spread
 from nscan_cli.graph.tum import Trajectory
 from nscan_cli.poses import Array, compose, relative, wrap
@@ -55,7 +56,9 @@ def trajectory_errors(
     """
     rows, partners = mutual(result.times, reference.times)
     if len(rows) == 0:
-        raise no_match(name, result.times, reference_name, reference.times)
+        lag = far_lag(result, reference)
+        fits = "" if lag is None else f"; stamps off by {lag:+.2f} s fit best"
+        raise no_match(name, result.times, reference_name, reference.times, fits)
     if len(rows) == 1:
         problem = f"only one pose matches {reference_name}"
         raise InputDataError(name, problem, "give a reference that covers more of it")

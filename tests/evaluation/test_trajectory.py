@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -10,6 +12,7 @@ from nscan_cli.evaluation.alignment import alignment
 from nscan_cli.evaluation.trajectory import trajectory_errors
 from nscan_cli.graph.tum import Trajectory
 from nscan_cli.poses import compose
+from tests.evaluation import paths
 
 
 def trajectory(poses: np.ndarray, start: float = 0.0) -> Trajectory:
@@ -94,6 +97,21 @@ def test_no_common_stamp_says_the_spans():
         InputDataError, match=r"a.json: no stamp of b.tum .* 0.000 to 2.000 s .*\+100.000 s off"
     ):
         trajectory_errors(trajectory(truth), trajectory(truth, start=100.0), "a.json", "b.tum")
+
+
+@pytest.mark.parametrize("lag", [1000.0, -77.0, 1.7e9])
+def test_clocks_that_have_no_time_in_common_are_told_by_the_paths(lag):
+    whole = paths.trajectory(paths.drive())
+    part = slice(100, 400)
+    result = Trajectory(whole.times[part], paths.noisy(whole.poses[part]), whole.stamps[part])
+    reference = replace(whole, times=whole.times + lag)
+    with pytest.raises(
+        InputDataError, match=rf"off at the start; stamps off by \{lag:+.1f}\d s fit best; give"
+    ):
+        trajectory_errors(result, reference)
+    other = paths.trajectory(paths.drive(seed=5), start=100.0 + lag)
+    with pytest.raises(InputDataError, match=r"off at the start; give the reference of this log"):
+        trajectory_errors(result, other)
 
 
 def test_one_common_stamp_is_not_enough():
