@@ -7,6 +7,7 @@ commas, other columns, and times in ns (pose_columns.py).
 from __future__ import annotations
 
 import math
+from array import array
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -100,11 +101,11 @@ def read_tum(path: str) -> Trajectory:
 def parse_tum(data: bytes, name: str) -> Trajectory:
     """The trajectory of TUM text; `name` is the file that errors name. Raises InputDataError."""
     stamps: list[str] = []
-    rows: list[list[float]] = []
+    values = array("d")
     columns: Columns | None = None
     power = 0
     for number, line in lines_of(data):
-        if not rows and is_header(line):
+        if not stamps and is_header(line):
             named = columns_named(line)
             columns = named or columns
             if named or line[0] in COMMENTS:
@@ -112,18 +113,18 @@ def parse_tum(data: bytes, name: str) -> Trajectory:
         if line[0] in COMMENTS:
             continue
         try:
-            if not rows:
+            if not stamps:
                 columns = columns or columns_of(line)
                 power = power_of(fields_of(line)[columns.time]) if columns.power is None else columns.power
             assert columns is not None
             stamp, pose = _pose(fields_of(line), columns, power)
         except (ValueError, IndexError) as error:
             raise InputDataError(name, str(error), REMEDY, line=number) from error
-        rows.append(pose)
+        values.extend(pose)
         stamps.append(stamp)
-    if not rows:
+    if not stamps:
         raise InputDataError(name, "no pose in it", REMEDY)
-    return Trajectory.in_space(stamps, np.array(rows))
+    return Trajectory.in_space(stamps, np.array(values).reshape(-1, 7))
 
 
 def _pose(fields: list[str], columns: Columns, power: int) -> tuple[str, list[float]]:
