@@ -32,7 +32,15 @@ DRAWN = 10
 @argument("result", type=FILE, tells="A graph, a TUM trajectory, or a CARMEN log with corrected poses; - is "
           "standard input.")  # fmt: skip
 @option("--relations", type=FILE, metavar="FILE", help="Relations of the benchmark of Kümmerle et al. 2009.")
-@option("--reference", type=FILE, metavar="FILE", help="A TUM trajectory, a graph, or a log with TRUEPOS.")
+@option(
+    "--reference",
+    type=FILE,
+    metavar="FILE",
+    help="A trajectory (TUM, or EuRoC's CSV), a graph, a log with TRUEPOS, or a recording.",
+)
+@option("--reference-topic", metavar="TOPIC",
+        help="Topic of the poses in the recording --reference, such as /vicon/robot/pose; of transforms "
+        "/tf:PARENT.CHILD.")  # fmt: skip
 @option("--worst", type=click.IntRange(0), metavar="N", help="List the N worst relations.")
 @option("--max-translation", type=click.FloatRange(0), metavar="M",
         help="Exit with 3 when the mean on relations, or the RMSE of the ATE, is above.")  # fmt: skip
@@ -45,6 +53,7 @@ def command(
     result: str,
     relations: str | None,
     reference: str | None,
+    reference_topic: str | None,
     worst: int | None,
     max_translation: float | None,
     max_rotation: float | None,
@@ -60,9 +69,16 @@ def command(
     needed: translational and rotational error, mean ± sd, median, mean square and maximum. With
     --reference, the trajectory is aligned first: absolute error (ATE), and relative error (RPE) per
     metre of path. The options that say how to read a log hold where RESULT or the reference is one.
+
+    What the two show of each other beside the errors is noted: clocks that differ, another unit, turned
+    frames, a reference of another point of the robot or out of the plane, two runs in one file.
     """
     if relations is None and reference is None:
         raise WrongUsageError("nothing to measure against; give --relations or --reference")
+    if reference is None and reference_topic is not None:
+        raise WrongUsageError(
+            "--reference-topic is of a recording that is the reference; give --reference too"
+        )
     if [result, relations, reference].count("-") > 1:
         raise WrongUsageError("standard input (-) can be one input only; give the others by their path")
     check_plot(plot, None, [result, relations, reference])
@@ -71,13 +87,15 @@ def command(
     from nscan_cli.evaluation.measure import measure
     from nscan_cli.evaluation.report import as_document, as_text
 
-    measured = measure(result, relations, reference, worst or 0, reading)
+    measured = measure(result, relations, reference, worst or 0, reading, reference_topic)
     evaluation = measured.evaluation
     for notice in measured.notices:
         say(f"warning: {notice}", quiet)
     if evaluation.relations and evaluation.relations[1].too_far:
         table, errors = evaluation.relations
         say(f"warning: a stamp is far from every pose in {errors.too_far} of {len(table)} relations", quiet)
+    for remark in evaluation.remarks:
+        say(f"note: {remark}", quiet)
     if as_json:
         click.echo(json.dumps(as_document(evaluation), indent=2, allow_nan=False))
     else:

@@ -46,12 +46,12 @@ def check_plot(plot: str | None, output: str | None, inputs: Sequence[str | None
         return
     if plot == "-":
         raise WrongUsageError("--plot -: only the result can go to standard output; name a file")
-    check_png(f"--plot {plot}", plot)
     file = os.path.realpath(plot)
     if output not in (None, "-") and os.path.realpath(str(output)) == file:
         raise WrongUsageError(f"--plot {plot}: is the result's name too; give each its own")
     if file in (os.path.realpath(path) for path in inputs if path and path != "-"):
         raise WrongUsageError(f"--plot {plot}: is an input, and would be replaced; choose another name")
+    check_png(f"--plot {plot}", plot)
     check_writable(plot)
 
 

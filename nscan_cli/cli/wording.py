@@ -6,6 +6,8 @@ from typing import Any
 
 import click
 
+AFTER_THE_COMMAND = ("-q", "--quiet", "-v", "--verbose", "--config", "--dump-config")
+"""Options that every command has, and nothing has before its name."""
 UNITS = {"M": "m", "DEG": "degrees", "T": "s", "SECONDS": "s"}
 """Units of numbers, by what the help writes in their place."""
 
@@ -45,4 +47,6 @@ def usage_problem(error: click.ClickException) -> str:
     if isinstance(error, click.BadParameter) and not isinstance(error, click.MissingParameter):
         place = error.param_hint or (error.param.get_error_hint(error.ctx) if error.param else "")
         return f"{place}: {error.message.rstrip('.')}".removeprefix(": ")
+    if isinstance(error, click.NoSuchOption) and error.option_name in AFTER_THE_COMMAND:
+        return f"{error.option_name} stands after the command's name"
     return error.format_message().rstrip(".")

@@ -33,13 +33,18 @@ def mutual(times: Array, reference: Array) -> tuple[NDArray[np.int64], NDArray[n
     return rows[pairs], partner[pairs]
 
 
-def no_match(result: str, times: Array, reference: str, reference_times: Array) -> InputDataError:
-    """The error of a result that has no stamp in common with its reference; it shows both spans."""
+def no_match(
+    result: str, times: Array, reference: str, reference_times: Array, fits: str = ""
+) -> InputDataError:
+    """The error of a result that has no stamp in common with its reference; it shows both spans.
+
+    `fits` says by how much the stamps would have to differ, where that is known.
+    """
     a, b, c, d = times.min(), times.max(), reference_times.min(), reference_times.max()
     problem = (
         f"no stamp of {reference} lies within {TOLERANCE} s of it; "
         f"the result spans {a:.3f} to {b:.3f} s ({counted(len(times), 'pose')}), "
         f"the reference {c:.3f} to {d:.3f} s ({counted(len(reference_times), 'stamp')}), "
-        f"{c - a:+.3f} s off at the start"
+        f"{c - a:+.3f} s off at the start{fits}"
     )
     return InputDataError(result, problem, "give the reference of this log, in the same clock")

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from nscan_cli.evaluation.relations import read_relations, relation_errors
+from nscan_cli.evaluation.remarks import remarks
 from nscan_cli.evaluation.report import Evaluation
 from nscan_cli.evaluation.results import load_reference, load_trajectory
 from nscan_cli.evaluation.trajectory import trajectory_errors
@@ -31,22 +32,25 @@ def measure(
     reference: str | None,
     worst: int = 0,
     reading: ReadingOptions = AS_FOUND,
+    reference_topic: str | None = None,
 ) -> Measured:
     """The errors of the file `result`, and its `worst` relations.
+
+    Of a recording, the reference's poses are those on `reference_topic`.
 
     Raises InputMissingError, InputDataError, and WrongUsageError where the options do not fit a log.
     """
     notices: list[str] = []
     trajectory = load_trajectory(result, reading, notices)
     on_relations, on_reference, truth = None, None, None
+    found: tuple[str, ...] = ()
     if relations is not None:
         table = read_relations(relations)
         on_relations = (table, relation_errors(trajectory, table, label(result)))
     if reference is not None:
-        truth = load_reference(reference, reading, notices)
-        on_reference = (
-            base_name(reference),
-            trajectory_errors(trajectory, truth, label(result), label(reference)),
-        )
-    evaluation = Evaluation(base_name(result), len(trajectory), on_relations, on_reference, worst)
+        truth = load_reference(reference, reading, notices, reference_topic)
+        errors = trajectory_errors(trajectory, truth, label(result), label(reference))
+        on_reference = (base_name(reference), errors)
+        found = tuple(remarks(trajectory, truth, errors))
+    evaluation = Evaluation(base_name(result), len(trajectory), on_relations, on_reference, worst, found)
     return Measured(evaluation, trajectory, truth, tuple(notices))

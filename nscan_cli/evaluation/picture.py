@@ -42,7 +42,7 @@ def picture(evaluation: Evaluation, result: Trajectory, reference: Trajectory | 
             f"{evaluation.result} on {name}: mean error {metres.mean:.4f} ± {metres.sd:.4f} m, "
             f"RMSE {metres.rmse:.4f} m"
         )
-        aligned = compose(against.alignment, result.poses)
+        aligned = compose(against.alignment.motion, result.poses)
         panels.append(
             plot_against(aligned, against.rows, against.translation, reference.poses, title, beside)
         )

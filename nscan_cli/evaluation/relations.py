@@ -6,7 +6,6 @@ relative pose of each pair of stamps is compared with the reference's, and so no
 
 from __future__ import annotations
 
-import io
 import math
 from dataclasses import dataclass
 
@@ -16,6 +15,7 @@ from numpy.typing import NDArray
 from nscan_cli.errors import InputDataError
 from nscan_cli.evaluation.association import TOLERANCE, nearest, no_match
 from nscan_cli.evaluation.statistics import Spread
+from nscan_cli.graph.pose_columns import fields_of, lines_of
 from nscan_cli.graph.tum import Trajectory
 from nscan_cli.inputs import base_name, label, read_text
 from nscan_cli.limits import DISTANCE, GRAPH, TIME
@@ -89,9 +89,9 @@ def read_relations(path: str) -> Relations:
     stamps: list[tuple[str, str]] = []
     rows: list[list[float]] = []
     lines: list[int] = []
-    for number, line in enumerate(io.BytesIO(read_text(path, GRAPH)), start=1):
-        fields = line.decode("utf-8", errors="replace").split()
-        if not fields or fields[0].startswith("#"):
+    for number, line in lines_of(read_text(path, GRAPH)):
+        fields = fields_of(line)
+        if line.startswith("#"):
             continue
         try:
             rows.append(_values(fields))

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
 from nscan_cli.counting import counted
+from nscan_cli.evaluation.alignment import Alignment
 from nscan_cli.evaluation.association import TOLERANCE
 from nscan_cli.evaluation.relations import RelationErrors, Relations
 from nscan_cli.evaluation.statistics import Spread
@@ -27,6 +29,8 @@ class Evaluation:
     reference: tuple[str, TrajectoryErrors] | None = None
     worst: int = 0
     """How many of the worst relations are listed."""
+    remarks: tuple[str, ...] = ()
+    """What result and reference show of each other that no error says."""
 
     def bounded(self) -> list[tuple[str, float, float]]:
         """What limits are held against: (name, m, degrees); means on relations, RMSE of the ATE."""
@@ -64,9 +68,19 @@ def as_text(evaluation: Evaluation) -> str:
         }
         blocks.append(
             f"reference  {name}: {errors_.matched} poses match within {TOLERANCE} s, "
-            f"{errors_.unmatched} do not\n\n" + _table(rows)
+            f"{errors_.unmatched} do not\n{_aligned(errors_.alignment)}\n" + _table(rows)
         )
     return "\n\n".join(blocks) + "\n"
+
+
+def _aligned(alignment: Alignment) -> str:
+    """A line for an alignment that is not the usual one."""
+    if alignment.by == "positions":
+        return ""
+    return (
+        f"alignment  its angle is that of the headings: result and reference move by\n"
+        f"           {alignment.common:.3f} m together, which leaves it open\n"
+    )
 
 
 def as_document(evaluation: Evaluation) -> dict[str, Any]:
@@ -91,6 +105,7 @@ def as_document(evaluation: Evaluation) -> dict[str, Any]:
             "name": name,
             "matched": against.matched,
             "unmatched": against.unmatched,
+            "alignment": _alignment_record(against),
             "ate": {
                 "translation": _figures(against.absolute_translation),
                 "rotation": _figures(against.absolute_rotation),
@@ -101,7 +116,19 @@ def as_document(evaluation: Evaluation) -> dict[str, Any]:
                 "rotation": _figures(against.relative_rotation),
             },
         }
+    document["notes"] = list(evaluation.remarks)
     return document
+
+
+def _alignment_record(errors: TrajectoryErrors) -> dict[str, Any]:
+    """What takes the result to the reference, what its angle is from, and of how many pairs."""
+    x, y, angle = errors.alignment.motion.tolist()
+    return {
+        "translation": [round(x, 9) + 0.0, round(y, 9) + 0.0],
+        "rotation": round(math.degrees(angle), 9) + 0.0,
+        "rotation_from": errors.alignment.by,
+        "pairs": errors.matched,
+    }
 
 
 def _table(rows: Mapping[str, Spread | None]) -> str:

@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-import io
 from dataclasses import replace
 
-from nscan_cli.errors import InputDataError
+from nscan_cli.errors import InputDataError, WrongUsageError
 from nscan_cli.graph.json_file import parse_graph
+from nscan_cli.graph.pose_columns import are_poses
 from nscan_cli.graph.tum import Trajectory, parse_tum
 from nscan_cli.inputs import label, read_bytes
 from nscan_cli.limits import GRAPH, MB, ExceededError
 from nscan_cli.logs.load import AS_FOUND, content_of, log_from
 from nscan_cli.logs.options import ReadingOptions
+from nscan_cli.logs.recorded_poses import poses_on, recording_in
 from nscan_cli.logs.scan import LaserLog
 
 
@@ -23,7 +24,7 @@ def load_trajectory(
     What a user should know of the file is added to the `notices`. Raises InputMissingError,
     InputDataError, and WrongUsageError where the options do not fit a log.
     """
-    loaded = _load(path, options, notices)
+    loaded = _loaded(read_bytes(path), path, options, [] if notices is None else notices)
     if isinstance(loaded, Trajectory):
         return loaded
     if loaded.odometry is None:
@@ -34,27 +35,45 @@ def load_trajectory(
 
 
 def load_reference(
-    path: str, options: ReadingOptions = AS_FOUND, notices: list[str] | None = None
+    path: str,
+    options: ReadingOptions = AS_FOUND,
+    notices: list[str] | None = None,
+    topic: str | None = None,
 ) -> Trajectory:
-    """The poses of a TUM file or a graph, or the true poses (TRUEPOS) in a log; likewise."""
-    loaded = _load(path, options, notices)
+    """The poses of a table (TUM, EuRoC) or a graph, the true poses (TRUEPOS) in a log, or those on a topic.
+
+    A recording needs the topic, and nothing else may have one. Raises likewise.
+    """
+    name, stored = label(path), read_bytes(path)
+    notices = [] if notices is None else notices
+    data, lost = content_of(stored, path, options.salvage)
+    try:
+        recording = recording_in(data, name, options.salvage)
+    except ExceededError as error:
+        raise InputDataError(name, str(error), error.remedy) from error
+    if recording is not None:
+        notices += [f"{name}: {warning}" for warning in ([lost] if lost else []) + recording.warnings]
+        return Trajectory.in_space(*poses_on(recording, topic, name, notices))
+    if topic is not None:
+        raise WrongUsageError(f"{name}: is no recording, and has no topics; leave out --reference-topic")
+    loaded = _loaded(stored, path, options, notices)
     if isinstance(loaded, Trajectory):
         return loaded
     if loaded.truth is None or loaded.truth_times is None:
         problem = "the log has no true poses (TRUEPOS)"
-        raise InputDataError(label(path), problem, "give a TUM file or a log with TRUEPOS as the reference")
+        raise InputDataError(name, problem, "give a TUM file or a log with TRUEPOS as the reference")
     stamps = [repr(time) for time in loaded.truth_times.tolist()]
     return Trajectory.in_order(loaded.truth_times, loaded.truth, stamps)
 
 
-def _load(path: str, options: ReadingOptions, notices: list[str] | None) -> Trajectory | LaserLog:
-    name, stored = label(path), read_bytes(path)
-    notices = [] if notices is None else notices
+def _loaded(stored: bytes, path: str, options: ReadingOptions, notices: list[str]) -> Trajectory | LaserLog:
+    """The trajectory or the log in the bytes that `path` has."""
+    name = label(path)
     data, lost = content_of(stored, path, options.salvage)
     if not data.strip():
         raise InputDataError(name, "is empty", "give a graph, a TUM file or a log")
     is_graph = data.lstrip().startswith(b"{")
-    if not is_graph and not _begins_with_numbers(data):
+    if not is_graph and not are_poses(data):
         del data
         log = log_from(stored, path, replace(options, allow_corrected=True), even_unusable=True)
         # That its poses are corrected ones is as it should be; what is lost or skipped is not.
@@ -73,20 +92,3 @@ def _load(path: str, options: ReadingOptions, notices: list[str] | None) -> Traj
         graph = parse_graph(data, name)
         return Trajectory.in_order(graph.times, graph.poses, graph.stamps)
     return parse_tum(data, name)
-
-
-def _begins_with_numbers(data: bytes) -> bool:
-    """Whether the first line that is neither blank nor a comment consists of numbers alone."""
-    for line in io.BytesIO(data):
-        fields = line.split()
-        if fields and not fields[0].startswith(b"#"):
-            return all(_is_number(field) for field in fields)
-    return False
-
-
-def _is_number(text: bytes) -> bool:
-    try:
-        float(text)
-    except ValueError:
-        return False
-    return True

@@ -11,7 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nscan_cli.errors import InputDataError
+from nscan_cli.evaluation.alignment import Alignment, alignment
 from nscan_cli.evaluation.association import mutual, no_match
+from nscan_cli.evaluation.clock import far_lag
 from nscan_cli.evaluation.statistics import Spread
 from nscan_cli.graph.tum import Trajectory
 from nscan_cli.poses import Array, compose, relative, wrap
@@ -28,10 +30,12 @@ class TrajectoryErrors:
     """Poses of the result that have their match in the reference."""
     unmatched: int
     """Poses of the result that have none."""
-    alignment: Array
-    """(3,) motion that takes the result into the frame of the reference."""
+    alignment: Alignment
+    """What takes the result into the frame of the reference."""
     rows: NDArray[np.int64]
     """(matched,) rows of the result's poses that have their match."""
+    partners: NDArray[np.int64]
+    """(matched,) rows of the reference that these match."""
     translation: Array
     """(matched,) m, absolute, of the poses in `rows`."""
     absolute_translation: Spread
@@ -44,7 +48,7 @@ class TrajectoryErrors:
 def trajectory_errors(
     result: Trajectory, reference: Trajectory, name: str = "result", reference_name: str = "the reference"
 ) -> TrajectoryErrors:
-    """ATE after the best rigid alignment, and RPE, of the poses that match in time.
+    """ATE after the best rigid alignment (alignment.py), and RPE, of the poses that match in time.
 
     Poses match that are each other's nearest in time, at most 0.1 s apart. The RPE compares the motion
     from every matched pose to the first one at least 1 m of path later. The names are for messages.
@@ -52,39 +56,29 @@ def trajectory_errors(
     """
     rows, partners = mutual(result.times, reference.times)
     if len(rows) == 0:
-        raise no_match(name, result.times, reference_name, reference.times)
+        lag = far_lag(result, reference)
+        fits = "" if lag is None else f"; stamps off by {lag:+.2f} s fit best"
+        raise no_match(name, result.times, reference_name, reference.times, fits)
     if len(rows) == 1:
         problem = f"only one pose matches {reference_name}"
         raise InputDataError(name, problem, "give a reference that covers more of it")
     poses, truth = result.poses[rows], reference.poses[partners]
-    motion = alignment(poses, truth)
-    aligned = compose(motion, poses)
+    found = alignment(poses, truth)
+    aligned = compose(found.motion, poses)
     translation = np.hypot(*(aligned - truth)[:, :2].T)
     relative_errors = _relative_errors(poses, truth)
     return TrajectoryErrors(
         matched=len(rows),
         unmatched=len(result) - len(rows),
-        alignment=motion,
+        alignment=found,
         rows=rows,
+        partners=partners,
         translation=translation,
         absolute_translation=Spread.of(translation),
         absolute_rotation=Spread.of(np.degrees(np.abs(wrap(aligned[:, 2] - truth[:, 2])))),
         relative_translation=Spread.of(relative_errors[0]) if len(relative_errors[0]) else None,
         relative_rotation=Spread.of(relative_errors[1]) if len(relative_errors[1]) else None,
     )
-
-
-def alignment(poses: Array, truth: Array) -> Array:
-    """The rigid motion (3,) that brings positions of `poses` (N, 3) nearest to those of `truth` (N, 3).
-
-    Least squares in closed form: with positions from their means, a and b, the angle is that of
-    Σ (a·b, a×b).
-    """
-    centre, true_centre = poses[:, :2].mean(axis=0), truth[:, :2].mean(axis=0)
-    a, b = poses[:, :2] - centre, truth[:, :2] - true_centre
-    angle = np.arctan2((a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]).sum(), (a * b).sum())
-    turned = compose([0.0, 0.0, angle], [*centre, 0.0])
-    return np.array([*(true_centre - turned[:2]), angle])
 
 
 def _relative_errors(poses: Array, truth: Array) -> tuple[Array, Array]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import struct
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from functools import lru_cache
 from typing import Any, TypeVar
 
@@ -39,10 +39,10 @@ def sweep_decoder(channel: Channel, file: str) -> Callable[[bytes], Sweep]:
 
 
 def placed_decoder(channel: Channel, file: str) -> Callable[[bytes], list[Placed]]:
-    """What turns a message with odometry or transforms into them. Raises InputDataError likewise."""
+    """What turns a message with odometry, transforms or poses into them. Raises InputDataError likewise."""
     if _is_foxglove(channel):
         return _viewed(channel, file, _foxglove().VIEWS[channel.type])
-    return _viewed(channel, file, _ros_odometry if channel.type.endswith("Odometry") else _ros_transforms)
+    return _viewed(channel, file, ROS_VIEWS.get(channel.type.rpartition("/")[2], _ros_transforms))
 
 
 def _is_foxglove(channel: Channel) -> bool:
@@ -153,10 +153,34 @@ def _ros_odometry(message: Any) -> list[Placed]:
 def _ros_transforms(message: Any) -> list[Placed]:
     """tf2_msgs/TFMessage"""
     parts: Iterable[Any] = message.transforms
-    return [
-        _ros_placed(part.header, part.child_frame_id, part.transform.translation, part.transform.rotation)
-        for part in parts
-    ]
+    return [placed for part in parts for placed in _ros_transform(part)]
+
+
+def _ros_transform(message: Any) -> list[Placed]:
+    """geometry_msgs/TransformStamped"""
+    at, turned = message.transform.translation, message.transform.rotation
+    return [_ros_placed(message.header, message.child_frame_id, at, turned)]
+
+
+def _ros_pose(message: Any) -> list[Placed]:
+    """geometry_msgs/PoseStamped, and PoseWithCovarianceStamped"""
+    pose = getattr(message.pose, "pose", message.pose)
+    return [_ros_placed(message.header, "", pose.position, pose.orientation)]
+
+
+def _ros_path(message: Any) -> list[Placed]:
+    """nav_msgs/Path"""
+    return [placed for pose in message.poses for placed in _ros_pose(pose)]
+
+
+ROS_VIEWS: Mapping[str, Callable[[Any], list[Placed]]] = {
+    "Odometry": _ros_odometry,
+    "TransformStamped": _ros_transform,
+    "PoseStamped": _ros_pose,
+    "PoseWithCovarianceStamped": _ros_pose,
+    "Path": _ros_path,
+}
+"""Of the types that place one thing; the others are transforms."""
 
 
 def _ros_placed(header: Any, child: str, at: Any, turned: Any) -> Placed:

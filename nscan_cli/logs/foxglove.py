@@ -51,6 +51,12 @@ def odometry(message: Any) -> list[Placed]:
     return [Placed(_stamp(message), frame_name(message.frame_id), frame_name(message.body_frame_id), pose)]
 
 
+def pose_in_frame(message: Any) -> list[Placed]:
+    """foxglove.PoseInFrame"""
+    pose = _rigid(message.pose.position, message.pose.orientation)
+    return [Placed(_stamp(message), frame_name(message.frame_id), "", pose)]
+
+
 def transform(message: Any) -> list[Placed]:
     """foxglove.FrameTransform"""
     pose = _rigid(message.translation, message.rotation)
@@ -65,6 +71,7 @@ def transforms(message: Any) -> list[Placed]:
 
 VIEWS: Mapping[str, Callable[[Any], list[Placed]]] = {
     "foxglove.Odometry": odometry,
+    "foxglove.PoseInFrame": pose_in_frame,
     "foxglove.FrameTransform": transform,
     "foxglove.FrameTransforms": transforms,
 }

@@ -17,6 +17,8 @@ class Form(NamedTuple):
     module: str
     magic: bytes | None = None
     """The first bytes of such a file; None: the module is asked."""
+    container: bool = False
+    """Whether it holds messages: the module then has `recording`, too."""
 
     def fits(self, data: bytes) -> bool:
         """Whether these bytes are of this form."""
@@ -31,9 +33,9 @@ class Form(NamedTuple):
 
 
 FORMS: tuple[Form, ...] = (
-    Form("MCAP", "nscan_cli.logs.mcap_log", b"\x89MCAP0\r\n"),
-    Form("ROS 1 bag", "nscan_cli.logs.rosbag1", b"#ROSBAG V2.0\n"),
-    Form("ROS 2 bag", "nscan_cli.logs.rosbag2", b"SQLite format 3\0"),
+    Form("MCAP", "nscan_cli.logs.mcap_log", b"\x89MCAP0\r\n", container=True),
+    Form("ROS 1 bag", "nscan_cli.logs.rosbag1", b"#ROSBAG V2.0\n", container=True),
+    Form("ROS 2 bag", "nscan_cli.logs.rosbag2", b"SQLite format 3\0", container=True),
     Form("CARMEN text", "nscan_cli.logs.carmen"),
     Form("Player text", "nscan_cli.logs.player"),
     Form(".script text", "nscan_cli.logs.script"),

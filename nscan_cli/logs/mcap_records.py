@@ -22,7 +22,7 @@ from mcap.opcode import Opcode
 from nscan_cli.counting import counted
 from nscan_cli.errors import InputDataError
 from nscan_cli.limits import INPUT, MB
-from nscan_cli.logs.recording import DAMAGED, WANTED, Channel, Message, Recording, ros_name
+from nscan_cli.logs.recording import DAMAGED, PATH, WANTED, Channel, Message, Recording, ros_name
 
 MAGIC = b"\x89MCAP0\r\n"
 HEAD, MESSAGE = struct.Struct("<BQ"), struct.Struct("<HIQQ")
@@ -260,6 +260,8 @@ class _Reader:
             self.counts[number] = self.counts.get(number, 0) + 1
             kept = self.wanted.get(number)
             if kept is not None:
+                if channel.type == PATH:
+                    kept.clear()
                 kept.append(Message(channel, log_time, data[begin + MESSAGE.size : stop]))
 
     def _define(self, opcode: int, data: bytes, begin: int, stop: int) -> None:

@@ -15,8 +15,17 @@ TRANSFORMS = (
     "foxglove.FrameTransform",
     "foxglove.FrameTransforms",
 )
-WANTED = SCANS + ODOMETRY + TRANSFORMS
-"""Types of messages that scans, odometry and mounting can come from."""
+PATH = "nav_msgs/msg/Path"
+"""A message of it has the poses of those before, too: of a topic, the last one is kept."""
+POSES = (
+    "geometry_msgs/msg/PoseStamped",
+    "geometry_msgs/msg/PoseWithCovarianceStamped",
+    "geometry_msgs/msg/TransformStamped",
+    "foxglove.PoseInFrame",
+    PATH,
+)
+WANTED = SCANS + ODOMETRY + TRANSFORMS + POSES
+"""Types of messages that scans, odometry, mounting and reference poses can come from."""
 DAMAGED = "fetch the file again, or use what can be read with --salvage"
 """What to do about damage that may be passed over."""
 
@@ -64,8 +73,12 @@ class Recording:
 
     def keep(self, message: Message) -> None:
         """Take up a message. Raises ExceededError when they get too large together."""
+        kept = self.messages.setdefault(message.channel.topic, [])
+        if message.channel.type == PATH:
+            self.size -= sum(len(before.data) for before in kept)
+            kept.clear()
         self.grow(len(message.data))
-        self.messages.setdefault(message.channel.topic, []).append(message)
+        kept.append(message)
 
     def topics(self, types: tuple[str, ...]) -> dict[str, int]:
         """Topics that have messages of some types, and how many."""

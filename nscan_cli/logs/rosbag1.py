@@ -32,10 +32,10 @@ class InMemory:
 
 def read(data: bytes, file: str, source: Source, options: ReadingOptions) -> LaserLog:
     """The scans of one topic; raises InputDataError and WrongUsageError as recorded.read does."""
-    return recorded.read(_recording(data, file, options.salvage), file, source, options)
+    return recorded.read(recording(data, file, options.salvage), file, source, options)
 
 
-def _recording(data: bytes, file: str, salvage: bool) -> Recording:
+def recording(data: bytes, file: str, salvage: bool) -> Recording:
     """All messages that are of use, in order of their log times. Raises InputDataError and ExceededError."""
     from lz4.frame import LZ4FrameDecompressor
     from rosbags.rosbag1 import Reader

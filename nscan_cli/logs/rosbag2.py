@@ -18,10 +18,10 @@ JOURNAL = slice(18, 20)
 
 def read(data: bytes, file: str, source: Source, options: ReadingOptions) -> LaserLog:
     """The scans of one topic; raises InputDataError and WrongUsageError as recorded.read does."""
-    return recorded.read(_recording(data, file, options.salvage), file, source, options)
+    return recorded.read(recording(data, file, options.salvage), file, source, options)
 
 
-def _recording(data: bytes, file: str, salvage: bool) -> Recording:
+def recording(data: bytes, file: str, salvage: bool) -> Recording:
     """All messages that are of use, in file order. Raises InputDataError."""
     recording = Recording("ROS 2 bag (SQLite)")
     try:

@@ -17,7 +17,7 @@ from pathlib import Path
 
 import numpy as np
 
-from nscan_cli.evaluation.trajectory import alignment
+from nscan_cli.evaluation.alignment import alignment
 from nscan_cli.poses import Array, compose
 from nscan_cli.slam.notices import notices
 from nscan_cli.slam.options import SlamOptions
@@ -99,7 +99,7 @@ def outcome(kind: Kind, seed: int, odometry: bool) -> Outcome:
 
 def rms(poses: Array, truth: Array) -> float:
     """Root mean square (m) of how far positions of poses (S, 3), laid over the true ones, are off these."""
-    off = compose(alignment(poses, truth), poses) - truth
+    off = compose(alignment(poses, truth).motion, poses) - truth
     return float(np.sqrt((off[:, :2] ** 2).sum(axis=1).mean()))
 
 

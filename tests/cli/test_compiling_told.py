@@ -45,7 +45,7 @@ some_kernels.add(1, 2)
 TOLD = "compiling the kernels, once for this version on this machine: long\n"
 
 
-def told(folder: Path, *names: str, quiet: bool = False, **settings: str) -> tuple[str, bool]:
+def told(folder: Path, settings: dict[str, str], *names: str, quiet: bool = False) -> tuple[str, bool]:
     """What a new process says that calls these kernels, and whether it knows that it has compiled."""
     (folder / "some_kernels.py").write_text(KERNELS)
     kept = {name: value for name, value in os.environ.items() if not name.startswith(("NUMBA_", "XDG_"))}
@@ -67,8 +67,8 @@ def told(folder: Path, *names: str, quiet: bool = False, **settings: str) -> tup
 @pytest.mark.parametrize("settings", [{}, {"NUMBA_OPT": "2"}], ids=["kept by us", "kept by numba"])
 def test_what_is_kept_is_not_announced(tmp_path: Path, settings: dict[str, str]):
     # The kernel with whole numbers that is compiled when the command has ended is no matter of its own.
-    assert told(tmp_path, **settings) == ("", False)
-    assert told(tmp_path, "add", **settings) == (TOLD, True)
-    assert told(tmp_path, "add", **settings) == ("", False)
-    assert told(tmp_path, "add", "subtract", quiet=True, **settings) == ("", True)
-    assert told(tmp_path, "subtract", "add", **settings) == ("", False)
+    assert told(tmp_path, settings) == ("", False)
+    assert told(tmp_path, settings, "add") == (TOLD, True)
+    assert told(tmp_path, settings, "add") == ("", False)
+    assert told(tmp_path, settings, "add", "subtract", quiet=True) == ("", True)
+    assert told(tmp_path, settings, "subtract", "add") == ("", False)

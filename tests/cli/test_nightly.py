@@ -165,7 +165,7 @@ def test_force(manifest, first, tmp_path, capsys):
         (["fine.toml", "-o", "no/out"], 73, "no/out: the folder no does not exist; create it first"),
         (["fine.toml", "-o", "fine.toml"], 73, "fine.toml: is no folder; name one, or a new one"),
         (["fine.toml", "-o", "out", "--scheduler", "x"], 2, "--scheduler x: is no address of the form tcp://"),
-        (["fine.toml"], 2, "nightly: Missing option '-o'"),
+        (["fine.toml"], 2, "nightly: Missing option --output"),
     ],
 )  # fmt: skip
 def test_a_mistake_is_one_line_with_its_code(arguments, code, message, tmp_path, monkeypatch, capsys):

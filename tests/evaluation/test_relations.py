@@ -118,6 +118,14 @@ def test_a_wrong_line_is_named(tmp_path: Path, text: str, problem: str):
         read(tmp_path, text)
 
 
+@pytest.mark.parametrize("between", ["\t", ",", ", ", ";"])
+def test_they_may_be_written_with_other_separators(tmp_path: Path, between: str):
+    line = "10.5 11.5 1 0.25 0 0 0 0.5"
+    found = read(tmp_path, "\ufeff" + line.replace(" ", between) + "\n")
+    assert found.stamps == (("10.5", "11.5"),)
+    np.testing.assert_array_equal(found.poses, read(tmp_path, line).poses)
+
+
 def test_missing_relations_say_so(tmp_path: Path):
     with pytest.raises(InputMissingError, match="no such file"):
         read_relations(str(tmp_path / "floor.relations"))

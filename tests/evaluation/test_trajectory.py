@@ -1,14 +1,18 @@
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from nscan_cli.errors import InputDataError
-from nscan_cli.evaluation.trajectory import alignment, trajectory_errors
+from nscan_cli.evaluation.alignment import alignment
+from nscan_cli.evaluation.trajectory import trajectory_errors
 from nscan_cli.graph.tum import Trajectory
 from nscan_cli.poses import compose
+from tests.evaluation import paths
 
 
 def trajectory(poses: np.ndarray, start: float = 0.0) -> Trajectory:
@@ -22,7 +26,7 @@ def test_a_moved_trajectory_has_no_error(seed: int):
     truth = rng.uniform([-20, -20, -3], [20, 20, 3], size=(12, 3))
     motion = rng.uniform(-3, 3, size=3)
     errors = trajectory_errors(trajectory(truth), trajectory(compose(motion, truth)))
-    np.testing.assert_allclose(errors.alignment, motion, atol=1e-9)
+    np.testing.assert_allclose(errors.alignment.motion, motion, atol=1e-9)
     for spread in (errors.absolute_translation, errors.absolute_rotation, errors.relative_rotation):
         assert spread is not None
         assert spread.maximum < 1e-9
@@ -32,7 +36,7 @@ def test_a_moved_trajectory_has_no_error(seed: int):
 def test_no_small_motion_improves_the_alignment(seed: int):
     rng = np.random.default_rng(seed)
     poses, truth = rng.uniform(-5, 5, size=(2, 6, 3))
-    best = alignment(poses, truth)
+    best = alignment(poses, truth).motion
 
     def cost(motion: np.ndarray) -> float:
         return float(((compose(motion, poses) - truth)[:, :2] ** 2).sum())
@@ -50,7 +54,7 @@ def test_the_absolute_error_of_one_pose_aside_is_this():
     result[1, 2] = np.radians(4)
     errors = trajectory_errors(trajectory(result), trajectory(truth))
     ate = errors.absolute_translation
-    np.testing.assert_allclose(errors.alignment, 0, atol=1e-12)
+    np.testing.assert_allclose(errors.alignment.motion, 0, atol=1e-12)
     assert ate.rmse == pytest.approx(np.sqrt(0.02 / 4))
     assert (ate.mean, ate.median, ate.maximum) == pytest.approx((0.05, 0.05, 0.1))
     assert errors.absolute_rotation.rmse == pytest.approx(2.0)
@@ -93,6 +97,21 @@ def test_no_common_stamp_says_the_spans():
         InputDataError, match=r"a.json: no stamp of b.tum .* 0.000 to 2.000 s .*\+100.000 s off"
     ):
         trajectory_errors(trajectory(truth), trajectory(truth, start=100.0), "a.json", "b.tum")
+
+
+@pytest.mark.parametrize("lag", [1000.0, -77.0, 1.7e9])
+def test_clocks_that_have_no_time_in_common_are_told_by_the_paths(lag):
+    whole = paths.trajectory(paths.drive())
+    part = slice(100, 400)
+    result = Trajectory(whole.times[part], paths.noisy(whole.poses[part]), whole.stamps[part])
+    reference = replace(whole, times=whole.times + lag)
+    with pytest.raises(
+        InputDataError, match=rf"off at the start; stamps off by \{lag:+.1f}\d s fit best; give"
+    ):
+        trajectory_errors(result, reference)
+    other = paths.trajectory(paths.drive(seed=5), start=100.0 + lag)
+    with pytest.raises(InputDataError, match=r"off at the start; give the reference of this log"):
+        trajectory_errors(result, other)
 
 
 def test_one_common_stamp_is_not_enough():

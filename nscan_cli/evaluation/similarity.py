@@ -1,0 +1,99 @@
+"""How well a path fits another one when it may be moved, turned, made larger, and be of another point."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from nscan_cli.evaluation.alignment import alignment, spread_about
+from nscan_cli.poses import Array, compose
+
+
+@dataclass(frozen=True)
+class Fit:
+    """Of positions a (N, 2) to b (N, 2); lengths in the unit of b, RMS."""
+
+    factor: float
+    """By which a is made larger."""
+    spread: float
+    """Of b about its mean."""
+    apart: float
+    """What is left between them without the factor."""
+    apart_scaled: float
+    """And with it."""
+    apart_mirrored: float
+    """With the factor, and a mirrored."""
+
+
+def fit(poses: Array, truth: Array) -> Fit:
+    """The least-squares fits of positions in closed form, from sums about their means."""
+    a, b = poses[:, :2] - poses[:, :2].mean(axis=0), truth[:, :2] - truth[:, :2].mean(axis=0)
+    size_a, size_b = float((a**2).sum() / len(a)), float((b**2).sum() / len(b))
+    (xx, xy), (yx, yy) = (a.T @ b / len(a)).tolist()
+    common, mirrored = float(np.hypot(xx + yy, xy - yx)), float(np.hypot(xx - yy, xy + yx))
+
+    def left(shared: float) -> float:
+        return math.sqrt(max(size_b - shared**2 / size_a, 0.0) if size_a > 0 else size_b)
+
+    return Fit(
+        factor=common / size_a if size_a > 0 else 1.0,
+        spread=size_b**0.5,
+        apart=max(size_a + size_b - 2 * common, 0.0) ** 0.5,
+        apart_scaled=left(common),
+        apart_mirrored=left(mirrored),
+    )
+
+
+@dataclass(frozen=True)
+class Lever:
+    """The point of the robot that a reference is of, seen from the point that the result is of."""
+
+    point: Array
+    """(2,) ahead and to the left, in the unit of the result."""
+    sigma: float
+    """Of it, in the direction in which it is known least."""
+    apart: float
+    """What is left between the positions with it (RMS), in the unit of the reference."""
+
+
+def lever(poses: Array, truth: Array) -> Lever | None:
+    """The lever arm of poses (N, 3) to positions in truth (N, 3); None where the angles leave it open.
+
+    b = t + k R(θ) a + k R(θ + φ) l by least squares, linear in t, in k (cos θ, sin θ), and in k R(θ) l.
+    Where the positions leave θ open, it is that of the headings, and k is 1.
+    """
+    aligned = alignment(poses, truth)
+    a, b = poses[:, :2] - poses[:, :2].mean(axis=0), truth[:, :2] - truth[:, :2].mean(axis=0)
+    cos, sin = np.cos(poses[:, 2]), np.sin(poses[:, 2])
+    one, none = np.ones(len(a)), np.zeros(len(a))
+    rows = [[one, none, cos, -sin], [none, one, sin, cos]]
+    is_open = aligned.by == "headings"
+    if is_open:
+        b = b - compose([0.0, 0.0, aligned.motion[2]], np.column_stack([a, none]))[:, :2]
+    else:
+        rows = [[*rows[0], a[:, 0], -a[:, 1]], [*rows[1], a[:, 1], a[:, 0]]]
+    design = np.vstack([np.column_stack(row) for row in rows])
+    scatter = design.T @ design / len(a)
+    if np.linalg.cond(scatter) > 1e8:
+        return None
+    wanted = np.concatenate([b[:, 0], b[:, 1]])
+    found = np.linalg.solve(scatter, design.T @ wanted / len(a))
+    apart = float(np.sqrt(((wanted - design @ found) ** 2).sum() / len(a)))
+    angle, factor = aligned.motion[2], 1.0
+    if not is_open:
+        angle, factor = np.arctan2(found[5], found[4]), float(np.hypot(found[4], found[5]))
+    # As errors of trajectories go together, more poses make nothing surer.
+    sigma = apart * float(np.sqrt(np.linalg.eigvalsh(np.linalg.inv(scatter)[2:4, 2:4])[-1]))
+    point = compose([0.0, 0.0, -float(angle)], [*found[2:4], 0.0])[:2]
+    return Lever(point / factor, sigma / factor, apart)
+
+
+def heading_difference(poses: Array, truth: Array) -> tuple[float, float]:
+    """By how much headings of truth (N, 3) are left of those of poses (N, 3), and ± (rad).
+
+    They are compared as the positions align them.
+    """
+    motion = alignment(poses, truth).motion
+    return spread_about(truth[:, 2] - poses[:, 2] - motion[2])
