@@ -19,7 +19,7 @@ TRIAL = 100
 """Iterations after which two starts are compared; only the better one goes on."""
 UNFOLDINGS = 3
 """How often a start is looked for from where a graph may be folded wrong, as long as each leads lower."""
-ROUNDING = 1e-9
+ROUNDING = 1e-6
 """Energies that differ by less, of themselves or of a χ² of 1, are the same: then the poses given stay."""
 
 
