@@ -23,7 +23,7 @@ class IndefiniteError(ValueError):
 
     def __init__(self, index: int, least: float, greatest: float) -> None:
         super().__init__(
-            f"has a negative eigenvalue, {least:.3g} beside {greatest:.3g}: more than rounding to six digits"
+            f"has a negative eigenvalue, {least:.3g} beside {greatest:.3g}, which rounding does not explain"
         )
         self.index = index
         """Which one of the matrices."""

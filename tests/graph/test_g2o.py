@@ -211,8 +211,8 @@ def test_written_marginals_stand_in_the_frame_of_the_measurement():
         ("EDGE_SE2 1 1 0 0 0 1 0 0 1 0 1\n", "line 1: the edge joins vertex 1 with itself"),
         (
             "EDGE_SE2 1 2 0 0 0 1 2 0 1 0 1\n",
-            "line 1: the information matrix has a negative eigenvalue, -1 beside 3: more than rounding to "
-            "six digits; mend or remove the line",
+            "line 1: the information matrix has a negative eigenvalue, -1 beside 3, which rounding does not "
+            "explain; mend or remove the line",
         ),
         ("EDGE_SE2 1 2 0 0 0 1 0 0 1 0\n", "line 1: EDGE_SE2 has 10 values instead of 11"),
         (

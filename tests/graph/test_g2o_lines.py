@@ -166,6 +166,12 @@ def test_keys_of_64_bits_come_back_from_both_forms(found: set[int]):
     assert (b'"vertex"' in data) is not small
 
 
+def test_a_byte_order_mark_and_line_ends_of_windows_cost_no_vertex():
+    text = "\ufeffVERTEX_SE2 0 0 0 0\r\nVERTEX_SE2 1 1 0 0\r\nEDGE_SE2 0 1 1 0 0 1 0 0 1 0 1\r\n"
+    graph = parse_g2o(text.encode(), "graph.g2o")
+    assert (graph.scans.tolist(), graph.provenance["skipped"]) == ([0, 1], {})
+
+
 def test_a_symbol_of_gtsam_is_its_key():
     text = (
         f"VERTEX_SE2 x1 1 0 0\nVERTEX_SE2 {GTSAM_X0} 0 0 0\n"
