@@ -92,8 +92,12 @@ def relative_jacobians(a: ArrayLike, b: ArrayLike) -> tuple[Array, Array]:
 
 
 def rotated_information(pose: ArrayLike, information: Array) -> Array:
-    """An information matrix (3, 3) of the frame of `pose` in the frame that the pose is given in."""
-    c, s = np.cos(np.asarray(pose)[2]), np.sin(np.asarray(pose)[2])
-    rotation = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
-    rotated: Array = rotation @ information @ rotation.T
+    """Information matrices (…, 3, 3) of the frame of `pose` in the frame that the pose is given in."""
+    angle = np.asarray(pose, dtype=np.float64)[..., 2]
+    rotation = np.zeros((*angle.shape, 3, 3))
+    rotation[..., 0, 0] = rotation[..., 1, 1] = np.cos(angle)
+    rotation[..., 1, 0] = np.sin(angle)
+    rotation[..., 0, 1] = -rotation[..., 1, 0]
+    rotation[..., 2, 2] = 1.0
+    rotated: Array = rotation @ information @ rotation.swapaxes(-1, -2)
     return rotated

@@ -175,11 +175,14 @@ def _fields(numbers: tuple[int, ...], match: NScanMatch, left_out: list[LeftOut]
     from nscan_cli.graph.json_fields import six_digits, triangle
     from nscan_cli.graph.model import NScan
     from nscan_cli.graph.relation_types import relation_record
+    from nscan_cli.graph.semidefinite import WRITTEN, as_information
 
     kept = [numbers[scan] for scan in match.kept]
     joint = match.joint
     score = float(match.overlap.min())
-    relation = NScan(tuple(kept), match.poses, joint.hessian, match.fixed, "nscan", score)
+    # Along the gauge it is 0 but for rounding.
+    information = as_information(joint.hessian, WRITTEN)
+    relation = NScan(tuple(kept), match.poses, information, match.fixed, "nscan", score)
     return {
         "relation": relation_record(relation, "scans"),
         "covariance": None if match.covariance is None else triangle(match.covariance),

@@ -135,7 +135,10 @@ def refine_saved(path: str, log_file: str | None, needs_log: bool, threads: int,
     from nscan_cli.graph.solve import optimise_graph
 
     compiling = Compiling("a minute or two", quiet)
-    graph = load_graph(path)
+    notices: list[str] = []
+    graph = load_graph(path, notices)
+    for notice in notices:
+        say(f"warning: {notice}", quiet)
     read = _log_of(path, graph, log_file, needs_log, quiet)
     before = graph.poses
     optimum = optimise_graph(graph)

@@ -47,14 +47,21 @@ class Terms:
         self._at: dict[int, Callable[[Array], Term]] = {}
 
     def columns(self, relations: Sequence[Relation], positions: Indices) -> Columns:
-        """The columns of some relations (Q); `positions[id]` is the place of a node."""
+        """The columns of some relations (Q); `positions[id]` is the place of a node, −1 where it has none.
+
+        Raises ValueError where a relation has such a node: as an index, −1 would be the last pose.
+        """
         slots = self._slots_of(relations)
         sizes = self._sizes[slots]
         starts, every = _starts(sizes), _starts(self._sizes)
         entries = np.arange(starts[-1]) + np.repeat(every[slots] - starts[:-1], sizes)
+        members = positions[self._nodes[entries]]
+        if members.min(initial=0) < 0:
+            node = self._nodes[entries][int(np.argmin(members))]
+            raise ValueError(f"a relation has node {node}, which is no keyframe of this energy")
         return Columns(
             starts=starts,
-            members=positions[self._nodes[entries]],
+            members=members,
             local=self._local[entries],
             hessian_starts=_starts(9 * self._sizes**2)[slots],
             hessians=self._hessians,

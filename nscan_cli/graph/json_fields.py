@@ -1,7 +1,8 @@
 """The parts of the graph's JSON: numbers as they are written, and records that are checked as they are read.
 
 Poses keep 9 decimals (nm, nrad), matrices 6 significant digits, and no zero has a sign, so that a graph
-that is read and written again gives the same bytes.
+that is read and written again gives the same bytes. (But for a matrix with an eigenvalue that rounding has
+made negative: it is 0 when it is read.)
 """
 
 from __future__ import annotations
@@ -11,7 +12,8 @@ from typing import Any
 
 import numpy as np
 
-from nscan_cli.graph.triangles import from_upper_triangle, is_indefinite, upper_triangle
+from nscan_cli.graph.semidefinite import IndefiniteError, semidefinite
+from nscan_cli.graph.triangles import from_upper_triangle, upper_triangle
 from nscan_cli.limits import DISTANCE, INFORMATION, Limit
 from nscan_cli.poses import Array, wrap
 
@@ -130,11 +132,20 @@ class Record:
         error = self.wrong(key, f"the upper triangle of a {size} × {size} matrix: {numbers}")
         return from_upper_triangle(_numbers(self.get(key), count, error, INFORMATION), size)
 
-    def information(self, key: str, size: int) -> Array:
-        """The same, and positive semi-definite."""
+    def information(self, key: str, size: int, held: int | None = None) -> Array:
+        """The same, and positive semi-definite; what rounding has made negative is 0.
+
+        What it has in the rows and columns of pose `held`, three of them, does not count.
+        """
         matrix = self.matrix(key, size)
-        if is_indefinite(matrix):
-            raise self.wrong(key, "positive semi-definite")
+        block: Any = ...
+        if held is not None:
+            others = np.delete(np.arange(size), slice(3 * held, 3 * held + 3))
+            block = np.ix_(others, others)
+        try:
+            (matrix[block],) = semidefinite(matrix[block][None])
+        except IndefiniteError as error:
+            raise MalformedError(self.place, f"{key!r} is not positive semi-definite: it {error}") from error
         return matrix
 
     def records(self, key: str) -> Iterator[Record]:

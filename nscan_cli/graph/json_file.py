@@ -8,6 +8,7 @@ from __future__ import annotations
 import io
 import itertools
 import json
+import re
 from collections.abc import Iterable, Iterator
 from json.encoder import encode_basestring_ascii
 from typing import Any, NoReturn
@@ -16,6 +17,7 @@ import numpy as np
 
 from nscan_cli.errors import InputDataError
 from nscan_cli.finite import check_finite
+from nscan_cli.graph.g2o_lines import LARGEST_KEY
 from nscan_cli.graph.json_fields import MalformedError, Record, pose_rows, six_digits, triangle
 from nscan_cli.graph.model import Graph, Loop
 from nscan_cli.graph.relation_types import relation_of, relation_record
@@ -33,6 +35,8 @@ SCHEMA = "urn:nscan-cli:pose-graph:1.0"
 UNITS = {"length": "m", "angle": "rad", "time": "s"}
 BLOCK = 1000
 """So many poses are written at a time."""
+KEY = re.compile("0|[1-9][0-9]{0,19}")
+"""A vertex of g2o: a number of 64 bits, which as text is exact for every reader of JSON."""
 NEXT = ",\n"
 """From one record to the next."""
 _compact = json.JSONEncoder(separators=(",", ":"), allow_nan=False, check_circular=False).encode
@@ -126,13 +130,17 @@ def _node_records(graph: Graph) -> Iterator[str]:
     poses = _each_pose(graph.poses)
     odometry = itertools.repeat(None, len(graph)) if graph.odometry is None else _each_pose(graph.odometry)
     scans, anchors = graph.scans.tolist(), graph.anchors.tolist()
-    each = zip(scans, graph.stamps, poses, odometry, anchors, strict=True)
-    for node, (scan, stamp, (x, y, angle), sensed, anchor) in enumerate(each):
+    named: Iterable[str] = itertools.repeat("", len(graph))
+    if graph.vertices is not None:
+        named = (f'"vertex":"{key}",' for key in graph.vertices)
+    each = zip(scans, named, graph.stamps, poses, odometry, anchors, strict=True)
+    for node, (scan, vertex, stamp, (x, y, angle), sensed, anchor) in enumerate(each):
         pose = f'"pose":[{x!r},{y!r},{angle!r}]'
         if sensed is not None:
             pose += ',"odometry":[{!r},{!r},{!r}]'.format(*sensed)
         keyframe = '"keyframe":true' if anchor == node else f'"keyframe":false,"attached":{anchor}'
-        yield f'{{"id":{node},"scan":{scan},"stamp":{encode_basestring_ascii(stamp)},{pose},{keyframe}}}'
+        stamped = f'{vertex}"stamp":{encode_basestring_ascii(stamp)}'
+        yield f'{{"id":{node},"scan":{scan},{stamped},{pose},{keyframe}}}'
 
 
 def _each_pose(poses: Array) -> Iterator[list[float]]:
@@ -198,6 +206,7 @@ def _nodes(document: Record) -> Graph:
     stamps: list[str] = []
     poses: list[Array] = []
     odometry: list[Array] = []
+    vertices: list[int] = []
     anchors: list[int] = []
     for node, record in enumerate(document.records("nodes")):
         if record.integer("id") != node:
@@ -211,11 +220,15 @@ def _nodes(document: Record) -> Graph:
         poses.append(record.pose("pose"))
         if "odometry" in record:
             odometry.append(record.pose("odometry"))
+        if "vertex" in record:
+            vertices.append(_vertex(record))
         anchors.append(_anchor(record, node))
     if not poses:
         raise MalformedError("nodes", "there are none")
     if odometry and len(odometry) != len(poses):
         raise MalformedError("nodes", f"{len(odometry)} of {len(poses)} have 'odometry'; all or none may")
+    if vertices and len(set(vertices)) != len(poses):
+        raise MalformedError("nodes", "'vertex' is not another one for each of them")
     for node, anchor in enumerate(anchors):
         if anchor >= len(anchors) or anchors[anchor] != anchor:
             raise MalformedError(f"nodes[{node}]", f"'attached' is {anchor}, which is no keyframe")
@@ -225,7 +238,15 @@ def _nodes(document: Record) -> Graph:
         poses=np.array(poses),
         odometry=np.array(odometry) if odometry else None,
         anchors=np.array(anchors, dtype=np.int64),
+        vertices=vertices or None,
     )
+
+
+def _vertex(record: Record) -> int:
+    key = record.text("vertex")
+    if not KEY.fullmatch(key) or int(key) > LARGEST_KEY:
+        raise record.wrong("vertex", "a number of 64 bits, as text")
+    return int(key)
 
 
 def _stamp(record: Record) -> str:

@@ -49,6 +49,8 @@ class Graph:
     loops: list[Loop] = field(default_factory=list)
     marginals: dict[int, Array] = field(default_factory=dict)
     """Keyframe id → (3, 3) marginal covariance of its global pose, the first keyframe held fixed."""
+    vertices: list[int] | None = None
+    """(N,) the keys that the nodes had in a g2o file, up to 64 bits, where these are no scan numbers."""
     provenance: dict[str, Any] = field(default_factory=dict)
     """As in the JSON: tool, inputs (name, sha256, bytes), parameters."""
 

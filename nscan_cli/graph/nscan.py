@@ -43,5 +43,6 @@ class NScan:
         fixed = record.integer("fixed")
         if fixed not in nodes:
             raise MalformedError(record.place, f"'fixed' is {fixed}, which is none of its nodes")
-        poses, hessian = record.poses("poses", len(nodes)), record.matrix("hessian", 3 * len(nodes))
-        return cls(nodes, poses, hessian, nodes.index(fixed), origin, score)
+        poses, held = record.poses("poses", len(nodes)), nodes.index(fixed)
+        hessian = record.information("hessian", 3 * len(nodes), held)
+        return cls(nodes, poses, hessian, held, origin, score)

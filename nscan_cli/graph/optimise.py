@@ -19,6 +19,9 @@ LEAST_DAMPING = 1e-9
 GREATEST_DAMPING = 1e8
 ROUNDING = 1e-12
 """Relative; an energy that rises by less counts as the same."""
+NOTHING = 1e-7
+"""Of the energy, or of a χ² of 1: where relations leave a direction open, a step that gains less is the
+last: it moves less than a thousandth of a standard deviation."""
 
 
 @dataclass(frozen=True)
@@ -39,15 +42,18 @@ def optimise(
 
     The steps are Newton's with the Gauss–Newton part of the Hessian while the poses move far, with the
     exact Hessian (25) when they settle and it is positive definite. They are damped, after Levenberg and
-    Marquardt, when they would raise the energy or the relations leave a direction open.
+    Marquardt, when they would raise the energy or the relations leave a direction open. In such a direction
+    poses could go on for ever, for less and less, so there the minimum is where nothing is gained.
     """
-    here, exact, damping = energy.evaluate(poses, exact=False), False, 0.0
+    here, exact, damping, is_open = energy.evaluate(poses, exact=False), False, 0.0, False
     iteration = 0
     for iteration in range(1, max_iterations + 1):
         step = newton_step(energy.pattern, here, damping)
         if step is None and exact:
             here, exact = energy.evaluate(poses, exact=False), False
             step = newton_step(energy.pattern, here, damping)
+        if not damping:
+            is_open = step is None
         if step is not None:
             trial = poses.copy()
             trial[energy.free] += step
@@ -60,6 +66,9 @@ def optimise(
                 return Optimum(_wrapped(poses), here.value, iteration, True)
             there = energy.evaluate(trial, exact=length < SETTLED)
             if there.value <= least:
+                gains = here.value - there.value > NOTHING * (1 + here.value)
+                if is_open and damping <= FIRST_DAMPING and not gains:
+                    return Optimum(_wrapped(trial), there.value, iteration, True)
                 poses, here, exact = trial, there, length < SETTLED
                 damping = 0.1 * damping if damping > LEAST_DAMPING else 0.0
                 continue

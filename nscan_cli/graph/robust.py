@@ -23,8 +23,6 @@ NARROWING = 1.4
 """Factor from one width of the kernel to the next."""
 STEPS = 5
 """Newton steps at each width."""
-LEAST_WEIGHT = 0.25
-"""What a relation at the bound weighs."""
 EASED_NARROWING, EASED_STEPS = 1.2, 10
 """On the way out of a fold, where all relations are doubted."""
 MOST_WIDTHS = 12
@@ -38,8 +36,11 @@ def contradicting(energy: GraphEnergy, poses: Array, doubted: NDArray[np.bool_])
     n scans χ² has 3 (n − 1) degrees of freedom.
     """
     bounds = BOUND * chi2_quantiles(energy, RARE)
-    weights, _ = _graduated(energy, poses, doubted, bounds, NARROWING, STEPS)
-    return doubted & (weights < LEAST_WEIGHT)
+    narrowed = _graduated(energy, poses, doubted, bounds, NARROWING, STEPS)
+    if narrowed is None:
+        return np.zeros(len(doubted), dtype=np.bool_)
+    # At the poses that the last weights have led to, not those that these were made from.
+    return doubted & (energy.terms(narrowed) > bounds)
 
 
 def eased(energy: GraphEnergy, poses: Array) -> Array | None:
@@ -50,10 +51,8 @@ def eased(energy: GraphEnergy, poses: Array) -> Array | None:
     where the χ² of each is below its 95 % quantile.
     """
     all_of_them = np.ones(len(energy.columns.fixed), dtype=np.bool_)
-    weights, eased_poses = _graduated(
-        energy, poses, all_of_them, chi2_quantiles(energy, USUAL), EASED_NARROWING, EASED_STEPS
-    )
-    return None if (weights == 1.0).all() else eased_poses
+    bounds = chi2_quantiles(energy, USUAL)
+    return _graduated(energy, poses, all_of_them, bounds, EASED_NARROWING, EASED_STEPS)
 
 
 def _graduated(
@@ -63,19 +62,22 @@ def _graduated(
     bounds: Array,
     narrowing: float,
     steps: int,
-) -> tuple[Array, Array]:
-    """The weights (R,) of the relations, and poses (K, 3), when the kernel has narrowed to bounds (R,)."""
+) -> Array | None:
+    """The poses (K, 3) when the kernel of the doubted relations (R,) has narrowed to their bounds (R,).
+
+    None where all are within these already, and where a χ² is beyond all numbers.
+    """
     weights, excess = np.ones(len(doubted)), energy.terms(poses) / bounds
     narrow = float(excess[doubted].max(initial=0.0))
-    if not np.isfinite(narrow):
-        return weights, poses
+    if not 1.0 < narrow < np.inf:
+        return None
     narrowing = max(narrowing, narrow ** (1 / MOST_WIDTHS))
     while narrow > 1.0:
         narrow = max(narrow / narrowing, 1.0)
         weights[doubted] = (narrow / (narrow + excess[doubted])) ** 2
         poses = optimise(energy.weighted(weights), poses, steps, 1e-4).poses
         excess = energy.terms(poses) / bounds
-    return weights, poses
+    return poses
 
 
 def chi2_quantiles(energy: GraphEnergy, deviations: float) -> Array:

@@ -19,8 +19,8 @@ TRIAL = 100
 """Iterations after which two starts are compared; only the better one goes on."""
 UNFOLDINGS = 3
 """How often a start is looked for from where a graph may be folded wrong, as long as each leads lower."""
-ROUNDING = 1e-9
-"""Relative; energies that differ by less are the same."""
+ROUNDING = 1e-6
+"""Energies that differ by less, of themselves or of a χ² of 1, are the same: then the poses given stay."""
 
 
 @dataclass(frozen=True)
@@ -81,7 +81,7 @@ def _lowest(energy: GraphEnergy, given: Array, max_iterations: int, tolerance: f
     for start in (given, chordal_start(energy, given)):
         found = optimise(energy, start, min(TRIAL, max_iterations), tolerance)
         iterations += found.iterations
-        if best is None or not best.energy <= found.energy * (1 + ROUNDING):
+        if best is None or _is_lower(found, best):
             best = found
     assert best is not None
     if not best.converged:
@@ -93,10 +93,15 @@ def _lowest(energy: GraphEnergy, given: Array, max_iterations: int, tolerance: f
             break
         found = optimise(energy, unbent, max_iterations, tolerance)
         iterations += found.iterations
-        if not found.energy < best.energy * (1 - ROUNDING):
+        if not _is_lower(found, best):
             break
         best = found
     return dataclasses.replace(best, iterations=iterations)
+
+
+def _is_lower(found: Optimum, best: Optimum) -> bool:
+    """Whether a minimum is clearly lower than the best so far, or that is none at all."""
+    return found.energy < best.energy - ROUNDING * (1 + best.energy) or not np.isfinite(best.energy)
 
 
 def components(graph: Graph) -> list[Component]:

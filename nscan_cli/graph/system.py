@@ -73,7 +73,7 @@ class GraphEnergy:
         columns = self._columns_at(poses) if self._not_linear else self.columns
         terms = np.zeros(len(columns.fixed))
         _values(columns, poses, terms)
-        return terms
+        return _not_negative(terms)
 
     def evaluate(self, poses: Array, exact: bool) -> System:
         """Energy, gradient and Hessian (exact, or its Gauss–Newton part) at the poses (K, 3)."""
@@ -83,6 +83,7 @@ class GraphEnergy:
         gradient = np.zeros((len(poses), 3))
         blocks = np.zeros((len(self.pattern.rows), 3, 3))
         _evaluate(columns, poses, float(exact), self._targets, terms, gradient, blocks)
+        _not_negative(terms)
         return System(float(terms.sum()), terms, gradient[self.free], blocks)
 
     def _columns_at(self, poses: Array) -> Columns:
@@ -96,6 +97,12 @@ class GraphEnergy:
             start = columns.hessian_starts[k]
             columns.hessians[start : start + term.hessian.size] = term.hessian.ravel()
         return columns
+
+
+def _not_negative(terms: Array) -> Array:
+    """The terms (Q,), where those that rounding has brought below 0 are now 0."""
+    np.maximum(terms, 0.0, out=terms)
+    return terms
 
 
 @kernel

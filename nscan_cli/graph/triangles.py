@@ -19,18 +19,10 @@ def upper_triangle(matrix: Array) -> Array:
 
 
 def from_upper_triangle(entries: Sequence[float] | Array, size: int) -> Array:
-    """The symmetric matrix (size, size) of its size(size+1)/2 entries on and above the diagonal."""
-    matrix = np.zeros((size, size))
+    """The symmetric matrices (…, size, size) of their size(size+1)/2 entries on and above the diagonal."""
+    entries = np.asarray(entries, dtype=np.float64)
+    matrices = np.zeros((*entries.shape[:-1], size, size))
     rows, columns = _upper(size)
-    matrix[rows, columns] = entries
-    matrix[columns, rows] = entries
-    return matrix
-
-
-def is_indefinite(matrix: Array, tolerance: float = 1e-5) -> bool:
-    """Whether a symmetric matrix has an eigenvalue below −tolerance times its largest in magnitude.
-
-    The tolerance is for files that keep few digits: it is not an error of theirs to be a little below 0.
-    """
-    eigenvalues = np.linalg.eigvalsh(matrix)
-    return bool(eigenvalues[0] < -tolerance * np.abs(eigenvalues).max())
+    matrices[..., rows, columns] = entries
+    matrices[..., columns, rows] = entries
+    return matrices

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from nscan_cli.compiled import kernel
 from nscan_cli.graph.model import Pairwise
+from nscan_cli.graph.semidefinite import as_information
 from nscan_cli.matching.planar import wrapped
 from nscan_cli.ndt.table import OPEN
 from nscan_cli.ndt.transform import Ndt
@@ -236,7 +237,7 @@ def relations_along(keyframes: Sequence[Keyframe], options: KeyframeOptions) -> 
     rotation[:, 0, 1] = np.sin(angles)
     rotation[:, 1, 0] = -rotation[:, 0, 1]
     rotation[:, 2, 2] = 1.0
-    hessians = np.array([tracked.hessian for tracked in last])
+    hessians = as_information(np.array([tracked.hessian for tracked in last]))
     expected = np.array([each.expected for each in keyframes[1:]])
     information = options.information_scale * rotation @ hessians @ rotation.transpose(0, 2, 1)
     lengths = np.array([b.path - a.path for a, b in itertools.pairwise(each.tracked for each in keyframes)])

@@ -158,3 +158,39 @@ def test_a_single_keyframe_is_where_it_is(folder, capsys):
     (folder / "one.g2o").write_text("VERTEX_SE2 0 0 0 0\n")
     assert run(["slam", "--from", "one.g2o", "-o", "one.json"]) == 0
     assert "sigma" not in capsys.readouterr().err
+
+
+def test_what_a_g2o_file_has_that_is_not_read_is_said(folder, capsys):
+    (folder / "more.g2o").write_text(
+        "VERTEX_SE2 0 0 0 0\nVERTEX_SE2 1 1 0 0\nEDGE_SE2 0 1 1 0 0 100 0 0 25 0 400\n"
+        "EDGE_PRIOR_SE2 0 0 0 0 1000 0 0 1000 0 1000\nVERTEX_XY 9 1 2\nEDGE_SE2_XY 0 9 1 2 10 0 10\n"
+    )
+    assert run(["slam", "--from", "more.g2o", "-o", "more.json"]) == 0
+    warnings = [line for line in capsys.readouterr().err.splitlines() if line.startswith("warning: ")]
+    assert [warning.split(":")[2] for warning in warnings] == [
+        " 1 EDGE_PRIOR_SE2 line skipped",
+        " 1 EDGE_SE2_XY line skipped",
+        " 1 VERTEX_XY line skipped",
+    ]
+    assert all(warning.startswith("warning: more.g2o: ") for warning in warnings)
+    assert read_graph("more.json").provenance["skipped"] == {
+        "EDGE_PRIOR_SE2": 1,
+        "EDGE_SE2_XY": 1,
+        "VERTEX_XY": 1,
+    }
+    assert run(["slam", "--from", "more.g2o", "-o", "more.json", "-q"]) == 0
+    assert capsys.readouterr().err == ""
+
+
+def test_keys_of_gtsam_come_back(folder):
+    first = 120 << 56
+    (folder / "keys.g2o").write_text(
+        f"VERTEX_SE2 {first} 0 0 0\nVERTEX_SE2 {first + 1} 1 0 0\n"
+        f"EDGE_SE2 {first} {first + 1} 1 0 0 100 0 0 25 0 400\n"
+    )
+    assert run(["slam", "--from", "keys.g2o", "-o", "keys.json", "-q"]) == 0
+    assert run(["slam", "--from", "keys.json", "-o", "again.json", "--g2o", "again.g2o", "-q"]) == 0
+    written = (folder / "again.g2o").read_text().splitlines()
+    assert [line.split()[1] for line in written[:2]] == [f"{first}", f"{first + 1}"]
+    assert written[2].startswith(f"EDGE_SE2 {first} {first + 1} ")
+    assert written[3] == f"FIX {first}"

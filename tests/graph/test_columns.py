@@ -5,13 +5,15 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from nscan_cli.graph.columns import Columns, Terms
 from nscan_cli.graph.relation import Relation
+from nscan_cli.graph.solve import optimise_graph
 from nscan_cli.graph.system import GraphEnergy
-from tests.graph.simulated import disturbed, mixed_ring
+from tests.graph.simulated import disturbed, graph_of, mixed_ring
 
 SIZE = 12
 TRUTH, PAIRWISE, NSCAN = mixed_ring(SIZE, noise=1.0)
@@ -56,3 +58,20 @@ def test_a_relation_in_the_place_of_another_is_one_of_its_own():
     other = replace(PAIRWISE[0], measurement=PAIRWISE[0].measurement + 0.5)
     relations = [other, *RELATIONS[1:]]
     assert_same(terms.columns(relations, positions), Terms().columns(relations, positions))
+
+
+def test_a_node_without_a_place_is_an_error_and_not_the_last_pose():
+    positions = np.arange(SIZE)
+    positions[PAIRWISE[2].nodes[1]] = -1
+    with pytest.raises(ValueError, match=f"a relation has node {PAIRWISE[2].nodes[1]}, which is no keyframe"):
+        GraphEnergy(SIZE, RELATIONS, positions)
+
+
+def test_a_scan_that_is_attached_to_a_keyframe_is_in_no_energy():
+    """Where one is made of it all the same, which no reader of files does, it is no silent wrong result."""
+    relations = [replace(PAIRWISE[0], nodes=nodes) for nodes in ((0, 1), (0, 2))]
+    graph = graph_of(TRUTH, relations, [])
+    optimise_graph(graph)
+    graph.anchors[1] = 0
+    with pytest.raises(ValueError, match="a relation has node 1, which is no keyframe"):
+        optimise_graph(graph)

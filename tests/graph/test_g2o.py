@@ -7,8 +7,9 @@ import pytest
 from hypothesis import given, settings
 
 from nscan_cli.errors import InputDataError
-from nscan_cli.graph.g2o import pairwise_marginals, read_g2o, write_g2o
+from nscan_cli.graph.g2o import read_g2o, write_g2o
 from nscan_cli.graph.model import Graph, NScan, Pairwise
+from nscan_cli.graph.pairwise_marginals import pairwise_marginals
 from nscan_cli.poses import compose, relative, rotated_information, wrap
 from tests.data import data_file
 from tests.graph.small_graph import graphs, small_graph
@@ -208,13 +209,17 @@ def test_written_marginals_stand_in_the_frame_of_the_measurement():
         ("VERTEX_SE2 1 0 0 0\nFIX 3\n", "line 2: there is no vertex 3"),
         ("FIX 1\nFIX 2\n", "line 2: a second vertex is fixed"),
         ("EDGE_SE2 1 1 0 0 0 1 0 0 1 0 1\n", "line 1: the edge joins vertex 1 with itself"),
-        ("EDGE_SE2 1 2 0 0 0 1 2 0 1 0 1\n", "line 1: the information matrix has a negative eigenvalue"),
+        (
+            "EDGE_SE2 1 2 0 0 0 1 2 0 1 0 1\n",
+            "line 1: the information matrix has a negative eigenvalue, -1 beside 3, which rounding does not "
+            "explain; mend or remove the line",
+        ),
         ("EDGE_SE2 1 2 0 0 0 1 0 0 1 0\n", "line 1: EDGE_SE2 has 10 values instead of 11"),
         (
             "EDGE_SE2 1 2 0 0 0 1 0 0 1 0 1\nEDGE_SE2 3 4 0 0 0 1 0 0 1 0 1\n",
             "line 2: no VERTEX_SE2 lines, and no edges lead from vertex 1 to vertex 3",
         ),
-        ("VERTEX_SE3:QUAT 0 0 0 0 0 0 0 1\n", "graph.g2o: no VERTEX_SE2 or EDGE_SE2 line"),
+        ("VERTEX_XY 0 0 0\n", "graph.g2o: no VERTEX_SE2 or EDGE_SE2 line; 1 VERTEX_XY line skipped"),
         ("", "graph.g2o: no VERTEX_SE2 or EDGE_SE2 line"),
     ],
 )

@@ -176,6 +176,14 @@ WRONG_IN_ITSELF: list[tuple[Change, str]] = [
     (lambda d: d["relations"][0].update(nodes=[0, 1]), "node 1 is no keyframe of this graph"),
     (lambda d: d["relations"][0].update(nodes=[0, 9]), "node 9 is no keyframe"),
     (lambda d: d["relations"][0].update(information=[-1, 0, 0, 1, 0, 1]), "positive semi-definite"),
+    (
+        lambda d: d["relations"][1].update(hessian=(-5.0 * np.eye(6)[np.triu_indices(6)]).tolist()),
+        r"relations\[1\]: 'hessian' is not positive semi-definite: it has a negative eigenvalue, -5 beside",
+    ),
+    (
+        lambda d: d["marginals"][0].update(covariance=[1, 2, 0, 1, 0, 1]),
+        r"marginals\[0\]: 'covariance' is not positive semi-definite",
+    ),
     (lambda d: d["relations"][1].update(nodes=[0, 2, 1]), "list of 3 poses"),
     (lambda d: d["relations"][1]["hessian"].append(0), "6 × 6 matrix: 21 finite numbers"),
     (lambda d: d["relations"][1].update(fixed=1), "'fixed' is 1, which is none of its nodes"),
@@ -189,6 +197,15 @@ def test_a_wrong_document_is_refused_with_its_place(change: Change, problem: str
         parse_graph(json.dumps(changed(change)).encode(), "floor.json")
     assert str(error.value).startswith("floor.json: ")
     assert str(error.value).endswith("mend it, or write the graph again with nscan-cli slam")
+
+
+def test_what_a_hessian_has_for_pose_c_does_not_count():
+    """The gauge is in it there, or anything: fᵗHf has no part of pose c, nodes[1] of this relation."""
+    hessian = np.diag([1.0, 1.0, 1.0, -7.0, -7.0, -7.0])
+    upper = hessian[np.triu_indices(6)].tolist()
+    data = json.dumps(changed(lambda d: d["relations"][1].update(hessian=upper))).encode()
+    (relation,) = parse_graph(data, "floor.json").nscan
+    np.testing.assert_array_equal(relation.hessian, hessian)
 
 
 @pytest.mark.parametrize("change", [change for change, _ in WRONG])

@@ -230,3 +230,15 @@ def test_a_match_that_says_nothing_leaves_the_motion_that_was_expected():
     found.add(3, room(3), step)
     covariance = np.linalg.inv(relation_to_previous(found).information)
     np.testing.assert_allclose(covariance, np.diag([0.03, 0.03, 0.0075]), rtol=0.01, atol=1e-9)
+
+
+@pytest.mark.parametrize("curve", [-1.0, -1e3, -1e6])
+def test_a_match_that_curves_down_says_nothing_in_that_direction(curve):
+    """As one that was not settled: what was expected of the motion stands there alone, and drift."""
+    found = Keyframes(OPTIONS, GAUSSIANS)
+    found.add(0, room(0), tracked(np.zeros(3)))
+    for hessian in (np.diag([9e4, curve, 1.6e5]), np.diag([9e4, 0.0, 1.6e5])):
+        found.add(len(found.list), room(1), tracked(np.zeros(3), hessian, path=0.5))
+    down, flat = relations_along(found.list, found.options)
+    assert np.linalg.eigvalsh(down.information)[0] > 0
+    np.testing.assert_allclose(down.information[1, 1], flat.information[1, 1], rtol=0.1)

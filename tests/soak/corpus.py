@@ -47,6 +47,18 @@ path = "other.mcap"
 """
 
 
+OTHER_G2O = f"""\
+VERTEX2 x0 0 0 0
+VERTEX_SE3:QUAT {(120 << 56) + 1} 1 0 0 0 0 0.5 0.8660254
+EDGE2 x0 x1 1 0 1.047 100 100 100 400 0 0
+EDGE_SE3:QUAT x1 x0 -0.5 0.866 0 0 0 -0.5 0.8660254 9 0 0 0 0 0 9 0 0 0 0 9 0 0 0 9 0 0 9 0 9
+VERTEX_XY 5000 1 2
+EDGE_SE2_XY x0 5000 1 2 10 0 10
+EDGE_PRIOR_SE2 x0 0 0 0 1000 0 0 1000 0 1000
+FIX x0
+"""
+
+
 def samples() -> dict[str, list[bytes]]:
     """The samples of each form, by its name; what the real logs add where they are there."""
     carmen = [room_log(12).encode(), *_real("fr079.log.gz"), *_real("mit-csail.log.gz")]
@@ -58,7 +70,7 @@ def samples() -> dict[str, list[bytes]]:
         "script": ["\n".join(LINES * 3).encode()],
         "gzip": [gzip.compress(data, mtime=0) for data in carmen[:2]],
         "json graph": [graph],
-        "g2o": [write_g2o(small_graph())],
+        "g2o": [write_g2o(small_graph()), OTHER_G2O.encode()],
         "tum": [write_tum([f"{100 + 0.2 * k:.1f}" for k in range(3)], small_graph().poses)],
         "relations": [RELATION.encode() * 3],
         "config": [CONFIG],

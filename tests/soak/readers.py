@@ -8,6 +8,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import click
+import numpy as np
 
 from nscan_cli.cli.info import as_text, facts_of
 from nscan_cli.cli.main import cli
@@ -50,10 +51,24 @@ def json_graph(path: str, chance: random.Random) -> None:
     """A graph that is read can be written, and reads back as the same."""
     graph = read_graph(path)
     written = write_graph(graph)
-    if write_graph(parse_graph(written, "again")) != written:
+    if not _same(write_graph(parse_graph(written, "again")), written):
         raise UnsoundError("a graph that was read and written reads back as another")
     write_g2o(graph)
     write_tum(graph.stamps, graph.poses)
+
+
+def _same(one: bytes, other: bytes) -> bool:
+    """Whether two graphs are: byte for byte, but for matrices that rounding made negative, and are mended."""
+    if one == other:
+        return True
+    documents, matrices = [json.loads(data) for data in (one, other)], []
+    for document in documents:
+        records = [*document["relations"], *document["marginals"]]
+        keys = ("information", "hessian", "covariance")
+        matrices.append([np.array(record.pop(key)) for record in records for key in keys if key in record])
+    return documents[0] == documents[1] and all(
+        np.abs(a - b).max() <= 1e-4 * np.abs(a).max() for a, b in zip(*matrices, strict=True)
+    )
 
 
 def g2o(path: str, chance: random.Random) -> None:
