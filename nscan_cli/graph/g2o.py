@@ -23,7 +23,7 @@ from nscan_cli.graph.model import Graph, Pairwise
 from nscan_cli.graph.pairwise_marginals import pairwise_marginals
 from nscan_cli.graph.semidefinite import IndefiniteError, semidefinite
 from nscan_cli.graph.triangles import from_upper_triangle, upper_triangle
-from nscan_cli.inputs import base_name, label, read_text
+from nscan_cli.inputs import base_name, label, read_bytes
 from nscan_cli.limits import GRAPH
 from nscan_cli.logs.scan import Source
 from nscan_cli.poses import Array, Indices, compose, inverse, rotated_information
@@ -43,7 +43,7 @@ def read_g2o(path: str) -> Graph:
 
     Raises InputMissingError when the file cannot be read, InputDataError on a malformed line.
     """
-    return parse_g2o(read_text(path, GRAPH), path)
+    return parse_g2o(read_bytes(path, GRAPH), path)
 
 
 def parse_g2o(data: bytes, path: str) -> Graph:

@@ -6,8 +6,9 @@ from nscan_cli.graph.g2o import parse_g2o
 from nscan_cli.graph.g2o_tags import losses
 from nscan_cli.graph.json_file import parse_graph
 from nscan_cli.graph.model import Graph
-from nscan_cli.inputs import label, read_text
+from nscan_cli.inputs import label, read_bytes
 from nscan_cli.limits import GRAPH
+from nscan_cli.text_encoding import plain
 
 
 def load_graph(path: str, notices: list[str] | None = None) -> Graph:
@@ -16,9 +17,10 @@ def load_graph(path: str, notices: list[str] | None = None) -> Graph:
     What was skipped, and is lost with it, is added to the `notices`. Raises InputMissingError when there is
     nothing to read, InputDataError when it is no graph.
     """
-    data = read_text(path, GRAPH)
-    if data.lstrip()[:1] == b"{":
-        return parse_graph(data, label(path))
+    data = read_bytes(path, GRAPH)
+    text = plain(data, label(path))
+    if text.lstrip()[:1] == b"{":
+        return parse_graph(text, label(path))
     graph = parse_g2o(data, path)
     if notices is not None:
         notices += [f"{label(path)}: {lost}" for lost in losses(graph.provenance["skipped"])]
