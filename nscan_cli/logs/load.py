@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
-import gzip
 import hashlib
-import io
-import zlib
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Protocol
 
-from nscan_cli.errors import InputDataError
-from nscan_cli.inputs import base_name, in_pieces, label, read_bytes
-from nscan_cli.limits import INPUT, ExceededError
-from nscan_cli.logs.kinds import FORMS, name_of, readable
+from nscan_cli.errors import InputDataError, WrongUsageError
+from nscan_cli.inputs import base_name, label, read_bytes
+from nscan_cli.limits import ExceededError
+from nscan_cli.logs import joining, recorded
+from nscan_cli.logs.kinds import FORMS, Form, foreign, readable
 from nscan_cli.logs.options import ReadingOptions
+from nscan_cli.logs.packing import packing_of, unpacked
+from nscan_cli.logs.parts import Parts, beside, parts_of
+from nscan_cli.logs.recording import Recording
 from nscan_cli.logs.scan import LaserLog, Source
 
 
@@ -24,39 +26,57 @@ class Reader(Protocol):
         """The scans; `file` is what messages call it. Raises InputDataError and WrongUsageError."""
 
 
+class Container(Protocol):
+    """What a module that reads a container of messages has."""
+
+    def recording(self, data: bytes, file: str, salvage: bool, beside: Mapping[str, bytes]) -> Recording:
+        """The messages; `file` is what errors call it, `beside` as in parts.beside, with their content.
+
+        Raises InputDataError and ExceededError.
+        """
+
+
 AS_FOUND = ReadingOptions()
 
-GZIP = b"\x1f\x8b"
-PIECE = 256
-UNPACKS = "unpacks to more and more"
 MEND = "fetch the file again, or use what can be read with --salvage"
 
 
-def read_log(path: str, options: ReadingOptions = AS_FOUND) -> LaserLog:
-    """The log at `path` ("-": standard input); its kind is found from its content.
+def read_log(paths: str | Sequence[str], options: ReadingOptions = AS_FOUND) -> LaserLog:
+    """The log at a path ("-": standard input), or in a folder or several files that a recorder has left.
 
-    Raises InputMissingError when there is nothing to read, InputDataError when it is no log or a damaged
-    one, WrongUsageError when the options do not fit it.
+    Its kind is found from its content. Raises InputMissingError when there is nothing to read,
+    InputDataError when it is no log or a damaged one, WrongUsageError when the options do not fit it, or the
+    paths are of several.
     """
-    return log_from(read_bytes(path), path, options)
+    parts = parts_of(paths)
+    if len(parts.files) > 1:
+        return _noted(_of_parts(parts, options), parts.warnings)
+    (path,) = parts.files
+    return _noted(log_from(read_bytes(path), path, options), parts.warnings)
 
 
 def log_from(stored: bytes, path: str, options: ReadingOptions = AS_FOUND) -> LaserLog:
     """The log in the bytes that `path` has; raises the same errors."""
     name = label(path)
-    source = Source(base_name(path), hashlib.sha256(stored).hexdigest(), len(stored))
     data, lost = content_of(stored, path, options.salvage)
-    del stored
     if not data.strip():
         raise InputDataError(name, "is empty", "give a log with laser scans")
+    form = _form(data, name)
+    more = _read_beside(path) if form.container else {}
+    source = _source(stored, path, more)
+    del stored
     try:
-        log = _reader(data, name).read(data, name, source, options)
+        if form.container:
+            container: Container = form.reader()
+            recording = container.recording(data, name, options.salvage, more)
+            del data, more
+            log = recorded.read(recording, name, source, options)
+        else:
+            reader: Reader = form.reader()
+            log = reader.read(data, name, source, options)
     except ExceededError as error:
         raise InputDataError(name, str(error), error.remedy) from error
-    if lost is None:
-        return log
-    report = replace(log.report, warnings=(lost, *log.report.warnings))
-    return replace(log, report=report)
+    return _noted(log, () if lost is None else (lost,))
 
 
 def content_of(stored: bytes, path: str, salvage: bool) -> tuple[bytes, str | None]:
@@ -64,56 +84,82 @@ def content_of(stored: bytes, path: str, salvage: bool) -> tuple[bytes, str | No
 
     Raises InputDataError.
     """
+    packing = packing_of(stored)
+    if packing is None:
+        return stored, None
     try:
-        return salvaged(stored) if salvage else (unpacked(stored, label(path)), None)
+        content, problem = unpacked(stored, packing)
     except ExceededError as error:
         raise InputDataError(label(path), str(error), error.remedy) from error
+    if problem is None:
+        return content, None
+    if not salvage:
+        raise InputDataError(label(path), problem, MEND)
+    return content, f"{problem}: the rest is lost"
 
 
-def _reader(data: bytes, name: str) -> Reader:
+def _of_parts(parts: Parts, options: ReadingOptions) -> LaserLog:
+    """The log in several files of one recording, of which one at a time is in memory."""
+    found: list[tuple[str, Recording]] = []
+    sources: list[tuple[Source, ...]] = []
+    first: tuple[str, str] | None = None
+    try:
+        for path in parts.files:
+            stored = read_bytes(path)
+            data, lost = content_of(stored, path, options.salvage)
+            form = _form(data, path)
+            if not form.container:
+                problem = f"{path}: is {form.name}, no recording"
+                raise WrongUsageError(f"{problem}; several LOGs have to be the files of one recording")
+            first = first or (path, form.name)
+            if form.name != first[1]:
+                raise joining.differing(first, (path, form.name))
+            more = _read_beside(path)
+            sources.append(_source(stored, path, more).files)
+            del stored
+            container: Container = form.reader()
+            recording = container.recording(data, path, options.salvage, more)
+            recording.warnings[:0] = [] if lost is None else [lost]
+            found.append((base_name(path), recording))
+        order = joining.in_order_of_time(found)
+        whole = joining.joined([found[place] for place in order], parts.are_parts)
+    except ExceededError as error:
+        raise InputDataError(parts.title, str(error), error.remedy) from error
+    del found
+    source = _together(parts.name, [file for place in order for file in sources[place]])
+    return recorded.read(whole, parts.title, source, options)
+
+
+def _form(data: bytes, name: str) -> Form:
     for form in FORMS:
         if form.fits(data):
-            reader: Reader = form.reader()
-            return reader
-    raise InputDataError(name, f"is {name_of(data)}", f"give a log: {readable()}")
+            return form
+    found = foreign(data)
+    remedy = found.remedy or f"give a log: {readable()}"
+    raise InputDataError(name, f"is {found.name}", remedy)
 
 
-def unpacked(stored: bytes, name: str) -> bytes:
-    """The content of `stored`, which may be compressed by gzip. Raises InputDataError and ExceededError."""
-    if not stored.startswith(GZIP):
-        return stored
-    try:
-        with gzip.GzipFile(fileobj=io.BytesIO(stored)) as file:
-            return in_pieces(file.read, INPUT, UNPACKS)
-    except EOFError as error:
-        raise InputDataError(name, "the gzip data end too early", MEND) from error
-    except (zlib.error, OSError) as error:
-        raise InputDataError(name, f"the gzip data are damaged ({error})", MEND) from error
+def _read_beside(path: str) -> dict[str, bytes]:
+    """The content of what stands beside a database, and belongs to it."""
+    return {end: read_bytes(name) for end, name in beside(path).items()}
 
 
-def salvaged(stored: bytes) -> tuple[bytes, str | None]:
-    """The content of `stored` as far as it can be unpacked, and what was lost; None when nothing was.
+def _source(stored: bytes, path: str, more: Mapping[str, bytes]) -> Source:
+    """The file, and what stands beside it."""
+    name = base_name(path)
+    contents = {name: stored} | {name + end: content for end, content in more.items()}
+    files = [Source(one, hashlib.sha256(content).hexdigest(), len(content)) for one, content in contents.items()]
+    return _together(name, files) if more else files[0]
 
-    Raises ExceededError.
-    """
-    if not stored.startswith(GZIP):
-        return stored, None
-    content, at, most = bytearray(), 0, INPUT.bytes
-    while stored.startswith(GZIP, at):
-        member = zlib.decompressobj(zlib.MAX_WBITS | 16)
-        try:
-            # In pieces: what goes before the damage stays.
-            while at < len(stored) and not member.eof:
-                content += member.decompress(stored[at : at + PIECE])
-                at = min(at + PIECE, len(stored)) - len(member.unused_data)
-                if len(content) > most:
-                    raise ExceededError(INPUT, UNPACKS)
-        except zlib.error as error:
-            return bytes(content), f"the gzip data are damaged near byte {at} ({error}): the rest is lost"
-        if not member.eof:
-            return bytes(content), "the gzip data end too early: the rest is lost"
-        while stored.startswith(b"\0", at):
-            at += 1
-    if at < len(stored):
-        return bytes(content), f"{len(stored) - at} bytes after the gzip data are no such data: left out"
-    return bytes(content), None
+
+def _together(name: str, files: Sequence[Source]) -> Source:
+    """Files as one source."""
+    sha256 = hashlib.sha256("".join(file.sha256 for file in files).encode()).hexdigest()
+    return Source(name, sha256, sum(file.bytes for file in files), tuple(files))
+
+
+def _noted(log: LaserLog, warnings: Sequence[str]) -> LaserLog:
+    """The log with more warnings, before its own."""
+    if not warnings:
+        return log
+    return replace(log, report=replace(log.report, warnings=(*warnings, *log.report.warnings)))

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from nscan_cli.logs import recorded
+from collections.abc import Mapping
+
 from nscan_cli.logs.mcap_records import read_records
-from nscan_cli.logs.options import ReadingOptions
-from nscan_cli.logs.scan import LaserLog, Source
+from nscan_cli.logs.recording import Recording
 
 
-def read(data: bytes, file: str, source: Source, options: ReadingOptions) -> LaserLog:
-    """The scans of one topic; raises InputDataError and WrongUsageError as recorded.read does."""
-    return recorded.read(read_records(data, file, options.salvage), file, source, options)
+def recording(data: bytes, file: str, salvage: bool, beside: Mapping[str, bytes]) -> Recording:
+    """All messages that are of use. Raises InputDataError and ExceededError."""
+    return read_records(data, file, salvage)

@@ -22,7 +22,7 @@ from mcap.opcode import Opcode
 from nscan_cli.counting import counted
 from nscan_cli.errors import InputDataError
 from nscan_cli.limits import INPUT, MB
-from nscan_cli.logs.recording import DAMAGED, WANTED, Channel, Message, Recording, ros_name
+from nscan_cli.logs.recording import DAMAGED, WANTED, Channel, Recording, ros_name
 
 MAGIC = b"\x89MCAP0\r\n"
 HEAD, MESSAGE = struct.Struct("<BQ"), struct.Struct("<HIQQ")
@@ -87,7 +87,6 @@ class _Reader:
         self.schemas: dict[int, records.Schema] = {}
         self.channels: dict[int, Channel] = {}
         self.counts: dict[int, int] = {}
-        self.wanted: dict[int, list[Message]] = {}
         self.recording = Recording("MCAP")
         self.checked = True
 
@@ -243,7 +242,7 @@ class _Reader:
             content = zstandard.ZstdDecompressor().decompress(chunk.data, max_output_size=size)
         else:
             content = chunk.data
-        self.recording.grow(len(content))
+        self.recording.pass_on(len(content))
         return content
 
     def _record(self, opcode: int, data: bytes, begin: int, stop: int) -> None:
@@ -258,9 +257,8 @@ class _Reader:
             if channel is None:
                 raise BrokenError(begin, f"a message of channel {number}, which is not defined")
             self.counts[number] = self.counts.get(number, 0) + 1
-            kept = self.wanted.get(number)
-            if kept is not None:
-                kept.append(Message(channel, log_time, data[begin + MESSAGE.size : stop]))
+            if channel.type in WANTED:
+                self.recording.keep(channel, log_time, data[begin + MESSAGE.size : stop])
 
     def _define(self, opcode: int, data: bytes, begin: int, stop: int) -> None:
         if opcode == Opcode.SCHEMA:
@@ -276,8 +274,6 @@ class _Reader:
         name, form, text = ("", "", b"") if known is None else (known.name, known.encoding, known.data)
         made = Channel(channel.topic, ros_name(name), channel.message_encoding, form, text)
         self.channels[channel.id] = made
-        if made.type in WANTED:
-            self.wanted[channel.id] = self.recording.messages.setdefault(channel.topic, [])
 
 
 def _stream(data: bytes, begin: int, stop: int) -> Any:

@@ -3,27 +3,23 @@
 from __future__ import annotations
 
 import sqlite3
+from collections.abc import Mapping
 from contextlib import closing
 
 from nscan_cli.errors import InputDataError
-from nscan_cli.logs import recorded
-from nscan_cli.logs.options import ReadingOptions
-from nscan_cli.logs.recording import WANTED, Channel, Message, Recording, ros_name
-from nscan_cli.logs.scan import LaserLog, Source
+from nscan_cli.logs.recording import WANTED, Channel, Recording, ros_name
+from nscan_cli.logs.unmerged import merged
 
 LEGACY_JOURNAL = b"\x01\x01"
 JOURNAL = slice(18, 20)
 """Bytes of the header that ask for a write-ahead log, which does not exist in memory."""
 
 
-def read(data: bytes, file: str, source: Source, options: ReadingOptions) -> LaserLog:
-    """The scans of one topic; raises InputDataError and WrongUsageError as recorded.read does."""
-    return recorded.read(_recording(data, file, options.salvage), file, source, options)
-
-
-def _recording(data: bytes, file: str, salvage: bool) -> Recording:
+def recording(data: bytes, file: str, salvage: bool, beside: Mapping[str, bytes]) -> Recording:
     """All messages that are of use, in file order. Raises InputDataError."""
     recording = Recording("ROS 2 bag (SQLite)")
+    if beside:
+        data, recording.warnings = merged(data, file, salvage, beside)
     try:
         with closing(sqlite3.connect(":memory:")) as bag:
             # A column may be made from a formula: its values need not be in the file.
@@ -60,4 +56,4 @@ def _read_tables(bag: sqlite3.Connection, with_schemas: bool, recording: Recordi
         if channel.type in WANTED:
             query = "SELECT timestamp, data FROM messages WHERE topic_id = ? ORDER BY id"
             for time, message in bag.execute(query, (number,)):
-                recording.keep(Message(channel, time, message))
+                recording.keep(channel, time, message)
