@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import hashlib
 import os
 import stat
 import sys
 import tomllib
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any
 
@@ -61,6 +62,11 @@ def read_toml(path: str, remedy: str) -> dict[str, Any]:
     except (ValueError, RecursionError) as error:
         # Not only TOML's own error: bytes that are no text, a number of thousands of digits.
         raise InputDataError(label(path), f"not TOML: {error}", remedy) from error
+
+
+def common_hash(hashes: Iterable[str]) -> str:
+    """The SHA-256 of several files together: that of theirs (hexadecimal digits), in whatever order."""
+    return hashlib.sha256("".join(sorted(hashes)).encode()).hexdigest()
 
 
 def label(path: str) -> str:

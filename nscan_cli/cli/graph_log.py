@@ -42,7 +42,9 @@ def read_graph_log(
     log = read_log(paths, _as_tracked(reading, graph_file, graph.provenance))
     inputs = _inputs(graph)
     if inputs and not is_made_from(inputs, log.source):
-        raise InputDataError(path, f"is not the log of {graph_file}: {_difference(inputs, log.source)}", REMEDY)
+        raise InputDataError(
+            path, f"is not the log of {graph_file}: {_difference(inputs, log.source)}", REMEDY
+        )
     rows = np.minimum(np.searchsorted(log.numbers, graph.scans), len(log) - 1)
     there = log.numbers[rows] == graph.scans
     some_left_out = reading.start is not None or reading.end is not None or reading.every > 1

@@ -128,7 +128,9 @@ def without_numbers(reason: str) -> str:
     return re.sub(r"(all )?\d+ scans?\b", "some scans", reason)
 
 
-def refine_saved(path: str, log_files: Sequence[str] | None, needs_log: bool, threads: int, quiet: bool) -> Run:
+def refine_saved(
+    path: str, log_files: Sequence[str] | None, needs_log: bool, threads: int, quiet: bool
+) -> Run:
     """Optimise a saved graph, and refine it where its log is there."""
     import numpy as np
 
@@ -167,7 +169,7 @@ def refine_saved(path: str, log_files: Sequence[str] | None, needs_log: bool, th
 def _log_of(
     path: str, graph: Graph, log_files: Sequence[str] | None, needed: bool, quiet: bool
 ) -> tuple[LaserLog, NDArray[np.int64], list[str]] | None:
-    """The log of a saved graph, the rows of its scans, and the paths of its files; None where the graph has none."""
+    """The log of a saved graph, the rows of its scans, and its files' paths; None where it has none."""
     from nscan_cli.cli.graph_log import find_log, read_graph_log
     from nscan_cli.logs.parts import files_of
     from nscan_cli.slam.again import can_refine, options_of

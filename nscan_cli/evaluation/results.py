@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import os
 from dataclasses import replace
 
 from nscan_cli.errors import InputDataError
@@ -10,7 +11,7 @@ from nscan_cli.graph.json_file import parse_graph
 from nscan_cli.graph.tum import Trajectory, parse_tum
 from nscan_cli.inputs import label, read_bytes
 from nscan_cli.limits import GRAPH, MB, ExceededError
-from nscan_cli.logs.load import AS_FOUND, content_of, log_from
+from nscan_cli.logs.load import AS_FOUND, content_of, log_from, read_log
 from nscan_cli.logs.options import ReadingOptions
 from nscan_cli.logs.scan import LaserLog
 
@@ -48,8 +49,13 @@ def load_reference(
 
 
 def _load(path: str, options: ReadingOptions, notices: list[str] | None) -> Trajectory | LaserLog:
-    name, stored = label(path), read_bytes(path)
+    name = label(path)
     notices = [] if notices is None else notices
+    if os.path.isdir(path):
+        log = read_log(path, replace(options, allow_corrected=True))
+        notices += [f"{name}: {notice}" for notice in log.report.notices()]
+        return log
+    stored = read_bytes(path)
     data, lost = content_of(stored, path, options.salvage)
     if not data.strip():
         raise InputDataError(name, "is empty", "give a graph, a TUM file or a log")

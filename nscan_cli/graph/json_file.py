@@ -22,8 +22,8 @@ from nscan_cli.graph.relation_types import relation_of, relation_record
 from nscan_cli.inputs import label, read_bytes
 from nscan_cli.limits import GRAPH, TIME
 from nscan_cli.logs.kinds import FORMS, name_of
-from nscan_cli.logs.packing import packing_of
 from nscan_cli.logs.order import STAMP
+from nscan_cli.logs.packing import packing_of
 from nscan_cli.poses import Array
 from nscan_cli.provenance import provenance_of
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from nscan_cli.counting import counted
 from nscan_cli.errors import WrongUsageError
 from nscan_cli.logs.recording import Recording
 from nscan_cli.logs.sensed import S
@@ -59,7 +58,8 @@ def differing(first: tuple[str, str], other: tuple[str, str]) -> WrongUsageError
     """Two files, each with its name and form, are no parts of one recording: what to say."""
     (name, form), (other_name, other_form) = first, other
     return WrongUsageError(
-        f"{name} is {form}, {other_name} {other_form}: they are not files of one recording; give one of them alone"
+        f"{name} is {form}, {other_name} {other_form}: they are not files of one recording; "
+        "give one of them alone"
     )
 
 

@@ -51,7 +51,6 @@ def readable() -> str:
     return f"{', '.join(form.name for form in FORMS)}; plain or packed by gzip, bzip2, xz, zstd or lz4"
 
 
-
 class Foreign(NamedTuple):
     """What a file is that no log is read from."""
 
@@ -67,15 +66,28 @@ MAGIC = (
     (b"#ROSBAG V", Foreign("a ROS 1 bag of an old version", RENEW)),
     (b"#ROSRECORD V", Foreign("a ROS 1 bag of an old version", RENEW)),
     (b"#ROSLOG V", Foreign("a ROS 1 bag of an old version", RENEW)),
-    (b"version https://git-lfs.github.com/spec/", Foreign("a pointer of Git LFS, not the file that it stands for",
-                                                          "fetch that by `git lfs pull`")),
-    (b"\x37\x7f\x06\x82", Foreign("the write-ahead log of an SQLite database", "give the .db3 that it is of")),
-    (b"\x37\x7f\x06\x83", Foreign("the write-ahead log of an SQLite database", "give the .db3 that it is of")),
-    (b"\xd9\xd5\x05\xf9\x20\xa1\x63\xd7", Foreign("the journal of an SQLite database",
-                                                   "give the .db3 that it is of")),
+    (
+        b"version https://git-lfs.github.com/spec/",
+        Foreign("a pointer of Git LFS, not the file that it stands for", "fetch that by `git lfs pull`"),
+    ),
+    (
+        b"\x37\x7f\x06\x82",
+        Foreign("the write-ahead log of an SQLite database", "give the .db3 that it is of"),
+    ),
+    (
+        b"\x37\x7f\x06\x83",
+        Foreign("the write-ahead log of an SQLite database", "give the .db3 that it is of"),
+    ),
+    (
+        b"\xd9\xd5\x05\xf9\x20\xa1\x63\xd7",
+        Foreign("the journal of an SQLite database", "give the .db3 that it is of"),
+    ),
     (b"\xd4\xc3\xb2\xa1", Foreign("a capture of network packets (pcap)", "give a recording of laser scans")),
     (b"\xa1\xb2\xc3\xd4", Foreign("a capture of network packets (pcap)", "give a recording of laser scans")),
-    (b"\x0a\x0d\x0d\x0a", Foreign("a capture of network packets (pcapng)", "give a recording of laser scans")),
+    (
+        b"\x0a\x0d\x0d\x0a",
+        Foreign("a capture of network packets (pcapng)", "give a recording of laser scans"),
+    ),
     (b"\x89PNG\r\n\x1a\n", Foreign("a PNG picture")),
     (b"\xff\xd8\xff", Foreign("a JPEG picture")),
     (b"P5", Foreign("a PGM picture")),
@@ -107,7 +119,9 @@ TEXT = (
 FIRST_LINE = re.compile(rb"^[ \t]*([^\s#][^\r\n]*)", re.MULTILINE)
 
 
-RAWLOG = re.compile(rb"[\x00-\xff]{1,4}(mrpt::(\w+::)?)?C(Observation|Action|SensoryFrame|Rawlog)\w*[\x00-\x1f]")
+RAWLOG = re.compile(
+    rb"[\x00-\xff]{1,4}(mrpt::(\w+::)?)?C(Observation|Action|SensoryFrame|Rawlog)\w*[\x00-\x1f]"
+)
 """How MRPT begins an object: the length of its class's name, the name, and a version."""
 
 

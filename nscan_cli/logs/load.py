@@ -8,9 +8,9 @@ from dataclasses import replace
 from typing import Protocol
 
 from nscan_cli.errors import InputDataError, WrongUsageError
-from nscan_cli.inputs import base_name, label, read_bytes
+from nscan_cli.inputs import base_name, common_hash, label, read_bytes
 from nscan_cli.limits import ExceededError
-from nscan_cli.logs import joining, recorded
+from nscan_cli.logs import joining
 from nscan_cli.logs.kinds import FORMS, Form, foreign, readable
 from nscan_cli.logs.options import ReadingOptions
 from nscan_cli.logs.packing import packing_of, unpacked
@@ -29,11 +29,8 @@ class Reader(Protocol):
 class Container(Protocol):
     """What a module that reads a container of messages has."""
 
-    def recording(self, data: bytes, file: str, salvage: bool, beside: Mapping[str, bytes]) -> Recording:
-        """The messages; `file` is what errors call it, `beside` as in parts.beside, with their content.
-
-        Raises InputDataError and ExceededError.
-        """
+    def recording(self, data: bytes, file: str, salvage: bool) -> Recording:
+        """The messages; `file` is what errors call it. Raises InputDataError and ExceededError."""
 
 
 AS_FOUND = ReadingOptions()
@@ -60,17 +57,15 @@ def log_from(stored: bytes, path: str, options: ReadingOptions = AS_FOUND) -> La
     name = label(path)
     data, lost = content_of(stored, path, options.salvage)
     if not data.strip():
-        raise InputDataError(name, "is empty", "give a log with laser scans")
-    form = _form(data, name)
-    more = _read_beside(path) if form.container else {}
+        raise InputDataError(name, lost or "is empty", "give a log with laser scans")
+    form, more = _form(data, name), _read_beside(path)
     source = _source(stored, path, more)
     del stored
     try:
         if form.container:
-            container: Container = form.reader()
-            recording = container.recording(data, name, options.salvage, more)
+            recording = _recording(form, data, name, options.salvage, more)
             del data, more
-            log = recorded.read(recording, name, source, options)
+            log = _scans(recording, name, source, options)
         else:
             reader: Reader = form.reader()
             log = reader.read(data, name, source, options)
@@ -117,8 +112,7 @@ def _of_parts(parts: Parts, options: ReadingOptions) -> LaserLog:
             more = _read_beside(path)
             sources.append(_source(stored, path, more).files)
             del stored
-            container: Container = form.reader()
-            recording = container.recording(data, path, options.salvage, more)
+            recording = _recording(form, data, path, options.salvage, more)
             recording.warnings[:0] = [] if lost is None else [lost]
             found.append((base_name(path), recording))
         order = joining.in_order_of_time(found)
@@ -127,7 +121,14 @@ def _of_parts(parts: Parts, options: ReadingOptions) -> LaserLog:
         raise InputDataError(parts.title, str(error), error.remedy) from error
     del found
     source = _together(parts.name, [file for place in order for file in sources[place]])
-    return recorded.read(whole, parts.title, source, options)
+    return _scans(whole, parts.title, source, options)
+
+
+def _scans(recording: Recording, name: str, source: Source, options: ReadingOptions) -> LaserLog:
+    """The scans of a recording; texts need none of what decodes messages."""
+    from nscan_cli.logs import recorded
+
+    return recorded.read(recording, name, source, options)
 
 
 def _form(data: bytes, name: str) -> Form:
@@ -139,6 +140,19 @@ def _form(data: bytes, name: str) -> Form:
     raise InputDataError(name, f"is {found.name}", remedy)
 
 
+def _recording(form: Form, data: bytes, name: str, salvage: bool, more: Mapping[str, bytes]) -> Recording:
+    """The messages in a container; a database is put together with what stands beside it first."""
+    container: Container = form.reader()
+    if not more:
+        return container.recording(data, name, salvage)
+    from nscan_cli.logs.unmerged import merged
+
+    data, warnings = merged(data, name, salvage, more)
+    recording = container.recording(data, name, salvage)
+    recording.warnings[:0] = warnings
+    return recording
+
+
 def _read_beside(path: str) -> dict[str, bytes]:
     """The content of what stands beside a database, and belongs to it."""
     return {end: read_bytes(name) for end, name in beside(path).items()}
@@ -148,14 +162,17 @@ def _source(stored: bytes, path: str, more: Mapping[str, bytes]) -> Source:
     """The file, and what stands beside it."""
     name = base_name(path)
     contents = {name: stored} | {name + end: content for end, content in more.items()}
-    files = [Source(one, hashlib.sha256(content).hexdigest(), len(content)) for one, content in contents.items()]
+    files = [
+        Source(one, hashlib.sha256(content).hexdigest(), len(content)) for one, content in contents.items()
+    ]
     return _together(name, files) if more else files[0]
 
 
 def _together(name: str, files: Sequence[Source]) -> Source:
     """Files as one source."""
-    sha256 = hashlib.sha256("".join(file.sha256 for file in files).encode()).hexdigest()
-    return Source(name, sha256, sum(file.bytes for file in files), tuple(files))
+    return Source(
+        name, common_hash(file.sha256 for file in files), sum(file.bytes for file in files), tuple(files)
+    )
 
 
 def _noted(log: LaserLog, warnings: Sequence[str]) -> LaserLog:

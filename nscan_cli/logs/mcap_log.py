@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
 from nscan_cli.logs.mcap_records import read_records
 from nscan_cli.logs.recording import Recording
 
 
-def recording(data: bytes, file: str, salvage: bool, beside: Mapping[str, bytes]) -> Recording:
+def recording(data: bytes, file: str, salvage: bool) -> Recording:
     """All messages that are of use. Raises InputDataError and ExceededError."""
     return read_records(data, file, salvage)

@@ -73,10 +73,14 @@ def parts_of(paths: str | Sequence[str]) -> Parts:
         warnings = () if path == STANDARD_INPUT else _siblings(path)
         return Parts(label(path), base_name(path), (path,), warnings)
     if STANDARD_INPUT in named:
-        raise WrongUsageError("standard input (-) can be no part of a recording; give all files by their paths")
+        raise WrongUsageError(
+            "standard input (-) can be no part of a recording; give all files by their paths"
+        )
     for path in named:
         if os.path.isdir(path):
-            raise WrongUsageError(f"{path}: is a folder beside other LOGs; give it alone, or the files of one recording")
+            raise WrongUsageError(
+                f"{path}: is a folder beside other LOGs; give it alone, or the files of one recording"
+            )
     if len({os.path.realpath(path) for path in named}) < len(named):
         raise WrongUsageError(f"{named[-1]}: one of the LOGs is given twice; give each once")
     files = [path for path in named if not any(path == other + end for other in named for end in BESIDE)]
@@ -143,7 +147,8 @@ def _alone(path: str, there: list[str], names: list[str]) -> list[str]:
         held = [f"{name}/" if os.path.isdir(os.path.join(path, name)) else name for name in names]
         holds = f"it holds {_some(held)}" if held else "it is empty"
         raise InputMissingError(
-            f"{path}: is a folder without a recording, {holds}; name a log, or a folder that `ros2 bag record` left"
+            f"{path}: is a folder without a recording, {holds}; "
+            "name a log, or a folder that `ros2 bag record` has left"
         )
     plain = {_without_packing(one): one for one in sorted(there, key=len, reverse=True)}
     parts = _in_order(plain.values())

@@ -61,7 +61,7 @@ class Recording:
     """Bytes that were unpacked on the way, of which only the messages are kept."""
 
     def pass_on(self, size: int) -> None:
-        """Take account of bytes that are unpacked and not kept. Raises ExceededError when they are too many."""
+        """Take account of bytes that are unpacked and not kept. Raises ExceededError beyond the limit."""
         self.passed += size
         UNPACKED.check(self.passed / MB, UNPACKS)
 

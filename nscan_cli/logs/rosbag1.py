@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import struct
 from bz2 import BZ2Decompressor
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from typing import Any
 
 from nscan_cli.errors import InputDataError
@@ -37,7 +37,7 @@ COUNT = struct.Struct("<II")
 WALKED = "its messages were found by walking through it"
 
 
-def recording(data: bytes, file: str, salvage: bool, beside: Mapping[str, bytes]) -> Recording:
+def recording(data: bytes, file: str, salvage: bool) -> Recording:
     """All messages that are of use, in order of their log times. Raises InputDataError and ExceededError."""
     walk = _Walk(data, file, salvage)
     walk.read()
@@ -84,7 +84,9 @@ class _Walk:
                 if record.kind == CONNECTION:
                     self._connect(record, self.data)
                 elif record.kind == CHUNK_INFO:
-                    pairs = COUNT.iter_unpack(self.data[record.begin : record.end][: 8 * record.number(b"count")])
+                    pairs = COUNT.iter_unpack(
+                        self.data[record.begin : record.end][: 8 * record.number(b"count")]
+                    )
                     promised[record.number(b"chunk_pos", LONG)] = dict(pairs)
         except (BrokenError, struct.error):
             return None

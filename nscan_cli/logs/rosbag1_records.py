@@ -122,7 +122,7 @@ def after_index(data: bytes, record: Record) -> int:
     """
     entries = record.begin + ENTRY[record.kind] * record.number(b"count")
     for at in (record.end, entries):
-        if at == len(data) or at < len(data) and _is_record(data, at):
+        if at == len(data) or (at < len(data) and _is_record(data, at)):
             return at
     raise BrokenError(record.at, "a record of the index has a wrong length", in_index=True)
 
@@ -133,7 +133,9 @@ def next_chunk(data: bytes, start: int) -> int | None:
     while found >= 0:
         for at in range(found - LENGTH.size, max(start, found - LONGEST_CHUNK_HEADER) - 1, -1):
             (size,) = LENGTH.unpack_from(data, at)
-            if found + len(CHUNK_FIELD) - at - LENGTH.size <= size < LONGEST_CHUNK_HEADER and _is_record(data, at):
+            if found + len(CHUNK_FIELD) - at - LENGTH.size <= size < LONGEST_CHUNK_HEADER and _is_record(
+                data, at
+            ):
                 return at
         found = data.find(CHUNK_FIELD, found + 1)
     return None

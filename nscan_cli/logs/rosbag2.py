@@ -3,23 +3,19 @@
 from __future__ import annotations
 
 import sqlite3
-from collections.abc import Mapping
 from contextlib import closing
 
 from nscan_cli.errors import InputDataError
 from nscan_cli.logs.recording import WANTED, Channel, Recording, ros_name
-from nscan_cli.logs.unmerged import merged
 
 LEGACY_JOURNAL = b"\x01\x01"
 JOURNAL = slice(18, 20)
 """Bytes of the header that ask for a write-ahead log, which does not exist in memory."""
 
 
-def recording(data: bytes, file: str, salvage: bool, beside: Mapping[str, bytes]) -> Recording:
+def recording(data: bytes, file: str, salvage: bool) -> Recording:
     """All messages that are of use, in file order. Raises InputDataError."""
     recording = Recording("ROS 2 bag (SQLite)")
-    if beside:
-        data, recording.warnings = merged(data, file, salvage, beside)
     try:
         with closing(sqlite3.connect(":memory:")) as bag:
             # A column may be made from a formula: its values need not be in the file.

@@ -23,8 +23,7 @@ TOGETHER = 256
 class Source:
     """What the log was read from: base name, SHA-256 of its bytes as stored, size in bytes.
 
-    Where that is more than one file, the SHA-256 is that of theirs, written in hexadecimal digits one after
-    another.
+    Where that is more than one file, the SHA-256 is inputs.common_hash of theirs.
     """
 
     name: str

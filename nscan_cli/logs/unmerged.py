@@ -18,7 +18,7 @@ from nscan_cli.errors import InputDataError, OutputError
 
 WAL = "-wal"
 HEAD, FRAME = 32, 24
-"""Bytes of the header of a write-ahead log, and of that of each of its frames (sqlite.org/fileformat2.html)."""
+"""Bytes of the header of a write-ahead log, and of each frame's in it (sqlite.org/fileformat2.html)."""
 SALTS = slice(16, 24)
 FRAME_SALTS = slice(8, 16)
 

@@ -71,7 +71,9 @@ def run_all(
         client.close(timeout=2)
 
 
-def run_there(task: Task, content: dict[str, Content], timeout: float | None, tool: str, topic: str) -> Outcome:
+def run_there(
+    task: Task, content: dict[str, Content], timeout: float | None, tool: str, topic: str
+) -> Outcome:
     """On a worker: do a task whose inputs have come along, and say under the topic how far it is."""
     from distributed import get_worker
 

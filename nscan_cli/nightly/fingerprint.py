@@ -10,7 +10,7 @@ from pathlib import Path
 
 from nscan_cli import __version__
 from nscan_cli.errors import InputMissingError
-from nscan_cli.inputs import read_bytes
+from nscan_cli.inputs import common_hash, read_bytes
 from nscan_cli.logs.parts import files_of
 from nscan_cli.nightly.manifest import Entry
 
@@ -35,7 +35,7 @@ def tool_key() -> str:
 
 
 def sha256_of(path: Path, role: str) -> str:
-    """SHA-256 of an input; of a log of several files as in logs.scan.Source, of any other of its bytes.
+    """SHA-256 of an input; of a log of several files as inputs.common_hash, of any other of its bytes.
 
     Raises InputMissingError when it cannot be read, or is no file at all, and the errors of files_of.
     """
@@ -46,7 +46,7 @@ def sha256_of(path: Path, role: str) -> str:
         if Path(file).exists() and not Path(file).is_file():
             raise InputMissingError(f"{file}: is no file; name one")
         hashes.append(hashlib.sha256(read_bytes(file)).hexdigest())
-    return hashes[0] if len(hashes) == 1 else hashlib.sha256("".join(hashes).encode()).hexdigest()
+    return hashes[0] if len(hashes) == 1 else common_hash(hashes)
 
 
 def size_of(path: Path) -> int:
