@@ -106,7 +106,8 @@ def beside(path: str) -> dict[str, str]:
     """
     if path == STANDARD_INPUT or not _head(path).startswith(SQLITE):
         return {}
-    names = {end: os.path.realpath(path) + end for end in BESIDE}
+    database = os.path.realpath(path) if os.path.islink(path) else path
+    names = {end: database + end for end in BESIDE}
     return {end: name for end, name in names.items() if os.path.isfile(name) and os.path.getsize(name)}
 
 
