@@ -6,6 +6,7 @@ import importlib
 import re
 from typing import Any, NamedTuple
 
+from nscan_cli.inputs import Bytes
 from nscan_cli.logs.packing import packing_of
 
 
@@ -22,11 +23,13 @@ class Form(NamedTuple):
     container: bool = False
     """Whether it holds messages, and may be one of several files of a recording: the module then has
     `recording`, as logs.load.Container says, in place of `read`."""
+    by_path: bool = False
+    """Whether the module has `recording_at` too, as logs.load.Database says, which opens the file itself."""
 
-    def fits(self, data: bytes) -> bool:
+    def fits(self, data: Bytes) -> bool:
         """Whether these bytes are of this form."""
         if self.magic is not None:
-            return data.startswith(self.magic)
+            return data[: len(self.magic)] == self.magic
         recognised: bool = self.reader().recognises(data)
         return recognised
 
@@ -38,7 +41,7 @@ class Form(NamedTuple):
 FORMS: tuple[Form, ...] = (
     Form("MCAP", "nscan_cli.logs.mcap_log", b"\x89MCAP0\r\n", container=True),
     Form("ROS 1 bag", "nscan_cli.logs.rosbag1", b"#ROSBAG V2.0\n", container=True),
-    Form("ROS 2 bag", "nscan_cli.logs.rosbag2", b"SQLite format 3\0", container=True),
+    Form("ROS 2 bag", "nscan_cli.logs.rosbag2", b"SQLite format 3\0", container=True, by_path=True),
     Form("CARMEN text", "nscan_cli.logs.carmen"),
     Form("Player text", "nscan_cli.logs.player"),
     Form(".script text", "nscan_cli.logs.script"),

@@ -3,18 +3,21 @@
 from __future__ import annotations
 
 import hashlib
+import os
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from mmap import mmap
 from typing import Protocol
 
 from nscan_cli.errors import InputDataError, WrongUsageError
-from nscan_cli.inputs import base_name, common_hash, label, read_bytes
+from nscan_cli.inputs import Bytes, base_name, common_hash, label, mapped, read_bytes, sha256_of
 from nscan_cli.limits import ExceededError
 from nscan_cli.logs import joining
 from nscan_cli.logs.kinds import FORMS, Form, foreign, readable
 from nscan_cli.logs.options import ReadingOptions
 from nscan_cli.logs.packing import packing_of, unpacked
-from nscan_cli.logs.parts import Parts, beside, parts_of
+from nscan_cli.logs.parts import Parts, beside, first_bytes, parts_of
 from nscan_cli.logs.recording import Recording
 from nscan_cli.logs.scan import LaserLog, Source
 
@@ -29,8 +32,15 @@ class Reader(Protocol):
 class Container(Protocol):
     """What a module that reads a container of messages has."""
 
-    def recording(self, data: bytes, file: str, salvage: bool) -> Recording:
+    def recording(self, data: Bytes, file: str, salvage: bool) -> Recording:
         """The messages; `file` is what errors call it. Raises InputDataError and ExceededError."""
+
+
+class Database(Container, Protocol):
+    """What a module has that opens a file itself."""
+
+    def recording_at(self, path: str, beside: Mapping[str, str], file: str, salvage: bool) -> Recording:
+        """The messages in the file and in what parts.beside has found. Raises the same errors."""
 
 
 AS_FOUND = ReadingOptions()
@@ -49,24 +59,36 @@ def read_log(paths: str | Sequence[str], options: ReadingOptions = AS_FOUND) -> 
     if len(parts.files) > 1:
         return _noted(_of_parts(parts, options), parts.warnings)
     (path,) = parts.files
-    return _noted(log_from(read_bytes(path), path, options), parts.warnings)
+    return _noted(log_from(stored_bytes(path), path, options), parts.warnings)
 
 
-def log_from(stored: bytes, path: str, options: ReadingOptions = AS_FOUND) -> LaserLog:
+def stored_bytes(path: str) -> Bytes:
+    """The bytes of a log as they are stored. Those of a recording in a file are not taken into memory.
+
+    Raises InputMissingError, and InputDataError when there are more than the limit allows.
+    """
+    head = first_bytes(path)
+    if any(form.container and form.fits(head) for form in FORMS if form.magic is not None):
+        return mapped(path)
+    return read_bytes(path)
+
+
+def log_from(stored: Bytes, path: str, options: ReadingOptions = AS_FOUND) -> LaserLog:
     """The log in the bytes that `path` has; raises the same errors."""
     name = label(path)
-    data, lost = content_of(stored, path, options.salvage)
-    if not data.strip():
+    data, lost = _content(stored, path, options.salvage)
+    if not re.search(rb"\S", data):
         raise InputDataError(name, lost or "is empty", "give a log with laser scans")
-    form, more = _form(data, name), _read_beside(path)
-    source = _source(stored, path, more)
+    form = _form(data, name)
+    source = _source(stored, path)
     del stored
     try:
         if form.container:
-            recording = _recording(form, data, name, options.salvage, more)
-            del data, more
+            recording = _recording(form, data, path, options.salvage)
+            del data
             log = _scans(recording, name, source, options)
         else:
+            assert isinstance(data, bytes)
             reader: Reader = form.reader()
             log = reader.read(data, name, source, options)
     except ExceededError as error:
@@ -93,6 +115,11 @@ def content_of(stored: bytes, path: str, salvage: bool) -> tuple[bytes, str | No
     return content, f"{problem}: the rest is lost"
 
 
+def _content(stored: Bytes, path: str, salvage: bool) -> tuple[Bytes, str | None]:
+    """The same; what is in its place in a file is not compressed."""
+    return content_of(stored, path, salvage) if isinstance(stored, bytes) else (stored, None)
+
+
 def _of_parts(parts: Parts, options: ReadingOptions) -> LaserLog:
     """The log in several files of one recording, of which one at a time is in memory."""
     found: list[tuple[str, Recording]] = []
@@ -100,8 +127,8 @@ def _of_parts(parts: Parts, options: ReadingOptions) -> LaserLog:
     first: tuple[str, str] | None = None
     try:
         for path in parts.files:
-            stored = read_bytes(path)
-            data, lost = content_of(stored, path, options.salvage)
+            stored = stored_bytes(path)
+            data, lost = _content(stored, path, options.salvage)
             form = _form(data, path)
             if not form.container:
                 problem = f"{path}: is {form.name}, no recording"
@@ -109,10 +136,10 @@ def _of_parts(parts: Parts, options: ReadingOptions) -> LaserLog:
             first = first or (path, form.name)
             if form.name != first[1]:
                 raise joining.differing(first, (path, form.name))
-            more = _read_beside(path)
-            sources.append(_source(stored, path, more).files)
+            sources.append(_source(stored, path).files)
             del stored
-            recording = _recording(form, data, path, options.salvage, more)
+            recording = _recording(form, data, path, options.salvage)
+            del data
             recording.warnings[:0] = [] if lost is None else [lost]
             found.append((base_name(path), recording))
         order = joining.in_order_of_time(found)
@@ -131,41 +158,33 @@ def _scans(recording: Recording, name: str, source: Source, options: ReadingOpti
     return recorded.read(recording, name, source, options)
 
 
-def _form(data: bytes, name: str) -> Form:
+def _form(data: Bytes, name: str) -> Form:
     for form in FORMS:
         if form.fits(data):
             return form
-    found = foreign(data)
+    found = foreign(bytes(data))
     remedy = found.remedy or f"give a log: {readable()}"
     raise InputDataError(name, f"is {found.name}", remedy)
 
 
-def _recording(form: Form, data: bytes, name: str, salvage: bool, more: Mapping[str, bytes]) -> Recording:
-    """The messages in a container; a database is put together with what stands beside it first."""
+def _recording(form: Form, data: Bytes, path: str, salvage: bool) -> Recording:
+    """The messages in a container: of a database from its file, where it is one and not compressed."""
+    if form.by_path and isinstance(data, mmap):
+        database: Database = form.reader()
+        return database.recording_at(path, beside(path), label(path), salvage)
     container: Container = form.reader()
-    if not more:
-        return container.recording(data, name, salvage)
-    from nscan_cli.logs.unmerged import merged
-
-    data, warnings = merged(data, name, salvage, more)
-    recording = container.recording(data, name, salvage)
-    recording.warnings[:0] = warnings
-    return recording
+    return container.recording(data, label(path), salvage)
 
 
-def _read_beside(path: str) -> dict[str, bytes]:
-    """The content of what stands beside a database, and belongs to it."""
-    return {end: read_bytes(name) for end, name in beside(path).items()}
-
-
-def _source(stored: bytes, path: str, more: Mapping[str, bytes]) -> Source:
+def _source(stored: Bytes, path: str) -> Source:
     """The file, and what stands beside it."""
     name = base_name(path)
-    contents = {name: stored} | {name + end: content for end, content in more.items()}
-    files = [
-        Source(one, hashlib.sha256(content).hexdigest(), len(content)) for one, content in contents.items()
+    sha256 = hashlib.sha256(stored).hexdigest() if isinstance(stored, bytes) else sha256_of(path)
+    more = [
+        Source(name + end, sha256_of(other), os.path.getsize(other)) for end, other in beside(path).items()
     ]
-    return _together(name, files) if more else files[0]
+    file = Source(name, sha256, len(stored))
+    return _together(name, [file, *more]) if more else file
 
 
 def _together(name: str, files: Sequence[Source]) -> Source:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
+from nscan_cli.inputs import Bytes
 from nscan_cli.limits import INPUT, ExceededError
 
 PIECE = 256
@@ -64,9 +65,9 @@ SUFFIXES = (".gz", ".bz2", ".xz", ".zst", ".zstd", ".lz4")
 """What names of compressed files end with."""
 
 
-def packing_of(data: bytes) -> Packing | None:
+def packing_of(data: Bytes) -> Packing | None:
     """How the data are compressed; None when they are not."""
-    return next((packing for packing in PACKINGS if data.startswith(packing.magic)), None)
+    return next((packing for packing in PACKINGS if data[: len(packing.magic)] == packing.magic), None)
 
 
 def unpacked(stored: bytes, packing: Packing) -> tuple[bytes, str | None]:

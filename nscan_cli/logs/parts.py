@@ -104,7 +104,7 @@ def beside(path: str) -> dict[str, str]:
 
     None when it is no database. As SQLite does, it is looked for beside the file that a link leads to.
     """
-    if path == STANDARD_INPUT or not _head(path).startswith(SQLITE):
+    if path == STANDARD_INPUT or not first_bytes(path).startswith(SQLITE):
         return {}
     database = os.path.realpath(path) if os.path.islink(path) else path
     names = {end: database + end for end in BESIDE}
@@ -203,12 +203,12 @@ def _is_recording(path: Path) -> bool:
     """Whether a file is a recording, by its first bytes, or is called one."""
     if not path.is_file():
         return False
-    head = _head(str(path))
+    head = first_bytes(str(path))
     magic = any(form.magic is not None and head.startswith(form.magic) for form in FORMS if form.container)
     return magic or _taken_apart(path.name).recording[1] != ""
 
 
-def _head(path: str) -> bytes:
+def first_bytes(path: str) -> bytes:
     """The first bytes of a regular file; none when it is not there."""
     try:
         if os.path.isfile(path):

@@ -10,6 +10,8 @@ import struct
 from collections.abc import Iterator
 from typing import NamedTuple
 
+from nscan_cli.inputs import Bytes
+
 LENGTH, LONG, TIME = struct.Struct("<I"), struct.Struct("<Q"), struct.Struct("<II")
 MAGIC = b"#ROSBAG V2.0\n"
 MESSAGE, HEADER, INDEX, CHUNK, CHUNK_INFO, CONNECTION = 2, 3, 4, 5, 6, 7
@@ -62,7 +64,7 @@ class Record(NamedTuple):
         return value
 
 
-def record_at(data: bytes, at: int, end: int) -> Record:
+def record_at(data: Bytes, at: int, end: int) -> Record:
     """The record that begins at a byte, and ends before `end`. Raises BrokenError when there is none."""
     fields, begin = fields_at(data, at, end, "a record's header")
     if begin + LENGTH.size > end:
@@ -77,7 +79,7 @@ def record_at(data: bytes, at: int, end: int) -> Record:
     return Record(at, kind[0], fields, begin, begin + size)
 
 
-def records(data: bytes, start: int, end: int) -> Iterator[Record]:
+def records(data: Bytes, start: int, end: int) -> Iterator[Record]:
     """One record after the other. Raises BrokenError where there is none."""
     at = start
     while at < end:
@@ -86,7 +88,7 @@ def records(data: bytes, start: int, end: int) -> Iterator[Record]:
         yield record
 
 
-def fields_at(data: bytes, at: int, end: int, what: str) -> tuple[dict[bytes, bytes], int]:
+def fields_at(data: Bytes, at: int, end: int, what: str) -> tuple[dict[bytes, bytes], int]:
     """Fields that begin with their common length, and the byte behind them. Raises BrokenError."""
     if at + LENGTH.size > end:
         raise BrokenError(at, f"it ends within {what}")
@@ -97,7 +99,7 @@ def fields_at(data: bytes, at: int, end: int, what: str) -> tuple[dict[bytes, by
     return named(data, begin, stop, at), stop
 
 
-def named(data: bytes, begin: int, stop: int, at: int) -> dict[bytes, bytes]:
+def named(data: Bytes, begin: int, stop: int, at: int) -> dict[bytes, bytes]:
     """The fields in some bytes; `at` is what an error names. Raises BrokenError."""
     fields = {}
     while begin < stop:
@@ -115,7 +117,7 @@ def named(data: bytes, begin: int, stop: int, at: int) -> dict[bytes, bytes]:
     return fields
 
 
-def after_index(data: bytes, record: Record) -> int:
+def after_index(data: Bytes, record: Record) -> int:
     """The byte behind a record of the index, whose length some recorders have written wrong.
 
     Raises BrokenError when no record begins where one has to.
@@ -127,7 +129,7 @@ def after_index(data: bytes, record: Record) -> int:
     raise BrokenError(record.at, "a record of the index has a wrong length", in_index=True)
 
 
-def next_chunk(data: bytes, start: int) -> int | None:
+def next_chunk(data: Bytes, start: int) -> int | None:
     """The byte at or behind `start` where the next chunk begins that is whole; None where there is none."""
     found = data.find(CHUNK_FIELD, start)
     while found >= 0:
@@ -141,7 +143,7 @@ def next_chunk(data: bytes, start: int) -> int | None:
     return None
 
 
-def _is_record(data: bytes, at: int) -> bool:
+def _is_record(data: Bytes, at: int) -> bool:
     try:
         record_at(data, at, len(data))
     except BrokenError:

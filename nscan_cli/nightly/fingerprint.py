@@ -10,7 +10,7 @@ from pathlib import Path
 
 from nscan_cli import __version__
 from nscan_cli.errors import InputMissingError
-from nscan_cli.inputs import common_hash, read_bytes
+from nscan_cli.inputs import common_hash, sha256_of
 from nscan_cli.logs.parts import files_of
 from nscan_cli.nightly.manifest import Entry
 
@@ -34,7 +34,7 @@ def tool_key() -> str:
     return f"{__version__}-{sources.hexdigest()[:16]}"
 
 
-def sha256_of(path: Path, role: str) -> str:
+def input_hash(path: Path, role: str) -> str:
     """SHA-256 of an input; of a log of several files as inputs.common_hash, of any other of its bytes.
 
     Raises InputMissingError when it cannot be read, or is no file at all, and the errors of files_of.
@@ -45,7 +45,7 @@ def sha256_of(path: Path, role: str) -> str:
         # From a named pipe nobody might ever write to, one would read for ever.
         if Path(file).exists() and not Path(file).is_file():
             raise InputMissingError(f"{file}: is no file; name one")
-        hashes.append(hashlib.sha256(read_bytes(file)).hexdigest())
+        hashes.append(sha256_of(file))
     return hashes[0] if len(hashes) == 1 else common_hash(hashes)
 
 

@@ -98,8 +98,9 @@ def test_whatever_is_named_like_a_file_is_completed_as_one(name):
 
 def test_shells_are_told_where_a_file_comes(tmp_path):
     for line in ("nscan-cli info off", "nscan-cli info on.mcap off",
-                 "nscan-cli render on.json on.mcap off", "nscan-cli slam office.log -o off", "nscan-cli evaluate off",
-                 "nscan-cli match office.log --plot off", "nscan-cli slam --config off"):  # fmt: skip
+                 "nscan-cli render on.json on.mcap off", "nscan-cli slam office.log -o off",
+                 "nscan-cli evaluate off", "nscan-cli match office.log --plot off",
+                 "nscan-cli slam --config off"):  # fmt: skip
         assert answer("bash", line, tmp_path) == "file,off\n", line
 
 

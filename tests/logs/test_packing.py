@@ -7,6 +7,7 @@ import gzip
 import io
 import lzma
 from collections.abc import Callable
+from pathlib import Path
 from types import SimpleNamespace
 
 import lz4.frame
@@ -18,6 +19,7 @@ from nscan_cli.errors import InputDataError
 from nscan_cli.limits import MB
 from nscan_cli.logs.load import read_log
 from nscan_cli.logs.options import ReadingOptions
+from nscan_cli.logs.scan import LaserLog
 from tests.logs.forms import FORMS
 from tests.logs.lines import flaser
 from tests.logs.recordings import drive
@@ -57,7 +59,7 @@ def test_texts_and_recordings(pack, path, tmp_path, monkeypatch):
         check_drive(read_log("-"))
 
 
-def read_plain(path):
+def read_plain(path: Path) -> LaserLog:
     plain = path.with_name("plain")
     plain.write_bytes(TEXT)
     return read_log(str(plain))

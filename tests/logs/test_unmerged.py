@@ -23,7 +23,7 @@ SALVAGE = ReadingOptions(salvage=True)
 
 
 @pytest.fixture
-def bag(tmp_path) -> Path:
+def bag(tmp_path: Path) -> Path:
     """A bag of drive() whose newer half is in the write-ahead log beside it, in a folder of its own."""
     whole, path = tmp_path / "whole.db3", tmp_path / "made.db3"
     whole.write_bytes(db3(drive(), tmp_path))
