@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 @option("--json", "as_json", is_flag=True, help="Print one JSON object (m, s, degrees).")
 @reading_options
 @common_options
-def command(log: str, as_json: bool, reading: ReadingOptions, **_common: Any) -> None:
+def command(log: tuple[str, ...], as_json: bool, reading: ReadingOptions, **_common: Any) -> None:
     """Tell what is in LOG, and what the other commands will use of it.
 
     These are scans, laser, mounting, odometry, what stands for no return, and what was skipped and why.
@@ -52,6 +52,9 @@ def facts_of(log: LaserLog) -> dict[str, Any]:
         "file": log.source.name,
         "sha256": log.source.sha256,
         "bytes": log.source.bytes,
+        "files": [
+            {"name": file.name, "sha256": file.sha256, "bytes": file.bytes} for file in log.source.files
+        ],
         "format": log.format,
         "laser": log.laser,
         "scans": len(log),
@@ -88,12 +91,13 @@ def as_text(facts: dict[str, Any]) -> str:
     odometry, no_return, gap = facts["odometry"], facts["no_return"], facts["longest_gap"]
     x, y, degrees = facts["mounting"]
     low, high = facts["range_limits"]
-    used = facts["used"]
+    used, files = facts["used"], facts["files"]
     path = "" if odometry is None else f"a path of {odometry['path']:.1f} m"
     rate = "" if facts["rate"] is None else f", {facts['rate']:.3g} a second, longest gap {gap:.3g} s"
     rows: list[Row] = [
         ("log", [f"{facts['file']}, {facts['bytes']} bytes"]),
-        ("sha256", [facts["sha256"]]),
+        ("files", [f"{file['name']}, {file['bytes']} bytes" for file in files] if len(files) > 1 else []),
+        ("sha256", [file["sha256"] for file in files]),
         ("format", [facts["format"]]),
         ("checksums", [used["checksums"]] if "checksums" in used else []),
         ("laser", [f"{facts['laser']}, {used['laser']}"]),

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Protocol
 
 from nscan_cli.errors import NscanError
-from nscan_cli.nightly.fingerprint import fingerprint, sha256_of, tool_key
+from nscan_cli.nightly.fingerprint import fingerprint, input_hash, size_of, tool_key
 from nscan_cli.nightly.folder import folder_of, scratch
 from nscan_cli.nightly.manifest import Entry
 from nscan_cli.nightly.nights import Night, add_night, is_up_to_date
@@ -55,7 +55,7 @@ def plan(entries: list[Entry], folder: Path, force: bool) -> Plan:
             planned.absent.append(entry)
             continue
         try:
-            hashes = {role: sha256_of(path) for role, path in entry.inputs.items()}
+            hashes = {role: input_hash(path, role) for role, path in entry.inputs.items()}
         except NscanError as error:
             planned.unreadable.append((entry, _with_sources(entry, str(error))))
             continue
@@ -69,7 +69,7 @@ def plan(entries: list[Entry], folder: Path, force: bool) -> Plan:
             planned.up_to_date.append(entry)
         else:
             planned.to_do.append((entry, key))
-    planned.to_do.sort(key=lambda item: -item[0].inputs["log"].stat().st_size)
+    planned.to_do.sort(key=lambda item: -size_of(item[0].inputs["log"]))
     return planned
 
 

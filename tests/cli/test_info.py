@@ -10,8 +10,9 @@ from nscan_cli.cli.main import run
 from tests.logs.lines import flaser
 
 KEYS = [
-    "file", "sha256", "bytes", "format", "laser", "scans", "first_scan", "last_scan", "beams", "angle_min",
-    "angle_max", "angle_increment", "start", "duration", "rate", "longest_gap", "odometry", "no_return",
+    "file", "sha256", "bytes", "files", "format", "laser", "scans", "first_scan", "last_scan", "beams",
+    "angle_min", "angle_max", "angle_increment", "start", "duration", "rate", "longest_gap", "odometry",
+    "no_return",
     "beams_without_return", "beams_unusable", "mounting", "range_limits", "used", "records",
     "skipped", "backward_stamps", "truth", "warnings",
 ]  # fmt: skip
