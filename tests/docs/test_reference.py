@@ -12,7 +12,7 @@ import pytest
 
 from nscan_cli import errors
 from nscan_cli.cli import main
-from nscan_cli.cli.command import Subcommand
+from nscan_cli.cli.command import Option, Subcommand
 from nscan_cli.cli.main import COMMANDS, cli, run
 from nscan_cli.cli.manual import EXAMPLES, EXIT_CODES
 from nscan_cli.limits import ALL
@@ -44,11 +44,12 @@ def test_every_argument_and_option_is_there_and_told(name):
         if isinstance(parameter, click.Argument):
             assert f"| `{parameter.make_metavar(PARENT)}` | " in chapter
             continue
-        assert isinstance(parameter, click.Option)
+        assert isinstance(parameter, Option)
         assert parameter.help, parameter.name
         for option in (*parameter.opts, *parameter.secondary_opts):
             assert re.search(rf"^\| `[^`]*{re.escape(option)}\b", chapter + everybodys, re.MULTILINE), option
-        assert re.search(rf"`{parameter.envvar}` \|$", chapter + everybodys, re.MULTILINE), parameter.envvar
+        variable = parameter.variables(click.Context(command(name)))[-1]
+        assert re.search(rf"`{variable}` \|$", chapter + everybodys, re.MULTILINE), variable
 
 
 def test_no_two_options_of_a_command_share_a_variable_with_each_other_or_a_limit():
