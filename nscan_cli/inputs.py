@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import contextlib
+import hashlib
+import mmap
 import os
 import stat
 import sys
 import tomllib
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +18,8 @@ from nscan_cli.limits import CONFIG, INPUT, MB, ExceededError, Limit
 from nscan_cli.text_encoding import plain
 
 STANDARD_INPUT = "-"
+Bytes = bytes | mmap.mmap
+"""Those of a file: in memory, or where they are."""
 
 
 def read_bytes(path: str, limit: Limit = INPUT) -> bytes:
@@ -24,16 +29,39 @@ def read_bytes(path: str, limit: Limit = INPUT) -> bytes:
     are more than the limit allows.
     """
     try:
-        if path == STANDARD_INPUT:
-            return in_pieces(sys.stdin.buffer.read, limit)
-        with open(path, "rb") as file:
-            status = os.fstat(file.fileno())
-            if not stat.S_ISREG(status.st_mode):
-                return in_pieces(file.read, limit)
-            limit.check(status.st_size / MB, f"has {status.st_size / MB:,.0f} MB")
-            return file.read()
+        with _told(path):
+            if path == STANDARD_INPUT:
+                return in_pieces(sys.stdin.buffer.read, limit)
+            with open(path, "rb") as file:
+                status = os.fstat(file.fileno())
+                if not stat.S_ISREG(status.st_mode):
+                    return in_pieces(file.read, limit)
+                limit.check(status.st_size / MB, f"has {status.st_size / MB:,.0f} MB")
+                return file.read()
     except ExceededError as error:
         raise InputDataError(label(path), str(error), error.remedy) from error
+
+
+def mapped(path: str) -> mmap.mmap:
+    """The bytes of a regular file, which stay where they are until they are looked at.
+
+    Raises InputMissingError as read_bytes does.
+    """
+    with _told(path), open(path, "rb") as file:
+        return mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ)
+
+
+def sha256_of(path: str) -> str:
+    """The SHA-256 of a regular file, which is never in memory as a whole. Raises InputMissingError."""
+    with _told(path), open(path, "rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
+
+
+@contextlib.contextmanager
+def _told(path: str) -> Iterator[None]:
+    """What goes wrong when a file is read, as InputMissingError."""
+    try:
+        yield
     except FileNotFoundError as error:
         raise InputMissingError(f"{path}: no such file; check the path") from error
     except IsADirectoryError as error:
@@ -67,6 +95,11 @@ def read_toml(path: str, remedy: str) -> dict[str, Any]:
     except (ValueError, RecursionError) as error:
         # Not only TOML's own error: bytes that are no text, a number of thousands of digits.
         raise InputDataError(label(path), f"not TOML: {error}", remedy) from error
+
+
+def common_hash(hashes: Iterable[str]) -> str:
+    """The SHA-256 of several files together: that of theirs (hexadecimal digits), in whatever order."""
+    return hashlib.sha256("".join(sorted(hashes)).encode()).hexdigest()
 
 
 def label(path: str) -> str:

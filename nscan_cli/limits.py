@@ -72,7 +72,9 @@ class Limit:
 
 
 INPUT = Limit("INPUT_MB", 1024, "MB")
-"""Of a log: as it is stored, and again of all that it unpacks to."""
+"""Of a log: as it is stored, and again of all that it unpacks to and that is kept."""
+UNPACKED = Limit("UNPACKED_MB", 65_536, "MB")
+"""Of the chunks of a recording, one after the other: of them only the wanted messages are kept."""
 GRAPH = Limit("GRAPH_MB", 256, "MB")
 """Of a graph, a trajectory or a file of relations."""
 CONFIG = Limit("CONFIG_MB", 1, "MB")
@@ -91,4 +93,4 @@ TIME = Limit("TIME", 1e11, "s")
 """No time stamp is beyond, before 0 or after."""
 INFORMATION = Limit("INFORMATION", 1e30, "")
 """No entry of an information, Hessian or covariance matrix is beyond."""
-ALL = (INPUT, GRAPH, CONFIG, BEAMS, READINGS, MAP_CELLS, KINDS, DISTANCE, TIME, INFORMATION)
+ALL = (INPUT, UNPACKED, GRAPH, CONFIG, BEAMS, READINGS, MAP_CELLS, KINDS, DISTANCE, TIME, INFORMATION)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, Any
 
 from nscan_cli import __version__
@@ -16,7 +16,14 @@ def provenance_of(sources: Iterable[Source], parameters: dict[str, Any]) -> dict
     return {
         "tool": {"name": "nscan-cli", "version": __version__},
         "inputs": [
-            {"name": source.name, "sha256": source.sha256, "bytes": source.bytes} for source in sources
+            {"name": file.name, "sha256": file.sha256, "bytes": file.bytes}
+            for source in sources
+            for file in source.files
         ],
         "parameters": parameters,
     }
+
+
+def is_made_from(inputs: Sequence[dict[str, Any]], source: Source) -> bool:
+    """Whether the inputs of a document are the files of this source, in whatever order."""
+    return sorted(file["sha256"] for file in inputs) == sorted(file.sha256 for file in source.files)

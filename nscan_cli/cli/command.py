@@ -117,8 +117,11 @@ argument = functools.partial(click.argument, cls=Argument)
 log_argument = functools.partial(
     argument,
     "log",
+    nargs=-1,
+    required=True,
     type=FILE,
-    tells=f"A laser log: {readable()}. - is standard input.",
+    tells=f"A laser log: {readable()}. - is standard input. A folder that `ros2 bag record` has left, and "
+    "several files of one recording, are one log.",
 )
 
 result_option = option(

@@ -3,27 +3,31 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from nscan_cli.counting import counted
 from nscan_cli.errors import InputDataError, InputMissingError
 from nscan_cli.limits import DISTANCE
 from nscan_cli.logs.options import ReadingOptions
+from nscan_cli.logs.parts import BESIDE
+from nscan_cli.provenance import is_made_from
 
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
     from nscan_cli.graph.model import Graph
-    from nscan_cli.logs.scan import LaserLog
+    from nscan_cli.logs.scan import LaserLog, Source
 
 REMEDY = "give the log that the graph was made from"
 
 
 def read_graph_log(
-    graph_file: str, graph: Graph, path: str, reading: ReadingOptions
+    graph_file: str, graph: Graph, paths: Sequence[str], reading: ReadingOptions
 ) -> tuple[LaserLog, NDArray[np.int64], NDArray[np.int64]]:
-    """The graph's log at `path`; the nodes (N,) whose scans `reading` leaves in, and the rows (N,) of these.
+    """The graph's log at `paths`; the nodes (N,) whose scans `reading` leaves in, and the rows (N,) of these.
 
     Raises InputMissingError when it cannot be read, InputDataError when it is another log than the graph's.
     """
@@ -31,12 +35,16 @@ def read_graph_log(
 
     from nscan_cli.compiled import bring_up
     from nscan_cli.logs.load import read_log
+    from nscan_cli.logs.parts import parts_of
 
     bring_up()
-    log = read_log(path, _as_tracked(reading, graph_file, graph.provenance))
-    sha256 = _source(graph).get("sha256")
-    if sha256 is not None and sha256 != log.source.sha256:
-        raise InputDataError(path, f"is not the log of {graph_file}: its SHA-256 is another", REMEDY)
+    path = parts_of(paths).title
+    log = read_log(paths, _as_tracked(reading, graph_file, graph.provenance))
+    inputs = _inputs(graph)
+    if inputs and not is_made_from(inputs, log.source):
+        raise InputDataError(
+            path, f"is not the log of {graph_file}: {_difference(inputs, log.source)}", REMEDY
+        )
     rows = np.minimum(np.searchsorted(log.numbers, graph.scans), len(log) - 1)
     there = log.numbers[rows] == graph.scans
     some_left_out = reading.start is not None or reading.end is not None or reading.every > 1
@@ -46,24 +54,63 @@ def read_graph_log(
     return log, np.flatnonzero(there), rows[there]
 
 
-def find_log(graph_file: str, graph: Graph) -> str:
-    """The path of the graph's log, beside the graph or in the current folder. Raises InputMissingError."""
-    name = _source(graph).get("name")
-    if name is None:
+def find_log(graph_file: str, graph: Graph) -> tuple[str, ...]:
+    """The paths of the graph's log: beside the graph or in the current folder, or in a folder that is there.
+
+    Raises InputMissingError.
+    """
+    inputs = _inputs(graph)
+    if not inputs:
         raise InputMissingError(f"{graph_file}: does not name its log; give its path as LOG")
+    # What stands beside a database is found by its name.
+    bases = [source["name"] for source in inputs]
+    sizes = {
+        Path(source["name"]).name: source["bytes"]
+        for source in inputs
+        if not any(source["name"] == base + end for base in bases for end in BESIDE)
+    }
     for folder in (Path(graph_file).parent, Path()):
-        path = folder / Path(name).name
-        if path.is_file():
-            return str(path)
+        if all((folder / name).is_file() for name in sizes):
+            return tuple(str(folder / name) for name in sizes)
+    for folder in (Path(graph_file).parent, Path()):
+        for inner in _folders(folder):
+            # Recordings of equal names lie in folders of their own.
+            if all(_has_size(inner / name, size) for name, size in sizes.items()):
+                return tuple(str(inner / name) for name in sizes)
+    more = f" and {counted(len(sizes) - 1, 'more file')}" if len(sizes) > 1 else ""
     raise InputMissingError(
-        f"{graph_file}: its log {name} is neither beside it nor in the current folder; give its path as LOG"
+        f"{graph_file}: its log {next(iter(sizes))}{more} is neither beside it nor in the current folder; "
+        "give its path as LOG"
     )
 
 
-def _source(graph: Graph) -> dict[str, Any]:
-    """What the graph says of the log that it was made from."""
-    sources: list[dict[str, Any]] = graph.provenance.get("inputs") or [{}]
-    return sources[0]
+def _folders(folder: Path) -> list[Path]:
+    """The folders in a folder, by name; none where it cannot be read."""
+    try:
+        return sorted(path for path in folder.iterdir() if path.is_dir())
+    except OSError:
+        return []
+
+
+def _has_size(path: Path, size: int) -> bool:
+    return path.is_file() and path.stat().st_size == size
+
+
+def _inputs(graph: Graph) -> list[dict[str, Any]]:
+    """What the graph says of the files that it was made from."""
+    inputs: list[dict[str, Any]] = graph.provenance.get("inputs") or []
+    return inputs
+
+
+def _difference(inputs: Sequence[dict[str, Any]], source: Source) -> str:
+    """How the files of a log differ from those that a graph was made from."""
+    if len(inputs) == 1 and not source.parts:
+        return "its SHA-256 is another"
+    there = {file.sha256 for file in source.files}
+    missing = [file["name"] for file in inputs if file["sha256"] not in there]
+    if missing:
+        return f"{', '.join(missing)} is not among its files, or has another SHA-256"
+    return f"the graph was made from {counted(len(inputs), 'file')} of its {len(source.files)}"
 
 
 def _as_tracked(reading: ReadingOptions, graph_file: str, provenance: dict[str, Any]) -> ReadingOptions:

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 @option("--json", "as_json", is_flag=True, help="Print one JSON object (m, s, degrees).")
 @reading_options
 @common_options
-def command(log: str, as_json: bool, reading: ReadingOptions, **_common: Any) -> None:
+def command(log: tuple[str, ...], as_json: bool, reading: ReadingOptions, **_common: Any) -> None:
     """Tell what is in LOG, and what the other commands will use of it.
 
     These are scans, laser, mounting, odometry, what stands for no return, and what was skipped and why.
@@ -60,6 +60,9 @@ def facts_of(log: LaserLog) -> dict[str, Any]:
         "file": log.source.name,
         "sha256": log.source.sha256,
         "bytes": log.source.bytes,
+        "files": [
+            {"name": file.name, "sha256": file.sha256, "bytes": file.bytes} for file in log.source.files
+        ],
         "format": log.format,
         "laser": log.laser,
         "scans": len(log),
@@ -104,12 +107,13 @@ def as_text(facts: dict[str, Any]) -> str:
 
 
 def _of_file(facts: dict[str, Any]) -> list[Row]:
-    used = facts["used"]
+    used, files = facts["used"], facts["files"]
     chosen = [used["laser"] if facts["laser"] is None else f"{facts['laser']}, {used['laser']}"]
     lasers = [laser_line(laser) for laser in facts["lasers"]]
     return [
         ("log", [f"{facts['file']}, {facts['bytes']} bytes"]),
-        ("sha256", [facts["sha256"]]),
+        ("files", [f"{file['name']}, {file['bytes']} bytes" for file in files] if len(files) > 1 else []),
+        ("sha256", [file["sha256"] for file in files]),
         ("format", [facts["format"]]),
         ("checksums", [used["checksums"]] if "checksums" in used else []),
         ("laser", [*chosen, *(lasers if len(lasers) > 1 else [])]),

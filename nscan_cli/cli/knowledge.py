@@ -22,6 +22,7 @@ from nscan_cli.matching.joint_energy import Priors, no_priors
 from nscan_cli.matching.nscan import PriorsAmong
 from nscan_cli.matching.priors import MotionModel, odometry_prior
 from nscan_cli.poses import Array
+from nscan_cli.provenance import is_made_from
 from nscan_cli.text_encoding import plain
 
 OTHER_LOG = "give the graph that was made from this log"
@@ -49,8 +50,8 @@ def read_knowledge(path: str, log: LaserLog) -> Knowledge:
     if not data.lstrip().startswith(b"{"):
         return Knowledge(parse_tum(data, name), source, name)
     graph = parse_graph(data, name)
-    logs = graph.provenance.get("inputs") or [{}]
-    if logs[0].get("sha256", log.source.sha256) != log.source.sha256:
+    inputs = graph.provenance.get("inputs")
+    if inputs and not is_made_from(inputs, log.source):
         raise InputDataError(name, f"is not a graph of {log.source.name}: the SHA-256 differs", OTHER_LOG)
     return Knowledge(graph, source, name)
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from nscan_cli.counting import counted
@@ -18,8 +18,8 @@ if TYPE_CHECKING:
     Read = Callable[[ReadingOptions], LaserLog]
 
 UNMOUNTED = (0.0, 0.0, 0.0)
-OF_ALL_LASERS = ("file", "sha256", "bytes", "format", "odometry", "used", "records", "truth", "warnings",
-                 "lasers", "odometries", "corrected")  # fmt: skip
+OF_ALL_LASERS = ("file", "sha256", "bytes", "files", "format", "odometry", "used", "records", "truth",
+                 "warnings", "lasers", "odometries", "corrected")  # fmt: skip
 """Facts that hold also where no laser is chosen."""
 
 
@@ -67,8 +67,8 @@ class Survey(NamedTuple):
         return {key: None if key in unknown else value for key, value in facts.items()}
 
 
-def survey_of(path: str, reading: ReadingOptions) -> Survey:
-    """What is in the log at `path`, whatever the user has left open.
+def survey_of(paths: Sequence[str], reading: ReadingOptions) -> Survey:
+    """What is in the log at the `paths`, whatever the user has left open.
 
     Raises what read_log does but for choices, corrected poses, lasers that are not level or not still, and
     readings of which none counts.
@@ -76,7 +76,7 @@ def survey_of(path: str, reading: ReadingOptions) -> Survey:
     from nscan_cli.logs.choices import OpenChoiceError
     from nscan_cli.logs.recorded_mounting import MountingError
 
-    read = _reader(path)
+    read = _reader(paths)
     options = dataclasses.replace(reading, allow_corrected=True)
     choices: dict[str, OpenChoiceError] = {}
     others: list[dict[str, Any]] = []
@@ -151,12 +151,12 @@ def _named(device: Device) -> dict[str, Any]:
     return {"name": device.name, "type": device.type, "records": device.records}
 
 
-def _reader(path: str) -> Read:
+def _reader(paths: Sequence[str]) -> Read:
     """What reads the log again with other options; standard input is read once."""
     from nscan_cli.inputs import STANDARD_INPUT, read_bytes
     from nscan_cli.logs.load import log_from, read_log
 
-    if path != STANDARD_INPUT:
-        return lambda options: read_log(path, options, even_unusable=True)
-    stored = read_bytes(path)
-    return lambda options: log_from(stored, path, options, even_unusable=True)
+    if tuple(paths) != (STANDARD_INPUT,):
+        return lambda options: read_log(paths, options, even_unusable=True)
+    stored = read_bytes(STANDARD_INPUT)
+    return lambda options: log_from(stored, STANDARD_INPUT, options, even_unusable=True)

@@ -69,7 +69,7 @@ class StartType(click.ParamType[Any]):
 @reading_options
 @common_options
 def command(
-    log: str,
+    log: tuple[str, ...],
     reference: int,
     scan: int,
     initial: str | None,
@@ -86,7 +86,9 @@ def command(
     What a corridor leaves open shows as the weakest direction, and best with --prior none.
     """
     check_writable(output)
-    check_plot(plot, output, [log])
+    from nscan_cli.logs.parts import files_of
+
+    check_plot(plot, output, files_of(log))
     from nscan_cli.logs.load import read_log
     from nscan_cli.matching.pairwise import PairOptions, match_pair, matched_points, scan_ndt
     from nscan_cli.matching.priors import MotionModel, odometry_prior

@@ -67,7 +67,7 @@ NAMED = 6
 @reading_options
 @common_options
 def command(
-    log: str,
+    log: tuple[str, ...],
     numbers: tuple[int, ...],
     pairs: Kind,
     gauge: str,
@@ -89,11 +89,13 @@ def command(
     """
     if fixed is not None and fixed not in numbers:
         raise WrongUsageError(f"--fixed {fixed}: is none of the scans to match; choose one of them")
-    if log == "-" and "-" in (initial, prior):
+    if "-" in log and "-" in (initial, prior):
         raise WrongUsageError("standard input (-) can be one input only; give the others by their path")
     check_writable(output)
     files = [path for path, words in ((initial, STARTS), (prior, PRIORS)) if path not in words]
-    check_plot(plot, output, [log, *files])
+    from nscan_cli.logs.parts import files_of
+
+    check_plot(plot, output, [*files_of(log), *files])
     from nscan_cli.cli.document import document
     from nscan_cli.inputs import base_name
     from nscan_cli.logs.load import read_log

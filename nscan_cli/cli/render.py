@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -29,7 +30,7 @@ if TYPE_CHECKING:
     ("nscan-cli render robot.json -o graph.png --trajectory --graph", "the path and the graph over the map"),
 )
 @argument("graph_file", metavar="GRAPH.json", type=FILE, tells="A result of slam; - is standard input.")
-@argument("log", required=False, type=FILE,
+@argument("log", nargs=-1, type=FILE,
           tells="The log that the graph was made from; if not given, it is looked for beside the graph, then "
           "in the current folder.")  # fmt: skip
 @option("-o", "--output", type=FILE, required=True, metavar="MAP.png",
@@ -48,7 +49,7 @@ if TYPE_CHECKING:
 @common_options
 def command(
     graph_file: str,
-    log: str | None,
+    log: tuple[str, ...],
     output: str,
     resolution: float,
     trajectory: bool,
@@ -78,15 +79,16 @@ def command(
         raise WrongUsageError("--yaml needs a map in a file; give -o MAP.png, or leave out --yaml")
     yaml = in_file and not picture if yaml is None else yaml
     check_map_outputs(output, yaml)
-    _check_mcap(mcap, [graph_file, log, output, yaml_path(output) if yaml else None])
-    if graph_file == "-" and log == "-":
+    _check_mcap(mcap, [graph_file, *log, output, yaml_path(output) if yaml else None])
+    if graph_file == "-" and "-" in log:
         raise WrongUsageError("standard input (-) can be one input only; give the other by its path")
     from nscan_cli.graph.json_file import read_graph
+    from nscan_cli.logs.parts import files_of
     from nscan_cli.mapping.occupancy import occupancy_grid
 
     whole = read_graph(graph_file)
-    log = find_log(graph_file, whole) if log is None else log
-    _check_mcap(mcap, [log])
+    log = log or find_log(graph_file, whole)
+    _check_mcap(mcap, files_of(log))
     scans, nodes, rows = read_graph_log(graph_file, whole, log, reading)
     poses = whole.poses[nodes]
     grid = occupancy_grid(scans, rows, poses, resolution)
@@ -144,7 +146,7 @@ def yaml_path(output: str) -> str:
     return str(Path(output).with_suffix(".yaml"))
 
 
-def _check_mcap(mcap: str | None, others: list[str | None]) -> None:
+def _check_mcap(mcap: str | None, others: Sequence[str | None]) -> None:
     """Refuse a recording that could never be written, or would replace another file of the command."""
     if mcap is None:
         return

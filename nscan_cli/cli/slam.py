@@ -27,6 +27,7 @@ MAPPING = ("max_scans", "relations", "no_loops")
     "slam",
     ("nscan-cli slam robot.log.gz -o robot.json --map robot.png", "a graph, a map and its YAML"),
     ("nscan-cli slam robot.mcap --no-odometry -o robot.json", "by the laser alone"),
+    ("nscan-cli slam my_bag/ -o my_bag.json", "a folder that `ros2 bag record` has left"),
     ("nscan-cli slam robot.log.gz -o robot.json --depfile robot.d", "in a Makefile"),
     ("nscan-cli slam --from robot.json -o refined.json", "a saved graph, optimised and refined again"),
 )
@@ -84,7 +85,7 @@ MAPPING = ("max_scans", "relations", "no_loops")
 @reading_options
 @common_options
 def command(
-    log: str | None,
+    log: tuple[str, ...],
     output: str,
     map_file: str | None,
     trajectory: str | None,
@@ -109,11 +110,11 @@ def command(
     is read, and its scans are matched, with the options that the graph was made with. When it is not
     there, the graph is optimised only.
     """
-    if log is None and from_file is None:
+    if not log and from_file is None:
         raise WrongUsageError("slam: give LOG, or --from GRAPH")
     if output == "-" and not _given("output") and sys.stdout is not None and sys.stdout.isatty():
         raise WrongUsageError("slam: the graph is long; give -o GRAPH.json, or -o - to see it here")
-    if log == "-" and from_file == "-":
+    if "-" in log and from_file == "-":
         raise WrongUsageError("standard input (-) can be one input only; give the other by its path")
     if from_file is not None and (reading != ReadingOptions() or _given(*MAPPING)):
         raise WrongUsageError(
@@ -121,8 +122,11 @@ def command(
             "those that the graph was made with hold"
         )
     outputs = Outputs(output, map_file, trajectory, g2o, carmen, depfile)
-    outputs.check([path for path in (from_file, log) if path is not None])
     from nscan_cli.cli.slam_runs import map_whole, refine_saved
+    from nscan_cli.logs.parts import files_of
+
+    named = [*([] if from_file is None else [from_file]), *(files_of(log) if log else ())]
+    outputs.check(named)
     from nscan_cli.memory import share_one_heap
     from nscan_cli.slam.run import slam_options
     from nscan_cli.threads import available_threads
@@ -131,11 +135,10 @@ def command(
     share_one_heap()
     began = time.perf_counter()
     if from_file is None:
-        assert log is not None
         options = slam_options(max_scans, relations, not no_loops)
         run = map_whole(log, reading, options, threads, quiet, verbose)
     else:
-        run = refine_saved(from_file, log, outputs.need_scans, threads, quiet)
+        run = refine_saved(from_file, log or None, outputs.need_scans, threads, quiet)
         # A log that was found must not be replaced either.
         outputs.check(run.inputs)
     outputs.write(run.graph, run.scans, run.rows, run.inputs, threads)

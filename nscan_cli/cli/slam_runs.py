@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import re
 from collections import Counter
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from nscan_cli.cli.progress import Compiling, progress, say
@@ -40,13 +41,14 @@ class Run:
 
 
 def map_whole(
-    log: str, reading: ReadingOptions, options: SlamOptions, threads: int, quiet: bool, verbose: int
+    log: Sequence[str], reading: ReadingOptions, options: SlamOptions, threads: int, quiet: bool, verbose: int
 ) -> Run:
     """Run the whole loop over a log."""
     import numpy as np
 
     from nscan_cli.compiled import bring_up
     from nscan_cli.logs.load import read_log
+    from nscan_cli.logs.parts import files_of
     from nscan_cli.slam.run import map_log
 
     bring_up()
@@ -76,7 +78,7 @@ def map_whole(
             ("tracking", [f"{starts} from other angles, {searches}"]),
             ("large loops", [f"{places} found by search at a place seen before"]),
         ]
-    return Run(graph, scans, np.arange(len(scans)), [log], summary, compiling.has_begun)
+    return Run(graph, scans, np.arange(len(scans)), files_of(log), summary, compiling.has_begun)
 
 
 def _graph_rows(graph: Graph) -> list[Row]:
@@ -126,7 +128,9 @@ def without_numbers(reason: str) -> str:
     return re.sub(r"(all )?\d+ scans?\b", "some scans", reason)
 
 
-def refine_saved(path: str, log_file: str | None, needs_log: bool, threads: int, quiet: bool) -> Run:
+def refine_saved(
+    path: str, log_files: Sequence[str] | None, needs_log: bool, threads: int, quiet: bool
+) -> Run:
     """Optimise a saved graph, and refine it where its log is there."""
     import numpy as np
 
@@ -139,7 +143,7 @@ def refine_saved(path: str, log_file: str | None, needs_log: bool, threads: int,
     graph = load_graph(path, notices)
     for notice in notices:
         say(f"warning: {notice}", quiet)
-    read = _log_of(path, graph, log_file, needs_log, quiet)
+    read = _log_of(path, graph, log_files, needs_log, quiet)
     before = graph.poses
     optimum = optimise_graph(graph)
     if not optimum.converged:
@@ -150,8 +154,8 @@ def refine_saved(path: str, log_file: str | None, needs_log: bool, threads: int,
     else:
         from nscan_cli.slam.again import refine_again
 
-        scans, rows, log_path = read
-        inputs.append(log_path)
+        scans, rows, log_paths = read
+        inputs += log_paths
         with progress("refining", None, quiet):
             graph = refine_again(graph, scans, rows, threads)
     moved = float(np.hypot(*(graph.poses - before)[:, :2].T).max())
@@ -166,14 +170,15 @@ def refine_saved(path: str, log_file: str | None, needs_log: bool, threads: int,
 
 
 def _log_of(
-    path: str, graph: Graph, log_file: str | None, needed: bool, quiet: bool
-) -> tuple[LaserLog, NDArray[np.int64], str] | None:
-    """The log of a saved graph, the rows of its scans, and its path; None where the graph has none."""
+    path: str, graph: Graph, log_files: Sequence[str] | None, needed: bool, quiet: bool
+) -> tuple[LaserLog, NDArray[np.int64], list[str]] | None:
+    """The log of a saved graph, the rows of its scans, and its files' paths; None where it has none."""
     from nscan_cli.cli.graph_log import find_log, read_graph_log
+    from nscan_cli.logs.parts import files_of
     from nscan_cli.slam.again import can_refine, options_of
 
     if not can_refine(graph):
-        if needed or log_file is not None:
+        if needed or log_files is not None:
             raise WrongUsageError(
                 f"slam: {path} is no graph that slam made from a log; leave out LOG, --map and --carmen"
             )
@@ -186,11 +191,11 @@ def _log_of(
             label(path), f"provenance.parameters: {error}", "mend it, or write it again"
         ) from error
     try:
-        log_file = find_log(path, graph) if log_file is None else log_file
+        log_files = find_log(path, graph) if log_files is None else log_files
     except InputMissingError as error:
         if needed:
             raise
         say(f"warning: optimised only, and not refined: {error}", quiet)
         return None
-    scans, _nodes, rows = read_graph_log(path, graph, log_file, ReadingOptions())
-    return scans, rows, log_file
+    scans, _nodes, rows = read_graph_log(path, graph, log_files, ReadingOptions())
+    return scans, rows, files_of(log_files)

@@ -2,17 +2,26 @@
 
 from __future__ import annotations
 
+import os
 from dataclasses import replace
 
 from nscan_cli.errors import InputDataError, WrongUsageError
 from nscan_cli.graph.json_file import parse_graph
 from nscan_cli.graph.pose_columns import are_poses
 from nscan_cli.graph.tum import Trajectory, parse_tum
-from nscan_cli.inputs import label, read_bytes
+from nscan_cli.inputs import Bytes, label, read_bytes
 from nscan_cli.limits import GRAPH, MB, ExceededError
-from nscan_cli.logs.load import AS_FOUND, content_of, log_from
+from nscan_cli.logs.load import (
+    AS_FOUND,
+    content_of,
+    log_from,
+    read_log,
+    recording_at,
+    recording_in,
+    stored_bytes,
+)
 from nscan_cli.logs.options import ReadingOptions
-from nscan_cli.logs.recorded_poses import poses_on, recording_in
+from nscan_cli.logs.recorded_poses import poses_on
 from nscan_cli.logs.scan import LaserLog
 
 
@@ -24,7 +33,13 @@ def load_trajectory(
     What a user should know of the file is added to the `notices`. Raises InputMissingError,
     InputDataError, and WrongUsageError where the options do not fit a log.
     """
-    loaded = _loaded(read_bytes(path), path, options, [] if notices is None else notices)
+    notices = [] if notices is None else notices
+    if os.path.isdir(path):
+        log = read_log(path, replace(options, allow_corrected=True), even_unusable=True)
+        notices += [f"{label(path)}: {notice}" for notice in log.report.notices()]
+        loaded: Trajectory | LaserLog = log
+    else:
+        loaded = _loaded(read_bytes(path), path, options, notices)
     if isinstance(loaded, Trajectory):
         return loaded
     if loaded.odometry is None:
@@ -44,19 +59,19 @@ def load_reference(
 
     A recording needs the topic, and nothing else may have one. Raises likewise.
     """
-    name, stored = label(path), read_bytes(path)
-    notices = [] if notices is None else notices
-    data, lost = content_of(stored, path, options.salvage)
-    try:
-        recording = recording_in(data, name, options.salvage)
-    except ExceededError as error:
-        raise InputDataError(name, str(error), error.remedy) from error
+    name, notices = label(path), [] if notices is None else notices
+    stored: Bytes = b""
+    if os.path.isdir(path):
+        recording = recording_at(path, options.salvage)
+    else:
+        stored = stored_bytes(path)
+        recording = recording_in(stored, path, options.salvage)
     if recording is not None:
-        notices += [f"{name}: {warning}" for warning in ([lost] if lost else []) + recording.warnings]
+        notices += [f"{name}: {warning}" for warning in recording.warnings]
         return Trajectory.in_space(*poses_on(recording, topic, name, notices))
     if topic is not None:
         raise WrongUsageError(f"{name}: is no recording, and has no topics; leave out --reference-topic")
-    loaded = _loaded(stored, path, options, notices)
+    loaded = _loaded(bytes(stored), path, options, notices)
     if isinstance(loaded, Trajectory):
         return loaded
     if loaded.truth is None or loaded.truth_times is None:

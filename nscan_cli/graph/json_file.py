@@ -24,8 +24,8 @@ from nscan_cli.graph.relation_types import relation_of, relation_record
 from nscan_cli.inputs import label, read_text
 from nscan_cli.limits import GRAPH, TIME
 from nscan_cli.logs.kinds import FORMS, name_of
-from nscan_cli.logs.load import GZIP
 from nscan_cli.logs.order import STAMP
+from nscan_cli.logs.packing import packing_of
 from nscan_cli.poses import Array
 from nscan_cli.provenance import provenance_of
 
@@ -115,8 +115,9 @@ def _not_json(data: bytes, name: str, error: Exception) -> InputDataError:
 
 
 def _kind(data: bytes) -> str:
-    if data.startswith(GZIP):
-        return "compressed by gzip"
+    packing = packing_of(data)
+    if packing is not None:
+        return f"compressed by {packing.name}"
     log = next((form.name for form in FORMS if form.fits(data)), None)
     return f"a log ({log})" if log else name_of(data)
 

@@ -2,18 +2,23 @@
 
 from __future__ import annotations
 
-import gzip
 import hashlib
-import io
-import zlib
+import os
+import re
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from mmap import mmap
 from typing import Protocol
 
-from nscan_cli.errors import InputDataError
-from nscan_cli.inputs import base_name, in_pieces, label, read_bytes
-from nscan_cli.limits import INPUT, ExceededError
-from nscan_cli.logs.kinds import FORMS, name_of, readable
+from nscan_cli.errors import InputDataError, WrongUsageError
+from nscan_cli.inputs import Bytes, base_name, common_hash, label, mapped, read_bytes, sha256_of
+from nscan_cli.limits import ExceededError
+from nscan_cli.logs import joining
+from nscan_cli.logs.kinds import FORMS, Form, foreign, readable
 from nscan_cli.logs.options import ReadingOptions
+from nscan_cli.logs.packing import packing_of, unpacked
+from nscan_cli.logs.parts import Parts, beside, first_bytes, parts_of
+from nscan_cli.logs.recording import Recording
 from nscan_cli.logs.scan import LaserLog, Source
 from nscan_cli.text_encoding import plain
 
@@ -25,44 +30,104 @@ class Reader(Protocol):
         """The scans; `file` is what messages call it. Raises InputDataError and WrongUsageError."""
 
 
+class Container(Protocol):
+    """What a module that reads a container of messages has."""
+
+    def recording(self, data: Bytes, file: str, salvage: bool) -> Recording:
+        """The messages; `file` is what errors call it. Raises InputDataError and ExceededError."""
+
+
+class Database(Container, Protocol):
+    """What a module has that opens a file itself."""
+
+    def recording_at(self, path: str, beside: Mapping[str, str], file: str, salvage: bool) -> Recording:
+        """The messages in the file and in what parts.beside has found. Raises the same errors."""
+
+
 AS_FOUND = ReadingOptions()
 
-GZIP = b"\x1f\x8b"
-PIECE = 256
-UNPACKS = "unpacks to more and more"
 MEND = "fetch the file again, or use what can be read with --salvage"
 
 
-def read_log(path: str, options: ReadingOptions = AS_FOUND, even_unusable: bool = False) -> LaserLog:
-    """The log at `path` ("-": standard input); its kind is found from its content.
+def read_log(
+    paths: str | Sequence[str], options: ReadingOptions = AS_FOUND, even_unusable: bool = False
+) -> LaserLog:
+    """The log at a path ("-": standard input), or in a folder or several files that a recorder has left.
 
-    Raises InputMissingError when there is nothing to read, InputDataError when it is no log, a damaged one,
-    or one none of whose readings counts (but with `even_unusable`), WrongUsageError when the options do
-    not fit it.
+    Its kind is found from its content. Raises InputMissingError when there is nothing to read,
+    InputDataError when it is no log, a damaged one, or one none of whose readings counts (but with
+    `even_unusable`), WrongUsageError when the options do not fit it, or the paths are of several.
     """
-    return log_from(read_bytes(path), path, options, even_unusable)
+    parts = parts_of(paths)
+    if len(parts.files) > 1:
+        log = _usable(_of_parts(parts, options), even_unusable)
+    else:
+        (path,) = parts.files
+        log = log_from(stored_bytes(path), path, options, even_unusable)
+    return _noted(log, parts.warnings)
+
+
+def stored_bytes(path: str) -> Bytes:
+    """The bytes of a log as they are stored. Those of a recording in a file are not taken into memory.
+
+    Raises InputMissingError, and InputDataError when there are more than the limit allows.
+    """
+    head = first_bytes(path)
+    if any(form.container and form.fits(head) for form in FORMS if form.magic is not None):
+        return mapped(path)
+    return read_bytes(path)
+
+
+def recording_in(stored: Bytes, path: str, salvage: bool) -> Recording | None:
+    """The messages of the recording whose bytes `path` has; None where it is none. Raises InputDataError."""
+    data, lost = _content(stored, path, salvage)
+    form = next((form for form in FORMS if form.container and form.fits(data)), None)
+    if form is None:
+        return None
+    try:
+        recording = _recording(form, data, path, salvage)
+    except ExceededError as error:
+        raise InputDataError(label(path), str(error), error.remedy) from error
+    recording.warnings[:0] = [] if lost is None else [lost]
+    return recording
+
+
+def recording_at(folder: str, salvage: bool) -> Recording | None:
+    """The messages of the recording in a folder; raises as read_log does."""
+    parts = parts_of(folder)
+    if len(parts.files) > 1:
+        recording: Recording | None = _joined(parts, salvage)[0]
+    else:
+        (path,) = parts.files
+        recording = recording_in(stored_bytes(path), path, salvage)
+    if recording is not None:
+        recording.warnings[:0] = parts.warnings
+    return recording
 
 
 def log_from(
-    stored: bytes, path: str, options: ReadingOptions = AS_FOUND, even_unusable: bool = False
+    stored: Bytes, path: str, options: ReadingOptions = AS_FOUND, even_unusable: bool = False
 ) -> LaserLog:
     """The log in the bytes that `path` has; raises the same errors."""
     name = label(path)
-    source = Source(base_name(path), hashlib.sha256(stored).hexdigest(), len(stored))
-    data, lost = content_of(stored, path, options.salvage)
+    data, lost = _content(stored, path, options.salvage)
+    if not re.search(rb"\S", data):
+        raise InputDataError(name, lost or "is empty", "give a log with laser scans")
+    form = _form(data, name)
+    source = _source(stored, path)
     del stored
-    if not data.strip():
-        raise InputDataError(name, "is empty", "give a log with laser scans")
     try:
-        log = _reader(data, name).read(data, name, source, options)
+        if form.container:
+            recording = _recording(form, data, path, options.salvage)
+            del data
+            log = _scans(recording, name, source, options)
+        else:
+            assert isinstance(data, bytes)
+            reader: Reader = form.reader()
+            log = reader.read(data, name, source, options)
     except ExceededError as error:
         raise InputDataError(name, str(error), error.remedy) from error
-    if log.report.unusable is not None and not even_unusable:
-        raise log.report.unusable
-    if lost is None:
-        return log
-    report = replace(log.report, warnings=(lost, *log.report.warnings))
-    return replace(log, report=report)
+    return _noted(_usable(log, even_unusable), () if lost is None else (lost,))
 
 
 def content_of(stored: bytes, path: str, salvage: bool) -> tuple[bytes, str | None]:
@@ -70,57 +135,114 @@ def content_of(stored: bytes, path: str, salvage: bool) -> tuple[bytes, str | No
 
     Raises InputDataError.
     """
+    packing = packing_of(stored)
+    if packing is None:
+        return plain(stored, label(path)), None
     try:
-        content, lost = salvaged(stored) if salvage else (unpacked(stored, label(path)), None)
+        content, problem = unpacked(stored, packing)
     except ExceededError as error:
         raise InputDataError(label(path), str(error), error.remedy) from error
-    return plain(content, label(path)), lost
+    content = plain(content, label(path))
+    if problem is None:
+        return content, None
+    if not salvage:
+        raise InputDataError(label(path), problem, MEND)
+    return content, f"{problem}: the rest is lost"
 
 
-def _reader(data: bytes, name: str) -> Reader:
+def _content(stored: Bytes, path: str, salvage: bool) -> tuple[Bytes, str | None]:
+    """The same; what is in its place in a file is not compressed."""
+    return content_of(stored, path, salvage) if isinstance(stored, bytes) else (stored, None)
+
+
+def _of_parts(parts: Parts, options: ReadingOptions) -> LaserLog:
+    """The log in several files of one recording."""
+    whole, source = _joined(parts, options.salvage)
+    return _scans(whole, parts.title, source, options)
+
+
+def _joined(parts: Parts, salvage: bool) -> tuple[Recording, Source]:
+    """The messages in several files of one recording, of which one at a time is in memory, and the files."""
+    found: list[tuple[str, Recording]] = []
+    sources: list[tuple[Source, ...]] = []
+    first: tuple[str, str] | None = None
+    try:
+        for path in parts.files:
+            stored = stored_bytes(path)
+            data, lost = _content(stored, path, salvage)
+            form = _form(data, path)
+            if not form.container:
+                problem = f"{path}: is {form.name}, no recording"
+                raise WrongUsageError(f"{problem}; several LOGs have to be the files of one recording")
+            first = first or (path, form.name)
+            if form.name != first[1]:
+                raise joining.differing(first, (path, form.name))
+            sources.append(_source(stored, path).files)
+            del stored
+            recording = _recording(form, data, path, salvage)
+            del data
+            recording.warnings[:0] = [] if lost is None else [lost]
+            found.append((base_name(path), recording))
+        order = joining.in_order_of_time(found)
+        whole = joining.joined([found[place] for place in order], parts.are_parts)
+    except ExceededError as error:
+        raise InputDataError(parts.title, str(error), error.remedy) from error
+    del found
+    return whole, _together(parts.name, [file for place in order for file in sources[place]])
+
+
+def _scans(recording: Recording, name: str, source: Source, options: ReadingOptions) -> LaserLog:
+    """The scans of a recording; texts need none of what decodes messages."""
+    from nscan_cli.logs import recorded
+
+    return recorded.read(recording, name, source, options)
+
+
+def _form(data: Bytes, name: str) -> Form:
     for form in FORMS:
         if form.fits(data):
-            reader: Reader = form.reader()
-            return reader
-    raise InputDataError(name, f"is {name_of(data)}", f"give a log: {readable()}")
+            return form
+    found = foreign(bytes(data))
+    remedy = found.remedy or f"give a log: {readable()}"
+    raise InputDataError(name, f"is {found.name}", remedy)
 
 
-def unpacked(stored: bytes, name: str) -> bytes:
-    """The content of `stored`, which may be compressed by gzip. Raises InputDataError and ExceededError."""
-    if not stored.startswith(GZIP):
-        return stored
-    try:
-        with gzip.GzipFile(fileobj=io.BytesIO(stored)) as file:
-            return in_pieces(file.read, INPUT, UNPACKS)
-    except EOFError as error:
-        raise InputDataError(name, "the gzip data end too early", MEND) from error
-    except (zlib.error, OSError) as error:
-        raise InputDataError(name, f"the gzip data are damaged ({error})", MEND) from error
+def _recording(form: Form, data: Bytes, path: str, salvage: bool) -> Recording:
+    """The messages in a container: of a database from its file, where it is one and not compressed."""
+    if form.by_path and isinstance(data, mmap):
+        database: Database = form.reader()
+        return database.recording_at(path, beside(path), label(path), salvage)
+    container: Container = form.reader()
+    return container.recording(data, label(path), salvage)
 
 
-def salvaged(stored: bytes) -> tuple[bytes, str | None]:
-    """The content of `stored` as far as it can be unpacked, and what was lost; None when nothing was.
+def _source(stored: Bytes, path: str) -> Source:
+    """The file, and what stands beside it."""
+    name = base_name(path)
+    sha256 = hashlib.sha256(stored).hexdigest() if isinstance(stored, bytes) else sha256_of(path)
+    more = [
+        Source(name + end, sha256_of(other), os.path.getsize(other)) for end, other in beside(path).items()
+    ]
+    file = Source(name, sha256, len(stored))
+    return _together(name, [file, *more]) if more else file
 
-    Raises ExceededError.
-    """
-    if not stored.startswith(GZIP):
-        return stored, None
-    content, at, most = bytearray(), 0, INPUT.bytes
-    while stored.startswith(GZIP, at):
-        member = zlib.decompressobj(zlib.MAX_WBITS | 16)
-        try:
-            # In pieces: what goes before the damage stays.
-            while at < len(stored) and not member.eof:
-                content += member.decompress(stored[at : at + PIECE])
-                at = min(at + PIECE, len(stored)) - len(member.unused_data)
-                if len(content) > most:
-                    raise ExceededError(INPUT, UNPACKS)
-        except zlib.error as error:
-            return bytes(content), f"the gzip data are damaged near byte {at} ({error}): the rest is lost"
-        if not member.eof:
-            return bytes(content), "the gzip data end too early: the rest is lost"
-        while stored.startswith(b"\0", at):
-            at += 1
-    if at < len(stored):
-        return bytes(content), f"{len(stored) - at} bytes after the gzip data are no such data: left out"
-    return bytes(content), None
+
+def _together(name: str, files: Sequence[Source]) -> Source:
+    """Files as one source."""
+    return Source(
+        name, common_hash(file.sha256 for file in files), sum(file.bytes for file in files), tuple(files)
+    )
+
+
+def _usable(log: LaserLog, even_unusable: bool) -> LaserLog:
+    """The log. Raises InputDataError where none of its readings counts, unless that is no matter."""
+    if log.report.unusable is not None and not even_unusable:
+        raise log.report.unusable
+    return log
+
+
+def _noted(log: LaserLog, warnings: Sequence[str]) -> LaserLog:
+    """The log with more warnings, before its own."""
+    if not warnings:
+        return log
+    return replace(log, report=replace(log.report, warnings=(*warnings, *log.report.warnings)))

@@ -21,8 +21,9 @@ from mcap.opcode import Opcode
 
 from nscan_cli.counting import counted
 from nscan_cli.errors import InputDataError
+from nscan_cli.inputs import Bytes
 from nscan_cli.limits import INPUT, MB
-from nscan_cli.logs.recording import DAMAGED, PATH, WANTED, Channel, Message, Recording, ros_name
+from nscan_cli.logs.recording import DAMAGED, WANTED, Channel, Recording, ros_name
 
 MAGIC = b"\x89MCAP0\r\n"
 HEAD, MESSAGE = struct.Struct("<BQ"), struct.Struct("<HIQQ")
@@ -70,7 +71,7 @@ class Summary:
     """Messages by channel, where the file says so."""
 
 
-def read_records(data: bytes, file: str, salvage: bool) -> Recording:
+def read_records(data: Bytes, file: str, salvage: bool) -> Recording:
     """All messages that scans, odometry and mounting can come from.
 
     With `salvage`, damaged parts are left out and told in the recording's warnings. Raises InputDataError
@@ -82,12 +83,11 @@ def read_records(data: bytes, file: str, salvage: bool) -> Recording:
 
 
 class _Reader:
-    def __init__(self, data: bytes, file: str, salvage: bool) -> None:
+    def __init__(self, data: Bytes, file: str, salvage: bool) -> None:
         self.data, self.file, self.salvage = data, file, salvage
         self.schemas: dict[int, records.Schema] = {}
         self.channels: dict[int, Channel] = {}
         self.counts: dict[int, int] = {}
-        self.wanted: dict[int, list[Message]] = {}
         self.recording = Recording("MCAP")
         self.checked = True
 
@@ -126,7 +126,7 @@ class _Reader:
         self.recording.warnings.append(f"damaged: {place}{problem}")
 
     def _framed(
-        self, data: bytes, start: int, end: int, allowed: set[Opcode]
+        self, data: Bytes, start: int, end: int, allowed: set[Opcode]
     ) -> Iterator[tuple[int, int, int]]:
         """Opcode, first byte of the content and the byte behind it, of one record after the other."""
         at = start
@@ -243,10 +243,10 @@ class _Reader:
             content = zstandard.ZstdDecompressor().decompress(chunk.data, max_output_size=size)
         else:
             content = chunk.data
-        self.recording.grow(len(content))
+        self.recording.pass_on(len(content))
         return content
 
-    def _record(self, opcode: int, data: bytes, begin: int, stop: int) -> None:
+    def _record(self, opcode: int, data: Bytes, begin: int, stop: int) -> None:
         """Take up a record that defines something, or a message."""
         if opcode in (Opcode.SCHEMA, Opcode.CHANNEL):
             self._define(opcode, data, begin, stop)
@@ -258,13 +258,10 @@ class _Reader:
             if channel is None:
                 raise BrokenError(begin, f"a message of channel {number}, which is not defined")
             self.counts[number] = self.counts.get(number, 0) + 1
-            kept = self.wanted.get(number)
-            if kept is not None:
-                if channel.type == PATH:
-                    kept.clear()
-                kept.append(Message(channel, log_time, data[begin + MESSAGE.size : stop]))
+            if channel.type in WANTED:
+                self.recording.keep(channel, log_time, data[begin + MESSAGE.size : stop])
 
-    def _define(self, opcode: int, data: bytes, begin: int, stop: int) -> None:
+    def _define(self, opcode: int, data: Bytes, begin: int, stop: int) -> None:
         if opcode == Opcode.SCHEMA:
             schema = records.Schema.read(_stream(data, begin, stop))
             self.schemas[schema.id] = schema
@@ -278,11 +275,9 @@ class _Reader:
         name, form, text = ("", "", b"") if known is None else (known.name, known.encoding, known.data)
         made = Channel(channel.topic, ros_name(name), channel.message_encoding, form, text)
         self.channels[channel.id] = made
-        if made.type in WANTED:
-            self.wanted[channel.id] = self.recording.messages.setdefault(channel.topic, [])
 
 
-def _stream(data: bytes, begin: int, stop: int) -> Any:
+def _stream(data: Bytes, begin: int, stop: int) -> Any:
     return ReadDataStream(io.BytesIO(data[begin:stop]))
 
 

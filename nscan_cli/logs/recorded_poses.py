@@ -8,7 +8,6 @@ from nscan_cli.counting import counted
 from nscan_cli.errors import InputDataError, WrongUsageError
 from nscan_cli.logs.decoding import UNDECODABLE, placed_decoder
 from nscan_cli.logs.frames import heading, unmoved
-from nscan_cli.logs.kinds import FORMS
 from nscan_cli.logs.recording import ODOMETRY, POSES, TRANSFORMS, Recording
 from nscan_cli.logs.sensed import Placed, S
 from nscan_cli.poses import Array
@@ -16,18 +15,6 @@ from nscan_cli.poses import Array
 PLACING = POSES + ODOMETRY + TRANSFORMS
 BETWEEN = ":"
 """Stands between a topic of transforms and the frames: /tf:world.robot."""
-
-
-def recording_in(data: bytes, file: str, salvage: bool) -> Recording | None:
-    """The messages of a recording; None where the bytes are none.
-
-    Raises InputDataError and ExceededError.
-    """
-    form = next((form for form in FORMS if form.container and form.fits(data)), None)
-    if form is None:
-        return None
-    recording: Recording = form.reader().recording(data, file, salvage)
-    return recording
 
 
 def poses_on(

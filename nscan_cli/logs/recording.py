@@ -5,7 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
-from nscan_cli.limits import INPUT, MB
+from nscan_cli.limits import INPUT, MB, UNPACKED
+from nscan_cli.logs.packing import UNPACKS, ZSTD, unpacked
 
 SCANS = ("sensor_msgs/msg/LaserScan", "foxglove.LaserScan")
 ODOMETRY = ("nav_msgs/msg/Odometry", "foxglove.Odometry")
@@ -64,21 +65,35 @@ class Recording:
     checksums: str = "none in this format"
     """Whether damage would have been found."""
     size: int = 0
-    """Bytes that were unpacked or kept so far."""
+    """Bytes of the messages."""
+    passed: int = 0
+    """Bytes that were unpacked on the way, of which only the messages are kept."""
+
+    def pass_on(self, size: int) -> None:
+        """Take account of bytes that are unpacked and not kept. Raises ExceededError beyond the limit."""
+        self.passed += size
+        UNPACKED.check(self.passed / MB, UNPACKS)
 
     def grow(self, size: int) -> None:
-        """Take account of bytes that are unpacked or kept. Raises ExceededError when they are too many."""
+        """Take account of bytes that are kept. Raises ExceededError when they are too many."""
         self.size += size
-        INPUT.check(self.size / MB, "unpacks to more and more")
+        INPUT.check(self.size / MB, UNPACKS)
 
-    def keep(self, message: Message) -> None:
-        """Take up a message. Raises ExceededError when they get too large together."""
-        kept = self.messages.setdefault(message.channel.topic, [])
-        if message.channel.type == PATH:
+    def keep(self, channel: Channel, log_time: int, data: bytes) -> None:
+        """Take up a message. Raises ExceededError when they get too large together.
+
+        rosbag2 may have compressed it on its own: CDR never begins as zstd does. What cannot be unpacked is
+        left as it is, for the decoder to refuse.
+        """
+        if channel.encoding == "cdr" and data.startswith(ZSTD.magic):
+            content, problem = unpacked(data, ZSTD)
+            data = data if problem else content
+        kept = self.messages.setdefault(channel.topic, [])
+        if channel.type == PATH:
             self.size -= sum(len(before.data) for before in kept)
             kept.clear()
-        self.grow(len(message.data))
-        kept.append(message)
+        self.grow(len(data))
+        kept.append(Message(channel, log_time, data))
 
     def topics(self, types: tuple[str, ...]) -> dict[str, int]:
         """Topics that have messages of some types, and how many."""

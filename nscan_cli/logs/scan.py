@@ -23,11 +23,21 @@ TOGETHER = 256
 
 @dataclass(frozen=True)
 class Source:
-    """The file that the log was read from: base name, SHA-256 of its bytes as stored, size in bytes."""
+    """What the log was read from: base name, SHA-256 of its bytes as stored, size in bytes.
+
+    Where that is more than one file, the SHA-256 is inputs.common_hash of theirs.
+    """
 
     name: str
     sha256: str
     bytes: int
+    parts: tuple[Source, ...] = ()
+    """The files, where there are several."""
+
+    @property
+    def files(self) -> tuple[Source, ...]:
+        """Each file."""
+        return self.parts or (self,)
 
 
 @dataclass(frozen=True)

@@ -19,6 +19,7 @@ from typing import Any
 
 from nscan_cli.errors import InputMissingError, NscanError, WrongUsageError
 from nscan_cli.inputs import read_bytes
+from nscan_cli.logs.parts import METADATA, beside, files_of
 from nscan_cli.nightly.fingerprint import tool_key
 from nscan_cli.nightly.processes import run_all as run_here
 from nscan_cli.nightly.task import Outcome, Report, Task
@@ -26,6 +27,8 @@ from nscan_cli.nightly.task import Outcome, Report, Task
 ADDRESS = re.compile(r"[a-z]+://.+:\d+")
 PATIENCE = 10.0
 """For the scheduler to answer, s."""
+Content = dict[str, bytes]
+"""Name → content of the files of an input."""
 AHEAD = 2
 """Logs that are sent ahead for each thread of the cluster: none has to wait, and not all are in memory."""
 
@@ -50,7 +53,7 @@ def run_all(
             while waiting and len(sent) < room:
                 task = waiting.popleft()
                 try:
-                    content = {role: read_bytes(path) for role, path in task.inputs.items()}
+                    content = {role: _content(path, role) for role, path in task.inputs.items()}
                 except NscanError as error:
                     yield task, Outcome.failed(str(error))
                     continue
@@ -68,7 +71,9 @@ def run_all(
         client.close(timeout=2)
 
 
-def run_there(task: Task, content: dict[str, bytes], timeout: float | None, tool: str, topic: str) -> Outcome:
+def run_there(
+    task: Task, content: dict[str, Content], timeout: float | None, tool: str, topic: str
+) -> Outcome:
     """On a worker: do a task whose inputs have come along, and say under the topic how far it is."""
     from distributed import get_worker
 
@@ -79,15 +84,26 @@ def run_there(task: Task, content: dict[str, bytes], timeout: float | None, tool
         )
     with tempfile.TemporaryDirectory(prefix="nscan-cli.") as folder:
         inputs = {}
-        for role, data in content.items():
-            path = Path(folder, "come", role, Path(task.inputs[role]).name)
-            path.parent.mkdir(parents=True)
-            path.write_bytes(data)
-            inputs[role] = str(path)
+        for role, files in content.items():
+            place = Path(folder, "come", role)
+            for name, data in files.items():
+                (place / name).parent.mkdir(parents=True, exist_ok=True)
+                (place / name).write_bytes(data)
+            inputs[role] = str(place / Path(task.inputs[role]).name)
         local = replace(task, inputs=inputs)
         run = run_here([local], 1, timeout, Path(folder), lambda *said: worker.log_event(topic, said))
         with contextlib.closing(run):
             return next(run)[1]
+
+
+def _content(path: str, role: str) -> Content:
+    """The files of an input; those of a folder have its name before their own. Raises NscanError."""
+    folder = Path(path)
+    if role != "log" or not folder.is_dir():
+        more = beside(path) if role == "log" else {}
+        return {folder.name + end: read_bytes(name) for end, name in {"": path, **more}.items()}
+    files = [*files_of(path), *(str(file) for file in (folder / METADATA,) if file.is_file())]
+    return {f"{folder.name}/{Path(file).name}": read_bytes(file) for file in files}
 
 
 def _client(address: str) -> Any:

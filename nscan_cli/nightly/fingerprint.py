@@ -11,7 +11,8 @@ from typing import Any
 
 from nscan_cli import __version__
 from nscan_cli.errors import InputMissingError
-from nscan_cli.inputs import read_bytes
+from nscan_cli.inputs import common_hash, sha256_of
+from nscan_cli.logs.parts import files_of
 from nscan_cli.nightly.manifest import Entry
 
 NO_RESULTS = ("cli", "nightly", "exports", "outputs.py")
@@ -34,12 +35,24 @@ def tool_key() -> str:
     return f"{__version__}-{sources.hexdigest()[:16]}"
 
 
-def sha256_of(path: Path) -> str:
-    """SHA-256 of a file's bytes. Raises InputMissingError when it cannot be read, or is no file at all."""
-    # From a named pipe nobody might ever write to, one would read for ever.
-    if path.exists() and not path.is_file():
-        raise InputMissingError(f"{path}: is no file; name one")
-    return hashlib.sha256(read_bytes(str(path))).hexdigest()
+def input_hash(path: Path, role: str) -> str:
+    """SHA-256 of an input; of a log of several files as inputs.common_hash, of any other of its bytes.
+
+    Raises InputMissingError when it cannot be read, or is no file at all, and the errors of files_of.
+    """
+    files = files_of(str(path)) if role == "log" else [str(path)]
+    hashes = []
+    for file in files:
+        # From a named pipe nobody might ever write to, one would read for ever.
+        if Path(file).exists() and not Path(file).is_file():
+            raise InputMissingError(f"{file}: is no file; name one")
+        hashes.append(sha256_of(file))
+    return hashes[0] if len(hashes) == 1 else common_hash(hashes)
+
+
+def size_of(path: Path) -> int:
+    """Bytes of the files that a log at `path` consists of."""
+    return sum(Path(file).stat().st_size for file in files_of(str(path)))
 
 
 def made_from(entry: Entry, hashes: dict[str, str]) -> dict[str, Any]:

@@ -14,8 +14,8 @@ from nscan_cli.errors import InputDataError, InputMissingError, WrongUsageError
 from nscan_cli.inputs import read_toml
 from nscan_cli.nightly.parameters import Parameters, parameters_from
 
-ENDINGS = (".log.gz", ".log", ".clf.gz", ".clf", ".script.gz", ".script", ".mcap", ".bag", ".db3")
-"""Of a log that the manifest gives by its name alone; the first that is there is taken."""
+ENDINGS = (".log.gz", ".log", ".clf.gz", ".clf", ".script.gz", ".script", ".mcap", ".bag", ".db3", "")
+"""Of a log that the manifest gives by its name alone; the first that is there is taken. "" is a folder."""
 NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,99}")
 TAKEN = ("report.html", "report.json")
 """Files of the folder that has the logs' folders."""

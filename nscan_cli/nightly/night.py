@@ -11,7 +11,7 @@ from typing import Any, Protocol
 
 from nscan_cli.errors import NscanError
 from nscan_cli.nightly.anew import reasons
-from nscan_cli.nightly.fingerprint import fingerprint, made_from, sha256_of, tool_key
+from nscan_cli.nightly.fingerprint import fingerprint, input_hash, made_from, size_of, tool_key
 from nscan_cli.nightly.folder import folder_of, scratch
 from nscan_cli.nightly.manifest import Entry
 from nscan_cli.nightly.nights import Night, add_night, is_up_to_date, read_nights
@@ -65,7 +65,7 @@ def plan(entries: list[Entry], folder: Path, force: bool) -> Plan:
             continue
         entry, lacking = _with_what_is_there(each) if each.optional else (each, [])
         try:
-            hashes = {role: sha256_of(path) for role, path in entry.inputs.items()}
+            hashes = {role: input_hash(path, role) for role, path in entry.inputs.items()}
         except NscanError as error:
             planned.unreadable.append((entry, _with_sources(entry, str(error))))
             continue
@@ -82,7 +82,7 @@ def plan(entries: list[Entry], folder: Path, force: bool) -> Plan:
             planned.to_do.append((entry, key))
             nights, this = read_nights(folder / entry.name), planned.made_from[entry.name]
             planned.anew[entry.name] = reasons(nights, key, tool_key(), this, force)
-    planned.to_do.sort(key=lambda item: -item[0].inputs["log"].stat().st_size)
+    planned.to_do.sort(key=lambda item: -size_of(item[0].inputs["log"]))
     return planned
 
 

@@ -97,8 +97,10 @@ def test_whatever_is_named_like_a_file_is_completed_as_one(name):
 
 
 def test_shells_are_told_where_a_file_comes(tmp_path):
-    for line in ("nscan-cli info off", "nscan-cli slam office.log -o off", "nscan-cli evaluate off",
-                 "nscan-cli match office.log --plot off", "nscan-cli slam --config off"):  # fmt: skip
+    for line in ("nscan-cli info off", "nscan-cli info on.mcap off",
+                 "nscan-cli render on.json on.mcap off", "nscan-cli slam office.log -o off",
+                 "nscan-cli evaluate off", "nscan-cli match office.log --plot off",
+                 "nscan-cli slam --config off"):  # fmt: skip
         assert answer("bash", line, tmp_path) == "file,off\n", line
 
 
@@ -129,6 +131,8 @@ def test_bash_completes(environment, robots):
         ("nscan-cli slam --map=offi", ["--map=office.json", "--map=office.log.gz"]),
         ("nscan-cli nightly radish --output=ni", ["--output=nights/"]),
         ("nscan-cli info off", ["office.json", "office.log.gz"]),
+        ("nscan-cli info ni", ["nights/"]),
+        ("nscan-cli info office.log.gz off", ["office.json", "office.log.gz"]),
         ("nscan-cli slam office.log.gz -o office.j", ["office.json"]),
         ("nscan-cli nightly radish -o ni", ["nights/"]),
     ],

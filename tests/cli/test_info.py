@@ -10,7 +10,8 @@ from nscan_cli.cli.main import run
 from tests.logs.lines import flaser
 
 KEYS = [
-    "file", "sha256", "bytes", "format", "laser", "scans", "first_scan", "last_scan", "beams", "fewest_beams",
+    "file", "sha256", "bytes", "files", "format", "laser", "scans", "first_scan", "last_scan", "beams",
+    "fewest_beams",
     "angle_min", "angle_max", "angle_increment", "angle_increments", "start", "duration", "rate",
     "longest_gap", "odometry", "no_return",
     "beams_without_return", "beams_unusable", "beams_lost", "mounting", "range_limits", "used", "records",

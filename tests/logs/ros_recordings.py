@@ -156,14 +156,17 @@ def ros2_idl(written: Iterable[Written]) -> bytes:
     )
 
 
-def bag1(written: Iterable[Written], folder: Path) -> bytes:
-    """A ROS 1 bag by rosbags."""
+def bag1(written: Iterable[Written], folder: Path, compression: str | None = None) -> bytes:
+    """A ROS 1 bag by rosbags; its chunks may be compressed, by BZ2 or LZ4."""
     from rosbags.rosbag1 import Writer
 
     path = folder / "made.bag"
     path.unlink(missing_ok=True)
     store = ros_text.store(ros1=True)
-    with Writer(path) as writer:
+    writer = Writer(path)
+    if compression is not None:
+        writer.set_compression(Writer.CompressionFormat[compression])
+    with writer:
         connections: dict[str, Any] = {}
         for one in written:
             name = ros_type(one.content)
@@ -176,21 +179,24 @@ def bag1(written: Iterable[Written], folder: Path) -> bytes:
 
 def db3(written: Iterable[Written], folder: Path) -> bytes:
     """The SQLite file of a ROS 2 bag by rosbags."""
-    return _bag2(written, folder, "SQLITE3", ".db3")
+    return next(bag2(written, folder / "made_bag", "SQLITE3").glob("*.db3")).read_bytes()
 
 
 def rosbags_mcap(written: Iterable[Written], folder: Path) -> bytes:
     """The MCAP of a ROS 2 bag by rosbags, which writes no checksums."""
-    return _bag2(written, folder, "MCAP", ".mcap")
+    return next(bag2(written, folder / "made_bag", "MCAP").glob("*.mcap")).read_bytes()
 
 
-def _bag2(written: Iterable[Written], folder: Path, plugin: str, suffix: str) -> bytes:
-    from rosbags.rosbag2 import StoragePlugin, Writer
+def bag2(written: Iterable[Written], path: Path, plugin: str, compression: str | None = None) -> Path:
+    """The folder of a ROS 2 bag by rosbags, as a recorder leaves one; compressed by FILE or MESSAGE."""
+    from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin, Writer
 
-    path = folder / "made_bag"
     shutil.rmtree(path, ignore_errors=True)
     store = ros_text.store(ros1=False)
-    with Writer(path, version=9, storage_plugin=StoragePlugin[plugin]) as writer:
+    writer = Writer(path, version=9, storage_plugin=StoragePlugin[plugin])
+    if compression is not None:
+        writer.set_compression(CompressionMode[compression], CompressionFormat.ZSTD)
+    with writer:
         connections: dict[str, Any] = {}
         for one in written:
             name = ros_type(one.content)
@@ -198,4 +204,25 @@ def _bag2(written: Iterable[Written], folder: Path, plugin: str, suffix: str) ->
                 connections[one.topic] = writer.add_connection(one.topic, name, typestore=store)
             message = ros_text.as_message(store, name, ros_message(one.content))
             writer.write(connections[one.topic], one.log_time, store.serialize_cdr(message, name))
-    return next(path.glob(f"*{suffix}")).read_bytes()
+    return path
+
+
+def split_bag2(
+    written: Iterable[Written], path: Path, plugin: str, count: int = 3, compression: str | None = None
+) -> Path:
+    """The same of a recorder that begins a new file now and then: NAME_0, NAME_1, …"""
+    every = list(written)
+    size = -(-len(every) // count)
+    names = []
+    path.mkdir()
+    for part in range(count):
+        made = bag2(every[part * size : (part + 1) * size], path.parent / "part", plugin, compression)
+        (file,) = (one for one in made.iterdir() if one.name != "metadata.yaml")
+        names.append(f"{path.name}_{part}{''.join(file.suffixes)}")
+        file.rename(path / names[-1])
+    metadata = (made / "metadata.yaml").read_text()
+    listed = metadata.replace(f"- {file.name}\n", "- " + "\n  - ".join(names) + "\n")
+    assert listed != metadata
+    (path / "metadata.yaml").write_text(listed)
+    shutil.rmtree(made)
+    return path

@@ -11,7 +11,8 @@ import numpy as np
 import pytest
 
 from nscan_cli.errors import InputDataError, WrongUsageError
-from nscan_cli.logs.recorded_poses import poses_on, recording_in
+from nscan_cli.logs.load import recording_in
+from nscan_cli.logs.recorded_poses import poses_on
 from nscan_cli.logs.recording import PATH
 from tests.logs import ros_text
 from tests.logs.recordings import START, S, turned

@@ -5,10 +5,15 @@ from __future__ import annotations
 import json
 import re
 import shutil
+import sqlite3
+from contextlib import closing
 from pathlib import Path
 from typing import Any
 
+from nscan_cli.nightly.manifest import Entry
+from tests.cli.room_drive import room_drive
 from tests.cli.room_log import room_log
+from tests.logs.ros_recordings import split_bag2
 
 SCANS = {"one": 12, "two": 16, "three": 20}
 BOUND = 0.5
@@ -30,6 +35,24 @@ def write_logs(folder: Path) -> Path:
     manifest = folder / "small.toml"
     manifest.write_text("\n".join(tables))
     return manifest
+
+
+def recordings(folder: Path) -> list[Entry]:
+    """A folder with a split recording, and a database with a write-ahead log beside it."""
+    split_bag2(room_drive(), folder / "my_bag", "MCAP")
+    made = split_bag2(room_drive(), folder / "made", "SQLITE3", 1) / "made_0.db3"
+    with closing(sqlite3.connect(made)) as database:
+        database.execute("PRAGMA journal_mode=WAL")
+        database.execute("CREATE TABLE copy AS SELECT * FROM messages WHERE id > 20")
+        database.execute("DELETE FROM messages WHERE id > 20")
+        database.commit()
+        database.execute("PRAGMA wal_checkpoint(TRUNCATE)")
+        database.execute("INSERT INTO messages SELECT * FROM copy")
+        database.commit()
+        shutil.copy(made, folder / "lab.db3")
+        shutil.copy(f"{made}-wal", folder / "lab.db3-wal")
+    shutil.rmtree(folder / "made")
+    return [Entry("split", {"log": folder / "my_bag"}), Entry("lab", {"log": folder / "lab.db3"})]
 
 
 def copy_of(folder: Path, place: Path) -> Path:

@@ -14,7 +14,8 @@ from nscan_cli.errors import InputMissingError, WrongUsageError
 from nscan_cli.nightly import cluster
 from nscan_cli.nightly.manifest import Entry, read_manifest
 from nscan_cli.nightly.task import Task
-from tests.nightly.small import results
+from tests.cli.room_drive import COUNT
+from tests.nightly.small import recordings, results
 
 distributed = pytest.importorskip("distributed")
 
@@ -49,6 +50,13 @@ def test_a_failure_costs_its_log_alone_and_reads_as_it_does_here(scheduler, smal
     assert "lost.log: no such file" in found["lost"].result["reason"]
     assert found["one"].result["counts"]["scans"] == 12
     assert {name for name, *_ in said} <= {"one"}
+
+
+def test_a_log_of_several_files_comes_along_whole(scheduler, tmp_path):
+    tasks = [Task.of(entry) for entry in recordings(tmp_path)]
+    for _task, outcome in cluster.run_all(tasks, scheduler, 60.0, lambda *_progress: None):
+        assert outcome.result["counts"]["scans"] == COUNT
+        assert outcome.result["counts"]["warnings"] == []
 
 
 def test_a_worker_that_dies_costs_no_log(scheduler, small, undisturbed, tmp_path):

@@ -46,7 +46,7 @@ def test_paths_relative_to_data(tmp_path):
     assert entry.inputs["log"] == data / "logs" / "intel.log.gz"
 
 
-@pytest.mark.parametrize("file", ["aces.clf", "aces.log.gz", "aces.mcap"])
+@pytest.mark.parametrize("file", ["aces.clf", "aces.log.gz", "aces.mcap", "aces.db3", "aces"])
 def test_a_log_by_its_name_alone(tmp_path, file):
     (tmp_path / file).touch()
     (tmp_path / "aces.relations").touch()

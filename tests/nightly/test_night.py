@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 
+from nscan_cli.logs.load import read_log
 from nscan_cli.nightly import fingerprint
 from nscan_cli.nightly import night as night_module
 from nscan_cli.nightly.manifest import Entry
@@ -16,6 +17,7 @@ from nscan_cli.nightly.night import carry_out, plan
 from nscan_cli.nightly.nights import read_nights
 from nscan_cli.nightly.parameters import parameters_from
 from nscan_cli.nightly.task import Outcome
+from tests.nightly.small import recordings
 
 
 class Silent:
@@ -226,6 +228,23 @@ def test_the_largest_log_is_begun_first(nights, tmp_path):
         (tmp_path / f"{name}.log").write_text("x" * size)
         entries.append(Entry(name, {"log": tmp_path / f"{name}.log"}))
     assert [entry.name for entry, _key in plan(entries, nights, False).to_do] == ["b", "c", "a"]
+
+
+def test_of_a_log_of_several_files_each_counts(nights, tmp_path):
+    entries = recordings(tmp_path)
+    before = dict(planned_keys(entries, nights))
+    assert set(before) == {"lab", "split"}
+    sha256 = read_log(str(tmp_path / "my_bag")).source.sha256
+    assert plan([replace(entries[0], sha256={"log": sha256})], nights, False).notes == {"split": []}
+    for file in ("my_bag/my_bag_2.mcap", "lab.db3-wal"):
+        with (tmp_path / file).open("ab") as changed:
+            changed.write(b"x")
+    after = dict(planned_keys(entries, nights))
+    assert all(after[name] != before[name] for name in before)
+
+
+def planned_keys(entries: list[Entry], nights: Path) -> list[tuple[str, str]]:
+    return [(each.name, key) for each, key in plan(entries, nights, False).to_do]
 
 
 def test_another_file_than_the_manifest_means_is_noted(entry, nights):

@@ -15,7 +15,9 @@ from nscan_cli.nightly import processes
 from nscan_cli.nightly.manifest import Entry
 from nscan_cli.nightly.processes import run_all
 from nscan_cli.nightly.task import Outcome, Task
+from tests.cli.room_drive import COUNT
 from tests.cli.room_log import room_log
+from tests.nightly.small import recordings
 
 
 def nothing(*_said):
@@ -50,6 +52,13 @@ def test_a_log_that_never_ends_is_stopped(endless, scratch):
     assert found["endless"].result == {"reason": "stopped after 0.5 s, see --timeout"}
     assert found["endless"].files == {}
     assert list(scratch.iterdir()) == []
+
+
+def test_logs_of_several_files(scratch, tmp_path):
+    tasks = [Task.of(entry) for entry in recordings(tmp_path)]
+    for outcome in outcomes(tasks, 2, 60.0, scratch, nothing).values():
+        assert outcome.result["counts"]["scans"] == COUNT
+        assert outcome.result["counts"]["warnings"] == []
 
 
 def test_a_process_that_is_killed_and_one_that_fails(fine, scratch, tmp_path):
