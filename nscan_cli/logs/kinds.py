@@ -101,6 +101,10 @@ MAGIC = (
     (b"Rar!\x1a\x07", Foreign("a RAR archive", f"{UNPACK}, by `unrar x`")),
     (b"\x1f\x9d", Foreign("compressed by compress", "unpack it first, by `uncompress`")),
     (b"LZIP", Foreign("compressed by lzip", "unpack it first, by `lzip -d`")),
+    (
+        b"rosbag2_bagfile_information:",
+        Foreign("the metadata of a ROS 2 bag", "give the folder that it is in"),
+    ),
     (b"\x7fELF", Foreign("a program")),
 )
 """What the first bytes say."""

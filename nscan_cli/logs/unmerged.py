@@ -6,25 +6,28 @@ puts them together, on copies: nothing changes where the files are.
 
 from __future__ import annotations
 
+import contextlib
 import os
 import shutil
 import sqlite3
 import struct
 import tempfile
 from collections.abc import Iterator, Mapping
-from contextlib import closing, contextmanager
+from contextlib import closing
 
 from nscan_cli.counting import counted
 from nscan_cli.errors import InputDataError, OutputError
 
-WAL = "-wal"
+WAL, JOURNAL = "-wal", "-journal"
+JOURNAL_END = b"\xd9\xd5\x05\xf9\x20\xa1\x63\xd7"
+"""The last bytes of a journal that ends with the name of a file."""
 HEAD, FRAME = 32, 24
 """Bytes of the header of a write-ahead log, and of each frame's in it (sqlite.org/fileformat2.html)."""
 SALTS = slice(16, 24)
 FRAME_SALTS = slice(8, 16)
 
 
-@contextmanager
+@contextlib.contextmanager
 def merged(path: str, beside: Mapping[str, str], file: str, salvage: bool) -> Iterator[tuple[str, list[str]]]:
     """Where a database is with all that stands beside it taken in, and what of that is of no use.
 
@@ -38,12 +41,13 @@ def merged(path: str, beside: Mapping[str, str], file: str, salvage: bool) -> It
         try:
             for end, source in {"": path, **beside}.items():
                 shutil.copyfile(source, place + end)
+            _check_journal(place)
             taken = _put_together(place)
         except OSError as error:
             problem = f"{folder}: has no copy of {file}: {error.strerror or error}"
             raise OutputError(f"{problem}; make room there, or set TMPDIR") from error
-        except sqlite3.Error as error:
-            # Of another database, or damaged: the file alone may be sound.
+        except (sqlite3.Error, UnicodeDecodeError) as error:
+            # Of another database, or damaged, what SQLite quotes of it too: the file alone may be sound.
             names = " and ".join(f"{file}{end}" for end in beside)
             problem = f"does not go together with {names} ({' '.join(str(error).split())})"
             if not salvage:
@@ -53,6 +57,17 @@ def merged(path: str, beside: Mapping[str, str], file: str, salvage: bool) -> It
             return
         lost = _left_over(beside[WAL], taken) if WAL in beside else ""
         yield place, [f"{file}{WAL}: {lost}"] if lost else []
+
+
+def _check_journal(path: str) -> None:
+    """Refuse a journal with the name of another file at its end, which SQLite would read, and remove.
+
+    Only transactions over several databases have one. Raises sqlite3.Error.
+    """
+    with contextlib.suppress(FileNotFoundError), open(path + JOURNAL, "rb") as journal:
+        journal.seek(-min(len(JOURNAL_END), os.path.getsize(path + JOURNAL)), os.SEEK_END)
+        if journal.read() == JOURNAL_END:
+            raise sqlite3.DatabaseError("its journal leads to other files")
 
 
 def _put_together(path: str) -> int:

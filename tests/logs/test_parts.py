@@ -10,8 +10,9 @@ from pathlib import Path
 
 import pytest
 
-from nscan_cli.errors import InputMissingError, WrongUsageError
+from nscan_cli.errors import InputDataError, InputMissingError, WrongUsageError
 from nscan_cli.logs.load import read_log
+from nscan_cli.logs.options import ReadingOptions
 from nscan_cli.logs.parts import files_of
 from nscan_cli.logs.scan import LaserLog
 from tests.logs.lines import flaser
@@ -59,6 +60,16 @@ def test_a_split_recording_is_one_whether_its_folder_or_its_files_are_named(spli
         data = Path(files_of(str(split))[number]).read_bytes()
         assert source.name.startswith(f"my_bag_{number}.")
         assert (source.sha256, source.bytes) == (hashlib.sha256(data).hexdigest(), len(data))
+
+
+def test_all_that_a_shell_finds_in_a_folder_may_be_named(split):
+    check_drive(read_log([str(path) for path in split.iterdir()]))
+    for more in ("my_bag_1.db3-wal", "my_bag_1.db3-shm"):
+        (split / more).touch()
+    if (split / "my_bag_1.db3").exists():
+        check_drive(read_log([str(path) for path in split.iterdir()]))
+    with pytest.raises(InputDataError, match="the metadata of a ROS 2 bag; give the folder that it is in"):
+        read_log(str(split / "metadata.yaml"))
 
 
 def test_the_files_are_in_order_of_time_whatever_their_names(split):
@@ -269,9 +280,6 @@ def test_logs_that_are_no_files_of_one_recording(tmp_path):
 
 
 def test_damage_in_one_of_the_files_is_told_with_its_name(split, tmp_path):
-    from nscan_cli.errors import InputDataError
-    from nscan_cli.logs.options import ReadingOptions
-
     path = next(split.glob("my_bag_1.*"))
     path.write_bytes(path.read_bytes()[:-3000])
     with pytest.raises(InputDataError, match=r"my_bag_1\."):

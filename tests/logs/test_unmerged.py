@@ -159,8 +159,9 @@ def test_a_write_ahead_log_that_breaks_the_database(bag, monkeypatch):
     assert "what that held is lost" in log.report.warnings[0]
 
 
-def test_a_journal_is_played_back(tmp_path):
-    """A transaction that was cut off in the middle: the journal has what the pages were before."""
+@pytest.fixture
+def cut_off(tmp_path: Path) -> Path:
+    """A bag in the middle of a transaction: the journal has what the pages were before."""
     path = tmp_path / "lab.db3"
     path.write_bytes(db3(drive(), tmp_path))
     folder = tmp_path / "given"
@@ -172,6 +173,22 @@ def test_a_journal_is_played_back(tmp_path):
         assert os.path.getsize(f"{path}-journal") > 0
         shutil.copy(path, folder / "lab.db3")
         shutil.copy(f"{path}-journal", folder / "lab.db3-journal")
-    log = read_log(str(folder / "lab.db3"))
+    return folder / "lab.db3"
+
+
+def test_a_journal_is_played_back(cut_off):
+    log = read_log(str(cut_off))
     check_drive(log)
     assert [source.name for source in log.source.files] == ["lab.db3", "lab.db3-journal"]
+
+
+def test_a_journal_removes_no_other_file(cut_off, tmp_path):
+    """SQLite takes the name at its end for that of a journal over several databases."""
+    other = tmp_path / "letter.txt"
+    other.write_text("Dear all,")
+    name, magic = str(other).encode(), b"\xd9\xd5\x05\xf9\x20\xa1\x63\xd7"
+    with Path(f"{cut_off}-journal").open("ab") as journal:
+        journal.write(bytes(4) + name + len(name).to_bytes(4, "big") + sum(name).to_bytes(4, "big") + magic)
+    with pytest.raises(InputDataError, match=r"does not go together with .*its journal leads to other files"):
+        read_log(str(cut_off))
+    assert other.read_text() == "Dear all,"

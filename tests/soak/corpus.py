@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
+import bz2
 import gzip
+import lzma
 import tempfile
 from pathlib import Path
+
+import lz4.frame
+import zstandard
 
 from nscan_cli.graph.g2o import write_g2o
 from nscan_cli.graph.json_file import write_graph
@@ -69,6 +74,12 @@ def samples() -> dict[str, list[bytes]]:
         "player": ["\n".join(lines).encode() + b"\n" for lines in players],
         "script": ["\n".join(LINES * 3).encode()],
         "gzip": [gzip.compress(data, mtime=0) for data in carmen[:2]],
+        "packed": [
+            bz2.compress(carmen[0]),
+            lzma.compress(carmen[0]),
+            zstandard.compress(carmen[0]),
+            lz4.frame.compress(carmen[0]),
+        ],
         "json graph": [graph],
         "g2o": [write_g2o(small_graph()), OTHER_G2O.encode()],
         "tum": [write_tum([f"{100 + 0.2 * k:.1f}" for k in range(3)], small_graph().poses)],
