@@ -7,11 +7,11 @@ import stat
 import sys
 import tomllib
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
 from nscan_cli.errors import InputDataError, InputMissingError
 from nscan_cli.limits import CONFIG, INPUT, MB, ExceededError, Limit
+from nscan_cli.text import name_of_path
 
 STANDARD_INPUT = "-"
 
@@ -70,4 +70,4 @@ def label(path: str) -> str:
 
 def base_name(path: str) -> str:
     """An input as results call it: its name without its folder, the same on every machine."""
-    return "standard input" if path == STANDARD_INPUT else Path(path).name
+    return "standard input" if path == STANDARD_INPUT else name_of_path(path)

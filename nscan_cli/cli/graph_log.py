@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
+import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from nscan_cli.errors import InputDataError, InputMissingError
 from nscan_cli.limits import DISTANCE
 from nscan_cli.logs.options import ReadingOptions
+from nscan_cli.text import name_of_path, path_of_name
 
 if TYPE_CHECKING:
     import numpy as np
@@ -52,12 +55,21 @@ def find_log(graph_file: str, graph: Graph) -> str:
     if name is None:
         raise InputMissingError(f"{graph_file}: does not name its log; give its path as LOG")
     for folder in (Path(graph_file).parent, Path()):
-        path = folder / Path(name).name
+        path = folder / path_of_name(Path(name).name)
         if path.is_file():
             return str(path)
+        if "\\" in name and (same := _shown_as(name, folder)):
+            return same
     raise InputMissingError(
         f"{graph_file}: its log {name} is neither beside it nor in the current folder; give its path as LOG"
     )
+
+
+def _shown_as(name: str, folder: Path) -> str | None:
+    """The file in the folder that the graph calls so, since its name is no UTF-8."""
+    with contextlib.suppress(OSError), os.scandir(folder) as entries:
+        return min((each.path for each in entries if name_of_path(each.name) == name), default=None)
+    return None
 
 
 def _source(graph: Graph) -> dict[str, Any]:

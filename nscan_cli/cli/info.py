@@ -6,13 +6,14 @@ import json
 import math
 from typing import TYPE_CHECKING, Any
 
-import click
-
 from nscan_cli.cli.command import log_argument, option, subcommand
 from nscan_cli.cli.options import common_options, reading_options
+from nscan_cli.cli.streams import answer
 from nscan_cli.cli.summary import Row, table
 from nscan_cli.counting import counted
 from nscan_cli.logs.options import ReadingOptions
+from nscan_cli.outputs import write_whole
+from nscan_cli.text import json_bytes
 
 if TYPE_CHECKING:
     from nscan_cli.logs.scan import LaserLog
@@ -36,7 +37,11 @@ def command(log: str, as_json: bool, reading: ReadingOptions, **_common: Any) ->
     from nscan_cli.logs.load import read_log
 
     facts = facts_of(read_log(log, reading))
-    click.echo(json.dumps(facts, ensure_ascii=False, allow_nan=False) if as_json else as_text(facts))
+    if as_json:
+        text = json.dumps(facts, ensure_ascii=False, allow_nan=False)
+        write_whole("-", json_bytes(f"{text}\n"))
+    else:
+        answer(f"{as_text(facts)}\n")
 
 
 def facts_of(log: LaserLog) -> dict[str, Any]:

@@ -7,6 +7,8 @@ import sys
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
+from nscan_cli.text import shown
+
 if TYPE_CHECKING:
     from rich.progress import Progress
 
@@ -14,7 +16,7 @@ if TYPE_CHECKING:
 def say(message: str, quiet: bool = False) -> None:
     """One line for people."""
     if not quiet:
-        print(message, file=sys.stderr)
+        print(shown(message), file=sys.stderr)
 
 
 def announce_compiling(kernel: str, quiet: bool) -> bool:

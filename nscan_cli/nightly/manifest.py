@@ -12,6 +12,7 @@ from typing import Any
 from nscan_cli.errors import InputDataError, InputMissingError, WrongUsageError
 from nscan_cli.inputs import read_toml
 from nscan_cli.nightly.parameters import Parameters, parameters_from
+from nscan_cli.text import path_of_name
 
 ENDINGS = (".log.gz", ".log", ".clf.gz", ".clf", ".script.gz", ".script", ".mcap", ".bag")
 """Of a log that the manifest gives by its name alone; the first that is there is taken."""
@@ -111,8 +112,8 @@ def _entry(file: str, number: int, table: dict[str, Any], folder: Path) -> Entry
     if bounds and "relations" not in table and "reference" not in table:
         remedy = "give relations or reference too"
         raise InputDataError(place, f"has {bounds[0]}, but nothing to measure against", remedy)
-    inputs = {"log": folder / table["path"] if "path" in table else _by_name(folder, name)}
-    inputs.update({role: folder / table[role] for role in ROLES[1:] if role in table})
+    inputs = {"log": folder / path_of_name(table["path"]) if "path" in table else _by_name(folder, name)}
+    inputs.update({role: folder / path_of_name(table[role]) for role in ROLES[1:] if role in table})
     return Entry(
         name=name,
         inputs=inputs,

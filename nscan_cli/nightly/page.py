@@ -9,6 +9,7 @@ from nscan_cli import __version__
 from nscan_cli.nightly.card import SIGNS, WORDS, card, change, real_time, seconds
 from nscan_cli.nightly.report import finished
 from nscan_cli.nightly.verdict import ASKING, ORDER, Status, Verdict, headline
+from nscan_cli.text import shown
 
 
 def page(title: str, verdicts: list[Verdict], folder: Path) -> bytes:
@@ -59,7 +60,7 @@ def page(title: str, verdicts: list[Verdict], folder: Path) -> bytes:
             "</html>",
         ]
     )
-    return (content + "\n").encode()
+    return shown(content + "\n").encode()
 
 
 def _readable(when: str) -> str:
