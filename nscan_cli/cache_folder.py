@@ -59,7 +59,7 @@ def cache_folder() -> Path | None:
 
 
 def _claim(folder: Path) -> None:
-    """Say whose the folder is, and once a day that it is used; when it is new, clear away others beside it."""
+    """Say whose the folder is, and once a day that it is used; when it is new, clear others away."""
     owner = folder / OWNER
     try:
         if time.time() - owner.stat().st_mtime > DAY:
@@ -117,7 +117,7 @@ def _sources_hash() -> str:
 
     Of the place because numba keeps the code of each copy of a file apart.
     """
-    sources = hashlib.sha256(f"{PACKAGE}\0".encode())
+    sources = hashlib.sha256(os.fsencode(PACKAGE) + b"\0")
     for path in sorted(PACKAGE.rglob("*.py")):
         text = path.read_bytes()
         if path.name in MAKERS or b"nscan_cli.compiled import" in text:

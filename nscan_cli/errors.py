@@ -1,5 +1,7 @@
 """The errors that a user can cause; each carries its exit code and prints as one line."""
 
+from nscan_cli.text import shown
+
 LONGEST = 2000
 """Characters of a message: it may quote an input, in which anything can stand."""
 
@@ -10,6 +12,7 @@ class NscanError(Exception):
     exit_code = 1
 
     def __init__(self, message: str) -> None:
+        message = shown(message)
         if len(message) > LONGEST:
             message = f"{message[: LONGEST // 2]} … {message[-LONGEST // 2 :]}"
         super().__init__(message)

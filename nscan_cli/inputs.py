@@ -10,11 +10,11 @@ import stat
 import sys
 import tomllib
 from collections.abc import Callable, Iterable, Iterator
-from pathlib import Path
 from typing import Any
 
 from nscan_cli.errors import InputDataError, InputMissingError
 from nscan_cli.limits import CONFIG, INPUT, MB, ExceededError, Limit
+from nscan_cli.text import name_of_path
 from nscan_cli.text_encoding import plain
 
 STANDARD_INPUT = "-"
@@ -109,4 +109,4 @@ def label(path: str) -> str:
 
 def base_name(path: str) -> str:
     """An input as results call it: its name without its folder, the same on every machine."""
-    return "standard input" if path == STANDARD_INPUT else Path(path).name
+    return "standard input" if path == STANDARD_INPUT else name_of_path(path)

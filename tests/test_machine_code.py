@@ -5,9 +5,6 @@ from __future__ import annotations
 import itertools
 import json
 import math
-import os
-import subprocess
-import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -16,106 +13,8 @@ import numpy as np
 import pytest
 
 from nscan_cli import machine_code
-from nscan_cli.cache_folder import PACKAGE
 from nscan_cli.compiled import Kernel, kernel
-
-KERNELS = """
-from typing import NamedTuple
-import numpy as np
-from nscan_cli.compiled import inlined_kernel, kernel, lean_kernel, summing_kernel
-
-class Pair(NamedTuple):
-    numbers: np.ndarray
-    factor: float
-
-@kernel
-def add(a, b):
-    return a + b
-
-@inlined_kernel
-def row(table, i):
-    return table[i]
-
-@summing_kernel
-def total(numbers):
-    s = 0.0
-    for number in numbers:
-        s += number
-    return s
-
-@lean_kernel
-def weigh(table, factor, i):
-    return total(row(table, i)) * factor
-
-@kernel
-def scaled(pair):
-    weights = np.empty(len(pair.numbers), dtype=np.float32)
-    for i in range(len(weights)):
-        weights[i] = weigh(pair.numbers, pair.factor, i)
-    return Pair(weights, -pair.factor), (len(weights), True)
-
-@kernel
-def refuse(a):
-    if a > 1:
-        raise ValueError("too much")
-    return a
-"""
-REPORT = """
-import json, sys
-import numpy as np
-from nscan_cli.cache_folder import cache_folder
-from nscan_cli.machine_code import first_compile
-from some_kernels import Pair, add, refuse, scaled
-
-first = first_compile("add")
-numbers = np.arange(6.0).reshape(2, 3)
-results = [add(1, 2), add(1.0, 0.5), add(np.float64(1), 2.0)]
-for layout in (numbers, np.asfortranarray(numbers), numbers[:, ::2], numbers[::-1]):
-    pair, counts = scaled(Pair(layout, 2.0))
-    kind = type(pair).__name__, pair.numbers.dtype.name
-    results.append([*kind, pair.numbers.tolist(), pair.factor, *counts])
-imported = "numba" in sys.modules
-try:
-    refuse(2)
-except ValueError as error:
-    results.append(str(error))
-print(json.dumps([str(cache_folder()), first, first_compile("add"), results, imported]))
-"""
-RESULTS = [
-    3,
-    1.5,
-    3.0,
-    ["Pair", "float32", [6.0, 24.0], -2.0, 2, True],
-    ["Pair", "float32", [6.0, 24.0], -2.0, 2, True],
-    ["Pair", "float32", [4.0, 16.0], -2.0, 2, True],
-    ["Pair", "float32", [24.0, 6.0], -2.0, 2, True],
-    "too much",
-]
-
-
-def process(folder: Path, code: str, **settings: str) -> bytes:
-    """What a new process prints, which has the folder's modules, and keeps what it compiles there."""
-    kept = {name: value for name, value in os.environ.items() if not name.startswith(("NUMBA_", "XDG_"))}
-    places = {
-        "NUMBA_CACHE_DIR": str(folder / "cache"),
-        "PYTHONPATH": os.pathsep.join([str(folder), str(PACKAGE.parent)]),
-    }
-    done = subprocess.run(
-        [sys.executable, "-c", code], env={**kept, **places, **settings}, capture_output=True, check=True
-    )
-    assert not done.stderr
-    return done.stdout
-
-
-def report(folder: Path, begin: str = "", **settings: str) -> list[Any]:
-    """What a new process says of kernels that it compiles or loads, with all that is kept in the folder."""
-    (folder / "some_kernels.py").write_text(KERNELS)
-    answer: list[Any] = json.loads(process(folder, begin + REPORT, **settings))
-    return answer
-
-
-def files(folder: Path, suffix: str) -> list[Path]:
-    return sorted((folder / "cache").rglob(f"*.{suffix}"))
+from tests.kernels_kept import REPORT, RESULTS, files, process, report
 
 
 @pytest.fixture(scope="module")
@@ -204,61 +103,6 @@ def test_code_of_an_unknown_numba_is_left_to_its_own_cache(tmp_path):
     assert report(tmp_path, swapped)[1:] == [False, False, RESULTS, True]
     assert files(tmp_path, "nbc") == kept
     assert not files(tmp_path, "code")
-
-
-HIDDEN = """
-import nscan_cli.machine_code as m
-whole = m._symbols
-m._symbols = lambda *libraries: (each for each in whole(*libraries) if each[0] != "NRT_adapt_ndarray_from_python")
-"""
-NOWHERE = """
-import llvmlite.binding as llvm
-find = llvm.address_of_symbol
-llvm.address_of_symbol = lambda name: None if name == "NRT_adapt_ndarray_from_python" else find(name)
-"""
-
-
-@pytest.mark.parametrize("hide", [HIDDEN, NOWHERE], ids=["without numba", "at all"])
-def test_code_that_calls_what_is_missing_is_left_to_numba(tmp_path, hide):
-    """As that for a vector library does, which numba finds; it is not compiled anew in every process."""
-    assert report(tmp_path)[3:] == [RESULTS, True]
-    whole = set(files(tmp_path, "code"))
-    # Found to be missing, compiled, and left; compiled and kept by numba; there from then on.
-    for _ in range(2):
-        assert report(tmp_path, hide)[3:] == [RESULTS, True]
-    lefts, kept = files(tmp_path, "left"), {path: path.stat().st_mtime_ns for path in files(tmp_path, "nb?")}
-    assert lefts
-    assert {path.with_suffix(".code") for path in lefts} | set(files(tmp_path, "code")) == whole
-    assert report(tmp_path, hide)[1:] == [False, False, RESULTS, True]
-    assert {path: path.stat().st_mtime_ns for path in files(tmp_path, "nb?")} == kept
-    assert files(tmp_path, "left") == lefts
-
-
-SVML = """
-import numba
-numba.config.USING_SVML = True
-"""
-
-
-def test_a_vector_library_has_machine_code_of_its_own(whole):
-    """It is there where somebody else has imported numba so: other processes would not find it."""
-    before = {path: path.stat().st_mtime_ns for path in (whole / "cache").rglob("*.*") if path.is_file()}
-    assert report(whole, SVML)[1:] == [True, False, RESULTS, True]
-    assert len(files(whole, "code")) == 12
-    assert report(whole)[1:] == [False, False, RESULTS, False]
-    assert {path: path.stat().st_mtime_ns for path in before} == before
-    for path in (whole / "cache").rglob("*.*"):
-        if path.is_file() and path not in before:
-            path.unlink()
-
-
-def test_numba_takes_no_vector_library_here(tmp_path):
-    """Whatever machine it is: sines in a loop would round otherwise."""
-    (tmp_path / "some_kernels.py").write_text(KERNELS)
-    (tmp_path / "numba").mkdir()
-    told = "import os; print(os.environ['NUMBA_DISABLE_INTEL_SVML']); raise SystemExit"
-    (tmp_path / "numba" / "__init__.py").write_text(told)
-    assert process(tmp_path, "from some_kernels import add; add(1, 2)") == b"1\n"
 
 
 WAVES = """

@@ -1,12 +1,17 @@
-"""Completion of `--option=value`, which zsh and fish take as one word, and click as its value alone."""
+"""Completion: of any names of files, and of `--option=value`, which zsh and fish take as one word.
+
+click takes that as its value alone.
+"""
 
 from __future__ import annotations
 
 import glob
 import os
+import sys
 from collections.abc import Iterator
 
 from click.shell_completion import (
+    BashComplete,
     CompletionItem,
     FishComplete,
     ShellComplete,
@@ -15,7 +20,23 @@ from click.shell_completion import (
 )
 
 
-class WholeWords(ShellComplete):
+class Names(str):
+    """Text that becomes the bytes that the names in it have."""
+
+    def encode(self, *_encoding: str) -> bytes:
+        """As click does it for the shell; names that are no UTF-8 would stop it."""
+        return super().encode(sys.getfilesystemencoding(), sys.getfilesystemencodeerrors())
+
+
+class AnyNames(ShellComplete):
+    """What goes to the shell may be no UTF-8."""
+
+    def complete(self) -> str:
+        """The lines that the shell reads."""
+        return Names(super().complete())
+
+
+class WholeWords(AnyNames):
     """What completes a value stands behind its option again."""
 
     def get_completions(self, args: list[str], incomplete: str) -> list[CompletionItem[str]]:
@@ -40,6 +61,10 @@ def _values(item: CompletionItem[str], value: str) -> Iterator[str]:
         yield os.path.join(path, "") if os.path.isdir(path) else path
 
 
+class Bash(AnyNames, BashComplete):
+    """Completion in bash."""
+
+
 class Zsh(WholeWords, ZshComplete):
     """Completion in zsh."""
 
@@ -48,7 +73,8 @@ class Fish(WholeWords, FishComplete):
     """Completion in fish."""
 
 
-def complete_whole_words() -> None:
-    """Let click complete so in both."""
+def add_completions() -> None:
+    """Let click complete so."""
+    add_completion_class(Bash)
     add_completion_class(Zsh)
     add_completion_class(Fish)

@@ -10,6 +10,7 @@ from nscan_cli.cli.command import FILE, argument, option, subcommand
 from nscan_cli.cli.options import common_options, reading_options
 from nscan_cli.cli.picture import check_plot, plot_option, write_plot
 from nscan_cli.cli.progress import say
+from nscan_cli.cli.streams import answer
 from nscan_cli.errors import CheckFailedError, WrongUsageError
 from nscan_cli.logs.options import ReadingOptions
 
@@ -97,9 +98,9 @@ def command(
     for remark in evaluation.remarks:
         say(f"note: {remark}", quiet)
     if as_json:
-        click.echo(json.dumps(as_document(evaluation), indent=2, allow_nan=False))
+        answer(json.dumps(as_document(evaluation), indent=2, allow_nan=False) + "\n")
     else:
-        click.echo(as_text(evaluation), nl=False)
+        answer(as_text(evaluation))
     if plot is not None:
         from nscan_cli.evaluation.picture import picture
 

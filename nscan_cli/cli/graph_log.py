@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
+import os
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -13,6 +15,7 @@ from nscan_cli.limits import DISTANCE
 from nscan_cli.logs.options import ReadingOptions
 from nscan_cli.logs.parts import BESIDE
 from nscan_cli.provenance import is_made_from
+from nscan_cli.text import name_of_path, path_of_name
 
 if TYPE_CHECKING:
     import numpy as np
@@ -70,18 +73,32 @@ def find_log(graph_file: str, graph: Graph) -> tuple[str, ...]:
         if not any(source["name"] == base + end for base in bases for end in BESIDE)
     }
     for folder in (Path(graph_file).parent, Path()):
-        if all((folder / name).is_file() for name in sizes):
-            return tuple(str(folder / name) for name in sizes)
+        files = [_called(name, folder) for name in sizes]
+        if None not in files:
+            return tuple(map(str, files))
     for folder in (Path(graph_file).parent, Path()):
         for inner in _folders(folder):
             # Recordings of equal names lie in folders of their own.
-            if all(_has_size(inner / name, size) for name, size in sizes.items()):
-                return tuple(str(inner / name) for name in sizes)
+            paths = {inner / path_of_name(name): size for name, size in sizes.items()}
+            if all(_has_size(path, size) for path, size in paths.items()):
+                return tuple(map(str, paths))
     more = f" and {counted(len(sizes) - 1, 'more file')}" if len(sizes) > 1 else ""
     raise InputMissingError(
         f"{graph_file}: its log {next(iter(sizes))}{more} is neither beside it nor in the current folder; "
         "give its path as LOG"
     )
+
+
+def _called(name: str, folder: Path) -> Path | None:
+    """The file in the folder that a graph calls so, also one whose name is no UTF-8; None without one."""
+    path = folder / path_of_name(name)
+    if path.is_file():
+        return path
+    if "\\" in name:
+        with contextlib.suppress(OSError), os.scandir(folder) as entries:
+            same = [Path(each.path) for each in entries if name_of_path(each.name) == name]
+            return min(same, default=None)
+    return None
 
 
 def _folders(folder: Path) -> list[Path]:

@@ -6,14 +6,15 @@ import json
 import math
 from typing import TYPE_CHECKING, Any
 
-import click
-
 from nscan_cli.cli.command import log_argument, option, subcommand
 from nscan_cli.cli.lasers import laser_line, survey_of
 from nscan_cli.cli.options import common_options, reading_options
+from nscan_cli.cli.streams import answer
 from nscan_cli.cli.summary import Row, table
 from nscan_cli.counting import counted
 from nscan_cli.logs.options import ReadingOptions
+from nscan_cli.outputs import write_whole
+from nscan_cli.text import json_bytes
 
 if TYPE_CHECKING:
     from nscan_cli.logs.scan import LaserLog
@@ -38,7 +39,11 @@ def command(log: tuple[str, ...], as_json: bool, reading: ReadingOptions, **_com
     """
     survey = survey_of(log, reading)
     facts = survey.without_unchosen(facts_of(survey.log) | survey.facts(reading))
-    click.echo(json.dumps(facts, ensure_ascii=False, allow_nan=False) if as_json else as_text(facts))
+    if as_json:
+        text = json.dumps(facts, ensure_ascii=False, allow_nan=False)
+        write_whole("-", json_bytes(f"{text}\n"))
+    else:
+        answer(f"{as_text(facts)}\n")
     if survey.refused is not None:
         raise survey.refused
 

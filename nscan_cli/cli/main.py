@@ -6,7 +6,6 @@ import contextlib
 import errno
 import gc
 import importlib
-import io
 import os
 import sys
 import traceback
@@ -16,8 +15,10 @@ import click
 from nscan_cli import __version__
 from nscan_cli.cli.command import CONTEXT, write_examples
 from nscan_cli.cli.manual import ENVIRONMENT, EXAMPLES, EXIT_CODES
+from nscan_cli.cli.streams import prepare
 from nscan_cli.cli.wording import usage_problem
 from nscan_cli.errors import InputDataError, NscanError, OutputError
+from nscan_cli.text import shown
 
 COMMANDS = {
     "info": "Tell what is in a log, and what the other commands will use of it.",
@@ -79,12 +80,7 @@ def cli() -> None:
 def main() -> None:
     """Entry point of the command; exits with the code of the outcome."""
     gc.set_threshold(OBJECTS)
-    raw: object = getattr(sys.stdout, "buffer", None)
-    if isinstance(raw, io.RawIOBase):
-        # With PYTHONUNBUFFERED, what a pipe does not take at once would be lost without an error.
-        sys.stdout = io.TextIOWrapper(
-            io.BufferedWriter(raw), sys.stdout.encoding, sys.stdout.errors, line_buffering=True
-        )
+    prepare()
     code = run(sys.argv[1:])
     # What is left goes with the process: at its end, Python need not look for what it could free.
     gc.freeze()
@@ -110,9 +106,9 @@ def run(arguments: list[str]) -> int:
         os.environ.setdefault(f"{library}_NUM_THREADS", "1")
     try:
         if COMPLETION in os.environ:
-            from nscan_cli.cli.completion import complete_whole_words
+            from nscan_cli.cli.completion import add_completions
 
-            complete_whole_words()
+            add_completions()
         outcome = cli.main(arguments, prog_name="nscan-cli", complete_var=COMPLETION, standalone_mode=False)
         if sys.stdout is not None:
             sys.stdout.flush()
@@ -171,4 +167,4 @@ def _usage(error: click.ClickException) -> str:
 def _say(message: str, with_traceback: bool) -> None:
     if with_traceback:
         traceback.print_exc()
-    print(f"nscan-cli: {' '.join(message.split())}", file=sys.stderr)
+    print(f"nscan-cli: {' '.join(shown(message).split())}", file=sys.stderr)

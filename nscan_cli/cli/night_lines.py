@@ -29,7 +29,9 @@ def night_lines(names: list[str], quiet: bool) -> Iterator[Watcher]:
     from rich.progress import BarColumn, Progress, TextColumn
 
     # The bar has the room that the words leave.
-    columns = (TextColumn("{task.description}"), BarColumn(None), TextColumn("{task.fields[detail]}"))
+    # A reason may quote anything: none of it is rich's own markup.
+    detail = TextColumn("{task.fields[detail]}", markup=False)
+    columns = (TextColumn("{task.description}"), BarColumn(None), detail)
     with Progress(*columns, console=Console(stderr=True), refresh_per_second=4, expand=True) as bars:
         yield LiveLines(bars, names)
 

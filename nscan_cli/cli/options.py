@@ -5,15 +5,18 @@ from __future__ import annotations
 import functools
 import json
 import math
+import os
 from collections.abc import Callable, Sequence
 from typing import Any
 
 import click
 
 from nscan_cli.cli.command import COMMON, OWN_MEANINGS, READING, Option, option
-from nscan_cli.errors import InputDataError
+from nscan_cli.errors import InputDataError, WrongUsageError
 from nscan_cli.inputs import read_toml
 from nscan_cli.logs.options import ReadingOptions
+from nscan_cli.outputs import write_whole
+from nscan_cli.text import path_of_name
 
 Command = Callable[..., Any]
 NOT_PARAMETERS = ("config", "dump_config", "quiet", "verbose")
@@ -42,7 +45,7 @@ def common_options(command: Command) -> Command:
     def wrapped(*args: Any, **kwargs: Any) -> Any:
         kwargs.pop("config")
         if kwargs.pop("dump_config"):
-            click.echo(_as_toml(click.get_current_context()), nl=False)
+            write_whole("-", _as_toml(click.get_current_context()).encode())
             return None
         return command(*args, **kwargs)
 
@@ -177,7 +180,7 @@ def _as_typed(entry: Any) -> str:
     if isinstance(entry, list):
         return ",".join(_as_typed(part) for part in entry)
     if isinstance(entry, (str, int, float)):
-        return str(entry)
+        return path_of_name(str(entry))
     raise click.BadParameter(f"{str(entry)!r} is neither text, number, true, false nor a list of them")
 
 
@@ -208,5 +211,11 @@ def _toml_value(value: Any) -> str:
         return repr(value)
     if isinstance(value, (tuple, list)):
         return "[" + ", ".join(_toml_value(part) for part in value) + "]"
+    try:
+        text = os.fsencode(str(value)).decode()
+    except UnicodeError as error:
+        raise WrongUsageError(
+            f"--dump-config: {value} is no UTF-8, as TOML is; choose another name"
+        ) from error
     # JSON escapes what TOML does, but for one.
-    return json.dumps(str(value), ensure_ascii=False).replace("\x7f", "\\u007f")
+    return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")

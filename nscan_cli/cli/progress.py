@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING
 
 import click
 
+from nscan_cli.text import shown
+
 if TYPE_CHECKING:
     from rich.progress import Progress
 
@@ -16,7 +18,7 @@ if TYPE_CHECKING:
 def say(message: str, quiet: bool = False) -> None:
     """One line for people."""
     if not quiet:
-        print(message, file=sys.stderr)
+        print(shown(message), file=sys.stderr)
 
 
 COMPILING = "compiling the kernels, once for this version on this machine"

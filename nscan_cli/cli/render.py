@@ -16,8 +16,10 @@ from nscan_cli.cli.picture import check_png
 from nscan_cli.cli.progress import say
 from nscan_cli.counting import counted
 from nscan_cli.errors import WrongUsageError
+from nscan_cli.inputs import base_name
 from nscan_cli.logs.options import ReadingOptions
 from nscan_cli.outputs import check_writable, is_device, write_whole
+from nscan_cli.text import path_of_name, shown
 
 if TYPE_CHECKING:
     from nscan_cli.mapping.image import MapImage
@@ -106,7 +108,7 @@ def command(
     else:
         from nscan_cli.mapping.image import map_image
 
-        write_map(output, map_image(grid), yaml)
+        write_map(output, map_image(grid), yaml, quiet)
     if mcap is not None:
         from nscan_cli.exports.mcap import recording
 
@@ -132,13 +134,20 @@ def check_map_outputs(output: str, yaml: bool) -> None:
         check_writable(yaml_path(output))
 
 
-def write_map(output: str, image: MapImage, yaml: bool) -> None:
+def write_map(output: str, image: MapImage, yaml: bool, quiet: bool) -> None:
     """Write a map for map_server, and with `yaml` the YAML beside it, which a loader looks for last."""
+    name = base_name(output)
+    if yaml and path_of_name(name) != Path(output).name:
+        say(
+            f"warning: {shown(yaml_path(output))} calls the map {name}, under which no loader finds it: "
+            "its name is no UTF-8, as YAML is",
+            quiet,
+        )
     from nscan_cli.mapping.image import map_png, map_yaml
 
     write_whole(output, map_png(image))
     if yaml:
-        write_whole(yaml_path(output), map_yaml(Path(output).name, image))
+        write_whole(yaml_path(output), map_yaml(name, image))
 
 
 def yaml_path(output: str) -> str:

@@ -141,7 +141,7 @@ def command(
         run = refine_saved(from_file, log or None, outputs.need_scans, threads, quiet)
         # A log that was found must not be replaced either.
         outputs.check(run.inputs)
-    outputs.write(run.graph, run.scans, run.rows, run.inputs, threads)
+    outputs.write(run.graph, run.scans, run.rows, run.inputs, threads, quiet)
     seconds = time.perf_counter() - began
     took = [f"{seconds:.1f} s" + (", the kernels' compilation included" if run.compiled else "")]
     if from_file is None and run.scans is not None and not run.compiled:

@@ -76,6 +76,7 @@ class Outputs:
         rows: NDArray[np.int64],
         inputs: Sequence[str],
         threads: int,
+        quiet: bool,
     ) -> None:
         """Write all; `rows` (N,) are those of the graph's scans, `inputs` what the depfile names."""
         from nscan_cli.graph.json_file import write_graph
@@ -108,7 +109,7 @@ class Outputs:
             write_whole(self.carmen, corrected_log(scans, rows, graph.poses))
         if image is not None and self.map is not None:
             # Last, since it may be refused for its size: the rest is then there.
-            write_map(self.map, image(), yaml=True)
+            write_map(self.map, image(), yaml=True, quiet=quiet)
         if self.depfile is not None:
             write_whole(self.depfile, self._rule(inputs))
 
@@ -121,7 +122,7 @@ class Outputs:
         targets = " ".join(escaped(path) for path in self.files() if path != self.depfile)
         # Standard input is no file that make could look for.
         prerequisites = "".join(f" {escaped(path)}" for path in inputs if path != "-")
-        return f"{targets}:{prerequisites}\n".encode()
+        return os.fsencode(f"{targets}:{prerequisites}\n")
 
 
 def _drawn(scans: LaserLog, rows: NDArray[np.int64], poses: Array, threads: int) -> MapImage:

@@ -13,6 +13,7 @@ from urllib.parse import urlsplit
 from nscan_cli.errors import InputDataError, InputMissingError, WrongUsageError
 from nscan_cli.inputs import read_toml
 from nscan_cli.nightly.parameters import Parameters, parameters_from
+from nscan_cli.text import path_of_name
 
 ENDINGS = (".log.gz", ".log", ".clf.gz", ".clf", ".script.gz", ".script", ".mcap", ".bag", ".db3", "")
 """Of a log that the manifest gives by its name alone; the first that is there is taken. "" is a folder."""
@@ -118,7 +119,9 @@ def _entry(file: str, number: int, table: dict[str, Any], folder: Path) -> Entry
     if bounds and "relations" not in table and "reference" not in table:
         remedy = "give relations or reference too"
         raise InputDataError(place, f"has {bounds[0]}, but nothing to measure against", remedy)
-    inputs = {"log": folder / table["path"] if "path" in table else _by_name(folder, name, table)}
+    inputs = {
+        "log": folder / path_of_name(table["path"]) if "path" in table else _by_name(folder, name, table)
+    }
     inputs.update({role: _beside(folder, name, table, role) for role in ROLES[1:] if role in table})
     return Entry(
         name=name,
@@ -145,14 +148,14 @@ def _by_name(folder: Path, name: str, table: dict[str, Any]) -> Path:
     paths = [folder / (each + ending) for each in _names_of(name, table) for ending in ENDINGS]
     source: str = table.get("source", "")
     downloaded = PurePosixPath(urlsplit(source).path).name
-    if downloaded.endswith(ENDINGS):
+    if downloaded.endswith(ENDINGS[:-1]):
         paths += [folder / downloaded, folder / downloaded.removesuffix(".gz")]
     return next((path for path in paths if path.exists()), paths[0])
 
 
 def _beside(folder: Path, name: str, table: dict[str, Any], role: str) -> Path:
     """What the log is measured against: as named; of an optional log, also under a name of the log."""
-    named: Path = folder / table[role]
+    named = folder / path_of_name(table[role])
     if not table.get("optional"):
         return named
     paths = [named, *(named.with_name(each + named.suffix) for each in _names_of(name, table))]

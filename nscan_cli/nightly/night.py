@@ -16,6 +16,7 @@ from nscan_cli.nightly.folder import folder_of, scratch
 from nscan_cli.nightly.manifest import Entry
 from nscan_cli.nightly.nights import Night, add_night, is_up_to_date, read_nights
 from nscan_cli.nightly.task import Outcome, Report, Task
+from nscan_cli.text import shown
 
 
 @dataclass(frozen=True)
@@ -70,7 +71,8 @@ def plan(entries: list[Entry], folder: Path, force: bool) -> Plan:
             planned.unreadable.append((entry, _with_sources(entry, str(error))))
             continue
         planned.notes[entry.name] = [
-            f"{entry.inputs[role].name} is not the file that the manifest means: its SHA-256 is another"
+            f"{shown(entry.inputs[role].name)} is not the file that the manifest means: "
+            "its SHA-256 is another"
             for role, sha256 in entry.sha256.items()
             if role in hashes and hashes[role] != sha256
         ] + lacking

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from nscan_cli.outputs import write_whole
+from nscan_cli.text import json_bytes
 
 FILE = "nights.jsonl"
 
@@ -53,7 +54,7 @@ def add_night(folder: Path, night: Night, files: dict[str, bytes]) -> None:
     outputs = {name: hashlib.sha256(content).hexdigest() for name, content in files.items()}
     lines = [*nights, {**night, "outputs": outputs} if outputs else night]
     text = "".join(json.dumps(line, ensure_ascii=False, allow_nan=False) + "\n" for line in lines)
-    write_whole(str(folder / FILE), text.encode())
+    write_whole(str(folder / FILE), json_bytes(text))
 
 
 def _sha256(path: Path) -> str | None:

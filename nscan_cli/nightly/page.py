@@ -10,6 +10,7 @@ from nscan_cli.counting import counted
 from nscan_cli.nightly.card import SIGNS, absent, card, change, chip, readable, real_time, seconds, timed
 from nscan_cli.nightly.report import finished
 from nscan_cli.nightly.verdict import ASKING, ORDER, Status, Verdict, headline
+from nscan_cli.text import shown
 
 
 def page(title: str, verdicts: list[Verdict], folder: Path) -> bytes:
@@ -60,7 +61,7 @@ def page(title: str, verdicts: list[Verdict], folder: Path) -> bytes:
             "</html>",
         ]
     )
-    return (content + "\n").encode()
+    return shown(content + "\n").encode()
 
 
 def _to_look_at(verdicts: list[Verdict]) -> list[str]:

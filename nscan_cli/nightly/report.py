@@ -7,6 +7,7 @@ from typing import Any
 
 from nscan_cli import __version__
 from nscan_cli.nightly.verdict import Errors, Verdict, headline
+from nscan_cli.text import json_bytes
 
 
 def as_document(verdicts: list[Verdict]) -> dict[str, Any]:
@@ -29,7 +30,7 @@ def as_document(verdicts: list[Verdict]) -> dict[str, Any]:
 def as_json(verdicts: list[Verdict]) -> bytes:
     """report.json."""
     text = json.dumps(as_document(verdicts), indent=1, ensure_ascii=False, allow_nan=False)
-    return (text + "\n").encode()
+    return json_bytes(text + "\n")
 
 
 def finished(verdicts: list[Verdict]) -> str | None:

@@ -15,7 +15,7 @@ import click
 import pytest
 
 from nscan_cli.cli.main import COMMANDS, cli
-from tests.docs.blocks import blocks
+from tests.docs.blocks import ROOT, blocks
 
 PATIENCE = 30.0
 """s"""
@@ -185,3 +185,20 @@ def shown(terminal: int, awaited: str) -> str:
         if select.select([terminal], [], [], 0.2)[0]:
             output += os.read(terminal, 4096)
     return output.decode(errors="replace")
+
+
+@pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
+def test_names_that_are_no_utf8_are_completed(tmp_path, shell):
+    (tmp_path / os.fsdecode(b"\xff.toml")).touch()
+    word = b"--config=\xff"
+    settings = {b"COMP_WORDS": b"nscan-cli info " + word, b"COMP_CWORD": word if shell == "fish" else b"2",
+                b"_NSCAN_CLI_COMPLETE": f"{shell}_complete".encode()}  # fmt: skip
+    done = subprocess.run(
+        [sys.executable, "-m", "nscan_cli"],
+        cwd=tmp_path,
+        env={**os.environb, b"PYTHONPATH": os.fsencode(ROOT), **settings},
+        capture_output=True,
+        check=True,
+    )
+    # bash looks for files itself.
+    assert (b"\xff" if shell == "bash" else word + b".toml") in done.stdout

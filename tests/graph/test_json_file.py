@@ -218,7 +218,7 @@ def test_the_schema_refuses_a_wrong_document(change: Change):
     ("data", "problem"),
     [
         (b"", "g.json, line 1: is empty"),
-        (b'{"format":\n"nscan-pose-graph",\n}', "g.json, line 3: not JSON"),
+        (b'{"format":\n"nscan-pose-graph"\n"version"}', "g.json, line 3: not JSON"),
         (b"# Dear all,\nfirst", "g.json: is of an unknown kind; give a graph in JSON, as nscan-cli slam"),
         (b"FLASER 1 2.0 0 0 0 0 0 0 1.0 host 1.0\n" * 3, r"g.json: is a log \(CARMEN text\); give a graph"),
         (b"\x1f\x8b\x08\x00\x00", "g.json: is compressed by gzip; give a graph"),
