@@ -1,10 +1,10 @@
-# Everything is set up in .venv by itself; PYTHON chooses the interpreter.
+# Everything is set up in .venv by itself. PYTHON chooses another interpreter, which gets a folder of its own.
 PYTHON ?= python3
-VENV := .venv
+VENV := .venv$(if $(filter-out python3,$(notdir $(PYTHON))),-$(notdir $(PYTHON)))
 RUN := $(VENV)/bin
 READY := $(VENV)/.ready
 
-.PHONY: map test lint samples figures pictures reference bench growth robustness lasers soak lowest lock clean
+.PHONY: map test smoke lint samples figures pictures reference bench growth robustness lasers soak lowest lock clean
 
 map: $(READY)
 	mkdir -p out
@@ -12,6 +12,10 @@ map: $(READY)
 
 test: $(READY)
 	$(RUN)/python -m pytest -n 2
+
+# What depends on the version of Python most: all that is read and written, and every command.
+smoke: $(READY)
+	$(RUN)/python -m pytest -n 2 tests/logs tests/graph tests/evaluation tests/exports tests/mapping tests/cli tests/docs
 
 lint: $(READY)
 	$(RUN)/ruff check
@@ -68,4 +72,4 @@ $(READY): pyproject.toml
 	touch $@
 
 clean:
-	rm -rf $(VENV) out
+	rm -rf .venv .venv-* out

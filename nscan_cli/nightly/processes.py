@@ -8,7 +8,6 @@ import os
 import selectors
 import shutil
 import subprocess
-import sys
 import time
 from collections import deque
 from collections.abc import Generator, Sequence
@@ -71,7 +70,7 @@ class Work:
         _lay_out(self.place, task, threads)
         with (self.place / "stderr.txt").open("wb") as errors:
             self.process = subprocess.Popen(
-                command(self.place),
+                start.command("work", str(self.place)),
                 stdin=subprocess.PIPE,
                 stdout=subprocess.PIPE,
                 stderr=errors,
@@ -134,11 +133,6 @@ class Work:
             return f"its process was killed by signal {-code}"
         said = (self.place / "stderr.txt").read_text("utf-8", errors="replace").strip().splitlines()
         return f"its process ended with code {code}" + (f": {said[-1]}" if said else "")
-
-
-def command(place: Path) -> list[str]:
-    """The command line of the process that does what lies in a place of work."""
-    return [sys.executable, "-P", start.__file__, str(place)]
 
 
 def _lay_out(place: Path, task: Task, threads: int) -> None:

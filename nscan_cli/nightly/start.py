@@ -1,12 +1,18 @@
-"""What the process of a log begins with, called by its path: `python -P start.py PLACE`.
+"""What a process of a night begins with, called by its path: `python -P start.py MODULE [ARGUMENT …]`.
 
 `python -m` would look for modules in the current folder first, and run what somebody has put there. The
 package is the one that this file is part of, whichever other one could be found.
 """
 
+import importlib
 import importlib.util
 import sys
 from pathlib import Path
+
+
+def command(module: str, *arguments: str) -> list[str]:
+    """The command line of a process that runs `main` of a module of this folder."""
+    return [sys.executable, "-P", __file__, module, *arguments]
 
 
 def take_package(folder: Path) -> None:
@@ -19,7 +25,7 @@ def take_package(folder: Path) -> None:
 
 
 if __name__ == "__main__":
-    take_package(Path(__file__).parent.parent)
-    from nscan_cli.nightly.work import main
-
-    main(sys.argv[1])
+    own = Path(__file__).parent
+    take_package(own.parent)
+    module, *arguments = sys.argv[1:]
+    importlib.import_module(f"{own.parent.name}.{own.name}.{module}").main(*arguments)

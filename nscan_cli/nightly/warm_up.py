@@ -1,6 +1,6 @@
 """All kernels compiled before the first log of a night, so that no log's time has their compilation in it.
 
-It is started as `python -m nscan_cli.nightly.warm_up`. What it maps is a corridor round a block, driven round
+It is started by `start.py`. What it maps is a corridor round a block, driven round
 one and a half times by a robot whose odometry drifts: there are keyframes, joint matches and loops. One side
 is bare, so that the way along it is hardly known.
 """
@@ -11,12 +11,12 @@ import contextlib
 import fcntl
 import os
 import subprocess
-import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from nscan_cli import machine_code
 from nscan_cli.cache_folder import cache_folder
+from nscan_cli.nightly import start
 
 if TYPE_CHECKING:
     from nscan_cli.poses import Array
@@ -44,9 +44,8 @@ def compile_kernels(environment: dict[str, str]) -> None:
         # Others wait here for the first, and find it done.
         fcntl.flock(lock, fcntl.LOCK_EX)
         if not _is_done(folder):
-            call = [sys.executable, "-P", "-m", __name__]
             subprocess.run(
-                call, env=environment, check=False, stdin=subprocess.DEVNULL,
+                start.command("warm_up"), env=environment, check=False, stdin=subprocess.DEVNULL,
                 stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True,
             )  # fmt: skip
             _done_file(folder).touch()
@@ -67,7 +66,7 @@ def _done_file(folder: Path) -> Path:
     return folder / f"{DONE}-{machine_code.machine()}"
 
 
-def warm_up() -> None:
+def main() -> None:
     """Do all that is done for a log of a night, so that the kernels are compiled."""
     import numpy as np
 
@@ -152,7 +151,3 @@ def _ranges(poses: Array, angles: Array) -> Array:
 def _square(half: float) -> list[tuple[tuple[float, float], tuple[float, float]]]:
     corners = [(-half, -half), (half, -half), (half, half), (-half, half)]
     return list(zip(corners, [*corners[1:], corners[0]], strict=True))
-
-
-if __name__ == "__main__":
-    warm_up()

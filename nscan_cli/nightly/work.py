@@ -56,13 +56,13 @@ def work(task: dict[str, Any], outputs: Path, report: Callable[[int, int, int], 
     from nscan_cli.logs.load import read_log
     from nscan_cli.mapping.image import map_image, map_png, map_yaml
     from nscan_cli.mapping.occupancy import occupancy_grid
+    from nscan_cli.nightly import warm_up
     from nscan_cli.nightly.preview import preview
-    from nscan_cli.nightly.warm_up import kept_kernels, warm_up
     from nscan_cli.slam.run import Counts, map_log, slam_options
 
     if cache_folder() is None:
-        warm_up()
-    kept, began = kept_kernels(), time.perf_counter()
+        warm_up.main()
+    kept, began = warm_up.kept_kernels(), time.perf_counter()
     reading, mapping = reading_of(task["reading"]), task["mapping"]
     options = slam_options(
         mapping.get("max-scans"), mapping.get("relations"), not mapping.get("no-loops", False)
@@ -82,7 +82,7 @@ def work(task: dict[str, Any], outputs: Path, report: Callable[[int, int, int], 
     (outputs / "map.png").write_bytes(map_png(image))
     (outputs / "map.yaml").write_bytes(map_yaml("map.png", image))
     seconds: float | None = round(time.perf_counter() - began, 3)
-    if "numba" in sys.modules and kept_kernels() - kept:
+    if "numba" in sys.modules and warm_up.kept_kernels() - kept:
         # Kept code is loaded without numba. A time with compilation in it is none of mapping.
         seconds = None
     picture, overlay = preview(grid, graph)

@@ -11,7 +11,7 @@ from typing import Any
 
 import pytest
 
-from nscan_cli.nightly import processes
+from nscan_cli.nightly import processes, start
 from nscan_cli.nightly.manifest import Entry
 from nscan_cli.nightly.processes import run_all
 from nscan_cli.nightly.task import Outcome, Task
@@ -119,7 +119,7 @@ def test_a_process_ends_with_whoever_has_started_it(endless, scratch):
     """Its standard input is closed when the parent is gone, however that went."""
     place = scratch / "endless"
     processes._lay_out(place, endless, 1)
-    process = subprocess.Popen(processes.command(place), stdin=subprocess.PIPE)
+    process = subprocess.Popen(start.command("work", str(place)), stdin=subprocess.PIPE)
     time.sleep(0.5)
     assert process.poll() is None
     process.communicate(timeout=20)

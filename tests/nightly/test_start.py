@@ -49,7 +49,7 @@ def test_the_package_is_the_one_that_starts_the_process(trap, tmp_path):
         shutil.copy(PACKAGE / name, package / name)
     (package / "nightly" / "work.py").write_text("def main(place):\n    print(__file__, place)\n")
     done = subprocess.run(
-        [sys.executable, "-P", str(package / "nightly" / "start.py"), "a place"],
+        [sys.executable, "-P", str(package / "nightly" / "start.py"), "work", "a place"],
         cwd=trap, env={**os.environ, "PYTHONPATH": str(PACKAGE.parent)}, capture_output=True, text=True,
         check=False,
     )  # fmt: skip

@@ -12,7 +12,7 @@ import pytest
 from nscan_cli import machine_code
 from nscan_cli.cli.night_lines import PlainLines
 from nscan_cli.logs.load import log_from
-from nscan_cli.nightly import processes, warm_up, work
+from nscan_cli.nightly import processes, start, warm_up, work
 from nscan_cli.nightly.card import card
 from nscan_cli.nightly.manifest import Entry
 from nscan_cli.nightly.task import Task
@@ -39,7 +39,7 @@ def calls(monkeypatch):
 def test_once_on_each_machine(cache, calls, monkeypatch):
     warm_up.compile_kernels({})
     warm_up.compile_kernels({})
-    assert [call[1:] for call in calls] == [["-P", "-m", "nscan_cli.nightly.warm_up"]]
+    assert calls == [start.command("warm_up")]
     # Somebody has cleared the folder.
     with monkeypatch.context() as patch:
         patch.setattr(machine_code, "first_compile", lambda _name: True)
