@@ -14,7 +14,6 @@ is that of (x, y, z, qx, qy, qz), and with qz = sin(Î¸/2) a quarter of qz's is Î
 
 from __future__ import annotations
 
-import codecs
 import io
 import math
 import re
@@ -29,6 +28,7 @@ from numpy.typing import NDArray
 from nscan_cli.errors import InputDataError
 from nscan_cli.limits import DISTANCE, INFORMATION, KINDS, Limit
 from nscan_cli.poses import Array
+from nscan_cli.text_encoding import MARK
 
 REMEDY = "mend or remove the line"
 LARGEST_KEY = 2**64 - 1
@@ -71,7 +71,7 @@ class Lines:
 def read_lines(data: bytes, name: str) -> Lines:
     """All lines of a file; `name` is what errors call it. Raises InputDataError naming the line."""
     lines = Lines()
-    for number, line in enumerate(io.BytesIO(data.removeprefix(codecs.BOM_UTF8)), start=1):
+    for number, line in enumerate(io.BytesIO(data.removeprefix(MARK)), start=1):
         fields = line.decode("utf-8", errors="replace").split("#", 1)[0].split()
         if not fields:
             continue

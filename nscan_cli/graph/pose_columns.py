@@ -11,6 +11,8 @@ import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
+from nscan_cli.text_encoding import MARK
+
 COMMENTS = "#%"
 """What a line begins with that is a comment, or names the columns."""
 UNIT = re.compile(r"[\[(].*?[\])]")
@@ -78,7 +80,7 @@ def fields_of(line: str) -> list[str]:
 
 def lines_of(data: bytes) -> Iterator[tuple[int, str]]:
     """The lines of a text that are not blank, each with its number; a byte-order mark is no part of one."""
-    for number, line in enumerate(io.BytesIO(data.removeprefix(b"\xef\xbb\xbf")), start=1):
+    for number, line in enumerate(io.BytesIO(data.removeprefix(MARK)), start=1):
         text = line.decode("utf-8", errors="replace").strip()
         if text:
             yield number, text

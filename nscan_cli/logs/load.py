@@ -18,7 +18,7 @@ from nscan_cli.logs.kinds import FORMS, Form, foreign, readable
 from nscan_cli.logs.options import ReadingOptions
 from nscan_cli.logs.packing import packing_of, unpacked
 from nscan_cli.logs.parts import Parts, beside, first_bytes, parts_of
-from nscan_cli.logs.recording import Recording
+from nscan_cli.logs.recording import DAMAGED, Recording
 from nscan_cli.logs.scan import LaserLog, Source
 from nscan_cli.text_encoding import plain
 
@@ -45,8 +45,6 @@ class Database(Container, Protocol):
 
 
 AS_FOUND = ReadingOptions()
-
-MEND = "fetch the file again, or use what can be read with --salvage"
 
 
 def read_log(
@@ -146,7 +144,7 @@ def content_of(stored: bytes, path: str, salvage: bool) -> tuple[bytes, str | No
     if problem is None:
         return content, None
     if not salvage:
-        raise InputDataError(label(path), problem, MEND)
+        raise InputDataError(label(path), problem, DAMAGED)
     return content, f"{problem}: the rest is lost"
 
 
