@@ -1,6 +1,6 @@
 """The errors that a user can cause; each carries its exit code and prints as one line."""
 
-from nscan_cli.text import shown
+from nscan_cli.files.text import shown
 
 LONGEST = 2000
 """Characters of a message: it may quote an input, in which anything can stand."""

@@ -7,7 +7,9 @@ from collections.abc import Iterable
 
 import click
 
-from nscan_cli.cli.command import (
+from nscan_cli.cli.main import COMMANDS, cli
+from nscan_cli.cli.manual import ENVIRONMENT, EXAMPLES, EXIT_CODES
+from nscan_cli.cli.subcommand import (
     ARGUMENTS,
     COMMON,
     CONTEXT,
@@ -18,11 +20,9 @@ from nscan_cli.cli.command import (
     Subcommand,
     section_of,
 )
-from nscan_cli.cli.main import COMMANDS, cli
-from nscan_cli.cli.manual import ENVIRONMENT, EXAMPLES, EXIT_CODES
-from nscan_cli.limits import ALL, Limit
-from nscan_cli.logs.kinds import readable
-from nscan_cli.outputs import write_whole
+from nscan_cli.files.limits import ALL, Limit
+from nscan_cli.files.outputs import write_whole
+from nscan_cli.logs.formats import readable
 
 HEAD = """\
 # Reference

@@ -10,13 +10,13 @@ from pathlib import Path
 
 import pytest
 
-from nscan_cli.limits import MB
+from nscan_cli.files.limits import MB
 from tests.logs.lines import flaser
 
 IN_BOUNDS = """
 import resource, sys
 from nscan_cli.cli.main import run
-import nscan_cli.cli.info, nscan_cli.logs.load, nscan_cli.graph.load, nscan_cli.logs.mcap_log
+import nscan_cli.cli.info, nscan_cli.logs.load, nscan_cli.graph.io.load_graph, nscan_cli.logs.recordings.mcap
 used = int(open("/proc/self/statm").read().split()[0]) * resource.getpagesize()
 limit = used + int(sys.argv[1])
 resource.setrlimit(resource.RLIMIT_AS, (limit, limit))

@@ -14,15 +14,15 @@ import nscan_cli
 from nscan_cli.cli.graph_log import find_log
 from nscan_cli.cli.main import run
 from nscan_cli.errors import InputDataError, InputMissingError
-from nscan_cli.graph.json_file import write_graph
+from nscan_cli.graph.io.json_graph import write_graph
 from nscan_cli.logs.load import read_log
 from tests.cli.room_log import room_log
 from tests.graph.small_graph import small_graph
-from tests.logs.containers import repacked
 from tests.logs.forms import FORMS
-from tests.logs.recordings import drive
-from tests.logs.ros_recordings import ros2
-from tests.logs.ros_text import definition
+from tests.logs.recordings.containers import repacked
+from tests.logs.recordings.drives import drive
+from tests.logs.recordings.ros import ros2
+from tests.logs.recordings.ros_text import definition
 
 PACKAGE = Path(nscan_cli.__file__).parent
 CALLS = {"eval", "exec", "compile", "__import__", "system", "popen"}

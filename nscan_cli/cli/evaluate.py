@@ -6,16 +6,16 @@ from typing import TYPE_CHECKING
 
 import click
 
-from nscan_cli.cli.command import FILE, argument, option, subcommand
-from nscan_cli.cli.options import common_options, reading_options
-from nscan_cli.cli.picture import check_plot, plot_option, write_plot
+from nscan_cli.cli.plot_option import check_plot, plot_option, write_plot
 from nscan_cli.cli.progress import say
-from nscan_cli.cli.streams import answer
+from nscan_cli.cli.shared_options import common_options, reading_options
+from nscan_cli.cli.standard_streams import answer
+from nscan_cli.cli.subcommand import FILE, argument, option, subcommand
 from nscan_cli.errors import CheckFailedError, WrongUsageError
-from nscan_cli.logs.options import ReadingOptions
+from nscan_cli.logs.reading_options import ReadingOptions
 
 if TYPE_CHECKING:
-    from nscan_cli.evaluation.report import Evaluation
+    from nscan_cli.evaluation.evaluation_report import Evaluation
 
 DRAWN = 10
 """The worst relations that a picture shows where --worst does not say."""
@@ -85,8 +85,8 @@ def command(
     check_plot(plot, None, [result, relations, reference])
     import json
 
-    from nscan_cli.evaluation.measure import measure
-    from nscan_cli.evaluation.report import as_document, as_text
+    from nscan_cli.evaluation.evaluation_report import as_document, as_text
+    from nscan_cli.evaluation.measured import measure
 
     measured = measure(result, relations, reference, worst or 0, reading, reference_topic)
     evaluation = measured.evaluation
@@ -102,7 +102,7 @@ def command(
     else:
         answer(as_text(evaluation))
     if plot is not None:
-        from nscan_cli.evaluation.picture import picture
+        from nscan_cli.evaluation.error_picture import picture
 
         drawn = DRAWN if worst is None else worst
         write_plot(plot, picture(evaluation, measured.trajectory, measured.reference, drawn))

@@ -9,20 +9,21 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from nscan_cli.counting import counted
 from nscan_cli.errors import InputDataError, InputMissingError
-from nscan_cli.limits import DISTANCE
-from nscan_cli.logs.options import ReadingOptions
-from nscan_cli.logs.parts import BESIDE
-from nscan_cli.provenance import is_made_from
-from nscan_cli.text import name_of_path, path_of_name
+from nscan_cli.files.counting import counted
+from nscan_cli.files.limits import DISTANCE
+from nscan_cli.files.provenance import is_made_from
+from nscan_cli.files.text import name_of_path, path_of_name
+from nscan_cli.logs.log_files import BESIDE
+from nscan_cli.logs.reading_options import ReadingOptions
 
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
+    from nscan_cli.files.source import Source
     from nscan_cli.graph.model import Graph
-    from nscan_cli.logs.scan import LaserLog, Source
+    from nscan_cli.logs.laser_log import LaserLog
 
 REMEDY = "give the log that the graph was made from"
 
@@ -36,9 +37,9 @@ def read_graph_log(
     """
     import numpy as np
 
-    from nscan_cli.compiled import bring_up
+    from nscan_cli.kernels.decorators import bring_up
     from nscan_cli.logs.load import read_log
-    from nscan_cli.logs.parts import parts_of
+    from nscan_cli.logs.log_files import parts_of
 
     bring_up()
     path = parts_of(paths).title

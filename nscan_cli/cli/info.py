@@ -6,18 +6,18 @@ import json
 import math
 from typing import TYPE_CHECKING, Any
 
-from nscan_cli.cli.command import log_argument, option, subcommand
-from nscan_cli.cli.lasers import laser_line, survey_of
-from nscan_cli.cli.options import common_options, reading_options
-from nscan_cli.cli.streams import answer
+from nscan_cli.cli.laser_survey import laser_line, survey_of
+from nscan_cli.cli.shared_options import common_options, reading_options
+from nscan_cli.cli.standard_streams import answer
+from nscan_cli.cli.subcommand import log_argument, option, subcommand
 from nscan_cli.cli.summary import Row, table
-from nscan_cli.counting import counted
-from nscan_cli.logs.options import ReadingOptions
-from nscan_cli.outputs import write_whole
-from nscan_cli.text import json_bytes
+from nscan_cli.files.counting import counted
+from nscan_cli.files.outputs import write_whole
+from nscan_cli.files.text import json_bytes
+from nscan_cli.logs.reading_options import ReadingOptions
 
 if TYPE_CHECKING:
-    from nscan_cli.logs.scan import LaserLog
+    from nscan_cli.logs.laser_log import LaserLog
 
 
 @subcommand(
@@ -52,7 +52,7 @@ def facts_of(log: LaserLog) -> dict[str, Any]:
     """What `info --json` prints; lengths in m, times in s, angles in degrees, keys always the same."""
     import numpy as np
 
-    from nscan_cli.logs.view import beams_lost, field_of_view
+    from nscan_cli.logs.field_of_view import beams_lost, field_of_view
 
     fewest, beams = (int(count) for count in (log.own_beams().min(), log.own_beams().max()))
     steps = np.diff(log.times)

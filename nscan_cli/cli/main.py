@@ -13,12 +13,12 @@ import traceback
 import click
 
 from nscan_cli import __version__
-from nscan_cli.cli.command import CONTEXT, write_examples
 from nscan_cli.cli.manual import ENVIRONMENT, EXAMPLES, EXIT_CODES
-from nscan_cli.cli.streams import prepare
-from nscan_cli.cli.wording import usage_problem
+from nscan_cli.cli.standard_streams import prepare
+from nscan_cli.cli.subcommand import CONTEXT, write_examples
+from nscan_cli.cli.usage_wording import usage_problem
 from nscan_cli.errors import InputDataError, NscanError, OutputError
-from nscan_cli.text import shown
+from nscan_cli.files.text import shown
 
 COMMANDS = {
     "info": "Tell what is in a log, and what the other commands will use of it.",

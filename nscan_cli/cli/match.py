@@ -8,18 +8,18 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from nscan_cli.cli.command import log_argument, option, result_option, subcommand
-from nscan_cli.cli.options import PoseType, common_options, reading_options
-from nscan_cli.cli.picture import check_plot, plot_option, write_plot
+from nscan_cli.cli.plot_option import check_plot, plot_option, write_plot
 from nscan_cli.cli.progress import Compiling, say
+from nscan_cli.cli.shared_options import PoseType, common_options, reading_options
+from nscan_cli.cli.subcommand import log_argument, option, result_option, subcommand
 from nscan_cli.cli.summary import Row, ended, table
 from nscan_cli.errors import WrongUsageError
-from nscan_cli.logs.options import ReadingOptions
-from nscan_cli.outputs import check_writable, write_whole
-from nscan_cli.provenance import provenance_of
+from nscan_cli.files.outputs import check_writable, write_whole
+from nscan_cli.files.provenance import provenance_of
+from nscan_cli.logs.reading_options import ReadingOptions
 
 if TYPE_CHECKING:
-    from nscan_cli.logs.scan import LaserLog
+    from nscan_cli.logs.laser_log import LaserLog
     from nscan_cli.matching.pairwise import PairMatch
     from nscan_cli.poses import Array
 
@@ -86,7 +86,7 @@ def command(
     What a corridor leaves open shows as the weakest direction, and best with --prior none.
     """
     check_writable(output)
-    from nscan_cli.logs.parts import files_of
+    from nscan_cli.logs.log_files import files_of
 
     check_plot(plot, output, files_of(log))
     from nscan_cli.logs.load import read_log
@@ -112,7 +112,7 @@ def command(
     }
     write_whole(output, _document(scans, (reference, scan), start, match, parameters))
     if plot is not None:
-        from nscan_cli.mapping.plots import plot_match
+        from nscan_cli.mapping.figures.match_plots import plot_match
 
         write_plot(plot, plot_match((reference, scan), fixed, moving, start, match))
     say(table(_summary(reference, scan, match)), quiet)
@@ -149,8 +149,8 @@ def _start(log: LaserLog, rows: tuple[int, int], initial: str) -> Array:
 def _document(
     log: LaserLog, numbers: tuple[int, int], start: Array, match: PairMatch, parameters: dict[str, Any]
 ) -> bytes:
-    from nscan_cli.cli.document import document, weakest_record
-    from nscan_cli.graph.json_fields import pose_rows, six_digits, triangle
+    from nscan_cli.cli.match_document import document, weakest_record
+    from nscan_cli.graph.io.json_fields import pose_rows, six_digits, triangle
 
     return document(
         FORMAT,

@@ -8,9 +8,9 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 from nscan_cli.cli.progress import say
-from nscan_cli.counting import counted
+from nscan_cli.files.counting import counted
 from nscan_cli.nightly.manifest import Entry
-from nscan_cli.nightly.nights import Night
+from nscan_cli.nightly.night_history import Night
 from nscan_cli.nightly.verdict import Errors
 
 if TYPE_CHECKING:

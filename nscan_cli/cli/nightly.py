@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING
 
 import click
 
-from nscan_cli.cli.command import FILE, argument, option, subcommand
-from nscan_cli.cli.options import common_options
 from nscan_cli.cli.progress import announce_compiling, say
+from nscan_cli.cli.shared_options import common_options
+from nscan_cli.cli.subcommand import FILE, argument, option, subcommand
 from nscan_cli.errors import CheckFailedError, InputMissingError
-from nscan_cli.inputs import base_name
+from nscan_cli.files.inputs import base_name
 
 if TYPE_CHECKING:
     from nscan_cli.nightly.manifest import Entry

@@ -8,24 +8,25 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from nscan_cli.cli.command import FILE, log_argument, option, result_option, subcommand
 from nscan_cli.cli.match import with_defaults
-from nscan_cli.cli.options import common_options, reading_options
-from nscan_cli.cli.picture import check_plot, plot_option, write_plot
+from nscan_cli.cli.plot_option import check_plot, plot_option, write_plot
 from nscan_cli.cli.progress import Compiling, say
 from nscan_cli.cli.scan_spec import ScanSpecType
+from nscan_cli.cli.shared_options import common_options, reading_options
+from nscan_cli.cli.subcommand import FILE, log_argument, option, result_option, subcommand
 from nscan_cli.cli.summary import Row, ended, table
-from nscan_cli.counting import counted
 from nscan_cli.errors import InputDataError, WrongUsageError
-from nscan_cli.logs.options import ReadingOptions
-from nscan_cli.outputs import check_writable, write_whole
-from nscan_cli.provenance import provenance_of
+from nscan_cli.files.counting import counted
+from nscan_cli.files.outputs import check_writable, write_whole
+from nscan_cli.files.provenance import provenance_of
+from nscan_cli.logs.reading_options import ReadingOptions
 
 if TYPE_CHECKING:
-    from nscan_cli.logs.scan import LaserLog, Source
-    from nscan_cli.matching.left_out import LeftOut
-    from nscan_cli.matching.nscan import NScanMatch, PriorsAmong
-    from nscan_cli.matching.pairs import Kind
+    from nscan_cli.files.source import Source
+    from nscan_cli.logs.laser_log import LaserLog
+    from nscan_cli.matching.joint.index_set import Kind
+    from nscan_cli.matching.joint.nscan_match import NScanMatch, PriorsAmong
+    from nscan_cli.matching.joint.outliers import ExcludedScan
     from nscan_cli.matching.priors import MotionModel
     from nscan_cli.matching.uncertainty import Weakest
     from nscan_cli.poses import Array
@@ -93,14 +94,14 @@ def command(
         raise WrongUsageError("standard input (-) can be one input only; give the others by their path")
     check_writable(output)
     files = [path for path, words in ((initial, STARTS), (prior, PRIORS)) if path not in words]
-    from nscan_cli.logs.parts import files_of
+    from nscan_cli.logs.log_files import files_of
 
     check_plot(plot, output, [*files_of(log), *files])
-    from nscan_cli.cli.document import document
-    from nscan_cli.inputs import base_name
+    from nscan_cli.cli.match_document import document
+    from nscan_cli.files.inputs import base_name
     from nscan_cli.logs.load import read_log
-    from nscan_cli.matching.joint import JointOptions
-    from nscan_cli.matching.nscan import nscan_match
+    from nscan_cli.matching.joint.joint_match import JointOptions
+    from nscan_cli.matching.joint.nscan_match import nscan_match
     from nscan_cli.matching.pairwise import PairOptions, matched_points
     from nscan_cli.matching.priors import MotionModel
 
@@ -135,7 +136,7 @@ def command(
     provenance = provenance_of([scans.source, *sources], parameters)
     write_whole(output, document(FORMAT, provenance, _fields(numbers, match, left_out)))
     if plot is not None:
-        from nscan_cli.mapping.plots import plot_nscan
+        from nscan_cli.mapping.figures.match_plots import plot_nscan
 
         write_plot(plot, plot_nscan(numbers, points, start, match, left_out))
     say(table(_summary(numbers, match, left_out)), quiet)
@@ -147,7 +148,13 @@ def _known(
     """The poses (n, 3) to start from, the priors, and the files that they come from."""
     import numpy as np
 
-    from nscan_cli.cli.knowledge import graph_priors, no_knowledge, odometry_priors, poses_of, read_knowledge
+    from nscan_cli.cli.known_poses import (
+        graph_priors,
+        no_knowledge,
+        odometry_priors,
+        poses_of,
+        read_knowledge,
+    )
     from nscan_cli.graph.model import Graph
     from nscan_cli.poses import relative
 
@@ -171,13 +178,13 @@ def _known(
     return start, priors, [knowledge.source for knowledge in files.values()]
 
 
-def _fields(numbers: tuple[int, ...], match: NScanMatch, left_out: list[LeftOut]) -> dict[str, Any]:
+def _fields(numbers: tuple[int, ...], match: NScanMatch, left_out: list[ExcludedScan]) -> dict[str, Any]:
     """What the document says of the match."""
-    from nscan_cli.cli.document import weakest_record
-    from nscan_cli.graph.json_fields import six_digits, triangle
+    from nscan_cli.cli.match_document import weakest_record
+    from nscan_cli.graph.io.json_fields import six_digits, triangle
     from nscan_cli.graph.model import NScan
-    from nscan_cli.graph.relation_types import relation_record
-    from nscan_cli.graph.semidefinite import WRITTEN, as_information
+    from nscan_cli.graph.relations.registry import relation_record
+    from nscan_cli.graph.relations.semidefinite import WRITTEN, as_information
 
     kept = [numbers[scan] for scan in match.kept]
     joint = match.joint
@@ -212,7 +219,7 @@ def _fields(numbers: tuple[int, ...], match: NScanMatch, left_out: list[LeftOut]
     }
 
 
-def _summary(numbers: tuple[int, ...], match: NScanMatch, left_out: list[LeftOut]) -> list[Row]:
+def _summary(numbers: tuple[int, ...], match: NScanMatch, left_out: list[ExcludedScan]) -> list[Row]:
     joint = match.joint
     weak = [
         _weakly_held(numbers[scan], weakest)
@@ -236,5 +243,5 @@ def _weakly_held(number: int, weakest: Weakest) -> str:
     return f"scan {number} along {math.degrees(weakest.direction):.0f}° ({known})"
 
 
-def _told(numbers: tuple[int, ...], left_out: list[LeftOut]) -> str:
+def _told(numbers: tuple[int, ...], left_out: list[ExcludedScan]) -> str:
     return "; ".join(f"scan {numbers[out.scan]} {out.reason}" for out in left_out)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from nscan_cli.text import shown
+from nscan_cli.files.text import shown
 
 if TYPE_CHECKING:
     from rich.progress import Progress
@@ -29,7 +29,7 @@ def announce_compiling(kernel: str, quiet: bool) -> bool:
 
     This is for kernels of other processes.
     """
-    from nscan_cli.machine_code import first_compile
+    from nscan_cli.kernels.machine_code import first_compile
 
     compiling = first_compile(kernel)
     if compiling:
@@ -44,7 +44,7 @@ class Compiling:
     """
 
     def __init__(self, takes: str, quiet: bool) -> None:
-        from nscan_cli.compiled import tell_when_compiling
+        from nscan_cli.kernels.decorators import tell_when_compiling
 
         self.has_begun = False
         self._takes, self._quiet = takes, quiet

@@ -9,20 +9,20 @@ from typing import TYPE_CHECKING
 
 import click
 
-from nscan_cli.cli.command import FILE, argument, option, subcommand
 from nscan_cli.cli.graph_log import find_log, read_graph_log
-from nscan_cli.cli.options import common_options, reading_options
-from nscan_cli.cli.picture import check_png
+from nscan_cli.cli.plot_option import check_png
 from nscan_cli.cli.progress import say
-from nscan_cli.counting import counted
+from nscan_cli.cli.shared_options import common_options, reading_options
+from nscan_cli.cli.subcommand import FILE, argument, option, subcommand
 from nscan_cli.errors import WrongUsageError
-from nscan_cli.inputs import base_name
-from nscan_cli.logs.options import ReadingOptions
-from nscan_cli.outputs import check_writable, is_device, write_whole
-from nscan_cli.text import path_of_name, shown
+from nscan_cli.files.counting import counted
+from nscan_cli.files.inputs import base_name
+from nscan_cli.files.outputs import check_writable, is_device, write_whole
+from nscan_cli.files.text import path_of_name, shown
+from nscan_cli.logs.reading_options import ReadingOptions
 
 if TYPE_CHECKING:
-    from nscan_cli.mapping.image import MapImage
+    from nscan_cli.mapping.map_image import MapImage
 
 
 @subcommand(
@@ -84,8 +84,8 @@ def command(
     _check_mcap(mcap, [graph_file, *log, output, yaml_path(output) if yaml else None])
     if graph_file == "-" and "-" in log:
         raise WrongUsageError("standard input (-) can be one input only; give the other by its path")
-    from nscan_cli.graph.json_file import read_graph
-    from nscan_cli.logs.parts import files_of
+    from nscan_cli.graph.io.json_graph import read_graph
+    from nscan_cli.logs.log_files import files_of
     from nscan_cli.mapping.occupancy import occupancy_grid
 
     whole = read_graph(graph_file)
@@ -95,7 +95,7 @@ def command(
     poses = whole.poses[nodes]
     grid = occupancy_grid(scans, rows, poses, resolution)
     if picture:
-        from nscan_cli.mapping.drawing import Overlays, draw_figure, draw_over_map
+        from nscan_cli.mapping.figures.map_drawing import Overlays, draw_figure, draw_over_map
 
         if uncertainty and not whole.marginals:
             say(f"warning: {graph_file} has no covariances, so no uncertainty is drawn", quiet)
@@ -106,13 +106,13 @@ def command(
             canvas = draw_over_map(grid, whole, overlays)
         write_whole(output, canvas.png())
     else:
-        from nscan_cli.mapping.image import map_image
+        from nscan_cli.mapping.map_image import map_image
 
         write_map(output, map_image(grid), yaml, quiet)
     if mcap is not None:
-        from nscan_cli.exports.mcap import recording
+        from nscan_cli.exports.mcap import ros2_recording
 
-        write_whole(mcap, recording(scans, rows, nodes, whole, grid))
+        write_whole(mcap, ros2_recording(scans, rows, nodes, whole, grid))
     if output != "-":
         low_x, low_y, high_x, high_y = grid.bounds
         say(
@@ -143,7 +143,7 @@ def write_map(output: str, image: MapImage, yaml: bool, quiet: bool) -> None:
             "its name is no UTF-8, as YAML is",
             quiet,
         )
-    from nscan_cli.mapping.image import map_png, map_yaml
+    from nscan_cli.mapping.map_image import map_png, map_yaml
 
     write_whole(output, map_png(image))
     if yaml:

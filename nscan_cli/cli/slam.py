@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING
 
 import click
 
-from nscan_cli.cli.command import FILE, log_argument, option, subcommand
-from nscan_cli.cli.options import common_options, reading_options
 from nscan_cli.cli.progress import say
+from nscan_cli.cli.shared_options import common_options, reading_options
 from nscan_cli.cli.slam_outputs import Outputs
+from nscan_cli.cli.subcommand import FILE, log_argument, option, subcommand
 from nscan_cli.cli.summary import table
 from nscan_cli.errors import WrongUsageError
-from nscan_cli.logs.options import ReadingOptions
+from nscan_cli.logs.reading_options import ReadingOptions
 
 if TYPE_CHECKING:
     from nscan_cli.slam.options import Relations
@@ -123,12 +123,12 @@ def command(
         )
     outputs = Outputs(output, map_file, trajectory, g2o, carmen, depfile)
     from nscan_cli.cli.slam_runs import map_whole, refine_saved
-    from nscan_cli.logs.parts import files_of
+    from nscan_cli.logs.log_files import files_of
 
     named = [*([] if from_file is None else [from_file]), *(files_of(log) if log else ())]
     outputs.check(named)
     from nscan_cli.memory import share_one_heap
-    from nscan_cli.slam.run import slam_options
+    from nscan_cli.slam.map_log import slam_options
     from nscan_cli.threads import available_threads
 
     threads = threads or available_threads()

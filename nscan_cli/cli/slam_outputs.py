@@ -10,17 +10,17 @@ from typing import TYPE_CHECKING
 
 from nscan_cli.cli.render import check_map_outputs, write_map, yaml_path
 from nscan_cli.errors import InputDataError, WrongUsageError
-from nscan_cli.inputs import label
-from nscan_cli.limits import DISTANCE
-from nscan_cli.outputs import check_writable, write_whole
+from nscan_cli.files.inputs import label
+from nscan_cli.files.limits import DISTANCE
+from nscan_cli.files.outputs import check_writable, write_whole
 
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
     from nscan_cli.graph.model import Graph
-    from nscan_cli.logs.scan import LaserLog
-    from nscan_cli.mapping.image import MapImage
+    from nscan_cli.logs.laser_log import LaserLog
+    from nscan_cli.mapping.map_image import MapImage
     from nscan_cli.poses import Array
 
 
@@ -79,7 +79,7 @@ class Outputs:
         quiet: bool,
     ) -> None:
         """Write all; `rows` (N,) are those of the graph's scans, `inputs` what the depfile names."""
-        from nscan_cli.graph.json_file import write_graph
+        from nscan_cli.graph.io.json_graph import write_graph
         from nscan_cli.memory import give_back
         from nscan_cli.threads import meanwhile, short_turns
 
@@ -96,11 +96,11 @@ class Outputs:
                 image = meanwhile(threads, partial(_drawn, scans, rows, graph.poses, threads))
             write_whole(self.graph, write_graph(graph))
         if self.trajectory is not None:
-            from nscan_cli.graph.tum import write_tum
+            from nscan_cli.graph.io.tum import write_tum
 
             write_whole(self.trajectory, write_tum(graph.stamps, graph.poses))
         if self.g2o is not None:
-            from nscan_cli.graph.g2o import write_g2o
+            from nscan_cli.graph.io.g2o import write_g2o
 
             write_whole(self.g2o, write_g2o(graph))
         if scans is not None and self.carmen is not None:
@@ -127,7 +127,7 @@ class Outputs:
 
 def _drawn(scans: LaserLog, rows: NDArray[np.int64], poses: Array, threads: int) -> MapImage:
     """The map; the counts that it is made of, and what else came before, make room for it."""
-    from nscan_cli.mapping.image import map_image
+    from nscan_cli.mapping.map_image import map_image
     from nscan_cli.mapping.occupancy import occupancy_grid
     from nscan_cli.memory import trim
 

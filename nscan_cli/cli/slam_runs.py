@@ -10,17 +10,17 @@ from typing import TYPE_CHECKING
 
 from nscan_cli.cli.progress import Compiling, progress, say
 from nscan_cli.cli.summary import Row
-from nscan_cli.counting import counted
 from nscan_cli.errors import InputDataError, InputMissingError, WrongUsageError
-from nscan_cli.inputs import label
-from nscan_cli.logs.options import ReadingOptions
+from nscan_cli.files.counting import counted
+from nscan_cli.files.inputs import label
+from nscan_cli.logs.reading_options import ReadingOptions
 
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
     from nscan_cli.graph.model import Graph
-    from nscan_cli.logs.scan import LaserLog
+    from nscan_cli.logs.laser_log import LaserLog
     from nscan_cli.slam.options import SlamOptions
 
 
@@ -46,10 +46,10 @@ def map_whole(
     """Run the whole loop over a log."""
     import numpy as np
 
-    from nscan_cli.compiled import bring_up
+    from nscan_cli.kernels.decorators import bring_up
     from nscan_cli.logs.load import read_log
-    from nscan_cli.logs.parts import files_of
-    from nscan_cli.slam.run import map_log
+    from nscan_cli.logs.log_files import files_of
+    from nscan_cli.slam.map_log import map_log
 
     bring_up()
     compiling = Compiling("a minute or two", quiet)
@@ -83,7 +83,7 @@ def map_whole(
 
 def _graph_rows(graph: Graph) -> list[Row]:
     """What a graph is made of, and why loops were refused."""
-    from nscan_cli.slam.run import Counts
+    from nscan_cli.slam.map_log import Counts
 
     counts = Counts.of(graph)
     tried, refused = counts.accepted + counts.refused.total(), counts.refused.total()
@@ -134,9 +134,9 @@ def refine_saved(
     """Optimise a saved graph, and refine it where its log is there."""
     import numpy as np
 
-    from nscan_cli.graph.load import load_graph
-    from nscan_cli.graph.marginals import marginal_covariances
-    from nscan_cli.graph.solve import optimise_graph
+    from nscan_cli.graph.io.load_graph import load_graph
+    from nscan_cli.graph.marginal_covariances import marginal_covariances
+    from nscan_cli.graph.optimise.whole_graph import optimise_graph
 
     compiling = Compiling("a minute or two", quiet)
     notices: list[str] = []
@@ -152,12 +152,12 @@ def refine_saved(
     if read is None:
         graph.marginals = marginal_covariances(graph)
     else:
-        from nscan_cli.slam.again import refine_again
+        from nscan_cli.slam.backend.resume import resume
 
         scans, rows, log_paths = read
         inputs += log_paths
         with progress("refining", None, quiet):
-            graph = refine_again(graph, scans, rows, threads)
+            graph = resume(graph, scans, rows, threads)
     moved = float(np.hypot(*(graph.poses - before)[:, :2].T).max())
     refined = "" if read is None else ", then refined"
     outcome = f"energy {optimum.energy:.6g} after {counted(optimum.iterations, 'iteration')}{refined}"
@@ -174,8 +174,8 @@ def _log_of(
 ) -> tuple[LaserLog, NDArray[np.int64], list[str]] | None:
     """The log of a saved graph, the rows of its scans, and its files' paths; None where it has none."""
     from nscan_cli.cli.graph_log import find_log, read_graph_log
-    from nscan_cli.logs.parts import files_of
-    from nscan_cli.slam.again import can_refine, options_of
+    from nscan_cli.logs.log_files import files_of
+    from nscan_cli.slam.backend.resume import can_refine, options_of
 
     if not can_refine(graph):
         if needed or log_files is not None:

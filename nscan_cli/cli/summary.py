@@ -5,7 +5,7 @@ from __future__ import annotations
 import textwrap
 from collections.abc import Sequence
 
-from nscan_cli.counting import counted
+from nscan_cli.files.counting import counted
 
 WIDTH = 80
 Row = tuple[str, Sequence[str]]

@@ -5,15 +5,15 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from nscan_cli.counting import counted
 from nscan_cli.errors import InputDataError
+from nscan_cli.files.counting import counted
 from nscan_cli.poses import Array
 
 TOLERANCE = 0.1
 """Seconds by which a stamp may miss a pose, as in Kümmerle's metric."""
 
 
-def nearest(times: Array, wanted: Array) -> NDArray[np.int64]:
+def nearest_in_time(times: Array, wanted: Array) -> NDArray[np.int64]:
     """The rows (M,) of `times` (N,), not decreasing, nearest to `wanted` (M,); the earlier of two as near."""
     right = np.clip(np.searchsorted(times, wanted), 1, max(len(times) - 1, 1))
     left = right - 1
@@ -27,8 +27,8 @@ def mutual(times: Array, reference: Array) -> tuple[NDArray[np.int64], NDArray[n
     Each row occurs once at most, whichever of the two is the denser. Both must not decrease.
     """
     rows = np.arange(len(times))
-    partner = nearest(reference, times)
-    back = nearest(times, reference)[partner]
+    partner = nearest_in_time(reference, times)
+    back = nearest_in_time(times, reference)[partner]
     pairs = (back == rows) & (np.abs(reference[partner] - times) <= TOLERANCE)
     return rows[pairs], partner[pairs]
 

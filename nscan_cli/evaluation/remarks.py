@@ -12,12 +12,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from nscan_cli.counting import counted
 from nscan_cli.evaluation.alignment import alignment
-from nscan_cli.evaluation.clock import DRIVEN, SMALLEST, WELL, Clocks
+from nscan_cli.evaluation.clock_lag import DRIVEN, SMALLEST, WELL, Clocks
 from nscan_cli.evaluation.similarity import Fit, Lever, fit, heading_difference, lever
-from nscan_cli.evaluation.trajectory import TrajectoryErrors
-from nscan_cli.graph.tum import Trajectory
+from nscan_cli.evaluation.trajectory_errors import TrajectoryErrors
+from nscan_cli.files.counting import counted
+from nscan_cli.graph.io.tum import Trajectory
 from nscan_cli.poses import Array, compose
 
 BETTER = 3.0

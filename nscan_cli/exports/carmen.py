@@ -13,10 +13,10 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from nscan_cli.finite import check_finite
-from nscan_cli.logs.corrected import OWN_HOST
-from nscan_cli.logs.laser import CARMEN_MAX_RANGE, beam_angles
-from nscan_cli.logs.scan import LaserLog
+from nscan_cli.files.finite import check_finite
+from nscan_cli.logs.laser_defaults import CARMEN_MAX_RANGE, beam_angles
+from nscan_cli.logs.laser_log import LaserLog
+from nscan_cli.logs.text.corrected_poses import OWN_HOST
 from nscan_cli.poses import Array, wrap
 
 HEADER = """\

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from nscan_cli import __version__
 from nscan_cli.errors import WrongUsageError
-from nscan_cli.exports.messages import (
+from nscan_cli.exports.ros_messages import (
     Messages,
     graph_markers,
     map_message,
@@ -29,10 +29,10 @@ from nscan_cli.exports.messages import (
     scan_message,
     transforms,
 )
-from nscan_cli.finite import check_finite
+from nscan_cli.files.finite import check_finite
 from nscan_cli.graph.model import Graph
 from nscan_cli.logs.frame_names import MAP
-from nscan_cli.logs.scan import LaserLog
+from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.mapping.occupancy import OccupancyGrid
 from nscan_cli.poses import compose, inverse
 
@@ -53,7 +53,7 @@ LAST_SECOND = 2**31
 """A stamp's seconds are 32 bits wide."""
 
 
-def recording(
+def ros2_recording(
     log: LaserLog, rows: NDArray[np.int64], nodes: NDArray[np.int64], graph: Graph, grid: OccupancyGrid
 ) -> bytes:
     """The MCAP of a graph and its map `grid`, with the scans in `rows` (N,) of the log at `nodes` (N,).

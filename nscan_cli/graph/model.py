@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from nscan_cli.graph.nscan import NScan
-from nscan_cli.graph.pairwise import Pairwise
-from nscan_cli.graph.relation import Relation
+from nscan_cli.graph.relations.base import Relation
+from nscan_cli.graph.relations.nscan import NScan
+from nscan_cli.graph.relations.pairwise import Pairwise
 from nscan_cli.poses import Array, compose, relative
 
 __all__ = ["Graph", "Loop", "NScan", "Pairwise"]

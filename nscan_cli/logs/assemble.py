@@ -9,16 +9,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from nscan_cli.limits import READINGS
-from nscan_cli.logs.angles import beam_directions
+from nscan_cli.files.limits import READINGS
+from nscan_cli.files.source import Source
+from nscan_cli.logs.beam_angles import beam_directions
 from nscan_cli.logs.choices import Device
 from nscan_cli.logs.frame_names import AS_USUAL, FrameNames
-from nscan_cli.logs.laser import mark_no_returns
-from nscan_cli.logs.lost import lost_readings
-from nscan_cli.logs.options import ReadingOptions
-from nscan_cli.logs.order import Order, selection
+from nscan_cli.logs.laser_defaults import mark_no_returns
+from nscan_cli.logs.laser_log import LaserLog, LogReport
+from nscan_cli.logs.lost_readings import lost_readings
 from nscan_cli.logs.range_limits import limits_in_force
-from nscan_cli.logs.scan import LaserLog, LogReport, Source
+from nscan_cli.logs.reading_options import ReadingOptions
+from nscan_cli.logs.scan_order import Order, selection
 from nscan_cli.logs.skips import Skips
 from nscan_cli.poses import Array
 
@@ -76,7 +77,7 @@ class Findings:
 
 
 @dataclass(frozen=True)
-class Motion:
+class RecordedMotion:
     """What moves, in order of time: odometry (S, 3), true poses (T, 3) at truth_times (T,)."""
 
     odometry: Array | None
@@ -107,7 +108,7 @@ def laser_log(
     raw: RawScans,
     times: Order,
     mount: Array,
-    motion: Motion,
+    motion: RecordedMotion,
     findings: Findings,
     options: ReadingOptions,
     file: str,

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Literal, NamedTuple
 
-from nscan_cli.counting import counted
 from nscan_cli.errors import WrongUsageError
+from nscan_cli.files.counting import counted
 
 
 class Device(NamedTuple):

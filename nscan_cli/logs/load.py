@@ -11,16 +11,17 @@ from mmap import mmap
 from typing import Protocol
 
 from nscan_cli.errors import InputDataError, WrongUsageError
-from nscan_cli.inputs import Bytes, base_name, common_hash, label, mapped, read_bytes, sha256_of
-from nscan_cli.limits import ExceededError
-from nscan_cli.logs import joining
-from nscan_cli.logs.kinds import FORMS, Form, foreign, readable
-from nscan_cli.logs.options import ReadingOptions
-from nscan_cli.logs.packing import packing_of, unpacked
-from nscan_cli.logs.parts import Parts, beside, first_bytes, parts_of
-from nscan_cli.logs.recording import DAMAGED, Recording
-from nscan_cli.logs.scan import LaserLog, Source
-from nscan_cli.text_encoding import plain
+from nscan_cli.files.encoding import plain
+from nscan_cli.files.inputs import Bytes, base_name, common_hash, label, mapped, read_bytes, sha256_of
+from nscan_cli.files.limits import ExceededError
+from nscan_cli.files.source import Source
+from nscan_cli.logs.compression import packing_of, unpacked
+from nscan_cli.logs.formats import FORMS, Form, foreign, readable
+from nscan_cli.logs.laser_log import LaserLog
+from nscan_cli.logs.log_files import Parts, beside, first_bytes, parts_of
+from nscan_cli.logs.reading_options import ReadingOptions
+from nscan_cli.logs.recordings import joined as joining
+from nscan_cli.logs.recordings.container import DAMAGED, Recording
 
 
 class Reader(Protocol):
@@ -191,7 +192,7 @@ def _joined(parts: Parts, salvage: bool) -> tuple[Recording, Source]:
 
 def _scans(recording: Recording, name: str, source: Source, options: ReadingOptions) -> LaserLog:
     """The scans of a recording; texts need none of what decodes messages."""
-    from nscan_cli.logs import recorded
+    from nscan_cli.logs.recordings import laser_scans as recorded
 
     return recorded.read(recording, name, source, options)
 

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from nscan_cli.logs.laser import no_return_value
-from nscan_cli.logs.options import ReadingOptions
-from nscan_cli.logs.peaks import FEWEST, ROUNDING, piled_up
+from nscan_cli.logs.laser_defaults import no_return_value
+from nscan_cli.logs.range_peaks import FEWEST, ROUNDING, piled_up
+from nscan_cli.logs.reading_options import ReadingOptions
 from nscan_cli.poses import Array
 
 if TYPE_CHECKING:

@@ -14,9 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nscan_cli.errors import WrongUsageError
-from nscan_cli.limits import MAP_CELLS
-from nscan_cli.logs.scan import LaserLog
-from nscan_cli.mapping.casting import TILE, Scans, Tiles, counted, extent
+from nscan_cli.files.limits import MAP_CELLS
+from nscan_cli.logs.laser_log import LaserLog
+from nscan_cli.mapping.ray_casting import TILE, ScanRays, Tiles, count_beams, extent
 from nscan_cli.poses import Array
 
 RESOLUTION = 0.05
@@ -146,7 +146,7 @@ def occupancy_grid(
     if len(rows) == 0:
         raise WrongUsageError(f"{log.source.name}: no scans to draw a map of; choose some")
     lasers = np.ascontiguousarray(log.laser_pose(poses))
-    scans = Scans(np.asarray(rows, dtype=np.int64), log.ranges, log.angle_min, log.angle_increment, lasers)
+    scans = ScanRays(np.asarray(rows, dtype=np.int64), log.ranges, log.angle_min, log.angle_increment, lasers)
     low_x, low_y, high_x, high_y = extent(scans, REACH)
     # One cell to spare: the border of the map is then free of what is drawn in it, and rounding harmless.
     left, bottom = math.floor(low_x / resolution) - 1, math.floor(low_y / resolution) - 1
@@ -161,7 +161,7 @@ def occupancy_grid(
             f"of {resolution:g} m, more than {most:,.0f}; {remedy}, or set {MAP_CELLS.variable} higher"
         )
     shape, corner = (height, width), (left * resolution, bottom * resolution)
-    tiles = counted(scans, REACH, shape, resolution, left, bottom, threads)
+    tiles = count_beams(scans, REACH, shape, resolution, left, bottom, threads)
     return OccupancyGrid.of_tiles(tiles, shape, resolution, corner)
 
 

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from nscan_cli.errors import InputDataError
-from nscan_cli.logs.scan import LaserLog
-from nscan_cli.matching.newton import PairProblem, minimise, objective
-from nscan_cli.matching.overlap import INLIER_BOUND, LEAST_OVERLAP
+from nscan_cli.logs.laser_log import LaserLog
+from nscan_cli.matching.joint.overlap import INLIER_BOUND, LEAST_OVERLAP
+from nscan_cli.matching.pairwise_solver import PairProblem, minimise, objective
 from nscan_cli.matching.priors import Prior
 from nscan_cli.matching.uncertainty import (
     Weakest,
@@ -18,9 +18,9 @@ from nscan_cli.matching.uncertainty import (
     is_settled,
     weakest_translation,
 )
+from nscan_cli.ndt.association import begin
 from nscan_cli.ndt.energy import OUT, inlier_share
-from nscan_cli.ndt.meeting import begin
-from nscan_cli.ndt.table import STRAIGHT
+from nscan_cli.ndt.hash_grid import STRAIGHT
 from nscan_cli.ndt.transform import Ndt
 from nscan_cli.poses import Array, wrap
 

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from nscan_cli.compiled import kernel
+from nscan_cli.kernels.decorators import kernel
 from nscan_cli.poses import Array, relative
 
 

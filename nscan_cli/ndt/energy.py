@@ -12,9 +12,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from nscan_cli.compiled import kernel, lean_kernel, summing_kernel
-from nscan_cli.ndt.meeting import BLOCKS, Meeting, RoomToMeet, meet, room_to_meet
-from nscan_cli.ndt.table import Grid, find_row, pack, shown
+from nscan_cli.kernels.decorators import kernel, leaf_kernel, reduction_kernel
+from nscan_cli.ndt.association import BLOCKS, Association, RoomToMeet, associate, room_to_meet
+from nscan_cli.ndt.hash_grid import Grid, find_row, pack, shown
 from nscan_cli.ndt.transform import Ndt
 from nscan_cli.poses import Array
 
@@ -31,7 +31,7 @@ LN2_HIGH, LN2_LOW = 0.6931471803691238, 1.9082149292705877e-10
 """ln 2 in two parts, of which the first times a whole number is exact."""
 
 
-@lean_kernel
+@leaf_kernel
 def accumulate(
     grid: Grid,
     half: float,
@@ -53,11 +53,11 @@ def accumulate(
     costs, well hit or not; it only counts when energies are compared. Of the points, every so-manyth
     counts by `stride`. `room` is to work in.
     """
-    count = meet(grid, half, points, x, y, phi, stride, room)
+    count = associate(grid, half, points, x, y, phi, stride, room)
     _sum(room.met, count, widening, curvature, baseline, out)
 
 
-@summing_kernel
+@reduction_kernel
 def _sum(met: Array, count: int, widening: float, curvature: float, baseline: float, out: Array) -> None:
     """Write E, gradient and Hessian of `count` points on Gaussians into out (10,).
 
@@ -74,8 +74,8 @@ def _sum(met: Array, count: int, widening: float, curvature: float, baseline: fl
     out[4], out[5], out[6], out[7], out[8], out[9] = hxx, hxy, hxp, hyy, hyp, hpp
 
 
-@summing_kernel
-def sum_meeting(meeting: Meeting, widening: float, curvature: float, out: Array) -> None:
+@reduction_kernel
+def sum_meeting(meeting: Association, widening: float, curvature: float, out: Array) -> None:
     """Write E, gradient and Hessian of the points of a meeting into out (10,), as `accumulate` does."""
     moved, gaussians = meeting.moved, meeting.gaussians
     e = gx = gy = gp = hxx = hxy = hxp = hyy = hyp = hpp = 0.0
@@ -101,7 +101,7 @@ def sum_meeting(meeting: Meeting, widening: float, curvature: float, out: Array)
     out[4], out[5], out[6], out[7], out[8], out[9] = hxx, hxy, hxp, hyy, hyp, hpp
 
 
-@summing_kernel
+@reduction_kernel
 def _terms(
     rx: float, ry: float, v: Vector, sigma: Symmetric, weight: float, widening: float, curvature: float
 ) -> Terms:
@@ -128,7 +128,7 @@ def _terms(
     )
 
 
-@lean_kernel
+@leaf_kernel
 def _exp(t: float) -> float:
     """eᵗ for −700 ≤ t ≤ 0, to 10⁻¹⁴ of it: 2ⁿ eʳ with |r| ≤ ½ ln 2, and eʳ by its series."""
     n = np.floor(t * LOG2_E + 0.5)
@@ -139,7 +139,7 @@ def _exp(t: float) -> float:
     return float(series * np.int64((np.int64(n) + 1023) << 52).view(np.float64))
 
 
-@lean_kernel
+@leaf_kernel
 def unpack(out: Array, scale: float, gradient: Array, hessian: Array) -> None:
     """Write gradient (3,) and Hessian (3, 3) of scale · E from the numbers (10,) of an evaluation."""
     index = 4
@@ -158,7 +158,7 @@ def inlier_share(grid: Grid, half: float, points: Array, pose: Array, bound: flo
     return float(find_inliers(grid, half, points, pose, bound, inliers) / max(points.shape[0], 1))
 
 
-@lean_kernel
+@leaf_kernel
 def find_inliers(
     grid: Grid, half: float, points: Array, pose: Array, bound: float, inliers: NDArray[np.bool_]
 ) -> int:

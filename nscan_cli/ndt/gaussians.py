@@ -16,8 +16,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from nscan_cli.compiled import lean_kernel, unfolded_kernel
-from nscan_cli.ndt.table import FACES, FLOOR, HALF_KEY, MINIMUM, Grid, find_row, unpack
+from nscan_cli.kernels.decorators import leaf_kernel, unfolded_kernel
+from nscan_cli.ndt.hash_grid import FACES, FLOOR, HALF_KEY, MINIMUM, Grid, find_row, unpack
 from nscan_cli.poses import Array
 
 Cells = tuple[int | np.int32, int, int, int]
@@ -33,7 +33,7 @@ ONE_SIDED = 0.2
 """A Gaussian shows one side when its beams run through it by so much of their length on average."""
 
 
-@lean_kernel
+@leaf_kernel
 def make_gaussian(grid: Grid, row: int, half: float) -> None:
     """Mean, inverse covariance and side of the block of four lattice cells whose lower left one is `row`.
 
@@ -72,7 +72,7 @@ def shape(grid: Grid, key: int, moments: Moments, long_axis: Direction, half: fl
         gaussian[5], gaussian[6] = side * nx, side * ny
 
 
-@lean_kernel
+@leaf_kernel
 def eigenvalues(grid: Grid, moments: Moments) -> tuple[float, float]:
     """Of a covariance, the smaller one first; both at least the floor, it 0.001 of the larger ([19])."""
     _, _, _, xx, xy, yy, _, _ = moments
@@ -103,7 +103,7 @@ def faces(grid: Grid, row: int, half: float) -> tuple[Moments, Moments]:
     return divided(whole), NOTHING
 
 
-@lean_kernel
+@leaf_kernel
 def _block(grid: Grid, cells: Cells, half: float) -> tuple[Moments, tuple[float, float]]:
     """The sums of a block from the centre of its first cell, and the normal of what is in its cells.
 
@@ -123,7 +123,7 @@ def _block(grid: Grid, cells: Cells, half: float) -> tuple[Moments, tuple[float,
     return sums, _normal(_doubled(xx, xy, yy))
 
 
-@lean_kernel
+@leaf_kernel
 def _are_two(grid: Grid, cells: Cells, normal: tuple[float, float]) -> bool:
     """Whether the beams come from both sides."""
     number_before = number_behind = against = along = 0.0
@@ -140,7 +140,7 @@ def _are_two(grid: Grid, cells: Cells, normal: tuple[float, float]) -> bool:
     return against > ONE_SIDED * number_before and along > ONE_SIDED * number_behind
 
 
-@lean_kernel
+@leaf_kernel
 def _face(grid: Grid, cells: Cells, half: float, nx: float, ny: float) -> Moments:
     """The sums of the parts of a block whose beams run along (nx, ny), from the centre of its first cell."""
     sums = NOTHING
@@ -152,7 +152,7 @@ def _face(grid: Grid, cells: Cells, half: float, nx: float, ny: float) -> Moment
     return sums
 
 
-@lean_kernel
+@leaf_kernel
 def _cells(grid: Grid, key: int, row: int) -> Cells:
     """Those of the block whose lower left cell is `row`."""
     return (
@@ -163,7 +163,7 @@ def _cells(grid: Grid, key: int, row: int) -> Cells:
     )
 
 
-@lean_kernel
+@leaf_kernel
 def plus(sums: Moments, part: Array, dx: float, dy: float) -> Moments:
     """The sums with a part, whose cell's centre is (dx, dy) off the point that they are about."""
     n, sx, sy, sxx, sxy, syy, fx, fy = sums
@@ -179,7 +179,7 @@ def plus(sums: Moments, part: Array, dx: float, dy: float) -> Moments:
     )
 
 
-@lean_kernel
+@leaf_kernel
 def divided(sums: Moments) -> Moments:
     """The moments of which these are the sums."""
     n, sx, sy, sxx, sxy, syy, fx, fy = sums
@@ -189,14 +189,14 @@ def divided(sums: Moments) -> Moments:
     return n, mx, my, sxx / n - mx * mx, sxy / n - mx * my, syy / n - my * my, fx / n, fy / n
 
 
-@lean_kernel
+@leaf_kernel
 def long_axis_of(moments: Moments) -> Direction:
     """That of the moments."""
     _, _, _, xx, xy, yy, _, _ = moments
     return _doubled(xx, xy, yy)
 
 
-@lean_kernel
+@leaf_kernel
 def _doubled(xx: float, xy: float, yy: float) -> Direction:
     """That of a covariance."""
     radius = radius_of(xx, xy, yy)
@@ -205,13 +205,13 @@ def _doubled(xx: float, xy: float, yy: float) -> Direction:
     return 1.0, 0.0
 
 
-@lean_kernel
+@leaf_kernel
 def radius_of(xx: float, xy: float, yy: float) -> float:
     """Half of what the eigenvalues of a covariance differ by."""
     return float(np.sqrt(0.25 * (xx - yy) * (xx - yy) + xy * xy))
 
 
-@lean_kernel
+@leaf_kernel
 def _normal(long_axis: Direction) -> tuple[float, float]:
     """The unit vector at a right angle to the long axis, (cos ½β, sin ½β)."""
     c2, s2 = long_axis

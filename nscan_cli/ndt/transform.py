@@ -7,10 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from nscan_cli.compiled import kernel
-from nscan_cli.ndt.compact import compacted
-from nscan_cli.ndt.grid import change, gathered, make_all, with_room
-from nscan_cli.ndt.table import ALONE, AROUND, FACES, FLOOR, MINIMUM, Grid, empty_grid
+from nscan_cli.kernels.decorators import kernel
+from nscan_cli.ndt.compaction import compacted
+from nscan_cli.ndt.grid_growth import change, gathered, make_all, with_room
+from nscan_cli.ndt.hash_grid import ALONE, AROUND, FACES, FLOOR, MINIMUM, Grid, empty_grid
 from nscan_cli.poses import Array
 
 LEAST_CAPACITY = 512

@@ -18,8 +18,8 @@ from queue import Empty, Queue
 from typing import Any
 
 from nscan_cli.errors import InputMissingError, NscanError, WrongUsageError
-from nscan_cli.inputs import read_bytes
-from nscan_cli.logs.parts import METADATA, beside, files_of
+from nscan_cli.files.inputs import read_bytes
+from nscan_cli.logs.log_files import METADATA, beside, files_of
 from nscan_cli.nightly.fingerprint import tool_key
 from nscan_cli.nightly.processes import run_all as run_here
 from nscan_cli.nightly.task import Outcome, Report, Task

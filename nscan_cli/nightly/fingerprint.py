@@ -11,14 +11,14 @@ from typing import Any
 
 from nscan_cli import __version__
 from nscan_cli.errors import InputMissingError
-from nscan_cli.inputs import common_hash, sha256_of
-from nscan_cli.logs.parts import files_of
+from nscan_cli.files.inputs import common_hash, sha256_of
+from nscan_cli.logs.log_files import files_of
 from nscan_cli.nightly.manifest import Entry
 
-NO_RESULTS = ("cli", "nightly", "exports", "outputs.py")
+NO_RESULTS = ("cli/", "nightly/", "exports/", "files/outputs.py")
 """Packages and modules whose code does not go into the results of a night."""
-MAKING = ("work.py", "preview.py")
-"""But these files of this one do."""
+MAKING = ("nightly/work.py", "nightly/preview.py")
+"""But these files do."""
 
 
 @functools.cache
@@ -28,7 +28,7 @@ def tool_key() -> str:
     sources = hashlib.sha256()
     for path in sorted(package.rglob("*.py")):
         name = path.relative_to(package)
-        if name.parts[0] in NO_RESULTS and not (name.parts[0] == "nightly" and name.name in MAKING):
+        if name.as_posix().startswith(NO_RESULTS) and name.as_posix() not in MAKING:
             continue
         text = path.read_bytes()
         sources.update(f"{name.as_posix()}\0{len(text)}\0".encode() + text)

@@ -10,7 +10,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from nscan_cli.errors import OutputError
-from nscan_cli.outputs import TEMPORARY
+from nscan_cli.files.outputs import TEMPORARY
 
 LOCK, SCRATCH = ".lock", ".scratch"
 

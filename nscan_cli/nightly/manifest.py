@@ -11,9 +11,9 @@ from typing import Any
 from urllib.parse import urlsplit
 
 from nscan_cli.errors import InputDataError, InputMissingError, WrongUsageError
-from nscan_cli.inputs import read_toml
-from nscan_cli.nightly.parameters import Parameters, parameters_from
-from nscan_cli.text import path_of_name
+from nscan_cli.files.inputs import read_toml
+from nscan_cli.files.text import path_of_name
+from nscan_cli.nightly.manifest_parameters import Parameters, parameters_from
 
 ENDINGS = (".log.gz", ".log", ".clf.gz", ".clf", ".script.gz", ".script", ".mcap", ".bag", ".db3", "")
 """Of a log that the manifest gives by its name alone; the first that is there is taken. "" is a folder."""

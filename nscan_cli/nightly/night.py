@@ -10,13 +10,13 @@ from pathlib import Path
 from typing import Any, Protocol
 
 from nscan_cli.errors import NscanError
-from nscan_cli.nightly.anew import reasons
+from nscan_cli.files.text import shown
 from nscan_cli.nightly.fingerprint import fingerprint, input_hash, made_from, size_of, tool_key
 from nscan_cli.nightly.folder import folder_of, scratch
 from nscan_cli.nightly.manifest import Entry
-from nscan_cli.nightly.nights import Night, add_night, is_up_to_date, read_nights
+from nscan_cli.nightly.night_history import Night, add_night, is_up_to_date, read_nights
+from nscan_cli.nightly.rebuild_reasons import reasons
 from nscan_cli.nightly.task import Outcome, Report, Task
-from nscan_cli.text import shown
 
 
 @dataclass(frozen=True)

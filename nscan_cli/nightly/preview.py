@@ -6,9 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nscan_cli.graph.model import Graph
-from nscan_cli.mapping.axes import round_length
-from nscan_cli.mapping.drawing import SOFT_GRAYS
-from nscan_cli.mapping.image import Gray, gray, png_bytes
+from nscan_cli.mapping.figures.axes import round_length
+from nscan_cli.mapping.figures.map_drawing import SOFT_GRAYS
+from nscan_cli.mapping.map_image import Gray, gray, png_bytes
 from nscan_cli.mapping.occupancy import OccupancyGrid
 from nscan_cli.poses import Array
 

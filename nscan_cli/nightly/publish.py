@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
+from nscan_cli.files.outputs import write_whole
 from nscan_cli.nightly.manifest import Entry
 from nscan_cli.nightly.night import Plan
-from nscan_cli.nightly.nights import read_nights
-from nscan_cli.nightly.page import page
-from nscan_cli.nightly.report import as_json
+from nscan_cli.nightly.night_history import read_nights
+from nscan_cli.nightly.report_json import as_json
+from nscan_cli.nightly.report_page import page
 from nscan_cli.nightly.verdict import Verdict, verdict
-from nscan_cli.outputs import write_whole
 
 
 def publish(title: str, entries: Sequence[Entry], planned: Plan, folder: Path) -> list[Verdict]:

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from nscan_cli.logs.options import ReadingOptions
+from nscan_cli.logs.reading_options import ReadingOptions
 from nscan_cli.nightly.manifest import Entry
 
 OUTPUTS, TASK, RESULT = "outputs", "task.json", "result.json"

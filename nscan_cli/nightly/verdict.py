@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from typing import Any, Literal
 
 from nscan_cli.nightly.manifest import Entry
-from nscan_cli.nightly.nights import Night
+from nscan_cli.nightly.night_history import Night
 
 Status = Literal["failed", "above", "worse", "good", "absent"]
 """In the order of how much they ask for a look."""

@@ -14,8 +14,8 @@ import subprocess
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from nscan_cli import machine_code
-from nscan_cli.cache_folder import cache_folder
+from nscan_cli.kernels import machine_code
+from nscan_cli.kernels.cache_folder import cache_folder
 from nscan_cli.nightly import start
 
 if TYPE_CHECKING:
@@ -70,11 +70,11 @@ def main() -> None:
     """Do all that is done for a log of a night, so that the kernels are compiled."""
     import numpy as np
 
-    from nscan_cli import compiled
+    from nscan_cli.kernels import decorators as compiled
     from nscan_cli.logs.load import log_from
-    from nscan_cli.logs.options import ReadingOptions
+    from nscan_cli.logs.reading_options import ReadingOptions
     from nscan_cli.mapping.occupancy import occupancy_grid
-    from nscan_cli.slam.run import map_log, slam_options
+    from nscan_cli.slam.map_log import map_log, slam_options
 
     compiled.bring_up()
     drive = drive_as_carmen()

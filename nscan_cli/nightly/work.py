@@ -50,15 +50,15 @@ def work(task: dict[str, Any], outputs: Path, report: Callable[[int, int, int], 
     """
     import numpy as np
 
-    from nscan_cli.cache_folder import cache_folder
-    from nscan_cli.graph.json_file import write_graph
-    from nscan_cli.graph.tum import write_tum
+    from nscan_cli.graph.io.json_graph import write_graph
+    from nscan_cli.graph.io.tum import write_tum
+    from nscan_cli.kernels.cache_folder import cache_folder
     from nscan_cli.logs.load import read_log
-    from nscan_cli.mapping.image import map_image, map_png, map_yaml
+    from nscan_cli.mapping.map_image import map_image, map_png, map_yaml
     from nscan_cli.mapping.occupancy import occupancy_grid
     from nscan_cli.nightly import warm_up
     from nscan_cli.nightly.preview import preview
-    from nscan_cli.slam.run import Counts, map_log, slam_options
+    from nscan_cli.slam.map_log import Counts, map_log, slam_options
 
     if cache_folder() is None:
         warm_up.main()
@@ -104,8 +104,8 @@ def work(task: dict[str, Any], outputs: Path, report: Callable[[int, int, int], 
 
 def _evaluation(inputs: dict[str, str], graph_file: str) -> dict[str, Any] | None:
     """What `evaluate --json` says of the graph; None where there is nothing to measure against."""
-    from nscan_cli.evaluation.measure import measure
-    from nscan_cli.evaluation.report import as_document
+    from nscan_cli.evaluation.evaluation_report import as_document
+    from nscan_cli.evaluation.measured import measure
 
     relations, reference = inputs.get("relations"), inputs.get("reference")
     if relations is None and reference is None:

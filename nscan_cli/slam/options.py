@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Literal
 
+from nscan_cli.matching.correlative_search import SearchOptions
 from nscan_cli.matching.priors import MotionModel
-from nscan_cli.matching.search import SearchOptions
 
 Relations = Literal["pairwise", "nscan", "both"]
 """What the graph is made of; see SlamOptions."""

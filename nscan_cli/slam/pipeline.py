@@ -8,31 +8,31 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 
-from nscan_cli.graph.marginals import marginal_covariances
+from nscan_cli.graph.marginal_covariances import marginal_covariances
 from nscan_cli.graph.model import Graph, Loop, NScan, Pairwise
-from nscan_cli.graph.optimise import optimise
-from nscan_cli.graph.relation import Relation
-from nscan_cli.graph.robust import contradicting
-from nscan_cli.logs.scan import LaserLog
+from nscan_cli.graph.optimise.graph_solver import optimise
+from nscan_cli.graph.optimise.robust import contradicting
+from nscan_cli.graph.relations.base import Relation
+from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.poses import Array, Indices
-from nscan_cli.slam.ahead import Ahead
-from nscan_cli.slam.believed import believed_odometry, hanging
-from nscan_cli.slam.closing import Closing
-from nscan_cli.slam.coverage import Coverage
-from nscan_cli.slam.energies import Energies
-from nscan_cli.slam.following import Followed, Follower
-from nscan_cli.slam.growth import Growth
-from nscan_cli.slam.in_view import sight
-from nscan_cli.slam.keyframes import Keyframe, Keyframes, extended, relations_along, route_of
-from nscan_cli.slam.near import Near, choose_nearby
-from nscan_cli.slam.nearby import MatchNearby, Nearby, match_nearby
+from nscan_cli.slam.backend.energy_cache import Energies
+from nscan_cli.slam.backend.refinement import Refinement
+from nscan_cli.slam.backend.scan_poses import between_keyframes
+from nscan_cli.slam.backend.schedule import OptimisationSchedule
+from nscan_cli.slam.backend.subgraph import Subgraph
+from nscan_cli.slam.frontend.odometry_checks import believed_odometry, hanging
+from nscan_cli.slam.frontend.scan_batch import ScanBatch
+from nscan_cli.slam.frontend.track_segments import SegmentTracker, TrackedSegments
+from nscan_cli.slam.frontend.visible_points import sight
+from nscan_cli.slam.keyframes.keyframe import Keyframe, Keyframes, extended, relations_along, route_of
+from nscan_cli.slam.local_matching.coverage import Coverage
+from nscan_cli.slam.local_matching.joint_relations import LocalMatch, MatchNearby, match_neighbours
+from nscan_cli.slam.local_matching.match_ahead import Ahead
+from nscan_cli.slam.local_matching.neighbours import Neighbours, choose_neighbours
+from nscan_cli.slam.local_matching.pairwise_relations import match_neighbours_pairwise
+from nscan_cli.slam.loop_closure.loop_detector import LoopDetector
+from nscan_cli.slam.loop_closure.place_search import TOO_LITTLE, Place, piece_moved
 from nscan_cli.slam.options import SlamOptions
-from nscan_cli.slam.pairs_nearby import match_pairs_nearby
-from nscan_cli.slam.part import Part
-from nscan_cli.slam.place import TOO_LITTLE, Place, piece_moved
-from nscan_cli.slam.refinement import Refinement
-from nscan_cli.slam.sensed import Sensed
-from nscan_cli.slam.trajectory import between_keyframes
 from nscan_cli.threads import Beside
 
 CONTRADICTS = "contradicts the rest of the graph"
@@ -54,7 +54,7 @@ class Slam:
         self.log, self.options, self.threads = log, options, threads
         seen, cell = log.ranges[log.ranges < options.tracking.reach], options.tracking.gaussians.cell
         tracking = dataclasses.replace(options.tracking, reach=sight(seen, cell))
-        self.tracker = Follower(tracking, options.breaks, log.odometry is not None)
+        self.tracker = SegmentTracker(tracking, options.breaks, log.odometry is not None)
         self.odometry, self.jumps = log.odometry, np.zeros(0, dtype=np.int64)
         if log.odometry is not None:
             self.odometry, self.jumps = believed_odometry(log.odometry, log.times)
@@ -63,7 +63,9 @@ class Slam:
         self.keyframes = Keyframes(options.keyframes, options.nscan.gaussians, median_range)
         self.tracked: list[Array] = []
         self.breaks: list[int] = []
-        self.match: MatchNearby = match_pairs_nearby if options.relations == "pairwise" else match_nearby
+        self.match: MatchNearby = (
+            match_neighbours_pairwise if options.relations == "pairwise" else match_neighbours
+        )
         self.ahead = Ahead(self.match, options.nscan, threads)
         self.steps: list[Pairwise] = []
         self.route = route_of(self.keyframes.list, self.steps, np.zeros((0, 3)))
@@ -72,9 +74,9 @@ class Slam:
         self.others: list[Relation] = []
         self.loops: list[Loop] = []
         self.energies, self.covered = Energies(len(log)), Coverage()
-        self.closing = Closing(options.closing, options.nscan, self.match, self.energies)
+        self.closing = LoopDetector(options.closing, options.nscan, self.match, self.energies)
         self.places: list[Place] = []
-        self.growth = Growth(options.growth)
+        self.growth = OptimisationSchedule(options.growth)
 
     def run(self, report: Report) -> Graph:
         """The paper's loop over all scans, and the last optimisation."""
@@ -88,7 +90,7 @@ class Slam:
         self.keyframes.part()
         self.grow(len(self.keyframes))
         for centre in range(len(self.keyframes) - self.options.nscan.behind, len(self.keyframes)):
-            self.match_nearby(centre)
+            self.match_neighbours(centre)
         self.optimise(max_iterations=100, tolerance=1e-6)
         self.reject()
         self.refine()
@@ -97,7 +99,7 @@ class Slam:
         graph.marginals = marginal_covariances(graph)
         return graph
 
-    def stretches(self) -> Iterator[Sensed]:
+    def stretches(self) -> Iterator[ScanBatch]:
         """The scans, a stretch of them at a time: the points that are matched.
 
         Those are within reach, and none of a laser that hangs.
@@ -110,10 +112,10 @@ class Slam:
                 sizes = np.diff(ends)
                 points = points[np.repeat(~hangs, sizes)]
                 ends = np.concatenate([[0], np.cumsum(np.where(hangs, 0, sizes))])
-            yield Sensed(first, points, ends, None if self.odometry is None else self.odometry[first:end])
+            yield ScanBatch(first, points, ends, None if self.odometry is None else self.odometry[first:end])
             first = end
 
-    def track(self, scans: Sensed) -> list[Followed]:
+    def track(self, scans: ScanBatch) -> list[TrackedSegments]:
         """Step 1: the poses of the next scans, each by matching it with the map of the last metres.
 
         Returns the scans that are settled by it; with the last one these are all.
@@ -122,7 +124,7 @@ class Slam:
         is_last = scans.first + len(scans) == len(self.log)
         return settled + self.tracker.finish() if is_last else settled
 
-    def settle(self, scans: Followed) -> bool:
+    def settle(self, scans: TrackedSegments) -> bool:
         """Step 2: whether there are new keyframes among scans that were tracked."""
         first, known = scans.sensed.first, len(self.keyframes)
         if scans.begins:
@@ -139,7 +141,7 @@ class Slam:
         for keyframe in self.keyframes.list[len(self.poses) : size]:
             keyframe.finish()
             self.add_keyframe(keyframe)
-            self.match_nearby(len(self.poses) - 1 - self.options.nscan.behind)
+            self.match_neighbours(len(self.poses) - 1 - self.options.nscan.behind)
 
     def add_keyframe(self, keyframe: Keyframe) -> None:
         """Step 2: a new keyframe, with its relation to the one before."""
@@ -150,12 +152,12 @@ class Slam:
         self.closing.extend(self.steps[before - 1], path - float(self.route.paths[-1]))
         self.route = extended(self.route, before + 1)
 
-    def match_nearby(self, centre: int) -> None:
+    def match_neighbours(self, centre: int) -> None:
         """Step 3: a keyframe matched with those near it; the graph follows when it must."""
         if centre < 0:
             return
         route, options = self.route, self.options.nscan
-        near = choose_nearby(route.poses, route.paths, centre, options)
+        near = choose_neighbours(route.poses, route.paths, centre, options)
         if not self.covered.is_due(route, centre, near, options):
             return
         # One more may be there that is not whole.
@@ -174,7 +176,7 @@ class Slam:
             refused = loop is not None and not loop.accepted
             self.close_loops(centre, near.tried[near.seen_before & refused])
 
-    def match_unless_doubted(self, centre: int, near: Near) -> Nearby | None:
+    def match_unless_doubted(self, centre: int, near: Neighbours) -> LocalMatch | None:
         """The match of a keyframe with those near it; without other visits if its place there is doubted."""
         nearby = self.ahead.match(self.route, centre, near)
         if nearby is None or nearby.loop is None:
@@ -184,7 +186,7 @@ class Slam:
             return nearby
         loop = dataclasses.replace(nearby.loop, accepted=False, reason=reason)
         alone = dataclasses.replace(self.options.nscan, loops=False)
-        near = choose_nearby(self.route.poses, self.route.paths, centre, alone)
+        near = choose_neighbours(self.route.poses, self.route.paths, centre, alone)
         nearby = self.match(self.route, centre, near, alone)
         return None if nearby is None else dataclasses.replace(nearby, loop=loop, whole=False)
 
@@ -199,7 +201,7 @@ class Slam:
         self.places.extend(places)
         self.optimise(max_iterations=100, tolerance=1e-4)
 
-    def take(self, nearby: Nearby) -> None:
+    def take(self, nearby: LocalMatch) -> None:
         """The relations of a match join the graph."""
         if nearby.loop is not None:
             self.loops.append(nearby.loop)
@@ -245,9 +247,9 @@ class Slam:
         ]
         self.optimise(max_iterations=100, tolerance=1e-6)
 
-    def optimise(self, max_iterations: int, tolerance: float, part: Part | None = None) -> None:
+    def optimise(self, max_iterations: int, tolerance: float, part: Subgraph | None = None) -> None:
         """Step 5: the global poses of all keyframes, or of a part, from all relations (paper, IV)."""
-        part = Part(self.relations) if part is None else part
+        part = Subgraph(self.relations) if part is None else part
         self.growth.optimised(len(self.poses), part)
         if len(self.poses) < 2:
             return

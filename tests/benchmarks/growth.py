@@ -99,8 +99,8 @@ def exponents(rows: list[Row]) -> tuple[float, float]:
 
 def draw(series: dict[str, list[Row]], path: str) -> None:
     """Time over scans, and memory, one above the other."""
-    from nscan_cli.mapping.canvas import figure_png
-    from nscan_cli.mapping.panels import stacked
+    from nscan_cli.mapping.figures.canvas import figure_png
+    from nscan_cli.mapping.figures.panels import stacked
 
     charts = []
     for key, label in (("seconds", "processor time, s"), ("megabytes", "peak memory, MB")):

@@ -19,7 +19,7 @@ import numpy as np
 
 from nscan_cli.evaluation.alignment import alignment
 from nscan_cli.poses import Array, compose
-from nscan_cli.slam.notices import notices
+from nscan_cli.slam.diagnostics.notices import notices
 from nscan_cli.slam.options import SlamOptions
 from nscan_cli.slam.pipeline import Slam
 from tests.benchmarks.robustness import false_loops

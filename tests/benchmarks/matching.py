@@ -9,16 +9,16 @@ from typing import get_args
 
 import numpy as np
 
-from nscan_cli.cli.knowledge import odometry_priors
+from nscan_cli.cli.known_poses import odometry_priors
+from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.logs.load import read_log
-from nscan_cli.logs.scan import LaserLog
-from nscan_cli.matching.joint import JointOptions
-from nscan_cli.matching.joint_energy import JointProblem, all_pairs, joint_energy, no_priors
-from nscan_cli.matching.nscan import nscan_match
-from nscan_cli.matching.pairs import Kind
+from nscan_cli.matching.joint.index_set import Kind
+from nscan_cli.matching.joint.joint_energy import JointProblem, all_pairs, joint_energy, no_priors
+from nscan_cli.matching.joint.joint_match import JointOptions
+from nscan_cli.matching.joint.nscan_match import nscan_match
+from nscan_cli.matching.joint.scan_set import lay_out
 from nscan_cli.matching.pairwise import PairOptions, match_pair, matched_points, scan_ndt
 from nscan_cli.matching.priors import MotionModel
-from nscan_cli.matching.scans import lay_out
 from nscan_cli.poses import Array, relative
 from tests.benchmarks.clock import Timing, median_of
 from tests.data import find_data

@@ -12,9 +12,9 @@ from typing import Any
 
 import numpy as np
 
-from nscan_cli.graph.g2o import read_g2o, write_g2o
+from nscan_cli.graph.io.g2o import read_g2o, write_g2o
 from nscan_cli.graph.model import Graph
-from nscan_cli.graph.solve import optimise_graph
+from nscan_cli.graph.optimise.whole_graph import optimise_graph
 from nscan_cli.logs.load import read_log
 from nscan_cli.matching.pairwise import PairOptions, match_pair, matched_points, scan_ndt
 from nscan_cli.poses import Array

@@ -21,9 +21,9 @@ from typing import Any
 import pytest
 
 from nscan_cli.cli.main import OBJECTS
-from nscan_cli.compiled import Kernel
+from nscan_cli.kernels.decorators import Kernel
+from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.logs.load import read_log
-from nscan_cli.logs.scan import LaserLog
 from nscan_cli.slam.options import SlamOptions
 from nscan_cli.slam.pipeline import Slam
 from tests.experiments.output import table

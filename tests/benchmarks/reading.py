@@ -8,12 +8,12 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from nscan_cli.logs.load import read_log
-from nscan_cli.logs.mcap_records import MAGIC
+from nscan_cli.logs.recordings.mcap_records import MAGIC
 from tests.benchmarks.clock import Timing, best_of
 from tests.data import find_data
-from tests.logs.containers import repacked
 from tests.logs.forms import FORMS
-from tests.logs.recordings import drive
+from tests.logs.recordings.containers import repacked
+from tests.logs.recordings.drives import drive
 
 SCANS, BEAMS = 10_000, 360
 

@@ -15,14 +15,14 @@ from pathlib import Path
 
 import numpy as np
 
-from nscan_cli.evaluation.relations import read_relations, relation_errors
-from nscan_cli.evaluation.results import load_reference
-from nscan_cli.evaluation.trajectory import trajectory_errors
+from nscan_cli.evaluation.load_trajectory import load_reference
+from nscan_cli.evaluation.reference_relations import read_relations, relation_errors
+from nscan_cli.evaluation.trajectory_errors import trajectory_errors
+from nscan_cli.graph.io.tum import Trajectory
 from nscan_cli.graph.model import Graph
-from nscan_cli.graph.tum import Trajectory
+from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.logs.load import read_log
-from nscan_cli.logs.options import ReadingOptions
-from nscan_cli.logs.scan import LaserLog
+from nscan_cli.logs.reading_options import ReadingOptions
 from nscan_cli.poses import Array, compose, relative, wrap
 from nscan_cli.slam.options import Relations, SlamOptions
 from nscan_cli.slam.pipeline import Slam

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from tests.logs.recordings import PERIOD, START, Odom, Scan, Tf, Written
+from tests.logs.recordings.drives import PERIOD, START, Odom, Scan, Tf, Written
 
 COUNT = 24
 

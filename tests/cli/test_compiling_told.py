@@ -9,12 +9,12 @@ from pathlib import Path
 
 import pytest
 
-from nscan_cli.cache_folder import PACKAGE
+from nscan_cli.kernels.cache_folder import PACKAGE
 
 KERNELS = """
-from nscan_cli.compiled import kernel, lean_kernel
+from nscan_cli.kernels.decorators import kernel, leaf_kernel
 
-@lean_kernel
+@leaf_kernel
 def doubled(a):
     return 2 * a
 

@@ -10,10 +10,10 @@ import pytest
 from PIL import Image
 
 from nscan_cli.cli.main import run
-from nscan_cli.graph.tum import write_tum
-from nscan_cli.mapping.canvas import BLUE, VERMILLION
-from nscan_cli.mapping.error_plots import REFERENCE
-from nscan_cli.mapping.ramp import ramp
+from nscan_cli.graph.io.tum import write_tum
+from nscan_cli.mapping.figures.canvas import BLUE, VERMILLION
+from nscan_cli.mapping.figures.colour_ramp import ramp
+from nscan_cli.mapping.figures.error_plots import REFERENCE
 
 # The robot drives 1 m a second along x; the relations say 1.1 m, and 1 m with 2° more.
 STAMPS = ["10.000000", "11.000000", "12.000000", "13.000000"]

@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 
 from nscan_cli.cli.main import run
-from nscan_cli.graph.tum import write_tum
+from nscan_cli.graph.io.tum import write_tum
 from nscan_cli.poses import compose
 from tests.data import data_file
 from tests.evaluation.paths import drive, noisy, trajectory
-from tests.logs.test_recorded_poses import PLACES, POSE, STAMPS, bag1
+from tests.logs.recordings.test_pose_topics import PLACES, POSE, STAMPS, bag1
 
 
 @pytest.fixture
@@ -138,7 +138,7 @@ def test_a_topic_and_a_recording_belong_together(files, capsys, arguments, said)
 
 @pytest.mark.logs
 def test_a_topic_of_a_real_recording_has_the_poses_of_its_table():
-    from nscan_cli.evaluation.results import load_reference
+    from nscan_cli.evaluation.load_trajectory import load_reference
 
     table = load_reference(str(data_file("field/mocap.reference.tum")))
     topic = load_reference(str(data_file("field/mocap.bag")), topic="/vrpn_client_node/jackal/pose")

@@ -13,9 +13,9 @@ import pytest
 
 from nscan_cli.cli.main import run
 from nscan_cli.exports.carmen import corrected_log
-from nscan_cli.graph.tum import write_tum
+from nscan_cli.graph.io.tum import write_tum
 from nscan_cli.logs.load import read_log
-from nscan_cli.logs.options import ReadingOptions
+from nscan_cli.logs.reading_options import ReadingOptions
 from nscan_cli.poses import relative
 from tests.data import data_file
 

@@ -11,7 +11,7 @@ import pytest
 
 from nscan_cli.cli.main import run
 from tests.cli.room_drive import COUNT, room_drive
-from tests.logs.ros_recordings import split_bag2
+from tests.logs.recordings.ros import split_bag2
 
 
 @pytest.fixture(scope="module")

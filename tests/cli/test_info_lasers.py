@@ -12,8 +12,8 @@ import pytest
 
 from nscan_cli.cli.main import run
 from tests.logs.lines import flaser
-from tests.logs.recordings import MOUNT, PERIOD, START, Odom, Scan, Tf, Written, drive, turned
-from tests.logs.ros_recordings import ros2
+from tests.logs.recordings.drives import MOUNT, PERIOD, START, Odom, Scan, Tf, Written, drive, turned
+from tests.logs.recordings.ros import ros2
 
 
 def with_more(*topics: tuple[str, type]) -> list[Written]:

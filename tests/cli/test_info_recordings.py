@@ -11,8 +11,8 @@ import pytest
 from mcap.reader import make_reader
 
 from nscan_cli.cli.main import run
-from tests.logs.recordings import drive
-from tests.logs.ros_recordings import ros2
+from tests.logs.recordings.drives import drive
+from tests.logs.recordings.ros import ros2
 
 
 @pytest.fixture

@@ -14,7 +14,7 @@ from pathlib import Path
 
 import pytest
 
-from nscan_cli.outputs import TEMPORARY
+from nscan_cli.files.outputs import TEMPORARY
 from tests.cli.room_log import ALL_OUTPUTS, room_log
 
 SCANS = 40

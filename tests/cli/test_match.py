@@ -12,9 +12,9 @@ import pytest
 from PIL import Image
 
 from nscan_cli.cli.main import run
-from nscan_cli.graph.triangles import from_upper_triangle
+from nscan_cli.graph.io.triangles import from_upper_triangle
 from nscan_cli.logs.load import read_log
-from nscan_cli.mapping.canvas import BLUE, PURPLE, VERMILLION
+from nscan_cli.mapping.figures.canvas import BLUE, PURPLE, VERMILLION
 from nscan_cli.poses import relative
 from tests.data import data_file
 from tests.logs.lines import flaser

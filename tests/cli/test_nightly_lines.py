@@ -11,7 +11,7 @@ from rich.progress import BarColumn, Progress, TextColumn
 
 from nscan_cli.cli.night_lines import LiveLines, night_lines
 from nscan_cli.nightly.manifest import Entry
-from nscan_cli.nightly.nights import Night
+from nscan_cli.nightly.night_history import Night
 
 DONE: Night = {
     "outcome": "done",

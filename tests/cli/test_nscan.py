@@ -10,14 +10,14 @@ import numpy as np
 import pytest
 
 from nscan_cli.cli.main import run
-from nscan_cli.graph.json_fields import Record
-from nscan_cli.graph.json_file import write_graph
+from nscan_cli.graph.io.json_fields import JsonRecord
+from nscan_cli.graph.io.json_graph import write_graph
+from nscan_cli.graph.io.triangles import from_upper_triangle
+from nscan_cli.graph.io.tum import write_tum
 from nscan_cli.graph.model import Graph, NScan, Pairwise
-from nscan_cli.graph.relation_types import relation_of
-from nscan_cli.graph.triangles import from_upper_triangle
-from nscan_cli.graph.tum import write_tum
+from nscan_cli.graph.relations.registry import relation_of
+from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.logs.load import read_log
-from nscan_cli.logs.scan import LaserLog
 from nscan_cli.poses import compose, relative
 from tests.data import data_file
 from tests.matching.problems import errors
@@ -71,7 +71,7 @@ def test_the_document(capsys, office):
     document, said = matched(capsys, SAMPLE, "--scans", SPEC)
     assert list(document) == KEYS
     assert (document["format"], document["version"]) == ("nscan-joint-match", "1.0")
-    relation = relation_of(Record(document["relation"], "relation"), "scans")
+    relation = relation_of(JsonRecord(document["relation"], "relation"), "scans")
     assert isinstance(relation, NScan)
     assert (relation.nodes, relation.fixed, relation.origin) == (tuple(SCANS), 0, "nscan")
     assert_true(document, office)

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from nscan_cli.cli.main import run
-from nscan_cli.graph.json_file import write_graph
+from nscan_cli.graph.io.json_graph import write_graph
 from nscan_cli.graph.model import Pairwise
+from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.logs.load import read_log
-from nscan_cli.logs.scan import LaserLog
 from nscan_cli.poses import relative
 from tests.cli.test_nscan import CORRIDOR, SAMPLE, SCANS, SPEC, assert_true, graph_of, matched
 

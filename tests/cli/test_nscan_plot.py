@@ -9,11 +9,11 @@ import pytest
 from PIL import Image
 
 from nscan_cli.cli.main import run
-from nscan_cli.graph.json_file import write_graph
+from nscan_cli.graph.io.json_graph import write_graph
 from nscan_cli.graph.model import Pairwise
 from nscan_cli.logs.load import read_log
-from nscan_cli.mapping.canvas import BLACK, DIM
-from nscan_cli.mapping.ramp import ramp
+from nscan_cli.mapping.figures.canvas import BLACK, DIM
+from nscan_cli.mapping.figures.colour_ramp import ramp
 from nscan_cli.poses import relative
 from tests.cli.test_nscan import SAMPLE, SCANS, SPEC, graph_of, matched
 

@@ -10,8 +10,8 @@ from typing import Any
 import click
 import pytest
 
-from nscan_cli.cli.command import OWN_MEANINGS, Option
 from nscan_cli.cli.main import COMMANDS, cli, run
+from nscan_cli.cli.subcommand import OWN_MEANINGS, Option
 
 EVERY = [
     (name, parameter)

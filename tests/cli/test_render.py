@@ -11,7 +11,7 @@ import pytest
 from PIL import Image
 
 from nscan_cli.cli.main import run
-from nscan_cli.graph.json_file import write_graph
+from nscan_cli.graph.io.json_graph import write_graph
 from nscan_cli.graph.model import Graph, Pairwise
 from tests.data import data_file
 from tests.mapping.nav2 import load_map

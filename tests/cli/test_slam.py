@@ -19,14 +19,14 @@ import pytest
 from PIL import Image
 
 from nscan_cli.cli.main import run
-from nscan_cli.graph.g2o import read_g2o
-from nscan_cli.graph.json_file import read_graph, write_graph
-from nscan_cli.graph.tum import read_tum
+from nscan_cli.graph.io.g2o import read_g2o
+from nscan_cli.graph.io.json_graph import read_graph, write_graph
+from nscan_cli.graph.io.tum import read_tum
 from nscan_cli.logs.load import read_log
-from nscan_cli.logs.options import ReadingOptions
+from nscan_cli.logs.reading_options import ReadingOptions
 from nscan_cli.poses import relative
 from tests.cli.room_log import ALL_OUTPUTS, room_log
-from tests.graph.test_json_file import validate
+from tests.graph.io.test_json_graph import validate
 
 SAMPLE = str(Path(__file__).resolve().parents[2] / "sample_logs" / "office.log.gz")
 SHORT = [SAMPLE, "--end", "40"]

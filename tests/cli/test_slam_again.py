@@ -14,11 +14,11 @@ import numpy as np
 import pytest
 
 from nscan_cli.cli.main import run
-from nscan_cli.graph.g2o import write_g2o
-from nscan_cli.graph.json_file import read_graph, write_graph
-from nscan_cli.graph.tum import read_tum
+from nscan_cli.graph.io.g2o import write_g2o
+from nscan_cli.graph.io.json_graph import read_graph, write_graph
+from nscan_cli.graph.io.tum import read_tum
 from nscan_cli.logs.load import read_log
-from nscan_cli.logs.options import ReadingOptions
+from nscan_cli.logs.reading_options import ReadingOptions
 from nscan_cli.poses import relative
 from tests.graph.small_graph import small_graph
 

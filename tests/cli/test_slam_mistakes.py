@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from nscan_cli.cli.main import run
-from nscan_cli.graph.json_file import write_graph
+from nscan_cli.graph.io.json_graph import write_graph
 from tests.cli.room_log import ALL_OUTPUTS, room_log
 from tests.graph.small_graph import small_graph
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import tomllib
 
 from nscan_cli.cli.main import run
-from nscan_cli.graph.json_file import read_graph
+from nscan_cli.graph.io.json_graph import read_graph
 from tests.cli.test_slam import SAMPLE, SHORT, document_of
-from tests.graph.test_json_file import validate
+from tests.graph.io.test_json_graph import validate
 
 
 def test_without_odometry(folder):

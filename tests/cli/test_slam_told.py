@@ -9,7 +9,7 @@ import pytest
 
 from nscan_cli.cli.main import run
 from nscan_cli.cli.slam_runs import without_numbers
-from nscan_cli.graph.json_file import read_graph
+from nscan_cli.graph.io.json_graph import read_graph
 from tests.cli.test_slam import SAMPLE, SHORT
 
 

@@ -20,7 +20,7 @@ import pytest
 
 from nscan_cli.cli.main import run
 from nscan_cli.logs.load import read_log
-from nscan_cli.logs.options import ReadingOptions
+from nscan_cli.logs.reading_options import ReadingOptions
 from nscan_cli.poses import relative
 from tests.docs.blocks import ROOT, blocks
 

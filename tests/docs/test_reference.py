@@ -12,10 +12,10 @@ import pytest
 
 from nscan_cli import errors
 from nscan_cli.cli import main
-from nscan_cli.cli.command import Option, Subcommand
 from nscan_cli.cli.main import COMMANDS, cli, run
 from nscan_cli.cli.manual import EXAMPLES, EXIT_CODES
-from nscan_cli.limits import ALL
+from nscan_cli.cli.subcommand import Option, Subcommand
+from nscan_cli.files.limits import ALL
 from nscan_cli.nightly.manifest import KEYS, read_manifest
 from tests.docs.blocks import blocks
 from tests.reference import reference

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from nscan_cli.graph.tum import Trajectory
+from nscan_cli.graph.io.tum import Trajectory
 from nscan_cli.poses import Array
 
 PERIOD = 0.1

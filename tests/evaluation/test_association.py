@@ -4,7 +4,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from nscan_cli.evaluation.association import TOLERANCE, mutual, nearest
+from nscan_cli.evaluation.association import TOLERANCE, mutual, nearest_in_time
 
 # Multiples of 1/64 s: differences are exact, and many times are equal.
 times = st.lists(st.integers(0, 640).map(lambda k: k / 64), min_size=1, max_size=12).map(sorted).map(np.array)
@@ -12,7 +12,7 @@ times = st.lists(st.integers(0, 640).map(lambda k: k / 64), min_size=1, max_size
 
 @given(times, times)
 def test_nearest_is_what_a_search_of_all_finds(a: np.ndarray, b: np.ndarray):
-    rows = nearest(a, b)
+    rows = nearest_in_time(a, b)
     np.testing.assert_array_equal(np.abs(a[rows] - b), np.abs(a[:, None] - b[None]).min(axis=0))
 
 

@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 import pytest
 
+from nscan_cli.evaluation.load_trajectory import load_reference, load_trajectory
 from nscan_cli.evaluation.remarks import remarks
-from nscan_cli.evaluation.results import load_reference, load_trajectory
-from nscan_cli.evaluation.trajectory import trajectory_errors
-from nscan_cli.graph.tum import Trajectory
+from nscan_cli.evaluation.trajectory_errors import trajectory_errors
+from nscan_cli.graph.io.tum import Trajectory
 from nscan_cli.poses import Array, compose
 from tests.data import data_file
 from tests.evaluation.paths import drive, noisy, trajectory

@@ -10,15 +10,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from nscan_cli.cli.knowledge import no_knowledge
-from nscan_cli.mapping.plots import plot_nscan
-from nscan_cli.matching.joint import JointMatch, JointOptions, match_near_and_far
-from nscan_cli.matching.joint_energy import JointProblem, all_pairs, no_priors
-from nscan_cli.matching.left_out import LeftOut
-from nscan_cli.matching.nscan import NScanMatch, nscan_match
-from nscan_cli.matching.pairs import Kind
+from nscan_cli.cli.known_poses import no_knowledge
+from nscan_cli.mapping.figures.match_plots import plot_nscan
+from nscan_cli.matching.joint.index_set import Kind
+from nscan_cli.matching.joint.joint_energy import JointProblem, all_pairs, no_priors
+from nscan_cli.matching.joint.joint_match import JointMatch, JointOptions, match_near_and_far
+from nscan_cli.matching.joint.nscan_match import NScanMatch, nscan_match
+from nscan_cli.matching.joint.outliers import ExcludedScan
+from nscan_cli.matching.joint.scan_set import lay_out
 from nscan_cli.matching.pairwise import matched_points, scan_ndt
-from nscan_cli.matching.scans import lay_out
 from nscan_cli.poses import Array, compose, relative, wrap
 from tests.experiments.reference import ReferenceLog
 from tests.matching.problems import OPTIONS, errors, near, office_truth
@@ -87,7 +87,7 @@ class Matched:
     """Scans after their match."""
 
     match: NScanMatch
-    left_out: tuple[LeftOut, ...]
+    left_out: tuple[ExcludedScan, ...]
     errors: Array
     """(k, 3) of the scans that were kept, seen from the first of them, m and rad."""
 

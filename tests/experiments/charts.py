@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from nscan_cli.mapping.axes import Entry, legend, round_length
-from nscan_cli.mapping.canvas import (
+from nscan_cli.mapping.figures.axes import Entry, legend, round_length
+from nscan_cli.mapping.figures.canvas import (
     BLACK,
     BLUE,
     GREEN,

@@ -9,14 +9,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from nscan_cli.cli.knowledge import no_knowledge
+from nscan_cli.cli.known_poses import no_knowledge
 from nscan_cli.graph.model import Graph, Pairwise
-from nscan_cli.graph.solve import optimise_graph
-from nscan_cli.matching.joint import JointOptions, match_near_and_far
-from nscan_cli.matching.joint_energy import JointProblem, all_pairs, no_priors
-from nscan_cli.matching.nscan import nscan_match
+from nscan_cli.graph.optimise.whole_graph import optimise_graph
+from nscan_cli.matching.joint.joint_energy import JointProblem, all_pairs, no_priors
+from nscan_cli.matching.joint.joint_match import JointOptions, match_near_and_far
+from nscan_cli.matching.joint.nscan_match import nscan_match
+from nscan_cli.matching.joint.scan_set import lay_out
 from nscan_cli.matching.pairwise import PairMatch, match_pair
-from nscan_cli.matching.scans import lay_out
 from nscan_cli.poses import Array, compose, relative
 from tests.experiments.charts import line_chart
 from tests.experiments.drawing import ERROR, Drawn, draw_real, draw_simulated

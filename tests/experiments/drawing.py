@@ -8,10 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nscan_cli.errors import InputDataError
-from nscan_cli.logs.scan import LaserLog
-from nscan_cli.matching.overlap import overlaps, weakest_link
+from nscan_cli.logs.laser_log import LaserLog
+from nscan_cli.matching.joint.overlap import overlaps, weakest_link
+from nscan_cli.matching.joint.scan_set import lay_out
 from nscan_cli.matching.pairwise import matched_points, scan_ndt
-from nscan_cli.matching.scans import lay_out
 from nscan_cli.ndt.transform import Ndt
 from nscan_cli.poses import Array, relative, wrap
 from tests.experiments.reference import ReferenceLog

@@ -14,13 +14,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from nscan_cli.mapping.axes import CAPTION_MARGINS, Entry, caption
-from nscan_cli.mapping.canvas import GREEN, ORANGE, PURPLE, SKY, VERMILLION, Canvas
-from nscan_cli.mapping.panels import side_by_side, stacked
-from nscan_cli.matching.joint import JointOptions, match_jointly
-from nscan_cli.matching.joint_energy import JointProblem, all_pairs, joint_energy, no_priors
+from nscan_cli.mapping.figures.axes import CAPTION_MARGINS, Entry, caption
+from nscan_cli.mapping.figures.canvas import GREEN, ORANGE, PURPLE, SKY, VERMILLION, Canvas
+from nscan_cli.mapping.figures.panels import side_by_side, stacked
+from nscan_cli.matching.joint.joint_energy import JointProblem, all_pairs, joint_energy, no_priors
+from nscan_cli.matching.joint.joint_match import JointOptions, match_jointly
+from nscan_cli.matching.joint.scan_set import lay_out
 from nscan_cli.matching.pairwise import PairOptions, scan_ndt
-from nscan_cli.matching.scans import lay_out
 from nscan_cli.poses import Array
 from tests.experiments.charts import heat_map, line_chart
 from tests.experiments.report import Report

@@ -13,13 +13,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from nscan_cli.mapping.axes import Entry, caption
-from nscan_cli.mapping.canvas import BLUE, GREEN, PURPLE, VERMILLION
-from nscan_cli.mapping.panels import bounds_around, panel, side_by_side, stacked
-from nscan_cli.mapping.symbols import robots
-from nscan_cli.matching.joint import JointMatch, JointOptions, match_near_and_far
-from nscan_cli.matching.joint_energy import JointProblem, Priors, joint_energy
-from nscan_cli.matching.neutral import neutral_energy
+from nscan_cli.mapping.figures.axes import Entry, caption
+from nscan_cli.mapping.figures.canvas import BLUE, GREEN, PURPLE, VERMILLION
+from nscan_cli.mapping.figures.panels import bounds_around, panel, side_by_side, stacked
+from nscan_cli.mapping.figures.symbols import robots
+from nscan_cli.matching.joint.joint_energy import JointProblem, Priors, joint_energy
+from nscan_cli.matching.joint.joint_match import JointMatch, JointOptions, match_near_and_far
+from nscan_cli.matching.joint.neutral_energy import neutral_energy
 from nscan_cli.matching.uncertainty import Weakest, weakest_translation
 from nscan_cli.poses import Array, compose, relative, transform
 from tests.experiments.charts import line_chart

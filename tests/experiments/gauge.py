@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from nscan_cli.matching.joint import JointMatch
+from nscan_cli.matching.joint.joint_match import JointMatch
 from tests.experiments.cases import SUCCESS, Case, Matched, office_case, real_case, told_iterations
 from tests.experiments.reference import reference_log
 from tests.experiments.report import Report

@@ -13,8 +13,10 @@ from typing import Protocol
 import numpy as np
 from scipy.sparse import csr_array
 
+from nscan_cli.graph.linalg.factor_pattern import Pattern, block_targets
 from nscan_cli.graph.model import NScan, Pairwise
-from nscan_cli.graph.optimise import (
+from nscan_cli.graph.optimise.graph_energy import GraphEnergy, System
+from nscan_cli.graph.optimise.graph_solver import (
     FIRST_DAMPING,
     GREATEST_DAMPING,
     LEAST_DAMPING,
@@ -22,8 +24,6 @@ from nscan_cli.graph.optimise import (
     Optimum,
     newton_step,
 )
-from nscan_cli.graph.pattern import Pattern, block_targets
-from nscan_cli.graph.system import GraphEnergy, System
 from nscan_cli.poses import Array, Indices
 from tests.experiments.mappings import Mapping, Relations, differences, grouped
 
@@ -119,7 +119,7 @@ class Held(GraphEnergy):
 
 
 def minimise(energy: Stepwise, poses: Array, max_iterations: int = MAX_ITERATIONS) -> Optimum:
-    """nscan_cli.graph.optimise with the same damping, for a function that is another one in each iteration.
+    """graph_solver.optimise with the same damping, for a function that is another one in each iteration.
 
     A step counts as good when it lowers the function of its iteration.
     """

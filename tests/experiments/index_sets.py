@@ -6,7 +6,7 @@ from typing import get_args
 
 import numpy as np
 
-from nscan_cli.matching.pairs import Kind
+from nscan_cli.matching.joint.index_set import Kind
 from tests.experiments.cases import SUCCESS, Case
 from tests.experiments.gauge import intel_cases, office_cases
 from tests.experiments.report import Report

@@ -10,14 +10,14 @@ from numpy.typing import NDArray
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
-from nscan_cli.evaluation.association import nearest
-from nscan_cli.evaluation.relations import read_relations
-from nscan_cli.graph.initialise import chordal_start
+from nscan_cli.evaluation.association import nearest_in_time
+from nscan_cli.evaluation.reference_relations import read_relations
 from nscan_cli.graph.model import Pairwise
-from nscan_cli.graph.optimise import optimise
-from nscan_cli.graph.system import GraphEnergy
+from nscan_cli.graph.optimise.chordal import chordal_start
+from nscan_cli.graph.optimise.graph_energy import GraphEnergy
+from nscan_cli.graph.optimise.graph_solver import optimise
+from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.logs.load import read_log
-from nscan_cli.logs.scan import LaserLog
 from nscan_cli.poses import Array
 from tests.data import find_data
 
@@ -59,7 +59,7 @@ def reference_log(name: str) -> ReferenceLog | None:
     ]
     energy = GraphEnergy(len(part), pairwise, positions)
     poses = optimise(energy, chordal_start(energy, np.zeros((len(part), 3)))).poses
-    return ReferenceLog(log, nearest(log.times, times[part]), poses)
+    return ReferenceLog(log, nearest_in_time(log.times, times[part]), poses)
 
 
 def _largest_part(nodes: NDArray[np.int64], count: int) -> NDArray[np.int64]:

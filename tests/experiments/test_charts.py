@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from PIL.Image import Image
 
-from nscan_cli.mapping.canvas import BLUE, GREEN, VERMILLION, Colour
+from nscan_cli.mapping.figures.canvas import BLUE, GREEN, VERMILLION, Colour
 from tests.experiments.charts import SHAPE, heat_map, line_chart, ticks
 
 

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from nscan_cli.graph.model import Graph
-from nscan_cli.graph.optimise import optimise
+from nscan_cli.graph.optimise.graph_solver import optimise
 from nscan_cli.poses import Array, compose, relative
 from tests.experiments import transformation
 from tests.experiments.held import MAX_ITERATIONS, Followed, Held, minimise

@@ -14,7 +14,7 @@ from typing import Protocol
 import numpy as np
 
 from nscan_cli.graph.model import Graph, NScan, Pairwise
-from nscan_cli.graph.optimise import Optimum, optimise
+from nscan_cli.graph.optimise.graph_solver import Optimum, optimise
 from nscan_cli.logs.load import read_log
 from nscan_cli.poses import Array, Indices, compose, relative
 from nscan_cli.slam.options import SlamOptions

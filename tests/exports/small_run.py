@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from nscan_cli.graph.model import Graph, NScan, Pairwise
-from nscan_cli.logs.scan import LaserLog
+from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.poses import Array, compose
 from tests.mapping.scenes import log_of
 

@@ -13,9 +13,9 @@ from hypothesis import strategies as st
 
 from nscan_cli.errors import InputDataError
 from nscan_cli.exports.carmen import corrected_log
+from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.logs.load import read_log
-from nscan_cli.logs.options import ReadingOptions
-from nscan_cli.logs.scan import LaserLog
+from nscan_cli.logs.reading_options import ReadingOptions
 from nscan_cli.poses import Array, relative
 from tests.exports.small_run import POSES, small_log
 from tests.mapping.scenes import log_of

@@ -10,12 +10,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from nscan_cli.exports.mcap import TOPICS, recording
-from nscan_cli.exports.messages import Messages, scan_message
+from nscan_cli.exports.mcap import TOPICS, ros2_recording
+from nscan_cli.exports.ros_messages import Messages, scan_message
 from nscan_cli.graph.model import Graph
 from nscan_cli.logs.frame_names import FrameNames
+from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.logs.load import read_log
-from nscan_cli.logs.scan import LaserLog
 from nscan_cli.mapping.occupancy import OccupancyGrid, occupancy_grid
 from nscan_cli.poses import Array, compose, relative
 from tests.exports.small_run import POSES, small_log, small_run_graph
@@ -47,7 +47,7 @@ def run() -> tuple[LaserLog, Graph, bytes]:
     """A log, its graph, and the recording of both."""
     log = small_log()
     graph = small_run_graph(log)
-    return log, graph, recording(log, NODES, NODES, graph, grid_of(log))
+    return log, graph, ros2_recording(log, NODES, NODES, graph, grid_of(log))
 
 
 @pytest.fixture(scope="module")
@@ -169,7 +169,7 @@ def test_the_frames_lead_from_the_map_to_the_laser(run, topics):
 def test_without_odometry_there_is_no_odom_frame(run):
     log = dataclasses.replace(run[0], odometry=None)
     graph = small_run_graph(log)
-    frames = frames_at(read_back(recording(log, NODES, NODES, graph, grid_of(log))), 4)
+    frames = frames_at(read_back(ros2_recording(log, NODES, NODES, graph, grid_of(log))), 4)
     assert set(frames) == {("map", "base_link"), ("base_link", "laser")}
     np.testing.assert_allclose(relative(frames["map", "base_link"], POSES[4]), 0, atol=1e-9)
 
@@ -199,21 +199,21 @@ def test_the_graph_is_marked_with_a_colour_for_each_kind(topics):
 def test_scans_that_are_left_out_are_not_written_but_the_path_is_whole(run):
     log, graph, _ = run
     some = np.array([1, 3])
-    found = read_back(recording(log, some, some, graph, grid_of(log)))
+    found = read_back(ros2_recording(log, some, some, graph, grid_of(log)))
     assert [len(found[topic]) for topic in ("/scan", "/tf")] == [2, 2]
     assert len(found["/path"][0][1].poses) == 5
 
 
 def test_equal_inputs_give_equal_bytes(run):
     log, graph, data = run
-    assert recording(log, NODES, NODES, graph, grid_of(log)) == data
+    assert ros2_recording(log, NODES, NODES, graph, grid_of(log)) == data
 
 
 @pytest.mark.parametrize("start", ["-12.5", "2147483647.5"])
 def test_stamps_that_ros_has_no_room_for_count_from_the_first_second(start):
     stamps = tuple(repr(float(start) + 0.25 * k) for k in range(5))
     log = dataclasses.replace(small_log(), stamps=stamps, times=np.array([float(s) for s in stamps]))
-    found = read_back(recording(log, NODES, NODES, small_run_graph(log), grid_of(log)))
+    found = read_back(ros2_recording(log, NODES, NODES, small_run_graph(log), grid_of(log)))
     assert [time for time, _ in found["/scan"]] == [5 * 10**8 + 25 * 10**7 * k for k in range(5)]
 
 
@@ -222,7 +222,7 @@ def test_a_recording_is_a_log_for_slam_too(run, tmp_path, odometry):
     """The scans, how the laser is mounted, and the raw odometry: not the corrected poses."""
     log = run[0] if odometry else dataclasses.replace(run[0], odometry=None)
     path = tmp_path / "out.mcap"
-    path.write_bytes(recording(log, NODES, NODES, small_run_graph(log), grid_of(log)))
+    path.write_bytes(ros2_recording(log, NODES, NODES, small_run_graph(log), grid_of(log)))
     back = read_log(str(path))
     np.testing.assert_array_equal(back.ranges, log.ranges)
     np.testing.assert_allclose(back.angle_min, log.angle_min, atol=1e-7)
@@ -256,7 +256,7 @@ def test_a_scan_has_its_own_beams():
 )
 def test_frames_keep_the_names_that_the_log_has(names, links):
     log = dataclasses.replace(small_log(), frames=names)
-    found = read_back(recording(log, NODES, NODES, small_run_graph(log), grid_of(log)))
+    found = read_back(ros2_recording(log, NODES, NODES, small_run_graph(log), grid_of(log)))
     placed = {
         (link.header.frame_id, link.child_frame_id)
         for topic in ("/tf", "/tf_static")

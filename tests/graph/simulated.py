@@ -9,7 +9,7 @@ from itertools import combinations
 import numpy as np
 
 from nscan_cli.graph.model import Graph, NScan, Pairwise
-from nscan_cli.graph.system import GraphEnergy
+from nscan_cli.graph.optimise.graph_energy import GraphEnergy
 from nscan_cli.poses import Array, compose, relative, relative_jacobians
 
 SIGMA = np.array([0.05, 0.03, 0.01])

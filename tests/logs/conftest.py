@@ -7,11 +7,11 @@ from pathlib import Path
 
 import pytest
 
+from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.logs.load import read_log
-from nscan_cli.logs.options import ReadingOptions
-from nscan_cli.logs.scan import LaserLog
-from tests.logs.recordings import Written
-from tests.logs.ros_recordings import ros2
+from nscan_cli.logs.reading_options import ReadingOptions
+from tests.logs.recordings.drives import Written
+from tests.logs.recordings.ros import ros2
 
 
 @pytest.fixture

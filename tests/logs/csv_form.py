@@ -7,10 +7,11 @@ import math
 import numpy as np
 
 from nscan_cli.errors import InputDataError
-from nscan_cli.logs.assemble import Findings, Motion, RawScans, laser_log, stacked
-from nscan_cli.logs.options import ReadingOptions
-from nscan_cli.logs.order import by_time
-from nscan_cli.logs.scan import LaserLog, Source
+from nscan_cli.files.source import Source
+from nscan_cli.logs.assemble import Findings, RawScans, RecordedMotion, laser_log, stacked
+from nscan_cli.logs.laser_log import LaserLog
+from nscan_cli.logs.reading_options import ReadingOptions
+from nscan_cli.logs.scan_order import by_time
 from nscan_cli.logs.skips import Skips
 
 HEAD = b"seconds,x,y,heading,ranges\n"
@@ -41,4 +42,6 @@ def read(data: bytes, file: str, source: Source, options: ReadingOptions) -> Las
     mount = np.array(options.mount or (0.0, 0.0, 0.0))
     findings.used |= {"laser": "the only laser", "mounting": "the robot's centre", "odometry": "the columns"}
     raw = RawScans(ranges, *half_turn, stamps, (0.0, 80.0))
-    return laser_log(source, "CSV", "the laser", raw, times, mount, Motion(odometry), findings, options, file)
+    return laser_log(
+        source, "CSV", "the laser", raw, times, mount, RecordedMotion(odometry), findings, options, file
+    )

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
-from tests.logs.foxglove_recordings import foxglove_json, protobuf
-from tests.logs.recordings import Written
-from tests.logs.ros_recordings import bag1, db3, ros1, ros2, ros2_idl, rosbags_mcap
+from tests.logs.recordings.drives import Written
+from tests.logs.recordings.foxglove import foxglove_json, protobuf
+from tests.logs.recordings.ros import bag1, db3, ros1, ros2, ros2_idl, rosbags_mcap
 
 FORMS: dict[str, Callable[[list[Written], Path], bytes]] = {
     "ros1": lambda written, _: ros1(written),

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.logs.load import read_log
-from nscan_cli.logs.options import ReadingOptions
-from nscan_cli.logs.scan import LaserLog
+from nscan_cli.logs.reading_options import ReadingOptions
 
 
 def flaser(

@@ -15,14 +15,14 @@ import numpy as np
 import pytest
 
 from nscan_cli.errors import InputDataError
+from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.logs.load import read_log
-from nscan_cli.logs.options import ReadingOptions
-from nscan_cli.logs.scan import LaserLog
-from tests.logs.containers import repacked
+from nscan_cli.logs.reading_options import ReadingOptions
 from tests.logs.forms import FORMS
 from tests.logs.lines import flaser
-from tests.logs.recordings import drive
-from tests.logs.ros_recordings import ros2
+from tests.logs.recordings.containers import repacked
+from tests.logs.recordings.drives import drive
+from tests.logs.recordings.ros import ros2
 
 COUNT = 40
 READINGS = [tuple(round(1 + 0.01 * k + 0.1 * beam, 2) for beam in range(20)) for k in range(COUNT)]

@@ -15,9 +15,9 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from nscan_cli.errors import InputDataError, InputMissingError, NscanError, WrongUsageError
+from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.logs.load import read_log
-from nscan_cli.logs.options import ReadingOptions
-from nscan_cli.logs.scan import LaserLog
+from nscan_cli.logs.reading_options import ReadingOptions
 from tests.logs.lines import flaser
 
 TEXT = "\n".join(flaser(time, laser=(time, 0, 0)) for time in range(20)).encode() + b"\n"

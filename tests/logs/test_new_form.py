@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from nscan_cli.cli.main import run
-from nscan_cli.logs import kinds
-from nscan_cli.logs.kinds import Form, readable
+from nscan_cli.logs import formats as kinds
+from nscan_cli.logs.formats import Form, readable
 from nscan_cli.logs.load import read_log
-from nscan_cli.logs.options import ReadingOptions
+from nscan_cli.logs.reading_options import ReadingOptions
 from tests.logs import csv_form
 from tests.logs.lines import flaser
 

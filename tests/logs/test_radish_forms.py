@@ -10,7 +10,7 @@ import pytest
 
 from nscan_cli.errors import InputDataError
 from nscan_cli.logs.load import read_log
-from nscan_cli.logs.options import ReadingOptions
+from nscan_cli.logs.reading_options import ReadingOptions
 from tests.logs.lines import flaser, read
 
 EPOCH = 1037836800

@@ -7,10 +7,10 @@ import math
 import numpy as np
 import pytest
 
-from nscan_cli.logs.options import ReadingOptions
+from nscan_cli.logs.reading_options import ReadingOptions
 from nscan_cli.mapping.occupancy import occupancy_grid
 from tests.logs import lines
-from tests.logs.recordings import Scan
+from tests.logs.recordings.drives import Scan
 from tests.logs.room import carmen, readings, recording, way
 
 PILE = ", where readings pile up that met nothing"

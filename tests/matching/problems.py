@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from nscan_cli.matching.joint_energy import JointProblem, Priors, all_pairs, no_priors
+from nscan_cli.matching.joint.joint_energy import JointProblem, Priors, all_pairs, no_priors
+from nscan_cli.matching.joint.scan_set import lay_out
 from nscan_cli.matching.pairwise import PairOptions, matched_points, scan_ndt
-from nscan_cli.matching.scans import lay_out
 from nscan_cli.ndt.transform import Ndt
 from nscan_cli.poses import Array, relative, wrap
 from tests.simulation.laser import exact

@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from nscan_cli.ndt.association import associate_again, begin, room_to_meet
 from nscan_cli.ndt.energy import OUT, accumulate, energy, inlier_share, sum_meeting
-from nscan_cli.ndt.meeting import begin, meet_again, room_to_meet
 from nscan_cli.ndt.transform import Ndt
 from nscan_cli.poses import Array, compose, relative, transform
-from tests.ndt.test_grid import assert_same, entries
+from tests.ndt.test_grid_growth import assert_same, entries
 
 THICK = 0.12
 """m"""
@@ -142,7 +142,7 @@ def test_what_is_kept_while_the_pose_changes_is_of_the_right_face(points, pose):
     rng = np.random.default_rng(3)
     for _ in range(30):
         at = pose + rng.uniform(-0.1, 0.1, 3)
-        meet_again(ndt.grid, ndt.half, meeting, *at)
+        associate_again(ndt.grid, ndt.half, meeting, *at)
         sum_meeting(meeting, 0.3, 0.0, kept)
         met = room_to_meet(len(scan), 1)
         accumulate(ndt.grid, ndt.half, scan, at[0], at[1], at[2], 0.3, 0.0, 0.0, 1, met, anew)

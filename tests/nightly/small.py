@@ -13,7 +13,7 @@ from typing import Any
 from nscan_cli.nightly.manifest import Entry
 from tests.cli.room_drive import room_drive
 from tests.cli.room_log import room_log
-from tests.logs.ros_recordings import split_bag2
+from tests.logs.recordings.ros import split_bag2
 
 SCANS = {"one": 12, "two": 16, "three": 20}
 BOUND = 0.5

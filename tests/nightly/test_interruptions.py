@@ -13,8 +13,8 @@ from pathlib import Path
 import pytest
 
 from nscan_cli.cli.main import run
+from nscan_cli.files.outputs import TEMPORARY
 from nscan_cli.nightly.folder import claimed
-from nscan_cli.outputs import TEMPORARY
 from tests.nightly.small import copy_of, results
 
 

@@ -8,7 +8,7 @@ import pytest
 
 from nscan_cli.errors import InputDataError, InputMissingError, WrongUsageError
 from nscan_cli.nightly.manifest import Entry, read_manifest, shipped
-from nscan_cli.nightly.parameters import parameters_from
+from nscan_cli.nightly.manifest_parameters import parameters_from
 
 INTEL = """
 [[log]]

@@ -13,9 +13,9 @@ from nscan_cli.logs.load import read_log
 from nscan_cli.nightly import fingerprint
 from nscan_cli.nightly import night as night_module
 from nscan_cli.nightly.manifest import Entry
+from nscan_cli.nightly.manifest_parameters import parameters_from
 from nscan_cli.nightly.night import carry_out, plan
-from nscan_cli.nightly.nights import read_nights
-from nscan_cli.nightly.parameters import parameters_from
+from nscan_cli.nightly.night_history import read_nights
 from nscan_cli.nightly.task import Outcome
 from tests.nightly.small import recordings
 

@@ -8,7 +8,7 @@ import pytest
 from PIL import Image
 
 from nscan_cli.graph.model import Graph, Loop
-from nscan_cli.mapping.drawing import SOFT_GRAYS
+from nscan_cli.mapping.figures.map_drawing import SOFT_GRAYS
 from nscan_cli.mapping.occupancy import FREE, OCCUPIED, UNKNOWN, OccupancyGrid
 from nscan_cli.nightly import preview as module
 from nscan_cli.nightly.preview import preview

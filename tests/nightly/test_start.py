@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from nscan_cli.cache_folder import PACKAGE
+from nscan_cli.kernels.cache_folder import PACKAGE
 from tests.cli.room_log import room_log
 
 NAMES = ("random", "json", "threading", "numpy", "nscan_cli/__init__", "nscan_cli/errors")

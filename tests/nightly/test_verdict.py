@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from nscan_cli.nightly.manifest import Entry
-from nscan_cli.nightly.nights import Night
+from nscan_cli.nightly.night_history import Night
 from nscan_cli.nightly.verdict import Verdict, headline, verdict
 
 

@@ -9,11 +9,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from nscan_cli import machine_code
 from nscan_cli.cli.night_lines import PlainLines
+from nscan_cli.kernels import machine_code
 from nscan_cli.logs.load import log_from
 from nscan_cli.nightly import processes, start, warm_up, work
-from nscan_cli.nightly.card import card
+from nscan_cli.nightly.log_card import card
 from nscan_cli.nightly.manifest import Entry
 from nscan_cli.nightly.task import Task
 from nscan_cli.nightly.verdict import verdict

@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from nscan_cli.compiled import kernel
+from nscan_cli.kernels.decorators import kernel
 from nscan_cli.poses import Array, compose
 from tests.simulation.drive import Drive, Odometry, odometry, poses
 from tests.simulation.laser import Laser, with_errors

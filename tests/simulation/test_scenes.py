@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from nscan_cli.logs import carmen
-from nscan_cli.logs.options import ReadingOptions
-from nscan_cli.logs.scan import Source
+from nscan_cli.files.source import Source
+from nscan_cli.logs.reading_options import ReadingOptions
+from nscan_cli.logs.text import carmen
 from nscan_cli.poses import compose, transform, wrap
 from tests.simulation.laser import Laser, exact
 from tests.simulation.office import ROOMS

@@ -11,8 +11,8 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from nscan_cli.logs.order import by_time
-from nscan_cli.logs.scan import LaserLog
+from nscan_cli.logs.laser_log import LaserLog
+from nscan_cli.logs.scan_order import by_time
 from nscan_cli.poses import Array, compose, relative, transform, wrap
 
 Rows = slice | NDArray[np.int64]

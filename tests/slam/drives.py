@@ -10,15 +10,15 @@ from typing import NamedTuple
 import numpy as np
 
 from nscan_cli.graph.model import Pairwise
-from nscan_cli.logs.scan import LaserLog
+from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.poses import Array, compose, relative
-from nscan_cli.slam.closing import Closing
-from nscan_cli.slam.found import Tracked
-from nscan_cli.slam.keyframes import Keyframe, Keyframes, Route, relations_along, route_of
-from nscan_cli.slam.near import choose_nearby
-from nscan_cli.slam.nearby import MatchNearby, Nearby
+from nscan_cli.slam.frontend.tracked_scans import Tracked
+from nscan_cli.slam.keyframes.keyframe import Keyframe, Keyframes, Route, relations_along, route_of
+from nscan_cli.slam.local_matching.joint_relations import LocalMatch, MatchNearby
+from nscan_cli.slam.local_matching.neighbours import choose_neighbours
+from nscan_cli.slam.loop_closure.loop_detector import LoopDetector
+from nscan_cli.slam.loop_closure.place_search import Place
 from nscan_cli.slam.options import KeyframeOptions, NScanOptions
-from nscan_cli.slam.place import Place
 from tests.simulation.drive import Drive
 from tests.simulation.laser import Laser
 from tests.simulation.office import office_world
@@ -33,9 +33,9 @@ AROUND = np.array([0.0, -0.44, -0.22, 0.22, 0.44])
 BEHIND = NScanOptions().behind
 
 
-def about(match: MatchNearby, route: Route, centre: int, options: NScanOptions) -> Nearby | None:
+def about(match: MatchNearby, route: Route, centre: int, options: NScanOptions) -> LocalMatch | None:
     """The match of a keyframe with those near it."""
-    near = choose_nearby(route.poses, route.paths, centre, options)
+    near = choose_neighbours(route.poses, route.paths, centre, options)
     return match(route, centre, near, options)
 
 
@@ -197,7 +197,7 @@ def twin_drive(apart: float = TWIN) -> Driven:
 
 
 def closed_along(
-    closing: Closing, drive: Driven, until: int | None = None, left_out: Sequence[int] = ()
+    closing: LoopDetector, drive: Driven, until: int | None = None, left_out: Sequence[int] = ()
 ) -> list[tuple[int, list[Place]]]:
     """What Closing gives for centre after centre, as in the loop: (centre, places) where there are any.
 

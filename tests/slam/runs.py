@@ -11,17 +11,17 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from nscan_cli.files.provenance import provenance_of
 from nscan_cli.graph.model import Graph
+from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.logs.load import read_log
-from nscan_cli.logs.options import ReadingOptions
-from nscan_cli.logs.scan import LaserLog
+from nscan_cli.logs.reading_options import ReadingOptions
 from nscan_cli.poses import Array
-from nscan_cli.provenance import provenance_of
-from nscan_cli.slam.found import Found, Tracked
+from nscan_cli.slam.frontend.scan_batch import ScanBatch
+from nscan_cli.slam.frontend.tracked_scans import Tracked, TrackedScans
+from nscan_cli.slam.frontend.tracker import Tracker
 from nscan_cli.slam.options import NScanOptions, Relations, SlamOptions, TrackingOptions
 from nscan_cli.slam.pipeline import Slam
-from nscan_cli.slam.sensed import Sensed
-from nscan_cli.slam.tracking import Tracker
 from tests.data import data_file
 
 SAMPLE = Path(__file__).resolve().parents[2] / "sample_logs" / "office.log.gz"
@@ -108,27 +108,27 @@ def tracked(log: LaserLog, options: TrackingOptions | None = None) -> tuple[list
     return scans_of(tracker.track(sensed_in(log))), tracker
 
 
-def sensed(scans: Sequence[Array], odometry: Array | None = None) -> Sensed:
+def sensed(scans: Sequence[Array], odometry: Array | None = None) -> ScanBatch:
     """Scans with points (m, 2) each, as tracking takes them."""
     ends = np.cumsum([0, *map(len, scans)])
-    return Sensed(0, np.concatenate([np.empty((0, 2)), *scans]), ends, odometry)
+    return ScanBatch(0, np.concatenate([np.empty((0, 2)), *scans]), ends, odometry)
 
 
-def sensed_in(log: LaserLog) -> Sensed:
+def sensed_in(log: LaserLog) -> ScanBatch:
     """All scans of a log."""
     return sensed([log.points(row) for row in range(len(log))], log.odometry)
 
 
-def scans_of(found: Found) -> list[Tracked]:
+def scans_of(found: TrackedScans) -> list[Tracked]:
     """One by one."""
     return [found.scan(k) for k in range(len(found.paths))]
 
 
-def found_of(*scans: Tracked) -> Found:
+def found_of(*scans: Tracked) -> TrackedScans:
     """The same as columns; the objective's value is nobody's."""
     names = ("pose", "hessian", "expected", "inliers", "path", "joined", "off")
     columns = ([getattr(scan, name) for scan in scans] for name in names)
-    return Found(np.full(len(scans), np.nan), *map(np.array, columns))
+    return TrackedScans(np.full(len(scans), np.nan), *map(np.array, columns))
 
 
 def poses_of(found: list[Tracked]) -> Array:

@@ -7,9 +7,9 @@ import dataclasses
 import numpy as np
 import pytest
 
-from nscan_cli.graph.json_file import parse_graph, write_graph
+from nscan_cli.graph.io.json_graph import parse_graph, write_graph
 from nscan_cli.graph.model import Graph
-from nscan_cli.logs.scan import LaserLog
+from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.poses import relative, wrap
 from tests.simulation.scenes import office
 from tests.slam.runs import mapped, office_log, part, truth_of, without_returns

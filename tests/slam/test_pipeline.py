@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from nscan_cli.evaluation.relations import read_relations, relation_errors
-from nscan_cli.evaluation.trajectory import trajectory_errors
-from nscan_cli.graph.json_file import parse_graph, write_graph
-from nscan_cli.graph.solve import optimise_graph
-from nscan_cli.graph.tum import Trajectory
+from nscan_cli.evaluation.reference_relations import read_relations, relation_errors
+from nscan_cli.evaluation.trajectory_errors import trajectory_errors
+from nscan_cli.graph.io.json_graph import parse_graph, write_graph
+from nscan_cli.graph.io.tum import Trajectory
+from nscan_cli.graph.optimise.whole_graph import optimise_graph
 from nscan_cli.logs.load import read_log
 from nscan_cli.poses import relative
 from nscan_cli.slam.options import SlamOptions

@@ -10,12 +10,12 @@ import numpy as np
 import pytest
 
 from nscan_cli.graph.model import Pairwise
+from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.logs.load import read_log
-from nscan_cli.logs.options import ReadingOptions
-from nscan_cli.logs.scan import LaserLog
+from nscan_cli.logs.reading_options import ReadingOptions
 from nscan_cli.poses import Array, relative
-from nscan_cli.slam.believed import believed_odometry, hanging
-from nscan_cli.slam.notices import notices
+from nscan_cli.slam.diagnostics.notices import notices
+from nscan_cli.slam.frontend.odometry_checks import believed_odometry, hanging
 from nscan_cli.slam.options import BreakOptions
 from tests.data import data_file
 from tests.simulation import trouble

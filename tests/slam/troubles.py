@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from nscan_cli.logs.scan import LaserLog
+from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.poses import Array
 from tests.simulation import trouble
 from tests.simulation.scenes import Scene, office

@@ -11,18 +11,18 @@ from pathlib import Path
 import lz4.frame
 import zstandard
 
-from nscan_cli.graph.g2o import write_g2o
-from nscan_cli.graph.json_file import write_graph
-from nscan_cli.graph.tum import write_tum
+from nscan_cli.graph.io.g2o import write_g2o
+from nscan_cli.graph.io.json_graph import write_graph
+from nscan_cli.graph.io.tum import write_tum
 from tests.cli.room_log import room_log
 from tests.data import find_data
 from tests.graph.small_graph import small_graph
-from tests.logs.containers import repacked
 from tests.logs.forms import FORMS
-from tests.logs.recordings import drive
-from tests.logs.test_player import V1, V2
+from tests.logs.recordings.containers import repacked
+from tests.logs.recordings.drives import drive
 from tests.logs.test_radish_forms import FORMS as WITH_BEARINGS
-from tests.logs.test_script import LINES
+from tests.logs.text.test_player import V1, V2
+from tests.logs.text.test_script import LINES
 
 REAL_LINES = 60
 """Of the real logs, so many lines."""

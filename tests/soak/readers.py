@@ -13,13 +13,13 @@ import numpy as np
 from nscan_cli.cli.info import as_text, facts_of
 from nscan_cli.cli.main import cli
 from nscan_cli.errors import NscanError
-from nscan_cli.evaluation.relations import read_relations
-from nscan_cli.evaluation.results import load_trajectory
-from nscan_cli.graph.g2o import read_g2o, write_g2o
-from nscan_cli.graph.json_file import parse_graph, read_graph, write_graph
-from nscan_cli.graph.tum import read_tum, write_tum
+from nscan_cli.evaluation.load_trajectory import load_trajectory
+from nscan_cli.evaluation.reference_relations import read_relations
+from nscan_cli.graph.io.g2o import read_g2o, write_g2o
+from nscan_cli.graph.io.json_graph import parse_graph, read_graph, write_graph
+from nscan_cli.graph.io.tum import read_tum, write_tum
 from nscan_cli.logs.load import read_log
-from nscan_cli.logs.options import ReadingOptions
+from nscan_cli.logs.reading_options import ReadingOptions
 from nscan_cli.nightly.manifest import read_manifest
 
 PROMISED = (2, 3, 65, 66, 73)

@@ -15,11 +15,11 @@ import time
 from collections import Counter
 from pathlib import Path
 
-from nscan_cli.graph.g2o import read_g2o
-from nscan_cli.graph.json_file import read_graph
-from nscan_cli.graph.tum import read_tum
+from nscan_cli.graph.io.g2o import read_g2o
+from nscan_cli.graph.io.json_graph import read_graph
+from nscan_cli.graph.io.tum import read_tum
 from nscan_cli.logs.load import read_log
-from nscan_cli.logs.options import ReadingOptions
+from nscan_cli.logs.reading_options import ReadingOptions
 from tests.cli.room_log import ALL_OUTPUTS, room_log
 from tests.soak.corpus import RELATION, samples
 from tests.soak.mutations import damaged

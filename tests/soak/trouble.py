@@ -14,10 +14,10 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.logs.load import read_log
-from nscan_cli.logs.options import ReadingOptions
-from nscan_cli.logs.scan import LaserLog
-from nscan_cli.slam.notices import notices
+from nscan_cli.logs.reading_options import ReadingOptions
+from nscan_cli.slam.diagnostics.notices import notices
 from tests.data import find_data
 from tests.slam import troubles
 from tests.slam.drives import round_scene

@@ -1,0 +1,142 @@
+"""What `nscan` knows before it matches: poses to start from, and priors, from the log or from files."""
+
+from __future__ import annotations
+
+import hashlib
+import itertools
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from nscan_cli.errors import InputDataError
+from nscan_cli.evaluation.association import TOLERANCE, nearest_in_time
+from nscan_cli.files.encoding import plain
+from nscan_cli.files.inputs import base_name, label, read_bytes
+from nscan_cli.files.limits import GRAPH
+from nscan_cli.files.provenance import is_made_from
+from nscan_cli.files.source import Source
+from nscan_cli.graph.io.json_graph import parse_graph
+from nscan_cli.graph.io.tum import Trajectory, parse_tum
+from nscan_cli.graph.model import Graph, Pairwise
+from nscan_cli.graph.relative_covariance import Between
+from nscan_cli.logs.laser_log import LaserLog
+from nscan_cli.matching.joint.joint_energy import Priors, no_priors
+from nscan_cli.matching.joint.nscan_match import PriorsAmong
+from nscan_cli.matching.priors import MotionModel, odometry_prior
+from nscan_cli.poses import Array
+
+OTHER_LOG = "give the graph that was made from this log"
+
+
+@dataclass(frozen=True)
+class Knowledge:
+    """A graph or a trajectory, and the file that it comes from."""
+
+    content: Graph | Trajectory
+    source: Source
+    name: str
+    """The file as messages call it."""
+
+
+def read_knowledge(path: str, log: LaserLog) -> Knowledge:
+    """The graph or TUM trajectory at `path`, told apart by content.
+
+    Raises InputMissingError when it cannot be read, InputDataError when it is neither, or the graph of
+    another log.
+    """
+    data, name = read_bytes(path, GRAPH), label(path)
+    source = Source(base_name(path), hashlib.sha256(data).hexdigest(), len(data))
+    data = plain(data, name)
+    if not data.lstrip().startswith(b"{"):
+        return Knowledge(parse_tum(data, name), source, name)
+    graph = parse_graph(data, name)
+    inputs = graph.provenance.get("inputs")
+    if inputs and not is_made_from(inputs, log.source):
+        raise InputDataError(name, f"is not a graph of {log.source.name}: the SHA-256 differs", OTHER_LOG)
+    return Knowledge(graph, source, name)
+
+
+def poses_of(knowledge: Knowledge, log: LaserLog, rows: Sequence[int]) -> Array:
+    """The poses (n, 3) of the scans in `rows`. Raises InputDataError naming the first without one."""
+    content = knowledge.content
+    if isinstance(content, Graph):
+        numbers = log.numbers[rows]
+        found = np.minimum(np.searchsorted(content.scans, numbers), len(content) - 1)
+        missing = content.scans[found] != numbers
+    else:
+        times = log.times[rows]
+        found = nearest_in_time(content.times, times)
+        missing = np.abs(content.times[found] - times) > TOLERANCE
+    if missing.any():
+        number = log.numbers[rows[int(np.argmax(missing))]]
+        raise InputDataError(knowledge.name, f"has no pose of scan {number}", "leave the scan out")
+    return content.poses[found]
+
+
+def no_knowledge(_kept: Sequence[int]) -> Priors:
+    """No priors, whichever the scans are."""
+    return no_priors()
+
+
+def odometry_priors(odometry: Array, numbers: Sequence[int], model: MotionModel) -> PriorsAmong:
+    """The odometry (n, 3) of the scans `numbers` as priors from each scan to the next in time."""
+
+    def among(kept: Sequence[int]) -> Priors:
+        order = sorted(range(len(kept)), key=lambda at: numbers[kept[at]])
+        pairs = list(itertools.pairwise(order))
+        priors = [odometry_prior(odometry[kept[a]], odometry[kept[b]], model) for a, b in pairs]
+        return _priors(pairs, [prior.mean for prior in priors], [prior.information for prior in priors])
+
+    return among
+
+
+def graph_priors(graph: Graph, numbers: Sequence[int]) -> PriorsAmong:
+    """What the graph knows of the scans `numbers` as priors (paper, V, step 3).
+
+    These are its pairwise relations among them; and where these leave parts of them apart that other
+    relations connect, the relative poses of scans that are next in time, as all relations give them.
+    """
+    nodes = {int(scan): node for node, scan in enumerate(graph.scans)}
+    between = Between(graph, [nodes[number] for number in numbers if number in nodes])
+
+    def among(kept: Sequence[int]) -> Priors:
+        places = {nodes[numbers[scan]]: at for at, scan in enumerate(kept) if numbers[scan] in nodes}
+        found = [relation for relation in graph.pairwise if all(node in places for node in relation.nodes)]
+        found += _bridges(between, sorted(places), [relation.nodes for relation in found])
+        return _priors(
+            [(places[a], places[b]) for a, b in (relation.nodes for relation in found)],
+            [relation.measurement for relation in found],
+            [relation.information for relation in found],
+        )
+
+    return among
+
+
+def _bridges(between: Between, nodes: list[int], joined: list[tuple[int, int]]) -> list[Pairwise]:
+    """The relations that connect what the graph connects, but those that are `joined` do not yet."""
+    group = {node: node for node in nodes}
+
+    def join(a: int, b: int) -> None:
+        gone = group[b]
+        group.update({node: group[a] for node in nodes if group[node] == gone})
+
+    for a, b in joined:
+        join(a, b)
+    bridges = []
+    for at, node in enumerate(nodes):
+        for earlier in reversed(nodes[:at]):
+            if group[earlier] == group[node]:
+                break
+            relation = between.relation(earlier, node)
+            if relation is not None:
+                bridges.append(relation)
+                join(earlier, node)
+                break
+    return bridges
+
+
+def _priors(pairs: list[tuple[int, int]], means: list[Array], information: list[Array]) -> Priors:
+    if not pairs:
+        return no_priors()
+    return Priors(np.array(pairs, dtype=np.int64), np.array(means), np.array(information))

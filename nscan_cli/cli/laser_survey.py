@@ -1,0 +1,162 @@
+"""What `info` finds out beyond the laser that is used: the others, and what an option has to choose."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from nscan_cli.errors import InputDataError, NscanError
+from nscan_cli.files.counting import counted
+from nscan_cli.logs.reading_options import ReadingOptions
+
+if TYPE_CHECKING:
+    from nscan_cli.logs.choices import Device, OpenChoiceError
+    from nscan_cli.logs.laser_log import LaserLog
+    from nscan_cli.logs.recordings.mounting import MountingError
+
+    Read = Callable[[ReadingOptions], LaserLog]
+
+UNMOUNTED = (0.0, 0.0, 0.0)
+OF_ALL_LASERS = ("file", "sha256", "bytes", "files", "format", "odometry", "used", "records", "truth",
+                 "warnings", "lasers", "odometries", "corrected")  # fmt: skip
+"""Facts that hold also where no laser is chosen."""
+
+
+class Survey(NamedTuple):
+    """A log with all that is in it."""
+
+    log: LaserLog
+    """Of the laser that is used; of the first one, where none is chosen."""
+    lasers: list[dict[str, Any]]
+    """What `info --json` says of each laser."""
+    choices: dict[str, OpenChoiceError]
+    """What an option has to choose, by "laser" and "odometry"."""
+    unmounted: MountingError | None
+    """Why the other commands do not take the laser as it is mounted."""
+
+    @property
+    def refused(self) -> InputDataError | None:
+        """Why the other commands do not take what is used: its mounting, or that no reading counts."""
+        return self.unmounted or (None if "laser" in self.choices else self.log.report.unusable)
+
+    def facts(self, reading: ReadingOptions) -> dict[str, Any]:
+        """What there is beside the log of one laser, and what is to be said of it."""
+        report = self.log.report
+        used = dict(report.used)
+        if report.corrected and reading.odometry and not reading.allow_corrected:
+            used["odometry"] += "; other commands need --allow-corrected or --no-odometry"
+        if self.unmounted is not None:
+            used["mounting"] = f"refused: {self.unmounted.problem}"
+        for what, choice in self.choices.items():
+            used[what] = f"several; {choice.remedy}"
+        odometry = self.choices.get("odometry")
+        found = report.odometries if odometry is None else odometry.devices
+        return {
+            "used": used,
+            "lasers": self.lasers,
+            "odometries": [_named(one) for one in found],
+            "corrected": report.corrected or None,
+        }
+
+    def without_unchosen(self, facts: dict[str, Any]) -> dict[str, Any]:
+        """The facts of the log, null where they would be of a laser that nobody chose, or of no mounting."""
+        unknown = {"mounting"} if self.unmounted is not None else set()
+        if "laser" in self.choices:
+            unknown = facts.keys() - set(OF_ALL_LASERS)
+        return {key: None if key in unknown else value for key, value in facts.items()}
+
+
+def survey_of(paths: Sequence[str], reading: ReadingOptions) -> Survey:
+    """What is in the log at the `paths`, whatever the user has left open.
+
+    Raises what read_log does but for choices, corrected poses, lasers that are not level or not still, and
+    readings of which none counts.
+    """
+    from nscan_cli.logs.choices import OpenChoiceError
+    from nscan_cli.logs.recordings.mounting import MountingError
+
+    read = _reader(paths)
+    options = dataclasses.replace(reading, allow_corrected=True)
+    choices: dict[str, OpenChoiceError] = {}
+    others: list[dict[str, Any]] = []
+    first: dict[str, Any]
+    unmounted: MountingError | None = None
+    log = None
+    while log is None:
+        try:
+            log = read(options)
+        except OpenChoiceError as choice:
+            choices[choice.what] = choice
+            if choice.what == "laser":
+                first, *others = [{choice.chooses: one.name, "mount": UNMOUNTED} for one in choice.devices]
+            else:
+                first = {"odometry": False}
+            options = dataclasses.replace(options, **first)
+        except MountingError as error:
+            unmounted = error
+            options = dataclasses.replace(options, mount=UNMOUNTED)
+        except InputDataError:
+            # Where none is chosen, any laser that can be read tells of the whole log.
+            if not others:
+                raise
+            options = dataclasses.replace(options, **others.pop(0))
+    alone = dataclasses.replace(reading, odometry=False)
+    chosen = None if "laser" in choices else log
+    lasers = [_facts_of(laser, log.report.laser_option, chosen, read, alone) for laser in log.report.lasers]
+    if unmounted is not None:
+        next(one for one in lasers if one["name"] == log.laser)["problem"] = unmounted.problem
+    return Survey(log, lasers, choices, unmounted)
+
+
+def rate_of(log: LaserLog) -> float | None:
+    """Scans a second; None where they take no time."""
+    duration = float(log.times[-1] - log.times[0])
+    return round((len(log) - 1) / duration, 3) if duration > 0 else None
+
+
+def laser_line(laser: dict[str, Any]) -> str:
+    """What `info` says of a laser."""
+    kind = "" if laser["type"] == laser["name"] else f" ({laser['type']})"
+    said = counted(laser["records"], "record")
+    if laser["scans"] is not None:
+        rate = "" if laser["rate"] is None else f", {laser['rate']:.3g} a second"
+        said = f"{counted(laser['scans'], 'scan')} of {counted(laser['beams'], 'beam')}{rate}"
+    return f"{laser['name']}{kind}: {said}{'' if laser['problem'] is None else '; ' + laser['problem']}"
+
+
+def _facts_of(
+    laser: Device, option: str, chosen: LaserLog | None, read: Read, alone: ReadingOptions
+) -> dict[str, Any]:
+    """What `info --json` says of a laser: of the log that is read already, or of one that is read for it."""
+    from nscan_cli.logs.recordings.mounting import MountingError
+
+    facts = {**_named(laser), "scans": None, "beams": None, "rate": None, "problem": None}
+    own: dict[str, Any] = {option.removeprefix("--"): laser.name}
+    alone = dataclasses.replace(alone, **own)
+    log = chosen if chosen is not None and chosen.laser == laser.name else None
+    try:
+        while log is None:
+            try:
+                log = read(alone)
+            except MountingError as error:
+                facts["problem"] = error.problem
+                alone = dataclasses.replace(alone, mount=UNMOUNTED)
+    except NscanError as error:
+        return facts | {"problem": str(error)}
+    return facts | {"scans": len(log), "beams": int(log.own_beams().max()), "rate": rate_of(log)}
+
+
+def _named(device: Device) -> dict[str, Any]:
+    return {"name": device.name, "type": device.type, "records": device.records}
+
+
+def _reader(paths: Sequence[str]) -> Read:
+    """What reads the log again with other options; standard input is read once."""
+    from nscan_cli.files.inputs import STANDARD_INPUT, read_bytes
+    from nscan_cli.logs.load import log_from, read_log
+
+    if tuple(paths) != (STANDARD_INPUT,):
+        return lambda options: read_log(paths, options, even_unusable=True)
+    stored = read_bytes(STANDARD_INPUT)
+    return lambda options: log_from(stored, STANDARD_INPUT, options, even_unusable=True)

@@ -1,0 +1,62 @@
+"""The option --plot, which several commands have: a picture beside their result."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from nscan_cli.cli.shared_options import Command
+from nscan_cli.cli.subcommand import FILE, option
+from nscan_cli.errors import WrongUsageError
+from nscan_cli.files.outputs import check_writable, is_device, write_whole
+
+if TYPE_CHECKING:
+    from PIL.Image import Image
+
+OTHER_FORMATS = (
+    ".bmp", ".eps", ".gif", ".jpeg", ".jpg", ".pdf", ".pgm", ".ppm", ".svg", ".tif", ".tiff", ".webp",
+)  # fmt: skip
+
+
+def plot_option(shows: str) -> Callable[[Command], Command]:
+    """The option; `shows` is what the picture shows."""
+    return option("--plot", type=FILE, metavar="PICTURE.png", help=f"Draw {shows}, as a PNG.")
+
+
+def check_png(place: str, path: str) -> None:
+    """Refuse a name that says that the picture is of another format, or of none. Raises WrongUsageError."""
+    named = Path(path)
+    if named.suffix.lower() in OTHER_FORMATS:
+        raise WrongUsageError(f"{place}: pictures are PNG; name it like {named.stem}.png")
+    # A folder is refused in its own words, where there is nothing to write.
+    is_file = path != "-" and not is_device(path) and not os.path.isdir(path) and named.name
+    if is_file and not named.suffix:
+        name = named.with_name(f"{named.name.strip('.') or 'map'}.png")
+        raise WrongUsageError(f"{place}: the name has no ending; pictures are PNG: name it {name}")
+
+
+def check_plot(plot: str | None, output: str | None, inputs: Sequence[str | None]) -> None:
+    """Refuse a picture that could never be written, or that would replace another file of the command.
+
+    Raises WrongUsageError and OutputError.
+    """
+    if plot is None:
+        return
+    if plot == "-":
+        raise WrongUsageError("--plot -: only the result can go to standard output; name a file")
+    file = os.path.realpath(plot)
+    if output not in (None, "-") and os.path.realpath(str(output)) == file:
+        raise WrongUsageError(f"--plot {plot}: is the result's name too; give each its own")
+    if file in (os.path.realpath(path) for path in inputs if path and path != "-"):
+        raise WrongUsageError(f"--plot {plot}: is an input, and would be replaced; choose another name")
+    check_png(f"--plot {plot}", plot)
+    check_writable(plot)
+
+
+def write_plot(plot: str, picture: Image) -> None:
+    """Write the picture whole or not at all. Raises OutputError."""
+    from nscan_cli.mapping.figures.canvas import figure_png
+
+    write_whole(plot, figure_png(picture))

@@ -1,0 +1,221 @@
+"""Options that commands share, and where their values come from: flag > environment > TOML > default."""
+
+from __future__ import annotations
+
+import functools
+import json
+import math
+import os
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import click
+
+from nscan_cli.cli.subcommand import COMMON, OWN_MEANINGS, READING, Option, option
+from nscan_cli.errors import InputDataError, WrongUsageError
+from nscan_cli.files.inputs import read_toml
+from nscan_cli.files.outputs import write_whole
+from nscan_cli.files.text import path_of_name
+from nscan_cli.logs.reading_options import ReadingOptions
+
+Command = Callable[..., Any]
+NOT_PARAMETERS = ("config", "dump_config", "quiet", "verbose")
+
+
+class PoseType(click.ParamType[Any]):
+    """X,Y,DEG on the command line, (x, y, θ) in m and rad inside."""
+
+    name = "X,Y,DEG"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        """Parse the three numbers; a wrong form is a usage error."""
+        try:
+            x, y, degrees = (float(part) for part in value.split(","))
+        except ValueError:
+            self.fail(f"{value!r} is not of the form X,Y,DEG, as in 0.1,0,90", param, ctx)
+        if not all(math.isfinite(part) for part in (x, y, degrees)):
+            self.fail(f"{value!r} has a part that is not finite", param, ctx)
+        return (x, y, math.radians(degrees))
+
+
+def common_options(command: Command) -> Command:
+    """-q, -v, --config and --dump-config; the command gets `quiet` and `verbose`."""
+
+    @functools.wraps(command)
+    def wrapped(*args: Any, **kwargs: Any) -> Any:
+        kwargs.pop("config")
+        if kwargs.pop("dump_config"):
+            write_whole("-", _as_toml(click.get_current_context()).encode())
+            return None
+        return command(*args, **kwargs)
+
+    say = functools.partial(option, section=COMMON)
+    options = [
+        say("-q", "--quiet", is_flag=True, help="Say nothing but errors."),
+        say("-v", "--verbose", count=True, help="Say more; -vv shows where an error arose."),
+        say("--config", type=click.Path(), metavar="FILE.toml", is_eager=True, callback=_read_config,
+            help="Take option values from a TOML file."),
+        say("--dump-config", is_flag=True, help="Print the options in force as TOML, and stop."),
+    ]  # fmt: skip
+    return _with_options(wrapped, options)
+
+
+def _with_options(command: Command, options: Sequence[Callable[[Command], Command]]) -> Command:
+    """The command with the options, in this order in its help."""
+    for decorator in reversed(options):
+        command = decorator(command)
+    return command
+
+
+def reading_options(command: Command) -> Command:
+    """How a log is to be read; the command gets `reading`, a ReadingOptions."""
+    read = functools.partial(option, section=READING)
+    options = [
+        read("--laser", metavar="TAG", help="Laser of a text log, such as FLASER or laser:0."),
+        read("--topic", metavar="TOPIC", help="Laser of an MCAP or a bag, such as /scan."),
+        read("--odom-topic", metavar="TOPIC", help="Odometry to use, such as /odom or /tf."),
+        read("--mount", type=PoseType(), help="Pose of the laser on the robot (m, degrees)."),
+        read("--flip", is_flag=True, help="The laser is mounted upside down."),
+        read("--min-range", type=click.FloatRange(0), metavar="M", help="Drop shorter beams."),
+        read("--max-range", type=click.FloatRange(0, min_open=True), metavar="M",
+             help="Take longer beams for no return."),
+        read("--angle-min", type=float, metavar="DEG", help="Direction of the first beam."),
+        read("--angle-increment", type=float, metavar="DEG", help="Angle from beam to beam."),
+        read("--start", type=float, metavar="T", help="Leave out the first T seconds."),
+        read("--end", type=float, metavar="T", help="Stop T seconds after the first scan."),
+        read("--every", type=click.IntRange(1), default=1, show_default=True, metavar="N",
+             help="Use every Nth scan."),
+        read("--no-odometry", is_flag=True, help="Do as if the log had no odometry."),
+        read("--strict", is_flag=True, help="A malformed record is an error, not a warning."),
+        read("--salvage", is_flag=True, help="Use what is readable of a damaged or cut-off file."),
+        read("--allow-corrected", is_flag=True,
+             help="Accept a log whose poses a mapper has corrected already."),
+    ]  # fmt: skip
+
+    @functools.wraps(command)
+    def wrapped(*args: Any, **kwargs: Any) -> Any:
+        def radians(degrees: float | None) -> float | None:
+            return None if degrees is None else math.radians(degrees)
+
+        reading = ReadingOptions(
+            laser=kwargs.pop("laser"),
+            topic=kwargs.pop("topic"),
+            odom_topic=kwargs.pop("odom_topic"),
+            mount=kwargs.pop("mount"),
+            flip=kwargs.pop("flip"),
+            min_range=kwargs.pop("min_range"),
+            max_range=kwargs.pop("max_range"),
+            angle_min=radians(kwargs.pop("angle_min")),
+            angle_increment=radians(kwargs.pop("angle_increment")),
+            start=kwargs.pop("start"),
+            end=kwargs.pop("end"),
+            every=kwargs.pop("every"),
+            odometry=not kwargs.pop("no_odometry"),
+            strict=kwargs.pop("strict"),
+            allow_corrected=kwargs.pop("allow_corrected"),
+            salvage=kwargs.pop("salvage"),
+        )
+        return command(*args, reading=reading, **kwargs)
+
+    return _with_options(wrapped, options)
+
+
+def _read_config(ctx: click.Context, _param: click.Parameter, value: str | None) -> str | None:
+    """Take a TOML file as the command's defaults.
+
+    Keys at the top and in the table of the command's name are long options without their dashes. At the
+    top, those that only other commands have are left alone, as are the tables of other commands.
+    """
+    if value is None:
+        return None
+    document = read_toml(value, "mend it, or leave out --config")
+    from nscan_cli.cli.main import COMMANDS
+
+    name = ctx.command.name or ""
+    own = document.get(name, {})
+    if not isinstance(own, dict):
+        raise InputDataError(value, f"{name} is no table", f"write [{name}], and its options below")
+    options = {param.long_name: param for param in _parameters(ctx.command)}
+    settings = {key: entry for key, entry in document.items() if key not in COMMANDS}
+    for key in list(settings):
+        if key in OWN_MEANINGS:
+            tables = " or ".join(f"[{command}]" for command in _commands_with(key))
+            problem = f"{key} stands for all commands, and means another thing in each"
+            raise InputDataError(value, problem, f"write it below {tables}")
+        if key not in options and _commands_with(key):
+            del settings[key]
+    settings.update(own)
+    defaults = {}
+    for key, entry in settings.items():
+        if key not in options:
+            raise InputDataError(
+                value, f"{name} has no option {key!r}", f"known: {', '.join(sorted(options))}"
+            )
+        try:
+            options[key].type_cast_value(ctx, _as_typed(entry))
+        except click.BadParameter as error:
+            raise InputDataError(
+                value, f"{key}: {error.message.rstrip('.')}", f"see {ctx.command_path} --help"
+            ) from error
+        defaults[options[key].name] = _as_typed(entry)
+    ctx.default_map = {**(ctx.default_map or {}), **defaults}
+    return value
+
+
+def _commands_with(key: str) -> list[str]:
+    """The commands that have an option of this long name, which a TOML file can have."""
+    from nscan_cli.cli.main import COMMANDS, cli
+
+    context = click.Context(cli)
+    commands = {name: cli.get_command(context, name) for name in COMMANDS}
+    return [
+        name
+        for name, command in commands.items()
+        if command is not None and key in (param.long_name for param in _parameters(command))
+    ]
+
+
+def _as_typed(entry: Any) -> str:
+    """A TOML value as one would type it on the command line. Raises BadParameter for what none would."""
+    if isinstance(entry, list):
+        return ",".join(_as_typed(part) for part in entry)
+    if isinstance(entry, (str, int, float)):
+        return path_of_name(str(entry))
+    raise click.BadParameter(f"{str(entry)!r} is neither text, number, true, false nor a list of them")
+
+
+def _parameters(command: click.Command) -> list[Option]:
+    """The options of a command that a TOML file can have, in the order of --help."""
+    return [
+        param for param in command.params if isinstance(param, Option) and param.name not in NOT_PARAMETERS
+    ]
+
+
+def _as_toml(ctx: click.Context) -> str:
+    """The command's options in force as a TOML table of its name."""
+    lines = [f"[{ctx.command.name}]"]
+    for param in _parameters(ctx.command):
+        value = ctx.params.get(param.name or "")
+        if value is None or value == ():
+            continue
+        if isinstance(param.type, PoseType):
+            value = [value[0], value[1], math.degrees(value[2])]
+        lines.append(f"{param.long_name} = {_toml_value(value)}")
+    return "\n".join(lines) + "\n"
+
+
+def _toml_value(value: Any) -> str:
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, (int, float)):
+        return repr(value)
+    if isinstance(value, (tuple, list)):
+        return "[" + ", ".join(_toml_value(part) for part in value) + "]"
+    try:
+        text = os.fsencode(str(value)).decode()
+    except UnicodeError as error:
+        raise WrongUsageError(
+            f"--dump-config: {value} is no UTF-8, as TOML is; choose another name"
+        ) from error
+    # JSON escapes what TOML does, but for one.
+    return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")

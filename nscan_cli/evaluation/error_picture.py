@@ -1,0 +1,50 @@
+"""An evaluation as a picture: where the result is wrong."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from nscan_cli.evaluation.evaluation_report import Evaluation
+from nscan_cli.graph.io.tum import Trajectory
+from nscan_cli.mapping.figures.canvas import Canvas
+from nscan_cli.mapping.figures.error_plots import plot_against, plot_relations
+from nscan_cli.mapping.figures.panels import bounds_around, is_wide, side_by_side, stacked
+from nscan_cli.poses import compose
+
+if TYPE_CHECKING:
+    from PIL.Image import Image
+
+
+def picture(evaluation: Evaluation, result: Trajectory, reference: Trajectory | None, worst: int) -> Image:
+    """The `worst` relations over the result, and the result over the reference: what there is of both.
+
+    `result` and `reference` are what the evaluation was made from.
+    """
+    panels: list[Canvas] = []
+    both = evaluation.relations is not None and evaluation.reference is not None
+    beside = both and not is_wide(bounds_around(result.poses[:, :2]))
+    if evaluation.relations:
+        table, errors = evaluation.relations
+        shown = errors.worst(worst)
+        of_worst = np.column_stack([errors.translation[shown], errors.rotation[shown]])
+        metres, degrees = errors.translation_spread, errors.rotation_spread
+        title = (
+            f"{evaluation.result} on {table.name}: mean error {metres.mean:.4f} ± {metres.sd:.4f} m, "
+            f"{degrees.mean:.2f} ± {degrees.sd:.2f}°"
+        )
+        panels.append(plot_relations(result.poses, errors.rows[shown], of_worst, title, beside))
+    if evaluation.reference and reference is not None:
+        name, against = evaluation.reference
+        metres = against.absolute_translation
+        title = (
+            f"{evaluation.result} on {name}: mean error {metres.mean:.4f} ± {metres.sd:.4f} m, "
+            f"RMSE {metres.rmse:.4f} m"
+        )
+        aligned = compose(against.alignment.motion, result.poses)
+        panels.append(
+            plot_against(aligned, against.rows, against.translation, reference.poses, title, beside)
+        )
+    join = side_by_side if beside else stacked
+    return join([panel.image() for panel in panels])

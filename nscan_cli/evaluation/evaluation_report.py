@@ -1,0 +1,193 @@
+"""An evaluation for people (a table of at most 80 columns) and for scripts (JSON)."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from nscan_cli.evaluation.alignment import Alignment
+from nscan_cli.evaluation.association import TOLERANCE
+from nscan_cli.evaluation.reference_relations import RelationErrors, Relations
+from nscan_cli.evaluation.statistics import Spread
+from nscan_cli.evaluation.trajectory_errors import RPE_DISTANCE, TrajectoryErrors
+from nscan_cli.files.counting import counted
+
+UNITS = {"translation": "m", "rotation": "deg", "time": "s"}
+HEADINGS = ("mean", "sd", "median", "mean square", "rmse", "max")
+
+
+@dataclass(frozen=True)
+class Evaluation:
+    """A result measured against relations, a reference trajectory, or both."""
+
+    result: str
+    """Base name, as are the names below."""
+    poses: int
+    relations: tuple[Relations, RelationErrors] | None = None
+    reference: tuple[str, TrajectoryErrors] | None = None
+    worst: int = 0
+    """How many of the worst relations are listed."""
+    remarks: tuple[str, ...] = ()
+    """What result and reference show of each other that no error says."""
+
+    def bounded(self) -> list[tuple[str, float, float]]:
+        """What limits are held against: (name, m, degrees); means on relations, RMSE of the ATE."""
+        figures = []
+        if self.relations:
+            errors = self.relations[1]
+            figures.append(("mean on relations", errors.translation_spread.mean, errors.rotation_spread.mean))
+        if self.reference:
+            ate = self.reference[1]
+            figures.append(("RMSE of the ATE", ate.absolute_translation.rmse, ate.absolute_rotation.rmse))
+        return figures
+
+
+def as_text(evaluation: Evaluation) -> str:
+    """The tables, with a final line feed."""
+    blocks = [f"result     {evaluation.result}: {counted(evaluation.poses, 'pose')}"]
+    if evaluation.relations:
+        relations, errors = evaluation.relations
+        near = len(errors.used) - errors.exact
+        blocks.append(
+            f"relations  {relations.name}: {len(errors.used)} of {len(relations)} used, "
+            f"{errors.exact} at exact stamps,\n"
+            f"           {near} within {TOLERANCE} s; {errors.too_far} not used, with no pose so near\n\n"
+            + _table({"translation, m": errors.translation_spread, "rotation, deg": errors.rotation_spread})
+        )
+        if evaluation.worst:
+            blocks.append(_worst_table(evaluation))
+    if evaluation.reference:
+        name, errors_ = evaluation.reference
+        rows = {
+            "ATE, m": errors_.absolute_translation,
+            "ATE, deg": errors_.absolute_rotation,
+            f"RPE, m per {RPE_DISTANCE:g} m": errors_.relative_translation,
+            f"RPE, deg per {RPE_DISTANCE:g} m": errors_.relative_rotation,
+        }
+        blocks.append(
+            f"reference  {name}: {errors_.matched} poses match within {TOLERANCE} s, "
+            f"{errors_.unmatched} do not\n{_aligned(errors_.alignment)}\n" + _table(rows)
+        )
+    return "\n\n".join(blocks) + "\n"
+
+
+def _aligned(alignment: Alignment) -> str:
+    """A line for an alignment that is not the usual one."""
+    if alignment.by == "positions":
+        return ""
+    return (
+        f"alignment  its angle is that of the headings: result and reference move by\n"
+        f"           {alignment.common:.3f} m together, which leaves it open\n"
+    )
+
+
+def as_document(evaluation: Evaluation) -> dict[str, Any]:
+    """The same as an object for JSON; lengths in m, angles in degrees."""
+    document: dict[str, Any] = {"result": evaluation.result, "poses": evaluation.poses, "units": UNITS}
+    if evaluation.relations:
+        relations, errors = evaluation.relations
+        document["relations"] = {
+            "name": relations.name,
+            "count": len(relations),
+            "used": len(errors.used),
+            "exact": errors.exact,
+            "near": len(errors.used) - errors.exact,
+            "too_far": errors.too_far,
+            "translation": _figures(errors.translation_spread),
+            "rotation": _figures(errors.rotation_spread),
+            "worst": _worst_rows(evaluation),
+        }
+    if evaluation.reference:
+        name, against = evaluation.reference
+        document["reference"] = {
+            "name": name,
+            "matched": against.matched,
+            "unmatched": against.unmatched,
+            "alignment": _alignment_record(against),
+            "ate": {
+                "translation": _figures(against.absolute_translation),
+                "rotation": _figures(against.absolute_rotation),
+            },
+            "rpe": {
+                "distance": RPE_DISTANCE,
+                "translation": _figures(against.relative_translation),
+                "rotation": _figures(against.relative_rotation),
+            },
+        }
+    document["notes"] = list(evaluation.remarks)
+    return document
+
+
+def _alignment_record(errors: TrajectoryErrors) -> dict[str, Any]:
+    """What takes the result to the reference, what its angle is from, and of how many pairs."""
+    x, y, angle = errors.alignment.motion.tolist()
+    return {
+        "translation": [round(x, 9) + 0.0, round(y, 9) + 0.0],
+        "rotation": round(math.degrees(angle), 9) + 0.0,
+        "rotation_from": errors.alignment.by,
+        "pairs": errors.matched,
+    }
+
+
+def _table(rows: Mapping[str, Spread | None]) -> str:
+    """A row of figures for each spread."""
+    lines = [" " * 18 + "".join(f"{heading:>{_width(heading)}}" for heading in HEADINGS)]
+    for name, spread in rows.items():
+        if spread is None:
+            lines.append(f"{name:<18}  none: the matched path is too short")
+            continue
+        cells = (
+            f"{_short(heading, figure):>{_width(heading)}}"
+            for heading, figure in zip(HEADINGS, _figures_of(spread), strict=True)
+        )
+        lines.append(f"{name:<18}" + "".join(cells))
+    return "\n".join(lines)
+
+
+def _short(heading: str, figure: float) -> str:
+    """At most 10 characters. Squares of small errors would vanish in four decimals."""
+    return f"{figure:.4g}" if heading == "mean square" or figure >= 99_999 else f"{figure:.4f}"
+
+
+def _width(heading: str) -> int:
+    return max(len(heading) + 1, 10)
+
+
+def _figures_of(spread: Spread) -> tuple[float, ...]:
+    return spread.mean, spread.sd, spread.median, spread.mean_square, spread.rmse, spread.maximum
+
+
+def _figures(spread: Spread | None) -> dict[str, float] | None:
+    if spread is None:
+        return None
+    names = (heading.replace(" ", "_") for heading in HEADINGS)
+    return {name: round(figure, 9) for name, figure in zip(names, _figures_of(spread), strict=True)}
+
+
+def _worst_rows(evaluation: Evaluation) -> list[dict[str, Any]]:
+    assert evaluation.relations is not None
+    relations, errors = evaluation.relations
+    rows = []
+    for position in errors.worst(evaluation.worst).tolist():
+        relation = int(errors.used[position])
+        rows.append(
+            {
+                "line": int(relations.lines[relation]),
+                "stamps": list(relations.stamps[relation]),
+                "translation": round(float(errors.translation[position]), 9),
+                "rotation": round(float(errors.rotation[position]), 9),
+            }
+        )
+    return rows
+
+
+def _worst_table(evaluation: Evaluation) -> str:
+    lines = [f"worst relations{'line':>9}{'from':>20}{'to':>20}{'m':>9}{'deg':>7}"]
+    for row in _worst_rows(evaluation):
+        start, end = row["stamps"]
+        lines.append(
+            f"{row['line']:>24}{start:>20}{end:>20}{row['translation']:>9.3f}{row['rotation']:>7.1f}"
+        )
+    return "\n".join(lines)

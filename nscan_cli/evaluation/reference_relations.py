@@ -1,0 +1,146 @@
+"""The error of a trajectory on reference relations.
+
+R. Kümmerle et al., "On measuring the accuracy of SLAM algorithms", Autonomous Robots 27, 2009: the
+relative pose of each pair of stamps is compared with the reference's, and so no common frame is needed.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nscan_cli.errors import InputDataError
+from nscan_cli.evaluation.association import TOLERANCE, nearest_in_time, no_match
+from nscan_cli.evaluation.statistics import Spread
+from nscan_cli.files.inputs import base_name, label, read_text
+from nscan_cli.files.limits import DISTANCE, GRAPH, TIME
+from nscan_cli.graph.io.pose_columns import fields_of, lines_of
+from nscan_cli.graph.io.tum import Trajectory
+from nscan_cli.poses import Array, relative, wrap
+
+COLUMNS = 8
+REMEDY = "relations are lines 't1 t2 x y z roll pitch yaw'"
+EXACT = 1e-5
+"""Seconds up to which stamps are the same: relation files keep five decimals or six."""
+PLANAR = 1e-6
+"""m and rad up to which a relation is one of 2D poses."""
+
+
+@dataclass(frozen=True)
+class Relations:
+    """Reference relations: the pose at the second stamp in the frame of the pose at the first."""
+
+    name: str
+    """Base name of the file."""
+    stamps: tuple[tuple[str, str], ...]
+    """R pairs as written."""
+    times: Array
+    """(R, 2) seconds."""
+    poses: Array
+    """(R, 3)"""
+    lines: NDArray[np.int64]
+    """(R,) line numbers in the file."""
+
+    def __len__(self) -> int:
+        return len(self.stamps)
+
+
+@dataclass(frozen=True)
+class RelationErrors:
+    """What a trajectory's error is on the relations that it has stamps for."""
+
+    used: NDArray[np.int64]
+    """(U,) rows of the relations that were used."""
+    exact: int
+    """How many of them found both stamps in the trajectory."""
+    too_far: int
+    """How many relations were left out: a stamp of theirs is more than 0.1 s from every pose."""
+    rows: NDArray[np.int64]
+    """(U, 2) rows of the trajectory."""
+    translation: Array
+    """(U,) m"""
+    rotation: Array
+    """(U,) degrees"""
+
+    @property
+    def translation_spread(self) -> Spread:
+        """Figures of the translational error, m."""
+        return Spread.of(self.translation)
+
+    @property
+    def rotation_spread(self) -> Spread:
+        """Figures of the rotational error, degrees."""
+        return Spread.of(self.rotation)
+
+    def worst(self, count: int) -> NDArray[np.int64]:
+        """Positions in `used` of the `count` largest translational errors, the largest first."""
+        return np.argsort(-self.translation, kind="stable")[:count].astype(np.int64)
+
+
+def read_relations(path: str) -> Relations:
+    """The relations of a file; "-" reads standard input.
+
+    Raises InputMissingError when the file cannot be read, InputDataError on a line that is no relation
+    of two 2D poses or when there is none.
+    """
+    stamps: list[tuple[str, str]] = []
+    rows: list[list[float]] = []
+    lines: list[int] = []
+    for number, line in lines_of(read_text(path, GRAPH)):
+        fields = fields_of(line)
+        if line.startswith("#"):
+            continue
+        try:
+            rows.append(_values(fields))
+        except ValueError as error:
+            raise InputDataError(label(path), str(error), REMEDY, line=number) from error
+        stamps.append((fields[0], fields[1]))
+        lines.append(number)
+    if not rows:
+        raise InputDataError(label(path), "no relation in it", REMEDY)
+    table = np.array(rows)
+    return Relations(
+        base_name(path), tuple(stamps), table[:, :2], table[:, [2, 3, 7]], np.array(lines, dtype=np.int64)
+    )
+
+
+def relation_errors(trajectory: Trajectory, relations: Relations, name: str = "result") -> RelationErrors:
+    """The errors of a trajectory; `name` is what a message calls it.
+
+    A stamp takes the nearest pose within 0.1 s. With u the relative pose in the trajectory and z that of
+    the relation, the errors are ‖(u_x − z_x, u_y − z_y)‖ and |u_φ − z_φ| in degrees. Raises
+    InputDataError when no relation can be used.
+    """
+    rows = nearest_in_time(trajectory.times, relations.times.ravel()).reshape(-1, 2)
+    distance = np.abs(trajectory.times[rows] - relations.times).max(axis=1)
+    used = np.flatnonzero(distance <= TOLERANCE)
+    if len(used) == 0:
+        raise no_match(name, trajectory.times, relations.name, relations.times.ravel())
+    rows = rows[used]
+    u = relative(trajectory.poses[rows[:, 1]], trajectory.poses[rows[:, 0]])
+    error = u - relations.poses[used]
+    return RelationErrors(
+        used=used.astype(np.int64),
+        exact=int((distance <= EXACT).sum()),
+        too_far=len(relations) - len(used),
+        rows=rows,
+        translation=np.hypot(error[:, 0], error[:, 1]),
+        rotation=np.degrees(np.abs(wrap(error[:, 2]))),
+    )
+
+
+def _values(fields: list[str]) -> list[float]:
+    """The numbers of a line. Raises ValueError saying what is wrong."""
+    if len(fields) != COLUMNS:
+        raise ValueError(f"{len(fields)} columns instead of {COLUMNS}")
+    values = [float(field) for field in fields]
+    if not all(math.isfinite(value) for value in values):
+        raise ValueError("a number is not finite")
+    if max(map(abs, values[:2])) > TIME.value or max(map(abs, values[2:])) > DISTANCE.value:
+        raise ValueError(f"a number is beyond {DISTANCE.value:g}, or a time beyond {TIME.shown()}")
+    if max(abs(value) for value in values[4:7]) > PLANAR:
+        raise ValueError("z, roll or pitch is not 0, but only 2D poses can be compared")
+    return values

@@ -1,0 +1,1 @@
+"""Graphs and trajectories as files."""

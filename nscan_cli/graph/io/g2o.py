@@ -1,0 +1,176 @@
+"""Pose graphs in g2o's text format, and TORO's: what g2o_lines.py reads, as a graph; and a graph as g2o.
+
+The error of an edge is z⁻¹ ∘ (x_i⁻¹ ∘ x_j) in g2o, so its translation stands in the frame of the
+measurement z; in eq. (16) it is (x̂_j ⊖ x̂_i) − z. The information is rotated by the angle of z between
+the two, which leaves the energy as it is.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections import deque
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nscan_cli.errors import InputDataError
+from nscan_cli.files.finite import check_finite
+from nscan_cli.files.inputs import base_name, label, read_bytes
+from nscan_cli.files.limits import GRAPH
+from nscan_cli.files.provenance import provenance_of
+from nscan_cli.files.source import Source
+from nscan_cli.graph.io.g2o_lines import REMEDY, Lines, keys, read_lines, rows, shown
+from nscan_cli.graph.io.g2o_tags import losses
+from nscan_cli.graph.io.json_fields import LARGEST_INTEGER
+from nscan_cli.graph.io.triangles import from_upper_triangle, upper_triangle
+from nscan_cli.graph.model import Graph, Pairwise
+from nscan_cli.graph.relations.pairwise_marginals import pairwise_marginals
+from nscan_cli.graph.relations.semidefinite import IndefiniteError, semidefinite
+from nscan_cli.poses import Array, Indices, compose, inverse, rotated_information
+
+
+def read_g2o(path: str) -> Graph:
+    """The graph of a g2o file; "-" reads standard input.
+
+    Nodes are the vertices in order of their keys, all of them keyframes; a node's scan number is the
+    vertex's key, its stamp its row. Where a key is too large for a scan number, all numbers are rows, and
+    the keys are the graph's `vertices`. Edges between vertices that follow each other get the origin
+    odometry, the others loop. A file without vertices gets its poses from the edges: the fewest from
+    the vertex of the smallest key, which is at the origin. FIX only chooses the frame, which is free
+    here, so it is checked and dropped; one vertex may be fixed. How many lines of which tags were
+    skipped is in provenance["skipped"]; g2o_tags.losses says what that means.
+
+    Raises InputMissingError when the file cannot be read, InputDataError on a malformed line.
+    """
+    return parse_g2o(read_bytes(path, GRAPH), path)
+
+
+def parse_g2o(data: bytes, path: str) -> Graph:
+    """The graph in the bytes of a g2o file, as read_g2o gives it."""
+    name = label(path)
+    lines = read_lines(data, name)
+    if not lines.vertices and not lines.edge_lines:
+        others = {tag: n for tag, n in lines.skipped.items() if tag.startswith(("VERTEX", "EDGE"))}
+        problem = "; ".join(["no VERTEX_SE2 or EDGE_SE2 line", *losses(others)])
+        raise InputDataError(name, problem, "give a 2D pose graph of g2o")
+    graph = _graph(lines, name)
+    source = Source(base_name(path), hashlib.sha256(data).hexdigest(), len(data))
+    graph.provenance = provenance_of([source], {})
+    graph.provenance["skipped"] = dict(sorted(lines.skipped.items()))
+    return graph
+
+
+def write_g2o(graph: Graph) -> bytes:
+    """The keyframes and relations as g2o text; the first keyframe is fixed.
+
+    A vertex's key is the one that it had in a g2o file, or else its scan number.
+
+    g2o has a form for pairwise relations alone: any other is replaced by the marginals of its Hessian
+    between pose c and every other pose, as pairwise edges. This loses what it says about the other poses
+    among each other, and a graph optimised from the file differs from one that has the whole Hessian.
+    Nodes that are no keyframes are left out. Numbers have the digits that read back exactly. Raises
+    NotFiniteError.
+    """
+    check_finite("the poses of the graph", graph.poses)
+    keyframes = graph.keyframes.tolist()
+    names = graph.scans.tolist() if graph.vertices is None else graph.vertices
+    lines = [f"VERTEX_SE2 {names[node]} {_numbers(graph.poses[node])}" for node in keyframes]
+    edges: list[Pairwise] = []
+    for each in graph.relations:
+        poses = graph.poses[list(each.nodes)]
+        edges += [each] if isinstance(each, Pairwise) else pairwise_marginals(each, poses)
+    for relation in edges:
+        z = relation.measurement
+        information = upper_triangle(rotated_information(inverse(z), relation.information))
+        a, b = relation.nodes
+        check_finite(f"the edge of {relation.nodes}", z, information)
+        lines.append(f"EDGE_SE2 {names[a]} {names[b]} {_numbers(z)} {_numbers(information)}")
+    # GTSAM's reader drops all edges after a tag that it does not know.
+    lines += [f"FIX {names[node]}" for node in keyframes[:1]]
+    return ("\n".join(lines) + "\n").encode()
+
+
+def _numbers(values: Array) -> str:
+    return " ".join(repr(value + 0.0) for value in values.tolist())
+
+
+def _chained(lines: Lines, name: str) -> dict[int, Array]:
+    """Poses by the fewest edges from the vertex of the smallest key, breadth first in file order."""
+    steps: dict[int, list[tuple[int, Array]]] = {}
+    ends = keys(lines.ends).reshape(-1, 2).tolist()
+    for (i, j), z in zip(ends, rows(lines.measurements, 3), strict=True):
+        steps.setdefault(i, []).append((j, z))
+        steps.setdefault(j, []).append((i, inverse(z)))
+    first = min(steps)
+    poses = {first: np.zeros(3)}
+    queue = deque([first])
+    while queue:
+        vertex = queue.popleft()
+        for other, z in steps[vertex]:
+            if other not in poses:
+                poses[other] = compose(poses[vertex], z)
+                queue.append(other)
+    for line, (i, _) in zip(lines.edge_lines, ends, strict=True):
+        if i not in poses:
+            way = f"from vertex {shown(first)} to vertex {shown(i)}"
+            problem = f"no VERTEX_SE2 lines, and no edges lead {way}"
+            raise InputDataError(name, problem, "add the vertices or the missing edges", line=line)
+    return poses
+
+
+def _graph(lines: Lines, name: str) -> Graph:
+    if lines.vertices:
+        found, poses = np.array(list(lines.vertices), dtype=np.uint64), rows(lines.poses, 3)
+    else:
+        chained = _chained(lines, name)
+        found, poses = np.array(list(chained), dtype=np.uint64), np.array(list(chained.values()))
+    order = np.argsort(found)
+    vertices = found[order]
+    graph = Graph(
+        scans=np.arange(len(vertices), dtype=np.int64),
+        stamps=[str(row) for row in range(len(vertices))],
+        poses=poses[order],
+        odometry=None,
+        anchors=np.arange(len(vertices), dtype=np.int64),
+    )
+    if vertices[-1] <= LARGEST_INTEGER:
+        graph.scans = vertices.astype(np.int64)
+    else:
+        graph.vertices = vertices.tolist()
+    graph.pairwise = _edges(lines, vertices, name)
+    for key, line in lines.fixed.items():
+        if key not in lines.passed_over:
+            _rows_of(np.array([key], dtype=np.uint64), vertices, [line], name)
+    return graph
+
+
+def _edges(lines: Lines, vertices: NDArray[np.uint64], name: str) -> list[Pairwise]:
+    """The edges between the vertices with keys (V,), which increase."""
+    ends = keys(lines.ends)
+    pairs = _rows_of(ends, vertices, np.repeat(lines.edge_lines, 2).tolist(), name).reshape(-1, 2)
+    measurements = rows(lines.measurements, 3)
+    try:
+        information = semidefinite(from_upper_triangle(rows(lines.information, 6), 3))
+    except IndefiniteError as error:
+        line = lines.edge_lines[error.index]
+        raise InputDataError(name, f"the information matrix {error}", REMEDY, line=line) from error
+    return [
+        Pairwise((a, b), z, turned, "odometry" if abs(a - b) == 1 else "loop")
+        for (a, b), z, turned in zip(
+            pairs.tolist(), measurements, rotated_information(measurements, information), strict=True
+        )
+    ]
+
+
+def _rows_of(
+    wanted: NDArray[np.uint64], vertices: NDArray[np.uint64], lines: Sequence[int], name: str
+) -> Indices:
+    """Where the keys that are wanted (n,), on so many lines, are among those of all vertices (V,)."""
+    found = np.minimum(np.searchsorted(vertices, wanted), len(vertices) - 1)
+    missing = np.flatnonzero(vertices[found] != wanted)
+    if len(missing):
+        first = int(missing[0])
+        problem = f"there is no vertex {shown(int(wanted[first]))}"
+        raise InputDataError(name, problem, "add its VERTEX_SE2 line", line=int(lines[first]))
+    return found

@@ -1,0 +1,49 @@
+"""The tags of g2o files that are not read, and what is lost with them."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+
+from nscan_cli.files.counting import counted
+
+LANDMARKS = "XY|POINT|LANDMARK|LINE|SEGMENT|PLANE|BEARING"
+LOST = (
+    ("SWITCH", "edges that can be switched off are not read, so these loops are not closed"),
+    ("MIXTURE|MAXMIX", "edges with several alternatives are not read, so what they join may come apart"),
+    ("PRIOR|GPS|GNSS|UTM", "priors on poses are not read, so the graph's frame is free, and its shape is "
+     "that of the edges between poses"),
+    (f"VERTEX.*({LANDMARKS})", "landmarks are not read"),
+    (f"^(LANDMARK|BR)$|EDGE.*({LANDMARKS})", "observations of landmarks are not read, so the poses are held "
+     "by the edges between poses alone"),
+    ("ROBUST", "edges with robust kernels are not read, so what they join may come apart"),
+    ("OFFSET|CALIB|PARAMS|CAMERA", "offsets and calibrations of sensors are not read, nor edges that need "
+     "them"),
+    ("VERTEX_?(SE3|3|SIM3)|EDGE_?(SE3|3|SIM3)", "of graphs in space only planar VERTEX_SE3:QUAT and "
+     "EDGE_SE3:QUAT are read"),
+    ("^VERTEX", "vertices of this kind are not read"),
+    ("^(EDGE|ODOMETRY|EQUIV)", "edges of this kind are not read, so what they join may come apart"),
+    ("LASER|TAG|IMU|IMAGE", "what sensors saw is not read from a graph"),
+    ("", "this tag is not known, and what it says is lost"),
+)  # fmt: skip
+"""The first one that fits a tag."""
+NAMED = 5
+"""So many tags of one kind are named."""
+WIDEST = 40
+"""Characters of a tag that are shown."""
+
+
+def losses(skipped: Mapping[str, int]) -> list[str]:
+    """A sentence for each kind of loss, of how many lines of which tags were skipped."""
+    kinds: dict[str, list[str]] = {}
+    for tag, count in skipped.items():
+        lost = next(lost for pattern, lost in LOST if re.search(pattern, tag))
+        name = tag if re.fullmatch("[!-~]+", tag) else ascii(tag)
+        kinds.setdefault(lost, []).append(counted(count, f"{name[:WIDEST]} line"))
+    sentences = []
+    for lost, lines in kinds.items():
+        more = [f"lines of {counted(len(lines) - NAMED, 'other tag')}"] if len(lines) > NAMED else []
+        *before, last = [*lines[:NAMED], *more]
+        listed = f"{', '.join(before)} and {last}" if before else last
+        sentences.append(f"{listed} skipped: {lost}")
+    return sentences

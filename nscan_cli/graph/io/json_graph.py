@@ -1,0 +1,294 @@
+"""The pose graph as a JSON file; pose-graph.schema.json beside this module describes it.
+
+One record a line, keys in fixed order: equal graphs give equal bytes, and text tools can work on them.
+"""
+
+from __future__ import annotations
+
+import io
+import itertools
+import json
+import re
+from collections.abc import Iterable, Iterator
+from json.encoder import encode_basestring_ascii
+from typing import Any, NoReturn
+
+import numpy as np
+
+from nscan_cli.errors import InputDataError
+from nscan_cli.files.finite import check_finite
+from nscan_cli.files.inputs import label, read_text
+from nscan_cli.files.limits import GRAPH, TIME
+from nscan_cli.files.provenance import provenance_of
+from nscan_cli.graph.io.g2o_lines import LARGEST_KEY
+from nscan_cli.graph.io.json_fields import JsonRecord, MalformedError, pose_rows, six_digits, triangle
+from nscan_cli.graph.model import Graph, Loop
+from nscan_cli.graph.relations.registry import relation_of, relation_record
+from nscan_cli.logs.compression import packing_of
+from nscan_cli.logs.formats import FORMS, name_of
+from nscan_cli.logs.scan_order import STAMP
+from nscan_cli.poses import Array
+
+FORMAT = "nscan-pose-graph"
+VERSION = "1.0"
+SCHEMA = "urn:nscan-cli:pose-graph:1.0"
+UNITS = {"length": "m", "angle": "rad", "time": "s"}
+BLOCK = 1000
+"""So many poses are written at a time."""
+KEY = re.compile("0|[1-9][0-9]{0,19}")
+"""A vertex of g2o: a number of 64 bits, which as text is exact for every reader of JSON."""
+NEXT = ",\n"
+"""From one record to the next."""
+_compact = json.JSONEncoder(separators=(",", ":"), allow_nan=False, check_circular=False).encode
+REMEDY = "mend it, or write the graph again with nscan-cli slam"
+
+
+def write_graph(graph: Graph) -> bytes:
+    """The graph as a JSON document in UTF-8, with a final line feed.
+
+    Poses are rounded to 9 decimals and matrices to 6 significant digits. Raises NotFiniteError, and
+    ValueError where it is the provenance that has a number that is not finite.
+    """
+    check_finite("the poses of the graph", graph.poses, graph.odometry)
+    check_finite("the covariances of the graph", *graph.marginals.values())
+    for relation in graph.relations:
+        term = relation.term()
+        check_finite(f"the relation of {relation.nodes}", term.local, term.hessian, relation.score)
+    provenance = {**provenance_of([], {}), **graph.provenance}
+    head: dict[str, Any] = {"$schema": SCHEMA, "format": FORMAT, "version": VERSION, "units": UNITS}
+    lists: dict[str, Iterable[str]] = {
+        "nodes": _node_records(graph),
+        "relations": (
+            _compact({"id": number, **relation_record(relation)})
+            for number, relation in enumerate(graph.relations)
+        ),
+        "loops": (_compact(_loop_record(loop)) for loop in graph.loops),
+        "marginals": (
+            _compact({"node": node, "covariance": triangle(covariance)})
+            for node, covariance in sorted(graph.marginals.items())
+        ),
+    }
+    # Piece by piece: as lists of numbers all records at once take many times the room of the document.
+    document = io.BytesIO()
+    for key, value in {**head, "provenance": provenance}.items():
+        document.write(f'{NEXT if document.tell() else "{"}"{key}":{_compact(value)}'.encode())
+    for key, records in lists.items():
+        document.write(f'{NEXT}"{key}":['.encode())
+        separator = "\n"
+        for record in records:
+            document.write(f"{separator}{record}".encode())
+            separator = NEXT
+        document.write(b"]" if separator == "\n" else b"\n]")
+    document.write(b"}\n")
+    return document.getvalue()
+
+
+def read_graph(path: str) -> Graph:
+    """The graph of a JSON file; "-" reads standard input.
+
+    Raises InputMissingError when the file cannot be read, InputDataError when it is no graph or its
+    parts do not fit each other.
+    """
+    return parse_graph(read_text(path, GRAPH), label(path))
+
+
+def parse_graph(data: bytes, name: str) -> Graph:
+    """The graph of a JSON document; `name` is the file that errors name. Raises InputDataError."""
+    try:
+        document = json.loads(data, parse_constant=_refuse_constant)
+    except (ValueError, RecursionError) as error:
+        raise _not_json(data, name, error) from error
+    try:
+        return _graph(JsonRecord(document, "document"))
+    except MalformedError as error:
+        raise InputDataError(name, str(error), REMEDY) from error
+
+
+def _not_json(data: bytes, name: str, error: Exception) -> InputDataError:
+    """What is wrong with a file that is no JSON: where it is broken, or what it is instead."""
+    if data.strip() and data.lstrip()[:1] not in (b"{", b"["):
+        return InputDataError(name, f"is {_kind(data)}", "give a graph in JSON, as nscan-cli slam writes it")
+    if isinstance(error, json.JSONDecodeError):
+        problem = f"not JSON: {error.msg}" if data.strip() else "is empty"
+        return InputDataError(name, problem, REMEDY, line=error.lineno)
+    return InputDataError(name, f"not JSON: {error}", REMEDY)
+
+
+def _kind(data: bytes) -> str:
+    packing = packing_of(data)
+    if packing is not None:
+        return f"compressed by {packing.name}"
+    log = next((form.name for form in FORMS if form.fits(data)), None)
+    return f"a log ({log})" if log else name_of(data)
+
+
+def _refuse_constant(constant: str) -> NoReturn:
+    raise ValueError(f"it has a number {constant}")
+
+
+def _node_records(graph: Graph) -> Iterator[str]:
+    """The nodes in JSON. There is one for every scan, and objects made of them would take longer."""
+    poses = _each_pose(graph.poses)
+    odometry = itertools.repeat(None, len(graph)) if graph.odometry is None else _each_pose(graph.odometry)
+    scans, anchors = graph.scans.tolist(), graph.anchors.tolist()
+    named: Iterable[str] = itertools.repeat("", len(graph))
+    if graph.vertices is not None:
+        named = (f'"vertex":"{key}",' for key in graph.vertices)
+    each = zip(scans, named, graph.stamps, poses, odometry, anchors, strict=True)
+    for node, (scan, vertex, stamp, (x, y, angle), sensed, anchor) in enumerate(each):
+        pose = f'"pose":[{x!r},{y!r},{angle!r}]'
+        if sensed is not None:
+            pose += ',"odometry":[{!r},{!r},{!r}]'.format(*sensed)
+        keyframe = '"keyframe":true' if anchor == node else f'"keyframe":false,"attached":{anchor}'
+        stamped = f'{vertex}"stamp":{encode_basestring_ascii(stamp)}'
+        yield f'{{"id":{node},"scan":{scan},{stamped},{pose},{keyframe}}}'
+
+
+def _each_pose(poses: Array) -> Iterator[list[float]]:
+    """The rows of poses (N, 3), not all at once: as lists they take many times the room."""
+    for first in range(0, len(poses), BLOCK):
+        yield from pose_rows(poses[first : first + BLOCK])
+
+
+def _loop_record(loop: Loop) -> dict[str, Any]:
+    return {
+        "nodes": list(loop.nodes),
+        "accepted": loop.accepted,
+        "reason": loop.reason,
+        "score": six_digits(loop.score),
+    }
+
+
+def _graph(document: JsonRecord) -> Graph:
+    if "format" not in document or document.get("format") != FORMAT:
+        raise MalformedError("document", f"'format' is not {FORMAT!r}, so this is no pose graph")
+    if document.get("version") != VERSION:
+        raise MalformedError("document", f"'version' is {document.get('version')!r}; {VERSION!r} can be read")
+    if document.get("units") != UNITS:
+        raise MalformedError("document", f"'units' is not {_compact(UNITS)}")
+    provenance = _provenance(document)
+    graph = _nodes(document)
+    graph.provenance = provenance
+    _relations(document, graph)
+    keyframes = set(graph.keyframes.tolist())
+    for record in document.records("loops"):
+        graph.loops.append(
+            Loop(
+                _pair(record, keyframes),
+                record.flag("accepted"),
+                record.text("reason"),
+                record.number("score"),
+            )
+        )
+    for record in document.records("marginals"):
+        node = record.integer("node")
+        _check_keyframes(record, (node,), keyframes)
+        if node in graph.marginals:
+            raise MalformedError(record.place, f"node {node} has a covariance already")
+        graph.marginals[node] = record.information("covariance", 3)
+    return graph
+
+
+def _provenance(document: JsonRecord) -> dict[str, Any]:
+    provenance = JsonRecord(document.get("provenance"), "provenance")
+    tool = JsonRecord(provenance.get("tool"), "provenance.tool")
+    tool.text("name")
+    tool.text("version")
+    for source in provenance.records("inputs"):
+        source.text("name")
+        source.text("sha256")
+        source.integer("bytes")
+    JsonRecord(provenance.get("parameters"), "provenance.parameters")
+    return provenance.value
+
+
+def _nodes(document: JsonRecord) -> Graph:
+    scans: list[int] = []
+    stamps: list[str] = []
+    poses: list[Array] = []
+    odometry: list[Array] = []
+    vertices: list[int] = []
+    anchors: list[int] = []
+    for node, record in enumerate(document.records("nodes")):
+        if record.integer("id") != node:
+            raise MalformedError(
+                record.place, f"'id' is {record.get('id')}, but ids count up from 0, here {node}"
+            )
+        scans.append(record.integer("scan"))
+        if node > 0 and scans[-1] <= scans[-2]:
+            raise MalformedError(record.place, "'scan' is not greater than that of the node before")
+        stamps.append(_stamp(record))
+        poses.append(record.pose("pose"))
+        if "odometry" in record:
+            odometry.append(record.pose("odometry"))
+        if "vertex" in record:
+            vertices.append(_vertex(record))
+        anchors.append(_anchor(record, node))
+    if not poses:
+        raise MalformedError("nodes", "there are none")
+    if odometry and len(odometry) != len(poses):
+        raise MalformedError("nodes", f"{len(odometry)} of {len(poses)} have 'odometry'; all or none may")
+    if vertices and len(set(vertices)) != len(poses):
+        raise MalformedError("nodes", "'vertex' is not another one for each of them")
+    for node, anchor in enumerate(anchors):
+        if anchor >= len(anchors) or anchors[anchor] != anchor:
+            raise MalformedError(f"nodes[{node}]", f"'attached' is {anchor}, which is no keyframe")
+    return Graph(
+        scans=np.array(scans, dtype=np.int64),
+        stamps=stamps,
+        poses=np.array(poses),
+        odometry=np.array(odometry) if odometry else None,
+        anchors=np.array(anchors, dtype=np.int64),
+        vertices=vertices or None,
+    )
+
+
+def _vertex(record: JsonRecord) -> int:
+    key = record.text("vertex")
+    if not KEY.fullmatch(key) or int(key) > LARGEST_KEY:
+        raise record.wrong("vertex", "a number of 64 bits, as text")
+    return int(key)
+
+
+def _stamp(record: JsonRecord) -> str:
+    stamp = record.text("stamp")
+    if not STAMP.fullmatch(stamp) or abs(float(stamp)) > TIME.value:
+        raise record.wrong("stamp", f"a time in seconds, as text, up to {TIME.shown()}")
+    return stamp
+
+
+def _anchor(record: JsonRecord, node: int) -> int:
+    if not record.flag("keyframe"):
+        anchor = record.integer("attached")
+        if anchor == node:
+            raise MalformedError(record.place, "'attached' is the node itself, which is no keyframe")
+        return anchor
+    if "attached" in record:
+        raise MalformedError(record.place, "a keyframe cannot be 'attached'")
+    return node
+
+
+def _relations(document: JsonRecord, graph: Graph) -> None:
+    keyframes = set(graph.keyframes.tolist())
+    for number, record in enumerate(document.records("relations")):
+        if record.integer("id") != number:
+            raise MalformedError(
+                record.place, f"'id' is {record.get('id')}, but ids count up from 0, here {number}"
+            )
+        relation = relation_of(record)
+        _check_keyframes(record, relation.nodes, keyframes)
+        graph.add(relation)
+
+
+def _pair(record: JsonRecord, keyframes: set[int]) -> tuple[int, int]:
+    nodes = record.integers("nodes")
+    if len(nodes) != 2:
+        raise record.wrong("nodes", "a pair of nodes")
+    _check_keyframes(record, nodes, keyframes)
+    return nodes[0], nodes[1]
+
+
+def _check_keyframes(record: JsonRecord, nodes: tuple[int, ...], keyframes: set[int]) -> None:
+    for node in nodes:
+        if node not in keyframes:
+            raise MalformedError(record.place, f"node {node} is no keyframe of this graph")

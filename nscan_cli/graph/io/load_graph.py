@@ -1,0 +1,27 @@
+"""A saved graph of any form, found from its content."""
+
+from __future__ import annotations
+
+from nscan_cli.files.encoding import plain
+from nscan_cli.files.inputs import label, read_bytes
+from nscan_cli.files.limits import GRAPH
+from nscan_cli.graph.io.g2o import parse_g2o
+from nscan_cli.graph.io.g2o_tags import losses
+from nscan_cli.graph.io.json_graph import parse_graph
+from nscan_cli.graph.model import Graph
+
+
+def load_graph(path: str, notices: list[str] | None = None) -> Graph:
+    """The graph in a JSON or a g2o file; "-" reads standard input.
+
+    What was skipped, and is lost with it, is added to the `notices`. Raises InputMissingError when there is
+    nothing to read, InputDataError when it is no graph.
+    """
+    data = read_bytes(path, GRAPH)
+    text = plain(data, label(path))
+    if text.lstrip()[:1] == b"{":
+        return parse_graph(text, label(path))
+    graph = parse_g2o(data, path)
+    if notices is not None:
+        notices += [f"{label(path)}: {lost}" for lost in losses(graph.provenance["skipped"])]
+    return graph

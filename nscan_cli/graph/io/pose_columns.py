@@ -1,0 +1,182 @@
+"""Which columns of a table of poses hold the time, the position and the quaternion, by their names or number.
+
+TUM: https://cvg.cit.tum.de/data/datasets/rgbd-dataset/file_formats. EuRoC (state_groundtruth_estimate0):
+M. Burri et al., "The EuRoC micro aerial vehicle datasets", IJRR 2016; times in ns, w before x, y, z.
+"""
+
+from __future__ import annotations
+
+import io
+import re
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+from nscan_cli.files.encoding import MARK
+
+COMMENTS = "#%"
+"""What a line begins with that is a comment, or names the columns."""
+UNIT = re.compile(r"[\[(].*?[\])]")
+WORD = re.compile(r"[a-z]+|[0-9]+")
+ROTATION = ("quat", "orient", "rot")
+"""What a part of a name begins with that is of a quaternion; another one is q."""
+NO_POSITION = ("v", "w", "b", "a", "twist", "vel", "linear", "angular", "covariance", "cov", "acc", "gyro")
+"""Parts of the names of what has an x, y and z, too: velocities, biases."""
+POSITION = ("", "t", "p", "pos", "position", "trans", "translation")
+"""What stands before the axis in the name of a coordinate."""
+SECONDS, NANOSECONDS = ("s", "sec", "secs", "seconds"), ("ns", "nsec", "nsecs", "nanosec", "nanoseconds")
+POWERS = {"ms": 3, "us": 6, "µs": 6} | dict.fromkeys(SECONDS, 0) | dict.fromkeys(NANOSECONDS, 9)
+"""Units of times: so many powers of ten to a second."""
+LATEST_SECONDS, STEP = 1e11, 1000
+"""A time beyond is in ms, another thousand times as far in µs, and then in ns."""
+
+
+@dataclass(frozen=True)
+class PoseColumns:
+    """Where a line has what; numbers of columns from 0."""
+
+    time: int
+    position: tuple[int, int, int | None]
+    """x, y and z, which may be missing."""
+    rotation: tuple[int, int, int, int]
+    """x, y, z and w of the quaternion."""
+    power: int | None = None
+    """Of ten, by which times are to be divided; None where nothing says so."""
+    count: int | None = None
+    """How many a line has to have; None: those that are used."""
+    rest: int | None = None
+    """The nanoseconds, where the time is whole seconds."""
+
+    @property
+    def least(self) -> int:
+        """How many columns a line needs."""
+        places = (self.time, *self.rotation, *self.position, self.rest)
+        return 1 + max(place for place in places if place is not None)
+
+    def stamp(self, fields: Sequence[str], power: int) -> str:
+        """The time of a line as text in seconds, with all its digits."""
+        time = fields[self.time]
+        if self.rest is not None:
+            return in_seconds(str(int(time) * 10**9 + int(fields[self.rest])), 9)
+        return in_seconds(time, power)
+
+
+TUM = PoseColumns(0, (1, 2, 3), (4, 5, 6, 7), count=8)
+EUROC = PoseColumns(0, (1, 2, 3), (5, 6, 7, 4), power=9)
+EUROC_COUNT = 17
+"""With velocity and biases."""
+
+
+def fields_of(line: str) -> list[str]:
+    """What a line has between commas, semicolons, tabs or spaces. Beside semicolons, commas are decimal."""
+    if ";" in line:
+        fields = line.replace(",", ".").split(";")
+    elif "," in line:
+        fields = line.split(",")
+    else:
+        return line.split()
+    fields = [field.strip().strip("\"'") for field in fields]
+    return fields if any(fields) and fields[-1] else fields[:-1] if any(fields) else []
+
+
+def lines_of(data: bytes) -> Iterator[tuple[int, str]]:
+    """The lines of a text that are not blank, each with its number; a byte-order mark is no part of one."""
+    for number, line in enumerate(io.BytesIO(data.removeprefix(MARK)), start=1):
+        text = line.decode("utf-8", errors="replace").strip()
+        if text:
+            yield number, text
+
+
+def columns_named(line: str) -> PoseColumns | None:
+    """The columns by the names in a line; None without those of a time, a position and a quaternion."""
+    found: dict[str, int] = {}
+    power, whole = None, False
+    fields = fields_of(line.lstrip(COMMENTS).strip())
+    for at, field in enumerate(fields):
+        name = UNIT.sub("", field).strip().lower()
+        words = WORD.findall(name)
+        if not words:
+            continue
+        what = _what(words)
+        if what == "time" and what not in found:
+            unit = "".join(UNIT.findall(field)).strip("[]() ").lower() or words[-1]
+            power, whole = POWERS.get(unit), words[-1] in SECONDS
+        elif what == "time" and whole and words[-1] in NANOSECONDS:
+            what = "rest"
+        if what:
+            found.setdefault(what, at)
+    try:
+        rotation = found["qx"], found["qy"], found["qz"], found["qw"]
+        position = found["x"], found["y"], found.get("z")
+        return PoseColumns(found["time"], position, rotation, power, rest=found.get("rest"))
+    except KeyError:
+        return None
+
+
+def _what(words: list[str]) -> str:
+    """What a column is that is called so: time, x, y, z, qx, qy, qz, qw, or nothing of use."""
+    if words[0].startswith("time") or words[-1] in ("t", "stamp", *SECONDS, *NANOSECONDS):
+        return "time"
+    axis, before = words[-1][-1], words[-1][:-1]
+    if axis not in "xyzw":
+        return ""
+    parts = [*words[:-1], before]
+    if any(part == "q" or part.startswith(ROTATION) for part in parts):
+        return f"q{axis}"
+    if axis == "w" or any(part in NO_POSITION for part in parts) or before not in POSITION:
+        return ""
+    return axis
+
+
+def columns_of(line: str) -> PoseColumns:
+    """The columns by the first line of numbers, where nothing names them.
+
+    Nanoseconds and commas are EuRoC's; other lines have to be of TUM's form.
+    """
+    fields = fields_of(line)
+    if len(fields) >= EUROC_COUNT or (
+        "," in line and ";" not in line and power_of(fields[0]) == POWERS["ns"]
+    ):
+        return EUROC
+    return TUM
+
+
+def is_header(line: str) -> bool:
+    """Whether a line says what the columns are, in whichever words, or is a comment."""
+    return line[0] in COMMENTS or not _is_number(fields_of(line)[0])
+
+
+def power_of(time: str) -> int:
+    """The power of ten that makes seconds of a time, by its size: no clock that counts seconds is so late."""
+    size, power = abs(float(time)), 0
+    while size > LATEST_SECONDS * STEP ** (power / 3) and power < POWERS["ns"]:
+        power += 3
+    return power
+
+
+def in_seconds(time: str, power: int) -> str:
+    """A time as text in seconds, with all its digits."""
+    if power == 0:
+        return time
+    try:
+        whole, rest = divmod(int(time), 10**power)
+    except ValueError:
+        return repr(float(time) / 10**power)
+    return f"{whole}.{rest:0{power}d}"
+
+
+def are_poses(data: bytes) -> bool:
+    """Whether a text is a table of poses: its first line names their columns, or is of numbers alone."""
+    for _number, line in lines_of(data):
+        if columns_named(line) is not None:
+            return True
+        if line[0] not in COMMENTS:
+            return all(_is_number(field) for field in fields_of(line))
+    return False
+
+
+def _is_number(text: str) -> bool:
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True

@@ -1,0 +1,144 @@
+"""Trajectories in the TUM format: `t x y z qx qy qz qw`, one pose a line, `#` comments.
+
+https://cvg.cit.tum.de/data/datasets/rgbd-dataset/file_formats. What others make of it is read as well: with
+commas, other columns, and times in ns (pose_columns.py).
+"""
+
+from __future__ import annotations
+
+import math
+from array import array
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nscan_cli.errors import InputDataError
+from nscan_cli.files.finite import check_finite
+from nscan_cli.files.inputs import label, read_text
+from nscan_cli.files.limits import DISTANCE, GRAPH, TIME
+from nscan_cli.graph.io.pose_columns import (
+    COMMENTS,
+    PoseColumns,
+    columns_named,
+    columns_of,
+    fields_of,
+    is_header,
+    lines_of,
+    power_of,
+)
+from nscan_cli.poses import Array, wrap
+
+REMEDY = "TUM lines are 't x y z qx qy qz qw'"
+UNIT_TOLERANCE = 0.01
+"""How far the length of a quaternion may be from 1: what rounding to a few digits does, and no more."""
+
+
+@dataclass(frozen=True)
+class Trajectory:
+    """Poses in order of time."""
+
+    times: Array
+    """(N,) seconds, not decreasing."""
+    poses: Array
+    """(N, 3)"""
+    stamps: tuple[str, ...]
+    """N times as the source wrote them."""
+    rows: NDArray[np.int64] | None = None
+    """(N,) where each stood in the source, in which another order can be; None: in the same order."""
+    spatial: Array | None = None
+    """(N, 4) what a plane has no place for: z (m), and the direction upwards as the body has it."""
+
+    def __len__(self) -> int:
+        return len(self.stamps)
+
+    @classmethod
+    def in_order(
+        cls, times: Array, poses: Array, stamps: Sequence[str], spatial: Array | None = None
+    ) -> Trajectory:
+        """The trajectory of poses in any order; those of equal time keep theirs."""
+        order = np.argsort(times, kind="stable")
+        texts = tuple(stamps[row] for row in order.tolist())
+        return cls(times[order], poses[order], texts, order, None if spatial is None else spatial[order])
+
+    @classmethod
+    def in_space(cls, stamps: Sequence[str], poses: Array) -> Trajectory:
+        """The trajectory of poses (N, 7) in space, in any order: x, y, z and quaternion x, y, z, w.
+
+        Of the rotation, the yaw is kept.
+        """
+        x, y, z, qx, qy, qz, qw = poses.T
+        yaw = np.arctan2(2 * (qw * qz + qx * qy), qw**2 + qx**2 - qy**2 - qz**2)
+        up = 2 * (qx * qz - qw * qy), 2 * (qy * qz + qw * qx), qw**2 + qz**2 - qx**2 - qy**2
+        times = np.array([float(stamp) for stamp in stamps])
+        return cls.in_order(times, np.column_stack([x, y, yaw]), stamps, np.column_stack([z, *up]))
+
+
+def write_tum(stamps: Sequence[str], poses: Array) -> bytes:
+    """Poses (N, 3) at N stamps, which are kept as they are; positions and quaternions with 9 decimals.
+
+    Raises NotFiniteError.
+    """
+    check_finite("the trajectory", poses)
+    half = 0.5 * wrap(poses[:, 2])
+    columns = np.round(np.column_stack([poses[:, :2], np.sin(half), np.cos(half)]), 9) + 0.0
+    return "".join(
+        f"{stamp} {x:.9f} {y:.9f} 0 0 0 {qz:.9f} {qw:.9f}\n"
+        for stamp, (x, y, qz, qw) in zip(stamps, columns.tolist(), strict=True)
+    ).encode()
+
+
+def read_tum(path: str) -> Trajectory:
+    """The trajectory of a TUM file, sorted by time; "-" reads standard input.
+
+    z is left out, and of the rotation only the yaw is kept. Raises InputMissingError when the file
+    cannot be read, InputDataError on a line that is not of the format or when there is no pose.
+    """
+    return parse_tum(read_text(path, GRAPH), label(path))
+
+
+def parse_tum(data: bytes, name: str) -> Trajectory:
+    """The trajectory of TUM text; `name` is the file that errors name. Raises InputDataError."""
+    stamps: list[str] = []
+    values = array("d")
+    columns: PoseColumns | None = None
+    power = 0
+    for number, line in lines_of(data):
+        if not stamps and is_header(line):
+            named = columns_named(line)
+            columns = named or columns
+            if named or line[0] in COMMENTS:
+                continue
+        if line[0] in COMMENTS:
+            continue
+        try:
+            if not stamps:
+                columns = columns or columns_of(line)
+                power = power_of(fields_of(line)[columns.time]) if columns.power is None else columns.power
+            assert columns is not None
+            stamp, pose = _pose(fields_of(line), columns, power)
+        except (ValueError, IndexError) as error:
+            raise InputDataError(name, str(error), REMEDY, line=number) from error
+        values.extend(pose)
+        stamps.append(stamp)
+    if not stamps:
+        raise InputDataError(name, "no pose in it", REMEDY)
+    return Trajectory.in_space(stamps, np.array(values).reshape(-1, 7))
+
+
+def _pose(fields: list[str], columns: PoseColumns, power: int) -> tuple[str, list[float]]:
+    """The stamp (s), and x, y, z and quaternion of a line. Raises ValueError saying what is wrong."""
+    if len(fields) != (columns.count or max(len(fields), columns.least)):
+        raise ValueError(f"{len(fields)} columns instead of {columns.count or columns.least}")
+    x, y, z = columns.position
+    time = float(fields[columns.time])
+    used = [fields[x], fields[y], "0" if z is None else fields[z], *(fields[at] for at in columns.rotation)]
+    values = [float(field) for field in used]
+    if not all(math.isfinite(value) for value in (time, *values)):
+        raise ValueError("a number is not finite")
+    if abs(time) > TIME.value * 10**power or max(map(abs, values)) > DISTANCE.value:
+        raise ValueError(f"a number is beyond {DISTANCE.value:g}, or the time beyond {TIME.shown()}")
+    if abs(math.hypot(*values[3:]) - 1) > UNIT_TOLERANCE:
+        raise ValueError("the quaternion is not of length 1")
+    return columns.stamp(fields, power), values

@@ -1,0 +1,1 @@
+"""Sparse matrices of 3 × 3 blocks: what SciPy does not have."""

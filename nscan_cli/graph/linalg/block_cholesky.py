@@ -1,0 +1,274 @@
+"""Sparse Cholesky factorisation of symmetric matrices made of 3 × 3 blocks, one row of blocks a node.
+
+A = LLᵗ in an order of little fill, supernode by supernode: its columns make a dense panel, one after another,
+with the rows of its own columns first. The factor tells which directions the matrix does not hold.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nscan_cli.graph.linalg.factor_pattern import Pattern
+from nscan_cli.kernels.decorators import forceinline_kernel, kernel, leaf_kernel, reduction_kernel
+from nscan_cli.poses import Array, Indices
+
+LEAST_PIVOT = 1e-12
+"""A pivot below this share of the diagonal entry that it comes from counts as none."""
+SUSPICIOUS_PIVOT = 1e-6
+LEAST_CURVATURE = 1e-15
+"""vᵗAv / Σ A_ii v_i² below which nothing holds the direction v: rounding leaves 1e-16, and the bend of an
+open chain of 20,000 keyframes has 1e-14."""
+
+
+class Factor(NamedTuple):
+    """L, and the directions that the matrix does not hold."""
+
+    pattern: Pattern
+    panels: Array
+    """Those of all supernodes, end to end; what lies above the diagonal is 0."""
+    loose: NDArray[np.bool_]
+    """(F, 3) by row: the pivot was not positive, and the diagonal entry, or more, was put in its place."""
+    diagonal: Array
+    """(F, 3) by row: the diagonal of the matrix."""
+
+
+def factorise(pattern: Pattern, blocks: Array) -> Factor:
+    """The factor of the matrix whose lower triangle is in blocks (B, 3, 3), which are left as they are."""
+    diagonal = np.ascontiguousarray(np.diagonal(blocks[pattern.starts[:-1]], axis1=1, axis2=2))
+    loose = np.zeros((len(pattern.place), 3), dtype=np.bool_)
+    return Factor(pattern, _factorise(pattern, blocks, diagonal, loose), loose, diagonal)
+
+
+def solve(factor: Factor, right: Array) -> Array:
+    """The solution (F, 3) for a right-hand side (F, 3), both by node."""
+    place = factor.pattern.place
+    x = np.empty((len(place), 3))
+    x[place] = right
+    flat, gathered = x.reshape(-1), np.empty(x.size)
+    _solve_lower(factor.pattern, factor.panels, flat, gathered)
+    _solve_upper(factor.pattern, factor.panels, flat, gathered)
+    return x[place]
+
+
+def loose_nodes(factor: Factor, share: float = 1e-6) -> NDArray[np.bool_]:
+    """Which nodes (F,) have a part in a direction that the matrix does not hold.
+
+    Each pivot has its direction v, with Lᵗv = e there and vᵗAv the pivot for v = 1 there. With long levers
+    rounding alone makes pivots of 1e-9 of the diagonal, so the directions of all small ones are looked at.
+    A node has a part in one when what it adds to Σ A_ii v_i² is not below share² of the largest.
+    """
+    pattern = factor.pattern
+    found = np.zeros(len(pattern.place), dtype=np.bool_)
+    pivots = _diagonal(pattern, factor.panels) ** 2
+    for row, component in np.argwhere(factor.loose | (pivots < SUSPICIOUS_PIVOT * factor.diagonal)):
+        v = np.zeros((len(found), 3))
+        v[row, component] = 1.0
+        _solve_upper(pattern, factor.panels, v.reshape(-1), np.empty(v.size))
+        v /= v[row, component]
+        part = v**2 * np.where(factor.diagonal > 0, factor.diagonal, 1.0)
+        if factor.loose[row, component] or pivots[row, component] < LEAST_CURVATURE * part.sum():
+            found |= (part > share**2 * part.max()).any(axis=1)
+    return found[pattern.place]
+
+
+@forceinline_kernel
+def panel_of(pattern: Pattern, panels: Array, supernode: int) -> Array:
+    """The panel (3 w, 3 h) of a supernode, its columns of numbers one after the other."""
+    width = 3 * (pattern.supernodes[supernode + 1] - pattern.supernodes[supernode])
+    return panels[pattern.panels[supernode] : pattern.panels[supernode + 1]].reshape(width, -1)
+
+
+@forceinline_kernel
+def rows_of(pattern: Pattern, supernode: int) -> Indices:
+    """(h,) the rows of blocks of a supernode's panel, its own first."""
+    first = pattern.supernodes[supernode]
+    return pattern.rows[pattern.starts[first] : pattern.starts[first + 1]]
+
+
+@kernel
+def _factorise(pattern: Pattern, blocks: Array, diagonal: Array, loose: NDArray[np.bool_]) -> Array:
+    """Left-looking: panel by panel, minus what the panels before it bring."""
+    supernodes, starts = pattern.supernodes, pattern.starts
+    count, nodes = supernodes.shape[0] - 1, starts.shape[0] - 1
+    panels = np.zeros(pattern.panels[count])
+    # first[j]: the supernodes whose next row to be used is one of j's, linked by `following`; at[k]: which.
+    first, following, at = np.full(count, -1), np.full(count, -1), np.zeros(count, dtype=np.int64)
+    owner, where = np.zeros(nodes, dtype=np.int64), np.zeros(nodes, dtype=np.int64)
+    for j in range(count):
+        owner[supernodes[j] : supernodes[j + 1]] = j
+    product, least, loose_numbers = np.zeros((3, 3 * nodes)), np.zeros(3 * nodes), loose.reshape(-1)
+    for j in range(count):
+        begin, end = supernodes[j], supernodes[j + 1]
+        rows, panel = rows_of(pattern, j), panel_of(pattern, panels, j)
+        for p in range(rows.shape[0]):
+            where[rows[p]] = p
+        _lay_in(blocks[starts[begin] : starts[end]], panel)
+        for i in range(panel.shape[0]):
+            least[i] = LEAST_PIVOT * panel[i, i]
+        k = first[j]
+        while k >= 0:
+            after, others, other = following[k], rows_of(pattern, k), panel_of(pattern, panels, k)
+            source, height = at[k], others.shape[0]
+            while source < height and others[source] < end:
+                column = 3 * (others[source] - begin)
+                _subtract_panel(other, others, source, where, column, panel, product)
+                source += 1
+            if source < height:
+                parent, at[k] = owner[others[source]], source
+                following[k], first[parent] = first[parent], k
+            k = after
+        _factorise_panel(panel, rows, diagonal, least, loose_numbers[3 * begin : 3 * end])
+        if rows.shape[0] > end - begin:
+            parent, at[j] = owner[rows[end - begin]], end - begin
+            following[j], first[parent] = first[parent], j
+    return panels
+
+
+@leaf_kernel
+def _lay_in(blocks: Array, panel: Array) -> None:
+    """The blocks of a supernode's columns, as they lie in the matrix, into its panel."""
+    p, height = 0, panel.shape[1] // 3
+    for column in range(panel.shape[0] // 3):
+        for row in range(column, height):
+            for a in range(3):
+                for b in range(3):
+                    panel[3 * column + b, 3 * row + a] = blocks[p, a, b]
+            p += 1
+
+
+@leaf_kernel
+def subtract_products(
+    factors: Array, column: int, source: Array, k: int, begin: int, out: Array, target: int
+) -> None:
+    """out[target + b, i] −= Σ factors[k + a, column + b] source[k + a, i] over a < 3; b < 3, i ≥ `begin`."""
+    x0, x1, x2 = factors[k, column], factors[k + 1, column], factors[k + 2, column]
+    y0, y1, y2 = factors[k, column + 1], factors[k + 1, column + 1], factors[k + 2, column + 1]
+    z0, z1, z2 = factors[k, column + 2], factors[k + 1, column + 2], factors[k + 2, column + 2]
+    for i in range(begin, source.shape[1]):
+        u, v, w = source[k, i], source[k + 1, i], source[k + 2, i]
+        out[target, i] -= x0 * u + x1 * v + x2 * w
+        out[target + 1, i] -= y0 * u + y1 * v + y2 * w
+        out[target + 2, i] -= z0 * u + z1 * v + z2 * w
+
+
+@leaf_kernel
+def _subtract_panel(
+    other: Array, rows: Indices, source: int, where: Indices, column: int, panel: Array, product: Array
+) -> None:
+    """Take from three columns of a panel what another one brings that has them as its rows `source`."""
+    product[:, 3 * source : other.shape[1]] = 0.0
+    for k in range(0, other.shape[0], 3):
+        subtract_products(other, 3 * source, other, k, 3 * source, product, 0)
+    for p in range(source, rows.shape[0]):
+        row = 3 * where[rows[p]]
+        for b in range(3):
+            for a in range(3):
+                panel[column + b, row + a] += product[b, 3 * p + a]
+
+
+@leaf_kernel
+def _factorise_panel(
+    panel: Array, rows: Indices, diagonal: Array, least: Array, loose: NDArray[np.bool_]
+) -> None:
+    """Three columns after the other, minus what those before them bring; pivots are more than `least`."""
+    height = panel.shape[1]
+    for j in range(0, panel.shape[0], 3):
+        for k in range(0, j, 3):
+            subtract_products(panel, j, panel, k, j, panel, j)
+        for column in range(j, j + 3):
+            for k in range(j, column):
+                factor = panel[k, column]
+                for i in range(column, height):
+                    panel[column, i] -= factor * panel[k, i]
+            pivot = panel[column, column]
+            if pivot > least[column]:
+                pivot = np.sqrt(pivot)
+            else:
+                loose[column] = True
+                pivot = _substitute(panel, rows, diagonal, least[column] / LEAST_PIVOT, column)
+            for i in range(column + 1, height):
+                panel[column, i] /= pivot
+            panel[column, column] = pivot
+            panel[column, j:column] = 0.0
+
+
+@leaf_kernel
+def _substitute(panel: Array, rows: Indices, diagonal: Array, own: float, column: int) -> float:
+    """The root of what takes the place of a pivot: its own entry of the matrix's diagonal, or more.
+
+    No entry of L is above the root of the diagonal entry of its row then. In a positive matrix none ever is.
+    In one that is indefinite by rounding they would grow from column to column, beyond all numbers.
+    P. Gill, W. Murray, "Newton-type methods for unconstrained and linearly constrained optimization", 1974.
+    """
+    square = own if own > 0.0 else 1.0
+    for i in range(column + 1, panel.shape[1]):
+        bound = diagonal[rows[i // 3], i % 3]
+        if bound > 0.0:
+            square = max(square, panel[column, i] ** 2 / bound)
+    return float(np.sqrt(square))
+
+
+@leaf_kernel
+def _solve_lower(pattern: Pattern, panels: Array, x: Array, gathered: Array) -> None:
+    """In place; x and room for as much, `gathered`, are (3 F,) by row."""
+    for j in range(pattern.supernodes.shape[0] - 1):
+        rows, panel = rows_of(pattern, j), panel_of(pattern, panels, j)
+        width, height, begin = panel.shape[0], panel.shape[1], 3 * rows[0]
+        for i in range(height):
+            gathered[i] = x[begin + i] if i < width else 0.0
+        for k in range(0, width, 3):
+            u = gathered[k] / panel[k, k]
+            v = (gathered[k + 1] - panel[k, k + 1] * u) / panel[k + 1, k + 1]
+            w = gathered[k + 2] - panel[k, k + 2] * u - panel[k + 1, k + 2] * v
+            w /= panel[k + 2, k + 2]
+            gathered[k], gathered[k + 1], gathered[k + 2] = u, v, w
+            for i in range(k + 3, height):
+                gathered[i] -= panel[k, i] * u + panel[k + 1, i] * v + panel[k + 2, i] * w
+        for i in range(width):
+            x[begin + i] = gathered[i]
+        for p in range(width // 3, rows.shape[0]):
+            for a in range(3):
+                x[3 * rows[p] + a] += gathered[3 * p + a]
+
+
+@leaf_kernel
+def _solve_upper(pattern: Pattern, panels: Array, x: Array, gathered: Array) -> None:
+    """The same for Lᵗ."""
+    for j in range(pattern.supernodes.shape[0] - 2, -1, -1):
+        rows, panel = rows_of(pattern, j), panel_of(pattern, panels, j)
+        for p in range(rows.shape[0]):
+            for a in range(3):
+                gathered[3 * p + a] = x[3 * rows[p] + a]
+        for k in range(panel.shape[0] - 3, -1, -3):
+            u, v, w = _dots(panel, k, gathered)
+            w = (gathered[k + 2] - w) / panel[k + 2, k + 2]
+            v = (gathered[k + 1] - v - panel[k + 1, k + 2] * w) / panel[k + 1, k + 1]
+            u = (gathered[k] - u - panel[k, k + 1] * v - panel[k, k + 2] * w) / panel[k, k]
+            gathered[k], gathered[k + 1], gathered[k + 2] = u, v, w
+        for i in range(panel.shape[0]):
+            x[3 * rows[0] + i] = gathered[i]
+
+
+@reduction_kernel
+def _dots(panel: Array, k: int, x: Array) -> tuple[float, float, float]:
+    """Of what is below a block of three columns with as much of x."""
+    u, v, w = 0.0, 0.0, 0.0
+    for i in range(k + 3, panel.shape[1]):
+        u += panel[k, i] * x[i]
+        v += panel[k + 1, i] * x[i]
+        w += panel[k + 2, i] * x[i]
+    return u, v, w
+
+
+@kernel
+def _diagonal(pattern: Pattern, panels: Array) -> Array:
+    """(F, 3) that of the factor, by row."""
+    diagonal = np.empty((pattern.place.shape[0], 3))
+    for j in range(pattern.supernodes.shape[0] - 1):
+        rows, panel = rows_of(pattern, j), panel_of(pattern, panels, j)
+        for column in range(panel.shape[0]):
+            diagonal[rows[column // 3], column % 3] = panel[column, column]
+    return diagonal

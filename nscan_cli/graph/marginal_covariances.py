@@ -1,0 +1,30 @@
+"""How well the graph knows its keyframes: marginal covariances of their global poses (paper, III-D, IV)."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from nscan_cli.graph.graph_information import information
+from nscan_cli.graph.linalg.block_cholesky import loose_nodes
+from nscan_cli.graph.linalg.selected_inverse import inverse_diagonal
+from nscan_cli.graph.model import Graph
+from nscan_cli.graph.optimise.whole_graph import components
+from nscan_cli.poses import Array
+
+
+def marginal_covariances(graph: Graph) -> dict[int, Array]:
+    """Keyframe id → covariance (3, 3) of its global pose (x, y, φ), with the first keyframe held fixed.
+
+    The first keyframe gets zeros. A keyframe is left out when it is not determined: no relations lead to it
+    from the first one, or they leave a direction open.
+    """
+    part = components(graph)[0]
+    first, others = int(part.keyframes[0]), part.keyframes[1:]
+    _, factor = information(graph, part)
+    covariances = inverse_diagonal(factor)
+    loose = loose_nodes(factor)
+    marginals = {first: np.zeros((3, 3))}
+    for keyframe, covariance, open_direction in zip(others.tolist(), covariances, loose, strict=True):
+        if not open_direction:
+            marginals[keyframe] = covariance
+    return marginals

@@ -1,0 +1,1 @@
+"""The energy of a graph and its minimum (paper, IV)."""

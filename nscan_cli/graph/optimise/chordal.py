@@ -1,0 +1,100 @@
+"""A start for graphs whose given poses lie too far from the minimum: rotations first, then positions.
+
+The chordal relaxation (Martinec, Pajdla 2007; Carlone et al. 2015): with the rotation of pose i as the
+complex number r_i = exp(i φ_i), a measured turn asks for r_b = r_a exp(i θ_ab), which is linear in r; with
+the rotations known, so are the positions.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from nscan_cli.graph.linalg.block_cholesky import factorise, solve
+from nscan_cli.graph.linalg.factor_pattern import block_targets
+from nscan_cli.graph.optimise.graph_energy import GraphEnergy
+from nscan_cli.graph.optimise.graph_solver import FIRST_DAMPING, newton_step
+from nscan_cli.graph.optimise.term_columns import TermColumns
+from nscan_cli.poses import Array, Indices
+
+LEAST_SHARE = 1e-9
+"""What information a direction gets at the least, as a share of the largest, so that all can be solved."""
+
+
+def chordal_start(energy: GraphEnergy, poses: Array) -> Array:
+    """Poses (K, 3) from the relations alone, with the fixed pose kept where it is in `poses`.
+
+    A relation gives the turns from its pose c to each of its other poses, weighed by their marginals; for
+    the positions it counts as it is. The relations have to connect all poses.
+    """
+    start = np.zeros_like(poses)
+    start[:, 2] = _rotations(energy, float(poses[energy.fixed, 2]))
+    # With all positions in one place the derivatives by the rotations of what stands in a relation's
+    # translations are 0, so that one Gauss–Newton step finds the positions from any distance.
+    system = energy.evaluate(start, exact=False)
+    step = newton_step(energy.pattern, system)
+    if step is None:
+        step = newton_step(energy.pattern, system, FIRST_DAMPING)
+    if step is not None:
+        start[energy.free] += step
+    start[:, :2] += poses[energy.fixed, :2]
+    return start
+
+
+def _rotations(energy: GraphEnergy, angle: float) -> Array:
+    """The angles (K,) that minimise Σ w |r_b − r_a exp(i θ_ab)|², r free but for the fixed pose's."""
+    a, b, turns, weights = _turns(energy.columns)
+    weights = np.maximum(weights, LEAST_SHARE * (weights.max(initial=0.0) or 1.0))
+    # r as (re, im, 0): blocks of three, for the pattern that is there.
+    own = weights[:, None, None] * np.eye(3)
+    turned = np.zeros_like(own)
+    turned[:, 0, 0] = turned[:, 1, 1] = weights * np.cos(turns)
+    turned[:, 1, 0] = weights * np.sin(turns)
+    turned[:, 0, 1] = -turned[:, 1, 0]
+    row, column = (energy.free_row[np.concatenate(nodes)] for nodes in ((a, b, b), (a, b, a)))
+    targets = block_targets(np.stack([row, column], axis=1), energy.pattern)
+    values = np.concatenate([own, own, -turned])
+    values = np.where((targets & 1)[:, None, None] == 1, values.transpose(0, 2, 1), values)
+    matrix = np.zeros((len(energy.pattern.rows), 3, 3))
+    np.add.at(matrix, targets[targets >= 0] >> 1, values[targets >= 0])
+
+    held = np.array([np.cos(angle), np.sin(angle), 0.0])
+    right = np.zeros((len(energy.free_row), 3))
+    np.add.at(right, b[a == energy.fixed], turned[a == energy.fixed] @ held)
+    np.add.at(right, a[b == energy.fixed], held @ turned[b == energy.fixed])
+    solved = solve(factorise(energy.pattern, matrix), right[energy.free])
+    angles = np.full(len(energy.free_row), angle)
+    angles[energy.free] = np.arctan2(solved[:, 1], solved[:, 0])
+    return angles
+
+
+def _turns(columns: TermColumns) -> tuple[Indices, Indices, Array, Array]:
+    """The turns θ_ab that the relations measured, with their weights 1/σ²: (a, b, θ, w)."""
+    nobody = np.zeros(0, dtype=np.int64)
+    parts = [(nobody, nobody, np.zeros(0), np.zeros(0))]
+    sizes = np.diff(columns.starts)
+    for n in np.unique(sizes):
+        chosen = np.flatnonzero(sizes == n)
+        c = columns.fixed[chosen, None]
+        others = np.arange(n - 1) + (np.arange(n - 1) >= c)
+        first = columns.starts[chosen, None]
+        H = columns.hessians[columns.hessian_starts[chosen, None] + np.arange(9 * n * n)]
+        H *= columns.weights[chosen, None]
+        free = (3 * others[:, :, None] + np.arange(3)).reshape(len(chosen), -1)
+        kept = H.reshape(-1, 3 * n, 3 * n)[
+            np.arange(len(chosen))[:, None, None], free[:, :, None], free[:, None]
+        ]
+        a = np.broadcast_to(columns.members[first + c], others.shape)
+        turn = columns.local[first + others, 2] - columns.local[first + c, 2]
+        weight = _marginal_weights(kept)
+        parts.append((a.ravel(), columns.members[first + others].ravel(), turn.ravel(), weight.ravel()))
+    a, b, turns, weights = (np.concatenate(column) for column in zip(*parts, strict=True))
+    return a, b, turns, weights
+
+
+def _marginal_weights(information: Array) -> Array:
+    """1/σ² (R, m) of the angles of m poses from their information (R, 3 m, 3 m)."""
+    size = information.shape[1]
+    largest = np.abs(information).max(axis=(1, 2), initial=0.0)[:, None, None]
+    regular = information + LEAST_SHARE * np.where(largest > 0, largest, 1.0) * np.eye(size)
+    weights: Array = 1 / np.diagonal(np.linalg.inv(regular), axis1=1, axis2=2)[:, 2::3]
+    return weights

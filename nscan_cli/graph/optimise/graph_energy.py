@@ -1,0 +1,200 @@
+"""The energy of a whole graph: all relations' terms summed into sparse blocks (paper, eqs. (17) and (23))."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nscan_cli.graph.linalg.factor_pattern import block_targets, find_pattern
+from nscan_cli.graph.optimise.term_columns import TermColumns, Terms
+from nscan_cli.graph.optimise.terms import nscan_term, nscan_value
+from nscan_cli.graph.relations.base import Relation
+from nscan_cli.kernels.decorators import kernel
+from nscan_cli.poses import Array, Indices
+
+
+class System(NamedTuple):
+    """The energy at some poses and its derivatives by the free poses: all but those held, in order."""
+
+    value: float
+    terms: Array
+    """(Q,) what each relation gives: χ² at the poses."""
+    gradient: Array
+    """(F, 3)"""
+    hessian: Array
+    """(B, 3, 3) the lower triangle, in the blocks of the factor's pattern."""
+
+
+class GraphEnergy:
+    """Evaluates the energy of K poses; the sparsity pattern is found once."""
+
+    def __init__(
+        self,
+        nodes: int,
+        relations: Sequence[Relation],
+        positions: Indices,
+        fixed: int = 0,
+        terms: Terms | None = None,
+        free: NDArray[np.bool_] | None = None,
+    ) -> None:
+        """Take relations between node ids; `positions[id]` is a node's place among the `nodes` poses.
+
+        The pose at place `fixed` is held where it is, and so are those that are not `free` (K,), if given.
+        With `terms`, those of the relations are kept there.
+        """
+        terms = terms or Terms()
+        self.columns = terms.columns(relations, positions)
+        self._not_linear = terms.not_linear(relations)
+        self.fixed = fixed
+        can_move = np.ones(nodes, dtype=np.bool_) if free is None else free.copy()
+        can_move[fixed] = False
+        self.free: Indices = np.flatnonzero(can_move)
+        """(F,) the places of the poses that can move."""
+        self.free_row: Indices = np.full(nodes, -1)
+        """(K,) the place of a pose among those; −1 for one that is held."""
+        self.free_row[self.free] = np.arange(len(self.free))
+        edges = _edges(self.columns, self.free_row)
+        self.pattern = find_pattern(edges, len(self.free))
+        self._targets = block_targets(edges, self.pattern)
+
+    def weighted(self, weights: Array) -> GraphEnergy:
+        """The energy with every relation's term multiplied by its weight (Q,)."""
+        other = copy.copy(self)
+        other.columns = self.columns._replace(weights=self.columns.weights * weights)
+        return other
+
+    def terms(self, poses: Array) -> Array:
+        """(Q,) what each relation gives at the poses (K, 3)."""
+        poses = np.ascontiguousarray(poses, dtype=np.float64)
+        columns = self._columns_at(poses) if self._not_linear else self.columns
+        terms = np.zeros(len(columns.fixed))
+        _values(columns, poses, terms)
+        return _not_negative(terms)
+
+    def evaluate(self, poses: Array, exact: bool) -> System:
+        """Energy, gradient and Hessian (exact, or its Gauss–Newton part) at the poses (K, 3)."""
+        poses = np.ascontiguousarray(poses, dtype=np.float64)
+        columns = self._columns_at(poses) if self._not_linear else self.columns
+        terms = np.zeros(len(columns.fixed))
+        gradient = np.zeros((len(poses), 3))
+        blocks = np.zeros((len(self.pattern.rows), 3, 3))
+        _evaluate(columns, poses, float(exact), self._targets, terms, gradient, blocks)
+        _not_negative(terms)
+        return System(float(terms.sum()), terms, gradient[self.free], blocks)
+
+    def _columns_at(self, poses: Array) -> TermColumns:
+        """The columns with those terms that are others at other poses."""
+        columns = self.columns
+        columns = columns._replace(local=columns.local.copy(), hessians=columns.hessians.copy())
+        for k, at in self._not_linear:
+            nodes = slice(columns.starts[k], columns.starts[k + 1])
+            term = at(poses[columns.members[nodes]])
+            columns.local[nodes] = term.local
+            start = columns.hessian_starts[k]
+            columns.hessians[start : start + term.hessian.size] = term.hessian.ravel()
+        return columns
+
+
+def _not_negative(terms: Array) -> Array:
+    """The terms (Q,), where those that rounding has brought below 0 are now 0."""
+    np.maximum(terms, 0.0, out=terms)
+    return terms
+
+
+@kernel
+def _edges(columns: TermColumns, free_row: Indices) -> Indices:
+    """The blocks of the lower triangle of each term, in order, as pairs of rows; −1 is a pose held."""
+    sizes = columns.starts[1:] - columns.starts[:-1]
+    edges = np.empty(((sizes * (sizes + 1)).sum() // 2, 2), dtype=np.int64)
+    e = 0
+    for k in range(columns.fixed.shape[0]):
+        e = _add_edges(columns.members[columns.starts[k] : columns.starts[k + 1]], free_row, edges, e)
+    return edges
+
+
+@kernel
+def _add_edges(members: Indices, free_row: Indices, edges: Indices, e: int) -> int:
+    for i in range(members.shape[0]):
+        for j in range(i + 1):
+            edges[e, 0], edges[e, 1] = free_row[members[i]], free_row[members[j]]
+            e += 1
+    return e
+
+
+@kernel
+def _evaluate(
+    columns: TermColumns,
+    poses: Array,
+    curvature: float,
+    targets: Indices,
+    terms: Array,
+    gradient: Array,
+    blocks: Array,
+) -> None:
+    """Each relation's value into terms (Q,), its gradient and Hessian added to their nodes."""
+    e = 0
+    part, block = np.empty(6), np.empty((6, 6))
+    for k in range(columns.fixed.shape[0]):
+        start, end = columns.starts[k], columns.starts[k + 1]
+        members, m = columns.members[start:end], 3 * (end - start)
+        if part.shape[0] != m:
+            part, block = np.empty(m), np.empty((m, m))
+        hessian = columns.hessians[columns.hessian_starts[k] : columns.hessian_starts[k] + m * m].reshape(
+            m, m
+        )
+        terms[k] = nscan_term(
+            _at(poses, members), columns.local[start:end], hessian, columns.fixed[k], curvature, part, block
+        )
+        weight = columns.weights[k]
+        if weight != 1.0:
+            terms[k] *= weight
+            part *= weight
+            block *= weight
+        e = _add_term(members, part, block, targets, e, gradient, blocks)
+
+
+@kernel
+def _values(columns: TermColumns, poses: Array, terms: Array) -> None:
+    """Each relation's value into terms (Q,)."""
+    for k in range(columns.fixed.shape[0]):
+        start, end = columns.starts[k], columns.starts[k + 1]
+        members, m = columns.members[start:end], 3 * (end - start)
+        hessian = columns.hessians[columns.hessian_starts[k] : columns.hessian_starts[k] + m * m].reshape(
+            m, m
+        )
+        terms[k] = columns.weights[k] * nscan_value(
+            _at(poses, members), columns.local[start:end], hessian, columns.fixed[k]
+        )
+
+
+@kernel
+def _at(poses: Array, members: Indices) -> Array:
+    gathered = np.empty((members.shape[0], 3))
+    for i in range(members.shape[0]):
+        for a in range(3):
+            gathered[i, a] = poses[members[i], a]
+    return gathered
+
+
+@kernel
+def _add_term(
+    members: Indices, part: Array, block: Array, targets: Indices, e: int, gradient: Array, blocks: Array
+) -> int:
+    for i in range(members.shape[0]):
+        for a in range(3):
+            gradient[members[i], a] += part[3 * i + a]
+        for j in range(i + 1):
+            target = targets[e] >> 1
+            if targets[e] >= 0:
+                for a in range(3):
+                    for b in range(3):
+                        if targets[e] & 1:
+                            blocks[target, b, a] += block[3 * i + a, 3 * j + b]
+                        else:
+                            blocks[target, a, b] += block[3 * i + a, 3 * j + b]
+            e += 1
+    return e

@@ -1,0 +1,127 @@
+"""Optimise a whole graph: all keyframes from all relations (paper, IV)."""
+
+from __future__ import annotations
+
+import dataclasses
+from dataclasses import dataclass
+
+import numpy as np
+
+from nscan_cli.graph.model import Graph
+from nscan_cli.graph.optimise.chordal import chordal_start
+from nscan_cli.graph.optimise.graph_energy import GraphEnergy
+from nscan_cli.graph.optimise.graph_solver import Optimum, optimise
+from nscan_cli.graph.optimise.robust import eased
+from nscan_cli.graph.relations.base import Relation
+from nscan_cli.poses import Array, Indices
+
+TRIAL = 100
+"""Iterations after which two starts are compared; only the better one goes on."""
+UNFOLDINGS = 3
+"""How often a start is looked for from where a graph may be folded wrong, as long as each leads lower."""
+ROUNDING = 1e-6
+"""Energies that differ by less, of themselves or of a χ² of 1, are the same: then the poses given stay."""
+
+
+@dataclass(frozen=True)
+class GraphOptimum:
+    """The energy Σ fᵗHf of all relations that is left, and how it was reached."""
+
+    energy: float
+    iterations: int
+    converged: bool
+    components: int
+    """Parts that no relation connects; a keyframe without any relation is one."""
+
+
+@dataclass(frozen=True)
+class Component:
+    """Keyframes that relations connect."""
+
+    keyframes: Indices
+    """Ids, increasing; the first one is held where it is."""
+    relations: list[Relation]
+
+    def energy(self, nodes: int) -> GraphEnergy:
+        """The energy of the keyframes' poses; `nodes` is the number of nodes of the graph."""
+        positions = np.full(nodes, -1)
+        positions[self.keyframes] = np.arange(len(self.keyframes))
+        return GraphEnergy(len(self.keyframes), self.relations, positions)
+
+
+def optimise_graph(graph: Graph, max_iterations: int = 1000, tolerance: float = 1e-6) -> GraphOptimum:
+    """Move the keyframes to the minimum of the graph's energy, and the attached nodes with them.
+
+    The lowest minimum of several starts is kept. The first keyframe of each component stays. Marginals in
+    the graph belonged to the poses before: they are removed.
+    """
+    total, iterations, converged = 0.0, 0, True
+    parts = components(graph)
+    poses = graph.poses.copy()
+    for part in parts:
+        if len(part.keyframes) == 1:
+            continue
+        lowest = _lowest(part.energy(len(graph)), poses[part.keyframes], max_iterations, tolerance)
+        poses[part.keyframes] = lowest.poses
+        total += lowest.energy
+        iterations += lowest.iterations
+        converged &= lowest.converged
+    graph.move_keyframes(graph.keyframes, poses[graph.keyframes])
+    graph.marginals = {}
+    return GraphOptimum(total, iterations, converged, len(parts))
+
+
+def _lowest(energy: GraphEnergy, given: Array, max_iterations: int, tolerance: float) -> Optimum:
+    """The lowest minimum: from the poses given (K, 3), from the chordal start, and from where that is eased.
+
+    The iterations are those of all.
+    """
+    iterations = 0
+    best: Optimum | None = None
+    for start in (given, chordal_start(energy, given)):
+        found = optimise(energy, start, min(TRIAL, max_iterations), tolerance)
+        iterations += found.iterations
+        if best is None or _is_lower(found, best):
+            best = found
+    assert best is not None
+    if not best.converged:
+        best = optimise(energy, best.poses, max_iterations, tolerance)
+        iterations += best.iterations
+    for _ in range(UNFOLDINGS):
+        unbent = eased(energy, best.poses)
+        if unbent is None:
+            break
+        found = optimise(energy, unbent, max_iterations, tolerance)
+        iterations += found.iterations
+        if not _is_lower(found, best):
+            break
+        best = found
+    return dataclasses.replace(best, iterations=iterations)
+
+
+def _is_lower(found: Optimum, best: Optimum) -> bool:
+    """Whether a minimum is clearly lower than the best so far, or that is none at all."""
+    return found.energy < best.energy - ROUNDING * (1 + best.energy) or not np.isfinite(best.energy)
+
+
+def components(graph: Graph) -> list[Component]:
+    """The connected parts of the graph, in order of their first keyframes."""
+    relations = graph.relations
+    labels = list(range(len(graph)))
+
+    def label(node: int) -> int:
+        while labels[node] != node:
+            labels[node] = node = labels[labels[node]]
+        return node
+
+    for relation in relations:
+        first = label(relation.nodes[0])
+        for node in relation.nodes[1:]:
+            labels[label(node)] = first
+    keyframes = graph.keyframes
+    parts: dict[int, tuple[list[int], list[Relation]]] = {}
+    for keyframe in keyframes:
+        parts.setdefault(label(int(keyframe)), ([], []))[0].append(int(keyframe))
+    for relation in relations:
+        parts[label(relation.nodes[0])][1].append(relation)
+    return [Component(np.array(ids, dtype=np.int64), relations) for ids, relations in parts.values()]

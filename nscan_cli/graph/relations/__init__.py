@@ -1,0 +1,1 @@
+"""The types of relations between keyframes (paper, IV)."""

@@ -1,0 +1,48 @@
+"""The relation of n keyframes whose scans were matched jointly (paper, IV, eqs. (18) to (23))."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, ClassVar, Self
+
+from nscan_cli.graph.io.json_fields import JsonRecord, MalformedError, pose_rows, triangle
+from nscan_cli.graph.relations.base import Term
+from nscan_cli.poses import Array
+
+
+@dataclass(frozen=True)
+class NScan:
+    """An nScan relation, eqs. (19) to (23): the local poses of n scans matched jointly."""
+
+    kind: ClassVar[str] = "nscan"
+    nodes: tuple[int, ...]
+    poses: Array
+    """(n, 3) local poses, in a frame of their own."""
+    hessian: Array
+    """(3n, 3n) H, at the local poses, variables (x, y, φ) scan by scan; its null space is the gauge."""
+    fixed: int
+    """Index into nodes of pose c, which carries the mapping from global to local coordinates."""
+    origin: str
+    score: float = 0.0
+
+    def term(self) -> Term:
+        """fᵗHf, eq. (23)."""
+        return Term(self.poses, self.hessian, self.fixed)
+
+    def content(self) -> dict[str, Any]:
+        """The local poses, H, and the node of pose c."""
+        return {
+            "poses": pose_rows(self.poses),
+            "hessian": triangle(self.hessian),
+            "fixed": self.nodes[self.fixed],
+        }
+
+    @classmethod
+    def from_content(cls, record: JsonRecord, nodes: tuple[int, ...], origin: str, score: float) -> Self:
+        """The relation of such a JSON object. Raises MalformedError."""
+        fixed = record.integer("fixed")
+        if fixed not in nodes:
+            raise MalformedError(record.place, f"'fixed' is {fixed}, which is none of its nodes")
+        poses, held = record.poses("poses", len(nodes)), nodes.index(fixed)
+        hessian = record.information("hessian", 3 * len(nodes), held)
+        return cls(nodes, poses, hessian, held, origin, score)

@@ -1,0 +1,57 @@
+"""The relation of two keyframes: a relative pose that was measured (paper, IV, eqs. (16) and (17))."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, ClassVar, Self
+
+import numpy as np
+
+from nscan_cli.graph.io.json_fields import JsonRecord, pose_rows, triangle
+from nscan_cli.graph.relations.base import Term
+from nscan_cli.poses import Array
+
+
+@dataclass(frozen=True)
+class Pairwise:
+    """A pairwise relation, eqs. (16) and (17): x̂_b ⊖ x̂_a was measured, where (a, b) = nodes."""
+
+    kind: ClassVar[str] = "pairwise"
+    nodes: tuple[int, int]
+    measurement: Array
+    """(3,) pose of nodes[1] in the frame of nodes[0]."""
+    information: Array
+    """(3, 3) C⁻¹ of the components of the measurement."""
+    origin: str
+    """odometry, track or loop."""
+    score: float = 0.0
+
+    def term(self) -> Term:
+        """ΔᵗC⁻¹Δ with Δ = (b ⊖ a) − p_ab, eqs. (16) and (17).
+
+        That is (23) of two poses, a at the local frame's origin and c = a: (19) to (22) are (16) there.
+        """
+        return self._term
+
+    @cached_property
+    def _term(self) -> Term:
+        # Kept: while a graph grows, its energy is made for each new keyframe.
+        local, hessian = np.zeros((2, 3)), np.zeros((6, 6))
+        local[1], hessian[3:, 3:] = self.measurement, self.information
+        return Term(local, hessian, 0)
+
+    def content(self) -> dict[str, Any]:
+        """The measurement and its information."""
+        return {
+            "measurement": pose_rows(self.measurement[None])[0],
+            "information": triangle(self.information),
+        }
+
+    @classmethod
+    def from_content(cls, record: JsonRecord, nodes: tuple[int, ...], origin: str, score: float) -> Self:
+        """The relation of such a JSON object. Raises MalformedError."""
+        if len(nodes) != 2:
+            raise record.wrong("nodes", "a pair of nodes")
+        a, b = nodes
+        return cls((a, b), record.pose("measurement"), record.information("information", 3), origin, score)

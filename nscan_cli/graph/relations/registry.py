@@ -1,0 +1,37 @@
+"""The types of relations that there are, and what a file keeps of a relation of any of them."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from nscan_cli.graph.io.json_fields import JsonRecord, six_digits
+from nscan_cli.graph.relations.base import Relation
+from nscan_cli.graph.relations.nscan import NScan
+from nscan_cli.graph.relations.pairwise import Pairwise
+
+RELATION_TYPES: list[type[Relation]] = [
+    Pairwise,
+    NScan,
+]
+"""A new type of relation is a module and a line here."""
+
+ORIGINS = ("odometry", "track", "nscan", "loop")
+
+
+def relation_record(relation: Relation, key: str = "nodes") -> dict[str, Any]:
+    """The JSON object of a relation; `key` says what its members are: "nodes" or "scans"."""
+    return {
+        "type": relation.kind,
+        key: list(relation.nodes),
+        **relation.content(),
+        "origin": relation.origin,
+        "score": six_digits(relation.score),
+    }
+
+
+def relation_of(record: JsonRecord, key: str = "nodes") -> Relation:
+    """The relation of such a JSON object. Raises MalformedError when its parts do not fit each other."""
+    types = {each.kind: each for each in RELATION_TYPES}
+    found = types[record.text("type", tuple(types))]
+    origin, score = record.text("origin", ORIGINS), record.number("score")
+    return found.from_content(record, record.integers(key), origin, score)

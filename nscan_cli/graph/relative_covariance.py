@@ -1,0 +1,76 @@
+"""What a graph knows of how two of its nodes lie to each other: the marginal of their relative pose."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from nscan_cli.graph.graph_information import information
+from nscan_cli.graph.linalg.block_cholesky import loose_nodes, solve
+from nscan_cli.graph.model import Graph, Pairwise
+from nscan_cli.graph.optimise.whole_graph import Component, components
+from nscan_cli.poses import Array, relative, relative_jacobians
+
+ATTACHED = np.array([0.05, 0.05, 0.05])
+"""m, m, rad; standard deviations of a node in the frame of the keyframe that it is attached to. The graph
+holds no measurement of it."""
+
+
+class Between:
+    """The relative poses of some nodes of a graph at its optimum, with what all its relations say of them."""
+
+    def __init__(self, graph: Graph, nodes: Sequence[int]) -> None:
+        self._graph = graph
+        anchors = set(graph.anchors[list(nodes)].tolist())
+        self._parts: list[tuple[list[int], Array]] = []
+        for part in components(graph):
+            chosen = [int(keyframe) for keyframe in part.keyframes if int(keyframe) in anchors]
+            if chosen:
+                self._parts.append(_joint_covariance(graph, part, chosen))
+
+    def relation(self, a: int, b: int) -> Pairwise | None:
+        """The pose of node b in the frame of node a, with the information that all relations together give.
+
+        A node that is no keyframe moves with the one that it is attached to, within ATTACHED. None when no
+        relations lead from one to the other, or they leave a direction open.
+        """
+        graph, nodes = self._graph, (a, b)
+        anchors = [int(graph.anchors[node]) for node in nodes]
+        part = next((part for part in self._parts if set(anchors) <= set(part[0])), None)
+        if part is None:
+            return None
+        chosen, covariance = part
+        by_b, by_a = relative_jacobians(graph.poses[b], graph.poses[a])
+        jacobian = np.zeros((3, len(covariance)))
+        for by, node, anchor in zip((by_a, by_b), nodes, anchors, strict=True):
+            at = 3 * chosen.index(anchor)
+            jacobian[:, at : at + 3] += by @ _lever(graph.poses[node] - graph.poses[anchor])
+        spread = sum(node != anchor for node, anchor in zip(nodes, anchors, strict=True))
+        relative_covariance = jacobian @ covariance @ jacobian.T + spread * np.diag(ATTACHED**2)
+        measurement = relative(graph.poses[b], graph.poses[a])
+        return Pairwise((a, b), measurement, np.linalg.inv(relative_covariance), "track")
+
+
+def _joint_covariance(graph: Graph, part: Component, chosen: list[int]) -> tuple[list[int], Array]:
+    """The keyframes (m,) of those chosen that are determined, and the covariance (3m, 3m) of their poses.
+
+    The component's first keyframe is held; relative poses do not depend on that.
+    """
+    energy, factor = information(graph, part)
+    loose = loose_nodes(factor)
+    rows = energy.free_row[np.searchsorted(part.keyframes, chosen)]
+    known = [at for at, row in enumerate(rows) if row < 0 or not loose[row]]
+    covariance = np.zeros((len(known), 3, len(known), 3))
+    free = [at for at, k in enumerate(known) if rows[k] >= 0]
+    for at in free:
+        for component in range(3):
+            unit = np.zeros((len(loose), 3))
+            unit[rows[known[at]], component] = 1.0
+            covariance[free, :, at, component] = solve(factor, unit)[rows[known][free]]
+    return [chosen[at] for at in known], covariance.reshape(3 * len(known), 3 * len(known))
+
+
+def _lever(offset: Array) -> Array:
+    """∂p/∂a (3, 3) of a pose p that moves with a rigidly, p − a = offset."""
+    return np.array([[1.0, 0.0, -offset[1]], [0.0, 1.0, offset[0]], [0.0, 0.0, 1.0]])

@@ -1,0 +1,1 @@
+"""Compiled code: which functions are kernels, and how their machine code is kept and loaded."""

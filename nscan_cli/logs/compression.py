@@ -1,0 +1,105 @@
+"""Bytes that are compressed whole: how each kind is known, and unpacked piece by piece."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+from nscan_cli.files.inputs import Bytes
+from nscan_cli.files.limits import INPUT, ExceededError
+
+PIECE = 256
+"""Bytes that are unpacked at once: what goes before damage stays, and no piece becomes large."""
+UNPACKS = "unpacks to more and more"
+
+
+class Packing(NamedTuple):
+    """A kind of compression of whole files."""
+
+    name: str
+    magic: bytes
+    """The first bytes of what is compressed so."""
+    new: Callable[[], Any]
+    """A decompressor, as in the standard library: decompress(bytes), eof, unused_data."""
+    command: str
+    """What unpacks such a file on the command line."""
+
+
+def _gzip() -> Any:
+    import zlib
+
+    return zlib.decompressobj(zlib.MAX_WBITS | 16)
+
+
+def _bzip2() -> Any:
+    import bz2
+
+    return bz2.BZ2Decompressor()
+
+
+def _xz() -> Any:
+    import lzma
+
+    return lzma.LZMADecompressor(memlimit=INPUT.bytes)
+
+
+def _zstd() -> Any:
+    import zstandard
+
+    return zstandard.ZstdDecompressor().decompressobj()
+
+
+def _lz4() -> Any:
+    from lz4.frame import LZ4FrameDecompressor
+
+    return LZ4FrameDecompressor()
+
+
+GZIP = Packing("gzip", b"\x1f\x8b", _gzip, "gunzip")
+BZIP2 = Packing("bzip2", b"BZh", _bzip2, "bunzip2")
+XZ = Packing("xz", b"\xfd7zXZ\0", _xz, "unxz")
+ZSTD = Packing("zstd", b"\x28\xb5\x2f\xfd", _zstd, "unzstd")
+LZ4 = Packing("lz4", b"\x04\x22\x4d\x18", _lz4, "unlz4")
+PACKINGS = (GZIP, BZIP2, XZ, ZSTD, LZ4)
+SUFFIXES = (".gz", ".bz2", ".xz", ".zst", ".zstd", ".lz4")
+"""What names of compressed files end with."""
+
+
+def packing_of(data: Bytes) -> Packing | None:
+    """How the data are compressed; None when they are not."""
+    return next((packing for packing in PACKINGS if data[: len(packing.magic)] == packing.magic), None)
+
+
+def unpacked(stored: bytes, packing: Packing) -> tuple[bytes, str | None]:
+    """The content as far as it can be unpacked, and what is wrong with the rest; None when nothing is.
+
+    Compressed data may follow one another. Raises ExceededError when it is too much.
+    """
+    content: list[bytes] = []
+    size, at, most = 0, 0, INPUT.bytes
+    problem = None
+    while problem is None and stored.startswith(packing.magic, at):
+        try:
+            member = packing.new()
+            while at < len(stored) and not member.eof:
+                piece = member.decompress(stored[at : at + PIECE])
+                at = min(at + PIECE, len(stored)) - len(member.unused_data or b"")
+                content.append(piece)
+                size += len(piece)
+                if size > most:
+                    raise ExceededError(INPUT, UNPACKS)
+        except ExceededError:
+            raise
+        except Exception as error:
+            # zlib.error, OSError, LZMAError, ZstdError, RuntimeError: each library has its own.
+            problem = f"are damaged near byte {at} ({' '.join(str(error).split())})"
+        else:
+            problem = None if member.eof else "end too early"
+        while stored.startswith(b"\0", at):
+            at += 1
+    if problem is not None:
+        return b"".join(content), f"the {packing.name} data {problem}"
+    if at < len(stored):
+        left = len(stored) - at
+        return b"".join(content), f"{left} bytes after the {packing.name} data are no such data"
+    return b"".join(content), None

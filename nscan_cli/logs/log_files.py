@@ -1,0 +1,216 @@
+"""Which files a log consists of: one, the files of a folder, or those of a recording that was split."""
+
+from __future__ import annotations
+
+import os
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path, PurePosixPath
+from typing import Any
+
+from nscan_cli.errors import InputMissingError, WrongUsageError
+from nscan_cli.files.counting import counted
+from nscan_cli.files.inputs import STANDARD_INPUT, base_name, label, read_bytes
+from nscan_cli.files.limits import CONFIG
+from nscan_cli.logs.formats import FORMS
+from nscan_cli.logs.recordings.recording_names import (
+    RECORDINGS,
+    common,
+    distinct,
+    gaps,
+    in_order,
+    some,
+    taken_apart,
+    without_packing,
+)
+
+METADATA = "metadata.yaml"
+SQLITE = b"SQLite format 3\0"
+BESIDE = ("-wal", "-journal")
+"""What is added to the name of a database for what has not been taken into it yet."""
+SHARED = "-shm"
+"""The same for what processes share that have it open, which says nothing of its own."""
+LISTED = re.compile(r"^ *relative_file_paths:.*(\n *- .*)*", re.MULTILINE)
+"""The part of metadata.yaml that names the files."""
+
+
+@dataclass(frozen=True)
+class Parts:
+    """The files of one log."""
+
+    title: str
+    """As messages call the log."""
+    name: str
+    """As results call it: the same on every machine."""
+    files: tuple[str, ...]
+    """Their paths."""
+    warnings: tuple[str, ...] = ()
+    """What a user should know of the choice."""
+    are_parts: bool = True
+    """Whether metadata.yaml or their names say that they are parts of one recording."""
+
+
+def parts_of(paths: str | Sequence[str]) -> Parts:
+    """The files of the log that these paths name: a file, "-", a folder, or the files of one recording.
+
+    Raises InputMissingError when a folder holds none, WrongUsageError when the paths are of several.
+    """
+    named = [paths] if isinstance(paths, str) else _recorded(paths)
+    if len(named) == 1:
+        (path,) = named
+        if os.path.isdir(path):
+            return _of_folder(path)
+        warnings = () if path == STANDARD_INPUT else _siblings(path)
+        return Parts(label(path), base_name(path), (path,), warnings)
+    if STANDARD_INPUT in named:
+        raise WrongUsageError(
+            "standard input (-) can be no part of a recording; give all files by their paths"
+        )
+    for path in named:
+        if os.path.isdir(path):
+            raise WrongUsageError(
+                f"{path}: is a folder beside other LOGs; give it alone, or the files of one recording"
+            )
+    if len({os.path.realpath(path) for path in named}) < len(named):
+        raise WrongUsageError(f"{named[-1]}: one of the LOGs is given twice; give each once")
+    parts = in_order(named)
+    agree = len({part.recording for part in parts}) == 1 and distinct(parts)
+    name = common(parts) if agree else ", ".join(base_name(part.file) for part in parts)
+    title = f"{parts[0].file} and {counted(len(parts) - 1, 'other')}"
+    return Parts(title, name, tuple(part.file for part in parts), gaps(parts, first=None), agree)
+
+
+def _recorded(paths: Sequence[str]) -> list[str]:
+    """Those of several paths that name files of a recording: a shell's * names what goes with them too."""
+    beside = {path + end for path in paths for end in (*BESIDE, SHARED)}
+    kept = [path for path in paths if path not in beside and Path(path).name != METADATA]
+    return kept or list(paths)
+
+
+def files_of(paths: str | Sequence[str]) -> list[str]:
+    """The paths of all files that are read for a log, with what stands beside databases; "-" is one too.
+
+    Raises the errors of parts_of.
+    """
+    return [one for path in parts_of(paths).files for one in (path, *beside(path).values())]
+
+
+def beside(path: str) -> dict[str, str]:
+    """The paths of what has not been taken into the database at `path` yet, by what their names add.
+
+    None when it is no database. As SQLite does, it is looked for beside the file that a link leads to.
+    """
+    if path == STANDARD_INPUT or not first_bytes(path).startswith(SQLITE):
+        return {}
+    database = os.path.realpath(path) if os.path.islink(path) else path
+    names = {end: database + end for end in BESIDE}
+    return {end: name for end, name in names.items() if os.path.isfile(name) and os.path.getsize(name)}
+
+
+def _of_folder(path: str) -> Parts:
+    """The recording in a folder: as its metadata.yaml says, else the only one that is there."""
+    folder = Path(path)
+    try:
+        names = sorted(name for name in os.listdir(folder) if not name.startswith("."))
+    except OSError as error:
+        raise InputMissingError(f"{path}: cannot be read: {error.strerror}; check the path") from error
+    there = [name for name in names if _is_recording(folder / name)]
+    name = Path(os.path.abspath(path)).name
+    warnings: list[str] = []
+    listed = _listed(folder, warnings) if METADATA in names else []
+    known = {without_packing(one): one for one in there}
+    found = [one if one in there else known.get(without_packing(one)) for one in listed]
+    files = [one for one in found if one is not None]
+    if listed and not files and there:
+        warnings.append(f"{METADATA} names other files than {some(there)}, which is there and is read")
+    elif listed:
+        gone = [one for one, other in zip(listed, found, strict=True) if other is None]
+        if gone and files:
+            warnings.append(f"{some(gone)} is not there, which {METADATA} names: what it held is missing")
+        twins = {without_packing(one) for one in files}
+        more = [one for one in there if without_packing(one) not in twins]
+        if more:
+            warnings.append(f"{some(more)} is not in {METADATA}, and is left out")
+    if not files:
+        files = _alone(path, there, names)
+        warnings += gaps(in_order(files), first=0)
+    ordered = tuple(str(folder / part.file) for part in in_order(files))
+    return Parts(path, name, ordered, tuple(warnings))
+
+
+def _alone(path: str, there: list[str], names: list[str]) -> list[str]:
+    """The files of the only recording among those of a folder."""
+    if not there:
+        held = [f"{name}/" if os.path.isdir(os.path.join(path, name)) else name for name in names]
+        holds = f"it holds {some(held)}" if held else "it is empty"
+        raise InputMissingError(
+            f"{path}: is a folder without a recording, {holds}; "
+            "name a log, or a folder that `ros2 bag record` has left"
+        )
+    plain = {without_packing(one): one for one in sorted(there, key=len, reverse=True)}
+    parts = in_order(plain.values())
+    if len({part.recording for part in parts}) > 1 or not distinct(parts):
+        raise WrongUsageError(f"{path}: holds several recordings, {some(there)}; name the files of one")
+    return [part.file for part in parts]
+
+
+def _siblings(path: str) -> tuple[str, ...]:
+    """What a user should know who has named one of several files of a recording."""
+    if taken_apart(path).number is None or not any(end in path for end in RECORDINGS):
+        return ()
+    file = Path(os.path.realpath(path))
+    if (file.parent / METADATA).is_file():
+        listed = _listed(file.parent, [])
+        if len(listed) > 1 and file.name in listed:
+            place, whole = listed.index(file.name) + 1, f"its folder {Path(path).parent}"
+            return (f"it is file {place} of {len(listed)} of a recording: give {whole} to read all of it",)
+    own = taken_apart(file.name)
+    try:
+        names = os.listdir(file.parent)
+    except OSError:
+        return ()
+    parts = in_order(name for name in names if taken_apart(name).recording == own.recording)
+    numbers = [part.number for part in parts]
+    if len(parts) < 2 or numbers != list(range(len(parts))):
+        return ()
+    place = numbers.index(own.number) + 1
+    return (f"it is file {place} of {len(parts)} of a recording: give all of them, {parts[0].file} to "
+            f"{parts[-1].file}, to read all of it",)  # fmt: skip
+
+
+def _listed(folder: Path, warnings: list[str]) -> list[str]:
+    """The names of the files that metadata.yaml names; none, and a warning, when it cannot be read."""
+    from ruamel.yaml import YAML
+
+    try:
+        # The rest, which may be long, is of no use.
+        text = LISTED.search(read_bytes(str(folder / METADATA), CONFIG).decode())
+        document: Any = YAML(typ="safe", pure=True).load(text.group() if text else "")
+        # Only what is in the folder: some versions name it too.
+        names = [PurePosixPath(str(name)).name for name in document["relative_file_paths"]]
+    except Exception as error:
+        # Whatever a parser raises, and what a document of another shape leads to.
+        warnings.append(f"{METADATA} cannot be read, and is left out ({type(error).__name__})")
+        return []
+    return list(dict.fromkeys(name for name in names if name))
+
+
+def _is_recording(path: Path) -> bool:
+    """Whether a file is a recording, by its first bytes, or is called one."""
+    if not path.is_file():
+        return False
+    head = first_bytes(str(path))
+    magic = any(form.magic is not None and head.startswith(form.magic) for form in FORMS if form.container)
+    return magic or taken_apart(path.name).recording[1] != ""
+
+
+def first_bytes(path: str) -> bytes:
+    """The first bytes of a regular file; none when it is not there."""
+    try:
+        if os.path.isfile(path):
+            with open(path, "rb") as file:
+                return file.read(16)
+    except (OSError, ValueError):
+        pass
+    return b""

@@ -1,0 +1,1 @@
+"""Recordings of messages: MCAP and ROS bags."""

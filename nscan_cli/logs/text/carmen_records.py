@@ -1,0 +1,208 @@
+"""CARMEN text, line by line: which records there are, and the numbers in them.
+
+Source of the form: CARMEN, src/logger/writelog.c. A line is `TAG values… ipc_timestamp host
+logger_timestamp`; lines that begin with # are comments.
+"""
+
+from __future__ import annotations
+
+import io
+import re
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nscan_cli.files.limits import KINDS
+from nscan_cli.logs.assemble import empty_table
+from nscan_cli.logs.skips import Skips
+from nscan_cli.logs.text.line_records import Block, LineRecord, as_text, beam_count, blocks, sound, sound_rows
+from nscan_cli.poses import Array
+
+TAG = re.compile(rb"[A-Z][A-Z0-9_]{2,31}\Z")
+NEW = re.compile(r"(RAW|ROBOT)LASER\d\Z")
+LASER = re.compile(rb"((RAW|ROBOT)?LASER\d|[FR]LASER)\Z")
+USED = (b"ODOM", b"TRUEPOS", b"PARAM")
+UNUSED = (0, b"")
+"""Stands for a line that is only counted."""
+TRAILER = 3
+
+
+@dataclass
+class CarmenScans:
+    """The scans of one laser, in file order: S scans of at most B beams."""
+
+    ranges: NDArray[np.float32]
+    """(S, B) as written; nan beyond a scan's own beams."""
+    beams: NDArray[np.int64]
+    """(S,)"""
+    head: Array
+    """(S, 7) of new messages: type, start angle, fov, resolution, maximum, accuracy, mode; else (S, 0)."""
+    laser: Array
+    """(S, 3) pose of the laser in the odometry frame; (S, 0) when the message has none."""
+    robot: Array
+    """(S, 3) pose of the robot, likewise."""
+    stamps: list[str]
+    lines: list[int]
+    hosts: set[bytes]
+
+
+def lines_by_tag(data: bytes, skips: Skips) -> dict[str, list[tuple[int, bytes]]]:
+    """The lines of a log (number from 1, bytes without the tag), by their tag, in file order.
+
+    Of tags that are neither of a laser nor USED, there are as many UNUSED as lines.
+    """
+    by_tag: dict[bytes, list[tuple[int, bytes]]] = {}
+    used: set[bytes] = set()
+    for number, line in enumerate(io.BytesIO(data), 1):
+        text = line.strip()
+        if not text or text.startswith(b"#"):
+            continue
+        tag, _, rest = text.partition(b" ")
+        if b"\t" in tag:
+            tag, rest = [*text.split(None, 1), b""][:2]
+        known = by_tag.get(tag)
+        if known is None:
+            if not TAG.match(tag) or len(by_tag) >= KINDS.value:
+                skips.add("not a CARMEN record", number)
+                continue
+            known = by_tag[tag] = []
+            if tag in USED or LASER.match(tag):
+                used.add(tag)
+        known.append((number, rest) if tag in used else UNUSED)
+    return {tag.decode(): lines for tag, lines in by_tag.items()}
+
+
+def numbers(
+    lines: list[tuple[int, bytes]], count: int, skips: Skips, stamped: bool = True, by_logger: bool = False
+) -> tuple[Array, list[str], list[int]]:
+    """Rows (R, count) of a short record such as ODOM, with stamps and line numbers.
+
+    `stamped`: a line without trailer is of no use. `by_logger`: the stamps are the logger's. Lines of
+    another length or with a value out of bounds are skipped.
+    """
+    rows, stamps, places = [], [], []
+    for number, text in lines:
+        tokens = text.split()
+        if len(tokens) not in ((count + TRAILER,) if stamped else (count + TRAILER, count)):
+            skips.add("wrong number of values", number)
+            continue
+        try:
+            row = [float(token) for token in tokens[:count]]
+        except ValueError:
+            skips.add("a value is not a number", number)
+            continue
+        if not sound(row):
+            skips.add("a value is out of bounds", number)
+            continue
+        rows.append(row)
+        stamps.append(as_text(tokens[-1 if by_logger else count]) if len(tokens) > count else "")
+        places.append(number)
+    return np.array(rows, dtype=np.float64).reshape(-1, count), stamps, places
+
+
+def logger_stamps(lines: list[tuple[int, bytes]], scans: CarmenScans) -> list[str]:
+    """When the scans were logged: the end of their lines; empty for those without a trailer."""
+    ends = dict(lines)
+    return [
+        as_text(ends[line].split()[-1]) if stamp else ""
+        for line, stamp in zip(scans.lines, scans.stamps, strict=True)
+    ]
+
+
+def scans(tag: str, lines: list[tuple[int, bytes]], skips: Skips) -> CarmenScans:
+    """The scans of all lines of one laser tag; malformed ones are skipped. Raises ExceededError."""
+    head = 7 if NEW.match(tag) else 0
+    poses = 6 if tag in ("FLASER", "RLASER") or tag.startswith("ROBOT") else 0
+    tail = poses + (5 if tag.startswith("ROBOT") else 0)
+    counts: dict[bytes, int] = {}
+    records = [
+        record
+        for number, text in lines
+        if (record := _record(number, text, head, tail, counts, skips)) is not None
+    ]
+    widest = max((n for _, n in records), default=0)
+    size = len(records)
+    result = CarmenScans(
+        ranges=empty_table(size, widest),
+        beams=np.zeros(size, dtype=np.int64),
+        head=np.zeros((size, head)),
+        laser=np.zeros((size, poses // 2)),
+        robot=np.zeros((size, poses // 2)),
+        stamps=[],
+        lines=[],
+        hosts=set(),
+    )
+    row = 0
+    for block in blocks(records, skips):
+        good, values = _without_problems(block, head, poses, tail, skips)
+        rows = slice(row, row + len(good))
+        with np.errstate(over="ignore"):
+            result.ranges[rows, : block.beams] = values[:, head + 1 : head + 1 + block.beams]
+        result.beams[rows] = block.beams
+        result.head[rows] = values[:, :head]
+        if poses:
+            at = values.shape[1] - tail
+            result.laser[rows], result.robot[rows] = values[:, at : at + 3], values[:, at + 3 : at + 6]
+        result.stamps += [record.stamp for record in good]
+        result.lines += [record.line for record in good]
+        result.hosts.update(record.host for record in good)
+        row += len(good)
+    if row < size:
+        for name in ("ranges", "beams", "head", "laser", "robot"):
+            setattr(result, name, getattr(result, name)[:row])
+    return result
+
+
+def _record(
+    number: int, text: bytes, head: int, tail: int, counts: dict[bytes, int], skips: Skips
+) -> tuple[LineRecord, int] | None:
+    """One laser line and its number of beams, or None when it is malformed.
+
+    The beam count is believed only as far as the line has that many values. `counts` are the beam counts
+    that were found to be some already: a log has few.
+    """
+    if b"  " in text or b"\t" in text:
+        text = b" ".join(text.split())
+    tokens = text.count(b" ") + 1
+    start = text.split(b" ", head + 1)
+    if not text or len(start) <= head:
+        skips.add("wrong number of values", number)
+        return None
+    beams = counts.get(start[head]) or beam_count(start[head], number, skips)
+    if beams is None:
+        return None
+    counts[start[head]] = beams
+    least = head + 1 + beams + tail + (1 if head else 0)
+    if tokens == least and not head:
+        return LineRecord(number, text, tokens, ""), beams
+    if tokens < least + TRAILER or (tokens > least + TRAILER and not head):
+        skips.add("wrong number of values", number)
+        return None
+    values, stamp, host, _ = text.rsplit(b" ", TRAILER)
+    return LineRecord(number, values, tokens - TRAILER, as_text(stamp), host), beams
+
+
+def _without_problems(
+    block: Block, head: int, poses: int, tail: int, skips: Skips
+) -> tuple[list[LineRecord], Array]:
+    """The laser records of a block whose numbers can be true, and their values; the others are skipped."""
+    values = block.values
+    problems: list[tuple[str, NDArray[np.bool_]]] = []
+    if head:
+        after = head + 1 + block.beams
+        remissions = values[:, after] == values.shape[1] - (after + 1 + tail)
+        angles = sound_rows(values[:, :head]) & (np.abs(values[:, [1, 3]]).max(axis=1) <= 4 * np.pi)
+        problems += [("wrong number of values", ~remissions), ("an angle is out of bounds", ~angles)]
+    if poses:
+        at = values.shape[1] - tail
+        problems.append(("a pose is out of bounds", ~sound_rows(values[:, at : at + poses])))
+    bad = np.zeros(len(values), dtype=np.bool_)
+    for _, wrong in problems:
+        bad |= wrong
+    if not bad.any():
+        return block.records, values
+    for row in np.flatnonzero(bad).tolist():
+        reason = next(reason for reason, wrong in problems if wrong[row])
+        skips.add(reason, block.records[row].line)
+    return [block.records[row] for row in np.flatnonzero(~bad).tolist()], values[~bad]

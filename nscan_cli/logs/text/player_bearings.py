@@ -1,0 +1,140 @@
+"""Laser records of Player logs that have no head: a range, a bearing and an intensity for each beam.
+
+So are they in logs of 2002, older than Player's writelog.cc, and in some with the lines' heads of version 1.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nscan_cli.logs.assemble import RawScans, empty_table
+from nscan_cli.logs.laser_defaults import CARMEN_MAX_RANGE
+from nscan_cli.logs.skips import Skips
+from nscan_cli.logs.text.bearings import Fan, are_degrees, fan
+from nscan_cli.logs.text.line_records import LineRecord, beams_problem, parsed, sound
+from nscan_cli.poses import Array
+
+VALUES = 3
+"""Of a beam."""
+LONGEST_NUMBER = 10
+"""Digits of a beam count."""
+LARGEST = 720.0
+"""Degrees; what is beyond was never a bearing."""
+
+
+class Row(NamedTuple):
+    """A scan as its line has it."""
+
+    record: LineRecord
+    ranges: Array
+    """(n,) m"""
+    bearings: Array
+    """(n,) rad or degrees"""
+
+
+def are_written(records: list[LineRecord], headed: bool) -> bool:
+    """Whether these laser records are of this kind; `headed`: they can have a head with a beam count."""
+    if any(map(_has_head, records)):
+        return False
+    return not headed or any(record.count and record.count % VALUES == 0 for record in records)
+
+
+def scans(records: list[LineRecord], skips: Skips) -> tuple[RawScans, str]:
+    """The scans in file order, and the unit of the bearings; what cannot be read is skipped.
+
+    Raises ExceededError.
+    """
+    rows = _rows(records, skips)
+    in_degrees = are_degrees(np.array([np.abs(row.bearings).max() for row in rows]))
+    fans: dict[bytes, Fan | None] = {}
+    whole: list[tuple[Row, Fan]] = []
+    for row in rows:
+        key = row.bearings.tobytes()
+        if key not in fans:
+            fans[key] = fan(row.bearings, in_degrees)
+        found = fans[key]
+        if found is None:
+            skips.add("the bearings are not evenly spaced", row.record.line)
+        else:
+            whole.append((row, found))
+    whole = _not_cut_off(whole, skips)
+    raw = RawScans(
+        _table(whole),
+        np.array([found.first for _, found in whole]),
+        np.array([found.step for _, found in whole]),
+        [row.record.stamp for row, _ in whole],
+        (0.0, CARMEN_MAX_RANGE),
+        ("none in a Player log", "assumed, as for CARMEN"),
+        beams=np.array([int(found.places[-1]) + 1 for _, found in whole], dtype=np.int64),
+    )
+    return raw, "degrees" if in_degrees else "rad"
+
+
+def has_degrees(poses: Array) -> bool:
+    """Whether the headings of poses (P, 3) are in degrees: then the robot drives where they point.
+
+    Headings within a turn of rad, and those of a robot that stands, are in rad.
+    """
+    if np.abs(poses[:, 2]).max() <= 2 * np.pi + 0.01:
+        return False
+    x, y = np.diff(poses[:, 0]), np.diff(poses[:, 1])
+    far = np.hypot(x, y) > 0
+    way, headings = np.arctan2(y, x)[far], poses[:-1, 2][far]
+    # Twice the angle: it may drive backwards.
+    lengths = np.hypot(x, y)[far]
+    in_degrees, in_rad = (
+        float(np.cos(2 * (way - angles)) @ lengths) for angles in (np.radians(headings), headings)
+    )
+    return in_degrees > max(in_rad, 0.0)
+
+
+def _has_head(record: LineRecord) -> bool:
+    """Whether it is one of version 1: first and last angle, step, count, and two values for each beam."""
+    start = record.values.split(b" ", 4)[:4]
+    count = start[3] if len(start) == 4 else b""
+    return count.isdigit() and len(count) < LONGEST_NUMBER and 4 + 2 * int(count) == record.count
+
+
+def _rows(records: list[LineRecord], skips: Skips) -> list[Row]:
+    whole = []
+    for record in records:
+        beams, more = divmod(record.count, VALUES)
+        problem = "wrong number of values" if more or not beams else beams_problem(beams)
+        if problem:
+            skips.add(problem, record.line)
+        else:
+            whole.append((record, beams))
+    rows = []
+    for record, _, values in parsed(whole, skips):
+        bearings = values[1::VALUES]
+        if not sound(bearings) or np.abs(bearings).max() > LARGEST:
+            skips.add("a bearing is out of bounds", record.line)
+        else:
+            rows.append(Row(record, values[::VALUES], bearings))
+    return rows
+
+
+def _not_cut_off(whole: list[tuple[Row, Fan]], skips: Skips) -> list[tuple[Row, Fan]]:
+    """All but those that begin as most scans do, and end before: no count says that a line is whole."""
+    usual = Counter((found.first, found.step, int(found.places[-1])) for _, found in whole).most_common(1)
+    kept = []
+    for row, found in whole:
+        first, step, last = usual[0][0]
+        if found.places[-1] < last and abs(found.first - first) < abs(step) / 2:
+            skips.add("fewer beams than the other scans, from the same bearing on", row.record.line)
+        else:
+            kept.append((row, found))
+    return kept
+
+
+def _table(whole: list[tuple[Row, Fan]]) -> NDArray[np.float32]:
+    """The readings (S, B) by direction; nan where there is none. Raises ExceededError."""
+    table = empty_table(len(whole), max((int(found.places[-1]) + 1 for _, found in whole), default=0))
+    with np.errstate(over="ignore", invalid="ignore"):
+        for readings, (row, found) in zip(table, whole, strict=True):
+            readings[found.places] = row.ranges
+    return table

@@ -1,0 +1,1 @@
+"""Pictures: drawing on a canvas, axes, plots."""

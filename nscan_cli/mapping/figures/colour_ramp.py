@@ -1,0 +1,27 @@
+"""Colours in an order that all eyes see: from dark blue over purple to orange."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from nscan_cli.mapping.figures.canvas import Colour
+
+# S. van der Walt, N. Smith, "plasma" (CC0), without its lightest fifth, which is lost on white.
+ANCHORS = np.array(
+    [
+        (13, 8, 135),
+        (84, 2, 163),
+        (139, 10, 165),
+        (185, 50, 137),
+        (219, 92, 104),
+        (244, 136, 73),
+        (252, 166, 54),
+    ]
+)
+
+
+def ramp(count: int) -> list[Colour]:
+    """So many colours, evenly spaced."""
+    at = np.linspace(0, len(ANCHORS) - 1, count)
+    channels = [np.interp(at, np.arange(len(ANCHORS)), channel) for channel in ANCHORS.T]
+    return [(red, green, blue) for red, green, blue in np.round(channels).astype(int).T.tolist()]

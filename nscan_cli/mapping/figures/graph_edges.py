@@ -1,0 +1,38 @@
+"""What a graph's relations look like: lines between keyframes, of three kinds."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nscan_cli.graph.model import Graph, NScan
+from nscan_cli.graph.relations.base import Relation
+from nscan_cli.mapping.figures.canvas import DIM, GREEN, VERMILLION
+
+ANOTHER_VISIT = 20.0
+"""Scans so much path (m) apart are of different visits, as the joint matches of slam have it."""
+EDGE_COLOURS = {"nScan": GREEN, "pairwise": DIM, "loop": VERMILLION}
+"""In the order in which they are drawn: loops on top."""
+
+
+def edges_by_kind(graph: Graph) -> dict[str, NDArray[np.int64]]:
+    """For each of EDGE_COLOURS, the nodes (E, 2) that are joined, sorted, each pair once.
+
+    An nScan relation, or one of a further type, joins its fixed scan with each of the others. Of one that
+    closes a loop, those lines are the loop that lead to another visit, or all where none does.
+    """
+    path = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(graph.poses[:, :2], axis=0).T))])
+    found: dict[str, set[tuple[int, int]]] = {kind: set() for kind in EDGE_COLOURS}
+    for relation in graph.pairwise:
+        found["loop" if relation.origin == "loop" else "pairwise"].add(relation.nodes)
+    joints: list[Relation] = [*graph.nscan, *graph.others]
+    for joint in joints:
+        centre = joint.nodes[joint.term().fixed]
+        others = [node for node in joint.nodes if node != centre]
+        closing = others if joint.origin == "loop" else []
+        if far := [node for node in closing if abs(path[node] - path[centre]) > ANOTHER_VISIT]:
+            closing = far
+        found["loop"].update((centre, node) for node in closing)
+        kind = "nScan" if isinstance(joint, NScan) else "pairwise"
+        found[kind].update((centre, node) for node in others if node not in closing)
+    return {kind: np.array(sorted(pairs), dtype=np.int64).reshape(-1, 2) for kind, pairs in found.items()}

@@ -1,0 +1,171 @@
+"""Pictures of a map for people: what the graph knows drawn over the map, and a figure for a paper."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nscan_cli.graph.model import Graph
+from nscan_cli.logs.laser_log import LaserLog
+from nscan_cli.mapping.figures.axes import (
+    AXES_MARGINS,
+    CAPTION_MARGINS,
+    FOOTER_MARGINS,
+    Entry,
+    axes,
+    footer,
+    legend_below,
+)
+from nscan_cli.mapping.figures.canvas import (
+    BLACK,
+    BLUE,
+    PURPLE,
+    SKY,
+    Bounds,
+    Canvas,
+)
+from nscan_cli.mapping.figures.covariance_ellipses import draw_ellipses
+from nscan_cli.mapping.figures.graph_edges import EDGE_COLOURS, edges_by_kind
+from nscan_cli.mapping.figures.panels import bounds_around
+from nscan_cli.mapping.map_image import gray
+from nscan_cli.mapping.occupancy import FREE, OCCUPIED, UNKNOWN, OccupancyGrid
+from nscan_cli.poses import Array, transform
+
+LEAST_PIXELS, MOST_PIXELS = 1600, 3200
+"""Of the longer side of a picture with overlays. A small map's cells become squares of pixels; of a large
+map several cells become one pixel, which is dark when one of them is, so that walls can still be seen."""
+FIGURE_PIXELS = 2400
+"""Of the longer side of a figure's plot: 20 cm at 300 dots an inch."""
+SOFT_GRAYS = {OCCUPIED: 60, UNKNOWN: 226, FREE: 255}
+"""Softer than map_server's, so that colours stand out."""
+FAR_OUT = 5e-4
+SEEN_ELLIPSE = 8.0
+"""Units of the longer half axis that an ellipse needs to be seen."""
+
+
+@dataclass(frozen=True)
+class Overlays:
+    """What is to be drawn over a map."""
+
+    trajectory: bool = False
+    graph: bool = False
+    uncertainty: bool = False
+
+    def __bool__(self) -> bool:
+        return self.trajectory or self.graph or self.uncertainty
+
+
+def draw_over_map(grid: OccupancyGrid, graph: Graph, overlays: Overlays) -> Canvas:
+    """The map in soft grays, the overlays in colour, and below them a scale and what the colours mean."""
+    background, cells_per_pixel = _background(grid)
+    canvas = Canvas(grid.bounds, 1 / (cells_per_pixel * grid.resolution), background, FOOTER_MARGINS)
+    footer(canvas, _draw_overlays(canvas, graph, overlays))
+    return canvas
+
+
+def draw_figure(
+    log: LaserLog,
+    rows: NDArray[np.int64],
+    poses: Array,
+    grid: OccupancyGrid,
+    graph: Graph,
+    overlays: Overlays,
+) -> Canvas:
+    """Points and path on white with axes in metres, as the paper's Figs. 6 and 7.
+
+    Of the points of the scans in `rows` (N,), taken at `poses` (N, 3), those are drawn that lie in
+    occupied cells of the grid: what moved through the scene is left out. The few points that lie far
+    outside, seen through a window, do not make the picture larger. Without overlays, the path is drawn;
+    what else is drawn, a legend tells.
+    """
+    points = _points_of_occupied_cells(log, rows, poses, grid)
+    margins = CAPTION_MARGINS if overlays.graph or overlays.uncertainty else AXES_MARGINS
+    canvas = Canvas.blank(_figure_bounds(points, graph.poses), FIGURE_PIXELS, margins)
+    canvas.cloud(points, BLACK, 0.6)
+    entries = _draw_overlays(canvas, graph, overlays if overlays else Overlays(trajectory=True))
+    if margins is CAPTION_MARGINS:
+        legend_below(canvas, entries)
+    else:
+        canvas.clear_margins()
+        axes(canvas)
+    return canvas
+
+
+def _figure_bounds(points: Array, poses: Array) -> Bounds:
+    """Around the poses (N, 3), and the points (M, 2) but a share of FAR_OUT on each side."""
+    seen = poses[:, :2]
+    if len(points):
+        seen = np.concatenate([np.quantile(points, [FAR_OUT, 1 - FAR_OUT], axis=0), seen])
+    return bounds_around(seen, spare=0.03)
+
+
+def _draw_overlays(canvas: Canvas, graph: Graph, overlays: Overlays) -> list[Entry]:
+    """Draw them; the legend's entries for what was drawn."""
+    entries: list[Entry] = []
+    if overlays.trajectory:
+        # Beneath relations, a broad and light band.
+        colour, width = (SKY, 5.0) if overlays.graph else (BLUE, 2.2)
+        canvas.line(graph.poses[:, :2], colour, width)
+        entries.append(("line", colour, "path"))
+    if overlays.graph:
+        entries += _draw_graph(canvas, graph)
+    if overlays.uncertainty:
+        entries += _draw_uncertainty(canvas, graph)
+    return entries
+
+
+def _background(grid: OccupancyGrid) -> tuple[NDArray[np.uint8], float]:
+    """The map in soft grays, (h, w), and how many of its cells lie along a pixel's side."""
+    cells = gray(grid, SOFT_GRAYS)
+    longest = max(cells.shape)
+    if longest <= MOST_PIXELS:
+        zoom = math.ceil(LEAST_PIXELS / longest)
+        return cells.repeat(zoom, axis=0).repeat(zoom, axis=1), 1 / zoom
+    side = math.ceil(longest / MOST_PIXELS)
+    height, width = -(-cells.shape[0] // side), -(-cells.shape[1] // side)
+    # Whole pixels, filled up above and to the right: the lower left corner keeps its place.
+    above, right = height * side - cells.shape[0], width * side - cells.shape[1]
+    padded = np.pad(cells, ((above, 0), (0, right)), constant_values=SOFT_GRAYS[UNKNOWN])
+    blocks = padded.reshape(height, side, width, side)
+    darkest, mean = blocks.min(axis=(1, 3)), blocks.mean(axis=(1, 3))
+    return np.where(darkest == SOFT_GRAYS[OCCUPIED], darkest, np.round(mean)).astype(np.uint8), float(side)
+
+
+def _draw_graph(canvas: Canvas, graph: Graph) -> list[Entry]:
+    """Relations as lines, of an nScan relation from its fixed scan to the others; keyframes as dots."""
+    entries: list[Entry] = []
+    edges = edges_by_kind(graph)
+    for kind, width in (("nScan", 1.2), ("pairwise", 1.2), ("loop", 2.0)):
+        nodes, colour = edges[kind], EDGE_COLOURS[kind]
+        if len(nodes):
+            starts, ends = graph.poses[nodes[:, 0], :2], graph.poses[nodes[:, 1], :2]
+            canvas.segments(starts, ends, colour, width)
+            entries.append(("line", colour, kind))
+    canvas.circles(graph.poses[graph.keyframes, :2], 1.8, BLACK)
+    return [*entries, ("disc", BLACK, "keyframe")]
+
+
+def _draw_uncertainty(canvas: Canvas, graph: Graph) -> list[Entry]:
+    """Ellipses of the keyframes' positions."""
+    keyframes = sorted(graph.marginals)
+    if not keyframes:
+        return []
+    covariances = np.array([graph.marginals[keyframe][:2, :2] for keyframe in keyframes])
+    return [draw_ellipses(canvas, graph.poses[keyframes, :2], covariances, PURPLE, SEEN_ELLIPSE)]
+
+
+def _points_of_occupied_cells(
+    log: LaserLog, rows: NDArray[np.int64], poses: Array, grid: OccupancyGrid
+) -> Array:
+    """(M, 2) the end points of the beams, m, that lie in occupied cells."""
+    seen = list(log.each_points())
+    points = np.concatenate([transform(pose, seen[row]) for row, pose in zip(rows, poses, strict=True)])
+    columns, lines = np.floor((points - np.array(grid.origin)) / grid.resolution).astype(np.int64).T
+    height, width = grid.shape
+    inside = (columns >= 0) & (columns < width) & (lines >= 0) & (lines < height)
+    points, columns, lines = points[inside], columns[inside], lines[inside]
+    occupied: Array = points[grid.states()[lines, columns] == OCCUPIED]
+    return occupied

@@ -1,0 +1,204 @@
+"""Beams followed through the cells of a grid, and counted there.
+
+J. Amanatides, A. Woo, "A fast voxel traversal algorithm for ray tracing", 1987.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nscan_cli.kernels.decorators import kernel, leaf_kernel
+from nscan_cli.poses import Array
+from nscan_cli.threads import in_threads
+
+TILE = 32
+"""Cells along the side of a tile."""
+MOST_PARTS = 4
+"""So many threads cast at most, for each has counts of its own."""
+NEVER = 1 << 62
+"""Where a ray crosses no border of this kind."""
+
+
+class Tiles(NamedTuple):
+    """The counts of the parts of a grid that a beam has met; most of a large map none ever does."""
+
+    numbers: NDArray[np.int32]
+    """(⌈H / TILE⌉, ⌈W / TILE⌉) the number of each tile; −1 for one that no beam has met."""
+    counts: NDArray[np.int32]
+    """(T, 2, TILE, TILE) hits, then misses, of each tile that has a number; those of others are 0."""
+
+
+class ScanRays(NamedTuple):
+    """The scans of a log that are cast, and where from."""
+
+    rows: NDArray[np.int64]
+    """(N,) of the log."""
+    ranges: NDArray[np.float32]
+    """(S, B) m"""
+    angle_min: Array
+    """(S,) rad"""
+    angle_increment: Array
+    """(S,) rad"""
+    lasers: Array
+    """(N, 3) poses of the laser."""
+
+
+def count_beams(
+    scans: ScanRays,
+    reach: float,
+    shape: tuple[int, int],
+    resolution: float,
+    left: int,
+    bottom: int,
+    threads: int,
+) -> Tiles:
+    """How the beams of all scans, up to `reach` (m), meet the cells of a grid of `shape` (H, W).
+
+    Its cell (0, 0) has its lower left corner at (left, bottom) · resolution; no beam may leave it.
+    """
+
+    def cast(some: NDArray[np.int64]) -> Tiles:
+        index = np.full((-(-shape[0] // TILE), -(-shape[1] // TILE)), -1, dtype=np.int32)
+        # There is room for all tiles, but only those that are written to take any memory: the first ones.
+        tiles = Tiles(index, np.zeros((index.size, 2, TILE, TILE), dtype=np.int32))
+        part = scans._replace(rows=scans.rows[some], lasers=scans.lasers[some])
+        _cast(part, reach, resolution, left, bottom, tiles)
+        return tiles
+
+    parts = min(threads, MOST_PARTS)
+    whole, *others = in_threads(parts, cast, np.array_split(np.arange(len(scans.rows)), parts))
+    for tiles in others:
+        _add(tiles, whole)
+    return whole
+
+
+@kernel
+def extent(scans: ScanRays, reach: float) -> tuple[float, float, float, float]:
+    """The least x and y and the greatest x and y of the lasers and of their beams' ends."""
+    rows, ranges, angle_min, angle_increment, lasers = scans
+    low_x = high_x = lasers[0, 0]
+    low_y = high_y = lasers[0, 1]
+    for k in range(len(rows)):
+        row = rows[k]
+        x, y, heading = lasers[k]
+        low_x, high_x = min(low_x, x), max(high_x, x)
+        low_y, high_y = min(low_y, y), max(high_y, y)
+        for beam in range(ranges.shape[1]):
+            if not np.isfinite(ranges[row, beam]):
+                continue
+            r = min(float(ranges[row, beam]), reach)
+            # Most beams are so short that they end within, whatever their direction is.
+            if x - r > low_x and x + r < high_x and y - r > low_y and y + r < high_y:
+                continue
+            angle = heading + angle_min[row] + beam * angle_increment[row]
+            end_x, end_y = x + r * np.cos(angle), y + r * np.sin(angle)
+            low_x, high_x = min(low_x, end_x), max(high_x, end_x)
+            low_y, high_y = min(low_y, end_y), max(high_y, end_y)
+    return low_x, low_y, high_x, high_y
+
+
+@kernel
+def _cast(scans: ScanRays, reach: float, resolution: float, left: int, bottom: int, tiles: Tiles) -> None:
+    """Add the beams of all scans to the counts of the tiles."""
+    rows, ranges, angle_min, angle_increment, lasers = scans
+    counts = tiles.counts.reshape(-1)
+    used = 0
+    for k in range(len(rows)):
+        row = rows[k]
+        x = lasers[k, 0] / resolution - left
+        y = lasers[k, 1] / resolution - bottom
+        for beam in range(ranges.shape[1]):
+            r = float(ranges[row, beam])
+            if not np.isfinite(r):
+                continue
+            angle = lasers[k, 2] + angle_min[row] + beam * angle_increment[row]
+            length = min(r, reach) / resolution
+            end_x, end_y = x + length * np.cos(angle), y + length * np.sin(angle)
+            used = _pass(x, y, end_x, end_y, tiles.numbers, counts, used)
+            if r <= reach:
+                hit, used = _hits(tiles.numbers, int(end_y), int(end_x), used)
+                counts[np.uint64(hit)] += 1
+
+
+@kernel
+def _add(tiles: Tiles, whole: Tiles) -> None:
+    """Add the counts of tiles to those of others in the same grid."""
+    counts, sums = tiles.counts.reshape(-1, 2 * TILE * TILE), whole.counts.reshape(-1, 2 * TILE * TILE)
+    used = np.count_nonzero(whole.numbers >= 0)
+    for row in range(tiles.numbers.shape[0]):
+        for column in range(tiles.numbers.shape[1]):
+            number = tiles.numbers[row, column]
+            if number < 0:
+                continue
+            if whole.numbers[row, column] < 0:
+                whole.numbers[row, column] = used
+                used += 1
+            for k in range(2 * TILE * TILE):
+                sums[whole.numbers[row, column], k] += counts[number, k]
+
+
+@leaf_kernel
+def _hits(numbers: NDArray[np.int32], line: int, column: int, used: int) -> tuple[int, int]:
+    """Where a cell's hits are counted; its tile gets a number if it has none. How many have one."""
+    row, place = np.uint64(line // TILE), np.uint64(column // TILE)
+    if numbers[row, place] < 0:
+        numbers[row, place] = used
+        used += 1
+    return int(numbers[row, place]) * 2 * TILE * TILE + line % TILE * TILE + column % TILE, used
+
+
+@leaf_kernel
+def _pass(
+    x: float,
+    y: float,
+    end_x: float,
+    end_y: float,
+    numbers: NDArray[np.int32],
+    counts: NDArray[np.int32],
+    used: int,
+) -> int:
+    """Count the cells from (x, y) up to, and without, the cell of the end as missed; in cells.
+
+    Returns how many tiles are used. A ray through a corner takes the step in y first.
+    """
+    column, line = int(x), int(y)
+    dx, dy = end_x - x, end_y - y
+    steps_x, steps_y = abs(int(end_x) - column), abs(int(end_y) - line)
+    step_x, step_y = (1 if dx > 0 else -1), (1 if dy > 0 else -1)
+    # Where the ray crosses the next borders, from 0 to 1 along it, and how far apart they are.
+    between_x, between_y = _fixed(1 / abs(dx)), _fixed(1 / abs(dy))
+    next_x = _fixed((column + 1 - x if dx > 0 else x - column) / abs(dx)) if steps_x > 0 else NEVER
+    next_y = _fixed((line + 1 - y if dy > 0 else y - line) / abs(dy)) if steps_y > 0 else NEVER
+    left = steps_x + steps_y
+    while left > 0:
+        at, used = _hits(numbers, line, column, used)
+        at += TILE * TILE
+        # The steps one way that lead out of the tile, and those the other way before.
+        steps_x = TILE - column % TILE if dx > 0 else column % TILE + 1
+        steps_y = TILE - line % TILE if dy > 0 else line % TILE + 1
+        out_x, out_y = next_x + (steps_x - 1) * between_x, next_y + (steps_y - 1) * between_y
+        if out_x < out_y:
+            steps_y = (out_x - next_y) // between_y + 1 if next_y <= out_x else 0
+        else:
+            steps_x = (out_y - next_x - 1) // between_x + 1 if next_x < out_y else 0
+        for _ in range(min(steps_x + steps_y, left)):
+            counts[np.uint64(at)] += 1
+            # All bits are set where x comes first. As a comparison it would be made a branch, which nobody
+            # can foresee, and take twice the time.
+            sideways = int(np.int64(np.uint64(next_x) - np.uint64(next_y))) >> 63
+            at += (step_x & sideways) + (TILE * step_y & ~sideways)
+            next_x += between_x & sideways
+            next_y += between_y & ~sideways
+        left -= steps_x + steps_y
+        column += steps_x * step_x
+        line += steps_y * step_y
+    return used
+
+
+@leaf_kernel
+def _fixed(t: float) -> int:
+    """A place along a ray in units of 2⁻⁵²; what is far beyond its end is somewhere beyond."""
+    return int(min(t, 16.0) * 4503599627370496.0)

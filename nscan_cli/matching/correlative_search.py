@@ -1,0 +1,297 @@
+"""Find the pose of a scan without a good start: branch and bound over a likelihood field.
+
+The field says of each small cell how near it is to a point of the reference; a pose scores the mean of the
+cells that the scan's points fall into. Coarser levels of the field hold the greatest value of a square of
+cells, so that one look bounds all shifts of a square from above, and whatever cannot beat the best pose
+found so far is never looked at (Olson 2009; Hess et al. 2016, section V). The pose found is the best of its
+lattice; NDT matching makes it exact.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nscan_cli.kernels.decorators import kernel
+from nscan_cli.poses import Array
+
+LEVELS = 4
+PAD = 1 << (LEVELS - 1)
+"""The coarsest level has squares of 2³ cells to a side."""
+LANES = 8
+"""So many numbers are summed or compared side by side."""
+SPLAT = 2
+"""Cells to each side that a point reaches."""
+
+
+@dataclass(frozen=True)
+class SearchOptions:
+    """How far, and how finely, a pose is searched."""
+
+    distance: float = 4.5
+    """m to each side: two starts that are 1.5 m off, and one that is turned by 30° seen 3 m away."""
+    turn: float = 1.1
+    """rad to each side: two starts that are turned by 30° each."""
+    cell: float = 0.2
+    """Side of a cell of the field, m."""
+    spread: float = 0.15
+    """Standard deviation (m) by which a point is blurred."""
+    beams: int = 90
+    """A scan with more points is searched with so many of them."""
+    lever: float = 15.0
+    """A turn moves a point at this distance (m) by one cell from one angle of the search to the next."""
+
+
+class Field(NamedTuple):
+    """A likelihood field and its levels, with nothing around it: PAD cells before, one behind."""
+
+    levels: NDArray[np.float32]
+    """(LEVELS − 1, w, h) values in [0, 1]; level l at (ix, iy): the greatest of 2ˡ × 2ˡ cells from there."""
+    coarsest: NDArray[np.float32]
+    """(PAD, w, ⌈h / PAD⌉ + 2 LANES) the last level; [r, ix, LANES + q] is its value at (ix, PAD q + r), so
+    that squares side by side are neighbours."""
+    x: float
+    """m, left border of the cell at PAD."""
+    y: float
+    cell: float
+
+
+class Spot(NamedTuple):
+    """The best pose of a search."""
+
+    score: float
+    """In [0, 1]; the score asked for where there is nothing better."""
+    pose: Array
+    """(3,)"""
+
+
+def likelihood_field(points: Array, options: SearchOptions) -> Field:
+    """The field of reference points (m, 2)."""
+    margin = SPLAT * options.cell
+    (left, right), (bottom, top) = ((float(each.min()), float(each.max())) for each in points.T)
+    x, y = left - margin, bottom - margin
+    width, height = (
+        int((end - begin) / options.cell) + 2 for begin, end in ((x, right + margin), (y, top + margin))
+    )
+    levels = np.zeros((LEVELS - 1, width + PAD + 1, height + PAD + 1), dtype=np.float32)
+    coarsest = np.zeros((PAD, width + PAD + 1, -(-levels.shape[2] // PAD) + 2 * LANES), dtype=np.float32)
+    field = Field(levels, coarsest, x, y, options.cell)
+    _splat(field, points, options.spread)
+    for level in range(1, LEVELS - 1):
+        _coarsen(levels[level - 1], 1 << (level - 1), levels[level])
+    _coarsen_last(levels[-1], coarsest)
+    return field
+
+
+class Search:
+    """The poses about `centre` (3,) of a scan with points (m, 2), and what squares of them score at most."""
+
+    def __init__(self, field: Field, points: Array, centre: Array, options: SearchOptions) -> None:
+        some = np.linspace(0, len(points) - 1, min(options.beams, len(points))).astype(np.int64)
+        chosen = np.ascontiguousarray(points[some])
+        step = options.cell / min(float(np.hypot(chosen[:, 0], chosen[:, 1]).max()), options.lever)
+        turns = int(options.turn / step)
+        self._field, self._centre = field, centre
+        self._angles = centre[2] + step * np.arange(-turns, turns + 1)
+        self._reach = int(options.distance / options.cell)
+        self._cells = _cells(field, chosen, centre, self._angles)
+        self._bounds = _tile_bounds(field.coarsest, self._cells, self._reach)
+
+    def best(self, least: float, without: tuple[Array, float] | None = None) -> Spot | None:
+        """The best pose, if it scores more than `least`.
+
+        `without` is a place, as a pose (3,) and a distance (m) from it, where none is looked for.
+        """
+        pose = np.empty(3)
+        place, away = (self._centre, -1.0) if without is None else without
+        score = _branch_and_bound(
+            self._field,
+            self._cells,
+            self._bounds,
+            self._centre,
+            self._angles,
+            self._reach,
+            least,
+            place,
+            away,
+            pose,
+        )
+        return Spot(score, pose) if score > least else None
+
+
+def search(field: Field, points: Array, centre: Array, least: float, options: SearchOptions) -> Spot | None:
+    """The best pose of a scan with points (m, 2) about `centre` (3,), if it scores more than `least`."""
+    return Search(field, points, centre, options).best(least)
+
+
+@kernel
+def _splat(field: Field, points: Array, spread: float) -> None:
+    """The finest level: by the nearest of the points whose cells are not more than SPLAT away."""
+    finest, cell = field.levels[0], field.cell
+    width, height = finest.shape[0] - PAD - 1, finest.shape[1] - PAD - 1
+    squares = np.full((width + 2 * SPLAT, height + SPLAT + LANES), np.inf)
+    dy2 = np.full(LANES, np.inf)
+    for k in range(points.shape[0]):
+        cx, cy = int((points[k, 0] - field.x) / cell), int((points[k, 1] - field.y) / cell)
+        for j in range(2 * SPLAT + 1):
+            dy = field.y + (cy + j - SPLAT + 0.5) * cell - points[k, 1]
+            dy2[j] = dy * dy
+        for i in range(2 * SPLAT + 1):
+            dx = field.x + (cx + i - SPLAT + 0.5) * cell - points[k, 0]
+            row = squares[cx + i, cy : cy + LANES]
+            for j in range(LANES):
+                square = dx * dx + dy2[j]
+                row[j] = square if square < row[j] else row[j]
+    for ix in range(width):
+        for iy in range(height):
+            square = squares[ix + SPLAT, iy + SPLAT]
+            if square < np.inf:
+                finest[ix + PAD, iy + PAD] = np.exp(-0.5 * square / (spread * spread))
+
+
+@kernel
+def _coarsen(finer: NDArray[np.float32], half: int, coarser: NDArray[np.float32]) -> None:
+    """Squares of twice as many cells to a side as the finer ones have, `half`; behind the last is nothing."""
+    width, height = finer.shape
+    for ix in range(width):
+        here, there, row = finer[ix], finer[min(ix + half, width - 1)], coarser[ix]
+        for iy in range(height):
+            row[iy] = here[iy] if here[iy] > there[iy] else there[iy]
+        for iy in range(height - half):
+            row[iy] = row[iy] if row[iy] > row[iy + half] else row[iy + half]
+
+
+@kernel
+def _coarsen_last(finer: NDArray[np.float32], coarsest: NDArray[np.float32]) -> None:
+    """As _coarsen, into the order of the coarsest level."""
+    row = np.empty((1, finer.shape[1]), dtype=np.float32)
+    for ix in range(finer.shape[0]):
+        there = min(ix + PAD // 2, finer.shape[0] - 1)
+        for iy in range(finer.shape[1]):
+            row[0, iy] = max(finer[ix, iy], finer[there, iy])
+        for iy in range(finer.shape[1]):
+            other = min(iy + PAD // 2, finer.shape[1] - 1)
+            coarsest[iy % PAD, ix, LANES + iy // PAD] = max(row[0, iy], row[0, other])
+
+
+@kernel
+def _cells(field: Field, points: Array, centre: Array, angles: Array) -> NDArray[np.int32]:
+    """(a, m, 2) the cells of the field that the points fall into, at the centre turned to each angle."""
+    cells = np.empty((angles.shape[0], points.shape[0], 2), dtype=np.int32)
+    for a in range(angles.shape[0]):
+        cos, sin = np.cos(angles[a]), np.sin(angles[a])
+        for k in range(points.shape[0]):
+            x = cos * points[k, 0] - sin * points[k, 1] + centre[0]
+            y = sin * points[k, 0] + cos * points[k, 1] + centre[1]
+            cells[a, k, 0] = PAD + int(np.floor((x - field.x) / field.cell))
+            cells[a, k, 1] = PAD + int(np.floor((y - field.y) / field.cell))
+    return cells
+
+
+@kernel
+def _tile_bounds(coarsest: NDArray[np.float32], cells: NDArray[np.int32], reach: int) -> Array:
+    """(a, t, t) what the shifts of each square of PAD × PAD score at most, from −reach on."""
+    tiles = (2 * reach) // PAD + 1
+    lanes = -(-tiles // LANES)
+    width, height = coarsest.shape[1], coarsest.shape[2]
+    bounds = np.zeros((cells.shape[0], tiles, lanes * LANES))
+    for a in range(cells.shape[0]):
+        for k in range(cells.shape[1]):
+            ix, iy = cells[a, k, 0] - reach, cells[a, k, 1] - reach
+            for lane in range(lanes):
+                first = iy // PAD + LANES * (lane + 1)
+                if first <= 0 or first + LANES >= height:
+                    continue
+                for i in range(max(-(ix // PAD), 0), tiles):
+                    if ix + i * PAD >= width:
+                        break
+                    row = coarsest[iy % PAD, ix + i * PAD, first : first + LANES]
+                    total = bounds[a, i, lane * LANES : (lane + 1) * LANES]
+                    for j in range(LANES):
+                        total[j] += row[j]
+    mean: Array = bounds[:, :, :tiles] / cells.shape[1]
+    return mean
+
+
+@kernel
+def _quarter_bounds(
+    level: NDArray[np.float32], half: int, cells: NDArray[np.int32], ox: int, oy: int, bounds: Array
+) -> None:
+    """What the four squares of `half` × `half` shifts from (ox, oy) on score at most: x first, then y.
+
+    Of single shifts these are the scores.
+    """
+    right, top = level.shape[0] - 1, level.shape[1] - 1
+    a, b, c, d = 0.0, 0.0, 0.0, 0.0
+    for k in range(cells.shape[0]):
+        ix, iy = cells[k, 0] + ox, cells[k, 1] + oy
+        x0, y0 = min(max(ix, 0), right), min(max(iy, 0), top)
+        x1, y1 = min(max(ix + half, 0), right), min(max(iy + half, 0), top)
+        a += level[x0, y0]
+        b += level[x1, y0]
+        c += level[x0, y1]
+        d += level[x1, y1]
+    bounds[0], bounds[1], bounds[2], bounds[3] = a, b, c, d
+    for quarter in range(4):
+        bounds[quarter] /= cells.shape[0]
+
+
+@kernel
+def _branch_and_bound(
+    field: Field,
+    cells: NDArray[np.int32],
+    tile_bounds: Array,
+    centre: Array,
+    angles: Array,
+    reach: int,
+    least: float,
+    place: Array,
+    away: float,
+    pose: Array,
+) -> float:
+    """Write the pose (3,) of the best score above `least`; returns that score, or `least`.
+
+    Poses within `away` of the `place` (3,) do not count.
+    """
+    tiles = tile_bounds.shape[1]
+    bounds = tile_bounds.ravel()
+    hopeful = np.flatnonzero(bounds > least)
+    best = least
+    stack, stack_bounds = np.empty((4 * LEVELS, 3), dtype=np.int64), np.empty(4 * LEVELS)
+    quarters = np.empty(4)
+    for tile in hopeful[np.argsort(-bounds[hopeful], kind="mergesort")]:
+        if bounds[tile] <= best:
+            break
+        a, i, j = tile // (tiles * tiles), (tile // tiles) % tiles, tile % tiles
+        stack[0, 0], stack[0, 1], stack[0, 2] = i * PAD - reach, j * PAD - reach, LEVELS - 1
+        stack_bounds[0] = bounds[tile]
+        size = 1
+        while size > 0:
+            size -= 1
+            ox, oy, level = stack[size, 0], stack[size, 1], stack[size, 2]
+            if stack_bounds[size] <= best:
+                continue
+            if level == 0:
+                x, y = centre[0] + ox * field.cell, centre[1] + oy * field.cell
+                if np.hypot(x - place[0], y - place[1]) > away:
+                    best = stack_bounds[size]
+                    pose[0], pose[1], pose[2] = x, y, angles[a]
+                continue
+            half, first = 1 << (level - 1), size
+            _quarter_bounds(field.levels[level - 1], half, cells[a], ox, oy, quarters)
+            for quarter in range(4):
+                bound = quarters[quarter]
+                if bound <= best:
+                    continue
+                # The most promising quarter lies on top.
+                at = size
+                while at > first and stack_bounds[at - 1] > bound:
+                    stack[at], stack_bounds[at] = stack[at - 1], stack_bounds[at - 1]
+                    at -= 1
+                stack[at, 0], stack[at, 1] = ox + (quarter & 1) * half, oy + (quarter >> 1) * half
+                stack[at, 2], stack_bounds[at] = level - 1, bound
+                size += 1
+    return float(best)

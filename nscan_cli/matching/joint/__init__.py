@@ -1,0 +1,1 @@
+"""nScan-Matching: n scans matched jointly (paper, III)."""

@@ -1,0 +1,111 @@
+"""n scans as the kernels of joint matching take them: their NDTs and points, laid end to end."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nscan_cli.kernels.decorators import forceinline_kernel, kernel
+from nscan_cli.ndt.association import room_to_meet
+from nscan_cli.ndt.energy import OUT, accumulate
+from nscan_cli.ndt.hash_grid import Grid
+from nscan_cli.ndt.transform import Ndt
+from nscan_cli.poses import Array
+
+
+class ScanSet(NamedTuple):
+    """The NDTs and points of n scans, laid end to end for the kernels."""
+
+    grid: Grid
+    """The arrays of all NDTs, one behind the other; rows count from the start of their own NDT."""
+    points: Array
+    """(Σ m, 2) the points of all scans, each in its own frame."""
+    starts: NDArray[np.int64]
+    """(4, n + 1) where each scan's slots of the table begin, its rows, its Gaussians and its points."""
+    half: float
+    """Side (m) of a lattice cell, the same for all."""
+    usual: Array
+    """(n,) mean s of each scan's points on its own Gaussians: what a perfect match would reach; or nan."""
+
+
+def lay_out(ndts: Sequence[Ndt], points: Sequence[Array], neutral: bool = True) -> ScanSet:
+    """Lay n NDTs of one cell size and the points (m_i, 2) of n scans end to end.
+
+    Without `neutral` the `usual` is nan: the neutral energy is not to be asked for.
+    """
+    sizes = [
+        (len(ndt.grid.table), ndt.rows, len(ndt.grid.gaussians), len(part))
+        for ndt, part in zip(ndts, points, strict=True)
+    ]
+    starts = np.zeros((4, len(ndts) + 1), dtype=np.int64)
+    np.array(sizes).T.cumsum(axis=1, out=starts[:, 1:])
+    keys = np.concatenate([ndt.grid.keys[: ndt.rows] for ndt in ndts])
+    links = np.concatenate([ndt.grid.links[: ndt.rows] for ndt in ndts])
+    # The sums are for growing; matching needs the Gaussians alone.
+    grid = Grid(
+        np.concatenate([ndt.grid.table for ndt in ndts]),
+        keys,
+        links,
+        np.empty((0, 2)),
+        np.empty((0, 2, 8)),
+        np.concatenate([ndt.grid.gaussians for ndt in ndts]),
+        np.empty(0),
+    )
+    unknown = np.full(len(ndts), np.nan)
+    scans = ScanSet(grid, np.concatenate(points, dtype=np.float64), starts, ndts[0].half, unknown)
+    return with_usual(scans) if neutral else scans
+
+
+def with_usual(scans: ScanSet) -> ScanSet:
+    """The scans with what is `usual`, so that the neutral energy can be asked for."""
+    return scans._replace(usual=_own_means(scans))
+
+
+@forceinline_kernel
+def scan_grid(scans: ScanSet, i: int) -> Grid:
+    """The NDT of scan i."""
+    grid, starts = scans.grid, scans.starts
+    t0, t1 = starts[0, i], starts[0, i + 1]
+    r0, r1 = starts[1, i], starts[1, i + 1]
+    g0, g1 = starts[2, i], starts[2, i + 1]
+    return Grid(
+        grid.table[t0:t1],
+        grid.keys[r0:r1],
+        grid.links[r0:r1],
+        grid.facing,
+        grid.sums,
+        grid.gaussians[g0:g1],
+        grid.making,
+    )
+
+
+@forceinline_kernel
+def scan_points(scans: ScanSet, i: int) -> Array:
+    """The points (m, 2) of scan i in its own frame."""
+    return scans.points[scans.starts[3, i] : scans.starts[3, i + 1]]
+
+
+@kernel
+def most_points(scans: ScanSet) -> int:
+    """Those of the scan that has most."""
+    most, starts = 0, scans.starts
+    for i in range(starts.shape[1] - 1):
+        most = max(most, starts[3, i + 1] - starts[3, i])
+    return int(most)
+
+
+@kernel
+def _own_means(scans: ScanSet) -> Array:
+    """(n,) mean s of each scan's points on its own Gaussians."""
+    means, out, room = np.empty(len(scans.usual)), np.empty(OUT), room_to_meet(most_points(scans), 1)
+    for i in range(len(means)):
+        grid, points = scan_grid(scans, i), scan_points(scans, i)
+        accumulate(grid, scans.half, points, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 1, room, out)
+        energy = out[0]
+        accumulate(grid, scans.half, points, 0.0, 0.0, 0.0, 1.0, 0.0, 1.0, 1, room, out)
+        # The difference is the number of Gaussians met.
+        means[i] = -energy / max(out[0] - energy, 1.0)
+    return means

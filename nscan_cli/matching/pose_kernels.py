@@ -1,0 +1,30 @@
+"""SE(2) inside the kernels: `nscan_cli.poses` for one pose at a time, without an array made for each."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from nscan_cli.kernels.decorators import leaf_kernel
+from nscan_cli.poses import Array
+
+
+@leaf_kernel
+def relative_pose(a: Array, b: Array, out: Array) -> None:
+    """Eq. (2), a ⊖ b; the angle is left as it is."""
+    cos, sin = np.cos(b[2]), np.sin(b[2])
+    dx, dy = a[0] - b[0], a[1] - b[1]
+    out[0], out[1], out[2] = cos * dx + sin * dy, cos * dy - sin * dx, a[2] - b[2]
+
+
+@leaf_kernel
+def composed_pose(a: Array, b: Array, out: Array) -> None:
+    """a ⊕ b; the angle is left as it is."""
+    cos, sin = np.cos(a[2]), np.sin(a[2])
+    x, y = cos * b[0] - sin * b[1] + a[0], sin * b[0] + cos * b[1] + a[1]
+    out[0], out[1], out[2] = x, y, a[2] + b[2]
+
+
+@leaf_kernel
+def wrapped(angle: float) -> float:
+    """The angle (rad) normalised to (−π, π]."""
+    return float(angle - 2 * np.pi * np.ceil((angle - np.pi) / (2 * np.pi)))

@@ -1,0 +1,113 @@
+"""What a manifest says of how a log is read and mapped: the options of `slam`, by their long names."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from dataclasses import dataclass, field
+from typing import Any
+
+from nscan_cli.errors import InputDataError, WrongUsageError
+from nscan_cli.logs.reading_options import ReadingOptions
+
+RELATIONS = ("pairwise", "nscan", "both")
+DEGREES = ("angle-min", "angle-increment")
+"""Degrees in the manifest, rad inside."""
+
+
+@dataclass(frozen=True)
+class Parameters:
+    """How one log is read and mapped; what is not said has the defaults of `slam`."""
+
+    reading: ReadingOptions = field(default_factory=ReadingOptions)
+    mapping: dict[str, Any] = field(default_factory=dict)
+    """max-scans, relations and no-loops, as far as the manifest has them."""
+
+    def as_table(self) -> dict[str, Any]:
+        """As in a manifest, without what has its default."""
+        usual, table = dataclasses.asdict(ReadingOptions()), dict[str, Any]()
+        for name, value in dataclasses.asdict(self.reading).items():
+            key = name.replace("_", "-")
+            if value == usual[name]:
+                continue
+            if key == "odometry":
+                table["no-odometry"] = True
+            elif key == "mount":
+                table[key] = [value[0], value[1], round(math.degrees(value[2]), 9)]
+            else:
+                table[key] = round(math.degrees(value), 9) if key in DEGREES else value
+        return {**table, **self.mapping}
+
+
+def parameters_from(place: str, table: dict[str, Any]) -> Parameters:
+    """The parameters of a table of the manifest; `place` says which one in messages.
+
+    Raises InputDataError.
+    """
+    known = _reading_options() | {"max-scans": int, "relations": str, "no-loops": bool}
+    reading: dict[str, Any] = {}
+    mapping: dict[str, Any] = {}
+    for key, value in table.items():
+        if key not in known:
+            problem = f"parameters has an unknown key {key!r}"
+            raise InputDataError(place, problem, f"known: {', '.join(sorted(known))}")
+        wanted = known[key]
+        if wanted is float and isinstance(value, int) and not isinstance(value, bool):
+            value = float(value)
+        if not _is_a(value, wanted):
+            raise _wrong(place, key, value, FORMS[wanted])
+        if key in ("max-scans", "relations", "no-loops"):
+            mapping[key] = value
+        elif key == "mount":
+            reading["mount"] = _pose(place, value)
+        elif key == "no-odometry":
+            reading["odometry"] = not value
+        else:
+            reading[key.replace("-", "_")] = math.radians(value) if key in DEGREES else value
+    if mapping.get("max-scans", 3) < 3:
+        raise _wrong(place, "max-scans", mapping["max-scans"], "3 or more")
+    if mapping.get("relations", "both") not in RELATIONS:
+        raise _wrong(place, "relations", mapping["relations"], f"one of {', '.join(RELATIONS)}")
+    if reading.get("every", 1) < 1:
+        raise _wrong(place, "every", reading["every"], "1 or more")
+    try:
+        return Parameters(ReadingOptions(**reading), mapping)
+    except WrongUsageError as error:
+        raise InputDataError(place, f"parameters: {error}", "mend them") from error
+
+
+FORMS = {
+    float: "a number",
+    int: "a whole number",
+    str: "a text",
+    bool: "true or false",
+    list: "[x, y, degrees]",
+}
+
+
+def _reading_options() -> dict[str, type]:
+    """Long option name → the type of its value in TOML."""
+    types: dict[str, type] = {"str": str, "float": float, "int": int, "bool": bool, "tuple": list}
+    options = {}
+    for option in dataclasses.fields(ReadingOptions):
+        # Annotations are text: "float | None", "tuple[float, float, float] | None".
+        kind = str(option.type).partition(" ")[0].partition("[")[0]
+        name = "no-odometry" if option.name == "odometry" else option.name.replace("_", "-")
+        options[name] = types[kind]
+    return options
+
+
+def _is_a(value: Any, wanted: type) -> bool:
+    """Whether a value is of this type; true and false are no numbers."""
+    return type(value) is wanted
+
+
+def _pose(place: str, value: list[Any]) -> tuple[float, float, float]:
+    if len(value) != 3 or not all(type(part) in (int, float) for part in value):
+        raise _wrong(place, "mount", value, FORMS[list])
+    x, y, degrees = value
+    return float(x), float(y), math.radians(degrees)
+
+
+def _wrong(place: str, key: str, value: Any, wanted: str) -> InputDataError:
+    return InputDataError(place, f"parameters: {key} is {value!r}", f"give {wanted}")

@@ -1,0 +1,36 @@
+"""The energy of a graph that grows (paper, V), or of some of its relations."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nscan_cli.graph.optimise.graph_energy import GraphEnergy
+from nscan_cli.graph.optimise.term_columns import Terms
+from nscan_cli.graph.relations.base import Relation
+from nscan_cli.slam.keyframes.keyframe import Route
+
+
+class Energies:
+    """Those of the keyframes of a route in a log of so many `scans`; terms of relations are kept."""
+
+    def __init__(self, scans: int) -> None:
+        self._scans, self._terms = scans, Terms()
+
+    def forget(self) -> None:
+        """Keep no terms any more: the relations that they are of have been replaced."""
+        self._terms = Terms()
+
+    def of(
+        self,
+        route: Route,
+        relations: Sequence[Relation],
+        fixed: int = 0,
+        free: NDArray[np.bool_] | None = None,
+    ) -> GraphEnergy:
+        """That of all keyframes with keyframe `fixed` held, and those that are not `free` (K,), if given."""
+        positions = np.full(self._scans, -1)
+        positions[route.rows] = np.arange(len(route.rows))
+        return GraphEnergy(len(route.rows), relations, positions, fixed, self._terms, free)

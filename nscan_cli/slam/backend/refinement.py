@@ -1,0 +1,115 @@
+"""Step 6 of the loop: the matches of step 3 again, from the poses that all relations together have found.
+
+A match made on the way knew only what had been seen so far, and started from poses that later loops have
+corrected. From the final poses, and with the scans of all visits, some find a better place; the graph moves,
+and those about what has moved are matched again.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+
+from nscan_cli.graph.model import Loop, NScan, Pairwise
+from nscan_cli.kernels.decorators import kernel
+from nscan_cli.matching.pose_kernels import relative_pose, wrapped
+from nscan_cli.poses import Array, Indices
+from nscan_cli.slam.keyframes.keyframe import Route
+from nscan_cli.slam.local_matching.coverage import Coverage
+from nscan_cli.slam.local_matching.joint_relations import LocalMatch, MatchNearby
+from nscan_cli.slam.local_matching.neighbours import Neighbours, choose_neighbours
+from nscan_cli.slam.options import NScanOptions
+from nscan_cli.threads import in_threads
+
+
+class Refinement:
+    """The relations about all keyframes, each as of the poses that it was last matched from."""
+
+    def __init__(
+        self,
+        route: Route,
+        options: NScanOptions,
+        match: MatchNearby,
+        wider: Mapping[int, float],
+        threads: int = 1,
+    ) -> None:
+        """Take the radius (m) about some centres that is `wider`: where large loops were closed."""
+        self._route, self._options, self._match, self._threads = route, options, match, threads
+        self._wider, self._covered = wider, Coverage()
+        self._found: list[LocalMatch | None] = [None] * len(route.poses)
+        self._starts: list[tuple[Indices, Array] | None] = [None] * len(route.poses)
+
+    def sweep(self, poses: Array, moved: float) -> int:
+        """Match again about the keyframes whose neighbours have moved by more than `moved` (m, rad).
+
+        `poses` (K, 3) are the global ones; returns how many were matched. Those that are chosen together
+        are matched side by side.
+        """
+        route, matched = self._route._replace(poses=poses), 0
+        waiting = {
+            k: choose_neighbours(poses, route.paths, k, self._options_of(k))
+            for k in range(len(poses))
+            if self._has_moved(k, poses, moved)
+        }
+        while chosen := self._uncovered(route, waiting):
+            found = in_threads(
+                self._threads,
+                lambda centre: self._match(route, centre, chosen[centre], self._options_of(centre)),
+                chosen,
+            )
+            for (centre, near), nearby in zip(chosen.items(), found, strict=True):
+                self._covered.add(int(route.rows[centre]), route.rows[near.tried].tolist(), nearby)
+                self._starts[centre] = near.tried, poses[near.tried]
+                self._found[centre] = nearby
+            waiting = {centre: near for centre, near in waiting.items() if centre not in chosen}
+            matched += len(chosen)
+        return matched
+
+    def _uncovered(self, route: Route, waiting: Mapping[int, Neighbours]) -> dict[int, Neighbours]:
+        """The centres to match next of those that wait, with the keyframes near each.
+
+        As if every match related all that it is tried with; where one does not, the next choice makes up.
+        """
+        chosen, covered = {}, Coverage(beneath=self._covered)
+        for centre, near in waiting.items():
+            needed = self._starts[centre] is not None or centre in self._wider
+            if needed or covered.is_due(route, centre, near, self._options):
+                chosen[centre] = near
+                covered.assume(route, centre, near)
+        return chosen
+
+    def _options_of(self, centre: int) -> NScanOptions:
+        if centre not in self._wider:
+            return self._options
+        return replace(self._options, radius=self._wider[centre])
+
+    def relations(self) -> tuple[list[Pairwise], list[NScan]]:
+        """The relations as they are now: of single matches, and of joint ones."""
+        found = [nearby for nearby in self._found if nearby is not None]
+        pairs = [relation for nearby in found for relation in nearby.pairwise]
+        return pairs, [nearby.nscan for nearby in found if nearby.nscan is not None]
+
+    def loops(self) -> list[Loop]:
+        """The verdicts on other visits that these relations come from."""
+        return [nearby.loop for nearby in self._found if nearby is not None and nearby.loop is not None]
+
+    def _has_moved(self, centre: int, poses: Array, moved: float) -> bool:
+        start = self._starts[centre]
+        if start is None:
+            return True
+        tried, before = start
+        return bool(_farthest_moved(before, poses[tried], int(np.searchsorted(tried, centre))) > moved)
+
+
+@kernel
+def _farthest_moved(before: Array, after: Array, centre: int) -> float:
+    """How far (m, rad) some pose (n, 3) moved in x, y or φ, seen from the one of the centre."""
+    farthest, was, now = 0.0, np.empty(3), np.empty(3)
+    for k in range(len(before)):
+        relative_pose(before[k], before[centre], was)
+        relative_pose(after[k], after[centre], now)
+        turned = abs(wrapped(now[2] - was[2]))
+        farthest = max(farthest, abs(now[0] - was[0]), abs(now[1] - was[1]), turned)
+    return farthest

@@ -1,0 +1,206 @@
+"""A saved graph refined again: steps 5 and 6 of the loop (paper, V), without tracking.
+
+The keyframes are laid out anew from the scans, with the poses of the graph where tracking had its own.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import itertools
+from typing import Any, get_args
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nscan_cli.graph.marginal_covariances import marginal_covariances
+from nscan_cli.graph.model import Graph, Pairwise
+from nscan_cli.logs.laser_log import LaserLog
+from nscan_cli.matching.priors import odometry_prior
+from nscan_cli.poses import relative
+from nscan_cli.slam.frontend.tracked_scans import TrackedScans
+from nscan_cli.slam.keyframes.keyframe import route_of
+from nscan_cli.slam.local_matching.joint_relations import LocalMatch
+from nscan_cli.slam.loop_closure.loop_detector import NO_SECOND, SO_FAR_OFF
+from nscan_cli.slam.loop_closure.place_search import AMBIGUOUS, ELSEWHERE, NO_MATCH, Place
+from nscan_cli.slam.options import Relations, SlamOptions
+from nscan_cli.slam.pipeline import Slam
+
+LEAST_VALUE, LARGEST_VALUE, MOST_VALUES = 1e-9, 1e9, 10
+"""What a parameter can be, and how many values a list of them can have."""
+SEARCHED = (AMBIGUOUS, ELSEWHERE, NO_MATCH, NO_SECOND, SO_FAR_OFF)
+"""Verdicts of the search for large loops, which is not made again: they stay."""
+
+
+def can_refine(graph: Graph) -> bool:
+    """Whether slam made the graph: its parameters are there, and all scans go with the last keyframe."""
+    keyframes = graph.keyframes
+    if "slam" not in graph.provenance.get("parameters", {}) or keyframes[0] != 0:
+        return False
+    last = keyframes[np.searchsorted(keyframes, np.arange(len(graph)), side="right") - 1]
+    return bool(np.array_equal(graph.anchors, last))
+
+
+def options_of(graph: Graph) -> SlamOptions:
+    """The parameters that the graph was made with; what it does not say has its default.
+
+    Raises ValueError naming a parameter that none can have been made with.
+    """
+    options: SlamOptions = _restored(SlamOptions(), graph.provenance["parameters"]["slam"], "slam")
+    return options
+
+
+def resume(graph: Graph, log: LaserLog, rows: NDArray[np.int64], threads: int = 1) -> Graph:
+    """The graph after its loops are checked, and its matches made again from its poses.
+
+    `rows` (N,) are the rows of the log with the scans of the nodes. `can_refine` has to hold.
+    """
+    options = options_of(graph)
+    slam = Slam(_scans(log, rows), options, threads)
+    _lay_out(slam, graph)
+    chain = _chain(graph, options)
+    slam.route = route_of(slam.keyframes.list, chain, graph.poses[graph.keyframes])
+    in_chain = {id(relation) for relation in chain}
+    slam.pairs = [pair for pair in graph.pairwise if id(pair) not in in_chain]
+    slam.nscan, slam.others = list(graph.nscan), list(graph.others)
+    slam.loops = [loop for loop in graph.loops if loop.reason not in SEARCHED]
+    slam.places = _places(graph, options)
+    slam.reject()
+    slam.refine()
+    refined = slam.graph()
+    refined.loops += [loop for loop in graph.loops if loop.reason in SEARCHED]
+    refined.provenance = graph.provenance
+    refined.marginals = marginal_covariances(refined)
+    return refined
+
+
+def _scans(log: LaserLog, rows: NDArray[np.int64]) -> LaserLog:
+    """The log with the scans in some rows (N,) alone."""
+    if np.array_equal(rows, np.arange(len(log))):
+        return log
+    return dataclasses.replace(
+        log,
+        numbers=log.numbers[rows],
+        stamps=tuple(log.stamps[row] for row in rows.tolist()),
+        times=log.times[rows],
+        ranges=log.ranges[rows],
+        angle_min=log.angle_min[rows],
+        angle_increment=log.angle_increment[rows],
+        odometry=None if log.odometry is None else log.odometry[rows],
+        beams=None if log.beams is None else log.beams[rows],
+    )
+
+
+def _lay_out(slam: Slam, graph: Graph) -> None:
+    """The keyframes with their Gaussians, as tracking would have made them at the graph's poses."""
+    breaks = _breaks(graph, slam.options)
+    found = _as_tracked(graph, breaks, slam.options)
+    for scans in slam.stretches():
+        those = found.part(scans.first, scans.first + len(scans))
+        for k, row in enumerate(range(scans.first, scans.first + len(scans))):
+            if row in breaks:
+                slam.keyframes.part()
+                slam.breaks.append(row)
+            if graph.anchors[row] == row:
+                slam.keyframes.add(row, scans.of(k), those.scan(k))
+                for whole in slam.keyframes.list[-2:-1]:
+                    whole.finish()
+            else:
+                slam.keyframes.attach(scans, those, k, k + 1)
+    slam.tracked.append(graph.poses)
+    slam.keyframes.part()
+
+
+def _as_tracked(graph: Graph, breaks: set[int], options: SlamOptions) -> TrackedScans:
+    """The scans as if tracking had found them at the graph's poses, and knew nothing of how well."""
+    found, step, path = TrackedScans.room(len(graph)), options.tracking.step, 0.0
+    found.poses[:], found.values[:], found.inliers[:] = graph.poses, 0.0, 1.0
+    found.hessians[:], found.expected[:], found.off[:] = 0.0, 0.0, 0.0
+    joined_at = graph.poses[0]
+    for row, pose in enumerate(graph.poses):
+        moved = relative(pose, joined_at)
+        distance = float(np.hypot(moved[0], moved[1]))
+        found.joined[row] = row == 0 or distance > step or abs(moved[2]) > step
+        if found.joined[row]:
+            path, joined_at = path + distance, pose
+        if row in breaks:
+            path += options.breaks.path
+        found.paths[row] = path
+    return found
+
+
+def _breaks(graph: Graph, options: SlamOptions) -> set[int]:
+    """The keyframes before which the track broke: not even the direction of the way there is known."""
+    least = (options.breaks.turn / 2) ** -2
+    tracked = [pair for pair in graph.pairwise if pair.origin == "track"]
+    return {pair.nodes[1] for pair in tracked if pair.information[2, 2] <= least}
+
+
+def _chain(graph: Graph, options: SlamOptions) -> list[Pairwise]:
+    """The relations from each keyframe to the next.
+
+    A graph of nScan relations alone has left out those that these hold together. In their place stands
+    what odometry would know of such a step.
+    """
+    tracked: dict[tuple[int, int], Pairwise] = {}
+    for pair in graph.pairwise:
+        if pair.origin == "track":
+            tracked.setdefault(pair.nodes, pair)
+    chain = []
+    for a, b in itertools.pairwise(graph.keyframes.tolist()):
+        step, information = odometry_prior(graph.poses[a], graph.poses[b], options.tracking.odometry)
+        chain.append(tracked.get((a, b)) or Pairwise((a, b), step, information, "track"))
+    return chain
+
+
+def _places(graph: Graph, options: SlamOptions) -> list[Place]:
+    """The large loops: those whose scans are further apart than a joint match reaches by itself."""
+    position = {int(node): k for k, node in enumerate(graph.keyframes)}
+    loops: list[tuple[tuple[int, ...], int, LocalMatch]] = []
+    for joint in graph.nscan:
+        if joint.origin == "loop":
+            loops.append((joint.nodes, joint.nodes[joint.fixed], LocalMatch((), joint, None, 0.0, True)))
+    for pair in graph.pairwise:
+        if pair.origin == "loop":
+            loops.append((pair.nodes, pair.nodes[1], LocalMatch((pair,), None, None, 0.0, True)))
+    places = []
+    for nodes, centre, nearby in loops:
+        away = relative(graph.poses[list(nodes)], graph.poses[centre])
+        distances = np.hypot(away[:, 0], away[:, 1])
+        farthest = nodes[int(np.argmax(distances))]
+        if distances.max() > options.nscan.radius:
+            measured = relative(graph.poses[centre], graph.poses[farthest])
+            radius = float(distances.max()) + options.refined
+            places.append(Place(position[farthest], position[centre], measured, radius, nearby))
+    return places
+
+
+def _restored(default: Any, values: Any, place: str) -> Any:
+    """The dataclass `default` with the values of a JSON object, as far as it has such fields."""
+    if not isinstance(values, dict):
+        raise ValueError(f"{place} is no object")
+    given: dict[str, Any] = {}
+    for field in dataclasses.fields(default):
+        if field.name not in values:
+            continue
+        inner = f"{place}.{field.name}"
+        given[field.name] = _like(getattr(default, field.name), values[field.name], inner)
+    return dataclasses.replace(default, **given)
+
+
+def _like(usual: Any, value: Any, place: str) -> Any:
+    """A value of the JSON as one of the kind that is usual there. Raises ValueError."""
+    if dataclasses.is_dataclass(usual):
+        return _restored(usual, value, place)
+    if isinstance(usual, tuple):
+        if not isinstance(value, (list, tuple)) or not 0 < len(value) <= MOST_VALUES:
+            raise ValueError(f"{place} is no list of a few values")
+        return tuple(_like(usual[0], part, place) for part in value)
+    if isinstance(usual, (bool, str)) or usual is None:
+        if type(value) is type(usual) and (not isinstance(usual, str) or value in get_args(Relations)):
+            return value
+    elif type(value) in (int, float) and type(value) in (int, type(usual)):
+        # Nothing that is measured by a parameter is below 0, and where 0 is none, it would divide.
+        least = 0 if isinstance(usual, int) or usual == 0 else LEAST_VALUE
+        if least <= value <= LARGEST_VALUE:
+            return value
+    raise ValueError(f"{place} is {str(value)[:40]!r}, which no graph is made with")

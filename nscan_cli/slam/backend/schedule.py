@@ -1,0 +1,45 @@
+"""Step 5 while the graph grows (paper, V): when it is optimised, and how much of it.
+
+A small graph is always optimised as a whole. Of a large one it is mostly what lies near its new keyframes, so
+that time grows with the log and not faster.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from nscan_cli.graph.relations.base import Relation
+from nscan_cli.slam.backend.subgraph import Subgraph, held_by_others, nearest_keyframes
+from nscan_cli.slam.keyframes.keyframe import Route
+from nscan_cli.slam.options import GrowthOptions
+
+
+class OptimisationSchedule:
+    """What has come to the graph since it was optimised, and since it was as a whole."""
+
+    def __init__(self, options: GrowthOptions) -> None:
+        self.options = options
+        self._moved, self._optimised, self._whole = 0.0, 0, 0
+
+    def matched(self, moved: float) -> None:
+        """A joint match has moved scans by so much in all, m."""
+        self._moved += moved
+
+    def is_due(self, size: int) -> bool:
+        """Whether a graph of so many keyframes has changed by so much that it is optimised."""
+        return self._moved > self.options.moved and size - self._optimised >= self.options.new * size
+
+    def due(self, route: Route, relations: Sequence[Relation]) -> Subgraph:
+        """What is optimised then."""
+        size, options = len(route.poses), self.options
+        if size <= options.most or size - self._whole >= options.new_of_all * size:
+            return Subgraph(relations)
+        return held_by_others(
+            route, relations, nearest_keyframes(route.poses, self._optimised, size, options.most)
+        )
+
+    def optimised(self, size: int, part: Subgraph) -> None:
+        """A part of a graph of so many keyframes has been optimised."""
+        self._moved, self._optimised = 0.0, size
+        if part.free is None:
+            self._whole = size

@@ -1,0 +1,68 @@
+"""Parts of a graph that is too large to be solved as a whole each time that it has grown (paper, V).
+
+New relations move what is near them. What lies far away is held meanwhile, or left out where it is asked how
+much is known: it could only tell more.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nscan_cli.graph.relations.base import Relation
+from nscan_cli.kernels.decorators import kernel
+from nscan_cli.poses import Array
+from nscan_cli.slam.keyframes.keyframe import Route
+
+Chosen = NDArray[np.bool_]
+"""(K,) keyframes of a graph."""
+
+
+class Subgraph(NamedTuple):
+    """Keyframes that can move, and the relations that count."""
+
+    relations: Sequence[Relation]
+    free: Chosen | None = None
+    """All, when None; the others are held where they are."""
+
+
+def held_by_others(route: Route, relations: Sequence[Relation], free: Chosen) -> Subgraph:
+    """The `free` keyframes, with all relations that one of them has a part in."""
+    nodes = frozenset(route.rows[free].tolist())
+    return Subgraph([relation for relation in relations if not nodes.isdisjoint(relation.nodes)], free)
+
+
+def without_others(
+    route: Route, way: Sequence[Relation], loops: Sequence[Relation], wanted: Chosen
+) -> Subgraph:
+    """The `wanted` keyframes with those that loops tie to them, and the relations among all these.
+
+    `way[k]` leads from keyframe k to k + 1.
+    """
+    inner = frozenset(route.rows[wanted].tolist())
+    nodes = inner.union(*(loop.nodes for loop in loops if not inner.isdisjoint(loop.nodes)))
+    chosen = np.isin(route.rows, list(nodes))
+    steps = [way[k] for k in np.flatnonzero(chosen[:-1] & chosen[1:]).tolist()]
+    return Subgraph([*steps, *(loop for loop in loops if nodes.issuperset(loop.nodes))], chosen)
+
+
+def nearest_keyframes(poses: Array, first: int, end: int, most: int) -> Chosen:
+    """Those of K poses (K, 3), so many at most, that lie nearest to any of those from `first` to `end`."""
+    order = np.argsort(_distances(poses, first, end), kind="stable")
+    chosen = np.zeros(len(poses), dtype=np.bool_)
+    chosen[order[:most]] = True
+    return chosen
+
+
+@kernel
+def _distances(poses: Array, first: int, end: int) -> Array:
+    """(K,) squared (m²), to the nearest of those from `first` to `end`."""
+    distances = np.full(len(poses), np.inf)
+    for k in range(len(poses)):
+        for other in range(first, end):
+            dx, dy = poses[k, 0] - poses[other, 0], poses[k, 1] - poses[other, 1]
+            distances[k] = min(distances[k], dx * dx + dy * dy)
+    return distances

@@ -1,0 +1,1 @@
+"""What a finished map tells of itself that a user should know."""

@@ -1,0 +1,66 @@
+"""What the robot sensed, as tracking takes it: scans of the log that follow each other, laid end to end."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from nscan_cli.kernels.decorators import kernel
+from nscan_cli.poses import Array, Indices
+
+
+@dataclass(frozen=True)
+class ScanBatch:
+    """n scans that follow each other, and what the odometry says."""
+
+    first: int
+    """The row of the first of them in the log."""
+    points: Array
+    """(P, 2) of these and maybe of other scans, one after another, each in its robot's frame."""
+    ends: Indices
+    """(n + 1,) scan k has points[ends[k] : ends[k + 1]]."""
+    odometry: Array | None
+    """(n, 3) poses of the robot; of all scans or of none."""
+
+    def __len__(self) -> int:
+        return len(self.ends) - 1
+
+    def of(self, k: int) -> Array:
+        """The points (m, 2) of one of them."""
+        return self.points[self.ends[k] : self.ends[k + 1]]
+
+    def part(self, first: int, end: int) -> ScanBatch:
+        """The scans from the `first` on, before the `end`."""
+        odometry = None if self.odometry is None else self.odometry[first:end]
+        return ScanBatch(self.first + first, self.points, self.ends[first : end + 1], odometry)
+
+    def chosen(self, chosen: Indices) -> tuple[Array, Indices]:
+        """The points (P, 2) of some of the scans, of indices (c,), copied, and where they end (c + 1,)."""
+        return _chosen(self.points, self.ends, chosen)
+
+    @classmethod
+    def together(cls, parts: Sequence[ScanBatch]) -> ScanBatch:
+        """The scans of several, of which each begins where the one before ends."""
+        scans = [part.chosen(np.arange(len(part))) for part in parts]
+        sizes = np.concatenate([np.diff(ends) for _, ends in scans])
+        odometry = [part.odometry for part in parts if part.odometry is not None]
+        return cls(
+            parts[0].first,
+            np.concatenate([points for points, _ in scans]),
+            np.concatenate([[0], np.cumsum(sizes)]),
+            np.concatenate(odometry) if odometry else None,
+        )
+
+
+@kernel
+def _chosen(points: Array, ends: Indices, chosen: Indices) -> tuple[Array, Indices]:
+    """What `chosen` of Sensed returns."""
+    own = np.zeros(len(chosen) + 1, dtype=np.int64)
+    for c in range(len(chosen)):
+        own[c + 1] = own[c] + ends[chosen[c] + 1] - ends[chosen[c]]
+    copied = np.empty((own[-1], 2))
+    for c in range(len(chosen)):
+        copied[own[c] : own[c + 1]] = points[ends[chosen[c]] : ends[chosen[c] + 1]]
+    return copied, own

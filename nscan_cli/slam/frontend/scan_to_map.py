@@ -1,0 +1,29 @@
+"""Step 1: one scan matched with the map of the last metres, from one start."""
+
+from __future__ import annotations
+
+from nscan_cli.kernels.decorators import kernel
+from nscan_cli.matching.pairwise_solver import PairProblem, minimise
+from nscan_cli.matching.priors import Prior
+from nscan_cli.ndt.association import associate_again, begin, count_inliers
+from nscan_cli.ndt.hash_grid import Grid
+from nscan_cli.poses import Array
+from nscan_cli.slam.frontend.tracking_parameters import TrackingParameters
+
+
+@kernel
+def match_and_count(
+    grid: Grid, settings: TrackingParameters, points: Array, prior: Prior, pose: Array, hessian: Array
+) -> tuple[float, float]:
+    """Minimise from `pose` (3,), in place; the objective's value, and the share of inliers there.
+
+    Writes the Hessian (3, 3) of the objective.
+    """
+    half, scale, widenings = settings.half, settings.scale, settings.widenings
+    meeting = begin(points)
+    problem = PairProblem(grid, half, meeting, scale, prior)
+    value, _, _, _, _ = minimise(
+        problem, pose, widenings, settings.max_iterations, settings.near, settings.tolerance, hessian
+    )
+    associate_again(grid, half, meeting, pose[0], pose[1], pose[2])
+    return value, count_inliers(meeting, settings.inlier_bound) / max(points.shape[0], 1)

@@ -1,0 +1,58 @@
+"""The parameters of tracking as its kernels take them."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from nscan_cli.matching.priors import Motion
+from nscan_cli.poses import Array
+from nscan_cli.slam.options import TrackingOptions
+
+
+class TrackingParameters(NamedTuple):
+    """The tracker's options as the kernels take them; see TrackingOptions."""
+
+    half: float
+    """Side (m) of a lattice cell of the map."""
+    in_view: float
+    """Up to so far (m) from where a scan was taken it had whole cells in view."""
+    window: float
+    step: float
+    widenings: Array
+    max_iterations: int
+    near: float
+    tolerance: float
+    scale: float
+    inlier_bound: float
+    inlier_share: float
+    far_share: float
+    turns: Array
+    """(rings, angles), with nan where a ring has fewer."""
+    odometry: Motion
+    steady_motion: Motion
+
+    @classmethod
+    def of(cls, options: TrackingOptions, odometry: bool = False) -> TrackingParameters:
+        """Those of the options, with odometry or without."""
+        turns = np.full((len(options.turns), max(map(len, options.turns), default=0)), np.nan)
+        for ring, angles in zip(turns, options.turns, strict=True):
+            ring[: len(angles)] = angles
+        return cls(
+            0.5 * options.gaussians.cell,
+            max(options.reach - options.gaussians.cell, 0.5 * options.reach),
+            options.window,
+            options.step,
+            np.array(options.widenings),
+            options.max_iterations,
+            options.near if odometry else options.tolerance,
+            options.tolerance,
+            options.scale,
+            options.inlier_bound,
+            options.inlier_share,
+            options.far_share,
+            turns,
+            Motion.of(options.odometry),
+            Motion.of(options.steady_motion),
+        )

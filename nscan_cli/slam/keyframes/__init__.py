@@ -1,0 +1,1 @@
+"""Step 2 of the loop: keyframes and the path between them (paper, V)."""

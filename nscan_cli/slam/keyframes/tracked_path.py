@@ -1,0 +1,59 @@
+"""The way as tracking has it, with the slips allowed for that it does not know of (paper, V: large loops)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import replace
+
+import numpy as np
+
+from nscan_cli.graph.model import Pairwise
+from nscan_cli.kernels.decorators import kernel
+from nscan_cli.matching.small_matrices import inverted
+from nscan_cli.poses import Array
+
+
+class TrackedPath:
+    """The relations from each keyframe to the next. `drift` (m/√m) and `drift_angle` (rad/√m) are those of
+    slips."""
+
+    def __init__(self, drift: float, drift_angle: float) -> None:
+        self.relations: list[Pairwise] = []
+        """`relations[k]` leads from keyframe k to k + 1."""
+        self._variances = drift**2, drift**2, drift_angle**2
+        self._covariances = np.empty((16, 3, 3))
+
+    @classmethod
+    def without_slips(cls, relations: Iterable[Pairwise]) -> TrackedPath:
+        """One of which tracking knows all."""
+        way = cls(0.0, 0.0)
+        for relation in relations:
+            way.extend(relation, 0.0)
+        return way
+
+    def __len__(self) -> int:
+        return len(self.relations)
+
+    @property
+    def covariances(self) -> Array:
+        """(len, 3, 3) of the relations' measurements."""
+        return self._covariances[: len(self.relations)]
+
+    def extend(self, relation: Pairwise, length: float) -> None:
+        """Follow a relation over a way of `length` (m)."""
+        slips = self._variances[0] * length, self._variances[1] * length, self._variances[2] * length
+        covariance, information = _with_slips(relation.information, slips)
+        end = len(self.relations)
+        if end == len(self._covariances):
+            self._covariances = np.concatenate([self._covariances, np.empty((end, 3, 3))])
+        self._covariances[end] = covariance
+        self.relations.append(replace(relation, information=information))
+
+
+@kernel
+def _with_slips(information: Array, slips: tuple[float, float, float]) -> tuple[Array, Array]:
+    """Covariance and information (3, 3) after these variances have been added."""
+    covariance = inverted(information)
+    for a in range(3):
+        covariance[a, a] += slips[a]
+    return covariance, inverted(covariance)

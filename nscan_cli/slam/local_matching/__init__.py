@@ -1,0 +1,1 @@
+"""Step 3 of the loop: keyframes matched with those near them (paper, V)."""

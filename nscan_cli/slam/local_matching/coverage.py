@@ -1,0 +1,69 @@
+"""Which keyframes have been matched with each other already, so that no match is made twice over."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Collection, Iterable
+
+from nscan_cli.slam.keyframes.keyframe import Route
+from nscan_cli.slam.local_matching.joint_relations import LocalMatch
+from nscan_cli.slam.local_matching.neighbours import Neighbours
+from nscan_cli.slam.options import NScanOptions
+
+
+class Coverage:
+    """Pairs of keyframes, by their nodes; those of the coverage `beneath` too, to which nothing is added."""
+
+    def __init__(self, beneath: Coverage | None = None) -> None:
+        self._partners: defaultdict[int, set[int]] = defaultdict(set)
+        self._closed: set[int] = set()
+        self._beneath = beneath
+
+    def is_due(self, route: Route, centre: int, near: Neighbours, options: NScanOptions) -> bool:
+        """Whether a match about `centre` with the keyframes near would tell something new.
+
+        Not where other matches hold most of its pairs. Nor, from the third visit on, when a joint match that
+        closed a loop has a centre so near along the path that both would take in some of the same keyframes
+        of this visit: going round and round, the graph would become no better, and ever harder to solve.
+        """
+        if near.visits > 1:
+            half = options.max_scans // 2
+            beside = route.rows[max(centre - half + 1, 0) : centre + half].tolist()
+            if self._has_closed(beside):
+                return False
+        return self.share(int(route.rows[centre]), route.rows[near.tried].tolist()) < options.covered
+
+    def share(self, centre: int, others: Iterable[int]) -> float:
+        """The share of the pairs of `centre` with each of the others that are there; 1 without any other."""
+        others = {*others} - {centre}
+        return 1.0 if not others else (len(others) - len(self._lacking(centre, others))) / len(others)
+
+    def add(self, centre: int, others: Collection[int], nearby: LocalMatch | None) -> None:
+        """A match of `centre` with all others that was tried, and what it related."""
+        self._partners[centre].update(others)
+        for other in others:
+            self._partners[other].add(centre)
+        if nearby is None:
+            return
+        for relation in nearby.relations:
+            self._relate(relation.nodes)
+        if nearby.nscan is not None and nearby.nscan.origin == "loop":
+            self._closed.add(centre)
+
+    def assume(self, route: Route, centre: int, near: Neighbours) -> None:
+        """A match of `centre` that is to be made, as if it related all that are near."""
+        self._relate(route.rows[near.tried].tolist())
+        if near.seen_before.any():
+            self._closed.add(int(route.rows[centre]))
+
+    def _relate(self, nodes: Collection[int]) -> None:
+        for node in nodes:
+            self._partners[node].update(nodes)
+
+    def _lacking(self, centre: int, others: set[int]) -> set[int]:
+        lacking = others - self._partners.get(centre, set())
+        return lacking if self._beneath is None else self._beneath._lacking(centre, lacking)
+
+    def _has_closed(self, nodes: Iterable[int]) -> bool:
+        here = not self._closed.isdisjoint(nodes)
+        return here or (self._beneath is not None and self._beneath._has_closed(nodes))

@@ -1,0 +1,247 @@
+"""Step 3 of the loop (paper, V): the joint match of a keyframe with those near it, as one relation."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nscan_cli.files.counting import counted
+from nscan_cli.graph.model import Loop, NScan, Pairwise
+from nscan_cli.kernels.decorators import kernel
+from nscan_cli.matching.joint.ambiguity import with_ambiguity
+from nscan_cli.matching.joint.joint_energy import JointProblem, Priors, all_pairs, no_priors
+from nscan_cli.matching.joint.joint_match import JointMatch, JointOptions, match_jointly
+from nscan_cli.matching.joint.overlap import held_at, hold
+from nscan_cli.matching.joint.scan_set import ScanSet, lay_out
+from nscan_cli.matching.pose_kernels import relative_pose
+from nscan_cli.poses import Array, Indices, compose, relative
+from nscan_cli.slam.keyframes.keyframe import Keyframe, Route, points_per_cell
+from nscan_cli.slam.local_matching.neighbours import Neighbours, choose_neighbours
+from nscan_cli.slam.options import NScanOptions
+
+LEAST_SCANS = 3
+"""Two scans are what a pairwise relation is for."""
+POSSIBLE = 0.5
+"""The last stage moves scans by centimetres: from less than this share of the overlap that holds two scans
+together, it brings none there."""
+NEAR = 5e-3
+"""m, rad; of some of the points no stage is worth more."""
+STRIDE = 4
+"""From a start that is right to centimetres, every so-manyth point leads to where all points are matched."""
+
+
+@dataclass(frozen=True)
+class LocalMatch:
+    """What the match of a keyframe with those near it gave: a joint one, or single ones."""
+
+    pairwise: tuple[Pairwise, ...]
+    """The relations of single matches."""
+    nscan: NScan | None
+    """That of a joint match; None when too few scans hang together, or the match did not converge."""
+    loop: Loop | None
+    """The verdict on what another visit saw; None where nothing was."""
+    moved: float
+    """How far (m) the match moved a scan, seen from the centre."""
+    whole: bool
+    """Whether all scans that were tried are related."""
+
+    @property
+    def relations(self) -> list[Pairwise | NScan]:
+        """All of them."""
+        return [*self.pairwise, *([] if self.nscan is None else [self.nscan])]
+
+    def tie(self, centre: int) -> tuple[int, Array] | None:
+        """A node of another visit, and the pose (3,) of node `centre` in its frame; None without a loop."""
+        for pair in self.pairwise:
+            if pair.origin == "loop":
+                return pair.nodes[0], pair.measurement
+        if self.nscan is None or self.nscan.origin != "loop" or self.loop is None:
+            return None
+        nodes, poses = self.nscan.nodes, self.nscan.poses
+        old = self.loop.nodes[0]
+        return old, relative(poses[nodes.index(centre)], poses[nodes.index(old)])
+
+
+MatchNearby = Callable[[Route, int, Neighbours, NScanOptions], LocalMatch | None]
+"""Step 3, jointly or in pairs: match_neighbours tells the arguments."""
+
+
+def match_neighbours(route: Route, centre: int, near: Neighbours, options: NScanOptions) -> LocalMatch | None:
+    """Match a keyframe jointly with those `near` it, with the relations of the chain among them as priors.
+
+    Scans that do not hang together with the `centre` by overlaps are left out, and the others matched
+    again. None when there are too few keyframes near.
+    """
+    if len(near.tried) < LEAST_SCANS:
+        return None
+    for widenings in options.attempts:
+        nearby, is_enough = _match_held(route, near.tried, near.seen_before, centre, widenings, options)
+        if is_enough and nearby.moved < options.settled:
+            break
+    return nearby
+
+
+def of_this_visit(route: Route, centre: int, options: NScanOptions) -> NDArray[np.bool_]:
+    """(K,) whether the path came by not long before or after keyframe `centre`."""
+    this: NDArray[np.bool_] = np.abs(route.paths - route.paths[centre]) <= options.recent
+    return this
+
+
+def visit_moved(route: Route, centre: int, place: Array, options: NScanOptions) -> Array:
+    """The poses (K, 3) with keyframe `centre` at a place (3,), and its visit moved with it as a whole."""
+    moved, visit = route.poses.copy(), of_this_visit(route, centre, options)
+    moved[visit] = compose(place, relative(moved[visit], route.poses[centre]))
+    return moved
+
+
+def match_at(
+    route: Route, centre: int, places: Sequence[Array], options: NScanOptions
+) -> list[tuple[float, Array]]:
+    """Joint matches from several places (3,) of the centre: the energy of each, and where the centre is then.
+
+    This visit is moved to each place as a whole, others stay. All are of the same scans, those that are near
+    at any of the places, so that the lowest energy tells which place is right.
+    """
+    starts = [visit_moved(route, centre, place, options) for place in places]
+    near = [choose_neighbours(start, route.paths, centre, options).tried for start in starts]
+    members = np.unique(np.concatenate(near))
+    visit = of_this_visit(route, centre, options)[members]
+    scans, old = _laid_out(route.keyframes, members), int(np.argmin(visit))
+    at, held = int(np.searchsorted(members, centre)), route.poses[members[old]]
+    found = []
+    for start in starts:
+        problem = _problem(scans, members, route, options)
+        match = match_jointly(problem, start[members], _stages(options.widenings, options))
+        found.append((match.energy, compose(held, relative(match.poses[at], match.poses[old]))))
+    return found
+
+
+def _match_held(
+    route: Route,
+    tried: Indices,
+    seen_before: NDArray[np.bool_],
+    centre: int,
+    widenings: tuple[float, ...],
+    options: NScanOptions,
+) -> tuple[LocalMatch, bool]:
+    """Match jointly, leave out what does not hang together, and match again, until all does.
+
+    Returns as well whether other stages can hold no more together: it converged, and all scans took part at
+    first. What was left out after that hardly ever comes back.
+    """
+    keyframes, poses = route.keyframes, route.poses
+    kept, start, scans = np.arange(len(tried)), poses[tried], _laid_out(keyframes, tried)
+    if len(widenings) == 1:
+        held = held_at(scans, start, POSSIBLE * options.overlap, int(tried.searchsorted(centre)))
+        kept, start = kept[held], start[held]
+    all_began = len(kept) == len(tried)
+    while len(kept) >= LEAST_SCANS:
+        members = tried[kept]
+        if len(members) < len(scans.usual):
+            scans = _laid_out(keyframes, members)
+        problem = _problem(scans, members, route, options)
+        match = match_jointly(problem, start, _stages(widenings, options))
+        at = int(members.searchsorted(centre))
+        held, score = hold(scans, match.poses, options.overlap, at)
+        if not held.all():
+            kept, start = kept[held], match.poses[held]
+            continue
+        if not match.converged:
+            loop = verdict(keyframes, tried, seen_before, centre, False, "did not converge", score)
+            return LocalMatch((), None, loop, 0.0, False), False
+        closed = bool(seen_before[kept].any())
+        origin = "loop" if closed else "nscan"
+        relation = _relation(route.rows[members], at, problem, match, origin, score)
+        whole = len(kept) == len(tried)
+        reason = "" if whole else f"{counted(len(tried) - len(kept), 'scan')} left out"
+        used, before = (members, seen_before[kept]) if closed else (tried, seen_before)
+        loop = verdict(keyframes, used, before, centre, closed, reason, score)
+        return LocalMatch((), relation, loop, moved_by(poses[members], match.poses, at), whole), all_began
+    reason = f"only {len(kept)} of {len(tried)} scans hang together"
+    loop = verdict(keyframes, tried, seen_before, centre, False, reason, 0.0)
+    return LocalMatch((), None, loop, 0.0, False), all_began
+
+
+def _laid_out(keyframes: Sequence[Keyframe], members: Indices) -> ScanSet:
+    chosen = [keyframes[k] for k in members.tolist()]
+    return lay_out([each.ndt for each in chosen], [each.points for each in chosen], neutral=False)
+
+
+def _problem(scans: ScanSet, members: Indices, route: Route, options: NScanOptions) -> JointProblem:
+    """The joint energy of some keyframes, with the relations of the chain among them as priors."""
+    (consecutive,) = np.nonzero(members[1:] == members[:-1] + 1)
+    known = [route.chain[k] for k in members[consecutive].tolist()]
+    priors = (
+        no_priors()
+        if not known
+        else Priors(
+            consecutive[:, None] + np.arange(2),
+            np.array([relation.measurement for relation in known]),
+            np.array([relation.information for relation in known]),
+        )
+    )
+    scale = scale_of([route.keyframes[k] for k in members.tolist()], options)
+    return JointProblem(scans, all_pairs(len(members)), priors, scale)
+
+
+def _stages(widenings: tuple[float, ...], options: NScanOptions) -> JointOptions:
+    return JointOptions(
+        widenings,
+        near=NEAR,
+        stride=STRIDE if len(widenings) == 1 else JointOptions.stride,
+        max_iterations=options.max_iterations,
+        tolerance=options.tolerance,
+        # The last step is shorter than a millimetre: its end need not be looked at.
+        thorough=False,
+    )
+
+
+def scale_of(keyframes: Sequence[Keyframe], options: NScanOptions) -> float:
+    """What the energy of some keyframes' scans is multiplied with to be a negative log likelihood."""
+    return options.scale_per_cell / points_per_cell(keyframes)
+
+
+def _relation(
+    nodes: Indices, fixed: int, problem: JointProblem, match: JointMatch, origin: str, score: float
+) -> NScan:
+    eigenvalues, vectors = np.linalg.eigh(match.hessian)
+    # What is left of negative curvature at the optimum is rounding, or a cell's border.
+    definite = (vectors * np.maximum(eigenvalues, 0.0)) @ vectors.T
+    return NScan(
+        nodes=tuple(nodes.tolist()),
+        poses=match.poses,
+        hessian=with_ambiguity(problem, match.poses, definite),
+        fixed=fixed,
+        origin=origin,
+        score=score,
+    )
+
+
+def verdict(
+    keyframes: Sequence[Keyframe],
+    members: Indices,
+    seen_before: NDArray[np.bool_],
+    centre: int,
+    accepted: bool,
+    reason: str,
+    score: float,
+) -> Loop | None:
+    """The verdict on the first keyframe of another visit, and the centre."""
+    if not seen_before.any():
+        return None
+    first = members[np.argmax(seen_before)]
+    return Loop((keyframes[first].row, keyframes[centre].row), accepted, reason, score)
+
+
+@kernel
+def moved_by(before: Array, after: Array, fixed: int) -> float:
+    """How far (m) some pose (n, 3) moved, seen from one of them."""
+    farthest, was, now = 0.0, np.empty(3), np.empty(3)
+    for k in range(len(before)):
+        relative_pose(before[k], before[fixed], was)
+        relative_pose(after[k], after[fixed], now)
+        farthest = max(farthest, np.hypot(now[0] - was[0], now[1] - was[1]))
+    return farthest

@@ -1,0 +1,111 @@
+"""Step 3 ahead of its turn: the next matches are made beside other work, as if the graph stayed as it is.
+
+At its turn a match counts if it is the very one that would be made then. So the graph is the same on any
+number of threads.
+"""
+
+from __future__ import annotations
+
+from concurrent.futures import Future, ThreadPoolExecutor
+from functools import partial
+from types import TracebackType
+from typing import NamedTuple
+
+import numpy as np
+
+from nscan_cli.slam.keyframes.keyframe import Route, extended
+from nscan_cli.slam.local_matching.coverage import Coverage
+from nscan_cli.slam.local_matching.joint_relations import LocalMatch, MatchNearby
+from nscan_cli.slam.local_matching.neighbours import Neighbours, choose_neighbours
+from nscan_cli.slam.options import NScanOptions
+from nscan_cli.threads import called
+
+AHEAD = 2
+"""So many matches are begun ahead of their turn."""
+
+
+class _Begun(NamedTuple):
+    route: Route
+    """What it is made with."""
+    near: Neighbours
+    match: Future[LocalMatch | None]
+
+
+class Ahead:
+    """The matches about the keyframes to come. To be used with `with`; none is begun until it is opened."""
+
+    def __init__(self, match: MatchNearby, options: NScanOptions, threads: int) -> None:
+        self._match, self._options, self._threads = match, options, threads
+        self._pool: ThreadPoolExecutor | None = None
+        self._begun: dict[int, _Begun] = {}
+
+    def open(self) -> None:
+        """From now on another thread, if there is one, has the time to make them: tracking is through."""
+        self._pool = ThreadPoolExecutor(1) if self._threads > 1 else None
+
+    def match(self, route: Route, centre: int, near: Neighbours) -> LocalMatch | None:
+        """The match of keyframe `centre` with those `near` it, whether it has been begun or not."""
+        begun = self._begun.pop(centre, None)
+        # What waits still is as well made here.
+        if begun is None or not np.array_equal(begun.route.poses, route.poses) or begun.match.cancel():
+            return self._match(route, centre, near, self._options)
+        if not begun.match.done():
+            self._make_next()
+        return begun.match.result()
+
+    def _make_next(self) -> None:
+        """Make the first match that waits, in the time that another one takes."""
+        for keyframe, (route, near, match) in self._begun.items():
+            if match.cancel():
+                made = called(partial(self._match, route, keyframe, near, self._options))
+                self._begun[keyframe] = _Begun(route, near, made)
+                return
+
+    def begin(
+        self,
+        route: Route,
+        whole: int,
+        centre: int,
+        near: Neighbours,
+        covered: Coverage,
+    ) -> None:
+        """Begin what comes after the match of keyframe `centre` with those `near`.
+
+        So many keyframes of the route are `whole`; those that the graph does not have yet join it next. Every
+        match is taken to relate all that it is tried with.
+        """
+        if self._pool is None:
+            return
+        assumed = Coverage(beneath=covered)
+        assumed.assume(route, centre, near)
+        self._drop_outdated(route, centre)
+        for other, begun in self._begun.items():
+            assumed.assume(begun.route, other, begun.near)
+        behind = self._options.behind
+        following = range(max([centre, *self._begun]) + 1, max(whole, len(route.poses)) - behind)
+        for keyframe in following:
+            if len(self._begun.keys() - {centre}) >= AHEAD:
+                return
+            longer = extended(route, keyframe + behind + 1)
+            near = choose_neighbours(longer.poses, longer.paths, keyframe, self._options)
+            if assumed.is_due(longer, keyframe, near, self._options):
+                assumed.assume(longer, keyframe, near)
+                match = self._pool.submit(self._match, longer, keyframe, near, self._options)
+                self._begun[keyframe] = _Begun(longer, near, match)
+
+    def _drop_outdated(self, route: Route, centre: int) -> None:
+        """Forget what is past, and what was begun before the graph moved."""
+        for keyframe, begun in list(self._begun.items()):
+            if keyframe < centre or not np.array_equal(begun.route.poses[: len(route.poses)], route.poses):
+                begun.match.cancel()
+                del self._begun[keyframe]
+
+    def __enter__(self) -> Ahead:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        if self._pool is not None:
+            self._pool.shutdown(wait=kind is not KeyboardInterrupt, cancel_futures=True)
+            self._pool = None

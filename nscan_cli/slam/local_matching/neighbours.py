@@ -1,0 +1,81 @@
+"""Step 3 of the loop (paper, V): which keyframes take part in the match of one."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nscan_cli.kernels.decorators import kernel
+from nscan_cli.poses import Array, Indices
+from nscan_cli.slam.options import NScanOptions
+
+
+class Neighbours(NamedTuple):
+    """The keyframes for a match."""
+
+    tried: Indices
+    """(n,), increasing."""
+    seen_before: NDArray[np.bool_]
+    """(n,) which are of another visit."""
+    visits: int
+    """How often the path came by here before."""
+
+
+def choose_neighbours(poses: Array, paths: Array, centre: int, options: NScanOptions) -> Neighbours:
+    """The keyframes for a match about `centre`.
+
+    Poses (K, 3) are global ones, paths (K,) lengths of path. Of the keyframes within the radius, those
+    nearest are taken; half of the places are kept for other visits, further along the path or back,
+    unless the options leave these out. Of these the first take part: going round and round, what had other
+    corridors in view would else make room for what sees the same once more.
+    """
+    first = options.first_visits if options.loops else 0
+    return Neighbours(
+        *_choose(poses, paths, centre, options.radius, options.recent, first, options.max_scans)
+    )
+
+
+@kernel
+def _choose(
+    poses: Array,
+    paths: Array,
+    centre: int,
+    radius: float,
+    recent: float,
+    first_visits: int,
+    most: int,
+) -> tuple[Indices, NDArray[np.bool_], int]:
+    """What choose_nearby returns. Another visit is one more than `recent` (m) of path away from the last."""
+    near, distances = np.empty(len(poses), dtype=np.int64), np.empty(len(poses))
+    before, left_out = np.empty(len(poses), dtype=np.bool_), np.empty(len(poses), dtype=np.bool_)
+    n = visits = others = 0
+    visit, last = -1, -np.inf
+    for k in range(len(poses)):
+        dx, dy = poses[k, 0] - poses[centre, 0], poses[k, 1] - poses[centre, 1]
+        if abs(dx) > radius or abs(dy) > radius:
+            continue
+        distance = np.sqrt(dx * dx + dy * dy)
+        if distance > radius:
+            continue
+        near[n], distances[n] = k, distance
+        before[n] = left_out[n] = abs(paths[centre] - paths[k]) > recent
+        if before[n] and first_visits > 0:
+            visit += paths[k] - last > recent
+            last = paths[k]
+            left_out[n] = visit >= first_visits
+            others += not left_out[n]
+            if k < centre:
+                visits = visit + 1
+        n += 1
+    order, chosen = np.argsort(distances[:n], kind="mergesort"), np.zeros(n, dtype=np.bool_)
+    room = most - min(others, most // 2)
+    taken = 0
+    for of_before in (False, True):
+        for at in order:
+            if taken < room and before[at] == of_before and not left_out[at]:
+                chosen[at] = True
+                taken += 1
+        room = most
+    return near[:n][chosen], before[:n][chosen], visits

@@ -1,0 +1,125 @@
+"""Step 3 of the loop without joint matches: a keyframe matched with each of those near it alone.
+
+What nScan matching is compared with: the same scans are chosen, and the same energy of two of them is
+minimised, but each result is a pairwise relation of its own.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from nscan_cli.files.counting import counted
+from nscan_cli.graph.model import Pairwise
+from nscan_cli.matching.joint.overlap import INLIER_BOUND
+from nscan_cli.matching.pairwise_solver import PairProblem, minimise
+from nscan_cli.matching.priors import Prior
+from nscan_cli.ndt.association import begin
+from nscan_cli.ndt.energy import energy, inlier_share
+from nscan_cli.poses import Array, inverse, relative, relative_jacobians, wrap
+from nscan_cli.slam.keyframes.keyframe import Keyframe, Route
+from nscan_cli.slam.local_matching.joint_relations import LocalMatch, moved_by, scale_of, verdict
+from nscan_cli.slam.local_matching.neighbours import Neighbours
+from nscan_cli.slam.options import NScanOptions
+
+
+@dataclass(frozen=True)
+class _Single:
+    """The match of the centre's points with the Gaussians of another keyframe."""
+
+    pose: Array
+    """(3,) of the centre in the other's frame."""
+    overlap: float
+    """The greater of the shares of points of one that lie on Gaussians of the other.
+
+    0 when no point of the centre meets a Gaussian of the other, whatever the other's points lie on.
+    """
+    moved: float
+    """How far (m) the match moved the other, seen from the centre."""
+    information: Array
+    """(3, 3) weighed as in nScan relations: the Hessian of the scaled energy, here without the prior."""
+
+
+def match_neighbours_pairwise(
+    route: Route, centre: int, near: Neighbours, options: NScanOptions
+) -> LocalMatch | None:
+    """Match a keyframe with each of those near it, and keep the matches with overlap enough.
+
+    Arguments as for match_neighbours. A loop is accepted when a match with some keyframe of another visit
+    is. None when no other keyframe is near.
+    """
+    keyframes = route.keyframes
+    others = near.tried != centre
+    tried, seen_before = near.tried[others], near.seen_before[others]
+    if len(tried) == 0:
+        return None
+    singles = [_match(route, int(other), centre, options) for other in tried]
+    overlaps = np.array([single.overlap for single in singles])
+    kept = overlaps >= options.overlap
+    relations = tuple(
+        _relation(keyframes[other], keyframes[centre], single, "loop" if seen else "track")
+        for other, seen, single, keep in zip(tried, seen_before, singles, kept, strict=True)
+        if keep
+    )
+    closed, whole = bool((kept & seen_before).any()), bool(kept.all())
+    if closed:
+        reason = "" if whole else f"{counted(int((~kept).sum()), 'scan')} left out"
+    else:
+        reason = f"too little overlap with {counted(int(seen_before.sum()), 'scan')} of another visit"
+    best = float(overlaps[seen_before].max(initial=0.0))
+    used = kept if closed else np.ones(len(tried), dtype=bool)
+    loop = verdict(keyframes, tried[used], seen_before[used], centre, closed, reason, best)
+    moved = max((single.moved for single, keep in zip(singles, kept, strict=True) if keep), default=0.0)
+    return LocalMatch(relations, None, loop, moved, whole)
+
+
+def _match(route: Route, other: int, centre: int, options: NScanOptions) -> _Single:
+    """The match of the centre with one other keyframe, from where the graph has them."""
+    keyframes, poses = route.keyframes, route.poses
+    reference, points = keyframes[other].ndt, keyframes[centre].points
+    prior = _prior(route.chain, other, centre)
+    scale = scale_of([keyframes[centre]], options)
+    start, origin, tolerance = relative(poses[centre], poses[other]), np.zeros(3), options.tolerance
+    for widenings in options.attempts:
+        pose, hessian = start.copy(), np.empty((3, 3))
+        problem = PairProblem(reference.grid, reference.half, begin(points), scale, prior)
+        minimise(problem, pose, np.array(widenings), options.max_iterations, tolerance, tolerance, hessian)
+        pose[2] = wrap(pose[2])
+        moved = moved_by(np.stack([origin, start]), np.stack([origin, pose]), 1)
+        overlap = _overlap(keyframes[other], keyframes[centre], pose)
+        if overlap >= options.overlap and moved < options.settled:
+            break
+    information = scale * energy(reference, points, pose, exact=False).hessian
+    return _Single(pose, overlap if information.any() else 0.0, moved, information)
+
+
+def _prior(chain: Sequence[Pairwise], other: int, centre: int) -> Prior:
+    """What tracking says of the centre's pose in the other's frame; nothing unless one follows the other."""
+    if other == centre - 1:
+        return Prior(chain[other].measurement, chain[other].information)
+    if other == centre + 1:
+        mean = inverse(chain[centre].measurement)
+        # The measurement is the inverse of the pose that is asked for.
+        _, by_pose = relative_jacobians(np.zeros(3), mean)
+        return Prior(mean, np.ascontiguousarray(by_pose.T @ chain[centre].information @ by_pose))
+    return Prior(np.zeros(3), np.zeros((3, 3)))
+
+
+def _overlap(other: Keyframe, centre: Keyframe, pose: Array) -> float:
+    """As in matching.overlap, of two: `pose` (3,) is the centre's in the other's frame."""
+    ndt, own = other.ndt, centre.ndt
+    on_other = inlier_share(ndt.grid, ndt.half, centre.points, pose, INLIER_BOUND)
+    on_centre = inlier_share(own.grid, own.half, other.points, inverse(pose), INLIER_BOUND)
+    return max(on_other, on_centre)
+
+
+def _relation(other: Keyframe, centre: Keyframe, single: _Single, origin: str) -> Pairwise:
+    return Pairwise(
+        nodes=(other.row, centre.row),
+        measurement=single.pose,
+        information=single.information,
+        origin=origin,
+        score=single.overlap,
+    )

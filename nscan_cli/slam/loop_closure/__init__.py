@@ -1,0 +1,1 @@
+"""Step 4 of the loop: places seen before, by search (paper, V)."""

@@ -1,0 +1,74 @@
+"""A log mapped: the whole loop (paper, V), and a graph that says what it was made from."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections import Counter
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+from nscan_cli.files.provenance import provenance_of
+from nscan_cli.graph.model import Graph
+from nscan_cli.logs.laser_log import LaserLog
+from nscan_cli.logs.reading_options import ReadingOptions
+from nscan_cli.slam.diagnostics.notices import notices
+from nscan_cli.slam.options import NScanOptions, Relations, SlamOptions
+from nscan_cli.slam.pipeline import Slam
+
+Report = Callable[[int, int, int], None]
+"""Called with the scans done, the keyframes, and the loops that are accepted so far."""
+
+
+@dataclass(frozen=True)
+class Counts:
+    """What a graph is made of."""
+
+    keyframes: int
+    pairwise: int
+    nscan: int
+    accepted: int
+    """Loops that were accepted."""
+    refused: Counter[str]
+    """Reason → loops that were refused for it."""
+
+    @classmethod
+    def of(cls, graph: Graph) -> Counts:
+        """Those of a graph."""
+        refused = Counter(loop.reason for loop in graph.loops if not loop.accepted)
+        accepted = len(graph.loops) - refused.total()
+        return cls(len(graph.keyframes), len(graph.pairwise), len(graph.nscan), accepted, refused)
+
+
+def slam_options(
+    max_scans: int | None = None, relations: Relations | None = None, loops: bool = True
+) -> SlamOptions:
+    """The parameters with what a user may choose; None means the default."""
+    nscan, whole = NScanOptions(loops=loops), SlamOptions()
+    if max_scans is not None:
+        nscan = dataclasses.replace(nscan, max_scans=max_scans)
+    return dataclasses.replace(whole, nscan=nscan, relations=relations or whole.relations)
+
+
+def map_log(
+    log: LaserLog, reading: ReadingOptions, options: SlamOptions, threads: int, report: Report
+) -> tuple[Slam, Graph]:
+    """The graph of a log that was read with `reading`, its provenance in it, and the loop as it ended."""
+    slam = Slam(log, options, threads)
+    looked_at = accepted = 0
+
+    def tell(done: int, keyframes: int) -> None:
+        # Another thread may make the list longer meanwhile; only in the end is it looked through again.
+        nonlocal looked_at, accepted
+        new = slam.loops[looked_at:]
+        looked_at += len(new)
+        accepted += sum(loop.accepted for loop in new)
+        report(done, keyframes, accepted)
+
+    graph = slam.run(tell)
+    parameters: dict[str, Any] = {
+        "reading": dataclasses.asdict(reading),
+        "slam": dataclasses.asdict(options),
+    }
+    graph.provenance = {**provenance_of([log.source], parameters), "notices": notices(slam)}
+    return slam, graph

@@ -1,0 +1,83 @@
+"""Times from stamps: sorted stably, counted when they step back, nominal when they say nothing."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from nscan_cli.errors import WrongUsageError
+from nscan_cli.logs.reading_options import ReadingOptions
+from nscan_cli.logs.scan_order import by_time, selection
+
+
+def test_sorted_stably_and_counted():
+    order = by_time(["2.0", "3.0", "1.0", "2.0", "0.5", "9"])
+    assert order.rows.tolist() == [4, 2, 0, 3, 1, 5]
+    assert order.stamps == ["0.5", "1.0", "2.0", "2.0", "3.0", "9"]
+    assert order.backward == 2
+    assert len(order.warnings) == 1
+
+
+@pytest.mark.parametrize(
+    "stamps",
+    [["0", "0", "0"], ["nan", "x", "1"], ["4.29497e+09"] * 9 + ["12"], ["", "", ""], ["1e300", "-inf", "2"]],
+)
+def test_stamps_that_say_nothing_leave_file_order(stamps):
+    order = by_time(stamps)
+    assert order.rows.tolist() == list(range(len(stamps)))
+    np.testing.assert_allclose(order.times, 0.1 * np.arange(len(stamps)))
+    assert order.stamps[1] == "0.100000"
+    assert "file order" in order.warnings[0]
+
+
+def test_a_single_bad_stamp_is_filled_in():
+    order = by_time(["1.5", "nan", "2.5", "3.5"])
+    assert order.times.tolist() == [1.5, 2.0, 2.5, 3.5]
+    assert order.stamps == ["1.5", "2.000000", "2.5", "3.5"]
+
+
+def test_one_scan_keeps_its_stamp():
+    assert by_time(["17.25"]).stamps == ["17.25"]
+
+
+@given(st.lists(st.floats(-1e6, 1e6).map(repr), min_size=1, max_size=30, unique=True))
+def test_sorting_keeps_every_scan(stamps):
+    order = by_time(stamps)
+    assert sorted(order.rows.tolist()) == list(range(len(stamps)))
+    assert (np.diff(order.times) >= 0).all()
+    assert [float(stamp) for stamp in order.stamps] == order.times.tolist()
+
+
+def test_selection_counts_from_the_first_scan():
+    times = 100 + np.arange(10) / 2
+    options = ReadingOptions(start=1.0, end=4.0, every=3)
+    # 1.0 s … 4.0 s are the scans 2 … 8; of these every third.
+    assert selection(times, options, "a.log").tolist() == [2, 5, 8]
+
+
+def test_selection_of_nothing_is_wrong_usage():
+    with pytest.raises(WrongUsageError, match=r"a\.log.*lasts 4\.5 s"):
+        selection(np.arange(10) / 2, ReadingOptions(start=60.0), "a.log")
+
+
+def test_a_clock_that_is_set_back_while_the_robot_drives_on_goes_on():
+    """Two ways through the same 8 s: sorted, their scans would take turns."""
+    times = np.concatenate([0.2 * np.arange(100), 12.0 + 0.2 * np.arange(100)])
+    order = by_time([f"{time:.1f}" for time in times])
+    np.testing.assert_array_equal(order.rows, np.arange(200))
+    np.testing.assert_allclose(order.times, 0.2 * np.arange(200), atol=1e-9)
+    assert order.stamps[99:101] == ["19.8", "20.000000"]
+    assert order.backward == 0
+    assert order.warnings == ["the clock is set back by 8.0 s at scan 100; the times go on from those before"]
+
+
+def test_messages_that_come_late_are_sorted_in():
+    """They fill the gap that they left; nor is a clock set back that meets no time again."""
+    times = 0.2 * np.arange(200)
+    late = np.concatenate([times[:60], times[120:160], times[60:120], times[160:]])
+    order = by_time([f"{time:.1f}" for time in late])
+    np.testing.assert_allclose(order.times, times, atol=1e-9)
+    apart = np.concatenate([times + 3600.0, times])
+    assert np.all(np.diff(by_time([f"{time:.1f}" for time in apart]).times) > 0)

@@ -1,0 +1,336 @@
+"""CARMEN records, line by line; what is expected is derived beside each."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from nscan_cli.errors import InputDataError, WrongUsageError
+from nscan_cli.logs.reading_options import ReadingOptions
+from tests.logs.lines import flaser, read
+
+INF = np.inf
+
+
+def f32(values) -> np.ndarray:
+    return np.array(values, dtype=np.float32)
+
+
+def test_flaser(tmp_path):
+    # The robot looks along +y at (1, 2); its laser is 0.2 m ahead of it: at (1, 2.2).
+    half = math.pi / 2
+    log = read(
+        tmp_path,
+        "# a comment",
+        flaser(100.25, (1.5, 81.91, 2.5), (1, 2.2, half), (1, 2, half)),
+        flaser(100.5, (1.25, 0, 2.75), (1, 2.3, half), (1, 2.1, half)),
+    )
+    assert (log.format, log.laser, log.stamps) == ("CARMEN", "FLASER", ("100.250000", "100.500000"))
+    np.testing.assert_array_equal(log.ranges, f32([[1.5, INF, 2.5], [1.25, np.nan, 2.75]]))
+    assert log.ranges.dtype == np.float32
+    np.testing.assert_allclose(log.mount, (0.2, 0, 0), atol=1e-6)
+    assert log.odometry is not None
+    np.testing.assert_allclose(log.odometry, [[1, 2, half], [1, 2.1, half]])
+    assert log.no_return == pytest.approx(81.91)
+    assert log.range_limits == (0.0, 80.0)
+    assert log.report.records == {"FLASER": 2}
+    # Three beams over 180°: −90°, 0°, 90°. The first end point is 1.5 m to the right of the laser.
+    np.testing.assert_allclose(log.points(0), [[0.2, -1.5], [0.2, 2.5]], atol=1e-6)
+
+
+def test_beams_of_differing_number(tmp_path):
+    log = read(tmp_path, flaser(1, (1, 2, 3)), flaser(2, (1, 2)))
+    np.testing.assert_array_equal(log.ranges, f32([[1, 2, 3], [1, 2, np.nan]]))
+    np.testing.assert_allclose(np.degrees(log.angle_increment), [90, 180])
+
+
+def test_flaser_without_trailer_gets_a_nominal_time(tmp_path):
+    log = read(tmp_path, "FLASER 2 1 2 0 0 0 0 0 0", "FLASER 2 1 2 1 0 0 1 0 0")
+    assert log.stamps == ("0.000000", "0.100000")
+    assert "file order" in log.report.warnings[0]
+
+
+@pytest.mark.parametrize("blank", ["\t", "   "])
+@pytest.mark.parametrize("end", ["\n", "\r\n"])
+def test_blanks_and_line_ends_do_not_matter(tmp_path, blank, end):
+    path = tmp_path / "a.log"
+    path.write_bytes((flaser(1) + end + "  " + flaser(2).replace(" ", blank) + end).encode())
+    from nscan_cli.logs.load import read_log
+
+    log = read_log(str(path))
+    np.testing.assert_array_equal(log.ranges, f32([[1, 2, 3]] * 2))
+
+
+def test_new_messages_carry_their_angles(tmp_path):
+    # type, start −0.5, fov 1, resolution 0.5, maximum 5, accuracy, mode; 3 ranges; 2 remissions;
+    # laser 0.3 m behind and turned by 180°; robot; tv rv, safety distances, turn axis.
+    line = "ROBOTLASER1 0 -0.5 1.0 0.5 5.0 0.01 0 3 1 2 6 2 7 8 0.7 0 3.141593 1 0 0 0.1 0 1 1 1e6 {} h 0"
+    log = read(tmp_path, line.format(1), line.format(2))
+    assert log.laser == "ROBOTLASER1"
+    np.testing.assert_allclose(log.angle_min, -0.5)
+    np.testing.assert_allclose(log.angle_increment, 0.5)
+    np.testing.assert_array_equal(log.ranges[0], f32([1, 2, INF]))
+    assert log.range_limits == (0.0, 5.0)
+    np.testing.assert_allclose(log.mount[:2], (-0.3, 0), atol=1e-6)
+    assert math.cos(log.mount[2]) == pytest.approx(-1)
+    assert log.odometry is not None
+    np.testing.assert_allclose(log.odometry, [[1, 0, 0]] * 2)
+
+
+def test_rawlaser_takes_odometry_from_odom(tmp_path):
+    # Half way in time between the two ODOM records, across ±180°: 179° and −177° meet at −179°.
+    a, b = math.radians(179), math.radians(-177)
+    log = read(
+        tmp_path,
+        f"ODOM 0 0 {a} 0 0 0 10.0 h 0",
+        f"ODOM 2 4 {b} 0 0 0 12.0 h 0",
+        "RAWLASER1 0 -1.5 3.0 0.5 20 0 0 2 1 2 0 11.0 h 0",
+        "RAWLASER1 0 -1.5 3.0 0.5 20 0 0 2 1 2 0 11.5 h 0",
+    )
+    assert log.odometry is not None
+    np.testing.assert_allclose(log.odometry[0], (1, 2, math.radians(-179)))
+    np.testing.assert_allclose(log.odometry[1], (1.5, 3, math.radians(-178)))
+
+
+def test_rawlaser_without_odom_has_no_odometry(tmp_path):
+    log = read(tmp_path, "RAWLASER1 0 -1.5 3.0 0.5 20 0 0 2 1 2 0 11.0 h 0")
+    assert log.odometry is None
+    assert "no odometry" in log.report.warnings[0]
+
+
+def test_odom_without_times_is_no_odometry(tmp_path):
+    scans = [f"RAWLASER1 0 -1.5 0.5 0.5 20 0 0 2 1 2 0 {time}.0 h 0" for time in (1, 2)]
+    log = read(tmp_path, *scans, *["ODOM 1 2 0 0 0 0 0 h 0"] * 3, *["TRUEPOS 1 2 0 0 0 0 0 h 0"] * 3)
+    assert log.odometry is None
+    assert log.truth is None
+    assert len(log.report.warnings) == 2
+
+
+def test_laser3_has_no_angles_and_no_mount(tmp_path):
+    log = read(tmp_path, "LASER3 3 1 2 3 1.0 h 0", "ODOM 1 2 0 0 0 0 1.0 h 0")
+    assert log.laser == "LASER3"
+    assert math.degrees(log.angle_increment[0]) == pytest.approx(90)
+    assert any("LASER3" in warning for warning in log.report.warnings)
+
+
+def test_all_poses_zero_is_no_odometry(tmp_path):
+    log = read(tmp_path, flaser(1), flaser(2), flaser(3))
+    assert log.odometry is None
+
+
+def test_truepos(tmp_path):
+    log = read(
+        tmp_path,
+        flaser(1),
+        "TRUEPOS 5 6 0.5 0 0 0 2.0 h 0",
+        "TRUEPOS 4 5 0.25 0 0 0 1.0 h 0",
+        "TRUEPOS 4 5 0.25 0 0 0",
+    )
+    assert log.truth is not None
+    assert log.truth_times is not None
+    np.testing.assert_array_equal(log.truth, [[4, 5, 0.25], [5, 6, 0.5]])
+    np.testing.assert_array_equal(log.truth_times, [1, 2])
+    assert log.report.skipped == {"wrong number of values": (1, 4)}
+
+
+def test_the_front_laser_is_preferred_and_the_others_named(tmp_path):
+    lines = [flaser(1, tag="RLASER"), flaser(1.1), flaser(2, tag="RLASER"), "LASER3 1 1 1.0 h 0"]
+    log = read(tmp_path, *lines)
+    assert (log.laser, len(log)) == ("FLASER", 1)
+    assert "RLASER (2), LASER3 (1)" in log.report.warnings[0]
+    assert read(tmp_path, *lines, options=ReadingOptions(laser="RLASER")).laser == "RLASER"
+    with pytest.raises(WrongUsageError, match=r"RAWLASER1.*FLASER, RLASER, LASER3"):
+        read(tmp_path, *lines, options=ReadingOptions(laser="RAWLASER1"))
+
+
+def test_options_for_angles_mount_and_flip(tmp_path):
+    options = ReadingOptions(angle_min=-0.25, angle_increment=0.125, mount=(1, 2, 3), flip=True)
+    log = read(tmp_path, flaser(1, laser=(9, 9, 9), robot=(1, 1, 1)), options=options)
+    assert (log.angle_min[0], log.angle_increment[0]) == (0.25, -0.125)
+    assert log.mount.tolist() == [1, 2, 3]
+
+
+def test_range_options(tmp_path):
+    options = ReadingOptions(min_range=1.0, max_range=2.5)
+    log = read(tmp_path, flaser(1, (0.5, 1.0, 1.5, 2.5, 81.91)), options=options)
+    np.testing.assert_array_equal(log.ranges[0], f32([np.nan, np.nan, 1.5, INF, INF]))
+    assert log.range_limits == (1.0, 2.5)
+    assert log.no_return == pytest.approx(81.91)
+
+
+def test_the_maximum_of_param_holds(tmp_path):
+    log = read(tmp_path, "PARAM robot_front_laser_max 2.5 nohost 0", flaser(1))
+    np.testing.assert_array_equal(log.ranges[0], f32([1, 2, INF]))
+
+
+def test_odometry_can_be_left_out(tmp_path):
+    assert read(tmp_path, flaser(1), options=ReadingOptions(odometry=False)).odometry is None
+
+
+PARAMS = ("PARAM robot_frontlaser_offset 0.2 nohost 0", "PARAM robot_frontlaser_side_offset -0.1 nohost 0")
+
+
+def test_param_mounts_the_laser_when_both_poses_are_equal(tmp_path):
+    log = read(tmp_path, *PARAMS, flaser(1, laser=(1, 1, 1)))
+    np.testing.assert_allclose(log.mount, (0.2, -0.1, 0))
+    assert "PARAM" in log.report.warnings[0]
+
+
+@pytest.mark.parametrize(("ahead", "warned"), [(0.2, False), (0.205, False), (0.3, True)])
+def test_poses_win_over_param(tmp_path, ahead, warned):
+    # Within 1 cm both say the same.
+    log = read(tmp_path, *PARAMS, flaser(1, laser=(1 + ahead, 0.9, 0), robot=(1, 1, 0)))
+    np.testing.assert_allclose(log.mount, (ahead, -0.1, 0), atol=1e-6)
+    assert any("PARAM" in warning for warning in log.report.warnings) == warned
+
+
+def test_the_rear_laser_is_turned_unless_param_says(tmp_path):
+    rear = [flaser(1, laser=(1, 1, 1), tag="RLASER"), flaser(2, laser=(2, 1, 1), tag="RLASER")]
+    offset = "PARAM robot_rearlaser_offset -0.3 nohost 0"
+    np.testing.assert_allclose(read(tmp_path, *rear).mount, (0, 0, math.pi))
+    np.testing.assert_allclose(read(tmp_path, offset, *rear).mount, (-0.3, 0, math.pi))
+    angle = "PARAM robot_rearlaser_angular_offset 3.0 nohost 0"
+    np.testing.assert_allclose(read(tmp_path, offset, angle, *rear).mount, (-0.3, 0, 3.0))
+
+
+def test_sorted_with_everything_that_belongs_to_a_scan(tmp_path):
+    log = read(
+        tmp_path, flaser(3, (3, 9), (3, 0, 0)), flaser(1, (1,), (1, 0, 0)), flaser(2, (2, 9), (2, 0, 0))
+    )
+    assert log.ranges[:, 0].tolist() == [1, 2, 3]
+    assert log.odometry is not None
+    assert log.odometry[:, 0].tolist() == [1, 2, 3]
+    assert math.degrees(log.angle_min[0]) == -90
+    assert log.report.backward_stamps == 1
+
+
+def test_numbers_are_those_of_the_whole_log(tmp_path):
+    lines = [flaser(time, (1 + time, 2), (time, 0, 0)) for time in (5, 4, 3, 2, 1, 0)]
+    log = read(tmp_path, *lines, options=ReadingOptions(start=1, end=5, every=2))
+    assert log.numbers.tolist() == [1, 3, 5]
+    assert log.times.tolist() == [1, 3, 5]
+    assert log.ranges[:, 0].tolist() == [2, 4, 6]
+    assert log.odometry is not None
+    assert log.odometry[:, 0].tolist() == [1, 3, 5]
+    assert log.row(3) == 1
+    with pytest.raises(WrongUsageError, match="no scan 2"):
+        log.row(2)
+
+
+MALFORMED = {
+    "FLASER 3 1 2 0 0 0 0 0 0 1.0 h 0": "wrong number of values",
+    "FLASER 999999999 1 2 0 0 0 0 0 0 1.0 h 0": "the beam count is not in 1…16384",
+    "FLASER 0 0 0 0 0 0 0 1.0 h 0": "the beam count is not in 1…16384",
+    "FLASER -1 0 0 0 0 0 0 1.0 h 0": "the beam count is not in 1…16384",
+    "FLASER x 1 2 0 0 0 0 0 0 1.0 h 0": "the beam count is not a number",
+    "FLASER 2 1 x 0 0 0 0 0 0 1.0 h 0": "a value is not a number",
+    "FLASER 2 1 1.2.3 0 0 0 0 0 0 1.0 h 0": "a value is not a number",
+    "FLASER 2 1 2 0 0 nan 0 0 0 1.0 h 0": "a pose is out of bounds",
+    "FLASER 2 1 2 0 0 0 1e300 0 0 1.0 h 0": "a pose is out of bounds",
+    "FLASER": "wrong number of values",
+    "\x07\x08 1 2": "not a CARMEN record",
+}
+
+
+@pytest.mark.parametrize("line", MALFORMED)
+def test_malformed_records_are_counted_or_refused(tmp_path, line):
+    lines = (flaser(1), flaser(2, laser=(1, 0, 0)), line, flaser(3), line)
+    log = read(tmp_path, *lines)
+    assert len(log) == 3
+    assert log.report.skipped == {MALFORMED[line]: (2, 3)}
+    with pytest.raises(InputDataError, match=r"test\.log, line 3: .*--strict"):
+        read(tmp_path, *lines, options=ReadingOptions(strict=True))
+
+
+def test_a_wrong_count_of_remissions(tmp_path):
+    good = "RAWLASER1 0 -1.5 3.0 0.5 20 0 0 2 1 2 1 9 11.0 h 0"
+    log = read(tmp_path, good, good.replace("2 1 9", "2 2 9"))
+    assert len(log) == 1
+    assert log.report.skipped == {"wrong number of values": (1, 2)}
+
+
+def test_nothing_but_malformed_records(tmp_path):
+    with pytest.raises(
+        InputDataError, match=r"line 1: none of its 1 FLASER records .*wrong number of values"
+    ):
+        read(tmp_path, "FLASER 3 1 2")
+
+
+def test_no_laser(tmp_path):
+    with pytest.raises(InputDataError, match="no laser scans, only PARAM, ODOM"):
+        read(tmp_path, "PARAM a 1 nohost 0", "ODOM 0 0 0 0 0 0 1 h 0")
+
+
+CORRECTED = {
+    "NEFF": [flaser(1.5, laser=(1, 0, 0)), "NEFF 12.5"],
+    "WEIGHT": [flaser(1.5, laser=(1, 0, 0)), "WEIGHT 0.5"],
+    "pippo": [flaser(1.5, laser=(1, 0, 0)).replace("nohost", "pippo")],
+    "six digits": [flaser("1.13486e+09", laser=(1, 0, 0)), flaser("1.13487e+09", laser=(2, 0, 0))],
+}
+
+
+@pytest.mark.parametrize("sign", CORRECTED)
+def test_corrected_poses_are_refused_unless_allowed(tmp_path, sign):
+    with pytest.raises(InputDataError, match=f"{sign}.*--allow-corrected"):
+        read(tmp_path, *CORRECTED[sign])
+    log = read(tmp_path, *CORRECTED[sign], options=ReadingOptions(allow_corrected=True))
+    assert log.odometry is not None
+    assert log.odometry[0, 0] == 1
+    assert any("result" in warning for warning in log.report.warnings)
+
+
+@pytest.mark.parametrize("times", [("0", "0.2", "0.4"), ("976052857.337530", "976052857.5"), ("1.000000",)])
+def test_equal_poses_alone_are_no_sign_of_correction(tmp_path, times):
+    assert len(read(tmp_path, *(flaser(time, laser=(1, 0, 0)) for time in times))) == len(times)
+
+
+def test_six_digit_times_alone_are_no_sign_of_correction(tmp_path):
+    assert len(read(tmp_path, flaser("1.13486e+09", laser=(1.1, 0, 0), robot=(1, 0, 0)))) == 1
+
+
+def test_records_of_unknown_kinds_are_told(tmp_path):
+    log = read(tmp_path, flaser(1), flaser(2).replace("FLASER", "FLASEQ"), flaser(3), "SONAR 1 2 3 h 4")
+    assert len(log) == 2
+    assert log.report.warnings[0] == "1 record of kinds unknown to CARMEN: FLASEQ (1)"
+
+
+def test_a_corrected_log_can_be_read_without_its_poses(tmp_path):
+    log = read(tmp_path, *CORRECTED["NEFF"], options=ReadingOptions(odometry=False))
+    assert log.odometry is None
+    assert log.report.corrected == "it has NEFF records"
+    assert log.report.warnings[0] == "the poses are a mapper's result, not odometry (it has NEFF records)"
+
+
+def test_where_no_time_was_measured_the_loggers_holds(tmp_path):
+    """PARAM and SYNC have absolute times there, all others seconds since the logger's start."""
+
+    def at(line: str, logged: float) -> str:
+        return f"{line.rsplit(' ', 3)[0]} 0 nohost {logged}"
+
+    log = read(
+        tmp_path,
+        "PARAM robot_width 1 nohost 1096466466.5",
+        "SYNC some 1096466466.9 nohost 1096466466.9",
+        at("ODOM 0 0 0 0 0 0 0 h 0", 1.0),
+        at("RAWLASER1 0 -1.57 3.14 1.57 80 0.01 0 3 1 2 3 0 0 h 0", 1.25),
+        at("RAWLASER1 0 -1.57 3.14 1.57 80 0.01 0 3 1 2 3 0 0 h 0", 1.75),
+        at("ODOM 4 0 0 0 0 0 0 h 0", 2.0),
+        at("TRUEPOS 7 0 0 0 0 0 0 h 0", 1.5),
+    )
+    assert log.stamps == ("1.25", "1.75")
+    assert log.odometry is not None
+    np.testing.assert_allclose(log.odometry[:, 0], [1.0, 3.0])
+    assert log.truth_times is not None
+    assert log.truth_times.tolist() == [1.5]
+    assert "the scans' own time stamps say nothing: the logger's are used" in log.report.warnings
+
+
+def test_times_of_the_logger_that_say_nothing_either(tmp_path):
+    log = read(tmp_path, flaser("0"), flaser("0"), flaser("0"))
+    assert log.stamps == ("0.000000", "0.100000", "0.200000")
+    assert "file order" in log.report.warnings[0]
+    # Without a trailer there is no time of a logger.
+    log = read(tmp_path, "FLASER 2 1 2 0 0 0 0 0 0.5", "FLASER 2 1 2 0 0 0 0 0 0.7")
+    assert log.stamps == ("0.000000", "0.100000")

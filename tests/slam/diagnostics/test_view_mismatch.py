@@ -1,0 +1,104 @@
+"""Scans that see other things than the keyframe beside which tracking has them."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from nscan_cli.poses import transform
+from nscan_cli.slam.diagnostics.notices import notices
+from nscan_cli.slam.diagnostics.view_mismatch import LEAST, ViewMismatch, view_mismatches
+from nscan_cli.slam.frontend.view_similarity import BEARINGS, LEAST_BEARINGS, view_similarity
+from tests.slam.drives import round_scene
+from tests.slam.runs import mapped, mapped_real
+from tests.slam.troubles import ROUND, without_odometry
+
+APART = 0.2, 0.1
+"""m, and for each metre."""
+
+
+def round_about(ranges: np.ndarray) -> np.ndarray:
+    """Points (BEARINGS, 2), one in each part of the view."""
+    angles = (np.arange(BEARINGS) + 0.5) * 2 * np.pi / BEARINGS - np.pi
+    return np.stack([ranges * np.cos(angles), ranges * np.sin(angles)], axis=1)
+
+
+def test_a_view_is_like_itself_and_not_like_one_that_is_farther():
+    ranges = np.linspace(1.0, 9.0, BEARINGS)
+    view = round_about(ranges)
+    assert view_similarity(view, view, *APART) == 1.0
+    assert view_similarity(view, round_about(ranges + 0.15), *APART) == 1.0
+    assert view_similarity(view, round_about(ranges * 2), *APART) == 0.0
+    half = np.where(np.arange(BEARINGS) % 2 == 0, ranges, 3 * ranges)
+    assert view_similarity(view, round_about(half), *APART) == 0.5
+
+
+def test_only_the_nearest_thing_counts_and_only_where_both_see_one():
+    near, far = round_about(np.full(BEARINGS, 2.0)), round_about(np.full(BEARINGS, 7.0))
+    assert view_similarity(near, np.concatenate([far, near]), *APART) == 1.0
+    assert view_similarity(near[: BEARINGS // 2], near, *APART) == 1.0
+
+
+@pytest.mark.parametrize("count", [0, 1, LEAST_BEARINGS - 1])
+def test_from_few_bearings_nothing_is_told(count):
+    view = round_about(np.full(BEARINGS, 2.0))
+    assert view_similarity(view, view[:count], *APART) is None
+
+
+def test_a_point_straight_behind_falls_into_a_part_of_the_view():
+    """At an angle of exactly π there is no part behind the last."""
+    behind = np.concatenate([round_about(np.full(BEARINGS, 2.0)), [[-1.0, 0.0], [-1.0, -0.0]]])
+    assert view_similarity(behind, behind, *APART) == 1.0
+
+
+def test_views_from_places_apart_are_compared_from_one_of_them():
+    view = round_about(np.full(BEARINGS, 5.0))
+    away = (0.5, 0.2, 1.0)
+    assert view_similarity(view, transform(np.array(away), view), *APART) == 1.0
+
+
+@pytest.mark.parametrize("odometry", [True, False])
+@pytest.mark.parametrize("seed", range(1, 9))
+def test_of_someone_who_walks_along_it_is_told(seed, odometry):
+    """Also where tracking does not break and no place is seen again (without odometry, of drive 8)."""
+    log = ROUND["someone who walks along"](round_scene().record(seed).log()).log
+    log = log if odometry else dataclasses.replace(log, odometry=None)
+    said = "\n".join(notices(mapped(log).slam))
+    assert "see other things than where they were found" in said
+
+
+def found_in(run) -> ViewMismatch | None:
+    slam = run.slam
+    tracking, breaks = slam.options.tracking, slam.options.breaks
+    poses = np.concatenate(slam.tracked)
+    several = [
+        view_mismatches(slam.log, poses, slam.keyframes.list, tracking.reach, breaks, threads)
+        for threads in (1, 2)
+    ]
+    assert several[0] == several[1]
+    return several[0]
+
+
+def test_the_stretch_is_where_the_robot_seems_to_stand():
+    """Drive 8: tracking stands from scan 10 to 85, which is 15 m of way."""
+    made = without_odometry(ROUND["someone who walks along"](round_scene().record(8).log()))
+    run = mapped(made.log)
+    found = found_in(run)
+    assert found is not None
+    assert 10 <= found.first < found.last <= 85
+    assert found.share < LEAST
+    tracked = np.concatenate(run.slam.tracked)[[found.first, found.last], :2]
+    assert np.linalg.norm(tracked[1] - tracked[0]) < 2.0
+
+
+def test_of_a_log_without_keyframes_nothing_is_told():
+    log = round_scene().record(5).log()
+    assert view_mismatches(log, np.zeros((len(log), 3)), [], 30.0, mapped(log).slam.options.breaks) is None
+
+
+@pytest.mark.logs
+@pytest.mark.parametrize("name", ["fr079", "mit-csail", "intel"])
+def test_in_real_buildings_scans_see_what_their_keyframes_saw(name):
+    assert found_in(mapped_real(name)) is None

@@ -1,0 +1,65 @@
+"""Tracking piece by piece; what breaks a track is tested on whole drives in test_trouble."""
+
+from __future__ import annotations
+
+import functools
+
+import numpy as np
+import pytest
+
+from nscan_cli.slam.frontend.first_scan import SCANS
+from nscan_cli.slam.frontend.scan_batch import ScanBatch
+from nscan_cli.slam.frontend.track_segments import SegmentTracker, TrackedSegments
+from nscan_cli.slam.options import BreakOptions, TrackingOptions
+from tests.slam.drives import round_scene
+from tests.slam.runs import part, sensed_in
+from tests.slam.troubles import carried, standing
+
+
+@functools.cache
+def scans() -> ScanBatch:
+    """40 scans of a drive, and 60 more after the robot was carried by 8 m."""
+    made = carried(round_scene().record(5).log(), 20.0, 28.0)
+    log = part(made.log, slice(made.before - 40, made.before + 60))
+    assert log.odometry is not None
+    return sensed_in(log)
+
+
+def followed(size: int) -> list[TrackedSegments]:
+    """All scans, so many at a time; one by one."""
+    follower, found, count = SegmentTracker(TrackingOptions(), BreakOptions()), [], len(scans())
+    for first in range(0, count, size):
+        found += follower.follow(scans().part(first, min(first + size, count)))
+    return [settled.one(k) for settled in found + follower.finish() for k in range(len(settled))]
+
+
+@pytest.mark.parametrize("size", [1, 7, 64])
+def test_a_track_breaks_where_it_does_however_many_scans_come_at_a_time(size):
+    """Scans that were tracked ahead of a break are tracked anew, as of the piece that begins there."""
+    found, together = followed(size), followed(100)
+    assert [scan.sensed.first for scan in found] == list(range(100))
+    assert [scan.sensed.first for scan in found if scan.breaks] == [40]
+    for one, other in zip(found, together, strict=True):
+        assert (one.begins, one.breaks) == (other.begins, other.breaks)
+        for of_one, of_other in zip(one.found, other.found, strict=True):
+            np.testing.assert_array_equal(of_one, of_other)
+
+
+def test_when_all_is_tracked_the_map_goes_and_what_was_counted_stays():
+    follower = SegmentTracker(TrackingOptions(), BreakOptions())
+    follower.follow(scans())
+    counted = follower.restarts, follower.searches
+    assert counted > (0, 0)
+    assert follower._tracker.map.rows > 0
+    follower.finish()
+    assert follower._tracker.map.rows == 0
+    assert (follower.restarts, follower.searches) == counted
+
+
+def test_of_a_robot_that_stands_few_scans_wait_for_it_to_drive():
+    """They would be kept for hours: the first scan of a piece is placed by those of its first metres."""
+    log = standing(SCANS + 200)
+    follower, settled = SegmentTracker(TrackingOptions(), BreakOptions(), odometry=False), 0
+    for first in range(0, len(log), 100):
+        settled += sum(map(len, follower.follow(sensed_in(part(log, slice(first, first + 100))))))
+        assert settled == (0 if first + 100 < SCANS else first + 100)
