@@ -1,4 +1,4 @@
-"""The real logs that some tests read; they are no part of the repository."""
+"""Logs that tests read: the samples of the repository, and real logs that are no part of it."""
 
 from __future__ import annotations
 
@@ -7,12 +7,18 @@ from pathlib import Path
 
 import pytest
 
-BESIDE_THE_REPOSITORY = Path(__file__).resolve().parents[2] / "shared" / "data"
+REPOSITORY = Path(__file__).resolve().parents[1]
+SAMPLE_LOGS = REPOSITORY / "sample_logs"
+PACKAGE = REPOSITORY / "nscan_cli"
+OFFICE_LOG = str(SAMPLE_LOGS / "office.log.gz")
+CORRIDOR_LOG = str(SAMPLE_LOGS / "corridor_and_room.log.gz")
+REAL_LOGS = REPOSITORY.parent / "shared" / "data"
+"""The folder of the real logs unless NSCAN_DATA names another."""
 
 
 def find_data(name: str) -> Path | None:
     """The real log or graph `name` in the folder NSCAN_DATA; None where it is absent."""
-    path = Path(os.environ.get("NSCAN_DATA", BESIDE_THE_REPOSITORY)) / name
+    path = Path(os.environ.get("NSCAN_DATA", REAL_LOGS)) / name
     return path if path.is_file() else None
 
 

@@ -12,13 +12,12 @@ import tempfile
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from tests.data import find_data
+from tests.data import OFFICE_LOG, find_data
 from tests.experiments.output import small_png
 
 if TYPE_CHECKING:
     from PIL.Image import Image
 
-OFFICE = "sample_logs/office.log.gz"
 PAIR_WIDTH = 1600
 """Pixels of two maps beside each other."""
 
@@ -45,10 +44,10 @@ def _opened(path: Path) -> Image:
 
 def _of_the_sample(scratch: Path) -> dict[str, Image]:
     graph, drawn, plot = scratch / "office.json", scratch / "office.png", scratch / "match.png"
-    _run("slam", OFFICE, "-o", graph)
-    _run("render", graph, OFFICE, "-o", drawn, "--trajectory", "--graph")
+    _run("slam", OFFICE_LOG, "-o", graph)
+    _run("render", graph, OFFICE_LOG, "-o", drawn, "--trajectory", "--graph")
     scans = ["--reference", "2000", "--scan", "2008", "--initial", "0.6,0.4,12", "--prior", "none"]
-    _run("match", OFFICE, *scans, "-o", scratch / "match.json", "--plot", plot)
+    _run("match", OFFICE_LOG, *scans, "-o", scratch / "match.json", "--plot", plot)
     return {"office": _opened(drawn), "match": _opened(plot)}
 
 

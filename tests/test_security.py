@@ -10,13 +10,13 @@ from pathlib import Path
 
 import pytest
 
-import nscan_cli
 from nscan_cli.cli.graph_log import find_log
 from nscan_cli.cli.main import run
 from nscan_cli.errors import InputDataError, InputMissingError
 from nscan_cli.graph.io.json_graph import write_graph
 from nscan_cli.logs.load import read_log
 from tests.cli.room_log import room_log
+from tests.data import PACKAGE
 from tests.graph.small_graph import small_graph
 from tests.logs.forms import FORMS
 from tests.logs.recordings.containers import repacked
@@ -24,7 +24,6 @@ from tests.logs.recordings.drives import drive
 from tests.logs.recordings.ros import ros2
 from tests.logs.recordings.ros_text import definition
 
-PACKAGE = Path(nscan_cli.__file__).parent
 CALLS = {"eval", "exec", "compile", "__import__", "system", "popen"}
 MODULES = {"pickle", "marshal", "shelve", "dill", "yaml"}
 SCAN = "sensor_msgs/msg/LaserScan"

@@ -10,16 +10,15 @@ import numpy as np
 
 from tests.benchmarks.clock import Timing
 from tests.benchmarks.processes import Used, run
-from tests.data import find_data
+from tests.data import CORRIDOR_LOG, OFFICE_LOG, find_data
 
-SAMPLES = Path("sample_logs")
 REAL = ("intel", "fr079", "mit-csail", "mit-killian", "fr-campus")
 RUNS = 5
 
 
 def timings() -> Iterator[Timing]:
     """One by one."""
-    small = str(SAMPLES / "corridor_and_room.log.gz")
+    small = CORRIDOR_LOG
     with TemporaryDirectory() as folder:
         graph, picture = str(Path(folder, "graph.json")), str(Path(folder, "map.png"))
 
@@ -34,7 +33,7 @@ def timings() -> Iterator[Timing]:
             ["match", small, "--reference", "10", "--scan", "12"],
             RUNS,
         )
-        yield _timed("process: slam, office", slam(str(SAMPLES / "office.log.gz")), 3)
+        yield _timed("process: slam, office", slam(OFFICE_LOG), 3)
         for name in REAL:
             path = find_data(f"{name}.log.gz")
             if path is not None:

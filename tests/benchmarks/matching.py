@@ -21,7 +21,7 @@ from nscan_cli.matching.pairwise import PairOptions, match_pair, matched_points,
 from nscan_cli.matching.priors import MotionModel
 from nscan_cli.poses import Array, relative
 from tests.benchmarks.clock import Timing, median_of
-from tests.data import find_data
+from tests.data import OFFICE_LOG, find_data
 
 CASES, SEED = 40, 1
 SPACING = 0.5
@@ -30,7 +30,7 @@ SPACING = 0.5
 
 def timings() -> Iterator[Timing]:
     """One by one."""
-    for name, path in (("office", Path("sample_logs/office.log.gz")), ("intel", find_data("intel.log.gz"))):
+    for name, path in (("office", Path(OFFICE_LOG)), ("intel", find_data("intel.log.gz"))):
         if path is None:
             continue
         log = read_log(str(path))

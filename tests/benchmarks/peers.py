@@ -19,10 +19,9 @@ from nscan_cli.logs.load import read_log
 from nscan_cli.matching.pairwise import PairOptions, match_pair, matched_points, scan_ndt
 from nscan_cli.poses import Array
 from tests.benchmarks.clock import Timing, best_of, median_of
-from tests.data import find_data
+from tests.data import OFFICE_LOG, find_data
 from tests.graph.simulated import disturbed, graph_of, mixed_ring
 
-SAMPLE = Path("sample_logs/office.log.gz")
 PAIRS, APART = 40, 5
 """Matches, of scans so many rows apart."""
 
@@ -35,7 +34,7 @@ def timings() -> Iterator[Timing]:
 
 def _matches() -> Iterator[Timing]:
     """From the pose that odometry gives to what converges, Gaussians or trees of both scans included."""
-    log = read_log(str(SAMPLE))
+    log = read_log(OFFICE_LOG)
     rows = np.linspace(0, len(log) - 1 - APART, PAIRS).astype(np.int64).tolist()
     pairs = [tuple(matched_points(log, row + more, PairOptions()) for more in (0, APART)) for row in rows]
     yield Timing("match of two scans: nscan-cli", median_of([partial(_ours, *pair) for pair in pairs]))

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from nscan_cli.kernels.cache_folder import PACKAGE
+from tests.data import REPOSITORY
 
 KERNELS = """
 from nscan_cli.kernels.decorators import kernel, leaf_kernel
@@ -51,7 +51,7 @@ def told(folder: Path, settings: dict[str, str], *names: str, quiet: bool = Fals
     kept = {name: value for name, value in os.environ.items() if not name.startswith(("NUMBA_", "XDG_"))}
     places = {
         "NUMBA_CACHE_DIR": str(folder / "cache"),
-        "PYTHONPATH": os.pathsep.join([str(folder), str(PACKAGE.parent)]),
+        "PYTHONPATH": os.pathsep.join([str(folder), str(REPOSITORY)]),
     }
     code = COMMAND.replace("NAMES", repr(names))
     done = subprocess.run(

@@ -15,7 +15,8 @@ import click
 import pytest
 
 from nscan_cli.cli.main import COMMANDS, cli
-from tests.docs.blocks import ROOT, blocks
+from tests.data import REPOSITORY
+from tests.docs.blocks import blocks
 
 PATIENCE = 30.0
 """s"""
@@ -196,7 +197,7 @@ def test_names_that_are_no_utf8_are_completed(tmp_path, shell):
     done = subprocess.run(
         [sys.executable, "-m", "nscan_cli"],
         cwd=tmp_path,
-        env={**os.environb, b"PYTHONPATH": os.fsencode(ROOT), **settings},
+        env={**os.environb, b"PYTHONPATH": os.fsencode(REPOSITORY), **settings},
         capture_output=True,
         check=True,
     )

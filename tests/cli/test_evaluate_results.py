@@ -17,9 +17,8 @@ from nscan_cli.graph.io.tum import write_tum
 from nscan_cli.logs.load import read_log
 from nscan_cli.logs.reading_options import ReadingOptions
 from nscan_cli.poses import relative
-from tests.data import data_file
+from tests.data import OFFICE_LOG, data_file
 
-SAMPLE = Path(__file__).resolve().parents[2] / "sample_logs" / "office.log.gz"
 END = 20.0
 RESULTS = ("graph.json", "path.tum", "corrected.log")
 
@@ -30,8 +29,8 @@ def mapped(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("mapped")
     outputs = ["-o", "graph.json", "--trajectory", "path.tum", "--carmen", "corrected.log"]
     arguments = [part if part.startswith("-") else str(folder / part) for part in outputs]
-    assert run(["slam", str(SAMPLE), "--end", str(END), "-q", *arguments]) == 0
-    log = read_log(str(SAMPLE), ReadingOptions(end=END))
+    assert run(["slam", OFFICE_LOG, "--end", str(END), "-q", *arguments]) == 0
+    log = read_log(OFFICE_LOG, ReadingOptions(end=END))
     assert log.truth is not None
     lines = []
     for a, b in zip(range(0, len(log) - 10, 7), range(10, len(log), 7), strict=True):

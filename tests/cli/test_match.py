@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import re
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -16,11 +15,9 @@ from nscan_cli.graph.io.triangles import from_upper_triangle
 from nscan_cli.logs.load import read_log
 from nscan_cli.mapping.figures.canvas import BLUE, PURPLE, VERMILLION
 from nscan_cli.poses import relative
-from tests.data import data_file
+from tests.data import CORRIDOR_LOG, OFFICE_LOG, data_file
 from tests.logs.lines import flaser
 
-SAMPLE = str(Path(__file__).resolve().parents[2] / "sample_logs" / "office.log.gz")
-CORRIDOR = str(Path(SAMPLE).with_name("corridor_and_room.log.gz"))
 KEYS = [
     "format", "version", "units", "provenance", "reference", "scan", "initial", "pose", "energy",
     "gradient_norm", "decrement", "hessian", "covariance", "eigenvalues", "weakest", "overlap", "iterations",
@@ -46,18 +43,18 @@ def off(document: dict[str, Any], log: str) -> np.ndarray:
 
 
 def test_the_document(capsys):
-    document, said = matched(capsys, SAMPLE, "--reference", "300", "--scan", "306")
+    document, said = matched(capsys, OFFICE_LOG, "--reference", "300", "--scan", "306")
     assert list(document) == KEYS
     assert (document["format"], document["version"]) == ("nscan-match", "1.0")
     assert document["units"] == {"length": "m", "angle": "rad"}
-    log = read_log(SAMPLE)
+    log = read_log(OFFICE_LOG)
     source = {"name": "office.log.gz", "sha256": log.source.sha256, "bytes": log.source.bytes}
     assert document["provenance"]["inputs"] == [source]
     assert document["provenance"]["parameters"]["prior"] == "odometry"
     assert log.odometry is not None
     np.testing.assert_allclose(document["initial"], relative(log.odometry[306], log.odometry[300]), atol=1e-8)
-    assert np.hypot(*off(document, SAMPLE)[:2]) < 0.03
-    assert abs(off(document, SAMPLE)[2]) < 0.01
+    assert np.hypot(*off(document, OFFICE_LOG)[:2]) < 0.03
+    assert abs(off(document, OFFICE_LOG)[2]) < 0.01
     hessian, covariance = (from_upper_triangle(document[key], 3) for key in ("hessian", "covariance"))
     np.testing.assert_allclose(hessian @ covariance, np.eye(3), atol=0.01)
     np.testing.assert_allclose(np.linalg.eigvalsh(hessian), document["eigenvalues"], rtol=1e-3)
@@ -78,7 +75,7 @@ def test_the_document(capsys):
 
 def test_a_corridor_shows_as_the_weakest_direction(capsys):
     """Scans 45 and 117 are 1 and 2 of the paper's Fig. 3: open along the corridor, the x axis of 45."""
-    document, said = matched(capsys, CORRIDOR, "--reference", "45", "--scan", "117", "--prior", "none")
+    document, said = matched(capsys, CORRIDOR_LOG, "--reference", "45", "--scan", "117", "--prior", "none")
     assert abs(np.degrees(document["weakest"]["direction"])) < 10
     across = 1 / np.sqrt(document["eigenvalues"][-1])
     assert document["weakest"]["sigma"] is None or document["weakest"]["sigma"] > 20 * across
@@ -87,21 +84,21 @@ def test_a_corridor_shows_as_the_weakest_direction(capsys):
 
 
 def test_the_start_can_be_given(capsys):
-    near, _ = matched(capsys, SAMPLE, "--reference", "300", "--scan", "306", "--prior", "none")
+    near, _ = matched(capsys, OFFICE_LOG, "--reference", "300", "--scan", "306", "--prior", "none")
     x, y, angle = near["pose"]
     initial = f"{x + 0.05:.4f},{y - 0.05:.4f},{np.degrees(angle) + 1:.4f}"
     given, _ = matched(
-        capsys, SAMPLE, "--reference", "300", "--scan", "306", "--prior", "none", "--initial", initial
+        capsys, OFFICE_LOG, "--reference", "300", "--scan", "306", "--prior", "none", "--initial", initial
     )
     np.testing.assert_allclose(given["initial"], [x + 0.05, y - 0.05, angle + np.radians(1)], atol=1e-4)
     np.testing.assert_allclose(given["pose"], near["pose"], atol=0.005)
-    still, _ = matched(capsys, SAMPLE, "--reference", "300", "--scan", "306", "--initial", "identity")
+    still, _ = matched(capsys, OFFICE_LOG, "--reference", "300", "--scan", "306", "--initial", "identity")
     assert still["initial"] == [0, 0, 0]
 
 
 def test_no_overlap_is_a_result_that_says_so(capsys):
     document, said = matched(
-        capsys, SAMPLE, "--reference", "0", "--scan", "1", "--initial", "-300,0,0", "--prior", "none"
+        capsys, OFFICE_LOG, "--reference", "0", "--scan", "1", "--initial", "-300,0,0", "--prior", "none"
     )
     assert (document["converged"], document["reason"]) == (False, "no overlap")
     assert document["covariance"] is None
@@ -111,7 +108,7 @@ def test_no_overlap_is_a_result_that_says_so(capsys):
 
 
 def test_the_file_holds_what_standard_output_would(tmp_path, capsys):
-    arguments = ["match", SAMPLE, "--reference", "10", "--scan", "12"]
+    arguments = ["match", OFFICE_LOG, "--reference", "10", "--scan", "12"]
     assert run(arguments) == 0
     out = capsys.readouterr().out
     assert run([*arguments, "-o", str(tmp_path / "match.json"), "-q"]) == 0
@@ -121,29 +118,29 @@ def test_the_file_holds_what_standard_output_would(tmp_path, capsys):
 
 
 def test_without_odometry_it_starts_from_identity_and_says_so(capsys):
-    document, said = matched(capsys, SAMPLE, "--reference", "10", "--scan", "12", "--no-odometry")
+    document, said = matched(capsys, OFFICE_LOG, "--reference", "10", "--scan", "12", "--no-odometry")
     assert document["initial"] == [0, 0, 0]
     assert document["provenance"]["parameters"]["prior"] == "none"
     assert said[0] == "no odometry: initial identity, prior none"
     _, said = matched(
-        capsys, SAMPLE, "--reference", "10", "--scan", "12", "--no-odometry", "--initial", "identity",
+        capsys, OFFICE_LOG, "--reference", "10", "--scan", "12", "--no-odometry", "--initial", "identity",
         "--prior", "none",
     )  # fmt: skip
     assert "no odometry" not in said[0]
 
 
 def test_the_options_can_be_dumped_and_read_back(tmp_path, capsys):
-    arguments = ["match", SAMPLE, "--reference", "10", "--scan", "12", "--initial", "0.1,0,90"]
+    arguments = ["match", OFFICE_LOG, "--reference", "10", "--scan", "12", "--initial", "0.1,0,90"]
     assert run([*arguments, "--dump-config"]) == 0
     config = tmp_path / "match.toml"
     config.write_text(capsys.readouterr().out)
     assert 'initial = "0.1,0,90"' in config.read_text()
-    document, _ = matched(capsys, SAMPLE, "--config", str(config))
+    document, _ = matched(capsys, OFFICE_LOG, "--config", str(config))
     np.testing.assert_allclose(document["initial"], [0.1, 0, np.pi / 2], atol=1e-9)
 
 
 def test_the_plot_shows_both_scans_before_and_after(tmp_path, capsys):
-    arguments = ["match", SAMPLE, "--reference", "2000", "--scan", "2008", "--initial", "0.6,0.4,12"]
+    arguments = ["match", OFFICE_LOG, "--reference", "2000", "--scan", "2008", "--initial", "0.6,0.4,12"]
     assert run(arguments) == 0
     alone = capsys.readouterr()
     assert run([*arguments, "--plot", str(tmp_path / "match.png")]) == 0
@@ -168,7 +165,7 @@ def test_the_plot_shows_both_scans_before_and_after(tmp_path, capsys):
 
 def test_a_match_that_failed_has_a_plot_too(tmp_path, capsys):
     document, _ = matched(
-        capsys, SAMPLE, "--reference", "0", "--scan", "1", "--initial", "-300,0,0", "--prior", "none",
+        capsys, OFFICE_LOG, "--reference", "0", "--scan", "1", "--initial", "-300,0,0", "--prior", "none",
         "--plot", str(tmp_path / "failed.png"),
     )  # fmt: skip
     assert not document["converged"]
@@ -181,7 +178,7 @@ def test_a_match_that_failed_has_a_plot_too(tmp_path, capsys):
         (["--plot", "-"], 2, "--plot -: only the result can go to standard output; name a file"),
         (["--plot", "match.pdf"], 2, "pictures are PNG; name it like match.png"),
         (["-o", "match", "--plot", "./match"], 2, "is the result's name too"),
-        (["--plot", SAMPLE], 2, "is an input, and would be replaced"),
+        (["--plot", OFFICE_LOG], 2, "is an input, and would be replaced"),
         (["--plot", "no/such.png"], 73, "the folder no does not exist"),
         (["--plot", "."], 73, "is a folder"),
     ],
@@ -191,7 +188,7 @@ def test_a_plot_that_cannot_be_is_refused_before_the_work(
 ):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr("nscan_cli.logs.load.read_log", pytest.fail)
-    assert run(["match", SAMPLE, "--reference", "10", "--scan", "12", *arguments]) == code
+    assert run(["match", OFFICE_LOG, "--reference", "10", "--scan", "12", *arguments]) == code
     out, err = capsys.readouterr()
     assert out == ""
     assert len(err.splitlines()) == 1
@@ -221,7 +218,7 @@ def test_a_plot_that_cannot_be_is_refused_before_the_work(
 )
 def test_mistakes_are_one_line(tmp_path, monkeypatch, capsys, arguments, code, said):
     monkeypatch.chdir(tmp_path)
-    assert run(["match", SAMPLE, *arguments]) == code
+    assert run(["match", OFFICE_LOG, *arguments]) == code
     out, err = capsys.readouterr()
     assert out == ""
     assert len(err.splitlines()) == 1
@@ -258,7 +255,7 @@ def test_a_real_log(capsys):
 def test_a_stage_that_was_cut_off_is_told_though_the_match_has_converged(capsys):
     """Half a metre off by the truth: the place is a minimum, but the way there was cut at 50 iterations."""
     arguments = ["--reference", "553", "--scan", "567", "--initial=-0.4,0.1,155", "--prior", "none"]
-    document, said = matched(capsys, SAMPLE, *arguments)
-    assert np.hypot(*off(document, SAMPLE)[:2]) > 0.4
+    document, said = matched(capsys, OFFICE_LOG, *arguments)
+    assert np.hypot(*off(document, OFFICE_LOG)[:2]) > 0.4
     assert (document["converged"], document["reason"], document["unsettled_stages"]) == (True, None, 1)
     assert said[-1].strip() == "1 stage before the last did not settle: the place is less sure"

@@ -10,10 +10,8 @@ from pathlib import Path
 import pytest
 
 from nscan_cli.cli.main import run
-from tests.data import data_file
+from tests.data import SAMPLE_LOGS, data_file
 from tests.nightly.small import copy_of, results, write_logs
-
-SAMPLES = Path(__file__).resolve().parents[2] / "sample_logs"
 
 
 @pytest.fixture(scope="module")
@@ -204,7 +202,7 @@ def test_where_no_log_is_there_it_is_said_where_to_get_them(tmp_path, capsys):
 
 
 def test_the_sample_logs_and_their_manifest(tmp_path):
-    assert run(["nightly", str(SAMPLES / "nightly.toml"), "-o", str(tmp_path / "nights"), "-q"]) == 0
+    assert run(["nightly", str(SAMPLE_LOGS / "nightly.toml"), "-o", str(tmp_path / "nights"), "-q"]) == 0
 
 
 @pytest.mark.logs

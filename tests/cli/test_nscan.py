@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -19,11 +18,9 @@ from nscan_cli.graph.relations.registry import relation_of
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.logs.load import read_log
 from nscan_cli.poses import compose, relative
-from tests.data import data_file
+from tests.data import CORRIDOR_LOG, OFFICE_LOG, data_file
 from tests.matching.problems import errors
 
-SAMPLE = str(Path(__file__).resolve().parents[2] / "sample_logs" / "office.log.gz")
-CORRIDOR = str(Path(SAMPLE).with_name("corridor_and_room.log.gz"))
 SPEC = "2000-2024:8"
 SCANS = [2000, 2008, 2016, 2024]
 KEYS = [
@@ -35,7 +32,7 @@ KEYS = [
 
 @pytest.fixture(scope="module")
 def office() -> LaserLog:
-    return read_log(SAMPLE)
+    return read_log(OFFICE_LOG)
 
 
 def matched(capsys: pytest.CaptureFixture[str], *arguments: str) -> tuple[dict[str, Any], list[str]]:
@@ -68,7 +65,7 @@ def assert_true(document: dict[str, Any], log: LaserLog, metres: float = 0.03) -
 
 
 def test_the_document(capsys, office):
-    document, said = matched(capsys, SAMPLE, "--scans", SPEC)
+    document, said = matched(capsys, OFFICE_LOG, "--scans", SPEC)
     assert list(document) == KEYS
     assert (document["format"], document["version"]) == ("nscan-joint-match", "1.0")
     relation = relation_of(JsonRecord(document["relation"], "relation"), "scans")
@@ -95,15 +92,15 @@ def test_the_document(capsys, office):
 
 def test_fig_3_of_the_paper_is_known_in_every_direction(capsys):
     """Scans 45, 117 and 150 are 1, 2 and 3 of the figure: jointly no direction is left open."""
-    document, _ = matched(capsys, CORRIDOR, "--scans", "45,117,150", "--prior", "none")
+    document, _ = matched(capsys, CORRIDOR_LOG, "--scans", "45,117,150", "--prior", "none")
     assert document["converged"]
     covariance = from_upper_triangle(document["covariance"], 6)
     assert np.sqrt(covariance[[0, 1, 3, 4], [0, 1, 3, 4]]).max() < 0.1
-    assert_true(document, read_log(CORRIDOR), 0.15)
+    assert_true(document, read_log(CORRIDOR_LOG), 0.15)
 
 
 def test_gauges_and_the_fixed_scan(capsys, office):
-    arguments = (SAMPLE, "--scans", SPEC, "--fixed", "2016")
+    arguments = (OFFICE_LOG, "--scans", SPEC, "--fixed", "2016")
     free, _ = matched(capsys, *arguments)
     fixed, _ = matched(capsys, *arguments, "--gauge", "fixed")
     for document in (free, fixed):
@@ -120,7 +117,7 @@ def test_gauges_and_the_fixed_scan(capsys, office):
 
 
 def test_without_odometry(capsys, office):
-    document, said = matched(capsys, SAMPLE, "--scans", "2000-2003", "--no-odometry")
+    document, said = matched(capsys, OFFICE_LOG, "--scans", "2000-2003", "--no-odometry")
     assert said[0] == "no odometry: initial identity, prior none"
     assert_true(document, office, 0.05)
 
@@ -134,7 +131,7 @@ def test_starts_from_a_graph_and_from_a_trajectory(tmp_path, capsys, office):
     tum.write_bytes(write_tum(stamps, office.truth[SCANS]))
     for path in (graph, tum):
         document, _ = matched(
-            capsys, SAMPLE, "--scans", SPEC, "--initial", str(path), "--prior", "none", "--gauge", "fixed"
+            capsys, OFFICE_LOG, "--scans", SPEC, "--initial", str(path), "--prior", "none", "--gauge", "fixed"
         )
         assert_true(document, office)
         np.testing.assert_allclose(document["relation"]["poses"][0], office.truth[2000], atol=1e-8)
@@ -156,13 +153,13 @@ def test_relations_of_a_graph_are_priors(tmp_path, capsys, office):
     path = tmp_path / "graph.json"
     path.write_bytes(write_graph(graph_of(office, [0, *SCANS], relations)))
     document, said = matched(
-        capsys, SAMPLE, "--scans", "2000,2008", "--initial", str(path), "--prior", str(path)
+        capsys, OFFICE_LOG, "--scans", "2000,2008", "--initial", str(path), "--prior", str(path)
     )
     poses = np.array(document["relation"]["poses"])
     np.testing.assert_allclose(relative(poses[1], poses[0]), step, atol=2e-3)
     assert len(document["provenance"]["inputs"]) == 2
     assert "warning" not in said[0]
-    _, said = matched(capsys, SAMPLE, "--scans", "2016,2024", "--prior", str(path))
+    _, said = matched(capsys, OFFICE_LOG, "--scans", "2016,2024", "--prior", str(path))
     assert "does not connect any two of the scans" in said[0]
 
 
@@ -176,14 +173,14 @@ def test_a_graph_gives_bounds_where_no_relation_joins_two_scans(tmp_path, capsys
     graph.poses = np.array([truth[0], compose(truth[0], steps[0]), compose(truth[0], compose(*steps))])
     path = tmp_path / "graph.json"
     path.write_bytes(write_graph(graph))
-    document, said = matched(capsys, SAMPLE, "--scans", "2000,2008", "--prior", str(path))
+    document, said = matched(capsys, OFFICE_LOG, "--scans", "2000,2008", "--prior", str(path))
     poses = np.array(document["relation"]["poses"])
     np.testing.assert_allclose(relative(poses[1], poses[0]), compose(*steps), atol=2e-3)
     assert "warning" not in said[0]
 
 
 def test_pairs_are_those_that_were_asked_for(capsys, office):
-    arguments = (SAMPLE, "--scans", "0-360:40")
+    arguments = (OFFICE_LOG, "--scans", "0-360:40")
     used = {}
     for kind in ("all", "visible", "overlap"):
         document, _ = matched(capsys, *arguments, "--pairs", kind)
@@ -198,7 +195,7 @@ def test_pairs_are_those_that_were_asked_for(capsys, office):
 def test_the_same_bytes_every_time(tmp_path):
     for name in ("a", "b"):
         outputs = ["-o", str(tmp_path / f"{name}.json"), "--plot", str(tmp_path / f"{name}.png")]
-        assert run(["nscan", CORRIDOR, "--scans", "20-100:20", "-q", *outputs]) == 0
+        assert run(["nscan", CORRIDOR_LOG, "--scans", "20-100:20", "-q", *outputs]) == 0
     for kind in ("json", "png"):
         assert (tmp_path / f"a.{kind}").read_bytes() == (tmp_path / f"b.{kind}").read_bytes()
 
@@ -236,7 +233,7 @@ def test_mistakes_are_one_line(tmp_path, monkeypatch, capsys, office, arguments,
     (tmp_path / "graph.json").write_bytes(write_graph(graph))
     graph.provenance["inputs"][0]["sha256"] = "0" * 64
     (tmp_path / "other.json").write_bytes(write_graph(graph))
-    assert run(["nscan", SAMPLE, *arguments]) == code
+    assert run(["nscan", OFFICE_LOG, *arguments]) == code
     out, err = capsys.readouterr()
     assert out == ""
     assert len(err.splitlines()) == 1

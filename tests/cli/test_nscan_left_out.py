@@ -11,12 +11,13 @@ from nscan_cli.graph.model import Pairwise
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.logs.load import read_log
 from nscan_cli.poses import relative
-from tests.cli.test_nscan import CORRIDOR, SAMPLE, SCANS, SPEC, assert_true, graph_of, matched
+from tests.cli.test_nscan import SCANS, SPEC, assert_true, graph_of, matched
+from tests.data import CORRIDOR_LOG, OFFICE_LOG
 
 
 @pytest.fixture(scope="module")
 def office() -> LaserLog:
-    return read_log(SAMPLE)
+    return read_log(OFFICE_LOG)
 
 
 def test_scans_that_cannot_meet_the_others_are_named_and_left_out(tmp_path, capsys, office):
@@ -25,7 +26,7 @@ def test_scans_that_cannot_meet_the_others_are_named_and_left_out(tmp_path, caps
     path = tmp_path / "torn.json"
     path.write_bytes(write_graph(graph))
     arguments = ["--scans", SPEC, "--initial", str(path), "--prior", "none", "--fixed", "2008"]
-    document, said = matched(capsys, SAMPLE, *arguments)
+    document, said = matched(capsys, OFFICE_LOG, *arguments)
     assert document["relation"]["scans"] == [2000, 2016, 2024]
     assert document["relation"]["fixed"] == 2000
     reason = "starts too far from all others to meet one"
@@ -34,7 +35,7 @@ def test_scans_that_cannot_meet_the_others_are_named_and_left_out(tmp_path, caps
     assert len(document["covariance"]) == 21
     assert said[-1] == f"left out  scan 2008 {reason}"
     assert_true(document, office)
-    code = run(["nscan", SAMPLE, "--scans", "2000,2008", *arguments[2:6]])
+    code = run(["nscan", OFFICE_LOG, "--scans", "2000,2008", *arguments[2:6]])
     out, err = capsys.readouterr()
     assert (code, out, len(err.splitlines())) == (65, "", 1)
     assert f"no two of the scans match: scan 2000 {reason}" in err
@@ -49,7 +50,7 @@ def test_a_scan_out_of_its_bounds_is_named_with_its_deviation(tmp_path, capsys, 
         graph.pairwise.append(Pairwise((a, b), step, np.eye(3) * 400, "track"))
     path = tmp_path / "graph.json"
     path.write_bytes(write_graph(graph))
-    document, said = matched(capsys, SAMPLE, "--scans", SPEC, "--prior", str(path))
+    document, said = matched(capsys, OFFICE_LOG, "--scans", SPEC, "--prior", str(path))
     (out,) = document["left_out"]
     # One prior of the two that it breaks, 0.5 m at 0.05 m.
     assert (out["scan"], out["chi2"]) == (2016, pytest.approx(100, rel=0.1))
@@ -61,7 +62,7 @@ def test_a_scan_out_of_its_bounds_is_named_with_its_deviation(tmp_path, capsys, 
 
 def test_a_weak_direction_is_named(capsys):
     """Scans 1 and 2 of Fig. 3 leave the corridor's direction open."""
-    document, said = matched(capsys, CORRIDOR, "--scans", "45,117")
+    document, said = matched(capsys, CORRIDOR_LOG, "--scans", "45,117")
     assert document["left_out"] == []
     for weakest in document["weakest"]:
         assert weakest["sigma"] > 0.05

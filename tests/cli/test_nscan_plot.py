@@ -15,7 +15,8 @@ from nscan_cli.logs.load import read_log
 from nscan_cli.mapping.figures.canvas import BLACK, DIM
 from nscan_cli.mapping.figures.colour_ramp import ramp
 from nscan_cli.poses import relative
-from tests.cli.test_nscan import SAMPLE, SCANS, SPEC, graph_of, matched
+from tests.cli.test_nscan import SCANS, SPEC, graph_of, matched
+from tests.data import OFFICE_LOG
 
 
 def count(pixels: np.ndarray, colour: tuple[int, ...]) -> int:
@@ -23,7 +24,7 @@ def count(pixels: np.ndarray, colour: tuple[int, ...]) -> int:
 
 
 def test_the_plot_shows_the_start_above_the_result(tmp_path, capsys):
-    arguments = [SAMPLE, "--scans", SPEC]
+    arguments = [OFFICE_LOG, "--scans", SPEC]
     alone, _ = matched(capsys, *arguments)
     beside, said = matched(capsys, *arguments, "--plot", str(tmp_path / "nscan.png"))
     assert beside == alone
@@ -43,7 +44,7 @@ def test_the_plot_shows_the_start_above_the_result(tmp_path, capsys):
 
 def test_the_plot_marks_the_scans_that_were_left_out(tmp_path, capsys):
     """A graph puts scan 2008 1 m aside, within 0.2 m: where it fits is out of these bounds."""
-    graph = graph_of(read_log(SAMPLE), SCANS)
+    graph = graph_of(read_log(OFFICE_LOG), SCANS)
     graph.poses[1, 1] += 1.0
     for a, b in ((0, 1), (1, 2), (1, 3), (0, 2), (2, 3)):
         step = relative(graph.poses[b], graph.poses[a])
@@ -51,7 +52,7 @@ def test_the_plot_marks_the_scans_that_were_left_out(tmp_path, capsys):
     path = str(tmp_path / "torn.json")
     Path(path).write_bytes(write_graph(graph))
     document, _ = matched(
-        capsys, SAMPLE, "--scans", SPEC, "--initial", path, "--prior", path,
+        capsys, OFFICE_LOG, "--scans", SPEC, "--initial", path, "--prior", path,
         "--plot", str(tmp_path / "nscan.png"),
     )  # fmt: skip
     assert [out["scan"] for out in document["left_out"]] == [2008]
@@ -75,7 +76,7 @@ def test_the_plot_marks_the_scans_that_were_left_out(tmp_path, capsys):
         (["--plot", "-"], 2, "--plot -: only the result can go to standard output"),
         (["--plot", "nscan.svg"], 2, "pictures are PNG"),
         (["-o", "nscan.png", "--plot", "nscan.png"], 2, "is the result's name too"),
-        (["--plot", SAMPLE], 2, "is an input"),
+        (["--plot", OFFICE_LOG], 2, "is an input"),
         (["--initial", "start.tum", "--plot", "start.tum"], 2, "is an input"),
         (["--plot", "no/such.png"], 73, "the folder no does not exist"),
     ],
@@ -85,7 +86,7 @@ def test_a_plot_that_cannot_be_is_refused_before_the_work(
 ):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr("nscan_cli.logs.load.read_log", pytest.fail)
-    assert run(["nscan", SAMPLE, "--scans", "1,2", *arguments]) == code
+    assert run(["nscan", OFFICE_LOG, "--scans", "1,2", *arguments]) == code
     out, err = capsys.readouterr()
     assert out == ""
     assert len(err.splitlines()) == 1

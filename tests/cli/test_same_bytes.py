@@ -10,12 +10,11 @@ from pathlib import Path
 import pytest
 
 from tests.cli.room_log import ALL_OUTPUTS
-
-SAMPLE = Path(__file__).resolve().parents[2] / "sample_logs" / "corridor_and_room.log.gz"
+from tests.data import CORRIDOR_LOG
 
 
 def outputs(folder: Path, threads: int, hash_seed: str) -> dict[str, bytes]:
-    (folder / "log").symlink_to(SAMPLE)
+    (folder / "log").symlink_to(CORRIDOR_LOG)
     command = [
         sys.executable,
         "-m",

@@ -26,10 +26,10 @@ from nscan_cli.logs.load import read_log
 from nscan_cli.logs.reading_options import ReadingOptions
 from nscan_cli.poses import relative
 from tests.cli.room_log import ALL_OUTPUTS, room_log
+from tests.data import OFFICE_LOG
 from tests.graph.io.test_json_graph import validate
 
-SAMPLE = str(Path(__file__).resolve().parents[2] / "sample_logs" / "office.log.gz")
-SHORT = [SAMPLE, "--end", "40"]
+SHORT = [OFFICE_LOG, "--end", "40"]
 """200 scans, 15 m."""
 
 
@@ -64,7 +64,7 @@ def test_the_graph_is_valid_against_the_schema(everything):
 
 def test_the_graph_is_of_the_log(everything):
     graph = read_graph(str(everything / "graph.json"))
-    log = read_log(SAMPLE, ReadingOptions(end=40.0))
+    log = read_log(OFFICE_LOG, ReadingOptions(end=40.0))
     assert log.truth is not None
     truth = log.truth[: len(log)]
     assert graph.stamps == list(log.stamps)
@@ -86,7 +86,7 @@ def test_trajectory_and_g2o_are_those_of_the_graph(everything):
 
 def test_the_corrected_log_has_the_graphs_poses_and_the_logs_scans(everything):
     graph = read_graph(str(everything / "graph.json"))
-    log = read_log(SAMPLE, ReadingOptions(end=40.0))
+    log = read_log(OFFICE_LOG, ReadingOptions(end=40.0))
     corrected = read_log(str(everything / "corrected.log"), ReadingOptions(allow_corrected=True))
     assert corrected.stamps == log.stamps
     np.testing.assert_array_equal(corrected.ranges, log.ranges)
@@ -111,7 +111,7 @@ def test_the_map_is_of_the_floor_and_its_yaml_beside_it(everything):
 def test_provenance_has_the_inputs_sha256_and_all_parameters_and_no_path(everything):
     text = (everything / "graph.json").read_text()
     provenance = json.loads(text)["provenance"]
-    data = Path(SAMPLE).read_bytes()
+    data = Path(OFFICE_LOG).read_bytes()
     assert provenance["inputs"] == [
         {"name": "office.log.gz", "sha256": hashlib.sha256(data).hexdigest(), "bytes": len(data)}
     ]
@@ -120,7 +120,7 @@ def test_provenance_has_the_inputs_sha256_and_all_parameters_and_no_path(everyth
     assert slam["nscan"]["max_scans"] == 10
     assert {"tracking", "keyframes", "nscan"} <= set(slam)
     assert str(everything) not in text
-    assert str(Path(SAMPLE).parent) not in text
+    assert str(Path(OFFICE_LOG).parent) not in text
     assert not re.search(r'"[^"]*/[^"]*"', text)
 
 
@@ -141,7 +141,7 @@ def test_the_depfile_names_every_output_and_the_log(everything):
     targets, sources = rule((everything / "graph.d").read_text())
     outputs = ("graph.json", "map.png", "map.yaml", "path.tum", "graph.g2o", "corrected.log")
     assert sorted(targets) == sorted(str(everything / name) for name in outputs)
-    assert sources == [SAMPLE]
+    assert sources == [OFFICE_LOG]
 
 
 def test_make_understands_the_depfile(folder):
@@ -178,7 +178,7 @@ def test_standard_output_gets_the_graph_and_nothing_else(everything, capsysbinar
 
 
 def test_the_log_may_come_from_standard_input(folder, everything, monkeypatch):
-    stdin = SimpleNamespace(buffer=io.BytesIO(Path(SAMPLE).read_bytes()))
+    stdin = SimpleNamespace(buffer=io.BytesIO(Path(OFFICE_LOG).read_bytes()))
     monkeypatch.setattr("sys.stdin", stdin)
     assert run(["slam", "-", "--end", "40", "-o", "graph.json", "-q"]) == 0
     found, named = (document_of(path) for path in (folder / "graph.json", everything / "graph.json"))

@@ -20,16 +20,15 @@ from nscan_cli.graph.io.tum import read_tum
 from nscan_cli.logs.load import read_log
 from nscan_cli.logs.reading_options import ReadingOptions
 from nscan_cli.poses import relative
+from tests.data import OFFICE_LOG
 from tests.graph.small_graph import small_graph
-
-SAMPLE = Path(__file__).resolve().parents[2] / "sample_logs" / "office.log.gz"
 
 
 @pytest.fixture(scope="module")
 def saved(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder with the graph of 200 scans of the sample alone."""
     folder = tmp_path_factory.mktemp("saved")
-    assert run(["slam", str(SAMPLE), "--end", "40", "-q", "-o", str(folder / "graph.json")]) == 0
+    assert run(["slam", OFFICE_LOG, "--end", "40", "-q", "-o", str(folder / "graph.json")]) == 0
     return folder
 
 
@@ -45,7 +44,7 @@ def test_with_its_log_a_graph_is_refined(folder, capsys):
     outputs = {"-o": "again.json", "--map": "again.png", "--trajectory": "again.tum", "--g2o": "again.g2o",
                "--carmen": "again.log", "--depfile": "again.d"}  # fmt: skip
     arguments = [part for pair in outputs.items() for part in pair]
-    assert run(["slam", "--from", "graph.json", str(SAMPLE), *arguments]) == 0
+    assert run(["slam", "--from", "graph.json", OFFICE_LOG, *arguments]) == 0
     said = capsys.readouterr().err
     assert re.search(r"^optimised  energy .* iterations, then refined$", said, re.MULTILINE)
     assert re.search(r"^moved +no pose by more than \S+ m$", said, re.MULTILINE)
@@ -60,17 +59,17 @@ def test_with_its_log_a_graph_is_refined(folder, capsys):
     assert corrected.odometry is not None
     np.testing.assert_allclose(relative(corrected.odometry, after.poses), 0, atol=3e-9)
     assert (folder / "again.d").read_text() == (
-        f"again.json again.png again.yaml again.tum again.g2o again.log: graph.json {SAMPLE}\n"
+        f"again.json again.png again.yaml again.tum again.g2o again.log: graph.json {OFFICE_LOG}\n"
     )
 
 
 @pytest.mark.parametrize("beside", [True, False])
 def test_the_log_is_found_beside_the_graph_or_here(folder, tmp_path_factory, monkeypatch, beside):
     elsewhere = tmp_path_factory.mktemp("elsewhere")
-    shutil.copy(SAMPLE, folder if beside else elsewhere)
+    shutil.copy(OFFICE_LOG, folder if beside else elsewhere)
     monkeypatch.chdir(elsewhere)
     assert run(["slam", "--from", str(folder / "graph.json"), "-o", "found.json", "-q"]) == 0
-    assert run(["slam", "--from", str(folder / "graph.json"), str(SAMPLE), "-o", "given.json", "-q"]) == 0
+    assert run(["slam", "--from", str(folder / "graph.json"), OFFICE_LOG, "-o", "given.json", "-q"]) == 0
     assert (elsewhere / "found.json").read_bytes() == (elsewhere / "given.json").read_bytes()
 
 
@@ -95,7 +94,7 @@ def test_a_graph_of_another_tool_is_optimised_only(folder, capsys, name):
     (folder / name).write_bytes(write_graph(graph) if name.endswith("json") else write_g2o(graph))
     assert run(["slam", "--from", name, "-o", "again.json"]) == 0
     assert f"{name}: is no graph that slam made from a log" in capsys.readouterr().err
-    assert run(["slam", "--from", name, str(SAMPLE), "-o", "more.json"]) == 2
+    assert run(["slam", "--from", name, OFFICE_LOG, "-o", "more.json"]) == 2
     assert not (folder / "more.json").exists()
 
 
@@ -106,7 +105,7 @@ def test_a_map_needs_the_log(folder, capsys):
 
 
 def test_another_log_is_refused(folder, capsys):
-    other = gzip.compress(gzip.decompress(SAMPLE.read_bytes()) + b"# another\n", mtime=0)
+    other = gzip.compress(gzip.decompress(Path(OFFICE_LOG).read_bytes()) + b"# another\n", mtime=0)
     (folder / "office.log.gz").write_bytes(other)
     assert hashlib.sha256(other).hexdigest() != read_graph("graph.json").provenance["inputs"][0]["sha256"]
     for arguments in ([], ["office.log.gz"]):
@@ -118,14 +117,14 @@ def test_another_log_is_refused(folder, capsys):
 
 
 def test_the_log_that_was_found_is_never_replaced(folder, capsys):
-    shutil.copy(SAMPLE, folder)
+    shutil.copy(OFFICE_LOG, folder)
     assert run(["slam", "--from", "graph.json", "-o", "again.json", "--carmen", "office.log.gz"]) == 2
     assert "office.log.gz is an input, and an output too" in capsys.readouterr().err
-    assert (folder / "office.log.gz").read_bytes() == SAMPLE.read_bytes()
+    assert (folder / "office.log.gz").read_bytes() == Path(OFFICE_LOG).read_bytes()
 
 
 def test_the_graph_may_come_from_standard_input(folder, monkeypatch):
-    shutil.copy(SAMPLE, folder)
+    shutil.copy(OFFICE_LOG, folder)
     data = (folder / "graph.json").read_bytes()
     monkeypatch.setattr("sys.stdin", SimpleNamespace(buffer=io.BytesIO(data)))
     assert run(["slam", "--from", "-", "-o", "piped.json", "-q"]) == 0
@@ -135,7 +134,7 @@ def test_the_graph_may_come_from_standard_input(folder, monkeypatch):
 
 def test_the_same_bytes_every_time(folder):
     for name in ("a.json", "b.json"):
-        assert run(["slam", "--from", "graph.json", str(SAMPLE), "-o", name, "-q"]) == 0
+        assert run(["slam", "--from", "graph.json", OFFICE_LOG, "-o", name, "-q"]) == 0
     assert (folder / "a.json").read_bytes() == (folder / "b.json").read_bytes()
 
 

@@ -6,7 +6,8 @@ import tomllib
 
 from nscan_cli.cli.main import run
 from nscan_cli.graph.io.json_graph import read_graph
-from tests.cli.test_slam import SAMPLE, SHORT, document_of
+from tests.cli.test_slam import SHORT, document_of
+from tests.data import OFFICE_LOG
 from tests.graph.io.test_json_graph import validate
 
 
@@ -42,7 +43,7 @@ def test_relations_of_one_kind(folder):
 
 
 def test_no_loops(folder):
-    assert run(["slam", SAMPLE, "--every", "10", "--no-loops", "-o", "graph.json", "-q"]) == 0
+    assert run(["slam", OFFICE_LOG, "--every", "10", "--no-loops", "-o", "graph.json", "-q"]) == 0
     graph = read_graph("graph.json")
     assert graph.provenance["parameters"]["slam"]["nscan"]["loops"] is False
     assert graph.loops == []
@@ -51,23 +52,23 @@ def test_no_loops(folder):
 
 def test_config_is_dumped_and_read_back(folder, capsys):
     given = ["--max-scans", "4", "--map", "map.png", "--every", "7", "--mount", "0.1,0,90"]
-    assert run(["slam", SAMPLE, *given, "--dump-config"]) == 0
+    assert run(["slam", OFFICE_LOG, *given, "--dump-config"]) == 0
     dumped = capsys.readouterr().out
     options = tomllib.loads(dumped)["slam"]
     assert (options["max-scans"], options["map"], options["every"]) == (4, "map.png", 7)
     assert options["output"] == "-"
     assert list(folder.iterdir()) == []
     (folder / "slam.toml").write_text(dumped)
-    assert run(["slam", SAMPLE, "--config", "slam.toml", "--dump-config"]) == 0
+    assert run(["slam", OFFICE_LOG, "--config", "slam.toml", "--dump-config"]) == 0
     assert capsys.readouterr().out == dumped
     # A flag is stronger than the file, the file than the default.
-    assert run(["slam", SAMPLE, "--config", "slam.toml", "--max-scans", "5", "--dump-config"]) == 0
+    assert run(["slam", OFFICE_LOG, "--config", "slam.toml", "--max-scans", "5", "--dump-config"]) == 0
     assert tomllib.loads(capsys.readouterr().out)["slam"] == {**options, "max-scans": 5}
 
 
 def test_config_takes_effect(folder):
     (folder / "slam.toml").write_text('end = 20.0\n[slam]\nmax-scans = 3\noutput = "graph.json"\n')
-    assert run(["slam", SAMPLE, "--config", "slam.toml", "-q"]) == 0
+    assert run(["slam", OFFICE_LOG, "--config", "slam.toml", "-q"]) == 0
     graph = read_graph("graph.json")
     assert len(graph) == 101
     assert {len(relation.nodes) for relation in graph.nscan} == {3}

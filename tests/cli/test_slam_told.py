@@ -10,11 +10,12 @@ import pytest
 from nscan_cli.cli.main import run
 from nscan_cli.cli.slam_runs import without_numbers
 from nscan_cli.graph.io.json_graph import read_graph
-from tests.cli.test_slam import SAMPLE, SHORT
+from tests.cli.test_slam import SHORT
+from tests.data import OFFICE_LOG
 
 
 def test_the_summary(folder, capsys):
-    assert run(["slam", SAMPLE, "--every", "10", "-o", "graph.json"]) == 0
+    assert run(["slam", OFFICE_LOG, "--every", "10", "-o", "graph.json"]) == 0
     out, err = capsys.readouterr()
     assert out == ""
     graph = read_graph("graph.json")
@@ -85,7 +86,7 @@ def test_the_progress_has_rate_keyframes_loops_and_time_left(folder, monkeypatch
 def test_refining_a_saved_graph_shows_that_it_works(folder, monkeypatch, capsys):
     on_terminal(monkeypatch)
     assert run(["slam", *SHORT, "-o", "graph.json", "-q"]) == 0
-    again = ["slam", "--from", "graph.json", SAMPLE, "-o", "refined.json"]
+    again = ["slam", "--from", "graph.json", OFFICE_LOG, "-o", "refined.json"]
     assert run([*again, "-q"]) == 0
     assert capsys.readouterr().err == ""
     assert run(again) == 0

@@ -9,10 +9,10 @@ from pathlib import Path
 
 import pytest
 
-from tests.docs.blocks import ROOT, blocks
+from tests.data import PACKAGE, REPOSITORY
+from tests.docs.blocks import blocks
 
-PACKAGE = ROOT / "nscan_cli"
-PAGE = (ROOT / "docs" / "architecture.md").read_text()
+PAGE = (REPOSITORY / "docs" / "architecture.md").read_text()
 ROW = re.compile(
     r"^\| (\(\d[^|]*|III[^|]*|V[^|]*) \| [^|]+ \| \[([\w/.]+)\]\(([^)]+)\) \| `(\w+)` \|$", re.MULTILINE
 )
@@ -43,7 +43,7 @@ def test_every_equation_is_in_the_table():
 
 @pytest.mark.parametrize(("what", "name", "link", "function"), ROWS, ids=lambda value: str(value)[:30])
 def test_the_function_is_there(what, name, link, function):
-    assert (PACKAGE.parent / "docs" / link).resolve() == PACKAGE / name
+    assert (REPOSITORY / "docs" / link).resolve() == PACKAGE / name
     assert function in functions(PACKAGE / name)
 
 
@@ -90,7 +90,7 @@ def imports() -> set[tuple[str, str]]:
 
 def test_imports_go_one_way():
     """In the order that CONTRIBUTING.md gives."""
-    (line,) = re.findall(r"Imports go one way: ([\w → ]+);", (ROOT / "CONTRIBUTING.md").read_text())
+    (line,) = re.findall(r"Imports go one way: ([\w → ]+);", (REPOSITORY / "CONTRIBUTING.md").read_text())
     order = {name: rank for rank, name in enumerate(line.split(" → "))}
     packages = {path.parent.name for path in PACKAGE.glob("*/__init__.py")}
     assert order.keys() == packages

@@ -5,6 +5,7 @@ from pathlib import Path
 import pytest
 from PIL import Image
 
+from tests.data import REPOSITORY
 from tests.experiments.output import HEIGHT, WIDTH
 from tests.pictures import main
 
@@ -13,7 +14,7 @@ def test_pictures_of_the_sample_are_drawn_without_real_logs(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("NSCAN_DATA", str(tmp_path))
-    monkeypatch.chdir(Path(__file__).resolve().parents[2])
+    monkeypatch.chdir(REPOSITORY)
     main(str(tmp_path))
     assert sorted(path.name for path in tmp_path.glob("*.png")) == ["match.png", "office.png"]
     for path in tmp_path.glob("*.png"):

@@ -22,7 +22,8 @@ from nscan_cli.cli.main import run
 from nscan_cli.logs.load import read_log
 from nscan_cli.logs.reading_options import ReadingOptions
 from nscan_cli.poses import relative
-from tests.docs.blocks import ROOT, blocks
+from tests.data import OFFICE_LOG, REPOSITORY, SAMPLE_LOGS
+from tests.docs.blocks import blocks
 
 STANDING, MOVING = 3000, 350
 MANIFEST_LOGS = ("corridor_and_room.player", "corridor_and_room.mcap")
@@ -33,7 +34,7 @@ NOT_RUN = ("pip ", "make", "eval ", "_NSCAN_CLI_COMPLETE")
 
 def intel_log() -> bytes:
     """The office log from its beginning, after a while of standing still."""
-    lines = gzip.decompress((ROOT / "sample_logs" / "office.log.gz").read_bytes()).decode().splitlines()
+    lines = gzip.decompress(Path(OFFICE_LOG).read_bytes()).decode().splitlines()
     head = [line for line in lines if line.startswith("PARAM")]
     records = [line for line in lines if line.startswith(("FLASER", "TRUEPOS"))][: 2 * MOVING]
     first = next(line for line in records if line.startswith("FLASER")).split()
@@ -61,7 +62,7 @@ def intel_relations(log_file: str) -> str:
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Where the user of the README is."""
     place = tmp_path_factory.mktemp("readme")
-    shutil.copytree(ROOT / "sample_logs", place / "sample_logs")
+    shutil.copytree(SAMPLE_LOGS, place / "sample_logs")
     manifest = place / "sample_logs" / "nightly.toml"
     head, *logs = manifest.read_text().split("[[log]]")
     kept = [log for log in logs if any(f'name = "{name}"' in log for name in MANIFEST_LOGS)]
@@ -154,14 +155,18 @@ def test_the_makefile_makes_again_what_has_changed(folder, tmp_path):
 
 
 def test_every_target_of_make_that_is_named_is_there():
-    targets = set(re.findall(r"^([\w-]+):", (ROOT / "Makefile").read_text(), re.MULTILINE))
+    targets = set(re.findall(r"^([\w-]+):", (REPOSITORY / "Makefile").read_text(), re.MULTILINE))
     for page in ("README.md", "CONTRIBUTING.md"):
-        named = set(re.findall(r"(?:`|^)make (?!-)(\w+)", (ROOT / page).read_text(), re.MULTILINE))
+        named = set(re.findall(r"(?:`|^)make (?!-)(\w+)", (REPOSITORY / page).read_text(), re.MULTILINE))
         assert named
         assert named <= targets, page
 
 
 def test_every_file_that_a_page_leads_to_is_there():
-    for page in (ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").glob("*.md"))):
+    for page in (
+        REPOSITORY / "README.md",
+        REPOSITORY / "CONTRIBUTING.md",
+        *sorted((REPOSITORY / "docs").glob("*.md")),
+    ):
         for place in re.findall(r"\]\(([^)#:]+)(?:#[^)]*)?\)", page.read_text()):
             assert (page.parent / place).exists(), f"{page.name}: {place}"

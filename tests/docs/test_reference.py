@@ -17,11 +17,11 @@ from nscan_cli.cli.manual import EXAMPLES, EXIT_CODES
 from nscan_cli.cli.subcommand import Option, Subcommand
 from nscan_cli.files.limits import ALL
 from nscan_cli.nightly.manifest import KEYS, read_manifest
+from tests.data import CORRIDOR_LOG, REPOSITORY
 from tests.docs.blocks import blocks
 from tests.reference import reference
 
-ROOT = Path(__file__).resolve().parents[2]
-PAGE = (ROOT / "docs" / "reference.md").read_text()
+PAGE = (REPOSITORY / "docs" / "reference.md").read_text()
 PARENT = click.Context(cli, info_name="nscan-cli")
 MARK_OF_CLICK = "_NSCAN_CLI_COMPLETE"
 
@@ -91,7 +91,7 @@ def test_the_settings_that_are_shown_are_taken(tmp_path, capsys):
 
 def test_every_environment_variable_that_the_package_reads_is_told():
     read = set()
-    for path in (ROOT / "nscan_cli").rglob("*.py"):
+    for path in (REPOSITORY / "nscan_cli").rglob("*.py"):
         read |= set(re.findall(r"environ(?:ment)?(?:\.\w+\(|\[)\"(\w+)\"", path.read_text()))
     assert {"NUMBA_CACHE_DIR", "XDG_CACHE_HOME"} <= read
     for variable in (*read, MARK_OF_CLICK, *(limit.variable for limit in ALL)):
@@ -134,9 +134,8 @@ def test_the_help_has_sections_in_order(capsys):
 
 def test_every_key_of_a_match_is_told_and_no_other(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    log = str(ROOT / "sample_logs" / "corridor_and_room.log.gz")
-    assert run(["match", log, "--reference", "100", "--scan", "104", "-o", "match.json", "-q"]) == 0
-    assert run(["nscan", log, "--scans", "100-108:4", "-o", "nscan.json", "-q"]) == 0
+    assert run(["match", CORRIDOR_LOG, "--reference", "100", "--scan", "104", "-o", "match.json", "-q"]) == 0
+    assert run(["nscan", CORRIDOR_LOG, "--scans", "100-108:4", "-o", "nscan.json", "-q"]) == 0
     written = {name: set(json.loads(Path(f"{name}.json").read_text())) for name in ("match", "nscan")}
     chapter = PAGE.partition("## Results of match and nscan\n")[2].partition("\n## ")[0]
     told: dict[str, set[str]] = {"match": set(), "nscan": set()}

@@ -19,13 +19,12 @@ from nscan_cli.logs.load import read_log
 from nscan_cli.poses import Array, Indices, compose, relative
 from nscan_cli.slam.options import SlamOptions
 from nscan_cli.slam.pipeline import Slam
-from tests.data import find_data
+from tests.data import OFFICE_LOG, find_data
 from tests.experiments.held import MAX_ITERATIONS, TOLERANCE, Followed, Held, minimise
 from tests.experiments.mappings import Mapping, mean, of_pose_c, optimal, with_c_held
 from tests.experiments.report import Report
 from tests.graph.simulated import disturbed
 
-OFFICE = Path(__file__).resolve().parents[2] / "sample_logs" / "office.log.gz"
 REAL = ("mit-csail", "intel")
 CHAIN_NOISE = np.array([0.03, 0.03, 0.015])
 """m, m, rad; standard deviations of what a noisy chain adds to each relation."""
@@ -113,7 +112,7 @@ def _chained(graph: Graph, noise: Array) -> Array:
 @functools.cache
 def problems() -> tuple[Problem, ...]:
     """The graphs of the simulated office, and of the REAL logs that are there."""
-    logs = {"simulated office": OFFICE} | {name: find_data(f"{name}.log.gz") for name in REAL}
+    logs = {"simulated office": Path(OFFICE_LOG)} | {name: find_data(f"{name}.log.gz") for name in REAL}
     return tuple(
         problem_of(name, Slam(read_log(str(path)), SlamOptions()).run(lambda done, keyframes: None))
         for name, path in logs.items()

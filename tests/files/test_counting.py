@@ -5,12 +5,11 @@ from __future__ import annotations
 import ast
 import itertools
 import re
-from pathlib import Path
 
 import pytest
 
-from nscan_cli.files import counting
 from nscan_cli.files.counting import counted
+from tests.data import PACKAGE
 
 
 @pytest.mark.parametrize(
@@ -28,7 +27,6 @@ def test_counted(count, thing, said):
     assert counted(count, thing) == said
 
 
-PACKAGE = Path(counting.__file__).parents[1]
 THINGS = re.compile(
     r" (scans|records|messages|iterations|evaluations|keyframes|poses|loops|pairs|steps|stamps)\b"
 )

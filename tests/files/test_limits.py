@@ -19,13 +19,14 @@ from nscan_cli.graph.io.json_graph import read_graph, write_graph
 from nscan_cli.logs.load import read_log
 from nscan_cli.logs.reading_options import ReadingOptions
 from tests.cli.room_log import room_log
+from tests.data import REPOSITORY
 from tests.graph.small_graph import small_graph
 from tests.logs.forms import FORMS
 from tests.logs.lines import flaser, read
 from tests.logs.recordings.containers import repacked
 from tests.logs.recordings.drives import drive
 
-DOCS = Path(__file__).resolve().parents[2] / "docs" / "limits.md"
+DOCS = REPOSITORY / "docs" / "limits.md"
 SALVAGE = ReadingOptions(salvage=True)
 
 

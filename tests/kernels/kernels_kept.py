@@ -9,7 +9,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from nscan_cli.kernels.cache_folder import PACKAGE
+from tests.data import REPOSITORY
 
 KERNELS = """
 from typing import NamedTuple
@@ -90,7 +90,7 @@ def process(folder: Path, code: str, **settings: str) -> bytes:
     kept = {name: value for name, value in os.environ.items() if not name.startswith(("NUMBA_", "XDG_"))}
     places = {
         "NUMBA_CACHE_DIR": str(folder / "cache"),
-        "PYTHONPATH": os.pathsep.join([str(folder), str(PACKAGE.parent)]),
+        "PYTHONPATH": os.pathsep.join([str(folder), str(REPOSITORY)]),
     }
     done = subprocess.run(
         [sys.executable, "-c", code], env={**kept, **places, **settings}, capture_output=True, check=True

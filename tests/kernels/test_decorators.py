@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from nscan_cli.kernels.cache_folder import PACKAGE
 from nscan_cli.kernels.decorators import Kernel, kernel
+from tests.data import CORRIDOR_LOG, PACKAGE, REPOSITORY
 
 
 def test_kernels_take_arrays_numbers_and_tuples():
@@ -67,8 +67,7 @@ print("numba" in sys.modules)
 
 def test_no_command_imports_numba_twice(tmp_path):
     """All that the kernels of the package return and hold can be kept."""
-    log = PACKAGE.parent / "sample_logs" / "corridor_and_room.log.gz"
-    paths = {"LOG": log, "GRAPH": tmp_path / "graph.json", "MAP": tmp_path / "map.png"}
+    paths = {"LOG": CORRIDOR_LOG, "GRAPH": tmp_path / "graph.json", "MAP": tmp_path / "map.png"}
     named = "".join(f"{name} = {str(path)!r}\n" for name, path in paths.items())
     clean = {
         name: value for name, value in os.environ.items() if name == "NUMBA_CACHE_DIR" or "NUMBA" not in name
@@ -76,7 +75,7 @@ def test_no_command_imports_numba_twice(tmp_path):
     for _ in range(2):
         done = subprocess.run(
             [sys.executable, "-c", named + COMMANDS], env=clean, capture_output=True, check=True, text=True,
-            cwd=PACKAGE.parent,
+            cwd=REPOSITORY,
         )  # fmt: skip
     assert done.stdout.splitlines()[-1] == "False"
 

@@ -1,7 +1,6 @@
 from __future__ import annotations
 
 import dataclasses
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -20,12 +19,12 @@ from nscan_cli.matching.pairwise import (
 from nscan_cli.matching.priors import Prior
 from nscan_cli.ndt.energy import energy
 from nscan_cli.poses import Array, relative, wrap
+from tests.data import OFFICE_LOG
 from tests.matching.problems import OPTIONS, fig_3, near, office_problem, office_truth, problem
 from tests.simulation.laser import Laser
 from tests.simulation.scenes import corridor_and_room, office
 
 ROWS = range(0, 2400, 100)
-SAMPLE = Path(__file__).resolve().parents[2] / "sample_logs" / "office.log.gz"
 
 
 def pair_matches(noise: bool) -> list[tuple[PairMatch, Array]]:
@@ -145,7 +144,7 @@ def test_too_few_steps_are_named():
 
 def test_a_stage_that_is_cut_off_on_the_way_is_counted():
     """From this start, turned by 155°, the first stage circles; the match converges, and at a wrong place."""
-    log = read_log(str(SAMPLE))
+    log = read_log(OFFICE_LOG)
     ndt, points = scan_ndt(matched_points(log, 553, OPTIONS), OPTIONS), matched_points(log, 567, OPTIONS)
     start = np.array([-0.4, 0.1, np.radians(155)])
     match = match_pair(ndt, points, start, None, OPTIONS)

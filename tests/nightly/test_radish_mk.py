@@ -10,9 +10,10 @@ from pathlib import Path
 
 import pytest
 
+from tests.data import SAMPLE_LOGS
 from tests.nightly.small import write_logs
 
-MAKEFILE = Path(__file__).resolve().parents[2] / "sample_logs" / "radish.mk"
+MAKEFILE = SAMPLE_LOGS / "radish.mk"
 MAKE = shutil.which("make")
 pytestmark = pytest.mark.skipif(MAKE is None, reason="make is not installed")
 

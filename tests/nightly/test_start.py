@@ -10,8 +10,8 @@ from pathlib import Path
 
 import pytest
 
-from nscan_cli.kernels.cache_folder import PACKAGE
 from tests.cli.room_log import room_log
+from tests.data import PACKAGE, REPOSITORY
 
 NAMES = ("random", "json", "threading", "numpy", "nscan_cli/__init__", "nscan_cli/errors")
 COMMAND = "import sys; from nscan_cli.cli.main import main; main()"
@@ -31,7 +31,7 @@ def trap(tmp_path: Path) -> Path:
 def test_nothing_of_the_current_folder_is_run(trap, tmp_path):
     (trap / "room.log").write_text(room_log(12))
     (trap / "logs.toml").write_text('[[log]]\nname = "room"\n')
-    environment = {**os.environ, "PYTHONPATH": str(PACKAGE.parent)}
+    environment = {**os.environ, "PYTHONPATH": str(REPOSITORY)}
     done = subprocess.run(
         [sys.executable, "-P", "-c", COMMAND, "nightly", "logs.toml", "-o", "nights", "--jobs", "1"],
         cwd=trap, env=environment, capture_output=True, text=True, check=False,
@@ -50,7 +50,7 @@ def test_the_package_is_the_one_that_starts_the_process(trap, tmp_path):
     (package / "nightly" / "work.py").write_text("def main(place):\n    print(__file__, place)\n")
     done = subprocess.run(
         [sys.executable, "-P", str(package / "nightly" / "start.py"), "work", "a place"],
-        cwd=trap, env={**os.environ, "PYTHONPATH": str(PACKAGE.parent)}, capture_output=True, text=True,
+        cwd=trap, env={**os.environ, "PYTHONPATH": str(REPOSITORY)}, capture_output=True, text=True,
         check=False,
     )  # fmt: skip
     assert done.stdout == f"{package / 'nightly' / 'work.py'} a place\n", done.stderr

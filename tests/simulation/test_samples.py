@@ -4,16 +4,14 @@ from __future__ import annotations
 
 import gzip
 import io
-from pathlib import Path
 
 import numpy as np
 import pytest
 from mcap.reader import make_reader
 
 from nscan_cli.logs.load import read_log
+from tests.data import CORRIDOR_LOG, SAMPLE_LOGS
 from tests.simulation.make_samples import main, samples
-
-FOLDER = Path(__file__).resolve().parents[2] / "sample_logs"
 
 
 @pytest.fixture(scope="module")
@@ -23,7 +21,7 @@ def made() -> dict[str, bytes]:
 
 @pytest.mark.parametrize("name", ["office.log", "corridor_and_room.log", "corridor_and_room.player.log"])
 def test_regenerated_samples_are_those_committed(made, name):
-    committed = (FOLDER / f"{name}.gz").read_bytes()
+    committed = (SAMPLE_LOGS / f"{name}.gz").read_bytes()
     # The text is compared: another version of zlib may pack it otherwise.
     assert gzip.decompress(committed) == made[name]
     assert committed[4:8] == bytes(4), "the header holds a time"
@@ -46,7 +44,7 @@ def test_written_twice_the_bytes_are_the_same(tmp_path, monkeypatch, made):
 
 
 def test_the_recording_holds_the_messages_that_are_made_again(made):
-    committed = (FOLDER / "corridor_and_room.mcap").read_bytes()
+    committed = (SAMPLE_LOGS / "corridor_and_room.mcap").read_bytes()
     assert len(committed) < 150_000
 
     def messages(data: bytes) -> list[tuple[str, str, int, bytes]]:
@@ -62,8 +60,8 @@ def test_the_recording_holds_the_messages_that_are_made_again(made):
 
 @pytest.mark.parametrize("name", ["corridor_and_room.player.log.gz", "corridor_and_room.mcap"])
 def test_the_same_drive_in_another_form(name):
-    carmen = read_log(str(FOLDER / "corridor_and_room.log.gz"))
-    other = read_log(str(FOLDER / name))
+    carmen = read_log(CORRIDOR_LOG)
+    other = read_log(str(SAMPLE_LOGS / name))
     np.testing.assert_array_equal(other.ranges, carmen.ranges)
     np.testing.assert_allclose(other.times, carmen.times, atol=1e-6)
     np.testing.assert_allclose(other.mount, carmen.mount, atol=1e-9)

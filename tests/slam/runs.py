@@ -6,7 +6,6 @@ import dataclasses
 import functools
 from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,9 +21,8 @@ from nscan_cli.slam.frontend.tracked_scans import Tracked, TrackedScans
 from nscan_cli.slam.frontend.tracker import Tracker
 from nscan_cli.slam.options import NScanOptions, Relations, SlamOptions, TrackingOptions
 from nscan_cli.slam.pipeline import Slam
-from tests.data import data_file
+from tests.data import OFFICE_LOG, data_file
 
-SAMPLE = Path(__file__).resolve().parents[2] / "sample_logs" / "office.log.gz"
 Rows = slice | NDArray[np.int64]
 
 
@@ -50,7 +48,7 @@ def mapped(log: LaserLog, options: SlamOptions | None = None, threads: int = 1) 
 @functools.cache
 def office_log(odometry: bool = True) -> LaserLog:
     """The office sample, with its true poses."""
-    return read_log(str(SAMPLE), ReadingOptions(odometry=odometry))
+    return read_log(OFFICE_LOG, ReadingOptions(odometry=odometry))
 
 
 @functools.cache

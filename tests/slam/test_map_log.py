@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 from collections import Counter
-from pathlib import Path
 
 import numpy as np
 
@@ -16,8 +15,7 @@ from nscan_cli.logs.reading_options import ReadingOptions
 from nscan_cli.slam.map_log import Counts, map_log, slam_options
 from nscan_cli.slam.options import SlamOptions
 from nscan_cli.slam.pipeline import STRETCH
-
-SAMPLE = str(Path(__file__).resolve().parents[2] / "sample_logs" / "corridor_and_room.log.gz")
+from tests.data import CORRIDOR_LOG
 
 
 def test_what_a_user_does_not_choose_has_its_default():
@@ -30,7 +28,7 @@ def test_what_a_user_does_not_choose_has_its_default():
 
 def test_the_graph_says_what_it_was_made_from_and_the_report_how_far_it_is():
     reading = ReadingOptions(every=2)
-    log, told = read_log(SAMPLE, reading), []
+    log, told = read_log(CORRIDOR_LOG, reading), []
     slam, graph = map_log(log, reading, slam_options(6), 1, lambda *state: told.append(state))
     provenance = graph.provenance
     assert provenance["tool"] == {"name": "nscan-cli", "version": __version__}
