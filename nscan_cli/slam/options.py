@@ -6,111 +6,13 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 from nscan_cli.matching.correlative_search import SearchOptions
-from nscan_cli.matching.priors import MotionModel
+from nscan_cli.slam.diagnostics.options import DiagnosticsOptions
+from nscan_cli.slam.frontend.options import BreakOptions, OdometryCheckOptions, TrackingOptions
+from nscan_cli.slam.gaussian_options import GaussianOptions
+from nscan_cli.slam.keyframes.options import KeyframeOptions
 
 Relations = Literal["pairwise", "nscan", "both"]
 """What the graph is made of; see SlamOptions."""
-
-
-@dataclass(frozen=True)
-class GaussianOptions:
-    """How points become Gaussians."""
-
-    cell: float = 0.5
-    """Side of a cell, m."""
-    minimum: int = 5
-    """Least number of points that make a Gaussian."""
-    floor: float = 0.02
-    """Least standard deviation of a Gaussian, m."""
-
-
-@dataclass(frozen=True)
-class TrackingOptions:
-    """Step 1: every scan against the map of the last stretch of the path."""
-
-    gaussians: GaussianOptions = field(default_factory=lambda: GaussianOptions(floor=0.03))
-    reach: float = 40.0
-    """Longer beams are not matched, m."""
-    window: float = 12.0
-    """Length of path whose scans the map holds, m."""
-    step: float = 0.05
-    """A scan joins the map when the robot has moved by so much (m, rad) since the last that did."""
-    widenings: tuple[float, ...] = (0.05, 0.3, 1.0)
-    max_iterations: int = 20
-    near: float = 5e-3
-    """m, rad; a wide stage has only to lead to the next one, and with odometry ends with a step that is
-    shorter,"""
-    tolerance: float = 1e-4
-    """the last stage with one that is shorter than this."""
-    scale: float = 0.1
-    """What the energy is multiplied with against the prior: four Gaussians see each point, and
-    neighbouring points hit the same wall."""
-    inlier_bound: float = 9.0
-    """A point within this squared Mahalanobis distance of a Gaussian is an inlier."""
-    inlier_share: float = 0.8
-    """With fewer inliers the match starts again from other angles: one that is off by 12° can have 0.7. So it
-    does, where there is odometry, with clearly fewer than the scan before had."""
-    turns: tuple[tuple[float, ...], ...] = ((0.1, 0.2), (0.4, 0.7), (1.0, 1.3))
-    """Angles (rad, to both sides) to start again from; a later ring when those before did not help,"""
-    far_share: float = 0.5
-    """and there are fewer inliers than that: outdoors most scans have few."""
-    odometry: MotionModel = field(default_factory=MotionModel)
-    steady_scans: int = 5
-    """Without odometry a scan is expected to move as these did on average: stamps and motion jitter."""
-    steady_motion: MotionModel = field(
-        default_factory=lambda: MotionModel(distance=0.3, angle=0.3, distance_per_metre=0.3)
-    )
-    """How sure that is."""
-    steady_search: SearchOptions = field(default_factory=lambda: SearchOptions(distance=1.5, turn=1.5))
-    """About what is expected, when other angles do not help either."""
-
-
-@dataclass(frozen=True)
-class BreakOptions:
-    """Step 1: when the track has broken, and what is known of the way then."""
-
-    inlier_share: float = 0.7
-    """A match with fewer inliers is poor."""
-    alike: float = 0.7
-    """A poor match goes on from the scans before if it sees the same in such a share of bearings."""
-    apart: float = 0.2
-    """The same is what is no further apart (m),"""
-    apart_per_metre: float = 0.1
-    """and by so much for each metre of its range."""
-    far: float = 2.0
-    """From farther (m) by odometry it may see something else;"""
-    far_turned: float = 1.0
-    """or turned by more (rad)."""
-    patience: int = 5
-    """For so many scans more the robot may see again what it saw before: someone stood in its way."""
-    path: float = 40.0
-    """A break counts as so much path (m): what lies before is another visit."""
-    distance: float = 100.0
-    """Standard deviation (m) of the way over a break,"""
-    turn: float = 1.8
-    """and of the turn (rad): any one is as likely."""
-
-
-@dataclass(frozen=True)
-class KeyframeOptions:
-    """Step 2: which scans become keyframes, and how well tracking knows the way between two."""
-
-    distance: float = 1.75
-    """m, at least."""
-    distance_per_range: float = 0.3
-    """Times the median range of the log's beams: who sees further sees the same for longer."""
-    turn: float = 0.8
-    """rad"""
-    slipped: float = 1.5
-    """So many standard deviations off the odometry a scan may have slipped, if less of it fits:"""
-    patience: float = 2.0
-    """it is a keyframe only when it is so many times farther from the last."""
-    information_scale: float = 0.8
-    """The Hessian of tracking is weighed by so much: neighbouring scans make the same errors."""
-    drift: float = 0.0025
-    """Standard deviation m/√m that no match shows."""
-    drift_angle: float = 0.001
-    """rad/√m"""
 
 
 @dataclass(frozen=True)
@@ -224,12 +126,14 @@ class GrowthOptions:
 class SlamOptions:
     """All of them."""
 
+    odometry_checks: OdometryCheckOptions = field(default_factory=OdometryCheckOptions)
     tracking: TrackingOptions = field(default_factory=TrackingOptions)
     breaks: BreakOptions = field(default_factory=BreakOptions)
     keyframes: KeyframeOptions = field(default_factory=KeyframeOptions)
     nscan: NScanOptions = field(default_factory=NScanOptions)
     closing: ClosingOptions = field(default_factory=ClosingOptions)
     growth: GrowthOptions = field(default_factory=GrowthOptions)
+    diagnostics: DiagnosticsOptions = field(default_factory=DiagnosticsOptions)
     relations: Relations = "both"
     """both: the chain of pairwise relations from tracking, and nScan relations of joint matches. nscan: of
     the chain only what no nScan relation holds together. pairwise: the chain, and each scan near a keyframe

@@ -52,9 +52,10 @@ class Slam:
 
     def __init__(self, log: LaserLog, options: SlamOptions, threads: int = 1) -> None:
         self.log, self.options, self.threads = log, options, threads
-        seen, cell = log.ranges[log.ranges < options.tracking.reach], options.tracking.gaussians.cell
-        tracking = dataclasses.replace(options.tracking, reach=sight(seen, cell))
-        self.tracker = SegmentTracker(tracking, options.breaks, log.odometry is not None)
+        seen, cell = log.ranges[log.ranges < options.tracking.max_range], options.tracking.gaussians.cell
+        self.tracker = SegmentTracker(
+            options.tracking, options.breaks, log.odometry is not None, sight(seen, cell)
+        )
         self.odometry, self.jumps = log.odometry, np.zeros(0, dtype=np.int64)
         if log.odometry is not None:
             self.odometry, self.jumps = believed_odometry(log.odometry, log.times)
@@ -105,7 +106,7 @@ class Slam:
         Those are within reach, and none of a laser that hangs.
         """
         first = 0
-        for points, ends in self.log.stretches(STRETCH, self.options.tracking.reach):
+        for points, ends in self.log.stretches(STRETCH, self.options.tracking.max_range):
             end = first + len(ends) - 1
             hangs = np.isin(np.arange(first, end), self.hanging)
             if hangs.any():

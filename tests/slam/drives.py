@@ -14,11 +14,12 @@ from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.poses import Array, compose, relative
 from nscan_cli.slam.frontend.tracked_scans import Tracked
 from nscan_cli.slam.keyframes.keyframe import Keyframe, Keyframes, Route, relations_along, route_of
+from nscan_cli.slam.keyframes.options import KeyframeOptions
 from nscan_cli.slam.local_matching.joint_relations import LocalMatch, MatchNearby
 from nscan_cli.slam.local_matching.neighbours import choose_neighbours
 from nscan_cli.slam.loop_closure.loop_detector import LoopDetector
 from nscan_cli.slam.loop_closure.place_search import Place
-from nscan_cli.slam.options import KeyframeOptions, NScanOptions
+from nscan_cli.slam.options import NScanOptions
 from tests.simulation.drive import Drive
 from tests.simulation.laser import Laser
 from tests.simulation.office import office_world

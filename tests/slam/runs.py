@@ -16,10 +16,11 @@ from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.logs.load import read_log
 from nscan_cli.logs.reading_options import ReadingOptions
 from nscan_cli.poses import Array
+from nscan_cli.slam.frontend.options import TrackingOptions
 from nscan_cli.slam.frontend.scan_batch import ScanBatch
 from nscan_cli.slam.frontend.tracked_scans import Tracked, TrackedScans
 from nscan_cli.slam.frontend.tracker import Tracker
-from nscan_cli.slam.options import NScanOptions, Relations, SlamOptions, TrackingOptions
+from nscan_cli.slam.options import NScanOptions, Relations, SlamOptions
 from nscan_cli.slam.pipeline import Slam
 from tests.data import OFFICE_LOG, data_file
 

@@ -16,7 +16,7 @@ from nscan_cli.logs.reading_options import ReadingOptions
 from nscan_cli.poses import Array, relative
 from nscan_cli.slam.diagnostics.notices import notices
 from nscan_cli.slam.frontend.odometry_checks import believed_odometry, hanging
-from nscan_cli.slam.options import BreakOptions
+from nscan_cli.slam.frontend.options import BreakOptions
 from tests.data import data_file
 from tests.simulation import trouble
 from tests.slam import troubles
@@ -64,7 +64,7 @@ def test_a_robot_that_was_carried_is_found_again_by_a_loop(name, odometry):
     assert max(errors(made, found.graph.poses)) < 0.05
     assert found.slam.breaks == [made.before]
     tie = relation_over_break(found)
-    assert np.sqrt(1 / tie.information[0, 0]) > BreakOptions().distance / 2
+    assert np.sqrt(1 / tie.information[0, 0]) > BreakOptions().distance_sigma / 2
     across = [
         relation for relation in found.graph.nscan if min(relation.nodes) < made.before <= max(relation.nodes)
     ]
@@ -113,10 +113,10 @@ def test_what_is_never_seen_again_is_a_piece_of_its_own_and_the_graph_says_so():
     assert error.whole > 1.0
     assert max(error.before, error.after) < 0.05
     assert found.slam.breaks == [made.before]
-    assert np.sqrt(1 / relation_over_break(found).information[0, 0]) > BreakOptions().distance / 2
+    assert np.sqrt(1 / relation_over_break(found).information[0, 0]) > BreakOptions().distance_sigma / 2
     assert not any(min(each.nodes) < made.before <= max(each.nodes) for each in found.graph.nscan)
     last = int(found.graph.keyframes[-1])
-    assert np.sqrt(found.graph.marginals[last][0, 0]) > BreakOptions().distance / 2
+    assert np.sqrt(found.graph.marginals[last][0, 0]) > BreakOptions().distance_sigma / 2
     assert np.sqrt(found.graph.marginals[int(found.graph.keyframes[3])][0, 0]) < 0.1
 
 

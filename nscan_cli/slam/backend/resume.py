@@ -112,7 +112,7 @@ def _lay_out(slam: Slam, graph: Graph) -> None:
 
 def _as_tracked(graph: Graph, breaks: set[int], options: SlamOptions) -> TrackedScans:
     """The scans as if tracking had found them at the graph's poses, and knew nothing of how well."""
-    found, step, path = TrackedScans.room(len(graph)), options.tracking.step, 0.0
+    found, step, path = TrackedScans.room(len(graph)), options.tracking.min_motion, 0.0
     found.poses[:], found.values[:], found.inliers[:] = graph.poses, 0.0, 1.0
     found.hessians[:], found.expected[:], found.off[:] = 0.0, 0.0, 0.0
     joined_at = graph.poses[0]
@@ -130,7 +130,7 @@ def _as_tracked(graph: Graph, breaks: set[int], options: SlamOptions) -> Tracked
 
 def _breaks(graph: Graph, options: SlamOptions) -> set[int]:
     """The keyframes before which the track broke: not even the direction of the way there is known."""
-    least = (options.breaks.turn / 2) ** -2
+    least = (options.breaks.turn_sigma / 2) ** -2
     tracked = [pair for pair in graph.pairwise if pair.origin == "track"]
     return {pair.nodes[1] for pair in tracked if pair.information[2, 2] <= least}
 

@@ -48,7 +48,7 @@ def _of_odometry(slam: Slam) -> list[str]:
     """Gaps that odometry alone leads over, and where it contradicts the scans."""
     log, odometry, route = slam.log, slam.odometry, slam.route
     assert odometry is not None
-    found, far, turned = [], slam.options.breaks.far, slam.options.breaks.far_turned
+    found, far, turned = [], slam.options.breaks.bridged_distance, slam.options.breaks.bridged_turn
     steps, periods = relative(odometry[1:], odometry[:-1]), np.diff(log.times)
     came_far = (np.hypot(steps[:, 0], steps[:, 1]) > far) | (np.abs(steps[:, 2]) > turned)
     usual = float(np.median(periods)) if len(periods) else 0.0
@@ -95,7 +95,7 @@ def _unlike(slam: Slam) -> list[str]:
     """Where tracking may have held on to what goes along."""
     tracking, breaks = slam.options.tracking, slam.options.breaks
     poses = np.concatenate(slam.tracked)
-    worst = view_mismatches(slam.log, poses, slam.keyframes.list, tracking.reach, breaks, slam.threads)
+    worst = view_mismatches(slam.log, poses, slam.keyframes.list, tracking.max_range, breaks, slam.threads)
     if worst is None:
         return []
     first, last = slam.log.numbers[[worst.first, worst.last]].tolist()

@@ -14,9 +14,9 @@ from nscan_cli.kernels.decorators import kernel
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.matching.pose_kernels import relative_pose
 from nscan_cli.poses import Array, Indices
+from nscan_cli.slam.frontend.options import BreakOptions
 from nscan_cli.slam.frontend.view_similarity import BEARINGS, nearest_ranges, share_alike
 from nscan_cli.slam.keyframes.keyframe import Keyframe
-from nscan_cli.slam.options import BreakOptions
 from nscan_cli.threads import in_threads
 
 AT_A_TIME = 256
@@ -73,7 +73,7 @@ def view_mismatches(
         np.concatenate(points),
         np.cumsum([0, *map(len, points)]),
     )
-    bounds = breaking.apart, breaking.apart_per_metre
+    bounds = breaking.view.tolerance, breaking.view.tolerance_per_metre
     shares = np.concatenate(
         in_threads(
             threads,

@@ -12,11 +12,11 @@ import numpy as np
 from nscan_cli.matching.priors import Prior
 from nscan_cli.ndt.transform import Ndt
 from nscan_cli.poses import Array
+from nscan_cli.slam.frontend.options import TrackingOptions
 from nscan_cli.slam.frontend.scan_batch import ScanBatch
 from nscan_cli.slam.frontend.scan_to_map import match_and_count
 from nscan_cli.slam.frontend.tracked_scans import TrackedScans
 from nscan_cli.slam.frontend.tracking_parameters import TrackingParameters
-from nscan_cli.slam.options import TrackingOptions
 
 PATH = 5.0
 """Those after it are the scans of so much path, m,"""
@@ -41,4 +41,4 @@ def place_first(scans: ScanBatch, found: TrackedScans, options: TrackingOptions)
     step: Array = np.linalg.inv(found.expected[1]).astype(np.float64)
     prior = Prior(first, step)
     _, inliers = match_and_count(ndt.grid, TrackingParameters.of(options), scans.of(0), prior, pose, hessian)
-    return pose if inliers >= options.inlier_share else first
+    return pose if inliers >= options.restart_inliers else first

@@ -13,11 +13,11 @@ from numpy.typing import NDArray
 
 from nscan_cli.poses import Array, compose, relative, transform
 from nscan_cli.slam.frontend.first_scan import PATH, SCANS, place_first
+from nscan_cli.slam.frontend.options import BreakOptions, TrackingOptions
 from nscan_cli.slam.frontend.scan_batch import ScanBatch
 from nscan_cli.slam.frontend.tracked_scans import TrackedScans
 from nscan_cli.slam.frontend.tracker import Tracker
 from nscan_cli.slam.frontend.view_similarity import LEAST_BEARINGS, view_similarity
-from nscan_cli.slam.options import BreakOptions, TrackingOptions
 
 
 @dataclass(frozen=True)
@@ -57,9 +57,16 @@ class SegmentTracker:
     `odometry` tells whether the scans have any.
     """
 
-    def __init__(self, options: TrackingOptions, breaking: BreakOptions, odometry: bool = True) -> None:
+    def __init__(
+        self,
+        options: TrackingOptions,
+        breaking: BreakOptions,
+        odometry: bool = True,
+        range_limit: float = np.inf,
+    ) -> None:
         self.options, self.breaking, self._has_odometry = options, breaking, odometry
-        self._tracker = Tracker(options, self._has_odometry)
+        self._range_limit = range_limit
+        self._tracker = Tracker(options, odometry, range_limit)
         self._restarts = self._searches = 0
         self._origin: Array | None = None
         """Where the piece begins, unless it is the first."""
@@ -104,7 +111,7 @@ class SegmentTracker:
 
     def _known(self, scans: TrackedSegments) -> int:
         """How many of the scans, from the first on, go on from those before."""
-        poor = scans.found.inliers < self.breaking.inlier_share
+        poor = scans.found.inliers < self.breaking.poor_inliers
         if not poor.any():
             return len(scans)
         enough = scans.see_enough
@@ -117,7 +124,7 @@ class SegmentTracker:
 
     def _doubt(self, scan: TrackedSegments) -> list[TrackedSegments]:
         """Doubt a scan, or find that it puts an end to doubts; returns what is settled by it."""
-        begins, patient = not self._doubted, len(self._doubted) < self.breaking.patience
+        begins, patient = not self._doubted, len(self._doubted) < self.breaking.max_doubted
         self._doubted.append(scan)
         if begins:
             return []
@@ -131,7 +138,7 @@ class SegmentTracker:
         settled = self._believe() + self._grow_up()
         self._restarts, self._searches = self.restarts, self.searches
         # The map of the last metres is large, and of no use any more.
-        self._tracker = Tracker(self.options, self._has_odometry)
+        self._tracker = Tracker(self.options, self._has_odometry, self._range_limit)
         return settled
 
     def _believe(self) -> list[TrackedSegments]:
@@ -189,14 +196,17 @@ class SegmentTracker:
         if before is None or before.sensed.odometry is None or scan.sensed.odometry is None:
             return False
         step = relative(scan.sensed.odometry[0], before.sensed.odometry[0])
-        return bool(np.hypot(step[0], step[1]) > self.breaking.far or abs(step[2]) > self.breaking.far_turned)
+        return bool(
+            np.hypot(step[0], step[1]) > self.breaking.bridged_distance
+            or abs(step[2]) > self.breaking.bridged_turn
+        )
 
     def _goes_on(self, scan: TrackedSegments, seen: TrackedSegments) -> bool:
         """Whether a scan sees what another one saw that was settled."""
         before = relative(seen.found.poses[0], scan.found.poses[0])
-        apart, per_metre = self.breaking.apart, self.breaking.apart_per_metre
+        apart, per_metre = self.breaking.view.tolerance, self.breaking.view.tolerance_per_metre
         share = view_similarity(scan.sensed.of(0), transform(before, seen.sensed.of(0)), apart, per_metre)
-        return share is not None and share >= self.breaking.alike
+        return share is not None and share >= self.breaking.min_similarity
 
     def _break(self) -> list[TrackedSegments]:
         """Track the doubted scans anew, as a piece of their own; empty if they do not hang together.
@@ -210,19 +220,19 @@ class SegmentTracker:
         guess = origin = last.found.poses[0]
         if first.sensed.odometry is not None and last.sensed.odometry is not None:
             guess = compose(origin, relative(first.sensed.odometry[0], last.sensed.odometry[0]))
-        self._tracker, self._origin = Tracker(self.options, self._has_odometry), guess
+        self._tracker, self._origin = Tracker(self.options, self._has_odometry, self._range_limit), guess
         is_known = self._has_come_far(first)
         self._path = float(last.found.paths[0])
         self._path += float(np.hypot(*(guess - origin)[:2])) if is_known else self.breaking.path
         piece = self._track(ScanBatch.together([scan.sensed for scan in self._doubted]))
-        if np.median(piece.found.inliers[1:]) < self.breaking.inlier_share:
+        if np.median(piece.found.inliers[1:]) < self.breaking.poor_inliers:
             self._tracker, self._origin, self._path = kept
             return []
         self._restarts += kept[0].restarts
         self._searches += kept[0].searches
         piece.found.inliers[0] = 0.0
         if not is_known:
-            distance, turn = self.breaking.distance, self.breaking.turn
+            distance, turn = self.breaking.distance_sigma, self.breaking.turn_sigma
             piece.found.expected[0] = np.diag([distance, distance, turn]) ** 2
         else:
             piece.found.expected[0] = first.found.expected[0]

@@ -12,6 +12,7 @@ from nscan_cli.matching.correlative_search import likelihood_field, search
 from nscan_cli.matching.priors import Prior
 from nscan_cli.ndt.transform import Ndt
 from nscan_cli.poses import Array
+from nscan_cli.slam.frontend.options import TrackingOptions
 from nscan_cli.slam.frontend.scan_batch import ScanBatch
 from nscan_cli.slam.frontend.scan_to_map import match_and_count
 from nscan_cli.slam.frontend.tracked_scans import TrackedScans
@@ -25,7 +26,6 @@ from nscan_cli.slam.frontend.tracking_kernels import (
     told_points,
 )
 from nscan_cli.slam.frontend.tracking_parameters import TrackingParameters
-from nscan_cli.slam.options import TrackingOptions
 
 RECENT = 5.0
 """A lost scan is searched among those of the last stretch of path, m."""
@@ -39,15 +39,15 @@ class Tracker:
     stages are done to their end.
     """
 
-    def __init__(self, options: TrackingOptions, odometry: bool = True) -> None:
+    def __init__(self, options: TrackingOptions, odometry: bool = True, range_limit: float = np.inf) -> None:
         self.options = options
         gaussians = options.gaussians
         self.map = Ndt.empty(
             gaussians.cell, gaussians.minimum, gaussians.floor, capacity=1 << 14, faces=odometry
         )
         self.searches = 0
-        self._settings = TrackingParameters.of(options, odometry)
-        self._track = Track.begin(options.steady_scans + 1)
+        self._settings = TrackingParameters.of(options, odometry, range_limit)
+        self._track = Track.begin(options.velocity_scans + 1)
         self._prior = Prior(np.zeros(3), np.zeros((3, 3)))
 
     @property
@@ -79,8 +79,8 @@ class Tracker:
         cloud = self._track.recent(RECENT)
         if not len(cloud) or not len(points):
             return
-        field = likelihood_field(cloud, self.options.steady_search)
-        place = search(field, points, self._prior.mean, LEAST_SCORE, self.options.steady_search)
+        field = likelihood_field(cloud, self.options.lost_search)
+        place = search(field, points, self._prior.mean, LEAST_SCORE, self.options.lost_search)
         if place is None:
             return
         self.searches += 1

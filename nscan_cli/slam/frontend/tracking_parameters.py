@@ -8,7 +8,7 @@ import numpy as np
 
 from nscan_cli.matching.priors import Motion
 from nscan_cli.poses import Array
-from nscan_cli.slam.options import TrackingOptions
+from nscan_cli.slam.frontend.options import TrackingOptions
 
 
 class TrackingParameters(NamedTuple):
@@ -34,25 +34,29 @@ class TrackingParameters(NamedTuple):
     steady_motion: Motion
 
     @classmethod
-    def of(cls, options: TrackingOptions, odometry: bool = False) -> TrackingParameters:
+    def of(
+        cls, options: TrackingOptions, odometry: bool = False, range_limit: float = np.inf
+    ) -> TrackingParameters:
         """Those of the options, with odometry or without."""
-        turns = np.full((len(options.turns), max(map(len, options.turns), default=0)), np.nan)
-        for ring, angles in zip(turns, options.turns, strict=True):
+        turns = np.full(
+            (len(options.restart_angles), max(map(len, options.restart_angles), default=0)), np.nan
+        )
+        for ring, angles in zip(turns, options.restart_angles, strict=True):
             ring[: len(angles)] = angles
         return cls(
             0.5 * options.gaussians.cell,
-            max(options.reach - options.gaussians.cell, 0.5 * options.reach),
+            max(range_limit - options.gaussians.cell, 0.5 * range_limit),
             options.window,
-            options.step,
+            options.min_motion,
             np.array(options.widenings),
             options.max_iterations,
-            options.near if odometry else options.tolerance,
+            options.coarse_tolerance if odometry else options.tolerance,
             options.tolerance,
             options.scale,
             options.inlier_bound,
-            options.inlier_share,
-            options.far_share,
+            options.restart_inliers,
+            options.far_restart_inliers,
             turns,
             Motion.of(options.odometry),
-            Motion.of(options.steady_motion),
+            Motion.of(options.constant_velocity),
         )

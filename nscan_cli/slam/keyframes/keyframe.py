@@ -23,8 +23,9 @@ from nscan_cli.ndt.transform import Ndt
 from nscan_cli.poses import Array, Indices, compose, relative
 from nscan_cli.slam.frontend.scan_batch import ScanBatch
 from nscan_cli.slam.frontend.tracked_scans import Tracked, TrackedScans
+from nscan_cli.slam.gaussian_options import GaussianOptions
+from nscan_cli.slam.keyframes.options import KeyframeOptions
 from nscan_cli.slam.keyframes.slip_detection import SlipDetector
-from nscan_cli.slam.options import GaussianOptions, KeyframeOptions
 
 LATTICE = 2.0**26
 """More cells than a lattice has in a row."""
@@ -171,7 +172,7 @@ class Keyframes:
         self.options, self.gaussians = options, gaussians
         self.distance = max(options.distance, options.distance_per_range * median_range)
         self.list: list[Keyframe] = []
-        self._slips = SlipDetector(options.slipped)
+        self._slips = SlipDetector(options.slip_sigmas)
         self._since: list[KeyframePoints] = []
         self._expected = np.zeros((3, 3))
 
@@ -182,7 +183,7 @@ class Keyframes:
         """Take in scans that were found: some become keyframes, the first of them where a piece begins."""
         begins |= not self.list
         before = found.poses[0] if begins else self.list[-1].tracked.pose
-        slipped, turn, patience = self._slips.among(found), self.options.turn, self.options.patience
+        slipped, turn, patience = self._slips.among(found), self.options.turn, self.options.slip_factor
         new = _new_keyframes(
             found.poses, slipped, int(begins), before, self.distance, turn, patience
         ).tolist()

@@ -20,7 +20,8 @@ from nscan_cli.slam.diagnostics.free_space_violations import (
 )
 from nscan_cli.slam.frontend.tracked_scans import Tracked
 from nscan_cli.slam.keyframes.keyframe import Keyframes, Route, route_of
-from nscan_cli.slam.options import KeyframeOptions, NScanOptions
+from nscan_cli.slam.keyframes.options import KeyframeOptions
+from nscan_cli.slam.options import NScanOptions
 from tests.simulation.laser import Laser
 from tests.slam.drives import ROUND, path_of, round_scene
 from tests.slam.runs import mapped_real, truth_of

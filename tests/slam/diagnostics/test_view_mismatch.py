@@ -74,7 +74,7 @@ def found_in(run) -> ViewMismatch | None:
     tracking, breaks = slam.options.tracking, slam.options.breaks
     poses = np.concatenate(slam.tracked)
     several = [
-        view_mismatches(slam.log, poses, slam.keyframes.list, tracking.reach, breaks, threads)
+        view_mismatches(slam.log, poses, slam.keyframes.list, tracking.max_range, breaks, threads)
         for threads in (1, 2)
     ]
     assert several[0] == several[1]

@@ -24,10 +24,10 @@ from nscan_cli.slam.frontend.constant_velocity import (
     told_within,
     weakest_direction,
 )
+from nscan_cli.slam.frontend.options import TrackingOptions
 from nscan_cli.slam.frontend.scan_to_map import match_and_count
 from nscan_cli.slam.frontend.tracked_scans import TrackedScans
 from nscan_cli.slam.frontend.tracking_parameters import TrackingParameters
-from nscan_cli.slam.options import TrackingOptions
 from tests.benchmarks.lasers import WAY, rms, turning
 from tests.ndt.rooms import room
 from tests.simulation.building import building, drive

@@ -10,8 +10,8 @@ import pytest
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.poses import Array, relative
 from nscan_cli.slam.frontend.first_scan import place_first
+from nscan_cli.slam.frontend.options import BreakOptions, TrackingOptions
 from nscan_cli.slam.frontend.track_segments import SegmentTracker, TrackedSegments
-from nscan_cli.slam.options import BreakOptions, TrackingOptions
 from tests.simulation.scenes import office
 from tests.slam.drives import round_scene
 from tests.slam.runs import found_of, office_log, part, sensed, sensed_in, tracked, truth_of

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from nscan_cli.slam.frontend.first_scan import SCANS
+from nscan_cli.slam.frontend.options import BreakOptions, TrackingOptions
 from nscan_cli.slam.frontend.scan_batch import ScanBatch
 from nscan_cli.slam.frontend.track_segments import SegmentTracker, TrackedSegments
-from nscan_cli.slam.options import BreakOptions, TrackingOptions
 from tests.slam.drives import round_scene
 from tests.slam.runs import part, sensed_in
 from tests.slam.troubles import carried, standing

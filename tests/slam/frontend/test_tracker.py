@@ -16,10 +16,10 @@ from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.matching.correlative_search import SearchOptions
 from nscan_cli.ndt.transform import Ndt
 from nscan_cli.poses import Array, compose, relative, transform, wrap
+from nscan_cli.slam.frontend.options import TrackingOptions
 from nscan_cli.slam.frontend.tracked_scans import Tracked
 from nscan_cli.slam.frontend.tracker import Tracker
 from nscan_cli.slam.frontend.tracking_kernels import CLEARLY
-from nscan_cli.slam.options import TrackingOptions
 from tests.ndt.rooms import room
 from tests.ndt.test_grid_growth import assert_same
 from tests.simulation.scenes import Scene
@@ -182,7 +182,7 @@ def test_odometry_that_is_off_by_a_radian_is_recovered_by_starts_at_other_angles
     assert np.hypot(end[0], end[1]) < 0.05
     assert abs(end[2]) < 0.01
     # Without these the scan is lost, whatever odometry says, and a search finds it.
-    lost, without = tracked(log, TrackingOptions(turns=()))
+    lost, without = tracked(log, TrackingOptions(restart_angles=()))
     assert (tracker.searches, without.restarts) == (0, 0)
     assert without.searches > 0
     assert np.abs(end_off(poses_of(lost), truth)).max() < 0.05
@@ -204,7 +204,7 @@ def test_without_odometry_a_jump_is_found_by_search():
     """0.9 m and 50° between two scans: further than any widened Gaussian or start from other angles leads."""
     jump, found = np.array([0.9, 0.5, 0.9]), []
     for search in (SearchOptions(distance=1.5, turn=1.5), SearchOptions(distance=0.1, turn=0.1)):
-        tracker = Tracker(TrackingOptions(steady_search=search))
+        tracker = Tracker(TrackingOptions(lost_search=search))
         scans = [room(1), room(1), transform(relative(np.zeros(3), jump), room(1))]
         found.append(tracker.track(sensed(scans)).poses[-1])
     np.testing.assert_allclose(found[0], jump, atol=0.02)

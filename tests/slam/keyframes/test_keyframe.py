@@ -16,8 +16,9 @@ from nscan_cli.ndt.hash_grid import OPEN
 from nscan_cli.ndt.transform import Ndt
 from nscan_cli.poses import Array, compose, relative, rotated_information
 from nscan_cli.slam.frontend.tracked_scans import Tracked
+from nscan_cli.slam.gaussian_options import GaussianOptions
 from nscan_cli.slam.keyframes.keyframe import Keyframes, relations_along
-from nscan_cli.slam.options import GaussianOptions, KeyframeOptions
+from nscan_cli.slam.keyframes.options import KeyframeOptions
 from tests.ndt.rooms import room
 from tests.slam.runs import found_of, sensed
 

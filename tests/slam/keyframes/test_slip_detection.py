@@ -11,12 +11,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from nscan_cli.poses import Array, compose, relative
+from nscan_cli.slam.frontend.options import TrackingOptions
 from nscan_cli.slam.frontend.tracked_scans import TrackedScans
 from nscan_cli.slam.frontend.tracker import Tracker
 from nscan_cli.slam.frontend.tracking_kernels import CLEARLY
+from nscan_cli.slam.gaussian_options import GaussianOptions
 from nscan_cli.slam.keyframes.keyframe import Keyframes
+from nscan_cli.slam.keyframes.options import KeyframeOptions
 from nscan_cli.slam.keyframes.slip_detection import SlipDetector
-from nscan_cli.slam.options import GaussianOptions, KeyframeOptions, TrackingOptions
 from tests.benchmarks.robustness import false_loops, mapped, undisturbed
 from tests.data import data_file
 from tests.ndt.rooms import room

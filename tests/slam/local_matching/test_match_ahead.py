@@ -9,12 +9,13 @@ import pytest
 
 from nscan_cli.graph.model import Pairwise
 from nscan_cli.slam.frontend.tracked_scans import Tracked
+from nscan_cli.slam.gaussian_options import GaussianOptions
 from nscan_cli.slam.keyframes.keyframe import Keyframe, Route, extended, route_of
 from nscan_cli.slam.local_matching.coverage import Coverage
 from nscan_cli.slam.local_matching.joint_relations import LocalMatch
 from nscan_cli.slam.local_matching.match_ahead import AHEAD, Ahead
 from nscan_cli.slam.local_matching.neighbours import Neighbours, choose_neighbours
-from nscan_cli.slam.options import GaussianOptions, NScanOptions
+from nscan_cli.slam.options import NScanOptions
 
 OPTIONS = NScanOptions(radius=2.5)
 """Two keyframes to both sides of one are near."""

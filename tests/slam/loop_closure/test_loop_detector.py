@@ -10,12 +10,13 @@ import pytest
 from nscan_cli.graph.model import Loop, Pairwise
 from nscan_cli.poses import compose, relative
 from nscan_cli.slam.backend.energy_cache import Energies
+from nscan_cli.slam.frontend.options import BreakOptions
 from nscan_cli.slam.keyframes.keyframe import route_of
 from nscan_cli.slam.local_matching.joint_relations import LocalMatch, match_neighbours
 from nscan_cli.slam.local_matching.pairwise_relations import match_neighbours_pairwise
 from nscan_cli.slam.loop_closure.loop_detector import NO_SECOND, SO_FAR_OFF, LoopDetector
 from nscan_cli.slam.loop_closure.place_search import AMBIGUOUS, OUTDONE, TOO_LITTLE, Place
-from nscan_cli.slam.options import BreakOptions, ClosingOptions, NScanOptions
+from nscan_cli.slam.options import ClosingOptions, NScanOptions
 from tests.slam.drives import (
     CABINETS,
     ROUND,
@@ -168,7 +169,7 @@ def test_who_is_lost_is_searched_for_in_all_that_was_seen_before():
         path = keyframe.tracked.path + breaking.path * pieces
         tracked = dataclasses.replace(keyframe.tracked, path=path)
         keyframes.append(dataclasses.replace(keyframe, row=ROWS * k, tracked=tracked))
-    nothing = np.diag(np.array([breaking.distance, breaking.distance, breaking.turn]) ** -2)
+    nothing = np.diag(np.array([breaking.distance_sigma, breaking.distance_sigma, breaking.turn_sigma]) ** -2)
     carried = Pairwise((0, 0), np.array([30.0, 5.0, 2.0]), nothing, "track")
     for k, relation in enumerate([*doors.chain[:8], carried, *office.chain]):
         known = carried if k + 1 in firsts else relation

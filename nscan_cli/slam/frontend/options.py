@@ -1,0 +1,150 @@
+"""The parameters of the front end: tracking, what is believed of a log, and breaks."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from nscan_cli.matching.correlative_search import SearchOptions
+from nscan_cli.matching.priors import MotionModel
+from nscan_cli.slam.gaussian_options import GaussianOptions
+
+
+@dataclass(frozen=True)
+class DegeneracyOptions:
+    """When and how far a scan without odometry keeps to its prediction, in a direction it tells little of."""
+
+    max_information_ratio: float = 0.12
+    """A direction with less than this share of the information across it is checked. A larger ratio checks
+    more scans."""
+    profile_sigmas: float = 2.5
+    """Half length of the line on which the objective is sampled, in standard deviations of the prediction."""
+    profile_step: float = 0.03
+    """Distance of the samples, m. No wall's Gaussian is narrower; a larger step is faster and coarser."""
+    rematch_gain: float = 3.0
+    """The scan is matched from the best sample too if the objective is lower there by more than this."""
+    trusted_sigma: float = 0.04
+    """A scan that tells its place on the line to this standard deviation (m) stays where it was matched."""
+    initial_sigma: float = 0.05
+    """Root mean square deviation of scans from their predictions before any was seen, m."""
+    smoothing: float = 0.02
+    """Weight of a new scan in that mean square. A larger weight follows changes of the motion faster."""
+    deviation_factor: float = 3.5
+    """Multiple of that deviation that is allowed. A larger factor trusts matches more than predictions."""
+    min_deviation: float = 0.03
+    """Least deviation that is allowed, m."""
+
+
+@dataclass(frozen=True)
+class TrackingOptions:
+    """Step 1: every scan is matched with the local map, the NDT of the last metres of the path."""
+
+    gaussians: GaussianOptions = field(default_factory=lambda: GaussianOptions(floor=0.03))
+    max_range: float = 40.0
+    """Longest beam that is matched, m."""
+    window: float = 12.0
+    """Length of the path whose scans the local map holds, m. A longer window drifts less and costs memory."""
+    min_motion: float = 0.05
+    """A scan joins the local map when the robot has moved farther (m) or turned more (rad) than this since
+    the last one that joined. A larger value makes the map sparser."""
+    widenings: tuple[float, ...] = (0.05, 0.3, 1.0)
+    """Stages of a match, wide to narrow: the exponent of the energy is weighed by each."""
+    max_iterations: int = 20
+    """Most Newton steps of a stage."""
+    coarse_tolerance: float = 5e-3
+    """With odometry, a stage before the last ends with a step shorter than this, m and rad."""
+    tolerance: float = 1e-4
+    """The last stage ends with a step shorter than this, m and rad; without odometry all stages do."""
+    scale: float = 0.1
+    """Weight of the energy against the prior. It is small, since four Gaussians see each point and
+    neighbouring points hit the same wall. A larger weight trusts the odometry less."""
+    inlier_bound: float = 9.0
+    """Largest squared Mahalanobis distance of an inlier from a Gaussian."""
+    restart_inliers: float = 0.8
+    """With a smaller share of inliers a match starts again from other angles: one that is off by 12° can have
+    0.7. With odometry it starts again, too, if the scan before had more by `inlier_margin`."""
+    inlier_margin: float = 0.05
+    """Difference of two shares of inliers that counts. A match from another angle must have more by this."""
+    restart_angles: tuple[tuple[float, ...], ...] = ((0.1, 0.2), (0.4, 0.7), (1.0, 1.3))
+    """Angles to start again from, to both sides, rad. A ring is tried when those before it did not help."""
+    far_restart_inliers: float = 0.5
+    """Rings after the first are tried with a smaller share of inliers only: outdoors most scans have few."""
+    lost_inliers: float = 0.3
+    """With a smaller share of inliers a scan with odometry is searched among the last ones; without odometry
+    `restart_inliers` decides. It is also the least score of a place that the search finds."""
+    lost_search: SearchOptions = field(default_factory=lambda: SearchOptions(distance=1.5, turn=1.5))
+    """The search for a lost scan, about its prediction."""
+    lost_search_path: float = 5.0
+    """Length of the path whose scans a lost scan is searched among, m."""
+    odometry: MotionModel = field(default_factory=MotionModel)
+    """Standard deviations of a step of the odometry, as a prior of the match."""
+    constant_velocity: MotionModel = field(
+        default_factory=lambda: MotionModel(distance=0.3, angle=0.3, distance_per_metre=0.3)
+    )
+    """Standard deviations of a step without odometry, predicted by constant velocity."""
+    velocity_scans: int = 5
+    """Steps whose mean is the velocity. More steps even out jitter of stamps, fewer follow turns faster."""
+    degeneracy_poses: int = 3
+    """Poses that have to be known before `degeneracy` is checked: fewer make no velocity."""
+    degeneracy: DegeneracyOptions = field(default_factory=DegeneracyOptions)
+    range_limit_outliers: float = 0.001
+    """Share of the ranges that may exceed the laser's range limit: some are echoes."""
+    range_limit_share: float = 0.01
+    """The range limit ends walls if this share of the ranges is in the last cell before it. Lasers of 12 m
+    and more have 0.001 to 0.004 there, those of 6 m and less 0.02 to 0.05."""
+    first_scan_path: float = 5.0
+    """Length of the path whose scans place the first scan of a track segment, m."""
+    first_scan_max_count: int = 2_000
+    """Most scans that wait for it: a robot may stand for hours."""
+
+
+@dataclass(frozen=True)
+class OdometryCheckOptions:
+    """Which steps of the odometry, or of the scans, are jumps that no robot drives."""
+
+    min_motion: float = 1e-3
+    """Least step (m, rad) that counts as motion."""
+    step_quantile: float = 0.99
+    """Quantile of the log's steps that is the usual longest one."""
+    jump_factor: float = 5.0
+    """A jump is longer than the usual longest step times this."""
+    min_jump: float = 1.0
+    """A jump is longer than this, m and rad: a match finds less by itself."""
+
+
+@dataclass(frozen=True)
+class ViewSimilarityOptions:
+    """When two scans from nearly the same place see the same."""
+
+    sectors: int = 180
+    """Sectors of the view; in each the nearest point of both scans is compared."""
+    min_sectors: int = 10
+    """Least number of sectors in which both scans have points; with fewer nothing is said."""
+    tolerance: float = 0.2
+    """Difference of two ranges that are the same, m."""
+    tolerance_per_metre: float = 0.1
+    """Growth of the tolerance with the shorter range, m/m."""
+
+
+@dataclass(frozen=True)
+class BreakOptions:
+    """When the track is broken: the robot was carried, and a new segment of the track begins."""
+
+    poor_inliers: float = 0.7
+    """A match with a smaller share of inliers is poor: the view is compared with that of the scan before."""
+    view: ViewSimilarityOptions = field(default_factory=ViewSimilarityOptions)
+    min_similarity: float = 0.7
+    """A poor match is doubted if the two views are the same in a smaller share of sectors."""
+    max_doubted: int = 5
+    """Scans that may follow a doubted one before the track breaks: someone may stand in the way. It does not
+    break if one of them sees again what was seen before."""
+    bridged_distance: float = 2.0
+    """A new segment that begins farther away by odometry (m) is no break: other things are in view there, and
+    odometry bridges the way."""
+    bridged_turn: float = 1.0
+    """The same bound for a turn, rad."""
+    path: float = 40.0
+    """Length of path that a break counts as, m: what lies before it is another visit."""
+    distance_sigma: float = 100.0
+    """Standard deviation of the way over a break, m."""
+    turn_sigma: float = 1.8
+    """Standard deviation of the turn over a break, rad: all are as likely."""
