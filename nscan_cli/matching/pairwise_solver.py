@@ -12,18 +12,13 @@ import numpy as np
 
 from nscan_cli.kernels.assign import assign, assign_rows
 from nscan_cli.kernels.decorators import kernel, leaf_kernel
+from nscan_cli.matching.damped_newton import PAIRWISE, is_accepted, is_last, next_damping
 from nscan_cli.matching.priors import Prior
 from nscan_cli.matching.small_matrices import solve_definite
 from nscan_cli.ndt.association import Association, associate_again
 from nscan_cli.ndt.energy import OUT, sum_meeting, unpack
 from nscan_cli.ndt.hash_grid import Grid
 from nscan_cli.poses import Array
-
-FIRST_DAMPING = 1e-3
-LEAST_DAMPING = 1e-7
-GREATEST_DAMPING = 1e6
-STALLED = 0.1
-"""Share of what ends a stage below which a damped step ends it."""
 
 
 class PairProblem(NamedTuple):
@@ -96,8 +91,7 @@ def minimise(
         widening, enough = widenings[stage], near if stage + 1 < widenings.shape[0] else tolerance
         value = objective(problem, pose, widening, 0.0, out, gradient, hessian)
         evaluations += 1
-        damping = FIRST_DAMPING
-        converged = False
+        damping, converged = PAIRWISE.first, False
         for _ in range(max_iterations):
             iterations += 1
             assign_rows(damped, hessian)
@@ -108,24 +102,21 @@ def minimise(
             for a in range(3):
                 trial[a] = pose[a] - step[a]
             length = max(abs(step[0]), abs(step[1]), abs(step[2]))
-            if length < enough and damping <= FIRST_DAMPING:
+            converged = is_last(length, enough, damping, PAIRWISE)
+            if converged and damping <= PAIRWISE.trusted:
                 # So near that the value and the Hessian are known well enough.
                 assign(pose, trial)
-                converged = True
                 break
             trial_value = objective(problem, trial, widening, 0.0, trial_out, trial_gradient, trial_hessian)
             evaluations += 1
-            if trial_value <= value:
+            accepted = is_accepted(value, trial_value, PAIRWISE)
+            if accepted:
                 value = trial_value
                 assign(pose, trial)
                 assign(out, trial_out)
                 assign(gradient, trial_gradient)
                 assign_rows(hessian, trial_hessian)
-                damping = max(damping * 0.1, LEAST_DAMPING)
-            else:
-                damping *= 10.0
-            # A step that is short because it is damped says less.
-            converged = length < STALLED * enough
-            if converged or damping > GREATEST_DAMPING:
+            damping = next_damping(damping, accepted, PAIRWISE)
+            if converged or damping > PAIRWISE.greatest:
                 break
     return value, out[0], iterations, evaluations, converged

@@ -16,14 +16,8 @@ from scipy.sparse import csr_array
 from nscan_cli.graph.linalg.factor_pattern import Pattern, block_targets
 from nscan_cli.graph.model import NScan, Pairwise
 from nscan_cli.graph.optimise.graph_energy import GraphEnergy, System
-from nscan_cli.graph.optimise.graph_solver import (
-    FIRST_DAMPING,
-    GREATEST_DAMPING,
-    LEAST_DAMPING,
-    ROUNDING,
-    Optimum,
-    newton_step,
-)
+from nscan_cli.graph.optimise.graph_solver import Optimum, newton_step
+from nscan_cli.matching.damped_newton import GRAPH, is_accepted, is_last, next_damping
 from nscan_cli.poses import Array, Indices
 from tests.experiments.mappings import Mapping, Relations, differences, grouped
 
@@ -124,23 +118,20 @@ def minimise(energy: Stepwise, poses: Array, max_iterations: int = MAX_ITERATION
     A step counts as good when it lowers the function of its iteration.
     """
     held = energy.hold(poses)
-    here, damping, iteration = energy.evaluate_held(poses, held), 0.0, 0
+    here, damping, iteration = energy.evaluate_held(poses, held), GRAPH.first, 0
     for iteration in range(1, max_iterations + 1):
-        step = newton_step(energy.pattern, here, damping)
+        step, accepted = newton_step(energy.pattern, here, damping), False
         if step is not None:
             trial = poses.copy()
             trial[energy.free] += step
             length = float(np.abs(step).max(initial=0.0))
-            lower = energy.value_held(trial, held) <= here.value + ROUNDING * abs(here.value)
-            if lower:
+            accepted = is_accepted(here.value, energy.value_held(trial, held), GRAPH)
+            if accepted:
                 poses, held = trial, energy.hold(trial)
                 here = energy.evaluate_held(poses, held)
-            if length <= TOLERANCE and damping <= 1:
+            if is_last(length, TOLERANCE, damping, GRAPH):
                 return Optimum(poses, here.value, iteration, True)
-            if lower:
-                damping = 0.1 * damping if damping > LEAST_DAMPING else 0.0
-                continue
-        damping = max(10 * damping, FIRST_DAMPING)
-        if damping > GREATEST_DAMPING:
+        damping = next_damping(damping, accepted, GRAPH)
+        if damping > GRAPH.greatest:
             break
     return Optimum(poses, here.value, iteration, False)

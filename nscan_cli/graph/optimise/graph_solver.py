@@ -9,16 +9,12 @@ import numpy as np
 from nscan_cli.graph.linalg.block_cholesky import factorise, solve
 from nscan_cli.graph.linalg.factor_pattern import Pattern
 from nscan_cli.graph.optimise.graph_energy import GraphEnergy, System
+from nscan_cli.matching.damped_newton import GRAPH, is_accepted, is_last, next_damping
 from nscan_cli.poses import Array, wrap
 
 SETTLED = 0.1
 """m, rad: the exact Hessian is used once a step is shorter. It needs fewer steps there than the
 Gauss–Newton part; farther away it needs more, and often is not positive definite."""
-FIRST_DAMPING = 1e-6
-LEAST_DAMPING = 1e-9
-GREATEST_DAMPING = 1e8
-ROUNDING = 1e-12
-"""Relative; an energy that rises by less counts as the same."""
 NOTHING = 1e-7
 """Of the energy, or of a χ² of 1: where relations leave a direction open, a step that gains less is the
 last: it moves less than a thousandth of a standard deviation."""
@@ -45,7 +41,7 @@ def optimise(
     Marquardt, when they would raise the energy or the relations leave a direction open. In such a direction
     poses could go on for ever, for less and less, so there the minimum is where nothing is gained.
     """
-    here, exact, damping, is_open = energy.evaluate(poses, exact=False), False, 0.0, False
+    here, exact, damping, is_open = energy.evaluate(poses, exact=False), False, GRAPH.first, False
     iteration = 0
     for iteration in range(1, max_iterations + 1):
         step = newton_step(energy.pattern, here, damping)
@@ -54,26 +50,25 @@ def optimise(
             step = newton_step(energy.pattern, here, damping)
         if not damping:
             is_open = step is None
+        accepted = False
         if step is not None:
             trial = poses.copy()
             trial[energy.free] += step
             length = float(np.abs(step).max(initial=0.0))
-            least = here.value + ROUNDING * abs(here.value)
-            if length <= tolerance and damping <= 1:
+            if is_last(length, tolerance, damping, GRAPH):
                 value = float(energy.terms(trial).sum())
-                if value <= least:
+                if is_accepted(here.value, value, GRAPH):
                     return Optimum(_wrapped(trial), value, iteration, True)
                 return Optimum(_wrapped(poses), here.value, iteration, True)
             there = energy.evaluate(trial, exact=length < SETTLED)
-            if there.value <= least:
+            accepted = is_accepted(here.value, there.value, GRAPH)
+            if accepted:
                 gains = here.value - there.value > NOTHING * (1 + here.value)
-                if is_open and damping <= FIRST_DAMPING and not gains:
+                if is_open and damping <= GRAPH.least_raised and not gains:
                     return Optimum(_wrapped(trial), there.value, iteration, True)
                 poses, here, exact = trial, there, length < SETTLED
-                damping = 0.1 * damping if damping > LEAST_DAMPING else 0.0
-                continue
-        damping = max(10 * damping, FIRST_DAMPING)
-        if damping > GREATEST_DAMPING:
+        damping = next_damping(damping, accepted, GRAPH)
+        if damping > GRAPH.greatest:
             break
     return Optimum(_wrapped(poses), here.value, iteration, False)
 

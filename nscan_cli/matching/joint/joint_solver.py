@@ -6,13 +6,10 @@ import numpy as np
 
 from nscan_cli.kernels.assign import assign, assign_rows
 from nscan_cli.kernels.decorators import kernel
+from nscan_cli.matching.damped_newton import JOINT, is_accepted, is_last, next_damping
 from nscan_cli.matching.joint.gauge import gauge_fixed_step
 from nscan_cli.matching.joint.joint_energy import JointProblem, evaluate
 from nscan_cli.poses import Array
-
-FIRST_DAMPING = 1e-3
-LEAST_DAMPING = 1e-8
-GREATEST_DAMPING = 1e4
 
 
 @kernel
@@ -103,7 +100,7 @@ def descend(
     step, trial = np.empty_like(poses), np.empty_like(poses)
     curvature = 1.0 if exact else 0.0
     value = evaluate(problem, poses, widening, curvature, neutral, stride, gradient, hessian)
-    iterations, evaluations, damping, converged = 0, 1, FIRST_DAMPING, False
+    iterations, evaluations, damping, converged = 0, 1, JOINT.first, False
     for _ in range(max_iterations):
         solved = gauge_fixed_step(gradient, hessian, poses, damping, fixed, step)
         if not solved and exact:
@@ -112,7 +109,7 @@ def descend(
             evaluations += 1
             solved = gauge_fixed_step(gradient, trial_hessian, poses, damping, fixed, step)
         if not solved:
-            damping *= 10
+            damping = next_damping(damping, False, JOINT)
             continue
         iterations += 1
         longest = 0.0
@@ -120,20 +117,19 @@ def descend(
             for a in range(3):
                 trial[i, a] = poses[i, a] + step[i, a]
                 longest = max(longest, abs(step[i, a]))
-        converged = longest < tolerance
+        converged = is_last(longest, tolerance, damping, JOINT)
         if converged and not thorough:
             assign_rows(poses, trial)
             break
         there = evaluate(problem, trial, widening, curvature, neutral, stride, trial_gradient, trial_hessian)
         evaluations += 1
-        if there <= value:
+        accepted = is_accepted(value, there, JOINT)
+        if accepted:
             value = there
             assign_rows(poses, trial)
             assign(gradient, trial_gradient)
             assign_rows(hessian, trial_hessian)
-            damping = max(0.1 * damping, LEAST_DAMPING)
-        else:
-            damping *= 10
-        if converged or damping > GREATEST_DAMPING:
+        damping = next_damping(damping, accepted, JOINT)
+        if converged or damping > JOINT.greatest:
             break
     return value, iterations, evaluations, converged

@@ -1,0 +1,67 @@
+"""Control of damped Newton steps, after Levenberg and Marquardt: damping, acceptance, and the last step.
+
+The solvers of pairwise matches, joint matches and graphs share it. Each adds damping · diag H to its Hessian.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from nscan_cli.kernels.decorators import leaf_kernel
+
+
+class StepControl(NamedTuple):
+    """The limits of a solver."""
+
+    first: float
+    """Damping of the first step."""
+    least: float
+    """Lower bound of the damping."""
+    least_divided: float
+    """Smaller damping is not divided by 10 when a step is accepted, but becomes `least`."""
+    least_raised: float
+    """Lower bound of the damping after a rejected step."""
+    greatest: float
+    """The solver gives up when the damping exceeds this."""
+    trusted: float
+    """With a larger damping, a step is short because it is damped."""
+    damped_share: float
+    """Share of the tolerance within which such a step is the last one. With 0 it never is."""
+    rounding: float
+    """Relative increase of the value that is accepted as rounding."""
+
+
+PAIRWISE = StepControl(1e-3, 1e-7, 1e-7, 0.0, 1e6, 1e-3, 0.1, 0.0)
+"""Starts are rough, so steps are damped from the first on. One NDT is cheap to evaluate: 1e6 allows long
+searches where the energy jumps at borders of cells."""
+JOINT = StepControl(1e-3, 1e-8, 1e-8, 0.0, 1e4, np.inf, 0.0, 0.0)
+"""An evaluation costs n (n − 1) times as much: it gives up earlier, and any step within the tolerance is the
+last one."""
+GRAPH = StepControl(0.0, 0.0, 1e-9, 1e-6, 1e8, 1.0, 0.0, 1e-12)
+"""The energy is smooth and nearly quadratic, so steps are undamped unless they fail. Sums over thousands of
+relations carry rounding errors."""
+
+
+@leaf_kernel
+def is_accepted(value: float, trial: float, control: StepControl) -> bool:
+    """Whether a step from an objective's `value` to its `trial` value is taken."""
+    return trial <= value + control.rounding * abs(value)
+
+
+@leaf_kernel
+def next_damping(damping: float, accepted: bool, control: StepControl) -> float:
+    """The damping after a step that was accepted or rejected."""
+    if not accepted:
+        return max(10.0 * damping, control.least_raised)
+    return max(0.1 * damping, control.least) if damping > control.least_divided else control.least
+
+
+@leaf_kernel
+def is_last(length: float, tolerance: float, damping: float, control: StepControl) -> bool:
+    """Whether a step is within the tolerance, so that the solver has converged.
+
+    `length` is the greatest change of a variable (m, rad), `damping` that of the step.
+    """
+    return length < (tolerance if damping <= control.trusted else control.damped_share * tolerance)
