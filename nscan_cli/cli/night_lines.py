@@ -9,18 +9,18 @@ from typing import TYPE_CHECKING
 
 from nscan_cli.cli.progress import say
 from nscan_cli.files.counting import counted
-from nscan_cli.nightly.manifest import Entry
-from nscan_cli.nightly.night_history import Night
-from nscan_cli.nightly.verdict import Errors
+from nscan_cli.nightly.manifest import ManifestEntry
+from nscan_cli.nightly.regression_check import MeasuredErrors
+from nscan_cli.nightly.run_history import RunRecord
 
 if TYPE_CHECKING:
     from rich.progress import Progress, TaskID
 
-    from nscan_cli.nightly.night import Watcher
+    from nscan_cli.nightly.run import RunObserver
 
 
 @contextlib.contextmanager
-def night_lines(names: list[str], quiet: bool) -> Iterator[Watcher]:
+def night_lines(names: list[str], quiet: bool) -> Iterator[RunObserver]:
     """The lines of the logs that are to be done, as long as the block lasts."""
     if quiet or not sys.stderr.isatty():
         yield PlainLines(quiet)
@@ -45,7 +45,7 @@ class PlainLines:
     def progress(self, name: str, done: int, total: int, keyframes: int) -> None:
         """Nothing."""
 
-    def finished(self, entry: Entry, night: Night) -> None:
+    def finished(self, entry: ManifestEntry, night: RunRecord) -> None:
         """Say what became of it."""
         say(f"{entry.name}: {_outcome(night)}", self.quiet)
 
@@ -66,7 +66,7 @@ class LiveLines:
         detail = f"{done}/{total} scans, {counted(keyframes, 'keyframe')}, {elapsed:.0f} s"
         self.bars.update(task, completed=done, total=total, detail=detail)
 
-    def finished(self, entry: Entry, night: Night) -> None:
+    def finished(self, entry: ManifestEntry, night: RunRecord) -> None:
         """Say in its line what became of it."""
         if entry.name not in self.tasks:
             self.tasks[entry.name] = self._line(entry.name)
@@ -80,10 +80,10 @@ class LiveLines:
         return self.bars.add_task(name, total=None, start=False, detail="")
 
 
-def _outcome(night: Night) -> str:
+def _outcome(night: RunRecord) -> str:
     if night["outcome"] != "done":
         return f"failed: {night['reason']}"
-    errors, took, counts = Errors.of(night), night["times"]["seconds"], night["counts"]
+    errors, took, counts = MeasuredErrors.of(night), night["times"]["seconds"], night["counts"]
     measured = "" if errors is None else f"{errors.what} {errors.metres:.4f} m, "
     if took is None:
         return f"{measured}not timed: kernels were compiled meanwhile"

@@ -15,9 +15,9 @@ from nscan_cli.errors import CheckFailedError, InputMissingError
 from nscan_cli.files.inputs import base_name
 
 if TYPE_CHECKING:
-    from nscan_cli.nightly.manifest import Entry
-    from nscan_cli.nightly.night import Engine, Outcomes
-    from nscan_cli.nightly.task import Report, Task
+    from nscan_cli.nightly.manifest import ManifestEntry
+    from nscan_cli.nightly.run import Executor, Outcomes
+    from nscan_cli.nightly.task import ProgressCallback, Task
 
 
 @subcommand(
@@ -58,11 +58,12 @@ def command(
 
     FOLDER/report.html and report.json are the report. Exit code 3 when a log fails or is above its bound.
     """
-    from nscan_cli.nightly.folder import claimed
     from nscan_cli.nightly.manifest import read_manifest
-    from nscan_cli.nightly.night import carry_out, plan
-    from nscan_cli.nightly.publish import publish
-    from nscan_cli.nightly.verdict import headline
+    from nscan_cli.nightly.plan import make_plan
+    from nscan_cli.nightly.regression_check import headline
+    from nscan_cli.nightly.report_files import write_reports
+    from nscan_cli.nightly.results_folder import locked_folder
+    from nscan_cli.nightly.run import run_plan
 
     entries = read_manifest(manifest, data)
     if all(entry.optional and not entry.is_there for entry in entries):
@@ -73,8 +74,8 @@ def command(
         raise InputMissingError(
             f"{manifest}: none of its logs is there, not even {first}; give --data FOLDER"
         )
-    with claimed(output) as folder:
-        planned = plan(entries, folder, force)
+    with locked_folder(output) as folder:
+        planned = make_plan(entries, folder, force)
         if len(planned.absent) > 1:
             listed = ", ".join(entry.name for entry in planned.absent)
             say(f"not there, skipped: {listed}; the report says where to get them", quiet)
@@ -90,11 +91,11 @@ def command(
                 announce_compiling("follow", quiet)
             names = [entry.name for entry, _key in planned.to_do]
             with night_lines(names, quiet) as lines:
-                carry_out(planned, folder, _engine(jobs, scheduler, timeout), lines)
+                run_plan(planned, folder, _engine(jobs, scheduler, timeout), lines)
         else:
             logs = "the log is" if len(planned.up_to_date) == 1 else f"all {len(planned.up_to_date)} logs are"
             say(f"nothing to do: {logs} up to date", quiet)
-        verdicts = publish(base_name(manifest), entries, planned, folder)
+        verdicts = write_reports(base_name(manifest), entries, planned, folder)
 
     report = os.path.join(output, "report.html")
     failures = [verdict for verdict in verdicts if verdict.is_failure]
@@ -105,27 +106,27 @@ def command(
     say(f"{headline(verdicts)}: {report}", quiet)
 
 
-def _say_absent(entry: Entry, quiet: bool) -> None:
+def _say_absent(entry: ManifestEntry, quiet: bool) -> None:
     remedy = f"; to be had from {' and '.join(entry.sources.values())}" if entry.sources else ""
     say(f"{entry.name}: {entry.inputs['log']} is not there, skipped{remedy}", quiet)
 
 
-def _engine(jobs: int | None, scheduler: str | None, timeout: float) -> Engine:
+def _engine(jobs: int | None, scheduler: str | None, timeout: float) -> Executor:
     """What does the tasks: processes here, or a cluster."""
 
-    def here(tasks: list[Task], scratch: Path, report: Report) -> Outcomes:
-        from nscan_cli.nightly import processes
+    def here(tasks: list[Task], scratch: Path, report: ProgressCallback) -> Outcomes:
+        from nscan_cli.nightly import local_executor
         from nscan_cli.threads import available_threads
 
         side_by_side = min(jobs or available_threads(), len(tasks))
         # Processors that are left over help along.
         threads = max(1, available_threads() // side_by_side)
-        return processes.run_all(tasks, side_by_side, timeout, scratch, report, threads)
+        return local_executor.run_locally(tasks, side_by_side, timeout, scratch, report, threads)
 
-    def there(tasks: list[Task], _scratch: Path, report: Report) -> Outcomes:
-        from nscan_cli.nightly import cluster
+    def there(tasks: list[Task], _scratch: Path, report: ProgressCallback) -> Outcomes:
+        from nscan_cli.nightly import dask_executor
 
         assert scheduler is not None
-        return cluster.run_all(tasks, scheduler, timeout, report)
+        return dask_executor.run_on_dask(tasks, scheduler, timeout, report)
 
     return here if scheduler is None else there

@@ -22,7 +22,7 @@ from nscan_cli.files.text import path_of_name, shown
 from nscan_cli.logs.reading_options import ReadingOptions
 
 if TYPE_CHECKING:
-    from nscan_cli.mapping.map_image import MapImage
+    from nscan_cli.mapping.map_server import MapImage
 
 
 @subcommand(
@@ -95,18 +95,18 @@ def command(
     poses = whole.poses[nodes]
     grid = occupancy_grid(scans, rows, poses, resolution)
     if picture:
-        from nscan_cli.mapping.figures.map_drawing import Overlays, draw_figure, draw_over_map
+        from nscan_cli.mapping.figures.map_plots import Overlays, plot_over_map, plot_paper_figure
 
         if uncertainty and not whole.marginals:
             say(f"warning: {graph_file} has no covariances, so no uncertainty is drawn", quiet)
         overlays = Overlays(trajectory, graph, uncertainty)
         if style == "paper":
-            canvas = draw_figure(scans, rows, poses, grid, whole, overlays)
+            canvas = plot_paper_figure(scans, rows, poses, grid, whole, overlays)
         else:
-            canvas = draw_over_map(grid, whole, overlays)
+            canvas = plot_over_map(grid, whole, overlays)
         write_whole(output, canvas.png())
     else:
-        from nscan_cli.mapping.map_image import map_image
+        from nscan_cli.mapping.map_server import map_image
 
         write_map(output, map_image(grid), yaml, quiet)
     if mcap is not None:
@@ -143,7 +143,7 @@ def write_map(output: str, image: MapImage, yaml: bool, quiet: bool) -> None:
             "its name is no UTF-8, as YAML is",
             quiet,
         )
-    from nscan_cli.mapping.map_image import map_png, map_yaml
+    from nscan_cli.mapping.map_server import map_png, map_yaml
 
     write_whole(output, map_png(image))
     if yaml:

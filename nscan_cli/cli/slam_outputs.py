@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
     from nscan_cli.graph.model import Graph
     from nscan_cli.logs.laser_log import LaserLog
-    from nscan_cli.mapping.map_image import MapImage
+    from nscan_cli.mapping.map_server import MapImage
     from nscan_cli.poses import Array
 
 
@@ -127,7 +127,7 @@ class Outputs:
 
 def _drawn(scans: LaserLog, rows: NDArray[np.int64], poses: Array, threads: int) -> MapImage:
     """The map; the counts that it is made of, and what else came before, make room for it."""
-    from nscan_cli.mapping.map_image import map_image
+    from nscan_cli.mapping.map_server import map_image
     from nscan_cli.mapping.occupancy import occupancy_grid
     from nscan_cli.memory import trim
 

@@ -9,8 +9,8 @@ import numpy as np
 from nscan_cli.evaluation.evaluation_report import Evaluation
 from nscan_cli.graph.io.tum import Trajectory
 from nscan_cli.mapping.figures.canvas import Canvas
-from nscan_cli.mapping.figures.error_plots import plot_against, plot_relations
-from nscan_cli.mapping.figures.panels import bounds_around, is_wide, side_by_side, stacked
+from nscan_cli.mapping.figures.error_plots import plot_against_reference, plot_relations
+from nscan_cli.mapping.figures.panels import bounds_around, hstack_images, is_wide, vstack_images
 from nscan_cli.poses import compose
 
 if TYPE_CHECKING:
@@ -44,7 +44,7 @@ def picture(evaluation: Evaluation, result: Trajectory, reference: Trajectory | 
         )
         aligned = compose(against.alignment.motion, result.poses)
         panels.append(
-            plot_against(aligned, against.rows, against.translation, reference.poses, title, beside)
+            plot_against_reference(aligned, against.rows, against.translation, reference.poses, title, beside)
         )
-    join = side_by_side if beside else stacked
+    join = hstack_images if beside else vstack_images
     return join([panel.image() for panel in panels])

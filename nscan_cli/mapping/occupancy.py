@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from nscan_cli.errors import WrongUsageError
 from nscan_cli.files.limits import MAP_CELLS
 from nscan_cli.logs.laser_log import LaserLog
-from nscan_cli.mapping.ray_casting import TILE, ScanRays, Tiles, count_beams, extent
+from nscan_cli.mapping.ray_casting import TILE, ScanRays, TileCounts, cast_rays, ray_bounds
 from nscan_cli.poses import Array
 
 RESOLUTION = 0.05
@@ -54,7 +54,7 @@ class OccupancyGrid:
 
     @classmethod
     def of_tiles(
-        cls, tiles: Tiles, shape: tuple[int, int], resolution: float, origin: tuple[float, float]
+        cls, tiles: TileCounts, shape: tuple[int, int], resolution: float, origin: tuple[float, float]
     ) -> OccupancyGrid:
         """The grid of `shape` (H, W) with the counts of its tiles."""
         grid = cls.__new__(cls)
@@ -62,7 +62,7 @@ class OccupancyGrid:
         return grid
 
     def _take(
-        self, tiles: Tiles, shape: tuple[int, ...], resolution: float, origin: tuple[float, float]
+        self, tiles: TileCounts, shape: tuple[int, ...], resolution: float, origin: tuple[float, float]
     ) -> None:
         self._tiles = tiles
         self.shape = shape[0], shape[1]
@@ -119,14 +119,16 @@ def _states(counts: NDArray[np.int32]) -> NDArray[np.int8]:
     return states
 
 
-def _tiled(hits: NDArray[np.int32], misses: NDArray[np.int32]) -> Tiles:
+def _tiled(hits: NDArray[np.int32], misses: NDArray[np.int32]) -> TileCounts:
     """The tiles of counts (H, W), all of them."""
     height, width = hits.shape
     rows, columns = -(-height // TILE), -(-width // TILE)
     padded = np.zeros((2, rows * TILE, columns * TILE), dtype=np.int32)
     padded[:, :height, :width] = hits, misses
     counts = padded.reshape(2, rows, TILE, columns, TILE).transpose(1, 3, 0, 2, 4).reshape(-1, 2, TILE, TILE)
-    return Tiles(np.arange(len(counts), dtype=np.int32).reshape(rows, columns), np.ascontiguousarray(counts))
+    return TileCounts(
+        np.arange(len(counts), dtype=np.int32).reshape(rows, columns), np.ascontiguousarray(counts)
+    )
 
 
 def occupancy_grid(
@@ -147,7 +149,7 @@ def occupancy_grid(
         raise WrongUsageError(f"{log.source.name}: no scans to draw a map of; choose some")
     lasers = np.ascontiguousarray(log.laser_pose(poses))
     scans = ScanRays(np.asarray(rows, dtype=np.int64), log.ranges, log.angle_min, log.angle_increment, lasers)
-    low_x, low_y, high_x, high_y = extent(scans, REACH)
+    low_x, low_y, high_x, high_y = ray_bounds(scans, REACH)
     # One cell to spare: the border of the map is then free of what is drawn in it, and rounding harmless.
     left, bottom = math.floor(low_x / resolution) - 1, math.floor(low_y / resolution) - 1
     width = math.floor(high_x / resolution) + 2 - left
@@ -161,7 +163,7 @@ def occupancy_grid(
             f"of {resolution:g} m, more than {most:,.0f}; {remedy}, or set {MAP_CELLS.variable} higher"
         )
     shape, corner = (height, width), (left * resolution, bottom * resolution)
-    tiles = count_beams(scans, REACH, shape, resolution, left, bottom, threads)
+    tiles = cast_rays(scans, REACH, shape, resolution, left, bottom, threads)
     return OccupancyGrid.of_tiles(tiles, shape, resolution, corner)
 
 

@@ -16,13 +16,13 @@ from nscan_cli.threads import in_threads
 
 TILE = 32
 """Cells along the side of a tile."""
-MOST_PARTS = 4
+MAX_THREADS = 4
 """So many threads cast at most, for each has counts of its own."""
-NEVER = 1 << 62
+NO_BORDER = 1 << 62
 """Where a ray crosses no border of this kind."""
 
 
-class Tiles(NamedTuple):
+class TileCounts(NamedTuple):
     """The counts of the parts of a grid that a beam has met; most of a large map none ever does."""
 
     numbers: NDArray[np.int32]
@@ -46,7 +46,7 @@ class ScanRays(NamedTuple):
     """(N, 3) poses of the laser."""
 
 
-def count_beams(
+def cast_rays(
     scans: ScanRays,
     reach: float,
     shape: tuple[int, int],
@@ -54,29 +54,29 @@ def count_beams(
     left: int,
     bottom: int,
     threads: int,
-) -> Tiles:
+) -> TileCounts:
     """How the beams of all scans, up to `reach` (m), meet the cells of a grid of `shape` (H, W).
 
     Its cell (0, 0) has its lower left corner at (left, bottom) · resolution; no beam may leave it.
     """
 
-    def cast(some: NDArray[np.int64]) -> Tiles:
+    def cast(some: NDArray[np.int64]) -> TileCounts:
         index = np.full((-(-shape[0] // TILE), -(-shape[1] // TILE)), -1, dtype=np.int32)
         # There is room for all tiles, but only those that are written to take any memory: the first ones.
-        tiles = Tiles(index, np.zeros((index.size, 2, TILE, TILE), dtype=np.int32))
+        tiles = TileCounts(index, np.zeros((index.size, 2, TILE, TILE), dtype=np.int32))
         part = scans._replace(rows=scans.rows[some], lasers=scans.lasers[some])
-        _cast(part, reach, resolution, left, bottom, tiles)
+        _cast_scans(part, reach, resolution, left, bottom, tiles)
         return tiles
 
-    parts = min(threads, MOST_PARTS)
+    parts = min(threads, MAX_THREADS)
     whole, *others = in_threads(parts, cast, np.array_split(np.arange(len(scans.rows)), parts))
     for tiles in others:
-        _add(tiles, whole)
+        _add_counts(tiles, whole)
     return whole
 
 
 @kernel
-def extent(scans: ScanRays, reach: float) -> tuple[float, float, float, float]:
+def ray_bounds(scans: ScanRays, reach: float) -> tuple[float, float, float, float]:
     """The least x and y and the greatest x and y of the lasers and of their beams' ends."""
     rows, ranges, angle_min, angle_increment, lasers = scans
     low_x = high_x = lasers[0, 0]
@@ -101,7 +101,9 @@ def extent(scans: ScanRays, reach: float) -> tuple[float, float, float, float]:
 
 
 @kernel
-def _cast(scans: ScanRays, reach: float, resolution: float, left: int, bottom: int, tiles: Tiles) -> None:
+def _cast_scans(
+    scans: ScanRays, reach: float, resolution: float, left: int, bottom: int, tiles: TileCounts
+) -> None:
     """Add the beams of all scans to the counts of the tiles."""
     rows, ranges, angle_min, angle_increment, lasers = scans
     counts = tiles.counts.reshape(-1)
@@ -117,14 +119,14 @@ def _cast(scans: ScanRays, reach: float, resolution: float, left: int, bottom: i
             angle = lasers[k, 2] + angle_min[row] + beam * angle_increment[row]
             length = min(r, reach) / resolution
             end_x, end_y = x + length * np.cos(angle), y + length * np.sin(angle)
-            used = _pass(x, y, end_x, end_y, tiles.numbers, counts, used)
+            used = _traverse(x, y, end_x, end_y, tiles.numbers, counts, used)
             if r <= reach:
-                hit, used = _hits(tiles.numbers, int(end_y), int(end_x), used)
+                hit, used = _hit_index(tiles.numbers, int(end_y), int(end_x), used)
                 counts[np.uint64(hit)] += 1
 
 
 @kernel
-def _add(tiles: Tiles, whole: Tiles) -> None:
+def _add_counts(tiles: TileCounts, whole: TileCounts) -> None:
     """Add the counts of tiles to those of others in the same grid."""
     counts, sums = tiles.counts.reshape(-1, 2 * TILE * TILE), whole.counts.reshape(-1, 2 * TILE * TILE)
     used = np.count_nonzero(whole.numbers >= 0)
@@ -141,7 +143,7 @@ def _add(tiles: Tiles, whole: Tiles) -> None:
 
 
 @leaf_kernel
-def _hits(numbers: NDArray[np.int32], line: int, column: int, used: int) -> tuple[int, int]:
+def _hit_index(numbers: NDArray[np.int32], line: int, column: int, used: int) -> tuple[int, int]:
     """Where a cell's hits are counted; its tile gets a number if it has none. How many have one."""
     row, place = np.uint64(line // TILE), np.uint64(column // TILE)
     if numbers[row, place] < 0:
@@ -151,7 +153,7 @@ def _hits(numbers: NDArray[np.int32], line: int, column: int, used: int) -> tupl
 
 
 @leaf_kernel
-def _pass(
+def _traverse(
     x: float,
     y: float,
     end_x: float,
@@ -169,12 +171,12 @@ def _pass(
     steps_x, steps_y = abs(int(end_x) - column), abs(int(end_y) - line)
     step_x, step_y = (1 if dx > 0 else -1), (1 if dy > 0 else -1)
     # Where the ray crosses the next borders, from 0 to 1 along it, and how far apart they are.
-    between_x, between_y = _fixed(1 / abs(dx)), _fixed(1 / abs(dy))
-    next_x = _fixed((column + 1 - x if dx > 0 else x - column) / abs(dx)) if steps_x > 0 else NEVER
-    next_y = _fixed((line + 1 - y if dy > 0 else y - line) / abs(dy)) if steps_y > 0 else NEVER
+    between_x, between_y = _fixed_point(1 / abs(dx)), _fixed_point(1 / abs(dy))
+    next_x = _fixed_point((column + 1 - x if dx > 0 else x - column) / abs(dx)) if steps_x > 0 else NO_BORDER
+    next_y = _fixed_point((line + 1 - y if dy > 0 else y - line) / abs(dy)) if steps_y > 0 else NO_BORDER
     left = steps_x + steps_y
     while left > 0:
-        at, used = _hits(numbers, line, column, used)
+        at, used = _hit_index(numbers, line, column, used)
         at += TILE * TILE
         # The steps one way that lead out of the tile, and those the other way before.
         steps_x = TILE - column % TILE if dx > 0 else column % TILE + 1
@@ -199,6 +201,6 @@ def _pass(
 
 
 @leaf_kernel
-def _fixed(t: float) -> int:
+def _fixed_point(t: float) -> int:
     """A place along a ray in units of 2⁻⁵²; what is far beyond its end is somewhere beyond."""
     return int(min(t, 16.0) * 4503599627370496.0)

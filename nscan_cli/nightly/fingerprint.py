@@ -13,11 +13,11 @@ from nscan_cli import __version__
 from nscan_cli.errors import InputMissingError
 from nscan_cli.files.inputs import common_hash, sha256_of
 from nscan_cli.logs.log_files import files_of
-from nscan_cli.nightly.manifest import Entry
+from nscan_cli.nightly.manifest import ManifestEntry
 
-NO_RESULTS = ("cli/", "nightly/", "exports/", "files/outputs.py")
+OUTSIDE_RESULTS = ("cli/", "nightly/", "exports/", "files/outputs.py")
 """Packages and modules whose code does not go into the results of a night."""
-MAKING = ("nightly/work.py", "nightly/preview.py")
+MAKES_RESULTS = ("nightly/worker.py", "nightly/map_preview.py")
 """But these files do."""
 
 
@@ -28,7 +28,7 @@ def tool_key() -> str:
     sources = hashlib.sha256()
     for path in sorted(package.rglob("*.py")):
         name = path.relative_to(package)
-        if name.as_posix().startswith(NO_RESULTS) and name.as_posix() not in MAKING:
+        if name.as_posix().startswith(OUTSIDE_RESULTS) and name.as_posix() not in MAKES_RESULTS:
             continue
         text = path.read_bytes()
         sources.update(f"{name.as_posix()}\0{len(text)}\0".encode() + text)
@@ -50,18 +50,18 @@ def input_hash(path: Path, role: str) -> str:
     return hashes[0] if len(hashes) == 1 else common_hash(hashes)
 
 
-def size_of(path: Path) -> int:
+def log_size(path: Path) -> int:
     """Bytes of the files that a log at `path` consists of."""
     return sum(Path(file).stat().st_size for file in files_of(str(path)))
 
 
-def made_from(entry: Entry, hashes: dict[str, str]) -> dict[str, Any]:
+def inputs_and_parameters(entry: ManifestEntry, hashes: dict[str, str]) -> dict[str, Any]:
     """Inputs and parameters of a log, so that what has changed can be told."""
     inputs = {role: [path.name, hashes[role]] for role, path in entry.inputs.items()}
     return {"inputs": inputs, "parameters": entry.parameters.as_table()}
 
 
-def fingerprint(entry: Entry, hashes: dict[str, str]) -> str:
+def fingerprint(entry: ManifestEntry, hashes: dict[str, str]) -> str:
     """The SHA-256 of all that the results of a log follow from; `hashes` are those of its inputs by role."""
     everything = {
         "tool": tool_key(),

@@ -4,18 +4,18 @@ from __future__ import annotations
 
 from html import escape
 
-from nscan_cli.nightly.verdict import Errors, Verdict
+from nscan_cli.nightly.regression_check import CheckResult, MeasuredErrors
 
 WIDTH, HEIGHT = 340, 96
 LEFT, RIGHT, TOP, BOTTOM = 50, 10, 8, 18
-NIGHTS = 40
+MAX_RUNS = 40
 """As many of the last ones are drawn."""
 
 
-def history(verdict: Verdict) -> str:
+def history_svg(verdict: CheckResult) -> str:
     """Error by night from 0 up, the bound as a dashed line, a cross for a night that failed."""
-    nights = verdict.nights[-NIGHTS:]
-    errors = [Errors.of(night) for night in nights]
+    nights = verdict.nights[-MAX_RUNS:]
+    errors = [MeasuredErrors.of(night) for night in nights]
     figures = [None if error is None else error.metres for error in errors]
     bound = verdict.entry.max_translation
     known = [figure for figure in figures if figure is not None]
@@ -32,9 +32,9 @@ def history(verdict: Verdict) -> str:
     if bound is not None and known:
         marks.append(f'<line class="bound" x1="{LEFT}" x2="{WIDTH - RIGHT}" y1="{y(bound):.1f}" '
                      f'y2="{y(bound):.1f}"/>')  # fmt: skip
-        marks.append(_label(LEFT - 6, y(bound) + 4, f"{bound:g}", "end"))
+        marks.append(_text_svg(LEFT - 6, y(bound) + 4, f"{bound:g}", "end"))
     if known:
-        marks.append(_label(LEFT - 6, y(0) + 4, "0 m", "end"))
+        marks.append(_text_svg(LEFT - 6, y(0) + 4, "0 m", "end"))
     corners = [f"{x(at):.1f},{y(figure):.1f}" for at, figure in enumerate(figures) if figure is not None]
     marks.append(f'<polyline class="run" points="{" ".join(corners)}"/>')
     for at, (night, figure) in enumerate(zip(nights, figures, strict=True)):
@@ -48,11 +48,11 @@ def history(verdict: Verdict) -> str:
             marks.append(f'<circle class="dot" cx="{x(at):.1f}" cy="{y(figure):.1f}" r="{radius}">'
                          f"<title>{figure:.4f} m; {tool}</title></circle>")  # fmt: skip
     count = "one night so far" if len(verdict.nights) == 1 else f"{len(verdict.nights)} nights"
-    marks.append(_label(WIDTH - RIGHT, HEIGHT - 3, count, "end"))
+    marks.append(_text_svg(WIDTH - RIGHT, HEIGHT - 3, count, "end"))
     return (
         f'<svg viewBox="0 0 {WIDTH} {HEIGHT}" role="img" aria-label="Errors by night">{"".join(marks)}</svg>'
     )
 
 
-def _label(x: float, y: float, text: str, anchor: str) -> str:
+def _text_svg(x: float, y: float, text: str, anchor: str) -> str:
     return f'<text x="{x:.1f}" y="{y:.1f}" text-anchor="{anchor}">{text}</text>'

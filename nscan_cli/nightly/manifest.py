@@ -13,19 +13,19 @@ from urllib.parse import urlsplit
 from nscan_cli.errors import InputDataError, InputMissingError, WrongUsageError
 from nscan_cli.files.inputs import read_toml
 from nscan_cli.files.text import path_of_name
-from nscan_cli.nightly.manifest_parameters import Parameters, parameters_from
+from nscan_cli.nightly.manifest_parameters import LogParameters, parameters_from
 
-ENDINGS = (".log.gz", ".log", ".clf.gz", ".clf", ".script.gz", ".script", ".mcap", ".bag", ".db3", "")
+LOG_SUFFIXES = (".log.gz", ".log", ".clf.gz", ".clf", ".script.gz", ".script", ".mcap", ".bag", ".db3", "")
 """Of a log that the manifest gives by its name alone; the first that is there is taken. "" is a folder."""
-NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,99}")
-TAKEN = ("report.html", "report.json")
+LOG_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,99}")
+RESERVED_NAMES = ("report.html", "report.json")
 """Files of the folder that has the logs' folders."""
 SHA256 = re.compile(r"[0-9a-f]{64}")
 ROLES = ("log", "relations", "reference")
 
 
 @dataclass(frozen=True)
-class Entry:
+class ManifestEntry:
     """A log of the manifest."""
 
     name: str
@@ -38,7 +38,7 @@ class Entry:
     """degrees"""
     published: dict[str, float] = field(default_factory=dict)
     """Method → its translational error (m) that somebody has published."""
-    parameters: Parameters = field(default_factory=Parameters)
+    parameters: LogParameters = field(default_factory=LogParameters)
     sources: dict[str, str] = field(default_factory=dict)
     """Role → where the file can be got."""
     sha256: dict[str, str] = field(default_factory=dict)
@@ -56,15 +56,15 @@ class Entry:
         return self.inputs["log"].exists()
 
 
-def read_manifest(path: str, data: str | None) -> list[Entry]:
+def read_manifest(path: str, data: str | None) -> list[ManifestEntry]:
     """The logs of the manifest at `path`, or of the one of that name which comes with the package.
 
     Their paths are relative to the folder `data`, or to the manifest where there is none. Raises
     InputMissingError when it cannot be read, InputDataError when it is not as it should be.
     """
     file, folder = path, Path(path).parent
-    if path in shipped() and not Path(path).exists():
-        file = str(shipped()[path])
+    if path in bundled_manifests() and not Path(path).exists():
+        file = str(bundled_manifests()[path])
         if data is None:
             raise WrongUsageError(
                 f"nightly: {path} has no logs of its own; give their folder with --data FOLDER; an empty one "
@@ -81,9 +81,9 @@ def read_manifest(path: str, data: str | None) -> list[Entry]:
     tables = document.get("log")
     if not isinstance(tables, list) or not all(isinstance(table, dict) for table in tables) or not tables:
         raise InputDataError(path, "has no logs", "begin each with [[log]], its name and path below")
-    entries: list[Entry] = []
+    entries: list[ManifestEntry] = []
     for number, table in enumerate(tables, 1):
-        entry = _entry(path, number, table, folder)
+        entry = _manifest_entry(path, number, table, folder)
         # Folders of names that differ in their case only are one folder on some file systems.
         if entry.name.lower() in (other.name.lower() for other in entries):
             raise InputDataError(path, f"two logs have the name {entry.name}", "give each its own")
@@ -91,28 +91,28 @@ def read_manifest(path: str, data: str | None) -> list[Entry]:
     return entries
 
 
-def shipped() -> dict[str, Path]:
+def bundled_manifests() -> dict[str, Path]:
     """The manifests that come with the package, by name."""
     return {path.stem: path for path in sorted(Path(__file__).parent.glob("*.toml"))}
 
 
-def _entry(file: str, number: int, table: dict[str, Any], folder: Path) -> Entry:
+def _manifest_entry(file: str, number: int, table: dict[str, Any], folder: Path) -> ManifestEntry:
     place = f"{file}, log {number}"
     name = table.get("name")
-    if not isinstance(name, str) or not NAME.fullmatch(name) or name.lower() in TAKEN:
+    if not isinstance(name, str) or not LOG_NAME.fullmatch(name) or name.lower() in RESERVED_NAMES:
         remedy = "letters, digits, '.', '_' and '-' make one, such as intel"
         raise InputDataError(place, "has no name" if name is None else f"{name!r} is no name", remedy)
     place += f" ({name})"
     for key, value in table.items():
-        if key not in KEYS:
-            raise InputDataError(place, f"has an unknown key {key!r}", f"known: {', '.join(KEYS)}")
-        problem = KEYS[key](value)
+        if key not in KEY_CHECKS:
+            raise InputDataError(place, f"has an unknown key {key!r}", f"known: {', '.join(KEY_CHECKS)}")
+        problem = KEY_CHECKS[key](value)
         if problem is not None:
-            raise InputDataError(place, f"{key} is {_shown(value)}", f"give {problem}")
+            raise InputDataError(place, f"{key} is {_abbreviated(value)}", f"give {problem}")
     if "relations" in table and "reference" in table:
         raise InputDataError(place, "has relations and reference", "leave one of them out")
     for role in ROLES:
-        for key in _about(role):
+        for key in _origin_keys(role):
             if key in table and role != "log" and role not in table:
                 raise InputDataError(place, f"has {key}, but no {role}", f"give {role} too, or leave it out")
     bounds = [key for key in ("max_translation", "max_rotation", "published") if key in table]
@@ -120,72 +120,72 @@ def _entry(file: str, number: int, table: dict[str, Any], folder: Path) -> Entry
         remedy = "give relations or reference too"
         raise InputDataError(place, f"has {bounds[0]}, but nothing to measure against", remedy)
     inputs = {
-        "log": folder / path_of_name(table["path"]) if "path" in table else _by_name(folder, name, table)
+        "log": folder / path_of_name(table["path"]) if "path" in table else _find_log(folder, name, table)
     }
-    inputs.update({role: _beside(folder, name, table, role) for role in ROLES[1:] if role in table})
-    return Entry(
+    inputs.update({role: _find_reference(folder, name, table, role) for role in ROLES[1:] if role in table})
+    return ManifestEntry(
         name=name,
         inputs=inputs,
         max_translation=table.get("max_translation"),
         max_rotation=table.get("max_rotation"),
         published={method: float(error) for method, error in table.get("published", {}).items()},
         parameters=parameters_from(place, table.get("parameters", {})),
-        sources={role: table[_about(role)[0]] for role in ROLES if _about(role)[0] in table},
-        sha256={role: table[_about(role)[1]] for role in ROLES if _about(role)[1] in table},
+        sources={role: table[_origin_keys(role)[0]] for role in ROLES if _origin_keys(role)[0] in table},
+        sha256={role: table[_origin_keys(role)[1]] for role in ROLES if _origin_keys(role)[1] in table},
         optional=table.get("optional", False),
         about=table.get("about", ""),
         published_map=table.get("published_map", ""),
     )
 
 
-def _about(role: str) -> tuple[str, str]:
+def _origin_keys(role: str) -> tuple[str, str]:
     """The keys that say where a file can be got, and its SHA-256."""
     return ("source", "sha256") if role == "log" else (f"{role}_source", f"{role}_sha256")
 
 
-def _by_name(folder: Path, name: str, table: dict[str, Any]) -> Path:
+def _find_log(folder: Path, name: str, table: dict[str, Any]) -> Path:
     """The log of this name, of one of its other names, or as the file at its source is called."""
-    paths = [folder / (each + ending) for each in _names_of(name, table) for ending in ENDINGS]
+    paths = [folder / (each + ending) for each in _file_stems(name, table) for ending in LOG_SUFFIXES]
     source: str = table.get("source", "")
     downloaded = PurePosixPath(urlsplit(source).path).name
-    if downloaded.endswith(ENDINGS[:-1]):
+    if downloaded.endswith(LOG_SUFFIXES[:-1]):
         paths += [folder / downloaded, folder / downloaded.removesuffix(".gz")]
     return next((path for path in paths if path.exists()), paths[0])
 
 
-def _beside(folder: Path, name: str, table: dict[str, Any], role: str) -> Path:
+def _find_reference(folder: Path, name: str, table: dict[str, Any], role: str) -> Path:
     """What the log is measured against: as named; of an optional log, also under a name of the log."""
     named = folder / path_of_name(table[role])
     if not table.get("optional"):
         return named
-    paths = [named, *(named.with_name(each + named.suffix) for each in _names_of(name, table))]
+    paths = [named, *(named.with_name(each + named.suffix) for each in _file_stems(name, table))]
     return next((path for path in paths if path.exists()), named)
 
 
-def _names_of(name: str, table: dict[str, Any]) -> list[str]:
+def _file_stems(name: str, table: dict[str, Any]) -> list[str]:
     return [name, *table.get("also", [])]
 
 
-def _shown(value: Any) -> str:
+def _abbreviated(value: Any) -> str:
     text = repr(value)
     return text if len(text) < 50 else f"{text[:47]}..."
 
 
-def _text(value: Any) -> str | None:
+def _check_text(value: Any) -> str | None:
     return None if isinstance(value, str) and value else "a text"
 
 
-def _number(value: Any) -> str | None:
+def _check_number(value: Any) -> str | None:
     good = isinstance(value, (int, float)) and not isinstance(value, bool) and value >= 0
     return None if good and math.isfinite(value) else "a number that is not negative"
 
 
-def _figures(value: Any) -> str | None:
-    good = isinstance(value, dict) and all(_number(error) is None for error in value.values())
+def _check_published(value: Any) -> str | None:
+    good = isinstance(value, dict) and all(_check_number(error) is None for error in value.values())
     return None if good else 'errors in metres by method, as in { "RBPF" = 0.070 }'
 
 
-def _digest(value: Any) -> str | None:
+def _check_sha256(value: Any) -> str | None:
     return (
         None
         if isinstance(value, str) and SHA256.fullmatch(value)
@@ -193,37 +193,39 @@ def _digest(value: Any) -> str | None:
     )
 
 
-def _names(value: Any) -> str | None:
-    good = isinstance(value, list) and all(isinstance(name, str) and NAME.fullmatch(name) for name in value)
+def _check_names(value: Any) -> str | None:
+    good = isinstance(value, list) and all(
+        isinstance(name, str) and LOG_NAME.fullmatch(name) for name in value
+    )
     return None if good else 'names of files without their endings, as in ["intel-lab"]'
 
 
-def _yes_or_no(value: Any) -> str | None:
+def _check_bool(value: Any) -> str | None:
     return None if isinstance(value, bool) else "true or false"
 
 
-def _table(value: Any) -> str | None:
+def _check_table(value: Any) -> str | None:
     return None if isinstance(value, dict) else "a table of options, as in { end = 60 }"
 
 
-KEYS: dict[str, Callable[[Any], str | None]] = {
-    "name": _text,
-    "path": _text,
-    "also": _names,
-    "optional": _yes_or_no,
-    "about": _text,
-    "published_map": _text,
-    "relations": _text,
-    "reference": _text,
-    "max_translation": _number,
-    "max_rotation": _number,
-    "published": _figures,
-    "parameters": _table,
-    "source": _text,
-    "sha256": _digest,
-    "relations_source": _text,
-    "relations_sha256": _digest,
-    "reference_source": _text,
-    "reference_sha256": _digest,
+KEY_CHECKS: dict[str, Callable[[Any], str | None]] = {
+    "name": _check_text,
+    "path": _check_text,
+    "also": _check_names,
+    "optional": _check_bool,
+    "about": _check_text,
+    "published_map": _check_text,
+    "relations": _check_text,
+    "reference": _check_text,
+    "max_translation": _check_number,
+    "max_rotation": _check_number,
+    "published": _check_published,
+    "parameters": _check_table,
+    "source": _check_text,
+    "sha256": _check_sha256,
+    "relations_source": _check_text,
+    "relations_sha256": _check_sha256,
+    "reference_source": _check_text,
+    "reference_sha256": _check_sha256,
 }
 """What a [[log]] may have; each says what it wants where a value is none."""

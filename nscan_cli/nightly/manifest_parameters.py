@@ -10,13 +10,13 @@ from typing import Any
 from nscan_cli.errors import InputDataError, WrongUsageError
 from nscan_cli.logs.reading_options import ReadingOptions
 
-RELATIONS = ("pairwise", "nscan", "both")
-DEGREES = ("angle-min", "angle-increment")
+RELATION_CHOICES = ("pairwise", "nscan", "both")
+DEGREE_OPTIONS = ("angle-min", "angle-increment")
 """Degrees in the manifest, rad inside."""
 
 
 @dataclass(frozen=True)
-class Parameters:
+class LogParameters:
     """How one log is read and mapped; what is not said has the defaults of `slam`."""
 
     reading: ReadingOptions = field(default_factory=ReadingOptions)
@@ -35,11 +35,11 @@ class Parameters:
             elif key == "mount":
                 table[key] = [value[0], value[1], round(math.degrees(value[2]), 9)]
             else:
-                table[key] = round(math.degrees(value), 9) if key in DEGREES else value
+                table[key] = round(math.degrees(value), 9) if key in DEGREE_OPTIONS else value
         return {**table, **self.mapping}
 
 
-def parameters_from(place: str, table: dict[str, Any]) -> Parameters:
+def parameters_from(place: str, table: dict[str, Any]) -> LogParameters:
     """The parameters of a table of the manifest; `place` says which one in messages.
 
     Raises InputDataError.
@@ -55,28 +55,30 @@ def parameters_from(place: str, table: dict[str, Any]) -> Parameters:
         if wanted is float and isinstance(value, int) and not isinstance(value, bool):
             value = float(value)
         if not _is_a(value, wanted):
-            raise _wrong(place, key, value, FORMS[wanted])
+            raise _parameter_error(place, key, value, TYPE_WORDS[wanted])
         if key in ("max-scans", "relations", "no-loops"):
             mapping[key] = value
         elif key == "mount":
-            reading["mount"] = _pose(place, value)
+            reading["mount"] = _mount_pose(place, value)
         elif key == "no-odometry":
             reading["odometry"] = not value
         else:
-            reading[key.replace("-", "_")] = math.radians(value) if key in DEGREES else value
+            reading[key.replace("-", "_")] = math.radians(value) if key in DEGREE_OPTIONS else value
     if mapping.get("max-scans", 3) < 3:
-        raise _wrong(place, "max-scans", mapping["max-scans"], "3 or more")
-    if mapping.get("relations", "both") not in RELATIONS:
-        raise _wrong(place, "relations", mapping["relations"], f"one of {', '.join(RELATIONS)}")
+        raise _parameter_error(place, "max-scans", mapping["max-scans"], "3 or more")
+    if mapping.get("relations", "both") not in RELATION_CHOICES:
+        raise _parameter_error(
+            place, "relations", mapping["relations"], f"one of {', '.join(RELATION_CHOICES)}"
+        )
     if reading.get("every", 1) < 1:
-        raise _wrong(place, "every", reading["every"], "1 or more")
+        raise _parameter_error(place, "every", reading["every"], "1 or more")
     try:
-        return Parameters(ReadingOptions(**reading), mapping)
+        return LogParameters(ReadingOptions(**reading), mapping)
     except WrongUsageError as error:
         raise InputDataError(place, f"parameters: {error}", "mend them") from error
 
 
-FORMS = {
+TYPE_WORDS = {
     float: "a number",
     int: "a whole number",
     str: "a text",
@@ -102,12 +104,12 @@ def _is_a(value: Any, wanted: type) -> bool:
     return type(value) is wanted
 
 
-def _pose(place: str, value: list[Any]) -> tuple[float, float, float]:
+def _mount_pose(place: str, value: list[Any]) -> tuple[float, float, float]:
     if len(value) != 3 or not all(type(part) in (int, float) for part in value):
-        raise _wrong(place, "mount", value, FORMS[list])
+        raise _parameter_error(place, "mount", value, TYPE_WORDS[list])
     x, y, degrees = value
     return float(x), float(y), math.radians(degrees)
 
 
-def _wrong(place: str, key: str, value: Any, wanted: str) -> InputDataError:
+def _parameter_error(place: str, key: str, value: Any, wanted: str) -> InputDataError:
     return InputDataError(place, f"parameters: {key} is {value!r}", f"give {wanted}")

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from nscan_cli.logs.reading_options import ReadingOptions
-from nscan_cli.nightly.manifest import Entry
+from nscan_cli.nightly.manifest import ManifestEntry
 
 OUTPUTS, TASK, RESULT = "outputs", "task.json", "result.json"
 """What a place of work has besides the inputs: a folder of outputs, the task, and at the end the result."""
@@ -27,7 +27,7 @@ class Task:
     mapping: dict[str, Any]
 
     @classmethod
-    def of(cls, entry: Entry) -> Task:
+    def of(cls, entry: ManifestEntry) -> Task:
         """The task of a log of the manifest."""
         inputs = {role: str(path.absolute()) for role, path in entry.inputs.items()}
         reading = dataclasses.asdict(entry.parameters.reading)
@@ -43,7 +43,7 @@ class Task:
         return json.dumps({**told, "threads": threads})
 
 
-def reading_of(record: dict[str, Any]) -> ReadingOptions:
+def reading_options_from(record: dict[str, Any]) -> ReadingOptions:
     """The reading options of a task's JSON."""
     mount = record["mount"]
     return ReadingOptions(**{**record, "mount": None if mount is None else tuple(mount)})
@@ -64,5 +64,5 @@ class Outcome:
         return cls({"reason": " ".join(reason.split())}, {})
 
 
-Report = Callable[[str, int, int, int], None]
+ProgressCallback = Callable[[str, int, int, int], None]
 """Called with the name of a log, and its scans done, all its scans, and its keyframes so far."""

@@ -1,6 +1,6 @@
 """All kernels compiled before the first log of a night, so that no log's time has their compilation in it.
 
-It is started by `start.py`. What it maps is a corridor round a block, driven round
+It is started by `bootstrap.py`. What it maps is a corridor round a block, driven round
 one and a half times by a robot whose odometry drifts: there are keyframes, joint matches and loops. One side
 is bare, so that the way along it is hardly known.
 """
@@ -16,19 +16,19 @@ from typing import TYPE_CHECKING
 
 from nscan_cli.kernels import machine_code
 from nscan_cli.kernels.cache_folder import cache_folder
-from nscan_cli.nightly import start
+from nscan_cli.nightly import bootstrap
 
 if TYPE_CHECKING:
     from nscan_cli.poses import Array
 
-OUTER, INNER = 9.0, 6.0
+OUTER_WALL, INNER_WALL = 9.0, 6.0
 """m from the middle to the corridor's walls."""
-WAY, STEP, BEAMS = 1.4, 0.3, 181
+LAPS, SCAN_SPACING, BEAMS = 1.4, 0.3, 181
 """Times round, m from scan to scan."""
-SIGHT, NO_RETURN, THREADS = 5.0, 81.91, 2
-DRIFT = 0.004
+LASER_RANGE, NO_RETURN, THREADS = 5.0, 81.91, 2
+ODOMETRY_DRIFT = 0.004
 """rad, per step."""
-DONE, LOCK = "all", ".compiling"
+COMPILED_FILE, LOCK_FILE = "all", ".compiling"
 """Files of the cache folder: the first, with the machine in its name, is there when all kernels are."""
 
 
@@ -38,32 +38,32 @@ def compile_kernels(environment: dict[str, str]) -> None:
     Where no folder is writable nothing is done. What goes wrong, the logs will say.
     """
     folder = cache_folder()
-    if folder is None or _is_done(folder):
+    if folder is None or _is_compiled(folder):
         return
-    with contextlib.suppress(OSError), (folder / LOCK).open("w") as lock:
+    with contextlib.suppress(OSError), (folder / LOCK_FILE).open("w") as lock:
         # Others wait here for the first, and find it done.
         fcntl.flock(lock, fcntl.LOCK_EX)
-        if not _is_done(folder):
+        if not _is_compiled(folder):
             subprocess.run(
-                start.command("warm_up"), env=environment, check=False, stdin=subprocess.DEVNULL,
+                bootstrap.worker_command("warm_up"), env=environment, check=False, stdin=subprocess.DEVNULL,
                 stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True,
             )  # fmt: skip
-            _done_file(folder).touch()
+            _compiled_file(folder).touch()
 
 
-def kept_kernels() -> set[str]:
+def cached_files() -> set[str]:
     """The files of the cache folder: one more, and something was compiled meanwhile."""
     folder = cache_folder()
     return set() if folder is None else {name for _, _, files in os.walk(folder) for name in files}
 
 
-def _is_done(folder: Path) -> bool:
+def _is_compiled(folder: Path) -> bool:
     """Whether the kernels were compiled, and not cleared away since."""
-    return _done_file(folder).exists() and not machine_code.first_compile("follow")
+    return _compiled_file(folder).exists() and not machine_code.first_compile("follow")
 
 
-def _done_file(folder: Path) -> Path:
-    return folder / f"{DONE}-{machine_code.machine()}"
+def _compiled_file(folder: Path) -> Path:
+    return folder / f"{COMPILED_FILE}-{machine_code.machine()}"
 
 
 def main() -> None:
@@ -77,26 +77,26 @@ def main() -> None:
     from nscan_cli.slam.map_log import map_log, slam_options
 
     compiled.bring_up()
-    drive = drive_as_carmen()
+    drive = simulated_carmen_log()
     for reading in (ReadingOptions(), ReadingOptions(end=20.0, odometry=False)):
         log = log_from(drive, "warm-up.log", reading)
         _, graph = map_log(log, reading, slam_options(None, None, True), THREADS, lambda *_progress: None)
         occupancy_grid(log, np.arange(len(log)), graph.poses, threads=THREADS)
 
 
-def drive_as_carmen() -> bytes:
+def simulated_carmen_log() -> bytes:
     """The drive as a CARMEN log."""
     import numpy as np
 
     from nscan_cli.poses import compose, relative
 
-    poses = _way()
+    poses = _simulated_poses()
     moves = relative(poses[1:], poses[:-1])
-    moves[:, 2] += DRIFT
+    moves[:, 2] += ODOMETRY_DRIFT
     robot = np.zeros(3)
     angles = np.radians(np.arange(BEAMS) - BEAMS // 2)
     lines = []
-    for row, ranges in enumerate(_ranges(poses, angles)):
+    for row, ranges in enumerate(_simulated_ranges(poses, angles)):
         robot = robot if row == 0 else compose(robot, moves[row - 1])
         pose = " ".join(f"{value:.6f}" for value in robot)
         values = " ".join(f"{value:.2f}" for value in ranges)
@@ -104,15 +104,15 @@ def drive_as_carmen() -> bytes:
     return "".join(lines).encode()
 
 
-def _way() -> Array:
+def _simulated_poses() -> Array:
     """Poses (S, 3) round the block in the middle of the corridor, turning on the spot at its corners."""
     import numpy as np
 
     from nscan_cli.poses import wrap
 
-    half = (OUTER + INNER) / 2
-    side = np.arange(-half, half, STEP)
-    sides = int(np.ceil(4 * WAY))
+    half = (OUTER_WALL + INNER_WALL) / 2
+    side = np.arange(-half, half, SCAN_SPACING)
+    sides = int(np.ceil(4 * LAPS))
     poses = []
     for number in range(sides):
         heading = number * np.pi / 2
@@ -126,14 +126,14 @@ def _way() -> Array:
     return way
 
 
-def _ranges(poses: Array, angles: Array) -> Array:
+def _simulated_ranges(poses: Array, angles: Array) -> Array:
     """(S, B) m to the walls of the corridor, with pillars on three of its sides."""
     import numpy as np
 
-    walls = [*_square(OUTER), *_square(INNER)]
+    walls = [*_square_walls(OUTER_WALL), *_square_walls(INNER_WALL)]
     for k in range(-8, 9, 2):
-        walls += [((k, OUTER), (k, OUTER - 0.4)), ((OUTER, k), (OUTER - 0.4, k)),
-                  ((-OUTER, k), (0.5 - OUTER, k + 0.3))]  # fmt: skip
+        walls += [((k, OUTER_WALL), (k, OUTER_WALL - 0.4)), ((OUTER_WALL, k), (OUTER_WALL - 0.4, k)),
+                  ((-OUTER_WALL, k), (0.5 - OUTER_WALL, k + 0.3))]  # fmt: skip
     directions = poses[:, 2:] + angles
     x, y = np.cos(directions), np.sin(directions)
     nearest = np.full(directions.shape, NO_RETURN)
@@ -145,9 +145,9 @@ def _ranges(poses: Array, angles: Array) -> Array:
             place = (along * y - left * x) / across
         meets = (length > 0.05) & (place >= 0) & (place <= 1)
         nearest = np.where(meets, np.minimum(nearest, length), nearest)
-    return np.where(nearest > SIGHT, NO_RETURN, nearest)
+    return np.where(nearest > LASER_RANGE, NO_RETURN, nearest)
 
 
-def _square(half: float) -> list[tuple[tuple[float, float], tuple[float, float]]]:
+def _square_walls(half: float) -> list[tuple[tuple[float, float], tuple[float, float]]]:
     corners = [(-half, -half), (half, -half), (half, half), (-half, half)]
     return list(zip(corners, [*corners[1:], corners[0]], strict=True))

@@ -12,8 +12,8 @@ from PIL import Image
 from nscan_cli.cli.main import run
 from nscan_cli.graph.io.tum import write_tum
 from nscan_cli.mapping.figures.canvas import BLUE, VERMILLION
-from nscan_cli.mapping.figures.colour_ramp import ramp
-from nscan_cli.mapping.figures.error_plots import REFERENCE
+from nscan_cli.mapping.figures.colormap import plasma
+from nscan_cli.mapping.figures.error_plots import REFERENCE_COLOUR
 
 # The robot drives 1 m a second along x; the relations say 1.1 m, and 1 m with 2° more.
 STAMPS = ["10.000000", "11.000000", "12.000000", "13.000000"]
@@ -170,9 +170,9 @@ def test_the_plot_shows_the_worst_relations(files: Path, capsys: pytest.CaptureF
 
 def test_the_plot_shows_both_trajectories_and_the_error(files: Path, capsys: pytest.CaptureFixture[str]):
     pixels = plotted(capsys, "--reference", "reference.tum")
-    assert count(pixels, REFERENCE) > 1000
+    assert count(pixels, REFERENCE_COLOUR) > 1000
     # All errors are 0.1 m, the greatest.
-    assert count(pixels, ramp(16)[-1]) > 100
+    assert count(pixels, plasma(16)[-1]) > 100
 
 
 @pytest.mark.parametrize("square", [True, False], ids=["side by side", "stacked"])
@@ -190,9 +190,9 @@ def test_relations_and_reference_have_a_panel_each(
     else:
         first, second = pixels[: height // 2], pixels[height // 2 :]
     assert count(first, VERMILLION) > 500
-    assert count(second, REFERENCE) > 500
+    assert count(second, REFERENCE_COLOUR) > 500
     # A few pixels of the edges of letters have that gray as well.
-    assert count(first, REFERENCE) < 100
+    assert count(first, REFERENCE_COLOUR) < 100
     assert count(second, VERMILLION) == 0
 
 

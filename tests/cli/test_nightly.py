@@ -11,7 +11,7 @@ import pytest
 
 from nscan_cli.cli.main import run
 from tests.data import SAMPLE_LOGS, data_file
-from tests.nightly.small import copy_of, results, write_logs
+from tests.nightly.small_logs import copy_of, results, write_logs
 
 
 @pytest.fixture(scope="module")

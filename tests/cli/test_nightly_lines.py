@@ -10,20 +10,20 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn
 
 from nscan_cli.cli.night_lines import LiveLines, night_lines
-from nscan_cli.nightly.manifest import Entry
-from nscan_cli.nightly.night_history import Night
+from nscan_cli.nightly.manifest import ManifestEntry
+from nscan_cli.nightly.run_history import RunRecord
 
-DONE: Night = {
+DONE: RunRecord = {
     "outcome": "done",
     "counts": {"duration": 100.0},
     "evaluation": {"relations": {"translation": {"mean": 0.0128}, "rotation": {"mean": 0.2}}},
     "times": {"seconds": 4.0},
 }
-FAILED: Night = {"outcome": "failed", "reason": "it died", "times": {}}
+FAILED: RunRecord = {"outcome": "failed", "reason": "it died", "times": {}}
 
 
-def entry(name: str) -> Entry:
-    return Entry(name, {"log": Path("x")})
+def entry(name: str) -> ManifestEntry:
+    return ManifestEntry(name, {"log": Path("x")})
 
 
 def test_a_live_line_for_each_log_and_no_more():

@@ -12,8 +12,8 @@ from nscan_cli.cli.main import run
 from nscan_cli.graph.io.json_graph import write_graph
 from nscan_cli.graph.model import Pairwise
 from nscan_cli.logs.load import read_log
-from nscan_cli.mapping.figures.canvas import BLACK, DIM
-from nscan_cli.mapping.figures.colour_ramp import ramp
+from nscan_cli.mapping.figures.canvas import BLACK, GRAY
+from nscan_cli.mapping.figures.colormap import plasma
 from nscan_cli.poses import relative
 from tests.cli.test_nscan import SCANS, SPEC, graph_of, matched
 from tests.data import OFFICE_LOG
@@ -38,7 +38,7 @@ def test_the_plot_shows_the_start_above_the_result(tmp_path, capsys):
     assert above.shape == below.shape
     # One circle for each scan in either, apart from the legend's; and they have moved.
     for panel in (above, below):
-        assert all(count(panel, colour) > 200 for colour in ramp(4))
+        assert all(count(panel, colour) > 200 for colour in plasma(4))
     assert (above != below).any()
 
 
@@ -59,7 +59,7 @@ def test_the_plot_marks_the_scans_that_were_left_out(tmp_path, capsys):
     with Image.open(tmp_path / "nscan.png") as picture:
         pixels = np.asarray(picture).astype(int)
     above, below = pixels[: len(pixels) // 2], pixels[len(pixels) // 2 :]
-    gray = [255 + (channel - 255) * 170 // 255 for channel in DIM]
+    gray = [255 + (channel - 255) * 170 // 255 for channel in GRAY]
     gray_dots = [
         np.count_nonzero(np.abs(panel - np.array(gray)).max(axis=-1) <= 2) for panel in (above, below)
     ]

@@ -16,7 +16,7 @@ from nscan_cli.cli.main import COMMANDS, cli, run
 from nscan_cli.cli.manual import EXAMPLES, EXIT_CODES
 from nscan_cli.cli.subcommand import Option, Subcommand
 from nscan_cli.files.limits import ALL
-from nscan_cli.nightly.manifest import KEYS, read_manifest
+from nscan_cli.nightly.manifest import KEY_CHECKS, read_manifest
 from tests.data import CORRIDOR_LOG, REPOSITORY
 from tests.docs.blocks import blocks
 from tests.reference import reference
@@ -76,7 +76,7 @@ def test_the_manifest_that_is_shown_has_every_key_and_can_be_read(tmp_path):
     (entry,) = read_manifest(str(tmp_path / "robots.toml"), None)
     assert entry.name == "intel"
     assert (entry.max_translation, entry.parameters.mapping) == (0.02, {"max-scans": 8})
-    for key in KEYS:
+    for key in KEY_CHECKS:
         assert key in PAGE.partition("## Manifest\n")[2].partition("\n## ")[0]
 
 

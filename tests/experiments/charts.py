@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from nscan_cli.mapping.figures.axes import Entry, legend, round_length
+from nscan_cli.mapping.figures.axes import LegendEntry, draw_legend, round_length
 from nscan_cli.mapping.figures.canvas import (
     BLACK,
     BLUE,
@@ -66,7 +66,7 @@ class Plane:
         for y in ticks(low_y, high_y):
             self._lines(np.array([low_x, high_x]), np.array([y, y]), GRID, 1.0)
 
-    def frame(self, x_label: str, y_label: str, title: str, entries: Sequence[Entry]) -> None:
+    def frame(self, x_label: str, y_label: str, title: str, entries: Sequence[LegendEntry]) -> None:
         """The frame with numbers, labels, title and legend; over whatever reached beyond the plot."""
         canvas, unit = self.canvas, self.canvas.unit
         canvas.clear_margins()
@@ -88,7 +88,7 @@ class Plane:
         canvas.text((left, top - 12 * unit), y_label, "lb")
         size = TEXT_SIZE * min(1.0, (right - left) / canvas.text_width(title))
         canvas.text(((left + right) / 2, top - 50 * unit), title, "ms", size)
-        legend(canvas, entries, left, right, bottom + 76 * unit, 0.5)
+        draw_legend(canvas, entries, left, right, bottom + 76 * unit, 0.5)
 
     def line(self, x: Array, y: Array, colour: Colour) -> None:
         """A line through data (N,), (N,); each point marked where there are few."""
@@ -120,7 +120,7 @@ def line_chart(
     spare = SPARE * float(np.ptp(xs)) if any(len(x) <= MOST_DOTTED for x, _ in series.values()) else 0.0
     plane = Plane(canvas, (float(xs.min()) - spare, low, float(xs.max()) + spare, high))
     plane.grid()
-    entries: list[Entry] = []
+    entries: list[LegendEntry] = []
     for number, (name, (x, y)) in enumerate(series.items()):
         colour = COLOURS[number % len(COLOURS)]
         plane.line(x, y, colour)
@@ -153,7 +153,7 @@ def heat_map(
     width, height = size
     canvas = Canvas((0.0, 0.0, float(width), float(height)), 1.0, gray, MARGINS, BESIDE_SCALE)
     plane = Plane(canvas, bounds)
-    entries: list[Entry] = []
+    entries: list[LegendEntry] = []
     for name, (colour, places) in marks.items():
         # A ring is a disc of no opacity within.
         ring = plane.places(places[:, 0], places[:, 1])

@@ -14,9 +14,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from nscan_cli.mapping.figures.axes import CAPTION_MARGINS, Entry, caption
+from nscan_cli.mapping.figures.axes import TITLE_MARGINS, LegendEntry, draw_title_and_legend
 from nscan_cli.mapping.figures.canvas import GREEN, ORANGE, PURPLE, SKY, VERMILLION, Canvas
-from nscan_cli.mapping.figures.panels import side_by_side, stacked
+from nscan_cli.mapping.figures.panels import hstack_images, vstack_images
 from nscan_cli.matching.joint.joint_energy import JointProblem, all_pairs, joint_energy, no_priors
 from nscan_cli.matching.joint.joint_match import JointOptions, match_jointly
 from nscan_cli.matching.joint.scan_set import lay_out
@@ -190,22 +190,22 @@ def _picture() -> Image:
         "Energy of all three (dark: low)",
         {"lowest": (GREEN, lowest), "second lowest": (VERMILLION, second)},
     )
-    energies = side_by_side([chart, image])
-    return stacked([_shapes(energies.width), energies])
+    energies = hstack_images([chart, image])
+    return vstack_images([_shapes(energies.width), energies])
 
 
 def _shapes(width: int) -> Image:
     """The three beside each other, in a picture of this width, pixels."""
     lefts = np.concatenate([[0.0], np.cumsum(np.array(WALLS) + GAP)])
     bounds = (-GAP / 2, -0.5, float(lefts[-1]) - GAP / 2, HEIGHTS[-1][1] + 0.5)
-    margins = SMALL * (CAPTION_MARGINS[0] + CAPTION_MARGINS[2]) / 1000
-    canvas = Canvas.blank(bounds, int(width / (1 + margins)), CAPTION_MARGINS, SMALL)
-    entries: list[Entry] = []
+    margins = SMALL * (TITLE_MARGINS[0] + TITLE_MARGINS[2]) / 1000
+    canvas = Canvas.blank(bounds, int(width / (1 + margins)), TITLE_MARGINS, SMALL)
+    entries: list[LegendEntry] = []
     for which, colour in enumerate((ORANGE, SKY, PURPLE)):
         moved = shape(which) + ORIGIN + np.array([lefts[which] + WALLS[which] / 2, 0.0])
         canvas.dots(moved, 3.2, colour)
         entries.append(("disc", colour, f"shape {which + 1}"))
-    caption(canvas, "Three shapes", entries)
+    draw_title_and_legend(canvas, "Three shapes", entries)
     return canvas.image()
 
 

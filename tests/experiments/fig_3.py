@@ -13,10 +13,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from nscan_cli.mapping.figures.axes import Entry, caption
+from nscan_cli.mapping.figures.axes import LegendEntry, draw_title_and_legend
 from nscan_cli.mapping.figures.canvas import BLUE, GREEN, PURPLE, VERMILLION
-from nscan_cli.mapping.figures.panels import bounds_around, panel, side_by_side, stacked
-from nscan_cli.mapping.figures.symbols import robots
+from nscan_cli.mapping.figures.panels import bounds_around, hstack_images, panel, vstack_images
+from nscan_cli.mapping.figures.symbols import draw_robots
 from nscan_cli.matching.joint.joint_energy import JointProblem, Priors, joint_energy
 from nscan_cli.matching.joint.joint_match import JointMatch, JointOptions, match_near_and_far
 from nscan_cli.matching.joint.neutral_energy import neutral_energy
@@ -218,7 +218,7 @@ def _picture() -> Image:
         beside=True,
     )
     above, below = [_panel((0, 1)), _panel((0, 2))], [_panel(ALL), chart]
-    return stacked([side_by_side(above), side_by_side(below)])
+    return vstack_images([hstack_images(above), hstack_images(below)])
 
 
 def _panel(which: tuple[int, ...]) -> Image:
@@ -227,7 +227,7 @@ def _panel(which: tuple[int, ...]) -> Image:
     placed = [transform(pose, points) for pose, points in zip(poses, scans().points, strict=True)]
     canvas = panel(bounds_around(np.concatenate(placed)), beside=True)
     covariance = np.linalg.inv(information(which)).astype(np.float64)
-    entries: list[Entry] = []
+    entries: list[LegendEntry] = []
     for scan in which:
         canvas.dots(placed[scan], 3.0, COLOURS[scan])
         entries.append(("robot", COLOURS[scan], f"scan {scan + 1}"))
@@ -236,7 +236,7 @@ def _panel(which: tuple[int, ...]) -> Image:
         canvas.ellipses(poses[None, scan, :2], block[None], ENLARGED, PURPLE)
     for scan in which:
         pose = poses[scan]
-        robots(canvas, canvas.pixels(pose[None, :2]), pose[None, 2], 7.0, COLOURS[scan])
+        draw_robots(canvas, canvas.pixels(pose[None, :2]), pose[None, 2], 7.0, COLOURS[scan])
     entries.append(("ellipse", PURPLE, f"{ENLARGED:g} sigma"))
-    caption(canvas, f"Scans {_name(which)}", entries)
+    draw_title_and_legend(canvas, f"Scans {_name(which)}", entries)
     return canvas.image()

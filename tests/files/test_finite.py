@@ -19,7 +19,7 @@ from nscan_cli.graph.io.json_graph import write_graph
 from nscan_cli.graph.io.tum import write_tum
 from nscan_cli.graph.model import Graph
 from nscan_cli.logs.laser_log import LaserLog
-from nscan_cli.mapping.map_image import MapImage, gray, map_yaml
+from nscan_cli.mapping.map_server import MapImage, gray_image, map_yaml
 from nscan_cli.mapping.occupancy import occupancy_grid
 from tests.cli.room_log import room_log
 from tests.graph.small_graph import small_graph
@@ -97,7 +97,7 @@ def test_exports(log, value):
     with pytest.raises(NotFiniteError):
         ros2_recording(log, rows, rows, with_wrong_pose(value), grid)
     with pytest.raises(NotFiniteError):
-        map_yaml("map.png", MapImage(gray(grid), 0.05, (value, 0.0)))
+        map_yaml("map.png", MapImage(gray_image(grid), 0.05, (value, 0.0)))
 
 
 def test_stamps_that_ros_has_no_room_for_are_wrong_usage(log):

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from nscan_cli.cli.main import run
-from tests.nightly.small import write_logs
+from tests.nightly.small_logs import write_logs
 
 
 @pytest.fixture(scope="session")

@@ -5,17 +5,17 @@ from pathlib import Path
 from typing import Any
 from xml.etree.ElementTree import Element, fromstring
 
-from nscan_cli.nightly.history_plot import NIGHTS, history
-from nscan_cli.nightly.manifest import Entry
-from nscan_cli.nightly.night_history import Night
-from nscan_cli.nightly.verdict import verdict
-from tests.nightly.test_verdict import FAILED, done
+from nscan_cli.nightly.history_plot import MAX_RUNS, history_svg
+from nscan_cli.nightly.manifest import ManifestEntry
+from nscan_cli.nightly.regression_check import check_log
+from nscan_cli.nightly.run_history import RunRecord
+from tests.nightly.test_regression_check import FAILED, done
 
-ENTRY = Entry("a", {"log": Path("a.log"), "relations": Path("r")}, 0.05)
+ENTRY = ManifestEntry("a", {"log": Path("a.log"), "relations": Path("r")}, 0.05)
 
 
-def plot(*nights: Night) -> Element:
-    svg = history(verdict(ENTRY, list(nights), [], False))
+def plot(*nights: RunRecord) -> Element:
+    svg = history_svg(check_log(ENTRY, list(nights), [], False))
     return fromstring(svg)
 
 
@@ -39,11 +39,11 @@ def test_a_dot_for_each_night_and_a_cross_for_a_failure():
 def test_all_lies_inside():
     svg = plot(*(done(0.01 * k) for k in range(1, 60)))
     dots = classes(svg, "dot")
-    assert len(dots) == NIGHTS
+    assert len(dots) == MAX_RUNS
     assert all(0 <= float(dot.get("cx")) <= 340 and 0 <= float(dot.get("cy")) <= 96 for dot in dots)
     assert svg[-1].text == "59 nights"
 
 
 def test_without_any_errors_there_is_still_a_plot():
     assert not classes(plot(FAILED), "bound")
-    assert not re.search("nan", history(verdict(ENTRY, [done(0.0)], [], False)))
+    assert not re.search("nan", history_svg(check_log(ENTRY, [done(0.0)], [], False)))

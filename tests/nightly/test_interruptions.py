@@ -14,8 +14,8 @@ import pytest
 
 from nscan_cli.cli.main import run
 from nscan_cli.files.outputs import TEMPORARY
-from nscan_cli.nightly.folder import claimed
-from tests.nightly.small import copy_of, results
+from nscan_cli.nightly.results_folder import locked_folder
+from tests.nightly.small_logs import copy_of, results
 
 
 def start(manifest: Path, folder: Path, *more: str) -> subprocess.Popen[bytes]:
@@ -57,7 +57,7 @@ def test_an_interrupt_is_code_130_and_quick(small, undisturbed, tmp_path):
 
 def test_two_at_once_in_one_folder_are_refused(small, tmp_path, capsys):
     folder = tmp_path / "nights"
-    with claimed(str(folder)):
+    with locked_folder(str(folder)):
         assert run(["nightly", str(small), "-o", str(folder)]) == 73
     assert "another nightly is at work there" in capsys.readouterr().err
 

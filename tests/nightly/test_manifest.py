@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from nscan_cli.errors import InputDataError, InputMissingError, WrongUsageError
-from nscan_cli.nightly.manifest import Entry, read_manifest, shipped
+from nscan_cli.nightly.manifest import ManifestEntry, bundled_manifests, read_manifest
 from nscan_cli.nightly.manifest_parameters import parameters_from
 
 INTEL = """
@@ -20,7 +20,7 @@ published = { "Cartographer" = 0.0229, "RBPF" = 0.070 }
 """
 
 
-def read(tmp_path: Path, text: str, data: str | None = None) -> list[Entry]:
+def read(tmp_path: Path, text: str, data: str | None = None) -> list[ManifestEntry]:
     (tmp_path / "night.toml").write_text(text)
     return read_manifest(str(tmp_path / "night.toml"), data)
 
@@ -172,4 +172,4 @@ def test_the_manifest_of_radish_has_the_logs_under_their_names_and_those_of_down
 
 
 def test_the_manifests_that_are_shipped():
-    assert set(shipped()) == {"kuemmerle", "radish"}
+    assert set(bundled_manifests()) == {"kuemmerle", "radish"}

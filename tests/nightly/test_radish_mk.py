@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from tests.data import SAMPLE_LOGS
-from tests.nightly.small import write_logs
+from tests.nightly.small_logs import write_logs
 
 MAKEFILE = SAMPLE_LOGS / "radish.mk"
 MAKE = shutil.which("make")

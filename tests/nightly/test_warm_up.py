@@ -12,11 +12,11 @@ import pytest
 from nscan_cli.cli.night_lines import PlainLines
 from nscan_cli.kernels import machine_code
 from nscan_cli.logs.load import log_from
-from nscan_cli.nightly import processes, start, warm_up, work
-from nscan_cli.nightly.log_card import card
-from nscan_cli.nightly.manifest import Entry
+from nscan_cli.nightly import bootstrap, local_executor, warm_up, worker
+from nscan_cli.nightly.html_log_section import log_section
+from nscan_cli.nightly.manifest import ManifestEntry
+from nscan_cli.nightly.regression_check import check_log
 from nscan_cli.nightly.task import Task
-from nscan_cli.nightly.verdict import verdict
 from tests.cli.room_log import room_log
 
 
@@ -39,7 +39,7 @@ def calls(monkeypatch):
 def test_once_on_each_machine(cache, calls, monkeypatch):
     warm_up.compile_kernels({})
     warm_up.compile_kernels({})
-    assert calls == [start.command("warm_up")]
+    assert calls == [bootstrap.worker_command("warm_up")]
     # Somebody has cleared the folder.
     with monkeypatch.context() as patch:
         patch.setattr(machine_code, "first_compile", lambda _name: True)
@@ -55,12 +55,12 @@ def test_where_nothing_can_be_kept_nothing_is_done(calls, monkeypatch):
     monkeypatch.setattr(warm_up, "cache_folder", lambda: None)
     warm_up.compile_kernels({})
     assert calls == []
-    assert warm_up.kept_kernels() == set()
+    assert warm_up.cached_files() == set()
 
 
 def test_before_the_first_log_begins(cache, monkeypatch, tmp_path):
     order = []
-    monkeypatch.setattr(processes, "compile_kernels", lambda _environment: order.append("kernels"))
+    monkeypatch.setattr(local_executor, "compile_kernels", lambda _environment: order.append("kernels"))
 
     class BegunError(Exception):
         pass
@@ -69,14 +69,14 @@ def test_before_the_first_log_begins(cache, monkeypatch, tmp_path):
         order.append("log")
         raise BegunError
 
-    monkeypatch.setattr(processes, "Work", begin)
+    monkeypatch.setattr(local_executor, "WorkerProcess", begin)
     with pytest.raises(BegunError):
-        next(processes.run_all([Task("a", {}, {}, {})], 1, None, tmp_path, lambda *_said: None))
+        next(local_executor.run_locally([Task("a", {}, {}, {})], 1, None, tmp_path, lambda *_said: None))
     assert order == ["kernels", "log"]
 
 
 def test_the_drive_has_what_a_night_can_have():
-    log = log_from(warm_up.drive_as_carmen(), "warm-up.log")
+    log = log_from(warm_up.simulated_carmen_log(), "warm-up.log")
     assert (len(log), log.ranges.shape[1]) == (330, warm_up.BEAMS)
     assert log.report.skipped == {}
     assert log.no_return == pytest.approx(warm_up.NO_RETURN)
@@ -93,14 +93,14 @@ def test_a_time_with_compilation_in_it_is_none(cache, tmp_path, compiles):
     importlib.import_module("numba")
     (tmp_path / "a.log").write_text(room_log(12))
     (tmp_path / "outputs").mkdir()
-    task = Task.of(Entry("a", {"log": tmp_path / "a.log"}))
+    task = Task.of(ManifestEntry("a", {"log": tmp_path / "a.log"}))
     told = {"inputs": task.inputs, "reading": task.reading, "mapping": {}, "threads": 1}
 
     def report(*_progress: int) -> None:
         if compiles:
             (cache / "follow.code").touch()
 
-    result = work.work(told, tmp_path / "outputs", report)
+    result = worker.map_and_evaluate(told, tmp_path / "outputs", report)
     assert (result["times"]["seconds"] is None) == compiles
 
 
@@ -111,9 +111,9 @@ def test_what_is_not_timed_is_said(tmp_path, capsys):
                    "loops": {"accepted": 0, "refused": 0}},
         "times": {"seconds": None, "finished": "2026-11-21T03:00:00Z", "anew": ["the log has changed"]},
     }  # fmt: skip
-    entry = Entry("a", {"log": Path("a.log")})
+    entry = ManifestEntry("a", {"log": Path("a.log")})
     PlainLines(False).finished(entry, night)
     assert capsys.readouterr().err == "a: not timed: kernels were compiled meanwhile\n"
-    text = card(verdict(entry, [night], [], absent=False), tmp_path)
+    text = log_section(check_log(entry, [night], [], absent=False), tmp_path)
     assert '<span class="time">not timed: kernels were compiled meanwhile</span>' in text
     assert '<span class="time">2026-11-21 03:00:00 UTC, anew: the log has changed</span>' in text

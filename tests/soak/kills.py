@@ -19,7 +19,7 @@ from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
 
-from tests.nightly.small import SCANS, results, write_logs
+from tests.nightly.small_logs import SCANS, results, write_logs
 
 TEMPORARY = ".nscan-cli."
 JOBS = 2

@@ -8,25 +8,25 @@ from collections.abc import Sequence
 import numpy as np
 
 from nscan_cli.mapping.figures.canvas import BLACK, TEXT_SIZE, Canvas, Colour
-from nscan_cli.mapping.figures.colour_ramp import ramp
-from nscan_cli.mapping.figures.symbols import crosses, robots
+from nscan_cli.mapping.figures.colormap import plasma
+from nscan_cli.mapping.figures.symbols import draw_crosses, draw_robots
 
-Entry = tuple[str, Colour, str]
+LegendEntry = tuple[str, Colour, str]
 """Of a legend: a shape (line, disc, robot, cross, ellipse or, all colours of it, ramp), colour, meaning."""
 AXES_MARGINS = (64.0, 44.0, 24.0, 64.0)
-"""What `axes` needs around the plot, units."""
-CAPTION_MARGINS = (64.0, 48.0, 24.0, 92.0)
-"""What `caption` and `legend_below` need."""
-FOOTER_MARGINS = (0.0, 0.0, 0.0, 44.0)
-"""What `footer` needs."""
-GAP, BETWEEN = 8.0, 22.0
+"""What `draw_axes` needs around the plot, units."""
+TITLE_MARGINS = (64.0, 48.0, 24.0, 92.0)
+"""What `draw_title_and_legend` and `draw_legend_below` need."""
+SCALE_BAR_MARGINS = (0.0, 0.0, 0.0, 44.0)
+"""What `draw_scale_bar` needs."""
+SYMBOL_GAP, ENTRY_GAP = 8.0, 22.0
 """Units from a symbol to its meaning, and from there to the next symbol."""
-LEGIBLE = 0.1
+MIN_TEXT_SCALE = 0.1
 """Text is shrunk to no less than such a share of its size, or left out."""
 RAMP_STEPS = 14
 
 
-def axes(canvas: Canvas) -> None:
+def draw_axes(canvas: Canvas) -> None:
     """A frame around the plot, with ticks and numbers in metres."""
     left, top, right, bottom = canvas.plot
     low_x, low_y, high_x, high_y = canvas.bounds
@@ -46,29 +46,29 @@ def axes(canvas: Canvas) -> None:
     canvas.text((left, top - 12 * unit), "y (m)", "mb")
 
 
-def caption(canvas: Canvas, title: str, entries: Sequence[Entry]) -> None:
+def draw_title_and_legend(canvas: Canvas, title: str, entries: Sequence[LegendEntry]) -> None:
     """Axes, a title above the plot, and a legend below it; over whatever was drawn in the margins."""
-    legend_below(canvas, entries)
+    draw_legend_below(canvas, entries)
     left, top, right, _bottom = canvas.plot
     # Beside "y (m)".
     start = left + 40 * canvas.unit
     shrunk = min(1.0, (right - start) / canvas.text_width(title))
-    if shrunk < LEGIBLE:
+    if shrunk < MIN_TEXT_SCALE:
         return
     size = TEXT_SIZE * shrunk
     x = max(start, (left + right - canvas.text_width(title, size)) / 2)
     canvas.text((x, top - 16 * canvas.unit), title, "ls", size)
 
 
-def legend_below(canvas: Canvas, entries: Sequence[Entry]) -> None:
+def draw_legend_below(canvas: Canvas, entries: Sequence[LegendEntry]) -> None:
     """Axes, and a legend below the plot; over whatever was drawn in the margins."""
     left, _top, right, bottom = canvas.plot
     canvas.clear_margins()
-    axes(canvas)
-    legend(canvas, entries, left, right, bottom + 72 * canvas.unit, 0.5)
+    draw_axes(canvas)
+    draw_legend(canvas, entries, left, right, bottom + 72 * canvas.unit, 0.5)
 
 
-def footer(canvas: Canvas, entries: Sequence[Entry]) -> None:
+def draw_scale_bar(canvas: Canvas, entries: Sequence[LegendEntry]) -> None:
     """A scale and a legend below the plot."""
     left, _top, right, bottom = canvas.plot
     unit, y = canvas.unit, bottom + 22 * canvas.unit
@@ -80,11 +80,11 @@ def footer(canvas: Canvas, entries: Sequence[Entry]) -> None:
     canvas.pixel_lines(ends, BLACK, 2)
     scale = f"{length:g} m"
     canvas.text((end + 9 * unit, y), scale)
-    legend(canvas, entries, end + canvas.text_width(scale) + 28 * unit, right - 14 * unit, y)
+    draw_legend(canvas, entries, end + canvas.text_width(scale) + 28 * unit, right - 14 * unit, y)
 
 
-def legend(
-    canvas: Canvas, entries: Sequence[Entry], left: float, right: float, y: float, align: float = 1.0
+def draw_legend(
+    canvas: Canvas, entries: Sequence[LegendEntry], left: float, right: float, y: float, align: float = 1.0
 ) -> None:
     """Symbols and what they stand for in a line at y, between left and right, all in pixels.
 
@@ -92,20 +92,20 @@ def legend(
     left of it that comes first.
     """
     needed = sum(
-        canvas.text_width(entry[2]) + (_symbol_width(entry) + GAP + BETWEEN) * canvas.unit
+        canvas.text_width(entry[2]) + (_symbol_width(entry) + SYMBOL_GAP + ENTRY_GAP) * canvas.unit
         for entry in entries
     )
-    needed -= BETWEEN * canvas.unit
+    needed -= ENTRY_GAP * canvas.unit
     shrunk = min(1.0, (right - left) / max(needed, 1.0))
-    if shrunk < LEGIBLE:
+    if shrunk < MIN_TEXT_SCALE:
         return
     size, unit = TEXT_SIZE * shrunk, canvas.unit * shrunk
     x = left + align * (right - left - shrunk * needed)
     for entry in entries:
-        _symbol(canvas, entry, x, y, unit)
-        x += (_symbol_width(entry) + GAP) * unit
+        _draw_symbol(canvas, entry, x, y, unit)
+        x += (_symbol_width(entry) + SYMBOL_GAP) * unit
         canvas.text((x, y), entry[2], size=size)
-        x += canvas.text_width(entry[2], size) + BETWEEN * unit
+        x += canvas.text_width(entry[2], size) + ENTRY_GAP * unit
 
 
 def round_length(length: float) -> float:
@@ -114,12 +114,12 @@ def round_length(length: float) -> float:
     return next(factor * power for factor in (5, 2, 1) if factor * power <= length * (1 + 1e-9))
 
 
-def _symbol_width(entry: Entry) -> float:
+def _symbol_width(entry: LegendEntry) -> float:
     """Units."""
     return 70.0 if entry[0] == "ramp" else 28.0
 
 
-def _symbol(canvas: Canvas, entry: Entry, x: float, y: float, unit: float) -> None:
+def _draw_symbol(canvas: Canvas, entry: LegendEntry, x: float, y: float, unit: float) -> None:
     """A symbol from x to the right, with units of so many pixels."""
     shape, colour, _meaning = entry
     width = _symbol_width(entry)
@@ -129,14 +129,14 @@ def _symbol(canvas: Canvas, entry: Entry, x: float, y: float, unit: float) -> No
         canvas.pixel_lines(np.array([[[x, y], [x + width * unit, y]]]), colour, 3)
     elif shape == "ramp":
         edges = np.linspace(x, x + width * unit, RAMP_STEPS + 1)
-        for start, end, step in zip(edges[:-1], edges[1:], ramp(RAMP_STEPS), strict=True):
+        for start, end, step in zip(edges[:-1], edges[1:], plasma(RAMP_STEPS), strict=True):
             canvas.pixel_lines(np.array([[[start, y], [end, y]]]), step, 12 * shrunk)
     elif shape == "disc":
         canvas.pixel_ovals(middle, np.array([5.0, 5.0]) * shrunk, colour)
     elif shape == "robot":
-        robots(canvas, middle, np.zeros(1), 7 * shrunk, colour)
+        draw_robots(canvas, middle, np.zeros(1), 7 * shrunk, colour)
     elif shape == "cross":
-        crosses(canvas, middle, 6 * shrunk, colour)
+        draw_crosses(canvas, middle, 6 * shrunk, colour)
     else:
         canvas.pixel_ovals(middle, np.array([12.0, 7.0]) * shrunk, (*colour[:3], 60), colour)
 

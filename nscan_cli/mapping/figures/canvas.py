@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from nscan_cli.mapping.map_image import png_bytes
+from nscan_cli.mapping.map_server import png_bytes
 from nscan_cli.poses import Array
 
 if TYPE_CHECKING:
@@ -32,27 +32,27 @@ Margins = tuple[float, float, float, float]
 # M. Okabe, K. Ito, "Color Universal Design": distinct to the colour-blind as well.
 ORANGE, SKY, GREEN = (230, 159, 0), (86, 180, 233), (0, 158, 115)
 BLUE, VERMILLION, PURPLE = (0, 114, 178), (213, 94, 0), (204, 121, 167)
-BLACK, DIM, WHITE = (20, 20, 20), (110, 110, 110), (255, 255, 255)
+BLACK, GRAY, WHITE = (20, 20, 20), (110, 110, 110), (255, 255, 255)
 
-SAMPLES = 3
+SUPERSAMPLING = 3
 """Every pixel is the mean of SAMPLES × SAMPLES."""
-BAND = 240
+BAND_ROWS = 240
 """Rows of pixels that are drawn at a time, so that large pictures take little memory."""
 TEXT_SIZE = 17.0
 """Units."""
-PIECE = 32
+LINE_CORNERS = 32
 """Corners of the pieces that long lines are drawn in."""
-CORNERS = 48
+ELLIPSE_CORNERS = 48
 """Of the polygon that is drawn for an ellipse."""
 DOT_CORNERS = 12
 """The same for a small dot."""
-DOTS_AN_INCH = 300
+DPI = 300
 """Of pictures for people: a plot of 2400 pixels is printed 20 cm long, with text of 10 points."""
 
 
 def figure_png(picture: Image) -> bytes:
     """A picture for people as a PNG file that says how large it is to be printed."""
-    return png_bytes(picture, DOTS_AN_INCH)
+    return png_bytes(picture, DPI)
 
 
 @dataclass(frozen=True)
@@ -66,7 +66,7 @@ class Band:
     def samples(self, pixels: Array) -> Array:
         """Positions (…, 2) in the picture as whole positions in the enlarged band."""
         # Pillow cuts fractions off, which is another rounding above a band than within it.
-        whole: Array = np.floor((pixels - np.array([0, self.top])) * SAMPLES + 0.5)
+        whole: Array = np.floor((pixels - np.array([0, self.top])) * SUPERSAMPLING + 0.5)
         return whole
 
     def reached_by(self, shapes: Array, spare: float) -> Array:
@@ -130,8 +130,8 @@ class Canvas:
         moved = np.any(np.diff(np.round(2 * corners), axis=0) != 0, axis=1)
         corners = corners[np.concatenate([[True], moved])]
         # In pieces, since a band is reached by a few of them only; every corner lies within a piece.
-        pieces = [corners[k : k + PIECE] for k in range(0, max(1, len(corners) - 2), PIECE - 2)]
-        pieces[-1] = np.pad(pieces[-1], ((0, PIECE - len(pieces[-1])), (0, 0)), mode="edge")
+        pieces = [corners[k : k + LINE_CORNERS] for k in range(0, max(1, len(corners) - 2), LINE_CORNERS - 2)]
+        pieces[-1] = np.pad(pieces[-1], ((0, LINE_CORNERS - len(pieces[-1])), (0, 0)), mode="edge")
         self.pixel_lines(np.stack(pieces), colour, width)
 
     def segments(self, starts: Array, ends: Array, colour: Colour, width: float = 1.0) -> None:
@@ -150,7 +150,7 @@ class Canvas:
 
     def ellipses(self, centres: Array, covariances: Array, sigmas: float, colour: Colour) -> None:
         """Ellipses of `sigmas` standard deviations of covariances (N, 2, 2), m², around (N, 2), m."""
-        angles = np.linspace(0, 2 * np.pi, CORNERS, endpoint=False)
+        angles = np.linspace(0, 2 * np.pi, ELLIPSE_CORNERS, endpoint=False)
         circle = np.stack([np.cos(angles), np.sin(angles)])
         values, vectors = np.linalg.eigh(covariances)
         axes = vectors * np.sqrt(np.maximum(values, 0))[:, None, :]
@@ -180,7 +180,7 @@ class Canvas:
         def stroke(band: Band) -> None:
             for line in band.reached_by(lines, pixel_width):
                 corners = line.ravel().tolist()
-                band.pen.line(corners, fill=colour, width=round(pixel_width * SAMPLES), joint="curve")
+                band.pen.line(corners, fill=colour, width=round(pixel_width * SUPERSAMPLING), joint="curve")
 
         self._strokes.append(stroke)
 
@@ -190,7 +190,7 @@ class Canvas:
         radii: Array,
         colour: Colour,
         ring: Colour | None = None,
-        corners: int = CORNERS,
+        corners: int = ELLIPSE_CORNERS,
     ) -> None:
         """Ovals at (N, 2) in pixels, with two radii along the picture's axes, in units."""
         angles = np.linspace(0, 2 * np.pi, corners, endpoint=False)
@@ -227,7 +227,7 @@ class Canvas:
 
     def text_width(self, text: str, size: float = TEXT_SIZE) -> float:
         """How wide a text will be, pixels."""
-        return self._font(size).getlength(text) / SAMPLES
+        return self._font(size).getlength(text) / SUPERSAMPLING
 
     def image(self) -> Image:
         """The picture, RGB."""
@@ -235,16 +235,16 @@ class Canvas:
 
         width, height = self.size
         picture = Image.new("RGB", (width, height))
-        for top in range(0, height, BAND):
-            pixels = self._pixels[top : top + BAND]
+        for top in range(0, height, BAND_ROWS):
+            pixels = self._pixels[top : top + BAND_ROWS]
             enlarged = Image.fromarray(pixels).resize(
-                (width * SAMPLES, len(pixels) * SAMPLES), Image.Resampling.NEAREST
+                (width * SUPERSAMPLING, len(pixels) * SUPERSAMPLING), Image.Resampling.NEAREST
             )
             # In this mode, drawing on RGB mixes colours by their opacity.
             band = Band(ImageDraw.Draw(enlarged, "RGBA"), top, len(pixels))
             for stroke in self._strokes:
                 stroke(band)
-            picture.paste(enlarged.reduce(SAMPLES), (0, top))
+            picture.paste(enlarged.reduce(SUPERSAMPLING), (0, top))
         return picture
 
     def png(self) -> bytes:
@@ -255,7 +255,7 @@ class Canvas:
         """Polygons (N, corners, 2) in pixels."""
 
         def stroke(band: Band) -> None:
-            width = max(SAMPLES, round(1.2 * self.unit * SAMPLES))
+            width = max(SUPERSAMPLING, round(1.2 * self.unit * SUPERSAMPLING))
             for outline in band.reached_by(outlines, width):
                 corners = outline.ravel().tolist()
                 band.pen.polygon(corners, fill=inside)
@@ -267,6 +267,6 @@ class Canvas:
     def _font(self, size: float) -> FreeTypeFont:
         from PIL import ImageFont
 
-        font = ImageFont.load_default(size * self.unit * SAMPLES)
+        font = ImageFont.load_default(size * self.unit * SUPERSAMPLING)
         assert isinstance(font, ImageFont.FreeTypeFont)
         return font

@@ -6,16 +6,18 @@ import math
 
 import numpy as np
 
-from nscan_cli.mapping.figures.axes import Entry
+from nscan_cli.mapping.figures.axes import LegendEntry
 from nscan_cli.mapping.figures.canvas import Canvas, Colour
 from nscan_cli.poses import Array
 
 SIGMAS = 3.0
-MOST = 1000.0
+MAX_ENLARGEMENT = 1000.0
 """Times that an ellipse is enlarged at most."""
 
 
-def draw_ellipses(canvas: Canvas, centres: Array, covariances: Array, colour: Colour, seen: float) -> Entry:
+def draw_ellipses(
+    canvas: Canvas, centres: Array, covariances: Array, colour: Colour, seen: float
+) -> LegendEntry:
     """Ellipses of SIGMAS standard deviations of covariances (N, 2, 2), m², around (N, 2), m.
 
     Where the longest half axis of all has less than `seen` units, all are enlarged alike. Returns the
@@ -23,7 +25,7 @@ def draw_ellipses(canvas: Canvas, centres: Array, covariances: Array, colour: Co
     """
     largest = SIGMAS * math.sqrt(float(np.linalg.eigvalsh(covariances).max()))
     wanted = seen * canvas.unit / canvas.pixels_per_metre
-    times = min(MOST, _round_factor(wanted / largest)) if largest > 0 else 1.0
+    times = min(MAX_ENLARGEMENT, _round_factor(wanted / largest)) if largest > 0 else 1.0
     canvas.ellipses(centres, covariances, SIGMAS * times, colour)
     enlarged = f", enlarged {times:g} times" if times > 1 else ""
     return "ellipse", colour, f"{SIGMAS:g} sigma{enlarged}"

@@ -7,11 +7,11 @@ from numpy.typing import NDArray
 
 from nscan_cli.graph.model import Graph, NScan
 from nscan_cli.graph.relations.base import Relation
-from nscan_cli.mapping.figures.canvas import DIM, GREEN, VERMILLION
+from nscan_cli.mapping.figures.canvas import GRAY, GREEN, VERMILLION
 
-ANOTHER_VISIT = 20.0
+REVISIT_DISTANCE = 20.0
 """Scans so much path (m) apart are of different visits, as the joint matches of slam have it."""
-EDGE_COLOURS = {"nScan": GREEN, "pairwise": DIM, "loop": VERMILLION}
+EDGE_COLOURS = {"nScan": GREEN, "pairwise": GRAY, "loop": VERMILLION}
 """In the order in which they are drawn: loops on top."""
 
 
@@ -30,7 +30,7 @@ def edges_by_kind(graph: Graph) -> dict[str, NDArray[np.int64]]:
         centre = joint.nodes[joint.term().fixed]
         others = [node for node in joint.nodes if node != centre]
         closing = others if joint.origin == "loop" else []
-        if far := [node for node in closing if abs(path[node] - path[centre]) > ANOTHER_VISIT]:
+        if far := [node for node in closing if abs(path[node] - path[centre]) > REVISIT_DISTANCE]:
             closing = far
         found["loop"].update((centre, node) for node in closing)
         kind = "nScan" if isinstance(joint, NScan) else "pairwise"

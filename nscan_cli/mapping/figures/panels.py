@@ -7,47 +7,47 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from nscan_cli.mapping.figures.axes import CAPTION_MARGINS
+from nscan_cli.mapping.figures.axes import TITLE_MARGINS
 from nscan_cli.mapping.figures.canvas import WHITE, Bounds, Canvas
 from nscan_cli.poses import Array
 
 if TYPE_CHECKING:
     from PIL.Image import Image
 
-PIXELS = 2400
+PLOT_PIXELS = 2400
 """Of the longer side of the plots of a picture together: 20 cm at 300 dots an inch."""
-STACKED_HEIGHT = 1600
+MAX_STACKED_HEIGHT = 1600
 """Pixels; of each of two stacked panels at most."""
-WIDE = 1.5
+WIDE_RATIO = 1.5
 """Width of a wide panel, measured by its height."""
-SLIMMEST = 0.35
+MIN_ASPECT = 0.35
 """Share of a panel's longer side that the shorter has at least."""
 
 
 def is_wide(bounds: Bounds) -> bool:
     """Whether panels of these bounds are better stacked than side by side."""
-    return bounds[2] - bounds[0] > WIDE * (bounds[3] - bounds[1])
+    return bounds[2] - bounds[0] > WIDE_RATIO * (bounds[3] - bounds[1])
 
 
-def panel(bounds: Bounds, beside: bool = False, right: float = CAPTION_MARGINS[2]) -> Canvas:
+def panel(bounds: Bounds, beside: bool = False, right: float = TITLE_MARGINS[2]) -> Canvas:
     """An empty panel with room for a caption, and a margin of `right` units on the right.
 
     One of two `beside` each other has half the pixels, and larger text and symbols for it.
     """
-    left, top, _right, bottom = CAPTION_MARGINS
-    pixels, scale = (PIXELS // 2, 1.5) if beside else (PIXELS, 1.0)
+    left, top, _right, bottom = TITLE_MARGINS
+    pixels, scale = (PLOT_PIXELS // 2, 1.5) if beside else (PLOT_PIXELS, 1.0)
     return Canvas.blank(bounds, pixels, (left, top, right, bottom), scale)
 
 
 def stacked_panels(bounds: Bounds) -> tuple[Canvas, Canvas]:
     """Two empty panels with room for captions that make a picture of moderate height when stacked."""
     width, height = bounds[2] - bounds[0], bounds[3] - bounds[1]
-    pixels = min(PIXELS, round(STACKED_HEIGHT * max(width, height) / height))
-    above, below = (Canvas.blank(bounds, pixels, CAPTION_MARGINS) for _ in range(2))
+    pixels = min(PLOT_PIXELS, round(MAX_STACKED_HEIGHT * max(width, height) / height))
+    above, below = (Canvas.blank(bounds, pixels, TITLE_MARGINS) for _ in range(2))
     return above, below
 
 
-def side_by_side(pictures: Sequence[Image]) -> Image:
+def hstack_images(pictures: Sequence[Image]) -> Image:
     """Pictures in a row on white."""
     from PIL import Image
 
@@ -59,7 +59,7 @@ def side_by_side(pictures: Sequence[Image]) -> Image:
     return row
 
 
-def stacked(pictures: Sequence[Image]) -> Image:
+def vstack_images(pictures: Sequence[Image]) -> Image:
     """Pictures in a column on white."""
     from PIL import Image
 

@@ -8,7 +8,7 @@ from nscan_cli.mapping.figures.canvas import WHITE, Canvas, Colour
 from nscan_cli.poses import Array
 
 
-def robots(canvas: Canvas, centres: Array, headings: Array, radius: float, colour: Colour) -> None:
+def draw_robots(canvas: Canvas, centres: Array, headings: Array, radius: float, colour: Colour) -> None:
     """Circles at (N, 2) in pixels, of `radius` units, with a line to where each heads, (N,) rad."""
     unit = canvas.unit
     aside = np.stack([np.cos(headings), -np.sin(headings)], axis=-1) * radius * unit
@@ -19,7 +19,7 @@ def robots(canvas: Canvas, centres: Array, headings: Array, radius: float, colou
     canvas.pixel_lines(lines, colour, 0.4 * radius)
 
 
-def crosses(canvas: Canvas, centres: Array, radius: float, colour: Colour) -> None:
+def draw_crosses(canvas: Canvas, centres: Array, radius: float, colour: Colour) -> None:
     """Crosses at (N, 2) in pixels, of `radius` units."""
     for aside in ((radius, radius), (radius, -radius)):
         step = np.array(aside) * canvas.unit

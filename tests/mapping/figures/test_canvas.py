@@ -129,7 +129,7 @@ def test_the_bands_do_not_show(monkeypatch):
         return pixels(canvas)
 
     whole = picture()
-    monkeypatch.setattr(canvas_module, "BAND", 37)
+    monkeypatch.setattr(canvas_module, "BAND_ROWS", 37)
     assert np.abs(picture() - whole).max() <= 1
 
 

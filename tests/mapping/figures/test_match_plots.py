@@ -5,14 +5,14 @@ import pytest
 from PIL.Image import Image
 
 from nscan_cli.mapping.figures import match_plots as plots
-from nscan_cli.mapping.figures.axes import Entry
-from nscan_cli.mapping.figures.canvas import BLACK, BLUE, DIM, PURPLE, VERMILLION, Canvas
-from nscan_cli.mapping.figures.colour_ramp import ramp
+from nscan_cli.mapping.figures.axes import LegendEntry
+from nscan_cli.mapping.figures.canvas import BLACK, BLUE, GRAY, PURPLE, VERMILLION, Canvas
+from nscan_cli.mapping.figures.colormap import plasma
 from nscan_cli.mapping.figures.covariance_ellipses import draw_ellipses
-from nscan_cli.mapping.figures.error_plots import REFERENCE, plot_against, plot_relations
-from nscan_cli.mapping.figures.labels import RADIUS, number_places
-from nscan_cli.mapping.figures.match_plots import OPACITY, plot_match, plot_nscan
-from nscan_cli.mapping.figures.panels import SLIMMEST, bounds_around, panel, stacked_panels
+from nscan_cli.mapping.figures.error_plots import REFERENCE_COLOUR, plot_against_reference, plot_relations
+from nscan_cli.mapping.figures.match_plots import POINT_OPACITY, plot_match, plot_nscan
+from nscan_cli.mapping.figures.number_labels import LABEL_RADIUS, draw_number_labels
+from nscan_cli.mapping.figures.panels import MIN_ASPECT, bounds_around, panel, stacked_panels
 from nscan_cli.matching.joint.joint_energy import all_pairs
 from nscan_cli.matching.joint.joint_match import JointMatch
 from nscan_cli.matching.joint.nscan_match import NScanMatch
@@ -39,7 +39,7 @@ def near(picture: np.ndarray, colour: tuple[int, ...], most: int = 6) -> np.ndar
 
 def blended(colour: tuple[int, ...], below: tuple[int, ...] = (255, 255, 255)) -> tuple[int, ...]:
     """What a dot of a scan looks like, on white or over another."""
-    return tuple(round(b + (c - b) * OPACITY / 255) for c, b in zip(colour, below, strict=True))
+    return tuple(round(b + (c - b) * POINT_OPACITY / 255) for c, b in zip(colour, below, strict=True))
 
 
 def at(canvas: Canvas, picture: np.ndarray, place: np.ndarray) -> np.ndarray:
@@ -61,7 +61,7 @@ def panels_of_match(start: np.ndarray, match: PairMatch) -> tuple[Canvas, np.nda
     moving = transform(np.array([-1.0, -0.5, 0.0]), ROOM)
     picture = pixels(plot_match((7, 9), ROOM, moving, start, match))
     places = [ROOM, transform(start, moving), transform(match.pose, moving), np.zeros((1, 2))]
-    canvas = panel(bounds_around(np.concatenate(places), SLIMMEST), beside=True)
+    canvas = panel(bounds_around(np.concatenate(places), MIN_ASPECT), beside=True)
     width, height = canvas.size
     assert picture.shape == (height, 2 * width, 3)
     return canvas, picture[:, :width], picture[:, width:]
@@ -89,7 +89,7 @@ def test_robots_are_circles_with_their_heading():
     unit = canvas.unit
     for pose, colour in ((np.zeros(3), BLUE), (start, VERMILLION)):
         column, row = canvas.pixels(pose[:2])
-        ahead = np.array([np.cos(pose[2]), -np.sin(pose[2])]) * 1.7 * plots.CIRCLE * unit
+        ahead = np.array([np.cos(pose[2]), -np.sin(pose[2])]) * 1.7 * plots.ROBOT_RADIUS * unit
         for x, y, drawn in (
             (column, row, True),
             (column + ahead[0], row + ahead[1], True),
@@ -156,7 +156,7 @@ def panels_of_nscan(
     picture = pixels(plot_nscan(range(10, 10 + len(start)), [ROOM] * len(start), start, match, left_out))
     stages = [*start[list(match.kept)], *match.poses]
     places = [*(transform(pose, ROOM) for pose in stages)]
-    canvas, _ = stacked_panels(bounds_around(np.concatenate(places), SLIMMEST))
+    canvas, _ = stacked_panels(bounds_around(np.concatenate(places), MIN_ASPECT))
     height = len(picture) // 2
     return canvas, picture[:height], picture[height:]
 
@@ -167,7 +167,7 @@ def test_scans_of_a_joint_match_have_a_colour_each_and_move():
     canvas, before, after = panels_of_nscan(start, nscan_of((0, 1, 2), poses), [])
     assert before.shape[:2] == canvas.size[::-1]
     post = np.array([-2.0, -3.0])
-    for colour, first, last in zip(ramp(3), start, poses, strict=True):
+    for colour, first, last in zip(plasma(3), start, poses, strict=True):
         assert near(at(canvas, before, first[:2]), colour)
         assert near(at(canvas, after, last[:2]), colour)
         assert near(at(canvas, before, post + first[:2]), blended(colour), 12)
@@ -180,7 +180,7 @@ def test_a_scan_that_was_left_out_is_gray_and_crossed_and_before_only():
     match = nscan_of((0, 2), start[[0, 2]])
     canvas, before, after = panels_of_nscan(start, match, [ExcludedScan(1, OVERLAPS_NONE, 0.0)])
     assert near(at(canvas, before, start[1, :2]), BLACK)
-    assert near(at(canvas, before, start[1, :2] + [-2.0, -3.0]), blended(DIM), 12)
+    assert near(at(canvas, before, start[1, :2] + [-2.0, -3.0]), blended(GRAY), 12)
     for aside in ([0.0, 0.0], [-2.0, -3.0]):
         assert near(at(canvas, after, start[1, :2] + aside), (255, 255, 255))
 
@@ -190,10 +190,10 @@ def test_a_scan_that_was_left_out_far_away_does_not_shrink_the_others():
     match = nscan_of((0, 2), start[[0, 2]])
     canvas, before, _after = panels_of_nscan(start, match, [ExcludedScan(1, OVERLAPS_NONE, 0.0)])
     assert before.shape[:2] == canvas.size[::-1]
-    assert near(at(canvas, before, start[2, :2]), ramp(2)[1])
+    assert near(at(canvas, before, start[2, :2]), plasma(2)[1])
     # No cross in the plot; one in gray in the legend.
     bottom = canvas.plot[3]
-    assert near(before[bottom:], DIM).sum() > 20
+    assert near(before[bottom:], GRAY).sum() > 20
 
 
 @pytest.mark.parametrize(
@@ -205,7 +205,7 @@ def test_a_scan_that_was_left_out_far_away_does_not_shrink_the_others():
     ],
 )
 def test_scans_that_were_left_out_are_named(scans, seen, meanings):
-    entries: list[Entry] = plots._missing([str(k) for k in range(len(seen))], np.array(seen))
+    entries: list[LegendEntry] = plots.excluded_legend([str(k) for k in range(len(seen))], np.array(seen))
     assert [entry[2] for entry in entries] == meanings
 
 
@@ -213,15 +213,15 @@ def test_scans_that_were_left_out_are_named(scans, seen, meanings):
     ("count", "meanings"), [(2, ["scan 0", "scan 1"]), (7, ["scans 0 to 6"])], ids=["few", "many"]
 )
 def test_few_scans_are_named_one_by_one(count, meanings):
-    assert [entry[2] for entry in plots._order([str(k) for k in range(count)])] == meanings
+    assert [entry[2] for entry in plots.scan_legend([str(k) for k in range(count)])] == meanings
 
 
 def test_the_colours_of_a_ramp_get_lighter_step_by_step():
-    light = [0.2126 * r + 0.7152 * g + 0.0722 * b for r, g, b in ramp(12)]
+    light = [0.2126 * r + 0.7152 * g + 0.0722 * b for r, g, b in plasma(12)]
     assert min(np.diff(light)) > 5
     # Still to be seen on white.
     assert light[-1] < 190
-    assert len(ramp(1)) == 1
+    assert len(plasma(1)) == 1
 
 
 SQUARE = np.array([[0.0, 0, 0], [4, 0, 0], [8, 0, 0], [8, 8, 0], [0, 8, 0]])
@@ -261,36 +261,36 @@ def test_a_list_without_room_counts_the_rest():
 def test_labels_lie_neither_over_each_other_nor_over_the_line():
     canvas = Canvas((0.0, 0.0, 10.0, 10.0), 100)
     line = np.stack([np.linspace(1, 9, 500), np.full(500, 5.0)], axis=1)
-    number_places(canvas, np.tile([[5.0, 5.0]], (8, 1)), line, VERMILLION)
+    draw_number_labels(canvas, np.tile([[5.0, 5.0]], (8, 1)), line, VERMILLION)
     ring = near(pixels(canvas.image()), VERMILLION, 90)
     rows = np.nonzero(ring)[0]
     # Every ring has a circumference of 2 π 11 pixels; rings that overlapped would hide some of it.
-    assert len(rows) > 8 * 2 * np.pi * RADIUS * 0.8
+    assert len(rows) > 8 * 2 * np.pi * LABEL_RADIUS * 0.8
     assert np.abs(rows - 500).min() >= 2
 
 
 def test_the_error_against_a_reference_is_told_by_colours():
     reference = np.stack([np.linspace(0, 8, 81), np.zeros(81), np.zeros(81)], axis=1)
     result = reference + np.array([0.0, 1.0, 0.0]) * np.linspace(0, 0.5, 81)[:, None]
-    canvas = plot_against(result, np.arange(81), np.linspace(0, 0.5, 81), reference, "title")
+    canvas = plot_against_reference(result, np.arange(81), np.linspace(0, 0.5, 81), reference, "title")
     picture = pixels(canvas.image())
-    colours = ramp(16)
+    colours = plasma(16)
     assert near(at(canvas, picture, result[2, :2]), colours[0])
     assert near(at(canvas, picture, result[78, :2]), colours[-1])
     middle = at(canvas, picture, result[40, :2])
     assert near(middle, colours[7], 12) or near(middle, colours[8], 12)
-    assert near(at(canvas, picture, np.array([6.05, 0.0])), REFERENCE)
+    assert near(at(canvas, picture, np.array([6.05, 0.0])), REFERENCE_COLOUR)
 
 
 def test_poses_without_a_match_have_no_colour_of_an_error():
     reference = np.stack([np.linspace(0, 8, 81), np.zeros(81), np.zeros(81)], axis=1)
     result = reference + np.array([0.0, 1.0, 0.0])
-    canvas = plot_against(result, np.arange(40), np.zeros(40), reference, "title")
+    canvas = plot_against_reference(result, np.arange(40), np.zeros(40), reference, "title")
     picture = pixels(canvas.image())
     # A line of a unit, 2.4 pixels.
     column, row = np.round(canvas.pixels(np.array([6.0, 1.0]))).astype(int)
     assert near(picture[row - 1 : row + 2, column], BLACK, 40).any()
-    assert near(at(canvas, picture, np.array([2.0, 1.0])), ramp(16)[0])
+    assert near(at(canvas, picture, np.array([2.0, 1.0])), plasma(16)[0])
 
 
 def test_the_same_picture_every_time():

@@ -4,18 +4,18 @@ from PIL import Image
 
 from nscan_cli.mapping.figures.canvas import BLUE, ORANGE, VERMILLION
 from nscan_cli.mapping.figures.panels import (
-    PIXELS,
-    STACKED_HEIGHT,
+    MAX_STACKED_HEIGHT,
+    PLOT_PIXELS,
     bounds_around,
+    hstack_images,
     panel,
-    side_by_side,
-    stacked,
     stacked_panels,
+    vstack_images,
 )
 
 
 def test_pictures_side_by_side():
-    row = side_by_side([Image.new("RGB", (10, 20), BLUE), Image.new("RGB", (5, 30), ORANGE)])
+    row = hstack_images([Image.new("RGB", (10, 20), BLUE), Image.new("RGB", (5, 30), ORANGE)])
     assert row.size == (15, 30)
     assert row.getpixel((9, 19)) == BLUE
     assert row.getpixel((10, 0)) == ORANGE
@@ -23,7 +23,7 @@ def test_pictures_side_by_side():
 
 
 def test_pictures_in_a_column():
-    column = stacked([Image.new("RGB", (10, 20), BLUE), Image.new("RGB", (5, 30), ORANGE)])
+    column = vstack_images([Image.new("RGB", (10, 20), BLUE), Image.new("RGB", (5, 30), ORANGE)])
     assert column.size == (10, 50)
     assert column.getpixel((9, 19)) == BLUE
     assert column.getpixel((0, 20)) == ORANGE
@@ -48,8 +48,8 @@ def test_stacked_panels_have_a_moderate_height(size):
     above, below = stacked_panels((0.0, 0.0, *size))
     assert above.size == below.size
     left, top, right, bottom = above.plot
-    assert max(right - left, bottom - top) <= PIXELS
-    assert bottom - top <= STACKED_HEIGHT
+    assert max(right - left, bottom - top) <= PLOT_PIXELS
+    assert bottom - top <= MAX_STACKED_HEIGHT
     assert (right - left) / (bottom - top) == pytest.approx(size[0] / size[1], rel=0.01)
 
 

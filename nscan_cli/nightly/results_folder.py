@@ -16,7 +16,7 @@ LOCK, SCRATCH = ".lock", ".scratch"
 
 
 @contextlib.contextmanager
-def claimed(folder: str) -> Iterator[Path]:
+def locked_folder(folder: str) -> Iterator[Path]:
     """The folder, made where only its parent is there, and nobody else's until the block ends.
 
     However the holder ends, its claim ends with it; what a killed one has begun to write is cleared away.
@@ -46,7 +46,7 @@ def claimed(folder: str) -> Iterator[Path]:
 
 
 @contextlib.contextmanager
-def scratch(folder: Path) -> Iterator[Path]:
+def scratch_folder(folder: Path) -> Iterator[Path]:
     """An empty folder in `folder`, gone when the block ends, or at the next call when it was cut off."""
     place = folder / SCRATCH
     shutil.rmtree(place, ignore_errors=True)
@@ -57,7 +57,7 @@ def scratch(folder: Path) -> Iterator[Path]:
         shutil.rmtree(place, ignore_errors=True)
 
 
-def folder_of(folder: Path, name: str) -> Path:
+def log_folder(folder: Path, name: str) -> Path:
     """The folder of one log's results, made where it is missing. Raises OutputError."""
     try:
         (folder / name).mkdir(exist_ok=True)

@@ -7,12 +7,12 @@ import re
 from html import escape
 from pathlib import Path
 
-from nscan_cli.nightly.history_plot import history
-from nscan_cli.nightly.manifest import Entry
-from nscan_cli.nightly.verdict import Errors, Status, Verdict
+from nscan_cli.nightly.history_plot import history_svg
+from nscan_cli.nightly.manifest import ManifestEntry
+from nscan_cli.nightly.regression_check import CheckResult, MeasuredErrors, Status
 
-SIGNS: dict[Status, str] = {"good": "✓", "worse": "!", "above": "✗", "failed": "✗", "absent": "–"}
-WORDS: dict[Status, str] = {
+STATUS_SYMBOLS: dict[Status, str] = {"good": "✓", "worse": "!", "above": "✗", "failed": "✗", "absent": "–"}
+STATUS_WORDS: dict[Status, str] = {
     "good": "good",
     "worse": "worse",
     "above": "above bound",
@@ -21,43 +21,43 @@ WORDS: dict[Status, str] = {
 }
 
 
-def card(verdict: Verdict, folder: Path) -> str:
+def log_section(verdict: CheckResult, folder: Path) -> str:
     """The card; map and layers are taken from the log's results in `folder`."""
     entry, last = verdict.entry, verdict.last
     parts = [
         f'<section class="log {verdict.status}" id="{entry.name}">',
-        f"<header><h2>{entry.name}</h2>{chip(verdict)}</header>",
+        f"<header><h2>{entry.name}</h2>{status_badge(verdict)}</header>",
     ]
     if verdict.status != "good":
         parts += [f'<p class="reason">{escape(reason)}</p>' for reason in verdict.reasons]
     if entry.about:
         parts.append(f'<p class="about">{escape(entry.about)}</p>')
     if verdict.status == "absent" and "log" in entry.sources:
-        parts.append(f"<p>To be had from {_source(entry)}</p>")
+        parts.append(f"<p>To be had from {_source_link(entry)}</p>")
     if last is not None and verdict.status in ("failed", "absent"):
         parts.append('<p class="about">Below: the last night that was done.</p>')
     if last is not None:
         parts += [
             '<div class="body"><div>',
             *_map(verdict, folder),
-            *_nights(verdict),
+            *_history(verdict),
             '</div><div class="facts">',
         ]
-        parts += [*_errors(verdict), *_bars(verdict), *_run(verdict), "</div></div>"]
+        parts += [*_error_table(verdict), *_published_bars(verdict), *_run_table(verdict), "</div></div>"]
     elif len(verdict.nights) > 1:
-        parts += _nights(verdict)
+        parts += _history(verdict)
     return "\n".join([*parts, "</section>"])
 
 
-def chip(verdict: Verdict) -> str:
+def status_badge(verdict: CheckResult) -> str:
     """What is to be said of the log in a word or two."""
     if verdict.status == "good" and not verdict.is_within_bounds:
         words = "not measured" if verdict.errors is None else "no bound"
         return f'<span class="chip absent">{words}</span>'
-    return f'<span class="chip {verdict.status}">{WORDS[verdict.status]}</span>'
+    return f'<span class="chip {verdict.status}">{STATUS_WORDS[verdict.status]}</span>'
 
 
-def absent(verdicts: list[Verdict]) -> list[str]:
+def absent_section(verdicts: list[CheckResult]) -> list[str]:
     """What is not there and never was, in few words, with the places to get it from."""
     if not verdicts:
         return []
@@ -65,7 +65,7 @@ def absent(verdicts: list[Verdict]) -> list[str]:
     for verdict in verdicts:
         entry = verdict.entry
         about = escape(entry.about)
-        source = ("<br>" if about else "") + _source(entry) if "log" in entry.sources else ""
+        source = ("<br>" if about else "") + _source_link(entry) if "log" in entry.sources else ""
         rows.append(f'<dt id="{entry.name}">{entry.name}</dt><dd>{about}{source}</dd>')
     title = "One more log is" if len(rows) == 1 else f"{len(rows)} more logs are"
     return [
@@ -75,9 +75,9 @@ def absent(verdicts: list[Verdict]) -> list[str]:
     ]
 
 
-def change(verdict: Verdict) -> str:
+def error_change(verdict: CheckResult) -> str:
     """By how much the error has changed since the night before, in per cent."""
-    errors, before = verdict.errors, Errors.of(verdict.before)
+    errors, before = verdict.errors, MeasuredErrors.of(verdict.before)
     if errors is None or before is None or before.what != errors.what or before.metres == 0:
         return ""
     percent = 100 * (errors.metres - before.metres) / before.metres
@@ -87,25 +87,25 @@ def change(verdict: Verdict) -> str:
     return f'<span class="{tone}">{"+" if percent > 0 else "−"}{abs(percent):.1f} %</span>'
 
 
-def seconds(verdict: Verdict) -> str:
+def run_time(verdict: CheckResult) -> str:
     """How long the log took; nothing where kernels were compiled meanwhile."""
     took = None if verdict.last is None else verdict.last["times"]["seconds"]
     return "" if took is None else f"{took:.1f} s"
 
 
-def real_time(verdict: Verdict) -> str:
+def real_time_factor(verdict: CheckResult) -> str:
     """How much faster than it was recorded."""
-    if not seconds(verdict) or verdict.last is None or not verdict.last["counts"]["duration"]:
+    if not run_time(verdict) or verdict.last is None or not verdict.last["counts"]["duration"]:
         return ""
     return f"{verdict.last['counts']['duration'] / max(verdict.last['times']['seconds'], 0.001):.0f} ×"
 
 
-def timed(text: str) -> str:
+def time_span(text: str) -> str:
     """In an element of the class that has all that differs from call to call."""
     return f'<span class="time">{text}</span>'
 
 
-def _map(verdict: Verdict, folder: Path) -> list[str]:
+def _map(verdict: CheckResult, folder: Path) -> list[str]:
     """The map with its layers; nothing where the files are gone."""
     name = verdict.entry.name
     try:
@@ -144,19 +144,19 @@ def _aspect(layers: str) -> float:
     return 1.0 if size is None else int(size[1]) / int(size[2])
 
 
-def _nights(verdict: Verdict) -> list[str]:
+def _history(verdict: CheckResult) -> list[str]:
     """The plot, where there is something to plot."""
-    if all(night["outcome"] == "done" and Errors.of(night) is None for night in verdict.nights):
+    if all(night["outcome"] == "done" and MeasuredErrors.of(night) is None for night in verdict.nights):
         return []
-    return ["<h3>Nights</h3>", f'<div class="nights">{history(verdict)}</div>']
+    return ["<h3>Nights</h3>", f'<div class="nights">{history_svg(verdict)}</div>']
 
 
-def _errors(verdict: Verdict) -> list[str]:
+def _error_table(verdict: CheckResult) -> list[str]:
     errors, entry = verdict.errors, verdict.entry
     if errors is None:
         return ['<p class="soft">There is nothing to measure it against.</p>']
     metres, degrees = errors.translation, errors.rotation
-    changed = change(verdict)
+    changed = error_change(verdict)
     rows = [
         ("mean ± sd", f"{metres['mean']:.4f} ± {metres['sd']:.4f} m"),
         ("median, greatest", f"{metres['median']:.4f}, {metres['max']:.3f} m"),
@@ -167,7 +167,7 @@ def _errors(verdict: Verdict) -> list[str]:
     return [
         f"<h3>Error, {errors.what}</h3>",
         f'<p class="big number">{errors.metres:.4f} m</p>',
-        _list(rows),
+        _definition_list(rows),
     ]
 
 
@@ -176,7 +176,7 @@ def _bound(translation: float | None, rotation: float | None) -> str:
     return ", ".join(parts if rotation is None else [*parts, f"{rotation:g}°"]) or "none"
 
 
-def _bars(verdict: Verdict) -> list[str]:
+def _published_bars(verdict: CheckResult) -> list[str]:
     """Ours and the published errors, the least first."""
     errors = verdict.errors
     if errors is None or not verdict.entry.published:
@@ -194,47 +194,47 @@ def _bars(verdict: Verdict) -> list[str]:
     return ["<h3>Beside the published errors, m</h3>", f'<div class="bars">{"".join(cells)}</div>']
 
 
-def _run(verdict: Verdict) -> list[str]:
+def _run_table(verdict: CheckResult) -> list[str]:
     assert verdict.last is not None
     counts = verdict.last["counts"]
     rows = [
         ("scans, keyframes", f"{counts['scans']:,}, {counts['keyframes']:,}"),
         ("relations", f"{counts['pairwise']:,} pairwise, {counts['nscan']:,} nScan"),
         ("loops", f"{counts['loops']['accepted']:,} accepted, {counts['loops']['refused']:,} refused"),
-        ("time", _time(verdict)),
-        ("made", _made(verdict)),
+        ("time", _time_row(verdict)),
+        ("made", _finish_and_reasons(verdict)),
     ]
     notes = [f'<p class="note">{escape(note)}</p>' for note in verdict.notes]
-    return ["<h3>Run</h3>", _list(rows), *notes]
+    return ["<h3>Run</h3>", _definition_list(rows), *notes]
 
 
-def _time(verdict: Verdict) -> str:
-    took, faster = seconds(verdict), real_time(verdict)
+def _time_row(verdict: CheckResult) -> str:
+    took, faster = run_time(verdict), real_time_factor(verdict)
     if not took:
-        return timed("not timed: kernels were compiled meanwhile")
-    return timed(f"{took}, {faster} real time" if faster else took)
+        return time_span("not timed: kernels were compiled meanwhile")
+    return time_span(f"{took}, {faster} real time" if faster else took)
 
 
-def _made(verdict: Verdict) -> str:
+def _finish_and_reasons(verdict: CheckResult) -> str:
     """When, and why it was done although it was done before."""
     assert verdict.last is not None
     times = verdict.last["times"]
     why = "; ".join(times.get("anew", []))
     anew = f", anew: {escape(why)}" if why else ""
-    return timed(f"{readable(times['finished'])}{anew}")
+    return time_span(f"{readable_time(times['finished'])}{anew}")
 
 
-def readable(when: str) -> str:
+def readable_time(when: str) -> str:
     """A time of ISO 8601 for people."""
     return when.replace("T", " ").replace("Z", " UTC")
 
 
-def _list(rows: list[tuple[str, str]]) -> str:
+def _definition_list(rows: list[tuple[str, str]]) -> str:
     cells = "".join(f'<dt>{name}</dt><dd class="number">{value}</dd>' for name, value in rows)
     return f"<dl>{cells}</dl>"
 
 
-def _source(entry: Entry) -> str:
+def _source_link(entry: ManifestEntry) -> str:
     source = entry.sources["log"]
     return f'<a href="{_link(source)}">{escape(source)}</a>'
 

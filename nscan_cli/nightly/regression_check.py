@@ -5,24 +5,24 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
-from nscan_cli.nightly.manifest import Entry
-from nscan_cli.nightly.night_history import Night
+from nscan_cli.nightly.manifest import ManifestEntry
+from nscan_cli.nightly.run_history import RunRecord
 
 Status = Literal["failed", "above", "worse", "good", "absent"]
 """In the order of how much they ask for a look."""
-ORDER: tuple[Status, ...] = ("failed", "above", "worse", "good", "absent")
+STATUS_ORDER: tuple[Status, ...] = ("failed", "above", "worse", "good", "absent")
 
-ASKING: dict[Status, str] = {"failed": "failed", "above": "above bound", "worse": "worse than before"}
+ATTENTION: dict[Status, str] = {"failed": "failed", "above": "above bound", "worse": "worse than before"}
 """Those that ask for a look at all, in words."""
 
-WORSE_SHARE = 0.05
+MIN_RELATIVE_RISE = 0.05
 """An error is worse than before when it has grown by more than this share of it,"""
-WORSE_TRANSLATION, WORSE_ROTATION = 5e-4, 0.01
+MIN_TRANSLATION_RISE, MIN_ROTATION_RISE = 5e-4, 0.01
 """and by more than this (m, degrees): less is what another compiler's last digits can do."""
 
 
 @dataclass(frozen=True)
-class Errors:
+class MeasuredErrors:
     """What bounds are held against: means on relations, RMSE of the ATE against a reference."""
 
     what: str
@@ -34,7 +34,7 @@ class Errors:
     """Which of them counts."""
 
     @classmethod
-    def of(cls, night: Night | None) -> Errors | None:
+    def of(cls, night: RunRecord | None) -> MeasuredErrors | None:
         """Those of a night; None where nothing was measured."""
         evaluation: dict[str, Any] = (night or {}).get("evaluation") or {}
         if "relations" in evaluation:
@@ -57,26 +57,26 @@ class Errors:
 
 
 @dataclass(frozen=True)
-class Verdict:
+class CheckResult:
     """What is to be said of a log."""
 
-    entry: Entry
+    entry: ManifestEntry
     status: Status
     reasons: list[str]
     """One line each: why it is failed, above its bound, or worse."""
-    nights: list[Night]
+    nights: list[RunRecord]
     """Oldest first."""
-    last: Night | None
+    last: RunRecord | None
     """The last night that was done; the failed one of a failed log came after it."""
-    before: Night | None
+    before: RunRecord | None
     """The one done before that."""
     notes: list[str] = field(default_factory=list)
     """What is odd about the inputs."""
 
     @property
-    def errors(self) -> Errors | None:
+    def errors(self) -> MeasuredErrors | None:
         """Of the last night that was done."""
-        return Errors.of(self.last)
+        return MeasuredErrors.of(self.last)
 
     @property
     def is_within_bounds(self) -> bool:
@@ -90,7 +90,7 @@ class Verdict:
         return self.status in ("failed", "above")
 
 
-def verdict(entry: Entry, nights: list[Night], notes: list[str], absent: bool) -> Verdict:
+def check_log(entry: ManifestEntry, nights: list[RunRecord], notes: list[str], absent: bool) -> CheckResult:
     """The verdict on a log of the manifest with these nights; one at least, unless it is absent."""
     done = [night for night in nights if night["outcome"] == "done"]
     last, before = (done[-1] if done else None), (done[-2] if len(done) > 1 else None)
@@ -98,18 +98,18 @@ def verdict(entry: Entry, nights: list[Night], notes: list[str], absent: bool) -
     if absent:
         status, reasons = "absent", [f"{entry.inputs['log'].name} is not there"]
     else:
-        status, reasons = _judged(entry, nights, last, before)
+        status, reasons = _status_and_reasons(entry, nights, last, before)
     if last is not None:
         notes = [*notes, *last["counts"]["warnings"]]
-    return Verdict(entry, status, reasons, nights, last, before, notes)
+    return CheckResult(entry, status, reasons, nights, last, before, notes)
 
 
-def _judged(
-    entry: Entry, nights: list[Night], last: Night | None, before: Night | None
+def _status_and_reasons(
+    entry: ManifestEntry, nights: list[RunRecord], last: RunRecord | None, before: RunRecord | None
 ) -> tuple[Status, list[str]]:
     if nights[-1]["outcome"] != "done":
         return "failed", [nights[-1]["reason"]]
-    errors = Errors.of(last)
+    errors = MeasuredErrors.of(last)
     if errors is None:
         return "good", []
     above = [
@@ -122,31 +122,31 @@ def _judged(
     ]
     if above:
         return "above", above
-    earlier = Errors.of(before)
+    earlier = MeasuredErrors.of(before)
     if earlier is None or earlier.what != errors.what:
         return "good", []
     worse = [
         f"{errors.what} rose from {old:.4f} to {new:.4f} {unit}"
         for old, new, least, unit in (
-            (earlier.metres, errors.metres, WORSE_TRANSLATION, "m"),
-            (earlier.degrees, errors.degrees, WORSE_ROTATION, "degrees"),
+            (earlier.metres, errors.metres, MIN_TRANSLATION_RISE, "m"),
+            (earlier.degrees, errors.degrees, MIN_ROTATION_RISE, "degrees"),
         )
-        if new - old > max(least, WORSE_SHARE * old)
+        if new - old > max(least, MIN_RELATIVE_RISE * old)
     ]
     return ("worse" if worse else "good"), worse
 
 
-def headline(verdicts: list[Verdict]) -> str:
+def headline(verdicts: list[CheckResult]) -> str:
     """The whole night in a line."""
-    count = {status: sum(each.status == status for each in verdicts) for status in ORDER}
+    count = {status: sum(each.status == status for each in verdicts) for status in STATUS_ORDER}
     there = len(verdicts) - count["absent"]
-    parts = [f"{count[status]} {words}" for status, words in ASKING.items() if count[status]]
+    parts = [f"{count[status]} {words}" for status, words in ATTENTION.items() if count[status]]
     of_all = f"of {there} {'log' if there == 1 else 'logs'}"
     if count["failed"] or count["above"]:
         return f"Not good: {of_all} {', '.join(parts)}"
     if parts:
         return f"Within bounds, but {of_all} {parts[0]}"
-    within = sum(verdict.is_within_bounds for verdict in verdicts)
+    within = sum(check_log.is_within_bounds for check_log in verdicts)
     if within == there:
         return "The log is good" if there == 1 else f"All {there} logs are good"
     if there == 1:

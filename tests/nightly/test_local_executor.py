@@ -11,13 +11,13 @@ from typing import Any
 
 import pytest
 
-from nscan_cli.nightly import processes, start
-from nscan_cli.nightly.manifest import Entry
-from nscan_cli.nightly.processes import run_all
+from nscan_cli.nightly import bootstrap, local_executor
+from nscan_cli.nightly.local_executor import run_locally
+from nscan_cli.nightly.manifest import ManifestEntry
 from nscan_cli.nightly.task import Outcome, Task
 from tests.cli.room_drive import COUNT
 from tests.cli.room_log import room_log
-from tests.nightly.small import recordings
+from tests.nightly.small_logs import recordings
 
 
 def nothing(*_said):
@@ -27,14 +27,14 @@ def nothing(*_said):
 @pytest.fixture
 def fine(tmp_path):
     (tmp_path / "fine.log").write_text(room_log(12))
-    return Task.of(Entry("fine", {"log": tmp_path / "fine.log"}))
+    return Task.of(ManifestEntry("fine", {"log": tmp_path / "fine.log"}))
 
 
 @pytest.fixture
 def endless(tmp_path):
     """A log that nobody ever writes to the end."""
     os.mkfifo(tmp_path / "endless.log")
-    return Task.of(Entry("endless", {"log": tmp_path / "endless.log"}))
+    return Task.of(ManifestEntry("endless", {"log": tmp_path / "endless.log"}))
 
 
 @pytest.fixture
@@ -44,7 +44,7 @@ def scratch(tmp_path):
 
 
 def outcomes(*arguments: Any) -> dict[str, Outcome]:
-    return {task.name: outcome for task, outcome in run_all(*arguments)}
+    return {task.name: outcome for task, outcome in run_locally(*arguments)}
 
 
 def test_a_log_that_never_ends_is_stopped(endless, scratch):
@@ -65,11 +65,11 @@ def test_a_process_that_is_killed_and_one_that_fails(fine, scratch, tmp_path):
     """The first dies as soon as it says something, the second has nothing to read; the third is done."""
     (tmp_path / "empty.log").touch()
     (tmp_path / "long.log").write_text(room_log(400))
-    long = Task.of(Entry("long", {"log": tmp_path / "long.log"}))
-    empty = Task.of(Entry("empty", {"log": tmp_path / "empty.log"}))
+    long = Task.of(ManifestEntry("long", {"log": tmp_path / "long.log"}))
+    empty = Task.of(ManifestEntry("empty", {"log": tmp_path / "empty.log"}))
     works = []
 
-    class Watched(processes.Work):
+    class Watched(local_executor.WorkerProcess):
         def __init__(self, *arguments):
             super().__init__(*arguments)
             works.append(self)
@@ -81,7 +81,7 @@ def test_a_process_that_is_killed_and_one_that_fails(fine, scratch, tmp_path):
             works[0].process.send_signal(signal.SIGKILL)
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(processes, "Work", Watched)
+        patch.setattr(local_executor, "WorkerProcess", Watched)
         found = outcomes([long, empty, fine], 1, None, scratch, report)
     assert found["long"].result == {"reason": "its process was killed by signal 9"}
     assert found["empty"].result == {"reason": "log/empty.log: is empty; give a log with laser scans"}
@@ -100,14 +100,14 @@ def test_a_process_that_cannot_even_start_says_why(fine, scratch, monkeypatch):
 
 def test_what_is_running_ends_with_the_iterator(endless, scratch, monkeypatch):
     works = []
-    made = processes.Work
+    made = local_executor.WorkerProcess
 
     def start(*arguments):
         works.append(made(*arguments))
         return works[-1]
 
-    monkeypatch.setattr(processes, "Work", start)
-    run = run_all([endless], 1, 0.01, scratch, nothing)
+    monkeypatch.setattr(local_executor, "WorkerProcess", start)
+    run = run_locally([endless], 1, 0.01, scratch, nothing)
     monkeypatch.setattr(made, "is_over", lambda *_: (_ for _ in ()).throw(KeyboardInterrupt))
     with pytest.raises(KeyboardInterrupt):
         next(run)
@@ -118,8 +118,8 @@ def test_what_is_running_ends_with_the_iterator(endless, scratch, monkeypatch):
 def test_a_process_ends_with_whoever_has_started_it(endless, scratch):
     """Its standard input is closed when the parent is gone, however that went."""
     place = scratch / "endless"
-    processes._lay_out(place, endless, 1)
-    process = subprocess.Popen(start.command("work", str(place)), stdin=subprocess.PIPE)
+    local_executor.prepare_workspace(place, endless, 1)
+    process = subprocess.Popen(bootstrap.worker_command("worker", str(place)), stdin=subprocess.PIPE)
     time.sleep(0.5)
     assert process.poll() is None
     process.communicate(timeout=20)

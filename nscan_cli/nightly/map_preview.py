@@ -7,24 +7,24 @@ from numpy.typing import NDArray
 
 from nscan_cli.graph.model import Graph
 from nscan_cli.mapping.figures.axes import round_length
-from nscan_cli.mapping.figures.map_drawing import SOFT_GRAYS
-from nscan_cli.mapping.map_image import Gray, gray, png_bytes
+from nscan_cli.mapping.figures.map_plots import SOFT_GRAYS
+from nscan_cli.mapping.map_server import Gray, gray_image, png_bytes
 from nscan_cli.mapping.occupancy import OccupancyGrid
 from nscan_cli.poses import Array
 
-PIXELS = 1400
+PREVIEW_PIXELS = 1400
 """Most pixels of the longer side: sharp on a desk's screen, and some tens of kilobytes."""
-STEP = 2.0
+MIN_PATH_STEP = 2.0
 """From one corner of the path to the next, pixels at least."""
 
 
-def preview(grid: OccupancyGrid, graph: Graph) -> tuple[bytes, bytes]:
+def map_preview(grid: OccupancyGrid, graph: Graph) -> tuple[bytes, bytes]:
     """The map as a PNG of three grays, and the SVG of the graph, in units of the PNG's pixels.
 
     Of the cells that share a pixel the darkest shows, so that walls can still be seen.
     """
-    cells = gray(grid, SOFT_GRAYS)
-    side = -(-max(cells.shape) // PIXELS)
+    cells = gray_image(grid, SOFT_GRAYS)
+    side = -(-max(cells.shape) // PREVIEW_PIXELS)
     pixels = _darkest(cells, side)
     height, width = pixels.shape
     per_metre = 1 / (side * grid.resolution)
@@ -63,9 +63,9 @@ def _svg(graph: Graph, places: Array, width: int, height: int, per_metre: float)
     x, y = places[0]
     return (
         f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width} {height}" aria-hidden="true">\n'
-        f'<path class="refused" fill="none" d="{_segments(places, refused)}"/>\n'
-        f'<path class="loops" fill="none" d="{_segments(places, accepted)}"/>\n'
-        f'<path class="path" fill="none" d="{_line(places)}"/>\n'
+        f'<path class="refused" fill="none" d="{_segments_data(places, refused)}"/>\n'
+        f'<path class="loops" fill="none" d="{_segments_data(places, accepted)}"/>\n'
+        f'<path class="path" fill="none" d="{_path_data(places)}"/>\n'
         f'<circle class="start" cx="{x:.1f}" cy="{y:.1f}" r="{0.6 * unit:.1f}"/>\n'
         '<path class="scale" fill="none" '
         f'd="M{left:.1f} {low - unit:.1f}V{low:.1f}H{end:.1f}v{-unit:.1f}"/>\n'
@@ -75,20 +75,20 @@ def _svg(graph: Graph, places: Array, width: int, height: int, per_metre: float)
     )
 
 
-def _line(places: Array) -> str:
+def _path_data(places: Array) -> str:
     """Through the places (N, 2), but for those that lie too near the one before."""
     kept = [places[0]]
     for place in places[1:]:
-        if np.hypot(*(place - kept[-1])) >= STEP:
+        if np.hypot(*(place - kept[-1])) >= MIN_PATH_STEP:
             kept.append(place)
     kept.append(places[-1])
-    return "M" + "L".join(_point(place) for place in kept)
+    return "M" + "L".join(_coordinates(place) for place in kept)
 
 
-def _segments(places: Array, pairs: list[tuple[int, int]]) -> str:
-    return "".join(f"M{_point(places[a])}L{_point(places[b])}" for a, b in pairs)
+def _segments_data(places: Array, pairs: list[tuple[int, int]]) -> str:
+    return "".join(f"M{_coordinates(places[a])}L{_coordinates(places[b])}" for a, b in pairs)
 
 
-def _point(place: NDArray[np.float64]) -> str:
+def _coordinates(place: NDArray[np.float64]) -> str:
     x, y = place
     return f"{x:.1f} {y:.1f}"

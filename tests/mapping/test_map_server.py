@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from nscan_cli.mapping.map_image import map_image, map_png, map_yaml
+from nscan_cli.mapping.map_server import map_image, map_png, map_yaml
 from nscan_cli.mapping.occupancy import FREE, OCCUPIED, UNKNOWN, OccupancyGrid
 from tests.mapping.nav2 import load_map
 

@@ -10,7 +10,7 @@ from contextlib import closing
 from pathlib import Path
 from typing import Any
 
-from nscan_cli.nightly.manifest import Entry
+from nscan_cli.nightly.manifest import ManifestEntry
 from tests.cli.room_drive import room_drive
 from tests.cli.room_log import room_log
 from tests.logs.recordings.ros import split_bag2
@@ -37,7 +37,7 @@ def write_logs(folder: Path) -> Path:
     return manifest
 
 
-def recordings(folder: Path) -> list[Entry]:
+def recordings(folder: Path) -> list[ManifestEntry]:
     """A folder with a split recording, and a database with a write-ahead log beside it."""
     split_bag2(room_drive(), folder / "my_bag", "MCAP")
     made = split_bag2(room_drive(), folder / "made", "SQLITE3", 1) / "made_0.db3"
@@ -52,7 +52,10 @@ def recordings(folder: Path) -> list[Entry]:
         shutil.copy(made, folder / "lab.db3")
         shutil.copy(f"{made}-wal", folder / "lab.db3-wal")
     shutil.rmtree(folder / "made")
-    return [Entry("split", {"log": folder / "my_bag"}), Entry("lab", {"log": folder / "lab.db3"})]
+    return [
+        ManifestEntry("split", {"log": folder / "my_bag"}),
+        ManifestEntry("lab", {"log": folder / "lab.db3"}),
+    ]
 
 
 def copy_of(folder: Path, place: Path) -> Path:

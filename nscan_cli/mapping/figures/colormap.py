@@ -7,7 +7,7 @@ import numpy as np
 from nscan_cli.mapping.figures.canvas import Colour
 
 # S. van der Walt, N. Smith, "plasma" (CC0), without its lightest fifth, which is lost on white.
-ANCHORS = np.array(
+PLASMA = np.array(
     [
         (13, 8, 135),
         (84, 2, 163),
@@ -20,8 +20,8 @@ ANCHORS = np.array(
 )
 
 
-def ramp(count: int) -> list[Colour]:
+def plasma(count: int) -> list[Colour]:
     """So many colours, evenly spaced."""
-    at = np.linspace(0, len(ANCHORS) - 1, count)
-    channels = [np.interp(at, np.arange(len(ANCHORS)), channel) for channel in ANCHORS.T]
+    at = np.linspace(0, len(PLASMA) - 1, count)
+    channels = [np.interp(at, np.arange(len(PLASMA)), channel) for channel in PLASMA.T]
     return [(red, green, blue) for red, green, blue in np.round(channels).astype(int).T.tolist()]

@@ -21,27 +21,27 @@ from nscan_cli.errors import InputMissingError, NscanError, WrongUsageError
 from nscan_cli.files.inputs import read_bytes
 from nscan_cli.logs.log_files import METADATA, beside, files_of
 from nscan_cli.nightly.fingerprint import tool_key
-from nscan_cli.nightly.processes import run_all as run_here
-from nscan_cli.nightly.task import Outcome, Report, Task
+from nscan_cli.nightly.local_executor import run_locally
+from nscan_cli.nightly.task import Outcome, ProgressCallback, Task
 
 ADDRESS = re.compile(r"[a-z]+://.+:\d+")
-PATIENCE = 10.0
+CONNECT_TIMEOUT = 10.0
 """For the scheduler to answer, s."""
-Content = dict[str, bytes]
+InputFiles = dict[str, bytes]
 """Name → content of the files of an input."""
-AHEAD = 2
+QUEUED_PER_THREAD = 2
 """Logs that are sent ahead for each thread of the cluster: none has to wait, and not all are in memory."""
 
 
-def run_all(
-    tasks: Sequence[Task], address: str, timeout: float | None, report: Report
+def run_on_dask(
+    tasks: Sequence[Task], address: str, timeout: float | None, report: ProgressCallback
 ) -> Generator[tuple[Task, Outcome]]:
     """Do the tasks on the cluster whose scheduler has this address, and yield each when it is done.
 
     When the iterator is closed, what has not begun yet is taken back. Raises WrongUsageError where Dask is
     not installed, InputMissingError where no scheduler answers, or it is lost.
     """
-    client = _client(address)
+    client = _connect(address)
     topic = f"nscan-cli-{client.id}"
     client.subscribe_topic(topic, lambda event: report(*event[1]))
     waiting = deque(tasks)
@@ -49,20 +49,20 @@ def run_all(
     done: Queue[Any] = Queue()
     try:
         while waiting or sent:
-            room = AHEAD * max(1, sum(client.nthreads().values()))
+            room = QUEUED_PER_THREAD * max(1, sum(client.nthreads().values()))
             while waiting and len(sent) < room:
                 task = waiting.popleft()
                 try:
-                    content = {role: _content(path, role) for role, path in task.inputs.items()}
+                    content = {role: _input_files(path, role) for role, path in task.inputs.items()}
                 except NscanError as error:
                     yield task, Outcome.failed(str(error))
                     continue
-                future = client.submit(run_there, task, content, timeout, tool_key(), topic, pure=False)
+                future = client.submit(run_on_worker, task, content, timeout, tool_key(), topic, pure=False)
                 sent[future] = task
                 future.add_done_callback(done.put)
             with contextlib.suppress(Empty):
                 future = done.get(timeout=0.5)
-                yield sent.pop(future), _outcome(future)
+                yield sent.pop(future), _future_outcome(future)
             if client.status != "running":
                 raise InputMissingError(f"--scheduler {address}: is gone; start it, and call again to go on")
     finally:
@@ -71,8 +71,8 @@ def run_all(
         client.close(timeout=2)
 
 
-def run_there(
-    task: Task, content: dict[str, Content], timeout: float | None, tool: str, topic: str
+def run_on_worker(
+    task: Task, content: dict[str, InputFiles], timeout: float | None, tool: str, topic: str
 ) -> Outcome:
     """On a worker: do a task whose inputs have come along, and say under the topic how far it is."""
     from distributed import get_worker
@@ -91,12 +91,12 @@ def run_there(
                 (place / name).write_bytes(data)
             inputs[role] = str(place / Path(task.inputs[role]).name)
         local = replace(task, inputs=inputs)
-        run = run_here([local], 1, timeout, Path(folder), lambda *said: worker.log_event(topic, said))
+        run = run_locally([local], 1, timeout, Path(folder), lambda *said: worker.log_event(topic, said))
         with contextlib.closing(run):
             return next(run)[1]
 
 
-def _content(path: str, role: str) -> Content:
+def _input_files(path: str, role: str) -> InputFiles:
     """The files of an input; those of a folder have its name before their own. Raises NscanError."""
     folder = Path(path)
     if role != "log" or not folder.is_dir():
@@ -106,7 +106,7 @@ def _content(path: str, role: str) -> Content:
     return {f"{folder.name}/{Path(file).name}": read_bytes(file) for file in files}
 
 
-def _client(address: str) -> Any:
+def _connect(address: str) -> Any:
     if not ADDRESS.fullmatch(address):
         raise WrongUsageError(f"--scheduler {address}: is no address of the form tcp://HOST:PORT; give one")
     try:
@@ -119,14 +119,14 @@ def _client(address: str) -> Any:
     logging.getLogger("distributed").setLevel(logging.CRITICAL)
     connect: Any = distributed.Client
     try:
-        return connect(address, timeout=PATIENCE, set_as_default=False)
+        return connect(address, timeout=CONNECT_TIMEOUT, set_as_default=False)
     except (OSError, ValueError) as error:
         raise InputMissingError(
             f"--scheduler {address}: no Dask scheduler answers there; start one, or leave --scheduler out"
         ) from error
 
 
-def _outcome(future: Any) -> Outcome:
+def _future_outcome(future: Any) -> Outcome:
     error = future.exception()
     if error is None:
         outcome: Outcome = future.result()

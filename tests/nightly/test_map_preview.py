@@ -8,10 +8,10 @@ import pytest
 from PIL import Image
 
 from nscan_cli.graph.model import Graph, Loop
-from nscan_cli.mapping.figures.map_drawing import SOFT_GRAYS
+from nscan_cli.mapping.figures.map_plots import SOFT_GRAYS
 from nscan_cli.mapping.occupancy import FREE, OCCUPIED, UNKNOWN, OccupancyGrid
-from nscan_cli.nightly import preview as module
-from nscan_cli.nightly.preview import preview
+from nscan_cli.nightly import map_preview as module
+from nscan_cli.nightly.map_preview import map_preview
 
 
 def graph_of(poses: list[tuple[float, float, float]]) -> Graph:
@@ -40,7 +40,7 @@ GRAPH = graph_of([(1.0, 2.0, 0), (2.0, 4.5, 0), (3.0, 2.0, 0)])
 
 
 def test_the_picture_has_a_pixel_for_each_cell(grid):
-    pixels = np.asarray(Image.open(io.BytesIO(preview(grid, GRAPH)[0])).convert("L"))
+    pixels = np.asarray(Image.open(io.BytesIO(map_preview(grid, GRAPH)[0])).convert("L"))
     occupied, free, unknown = (SOFT_GRAYS[state] for state in (OCCUPIED, FREE, UNKNOWN))
     assert pixels.tolist() == [
         *[[free, free, unknown, unknown]] * 4,
@@ -49,8 +49,8 @@ def test_the_picture_has_a_pixel_for_each_cell(grid):
 
 
 def test_a_wall_is_seen_where_cells_share_a_pixel(grid, monkeypatch):
-    monkeypatch.setattr(module, "PIXELS", 3)
-    picture, layers = preview(grid, GRAPH)
+    monkeypatch.setattr(module, "PREVIEW_PIXELS", 3)
+    picture, layers = map_preview(grid, GRAPH)
     pixels = np.asarray(Image.open(io.BytesIO(picture)).convert("L"))
     occupied, free, unknown = (SOFT_GRAYS[state] for state in (OCCUPIED, FREE, UNKNOWN))
     # Filled up above: the lower left corner keeps its place.
@@ -59,7 +59,7 @@ def test_a_wall_is_seen_where_cells_share_a_pixel(grid, monkeypatch):
 
 
 def test_the_layers_lie_over_the_picture(grid):
-    layers = preview(grid, GRAPH)[1].decode()
+    layers = map_preview(grid, GRAPH)[1].decode()
     assert 'viewBox="0 0 4 5"' in layers
 
     def path(name: str) -> str:
@@ -77,6 +77,6 @@ def test_the_layers_lie_over_the_picture(grid):
 
 def test_the_path_leaves_out_what_nobody_can_see(grid):
     dense = graph_of([(1.0 + 0.001 * k, 2.0, 0.0) for k in range(2001)])
-    layers = preview(grid, dense)[1].decode()
+    layers = map_preview(grid, dense)[1].decode()
     (path,) = re.findall(r'class="path"[^>]*', layers)
     assert path.count("L") <= 3

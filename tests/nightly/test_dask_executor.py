@@ -11,11 +11,11 @@ import pytest
 
 from nscan_cli.cli.main import run
 from nscan_cli.errors import InputMissingError, WrongUsageError
-from nscan_cli.nightly import cluster
-from nscan_cli.nightly.manifest import Entry, read_manifest
+from nscan_cli.nightly import dask_executor
+from nscan_cli.nightly.manifest import ManifestEntry, read_manifest
 from nscan_cli.nightly.task import Task
 from tests.cli.room_drive import COUNT
-from tests.nightly.small import recordings, results
+from tests.nightly.small_logs import recordings, results
 
 distributed = pytest.importorskip("distributed")
 
@@ -36,13 +36,13 @@ def test_the_same_results_as_in_local_processes(scheduler, small, undisturbed, t
 
 def test_a_failure_costs_its_log_alone_and_reads_as_it_does_here(scheduler, small, tmp_path):
     (tmp_path / "empty.log").touch()
-    bad = Task.of(Entry("empty", {"log": tmp_path / "empty.log"}))
-    lost = Task.of(Entry("lost", {"log": tmp_path / "lost.log"}))
+    bad = Task.of(ManifestEntry("empty", {"log": tmp_path / "empty.log"}))
+    lost = Task.of(ManifestEntry("lost", {"log": tmp_path / "lost.log"}))
     fine = Task.of(read_manifest(str(small), None)[0])
     said = []
     found = {
         task.name: outcome
-        for task, outcome in cluster.run_all(
+        for task, outcome in dask_executor.run_on_dask(
             [bad, lost, fine], scheduler, 60.0, lambda *progress: said.append(progress)
         )
     }
@@ -54,7 +54,7 @@ def test_a_failure_costs_its_log_alone_and_reads_as_it_does_here(scheduler, smal
 
 def test_a_log_of_several_files_comes_along_whole(scheduler, tmp_path):
     tasks = [Task.of(entry) for entry in recordings(tmp_path)]
-    for _task, outcome in cluster.run_all(tasks, scheduler, 60.0, lambda *_progress: None):
+    for _task, outcome in dask_executor.run_on_dask(tasks, scheduler, 60.0, lambda *_progress: None):
         assert outcome.result["counts"]["scans"] == COUNT
         assert outcome.result["counts"]["warnings"] == []
 
@@ -72,19 +72,19 @@ def test_a_worker_that_dies_costs_no_log(scheduler, small, undisturbed, tmp_path
 
 
 def test_a_worker_with_another_version_is_named(scheduler, small, monkeypatch):
-    monkeypatch.setattr(cluster, "tool_key", lambda: "9.9.9-0")
+    monkeypatch.setattr(dask_executor, "tool_key", lambda: "9.9.9-0")
     task = Task.of(read_manifest(str(small), None)[0])
-    ((_task, outcome),) = cluster.run_all([task], scheduler, None, lambda *_: None)
+    ((_task, outcome),) = dask_executor.run_on_dask([task], scheduler, None, lambda *_: None)
     assert "another nscan-cli" in outcome.result["reason"]
     assert "in place of 9.9.9-0; install the same" in outcome.result["reason"]
 
 
 def test_no_scheduler(monkeypatch):
-    monkeypatch.setattr(cluster, "PATIENCE", 0.5)
+    monkeypatch.setattr(dask_executor, "CONNECT_TIMEOUT", 0.5)
     with socket.socket() as port:
         port.bind(("127.0.0.1", 0))
         address = f"tcp://127.0.0.1:{port.getsockname()[1]}"
         with pytest.raises(InputMissingError, match="no Dask scheduler answers there"):
-            next(cluster.run_all([], address, None, lambda *_: None), None)
+            next(dask_executor.run_on_dask([], address, None, lambda *_: None), None)
     with pytest.raises(WrongUsageError, match="no address of the form tcp://HOST:PORT"):
-        next(cluster.run_all([], "here", None, lambda *_: None), None)
+        next(dask_executor.run_on_dask([], "here", None, lambda *_: None), None)

@@ -12,11 +12,11 @@ from pathlib import Path
 
 import pytest
 
-from nscan_cli.nightly.manifest import Entry, read_manifest
-from nscan_cli.nightly.night_history import read_nights
-from nscan_cli.nightly.report_page import page
-from nscan_cli.nightly.verdict import verdict
-from tests.nightly.test_verdict import FAILED
+from nscan_cli.nightly.html_report import html_report
+from nscan_cli.nightly.manifest import ManifestEntry, read_manifest
+from nscan_cli.nightly.regression_check import check_log
+from nscan_cli.nightly.run_history import read_runs
+from tests.nightly.test_regression_check import FAILED
 
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
 FLAGS = ["--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run",
@@ -47,16 +47,23 @@ addEventListener("load", () => setTimeout(() => {
 def pages(small, undisturbed):
     """A good night, and one with everything in it that can go wrong."""
     entries = read_manifest(str(small), None)
-    nights = {entry.name: read_nights(undisturbed / entry.name) for entry in entries}
-    good = [verdict(entry, nights[entry.name], [], False) for entry in entries]
+    nights = {entry.name: read_runs(undisturbed / entry.name) for entry in entries}
+    good = [check_log(entry, nights[entry.name], [], False) for entry in entries]
     name = "a_name_that_is_as_long_as_names_of_logs_can_be_on_some_days.2026-11-21"
     bad = [
         *good,
-        verdict(entries[0], [*nights["one"], {**FAILED, "reason": EVIL}], [EVIL], False),
-        verdict(Entry(name, {"log": Path("x" * 200)}, sources={"log": f"javascript:{EVIL}"}), [], [], True),
-        verdict(Entry(name + "2", {"log": Path("x")}), [{**FAILED, "reason": "word " * 80}], [], False),
+        check_log(entries[0], [*nights["one"], {**FAILED, "reason": EVIL}], [EVIL], False),
+        check_log(
+            ManifestEntry(name, {"log": Path("x" * 200)}, sources={"log": f"javascript:{EVIL}"}), [], [], True
+        ),
+        check_log(
+            ManifestEntry(name + "2", {"log": Path("x")}), [{**FAILED, "reason": "word " * 80}], [], False
+        ),
     ]
-    return {"good": page("small", good, undisturbed).decode(), "bad": page(EVIL, bad, undisturbed).decode()}
+    return {
+        "good": html_report("small", good, undisturbed).decode(),
+        "bad": html_report(EVIL, bad, undisturbed).decode(),
+    }
 
 
 class Tags(HTMLParser):

@@ -12,12 +12,12 @@ from nscan_cli.graph.model import Graph
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.mapping.figures.axes import (
     AXES_MARGINS,
-    CAPTION_MARGINS,
-    FOOTER_MARGINS,
-    Entry,
-    axes,
-    footer,
-    legend_below,
+    SCALE_BAR_MARGINS,
+    TITLE_MARGINS,
+    LegendEntry,
+    draw_axes,
+    draw_legend_below,
+    draw_scale_bar,
 )
 from nscan_cli.mapping.figures.canvas import (
     BLACK,
@@ -30,19 +30,19 @@ from nscan_cli.mapping.figures.canvas import (
 from nscan_cli.mapping.figures.covariance_ellipses import draw_ellipses
 from nscan_cli.mapping.figures.graph_edges import EDGE_COLOURS, edges_by_kind
 from nscan_cli.mapping.figures.panels import bounds_around
-from nscan_cli.mapping.map_image import gray
+from nscan_cli.mapping.map_server import gray_image
 from nscan_cli.mapping.occupancy import FREE, OCCUPIED, UNKNOWN, OccupancyGrid
 from nscan_cli.poses import Array, transform
 
-LEAST_PIXELS, MOST_PIXELS = 1600, 3200
+MIN_PIXELS, MAX_PIXELS = 1600, 3200
 """Of the longer side of a picture with overlays. A small map's cells become squares of pixels; of a large
 map several cells become one pixel, which is dark when one of them is, so that walls can still be seen."""
-FIGURE_PIXELS = 2400
+PAPER_PIXELS = 2400
 """Of the longer side of a figure's plot: 20 cm at 300 dots an inch."""
 SOFT_GRAYS = {OCCUPIED: 60, UNKNOWN: 226, FREE: 255}
 """Softer than map_server's, so that colours stand out."""
-FAR_OUT = 5e-4
-SEEN_ELLIPSE = 8.0
+OUTLIER_QUANTILE = 5e-4
+MIN_ELLIPSE = 8.0
 """Units of the longer half axis that an ellipse needs to be seen."""
 
 
@@ -58,15 +58,15 @@ class Overlays:
         return self.trajectory or self.graph or self.uncertainty
 
 
-def draw_over_map(grid: OccupancyGrid, graph: Graph, overlays: Overlays) -> Canvas:
+def plot_over_map(grid: OccupancyGrid, graph: Graph, overlays: Overlays) -> Canvas:
     """The map in soft grays, the overlays in colour, and below them a scale and what the colours mean."""
-    background, cells_per_pixel = _background(grid)
-    canvas = Canvas(grid.bounds, 1 / (cells_per_pixel * grid.resolution), background, FOOTER_MARGINS)
-    footer(canvas, _draw_overlays(canvas, graph, overlays))
+    background, cells_per_pixel = _background_image(grid)
+    canvas = Canvas(grid.bounds, 1 / (cells_per_pixel * grid.resolution), background, SCALE_BAR_MARGINS)
+    draw_scale_bar(canvas, _draw_overlays(canvas, graph, overlays))
     return canvas
 
 
-def draw_figure(
+def plot_paper_figure(
     log: LaserLog,
     rows: NDArray[np.int64],
     poses: Array,
@@ -82,15 +82,15 @@ def draw_figure(
     what else is drawn, a legend tells.
     """
     points = _points_of_occupied_cells(log, rows, poses, grid)
-    margins = CAPTION_MARGINS if overlays.graph or overlays.uncertainty else AXES_MARGINS
-    canvas = Canvas.blank(_figure_bounds(points, graph.poses), FIGURE_PIXELS, margins)
+    margins = TITLE_MARGINS if overlays.graph or overlays.uncertainty else AXES_MARGINS
+    canvas = Canvas.blank(_figure_bounds(points, graph.poses), PAPER_PIXELS, margins)
     canvas.cloud(points, BLACK, 0.6)
     entries = _draw_overlays(canvas, graph, overlays if overlays else Overlays(trajectory=True))
-    if margins is CAPTION_MARGINS:
-        legend_below(canvas, entries)
+    if margins is TITLE_MARGINS:
+        draw_legend_below(canvas, entries)
     else:
         canvas.clear_margins()
-        axes(canvas)
+        draw_axes(canvas)
     return canvas
 
 
@@ -98,13 +98,13 @@ def _figure_bounds(points: Array, poses: Array) -> Bounds:
     """Around the poses (N, 3), and the points (M, 2) but a share of FAR_OUT on each side."""
     seen = poses[:, :2]
     if len(points):
-        seen = np.concatenate([np.quantile(points, [FAR_OUT, 1 - FAR_OUT], axis=0), seen])
+        seen = np.concatenate([np.quantile(points, [OUTLIER_QUANTILE, 1 - OUTLIER_QUANTILE], axis=0), seen])
     return bounds_around(seen, spare=0.03)
 
 
-def _draw_overlays(canvas: Canvas, graph: Graph, overlays: Overlays) -> list[Entry]:
+def _draw_overlays(canvas: Canvas, graph: Graph, overlays: Overlays) -> list[LegendEntry]:
     """Draw them; the legend's entries for what was drawn."""
-    entries: list[Entry] = []
+    entries: list[LegendEntry] = []
     if overlays.trajectory:
         # Beneath relations, a broad and light band.
         colour, width = (SKY, 5.0) if overlays.graph else (BLUE, 2.2)
@@ -117,14 +117,14 @@ def _draw_overlays(canvas: Canvas, graph: Graph, overlays: Overlays) -> list[Ent
     return entries
 
 
-def _background(grid: OccupancyGrid) -> tuple[NDArray[np.uint8], float]:
+def _background_image(grid: OccupancyGrid) -> tuple[NDArray[np.uint8], float]:
     """The map in soft grays, (h, w), and how many of its cells lie along a pixel's side."""
-    cells = gray(grid, SOFT_GRAYS)
+    cells = gray_image(grid, SOFT_GRAYS)
     longest = max(cells.shape)
-    if longest <= MOST_PIXELS:
-        zoom = math.ceil(LEAST_PIXELS / longest)
+    if longest <= MAX_PIXELS:
+        zoom = math.ceil(MIN_PIXELS / longest)
         return cells.repeat(zoom, axis=0).repeat(zoom, axis=1), 1 / zoom
-    side = math.ceil(longest / MOST_PIXELS)
+    side = math.ceil(longest / MAX_PIXELS)
     height, width = -(-cells.shape[0] // side), -(-cells.shape[1] // side)
     # Whole pixels, filled up above and to the right: the lower left corner keeps its place.
     above, right = height * side - cells.shape[0], width * side - cells.shape[1]
@@ -134,9 +134,9 @@ def _background(grid: OccupancyGrid) -> tuple[NDArray[np.uint8], float]:
     return np.where(darkest == SOFT_GRAYS[OCCUPIED], darkest, np.round(mean)).astype(np.uint8), float(side)
 
 
-def _draw_graph(canvas: Canvas, graph: Graph) -> list[Entry]:
+def _draw_graph(canvas: Canvas, graph: Graph) -> list[LegendEntry]:
     """Relations as lines, of an nScan relation from its fixed scan to the others; keyframes as dots."""
-    entries: list[Entry] = []
+    entries: list[LegendEntry] = []
     edges = edges_by_kind(graph)
     for kind, width in (("nScan", 1.2), ("pairwise", 1.2), ("loop", 2.0)):
         nodes, colour = edges[kind], EDGE_COLOURS[kind]
@@ -148,13 +148,13 @@ def _draw_graph(canvas: Canvas, graph: Graph) -> list[Entry]:
     return [*entries, ("disc", BLACK, "keyframe")]
 
 
-def _draw_uncertainty(canvas: Canvas, graph: Graph) -> list[Entry]:
+def _draw_uncertainty(canvas: Canvas, graph: Graph) -> list[LegendEntry]:
     """Ellipses of the keyframes' positions."""
     keyframes = sorted(graph.marginals)
     if not keyframes:
         return []
     covariances = np.array([graph.marginals[keyframe][:2, :2] for keyframe in keyframes])
-    return [draw_ellipses(canvas, graph.poses[keyframes, :2], covariances, PURPLE, SEEN_ELLIPSE)]
+    return [draw_ellipses(canvas, graph.poses[keyframes, :2], covariances, PURPLE, MIN_ELLIPSE)]
 
 
 def _points_of_occupied_cells(

@@ -20,14 +20,14 @@ if TYPE_CHECKING:
 
 Gray = NDArray[np.uint8]
 
-MAP_GRAYS = {OCCUPIED: 0, UNKNOWN: 205, FREE: 254}
-OCCUPIED_THRESHOLD, FREE_THRESHOLD = 0.65, 0.196
+MAP_SERVER_GRAYS = {OCCUPIED: 0, UNKNOWN: 205, FREE: 254}
+OCCUPIED_THRESH, FREE_THRESH = 0.65, 0.196
 """Shares of black. A gray of 205 has 0.19608: with a threshold of 0.25 it would load as free."""
 RUN_LENGTHS = 3
 """zlib's strategy Z_RLE: on maps as small as the best level, in half the time of the default."""
 
 
-def gray(grid: OccupancyGrid, grays: dict[int, int] = MAP_GRAYS) -> Gray:
+def gray_image(grid: OccupancyGrid, grays: dict[int, int] = MAP_SERVER_GRAYS) -> Gray:
     """(H, W) the gray of every cell's state; unlike the grid's, row 0 is that of greatest y."""
     table = np.zeros(256, dtype=np.uint8)
     for state, value in grays.items():
@@ -53,7 +53,7 @@ class MapImage(NamedTuple):
 
 def map_image(grid: OccupancyGrid) -> MapImage:
     """That of a grid."""
-    return MapImage(gray(grid), grid.resolution, grid.origin)
+    return MapImage(gray_image(grid), grid.resolution, grid.origin)
 
 
 def map_png(image: MapImage) -> bytes:
@@ -69,15 +69,15 @@ def map_yaml(image_name: str, image: MapImage) -> bytes:
     The origin's yaw is 0: consumers ignore it.
     """
     check_finite("the origin of the map", image.origin, image.resolution)
-    x, y = (_decimal(value) for value in image.origin)
+    x, y = (_yaml_number(value) for value in image.origin)
     return (
         f"image: {json.dumps(image_name, ensure_ascii=False)}\n"
         "mode: trinary\n"
-        f"resolution: {_decimal(image.resolution)}\n"
+        f"resolution: {_yaml_number(image.resolution)}\n"
         f"origin: [{x}, {y}, 0.0]\n"
         "negate: 0\n"
-        f"occupied_thresh: {OCCUPIED_THRESHOLD}\n"
-        f"free_thresh: {FREE_THRESHOLD}\n"
+        f"occupied_thresh: {OCCUPIED_THRESH}\n"
+        f"free_thresh: {FREE_THRESH}\n"
     ).encode()
 
 
@@ -91,7 +91,7 @@ def png_bytes(image: Image, dpi: int | None = None) -> bytes:
     return file.getvalue()
 
 
-def _decimal(value: float) -> str:
+def _yaml_number(value: float) -> str:
     """Never with an exponent, which YAML 1.1 reads as text when there is no point before it."""
     text = f"{value + 0.0:.9f}".rstrip("0")
     return text + "0" if text.endswith(".") else text

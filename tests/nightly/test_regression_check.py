@@ -4,16 +4,16 @@ from pathlib import Path
 
 import pytest
 
-from nscan_cli.nightly.manifest import Entry
-from nscan_cli.nightly.night_history import Night
-from nscan_cli.nightly.verdict import Verdict, headline, verdict
+from nscan_cli.nightly.manifest import ManifestEntry
+from nscan_cli.nightly.regression_check import CheckResult, check_log, headline
+from nscan_cli.nightly.run_history import RunRecord
 
 
 def figures(value: float) -> dict[str, float]:
     return dict.fromkeys(("mean", "sd", "median", "mean_square", "rmse", "max"), value)
 
 
-def done(translation: float, rotation: float = 0.1) -> Night:
+def done(translation: float, rotation: float = 0.1) -> RunRecord:
     evaluation = {"relations": {"translation": figures(translation), "rotation": figures(rotation)}}
     return {"key": "", "tool": "", "outcome": "done", "counts": {"warnings": []}, "evaluation": evaluation}
 
@@ -31,10 +31,10 @@ UNMEASURED = {**done(1.0), "evaluation": None}
 
 
 def judged(
-    *nights: Night, translation: float | None = None, rotation: float | None = None, absent: bool = False
-) -> Verdict:
-    entry = Entry("a", {"log": Path("a.log"), "relations": Path("r")}, translation, rotation)
-    return verdict(entry, list(nights), [], absent)
+    *nights: RunRecord, translation: float | None = None, rotation: float | None = None, absent: bool = False
+) -> CheckResult:
+    entry = ManifestEntry("a", {"log": Path("a.log"), "relations": Path("r")}, translation, rotation)
+    return check_log(entry, list(nights), [], absent)
 
 
 @pytest.mark.parametrize(

@@ -1,6 +1,6 @@
 """One log from its bytes to map and errors, in a process of its own.
 
-It is started by `start.py`. What it does is what `slam` with --map and
+It is started by `bootstrap.py`. What it does is what `slam` with --map and
 --trajectory, and `evaluate`, do. It says how far it is on its standard output, a line of JSON at a time, and
 ends itself when its standard input does: whoever started it is gone then.
 """
@@ -19,18 +19,18 @@ from pathlib import Path
 from typing import Any
 
 from nscan_cli.errors import NscanError
-from nscan_cli.nightly.task import OUTPUTS, RESULT, TASK, reading_of
+from nscan_cli.nightly.task import OUTPUTS, RESULT, TASK, reading_options_from
 
-BETWEEN_REPORTS = 0.2
+REPORT_INTERVAL = 0.2
 """s"""
 
 
 def main(place: str) -> None:
     """Do the task of a place of work; its outputs and its result are there afterwards."""
-    threading.Thread(target=_end_with_the_parent, daemon=True).start()
+    threading.Thread(target=_exit_with_parent, daemon=True).start()
     os.chdir(place)
     try:
-        result = work(json.loads(Path(TASK).read_bytes()), Path(OUTPUTS), _reporter())
+        result = map_and_evaluate(json.loads(Path(TASK).read_bytes()), Path(OUTPUTS), _progress_printer())
     except NscanError as error:
         result = {"reason": str(error)}
     except OSError as error:
@@ -43,7 +43,9 @@ def main(place: str) -> None:
     Path(RESULT).write_text(json.dumps(result, allow_nan=False))
 
 
-def work(task: dict[str, Any], outputs: Path, report: Callable[[int, int, int], None]) -> dict[str, Any]:
+def map_and_evaluate(
+    task: dict[str, Any], outputs: Path, report: Callable[[int, int, int], None]
+) -> dict[str, Any]:
     """Map and measure; the counts, the evaluation and the times. Raises the errors of both.
 
     There is no time where kernels were compiled meanwhile.
@@ -54,16 +56,16 @@ def work(task: dict[str, Any], outputs: Path, report: Callable[[int, int, int], 
     from nscan_cli.graph.io.tum import write_tum
     from nscan_cli.kernels.cache_folder import cache_folder
     from nscan_cli.logs.load import read_log
-    from nscan_cli.mapping.map_image import map_image, map_png, map_yaml
+    from nscan_cli.mapping.map_server import map_image, map_png, map_yaml
     from nscan_cli.mapping.occupancy import occupancy_grid
     from nscan_cli.nightly import warm_up
-    from nscan_cli.nightly.preview import preview
+    from nscan_cli.nightly.map_preview import map_preview
     from nscan_cli.slam.map_log import Counts, map_log, slam_options
 
     if cache_folder() is None:
         warm_up.main()
-    kept, began = warm_up.kept_kernels(), time.perf_counter()
-    reading, mapping = reading_of(task["reading"]), task["mapping"]
+    kept, began = warm_up.cached_files(), time.perf_counter()
+    reading, mapping = reading_options_from(task["reading"]), task["mapping"]
     options = slam_options(
         mapping.get("max-scans"), mapping.get("relations"), not mapping.get("no-loops", False)
     )
@@ -82,10 +84,10 @@ def work(task: dict[str, Any], outputs: Path, report: Callable[[int, int, int], 
     (outputs / "map.png").write_bytes(map_png(image))
     (outputs / "map.yaml").write_bytes(map_yaml("map.png", image))
     seconds: float | None = round(time.perf_counter() - began, 3)
-    if "numba" in sys.modules and warm_up.kept_kernels() - kept:
+    if "numba" in sys.modules and warm_up.cached_files() - kept:
         # Kept code is loaded without numba. A time with compilation in it is none of mapping.
         seconds = None
-    picture, overlay = preview(grid, graph)
+    picture, overlay = map_preview(grid, graph)
     (outputs / "preview.png").write_bytes(picture)
     (outputs / "preview.svg").write_bytes(overlay)
     made = Counts.of(graph)
@@ -113,7 +115,7 @@ def _evaluation(inputs: dict[str, str], graph_file: str) -> dict[str, Any] | Non
     return as_document(measure(graph_file, relations, reference).evaluation)
 
 
-def _reporter() -> Callable[[int, int, int], None]:
+def _progress_printer() -> Callable[[int, int, int], None]:
     """Says how far the work is, not too often."""
     next_time = 0.0
 
@@ -121,13 +123,13 @@ def _reporter() -> Callable[[int, int, int], None]:
         nonlocal next_time
         if done < total and time.monotonic() < next_time:
             return
-        next_time = time.monotonic() + BETWEEN_REPORTS
+        next_time = time.monotonic() + REPORT_INTERVAL
         print(json.dumps([done, total, keyframes]), flush=True)
 
     return report
 
 
-def _end_with_the_parent() -> None:
+def _exit_with_parent() -> None:
     with contextlib.suppress(OSError):
         while os.read(0, 1024):
             pass

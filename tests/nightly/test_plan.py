@@ -11,13 +11,14 @@ import pytest
 
 from nscan_cli.logs.load import read_log
 from nscan_cli.nightly import fingerprint
-from nscan_cli.nightly import night as night_module
-from nscan_cli.nightly.manifest import Entry
+from nscan_cli.nightly import plan as plan_module
+from nscan_cli.nightly.manifest import ManifestEntry
 from nscan_cli.nightly.manifest_parameters import parameters_from
-from nscan_cli.nightly.night import carry_out, plan
-from nscan_cli.nightly.night_history import read_nights
+from nscan_cli.nightly.plan import make_plan
+from nscan_cli.nightly.run import run_plan
+from nscan_cli.nightly.run_history import read_runs
 from nscan_cli.nightly.task import Outcome
-from tests.nightly.small import recordings
+from tests.nightly.small_logs import recordings
 
 
 class Silent:
@@ -46,10 +47,10 @@ def good(content: bytes = b"map") -> Outcome:
 
 
 @pytest.fixture
-def entry(tmp_path: Path) -> Entry:
+def entry(tmp_path: Path) -> ManifestEntry:
     (tmp_path / "a.log").write_text("a")
     (tmp_path / "a.tum").write_text("t")
-    return Entry("a", {"log": tmp_path / "a.log", "reference": tmp_path / "a.tum"})
+    return ManifestEntry("a", {"log": tmp_path / "a.log", "reference": tmp_path / "a.tum"})
 
 
 @pytest.fixture
@@ -58,14 +59,14 @@ def nights(tmp_path: Path) -> Path:
     return tmp_path / "nights"
 
 
-def night(entry: Entry, folder: Path, *outcomes: Outcome, force: bool = False) -> Fake:
+def night(entry: ManifestEntry, folder: Path, *outcomes: Outcome, force: bool = False) -> Fake:
     fake = Fake(*outcomes)
-    carry_out(plan([entry], folder, force), folder, fake, Silent())
+    run_plan(make_plan([entry], folder, force), folder, fake, Silent())
     return fake
 
 
-def is_done(entry: Entry, folder: Path) -> bool:
-    return plan([entry], folder, False).up_to_date == [entry]
+def is_done(entry: ManifestEntry, folder: Path) -> bool:
+    return make_plan([entry], folder, False).up_to_date == [entry]
 
 
 def test_what_is_done_is_up_to_date(entry, nights):
@@ -111,9 +112,9 @@ def test_a_failure_is_tried_again_and_told_once(entry, nights):
     night(entry, nights, Outcome.failed("no\nroom"))
     assert not is_done(entry, nights)
     night(entry, nights, Outcome.failed("no room"))
-    assert [line["reason"] for line in read_nights(nights / "a")] == ["no room"]
+    assert [line["reason"] for line in read_runs(nights / "a")] == ["no room"]
     night(entry, nights, good())
-    assert [line["outcome"] for line in read_nights(nights / "a")] == ["done"]
+    assert [line["outcome"] for line in read_runs(nights / "a")] == ["done"]
 
 
 def test_a_night_for_every_change(entry, nights):
@@ -122,7 +123,7 @@ def test_a_night_for_every_change(entry, nights):
     entry.inputs["log"].write_text("b")
     night(entry, nights, good(b"2"))
     night(entry, nights, Outcome.failed("stopped"), force=True)
-    assert [line["outcome"] for line in read_nights(nights / "a")] == ["done", "done", "failed"]
+    assert [line["outcome"] for line in read_runs(nights / "a")] == ["done", "done", "failed"]
     assert (nights / "a" / "map.png").read_bytes() == b"2"
     assert not is_done(entry, nights)
 
@@ -133,33 +134,33 @@ def test_a_history_that_is_damaged_begins_anew(entry, nights):
         (nights / "a" / "nights.jsonl").write_bytes(damage)
         assert not is_done(entry, nights)
         night(entry, nights, good())
-        assert len(read_nights(nights / "a")) == 1
+        assert len(read_runs(nights / "a")) == 1
 
 
 def test_logs_that_are_absent_or_unreadable_do_not_reach_the_engine(entry, nights, tmp_path):
-    absent = Entry("b", {"log": tmp_path / "b.log"}, optional=True)
-    folder = Entry("c", {"log": tmp_path})
+    absent = ManifestEntry("b", {"log": tmp_path / "b.log"}, optional=True)
+    folder = ManifestEntry("c", {"log": tmp_path})
     sources = {"log": "https://example.org/a.log", "relations": "https://example.org/d.relations"}
     inputs = {"log": tmp_path / "a.log", "relations": tmp_path / "d.relations"}
-    lost = Entry("d", inputs, sources=sources)
-    planned = plan([absent, folder, lost, entry], nights, False)
+    lost = ManifestEntry("d", inputs, sources=sources)
+    planned = make_plan([absent, folder, lost, entry], nights, False)
     assert planned.absent == [absent]
     assert [each.name for each, _reason in planned.unreadable] == ["c", "d"]
     fake = Fake(good())
-    carry_out(planned, nights, fake, Silent())
+    run_plan(planned, nights, fake, Silent())
     assert fake.done == ["a"]
-    reason = read_nights(nights / "d")[0]["reason"]
+    reason = read_runs(nights / "d")[0]["reason"]
     assert "d.relations: no such file" in reason
-    assert reason.endswith("; to be had from https://example.org/d.relations")
+    assert reason.endswith("; download from https://example.org/d.relations")
     assert not (nights / "b").exists()
 
 
 def test_a_log_that_is_not_there_has_failed_unless_it_is_optional(nights, tmp_path):
-    entry = Entry("b", {"log": tmp_path / "b.log"}, sources={"log": "https://example.org/b.log"})
-    planned = plan([entry], nights, False)
+    entry = ManifestEntry("b", {"log": tmp_path / "b.log"}, sources={"log": "https://example.org/b.log"})
+    planned = make_plan([entry], nights, False)
     assert planned.absent == []
-    assert planned.unreadable == [(entry, "b.log is not there; to be had from https://example.org/b.log")]
-    planned = plan([replace(entry, optional=True)], nights, False)
+    assert planned.unreadable == [(entry, "b.log is not there; download from https://example.org/b.log")]
+    planned = make_plan([replace(entry, optional=True)], nights, False)
     assert (planned.absent, planned.unreadable) == ([replace(entry, optional=True)], [])
 
 
@@ -167,24 +168,24 @@ def test_an_optional_log_is_mapped_without_what_is_not_there_to_measure_it(entry
     (tmp_path / "a.tum").unlink()
     sources = {"reference": "https://example.org/a.tum"}
     optional = replace(entry, optional=True, sources=sources, sha256={"reference": "0" * 64})
-    planned = plan([optional], nights, False)
+    planned = make_plan([optional], nights, False)
     ((planned_entry, _key),) = planned.to_do
     assert planned_entry.inputs == {"log": tmp_path / "a.log"}
     assert planned.notes["a"] == [
-        "a.tum is not there: there is nothing to measure it against; to be had from https://example.org/a.tum"
+        "a.tum is not there, so no errors are measured; download from https://example.org/a.tum"
     ]
-    ((_, reason),) = plan([replace(optional, optional=False)], nights, False).unreadable
+    ((_, reason),) = make_plan([replace(optional, optional=False)], nights, False).unreadable
     assert "a.tum: no such file" in reason
 
 
-def why(entry: Entry, folder: Path, force: bool = False) -> list[str]:
-    return plan([entry], folder, force).anew.get("a", ["nothing to do"])
+def why(entry: ManifestEntry, folder: Path, force: bool = False) -> list[str]:
+    return make_plan([entry], folder, force).rerun_reasons.get("a", ["nothing to do"])
 
 
 def test_why_a_log_is_made_anew(entry, nights, tmp_path, monkeypatch):
     assert why(entry, nights) == []
     night(entry, nights, good())
-    assert read_nights(nights / "a")[0]["times"]["anew"] == []
+    assert read_runs(nights / "a")[0]["times"]["anew"] == []
     assert why(entry, nights) == ["nothing to do"]
     assert why(entry, nights, force=True) == ["--force"]
     entry.inputs["log"].write_text("b")
@@ -195,7 +196,7 @@ def test_why_a_log_is_made_anew(entry, nights, tmp_path, monkeypatch):
                "the parameter mount is [0.1, 0.0, 90.0]"]  # fmt: skip
     assert why(entry, nights)[2:] == changes
     night(entry, nights, good())
-    assert read_nights(nights / "a")[1]["times"]["anew"][2:] == changes
+    assert read_runs(nights / "a")[1]["times"]["anew"][2:] == changes
     # The same parameters as the history has them are the same.
     assert why(entry, nights, force=True)[-1] == "--force"
     (nights / "a" / "map.png").unlink()
@@ -205,7 +206,7 @@ def test_why_a_log_is_made_anew(entry, nights, tmp_path, monkeypatch):
     night(entry, nights, Outcome.failed("no room"))
     assert why(entry, nights)[-1] == "it failed the night before"
     night(entry, nights, good())
-    for module in (fingerprint, night_module):
+    for module in (fingerprint, plan_module):
         monkeypatch.setattr(module, "tool_key", lambda: "9.0.0-00")
     (reason,) = why(entry, nights)
     assert re.fullmatch(r"the code of nscan-cli has changed: 9\.0\.0, no longer [\d.]+\w*", reason)
@@ -226,8 +227,8 @@ def test_the_largest_log_is_begun_first(nights, tmp_path):
     entries = []
     for name, size in (("a", 1), ("b", 3), ("c", 2)):
         (tmp_path / f"{name}.log").write_text("x" * size)
-        entries.append(Entry(name, {"log": tmp_path / f"{name}.log"}))
-    assert [entry.name for entry, _key in plan(entries, nights, False).to_do] == ["b", "c", "a"]
+        entries.append(ManifestEntry(name, {"log": tmp_path / f"{name}.log"}))
+    assert [entry.name for entry, _key in make_plan(entries, nights, False).to_do] == ["b", "c", "a"]
 
 
 def test_of_a_log_of_several_files_each_counts(nights, tmp_path):
@@ -235,7 +236,7 @@ def test_of_a_log_of_several_files_each_counts(nights, tmp_path):
     before = dict(planned_keys(entries, nights))
     assert set(before) == {"lab", "split"}
     sha256 = read_log(str(tmp_path / "my_bag")).source.sha256
-    assert plan([replace(entries[0], sha256={"log": sha256})], nights, False).notes == {"split": []}
+    assert make_plan([replace(entries[0], sha256={"log": sha256})], nights, False).notes == {"split": []}
     for file in ("my_bag/my_bag_2.mcap", "lab.db3-wal"):
         with (tmp_path / file).open("ab") as changed:
             changed.write(b"x")
@@ -243,15 +244,15 @@ def test_of_a_log_of_several_files_each_counts(nights, tmp_path):
     assert all(after[name] != before[name] for name in before)
 
 
-def planned_keys(entries: list[Entry], nights: Path) -> list[tuple[str, str]]:
-    return [(each.name, key) for each, key in plan(entries, nights, False).to_do]
+def planned_keys(entries: list[ManifestEntry], nights: Path) -> list[tuple[str, str]]:
+    return [(each.name, key) for each, key in make_plan(entries, nights, False).to_do]
 
 
 def test_another_file_than_the_manifest_means_is_noted(entry, nights):
     sha256 = "ca978112ca1bbdcafac231b39a23dc4da786eff8147c4e72b9807785afee48bb"  # of "a"
-    assert plan([replace(entry, sha256={"log": sha256})], nights, False).notes == {"a": []}
-    (note,) = plan([replace(entry, sha256={"log": "0" * 64})], nights, False).notes["a"]
-    assert note == "a.log is not the file that the manifest means: its SHA-256 is another"
+    assert make_plan([replace(entry, sha256={"log": sha256})], nights, False).notes == {"a": []}
+    (note,) = make_plan([replace(entry, sha256={"log": "0" * 64})], nights, False).notes["a"]
+    assert note == "a.log differs from the file named in the manifest: its SHA-256 does not match"
 
 
 def test_the_tools_key_is_of_the_code_that_makes_results():

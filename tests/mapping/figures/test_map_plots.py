@@ -2,11 +2,11 @@ import numpy as np
 import pytest
 
 from nscan_cli.graph.model import Graph, NScan, Pairwise
-from nscan_cli.mapping.figures import map_drawing as drawing
+from nscan_cli.mapping.figures import map_plots as drawing
 from nscan_cli.mapping.figures.axes import round_length
-from nscan_cli.mapping.figures.canvas import BLUE, DIM, GREEN, PURPLE, SKY, VERMILLION, Canvas
+from nscan_cli.mapping.figures.canvas import BLUE, GRAY, GREEN, PURPLE, SKY, VERMILLION, Canvas
 from nscan_cli.mapping.figures.graph_edges import edges_by_kind
-from nscan_cli.mapping.figures.map_drawing import Overlays, draw_figure, draw_over_map
+from nscan_cli.mapping.figures.map_plots import Overlays, plot_over_map, plot_paper_figure
 from nscan_cli.mapping.occupancy import OccupancyGrid, occupancy_grid
 from tests.mapping.scenes import half_circle
 
@@ -36,20 +36,20 @@ def colour_at(canvas: Canvas, x: float, y: float) -> np.ndarray:
 
 @pytest.mark.parametrize(
     ("place", "colour"),
-    [((2.0, 0.0), DIM), ((0.0, 2.0), VERMILLION), ((2.0, 2.0), GREEN)],
+    [((2.0, 0.0), GRAY), ((0.0, 2.0), VERMILLION), ((2.0, 2.0), GREEN)],
     ids=["pairwise", "loop", "nScan"],
 )
 def test_each_kind_of_relation_has_its_colour(place, colour):
-    canvas = draw_over_map(empty_map(), graph_of_a_square(), Overlays(graph=True))
+    canvas = plot_over_map(empty_map(), graph_of_a_square(), Overlays(graph=True))
     assert np.abs(colour_at(canvas, *place) - colour).max() < 60
 
 
 def test_the_path_is_drawn_alone_and_beneath_the_relations():
     graph = graph_of_a_square()
-    alone = draw_over_map(empty_map(), graph, Overlays(trajectory=True))
+    alone = plot_over_map(empty_map(), graph, Overlays(trajectory=True))
     assert np.abs(colour_at(alone, 2.0, 0.0) - BLUE).max() < 60
     assert (colour_at(alone, 0.0, 2.0) == 255).all()
-    both = np.asarray(draw_over_map(empty_map(), graph, Overlays(trajectory=True, graph=True)).image())
+    both = np.asarray(plot_over_map(empty_map(), graph, Overlays(trajectory=True, graph=True)).image())
     assert (np.abs(both.astype(int) - SKY).max(axis=-1) < 5).any()
 
 
@@ -57,7 +57,7 @@ def test_an_uncertainty_too_small_to_be_seen_is_enlarged_and_the_legend_says_so(
     def purple(scale: float) -> tuple[int, int]:
         graph = graph_of_a_square()
         graph.marginals = {2: np.diag([0.3**2, 0.1**2, 0.01]) * scale**2}
-        canvas = draw_over_map(empty_map(), graph, Overlays(uncertainty=True))
+        canvas = plot_over_map(empty_map(), graph, Overlays(uncertainty=True))
         picture = np.asarray(canvas.image()).astype(int)
         bottom = canvas.plot[3]
         near = np.abs(picture - PURPLE).max(axis=-1) < 60
@@ -73,12 +73,12 @@ def test_an_uncertainty_too_small_to_be_seen_is_enlarged_and_the_legend_says_so(
 
 
 def test_walls_of_a_large_map_stay_when_cells_are_merged(monkeypatch):
-    monkeypatch.setattr(drawing, "LEAST_PIXELS", 10)
-    monkeypatch.setattr(drawing, "MOST_PIXELS", 60)
+    monkeypatch.setattr(drawing, "MIN_PIXELS", 10)
+    monkeypatch.setattr(drawing, "MAX_PIXELS", 60)
     hits = np.zeros((121, 100), dtype=np.int32)
     hits[:, 50] = 9
     grid = OccupancyGrid(hits, np.ones_like(hits), 0.05, (0.0, 0.0))
-    canvas = draw_over_map(grid, graph_of_a_square(), Overlays(uncertainty=False))
+    canvas = plot_over_map(grid, graph_of_a_square(), Overlays(uncertainty=False))
     # Three cells along a pixel: 41 rows for 121 cells, the column of cell 50 is the seventeenth.
     left, top, right, bottom = canvas.plot
     assert (right - left, bottom - top) == (34, 41)
@@ -98,7 +98,7 @@ def test_a_figure_shows_walls_and_path_and_leaves_out_who_walked_by():
     poses[:, 0] = np.linspace(0, 0.001, scans)
     graph = Graph(rows, [str(k) for k in rows], poses, None, rows)
     grid = occupancy_grid(log, rows, poses)
-    canvas = draw_figure(log, rows, poses, grid, graph, Overlays())
+    canvas = plot_paper_figure(log, rows, poses, grid, graph, Overlays())
     left, top, right, bottom = canvas.plot
     picture = np.asarray(canvas.image()).astype(int)
     walls = np.argwhere(picture.sum(axis=-1) < 150)
@@ -115,7 +115,9 @@ def figure(overlays: Overlays, ranges: np.ndarray | None = None) -> Canvas:
     scans = 20
     log = half_circle(np.full((scans, 181), 5.0) if ranges is None else ranges)
     rows, poses = np.arange(scans), np.zeros((scans, 3))
-    return draw_figure(log, rows, poses, occupancy_grid(log, rows, poses), graph_of_a_square(), overlays)
+    return plot_paper_figure(
+        log, rows, poses, occupancy_grid(log, rows, poses), graph_of_a_square(), overlays
+    )
 
 
 def colours_below(canvas: Canvas) -> set[tuple[int, ...]]:
@@ -126,7 +128,7 @@ def colours_below(canvas: Canvas) -> set[tuple[int, ...]]:
 
 def test_a_figure_says_what_its_colours_mean_where_it_has_several():
     assert BLUE not in colours_below(figure(Overlays(trajectory=True)))
-    assert {SKY, GREEN, DIM, VERMILLION} <= colours_below(figure(Overlays(trajectory=True, graph=True)))
+    assert {SKY, GREEN, GRAY, VERMILLION} <= colours_below(figure(Overlays(trajectory=True, graph=True)))
     assert PURPLE in colours_below(figure(Overlays(uncertainty=True)))
 
 

@@ -6,27 +6,32 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from nscan_cli.files.outputs import write_whole
-from nscan_cli.nightly.manifest import Entry
-from nscan_cli.nightly.night import Plan
-from nscan_cli.nightly.night_history import read_nights
-from nscan_cli.nightly.report_json import as_json
-from nscan_cli.nightly.report_page import page
-from nscan_cli.nightly.verdict import Verdict, verdict
+from nscan_cli.nightly.html_report import html_report
+from nscan_cli.nightly.json_report import json_report
+from nscan_cli.nightly.manifest import ManifestEntry
+from nscan_cli.nightly.plan import Plan
+from nscan_cli.nightly.regression_check import CheckResult, check_log
+from nscan_cli.nightly.run_history import read_runs
 
 
-def publish(title: str, entries: Sequence[Entry], planned: Plan, folder: Path) -> list[Verdict]:
+def write_reports(
+    title: str, entries: Sequence[ManifestEntry], planned: Plan, folder: Path
+) -> list[CheckResult]:
     """Write the report on what is in the folder, and return what it says. Raises OutputError."""
     absent = [entry.name for entry in planned.absent]
     verdicts = [
-        verdict(
+        check_log(
             entry,
-            read_nights(folder / entry.name),
+            read_runs(folder / entry.name),
             planned.notes.get(entry.name, []),
             absent=entry.name in absent,
         )
         for entry in entries
     ]
-    for name, content in (("report.json", as_json(verdicts)), ("report.html", page(title, verdicts, folder))):
+    for name, content in (
+        ("report.json", json_report(verdicts)),
+        ("report.html", html_report(title, verdicts, folder)),
+    ):
         path = folder / name
         if not path.is_file() or path.read_bytes() != content:
             write_whole(str(path), content)

@@ -10,12 +10,12 @@ import sys
 from pathlib import Path
 
 
-def command(module: str, *arguments: str) -> list[str]:
+def worker_command(module: str, *arguments: str) -> list[str]:
     """The command line of a process that runs `main` of a module of this folder."""
     return [sys.executable, "-P", __file__, module, *arguments]
 
 
-def take_package(folder: Path) -> None:
+def import_package_at(folder: Path) -> None:
     """Let the package in this folder be the one that is imported from now on."""
     found = importlib.util.spec_from_file_location(folder.name, folder / "__init__.py")
     assert found is not None
@@ -26,6 +26,6 @@ def take_package(folder: Path) -> None:
 
 if __name__ == "__main__":
     own = Path(__file__).parent
-    take_package(own.parent)
+    import_package_at(own.parent)
     module, *arguments = sys.argv[1:]
     importlib.import_module(f"{own.parent.name}.{own.name}.{module}").main(*arguments)

@@ -14,22 +14,22 @@ from collections.abc import Generator, Sequence
 from pathlib import Path
 from typing import Any
 
-from nscan_cli.nightly import start
-from nscan_cli.nightly.task import OUTPUTS, RESULT, TASK, Outcome, Report, Task
+from nscan_cli.nightly import bootstrap
+from nscan_cli.nightly.task import OUTPUTS, RESULT, TASK, Outcome, ProgressCallback, Task
 from nscan_cli.nightly.warm_up import compile_kernels
 
-LIBRARIES = ("OPENBLAS", "MKL", "OMP")
+THREADED_LIBRARIES = ("OPENBLAS", "MKL", "OMP")
 """One thread each: there are as many processes as there is work for, and digits depend on how many."""
-GRACE = 10.0
+EXIT_TIMEOUT = 10.0
 """A process that has closed its output is given so long to end, s."""
 
 
-def run_all(
+def run_locally(
     tasks: Sequence[Task],
     jobs: int,
     timeout: float | None,
     scratch: Path,
-    report: Report,
+    report: ProgressCallback,
     threads: int = 1,
 ) -> Generator[tuple[Task, Outcome]]:
     """Do the tasks, `jobs` at a time, and yield each with its outcome when it is done.
@@ -39,12 +39,12 @@ def run_all(
     what is running is killed. The kernels are compiled before the first one begins.
     """
     compile_kernels(_environment())
-    waiting, running = deque(tasks), set[Work]()
+    waiting, running = deque(tasks), set[WorkerProcess]()
     with selectors.DefaultSelector() as selector:
         try:
             while waiting or running:
                 while waiting and len(running) < jobs:
-                    work = Work(waiting.popleft(), scratch, threads)
+                    work = WorkerProcess(waiting.popleft(), scratch, threads)
                     running.add(work)
                     selector.register(work.output, selectors.EVENT_READ, work)
                 for key, _events in selector.select(0.5):
@@ -59,7 +59,7 @@ def run_all(
                 work.stop()
 
 
-class Work:
+class WorkerProcess:
     """A log's process, from its start to its outcome."""
 
     def __init__(self, task: Task, scratch: Path, threads: int) -> None:
@@ -67,10 +67,10 @@ class Work:
         self.place = scratch / task.name
         self.began = time.monotonic()
         self._closed, self._said = False, b""
-        _lay_out(self.place, task, threads)
+        prepare_workspace(self.place, task, threads)
         with (self.place / "stderr.txt").open("wb") as errors:
             self.process = subprocess.Popen(
-                start.command("work", str(self.place)),
+                bootstrap.worker_command("worker", str(self.place)),
                 stdin=subprocess.PIPE,
                 stdout=subprocess.PIPE,
                 stderr=errors,
@@ -82,7 +82,7 @@ class Work:
         self.output = self.process.stdout
         os.set_blocking(self.output.fileno(), False)
 
-    def listen(self, report: Report) -> None:
+    def listen(self, report: ProgressCallback) -> None:
         """Pass on what it says; its latest word is enough."""
         said = os.read(self.output.fileno(), 65536)
         self._closed = not said
@@ -100,7 +100,7 @@ class Work:
         late = not self._closed and self._is_late(timeout)
         if not late:
             with contextlib.suppress(subprocess.TimeoutExpired):
-                self.process.wait(GRACE)
+                self.process.wait(EXIT_TIMEOUT)
         outcome = Outcome.failed(f"stopped after {timeout:g} s, see --timeout") if late else self._result()
         self.stop()
         return outcome
@@ -135,7 +135,7 @@ class Work:
         return f"its process ended with code {code}" + (f": {said[-1]}" if said else "")
 
 
-def _lay_out(place: Path, task: Task, threads: int) -> None:
+def prepare_workspace(place: Path, task: Task, threads: int) -> None:
     """A place of work: the inputs under the same names on every machine, and the task."""
     shutil.rmtree(place, ignore_errors=True)
     (place / OUTPUTS).mkdir(parents=True)
@@ -147,7 +147,7 @@ def _lay_out(place: Path, task: Task, threads: int) -> None:
 
 def _environment() -> dict[str, str]:
     environment = {**os.environ}
-    for library in LIBRARIES:
+    for library in THREADED_LIBRARIES:
         environment.setdefault(f"{library}_NUM_THREADS", "1")
     # The process works in another folder.
     if environment.get("NUMBA_CACHE_DIR"):

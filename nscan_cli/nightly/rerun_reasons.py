@@ -4,19 +4,21 @@ from __future__ import annotations
 
 from typing import Any
 
-from nscan_cli.nightly.night_history import Night
+from nscan_cli.nightly.run_history import RunRecord
 
-NAMES = {"log": "the log", "relations": "the file of relations", "reference": "the reference"}
+INPUT_NAMES = {"log": "the log", "relations": "the file of relations", "reference": "the reference"}
 
 
-def reasons(nights: list[Night], key: str, tool: str, made_from: dict[str, Any], force: bool) -> list[str]:
+def rerun_reasons(
+    nights: list[RunRecord], key: str, tool: str, made_from: dict[str, Any], force: bool
+) -> list[str]:
     """Why a log with these nights (oldest first) is done again; none for one that is new."""
     if not nights:
         return []
     last = nights[-1]
     # A night from the same things takes the place of the last one: what counts is what came before.
     before = next((night for night in reversed(nights) if night["key"] != key and night["key"]), None)
-    found = [] if before is None else _changes(before, tool, made_from)
+    found = [] if before is None else _differences(before, tool, made_from)
     if last["outcome"] != "done":
         found.append("it failed the night before")
     elif last["key"] == key:
@@ -24,11 +26,11 @@ def reasons(nights: list[Night], key: str, tool: str, made_from: dict[str, Any],
     return found
 
 
-def _changes(before: Night, tool: str, made_from: dict[str, Any]) -> list[str]:
+def _differences(before: RunRecord, tool: str, made_from: dict[str, Any]) -> list[str]:
     found = []
     then = before.get("made_from")
     if then is not None:
-        for role, name in NAMES.items():
+        for role, name in INPUT_NAMES.items():
             old, new = then["inputs"].get(role), made_from["inputs"].get(role)
             if old is None and new is not None:
                 found.append(f"{name} is new")
@@ -40,7 +42,7 @@ def _changes(before: Night, tool: str, made_from: dict[str, Any]) -> list[str]:
                 found.append(f"{name} is called {new[0]}, no longer {old[0]}")
         old, new = then["parameters"], made_from["parameters"]
         found += [
-            _change_of(parameter, old.get(parameter), new.get(parameter))
+            _parameter_difference(parameter, old.get(parameter), new.get(parameter))
             for parameter in sorted({*old, *new})
             if old.get(parameter) != new.get(parameter)
         ]
@@ -51,7 +53,7 @@ def _changes(before: Night, tool: str, made_from: dict[str, Any]) -> list[str]:
     return found or ["the log, what it is measured against, or its parameters have changed"]
 
 
-def _change_of(parameter: str, old: Any, new: Any) -> str:
+def _parameter_difference(parameter: str, old: Any, new: Any) -> str:
     if new is None:
         return f"the parameter {parameter} is not given any more"
     return f"the parameter {parameter} is {new}" + ("" if old is None else f", no longer {old}")
