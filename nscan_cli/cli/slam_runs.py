@@ -64,7 +64,7 @@ def map_whole(
                 # The last optimisation, and matches that are made again until nothing moves.
                 bar.begin("closing up and refining", None)
 
-        slam, graph = map_log(scans, reading, options, threads, report)
+        state, graph = map_log(scans, reading, options, threads, report)
     for warning in graph.provenance["notices"]:
         say(f"warning: {warning}", quiet)
     summary: list[Row] = [
@@ -72,8 +72,11 @@ def map_whole(
         *_graph_rows(graph),
     ]
     if verbose:
-        starts, searches = counted(slam.tracker.restarts, "start"), counted(slam.tracker.searches, "search")
-        places = counted(len(slam.places), "keyframe")
+        starts, searches = (
+            counted(state.tracking_restarts, "start"),
+            counted(state.tracking_searches, "search"),
+        )
+        places = counted(len(state.places), "keyframe")
         summary += [
             ("tracking", [f"{starts} from other angles, {searches}"]),
             ("large loops", [f"{places} found by search at a place seen before"]),

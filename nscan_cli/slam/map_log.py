@@ -14,7 +14,8 @@ from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.logs.reading_options import ReadingOptions
 from nscan_cli.slam.diagnostics.notices import notices
 from nscan_cli.slam.options import NScanOptions, Relations, SlamOptions
-from nscan_cli.slam.pipeline import Slam
+from nscan_cli.slam.pipeline import run_slam
+from nscan_cli.slam.state import SlamState
 
 Report = Callable[[int, int, int], None]
 """Called with the scans done, the keyframes, and the loops that are accepted so far."""
@@ -52,23 +53,23 @@ def slam_options(
 
 def map_log(
     log: LaserLog, reading: ReadingOptions, options: SlamOptions, threads: int, report: Report
-) -> tuple[Slam, Graph]:
-    """The graph of a log that was read with `reading`, its provenance in it, and the loop as it ended."""
-    slam = Slam(log, options, threads)
+) -> tuple[SlamState, Graph]:
+    """The state at the end of the loop, and the graph of a log that was read with `reading`."""
+    state = SlamState.of_log(log, options, threads)
     looked_at = accepted = 0
 
     def tell(done: int, keyframes: int) -> None:
         # Another thread may make the list longer meanwhile; only in the end is it looked through again.
         nonlocal looked_at, accepted
-        new = slam.loops[looked_at:]
+        new = state.loops[looked_at:]
         looked_at += len(new)
         accepted += sum(loop.accepted for loop in new)
         report(done, keyframes, accepted)
 
-    graph = slam.run(tell)
+    graph = run_slam(state, tell)
     parameters: dict[str, Any] = {
         "reading": dataclasses.asdict(reading),
         "slam": dataclasses.asdict(options),
     }
-    graph.provenance = {**provenance_of([log.source], parameters), "notices": notices(slam)}
-    return slam, graph
+    graph.provenance = {**provenance_of([log.source], parameters), "notices": notices(state)}
+    return state, graph

@@ -21,7 +21,8 @@ from nscan_cli.evaluation.alignment import alignment
 from nscan_cli.poses import Array, compose
 from nscan_cli.slam.diagnostics.notices import notices
 from nscan_cli.slam.options import SlamOptions
-from nscan_cli.slam.pipeline import Slam
+from nscan_cli.slam.pipeline import run_slam
+from nscan_cli.slam.state import SlamState
 from tests.benchmarks.robustness import false_loops
 from tests.experiments.output import table
 from tests.simulation.building import building, drive
@@ -91,10 +92,10 @@ def outcome(kind: Kind, seed: int, odometry: bool) -> Outcome:
     place = building(2, 2, seed)
     recording = drive(place, place.crossings(WAY), "building", None, kind.laser, kind.how, seed)
     log = recording.log()
-    slam = Slam(log if odometry else dataclasses.replace(log, odometry=None), SlamOptions())
-    graph = slam.run(lambda scans, keyframes: None)
+    state = SlamState.of_log(log if odometry else dataclasses.replace(log, odometry=None), SlamOptions())
+    graph = run_slam(state, lambda scans, keyframes: None)
     false = false_loops(graph, recording.truth)
-    return Outcome(kind.name, odometry, rms(graph.poses, recording.truth), false, bool(notices(slam)))
+    return Outcome(kind.name, odometry, rms(graph.poses, recording.truth), false, bool(notices(state)))
 
 
 def rms(poses: Array, truth: Array) -> float:

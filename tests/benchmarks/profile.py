@@ -25,7 +25,8 @@ from nscan_cli.kernels.decorators import Kernel
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.logs.load import read_log
 from nscan_cli.slam.options import SlamOptions
-from nscan_cli.slam.pipeline import Slam
+from nscan_cli.slam.pipeline import run_slam
+from nscan_cli.slam.state import SlamState
 from tests.experiments.output import table
 
 NAMED = 8
@@ -62,7 +63,7 @@ def spent(log: LaserLog, runs: int) -> Spent:
         return call
 
     # All that it takes is loaded then.
-    Slam(log, SlamOptions()).run(lambda *done: None)
+    run_slam(SlamState.of_log(log, SlamOptions()), lambda *done: None)
     best = None
     with pytest.MonkeyPatch.context() as patch:
         for kernel in [each for each in gc.get_objects() if type(each) is Kernel]:
@@ -74,7 +75,7 @@ def spent(log: LaserLog, runs: int) -> Spent:
         for _ in range(runs):
             before, times = best, Spent()
             begun = time.perf_counter()
-            Slam(log, SlamOptions()).run(lambda *done: None)
+            run_slam(SlamState.of_log(log, SlamOptions()), lambda *done: None)
             times.whole = time.perf_counter() - begun
             best = times if before is None or times.whole < before.whole else before
     assert best is not None
@@ -101,7 +102,7 @@ def libraries(log: LaserLog, runs: int) -> list[tuple[str, str]]:
             # It says nowhere that it has begun.
             time.sleep(1)
             for _ in range(runs):
-                Slam(log, SlamOptions()).run(lambda *done: None)
+                run_slam(SlamState.of_log(log, SlamOptions()), lambda *done: None)
             recorder.send_signal(signal.SIGINT)
         report = subprocess.run(
             ["perf", "report", "-i", samples, "--sort", "dso", "--stdio"],

@@ -25,7 +25,8 @@ from nscan_cli.logs.load import read_log
 from nscan_cli.logs.reading_options import ReadingOptions
 from nscan_cli.poses import Array, compose, relative, wrap
 from nscan_cli.slam.options import Relations, SlamOptions
-from nscan_cli.slam.pipeline import Slam
+from nscan_cli.slam.pipeline import run_slam
+from nscan_cli.slam.state import SlamState
 from tests.data import find_data
 from tests.experiments.output import table
 
@@ -95,8 +96,8 @@ def disturbed(log: LaserLog, seed: int, dropped: int) -> LaserLog:
 def mapped(name: str, seed: int, dropped: int, relations: Relations) -> Graph:
     """The graph of a log, disturbed."""
     log = read_log(str(find_data(f"{name}.log.gz")), ReadingOptions())
-    slam = Slam(disturbed(log, seed, dropped), SlamOptions(relations=relations))
-    return slam.run(lambda scans, keyframes: None)
+    state = SlamState.of_log(disturbed(log, seed, dropped), SlamOptions(relations=relations))
+    return run_slam(state, lambda scans, keyframes: None)
 
 
 def errors(name: str, graph: Graph) -> tuple[float, float]:

@@ -18,7 +18,8 @@ from nscan_cli.graph.optimise.graph_solver import Optimum, optimise
 from nscan_cli.logs.load import read_log
 from nscan_cli.poses import Array, Indices, compose, relative
 from nscan_cli.slam.options import SlamOptions
-from nscan_cli.slam.pipeline import Slam
+from nscan_cli.slam.pipeline import run_slam
+from nscan_cli.slam.state import SlamState
 from tests.data import OFFICE_LOG, find_data
 from tests.experiments.held import MAX_ITERATIONS, TOLERANCE, Followed, Held, minimise
 from tests.experiments.mappings import Mapping, mean, of_pose_c, optimal, with_c_held
@@ -114,7 +115,9 @@ def problems() -> tuple[Problem, ...]:
     """The graphs of the simulated office, and of the REAL logs that are there."""
     logs = {"simulated office": Path(OFFICE_LOG)} | {name: find_data(f"{name}.log.gz") for name in REAL}
     return tuple(
-        problem_of(name, Slam(read_log(str(path)), SlamOptions()).run(lambda done, keyframes: None))
+        problem_of(
+            name, run_slam(SlamState.of_log(read_log(str(path)), SlamOptions()), lambda done, keyframes: None)
+        )
         for name, path in logs.items()
         if path is not None
     )

@@ -21,7 +21,8 @@ from nscan_cli.slam.frontend.scan_batch import ScanBatch
 from nscan_cli.slam.frontend.tracked_scans import Tracked, TrackedScans
 from nscan_cli.slam.frontend.tracker import Tracker
 from nscan_cli.slam.options import NScanOptions, Relations, SlamOptions
-from nscan_cli.slam.pipeline import Slam
+from nscan_cli.slam.pipeline import run_slam
+from nscan_cli.slam.state import SlamState
 from tests.data import OFFICE_LOG, data_file
 
 Rows = slice | NDArray[np.int64]
@@ -33,17 +34,18 @@ class Mapped:
 
     log: LaserLog
     graph: Graph
-    slam: Slam
+    state: SlamState
+    """At the end of the loop."""
 
 
 def mapped(log: LaserLog, options: SlamOptions | None = None, threads: int = 1) -> Mapped:
     """Run the loop over a log."""
     options = options or SlamOptions()
-    slam = Slam(log, options, threads)
-    graph = slam.run(lambda done, keyframes: None)
+    state = SlamState.of_log(log, options, threads)
+    graph = run_slam(state, lambda done, keyframes: None)
     parameters = {"reading": dataclasses.asdict(ReadingOptions()), "slam": dataclasses.asdict(options)}
     graph.provenance = provenance_of([log.source], parameters)
-    return Mapped(log, graph, slam)
+    return Mapped(log, graph, state)
 
 
 @functools.cache

@@ -12,9 +12,9 @@ from nscan_cli.graph.io.json_graph import write_graph
 from nscan_cli.graph.model import Graph, Loop
 from nscan_cli.logs.load import read_log
 from nscan_cli.logs.reading_options import ReadingOptions
+from nscan_cli.slam.frontend.scan_batch import SCANS_PER_BATCH
 from nscan_cli.slam.map_log import Counts, map_log, slam_options
 from nscan_cli.slam.options import SlamOptions
-from nscan_cli.slam.pipeline import STRETCH
 from tests.data import CORRIDOR_LOG
 
 
@@ -29,17 +29,17 @@ def test_what_a_user_does_not_choose_has_its_default():
 def test_the_graph_says_what_it_was_made_from_and_the_report_how_far_it_is():
     reading = ReadingOptions(every=2)
     log, told = read_log(CORRIDOR_LOG, reading), []
-    slam, graph = map_log(log, reading, slam_options(6), 1, lambda *state: told.append(state))
+    state, graph = map_log(log, reading, slam_options(6), 1, lambda *done: told.append(done))
     provenance = graph.provenance
     assert provenance["tool"] == {"name": "nscan-cli", "version": __version__}
     assert provenance["inputs"][0]["sha256"] == log.source.sha256
     assert provenance["parameters"]["reading"]["every"] == 2
     assert provenance["parameters"]["slam"]["nscan"]["max_scans"] == 6
     done, keyframes, loops = zip(*told, strict=True)
-    assert done == (*range(STRETCH, len(log), STRETCH), len(log))
+    assert done == (*range(SCANS_PER_BATCH, len(log), SCANS_PER_BATCH), len(log))
     assert (np.diff(keyframes) >= 0).all()
     assert (np.diff(loops) >= 0).all()
-    assert keyframes[-1] == len(slam.keyframes) == len(graph.keyframes)
+    assert keyframes[-1] == len(state.keyframes) == len(graph.keyframes)
     assert 0 <= loops[-1] <= len(graph.loops)
     again = map_log(log, reading, slam_options(6), 2, lambda *_state: None)[1]
     assert write_graph(again) == write_graph(graph)

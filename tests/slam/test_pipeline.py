@@ -12,8 +12,10 @@ from nscan_cli.graph.io.tum import Trajectory
 from nscan_cli.graph.optimise.whole_graph import optimise_graph
 from nscan_cli.logs.load import read_log
 from nscan_cli.poses import relative
+from nscan_cli.slam.frontend.scan_batch import SCANS_PER_BATCH
 from nscan_cli.slam.options import SlamOptions
-from nscan_cli.slam.pipeline import STRETCH, Slam
+from nscan_cli.slam.pipeline import run_slam
+from nscan_cli.slam.state import SlamState
 from tests.data import data_file
 from tests.slam.runs import (
     Mapped,
@@ -52,7 +54,7 @@ def test_loops_mend_what_tracking_got_wrong(odometry):
         trajectory_errors(
             Trajectory(log.times, poses, log.stamps), Trajectory(log.times, truth, log.stamps)
         ).absolute_translation.rmse
-        for poses in (np.concatenate(office.slam.tracked), office.graph.poses)
+        for poses in (np.concatenate(office.state.tracked), office.graph.poses)
     ]
     assert rmse[1] < 0.9 * rmse[0]
 
@@ -84,7 +86,7 @@ def test_every_scan_has_a_pose_and_an_anchor_that_is_a_keyframe_not_after_it(odo
 
 def test_keyframes_are_as_far_apart_as_the_options_say():
     office, options = mapped_office(True), SlamOptions().keyframes
-    tracked = np.concatenate(office.slam.tracked)
+    tracked = np.concatenate(office.state.tracked)
     off = relative(tracked, tracked[office.graph.anchors])
     assert np.hypot(off[:, 0], off[:, 1]).max() <= options.distance
     assert np.abs(off[:, 2]).max() <= options.turn
@@ -164,9 +166,11 @@ def test_read_back_and_optimised_again_it_hardly_moves(odometry):
 
 def test_progress_is_reported_stretch_by_stretch():
     said: list[tuple[int, int]] = []
-    log = part(office_log(), slice(0, STRETCH + 10))
-    graph = Slam(log, SlamOptions()).run(lambda done, keyframes: said.append((done, keyframes)))
-    assert [done for done, _ in said] == [STRETCH, STRETCH + 10]
+    log = part(office_log(), slice(0, SCANS_PER_BATCH + 10))
+    graph = run_slam(
+        SlamState.of_log(log, SlamOptions()), lambda done, keyframes: said.append((done, keyframes))
+    )
+    assert [done for done, _ in said] == [SCANS_PER_BATCH, SCANS_PER_BATCH + 10]
     assert 1 <= said[0][1] <= said[1][1]
     assert said[-1][1] == len(graph.keyframes)
 

@@ -51,7 +51,7 @@ def test_the_map_is_as_if_it_had_not_happened(name):
     """Measured: 0.024 m at most; before, 16 m after a wrong value of odometry, 4 m with a frozen laser."""
     made, found = case(name)
     assert max(errors(made, found.graph.poses)) < 0.05
-    assert found.slam.breaks == []
+    assert found.state.breaks == []
 
 
 @pytest.mark.parametrize(
@@ -62,7 +62,7 @@ def test_a_robot_that_was_carried_is_found_again_by_a_loop(name, odometry):
     """Without odometry a jump along a corridor may look like a drive; elsewhere it shows too."""
     made, found = case(name, odometry)
     assert max(errors(made, found.graph.poses)) < 0.05
-    assert found.slam.breaks == [made.before]
+    assert found.state.breaks == [made.before]
     tie = relation_over_break(found)
     assert np.sqrt(1 / tie.information[0, 0]) > BreakOptions().distance_sigma / 2
     across = [
@@ -73,12 +73,12 @@ def test_a_robot_that_was_carried_is_found_again_by_a_loop(name, odometry):
 
 def test_what_went_wrong_is_said_by_the_numbers_of_the_scans():
     made, found = case("carried by 5 m")
-    slam, numbers = copy.copy(found.slam), made.log.numbers
+    state, numbers = copy.copy(found.state), made.log.numbers
     broken = f"tracking broke at scan {numbers[made.before]}; of the way there nothing is known"
-    assert notices(slam) == [broken]
-    slam.jumps, slam.hanging = np.arange(12), np.array([3, 7])
+    assert notices(state) == [broken]
+    state.odometry_jumps, state.frozen_scans = np.arange(12), np.array([3, 7])
     several = ", ".join(str(number) for number in numbers[:10])
-    assert notices(slam)[1:] == [
+    assert notices(state)[1:] == [
         f"the odometry jumps at scans {several} and 2 more; these steps are not believed",
         f"the laser repeats itself at scans {numbers[3]}, {numbers[7]}; these are not matched",
     ]
@@ -92,12 +92,12 @@ def test_without_odometry_a_jump_along_a_corridor_is_said():
         f"the scans jump at scan {made.log.numbers[made.before]}, farther than the robot drives from one to "
         "the next: scans are missing, it was carried, or tracking has slipped; how far it came is not known"
     )
-    assert said in notices(found.slam)
-    assert notices(case("none", odometry=False)[1].slam) == []
+    assert said in notices(found.state)
+    assert notices(case("none", odometry=False)[1].state) == []
 
 
 def relation_over_break(found: Mapped) -> Pairwise:
-    (row,) = found.slam.breaks
+    (row,) = found.state.breaks
     (tie,) = [
         relation
         for relation in found.graph.pairwise
@@ -112,7 +112,7 @@ def test_what_is_never_seen_again_is_a_piece_of_its_own_and_the_graph_says_so():
     error = errors(made, found.graph.poses)
     assert error.whole > 1.0
     assert max(error.before, error.after) < 0.05
-    assert found.slam.breaks == [made.before]
+    assert found.state.breaks == [made.before]
     assert np.sqrt(1 / relation_over_break(found).information[0, 0]) > BreakOptions().distance_sigma / 2
     assert not any(min(each.nodes) < made.before <= max(each.nodes) for each in found.graph.nscan)
     last = int(found.graph.keyframes[-1])
@@ -134,7 +134,7 @@ def test_threads_change_nothing():
     made, found = case("carried by 2 m")
     beside = mapped(made.log, threads=2)
     np.testing.assert_array_equal(beside.graph.poses, found.graph.poses)
-    assert beside.slam.breaks == found.slam.breaks
+    assert beside.state.breaks == found.state.breaks
 
 
 def test_rooms_alike_are_not_taken_for_one_another():
@@ -157,7 +157,7 @@ def test_someone_in_the_way_for_half_a_second_breaks_nothing():
     ranges = log().ranges.copy()
     ranges[at : at + 3] = 0.5
     found = mapped(dataclasses.replace(log(), ranges=ranges))
-    assert found.slam.breaks == []
+    assert found.state.breaks == []
     assert errors(Case(log(), at, at), found.graph.poses).whole < 0.05
 
 
@@ -226,5 +226,5 @@ def test_a_real_log_whose_robot_was_kidnapped():
     path = float(np.hypot(*np.diff(clean.poses[:, :2], axis=0).T).sum())
     made = troubles.kidnapped(real, path, 0.2 * path, 0.9 * path)
     found = mapped(made.log)
-    assert found.slam.breaks == [made.before]
+    assert found.state.breaks == [made.before]
     assert max(errors(made, found.graph.poses)) < 0.05

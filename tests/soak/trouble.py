@@ -66,15 +66,15 @@ TOLD = {
 
 def _row(name: str, case: Case) -> None:
     found = mapped(case.log)
-    slam, graph = found.slam, found.graph
+    state, graph = found.state, found.graph
     error = errors(case, graph.poses)
     said = [
         f"{len(what)} {word} at {' '.join(map(str, what[:3]))}"
-        for word, what in (("breaks", slam.breaks), ("jumps", slam.jumps.tolist()))
+        for word, what in (("breaks", state.breaks), ("jumps", state.odometry_jumps.tolist()))
         if what
     ]
-    said += [f"{len(slam.hanging)} scans of a laser that hangs"] if len(slam.hanging) else []
-    told = " ".join(notices(slam))
+    said += [f"{len(state.frozen_scans)} scans of a laser that hangs"] if len(state.frozen_scans) else []
+    told = " ".join(notices(state))
     said += [short for words, short in TOLD.items() if words in told]
     accepted = sum(loop.accepted for loop in graph.loops)
     print(

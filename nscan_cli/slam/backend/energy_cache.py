@@ -13,7 +13,7 @@ from nscan_cli.graph.relations.base import Relation
 from nscan_cli.slam.keyframes.keyframe import Route
 
 
-class Energies:
+class EnergyCache:
     """Those of the keyframes of a route in a log of so many `scans`; terms of relations are kept."""
 
     def __init__(self, scans: int) -> None:

@@ -16,12 +16,32 @@ from nscan_cli.graph.model import Loop, NScan, Pairwise
 from nscan_cli.kernels.decorators import kernel
 from nscan_cli.matching.pose_kernels import relative_pose, wrapped
 from nscan_cli.poses import Array, Indices
+from nscan_cli.slam.backend.optimisation import optimise
+from nscan_cli.slam.backend.rejection import reject_contradicting_loops
 from nscan_cli.slam.keyframes.keyframe import Route
 from nscan_cli.slam.local_matching.coverage import Coverage
 from nscan_cli.slam.local_matching.joint_relations import LocalMatch, MatchNearby
 from nscan_cli.slam.local_matching.neighbours import Neighbours, choose_neighbours
 from nscan_cli.slam.options import NScanOptions
+from nscan_cli.slam.state import SlamState
 from nscan_cli.threads import in_threads
+
+
+def refine(state: SlamState) -> None:
+    """Make the matches again, until they move nothing that was matched. Changes relations, loops, route."""
+    options = state.options
+    # The poses are right to centimetres: the last stage is all it takes.
+    last = replace(options.nscan, widenings=options.nscan.widenings[-1:])
+    wider = {place.centre: place.radius for place in state.places}
+    refinement = Refinement(state.route, last, state.match, wider, state.threads)
+    for _ in range(options.refinements):
+        if not refinement.sweep(state.poses, options.refined):
+            break
+        state.matched_pairs, state.nscan_relations = refinement.relations()
+        state.energies.forget()
+        state.loops = refinement.loops()
+        optimise(state, max_iterations=100, tolerance=1e-6)
+        reject_contradicting_loops(state)
 
 
 class Refinement:

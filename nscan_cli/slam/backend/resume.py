@@ -12,18 +12,21 @@ from typing import Any, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from nscan_cli.graph.marginal_covariances import marginal_covariances
 from nscan_cli.graph.model import Graph, Pairwise
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.matching.priors import odometry_prior
 from nscan_cli.poses import relative
+from nscan_cli.slam.backend.finish import finish_graph
+from nscan_cli.slam.backend.refinement import refine
+from nscan_cli.slam.backend.rejection import reject_contradicting_loops
+from nscan_cli.slam.frontend.scan_batch import scan_batches
 from nscan_cli.slam.frontend.tracked_scans import TrackedScans
 from nscan_cli.slam.keyframes.keyframe import route_of
 from nscan_cli.slam.local_matching.joint_relations import LocalMatch
 from nscan_cli.slam.loop_closure.loop_detector import NO_SECOND, SO_FAR_OFF
 from nscan_cli.slam.loop_closure.place_search import AMBIGUOUS, ELSEWHERE, NO_MATCH, Place
 from nscan_cli.slam.options import Relations, SlamOptions
-from nscan_cli.slam.pipeline import Slam
+from nscan_cli.slam.state import SlamState
 
 LEAST_VALUE, LARGEST_VALUE, MOST_VALUES = 1e-9, 1e9, 10
 """What a parameter can be, and how many values a list of them can have."""
@@ -54,23 +57,33 @@ def resume(graph: Graph, log: LaserLog, rows: NDArray[np.int64], threads: int = 
 
     `rows` (N,) are the rows of the log with the scans of the nodes. `can_refine` has to hold.
     """
-    options = options_of(graph)
-    slam = Slam(_scans(log, rows), options, threads)
-    _lay_out(slam, graph)
-    chain = _chain(graph, options)
-    slam.route = route_of(slam.keyframes.list, chain, graph.poses[graph.keyframes])
-    in_chain = {id(relation) for relation in chain}
-    slam.pairs = [pair for pair in graph.pairwise if id(pair) not in in_chain]
-    slam.nscan, slam.others = list(graph.nscan), list(graph.others)
-    slam.loops = [loop for loop in graph.loops if loop.reason not in SEARCHED]
-    slam.places = _places(graph, options)
-    slam.reject()
-    slam.refine()
-    refined = slam.graph()
+    state = state_of_graph(graph, _scans(log, rows), options_of(graph), threads)
+    reject_contradicting_loops(state)
+    refine(state)
+    refined = finish_graph(state)
     refined.loops += [loop for loop in graph.loops if loop.reason in SEARCHED]
     refined.provenance = graph.provenance
-    refined.marginals = marginal_covariances(refined)
     return refined
+
+
+def state_of_graph(graph: Graph, log: LaserLog, options: SlamOptions, threads: int = 1) -> SlamState:
+    """The state of the loop after its last optimisation, as a saved graph of all scans of `log` has it."""
+    state, breaks = SlamState.of_log(log, options, threads), _breaks(graph, options)
+    _add_keyframes(state, graph, breaks)
+    chain = _chain(graph, options)
+    in_chain = {id(relation) for relation in chain}
+    return dataclasses.replace(
+        state,
+        route=route_of(state.keyframes.list, chain, graph.poses[graph.keyframes]),
+        chain=chain,
+        tracked=[graph.poses],
+        breaks=sorted(breaks),
+        matched_pairs=[pair for pair in graph.pairwise if id(pair) not in in_chain],
+        nscan_relations=list(graph.nscan),
+        other_relations=list(graph.others),
+        loops=[loop for loop in graph.loops if loop.reason not in SEARCHED],
+        places=_places(graph, options),
+    )
 
 
 def _scans(log: LaserLog, rows: NDArray[np.int64]) -> LaserLog:
@@ -90,24 +103,22 @@ def _scans(log: LaserLog, rows: NDArray[np.int64]) -> LaserLog:
     )
 
 
-def _lay_out(slam: Slam, graph: Graph) -> None:
-    """The keyframes with their Gaussians, as tracking would have made them at the graph's poses."""
-    breaks = _breaks(graph, slam.options)
-    found = _as_tracked(graph, breaks, slam.options)
-    for scans in slam.stretches():
+def _add_keyframes(state: SlamState, graph: Graph, breaks: set[int]) -> None:
+    """Add the graph's keyframes with their Gaussians, as tracking would have made them at its poses."""
+    log, keyframes = state.log, state.keyframes
+    found = _as_tracked(graph, breaks, state.options)
+    for scans in scan_batches(log, state.options.tracking.max_range, state.odometry, state.frozen_scans):
         those = found.part(scans.first, scans.first + len(scans))
         for k, row in enumerate(range(scans.first, scans.first + len(scans))):
             if row in breaks:
-                slam.keyframes.part()
-                slam.breaks.append(row)
+                keyframes.part()
             if graph.anchors[row] == row:
-                slam.keyframes.add(row, scans.of(k), those.scan(k))
-                for whole in slam.keyframes.list[-2:-1]:
+                keyframes.add(row, scans.of(k), those.scan(k))
+                for whole in keyframes.list[-2:-1]:
                     whole.finish()
             else:
-                slam.keyframes.attach(scans, those, k, k + 1)
-    slam.tracked.append(graph.poses)
-    slam.keyframes.part()
+                keyframes.attach(scans, those, k, k + 1)
+    keyframes.part()
 
 
 def _as_tracked(graph: Graph, breaks: set[int], options: SlamOptions) -> TrackedScans:

@@ -14,7 +14,7 @@ from nscan_cli.slam.diagnostics.free_space_violations import free_space_violatio
 from nscan_cli.slam.diagnostics.odometry_disagreement import odometry_disagreements
 from nscan_cli.slam.diagnostics.view_mismatch import view_mismatches
 from nscan_cli.slam.frontend.odometry_checks import jumps_of, repeating
-from nscan_cli.slam.pipeline import Slam
+from nscan_cli.slam.state import SlamState
 
 MOST_NAMED = 10
 """Scans or stretches that a notice names."""
@@ -27,28 +27,27 @@ EXPECTED = 3.0
 has drifted, and twice as much is no sign of a mistake."""
 
 
-def notices(slam: Slam) -> list[str]:
+def notices(state: SlamState) -> list[str]:
     """What went wrong on the way, as whole sentences."""
-    log, found = slam.log, []
-    if slam.breaks:
-        found.append(f"tracking broke at {_scans(log, slam.breaks)}; of the way there nothing is known")
-    if len(slam.jumps):
+    log, found = state.log, []
+    if state.breaks:
+        found.append(f"tracking broke at {_scans(log, state.breaks)}; of the way there nothing is known")
+    jumps = state.odometry_jumps.tolist()
+    if jumps:
+        found.append(f"the odometry jumps at {_scans(log, jumps)}; these steps are not believed")
+    if len(state.frozen_scans):
         found.append(
-            f"the odometry jumps at {_scans(log, slam.jumps.tolist())}; these steps are not believed"
+            f"the laser repeats itself at {_scans(log, state.frozen_scans.tolist())}; these are not matched"
         )
-    if len(slam.hanging):
-        found.append(
-            f"the laser repeats itself at {_scans(log, slam.hanging.tolist())}; these are not matched"
-        )
-    found += _without_odometry(slam) if slam.odometry is None else _of_odometry(slam)
-    return found + _unlike(slam) + _contradictions(slam) + _looked_through(slam)
+    found += _without_odometry(state) if state.odometry is None else _of_odometry(state)
+    return found + _unlike(state) + _contradictions(state) + _looked_through(state)
 
 
-def _of_odometry(slam: Slam) -> list[str]:
+def _of_odometry(state: SlamState) -> list[str]:
     """Gaps that odometry alone leads over, and where it contradicts the scans."""
-    log, odometry, route = slam.log, slam.odometry, slam.route
+    log, odometry, route = state.log, state.odometry, state.route
     assert odometry is not None
-    found, far, turned = [], slam.options.breaks.bridged_distance, slam.options.breaks.bridged_turn
+    found, far, turned = [], state.options.breaks.bridged_distance, state.options.breaks.bridged_turn
     steps, periods = relative(odometry[1:], odometry[:-1]), np.diff(log.times)
     came_far = (np.hypot(steps[:, 0], steps[:, 1]) > far) | (np.abs(steps[:, 2]) > turned)
     usual = float(np.median(periods)) if len(periods) else 0.0
@@ -58,7 +57,7 @@ def _of_odometry(slam: Slam) -> list[str]:
             f"there are no scans on the way to {_scans(log, gaps)}, "
             f"by odometry more than {far:g} m or {turned:g} rad"
         )
-    apart = odometry_disagreements(route.rows, route.poses, odometry, slam.breaks)
+    apart = odometry_disagreements(route.rows, route.poses, odometry, state.breaks)
     if apart:
         some = "; ".join(
             f"{each.by_odometry:.1f} m and {each.by_scans:.1f} m from scan {log.numbers[each.first]} "
@@ -73,16 +72,16 @@ def _of_odometry(slam: Slam) -> list[str]:
     return found
 
 
-def _without_odometry(slam: Slam) -> list[str]:
+def _without_odometry(state: SlamState) -> list[str]:
     """Where the robot may have gone on unseen, and where it came farther than it can."""
-    log, found = slam.log, []
+    log, found = state.log, []
     same = repeating(log, np.ones(max(len(log) - 1, 0), dtype=np.bool_)).tolist()
     if same:
         found.append(
             f"the laser repeats itself at {_scans(log, same)}: it hangs, or the robot stands; "
             "without odometry it counts as standing"
         )
-    jumps = np.setdiff1d(jumps_of(np.concatenate(slam.tracked)), slam.breaks).tolist()
+    jumps = np.setdiff1d(jumps_of(np.concatenate(state.tracked)), state.breaks).tolist()
     if jumps:
         found.append(
             f"the scans jump at {_scans(log, jumps)}, farther than the robot drives from one to the next: "
@@ -91,26 +90,26 @@ def _without_odometry(slam: Slam) -> list[str]:
     return found
 
 
-def _unlike(slam: Slam) -> list[str]:
+def _unlike(state: SlamState) -> list[str]:
     """Where tracking may have held on to what goes along."""
-    tracking, breaks = slam.options.tracking, slam.options.breaks
-    poses = np.concatenate(slam.tracked)
-    worst = view_mismatches(slam.log, poses, slam.keyframes.list, tracking.max_range, breaks, slam.threads)
+    tracking, breaks = state.options.tracking, state.options.breaks
+    poses = np.concatenate(state.tracked)
+    worst = view_mismatches(state.log, poses, state.keyframes.list, tracking.max_range, breaks, state.threads)
     if worst is None:
         return []
-    first, last = slam.log.numbers[[worst.first, worst.last]].tolist()
+    first, last = state.log.numbers[[worst.first, worst.last]].tolist()
     return [
         f"scans {first} to {last} see other things than where they were found: the same in {worst.share:.0%} "
         "of all bearings; someone walks along, or tracking has slipped"
     ]
 
 
-def _contradictions(slam: Slam) -> list[str]:
+def _contradictions(state: SlamState) -> list[str]:
     """Whether the relations of the graph fit together as their information says they should."""
-    relations = slam.relations
+    relations = state.relations
     if not relations:
         return []
-    chi2 = chi2_by_three(slam.energies.of(slam.route, relations), slam.poses)
+    chi2 = chi2_by_three(state.energies.of(state.route, relations), state.poses)
     loops = chi2[[relation.origin == "loop" for relation in relations]]
     mean, of_loops = float(chi2.mean()), float(loops.mean()) if len(loops) else 0.0
     if mean <= EXPECTED and of_loops <= 2 * EXPECTED:
@@ -118,16 +117,16 @@ def _contradictions(slam: Slam) -> list[str]:
     nodes = relations[int(np.argmax(chi2))].nodes
     return [
         f"relations contradict each other: their mean χ² is {mean:.1f}, that of loops {of_loops:.1f}, "
-        f"for {EXPECTED:g} degrees of freedom; the map may be wrong, at {_scans(slam.log, nodes)} above all"
+        f"for {EXPECTED:g} degrees of freedom; the map may be wrong, at {_scans(state.log, nodes)} above all"
     ]
 
 
-def _looked_through(slam: Slam) -> list[str]:
+def _looked_through(state: SlamState) -> list[str]:
     """Whether visits of a place contradict each other, however well they match."""
-    worst = free_space_violations(slam.log, slam.route, slam.options.nscan, slam.threads)
+    worst = free_space_violations(state.log, state.route, state.options.nscan, state.threads)
     if worst is None or worst.share <= worst.most:
         return []
-    first, last = slam.log.numbers[[worst.first, worst.last]].tolist()
+    first, last = state.log.numbers[[worst.first, worst.last]].tolist()
     return [
         f"places do not look as they did before: from scan {first} to {last}, {worst.share:.1%} of what one "
         f"visit saw is looked through from another, at most {worst.most:.1%} in a sound map; the map is "

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from nscan_cli.kernels.decorators import kernel
+from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.poses import Array, Indices
+
+SCANS_PER_BATCH = 128
+"""Scans that are tracked together, before the keyframes among them are chosen."""
 
 
 @dataclass(frozen=True)
@@ -52,6 +56,23 @@ class ScanBatch:
             np.concatenate([[0], np.cumsum(sizes)]),
             np.concatenate(odometry) if odometry else None,
         )
+
+
+def scan_batches(log: LaserLog, reach: float, odometry: Array | None, frozen: Indices) -> Iterator[ScanBatch]:
+    """The scans of a log, batch by batch: their points within `reach` (m), and the odometry (S, 3), if any.
+
+    Scans in the `frozen` rows (H,) have no points.
+    """
+    first = 0
+    for points, ends in log.stretches(SCANS_PER_BATCH, reach):
+        end = first + len(ends) - 1
+        is_frozen = np.isin(np.arange(first, end), frozen)
+        if is_frozen.any():
+            sizes = np.diff(ends)
+            points = points[np.repeat(~is_frozen, sizes)]
+            ends = np.concatenate([[0], np.cumsum(np.where(is_frozen, 0, sizes))])
+        yield ScanBatch(first, points, ends, None if odometry is None else odometry[first:end])
+        first = end
 
 
 @kernel

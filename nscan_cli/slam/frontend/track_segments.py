@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.poses import Array, compose, relative, transform
 from nscan_cli.slam.frontend.first_scan import PATH, SCANS, place_first
 from nscan_cli.slam.frontend.options import BreakOptions, TrackingOptions
@@ -18,6 +19,8 @@ from nscan_cli.slam.frontend.scan_batch import ScanBatch
 from nscan_cli.slam.frontend.tracked_scans import TrackedScans
 from nscan_cli.slam.frontend.tracker import Tracker
 from nscan_cli.slam.frontend.view_similarity import LEAST_BEARINGS, view_similarity
+from nscan_cli.slam.frontend.visible_points import sight
+from nscan_cli.slam.options import SlamOptions
 
 
 @dataclass(frozen=True)
@@ -238,3 +241,9 @@ class SegmentTracker:
             piece.found.expected[0] = first.found.expected[0]
         before, self._young, self._doubted = self._grow_up(), [], []
         return before + self._settle(replace(piece, begins=True, breaks=not is_known))
+
+
+def tracker_of(log: LaserLog, options: SlamOptions) -> SegmentTracker:
+    """The tracker for a log."""
+    seen, cell = log.ranges[log.ranges < options.tracking.max_range], options.tracking.gaussians.cell
+    return SegmentTracker(options.tracking, options.breaks, log.odometry is not None, sight(seen, cell))

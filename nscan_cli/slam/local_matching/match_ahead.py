@@ -31,7 +31,7 @@ class _Begun(NamedTuple):
     match: Future[LocalMatch | None]
 
 
-class Ahead:
+class MatchAhead:
     """The matches about the keyframes to come. To be used with `with`; none is begun until it is opened."""
 
     def __init__(self, match: MatchNearby, options: NScanOptions, threads: int) -> None:
@@ -100,7 +100,7 @@ class Ahead:
                 begun.match.cancel()
                 del self._begun[keyframe]
 
-    def __enter__(self) -> Ahead:
+    def __enter__(self) -> MatchAhead:
         return self
 
     def __exit__(

@@ -18,7 +18,7 @@ from nscan_cli.graph.model import Loop, Pairwise
 from nscan_cli.graph.relations.base import Relation
 from nscan_cli.matching.correlative_search import SearchOptions
 from nscan_cli.poses import Array, Indices, compose, relative, wrap
-from nscan_cli.slam.backend.energy_cache import Energies
+from nscan_cli.slam.backend.energy_cache import EnergyCache
 from nscan_cli.slam.backend.subgraph import Subgraph, nearest_keyframes, without_others
 from nscan_cli.slam.keyframes.keyframe import Route
 from nscan_cli.slam.keyframes.tracked_path import TrackedPath
@@ -39,7 +39,7 @@ class LoopDetector:
     """The search for large loops, keyframe by keyframe; `energies` makes those of the graph."""
 
     def __init__(
-        self, options: ClosingOptions, nscan: NScanOptions, match: MatchNearby, energies: Energies
+        self, options: ClosingOptions, nscan: NScanOptions, match: MatchNearby, energies: EnergyCache
     ) -> None:
         self.options, self.nscan, self.match, self.energies = options, nscan, match, energies
         self.way = TrackedPath(options.drift, options.drift_angle)

@@ -51,35 +51,35 @@ class Recorded:
 
 
 def refinement(match: MatchNearby, wider: dict[int, float] | None = None) -> Refinement:
-    slam = unrefined().slam
-    return Refinement(slam.route, slam.options.nscan, match, wider or {})
+    state = unrefined().state
+    return Refinement(state.route, state.options.nscan, match, wider or {})
 
 
 def near(centre: int) -> list[int]:
-    slam = unrefined().slam
-    paths = np.array([keyframe.tracked.path for keyframe in slam.keyframes.list])
-    chosen: list[int] = choose_neighbours(slam.poses, paths, centre, slam.options.nscan)[0].tolist()
+    state = unrefined().state
+    paths = np.array([keyframe.tracked.path for keyframe in state.keyframes.list])
+    chosen: list[int] = choose_neighbours(state.poses, paths, centre, state.options.nscan)[0].tolist()
     return chosen
 
 
 @BOTH_KINDS
 def test_a_sweep_matches_what_is_not_covered_and_a_second_from_the_same_poses_none(match):
-    slam = unrefined().slam
+    state = unrefined().state
     recorded = Recorded(match)
     found = refinement(recorded)
     assert found.relations() == ([], [])
-    matched = found.sweep(slam.poses, MOVED)
+    matched = found.sweep(state.poses, MOVED)
     centres = recorded.centres()
     assert matched == len(centres)
     assert len(set(centres)) == matched
     # Every keyframe is a centre, or was tried with one; single matches cover only those with their centres.
-    assert {k for centre in centres for k in near(centre)} == set(range(len(slam.keyframes)))
+    assert {k for centre in centres for k in near(centre)} == set(range(len(state.keyframes)))
     least, most = (0.1, 0.5) if match is match_neighbours else (0.6, 1.0)
-    assert least < matched / len(slam.keyframes) < most
+    assert least < matched / len(state.keyframes) < most
     before = found.relations()
-    assert found.sweep(slam.poses, MOVED) == 0
+    assert found.sweep(state.poses, MOVED) == 0
     # A motion of all together moves nothing against its neighbours.
-    assert found.sweep(slam.poses + np.array([3.0, -2.0, 0.0]), MOVED) == 0
+    assert found.sweep(state.poses + np.array([3.0, -2.0, 0.0]), MOVED) == 0
     pairs, joint = found.relations()
     assert all(a is b for a, b in zip((*pairs, *joint), (*before[0], *before[1]), strict=True))
     assert bool(joint) is (match is match_neighbours)
@@ -88,9 +88,9 @@ def test_a_sweep_matches_what_is_not_covered_and_a_second_from_the_same_poses_no
 
 @BOTH_KINDS
 def test_after_one_keyframe_has_moved_only_those_matched_with_it_are_matched_again(match):
-    slam = unrefined().slam
+    state = unrefined().state
     recorded = Recorded(match)
-    found, poses = refinement(recorded), slam.poses
+    found, poses = refinement(recorded), state.poses
     found.sweep(poses, MOVED)
     centres = recorded.centres()
     last = max(range(len(poses)), key=lambda k: sum(k in near(centre) for centre in centres))
@@ -106,21 +106,21 @@ def test_after_one_keyframe_has_moved_only_those_matched_with_it_are_matched_aga
 
 
 def test_about_a_closed_loop_a_match_is_made_whatever_others_cover_and_reaches_farther():
-    slam, recorded = unrefined().slam, Recorded(match_neighbours)
-    refinement(recorded).sweep(slam.poses, MOVED)
-    covered = sorted(set(range(len(slam.keyframes))) - set(recorded.centres()))[5]
+    state, recorded = unrefined().state, Recorded(match_neighbours)
+    refinement(recorded).sweep(state.poses, MOVED)
+    covered = sorted(set(range(len(state.keyframes))) - set(recorded.centres()))[5]
     found = refinement(recorded, {covered: 6.5})
-    found.sweep(slam.poses, MOVED)
+    found.sweep(state.poses, MOVED)
     radii = dict(recorded.made)
     assert radii.pop(covered) == 6.5
-    assert set(radii.values()) == {slam.options.nscan.radius}
-    assert found.sweep(slam.poses, MOVED) == 0
+    assert set(radii.values()) == {state.options.nscan.radius}
+    assert found.sweep(state.poses, MOVED) == 0
 
 
 def test_a_turn_alone_is_a_motion():
-    slam = unrefined().slam
-    found, turned = refinement(match_neighbours_pairwise), slam.poses.copy()
-    found.sweep(slam.poses, MOVED)
+    state = unrefined().state
+    found, turned = refinement(match_neighbours_pairwise), state.poses.copy()
+    found.sweep(state.poses, MOVED)
     turned[0, 2] += 2 * np.pi
     assert found.sweep(turned, MOVED) == 0
     turned[0, 2] += 1.5 * MOVED

@@ -61,7 +61,7 @@ def test_solved_in_parts_the_map_is_the_same():
     log = growing(6_250).log()
     whole = mapped(log)
     parts = SlamOptions(closing=ClosingOptions(asked=20), growth=GrowthOptions(most=20))
-    assert len(whole.slam.poses) < SlamOptions().growth.most
+    assert len(whole.state.poses) < SlamOptions().growth.most
     found = mapped(log, parts)
     assert [(loop.nodes, loop.accepted) for loop in found.graph.loops] == [
         (loop.nodes, loop.accepted) for loop in whole.graph.loops

@@ -14,7 +14,7 @@ from nscan_cli.graph.model import NScan, Pairwise
 from nscan_cli.graph.optimise.graph_energy import GraphEnergy
 from nscan_cli.graph.optimise.graph_solver import optimise
 from nscan_cli.graph.relations.base import Relation
-from nscan_cli.slam.backend.energy_cache import Energies
+from nscan_cli.slam.backend.energy_cache import EnergyCache
 from nscan_cli.slam.backend.subgraph import (
     Chosen,
     Subgraph,
@@ -40,7 +40,7 @@ class Walked(NamedTuple):
     loops: list[Relation]
 
     def energy(self, part: Subgraph, fixed: int) -> GraphEnergy:
-        return Energies(APART * len(self.route.rows)).of(self.route, part.relations, fixed, part.free)
+        return EnergyCache(APART * len(self.route.rows)).of(self.route, part.relations, fixed, part.free)
 
     def whole(self) -> Subgraph:
         return Subgraph([*self.way, *self.loops])

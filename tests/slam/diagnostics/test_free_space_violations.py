@@ -136,7 +136,7 @@ def test_of_a_laser_that_hangs_nothing_is_compared():
 @pytest.mark.parametrize("name", ["fr079", "mit-csail", "intel"])
 def test_in_real_buildings_little_is_looked_through(name):
     found = mapped_real(name)
-    seen = free_space_violations(found.log, found.slam.route, found.slam.options.nscan)
+    seen = free_space_violations(found.log, found.state.route, found.state.options.nscan)
     assert seen is not None
     assert seen.share < seen.most / 2
     assert seen.share < 2 * seen.within

@@ -44,7 +44,7 @@ def simulated() -> LaserLog:
 )
 def test_trouble_that_the_graph_hides_is_told(trouble, odometry, told):
     made = ROUND[trouble](simulated())
-    said = notices(mapped((made if odometry else without_odometry(made)).log).slam)
+    said = notices(mapped((made if odometry else without_odometry(made)).log).state)
     assert re.search(rf"{told}.*\Z", "\n".join(said))
 
 
@@ -53,7 +53,7 @@ def test_a_map_that_a_glass_wall_has_made_6_m_too_short_is_told(seed):
     """Tracking stands still beside the glass, and in the other corridor the visits match, 6 m off."""
     drive = round_scene().record(seed).log()
     made = without_odometry(ROUND["glass wall, seen within 17° of head-on"](drive))
-    said = "\n".join(notices(mapped(made.log).slam))
+    said = "\n".join(notices(mapped(made.log).state))
     told = re.search(r"as they did before: from scan (\d+) to (\d+), ([\d.]+)% of what one visit saw", said)
     assert told is not None
     assert 270 <= int(told[1]) < int(told[2])
@@ -65,7 +65,7 @@ def test_of_someone_who_walks_along_it_is_told_that_odometry_and_scans_disagree(
     """On some drives tracking breaks before, or relations contradict each other behind."""
     log = ROUND["someone who walks along"](round_scene().record(seed).log()).log
     ways = r"odometry and scans disagree about the way: 1\d\.\d m and \d\.\d m from scan (\d+) to (\d+)"
-    told = re.search(ways, "\n".join(notices(mapped(log).slam)))
+    told = re.search(ways, "\n".join(notices(mapped(log).state)))
     assert told is not None
     assert int(told[1]) < 40
     assert int(told[2]) > 60
@@ -75,7 +75,7 @@ def test_of_someone_who_walks_along_it_is_told_that_odometry_and_scans_disagree(
 @pytest.mark.parametrize("odometry", [True, False])
 def test_of_a_sound_drive_there_is_nothing_to_tell(odometry, trouble):
     made = ROUND[trouble](simulated())
-    assert notices(mapped((made if odometry else without_odometry(made)).log).slam) == []
+    assert notices(mapped((made if odometry else without_odometry(made)).log).state) == []
 
 
 def test_the_graph_keeps_what_was_told():
@@ -90,7 +90,7 @@ def test_the_graph_keeps_what_was_told():
 def test_odometry_without_sign_in_a_real_log_is_told():
     """fr079 goes 4 m ahead and 3 m back about scan 1400; its odometry says ahead all the way."""
     log = read_log(str(data_file("fr079.log.gz")), ReadingOptions(start=0.0, end=400.0))
-    (told,) = notices(mapped(log).slam)
+    (told,) = notices(mapped(log).state)
     lengths = re.search(r"disagree about the way: (\S+) m and (\S+) m from scan (\d+) to (\d+)", told)
     assert lengths is not None
     by_odometry, by_scans, first, last = map(float, lengths.groups())

@@ -65,16 +65,16 @@ def test_of_someone_who_walks_along_it_is_told(seed, odometry):
     """Also where tracking does not break and no place is seen again (without odometry, of drive 8)."""
     log = ROUND["someone who walks along"](round_scene().record(seed).log()).log
     log = log if odometry else dataclasses.replace(log, odometry=None)
-    said = "\n".join(notices(mapped(log).slam))
+    said = "\n".join(notices(mapped(log).state))
     assert "see other things than where they were found" in said
 
 
 def found_in(run) -> ViewMismatch | None:
-    slam = run.slam
-    tracking, breaks = slam.options.tracking, slam.options.breaks
-    poses = np.concatenate(slam.tracked)
+    state = run.state
+    tracking, breaks = state.options.tracking, state.options.breaks
+    poses = np.concatenate(state.tracked)
     several = [
-        view_mismatches(slam.log, poses, slam.keyframes.list, tracking.max_range, breaks, threads)
+        view_mismatches(state.log, poses, state.keyframes.list, tracking.max_range, breaks, threads)
         for threads in (1, 2)
     ]
     assert several[0] == several[1]
@@ -89,13 +89,13 @@ def test_the_stretch_is_where_the_robot_seems_to_stand():
     assert found is not None
     assert 10 <= found.first < found.last <= 85
     assert found.share < LEAST
-    tracked = np.concatenate(run.slam.tracked)[[found.first, found.last], :2]
+    tracked = np.concatenate(run.state.tracked)[[found.first, found.last], :2]
     assert np.linalg.norm(tracked[1] - tracked[0]) < 2.0
 
 
 def test_of_a_log_without_keyframes_nothing_is_told():
     log = round_scene().record(5).log()
-    assert view_mismatches(log, np.zeros((len(log), 3)), [], 30.0, mapped(log).slam.options.breaks) is None
+    assert view_mismatches(log, np.zeros((len(log), 3)), [], 30.0, mapped(log).state.options.breaks) is None
 
 
 @pytest.mark.logs

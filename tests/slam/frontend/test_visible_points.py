@@ -12,9 +12,10 @@ from hypothesis import strategies as st
 
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.poses import Array, compose, relative
+from nscan_cli.slam.frontend.scan_batch import scan_batches
+from nscan_cli.slam.frontend.track_segments import tracker_of
 from nscan_cli.slam.frontend.visible_points import sight, visible_points
 from nscan_cli.slam.options import SlamOptions
-from nscan_cli.slam.pipeline import Slam
 from tests.benchmarks.lasers import KINDS, WAY
 from tests.simulation.building import building, drive
 from tests.slam.runs import office_log
@@ -66,6 +67,12 @@ def test_corridors_are_as_long_as_they_are_with_a_laser_of_four_metres(odometry)
     With all points matched they are 1.3 % too short, and 7 % without odometry.
     """
     log, truth = short_drive()
-    slam = Slam(log if odometry else dataclasses.replace(log, odometry=None), SlamOptions())
-    tracked = [each.found.poses for scans in slam.stretches() for each in slam.track(scans)]
+    log = log if odometry else dataclasses.replace(log, odometry=None)
+    tracker, options = tracker_of(log, SlamOptions()), SlamOptions().tracking
+    segments = [
+        each
+        for scans in scan_batches(log, options.max_range, log.odometry, np.zeros(0, dtype=np.int64))
+        for each in tracker.follow(scans)
+    ]
+    tracked = [each.found.poses for each in segments + tracker.finish()]
     assert abs(along(np.concatenate(tracked), truth) - 1) < (0.01 if odometry else 0.02)

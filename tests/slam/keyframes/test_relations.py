@@ -63,7 +63,7 @@ def test_pairwise_has_the_chain_and_single_matches_and_no_joint_one():
 def test_pairwise_loops_have_one_verdict_for_each_centre():
     """And another one where a place was searched and not found."""
     office = mapped_office(True, "pairwise")
-    graph, refused = office.graph, office.slam.closing.refused()
+    graph, refused = office.graph, office.state.detector.refused()
     centres = [loop.nodes[1] for loop in graph.loops[: len(graph.loops) - len(refused)]]
     assert graph.loops[len(centres) :] == refused
     assert centres == sorted(set(centres))
@@ -78,7 +78,7 @@ def test_pairwise_loops_have_one_verdict_for_each_centre():
 @pytest.mark.parametrize(("relations", "least"), [("both", 1.2), ("pairwise", 4.2)])
 def test_without_loops_no_relation_joins_different_visits(relations: Relations, least: float):
     office = mapped_office(True, relations, loops=False)
-    paths = {keyframe.row: keyframe.tracked.path for keyframe in office.slam.keyframes.list}
+    paths = {keyframe.row: keyframe.tracked.path for keyframe in office.state.keyframes.list}
     recent = SlamOptions().nscan.recent
     pairwise, nscan = office.graph.pairwise, office.graph.nscan
     found: list[tuple[tuple[int, ...], int]] = [(relation.nodes, relation.nodes[1]) for relation in pairwise]

@@ -147,7 +147,7 @@ def test_keyframes_that_others_cover_are_no_centres():
 def test_yet_each_keyframe_is_a_centre_or_others_hold_its_pairs():
     """From the final poses: what the last sweep left out was held by the relations that are in the graph."""
     office = mapped_office(True)
-    keyframes, options = office.slam.keyframes.list, office.slam.options.nscan
+    keyframes, options = office.state.keyframes.list, office.state.options.nscan
     rows = [keyframe.row for keyframe in keyframes]
     paths = np.array([keyframe.tracked.path for keyframe in keyframes])
     covered = Coverage()
@@ -155,7 +155,7 @@ def test_yet_each_keyframe_is_a_centre_or_others_hold_its_pairs():
         covered.add(relation.nodes[relation.fixed], [], joint(*relation.nodes))
     shares = np.zeros(len(rows))
     for k in range(len(rows)):
-        near, *_ = choose_neighbours(office.slam.poses, paths, k, options)
+        near, *_ = choose_neighbours(office.state.poses, paths, k, options)
         shares[k] = covered.share(rows[k], [rows[other] for other in near])
     assert (shares > 0).all()
     held = (shares >= options.covered) | np.isin(rows, list(centres(office)))

@@ -46,15 +46,15 @@ def test_the_loop_mends_a_slip_that_no_scan_saw(slip):
     if slip != ALONG:
         # Along the way a joint match finds it too: what odometry alone says is held loosely.
         assert rmse(run(slip, False)) > 0.5
-    slam, graph = run(slip, True).slam, run(slip, True).graph
-    assert len(slam.places) >= 2
+    state, graph = run(slip, True).state, run(slip, True).graph
+    assert len(state.places) >= 2
     # All keyframes of the second visit, 12 m, lie in relations that close the loop, from where it was closed.
     joined = {node for relation in graph.nscan if relation.origin == "loop" for node in relation.nodes}
-    first = min(place.centre for place in slam.places)
+    first = min(place.centre for place in state.places)
     # Also in the last sweep, in which other matches would cover them.
     centres = {relation.nodes[relation.fixed] for relation in graph.nscan}
-    assert {slam.keyframes.list[place.centre].row for place in slam.places} <= centres
-    assert {keyframe.row for keyframe in slam.keyframes.list[first:]} <= joined
+    assert {state.keyframes.list[place.centre].row for place in state.places} <= centres
+    assert {keyframe.row for keyframe in state.keyframes.list[first:]} <= joined
 
 
 def test_single_matches_mend_it_too():
@@ -65,9 +65,9 @@ def test_single_matches_mend_it_too():
 def test_the_graph_has_the_verdicts_on_what_was_searched():
     """Ranges of 5 m leave much alike: what was refused comes after the verdicts of the joint matches."""
     short = mapped(slipped_round(ASLANT, max_range=5.0))
-    refused = short.slam.closing.refused()
+    refused = short.state.detector.refused()
     assert len(refused) > 5
-    assert short.graph.loops == short.slam.loops + refused
+    assert short.graph.loops == short.state.loops + refused
     assert all(loop.reason and not loop.accepted for loop in refused)
 
 

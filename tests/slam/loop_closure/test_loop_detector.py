@@ -9,7 +9,7 @@ import pytest
 
 from nscan_cli.graph.model import Loop, Pairwise
 from nscan_cli.poses import compose, relative
-from nscan_cli.slam.backend.energy_cache import Energies
+from nscan_cli.slam.backend.energy_cache import EnergyCache
 from nscan_cli.slam.frontend.options import BreakOptions
 from nscan_cli.slam.keyframes.keyframe import route_of
 from nscan_cli.slam.local_matching.joint_relations import LocalMatch, match_neighbours
@@ -44,7 +44,7 @@ NEVER = ClosingOptions(score=1.1)
 
 
 def closing(options: ClosingOptions = ClosingOptions()) -> LoopDetector:  # noqa: B008
-    return LoopDetector(options, NSCAN, match_neighbours, Energies(ROWS * len(round_drive().keyframes)))
+    return LoopDetector(options, NSCAN, match_neighbours, EnergyCache(ROWS * len(round_drive().keyframes)))
 
 
 def bent(slip: tuple[float, float, float] = ACROSS) -> Driven:
@@ -175,7 +175,7 @@ def test_who_is_lost_is_searched_for_in_all_that_was_seen_before():
         known = carried if k + 1 in firsts else relation
         chain.append(dataclasses.replace(known, nodes=(ROWS * k, ROWS * (k + 1))))
     drive = Driven(keyframes, chain, along(chain), office.truth)
-    lost = LoopDetector(ClosingOptions(), NSCAN, match_neighbours, Energies(ROWS * size))
+    lost = LoopDetector(ClosingOptions(), NSCAN, match_neighbours, EnergyCache(ROWS * size))
     found = closed_along(lost, drive)
     assert found
     for _, places in found:

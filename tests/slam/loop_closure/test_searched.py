@@ -167,4 +167,4 @@ def test_without_loops_nothing_is_searched(searches):
     made = searches({})
     options = SlamOptions(nscan=NScanOptions(loops=False))
     alone = mapped(slipped_round(ACROSS), options)
-    assert (made, alone.slam.places, alone.graph.loops) == ([], [], [])
+    assert (made, alone.state.places, alone.graph.loops) == ([], [], [])

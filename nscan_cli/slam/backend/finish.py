@@ -1,0 +1,30 @@
+"""The graph of a finished loop: the poses of all scans, the relations, and how certain the poses are."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from nscan_cli.graph.marginal_covariances import marginal_covariances
+from nscan_cli.graph.model import Graph
+from nscan_cli.slam.backend.scan_poses import between_keyframes
+from nscan_cli.slam.state import SlamState
+
+
+def finish_graph(state: SlamState) -> Graph:
+    """The graph of all scans, with marginal covariances. Changes nothing but the cache of energies."""
+    state.energies.forget()
+    log, rows = state.log, state.route.rows
+    anchors = rows[np.searchsorted(rows, np.arange(len(log)), side="right") - 1]
+    graph = Graph(
+        scans=log.numbers,
+        stamps=list(log.stamps),
+        poses=between_keyframes(np.concatenate(state.tracked), rows, state.poses, state.breaks),
+        odometry=log.odometry,
+        anchors=anchors,
+        pairwise=state.pairwise_relations,
+        nscan=state.nscan_relations,
+        others=state.other_relations,
+        loops=state.loops + state.detector.refused(),
+    )
+    graph.marginals = marginal_covariances(graph)
+    return graph

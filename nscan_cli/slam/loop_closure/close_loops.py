@@ -1,0 +1,34 @@
+"""Step 4 of the loop (paper, V): large loops are closed where a search finds an earlier visit."""
+
+from __future__ import annotations
+
+from nscan_cli.slam.backend.optimisation import optimise
+from nscan_cli.slam.local_matching.joint_relations import LocalMatch
+from nscan_cli.slam.local_matching.match_keyframe import add_relations
+from nscan_cli.slam.local_matching.neighbours import Neighbours
+from nscan_cli.slam.loop_closure.place_search import TOO_LITTLE, piece_moved
+from nscan_cli.slam.state import SlamState
+
+
+def close_loops(
+    state: SlamState, centre: int, neighbours: Neighbours, local_match: LocalMatch | None
+) -> None:
+    """Search for keyframe `centre` among earlier visits that may be too far off for a joint match.
+
+    Changes route, relations, loops, places, and optimises the graph, if enough keyframes find the same place.
+    """
+    loop = None if local_match is None else local_match.loop
+    # At the border of an earlier visit a place well inside fits better than the right one, half of which
+    # was not seen: there a search says no more than the match.
+    if not state.options.nscan.loops or (loop is not None and loop.reason == TOO_LITTLE):
+        return
+    is_refused = loop is not None and not loop.accepted
+    left_out = neighbours.tried[neighbours.seen_before & is_refused]
+    places = state.detector.close(state.route, centre, left_out, state.loop_relations)
+    if not places:
+        return
+    state.route = piece_moved(state.route, places[-1], state.breaks)
+    for place in places:
+        add_relations(state, place.nearby)
+    state.places.extend(places)
+    optimise(state, max_iterations=100, tolerance=1e-4)

@@ -1,0 +1,112 @@
+"""The state of the SLAM loop (paper, V), which the functions of its steps read and change."""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from nscan_cli.graph.model import Loop, NScan, Pairwise
+from nscan_cli.graph.relations.base import Relation
+from nscan_cli.logs.laser_log import LaserLog
+from nscan_cli.poses import Array, Indices
+from nscan_cli.slam.backend.energy_cache import EnergyCache
+from nscan_cli.slam.backend.schedule import OptimisationSchedule
+from nscan_cli.slam.frontend.odometry_checks import believed_odometry, hanging
+from nscan_cli.slam.keyframes.keyframe import Keyframes, Route, route_of
+from nscan_cli.slam.local_matching.coverage import Coverage
+from nscan_cli.slam.local_matching.joint_relations import MatchNearby, match_neighbours
+from nscan_cli.slam.local_matching.pairwise_relations import match_neighbours_pairwise
+from nscan_cli.slam.loop_closure.loop_detector import LoopDetector
+from nscan_cli.slam.loop_closure.place_search import Place
+from nscan_cli.slam.options import SlamOptions
+
+
+@dataclass
+class SlamState:
+    """What the loop knows. `of_log` makes the state before the first scan.
+
+    While the log is tracked, the tracking thread changes keyframes, chain, tracked and breaks; another thread
+    that grows the graph may change the rest.
+    """
+
+    log: LaserLog
+    options: SlamOptions
+    threads: int
+    odometry: Array | None
+    """(S, 3) odometry without its jumps; None without odometry."""
+    odometry_jumps: Indices
+    """(J,) rows to which the odometry jumped."""
+    frozen_scans: Indices
+    """(H,) rows of scans that a laser repeated while the robot moved."""
+    keyframes: Keyframes
+    route: Route
+    """The keyframes that are in the graph, and their global poses."""
+    chain: list[Pairwise]
+    """Relations of tracking: `chain[k]` leads from keyframe k to k + 1. The route holds the same list."""
+    tracked: list[Array] = field(default_factory=list)
+    """(n, 3) poses of the scans as tracking found them, batch by batch."""
+    breaks: list[int] = field(default_factory=list)
+    """Rows of the keyframes before which the track broke, increasing."""
+    matched_pairs: list[Pairwise] = field(default_factory=list)
+    """Pairwise relations of matches between a keyframe and one neighbour."""
+    nscan_relations: list[NScan] = field(default_factory=list)
+    other_relations: list[Relation] = field(default_factory=list)
+    """Relations of a saved graph that the loop does not make."""
+    loops: list[Loop] = field(default_factory=list)
+    """The verdicts on loops, accepted and refused ones."""
+    places: list[Place] = field(default_factory=list)
+    """Places of earlier visits that a search found."""
+    tracking_restarts: int = 0
+    """Scan matches that tracking started again from other angles."""
+    tracking_searches: int = 0
+    """Searches of tracking for a scan among the last ones."""
+
+    def __post_init__(self) -> None:
+        options = self.options
+        is_pairwise = options.relations == "pairwise"
+        self.match: MatchNearby = match_neighbours_pairwise if is_pairwise else match_neighbours
+        self.energies, self.coverage = EnergyCache(len(self.log)), Coverage()
+        self.detector = LoopDetector(options.closing, options.nscan, self.match, self.energies)
+        self.schedule = OptimisationSchedule(options.growth)
+
+    @classmethod
+    def of_log(cls, log: LaserLog, options: SlamOptions, threads: int = 1) -> SlamState:
+        """The state before the first scan of a log."""
+        odometry, jumps = log.odometry, np.zeros(0, dtype=np.int64)
+        if odometry is not None:
+            odometry, jumps = believed_odometry(odometry, log.times)
+        seen = log.ranges[log.ranges < options.tracking.max_range]
+        median_range = float(np.median(seen)) if len(seen) else 0.0
+        keyframes, chain = (
+            Keyframes(options.keyframes, options.nscan.gaussians, median_range),
+            list[Pairwise](),
+        )
+        route = route_of(keyframes.list, chain, np.zeros((0, 3)))
+        frozen = hanging(log, odometry)
+        return cls(log, options, threads, odometry, jumps, frozen, keyframes, route, chain)
+
+    @property
+    def poses(self) -> Array:
+        """(K, 3) global poses of the keyframes in the graph."""
+        return self.route.poses
+
+    @property
+    def relations(self) -> list[Relation]:
+        """All relations, in the order of the graph."""
+        return [*self.pairwise_relations, *self.nscan_relations, *self.other_relations]
+
+    @property
+    def pairwise_relations(self) -> list[Pairwise]:
+        """The chain, or what of it the options keep, and the matched pairs."""
+        chain = self.route.chain[: max(len(self.poses) - 1, 0)]
+        if self.options.relations != "nscan":
+            return [*chain, *self.matched_pairs]
+        joined = {pair for relation in self.nscan_relations for pair in itertools.pairwise(relation.nodes)}
+        return [relation for relation in chain if relation.nodes not in joined]
+
+    def loop_relations(self) -> list[Relation]:
+        """The relations that close loops."""
+        matched: list[Relation] = [*self.matched_pairs, *self.nscan_relations, *self.other_relations]
+        return [relation for relation in matched if relation.origin == "loop"]
