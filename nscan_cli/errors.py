@@ -1,8 +1,8 @@
 """The errors that a user can cause; each carries its exit code and prints as one line."""
 
-from nscan_cli.files.text import shown
+from nscan_cli.files.text import printable
 
-LONGEST = 2000
+LONGEST_MESSAGE = 2000
 """Characters of a message: it may quote an input, in which anything can stand."""
 
 
@@ -12,9 +12,9 @@ class NscanError(Exception):
     exit_code = 1
 
     def __init__(self, message: str) -> None:
-        message = shown(message)
-        if len(message) > LONGEST:
-            message = f"{message[: LONGEST // 2]} … {message[-LONGEST // 2 :]}"
+        message = printable(message)
+        if len(message) > LONGEST_MESSAGE:
+            message = f"{message[: LONGEST_MESSAGE // 2]} … {message[-LONGEST_MESSAGE // 2 :]}"
         super().__init__(message)
 
 

@@ -10,7 +10,7 @@ from concurrent.futures import Future, ThreadPoolExecutor
 from types import TracebackType
 from typing import Any, TypeVar
 
-SWITCH = 2e-4
+SWITCH_INTERVAL = 2e-4
 """s; a thread that comes out of a kernel waits for the interpreter so long at most. The kernels take about as
 long, and by Python's own 5 ms both threads would wait most of the time."""
 
@@ -23,7 +23,7 @@ def available_threads() -> int:
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
-def in_threads(threads: int, function: Callable[[Item], Result], items: Iterable[Item]) -> list[Result]:
+def map_in_threads(threads: int, function: Callable[[Item], Result], items: Iterable[Item]) -> list[Result]:
     """What a function gives for each of the items, in their order."""
     if threads < 2:
         return [function(item) for item in items]
@@ -31,7 +31,7 @@ def in_threads(threads: int, function: Callable[[Item], Result], items: Iterable
         return list(pool.map(function, items))
 
 
-def meanwhile(threads: int, function: Callable[[], Result]) -> Callable[[], Result]:
+def in_background(threads: int, function: Callable[[], Result]) -> Callable[[], Result]:
     """Call a function beside the caller's own work; with one thread, when its result is asked for.
 
     Returns what gives the result, or raises the function's error.
@@ -44,7 +44,7 @@ def meanwhile(threads: int, function: Callable[[], Result]) -> Callable[[], Resu
     return future.result
 
 
-def called(function: Callable[[], Result]) -> Future[Result]:
+def completed_call(function: Callable[[], Result]) -> Future[Result]:
     """A call that is made here and now, as one that another thread has made: its error is kept in it."""
     future: Future[Result] = Future()
     try:
@@ -55,18 +55,18 @@ def called(function: Callable[[], Result]) -> Future[Result]:
 
 
 @contextlib.contextmanager
-def short_turns(threads: int) -> Iterator[None]:
+def short_switch_interval(threads: int) -> Iterator[None]:
     """Let several threads wait for the interpreter no longer than SWITCH, until it ends."""
     interval = sys.getswitchinterval()
     if threads > 1:
-        sys.setswitchinterval(SWITCH)
+        sys.setswitchinterval(SWITCH_INTERVAL)
     try:
         yield
     finally:
         sys.setswitchinterval(interval)
 
 
-class Beside:
+class BackgroundCalls:
     """Calls that are made one after another beside the caller's own work; at once if there is one thread.
 
     To be used with `with`: at its end all calls are made. The first error of a call is raised at the next
@@ -75,7 +75,7 @@ class Beside:
 
     def __init__(self, threads: int) -> None:
         self._pool = ThreadPoolExecutor(1) if threads > 1 else None
-        self._turns = short_turns(threads)
+        self._turns = short_switch_interval(threads)
         self._calls: list[Future[Any]] = []
 
     def __call__(self, function: Callable[[Item], Any], item: Item) -> None:
@@ -87,7 +87,7 @@ class Beside:
             self._calls.pop(0).result()
         self._calls.append(self._pool.submit(function, item))
 
-    def __enter__(self) -> Beside:
+    def __enter__(self) -> BackgroundCalls:
         self._turns.__enter__()
         return self
 

@@ -21,7 +21,7 @@ from nscan_cli.cli.subcommand import (
     section_of,
 )
 from nscan_cli.files.limits import ALL, Limit
-from nscan_cli.files.outputs import write_whole
+from nscan_cli.files.outputs import write_atomically
 from nscan_cli.logs.formats import readable
 
 HEAD = """\
@@ -271,4 +271,4 @@ def _table(head: tuple[str, ...], rows: Iterable[tuple[str, ...]]) -> str:
 
 
 if __name__ == "__main__":
-    write_whole(sys.argv[1], reference().encode())
+    write_atomically(sys.argv[1], reference().encode())

@@ -8,7 +8,7 @@ import time
 
 import pytest
 
-from nscan_cli.threads import Beside, available_threads, in_threads, meanwhile
+from nscan_cli.threads import BackgroundCalls, available_threads, in_background, map_in_threads
 
 THREADS = pytest.mark.parametrize("threads", [1, 2, 5])
 
@@ -19,28 +19,28 @@ def test_results_come_in_the_order_of_the_items(threads):
         time.sleep(0.002 * (9 - item))
         return item * item
 
-    assert in_threads(threads, slower_at_first, range(10)) == [k * k for k in range(10)]
+    assert map_in_threads(threads, slower_at_first, range(10)) == [k * k for k in range(10)]
 
 
 def test_one_thread_is_the_callers_own():
     own = threading.get_ident()
-    assert in_threads(1, lambda _: threading.get_ident(), range(3)) == [own] * 3
+    assert map_in_threads(1, lambda _: threading.get_ident(), range(3)) == [own] * 3
     seen: list[int] = []
-    with Beside(1) as beside:
+    with BackgroundCalls(1) as beside:
         beside(lambda _: seen.append(threading.get_ident()), 0)
         assert seen == [own]
 
 
 @THREADS
 def test_what_is_called_meanwhile_gives_its_result_or_its_error(threads):
-    assert meanwhile(threads, lambda: 7)() == 7
+    assert in_background(threads, lambda: 7)() == 7
     called: list[int] = []
 
     def fail() -> None:
         called.append(threading.get_ident())
         raise ValueError("at last")
 
-    result = meanwhile(threads, fail)
+    result = in_background(threads, fail)
     with pytest.raises(ValueError, match="at last"):
         result()
     assert (called == [threading.get_ident()]) == (threads == 1)
@@ -48,7 +48,7 @@ def test_what_is_called_meanwhile_gives_its_result_or_its_error(threads):
 
 def test_beside_leaves_the_interpreter_as_it_was():
     before = sys.getswitchinterval()
-    with Beside(2):
+    with BackgroundCalls(2):
         assert sys.getswitchinterval() < before
     assert sys.getswitchinterval() == before
 
@@ -63,7 +63,7 @@ def test_calls_beside_are_made_one_after_another_and_all_before_the_end(threads)
         made.append(item)
         busy.release()
 
-    with Beside(threads) as beside:
+    with BackgroundCalls(threads) as beside:
         for k in range(20):
             beside(call, k)
     assert made == list(range(20))
@@ -79,7 +79,7 @@ def test_an_error_beside_is_raised_and_ends_it(threads):
             raise ValueError("the fourth")
 
     def hundred() -> None:
-        with Beside(threads) as beside:
+        with BackgroundCalls(threads) as beside:
             for k in range(100):
                 beside(call, k)
                 time.sleep(0.001)
@@ -99,7 +99,7 @@ def test_after_the_callers_own_error_nothing_waits(threads):
         made.append(item)
 
     def interrupted() -> None:
-        with Beside(threads) as beside:
+        with BackgroundCalls(threads) as beside:
             for k in range(6):
                 beside(call, k)
             raise KeyboardInterrupt

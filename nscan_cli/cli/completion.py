@@ -20,7 +20,7 @@ from click.shell_completion import (
 )
 
 
-class Names(str):
+class EncodedNames(str):
     """Text that becomes the bytes that the names in it have."""
 
     def encode(self, *_encoding: str) -> bytes:
@@ -28,15 +28,15 @@ class Names(str):
         return super().encode(sys.getfilesystemencoding(), sys.getfilesystemencodeerrors())
 
 
-class AnyNames(ShellComplete):
+class AnyNameComplete(ShellComplete):
     """What goes to the shell may be no UTF-8."""
 
     def complete(self) -> str:
         """The lines that the shell reads."""
-        return Names(super().complete())
+        return EncodedNames(super().complete())
 
 
-class WholeWords(AnyNames):
+class WholeWordComplete(AnyNameComplete):
     """What completes a value stands behind its option again."""
 
     def get_completions(self, args: list[str], incomplete: str) -> list[CompletionItem[str]]:
@@ -48,11 +48,11 @@ class WholeWords(AnyNames):
         return [
             CompletionItem(f"{option}={whole}", help=item.help)
             for item in found
-            for whole in _values(item, value)
+            for whole in _expanded_values(item, value)
         ]
 
 
-def _values(item: CompletionItem[str], value: str) -> Iterator[str]:
+def _expanded_values(item: CompletionItem[str], value: str) -> Iterator[str]:
     """Those that an item stands for: shells look for files by a whole word, and would find none."""
     if item.type == "plain":
         yield item.value
@@ -61,20 +61,20 @@ def _values(item: CompletionItem[str], value: str) -> Iterator[str]:
         yield os.path.join(path, "") if os.path.isdir(path) else path
 
 
-class Bash(AnyNames, BashComplete):
+class BashCompletion(AnyNameComplete, BashComplete):
     """Completion in bash."""
 
 
-class Zsh(WholeWords, ZshComplete):
+class ZshCompletion(WholeWordComplete, ZshComplete):
     """Completion in zsh."""
 
 
-class Fish(WholeWords, FishComplete):
+class FishCompletion(WholeWordComplete, FishComplete):
     """Completion in fish."""
 
 
 def add_completions() -> None:
     """Let click complete so."""
-    add_completion_class(Bash)
-    add_completion_class(Zsh)
-    add_completion_class(Fish)
+    add_completion_class(BashCompletion)
+    add_completion_class(ZshCompletion)
+    add_completion_class(FishCompletion)

@@ -9,15 +9,15 @@ import click
 from nscan_cli.cli.plot_option import check_plot, plot_option, write_plot
 from nscan_cli.cli.progress import say
 from nscan_cli.cli.shared_options import common_options, reading_options
-from nscan_cli.cli.standard_streams import answer
-from nscan_cli.cli.subcommand import FILE, argument, option, subcommand
+from nscan_cli.cli.standard_streams import print_result
+from nscan_cli.cli.subcommand import PATH, argument, option, subcommand
 from nscan_cli.errors import CheckFailedError, WrongUsageError
 from nscan_cli.logs.reading_options import ReadingOptions
 
 if TYPE_CHECKING:
     from nscan_cli.evaluation.evaluation_report import Evaluation
 
-DRAWN = 10
+DEFAULT_DRAWN = 10
 """The worst relations that a picture shows where --worst does not say."""
 
 
@@ -30,12 +30,12 @@ DRAWN = 10
         "as a test: exit code 3",
     ),
 )
-@argument("result", type=FILE, tells="A graph, a TUM trajectory, or a CARMEN log with corrected poses; - is "
+@argument("result", type=PATH, tells="A graph, a TUM trajectory, or a CARMEN log with corrected poses; - is "
           "standard input.")  # fmt: skip
-@option("--relations", type=FILE, metavar="FILE", help="Relations of the benchmark of Kümmerle et al. 2009.")
+@option("--relations", type=PATH, metavar="FILE", help="Relations of the benchmark of Kümmerle et al. 2009.")
 @option(
     "--reference",
-    type=FILE,
+    type=PATH,
     metavar="FILE",
     help="A trajectory (TUM, or EuRoC's CSV), a graph, a log with TRUEPOS, or a recording.",
 )
@@ -98,18 +98,18 @@ def command(
     for remark in evaluation.remarks:
         say(f"note: {remark}", quiet)
     if as_json:
-        answer(json.dumps(as_document(evaluation), indent=2, allow_nan=False) + "\n")
+        print_result(json.dumps(as_document(evaluation), indent=2, allow_nan=False) + "\n")
     else:
-        answer(as_text(evaluation))
+        print_result(as_text(evaluation))
     if plot is not None:
         from nscan_cli.evaluation.error_picture import picture
 
-        drawn = DRAWN if worst is None else worst
+        drawn = DEFAULT_DRAWN if worst is None else worst
         write_plot(plot, picture(evaluation, measured.trajectory, measured.reference, drawn))
-    _check(evaluation, max_translation, max_rotation)
+    _check_bounds(evaluation, max_translation, max_rotation)
 
 
-def _check(evaluation: Evaluation, max_translation: float | None, max_rotation: float | None) -> None:
+def _check_bounds(evaluation: Evaluation, max_translation: float | None, max_rotation: float | None) -> None:
     above = []
     for name, translation, rotation in evaluation.bounded():
         if max_translation is not None and translation > max_translation:

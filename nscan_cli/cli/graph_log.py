@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from nscan_cli.graph.model import Graph
     from nscan_cli.logs.laser_log import LaserLog
 
-REMEDY = "give the log that the graph was made from"
+GRAPH_LOG_REMEDY = "give the log that the graph was made from"
 
 
 def read_graph_log(
@@ -37,24 +37,24 @@ def read_graph_log(
     """
     import numpy as np
 
-    from nscan_cli.kernels.decorators import bring_up
+    from nscan_cli.kernels.decorators import load_runtime
     from nscan_cli.logs.load import read_log
     from nscan_cli.logs.log_files import parts_of
 
-    bring_up()
+    load_runtime()
     path = parts_of(paths).title
-    log = read_log(paths, _as_tracked(reading, graph_file, graph.provenance))
-    inputs = _inputs(graph)
+    log = read_log(paths, _options_of_slam(reading, graph_file, graph.provenance))
+    inputs = _graph_inputs(graph)
     if inputs and not is_made_from(inputs, log.source):
         raise InputDataError(
-            path, f"is not the log of {graph_file}: {_difference(inputs, log.source)}", REMEDY
+            path, f"is not the log of {graph_file}: {_difference(inputs, log.source)}", GRAPH_LOG_REMEDY
         )
     rows = np.minimum(np.searchsorted(log.numbers, graph.scans), len(log) - 1)
     there = log.numbers[rows] == graph.scans
     some_left_out = reading.start is not None or reading.end is not None or reading.every > 1
     if not there.all() and not some_left_out:
         number = int(graph.scans[np.argmin(there)])
-        raise InputDataError(path, f"has no scan {number}, which {graph_file} has", REMEDY)
+        raise InputDataError(path, f"has no scan {number}, which {graph_file} has", GRAPH_LOG_REMEDY)
     return log, np.flatnonzero(there), rows[there]
 
 
@@ -63,7 +63,7 @@ def find_log(graph_file: str, graph: Graph) -> tuple[str, ...]:
 
     Raises InputMissingError.
     """
-    inputs = _inputs(graph)
+    inputs = _graph_inputs(graph)
     if not inputs:
         raise InputMissingError(f"{graph_file}: does not name its log; give its path as LOG")
     # What stands beside a database is found by its name.
@@ -74,7 +74,7 @@ def find_log(graph_file: str, graph: Graph) -> tuple[str, ...]:
         if not any(source["name"] == base + end for base in bases for end in BESIDE)
     }
     for folder in (Path(graph_file).parent, Path()):
-        files = [_called(name, folder) for name in sizes]
+        files = [_file_named(name, folder) for name in sizes]
         if None not in files:
             return tuple(map(str, files))
     for folder in (Path(graph_file).parent, Path()):
@@ -90,7 +90,7 @@ def find_log(graph_file: str, graph: Graph) -> tuple[str, ...]:
     )
 
 
-def _called(name: str, folder: Path) -> Path | None:
+def _file_named(name: str, folder: Path) -> Path | None:
     """The file in the folder that a graph calls so, also one whose name is no UTF-8; None without one."""
     path = folder / path_of_name(name)
     if path.is_file():
@@ -114,7 +114,7 @@ def _has_size(path: Path, size: int) -> bool:
     return path.is_file() and path.stat().st_size == size
 
 
-def _inputs(graph: Graph) -> list[dict[str, Any]]:
+def _graph_inputs(graph: Graph) -> list[dict[str, Any]]:
     """What the graph says of the files that it was made from."""
     inputs: list[dict[str, Any]] = graph.provenance.get("inputs") or []
     return inputs
@@ -131,7 +131,7 @@ def _difference(inputs: Sequence[dict[str, Any]], source: Source) -> str:
     return f"the graph was made from {counted(len(inputs), 'file')} of its {len(source.files)}"
 
 
-def _as_tracked(reading: ReadingOptions, graph_file: str, provenance: dict[str, Any]) -> ReadingOptions:
+def _options_of_slam(reading: ReadingOptions, graph_file: str, provenance: dict[str, Any]) -> ReadingOptions:
     """The options that the graph's log was read with, where `reading` does not say otherwise.
 
     But which scans there are, the graph itself says; `reading` may leave out more.
@@ -145,19 +145,23 @@ def _as_tracked(reading: ReadingOptions, graph_file: str, provenance: dict[str, 
         unsaid = getattr(reading, option.name) == getattr(default, option.name)
         if isinstance(tracked, dict) and unsaid and option.name in tracked and option.name not in choices:
             value = tracked[option.name]
-            if not _fits(value, str(option.type)):
+            if not _is_value_of(value, str(option.type)):
                 problem = f"provenance.parameters.reading: {option.name} is {str(value)[:40]!r}"
                 raise InputDataError(graph_file, problem, "mend it, or write the graph again")
             kept[option.name] = tuple(value) if isinstance(value, list) else value
     return dataclasses.replace(reading, **kept)
 
 
-def _fits(value: Any, kind: str) -> bool:
+def _is_value_of(value: Any, kind: str) -> bool:
     """Whether a value of the graph is one for a field of ReadingOptions with this annotation."""
     if value is None:
         return "None" in kind
     if isinstance(value, list):
-        return kind.startswith("tuple") and len(value) == 3 and all(_fits(part, "float") for part in value)
+        return (
+            kind.startswith("tuple")
+            and len(value) == 3
+            and all(_is_value_of(part, "float") for part in value)
+        )
     if isinstance(value, bool) or kind == "bool":
         return isinstance(value, bool) and kind == "bool"
     if isinstance(value, str):

@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, Any
 
 from nscan_cli.cli.laser_survey import laser_line, survey_of
 from nscan_cli.cli.shared_options import common_options, reading_options
-from nscan_cli.cli.standard_streams import answer
+from nscan_cli.cli.standard_streams import print_result
 from nscan_cli.cli.subcommand import log_argument, option, subcommand
-from nscan_cli.cli.summary import Row, table
+from nscan_cli.cli.summary import Row, summary_table
 from nscan_cli.files.counting import counted
-from nscan_cli.files.outputs import write_whole
+from nscan_cli.files.outputs import write_atomically
 from nscan_cli.files.text import json_bytes
 from nscan_cli.logs.reading_options import ReadingOptions
 
@@ -41,9 +41,9 @@ def command(log: tuple[str, ...], as_json: bool, reading: ReadingOptions, **_com
     facts = survey.without_unchosen(facts_of(survey.log) | survey.facts(reading))
     if as_json:
         text = json.dumps(facts, ensure_ascii=False, allow_nan=False)
-        write_whole("-", json_bytes(f"{text}\n"))
+        write_atomically("-", json_bytes(f"{text}\n"))
     else:
-        answer(f"{as_text(facts)}\n")
+        print_result(f"{facts_table(facts)}\n")
     if survey.refused is not None:
         raise survey.refused
 
@@ -58,7 +58,7 @@ def facts_of(log: LaserLog) -> dict[str, Any]:
     steps = np.diff(log.times)
     duration = float(log.times[-1] - log.times[0])
     first, last, step = (math.degrees(angle) for angle in field_of_view(log))
-    increments = [_degrees(find(log.angle_increment)) for find in (np.min, np.max)]
+    increments = [_rounded_degrees(find(log.angle_increment)) for find in (np.min, np.max)]
     without_return, unusable = beams_lost(log)
     path = None if log.odometry is None else np.diff(log.odometry[:, :2], axis=0)
     return {
@@ -88,7 +88,7 @@ def facts_of(log: LaserLog) -> dict[str, Any]:
         "beams_without_return": round(without_return, 6),
         "beams_unusable": round(unusable, 6),
         "beams_lost": log.report.lost,
-        "mounting": [*(round(float(part), 6) for part in log.mount[:2]), _degrees(log.mount[2])],
+        "mounting": [*(round(float(part), 6) for part in log.mount[:2]), _rounded_degrees(log.mount[2])],
         "range_limits": [round(limit, 6) for limit in log.range_limits],
         "used": log.report.used,
         "records": log.report.records,
@@ -105,10 +105,10 @@ def facts_of(log: LaserLog) -> dict[str, Any]:
     }
 
 
-def as_text(facts: dict[str, Any]) -> str:
+def facts_table(facts: dict[str, Any]) -> str:
     """The facts as aligned lines, one a fact; those that may repeat as several lines."""
     of_laser = [] if facts["laser"] is None else _of_laser(facts)
-    return table([*_of_file(facts), *of_laser, *_of_whole(facts)])
+    return summary_table([*_of_file(facts), *of_laser, *_of_whole(facts)])
 
 
 def _of_file(facts: dict[str, Any]) -> list[Row]:
@@ -133,16 +133,16 @@ def _of_laser(facts: dict[str, Any]) -> list[Row]:
     return [
         ("scans", [f"{facts['scans']}, numbered {facts['first_scan']} to {facts['last_scan']}{rate}"]),
         ("duration", [f"{facts['duration']:.1f} s from {facts['start']}"]),
-        ("beams", [_between(facts["fewest_beams"], facts["beams"])]),
+        ("beams", [_interval(facts["fewest_beams"], facts["beams"])]),
         ("field of view", [f"{facts['angle_min']:g}° to {facts['angle_max']:g}°, "
-                           f"{_between(finest, coarsest, '°')} a beam"]),
+                           f"{_interval(finest, coarsest, '°')} a beam"]),
         ("range limits", [f"{low:g} m to {high:g} m",
                           f"lower: {used['range_min']}", f"upper: {used['range_max']}"]),
         ("no return", ["no such value" if no_return is None else f"{no_return:g} m and above"]),
         ("beams lost", [f"{facts['beams_without_return']:.1%} without return, "
                         f"{facts['beams_unusable']:.1%} unusable",
                         *(f"{count:,} {why}" for why, count in facts["beams_lost"].items())]),
-        ("mounting", [*([] if facts["mounting"] is None else [_placed(*facts["mounting"])]),
+        ("mounting", [*([] if facts["mounting"] is None else [_mounting_line(*facts["mounting"])]),
                       used["mounting"]]),
     ]  # fmt: skip
 
@@ -150,9 +150,9 @@ def _of_laser(facts: dict[str, Any]) -> list[Row]:
 def _of_whole(facts: dict[str, Any]) -> list[Row]:
     odometry, used, backward = facts["odometry"], facts["used"], facts["backward_stamps"]
     path = [] if odometry is None else [f"a path of {odometry['path']:.1f} m"]
-    skipped = None if facts["skipped"] is None else [_skipped(entry) for entry in facts["skipped"]]
+    skipped = None if facts["skipped"] is None else [_skipped_line(entry) for entry in facts["skipped"]]
     return [
-        ("odometry", [*path, used["odometry"], *_listed(facts["odometries"])]),
+        ("odometry", [*path, used["odometry"], *_odometry_lines(facts["odometries"])]),
         ("truth", [counted(facts["truth"], "pose") if facts["truth"] else "none"]),
         ("records", [f"{count} {tag}" for tag, count in facts["records"].items()]),
         (
@@ -164,29 +164,29 @@ def _of_whole(facts: dict[str, Any]) -> list[Row]:
     ]
 
 
-def _listed(odometries: list[dict[str, Any]]) -> list[str]:
+def _odometry_lines(odometries: list[dict[str, Any]]) -> list[str]:
     """All odometries, where there are several."""
     if len(odometries) < 2:
         return []
     return [f"{one['name']} ({one['type']}): {counted(one['records'], 'record')}" for one in odometries]
 
 
-def _placed(x: float, y: float, degrees: float) -> str:
+def _mounting_line(x: float, y: float, degrees: float) -> str:
     """A laser's place on the robot (m)."""
     ahead, left = "ahead" if x >= 0 else "behind", "left" if y >= 0 else "right"
     return f"{abs(x):g} m {ahead}, {abs(y):g} m to the {left}, turned by {degrees:g}°"
 
 
-def _skipped(entry: dict[str, Any]) -> str:
+def _skipped_line(entry: dict[str, Any]) -> str:
     ((place, first),) = (
         (key.removeprefix("first_"), entry[key]) for key in entry if key.startswith("first_")
     )
     return f"{counted(entry['records'], 'record')}: {entry['reason']}, first in {place} {first}"
 
 
-def _between(least: float, most: float, unit: str = "") -> str:
+def _interval(least: float, most: float, unit: str = "") -> str:
     return f"{most:g}{unit}" if least == most else f"{least:g}{unit} to {most:g}{unit}"
 
 
-def _degrees(angle: float) -> float:
+def _rounded_degrees(angle: float) -> float:
     return round(math.degrees(angle), 6) + 0.0

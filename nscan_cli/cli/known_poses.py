@@ -11,7 +11,7 @@ import numpy as np
 
 from nscan_cli.errors import InputDataError
 from nscan_cli.evaluation.association import TOLERANCE, nearest_in_time
-from nscan_cli.files.encoding import plain
+from nscan_cli.files.encoding import without_byte_order_mark
 from nscan_cli.files.inputs import base_name, label, read_bytes
 from nscan_cli.files.limits import GRAPH
 from nscan_cli.files.provenance import is_made_from
@@ -26,11 +26,11 @@ from nscan_cli.matching.joint.nscan_match import PriorsAmong
 from nscan_cli.matching.priors import MotionModel, odometry_prior
 from nscan_cli.poses import Array
 
-OTHER_LOG = "give the graph that was made from this log"
+LOG_REMEDY = "give the graph that was made from this log"
 
 
 @dataclass(frozen=True)
-class Knowledge:
+class PoseFile:
     """A graph or a trajectory, and the file that it comes from."""
 
     content: Graph | Trajectory
@@ -39,7 +39,7 @@ class Knowledge:
     """The file as messages call it."""
 
 
-def read_knowledge(path: str, log: LaserLog) -> Knowledge:
+def read_pose_file(path: str, log: LaserLog) -> PoseFile:
     """The graph or TUM trajectory at `path`, told apart by content.
 
     Raises InputMissingError when it cannot be read, InputDataError when it is neither, or the graph of
@@ -47,17 +47,17 @@ def read_knowledge(path: str, log: LaserLog) -> Knowledge:
     """
     data, name = read_bytes(path, GRAPH), label(path)
     source = Source(base_name(path), hashlib.sha256(data).hexdigest(), len(data))
-    data = plain(data, name)
+    data = without_byte_order_mark(data, name)
     if not data.lstrip().startswith(b"{"):
-        return Knowledge(parse_tum(data, name), source, name)
+        return PoseFile(parse_tum(data, name), source, name)
     graph = parse_graph(data, name)
     inputs = graph.provenance.get("inputs")
     if inputs and not is_made_from(inputs, log.source):
-        raise InputDataError(name, f"is not a graph of {log.source.name}: the SHA-256 differs", OTHER_LOG)
-    return Knowledge(graph, source, name)
+        raise InputDataError(name, f"is not a graph of {log.source.name}: the SHA-256 differs", LOG_REMEDY)
+    return PoseFile(graph, source, name)
 
 
-def poses_of(knowledge: Knowledge, log: LaserLog, rows: Sequence[int]) -> Array:
+def initial_poses(knowledge: PoseFile, log: LaserLog, rows: Sequence[int]) -> Array:
     """The poses (n, 3) of the scans in `rows`. Raises InputDataError naming the first without one."""
     content = knowledge.content
     if isinstance(content, Graph):
@@ -74,7 +74,7 @@ def poses_of(knowledge: Knowledge, log: LaserLog, rows: Sequence[int]) -> Array:
     return content.poses[found]
 
 
-def no_knowledge(_kept: Sequence[int]) -> Priors:
+def no_priors_among(_kept: Sequence[int]) -> Priors:
     """No priors, whichever the scans are."""
     return no_priors()
 
@@ -86,7 +86,7 @@ def odometry_priors(odometry: Array, numbers: Sequence[int], model: MotionModel)
         order = sorted(range(len(kept)), key=lambda at: numbers[kept[at]])
         pairs = list(itertools.pairwise(order))
         priors = [odometry_prior(odometry[kept[a]], odometry[kept[b]], model) for a, b in pairs]
-        return _priors(pairs, [prior.mean for prior in priors], [prior.information for prior in priors])
+        return _as_priors(pairs, [prior.mean for prior in priors], [prior.information for prior in priors])
 
     return among
 
@@ -103,8 +103,8 @@ def graph_priors(graph: Graph, numbers: Sequence[int]) -> PriorsAmong:
     def among(kept: Sequence[int]) -> Priors:
         places = {nodes[numbers[scan]]: at for at, scan in enumerate(kept) if numbers[scan] in nodes}
         found = [relation for relation in graph.pairwise if all(node in places for node in relation.nodes)]
-        found += _bridges(between, sorted(places), [relation.nodes for relation in found])
-        return _priors(
+        found += _connecting_relations(between, sorted(places), [relation.nodes for relation in found])
+        return _as_priors(
             [(places[a], places[b]) for a, b in (relation.nodes for relation in found)],
             [relation.measurement for relation in found],
             [relation.information for relation in found],
@@ -113,7 +113,9 @@ def graph_priors(graph: Graph, numbers: Sequence[int]) -> PriorsAmong:
     return among
 
 
-def _bridges(between: Between, nodes: list[int], joined: list[tuple[int, int]]) -> list[Pairwise]:
+def _connecting_relations(
+    between: Between, nodes: list[int], joined: list[tuple[int, int]]
+) -> list[Pairwise]:
     """The relations that connect what the graph connects, but those that are `joined` do not yet."""
     group = {node: node for node in nodes}
 
@@ -136,7 +138,7 @@ def _bridges(between: Between, nodes: list[int], joined: list[tuple[int, int]]) 
     return bridges
 
 
-def _priors(pairs: list[tuple[int, int]], means: list[Array], information: list[Array]) -> Priors:
+def _as_priors(pairs: list[tuple[int, int]], means: list[Array], information: list[Array]) -> Priors:
     if not pairs:
         return no_priors()
     return Priors(np.array(pairs, dtype=np.int64), np.array(means), np.array(information))

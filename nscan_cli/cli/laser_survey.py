@@ -17,8 +17,8 @@ if TYPE_CHECKING:
 
     Read = Callable[[ReadingOptions], LaserLog]
 
-UNMOUNTED = (0.0, 0.0, 0.0)
-OF_ALL_LASERS = ("file", "sha256", "bytes", "files", "format", "odometry", "used", "records", "truth",
+ZERO_MOUNT = (0.0, 0.0, 0.0)
+LASER_INDEPENDENT = ("file", "sha256", "bytes", "files", "format", "odometry", "used", "records", "truth",
                  "warnings", "lasers", "odometries", "corrected")  # fmt: skip
 """Facts that hold also where no laser is chosen."""
 
@@ -55,7 +55,7 @@ class Survey(NamedTuple):
         return {
             "used": used,
             "lasers": self.lasers,
-            "odometries": [_named(one) for one in found],
+            "odometries": [_device_facts(one) for one in found],
             "corrected": report.corrected or None,
         }
 
@@ -63,7 +63,7 @@ class Survey(NamedTuple):
         """The facts of the log, null where they would be of a laser that nobody chose, or of no mounting."""
         unknown = {"mounting"} if self.unmounted is not None else set()
         if "laser" in self.choices:
-            unknown = facts.keys() - set(OF_ALL_LASERS)
+            unknown = facts.keys() - set(LASER_INDEPENDENT)
         return {key: None if key in unknown else value for key, value in facts.items()}
 
 
@@ -89,13 +89,13 @@ def survey_of(paths: Sequence[str], reading: ReadingOptions) -> Survey:
         except OpenChoiceError as choice:
             choices[choice.what] = choice
             if choice.what == "laser":
-                first, *others = [{choice.chooses: one.name, "mount": UNMOUNTED} for one in choice.devices]
+                first, *others = [{choice.chooses: one.name, "mount": ZERO_MOUNT} for one in choice.devices]
             else:
                 first = {"odometry": False}
             options = dataclasses.replace(options, **first)
         except MountingError as error:
             unmounted = error
-            options = dataclasses.replace(options, mount=UNMOUNTED)
+            options = dataclasses.replace(options, mount=ZERO_MOUNT)
         except InputDataError:
             # Where none is chosen, any laser that can be read tells of the whole log.
             if not others:
@@ -103,7 +103,9 @@ def survey_of(paths: Sequence[str], reading: ReadingOptions) -> Survey:
             options = dataclasses.replace(options, **others.pop(0))
     alone = dataclasses.replace(reading, odometry=False)
     chosen = None if "laser" in choices else log
-    lasers = [_facts_of(laser, log.report.laser_option, chosen, read, alone) for laser in log.report.lasers]
+    lasers = [
+        _laser_facts(laser, log.report.laser_option, chosen, read, alone) for laser in log.report.lasers
+    ]
     if unmounted is not None:
         next(one for one in lasers if one["name"] == log.laser)["problem"] = unmounted.problem
     return Survey(log, lasers, choices, unmounted)
@@ -125,13 +127,13 @@ def laser_line(laser: dict[str, Any]) -> str:
     return f"{laser['name']}{kind}: {said}{'' if laser['problem'] is None else '; ' + laser['problem']}"
 
 
-def _facts_of(
+def _laser_facts(
     laser: Device, option: str, chosen: LaserLog | None, read: Read, alone: ReadingOptions
 ) -> dict[str, Any]:
     """What `info --json` says of a laser: of the log that is read already, or of one that is read for it."""
     from nscan_cli.logs.recordings.mounting import MountingError
 
-    facts = {**_named(laser), "scans": None, "beams": None, "rate": None, "problem": None}
+    facts = {**_device_facts(laser), "scans": None, "beams": None, "rate": None, "problem": None}
     own: dict[str, Any] = {option.removeprefix("--"): laser.name}
     alone = dataclasses.replace(alone, **own)
     log = chosen if chosen is not None and chosen.laser == laser.name else None
@@ -141,13 +143,13 @@ def _facts_of(
                 log = read(alone)
             except MountingError as error:
                 facts["problem"] = error.problem
-                alone = dataclasses.replace(alone, mount=UNMOUNTED)
+                alone = dataclasses.replace(alone, mount=ZERO_MOUNT)
     except NscanError as error:
         return facts | {"problem": str(error)}
     return facts | {"scans": len(log), "beams": int(log.own_beams().max()), "rate": rate_of(log)}
 
 
-def _named(device: Device) -> dict[str, Any]:
+def _device_facts(device: Device) -> dict[str, Any]:
     return {"name": device.name, "type": device.type, "records": device.records}
 
 

@@ -14,11 +14,11 @@ import click
 
 from nscan_cli import __version__
 from nscan_cli.cli.manual import ENVIRONMENT, EXAMPLES, EXIT_CODES
-from nscan_cli.cli.standard_streams import prepare
+from nscan_cli.cli.standard_streams import configure_streams
 from nscan_cli.cli.subcommand import CONTEXT, write_examples
 from nscan_cli.cli.usage_wording import usage_problem
 from nscan_cli.errors import InputDataError, NscanError, OutputError
-from nscan_cli.files.text import shown
+from nscan_cli.files.text import printable
 
 COMMANDS = {
     "info": "Tell what is in a log, and what the other commands will use of it.",
@@ -30,12 +30,12 @@ COMMANDS = {
     "nightly": "Map and measure many logs, and report what has changed.",
 }
 INTERRUPTED, CLOSED_EARLY, INTERNAL_ERROR = 130, 141, 1
-COMPLETION = "_NSCAN_CLI_COMPLETE"
+COMPLETION_VARIABLE = "_NSCAN_CLI_COMPLETE"
 """The variable by which a shell asks what a line can go on with."""
-OBJECTS = 50_000
+GC_THRESHOLD = 50_000
 """So many new ones before the garbage collection looks for what can go. Python's own 700 have it look through
 all that the imports make again and again, and of that nothing ever goes."""
-NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)
+WRITE_ERRNOS = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)
 
 
 class LazyGroup(click.Group):
@@ -79,8 +79,8 @@ def cli() -> None:
 
 def main() -> None:
     """Entry point of the command; exits with the code of the outcome."""
-    gc.set_threshold(OBJECTS)
-    prepare()
+    gc.set_threshold(GC_THRESHOLD)
+    configure_streams()
     code = run(sys.argv[1:])
     # What is left goes with the process: at its end, Python need not look for what it could free.
     gc.freeze()
@@ -105,11 +105,13 @@ def run(arguments: list[str]) -> int:
     for library in ("OPENBLAS", "MKL", "OMP"):
         os.environ.setdefault(f"{library}_NUM_THREADS", "1")
     try:
-        if COMPLETION in os.environ:
+        if COMPLETION_VARIABLE in os.environ:
             from nscan_cli.cli.completion import add_completions
 
             add_completions()
-        outcome = cli.main(arguments, prog_name="nscan-cli", complete_var=COMPLETION, standalone_mode=False)
+        outcome = cli.main(
+            arguments, prog_name="nscan-cli", complete_var=COMPLETION_VARIABLE, standalone_mode=False
+        )
         if sys.stdout is not None:
             sys.stdout.flush()
         return outcome if isinstance(outcome, int) else 0
@@ -121,29 +123,29 @@ def run(arguments: list[str]) -> int:
         error.show()
         return error.exit_code
     except click.ClickException as error:
-        _say(_usage(error), verbose)
+        _print_error(_usage_line(error), verbose)
         return error.exit_code
     except (BrokenPipeError, SystemExit) as error:
         # Without its standalone mode, click itself exits for completions and for a closed pipe alone.
-        if COMPLETION in os.environ and isinstance(error, SystemExit):
+        if COMPLETION_VARIABLE in os.environ and isinstance(error, SystemExit):
             return int(error.code or 0)
         return CLOSED_EARLY
     except NscanError as error:
-        _say(str(error), verbose)
+        _print_error(str(error), verbose)
         return error.exit_code
     except MemoryError:
-        _say("there is not enough memory for this; see --every, --start and --end", verbose)
+        _print_error("there is not enough memory for this; see --every, --start and --end", verbose)
         return InputDataError.exit_code
     except Exception as error:
         if _is_interrupt(error):
             # As click does, which ends the line in which a terminal shows ^C.
             print(file=sys.stderr)
             return INTERRUPTED
-        if isinstance(error, OSError) and error.errno in NO_ROOM and error.filename is None:
-            _say(f"standard output: cannot be written: {error.strerror}", verbose)
+        if isinstance(error, OSError) and error.errno in WRITE_ERRNOS and error.filename is None:
+            _print_error(f"standard output: cannot be written: {error.strerror}", verbose)
             return OutputError.exit_code
         hint = "" if verbose else "; -vv shows where"
-        _say(f"internal error, please report it: {type(error).__name__}: {error}{hint}", verbose)
+        _print_error(f"internal error, please report it: {type(error).__name__}: {error}{hint}", verbose)
         return INTERNAL_ERROR
 
 
@@ -154,7 +156,7 @@ def _is_interrupt(error: BaseException | None) -> bool:
     return error is not None
 
 
-def _usage(error: click.ClickException) -> str:
+def _usage_line(error: click.ClickException) -> str:
     """What click says in several lines, in one."""
     problem = usage_problem(error)
     context = getattr(error, "ctx", None)
@@ -164,7 +166,7 @@ def _usage(error: click.ClickException) -> str:
     return f"{command}: {problem}".removeprefix(": ") + f"; see {context.command_path} --help"
 
 
-def _say(message: str, with_traceback: bool) -> None:
+def _print_error(message: str, with_traceback: bool) -> None:
     if with_traceback:
         traceback.print_exc()
-    print(f"nscan-cli: {' '.join(shown(message).split())}", file=sys.stderr)
+    print(f"nscan-cli: {' '.join(printable(message).split())}", file=sys.stderr)

@@ -12,9 +12,9 @@ from nscan_cli.cli.plot_option import check_plot, plot_option, write_plot
 from nscan_cli.cli.progress import Compiling, say
 from nscan_cli.cli.shared_options import PoseType, common_options, reading_options
 from nscan_cli.cli.subcommand import log_argument, option, result_option, subcommand
-from nscan_cli.cli.summary import Row, ended, table
+from nscan_cli.cli.summary import Row, match_outcome, summary_table
 from nscan_cli.errors import WrongUsageError
-from nscan_cli.files.outputs import check_writable, write_whole
+from nscan_cli.files.outputs import check_writable, write_atomically
 from nscan_cli.files.provenance import provenance_of
 from nscan_cli.logs.reading_options import ReadingOptions
 
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from nscan_cli.matching.pairwise import PairMatch
     from nscan_cli.poses import Array
 
-FORMAT = "nscan-match"
+MATCH_FORMAT = "nscan-match"
 
 
 class StartType(click.ParamType[Any]):
@@ -98,7 +98,7 @@ def command(
     rows = scans.row(reference), scans.row(scan)
     initial, prior = with_defaults(scans, initial, prior, quiet)
     options, model = PairOptions(), MotionModel()
-    start = _start(scans, rows, initial)
+    start = _initial_pose(scans, rows, initial)
     known = None
     if prior == "odometry" and scans.odometry is not None:
         known = odometry_prior(scans.odometry[rows[0]], scans.odometry[rows[1]], model)
@@ -110,12 +110,12 @@ def command(
         "prior": prior,
         "odometry": dataclasses.asdict(model),
     }
-    write_whole(output, _document(scans, (reference, scan), start, match, parameters))
+    write_atomically(output, _document(scans, (reference, scan), start, match, parameters))
     if plot is not None:
         from nscan_cli.mapping.figures.match_plots import plot_match
 
         write_plot(plot, plot_match((reference, scan), fixed, moving, start, match))
-    say(table(_summary(reference, scan, match)), quiet)
+    say(summary_table(_match_rows(reference, scan, match)), quiet)
 
 
 def with_defaults(log: LaserLog, initial: str | None, prior: str | None, quiet: bool) -> tuple[str, str]:
@@ -133,7 +133,7 @@ def with_defaults(log: LaserLog, initial: str | None, prior: str | None, quiet: 
     return initial or "identity", prior or "none"
 
 
-def _start(log: LaserLog, rows: tuple[int, int], initial: str) -> Array:
+def _initial_pose(log: LaserLog, rows: tuple[int, int], initial: str) -> Array:
     """The relative pose (3,) to start from."""
     import numpy as np
 
@@ -153,7 +153,7 @@ def _document(
     from nscan_cli.graph.io.json_fields import pose_rows, six_digits, triangle
 
     return document(
-        FORMAT,
+        MATCH_FORMAT,
         provenance_of([log.source], parameters),
         {
             "reference": numbers[0],
@@ -177,7 +177,7 @@ def _document(
     )
 
 
-def _summary(reference: int, scan: int, match: PairMatch) -> list[Row]:
+def _match_rows(reference: int, scan: int, match: PairMatch) -> list[Row]:
     import numpy as np
 
     x, y, angle = match.pose.tolist()
@@ -197,5 +197,5 @@ def _summary(reference: int, scan: int, match: PairMatch) -> list[Row]:
         ("sigma", [known]),
         ("weakest", [f"{least} {along}"]),
         ("overlap", [f"{match.overlap:.0%}"]),
-        ("match", ended(match.reason, match.iterations, match.evaluations, match.unsettled)),
+        ("match", match_outcome(match.reason, match.iterations, match.evaluations, match.unsettled)),
     ]  # fmt: skip

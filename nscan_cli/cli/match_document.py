@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from nscan_cli.matching.uncertainty import Weakest
 
-UNITS = {"length": "m", "angle": "rad"}
+DOCUMENT_UNITS = {"length": "m", "angle": "rad"}
 
 
 def document(name: str, provenance: dict[str, Any], fields: dict[str, Any]) -> bytes:
     """The document of format `name` in UTF-8, with a final line feed."""
-    head = {"format": name, "version": "1.0", "units": UNITS, "provenance": provenance}
+    head = {"format": name, "version": "1.0", "units": DOCUMENT_UNITS, "provenance": provenance}
     lines = [
         f'"{key}":{json.dumps(value, separators=(",", ":"), allow_nan=False)}'
         for key, value in {**head, **fields}.items()

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 def night_lines(names: list[str], quiet: bool) -> Iterator[RunObserver]:
     """The lines of the logs that are to be done, as long as the block lasts."""
     if quiet or not sys.stderr.isatty():
-        yield PlainLines(quiet)
+        yield PlainProgress(quiet)
         return
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn
@@ -33,10 +33,10 @@ def night_lines(names: list[str], quiet: bool) -> Iterator[RunObserver]:
     detail = TextColumn("{task.fields[detail]}", markup=False)
     columns = (TextColumn("{task.description}"), BarColumn(None), detail)
     with Progress(*columns, console=Console(stderr=True), refresh_per_second=4, expand=True) as bars:
-        yield LiveLines(bars, names)
+        yield LiveProgress(bars, names)
 
 
-class PlainLines:
+class PlainProgress:
     """A line when a log is done."""
 
     def __init__(self, quiet: bool) -> None:
@@ -47,10 +47,10 @@ class PlainLines:
 
     def finished(self, entry: ManifestEntry, night: RunRecord) -> None:
         """Say what became of it."""
-        say(f"{entry.name}: {_outcome(night)}", self.quiet)
+        say(f"{entry.name}: {_outcome_line(night)}", self.quiet)
 
 
-class LiveLines:
+class LiveProgress:
     """A bar for every log, from the beginning."""
 
     def __init__(self, bars: Progress, names: list[str]) -> None:
@@ -73,7 +73,7 @@ class LiveLines:
         task = self.tasks[entry.name]
         total = self.bars.tasks[task].total or 1
         completed = total if night["outcome"] == "done" else None
-        self.bars.update(task, completed=completed, total=total, detail=_outcome(night))
+        self.bars.update(task, completed=completed, total=total, detail=_outcome_line(night))
         self.bars.stop_task(task)
 
     def _line(self, name: str) -> TaskID:

@@ -10,7 +10,7 @@ import click
 
 from nscan_cli.cli.progress import announce_compiling, say
 from nscan_cli.cli.shared_options import common_options
-from nscan_cli.cli.subcommand import FILE, argument, option, subcommand
+from nscan_cli.cli.subcommand import PATH, argument, option, subcommand
 from nscan_cli.errors import CheckFailedError, InputMissingError
 from nscan_cli.files.inputs import base_name
 
@@ -25,11 +25,11 @@ if TYPE_CHECKING:
     ("nscan-cli nightly robots.toml -o nights", "every log of a manifest; again the next night"),
     ("nscan-cli nightly kuemmerle --data logs -o nights", "a benchmark, with published figures"),
 )
-@argument("manifest", metavar="MANIFEST.toml", type=FILE, tells="A manifest; or kuemmerle or radish, which "
+@argument("manifest", metavar="MANIFEST.toml", type=PATH, tells="A manifest; or kuemmerle or radish, which "
           "come with nscan-cli.")  # fmt: skip
-@option("-o", "--output", type=FILE, required=True, metavar="FOLDER",
+@option("-o", "--output", type=PATH, required=True, metavar="FOLDER",
         help="Results, history and report; made if new.")  # fmt: skip
-@option("--data", type=FILE, metavar="FOLDER", help="Where the logs are, if not beside the manifest.")
+@option("--data", type=PATH, metavar="FOLDER", help="Where the logs are, if not beside the manifest.")
 @option("--jobs", type=click.IntRange(1), metavar="N", help="Logs at a time; one a processor if not given.")
 @option("--scheduler", metavar="ADDRESS",
         help="Run on the Dask cluster of this scheduler, tcp://HOST:PORT.")  # fmt: skip
@@ -85,7 +85,7 @@ def command(
             for note in notes:
                 say(f"{name}: warning: {note}", quiet)
         if planned.to_do or planned.unreadable:
-            from nscan_cli.cli.night_lines import night_lines
+            from nscan_cli.cli.night_lines import night_progress
 
             if scheduler is None:
                 announce_compiling("follow", quiet)

@@ -13,11 +13,11 @@ from nscan_cli.cli.plot_option import check_plot, plot_option, write_plot
 from nscan_cli.cli.progress import Compiling, say
 from nscan_cli.cli.scan_spec import ScanSpecType
 from nscan_cli.cli.shared_options import common_options, reading_options
-from nscan_cli.cli.subcommand import FILE, log_argument, option, result_option, subcommand
-from nscan_cli.cli.summary import Row, ended, table
+from nscan_cli.cli.subcommand import PATH, log_argument, option, result_option, subcommand
+from nscan_cli.cli.summary import Row, match_outcome, summary_table
 from nscan_cli.errors import InputDataError, WrongUsageError
 from nscan_cli.files.counting import counted
-from nscan_cli.files.outputs import check_writable, write_whole
+from nscan_cli.files.outputs import check_writable, write_atomically
 from nscan_cli.files.provenance import provenance_of
 from nscan_cli.logs.reading_options import ReadingOptions
 
@@ -31,10 +31,10 @@ if TYPE_CHECKING:
     from nscan_cli.matching.uncertainty import Weakest
     from nscan_cli.poses import Array
 
-FORMAT = "nscan-joint-match"
-STARTS, PRIORS = ("odometry", "identity"), ("odometry", "none")
+NSCAN_FORMAT = "nscan-joint-match"
+INITIAL_WORDS, PRIOR_WORDS = ("odometry", "identity"), ("odometry", "none")
 """What is no file in --initial and in --prior."""
-NAMED = 6
+LISTED_SCANS = 6
 """Weakly held scans that the summary names; the result has all."""
 
 
@@ -57,10 +57,10 @@ NAMED = 6
 @option("--fixed", type=click.IntRange(0), metavar="K",
         help="The scan that a fixed gauge holds and the covariance is relative to; the first of SPEC if not "
         "given.")  # fmt: skip
-@option("--initial", type=FILE, metavar="odometry|identity|GRAPH.json|TRAJECTORY.tum",
+@option("--initial", type=PATH, metavar="odometry|identity|GRAPH.json|TRAJECTORY.tum",
         help="Poses to start from; if not given, the odometry where the log has it, or else "
         "identity.")  # fmt: skip
-@option("--prior", type=FILE, metavar="odometry|none|GRAPH.json",
+@option("--prior", type=PATH, metavar="odometry|none|GRAPH.json",
         help="What is known before matching, or what a graph says of the scans; if not given, the odometry "
         "where the log has it.")  # fmt: skip
 @result_option
@@ -93,7 +93,7 @@ def command(
     if "-" in log and "-" in (initial, prior):
         raise WrongUsageError("standard input (-) can be one input only; give the others by their path")
     check_writable(output)
-    files = [path for path, words in ((initial, STARTS), (prior, PRIORS)) if path not in words]
+    files = [path for path, words in ((initial, INITIAL_WORDS), (prior, PRIOR_WORDS)) if path not in words]
     from nscan_cli.logs.log_files import files_of
 
     check_plot(plot, output, [*files_of(log), *files])
@@ -111,8 +111,8 @@ def command(
     initial, prior = with_defaults(scans, initial, prior, quiet)
     options, model = PairOptions(), MotionModel()
     joint = JointOptions(fixed=0 if gauge == "fixed" else None)
-    start, priors, sources = _known(scans, numbers, initial, prior, model)
-    if prior not in PRIORS and not len(priors(range(len(numbers))).pairs):
+    start, priors, sources = _initial_and_priors(scans, numbers, initial, prior, model)
+    if prior not in PRIOR_WORDS and not len(priors(range(len(numbers))).pairs):
         say(f"warning: {prior} does not connect any two of the scans", quiet)
     points = [matched_points(scans, row, options) for row in rows]
     held = 0 if fixed is None else numbers.index(fixed)
@@ -120,7 +120,7 @@ def command(
     if match is None:
         raise InputDataError(
             scans.source.name,
-            f"no two of the scans match: {_told(numbers, left_out)}",
+            f"no two of the scans match: {_left_out_line(numbers, left_out)}",
             "choose scans that see the same walls, or another --initial",
         )
     parameters = {
@@ -134,15 +134,15 @@ def command(
         "odometry": dataclasses.asdict(model),
     }
     provenance = provenance_of([scans.source, *sources], parameters)
-    write_whole(output, document(FORMAT, provenance, _fields(numbers, match, left_out)))
+    write_atomically(output, document(NSCAN_FORMAT, provenance, _fields(numbers, match, left_out)))
     if plot is not None:
         from nscan_cli.mapping.figures.match_plots import plot_nscan
 
         write_plot(plot, plot_nscan(numbers, points, start, match, left_out))
-    say(table(_summary(numbers, match, left_out)), quiet)
+    say(summary_table(_nscan_rows(numbers, match, left_out)), quiet)
 
 
-def _known(
+def _initial_and_priors(
     log: LaserLog, numbers: tuple[int, ...], initial: str, prior: str, model: MotionModel
 ) -> tuple[Array, PriorsAmong, list[Source]]:
     """The poses (n, 3) to start from, the priors, and the files that they come from."""
@@ -150,25 +150,25 @@ def _known(
 
     from nscan_cli.cli.known_poses import (
         graph_priors,
-        no_knowledge,
+        initial_poses,
+        no_priors_among,
         odometry_priors,
-        poses_of,
-        read_knowledge,
+        read_pose_file,
     )
     from nscan_cli.graph.model import Graph
     from nscan_cli.poses import relative
 
     rows = [log.row(number) for number in numbers]
     odometry = None if log.odometry is None else log.odometry[rows]
-    paths = [path for path, words in ((initial, STARTS), (prior, PRIORS)) if path not in words]
-    files = {path: read_knowledge(path, log) for path in dict.fromkeys(paths)}
+    paths = [path for path, words in ((initial, INITIAL_WORDS), (prior, PRIOR_WORDS)) if path not in words]
+    files = {path: read_pose_file(path, log) for path in dict.fromkeys(paths)}
     start = np.zeros((len(rows), 3))
-    priors: PriorsAmong = no_knowledge
-    if initial not in STARTS:
-        start = poses_of(files[initial], log, rows)
+    priors: PriorsAmong = no_priors_among
+    if initial not in INITIAL_WORDS:
+        start = initial_poses(files[initial], log, rows)
     elif initial == "odometry" and odometry is not None:
         start = relative(odometry, odometry[0])
-    if prior not in PRIORS:
+    if prior not in PRIOR_WORDS:
         graph = files[prior].content
         if not isinstance(graph, Graph):
             raise WrongUsageError(f"--prior {prior}: is a trajectory, which has no relations; give a graph")
@@ -219,29 +219,29 @@ def _fields(numbers: tuple[int, ...], match: NScanMatch, left_out: list[Excluded
     }
 
 
-def _summary(numbers: tuple[int, ...], match: NScanMatch, left_out: list[ExcludedScan]) -> list[Row]:
+def _nscan_rows(numbers: tuple[int, ...], match: NScanMatch, left_out: list[ExcludedScan]) -> list[Row]:
     joint = match.joint
     weak = [
-        _weakly_held(numbers[scan], weakest)
+        _weakly_held_line(numbers[scan], weakest)
         for scan, weakest in zip(match.kept, match.weakest, strict=True)
         if weakest.is_weak
     ]
-    more = [f"and {len(weak) - NAMED} more"] if len(weak) > NAMED else []
+    more = [f"and {len(weak) - LISTED_SCANS} more"] if len(weak) > LISTED_SCANS else []
     searched = "by search: the start by itself led to a poorer match"
     return [
         ("scans", [f"{len(match.kept)} of {len(numbers)}, matched in {counted(len(match.pairs), 'pair')}"]),
         ("overlap", [f"{match.overlap.min():.0%} at least"]),
-        ("match", ended(match.reason, joint.iterations, joint.evaluations, joint.unsettled)),
+        ("match", match_outcome(match.reason, joint.iterations, joint.evaluations, joint.unsettled)),
         ("placed", [searched] if joint.searched else []),
-        ("held weakly", [*weak[:NAMED], *more]),
+        ("held weakly", [*weak[:LISTED_SCANS], *more]),
         ("left out", [f"scan {numbers[out.scan]} {out.reason}" for out in left_out]),
     ]
 
 
-def _weakly_held(number: int, weakest: Weakest) -> str:
+def _weakly_held_line(number: int, weakest: Weakest) -> str:
     known = "open" if weakest.sigma is None else f"σ {weakest.sigma:.2g} m"
     return f"scan {number} along {math.degrees(weakest.direction):.0f}° ({known})"
 
 
-def _told(numbers: tuple[int, ...], left_out: list[ExcludedScan]) -> str:
+def _left_out_line(numbers: tuple[int, ...], left_out: list[ExcludedScan]) -> str:
     return "; ".join(f"scan {numbers[out.scan]} {out.reason}" for out in left_out)

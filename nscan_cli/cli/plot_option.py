@@ -8,27 +8,27 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from nscan_cli.cli.shared_options import Command
-from nscan_cli.cli.subcommand import FILE, option
+from nscan_cli.cli.subcommand import PATH, option
 from nscan_cli.errors import WrongUsageError
-from nscan_cli.files.outputs import check_writable, is_device, write_whole
+from nscan_cli.files.outputs import check_writable, is_device, write_atomically
 
 if TYPE_CHECKING:
     from PIL.Image import Image
 
-OTHER_FORMATS = (
+OTHER_SUFFIXES = (
     ".bmp", ".eps", ".gif", ".jpeg", ".jpg", ".pdf", ".pgm", ".ppm", ".svg", ".tif", ".tiff", ".webp",
 )  # fmt: skip
 
 
 def plot_option(shows: str) -> Callable[[Command], Command]:
     """The option; `shows` is what the picture shows."""
-    return option("--plot", type=FILE, metavar="PICTURE.png", help=f"Draw {shows}, as a PNG.")
+    return option("--plot", type=PATH, metavar="PICTURE.png", help=f"Draw {shows}, as a PNG.")
 
 
 def check_png(place: str, path: str) -> None:
     """Refuse a name that says that the picture is of another format, or of none. Raises WrongUsageError."""
     named = Path(path)
-    if named.suffix.lower() in OTHER_FORMATS:
+    if named.suffix.lower() in OTHER_SUFFIXES:
         raise WrongUsageError(f"{place}: pictures are PNG; name it like {named.stem}.png")
     # A folder is refused in its own words, where there is nothing to write.
     is_file = path != "-" and not is_device(path) and not os.path.isdir(path) and named.name
@@ -59,4 +59,4 @@ def write_plot(plot: str, picture: Image) -> None:
     """Write the picture whole or not at all. Raises OutputError."""
     from nscan_cli.mapping.figures.canvas import figure_png
 
-    write_whole(plot, figure_png(picture))
+    write_atomically(plot, figure_png(picture))

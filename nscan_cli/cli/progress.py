@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from nscan_cli.files.text import shown
+from nscan_cli.files.text import printable
 
 if TYPE_CHECKING:
     from rich.progress import Progress
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 def say(message: str, quiet: bool = False) -> None:
     """One line for people."""
     if not quiet:
-        print(shown(message), file=sys.stderr)
+        print(printable(message), file=sys.stderr)
 
 
 COMPILING = "compiling the kernels, once for this version on this machine"
@@ -29,9 +29,9 @@ def announce_compiling(kernel: str, quiet: bool) -> bool:
 
     This is for kernels of other processes.
     """
-    from nscan_cli.kernels.machine_code import first_compile
+    from nscan_cli.kernels.machine_code import is_uncompiled
 
-    compiling = first_compile(kernel)
+    compiling = is_uncompiled(kernel)
     if compiling:
         say(f"{COMPILING}: a minute or two", quiet)
     return compiling
@@ -44,14 +44,14 @@ class Compiling:
     """
 
     def __init__(self, takes: str, quiet: bool) -> None:
-        from nscan_cli.kernels.decorators import tell_when_compiling
+        from nscan_cli.kernels.decorators import on_first_compile
 
         self.has_begun = False
         self._takes, self._quiet = takes, quiet
-        tell_when_compiling(self._begin)
+        on_first_compile(self._begin)
         context = click.get_current_context(silent=True)
         if context is not None:
-            context.call_on_close(lambda: tell_when_compiling(None))
+            context.call_on_close(lambda: on_first_compile(None))
 
     def _begin(self) -> None:
         self.has_begun = True

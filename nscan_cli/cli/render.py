@@ -13,12 +13,12 @@ from nscan_cli.cli.graph_log import find_log, read_graph_log
 from nscan_cli.cli.plot_option import check_png
 from nscan_cli.cli.progress import say
 from nscan_cli.cli.shared_options import common_options, reading_options
-from nscan_cli.cli.subcommand import FILE, argument, option, subcommand
+from nscan_cli.cli.subcommand import PATH, argument, option, subcommand
 from nscan_cli.errors import WrongUsageError
 from nscan_cli.files.counting import counted
 from nscan_cli.files.inputs import base_name
-from nscan_cli.files.outputs import check_writable, is_device, write_whole
-from nscan_cli.files.text import path_of_name, shown
+from nscan_cli.files.outputs import check_writable, is_device, write_atomically
+from nscan_cli.files.text import path_of_name, printable
 from nscan_cli.logs.reading_options import ReadingOptions
 
 if TYPE_CHECKING:
@@ -31,11 +31,11 @@ if TYPE_CHECKING:
     ("nscan-cli render robot.json -o figure.png --style paper", "a figure; the log is beside the graph"),
     ("nscan-cli render robot.json -o graph.png --trajectory --graph", "the path and the graph over the map"),
 )
-@argument("graph_file", metavar="GRAPH.json", type=FILE, tells="A result of slam; - is standard input.")
-@argument("log", nargs=-1, type=FILE,
+@argument("graph_file", metavar="GRAPH.json", type=PATH, tells="A result of slam; - is standard input.")
+@argument("log", nargs=-1, type=PATH,
           tells="The log that the graph was made from; if not given, it is looked for beside the graph, then "
           "in the current folder.")  # fmt: skip
-@option("-o", "--output", type=FILE, required=True, metavar="MAP.png",
+@option("-o", "--output", type=PATH, required=True, metavar="MAP.png",
         help="The picture; - is standard output.")  # fmt: skip
 @option("--resolution", type=click.FloatRange(0.001, 10), default=0.05, show_default=True, metavar="M",
         help="Size of a cell.")  # fmt: skip
@@ -46,7 +46,7 @@ if TYPE_CHECKING:
         help="A map for robots, or points and path on white with axes.")  # fmt: skip
 @option("--yaml/--no-yaml", default=None,
         help="Write MAP.yaml for map_server and Nav2 beside the map; done for plain maps.")  # fmt: skip
-@option("--mcap", type=FILE, metavar="OUT.mcap", help="Map, path, graph and scans for Foxglove and RViz too.")
+@option("--mcap", type=PATH, metavar="OUT.mcap", help="Map, path, graph and scans for Foxglove and RViz too.")
 @reading_options
 @common_options
 def command(
@@ -112,7 +112,7 @@ def command(
     if mcap is not None:
         from nscan_cli.exports.mcap import ros2_recording
 
-        write_whole(mcap, ros2_recording(scans, rows, nodes, whole, grid))
+        write_atomically(mcap, ros2_recording(scans, rows, nodes, whole, grid))
     if output != "-":
         low_x, low_y, high_x, high_y = grid.bounds
         say(
@@ -139,15 +139,15 @@ def write_map(output: str, image: MapImage, yaml: bool, quiet: bool) -> None:
     name = base_name(output)
     if yaml and path_of_name(name) != Path(output).name:
         say(
-            f"warning: {shown(yaml_path(output))} calls the map {name}, under which no loader finds it: "
+            f"warning: {printable(yaml_path(output))} calls the map {name}, under which no loader finds it: "
             "its name is no UTF-8, as YAML is",
             quiet,
         )
     from nscan_cli.mapping.map_server import map_png, map_yaml
 
-    write_whole(output, map_png(image))
+    write_atomically(output, map_png(image))
     if yaml:
-        write_whole(yaml_path(output), map_yaml(name, image))
+        write_atomically(yaml_path(output), map_yaml(name, image))
 
 
 def yaml_path(output: str) -> str:

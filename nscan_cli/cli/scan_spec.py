@@ -7,7 +7,7 @@ from typing import Any
 
 import click
 
-PART = re.compile(r"(\d+)(?:-(\d+)(?::(\d+))?)?")
+SPEC_PART = re.compile(r"(\d+)(?:-(\d+)(?::(\d+))?)?")
 MOST_SCANS = 500
 """The Hessian grows with the square of the scans; more than these are a slip of the keyboard."""
 
@@ -21,7 +21,7 @@ class ScanSpecType(click.ParamType[Any]):
         """Parse the scan numbers; a wrong form, a single scan and a scan twice are usage errors."""
         scans: list[int] = []
         for part in value.split(","):
-            match = PART.fullmatch(part.strip())
+            match = SPEC_PART.fullmatch(part.strip())
             if match is None:
                 self.fail(f"{part!r} is not of the form 10, 14-20 or 100-190:10", param, ctx)
             first, last, step = int(match[1]), int(match[2] or match[1]), int(match[3] or 1)

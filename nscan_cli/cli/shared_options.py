@@ -11,10 +11,10 @@ from typing import Any
 
 import click
 
-from nscan_cli.cli.subcommand import COMMON, OWN_MEANINGS, READING, Option, option
+from nscan_cli.cli.subcommand import COMMAND_SPECIFIC, COMMON, READING, Option, option
 from nscan_cli.errors import InputDataError, WrongUsageError
 from nscan_cli.files.inputs import read_toml
-from nscan_cli.files.outputs import write_whole
+from nscan_cli.files.outputs import write_atomically
 from nscan_cli.files.text import path_of_name
 from nscan_cli.logs.reading_options import ReadingOptions
 
@@ -45,7 +45,7 @@ def common_options(command: Command) -> Command:
     def wrapped(*args: Any, **kwargs: Any) -> Any:
         kwargs.pop("config")
         if kwargs.pop("dump_config"):
-            write_whole("-", _as_toml(click.get_current_context()).encode())
+            write_atomically("-", _as_toml(click.get_current_context()).encode())
             return None
         return command(*args, **kwargs)
 
@@ -138,11 +138,11 @@ def _read_config(ctx: click.Context, _param: click.Parameter, value: str | None)
     options = {param.long_name: param for param in _parameters(ctx.command)}
     settings = {key: entry for key, entry in document.items() if key not in COMMANDS}
     for key in list(settings):
-        if key in OWN_MEANINGS:
-            tables = " or ".join(f"[{command}]" for command in _commands_with(key))
+        if key in COMMAND_SPECIFIC:
+            tables = " or ".join(f"[{command}]" for command in _commands_having(key))
             problem = f"{key} stands for all commands, and means another thing in each"
             raise InputDataError(value, problem, f"write it below {tables}")
-        if key not in options and _commands_with(key):
+        if key not in options and _commands_having(key):
             del settings[key]
     settings.update(own)
     defaults = {}
@@ -152,17 +152,17 @@ def _read_config(ctx: click.Context, _param: click.Parameter, value: str | None)
                 value, f"{name} has no option {key!r}", f"known: {', '.join(sorted(options))}"
             )
         try:
-            options[key].type_cast_value(ctx, _as_typed(entry))
+            options[key].type_cast_value(ctx, _as_argument(entry))
         except click.BadParameter as error:
             raise InputDataError(
                 value, f"{key}: {error.message.rstrip('.')}", f"see {ctx.command_path} --help"
             ) from error
-        defaults[options[key].name] = _as_typed(entry)
+        defaults[options[key].name] = _as_argument(entry)
     ctx.default_map = {**(ctx.default_map or {}), **defaults}
     return value
 
 
-def _commands_with(key: str) -> list[str]:
+def _commands_having(key: str) -> list[str]:
     """The commands that have an option of this long name, which a TOML file can have."""
     from nscan_cli.cli.main import COMMANDS, cli
 
@@ -175,10 +175,10 @@ def _commands_with(key: str) -> list[str]:
     ]
 
 
-def _as_typed(entry: Any) -> str:
+def _as_argument(entry: Any) -> str:
     """A TOML value as one would type it on the command line. Raises BadParameter for what none would."""
     if isinstance(entry, list):
-        return ",".join(_as_typed(part) for part in entry)
+        return ",".join(_as_argument(part) for part in entry)
     if isinstance(entry, (str, int, float)):
         return path_of_name(str(entry))
     raise click.BadParameter(f"{str(entry)!r} is neither text, number, true, false nor a list of them")

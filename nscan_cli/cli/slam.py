@@ -10,16 +10,16 @@ import click
 
 from nscan_cli.cli.progress import say
 from nscan_cli.cli.shared_options import common_options, reading_options
-from nscan_cli.cli.slam_outputs import Outputs
-from nscan_cli.cli.subcommand import FILE, log_argument, option, subcommand
-from nscan_cli.cli.summary import table
+from nscan_cli.cli.slam_outputs import SlamOutputs
+from nscan_cli.cli.subcommand import PATH, log_argument, option, subcommand
+from nscan_cli.cli.summary import summary_table
 from nscan_cli.errors import WrongUsageError
 from nscan_cli.logs.reading_options import ReadingOptions
 
 if TYPE_CHECKING:
     from nscan_cli.slam.options import Relations
 
-MAPPING = ("max_scans", "relations", "no_loops")
+MAPPING_OPTIONS = ("max_scans", "relations", "no_loops")
 """Options that say how a log is mapped."""
 
 
@@ -35,24 +35,24 @@ MAPPING = ("max_scans", "relations", "no_loops")
 @option(
     "-o",
     "--output",
-    type=FILE,
+    type=PATH,
     default="-",
     metavar="GRAPH.json",
     help="The graph; standard output if not given.",
 )
-@option("--map", "map_file", type=FILE, metavar="MAP.png", help="The map too, and MAP.yaml beside it.")
-@option("--trajectory", type=FILE, metavar="OUT.tum", help="The pose of every scan too, in TUM's form.")
+@option("--map", "map_file", type=PATH, metavar="MAP.png", help="The map too, and MAP.yaml beside it.")
+@option("--trajectory", type=PATH, metavar="OUT.tum", help="The pose of every scan too, in TUM's form.")
 @option(
     "--g2o",
-    type=FILE,
+    type=PATH,
     metavar="OUT.g2o",
     help="The keyframes' graph too, in g2o's form; nScan relations become pairwise ones.",
 )
-@option("--carmen", type=FILE, metavar="OUT.log", help="The log with corrected poses too, in CARMEN's form.")
+@option("--carmen", type=PATH, metavar="OUT.log", help="The log with corrected poses too, in CARMEN's form.")
 @option(
     "--from",
     "from_file",
-    type=FILE,
+    type=PATH,
     metavar="GRAPH",
     help="Optimise a saved graph (JSON or g2o) and refine it with its LOG; nothing is tracked.",
 )
@@ -80,7 +80,7 @@ MAPPING = ("max_scans", "relations", "no_loops")
     help="Work in so many threads, one a processor if not given; the result is the same.",
 )
 @option(
-    "--depfile", type=FILE, metavar="FILE", help="Write what the outputs were made from as a rule for make."
+    "--depfile", type=PATH, metavar="FILE", help="Write what the outputs were made from as a rule for make."
 )
 @reading_options
 @common_options
@@ -116,29 +116,29 @@ def command(
         raise WrongUsageError("slam: the graph is long; give -o GRAPH.json, or -o - to see it here")
     if "-" in log and from_file == "-":
         raise WrongUsageError("standard input (-) can be one input only; give the other by its path")
-    if from_file is not None and (reading != ReadingOptions() or _given(*MAPPING)):
+    if from_file is not None and (reading != ReadingOptions() or _given(*MAPPING_OPTIONS)):
         raise WrongUsageError(
             "slam: reading options, --max-scans, --relations and --no-loops do not go with --from; "
             "those that the graph was made with hold"
         )
-    outputs = Outputs(output, map_file, trajectory, g2o, carmen, depfile)
-    from nscan_cli.cli.slam_runs import map_whole, refine_saved
+    outputs = SlamOutputs(output, map_file, trajectory, g2o, carmen, depfile)
+    from nscan_cli.cli.slam_runs import run_on_graph, run_on_log
     from nscan_cli.logs.log_files import files_of
 
     named = [*([] if from_file is None else [from_file]), *(files_of(log) if log else ())]
     outputs.check(named)
-    from nscan_cli.memory import share_one_heap
+    from nscan_cli.memory import use_one_arena
     from nscan_cli.slam.map_log import slam_options
     from nscan_cli.threads import available_threads
 
     threads = threads or available_threads()
-    share_one_heap()
+    use_one_arena()
     began = time.perf_counter()
     if from_file is None:
         options = slam_options(max_scans, relations, not no_loops)
-        run = map_whole(log, reading, options, threads, quiet, verbose)
+        run = run_on_log(log, reading, options, threads, quiet, verbose)
     else:
-        run = refine_saved(from_file, log or None, outputs.need_scans, threads, quiet)
+        run = run_on_graph(from_file, log or None, outputs.need_scans, threads, quiet)
         # A log that was found must not be replaced either.
         outputs.check(run.inputs)
     outputs.write(run.graph, run.scans, run.rows, run.inputs, threads, quiet)
@@ -147,7 +147,7 @@ def command(
     if from_file is None and run.scans is not None and not run.compiled:
         rate, span = len(run.scans) / seconds, float(run.scans.times[-1] - run.scans.times[0])
         took = [f"{took[0]}, {rate:.0f} scans a second, {span / seconds:.0f} times real time"]
-    say(table([*run.summary, ("time", took), ("written", [", ".join(outputs.files())])]), quiet)
+    say(summary_table([*run.summary, ("time", took), ("written", [", ".join(outputs.files())])]), quiet)
 
 
 def _given(*options: str) -> bool:

@@ -12,7 +12,7 @@ from nscan_cli.cli.render import check_map_outputs, write_map, yaml_path
 from nscan_cli.errors import InputDataError, WrongUsageError
 from nscan_cli.files.inputs import label
 from nscan_cli.files.limits import DISTANCE
-from nscan_cli.files.outputs import check_writable, write_whole
+from nscan_cli.files.outputs import check_writable, write_atomically
 
 if TYPE_CHECKING:
     import numpy as np
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class Outputs:
+class SlamOutputs:
     """Paths, None where nothing was asked for; only the graph's may be "-", standard output."""
 
     graph: str
@@ -80,10 +80,10 @@ class Outputs:
     ) -> None:
         """Write all; `rows` (N,) are those of the graph's scans, `inputs` what the depfile names."""
         from nscan_cli.graph.io.json_graph import write_graph
-        from nscan_cli.memory import give_back
-        from nscan_cli.threads import meanwhile, short_turns
+        from nscan_cli.memory import release_memory
+        from nscan_cli.threads import in_background, short_switch_interval
 
-        give_back()
+        release_memory()
         farthest = float(abs(graph.poses[:, :2]).max())
         if farthest > DISTANCE.value:
             problem = f"leads to a pose {farthest:.3g} m away, which no graph may have"
@@ -91,27 +91,27 @@ class Outputs:
                 label(inputs[0]), problem, f"look for jumps, or set {DISTANCE.variable} higher"
             )
         image = None
-        with short_turns(threads):
+        with short_switch_interval(threads):
             if scans is not None and self.map is not None:
-                image = meanwhile(threads, partial(_drawn, scans, rows, graph.poses, threads))
-            write_whole(self.graph, write_graph(graph))
+                image = in_background(threads, partial(_draw_map, scans, rows, graph.poses, threads))
+            write_atomically(self.graph, write_graph(graph))
         if self.trajectory is not None:
             from nscan_cli.graph.io.tum import write_tum
 
-            write_whole(self.trajectory, write_tum(graph.stamps, graph.poses))
+            write_atomically(self.trajectory, write_tum(graph.stamps, graph.poses))
         if self.g2o is not None:
             from nscan_cli.graph.io.g2o import write_g2o
 
-            write_whole(self.g2o, write_g2o(graph))
+            write_atomically(self.g2o, write_g2o(graph))
         if scans is not None and self.carmen is not None:
             from nscan_cli.exports.carmen import corrected_log
 
-            write_whole(self.carmen, corrected_log(scans, rows, graph.poses))
+            write_atomically(self.carmen, corrected_log(scans, rows, graph.poses))
         if image is not None and self.map is not None:
             # Last, since it may be refused for its size: the rest is then there.
             write_map(self.map, image(), yaml=True, quiet=quiet)
         if self.depfile is not None:
-            write_whole(self.depfile, self._rule(inputs))
+            write_atomically(self.depfile, self._rule(inputs))
 
     def _rule(self, inputs: Sequence[str]) -> bytes:
         """`outputs: inputs` for make's include, with spaces and dollars escaped."""
@@ -125,12 +125,12 @@ class Outputs:
         return os.fsencode(f"{targets}:{prerequisites}\n")
 
 
-def _drawn(scans: LaserLog, rows: NDArray[np.int64], poses: Array, threads: int) -> MapImage:
+def _draw_map(scans: LaserLog, rows: NDArray[np.int64], poses: Array, threads: int) -> MapImage:
     """The map; the counts that it is made of, and what else came before, make room for it."""
     from nscan_cli.mapping.map_server import map_image
     from nscan_cli.mapping.occupancy import occupancy_grid
-    from nscan_cli.memory import trim
+    from nscan_cli.memory import trim_heap
 
     grid = occupancy_grid(scans, rows, poses, threads=threads)
-    trim()
+    trim_heap()
     return map_image(grid)

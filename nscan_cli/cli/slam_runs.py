@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 
 @dataclasses.dataclass(frozen=True)
-class Run:
+class SlamRun:
     """What there is to write and to say."""
 
     graph: Graph
@@ -40,18 +40,18 @@ class Run:
     """Whether the kernels had to be compiled first."""
 
 
-def map_whole(
+def run_on_log(
     log: Sequence[str], reading: ReadingOptions, options: SlamOptions, threads: int, quiet: bool, verbose: int
-) -> Run:
+) -> SlamRun:
     """Run the whole loop over a log."""
     import numpy as np
 
-    from nscan_cli.kernels.decorators import bring_up
+    from nscan_cli.kernels.decorators import load_runtime
     from nscan_cli.logs.load import read_log
     from nscan_cli.logs.log_files import files_of
     from nscan_cli.slam.map_log import map_log
 
-    bring_up()
+    load_runtime()
     compiling = Compiling("a minute or two", quiet)
     scans = read_log(log, reading)
     for warning in scans.report.notices():
@@ -81,7 +81,7 @@ def map_whole(
             ("tracking", [f"{starts} from other angles, {searches}"]),
             ("large loops", [f"{places} found by search at a place seen before"]),
         ]
-    return Run(graph, scans, np.arange(len(scans)), files_of(log), summary, compiling.has_begun)
+    return SlamRun(graph, scans, np.arange(len(scans)), files_of(log), summary, compiling.has_begun)
 
 
 def _graph_rows(graph: Graph) -> list[Row]:
@@ -101,11 +101,11 @@ def _graph_rows(graph: Graph) -> list[Row]:
             [f"{tried} tried, {counts.accepted} accepted, {refused} refused" if tried else "none tried"],
         ),
         ("refused", [f"{count}: {reason}" for reason, count in reasons.most_common()]),
-        ("sigma", _sureness(graph)),
+        ("sigma", _sigma_lines(graph)),
     ]
 
 
-def _sureness(graph: Graph) -> list[str]:
+def _sigma_lines(graph: Graph) -> list[str]:
     """How well the graph knows where its keyframes are, in the direction of which it knows least."""
     import numpy as np
 
@@ -131,9 +131,9 @@ def without_numbers(reason: str) -> str:
     return re.sub(r"(all )?\d+ scans?\b", "some scans", reason)
 
 
-def refine_saved(
+def run_on_graph(
     path: str, log_files: Sequence[str] | None, needs_log: bool, threads: int, quiet: bool
-) -> Run:
+) -> SlamRun:
     """Optimise a saved graph, and refine it where its log is there."""
     import numpy as np
 
@@ -146,7 +146,7 @@ def refine_saved(
     graph = load_graph(path, notices)
     for notice in notices:
         say(f"warning: {notice}", quiet)
-    read = _log_of(path, graph, log_files, needs_log, quiet)
+    read = _graph_log(path, graph, log_files, needs_log, quiet)
     before = graph.poses
     optimum = optimise_graph(graph)
     if not optimum.converged:
@@ -169,10 +169,10 @@ def refine_saved(
         ("optimised", [outcome]),
         ("moved", [f"no pose by more than {moved:.3g} m"]),
     ]
-    return Run(graph, scans, rows, inputs, summary, compiling.has_begun)
+    return SlamRun(graph, scans, rows, inputs, summary, compiling.has_begun)
 
 
-def _log_of(
+def _graph_log(
     path: str, graph: Graph, log_files: Sequence[str] | None, needed: bool, quiet: bool
 ) -> tuple[LaserLog, NDArray[np.int64], list[str]] | None:
     """The log of a saved graph, the rows of its scans, and its files' paths; None where it has none."""

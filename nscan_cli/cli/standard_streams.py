@@ -6,27 +6,27 @@ import codecs
 import io
 import sys
 
-from nscan_cli.files.text import in_plain_letters, shown
+from nscan_cli.files.text import encode_fallback, printable
 
 HANDLER = "nscan-cli"
 """Name of the error handler of both streams."""
 
 
-def prepare() -> None:
+def configure_streams() -> None:
     """Let characters that an encoding lacks be printed in others."""
     if isinstance(raw := getattr(sys.stdout, "buffer", None), io.RawIOBase):
         # With PYTHONUNBUFFERED, what a pipe does not take at once would be lost without an error.
         sys.stdout = io.TextIOWrapper(
             io.BufferedWriter(raw), sys.stdout.encoding, sys.stdout.errors, line_buffering=True
         )
-    codecs.register_error(HANDLER, in_plain_letters)
+    codecs.register_error(HANDLER, encode_fallback)
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors=HANDLER)
 
 
-def answer(text: str) -> None:
+def print_result(text: str) -> None:
     """Print to standard output, in its own encoding, what is for people."""
     if sys.stdout is not None:
-        sys.stdout.write(shown(text))
+        sys.stdout.write(printable(text))
         sys.stdout.flush()

@@ -17,14 +17,14 @@ from nscan_cli.logs.formats import readable
 
 CONTEXT: dict[str, Any] = {"help_option_names": ["-h", "--help"]}
 # One prefix for all commands: what is set once in a shell or a Makefile holds for each of them.
-PREFIX = "NSCAN_CLI_"
+VARIABLE_PREFIX = "NSCAN_CLI_"
 ARGUMENTS, OWN, READING, COMMON = "Arguments", "Options", "Reading the log", "For all commands"
 SECTIONS = (ARGUMENTS, OWN, READING, COMMON)
 """Of the help, in this order."""
-OWN_MEANINGS = {"initial", "output", "plot", "prior", "reference", "relations", "trajectory"}
+COMMAND_SPECIFIC = {"initial", "output", "plot", "prior", "reference", "relations", "trajectory"}
 """Long names of options that mean another thing in another command. What is set for all commands sets none of
 them: neither a variable without the command's name nor a key at the top of a TOML file."""
-FILE = click.Path()
+PATH = click.Path()
 """A file's name, which a shell can complete; "-" too."""
 
 Example = tuple[str, str]
@@ -37,7 +37,7 @@ class Option(click.Option):
     def __init__(self, *args: Any, section: str = OWN, **attributes: Any) -> None:
         super().__init__(*args, **attributes)
         self.section = section
-        self.envvar: str = PREFIX + _in_capitals(self.long_name)
+        self.envvar: str = VARIABLE_PREFIX + _upper_case(self.long_name)
 
     @property
     def long_name(self) -> str:
@@ -47,11 +47,11 @@ class Option(click.Option):
     @property
     def is_shared(self) -> bool:
         """Whether it means the same in all commands that have it."""
-        return self.long_name not in OWN_MEANINGS
+        return self.long_name not in COMMAND_SPECIFIC
 
     def variables(self, ctx: click.Context) -> list[str]:
         """Those that set it, the command's own first."""
-        own = f"{PREFIX}{_in_capitals(ctx.command.name or '')}_{_in_capitals(self.long_name)}"
+        own = f"{VARIABLE_PREFIX}{_upper_case(ctx.command.name or '')}_{_upper_case(self.long_name)}"
         return [own, self.envvar] if self.is_shared else [own]
 
     def resolve_envvar_value(self, ctx: click.Context) -> str | None:
@@ -93,7 +93,7 @@ class Option(click.Option):
         return f"--{self.long_name}"
 
 
-def _in_capitals(name: str) -> str:
+def _upper_case(name: str) -> str:
     """The part of a variable's name that stands for a command or an option."""
     return name.upper().replace("-", "_")
 
@@ -119,7 +119,7 @@ log_argument = functools.partial(
     "log",
     nargs=-1,
     required=True,
-    type=FILE,
+    type=PATH,
     tells=f"A laser log: {readable()}. - is standard input. A folder that `ros2 bag record` has left, and "
     "several files of one recording, are one log.",
 )
@@ -127,7 +127,7 @@ log_argument = functools.partial(
 result_option = option(
     "-o",
     "--output",
-    type=FILE,
+    type=PATH,
     default="-",
     metavar="RESULT.json",
     help="The result; standard output if not given.",

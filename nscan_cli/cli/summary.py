@@ -7,12 +7,12 @@ from collections.abc import Sequence
 
 from nscan_cli.files.counting import counted
 
-WIDTH = 80
+TERMINAL_WIDTH = 80
 Row = tuple[str, Sequence[str]]
 """A title, and the lines beside it; no line, no row."""
 
 
-def table(rows: Sequence[Row], width: int | None = WIDTH) -> str:
+def summary_table(rows: Sequence[Row], width: int | None = TERMINAL_WIDTH) -> str:
     """The rows with their titles in a column of its own; lines are broken at `width`, where it is given."""
     filled = [(title, lines) for title, lines in rows if lines]
     aside = max(len(title) for title, _lines in filled) + 2
@@ -27,7 +27,7 @@ def table(rows: Sequence[Row], width: int | None = WIDTH) -> str:
     return "\n".join(shown)
 
 
-def ended(reason: str | None, iterations: int, evaluations: int, unsettled: int) -> list[str]:
+def match_outcome(reason: str | None, iterations: int, evaluations: int, unsettled: int) -> list[str]:
     """How a match ended: converged, or why not (`reason`), what it took, and what was cut off on its way."""
     outcome = "converged" if reason is None else f"not converged ({reason})"
     cut = f"{counted(unsettled, 'stage')} before the last did not settle: the place is less sure"

@@ -6,9 +6,9 @@ from typing import Any
 
 import click
 
-AFTER_THE_COMMAND = ("-q", "--quiet", "-v", "--verbose", "--config", "--dump-config")
+SUBCOMMAND_OPTIONS = ("-q", "--quiet", "-v", "--verbose", "--config", "--dump-config")
 """Options that every command has, and nothing has before its name."""
-UNITS = {"M": "m", "DEG": "degrees", "T": "s", "SECONDS": "s"}
+METAVAR_UNITS = {"M": "m", "DEG": "degrees", "T": "s", "SECONDS": "s"}
 """Units of numbers, by what the help writes in their place."""
 
 
@@ -28,11 +28,11 @@ def value_problem(kind: click.ParamType[Any], value: Any, metavar: str | None) -
         number = int(value) if whole else float(value)
     except (ValueError, TypeError, OverflowError):
         return f"{value!r} is not a {'whole ' if whole else ''}number"
-    unit = UNITS.get(metavar or "")
-    return f"has to be {_bounds(kind)}{f' ({unit})' if unit else ''}, and is {number:g}"
+    unit = METAVAR_UNITS.get(metavar or "")
+    return f"has to be {_range_text(kind)}{f' ({unit})' if unit else ''}, and is {number:g}"
 
 
-def _bounds(kind: Any) -> str:
+def _range_text(kind: Any) -> str:
     """Between which numbers one of a range has to be."""
     low, high = kind.min, kind.max
     if low is not None and high is not None and not kind.min_open and not kind.max_open:
@@ -47,6 +47,6 @@ def usage_problem(error: click.ClickException) -> str:
     if isinstance(error, click.BadParameter) and not isinstance(error, click.MissingParameter):
         place = error.param_hint or (error.param.get_error_hint(error.ctx) if error.param else "")
         return f"{place}: {error.message.rstrip('.')}".removeprefix(": ")
-    if isinstance(error, click.NoSuchOption) and error.option_name in AFTER_THE_COMMAND:
+    if isinstance(error, click.NoSuchOption) and error.option_name in SUBCOMMAND_OPTIONS:
         return f"{error.option_name} stands after the command's name"
     return error.format_message().rstrip(".")

@@ -6,8 +6,8 @@ import os
 from dataclasses import replace
 
 from nscan_cli.errors import InputDataError, WrongUsageError
-from nscan_cli.files.inputs import Bytes, label, read_bytes
-from nscan_cli.files.limits import GRAPH, MB, ExceededError
+from nscan_cli.files.inputs import FileBytes, label, read_bytes
+from nscan_cli.files.limits import GRAPH, MB, LimitExceededError
 from nscan_cli.graph.io.json_graph import parse_graph
 from nscan_cli.graph.io.pose_columns import are_poses
 from nscan_cli.graph.io.tum import Trajectory, parse_tum
@@ -60,7 +60,7 @@ def load_reference(
     A recording needs the topic, and nothing else may have one. Raises likewise.
     """
     name, notices = label(path), [] if notices is None else notices
-    stored: Bytes = b""
+    stored: FileBytes = b""
     if os.path.isdir(path):
         recording = recording_at(path, options.salvage)
     else:
@@ -97,7 +97,7 @@ def _loaded(stored: bytes, path: str, options: ReadingOptions, notices: list[str
         return log
     try:
         GRAPH.check(len(data) / MB, f"has {len(data) / MB:,.0f} MB")
-    except ExceededError as error:
+    except LimitExceededError as error:
         raise InputDataError(name, str(error), error.remedy) from error
     if lost is not None:
         notices.append(f"{name}: {lost}")

@@ -13,12 +13,12 @@ from collections.abc import Callable, Iterable, Iterator
 from typing import Any
 
 from nscan_cli.errors import InputDataError, InputMissingError
-from nscan_cli.files.encoding import plain
-from nscan_cli.files.limits import CONFIG, INPUT, MB, ExceededError, Limit
+from nscan_cli.files.encoding import without_byte_order_mark
+from nscan_cli.files.limits import CONFIG, INPUT, MB, Limit, LimitExceededError
 from nscan_cli.files.text import name_of_path
 
 STANDARD_INPUT = "-"
-Bytes = bytes | mmap.mmap
+FileBytes = bytes | mmap.mmap
 """Those of a file: in memory, or where they are."""
 
 
@@ -29,36 +29,36 @@ def read_bytes(path: str, limit: Limit = INPUT) -> bytes:
     are more than the limit allows.
     """
     try:
-        with _told(path):
+        with _as_input_errors(path):
             if path == STANDARD_INPUT:
-                return in_pieces(sys.stdin.buffer.read, limit)
+                return read_all(sys.stdin.buffer.read, limit)
             with open(path, "rb") as file:
                 status = os.fstat(file.fileno())
                 if not stat.S_ISREG(status.st_mode):
-                    return in_pieces(file.read, limit)
+                    return read_all(file.read, limit)
                 limit.check(status.st_size / MB, f"has {status.st_size / MB:,.0f} MB")
                 return file.read()
-    except ExceededError as error:
+    except LimitExceededError as error:
         raise InputDataError(label(path), str(error), error.remedy) from error
 
 
-def mapped(path: str) -> mmap.mmap:
+def memory_map(path: str) -> mmap.mmap:
     """The bytes of a regular file, which stay where they are until they are looked at.
 
     Raises InputMissingError as read_bytes does.
     """
-    with _told(path), open(path, "rb") as file:
+    with _as_input_errors(path), open(path, "rb") as file:
         return mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ)
 
 
 def sha256_of(path: str) -> str:
     """The SHA-256 of a regular file, which is never in memory as a whole. Raises InputMissingError."""
-    with _told(path), open(path, "rb") as file:
+    with _as_input_errors(path), open(path, "rb") as file:
         return hashlib.file_digest(file, "sha256").hexdigest()
 
 
 @contextlib.contextmanager
-def _told(path: str) -> Iterator[None]:
+def _as_input_errors(path: str) -> Iterator[None]:
     """What goes wrong when a file is read, as InputMissingError."""
     try:
         yield
@@ -74,16 +74,16 @@ def _told(path: str) -> Iterator[None]:
 
 def read_text(path: str, limit: Limit = INPUT) -> bytes:
     """The bytes of a text without a byte-order mark; raises also InputDataError for one that is not UTF-8."""
-    return plain(read_bytes(path, limit), label(path))
+    return without_byte_order_mark(read_bytes(path, limit), label(path))
 
 
-def in_pieces(read: Callable[[int], bytes], limit: Limit, problem: str = "goes on and on") -> bytes:
+def read_all(read: Callable[[int], bytes], limit: Limit, problem: str = "goes on and on") -> bytes:
     """All that can be read from where nobody knows the length. Raises ExceededError beyond the limit."""
     pieces, size, most = [], 0, limit.bytes
     while piece := read(MB):
         size += len(piece)
         if size > most:
-            raise ExceededError(limit, problem)
+            raise LimitExceededError(limit, problem)
         pieces.append(piece)
     return b"".join(pieces)
 

@@ -12,11 +12,11 @@ from dataclasses import dataclass
 
 from nscan_cli.errors import WrongUsageError
 
-PREFIX = "NSCAN_CLI_MAX_"
+LIMIT_PREFIX = "NSCAN_CLI_MAX_"
 MB = 1 << 20
 
 
-class ExceededError(Exception):
+class LimitExceededError(Exception):
     """An input is beyond a limit; who knows the input's name makes a message of it."""
 
     def __init__(self, limit: Limit, problem: str) -> None:
@@ -36,7 +36,7 @@ class Limit:
     @property
     def variable(self) -> str:
         """The environment variable that sets it."""
-        return PREFIX + self.name
+        return LIMIT_PREFIX + self.name
 
     @property
     def value(self) -> float:
@@ -68,7 +68,7 @@ class Limit:
     def check(self, value: float, problem: str) -> None:
         """Raises ExceededError when the value, which `problem` tells of, is greater."""
         if value > self.value:
-            raise ExceededError(self, problem)
+            raise LimitExceededError(self, problem)
 
 
 INPUT = Limit("INPUT_MB", 1024, "MB")
@@ -85,7 +85,7 @@ READINGS = Limit("READINGS", 250_000_000, "readings")
 """Of a log: its scans times the beams of the widest one; 4 bytes each."""
 MAP_CELLS = Limit("MAP_CELLS", 200_000_000, "cells")
 """Of a map; 700 m × 700 m at 0.05 m. 8 bytes each for what is seen."""
-KINDS = Limit("KINDS", 1000, "kinds")
+RECORD_KINDS = Limit("KINDS", 1000, "kinds")
 """Of records (tags, devices) in a text that are told from each other."""
 DISTANCE = Limit("DISTANCE", 1e9, "m")
 """No coordinate of a pose, and no other number of its record, is beyond."""
@@ -93,4 +93,4 @@ TIME = Limit("TIME", 1e11, "s")
 """No time stamp is beyond, before 0 or after."""
 INFORMATION = Limit("INFORMATION", 1e30, "")
 """No entry of an information, Hessian or covariance matrix is beyond."""
-ALL = (INPUT, UNPACKED, GRAPH, CONFIG, BEAMS, READINGS, MAP_CELLS, KINDS, DISTANCE, TIME, INFORMATION)
+ALL = (INPUT, UNPACKED, GRAPH, CONFIG, BEAMS, READINGS, MAP_CELLS, RECORD_KINDS, DISTANCE, TIME, INFORMATION)

@@ -13,12 +13,12 @@ from typing import BinaryIO
 
 from nscan_cli.errors import OutputError
 
-TEMPORARY = ".nscan-cli."
+TEMPORARY_PREFIX = ".nscan-cli."
 """What the name of a file begins with that is not whole yet; a process that is killed leaves it behind."""
 
 
 @contextlib.contextmanager
-def whole_file(path: str) -> Iterator[BinaryIO]:
+def atomic_file(path: str) -> Iterator[BinaryIO]:
     """A binary file that appears under `path` whole when the block ends well, and not at all otherwise.
 
     "-" is standard output; what is no regular file, such as /dev/null or a named pipe, is written to as
@@ -39,7 +39,7 @@ def whole_file(path: str) -> Iterator[BinaryIO]:
             with open(path, "wb") as device:
                 yield device
             return
-        clear_left_over(target.parent)
+        remove_leftovers(target.parent)
         with _temporary(target.parent) as (file, name):
             yield file
             file.flush()
@@ -59,7 +59,7 @@ def _temporary(folder: Path) -> Iterator[tuple[BinaryIO, str]]:
     """
     while True:
         # A name that nobody can guess, and the rights of any other new file: the umask applies.
-        name = str(folder / f"{TEMPORARY}{os.urandom(8).hex()}")
+        name = str(folder / f"{TEMPORARY_PREFIX}{os.urandom(8).hex()}")
         descriptor = os.open(name, os.O_CREAT | os.O_EXCL | os.O_WRONLY | os.O_CLOEXEC, 0o666)
         with os.fdopen(descriptor, "wb") as file:
             try:
@@ -75,10 +75,10 @@ def _temporary(folder: Path) -> Iterator[tuple[BinaryIO, str]]:
                     os.unlink(name)
 
 
-def clear_left_over(folder: Path) -> None:
+def remove_leftovers(folder: Path) -> None:
     """Remove the files that killed processes have begun to write in the folder."""
     with contextlib.suppress(OSError):
-        for left_over in folder.glob(f"{TEMPORARY}*"):
+        for left_over in folder.glob(f"{TEMPORARY_PREFIX}*"):
             with contextlib.suppress(OSError), left_over.open("rb") as file:
                 fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
                 left_over.unlink()
@@ -114,15 +114,15 @@ def is_device(path: str) -> bool:
     return not (stat.S_ISREG(mode) or stat.S_ISDIR(mode))
 
 
-def write_whole(path: str, data: bytes) -> None:
+def write_atomically(path: str, data: bytes) -> None:
     """Write `data` to `path` ("-": standard output), whole or not at all. Raises OutputError."""
-    with whole_file(path) as file:
+    with atomic_file(path) as file:
         file.write(data)
 
 
-def write_first(path: Path, data: bytes) -> None:
+def write_once(path: Path, data: bytes) -> None:
     """Write `data` whole to a file that nobody has written before; what is there stays. Raises OSError."""
-    clear_left_over(path.parent)
+    remove_leftovers(path.parent)
     with _temporary(path.parent) as (file, name):
         file.write(data)
         file.flush()

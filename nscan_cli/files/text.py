@@ -6,26 +6,26 @@ import os
 import re
 from pathlib import Path
 
-NO_BYTES = re.compile("[\ud800-\udc7f\udd00-\udfff]")
+LONE_SURROGATES = re.compile("[\ud800-\udc7f\udd00-\udfff]")
 """Single surrogates by which Python stands for no byte: a JSON text may have them."""
-PLAIN = {
+ASCII_FORMS = {
     "°": " deg", "±": "+-", "×": "x", "·": "*", "→": "->", "←": "<-", "−": "-", "–": "-", "…": "...",
     "≤": "<=", "≥": ">=", "²": "^2", "√": "sqrt ", "Δ": "delta ", "θ": "theta", "φ": "phi", "σ": "sigma",
 }  # fmt: skip
 """What is printed where an encoding lacks a character of this package's own messages."""
 
 
-def shown(text: str) -> str:
+def printable(text: str) -> str:
     r"""Text with the bytes of names that are no UTF-8 escaped, as in `\xff.log`; other text as it is."""
     if text.isascii():
         return text
-    whole = NO_BYTES.sub(lambda found: f"\\u{ord(found[0]):04x}", text)
+    whole = LONE_SURROGATES.sub(lambda found: f"\\u{ord(found[0]):04x}", text)
     return whole.encode("utf-8", "surrogateescape").decode("utf-8", "backslashreplace")
 
 
 def name_of_path(path: str) -> str:
     """The name of a file without its folder, as results call it: the same text on every machine."""
-    return shown(os.fsencode(Path(path).name).decode("utf-8", "surrogateescape"))
+    return printable(os.fsencode(Path(path).name).decode("utf-8", "surrogateescape"))
 
 
 def path_of_name(name: str) -> str:
@@ -33,7 +33,7 @@ def path_of_name(name: str) -> str:
     try:
         return os.fsdecode(name.encode("utf-8", "surrogateescape"))
     except UnicodeEncodeError:
-        return shown(name)
+        return printable(name)
 
 
 def json_bytes(text: str) -> bytes:
@@ -41,9 +41,12 @@ def json_bytes(text: str) -> bytes:
     return text.encode("utf-8", "backslashreplace")
 
 
-def in_plain_letters(error: UnicodeError) -> tuple[str, int]:
+def encode_fallback(error: UnicodeError) -> tuple[str, int]:
     """What is printed for characters that an encoding lacks: the error handler of the output streams."""
     assert isinstance(error, UnicodeEncodeError)
     lacking = error.object[error.start : error.end]
-    plain = (PLAIN.get(each, each.encode("ascii", "backslashreplace").decode()) for each in shown(lacking))
+    plain = (
+        ASCII_FORMS.get(each, each.encode("ascii", "backslashreplace").decode())
+        for each in printable(lacking)
+    )
     return "".join(plain), error.end

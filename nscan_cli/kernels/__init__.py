@@ -1,1 +1,1 @@
-"""Compiled code: which functions are kernels, and how their machine code is kept and loaded."""
+"""Compiled code: the decorators of kernels, and the cache of their machine code."""

@@ -1,7 +1,6 @@
-"""Arrays assigned by loops.
+"""Assignment of arrays by loops.
 
-numba checks the shapes of `a[:] = b` and brings the code of its error message, texts and lists and all, into
-every kernel that has one.
+For `a[:] = b`, numba checks the shapes, and compiles the code of its error message into every kernel.
 """
 
 from __future__ import annotations
@@ -15,14 +14,14 @@ from nscan_cli.kernels.decorators import leaf_kernel
 
 @leaf_kernel
 def assign(target: NDArray[Any], source: NDArray[Any]) -> None:
-    """The numbers of `source` (n,) into `target` (n,)."""
+    """Copy `source` (n,) into `target` (n,)."""
     for k in range(target.shape[0]):
         target[k] = source[k]
 
 
 @leaf_kernel
 def assign_rows(target: NDArray[Any], source: NDArray[Any]) -> None:
-    """The numbers of `source` (n, m) into `target` (n, m)."""
+    """Copy `source` (n, m) into `target` (n, m)."""
     for row in range(target.shape[0]):
         for k in range(target.shape[1]):
             target[row, k] = source[row, k]

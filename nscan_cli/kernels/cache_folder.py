@@ -1,10 +1,10 @@
-"""The folder where the kernels' machine code is kept.
+"""The folder where the kernels' machine code is cached.
 
-It carries a hash of all files with kernels: when one of them changes, all are compiled again. A constant
-that a kernel uses belongs into a file with kernels.
+Its name has a hash of all files with kernels: when one of them changes, all kernels are compiled again. So a
+constant that a kernel uses must stand in a file with kernels.
 
-When a version makes its folder, those that nobody needs any more go. A process that still uses one of them
-keeps what it has loaded; what it has not, it compiles and keeps in memory.
+When a version makes its folder, obsolete folders are removed. A process that still uses one of them goes on
+with what it has loaded, and compiles the rest in memory.
 """
 
 from __future__ import annotations
@@ -21,31 +21,33 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from nscan_cli import __version__
-from nscan_cli.files.outputs import TEMPORARY, write_first
+from nscan_cli.files.outputs import TEMPORARY_PREFIX, write_once
 
 PACKAGE = Path(__file__).parents[1]
-MAKERS = {"kernels/cache_folder.py", "kernels/decorators.py", "kernels/machine_code.py"}
-"""Files of the package that say how machine code is made and kept."""
-NAME = re.compile(r"\d[\w.+]*-[0-9a-f]{16}")
-"""Of a folder: a version and a hash."""
-OWNER = ".package"
-"""A file of the folder that has the place of its package. Its time says when the folder was last used."""
-KEPT = re.compile(rf"{re.escape(OWNER)}|{re.escape(TEMPORARY)}.*|.*\.(code|left|nbc|nbi)(\.tmp\..*)?")
-"""Names of the files that nscan-cli and numba keep in it."""
+COMPILER_SOURCES = {"kernels/cache_folder.py", "kernels/decorators.py", "kernels/machine_code.py"}
+"""Files of the package that decide how machine code is compiled and cached."""
+FOLDER_NAME = re.compile(r"\d[\w.+]*-[0-9a-f]{16}")
+"""The name of a cache folder: a version and a hash."""
+OWNER_FILE = ".package"
+"""A file with the path of the package that the folder belongs to. Its time is that of the last use."""
+CACHE_FILES = re.compile(
+    rf"{re.escape(OWNER_FILE)}|{re.escape(TEMPORARY_PREFIX)}.*|.*\.(code|left|nbc|nbi)(\.tmp\..*)?"
+)
+"""Names of the files that nscan-cli and numba write into the folder."""
 DAY = 86400.0
-UNUSED = 30 * DAY
-"""So long nobody has used the folder of another copy of the package that need not be kept, s."""
+EXPIRY = 30 * DAY
+"""Time without use after which the folder of another copy of the package is obsolete, s."""
 
 
 @functools.cache
 def cache_folder() -> Path | None:
-    """The folder for the kernels' machine code; None when no place is writable.
+    """The folder for the kernels' machine code; None where none is writable.
 
-    The first that can be written of: `NUMBA_CACHE_DIR` where it is set, otherwise the user's cache
-    folder; a folder of this user among the temporary files.
+    It is in `NUMBA_CACHE_DIR` if that is set, else in the user's cache folder; if that is not writable, in a
+    private folder among the temporary files.
     """
     key = f"{__version__}-{_sources_hash()}"
-    for place in _places():
+    for place in _candidates():
         folder = place / key
         try:
             folder.mkdir(parents=True, exist_ok=True)
@@ -59,45 +61,45 @@ def cache_folder() -> Path | None:
 
 
 def _claim(folder: Path) -> None:
-    """Say whose the folder is, and once a day that it is used; when it is new, clear others away."""
-    owner = folder / OWNER
+    """Mark the folder as used, once a day. When it is new, remove obsolete folders and name its owner."""
+    owner = folder / OWNER_FILE
     try:
         if time.time() - owner.stat().st_mtime > DAY:
             os.utime(owner)
     except FileNotFoundError:
         for other in os.scandir(folder.parent):
-            if NAME.fullmatch(other.name) and other.name != folder.name and _is_over(other):
-                _clear(other.path)
-        write_first(owner, os.fsencode(PACKAGE))
+            if FOLDER_NAME.fullmatch(other.name) and other.name != folder.name and _is_obsolete(other):
+                _remove_cache_files(other.path)
+        write_once(owner, os.fsencode(PACKAGE))
 
 
-def _is_over(other: os.DirEntry[str]) -> bool:
-    """Whether what is kept in a folder is of no more use.
+def _is_obsolete(other: os.DirEntry[str]) -> bool:
+    """Whether a cache folder is of no more use.
 
-    It is that of a copy of the package that is gone, or has other kernels now; was not used for a month; or
-    does not say whose it is: an old version has made it.
+    Its package is gone or has other kernels now, it was not used for EXPIRY, or it has no owner file, as
+    folders of old versions.
     """
     if not other.is_dir(follow_symlinks=False):
         return False
     try:
-        package = Path(other.path, OWNER).read_bytes()
-        used = os.stat(os.path.join(other.path, OWNER)).st_mtime
+        package = Path(other.path, OWNER_FILE).read_bytes()
+        used = os.stat(os.path.join(other.path, OWNER_FILE)).st_mtime
     except FileNotFoundError:
         return True
-    return package == os.fsencode(PACKAGE) or not os.path.isdir(package) or time.time() - used > UNUSED
+    return package == os.fsencode(PACKAGE) or not os.path.isdir(package) or time.time() - used > EXPIRY
 
 
-def _clear(folder: str) -> None:
-    """Remove the files that are kept in a folder, and what is empty then; links are not followed."""
+def _remove_cache_files(folder: str) -> None:
+    """Remove the cached files below a folder, then empty folders; links are not followed."""
     for place, _folders, names in os.walk(folder, topdown=False):
-        for name in filter(KEPT.fullmatch, names):
+        for name in filter(CACHE_FILES.fullmatch, names):
             with contextlib.suppress(OSError):
                 os.unlink(os.path.join(place, name))
         with contextlib.suppress(OSError):
             os.rmdir(place)
 
 
-def _places() -> Iterator[Path]:
+def _candidates() -> Iterator[Path]:
     configured = os.environ.get("NUMBA_CACHE_DIR")
     user = os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache")
     yield Path(configured or user).absolute() / "nscan-cli"
@@ -107,19 +109,22 @@ def _places() -> Iterator[Path]:
         status = private.lstat()
     except OSError:
         return
-    # What is loaded from here is run: the folder must not be one that somebody else has laid out.
+    # Code from here is run, so nobody else may be able to write here.
     if stat.S_ISDIR(status.st_mode) and status.st_uid == os.getuid() and not status.st_mode & 0o022:
         yield private
 
 
 def _sources_hash() -> str:
-    """Hash of the package's place, and of the paths and bytes of all its files that make kernels.
+    """Hash of the package's path, and of the paths and bytes of all its files with kernels.
 
-    Of the place because numba keeps the code of each copy of a file apart.
+    The package's path is part of it because numba caches each copy of a file separately.
     """
-    sources = hashlib.sha256(os.fsencode(PACKAGE) + b"\0")
+    digest = hashlib.sha256(os.fsencode(PACKAGE) + b"\0")
     for path in sorted(PACKAGE.rglob("*.py")):
         text = path.read_bytes()
-        if path.relative_to(PACKAGE).as_posix() in MAKERS or b"nscan_cli.kernels.decorators import" in text:
-            sources.update(f"{path.relative_to(PACKAGE)}\0{len(text)}\0".encode() + text)
-    return sources.hexdigest()[:16]
+        if (
+            path.relative_to(PACKAGE).as_posix() in COMPILER_SOURCES
+            or b"nscan_cli.kernels.decorators import" in text
+        ):
+            digest.update(f"{path.relative_to(PACKAGE)}\0{len(text)}\0".encode() + text)
+    return digest.hexdigest()[:16]

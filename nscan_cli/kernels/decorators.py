@@ -1,6 +1,7 @@
-"""`kernel`, the decorator of compiled functions: machine code as kept in the cache folder, or made by numba.
+"""`kernel`, the decorator of compiled functions: loads machine code from the cache folder, or has numba make
+it.
 
-numba keeps what it has compiled one by one, too: it saves compiling anew what two kernels call.
+numba's own cache is used beside it, so that a function that two kernels call is compiled once.
 """
 
 from __future__ import annotations
@@ -22,72 +23,73 @@ Function = TypeVar("Function", bound=Callable[..., Any])
 
 C_ORDER, FORTRAN_ORDER, ALIGNED_AND_WRITEABLE = 1, 2, 0x500
 """Bits of the flags of an array."""
-IN_C_ORDER, NOT_IN_C_ORDER = ALIGNED_AND_WRITEABLE | C_ORDER, ALIGNED_AND_WRITEABLE | FORTRAN_ORDER
-"""What of them counts. What is in both orders, as all that has one axis, is in C's."""
-LOOK = operator.attrgetter("dtype", "ndim", "flags.num")
-"""Of an array. Flags that do not count are among them."""
-LOCK = threading.RLock()
-"""Held while kernels are loaded or made."""
-TO_BE_TOLD: list[Callable[[], None]] = []
-"""Who wants to know that this process compiles."""
+C_ORDER_FLAGS, OTHER_ORDER_FLAGS = ALIGNED_AND_WRITEABLE | C_ORDER, ALIGNED_AND_WRITEABLE | FORTRAN_ORDER
+"""The flags that machine code depends on. An array in both orders, such as one of one axis, is in C order."""
+ARRAY_KEY = operator.attrgetter("dtype", "ndim", "flags.num")
+"""The fingerprint of an array. It has more flags than machine code depends on."""
+COMPILE_LOCK = threading.RLock()
+"""Held while kernels are loaded or compiled."""
+COMPILE_CALLBACKS: list[Callable[[], None]] = []
+"""Called once before this process compiles its next kernel."""
 
 
-def bring_up() -> None:
-    """Load what runs kernels, for a command that will need it: what comes before may use kernels, too."""
-    # Another numba than is known, which keeps its code itself, can raise anything.
-    with LOCK, contextlib.suppress(Exception):
-        machine_code.engine()
+def load_runtime() -> None:
+    """Load what runs kernels. Commands that need it call this before reading, which then uses kernels."""
+    # A numba that this version does not know can raise anything. It then uses its own cache.
+    with COMPILE_LOCK, contextlib.suppress(Exception):
+        machine_code.runtime()
 
 
-def are_up() -> bool:
-    """Whether kernels run in this process already: LLVM takes room that reading alone may not have."""
-    return machine_code.engine.cache_info().currsize > 0
+def runtime_is_loaded() -> bool:
+    """Whether this process has loaded what runs kernels. For reading alone it takes too much memory."""
+    return machine_code.runtime.cache_info().currsize > 0
 
 
-def tell_when_compiling(tell: Callable[[], None] | None) -> None:
-    """Have `tell` called once, just before this process compiles a kernel; None: nobody wants to know."""
-    TO_BE_TOLD[:] = [] if tell is None else [tell]
+def on_first_compile(callback: Callable[[], None] | None) -> None:
+    """Call `callback` once, just before this process compiles a kernel; None removes it."""
+    COMPILE_CALLBACKS[:] = [] if callback is None else [callback]
 
 
-def _tell() -> None:
-    while TO_BE_TOLD:
-        TO_BE_TOLD.pop()()
+def _announce_compile() -> None:
+    while COMPILE_CALLBACKS:
+        COMPILE_CALLBACKS.pop()()
 
 
 def kernel(function: Function) -> Function:
-    """Compile `function` at its first call with numba, or load its machine code from the cache folder.
+    """Compile `function` with numba at its first call, or load its machine code from the cache folder.
 
-    No parallel loops, and of fastmath only fused multiply-adds, which change no order: the same bytes come
-    out on any number of threads. The interpreter's lock is released, so threads can share the work.
+    There are no parallel loops, and of fastmath only fused multiply-adds, which keep the order of sums. So
+    results do not depend on the number of threads. The GIL is released, so threads can share the work.
     """
     return cast(Function, Kernel(function, {"contract"}))
 
 
 def leaf_kernel(function: Function) -> Function:
-    """The same for what is called in the loops of other kernels: it makes no arrays.
+    """A kernel that other kernels call in their loops. It must not make arrays.
 
-    It counts no references to the arrays that it is given: in a loop that takes longer than the work.
+    It does not count references to its arguments (numba's `_nrt=False`), which would take longer than its
+    work.
     """
     return cast(Function, Kernel(function, {"contract"}, _nrt=False))
 
 
-def unfolded_kernel(function: Function) -> Function:
-    """A lean kernel whose machine code becomes part of its callers', however long: it may take many arrays.
+def llvm_inline_kernel(function: Function) -> Function:
+    """A leaf kernel that LLVM always inlines (numba's `forceinline=True`), however long it is.
 
-    To hand over the arrays of an NDT takes a hundred machine words a call.
+    For kernels that take many arrays: to pass the arrays of an NDT takes a hundred machine words a call.
     """
     return cast(Function, Kernel(function, {"contract"}, _nrt=False, forceinline=True))
 
 
-def forceinline_kernel(function: Function) -> Function:
-    """The same for what gives lean kernels a part of their arrays: it becomes part of them."""
+def numba_inline_kernel(function: Function) -> Function:
+    """A kernel that numba inlines before typing (`inline="always"`), for one that returns views of arrays."""
     return cast(Function, Kernel(function, {"contract"}, inline="always"))
 
 
 def reduction_kernel(function: Function) -> Function:
-    """A lean kernel whose loop does nothing but sum: its terms may be summed in lanes, side by side.
+    """A leaf kernel whose loop only sums. The compiler may vectorise it, which changes the order of the sum.
 
-    How many lanes there are depends on the processor, on nothing else.
+    The number of vector lanes depends on the processor alone.
     """
     return cast(Function, Kernel(function, {"contract", "reassoc", "nsz"}, _nrt=False))
 
@@ -99,58 +101,59 @@ class Kernel:
         functools.update_wrapper(self, function)
         self.py_func = function
         self._options = {"nogil": True, "error_model": "numpy", "fastmath": fastmath, **options}
-        self._versions: dict[object, Callable[..., Any]] = {}
-        """By the kinds of the arguments; by their looks, of which several are of the same kinds, below."""
-        self._by_looks: dict[object, Callable[..., Any]] = {}
-        self._called_by_kernels: Any = None
+        self.specialisations: dict[object, Callable[..., Any]] = {}
+        """Compiled functions by the types of the arguments (`_type_key`)."""
+        self.by_fingerprint: dict[object, Callable[..., Any]] = {}
+        """The same functions by the fingerprints of the arguments, which are faster to take."""
+        self._dispatcher: Any = None
 
     def __call__(self, *arguments: Any) -> Any:
         """What the function returns."""
-        looks = tuple([LOOK(each) if type(each) is np.ndarray else _look(each) for each in arguments])
-        version = self._by_looks.get(looks)
-        if version is None:
-            version = self._by_looks[looks] = self._by_kinds(arguments)
-        return version(*arguments)
+        key = tuple(
+            [ARRAY_KEY(each) if type(each) is np.ndarray else _fingerprint(each) for each in arguments]
+        )
+        compiled = self.by_fingerprint.get(key)
+        if compiled is None:
+            compiled = self.by_fingerprint[key] = self._specialisation(arguments)
+        return compiled(*arguments)
 
-    def _by_kinds(self, arguments: tuple[Any, ...]) -> Callable[..., Any]:
-        """The kernel for such arguments, which may be there already."""
-        kinds = tuple([_kind(argument) for argument in arguments])
-        with LOCK:
-            if kinds not in self._versions:
-                self._versions[kinds] = self._version(kinds, arguments)
-            return self._versions[kinds]
+    def _specialisation(self, arguments: tuple[Any, ...]) -> Callable[..., Any]:
+        """The compiled function for arguments of these types, which is made if there is none yet."""
+        types = tuple([_type_key(argument) for argument in arguments])
+        with COMPILE_LOCK:
+            if types not in self.specialisations:
+                self.specialisations[types] = self._load_or_compile(types, arguments)
+            return self.specialisations[types]
 
-    def _version(self, kinds: object, arguments: tuple[Any, ...]) -> Callable[..., Any]:
-        """The kernel for arguments of these kinds."""
-        file = machine_code.kept_in(f"{self.py_func.__module__}.{self.py_func.__qualname__}", kinds)
+    def _load_or_compile(self, types: object, arguments: tuple[Any, ...]) -> Callable[..., Any]:
+        file = machine_code.code_file(f"{self.py_func.__module__}.{self.py_func.__qualname__}", types)
         if file is None:
             return cast(Callable[..., Any], self.dispatcher)
-        version = machine_code.load(file, self.py_func.__name__)
-        if version is None:
-            _tell()
-            made = self._dispatcher(arguments)
-            (compiled,) = made.overloads.values()
-            # Another process may have been first.
-            version = machine_code.keep(file, self.py_func.__name__, compiled) or made
-        return cast(Callable[..., Any], version)
+        loaded = machine_code.load(file, self.py_func.__name__)
+        if loaded is None:
+            _announce_compile()
+            jitted = self._njit(arguments)
+            (compiled,) = jitted.overloads.values()
+            # Another process may have saved its code first.
+            loaded = machine_code.save(file, self.py_func.__name__, compiled) or jitted
+        return cast(Callable[..., Any], loaded)
 
     @property
     def dispatcher(self) -> Any:
-        """What numba makes of the function, with numba's own cache: for the kernels that call it."""
-        with LOCK:
-            if self._called_by_kernels is None:
-                self._called_by_kernels = self._dispatcher()
-                _forgive(getattr(self._called_by_kernels, "_cache", None))
-        return self._called_by_kernels
+        """numba's dispatcher of the function, with numba's own cache. Kernels that call this one use it."""
+        with COMPILE_LOCK:
+            if self._dispatcher is None:
+                self._dispatcher = self._njit()
+                _tolerate_broken_cache(getattr(self._dispatcher, "_cache", None))
+        return self._dispatcher
 
-    def _dispatcher(self, arguments: tuple[Any, ...] | None = None) -> Any:
-        """A function of numba's that compiles this one at its call, or now and only for these arguments."""
-        numba = _numba()
+    def _njit(self, arguments: tuple[Any, ...] | None = None) -> Any:
+        """A dispatcher that compiles at its first call; given arguments, now and for their types only."""
+        numba = _import_numba()
         config: Any = numba.config
         folder = cache_folder() if arguments is None else None
         signature = None if arguments is None else [tuple(map(numba.typeof, arguments))]
-        # numba picks a function's folder when it is decorated: other users of numba in this process keep
-        # theirs.
+        # numba reads its cache folder when it decorates. It is restored for other users of numba.
         own = "" if folder is None else str(folder / machine_code.vector_library())
         configured, config.CACHE_DIR = config.CACHE_DIR, own
         try:
@@ -160,19 +163,19 @@ class Kernel:
 
     @property
     def _numba_type_(self) -> Any:
-        """What numba takes a kernel for that another one calls."""
+        """The numba type of this kernel in one that calls it."""
         return self.dispatcher._numba_type_
 
     @property
     def targetoptions(self) -> Any:
-        """Where numba looks whether the kernel becomes part of the one that calls it."""
+        """The options in which numba looks for `inline`."""
         return self.dispatcher.targetoptions
 
 
-def _numba() -> Any:
-    """numba; where it comes in here, without the vector library that a machine may have.
+def _import_numba() -> Any:
+    """numba, imported without Intel's vector library (SVML), if this is the first import.
 
-    With that, sines would round otherwise than on other machines, and kept code would need it.
+    With SVML, sines round differently than on other machines, and cached code needs the library.
     """
     switch = "NUMBA_DISABLE_INTEL_SVML"
     before, os.environ[switch] = os.environ.get(switch), "1"
@@ -187,22 +190,24 @@ def _numba() -> Any:
             os.environ[switch] = before
 
 
-def _look(value: Any) -> object:
-    """What tells arguments of other kinds apart, and can be had in less time than the kind."""
+def _fingerprint(value: Any) -> object:
+    """A key that differs wherever `_type_key` differs, and takes less time."""
     if isinstance(value, np.ndarray):
-        return LOOK(value)
+        return ARRAY_KEY(value)
     if isinstance(value, tuple):
-        return type(value), *[LOOK(each) if type(each) is np.ndarray else _look(each) for each in value]
+        return type(value), *[
+            ARRAY_KEY(each) if type(each) is np.ndarray else _fingerprint(each) for each in value
+        ]
     return type(value)
 
 
-def _kind(value: Any) -> object:
-    """What of an argument its machine code depends on."""
+def _type_key(value: Any) -> object:
+    """What machine code depends on of an argument. Raises TypeError for what no kernel takes."""
     if isinstance(value, np.ndarray):
         flags = value.flags.num
-        return value.dtype, value.ndim, flags & (IN_C_ORDER if flags & C_ORDER else NOT_IN_C_ORDER)
+        return value.dtype, value.ndim, flags & (C_ORDER_FLAGS if flags & C_ORDER else OTHER_ORDER_FLAGS)
     if isinstance(value, tuple):
-        return type(value), *[_kind(each) for each in value]
+        return type(value), *[_type_key(each) for each in value]
     if isinstance(value, float):
         return float
     if value is None or isinstance(value, (int, np.generic)):
@@ -210,8 +215,8 @@ def _kind(value: Any) -> object:
     raise TypeError(f"kernels take arrays, numbers and tuples of them, not {type(value).__name__}")
 
 
-def _forgive(cache: Any) -> None:
-    """Let no folder that is full or damaged stop the work: what cannot be loaded is compiled anew."""
+def _tolerate_broken_cache(cache: Any) -> None:
+    """Keep a full or damaged cache folder from stopping the work: what cannot be loaded is compiled again."""
     if cache is None:
         return
     load, save = cache.load_overload, cache.save_overload
@@ -221,11 +226,11 @@ def _forgive(cache: Any) -> None:
         try:
             loaded = load(*call)
         except Exception:
-            # What is damaged can raise anything. An empty index takes its place.
+            # A damaged file can raise anything. Its index is emptied.
             with contextlib.suppress(Exception):
                 cache.flush()
         if loaded is None:
-            _tell()
+            _announce_compile()
         return loaded
 
     def save_if_possible(*call: Any) -> None:

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
-from nscan_cli.files.inputs import Bytes
-from nscan_cli.files.limits import INPUT, ExceededError
+from nscan_cli.files.inputs import FileBytes
+from nscan_cli.files.limits import INPUT, LimitExceededError
 
 PIECE = 256
 """Bytes that are unpacked at once: what goes before damage stays, and no piece becomes large."""
@@ -65,7 +65,7 @@ SUFFIXES = (".gz", ".bz2", ".xz", ".zst", ".zstd", ".lz4")
 """What names of compressed files end with."""
 
 
-def packing_of(data: Bytes) -> Packing | None:
+def packing_of(data: FileBytes) -> Packing | None:
     """How the data are compressed; None when they are not."""
     return next((packing for packing in PACKINGS if data[: len(packing.magic)] == packing.magic), None)
 
@@ -87,8 +87,8 @@ def unpacked(stored: bytes, packing: Packing) -> tuple[bytes, str | None]:
                 content.append(piece)
                 size += len(piece)
                 if size > most:
-                    raise ExceededError(INPUT, UNPACKS)
-        except ExceededError:
+                    raise LimitExceededError(INPUT, UNPACKS)
+        except LimitExceededError:
             raise
         except Exception as error:
             # zlib.error, OSError, LZMAError, ZstdError, RuntimeError: each library has its own.

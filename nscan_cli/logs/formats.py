@@ -6,7 +6,7 @@ import importlib
 import re
 from typing import Any, NamedTuple
 
-from nscan_cli.files.inputs import Bytes
+from nscan_cli.files.inputs import FileBytes
 from nscan_cli.logs.compression import packing_of
 
 
@@ -26,7 +26,7 @@ class Form(NamedTuple):
     by_path: bool = False
     """Whether the module has `recording_at` too, as logs.load.Database says, which opens the file itself."""
 
-    def fits(self, data: Bytes) -> bool:
+    def fits(self, data: FileBytes) -> bool:
         """Whether these bytes are of this form."""
         if self.magic is not None:
             return data[: len(self.magic)] == self.magic

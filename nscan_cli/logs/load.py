@@ -11,9 +11,9 @@ from mmap import mmap
 from typing import Protocol
 
 from nscan_cli.errors import InputDataError, WrongUsageError
-from nscan_cli.files.encoding import plain
-from nscan_cli.files.inputs import Bytes, base_name, common_hash, label, mapped, read_bytes, sha256_of
-from nscan_cli.files.limits import ExceededError
+from nscan_cli.files.encoding import without_byte_order_mark
+from nscan_cli.files.inputs import FileBytes, base_name, common_hash, label, memory_map, read_bytes, sha256_of
+from nscan_cli.files.limits import LimitExceededError
 from nscan_cli.files.source import Source
 from nscan_cli.logs.compression import packing_of, unpacked
 from nscan_cli.logs.formats import FORMS, Form, foreign, readable
@@ -34,7 +34,7 @@ class Reader(Protocol):
 class Container(Protocol):
     """What a module that reads a container of messages has."""
 
-    def recording(self, data: Bytes, file: str, salvage: bool) -> Recording:
+    def recording(self, data: FileBytes, file: str, salvage: bool) -> Recording:
         """The messages; `file` is what errors call it. Raises InputDataError and ExceededError."""
 
 
@@ -66,18 +66,18 @@ def read_log(
     return _noted(log, parts.warnings)
 
 
-def stored_bytes(path: str) -> Bytes:
+def stored_bytes(path: str) -> FileBytes:
     """The bytes of a log as they are stored. Those of a recording in a file are not taken into memory.
 
     Raises InputMissingError, and InputDataError when there are more than the limit allows.
     """
     head = first_bytes(path)
     if any(form.container and form.fits(head) for form in FORMS if form.magic is not None):
-        return mapped(path)
+        return memory_map(path)
     return read_bytes(path)
 
 
-def recording_in(stored: Bytes, path: str, salvage: bool) -> Recording | None:
+def recording_in(stored: FileBytes, path: str, salvage: bool) -> Recording | None:
     """The messages of the recording whose bytes `path` has; None where it is none. Raises InputDataError."""
     data, lost = _content(stored, path, salvage)
     form = next((form for form in FORMS if form.container and form.fits(data)), None)
@@ -85,7 +85,7 @@ def recording_in(stored: Bytes, path: str, salvage: bool) -> Recording | None:
         return None
     try:
         recording = _recording(form, data, path, salvage)
-    except ExceededError as error:
+    except LimitExceededError as error:
         raise InputDataError(label(path), str(error), error.remedy) from error
     recording.warnings[:0] = [] if lost is None else [lost]
     return recording
@@ -105,7 +105,7 @@ def recording_at(folder: str, salvage: bool) -> Recording | None:
 
 
 def log_from(
-    stored: Bytes, path: str, options: ReadingOptions = AS_FOUND, even_unusable: bool = False
+    stored: FileBytes, path: str, options: ReadingOptions = AS_FOUND, even_unusable: bool = False
 ) -> LaserLog:
     """The log in the bytes that `path` has; raises the same errors."""
     name = label(path)
@@ -124,7 +124,7 @@ def log_from(
             assert isinstance(data, bytes)
             reader: Reader = form.reader()
             log = reader.read(data, name, source, options)
-    except ExceededError as error:
+    except LimitExceededError as error:
         raise InputDataError(name, str(error), error.remedy) from error
     return _noted(_usable(log, even_unusable), () if lost is None else (lost,))
 
@@ -136,12 +136,12 @@ def content_of(stored: bytes, path: str, salvage: bool) -> tuple[bytes, str | No
     """
     packing = packing_of(stored)
     if packing is None:
-        return plain(stored, label(path)), None
+        return without_byte_order_mark(stored, label(path)), None
     try:
         content, problem = unpacked(stored, packing)
-    except ExceededError as error:
+    except LimitExceededError as error:
         raise InputDataError(label(path), str(error), error.remedy) from error
-    content = plain(content, label(path))
+    content = without_byte_order_mark(content, label(path))
     if problem is None:
         return content, None
     if not salvage:
@@ -149,7 +149,7 @@ def content_of(stored: bytes, path: str, salvage: bool) -> tuple[bytes, str | No
     return content, f"{problem}: the rest is lost"
 
 
-def _content(stored: Bytes, path: str, salvage: bool) -> tuple[Bytes, str | None]:
+def _content(stored: FileBytes, path: str, salvage: bool) -> tuple[FileBytes, str | None]:
     """The same; what is in its place in a file is not compressed."""
     return content_of(stored, path, salvage) if isinstance(stored, bytes) else (stored, None)
 
@@ -184,7 +184,7 @@ def _joined(parts: Parts, salvage: bool) -> tuple[Recording, Source]:
             found.append((base_name(path), recording))
         order = joining.in_order_of_time(found)
         whole = joining.joined([found[place] for place in order], parts.are_parts)
-    except ExceededError as error:
+    except LimitExceededError as error:
         raise InputDataError(parts.title, str(error), error.remedy) from error
     del found
     return whole, _together(parts.name, [file for place in order for file in sources[place]])
@@ -197,7 +197,7 @@ def _scans(recording: Recording, name: str, source: Source, options: ReadingOpti
     return recorded.read(recording, name, source, options)
 
 
-def _form(data: Bytes, name: str) -> Form:
+def _form(data: FileBytes, name: str) -> Form:
     for form in FORMS:
         if form.fits(data):
             return form
@@ -206,7 +206,7 @@ def _form(data: Bytes, name: str) -> Form:
     raise InputDataError(name, f"is {found.name}", remedy)
 
 
-def _recording(form: Form, data: Bytes, path: str, salvage: bool) -> Recording:
+def _recording(form: Form, data: FileBytes, path: str, salvage: bool) -> Recording:
     """The messages in a container: of a database from its file, where it is one and not compressed."""
     if form.by_path and isinstance(data, mmap):
         database: Database = form.reader()
@@ -215,7 +215,7 @@ def _recording(form: Form, data: Bytes, path: str, salvage: bool) -> Recording:
     return container.recording(data, label(path), salvage)
 
 
-def _source(stored: Bytes, path: str) -> Source:
+def _source(stored: FileBytes, path: str) -> Source:
     """The file, and what stands beside it."""
     name = base_name(path)
     sha256 = hashlib.sha256(stored).hexdigest() if isinstance(stored, bytes) else sha256_of(path)

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from nscan_cli.kernels.decorators import kernel, leaf_kernel
 from nscan_cli.poses import Array
-from nscan_cli.threads import in_threads
+from nscan_cli.threads import map_in_threads
 
 TILE = 32
 """Cells along the side of a tile."""

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from nscan_cli.kernels.decorators import forceinline_kernel, kernel, leaf_kernel
+from nscan_cli.kernels.decorators import kernel, leaf_kernel, numba_inline_kernel
 from nscan_cli.ndt.gaussians import make_gaussian
 from nscan_cli.ndt.hash_grid import OUTDATED, Grid, find_row, pack, shown
 from nscan_cli.poses import Array
@@ -139,7 +139,7 @@ def associate_again(grid: Grid, half: float, meeting: Association, x: float, y: 
                     meeting.gaussians[block, number, k] = gaussian[number]
 
 
-@forceinline_kernel
+@numba_inline_kernel
 def _make_outdated(grid: Grid, row: int, half: float) -> None:
     """Make the Gaussians of a lattice cell anew that are outdated."""
     for block in range(BLOCKS):

@@ -16,7 +16,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from nscan_cli.kernels.decorators import leaf_kernel, unfolded_kernel
+from nscan_cli.kernels.decorators import leaf_kernel, llvm_inline_kernel
 from nscan_cli.ndt.hash_grid import FACES, FLOOR, HALF_KEY, MINIMUM, Grid, find_row, unpack
 from nscan_cli.poses import Array
 
@@ -51,7 +51,7 @@ def make_gaussian(grid: Grid, row: int, half: float) -> None:
         shape(grid, key, back, long_axis_of(back), half, grid.gaussians[other])
 
 
-@unfolded_kernel
+@llvm_inline_kernel
 def shape(grid: Grid, key: int, moments: Moments, long_axis: Direction, half: float, gaussian: Array) -> None:
     """Write the numbers of the Gaussian with some moments about the centre of the cell of `key`."""
     (_, mx, my, _, _, _, fx, fy), (c2, s2) = moments, long_axis
@@ -81,7 +81,7 @@ def eigenvalues(grid: Grid, moments: Moments) -> tuple[float, float]:
     return max(middle - radius, floor * floor, 0.001 * large), large
 
 
-@unfolded_kernel
+@llvm_inline_kernel
 def faces(grid: Grid, row: int, half: float) -> tuple[Moments, Moments]:
     """Of the points of the block of `row`, and of those that lie on another face of the wall there.
 

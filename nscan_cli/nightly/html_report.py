@@ -74,7 +74,7 @@ def html_report(title: str, verdicts: list[CheckResult], folder: Path) -> bytes:
             "</html>",
         ]
     )
-    return shown(content + "\n").encode()
+    return printable(content + "\n").encode()
 
 
 def _to_look_at(verdicts: list[CheckResult]) -> list[str]:

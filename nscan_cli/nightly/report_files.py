@@ -34,5 +34,5 @@ def write_reports(
     ):
         path = folder / name
         if not path.is_file() or path.read_bytes() != content:
-            write_whole(str(path), content)
+            write_atomically(str(path), content)
     return verdicts

@@ -10,7 +10,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from nscan_cli.errors import OutputError
-from nscan_cli.files.outputs import TEMPORARY
+from nscan_cli.files.outputs import TEMPORARY_PREFIX
 
 LOCK, SCRATCH = ".lock", ".scratch"
 
@@ -38,7 +38,7 @@ def locked_folder(folder: str) -> Iterator[Path]:
         os.close(lock)
         raise OutputError(f"{folder}: another nightly is at work there; wait for it") from error
     try:
-        for left_over in (*path.glob(f"{TEMPORARY}*"), *path.glob(f"*/{TEMPORARY}*")):
+        for left_over in (*path.glob(f"{TEMPORARY_PREFIX}*"), *path.glob(f"*/{TEMPORARY_PREFIX}*")):
             left_over.unlink()
         yield path
     finally:

@@ -7,7 +7,7 @@ import json
 from pathlib import Path
 from typing import Any
 
-from nscan_cli.files.outputs import write_whole
+from nscan_cli.files.outputs import write_atomically
 from nscan_cli.files.text import json_bytes
 
 HISTORY_FILE = "nights.jsonl"

@@ -20,7 +20,7 @@ from typing import Any
 
 import pytest
 
-from nscan_cli.cli.main import OBJECTS
+from nscan_cli.cli.main import GC_THRESHOLD
 from nscan_cli.kernels.decorators import Kernel
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.logs.load import read_log
@@ -68,10 +68,10 @@ def spent(log: LaserLog, runs: int) -> Spent:
     with pytest.MonkeyPatch.context() as patch:
         for kernel in [each for each in gc.get_objects() if type(each) is Kernel]:
             versions = {
-                kinds: timed(kernel.py_func.__name__, each) for kinds, each in kernel._versions.items()
+                kinds: timed(kernel.py_func.__name__, each) for kinds, each in kernel.specialisations.items()
             }
-            patch.setattr(kernel, "_versions", versions)
-            patch.setattr(kernel, "_by_looks", {})
+            patch.setattr(kernel, "specialisations", versions)
+            patch.setattr(kernel, "by_fingerprint", {})
         for _ in range(runs):
             before, times = best, Spent()
             begun = time.perf_counter()
@@ -121,7 +121,7 @@ def main() -> None:
     parser.add_argument("--runs", type=int, default=5)
     parser.add_argument("--perf", action="store_true", help="sample the libraries, too")
     options = parser.parse_args()
-    gc.set_threshold(OBJECTS)
+    gc.set_threshold(GC_THRESHOLD)
     rows: list[list[str]] = []
     for path in options.logs:
         log = read_log(path)

@@ -14,7 +14,7 @@ from pathlib import Path
 
 import pytest
 
-from nscan_cli.files.outputs import TEMPORARY
+from nscan_cli.files.outputs import TEMPORARY_PREFIX
 from tests.cli.room_log import ALL_OUTPUTS, room_log
 
 SCANS = 40
@@ -62,7 +62,7 @@ def test_killed_at_random_moments(undisturbed, tmp_path):
         process.kill()
         process.communicate()
         left = outputs(tmp_path)
-        assert sum(name.startswith(TEMPORARY) for name in left) <= 1
+        assert sum(name.startswith(TEMPORARY_PREFIX) for name in left) <= 1
         for name in new:
             assert left[name] in (old[name], new[name])
     assert start(tmp_path, *ALL_OUTPUTS).wait(120) == 0

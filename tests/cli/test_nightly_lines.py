@@ -31,7 +31,7 @@ def test_a_live_line_for_each_log_and_no_more():
     columns = (TextColumn("{task.description}"), BarColumn(5), TextColumn("{task.fields[detail]}"))
     console = Console(file=screen, force_terminal=True, width=100, color_system=None)
     with Progress(*columns, console=console, auto_refresh=False) as bars:
-        lines = LiveLines(bars, ["intel", "fr079"])
+        lines = LiveProgress(bars, ["intel", "fr079"])
         lines.progress("intel", 50, 200, 7)
         details = [task.fields["detail"] for task in bars.tasks]
         assert details == ["50/200 scans, 7 keyframes, 0 s", ""]
@@ -50,7 +50,7 @@ def test_a_live_line_for_each_log_and_no_more():
 
 @pytest.mark.parametrize("quiet", [False, True])
 def test_plain_lines_where_there_is_no_terminal(quiet, capsys):
-    with night_lines(["intel"], quiet) as lines:
+    with night_progress(["intel"], quiet) as lines:
         lines.progress("intel", 50, 200, 7)
         lines.finished(entry("intel"), {**DONE, "evaluation": None})
     said = "" if quiet else "intel: 4.0 s, 25 times real time\n"

@@ -11,7 +11,7 @@ import click
 import pytest
 
 from nscan_cli.cli.main import COMMANDS, cli, run
-from nscan_cli.cli.subcommand import OWN_MEANINGS, Option
+from nscan_cli.cli.subcommand import COMMAND_SPECIFIC, Option
 
 EVERY = [
     (name, parameter)
@@ -48,7 +48,7 @@ def test_options_of_one_name_mean_the_same_or_are_a_commands_own():
     meanings: dict[str, set[tuple[Any, ...]]] = {}
     for _name, option in EVERY:
         meanings.setdefault(option.long_name, set()).add(meaning(option))
-    assert {name for name, found in meanings.items() if len(found) > 1} == OWN_MEANINGS
+    assert {name for name, found in meanings.items() if len(found) > 1} == COMMAND_SPECIFIC
 
 
 def test_no_two_options_have_the_same_variable():

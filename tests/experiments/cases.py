@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from nscan_cli.cli.known_poses import no_knowledge
+from nscan_cli.cli.known_poses import no_priors_among
 from nscan_cli.mapping.figures.match_plots import plot_nscan
 from nscan_cli.matching.joint.index_set import Kind
 from nscan_cli.matching.joint.joint_energy import JointProblem, all_pairs, no_priors
@@ -67,7 +67,7 @@ class Case:
         Raises RuntimeError when no two of the scans match.
         """
         match, left_out = nscan_match(
-            self.points, self.start, no_knowledge, fixed or 0, OPTIONS, JointOptions(fixed=fixed), pairs
+            self.points, self.start, no_priors_among, fixed or 0, OPTIONS, JointOptions(fixed=fixed), pairs
         )
         if match is None:
             raise RuntimeError(f"{self.name}: no two of the scans match")

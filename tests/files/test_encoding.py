@@ -8,7 +8,7 @@ import pytest
 
 from nscan_cli.errors import InputDataError
 from nscan_cli.evaluation.reference_relations import read_relations
-from nscan_cli.files.encoding import plain
+from nscan_cli.files.encoding import without_byte_order_mark
 from nscan_cli.graph.io.load_graph import load_graph
 from nscan_cli.graph.io.tum import read_tum
 from nscan_cli.logs.load import read_log
@@ -57,4 +57,4 @@ def test_other_encodings_are_named(encoding, tmp_path):
 
 @pytest.mark.parametrize("data", [b"", b"FLASER 1", bytes(64), b"\x89MCAP0\r\n", b"a\0b", bytes(range(256))])
 def test_other_bytes_stay_as_they_are(data):
-    assert plain(data, "x") == data
+    assert without_byte_order_mark(data, "x") == data

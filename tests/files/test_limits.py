@@ -158,7 +158,7 @@ def test_one_wide_scan_among_many_narrow_ones_takes_no_memory(tmp_path, monkeypa
 
 
 def test_no_more_kinds_of_records_than_the_limit(tmp_path, monkeypatch):
-    set_limit(monkeypatch, limits.KINDS, 3)
+    set_limit(monkeypatch, limits.RECORD_KINDS, 3)
     log = read(tmp_path, flaser(1.0), *(f"TAG{k} 1" for k in range(9)))
     assert len(log.report.records) == 3
     assert log.report.skipped == {"not a CARMEN record": (7, 4)}

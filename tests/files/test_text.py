@@ -9,7 +9,7 @@ import pytest
 
 from nscan_cli.errors import InputMissingError
 from nscan_cli.files.inputs import base_name
-from nscan_cli.files.text import in_plain_letters, json_bytes, path_of_name, shown
+from nscan_cli.files.text import encode_fallback, json_bytes, path_of_name, printable
 
 
 @pytest.mark.parametrize(
@@ -24,7 +24,7 @@ from nscan_cli.files.text import in_plain_letters, json_bytes, path_of_name, sho
     ],
 )
 def test_text_is_shown_as_unicode(text, as_shown):
-    assert shown(text) == as_shown
+    assert printable(text) == as_shown
     assert str(InputMissingError(text)) == as_shown
 
 
@@ -42,7 +42,7 @@ def test_a_name_is_the_same_text_whatever_its_folder():
      ("ascii", "90 deg +- sigma -> \\u65e5 \\xff")],
 )  # fmt: skip
 def test_what_an_encoding_lacks_is_printed_in_other_characters(encoding, printed):
-    codecs.register_error("plain", in_plain_letters)
+    codecs.register_error("plain", encode_fallback)
     assert "90° ± σ → 日 \udcff".encode(encoding, "plain").decode(encoding) == printed
 
 

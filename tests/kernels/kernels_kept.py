@@ -14,7 +14,7 @@ from tests.data import REPOSITORY
 KERNELS = """
 from typing import NamedTuple
 import numpy as np
-from nscan_cli.kernels.decorators import forceinline_kernel, kernel, leaf_kernel, reduction_kernel
+from nscan_cli.kernels.decorators import numba_inline_kernel, kernel, leaf_kernel, reduction_kernel
 
 class Pair(NamedTuple):
     numbers: np.ndarray
@@ -24,7 +24,7 @@ class Pair(NamedTuple):
 def add(a, b):
     return a + b
 
-@forceinline_kernel
+@numba_inline_kernel
 def row(table, i):
     return table[i]
 
@@ -56,10 +56,10 @@ REPORT = """
 import json, sys
 import numpy as np
 from nscan_cli.kernels.cache_folder import cache_folder
-from nscan_cli.kernels.machine_code import first_compile
+from nscan_cli.kernels.machine_code import is_uncompiled
 from some_kernels import Pair, add, refuse, scaled
 
-first = first_compile("add")
+first = is_uncompiled("add")
 numbers = np.arange(6.0).reshape(2, 3)
 results = [add(1, 2), add(1.0, 0.5), add(np.float64(1), 2.0)]
 for layout in (numbers, np.asfortranarray(numbers), numbers[:, ::2], numbers[::-1]):
@@ -71,7 +71,7 @@ try:
     refuse(2)
 except ValueError as error:
     results.append(str(error))
-print(json.dumps([str(cache_folder()), first, first_compile("add"), results, imported]))
+print(json.dumps([str(cache_folder()), first, is_uncompiled("add"), results, imported]))
 """
 RESULTS = [
     3,

@@ -13,7 +13,7 @@ import pytest
 from nscan_cli.kernels import cache_folder as folders
 from nscan_cli.kernels.cache_folder import cache_folder
 from nscan_cli.kernels.decorators import kernel
-from nscan_cli.kernels.machine_code import first_compile
+from nscan_cli.kernels.machine_code import is_uncompiled
 
 
 @pytest.fixture
@@ -75,7 +75,7 @@ def test_a_temporary_folder_that_others_can_write_is_not_trusted(places, monkeyp
     private.mkdir()
     private.chmod(0o777)
     assert chosen() is None
-    assert first_compile("approach_and_finish")
+    assert is_uncompiled("approach_and_finish")
     private.rmdir()
     (places / "elsewhere").mkdir()
     private.symlink_to(places / "elsewhere")
@@ -102,7 +102,7 @@ def made_by(package: Path, folder: Path) -> Path:
     (folder / "below_0a1b").mkdir(parents=True)
     for name in ("a.b-01.code", "a.c-01.left", "below_0a1b/f-1.py311.nbi", "below_0a1b/f-1.py311.1.nbc"):
         (folder / name).write_bytes(b"x")
-    (folder / folders.OWNER).write_bytes(os.fsencode(package))
+    (folder / folders.OWNER_FILE).write_bytes(os.fsencode(package))
     return folder
 
 
@@ -113,10 +113,10 @@ def test_a_new_folder_takes_the_place_of_those_that_nobody_needs(places):
     own = made_by(folders.PACKAGE, base / "0.1.0-00000000000000aa")
     gone = made_by(places / "gone", base / "0.1.0-00000000000000ab")
     old = made_by(folders.PACKAGE, base / "0.0.9-00000000000000ac")
-    (old / folders.OWNER).unlink()
+    (old / folders.OWNER_FILE).unlink()
     unused, used = (made_by(elsewhere, base / f"1.2.3rc1-00000000000000a{k}") for k in "de")
     long_ago = time.time() - 31 * 86400
-    os.utime(unused / folders.OWNER, (long_ago, long_ago))
+    os.utime(unused / folders.OWNER_FILE, (long_ago, long_ago))
     mixed = made_by(places / "gone", base / "0.1.0-00000000000000af")
     (mixed / "below_0a1b" / "notes.txt").write_text("mine")
     strangers = [made_by(places / "gone", base / "src"), made_by(places / "gone", places / "linked")]
@@ -141,7 +141,7 @@ def test_a_new_folder_takes_the_place_of_those_that_nobody_needs(places):
 def test_a_folder_that_is_used_says_so(places):
     folder = chosen()
     assert folder is not None
-    owner = folder / folders.OWNER
+    owner = folder / folders.OWNER_FILE
     assert owner.read_bytes() == os.fsencode(folders.PACKAGE)
     before = owner.stat().st_mtime
     chosen()

@@ -35,7 +35,7 @@ def test_an_array_that_cannot_be_written_has_code_of_its_own():
     values.setflags(write=False)
     assert lowest(values) == lowest(values.copy()) == 1.0
     assert isinstance(lowest, Kernel)
-    assert len(lowest._versions) == 2
+    assert len(lowest.specialisations) == 2
 
 
 def test_arrays_that_only_look_different_have_the_same_code():
@@ -46,8 +46,8 @@ def test_arrays_that_only_look_different_have_the_same_code():
     values = np.array([2.0, 1.0])
     assert greatest(values) == greatest(values[:]) == 2.0
     assert isinstance(greatest, Kernel)
-    assert len(greatest._by_looks) == 2
-    assert len(greatest._versions) == 1
+    assert len(greatest.by_fingerprint) == 2
+    assert len(greatest.specialisations) == 1
 
 
 COMMANDS = """

@@ -96,7 +96,9 @@ def test_what_numba_is_told_holds(whole, setting):
 
 def test_code_of_an_unknown_numba_is_left_to_its_own_cache(tmp_path):
     """It has renamed what is asked here: compiled in the first process, kept by numba in the second."""
-    swapped = "import nscan_cli.kernels.machine_code as m; m._parts = lambda compiled: compiled._renamed()\n"
+    swapped = (
+        "import nscan_cli.kernels.machine_code as m; m.object_code = lambda compiled: compiled._renamed()\n"
+    )
     assert report(tmp_path, swapped)[1:] == [True, False, RESULTS, True]
     assert report(tmp_path, swapped)[3:] == [RESULTS, True]
     kept = files(tmp_path, "nbc")
@@ -182,9 +184,9 @@ def test_machine_code_is_loaded_once(tmp_path, monkeypatch):
     numbers = np.arange(3.0)
     both(numbers)
     assert isinstance(both, Kernel)
-    (kept,), (first,) = tmp_path.glob(f"*{machine_code.SUFFIX}"), both._versions.values()
+    (kept,), (first,) = tmp_path.glob(f"*{machine_code.SUFFIX}"), both.specialisations.values()
     assert machine_code.load(kept, "both") is first
-    both._versions.clear()
-    both._by_looks.clear()
+    both.specialisations.clear()
+    both.by_fingerprint.clear()
     np.testing.assert_array_equal(both(numbers)[1], [1.0, 2.0, 3.0])
-    assert list(both._versions.values()) == [first]
+    assert list(both.specialisations.values()) == [first]

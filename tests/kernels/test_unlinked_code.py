@@ -8,9 +8,9 @@ from tests.kernels.kernels_kept import KERNELS, RESULTS, files, process, report
 
 HIDDEN = """
 import nscan_cli.kernels.machine_code as m
-whole = m._symbols
+whole = m.symbols
 name = "NRT_adapt_ndarray_from_python"
-m._symbols = lambda *libraries: (each for each in whole(*libraries) if each[0] != name)
+m.symbols = lambda *libraries: (each for each in whole(*libraries) if each[0] != name)
 """
 NOWHERE = """
 import llvmlite.binding as llvm

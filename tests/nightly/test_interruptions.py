@@ -65,6 +65,6 @@ def test_two_at_once_in_one_folder_are_refused(small, tmp_path, capsys):
 def test_what_was_half_written_is_cleared_away(small, undisturbed, tmp_path):
     folder = copy_of(undisturbed, tmp_path / "nights")
     for place in (folder, folder / "one"):
-        (place / f"{TEMPORARY}x1y2").write_bytes(b"half")
+        (place / f"{TEMPORARY_PREFIX}x1y2").write_bytes(b"half")
     assert run(["nightly", str(small), "-o", str(folder), "-q"]) == 0
     assert results(folder) == results(undisturbed)

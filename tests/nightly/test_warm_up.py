@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from nscan_cli.cli.night_lines import PlainLines
+from nscan_cli.cli.night_lines import PlainProgress
 from nscan_cli.kernels import machine_code
 from nscan_cli.logs.load import log_from
 from nscan_cli.nightly import bootstrap, local_executor, warm_up, worker
@@ -24,7 +24,7 @@ from tests.cli.room_log import room_log
 def cache(tmp_path, monkeypatch):
     (tmp_path / "cache").mkdir()
     monkeypatch.setattr(warm_up, "cache_folder", lambda: tmp_path / "cache")
-    monkeypatch.setattr(machine_code, "first_compile", lambda _name: False)
+    monkeypatch.setattr(machine_code, "is_uncompiled", lambda _name: False)
     return tmp_path / "cache"
 
 
@@ -42,11 +42,11 @@ def test_once_on_each_machine(cache, calls, monkeypatch):
     assert calls == [bootstrap.worker_command("warm_up")]
     # Somebody has cleared the folder.
     with monkeypatch.context() as patch:
-        patch.setattr(machine_code, "first_compile", lambda _name: True)
+        patch.setattr(machine_code, "is_uncompiled", lambda _name: True)
         warm_up.compile_kernels({})
     assert len(calls) == 2
     # Another processor, or another numba.
-    monkeypatch.setattr(machine_code, "machine", lambda: "another")
+    monkeypatch.setattr(machine_code, "build_key", lambda: "another")
     warm_up.compile_kernels({})
     assert len(calls) == 3
 

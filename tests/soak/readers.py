@@ -10,7 +10,7 @@ from pathlib import Path
 import click
 import numpy as np
 
-from nscan_cli.cli.info import as_text, facts_of
+from nscan_cli.cli.info import facts_of, facts_table
 from nscan_cli.cli.main import cli
 from nscan_cli.errors import NscanError
 from nscan_cli.evaluation.load_trajectory import load_trajectory
@@ -44,7 +44,7 @@ def log(path: str, chance: random.Random) -> None:
     )
     facts = facts_of(read_log(path, options))
     json.dumps(facts, allow_nan=False)
-    as_text(facts)
+    facts_table(facts)
 
 
 def json_graph(path: str, chance: random.Random) -> None:

@@ -26,8 +26,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nscan_cli.errors import InputDataError
-from nscan_cli.files.encoding import MARK
-from nscan_cli.files.limits import DISTANCE, INFORMATION, KINDS, Limit
+from nscan_cli.files.encoding import BYTE_ORDER_MARK
+from nscan_cli.files.limits import DISTANCE, INFORMATION, RECORD_KINDS, Limit
 from nscan_cli.poses import Array
 
 REMEDY = "mend or remove the line"
@@ -71,7 +71,7 @@ class Lines:
 def read_lines(data: bytes, name: str) -> Lines:
     """All lines of a file; `name` is what errors call it. Raises InputDataError naming the line."""
     lines = Lines()
-    for number, line in enumerate(io.BytesIO(data.removeprefix(MARK)), start=1):
+    for number, line in enumerate(io.BytesIO(data.removeprefix(BYTE_ORDER_MARK)), start=1):
         fields = line.decode("utf-8", errors="replace").split("#", 1)[0].split()
         if not fields:
             continue
@@ -139,7 +139,7 @@ def _take(lines: Lines, number: int, fields: list[str]) -> None:
         for text in fields[1:]:
             lines.fixed.setdefault(_key(text), number)
     else:
-        known = tag in lines.skipped or len(lines.skipped) < KINDS.value
+        known = tag in lines.skipped or len(lines.skipped) < RECORD_KINDS.value
         lines.skipped[tag if known else "others"] += 1
         key_there = _key_of(fields[1]) if tag.startswith("VERTEX") and len(fields) > 1 else None
         if key_there is not None:

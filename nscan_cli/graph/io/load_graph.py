@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from nscan_cli.files.encoding import plain
+from nscan_cli.files.encoding import without_byte_order_mark
 from nscan_cli.files.inputs import label, read_bytes
 from nscan_cli.files.limits import GRAPH
 from nscan_cli.graph.io.g2o import parse_g2o
@@ -18,7 +18,7 @@ def load_graph(path: str, notices: list[str] | None = None) -> Graph:
     nothing to read, InputDataError when it is no graph.
     """
     data = read_bytes(path, GRAPH)
-    text = plain(data, label(path))
+    text = without_byte_order_mark(data, label(path))
     if text.lstrip()[:1] == b"{":
         return parse_graph(text, label(path))
     graph = parse_g2o(data, path)

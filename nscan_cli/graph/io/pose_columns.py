@@ -11,7 +11,7 @@ import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
-from nscan_cli.files.encoding import MARK
+from nscan_cli.files.encoding import BYTE_ORDER_MARK
 
 COMMENTS = "#%"
 """What a line begins with that is a comment, or names the columns."""
@@ -80,7 +80,7 @@ def fields_of(line: str) -> list[str]:
 
 def lines_of(data: bytes) -> Iterator[tuple[int, str]]:
     """The lines of a text that are not blank, each with its number; a byte-order mark is no part of one."""
-    for number, line in enumerate(io.BytesIO(data.removeprefix(MARK)), start=1):
+    for number, line in enumerate(io.BytesIO(data.removeprefix(BYTE_ORDER_MARK)), start=1):
         text = line.decode("utf-8", errors="replace").strip()
         if text:
             yield number, text

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nscan_cli.graph.linalg.factor_pattern import Pattern
-from nscan_cli.kernels.decorators import forceinline_kernel, kernel, leaf_kernel, reduction_kernel
+from nscan_cli.kernels.decorators import kernel, leaf_kernel, numba_inline_kernel, reduction_kernel
 from nscan_cli.poses import Array, Indices
 
 LEAST_PIVOT = 1e-12
@@ -74,14 +74,14 @@ def loose_nodes(factor: Factor, share: float = 1e-6) -> NDArray[np.bool_]:
     return found[pattern.place]
 
 
-@forceinline_kernel
+@numba_inline_kernel
 def panel_of(pattern: Pattern, panels: Array, supernode: int) -> Array:
     """The panel (3 w, 3 h) of a supernode, its columns of numbers one after the other."""
     width = 3 * (pattern.supernodes[supernode + 1] - pattern.supernodes[supernode])
     return panels[pattern.panels[supernode] : pattern.panels[supernode + 1]].reshape(width, -1)
 
 
-@forceinline_kernel
+@numba_inline_kernel
 def rows_of(pattern: Pattern, supernode: int) -> Indices:
     """(h,) the rows of blocks of a supernode's panel, its own first."""
     first = pattern.supernodes[supernode]

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from nscan_cli.files.inputs import Bytes
+from nscan_cli.files.inputs import FileBytes
 from nscan_cli.logs.recordings.container import Recording
 from nscan_cli.logs.recordings.mcap_records import read_records
 
 
-def recording(data: Bytes, file: str, salvage: bool) -> Recording:
+def recording(data: FileBytes, file: str, salvage: bool) -> Recording:
     """All messages that are of use. Raises InputDataError and ExceededError."""
     return read_records(data, file, salvage)

@@ -21,7 +21,7 @@ from mcap.opcode import Opcode
 
 from nscan_cli.errors import InputDataError
 from nscan_cli.files.counting import counted
-from nscan_cli.files.inputs import Bytes
+from nscan_cli.files.inputs import FileBytes
 from nscan_cli.files.limits import INPUT, MB
 from nscan_cli.logs.recordings.container import DAMAGED, WANTED, Channel, Recording, ros_name
 
@@ -71,7 +71,7 @@ class Summary:
     """Messages by channel, where the file says so."""
 
 
-def read_records(data: Bytes, file: str, salvage: bool) -> Recording:
+def read_records(data: FileBytes, file: str, salvage: bool) -> Recording:
     """All messages that scans, odometry and mounting can come from.
 
     With `salvage`, damaged parts are left out and told in the recording's warnings. Raises InputDataError
@@ -83,7 +83,7 @@ def read_records(data: Bytes, file: str, salvage: bool) -> Recording:
 
 
 class _Reader:
-    def __init__(self, data: Bytes, file: str, salvage: bool) -> None:
+    def __init__(self, data: FileBytes, file: str, salvage: bool) -> None:
         self.data, self.file, self.salvage = data, file, salvage
         self.schemas: dict[int, records.Schema] = {}
         self.channels: dict[int, Channel] = {}
@@ -126,7 +126,7 @@ class _Reader:
         self.recording.warnings.append(f"damaged: {place}{problem}")
 
     def _framed(
-        self, data: Bytes, start: int, end: int, allowed: set[Opcode]
+        self, data: FileBytes, start: int, end: int, allowed: set[Opcode]
     ) -> Iterator[tuple[int, int, int]]:
         """Opcode, first byte of the content and the byte behind it, of one record after the other."""
         at = start
@@ -246,7 +246,7 @@ class _Reader:
         self.recording.pass_on(len(content))
         return content
 
-    def _record(self, opcode: int, data: Bytes, begin: int, stop: int) -> None:
+    def _record(self, opcode: int, data: FileBytes, begin: int, stop: int) -> None:
         """Take up a record that defines something, or a message."""
         if opcode in (Opcode.SCHEMA, Opcode.CHANNEL):
             self._define(opcode, data, begin, stop)
@@ -261,7 +261,7 @@ class _Reader:
             if channel.type in WANTED:
                 self.recording.keep(channel, log_time, data[begin + MESSAGE.size : stop])
 
-    def _define(self, opcode: int, data: Bytes, begin: int, stop: int) -> None:
+    def _define(self, opcode: int, data: FileBytes, begin: int, stop: int) -> None:
         if opcode == Opcode.SCHEMA:
             schema = records.Schema.read(_stream(data, begin, stop))
             self.schemas[schema.id] = schema
@@ -277,7 +277,7 @@ class _Reader:
         self.channels[channel.id] = made
 
 
-def _stream(data: Bytes, begin: int, stop: int) -> Any:
+def _stream(data: FileBytes, begin: int, stop: int) -> Any:
     return ReadDataStream(io.BytesIO(data[begin:stop]))
 
 

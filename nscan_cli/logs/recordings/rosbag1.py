@@ -12,7 +12,7 @@ from collections.abc import Callable
 from typing import Any
 
 from nscan_cli.errors import InputDataError
-from nscan_cli.files.inputs import Bytes
+from nscan_cli.files.inputs import FileBytes
 from nscan_cli.files.limits import INPUT, MB
 from nscan_cli.logs.recordings.container import DAMAGED, WANTED, Channel, Recording, ros_name
 from nscan_cli.logs.recordings.rosbag1_records import (
@@ -38,7 +38,7 @@ COUNT = struct.Struct("<II")
 WALKED = "its messages were found by walking through it"
 
 
-def recording(data: Bytes, file: str, salvage: bool) -> Recording:
+def recording(data: FileBytes, file: str, salvage: bool) -> Recording:
     """All messages that are of use, in order of their log times. Raises InputDataError and ExceededError."""
     walk = _Walk(data, file, salvage)
     walk.read()
@@ -46,7 +46,7 @@ def recording(data: Bytes, file: str, salvage: bool) -> Recording:
 
 
 class _Walk:
-    def __init__(self, data: Bytes, file: str, salvage: bool) -> None:
+    def __init__(self, data: FileBytes, file: str, salvage: bool) -> None:
         self.data, self.file, self.salvage = data, file, salvage
         self.channels: dict[int, Channel] = {}
         self.in_chunks: dict[int, dict[int, int]] = {}
@@ -121,7 +121,7 @@ class _Walk:
         """Take up what is in a chunk. Of one that was never ended, the records follow it as they are."""
         counts = self.in_chunks.setdefault(chunk.at, {})
         try:
-            content: Bytes = self.data
+            content: FileBytes = self.data
             begin, end = chunk.begin, chunk.end
             if chunk.text(b"compression") != "none" and begin < end:
                 content = self._unpacked(chunk)
@@ -148,7 +148,7 @@ class _Walk:
         self.recording.pass_on(size)
         return content
 
-    def _take(self, record: BagRecord, content: Bytes, counts: dict[int, int]) -> None:
+    def _take(self, record: BagRecord, content: FileBytes, counts: dict[int, int]) -> None:
         """Take up a record that defines a connection, or a message."""
         if record.kind == CONNECTION:
             self._connect(record, content)
@@ -164,7 +164,7 @@ class _Walk:
         else:
             raise DamagedBagError(record.at, "a record that does not belong there")
 
-    def _connect(self, record: BagRecord, content: Bytes) -> None:
+    def _connect(self, record: BagRecord, content: FileBytes) -> None:
         number = record.number(b"conn")
         if number in self.channels:
             return

@@ -10,7 +10,7 @@ import struct
 from collections.abc import Iterator
 from typing import NamedTuple
 
-from nscan_cli.files.inputs import Bytes
+from nscan_cli.files.inputs import FileBytes
 
 LENGTH, LONG, TIME = struct.Struct("<I"), struct.Struct("<Q"), struct.Struct("<II")
 MAGIC = b"#ROSBAG V2.0\n"
@@ -64,7 +64,7 @@ class BagRecord(NamedTuple):
         return value
 
 
-def record_at(data: Bytes, at: int, end: int) -> BagRecord:
+def record_at(data: FileBytes, at: int, end: int) -> BagRecord:
     """The record that begins at a byte, and ends before `end`. Raises BrokenError when there is none."""
     fields, begin = fields_at(data, at, end, "a record's header")
     if begin + LENGTH.size > end:
@@ -79,7 +79,7 @@ def record_at(data: Bytes, at: int, end: int) -> BagRecord:
     return BagRecord(at, kind[0], fields, begin, begin + size)
 
 
-def records(data: Bytes, start: int, end: int) -> Iterator[BagRecord]:
+def records(data: FileBytes, start: int, end: int) -> Iterator[BagRecord]:
     """One record after the other. Raises BrokenError where there is none."""
     at = start
     while at < end:
@@ -88,7 +88,7 @@ def records(data: Bytes, start: int, end: int) -> Iterator[BagRecord]:
         yield record
 
 
-def fields_at(data: Bytes, at: int, end: int, what: str) -> tuple[dict[bytes, bytes], int]:
+def fields_at(data: FileBytes, at: int, end: int, what: str) -> tuple[dict[bytes, bytes], int]:
     """Fields that begin with their common length, and the byte behind them. Raises BrokenError."""
     if at + LENGTH.size > end:
         raise DamagedBagError(at, f"it ends within {what}")
@@ -99,7 +99,7 @@ def fields_at(data: Bytes, at: int, end: int, what: str) -> tuple[dict[bytes, by
     return named(data, begin, stop, at), stop
 
 
-def named(data: Bytes, begin: int, stop: int, at: int) -> dict[bytes, bytes]:
+def named(data: FileBytes, begin: int, stop: int, at: int) -> dict[bytes, bytes]:
     """The fields in some bytes; `at` is what an error names. Raises BrokenError."""
     fields = {}
     while begin < stop:
@@ -117,7 +117,7 @@ def named(data: Bytes, begin: int, stop: int, at: int) -> dict[bytes, bytes]:
     return fields
 
 
-def after_index(data: Bytes, record: BagRecord) -> int:
+def after_index(data: FileBytes, record: BagRecord) -> int:
     """The byte behind a record of the index, whose length some recorders have written wrong.
 
     Raises BrokenError when no record begins where one has to.
@@ -129,7 +129,7 @@ def after_index(data: Bytes, record: BagRecord) -> int:
     raise DamagedBagError(record.at, "a record of the index has a wrong length", in_index=True)
 
 
-def next_chunk(data: Bytes, start: int) -> int | None:
+def next_chunk(data: FileBytes, start: int) -> int | None:
     """The byte at or behind `start` where the next chunk begins that is whole; None where there is none."""
     found = data.find(CHUNK_FIELD, start)
     while found >= 0:
@@ -143,7 +143,7 @@ def next_chunk(data: Bytes, start: int) -> int | None:
     return None
 
 
-def _is_record(data: Bytes, at: int) -> bool:
+def _is_record(data: FileBytes, at: int) -> bool:
     try:
         record_at(data, at, len(data))
     except DamagedBagError:

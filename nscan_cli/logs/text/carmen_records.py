@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from nscan_cli.files.limits import KINDS
+from nscan_cli.files.limits import RECORD_KINDS
 from nscan_cli.logs.assemble import empty_table
 from nscan_cli.logs.skips import Skips
 from nscan_cli.logs.text.line_records import Block, LineRecord, as_text, beam_count, blocks, sound, sound_rows
@@ -63,7 +63,7 @@ def lines_by_tag(data: bytes, skips: Skips) -> dict[str, list[tuple[int, bytes]]
             tag, rest = [*text.split(None, 1), b""][:2]
         known = by_tag.get(tag)
         if known is None:
-            if not TAG.match(tag) or len(by_tag) >= KINDS.value:
+            if not TAG.match(tag) or len(by_tag) >= RECORD_KINDS.value:
                 skips.add("not a CARMEN record", number)
                 continue
             known = by_tag[tag] = []

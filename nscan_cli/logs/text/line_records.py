@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from nscan_cli.files.limits import BEAMS, DISTANCE
-from nscan_cli.kernels.decorators import are_up, kernel, leaf_kernel
+from nscan_cli.kernels.decorators import kernel, leaf_kernel, runtime_is_loaded
 from nscan_cli.logs.skips import Skips
 from nscan_cli.poses import Array
 
@@ -81,7 +81,7 @@ def _layout(record: tuple[LineRecord, int]) -> tuple[int, int]:
 
 def floats(text: bytes) -> Array | None:
     """All numbers of a text separated by blanks, or None when something else is among them."""
-    if len(text) >= LONG and are_up():
+    if len(text) >= LONG and runtime_is_loaded():
         values = np.empty(len(text) // 2 + 1)
         count = _plain_decimals(np.frombuffer(text, dtype=np.uint8), values)
         if count >= 0:

@@ -16,7 +16,7 @@ from typing import Literal
 
 import numpy as np
 
-from nscan_cli.files.limits import KINDS
+from nscan_cli.files.limits import RECORD_KINDS
 from nscan_cli.logs.assemble import RawScans, stacked
 from nscan_cli.logs.laser_defaults import CARMEN_MAX_RANGE
 from nscan_cli.logs.skips import Skips
@@ -72,7 +72,7 @@ def lines_by_device(data: bytes, version: Version, skips: Skips) -> Lines:
         host, robot = parts[1:3] if version else (b"", b"")
         stamp = parts[time]
         key = (host, robot, parts[at], parts[at + 1], kind)
-        if key not in found and len(found) >= KINDS.value:
+        if key not in found and len(found) >= RECORD_KINDS.value:
             skips.add("a device too many", number)
             continue
         found.setdefault(key, []).append((number, stamp, payload))

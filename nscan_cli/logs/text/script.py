@@ -12,7 +12,7 @@ import re
 import numpy as np
 
 from nscan_cli.errors import InputDataError, WrongUsageError
-from nscan_cli.files.limits import KINDS
+from nscan_cli.files.limits import RECORD_KINDS
 from nscan_cli.files.source import Source
 from nscan_cli.logs import scan_order as order
 from nscan_cli.logs.assemble import Findings, RawScans, RecordedMotion, laser_log, stacked
@@ -88,7 +88,7 @@ def _lines(data: bytes, skips: Skips) -> Lines:
         tag, head = parts["tag"].decode(), parts["head"]
         if tag in ("LASER-RANGE", "LASER-SCAN"):
             tag = f"LASER-RANGE:{head.split()[0].decode('ascii', 'replace') if head.strip() else ''}"
-        if tag not in lines and len(lines) >= KINDS.value:
+        if tag not in lines and len(lines) >= RECORD_KINDS.value:
             skips.add("a kind of record too many", number)
             continue
         if tag != "POS" and not tag.startswith("LASER-RANGE:"):

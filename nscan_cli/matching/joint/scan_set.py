@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from nscan_cli.kernels.decorators import forceinline_kernel, kernel
+from nscan_cli.kernels.decorators import kernel, numba_inline_kernel
 from nscan_cli.ndt.association import room_to_meet
 from nscan_cli.ndt.energy import OUT, accumulate
 from nscan_cli.ndt.hash_grid import Grid
@@ -64,7 +64,7 @@ def with_usual(scans: ScanSet) -> ScanSet:
     return scans._replace(usual=_own_means(scans))
 
 
-@forceinline_kernel
+@numba_inline_kernel
 def scan_grid(scans: ScanSet, i: int) -> Grid:
     """The NDT of scan i."""
     grid, starts = scans.grid, scans.starts
@@ -82,7 +82,7 @@ def scan_grid(scans: ScanSet, i: int) -> Grid:
     )
 
 
-@forceinline_kernel
+@numba_inline_kernel
 def scan_points(scans: ScanSet, i: int) -> Array:
     """The points (m, 2) of scan i in its own frame."""
     return scans.points[scans.starts[3, i] : scans.starts[3, i + 1]]

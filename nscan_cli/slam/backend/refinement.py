@@ -74,7 +74,7 @@ class Refinement:
             if self._has_moved(k, poses, moved)
         }
         while chosen := self._uncovered(route, waiting):
-            found = in_threads(
+            found = map_in_threads(
                 self._threads,
                 lambda centre: self._match(route, centre, chosen[centre], self._options_of(centre)),
                 chosen,

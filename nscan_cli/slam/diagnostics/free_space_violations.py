@@ -21,7 +21,7 @@ from nscan_cli.matching.pose_kernels import relative_pose
 from nscan_cli.poses import Array, Indices, inverse, transform
 from nscan_cli.slam.keyframes.keyframe import Route
 from nscan_cli.slam.options import NScanOptions
-from nscan_cli.threads import in_threads
+from nscan_cli.threads import map_in_threads
 
 STRETCH = 40
 """Keyframes that came by again, one after another, are judged together. What differs in a sound map is seen
@@ -100,7 +100,7 @@ def free_space_violations(
         log.ranges[rows],
         np.stack([log.angle_min[rows], log.angle_increment[rows]], axis=1),
     )
-    parts = in_threads(
+    parts = map_in_threads(
         threads,
         lambda first: _compare(views, first, first + AT_A_TIME, options.radius, options.recent),
         range(0, len(rows), AT_A_TIME),

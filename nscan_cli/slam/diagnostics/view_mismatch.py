@@ -17,7 +17,7 @@ from nscan_cli.poses import Array, Indices
 from nscan_cli.slam.frontend.options import BreakOptions
 from nscan_cli.slam.frontend.view_similarity import BEARINGS, nearest_ranges, share_alike
 from nscan_cli.slam.keyframes.keyframe import Keyframe
-from nscan_cli.threads import in_threads
+from nscan_cli.threads import map_in_threads
 
 AT_A_TIME = 256
 """Scans that a thread compares."""
@@ -75,7 +75,7 @@ def view_mismatches(
     )
     bounds = breaking.view.tolerance, breaking.view.tolerance_per_metre
     shares = np.concatenate(
-        in_threads(
+        map_in_threads(
             threads,
             lambda first: _shares(
                 views, first, *log.points_of(slice(first, first + AT_A_TIME), reach), *bounds

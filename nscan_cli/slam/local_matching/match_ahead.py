@@ -18,7 +18,7 @@ from nscan_cli.slam.local_matching.coverage import Coverage
 from nscan_cli.slam.local_matching.joint_relations import LocalMatch, MatchNearby
 from nscan_cli.slam.local_matching.neighbours import Neighbours, choose_neighbours
 from nscan_cli.slam.options import NScanOptions
-from nscan_cli.threads import called
+from nscan_cli.threads import completed_call
 
 AHEAD = 2
 """So many matches are begun ahead of their turn."""
@@ -57,7 +57,7 @@ class MatchAhead:
         """Make the first match that waits, in the time that another one takes."""
         for keyframe, (route, near, match) in self._begun.items():
             if match.cancel():
-                made = called(partial(self._match, route, keyframe, near, self._options))
+                made = completed_call(partial(self._match, route, keyframe, near, self._options))
                 self._begun[keyframe] = _Begun(route, near, made)
                 return
 

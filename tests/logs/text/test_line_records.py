@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from nscan_cli.kernels.decorators import bring_up
+from nscan_cli.kernels.decorators import load_runtime
 from nscan_cli.logs.text import line_records as text_records
 from nscan_cli.logs.text.line_records import LONG, floats
 
@@ -26,7 +26,7 @@ blanks = st.text(" \t\n\v\f\r", min_size=1, max_size=3)
 
 @pytest.fixture(scope="module", autouse=True)
 def kernels_are_up() -> None:
-    bring_up()
+    load_runtime()
 
 
 def long_text(tokens: list[str], blank: str) -> bytes:
@@ -62,6 +62,6 @@ def test_numpy_is_asked_only_where_numbers_are_not_plain_or_no_kernels_are_up(
     assert floats(long_text(["1076354563.123456", "-0.000", "81.83"], " ")) is not None
     with pytest.raises(AssertionError):
         floats(long_text(["1e5"], " "))
-    monkeypatch.setattr(text_records, "are_up", lambda: False)
+    monkeypatch.setattr(text_records, "runtime_is_loaded", lambda: False)
     with pytest.raises(AssertionError):
         floats(long_text(["1.5"], " "))
