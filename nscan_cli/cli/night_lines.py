@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 
 @contextlib.contextmanager
-def night_lines(names: list[str], quiet: bool) -> Iterator[RunObserver]:
+def night_progress(names: list[str], quiet: bool) -> Iterator[RunObserver]:
     """The lines of the logs that are to be done, as long as the block lasts."""
     if quiet or not sys.stderr.isatty():
         yield PlainProgress(quiet)
@@ -80,7 +80,7 @@ class LiveProgress:
         return self.bars.add_task(name, total=None, start=False, detail="")
 
 
-def _outcome(night: RunRecord) -> str:
+def _outcome_line(night: RunRecord) -> str:
     if night["outcome"] != "done":
         return f"failed: {night['reason']}"
     errors, took, counts = MeasuredErrors.of(night), night["times"]["seconds"], night["counts"]

@@ -90,7 +90,7 @@ def command(
             if scheduler is None:
                 announce_compiling("follow", quiet)
             names = [entry.name for entry, _key in planned.to_do]
-            with night_lines(names, quiet) as lines:
+            with night_progress(names, quiet) as lines:
                 run_plan(planned, folder, _engine(jobs, scheduler, timeout), lines)
         else:
             logs = "the log is" if len(planned.up_to_date) == 1 else f"all {len(planned.up_to_date)} logs are"

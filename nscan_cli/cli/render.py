@@ -104,7 +104,7 @@ def command(
             canvas = plot_paper_figure(scans, rows, poses, grid, whole, overlays)
         else:
             canvas = plot_over_map(grid, whole, overlays)
-        write_whole(output, canvas.png())
+        write_atomically(output, canvas.png())
     else:
         from nscan_cli.mapping.map_server import map_image
 

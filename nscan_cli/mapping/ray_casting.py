@@ -69,7 +69,7 @@ def cast_rays(
         return tiles
 
     parts = min(threads, MAX_THREADS)
-    whole, *others = in_threads(parts, cast, np.array_split(np.arange(len(scans.rows)), parts))
+    whole, *others = map_in_threads(parts, cast, np.array_split(np.arange(len(scans.rows)), parts))
     for tiles in others:
         _add_counts(tiles, whole)
     return whole

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from nscan_cli import __version__
 from nscan_cli.files.counting import counted
-from nscan_cli.files.text import shown
+from nscan_cli.files.text import printable
 from nscan_cli.nightly.html_log_section import (
     STATUS_SYMBOLS,
     absent_section,

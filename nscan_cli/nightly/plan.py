@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from nscan_cli.errors import NscanError
-from nscan_cli.files.text import shown
+from nscan_cli.files.text import printable
 from nscan_cli.nightly.fingerprint import fingerprint, input_hash, inputs_and_parameters, log_size, tool_key
 from nscan_cli.nightly.manifest import ManifestEntry
 from nscan_cli.nightly.rerun_reasons import rerun_reasons
@@ -51,7 +51,7 @@ def make_plan(entries: list[ManifestEntry], folder: Path, force: bool) -> Plan:
             planned.unreadable.append((entry, _with_sources(entry, str(error))))
             continue
         planned.notes[entry.name] = [
-            f"{shown(entry.inputs[role].name)} differs from the file named in the manifest: "
+            f"{printable(entry.inputs[role].name)} differs from the file named in the manifest: "
             "its SHA-256 does not match"
             for role, sha256 in entry.sha256.items()
             if role in hashes and hashes[role] != sha256

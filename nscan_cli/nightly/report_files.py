@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from nscan_cli.files.outputs import write_whole
+from nscan_cli.files.outputs import write_atomically
 from nscan_cli.nightly.html_report import html_report
 from nscan_cli.nightly.json_report import json_report
 from nscan_cli.nightly.manifest import ManifestEntry

@@ -46,7 +46,7 @@ def append_run(folder: Path, night: RunRecord, files: dict[str, bytes]) -> None:
     what went well. Raises OutputError.
     """
     for name, content in files.items():
-        write_whole(str(folder / name), content)
+        write_atomically(str(folder / name), content)
     nights = read_runs(folder)
     again = bool(nights) and nights[-1]["key"] == night["key"]
     if again and (night["outcome"] == "done" or nights[-1]["outcome"] == "failed"):
@@ -54,7 +54,7 @@ def append_run(folder: Path, night: RunRecord, files: dict[str, bytes]) -> None:
     outputs = {name: hashlib.sha256(content).hexdigest() for name, content in files.items()}
     lines = [*nights, {**night, "outputs": outputs} if outputs else night]
     text = "".join(json.dumps(line, ensure_ascii=False, allow_nan=False) + "\n" for line in lines)
-    write_whole(str(folder / HISTORY_FILE), json_bytes(text))
+    write_atomically(str(folder / HISTORY_FILE), json_bytes(text))
 
 
 def _sha256(path: Path) -> str | None:

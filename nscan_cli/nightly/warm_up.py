@@ -59,11 +59,11 @@ def cached_files() -> set[str]:
 
 def _is_compiled(folder: Path) -> bool:
     """Whether the kernels were compiled, and not cleared away since."""
-    return _compiled_file(folder).exists() and not machine_code.first_compile("follow")
+    return _compiled_file(folder).exists() and not machine_code.is_uncompiled("follow")
 
 
 def _compiled_file(folder: Path) -> Path:
-    return folder / f"{COMPILED_FILE}-{machine_code.machine()}"
+    return folder / f"{COMPILED_FILE}-{machine_code.build_key()}"
 
 
 def main() -> None:
@@ -76,7 +76,7 @@ def main() -> None:
     from nscan_cli.mapping.occupancy import occupancy_grid
     from nscan_cli.slam.map_log import map_log, slam_options
 
-    compiled.bring_up()
+    compiled.load_runtime()
     drive = simulated_carmen_log()
     for reading in (ReadingOptions(), ReadingOptions(end=20.0, odometry=False)):
         log = log_from(drive, "warm-up.log", reading)

@@ -18,7 +18,7 @@ from nscan_cli.slam.local_matching.match_keyframe import match_keyframe
 from nscan_cli.slam.local_matching.neighbours import choose_neighbours
 from nscan_cli.slam.loop_closure.close_loops import close_loops
 from nscan_cli.slam.state import SlamState
-from nscan_cli.threads import Beside
+from nscan_cli.threads import BackgroundCalls
 
 Report = Callable[[int, int], None]
 """Called with the number of scans tracked and of keyframes."""
@@ -32,7 +32,7 @@ def run_slam(state: SlamState, report: Report) -> Graph:
     tracker, behind = tracker_of(state.log, state.options), state.options.nscan.behind
     with (
         MatchAhead(state.match, state.options.nscan, state.threads) as ahead,
-        Beside(state.threads) as beside,
+        BackgroundCalls(state.threads) as beside,
     ):
         for scans in scan_batches(
             state.log, state.options.tracking.max_range, state.odometry, state.frozen_scans

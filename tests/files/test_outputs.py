@@ -76,8 +76,12 @@ def test_what_a_killed_process_has_left_is_cleared_away(tmp_path):
     """But not what another one is writing at the moment."""
     for name in ("dead", "dead2"):
         (tmp_path / f"{TEMPORARY_PREFIX}{name}").write_bytes(b"half")
-    other = "import sys; from nscan_cli.files.outputs import atomic_file\n"
-    other += "with atomic_file('other.json') as file: file.write(b'x'); print(1, flush=True); sys.stdin.read()"
+    other = (
+        "import sys; from nscan_cli.files.outputs import atomic_file\n"
+        "with atomic_file('other.json') as f: f.write(b'x'); print(1, flush=True); sys.stdin.read()"
+    )
+        "with atomic_file('other.json') as file: file.write(b'x'); print(1, flush=True); sys.stdin.read()"
+    )
     process = subprocess.Popen(
         [sys.executable, "-c", other], cwd=tmp_path, stdin=subprocess.PIPE, stdout=subprocess.PIPE
     )

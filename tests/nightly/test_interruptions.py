@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 
 from nscan_cli.cli.main import run
-from nscan_cli.files.outputs import TEMPORARY
+from nscan_cli.files.outputs import TEMPORARY_PREFIX
 from nscan_cli.nightly.results_folder import locked_folder
 from tests.nightly.small_logs import copy_of, results
 

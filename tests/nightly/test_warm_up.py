@@ -112,7 +112,7 @@ def test_what_is_not_timed_is_said(tmp_path, capsys):
         "times": {"seconds": None, "finished": "2026-11-21T03:00:00Z", "anew": ["the log has changed"]},
     }  # fmt: skip
     entry = ManifestEntry("a", {"log": Path("a.log")})
-    PlainLines(False).finished(entry, night)
+    PlainProgress(False).finished(entry, night)
     assert capsys.readouterr().err == "a: not timed: kernels were compiled meanwhile\n"
     text = log_section(check_log(entry, [night], [], absent=False), tmp_path)
     assert '<span class="time">not timed: kernels were compiled meanwhile</span>' in text

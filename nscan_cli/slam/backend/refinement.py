@@ -24,7 +24,7 @@ from nscan_cli.slam.local_matching.joint_relations import LocalMatch, MatchNearb
 from nscan_cli.slam.local_matching.neighbours import Neighbours, choose_neighbours
 from nscan_cli.slam.options import NScanOptions
 from nscan_cli.slam.state import SlamState
-from nscan_cli.threads import in_threads
+from nscan_cli.threads import map_in_threads
 
 
 def refine(state: SlamState) -> None:
