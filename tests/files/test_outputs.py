@@ -80,8 +80,6 @@ def test_what_a_killed_process_has_left_is_cleared_away(tmp_path):
         "import sys; from nscan_cli.files.outputs import atomic_file\n"
         "with atomic_file('other.json') as f: f.write(b'x'); print(1, flush=True); sys.stdin.read()"
     )
-        "with atomic_file('other.json') as file: file.write(b'x'); print(1, flush=True); sys.stdin.read()"
-    )
     process = subprocess.Popen(
         [sys.executable, "-c", other], cwd=tmp_path, stdin=subprocess.PIPE, stdout=subprocess.PIPE
     )
