@@ -1,5 +1,4 @@
-"""`kernel`, the decorator of compiled functions: loads machine code from the cache folder, or has numba make
-it.
+"""`kernel`, the decorator of compiled functions: it loads cached machine code, or has numba compile it.
 
 numba's own cache is used beside it, so that a function that two kernels call is compiled once.
 """
