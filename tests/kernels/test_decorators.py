@@ -91,7 +91,7 @@ def kernels() -> Iterator[tuple[str, ast.FunctionDef]]:
 
 
 def test_no_kernel_needs_scipy():
-    """numba compiles products of matrices only where SciPy is installed, and nothing installs it."""
+    """numba takes products of matrices from SciPy's BLAS: a kernel with one would have to import it."""
     found = dict(kernels())
     assert len(found) > 50
     for name, function in found.items():

@@ -10,7 +10,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from nscan_cli.graph.linalg.ordering import order_of_little_fill
 from nscan_cli.kernels.decorators import kernel
 from nscan_cli.poses import Indices
 
@@ -38,8 +37,7 @@ def find_pattern(edges: Indices, nodes: int) -> Pattern:
     if nodes == 0:
         none = np.zeros(1, np.int64)
         return Pattern(none[:0], none, none[:0], none, none)
-    indptr, indices = _adjacency(edges, nodes)
-    place = order_of_little_fill(indptr, indices)
+    indptr, indices, place = _fill_reducing_order(edges, nodes)
     starts, rows = _fill(indptr, indices, place, np.argsort(place))
     heights = np.diff(starts)
     # The rows of a column are those of the one before, less one, when there are as many and it is the first
@@ -49,6 +47,32 @@ def find_pattern(edges: Indices, nodes: int) -> Pattern:
     supernodes = np.concatenate([[0], np.flatnonzero(~goes_on) + 1, [nodes]])
     numbers = 9 * np.diff(supernodes) * heights[supernodes[:-1]]
     return Pattern(place, starts, rows, supernodes, np.concatenate([[0], np.cumsum(numbers)]))
+
+
+def _fill_reducing_order(edges: Indices, nodes: int) -> tuple[Indices, Indices, Indices]:
+    """The neighbours of each node, itself among them, and its row: (indptr, indices, place).
+
+    The order is SuperLU's multiple minimum degree. Its incomplete factorisation drops every entry off the
+    diagonal, so that it gives the order of the complete one and does not factorise.
+    """
+    from scipy.sparse import coo_array
+    from scipy.sparse.linalg import spilu
+
+    a, b = edges[(edges >= 0).all(axis=1)].T
+    each = np.arange(nodes)
+    entries = np.concatenate([np.full(2 * len(a), 1e-9), np.ones(nodes)])
+    ends = np.concatenate([a, b, each]), np.concatenate([b, a, each])
+    matrix = coo_array((entries, ends), shape=(nodes, nodes)).tocsc()
+    order = spilu(
+        matrix,
+        drop_tol=1.0,
+        drop_rule="basic",
+        fill_factor=1.0,
+        permc_spec="MMD_AT_PLUS_A",
+        diag_pivot_thresh=0.0,
+        options={"SymmetricMode": True},
+    ).perm_c
+    return matrix.indptr.astype(np.int64), matrix.indices.astype(np.int64), order.astype(np.int64)
 
 
 @kernel
@@ -74,47 +98,6 @@ def block_targets(edges: Indices, pattern: Pattern) -> Indices:
                 high = middle
         targets[e] = 2 * low + transposed
     return targets
-
-
-@kernel
-def _adjacency(edges: Indices, nodes: int) -> tuple[Indices, Indices]:
-    """The neighbours of each node, itself among them, increasing: (indptr, indices)."""
-    ends = np.ones(nodes, dtype=np.int64)
-    for e in range(edges.shape[0]):
-        a, b = edges[e, 0], edges[e, 1]
-        if a >= 0 and b >= 0 and a != b:
-            ends[a] += 1
-            ends[b] += 1
-    for node in range(1, nodes):
-        ends[node] += ends[node - 1]
-    # As often as they are named, in any order; then, of each node in order, to its neighbours: sorted.
-    starts = np.zeros(nodes + 1, dtype=np.int64)
-    for node in range(nodes):
-        starts[node + 1] = ends[node]
-    at, named = starts[:-1].copy(), np.empty(starts[nodes], dtype=np.int64)
-    for node in range(nodes):
-        named[at[node]] = node
-        at[node] += 1
-    for e in range(edges.shape[0]):
-        a, b = edges[e, 0], edges[e, 1]
-        if a >= 0 and b >= 0 and a != b:
-            named[at[a]], named[at[b]] = b, a
-            at[a] += 1
-            at[b] += 1
-    at, indices = starts[:-1].copy(), np.empty_like(named)
-    for node in range(nodes):
-        for p in range(starts[node], starts[node + 1]):
-            other = named[p]
-            if at[other] == starts[other] or indices[at[other] - 1] != node:
-                indices[at[other]] = node
-                at[other] += 1
-    indptr = np.zeros(nodes + 1, dtype=np.int64)
-    for node in range(nodes):
-        begin, count = indptr[node], at[node] - starts[node]
-        for p in range(count):
-            indices[begin + p] = indices[starts[node] + p]
-        indptr[node + 1] = begin + count
-    return indptr, indices[: indptr[nodes]].copy()
 
 
 @kernel

@@ -54,3 +54,18 @@ def test_the_pattern_is_that_of_the_elimination(drawn):
             row, column = sorted((pattern.place[a], pattern.place[b]), reverse=True)
             assert pattern.rows[target >> 1] == row
             assert pattern.starts[column] <= target >> 1 < pattern.starts[column + 1]
+
+
+@given(st.lists(st.integers(0, 10**6), max_size=40))
+@settings(max_examples=60, deadline=None)
+def test_a_tree_fills_nothing(parents: list[int]):
+    """Its leaves are eliminated before their parents, so the factor has the blocks of the matrix alone."""
+    branches = [(k + 1, parent % (k + 1)) for k, parent in enumerate(parents)]
+    nodes = len(parents) + 1
+    pattern = find_pattern(np.array(branches, dtype=np.int64).reshape(-1, 2), nodes)
+    assert len(pattern.rows) == 2 * nodes - 1
+
+
+def test_a_ring_fills_one_block_for_each_node_but_three():
+    pattern = find_pattern(np.array([(k, (k + 1) % 9) for k in range(9)]), 9)
+    assert len(pattern.rows) == 9 + 9 + 6
