@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Literal
 
+from nscan_cli.graph.optimise.robust import RobustOptions
 from nscan_cli.matching.correlative_search import SearchOptions
 from nscan_cli.slam.diagnostics.options import DiagnosticsOptions
 from nscan_cli.slam.frontend.options import BreakOptions, OdometryCheckOptions, TrackingOptions
@@ -133,6 +134,7 @@ class SlamOptions:
     nscan: NScanOptions = field(default_factory=NScanOptions)
     closing: ClosingOptions = field(default_factory=ClosingOptions)
     growth: GrowthOptions = field(default_factory=GrowthOptions)
+    rejection: RobustOptions = field(default_factory=RobustOptions)
     diagnostics: DiagnosticsOptions = field(default_factory=DiagnosticsOptions)
     relations: Relations = "both"
     """both: the chain of pairwise relations from tracking, and nScan relations of joint matches. nscan: of

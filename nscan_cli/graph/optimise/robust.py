@@ -1,11 +1,13 @@
 """Which relations contradict all others, and a way out of a local minimum, by graduated non-convexity.
 
-Yang, Antonante, Tzoumas, Carlone, "Graduated Non-Convexity for Robust Spatial Perception", RA-L 2020: a
-relation that may be wrong counts by the kernel of Geman and McClure, which begins so wide that the energy is
-all but convex, and narrows to its bound.
+Yang, Antonante, Tzoumas, Carlone, "Graduated Non-Convexity for Robust Spatial Perception", RA-L 2020: each
+doubted relation counts by the kernel of Geman and McClure. The kernel begins so wide that the energy is
+nearly convex, and narrows to the relation's bound.
 """
 
 from __future__ import annotations
+
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,86 +16,87 @@ from nscan_cli.graph.optimise.graph_energy import GraphEnergy
 from nscan_cli.graph.optimise.graph_solver import optimise
 from nscan_cli.poses import Array
 
-RARE, USUAL = 3.09, 1.645
-"""Standard deviations of a normal number: its 99.9 % and 95 % quantiles, which those of χ² are made of."""
-BOUND = 3.0
-"""Relations contradict the others beyond so many times the 99.9 % quantile of their χ²: those that share
-scans are not as independent as they would have to be."""
-NARROWING = 1.4
-"""Factor from one width of the kernel to the next."""
-STEPS = 5
-"""Newton steps at each width."""
-EASED_NARROWING, EASED_STEPS = 1.2, 10
-"""On the way out of a fold, where all relations are doubted."""
-MOST_WIDTHS = 12
-"""A kernel that begins so wide that it would take more than this narrows faster."""
+
+@dataclass(frozen=True)
+class RobustOptions:
+    """Bounds and steps of graduated non-convexity; the defaults are for loops that may be wrong."""
+
+    tail_probability: float = 0.001
+    """A relation fits where its χ² is below the quantile that it exceeds with this probability. A smaller
+    value doubts fewer relations."""
+    bound_factor: float = 3.0
+    """Factor on that quantile: relations that share scans are less independent than χ² assumes. A larger
+    value doubts fewer relations."""
+    narrowing: float = 1.4
+    """Factor from one width of the kernel to the next. A larger value takes fewer and coarser steps."""
+    iterations: int = 5
+    """Newton steps at each width. More steps follow the minimum more closely and take longer."""
+    max_widths: int = 12
+    """Largest number of widths. Where the first width would need more, the narrowing is larger. A larger
+    value takes longer on graphs that fit badly."""
 
 
-def contradicting(energy: GraphEnergy, poses: Array, doubted: NDArray[np.bool_]) -> NDArray[np.bool_]:
+UNFOLDING = RobustOptions(tail_probability=0.05, bound_factor=1.0, narrowing=1.2, iterations=10)
+"""The options on the way out of a local minimum, where all relations are doubted."""
+
+
+def contradicting(
+    energy: GraphEnergy, poses: Array, doubted: NDArray[np.bool_], options: RobustOptions | None = None
+) -> NDArray[np.bool_]:
     """Which of the doubted relations (R,) contradict the others; `poses` (K, 3) are at the energy's optimum.
 
-    The relations are in the energy's order. Nothing is done when all are within the bound already. Of one of
-    n scans χ² has 3 (n − 1) degrees of freedom.
+    The relations are in the energy's order. None contradicts where all are within their bounds at the poses.
     """
-    bounds = BOUND * chi2_quantiles(energy, RARE)
-    narrowed = _graduated(energy, poses, doubted, bounds, NARROWING, STEPS)
-    if narrowed is None:
+    options = options or RobustOptions()
+    bounds = chi2_bounds(energy, options)
+    robust_poses = _graduated(energy, poses, doubted, bounds, options)
+    if robust_poses is None:
         return np.zeros(len(doubted), dtype=np.bool_)
     # At the poses that the last weights have led to, not those that these were made from.
-    return doubted & (energy.terms(narrowed) > bounds)
+    return doubted & (energy.terms(robust_poses) > bounds)
 
 
-def eased(energy: GraphEnergy, poses: Array) -> Array | None:
-    """Another start (K, 3) where a graph at `poses` (K, 3) may be folded wrong; None where all relations fit.
+def unfolded(energy: GraphEnergy, poses: Array) -> Array | None:
+    """Another start (K, 3) where a graph at `poses` (K, 3) may be in a local minimum; None where all fit.
 
-    In a local minimum most relations bend a little, and a few a lot. Here those that fit least lose their
-    say, so that the others unbend; poses that all relations agree on are found again from there. All fit
-    where the χ² of each is below its 95 % quantile.
+    In a local minimum most relations are off a little, and a few a lot. The relations that fit least lose
+    their weight, so that the others recover. From there, the poses that all relations agree on are found.
     """
-    all_of_them = np.ones(len(energy.columns.fixed), dtype=np.bool_)
-    bounds = chi2_quantiles(energy, USUAL)
-    return _graduated(energy, poses, all_of_them, bounds, EASED_NARROWING, EASED_STEPS)
+    every = np.ones(len(energy.columns.fixed), dtype=np.bool_)
+    return _graduated(energy, poses, every, chi2_bounds(energy, UNFOLDING), UNFOLDING)
 
 
 def _graduated(
-    energy: GraphEnergy,
-    poses: Array,
-    doubted: NDArray[np.bool_],
-    bounds: Array,
-    narrowing: float,
-    steps: int,
+    energy: GraphEnergy, poses: Array, doubted: NDArray[np.bool_], bounds: Array, options: RobustOptions
 ) -> Array | None:
     """The poses (K, 3) when the kernel of the doubted relations (R,) has narrowed to their bounds (R,).
 
-    None where all are within these already, and where a χ² is beyond all numbers.
+    None where all are within these already, and where a χ² is not finite.
     """
     weights, excess = np.ones(len(doubted)), energy.terms(poses) / bounds
-    narrow = float(excess[doubted].max(initial=0.0))
-    if not 1.0 < narrow < np.inf:
+    width = float(excess[doubted].max(initial=0.0))
+    if not 1.0 < width < np.inf:
         return None
-    narrowing = max(narrowing, narrow ** (1 / MOST_WIDTHS))
-    while narrow > 1.0:
-        narrow = max(narrow / narrowing, 1.0)
-        weights[doubted] = (narrow / (narrow + excess[doubted])) ** 2
-        poses = optimise(energy.weighted(weights), poses, steps, 1e-4).poses
+    narrowing = max(options.narrowing, width ** (1 / options.max_widths))
+    while width > 1.0:
+        width = max(width / narrowing, 1.0)
+        weights[doubted] = (width / (width + excess[doubted])) ** 2
+        poses = optimise(energy.weighted(weights), poses, options.iterations, 1e-4).poses
         excess = energy.terms(poses) / bounds
     return poses
 
 
-def chi2_quantiles(energy: GraphEnergy, deviations: float) -> Array:
-    """(R,) the quantile of every relation's χ² that is so many standard deviations of a normal number.
+def chi2_bounds(energy: GraphEnergy, options: RobustOptions) -> Array:
+    """(R,) the bound on the χ² of each relation; one of n scans has 3 (n − 1) degrees of freedom."""
+    from scipy.special import chdtri
 
-    By E. B. Wilson, M. M. Hilferty, "The Distribution of Chi-Square", 1931: within 2 % for three degrees of
-    freedom, and closer for more.
-    """
     freedom = 3.0 * (np.diff(energy.columns.starts) - 1)
-    spread = 2 / (9 * freedom)
-    quantiles: Array = freedom * (1 - spread + deviations * np.sqrt(spread)) ** 3
-    return quantiles
+    bounds: Array = options.bound_factor * np.asarray(chdtri(freedom, options.tail_probability), np.float64)
+    return bounds
 
 
 def chi2_by_three(energy: GraphEnergy, poses: Array) -> Array:
-    """(R,) χ² of every relation at the poses (K, 3) for three degrees of freedom."""
+    """(R,) χ² of every relation at the poses (K, 3), scaled to three degrees of freedom."""
     sizes = np.diff(energy.columns.starts)
     chi2: Array = energy.terms(poses) / (sizes - 1)
     return chi2

@@ -11,7 +11,7 @@ from nscan_cli.graph.model import Graph
 from nscan_cli.graph.optimise.chordal import chordal_start
 from nscan_cli.graph.optimise.graph_energy import GraphEnergy
 from nscan_cli.graph.optimise.graph_solver import Optimum, optimise
-from nscan_cli.graph.optimise.robust import eased
+from nscan_cli.graph.optimise.robust import unfolded
 from nscan_cli.graph.relations.base import Relation
 from nscan_cli.poses import Array, Indices
 
@@ -72,9 +72,9 @@ def optimise_graph(graph: Graph, max_iterations: int = 1000, tolerance: float = 
 
 
 def _lowest(energy: GraphEnergy, given: Array, max_iterations: int, tolerance: float) -> Optimum:
-    """The lowest minimum: from the poses given (K, 3), from the chordal start, and from where that is eased.
+    """The lowest minimum from the poses given (K, 3), the chordal start, and the unfolded best of both.
 
-    The iterations are those of all.
+    The iterations are those of all starts together.
     """
     iterations = 0
     best: Optimum | None = None
@@ -88,7 +88,7 @@ def _lowest(energy: GraphEnergy, given: Array, max_iterations: int, tolerance: f
         best = optimise(energy, best.poses, max_iterations, tolerance)
         iterations += best.iterations
     for _ in range(UNFOLDINGS):
-        unbent = eased(energy, best.poses)
+        unbent = unfolded(energy, best.poses)
         if unbent is None:
             break
         found = optimise(energy, unbent, max_iterations, tolerance)
@@ -105,23 +105,18 @@ def _is_lower(found: Optimum, best: Optimum) -> bool:
 
 
 def components(graph: Graph) -> list[Component]:
-    """The connected parts of the graph, in order of their first keyframes."""
+    """The connected components of the graph, in order of their first keyframes."""
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
     relations = graph.relations
-    labels = list(range(len(graph)))
-
-    def label(node: int) -> int:
-        while labels[node] != node:
-            labels[node] = node = labels[labels[node]]
-        return node
-
+    edges = [(relation.nodes[0], node) for relation in relations for node in relation.nodes[1:]]
+    a, b = np.array(edges, dtype=np.int64).reshape(-1, 2).T
+    links = coo_array((np.ones(len(a)), (a, b)), shape=(len(graph), len(graph)))
+    labels = connected_components(links, directed=False)[1].tolist()
+    members: dict[int, tuple[list[int], list[Relation]]] = {}
+    for keyframe in graph.keyframes.tolist():
+        members.setdefault(labels[keyframe], ([], []))[0].append(keyframe)
     for relation in relations:
-        first = label(relation.nodes[0])
-        for node in relation.nodes[1:]:
-            labels[label(node)] = first
-    keyframes = graph.keyframes
-    parts: dict[int, tuple[list[int], list[Relation]]] = {}
-    for keyframe in keyframes:
-        parts.setdefault(label(int(keyframe)), ([], []))[0].append(int(keyframe))
-    for relation in relations:
-        parts[label(relation.nodes[0])][1].append(relation)
-    return [Component(np.array(ids, dtype=np.int64), relations) for ids, relations in parts.values()]
+        members[labels[relation.nodes[0]]][1].append(relation)
+    return [Component(np.array(ids, dtype=np.int64), relations) for ids, relations in members.values()]

@@ -12,8 +12,8 @@ from nscan_cli.matching.joint.joint_energy import Priors
 from nscan_cli.matching.joint.overlap import LEAST_OVERLAP, Overlaps
 from nscan_cli.poses import Array, relative, relative_jacobians, wrap
 
-BOUND = 16.27
-"""99.9 % of χ² with three degrees of freedom."""
+OUTLIER_PROBABILITY = 0.001
+"""A scan is an outlier where its priors give such a χ² with a smaller probability."""
 OUT_OF_REACH = "starts too far from all others to meet one"
 OVERLAPS_NONE = "overlaps none of the others"
 IN_NO_PAIR = "is in no pair of the index set"
@@ -63,14 +63,17 @@ def outliers(
     ]
     if lost:
         return lost
+    from scipy.special import chdtri
+
+    bound = float(chdtri(3, OUTLIER_PROBABILITY))
     by_all, by_most = squared_deviations(priors, poses, information)
     # Only the worst: a scan that is wrong takes its neighbours along, which have one prior less that fits.
-    worst = int(np.argmax(np.where(by_most > BOUND, by_all, 0.0)))
+    worst = int(np.argmax(np.where(by_most > bound, by_all, 0.0)))
     chi2 = float(by_most[worst])
-    if chi2 <= BOUND:
+    if chi2 <= bound:
         return []
     return [
-        ExcludedScan(worst, f"{OUT_OF_BOUNDS} (χ² {chi2:.1f}, at most {BOUND})", float(best[worst]), chi2)
+        ExcludedScan(worst, f"{OUT_OF_BOUNDS} (χ² {chi2:.1f}, at most {bound:.2f})", float(best[worst]), chi2)
     ]
 
 

@@ -18,19 +18,20 @@ def replace_weak_directions(problem: JointProblem, poses: Array) -> Array | None
     Wide Gaussians slide scans together along a corridor, and nothing there brings them back; what the
     slide has found across the corridor and in rotation stays. None when the scans hold all directions.
     """
+    from scipy.linalg import eigh
+
     if not len(problem.priors.pairs):
         return None
     scans = joint_energy(problem._replace(priors=no_priors()), poses, exact=False).hessian[3:, 3:]
     priors = joint_energy(problem._replace(pairs=problem.pairs[:0]), poses, exact=False)
     known = scans + priors.hessian[3:, 3:]
     known += 1e-9 * np.trace(known) / len(known) * np.eye(len(known))
-    # Where all knowledge is 1, the shares are the eigenvalues of what the priors know.
-    scaled = np.linalg.inv(np.linalg.cholesky(known))
-    shares, turned = np.linalg.eigh(scaled @ priors.hessian[3:, 3:] @ scaled.T)
+    # The share λ of the priors in each direction v: H_priors v = λ H v, with vᵗHv = 1.
+    shares, directions = eigh(priors.hessian[3:, 3:], known)
     open_ = shares > SHARE
     if not open_.any():
         return None
-    along = scaled.T @ turned[:, open_]
+    along = directions[:, open_]
     moved = poses.copy()
     moved[1:] -= (along @ (along.T @ priors.gradient[3:] / shares[open_])).reshape(-1, 3)
     return moved

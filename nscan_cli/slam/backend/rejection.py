@@ -19,7 +19,7 @@ def reject_contradicting_loops(state: SlamState) -> None:
     relations = state.relations
     energy = state.energies.of(state.route, relations)
     closes_loop = np.array([relation.origin == "loop" for relation in relations], dtype=np.bool_)
-    wrong = contradicting(energy, state.poses, closes_loop)
+    wrong = contradicting(energy, state.poses, closes_loop, state.options.rejection)
     if not wrong.any():
         return
     rejected = [relation for relation, is_wrong in zip(relations, wrong, strict=True) if is_wrong]

@@ -11,13 +11,12 @@ from scipy.stats import chi2
 from nscan_cli.graph.model import NScan, Pairwise
 from nscan_cli.graph.optimise.graph_solver import optimise
 from nscan_cli.graph.optimise.robust import (
-    BOUND,
-    RARE,
-    USUAL,
+    UNFOLDING,
+    RobustOptions,
+    chi2_bounds,
     chi2_by_three,
-    chi2_quantiles,
     contradicting,
-    eased,
+    unfolded,
 )
 from nscan_cli.poses import relative
 from tests.graph.simulated import (
@@ -94,7 +93,7 @@ def test_those_named_are_the_ones_beyond_the_bound_without_them(seed, off):
     named = contradicting(energy, poses, doubted)
     kept = [relation for relation, wrong in zip(relations, named, strict=True) if not wrong]
     without = optimise(energy_of(truth, kept, []), poses).poses
-    beyond = energy.terms(without) > BOUND * chi2_quantiles(energy, RARE)
+    beyond = energy.terms(without) > chi2_bounds(energy, RobustOptions())
     np.testing.assert_array_equal(named, doubted & beyond)
 
 
@@ -140,21 +139,22 @@ def test_quantiles_are_those_of_chi2():
     energy = energy_of(truth, pairwise, nscan)
     freedom = 3 * (np.array([2] * len(pairwise) + [len(relation.nodes) for relation in nscan]) - 1)
     assert len(set(freedom)) > 1
-    for deviations, share in ((RARE, 0.999), (USUAL, 0.95)):
-        np.testing.assert_allclose(chi2_quantiles(energy, deviations), chi2.ppf(share, freedom), rtol=0.02)
+    loops, every = chi2_bounds(energy, RobustOptions()), chi2_bounds(energy, UNFOLDING)
+    np.testing.assert_allclose(loops, 3.0 * chi2.ppf(0.999, freedom), rtol=1e-9)
+    np.testing.assert_allclose(every, chi2.ppf(0.95, freedom), rtol=1e-9)
 
 
 def test_where_all_relations_fit_there_is_no_other_start():
     truth, pairwise, nscan = mixed_ring(12, noise=0.3)
     energy = energy_of(truth, pairwise, nscan)
-    assert eased(energy, optimise(energy, truth).poses) is None
+    assert unfolded(energy, optimise(energy, truth).poses) is None
 
 
 def test_a_chi2_beyond_all_numbers_is_no_reason_to_narrow_for_ever():
     truth, pairwise, nscan = mixed_ring(12, noise=0.3)
     energy = energy_of(truth, pairwise, nscan).weighted(np.full(len(pairwise) + len(nscan), np.inf))
     assert not np.isfinite(energy.terms(truth)).all()
-    assert eased(energy, truth) is None
+    assert unfolded(energy, truth) is None
     assert not contradicting(energy, truth, np.ones(len(pairwise) + len(nscan), dtype=bool)).any()
 
 
@@ -162,7 +162,7 @@ def test_what_is_not_doubted_is_never_named():
     relations, _ = with_loops(3, seed=1)
     energy = energy_of(ring(COUNT), relations, [])
     poses = optimise(energy, ring(COUNT)).poses
-    assert (energy.terms(poses) / chi2_quantiles(energy, RARE)).max() > BOUND
+    assert (energy.terms(poses) / chi2_bounds(energy, RobustOptions())).max() > 1.0
     assert not contradicting(energy, poses, np.zeros(len(relations), dtype=bool)).any()
 
 

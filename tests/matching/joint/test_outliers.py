@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from scipy.stats import chi2
 
 from nscan_cli.matching.joint.joint_energy import Priors, all_pairs, no_priors
 from nscan_cli.matching.joint.outliers import (
-    BOUND,
     IN_NO_PAIR,
     OUT_OF_BOUNDS,
     OVERLAPS_NONE,
@@ -77,7 +77,7 @@ def test_the_deviations_of_sound_scans_are_chi_squared():
         mean, matched = (root @ rng.normal(size=3) for root in roots)
         found.append(deviation(prior @ (matched - mean), prior, match))
     assert np.mean(found) == pytest.approx(3, abs=0.15)
-    assert 0 < np.mean(np.array(found) > BOUND) < 0.003
+    assert 0 < np.mean(np.array(found) > chi2.ppf(0.999, 3)) < 0.003
 
 
 def test_what_a_match_leaves_open_is_no_deviation():
@@ -119,7 +119,7 @@ def test_an_odometry_that_slipped_once_puts_no_scan_out_of_bounds():
     priors = chain(POSES)
     priors.means[1, 0] += 0.4
     by_all, by_most = squared_deviations(priors, POSES, CERTAIN)
-    assert by_all.max() > BOUND
+    assert by_all.max() > chi2.ppf(0.999, 3)
     assert by_most.max() < 1e-6
     assert outliers(all_overlap(4), all_pairs(4), priors, POSES, CERTAIN) == []
 
