@@ -19,7 +19,7 @@ from nscan_cli.files.source import Source
 from nscan_cli.graph.io.json_graph import parse_graph
 from nscan_cli.graph.io.tum import Trajectory, parse_tum
 from nscan_cli.graph.model import Graph, Pairwise
-from nscan_cli.graph.relative_covariance import Between
+from nscan_cli.graph.relative_covariance import RelativePoses
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.matching.joint.joint_energy import Priors, no_priors
 from nscan_cli.matching.joint.nscan_match import PriorsAmong
@@ -98,7 +98,7 @@ def graph_priors(graph: Graph, numbers: Sequence[int]) -> PriorsAmong:
     relations connect, the relative poses of scans that are next in time, as all relations give them.
     """
     nodes = {int(scan): node for node, scan in enumerate(graph.scans)}
-    between = Between(graph, [nodes[number] for number in numbers if number in nodes])
+    between = RelativePoses(graph, [nodes[number] for number in numbers if number in nodes])
 
     def among(kept: Sequence[int]) -> Priors:
         places = {nodes[numbers[scan]]: at for at, scan in enumerate(kept) if numbers[scan] in nodes}
@@ -114,7 +114,7 @@ def graph_priors(graph: Graph, numbers: Sequence[int]) -> PriorsAmong:
 
 
 def _connecting_relations(
-    between: Between, nodes: list[int], joined: list[tuple[int, int]]
+    between: RelativePoses, nodes: list[int], joined: list[tuple[int, int]]
 ) -> list[Pairwise]:
     """The relations that connect what the graph connects, but those that are `joined` do not yet."""
     group = {node: node for node in nodes}

@@ -184,13 +184,13 @@ def _fields(numbers: tuple[int, ...], match: NScanMatch, left_out: list[Excluded
     from nscan_cli.graph.io.json_fields import six_digits, triangle
     from nscan_cli.graph.model import NScan
     from nscan_cli.graph.relations.registry import relation_record
-    from nscan_cli.graph.relations.semidefinite import WRITTEN, as_information
+    from nscan_cli.graph.relations.semidefinite import WRITTEN_ROUNDING, as_information
 
     kept = [numbers[scan] for scan in match.kept]
     joint = match.joint
     score = float(match.overlap.min())
     # Along the gauge it is 0 but for rounding.
-    information = as_information(joint.hessian, WRITTEN)
+    information = as_information(joint.hessian, WRITTEN_ROUNDING)
     relation = NScan(tuple(kept), match.poses, information, match.fixed, "nscan", score)
     return {
         "relation": relation_record(relation, "scans"),

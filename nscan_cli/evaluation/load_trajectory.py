@@ -9,7 +9,7 @@ from nscan_cli.errors import InputDataError, WrongUsageError
 from nscan_cli.files.inputs import FileBytes, label, read_bytes
 from nscan_cli.files.limits import GRAPH, MB, LimitExceededError
 from nscan_cli.graph.io.json_graph import parse_graph
-from nscan_cli.graph.io.pose_columns import are_poses
+from nscan_cli.graph.io.pose_columns import is_pose_table
 from nscan_cli.graph.io.tum import Trajectory, parse_tum
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.logs.load import (
@@ -88,7 +88,7 @@ def _loaded(stored: bytes, path: str, options: ReadingOptions, notices: list[str
     if not data.strip():
         raise InputDataError(name, "is empty", "give a graph, a TUM file or a log")
     is_graph = data.lstrip().startswith(b"{")
-    if not is_graph and not are_poses(data):
+    if not is_graph and not is_pose_table(data):
         del data
         log = log_from(stored, path, replace(options, allow_corrected=True), even_unusable=True)
         # That its poses are corrected ones is as it should be; what is lost or skipped is not.

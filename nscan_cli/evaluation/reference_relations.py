@@ -17,7 +17,7 @@ from nscan_cli.evaluation.association import TOLERANCE, nearest_in_time, no_matc
 from nscan_cli.evaluation.statistics import Spread
 from nscan_cli.files.inputs import base_name, label, read_text
 from nscan_cli.files.limits import DISTANCE, GRAPH, TIME
-from nscan_cli.graph.io.pose_columns import fields_of, lines_of
+from nscan_cli.graph.io.pose_columns import numbered_lines, split_fields
 from nscan_cli.graph.io.tum import Trajectory
 from nscan_cli.poses import Array, relative, wrap
 
@@ -89,8 +89,8 @@ def read_relations(path: str) -> Relations:
     stamps: list[tuple[str, str]] = []
     rows: list[list[float]] = []
     lines: list[int] = []
-    for number, line in lines_of(read_text(path, GRAPH)):
-        fields = fields_of(line)
+    for number, line in numbered_lines(read_text(path, GRAPH)):
+        fields = split_fields(line)
         if line.startswith("#"):
             continue
         try:

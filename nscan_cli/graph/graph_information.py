@@ -22,7 +22,7 @@ from nscan_cli.graph.relations.base import Relation
 from nscan_cli.poses import Array
 
 
-def information(graph: Graph, part: Component) -> tuple[GraphEnergy, Factor]:
+def component_information(graph: Graph, part: Component) -> tuple[GraphEnergy, Factor]:
     """The energy of a part of the graph, and the factor of its information at the graph's poses.
 
     The energies (17) and (23) have no ½, so the information is half their Hessian; its Gauss–Newton part
@@ -40,10 +40,10 @@ def _each_pair_once(relations: Sequence[Relation]) -> Array:
     what they say is in H already. What relations of further types say is not of scans, and counts whole.
     """
     of_scans = [k for k, relation in enumerate(relations) if isinstance(relation, NScan | Pairwise)]
-    pairs = [_pairs(relations[k].nodes) for k in of_scans]
+    pairs = [_pair_keys(relations[k].nodes) for k in of_scans]
     sizes = [len(each) for each in pairs]
     is_joint = np.repeat([isinstance(relations[k], NScan) for k in of_scans], sizes).astype(np.bool_)
-    _, places = np.unique(np.concatenate([_pairs(()), *pairs]), return_inverse=True)
+    _, places = np.unique(np.concatenate([_pair_keys(()), *pairs]), return_inverse=True)
     of_joint, of_any = np.bincount(places[is_joint], minlength=len(places)), np.bincount(places)
     counts = np.where(is_joint, of_any[places], of_joint[places] + 1)
     owners = np.repeat(np.arange(len(sizes)), sizes)
@@ -52,7 +52,7 @@ def _each_pair_once(relations: Sequence[Relation]) -> Array:
     return weights
 
 
-def _pairs(nodes: Sequence[int]) -> NDArray[np.int64]:
+def _pair_keys(nodes: Sequence[int]) -> NDArray[np.int64]:
     """(n (n − 1) / 2,) the pairs of n nodes, each as one number."""
     ordered = np.sort(np.array(nodes, dtype=np.int64))
     a, b = _all_pairs(len(ordered))

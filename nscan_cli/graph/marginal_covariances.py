@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from nscan_cli.graph.graph_information import information
-from nscan_cli.graph.linalg.block_cholesky import loose_nodes
+from nscan_cli.graph.graph_information import component_information
+from nscan_cli.graph.linalg.block_cholesky import undetermined_nodes
 from nscan_cli.graph.linalg.selected_inverse import inverse_diagonal
 from nscan_cli.graph.model import Graph
 from nscan_cli.graph.optimise.whole_graph import components
@@ -20,9 +20,9 @@ def marginal_covariances(graph: Graph) -> dict[int, Array]:
     """
     part = components(graph)[0]
     first, others = int(part.keyframes[0]), part.keyframes[1:]
-    _, factor = information(graph, part)
+    _, factor = component_information(graph, part)
     covariances = inverse_diagonal(factor)
-    loose = loose_nodes(factor)
+    loose = undetermined_nodes(factor)
     marginals = {first: np.zeros((3, 3))}
     for keyframe, covariance, open_direction in zip(others.tolist(), covariances, loose, strict=True):
         if not open_direction:

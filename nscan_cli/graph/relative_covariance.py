@@ -6,18 +6,18 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from nscan_cli.graph.graph_information import information
-from nscan_cli.graph.linalg.block_cholesky import loose_nodes, solve
+from nscan_cli.graph.graph_information import component_information
+from nscan_cli.graph.linalg.block_cholesky import solve, undetermined_nodes
 from nscan_cli.graph.model import Graph, Pairwise
 from nscan_cli.graph.optimise.whole_graph import Component, components
 from nscan_cli.poses import Array, relative, relative_jacobians
 
-ATTACHED = np.array([0.05, 0.05, 0.05])
+ATTACHMENT_SIGMA = np.array([0.05, 0.05, 0.05])
 """m, m, rad; standard deviations of a node in the frame of the keyframe that it is attached to. The graph
 holds no measurement of it."""
 
 
-class Between:
+class RelativePoses:
     """The relative poses of some nodes of a graph at its optimum, with what all its relations say of them."""
 
     def __init__(self, graph: Graph, nodes: Sequence[int]) -> None:
@@ -45,9 +45,9 @@ class Between:
         jacobian = np.zeros((3, len(covariance)))
         for by, node, anchor in zip((by_a, by_b), nodes, anchors, strict=True):
             at = 3 * chosen.index(anchor)
-            jacobian[:, at : at + 3] += by @ _lever(graph.poses[node] - graph.poses[anchor])
+            jacobian[:, at : at + 3] += by @ _rigid_jacobian(graph.poses[node] - graph.poses[anchor])
         spread = sum(node != anchor for node, anchor in zip(nodes, anchors, strict=True))
-        relative_covariance = jacobian @ covariance @ jacobian.T + spread * np.diag(ATTACHED**2)
+        relative_covariance = jacobian @ covariance @ jacobian.T + spread * np.diag(ATTACHMENT_SIGMA**2)
         measurement = relative(graph.poses[b], graph.poses[a])
         return Pairwise((a, b), measurement, np.linalg.inv(relative_covariance), "track")
 
@@ -57,8 +57,8 @@ def _joint_covariance(graph: Graph, part: Component, chosen: list[int]) -> tuple
 
     The component's first keyframe is held; relative poses do not depend on that.
     """
-    energy, factor = information(graph, part)
-    loose = loose_nodes(factor)
+    energy, factor = component_information(graph, part)
+    loose = undetermined_nodes(factor)
     rows = energy.free_row[np.searchsorted(part.keyframes, chosen)]
     known = [at for at, row in enumerate(rows) if row < 0 or not loose[row]]
     covariance = np.zeros((len(known), 3, len(known), 3))
@@ -71,6 +71,6 @@ def _joint_covariance(graph: Graph, part: Component, chosen: list[int]) -> tuple
     return [chosen[at] for at in known], covariance.reshape(3 * len(known), 3 * len(known))
 
 
-def _lever(offset: Array) -> Array:
+def _rigid_jacobian(offset: Array) -> Array:
     """∂p/∂a (3, 3) of a pose p that moves with a rigidly, p − a = offset."""
     return np.array([[1.0, 0.0, -offset[1]], [0.0, 1.0, offset[0]], [0.0, 0.0, 1.0]])

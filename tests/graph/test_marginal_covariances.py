@@ -3,7 +3,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from nscan_cli.graph.graph_information import information
+from nscan_cli.graph.graph_information import component_information
 from nscan_cli.graph.io.g2o import read_g2o
 from nscan_cli.graph.marginal_covariances import marginal_covariances
 from nscan_cli.graph.model import Pairwise
@@ -30,8 +30,8 @@ def test_they_are_the_blocks_of_the_dense_inverse():
     graph = graph_of(truth, pairwise, nscan)
     optimise_graph(graph)
     energy = energy_of(truth, *each_pair_once(pairwise, nscan))
-    information = 0.5 * dense_matrix(energy, energy.evaluate(graph.poses, exact=False).hessian)
-    blocks = np.linalg.inv(information).reshape(29, 3, 29, 3)
+    component_information = 0.5 * dense_matrix(energy, energy.evaluate(graph.poses, exact=False).hessian)
+    blocks = np.linalg.inv(component_information).reshape(29, 3, 29, 3)
     marginals = marginal_covariances(graph)
     assert sorted(marginals) == list(range(30))
     np.testing.assert_array_equal(marginals[0], np.zeros((3, 3)))
@@ -99,7 +99,7 @@ def test_a_chain_beyond_the_digits_of_its_numbers_has_finite_covariances(step: f
     pairwise = [Pairwise((a, a + 1), each, vague, "track") for a, each in enumerate(steps)]
     pairwise += [Pairwise((a, a + 1), steps[a], sure, "track") for a in range(0, size - 1, 50)]
     graph = graph_of(np.array(poses), pairwise, [])
-    _, factor = information(graph, components(graph)[0])
+    _, factor = component_information(graph, components(graph)[0])
     assert factor.loose.any()
     assert np.abs(factor.panels).max() <= 1.01 * np.sqrt(factor.diagonal.max())
     marginals = marginal_covariances(graph)

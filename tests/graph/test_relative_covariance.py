@@ -7,7 +7,7 @@ import pytest
 
 from nscan_cli.graph.model import Graph, Pairwise
 from nscan_cli.graph.optimise.whole_graph import optimise_graph
-from nscan_cli.graph.relative_covariance import ATTACHED, Between
+from nscan_cli.graph.relative_covariance import ATTACHMENT_SIGMA, RelativePoses
 from nscan_cli.poses import Array, compose, relative, relative_jacobians
 from tests.graph.simulated import dense_matrix, each_pair_once, energy_of, graph_of, mixed_ring
 
@@ -34,7 +34,7 @@ def dense(graph: Graph, held: int) -> Array:
 
 
 def test_it_is_the_marginal_of_the_dense_inverse_with_the_first_of_the_two_held(ring):
-    between = Between(ring, CHOSEN)
+    between = RelativePoses(ring, CHOSEN)
     for a, b in itertools.permutations(CHOSEN, 2):
         relation = between.relation(a, b)
         assert relation is not None
@@ -51,7 +51,7 @@ def test_one_relation_between_two_is_given_back():
     poses = np.array([[1.0, 2, 0.5], [2.0, 1, 2.5]])
     step = relative(poses[1], poses[0])
     graph = graph_of(poses, [Pairwise((0, 1), step, information, "track")], [])
-    relation = Between(graph, (0, 1)).relation(0, 1)
+    relation = RelativePoses(graph, (0, 1)).relation(0, 1)
     assert relation is not None
     np.testing.assert_allclose(relation.information, information, rtol=1e-9)
 
@@ -64,7 +64,7 @@ def test_an_attached_node_moves_with_its_keyframe(ring):
     graph.stamps = [str(k) for k in range(31)]
     graph.poses = np.vstack([ring.poses, compose(ring.poses[4], offset)])
     graph.anchors = np.append(np.arange(30), 4)
-    between = Between(graph, (11, 30))
+    between = RelativePoses(graph, (11, 30))
     relation = between.relation(11, 30)
     assert relation is not None
     covariance = dense(ring, 11)[4, :, 4]
@@ -77,12 +77,12 @@ def test_an_attached_node_moves_with_its_keyframe(ring):
         [(seen(ring.poses[4] + unit) - seen(ring.poses[4] - unit)) / (2 * step) for unit in step * np.eye(3)],
         axis=1,
     )
-    expected = jacobian @ covariance @ jacobian.T + np.diag(ATTACHED**2)
+    expected = jacobian @ covariance @ jacobian.T + np.diag(ATTACHMENT_SIGMA**2)
     np.testing.assert_allclose(np.linalg.inv(relation.information), expected, rtol=1e-5, atol=1e-9)
-    with_its_own = Between(graph, (4, 30)).relation(4, 30)
+    with_its_own = RelativePoses(graph, (4, 30)).relation(4, 30)
     assert with_its_own is not None
     np.testing.assert_allclose(with_its_own.measurement, offset, atol=1e-12)
-    np.testing.assert_allclose(with_its_own.information, np.diag(ATTACHED**-2), rtol=1e-6)
+    np.testing.assert_allclose(with_its_own.information, np.diag(ATTACHMENT_SIGMA**-2), rtol=1e-6)
 
 
 def test_nodes_that_no_relations_connect_have_none(ring):
@@ -90,7 +90,7 @@ def test_nodes_that_no_relations_connect_have_none(ring):
     graph.pairwise.append(Pairwise((30, 31), np.ones(3), np.eye(3), "track"))
     # 32 hangs on 3, but may slide.
     graph.pairwise.append(Pairwise((3, 32), np.ones(3), np.diag([1.0, 0.0, 50.0]), "loop"))
-    between = Between(graph, (3, 5, 30, 31, 32))
+    between = RelativePoses(graph, (3, 5, 30, 31, 32))
     assert between.relation(3, 30) is None
     assert between.relation(3, 32) is None
     assert between.relation(5, 3) is not None

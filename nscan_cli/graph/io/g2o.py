@@ -20,7 +20,7 @@ from nscan_cli.files.inputs import base_name, label, read_bytes
 from nscan_cli.files.limits import GRAPH
 from nscan_cli.files.provenance import provenance_of
 from nscan_cli.files.source import Source
-from nscan_cli.graph.io.g2o_lines import REMEDY, Lines, keys, read_lines, rows, shown
+from nscan_cli.graph.io.g2o_lines import G2O_REMEDY, G2oLines, key_text, keys, read_lines, rows
 from nscan_cli.graph.io.g2o_tags import losses
 from nscan_cli.graph.io.json_fields import LARGEST_INTEGER
 from nscan_cli.graph.io.triangles import from_upper_triangle, upper_triangle
@@ -54,7 +54,7 @@ def parse_g2o(data: bytes, path: str) -> Graph:
         others = {tag: n for tag, n in lines.skipped.items() if tag.startswith(("VERTEX", "EDGE"))}
         problem = "; ".join(["no VERTEX_SE2 or EDGE_SE2 line", *losses(others)])
         raise InputDataError(name, problem, "give a 2D pose graph of g2o")
-    graph = _graph(lines, name)
+    graph = _graph_of_lines(lines, name)
     source = Source(base_name(path), hashlib.sha256(data).hexdigest(), len(data))
     graph.provenance = provenance_of([source], {})
     graph.provenance["skipped"] = dict(sorted(lines.skipped.items()))
@@ -75,7 +75,7 @@ def write_g2o(graph: Graph) -> bytes:
     check_finite("the poses of the graph", graph.poses)
     keyframes = graph.keyframes.tolist()
     names = graph.scans.tolist() if graph.vertices is None else graph.vertices
-    lines = [f"VERTEX_SE2 {names[node]} {_numbers(graph.poses[node])}" for node in keyframes]
+    lines = [f"VERTEX_SE2 {names[node]} {_number_texts(graph.poses[node])}" for node in keyframes]
     edges: list[Pairwise] = []
     for each in graph.relations:
         poses = graph.poses[list(each.nodes)]
@@ -85,17 +85,17 @@ def write_g2o(graph: Graph) -> bytes:
         information = upper_triangle(rotated_information(inverse(z), relation.information))
         a, b = relation.nodes
         check_finite(f"the edge of {relation.nodes}", z, information)
-        lines.append(f"EDGE_SE2 {names[a]} {names[b]} {_numbers(z)} {_numbers(information)}")
+        lines.append(f"EDGE_SE2 {names[a]} {names[b]} {_number_texts(z)} {_number_texts(information)}")
     # GTSAM's reader drops all edges after a tag that it does not know.
     lines += [f"FIX {names[node]}" for node in keyframes[:1]]
     return ("\n".join(lines) + "\n").encode()
 
 
-def _numbers(values: Array) -> str:
+def _number_texts(values: Array) -> str:
     return " ".join(repr(value + 0.0) for value in values.tolist())
 
 
-def _chained(lines: Lines, name: str) -> dict[int, Array]:
+def _poses_along_edges(lines: G2oLines, name: str) -> dict[int, Array]:
     """Poses by the fewest edges from the vertex of the smallest key, breadth first in file order."""
     steps: dict[int, list[tuple[int, Array]]] = {}
     ends = keys(lines.ends).reshape(-1, 2).tolist()
@@ -113,17 +113,17 @@ def _chained(lines: Lines, name: str) -> dict[int, Array]:
                 queue.append(other)
     for line, (i, _) in zip(lines.edge_lines, ends, strict=True):
         if i not in poses:
-            way = f"from vertex {shown(first)} to vertex {shown(i)}"
+            way = f"from vertex {key_text(first)} to vertex {key_text(i)}"
             problem = f"no VERTEX_SE2 lines, and no edges lead {way}"
             raise InputDataError(name, problem, "add the vertices or the missing edges", line=line)
     return poses
 
 
-def _graph(lines: Lines, name: str) -> Graph:
+def _graph_of_lines(lines: G2oLines, name: str) -> Graph:
     if lines.vertices:
         found, poses = np.array(list(lines.vertices), dtype=np.uint64), rows(lines.poses, 3)
     else:
-        chained = _chained(lines, name)
+        chained = _poses_along_edges(lines, name)
         found, poses = np.array(list(chained), dtype=np.uint64), np.array(list(chained.values()))
     order = np.argsort(found)
     vertices = found[order]
@@ -138,14 +138,14 @@ def _graph(lines: Lines, name: str) -> Graph:
         graph.scans = vertices.astype(np.int64)
     else:
         graph.vertices = vertices.tolist()
-    graph.pairwise = _edges(lines, vertices, name)
+    graph.pairwise = _pairwise_relations(lines, vertices, name)
     for key, line in lines.fixed.items():
         if key not in lines.passed_over:
             _rows_of(np.array([key], dtype=np.uint64), vertices, [line], name)
     return graph
 
 
-def _edges(lines: Lines, vertices: NDArray[np.uint64], name: str) -> list[Pairwise]:
+def _pairwise_relations(lines: G2oLines, vertices: NDArray[np.uint64], name: str) -> list[Pairwise]:
     """The edges between the vertices with keys (V,), which increase."""
     ends = keys(lines.ends)
     pairs = _rows_of(ends, vertices, np.repeat(lines.edge_lines, 2).tolist(), name).reshape(-1, 2)
@@ -154,7 +154,7 @@ def _edges(lines: Lines, vertices: NDArray[np.uint64], name: str) -> list[Pairwi
         information = semidefinite(from_upper_triangle(rows(lines.information, 6), 3))
     except IndefiniteError as error:
         line = lines.edge_lines[error.index]
-        raise InputDataError(name, f"the information matrix {error}", REMEDY, line=line) from error
+        raise InputDataError(name, f"the information matrix {error}", G2O_REMEDY, line=line) from error
     return [
         Pairwise((a, b), z, turned, "odometry" if abs(a - b) == 1 else "loop")
         for (a, b), z, turned in zip(
@@ -171,6 +171,6 @@ def _rows_of(
     missing = np.flatnonzero(vertices[found] != wanted)
     if len(missing):
         first = int(missing[0])
-        problem = f"there is no vertex {shown(int(wanted[first]))}"
+        problem = f"there is no vertex {key_text(int(wanted[first]))}"
         raise InputDataError(name, problem, "add its VERTEX_SE2 line", line=int(lines[first]))
     return found

@@ -30,11 +30,11 @@ from nscan_cli.files.encoding import BYTE_ORDER_MARK
 from nscan_cli.files.limits import DISTANCE, INFORMATION, RECORD_KINDS, Limit
 from nscan_cli.poses import Array
 
-REMEDY = "mend or remove the line"
+G2O_REMEDY = "mend or remove the line"
 LARGEST_KEY = 2**64 - 1
-SYMBOL = re.compile("([A-Za-z])([0-9]{1,17})")
+GTSAM_SYMBOL = re.compile("([A-Za-z])([0-9]{1,17})")
 """A key as GTSAM shows it, x12: the letter is in the highest of its eight bytes."""
-PLANAR = 1e-6
+PLANAR_TOLERANCE = 1e-6
 """m, and of a quaternion: no more is left of z, roll and pitch by rounding to six decimals."""
 LENGTH = 0.01
 """So far from 1 the length of a quaternion can be."""
@@ -45,7 +45,7 @@ class _NotPlanarError(ValueError):
 
 
 @dataclass
-class Lines:
+class G2oLines:
     """What a file holds: V vertices and E edges as columns, and the rest by tag."""
 
     vertices: dict[int, int] = field(default_factory=dict)
@@ -68,30 +68,30 @@ class Lines:
     """Keys of vertices that are no poses."""
 
 
-def read_lines(data: bytes, name: str) -> Lines:
+def read_lines(data: bytes, name: str) -> G2oLines:
     """All lines of a file; `name` is what errors call it. Raises InputDataError naming the line."""
-    lines = Lines()
+    lines = G2oLines()
     for number, line in enumerate(io.BytesIO(data.removeprefix(BYTE_ORDER_MARK)), start=1):
         fields = line.decode("utf-8", errors="replace").split("#", 1)[0].split()
         if not fields:
             continue
         try:
-            _take(lines, number, fields)
+            _read_line(lines, number, fields)
         except _NotPlanarError as error:
             remedy = "give a graph of the plane: poses in space are not read"
             raise InputDataError(name, str(error), remedy, line=number) from error
         except ValueError as error:
-            raise InputDataError(name, str(error), REMEDY, line=number) from error
+            raise InputDataError(name, str(error), G2O_REMEDY, line=number) from error
     for values, width, at, limit in (
         (lines.poses, 3, lines.vertex_lines, DISTANCE),
         (lines.measurements, 3, lines.edge_lines, DISTANCE),
         (lines.information, 6, lines.edge_lines, INFORMATION),
     ):
-        _check(rows(values, width), at, limit, name)
+        _check_limits(rows(values, width), at, limit, name)
     fixed = [line for key, line in lines.fixed.items() if key not in lines.passed_over]
     if len(fixed) > 1:
         problem = "a second vertex is fixed, but only one can be"
-        raise InputDataError(name, problem, REMEDY, line=fixed[1])
+        raise InputDataError(name, problem, G2O_REMEDY, line=fixed[1])
     return lines
 
 
@@ -105,31 +105,31 @@ def keys(values: array[int]) -> NDArray[np.uint64]:
     return np.asarray(values, dtype=np.uint64)
 
 
-def shown(key: int) -> str:
+def key_text(key: int) -> str:
     """A key as messages name it; one that is a symbol of GTSAM, with that."""
     letter, number = chr(key >> 56), key & (1 << 56) - 1
     return f"{key} ({letter}{number})" if letter.isascii() and letter.isalpha() else f"{key}"
 
 
-def _take(lines: Lines, number: int, fields: list[str]) -> None:
+def _read_line(lines: G2oLines, number: int, fields: list[str]) -> None:
     """Put one line among the others. Raises ValueError saying what is wrong with it."""
     tag = fields[0]
-    if tag in VERTICES:
-        values, pose = VERTICES[tag]
+    if tag in VERTEX_TAGS:
+        values, pose = VERTEX_TAGS[tag]
         _check_length(fields, values)
         key = _key(fields[1])
         if key in lines.vertices:
-            raise ValueError(f"vertex {shown(key)} is there already")
+            raise ValueError(f"vertex {key_text(key)} is there already")
         lines.poses.extend(pose([float(text) for text in fields[2:]]))
         lines.vertices[key] = len(lines.vertex_lines)
         lines.vertex_lines.append(number)
-    elif tag in EDGES:
-        values, pose, information = EDGES[tag]
+    elif tag in EDGE_TAGS:
+        values, pose, information = EDGE_TAGS[tag]
         triangle = 6 if values == 3 else 21
         _check_length(fields, 2 + values + triangle)
         i, j = _key(fields[1]), _key(fields[2])
         if i == j:
-            raise ValueError(f"the edge joins vertex {shown(i)} with itself")
+            raise ValueError(f"the edge joins vertex {key_text(i)} with itself")
         numbers = [float(text) for text in fields[3:]]
         lines.measurements.extend(pose(numbers[:values]))
         lines.information.extend(information(numbers[values:]))
@@ -160,7 +160,7 @@ def _key(text: str) -> int:
 
 def _key_of(text: str) -> int | None:
     """The key that a text is, of 64 bits at most; None where it is none."""
-    symbol = SYMBOL.fullmatch(text)
+    symbol = GTSAM_SYMBOL.fullmatch(text)
     if symbol and int(symbol[2]) < 1 << 56:
         return (ord(symbol[1]) << 56) + int(symbol[2])
     if text.isascii() and text.isdigit() and len(text) < 21 and int(text) <= LARGEST_KEY:
@@ -168,17 +168,17 @@ def _key_of(text: str) -> int | None:
     return None
 
 
-def _check(values: Array, lines: Sequence[int], limit: Limit, name: str) -> None:
+def _check_limits(values: Array, lines: Sequence[int], limit: Limit, name: str) -> None:
     """Raises InputDataError naming the first line whose row of values has a number that cannot be."""
     wrong = np.flatnonzero(~(np.abs(values) <= limit.value).all(axis=1))
     if len(wrong):
         first = int(wrong[0])
         finite = np.isfinite(values[first]).all()
         problem = f"a number is beyond {limit.value:g}" if finite else "a number is not finite"
-        raise InputDataError(name, problem, REMEDY, line=lines[first])
+        raise InputDataError(name, problem, G2O_REMEDY, line=lines[first])
 
 
-def _as_it_is(numbers: list[float]) -> list[float]:
+def _unchanged(numbers: list[float]) -> list[float]:
     return numbers
 
 
@@ -191,18 +191,18 @@ def _in_the_plane(numbers: list[float]) -> list[float]:
     if not abs(length - 1.0) < LENGTH:
         raise ValueError(f"the quaternion has the length {length:.3g} instead of 1")
     qx, qy, qz, qw = quaternion
-    if max(abs(z), abs(qx), abs(qy)) > PLANAR:
+    if max(abs(z), abs(qx), abs(qy)) > PLANAR_TOLERANCE:
         raise _NotPlanarError(f"the pose is not planar: z {z:.3g} m, qx {qx:.3g}, qy {qy:.3g}")
     angle = 2.0 * math.atan2(qz, qw)
     return [x, y, math.remainder(angle, 2.0 * math.pi)]
 
 
-def _of_toro(numbers: list[float]) -> list[float]:
+def _from_toro(numbers: list[float]) -> list[float]:
     """The upper triangle row by row, of TORO's I11 I12 I22 I33 I13 I23."""
     return [numbers[k] for k in (0, 1, 4, 2, 5, 3)]
 
 
-def _of_quaternion(numbers: list[float]) -> list[float]:
+def _from_quaternion(numbers: list[float]) -> list[float]:
     """The upper triangle of x, y and θ, of that of x, y, z, qx, qy, qz.
 
     z, qx and qy are measured as 0 and are 0, so what it says of them adds nothing.
@@ -213,16 +213,16 @@ def _of_quaternion(numbers: list[float]) -> list[float]:
     return [xx, xy, xq / 2, yy, yq / 2, qq / 4]
 
 
-Numbers = Callable[[list[float]], list[float]]
-VERTICES: dict[str, tuple[int, Numbers]] = {
-    "VERTEX_SE2": (4, _as_it_is),
-    "VERTEX2": (4, _as_it_is),
+Conversion = Callable[[list[float]], list[float]]
+VERTEX_TAGS: dict[str, tuple[int, Conversion]] = {
+    "VERTEX_SE2": (4, _unchanged),
+    "VERTEX2": (4, _unchanged),
     "VERTEX_SE3:QUAT": (8, _in_the_plane),
 }
 """How many values stand after a tag, and what makes x, y, θ of all but the key."""
-EDGES: dict[str, tuple[int, Numbers, Numbers]] = {
-    "EDGE_SE2": (3, _as_it_is, _as_it_is),
-    "EDGE2": (3, _as_it_is, _of_toro),
-    "EDGE_SE3:QUAT": (7, _in_the_plane, _of_quaternion),
+EDGE_TAGS: dict[str, tuple[int, Conversion, Conversion]] = {
+    "EDGE_SE2": (3, _unchanged, _unchanged),
+    "EDGE2": (3, _unchanged, _from_toro),
+    "EDGE_SE3:QUAT": (7, _in_the_plane, _from_quaternion),
 }
 """How many values the measurement has, and what makes x, y, θ of it, and 6 of its information."""

@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from nscan_cli.files.counting import counted
 
 LANDMARKS = "XY|POINT|LANDMARK|LINE|SEGMENT|PLANE|BEARING"
-LOST = (
+LOSSES = (
     ("SWITCH", "edges that can be switched off are not read, so these loops are not closed"),
     ("MIXTURE|MAXMIX", "edges with several alternatives are not read, so what they join may come apart"),
     ("PRIOR|GPS|GNSS|UTM", "priors on poses are not read, so the graph's frame is free, and its shape is "
@@ -27,9 +27,9 @@ LOST = (
     ("", "this tag is not known, and what it says is lost"),
 )  # fmt: skip
 """The first one that fits a tag."""
-NAMED = 5
+NAMED_TAGS = 5
 """So many tags of one kind are named."""
-WIDEST = 40
+SHOWN_TAG_LENGTH = 40
 """Characters of a tag that are shown."""
 
 
@@ -37,13 +37,15 @@ def losses(skipped: Mapping[str, int]) -> list[str]:
     """A sentence for each kind of loss, of how many lines of which tags were skipped."""
     kinds: dict[str, list[str]] = {}
     for tag, count in skipped.items():
-        lost = next(lost for pattern, lost in LOST if re.search(pattern, tag))
+        lost = next(lost for pattern, lost in LOSSES if re.search(pattern, tag))
         name = tag if re.fullmatch("[!-~]+", tag) else ascii(tag)
-        kinds.setdefault(lost, []).append(counted(count, f"{name[:WIDEST]} line"))
+        kinds.setdefault(lost, []).append(counted(count, f"{name[:SHOWN_TAG_LENGTH]} line"))
     sentences = []
     for lost, lines in kinds.items():
-        more = [f"lines of {counted(len(lines) - NAMED, 'other tag')}"] if len(lines) > NAMED else []
-        *before, last = [*lines[:NAMED], *more]
+        more = (
+            [f"lines of {counted(len(lines) - NAMED_TAGS, 'other tag')}"] if len(lines) > NAMED_TAGS else []
+        )
+        *before, last = [*lines[:NAMED_TAGS], *more]
         listed = f"{', '.join(before)} and {last}" if before else last
         sentences.append(f"{listed} skipped: {lost}")
     return sentences

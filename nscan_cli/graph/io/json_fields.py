@@ -17,7 +17,7 @@ from nscan_cli.graph.io.triangles import from_upper_triangle, upper_triangle
 from nscan_cli.graph.relations.semidefinite import IndefiniteError, semidefinite
 from nscan_cli.poses import Array, wrap
 
-DECIMALS = 9
+POSE_DECIMALS = 9
 LARGEST_ANGLE = 3.141592653
 """The last angle before π, rad, that 9 decimals can give."""
 LARGEST_INTEGER = 2**53
@@ -29,9 +29,9 @@ def pose_rows(poses: Array) -> list[list[float]]:
     angles = wrap(poses[:, 2]).tolist()
     return [
         [
-            round(x, DECIMALS) + 0.0,
-            round(y, DECIMALS) + 0.0,
-            min(max(round(angle, DECIMALS) + 0.0, -LARGEST_ANGLE), LARGEST_ANGLE),
+            round(x, POSE_DECIMALS) + 0.0,
+            round(y, POSE_DECIMALS) + 0.0,
+            min(max(round(angle, POSE_DECIMALS) + 0.0, -LARGEST_ANGLE), LARGEST_ANGLE),
         ]
         for (x, y, _), angle in zip(poses.tolist(), angles, strict=True)
     ]
@@ -111,11 +111,13 @@ class JsonRecord:
     def number(self, key: str) -> float:
         """A finite number."""
         error = self.wrong(key, "a finite number")
-        return float(_numbers([self.get(key)], 1, error)[0])
+        return float(_checked_numbers([self.get(key)], 1, error)[0])
 
     def pose(self, key: str) -> Array:
         """(3,) x, y, φ."""
-        return _numbers(self.get(key), 3, self.wrong(key, f"a pose of three {_bounded(DISTANCE)}"), DISTANCE)
+        return _checked_numbers(
+            self.get(key), 3, self.wrong(key, f"a pose of three {_bounded(DISTANCE)}"), DISTANCE
+        )
 
     def poses(self, key: str, count: int) -> Array:
         """(count, 3) poses."""
@@ -123,14 +125,14 @@ class JsonRecord:
         error = self.wrong(key, f"a list of {count} poses of three {_bounded(DISTANCE)}")
         if not isinstance(values, list) or len(values) != count:
             raise error
-        return np.array([_numbers(value, 3, error, DISTANCE) for value in values])
+        return np.array([_checked_numbers(value, 3, error, DISTANCE) for value in values])
 
     def matrix(self, key: str, size: int) -> Array:
         """The symmetric matrix (size, size) of an upper triangle."""
         count = size * (size + 1) // 2
         numbers = f"{count} {_bounded(INFORMATION)}"
         error = self.wrong(key, f"the upper triangle of a {size} × {size} matrix: {numbers}")
-        return from_upper_triangle(_numbers(self.get(key), count, error, INFORMATION), size)
+        return from_upper_triangle(_checked_numbers(self.get(key), count, error, INFORMATION), size)
 
     def information(self, key: str, size: int, held: int | None = None) -> Array:
         """The same, and positive semi-definite; what rounding has made negative is 0.
@@ -165,7 +167,7 @@ def _bounded(limit: Limit) -> str:
     return f"finite numbers up to {limit.value:g}"
 
 
-def _numbers(values: Any, count: int, error: MalformedError, limit: Limit | None = None) -> Array:
+def _checked_numbers(values: Any, count: int, error: MalformedError, limit: Limit | None = None) -> Array:
     if not isinstance(values, list) or len(values) != count:
         raise error
     # A bool is an int for Python, but no number of JSON.

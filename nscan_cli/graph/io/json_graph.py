@@ -29,18 +29,18 @@ from nscan_cli.logs.formats import FORMS, name_of
 from nscan_cli.logs.scan_order import STAMP
 from nscan_cli.poses import Array
 
-FORMAT = "nscan-pose-graph"
+GRAPH_FORMAT = "nscan-pose-graph"
 VERSION = "1.0"
 SCHEMA = "urn:nscan-cli:pose-graph:1.0"
-UNITS = {"length": "m", "angle": "rad", "time": "s"}
-BLOCK = 1000
+GRAPH_UNITS = {"length": "m", "angle": "rad", "time": "s"}
+POSES_AT_A_TIME = 1000
 """So many poses are written at a time."""
-KEY = re.compile("0|[1-9][0-9]{0,19}")
+VERTEX_KEY = re.compile("0|[1-9][0-9]{0,19}")
 """A vertex of g2o: a number of 64 bits, which as text is exact for every reader of JSON."""
-NEXT = ",\n"
+RECORD_SEPARATOR = ",\n"
 """From one record to the next."""
 _compact = json.JSONEncoder(separators=(",", ":"), allow_nan=False, check_circular=False).encode
-REMEDY = "mend it, or write the graph again with nscan-cli slam"
+JSON_REMEDY = "mend it, or write the graph again with nscan-cli slam"
 
 
 def write_graph(graph: Graph) -> bytes:
@@ -55,7 +55,12 @@ def write_graph(graph: Graph) -> bytes:
         term = relation.term()
         check_finite(f"the relation of {relation.nodes}", term.local, term.hessian, relation.score)
     provenance = {**provenance_of([], {}), **graph.provenance}
-    head: dict[str, Any] = {"$schema": SCHEMA, "format": FORMAT, "version": VERSION, "units": UNITS}
+    head: dict[str, Any] = {
+        "$schema": SCHEMA,
+        "format": GRAPH_FORMAT,
+        "version": VERSION,
+        "units": GRAPH_UNITS,
+    }
     lists: dict[str, Iterable[str]] = {
         "nodes": _node_records(graph),
         "relations": (
@@ -71,13 +76,13 @@ def write_graph(graph: Graph) -> bytes:
     # Piece by piece: as lists of numbers all records at once take many times the room of the document.
     document = io.BytesIO()
     for key, value in {**head, "provenance": provenance}.items():
-        document.write(f'{NEXT if document.tell() else "{"}"{key}":{_compact(value)}'.encode())
+        document.write(f'{RECORD_SEPARATOR if document.tell() else "{"}"{key}":{_compact(value)}'.encode())
     for key, records in lists.items():
-        document.write(f'{NEXT}"{key}":['.encode())
+        document.write(f'{RECORD_SEPARATOR}"{key}":['.encode())
         separator = "\n"
         for record in records:
             document.write(f"{separator}{record}".encode())
-            separator = NEXT
+            separator = RECORD_SEPARATOR
         document.write(b"]" if separator == "\n" else b"\n]")
     document.write(b"}\n")
     return document.getvalue()
@@ -99,22 +104,24 @@ def parse_graph(data: bytes, name: str) -> Graph:
     except (ValueError, RecursionError) as error:
         raise _not_json(data, name, error) from error
     try:
-        return _graph(JsonRecord(document, "document"))
+        return _graph_of_document(JsonRecord(document, "document"))
     except MalformedError as error:
-        raise InputDataError(name, str(error), REMEDY) from error
+        raise InputDataError(name, str(error), JSON_REMEDY) from error
 
 
 def _not_json(data: bytes, name: str, error: Exception) -> InputDataError:
     """What is wrong with a file that is no JSON: where it is broken, or what it is instead."""
     if data.strip() and data.lstrip()[:1] not in (b"{", b"["):
-        return InputDataError(name, f"is {_kind(data)}", "give a graph in JSON, as nscan-cli slam writes it")
+        return InputDataError(
+            name, f"is {_kind_of_content(data)}", "give a graph in JSON, as nscan-cli slam writes it"
+        )
     if isinstance(error, json.JSONDecodeError):
         problem = f"not JSON: {error.msg}" if data.strip() else "is empty"
-        return InputDataError(name, problem, REMEDY, line=error.lineno)
-    return InputDataError(name, f"not JSON: {error}", REMEDY)
+        return InputDataError(name, problem, JSON_REMEDY, line=error.lineno)
+    return InputDataError(name, f"not JSON: {error}", JSON_REMEDY)
 
 
-def _kind(data: bytes) -> str:
+def _kind_of_content(data: bytes) -> str:
     packing = packing_of(data)
     if packing is not None:
         return f"compressed by {packing.name}"
@@ -128,8 +135,8 @@ def _refuse_constant(constant: str) -> NoReturn:
 
 def _node_records(graph: Graph) -> Iterator[str]:
     """The nodes in JSON. There is one for every scan, and objects made of them would take longer."""
-    poses = _each_pose(graph.poses)
-    odometry = itertools.repeat(None, len(graph)) if graph.odometry is None else _each_pose(graph.odometry)
+    poses = _pose_blocks(graph.poses)
+    odometry = itertools.repeat(None, len(graph)) if graph.odometry is None else _pose_blocks(graph.odometry)
     scans, anchors = graph.scans.tolist(), graph.anchors.tolist()
     named: Iterable[str] = itertools.repeat("", len(graph))
     if graph.vertices is not None:
@@ -144,10 +151,10 @@ def _node_records(graph: Graph) -> Iterator[str]:
         yield f'{{"id":{node},"scan":{scan},{stamped},{pose},{keyframe}}}'
 
 
-def _each_pose(poses: Array) -> Iterator[list[float]]:
+def _pose_blocks(poses: Array) -> Iterator[list[float]]:
     """The rows of poses (N, 3), not all at once: as lists they take many times the room."""
-    for first in range(0, len(poses), BLOCK):
-        yield from pose_rows(poses[first : first + BLOCK])
+    for first in range(0, len(poses), POSES_AT_A_TIME):
+        yield from pose_rows(poses[first : first + POSES_AT_A_TIME])
 
 
 def _loop_record(loop: Loop) -> dict[str, Any]:
@@ -159,13 +166,13 @@ def _loop_record(loop: Loop) -> dict[str, Any]:
     }
 
 
-def _graph(document: JsonRecord) -> Graph:
-    if "format" not in document or document.get("format") != FORMAT:
-        raise MalformedError("document", f"'format' is not {FORMAT!r}, so this is no pose graph")
+def _graph_of_document(document: JsonRecord) -> Graph:
+    if "format" not in document or document.get("format") != GRAPH_FORMAT:
+        raise MalformedError("document", f"'format' is not {GRAPH_FORMAT!r}, so this is no pose graph")
     if document.get("version") != VERSION:
         raise MalformedError("document", f"'version' is {document.get('version')!r}; {VERSION!r} can be read")
-    if document.get("units") != UNITS:
-        raise MalformedError("document", f"'units' is not {_compact(UNITS)}")
+    if document.get("units") != GRAPH_UNITS:
+        raise MalformedError("document", f"'units' is not {_compact(GRAPH_UNITS)}")
     provenance = _provenance(document)
     graph = _nodes(document)
     graph.provenance = provenance
@@ -174,7 +181,7 @@ def _graph(document: JsonRecord) -> Graph:
     for record in document.records("loops"):
         graph.loops.append(
             Loop(
-                _pair(record, keyframes),
+                _loop_nodes(record, keyframes),
                 record.flag("accepted"),
                 record.text("reason"),
                 record.number("score"),
@@ -217,13 +224,13 @@ def _nodes(document: JsonRecord) -> Graph:
         scans.append(record.integer("scan"))
         if node > 0 and scans[-1] <= scans[-2]:
             raise MalformedError(record.place, "'scan' is not greater than that of the node before")
-        stamps.append(_stamp(record))
+        stamps.append(_node_stamp(record))
         poses.append(record.pose("pose"))
         if "odometry" in record:
             odometry.append(record.pose("odometry"))
         if "vertex" in record:
-            vertices.append(_vertex(record))
-        anchors.append(_anchor(record, node))
+            vertices.append(_node_vertex(record))
+        anchors.append(_node_anchor(record, node))
     if not poses:
         raise MalformedError("nodes", "there are none")
     if odometry and len(odometry) != len(poses):
@@ -243,21 +250,21 @@ def _nodes(document: JsonRecord) -> Graph:
     )
 
 
-def _vertex(record: JsonRecord) -> int:
+def _node_vertex(record: JsonRecord) -> int:
     key = record.text("vertex")
-    if not KEY.fullmatch(key) or int(key) > LARGEST_KEY:
+    if not VERTEX_KEY.fullmatch(key) or int(key) > LARGEST_KEY:
         raise record.wrong("vertex", "a number of 64 bits, as text")
     return int(key)
 
 
-def _stamp(record: JsonRecord) -> str:
+def _node_stamp(record: JsonRecord) -> str:
     stamp = record.text("stamp")
     if not STAMP.fullmatch(stamp) or abs(float(stamp)) > TIME.value:
         raise record.wrong("stamp", f"a time in seconds, as text, up to {TIME.shown()}")
     return stamp
 
 
-def _anchor(record: JsonRecord, node: int) -> int:
+def _node_anchor(record: JsonRecord, node: int) -> int:
     if not record.flag("keyframe"):
         anchor = record.integer("attached")
         if anchor == node:
@@ -280,7 +287,7 @@ def _relations(document: JsonRecord, graph: Graph) -> None:
         graph.add(relation)
 
 
-def _pair(record: JsonRecord, keyframes: set[int]) -> tuple[int, int]:
+def _loop_nodes(record: JsonRecord, keyframes: set[int]) -> tuple[int, int]:
     nodes = record.integers("nodes")
     if len(nodes) != 2:
         raise record.wrong("nodes", "a pair of nodes")

@@ -13,20 +13,25 @@ from dataclasses import dataclass
 
 from nscan_cli.files.encoding import BYTE_ORDER_MARK
 
-COMMENTS = "#%"
+COMMENT_MARKS = "#%"
 """What a line begins with that is a comment, or names the columns."""
-UNIT = re.compile(r"[\[(].*?[\])]")
-WORD = re.compile(r"[a-z]+|[0-9]+")
-ROTATION = ("quat", "orient", "rot")
+UNIT_IN_NAME = re.compile(r"[\[(].*?[\])]")
+WORD_IN_NAME = re.compile(r"[a-z]+|[0-9]+")
+ROTATION_PREFIXES = ("quat", "orient", "rot")
 """What a part of a name begins with that is of a quaternion; another one is q."""
-NO_POSITION = ("v", "w", "b", "a", "twist", "vel", "linear", "angular", "covariance", "cov", "acc", "gyro")
+OTHER_VECTORS = ("v", "w", "b", "a", "twist", "vel", "linear", "angular", "covariance", "cov", "acc", "gyro")
 """Parts of the names of what has an x, y and z, too: velocities, biases."""
-POSITION = ("", "t", "p", "pos", "position", "trans", "translation")
+POSITION_NAMES = ("", "t", "p", "pos", "position", "trans", "translation")
 """What stands before the axis in the name of a coordinate."""
-SECONDS, NANOSECONDS = ("s", "sec", "secs", "seconds"), ("ns", "nsec", "nsecs", "nanosec", "nanoseconds")
-POWERS = {"ms": 3, "us": 6, "µs": 6} | dict.fromkeys(SECONDS, 0) | dict.fromkeys(NANOSECONDS, 9)
+SECOND_UNITS, NANOSECOND_UNITS = (
+    ("s", "sec", "secs", "seconds"),
+    ("ns", "nsec", "nsecs", "nanosec", "nanoseconds"),
+)
+TIME_POWERS = (
+    {"ms": 3, "us": 6, "µs": 6} | dict.fromkeys(SECOND_UNITS, 0) | dict.fromkeys(NANOSECOND_UNITS, 9)
+)
 """Units of times: so many powers of ten to a second."""
-LATEST_SECONDS, STEP = 1e11, 1000
+LATEST_SECONDS, POWER_STEP = 1e11, 1000
 """A time beyond is in ms, another thousand times as far in µs, and then in ns."""
 
 
@@ -66,7 +71,7 @@ EUROC_COUNT = 17
 """With velocity and biases."""
 
 
-def fields_of(line: str) -> list[str]:
+def split_fields(line: str) -> list[str]:
     """What a line has between commas, semicolons, tabs or spaces. Beside semicolons, commas are decimal."""
     if ";" in line:
         fields = line.replace(",", ".").split(";")
@@ -78,7 +83,7 @@ def fields_of(line: str) -> list[str]:
     return fields if any(fields) and fields[-1] else fields[:-1] if any(fields) else []
 
 
-def lines_of(data: bytes) -> Iterator[tuple[int, str]]:
+def numbered_lines(data: bytes) -> Iterator[tuple[int, str]]:
     """The lines of a text that are not blank, each with its number; a byte-order mark is no part of one."""
     for number, line in enumerate(io.BytesIO(data.removeprefix(BYTE_ORDER_MARK)), start=1):
         text = line.decode("utf-8", errors="replace").strip()
@@ -86,21 +91,21 @@ def lines_of(data: bytes) -> Iterator[tuple[int, str]]:
             yield number, text
 
 
-def columns_named(line: str) -> PoseColumns | None:
+def columns_by_name(line: str) -> PoseColumns | None:
     """The columns by the names in a line; None without those of a time, a position and a quaternion."""
     found: dict[str, int] = {}
     power, whole = None, False
-    fields = fields_of(line.lstrip(COMMENTS).strip())
+    fields = split_fields(line.lstrip(COMMENT_MARKS).strip())
     for at, field in enumerate(fields):
-        name = UNIT.sub("", field).strip().lower()
-        words = WORD.findall(name)
+        name = UNIT_IN_NAME.sub("", field).strip().lower()
+        words = WORD_IN_NAME.findall(name)
         if not words:
             continue
-        what = _what(words)
+        what = _quantity(words)
         if what == "time" and what not in found:
-            unit = "".join(UNIT.findall(field)).strip("[]() ").lower() or words[-1]
-            power, whole = POWERS.get(unit), words[-1] in SECONDS
-        elif what == "time" and whole and words[-1] in NANOSECONDS:
+            unit = "".join(UNIT_IN_NAME.findall(field)).strip("[]() ").lower() or words[-1]
+            power, whole = TIME_POWERS.get(unit), words[-1] in SECOND_UNITS
+        elif what == "time" and whole and words[-1] in NANOSECOND_UNITS:
             what = "rest"
         if what:
             found.setdefault(what, at)
@@ -112,29 +117,29 @@ def columns_named(line: str) -> PoseColumns | None:
         return None
 
 
-def _what(words: list[str]) -> str:
+def _quantity(words: list[str]) -> str:
     """What a column is that is called so: time, x, y, z, qx, qy, qz, qw, or nothing of use."""
-    if words[0].startswith("time") or words[-1] in ("t", "stamp", *SECONDS, *NANOSECONDS):
+    if words[0].startswith("time") or words[-1] in ("t", "stamp", *SECOND_UNITS, *NANOSECOND_UNITS):
         return "time"
     axis, before = words[-1][-1], words[-1][:-1]
     if axis not in "xyzw":
         return ""
     parts = [*words[:-1], before]
-    if any(part == "q" or part.startswith(ROTATION) for part in parts):
+    if any(part == "q" or part.startswith(ROTATION_PREFIXES) for part in parts):
         return f"q{axis}"
-    if axis == "w" or any(part in NO_POSITION for part in parts) or before not in POSITION:
+    if axis == "w" or any(part in OTHER_VECTORS for part in parts) or before not in POSITION_NAMES:
         return ""
     return axis
 
 
-def columns_of(line: str) -> PoseColumns:
+def columns_by_content(line: str) -> PoseColumns:
     """The columns by the first line of numbers, where nothing names them.
 
     Nanoseconds and commas are EuRoC's; other lines have to be of TUM's form.
     """
-    fields = fields_of(line)
+    fields = split_fields(line)
     if len(fields) >= EUROC_COUNT or (
-        "," in line and ";" not in line and power_of(fields[0]) == POWERS["ns"]
+        "," in line and ";" not in line and power_by_size(fields[0]) == TIME_POWERS["ns"]
     ):
         return EUROC
     return TUM
@@ -142,13 +147,13 @@ def columns_of(line: str) -> PoseColumns:
 
 def is_header(line: str) -> bool:
     """Whether a line says what the columns are, in whichever words, or is a comment."""
-    return line[0] in COMMENTS or not _is_number(fields_of(line)[0])
+    return line[0] in COMMENT_MARKS or not _is_number(split_fields(line)[0])
 
 
-def power_of(time: str) -> int:
+def power_by_size(time: str) -> int:
     """The power of ten that makes seconds of a time, by its size: no clock that counts seconds is so late."""
     size, power = abs(float(time)), 0
-    while size > LATEST_SECONDS * STEP ** (power / 3) and power < POWERS["ns"]:
+    while size > LATEST_SECONDS * POWER_STEP ** (power / 3) and power < TIME_POWERS["ns"]:
         power += 3
     return power
 
@@ -164,13 +169,13 @@ def in_seconds(time: str, power: int) -> str:
     return f"{whole}.{rest:0{power}d}"
 
 
-def are_poses(data: bytes) -> bool:
+def is_pose_table(data: bytes) -> bool:
     """Whether a text is a table of poses: its first line names their columns, or is of numbers alone."""
-    for _number, line in lines_of(data):
-        if columns_named(line) is not None:
+    for _number, line in numbered_lines(data):
+        if columns_by_name(line) is not None:
             return True
-        if line[0] not in COMMENTS:
-            return all(_is_number(field) for field in fields_of(line))
+        if line[0] not in COMMENT_MARKS:
+            return all(_is_number(field) for field in split_fields(line))
     return False
 
 

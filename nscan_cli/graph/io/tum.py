@@ -19,18 +19,18 @@ from nscan_cli.files.finite import check_finite
 from nscan_cli.files.inputs import label, read_text
 from nscan_cli.files.limits import DISTANCE, GRAPH, TIME
 from nscan_cli.graph.io.pose_columns import (
-    COMMENTS,
+    COMMENT_MARKS,
     PoseColumns,
-    columns_named,
-    columns_of,
-    fields_of,
+    columns_by_content,
+    columns_by_name,
     is_header,
-    lines_of,
-    power_of,
+    numbered_lines,
+    power_by_size,
+    split_fields,
 )
 from nscan_cli.poses import Array, wrap
 
-REMEDY = "TUM lines are 't x y z qx qy qz qw'"
+TUM_REMEDY = "TUM lines are 't x y z qx qy qz qw'"
 UNIT_TOLERANCE = 0.01
 """How far the length of a quaternion may be from 1: what rounding to a few digits does, and no more."""
 
@@ -104,30 +104,34 @@ def parse_tum(data: bytes, name: str) -> Trajectory:
     values = array("d")
     columns: PoseColumns | None = None
     power = 0
-    for number, line in lines_of(data):
+    for number, line in numbered_lines(data):
         if not stamps and is_header(line):
-            named = columns_named(line)
+            named = columns_by_name(line)
             columns = named or columns
-            if named or line[0] in COMMENTS:
+            if named or line[0] in COMMENT_MARKS:
                 continue
-        if line[0] in COMMENTS:
+        if line[0] in COMMENT_MARKS:
             continue
         try:
             if not stamps:
-                columns = columns or columns_of(line)
-                power = power_of(fields_of(line)[columns.time]) if columns.power is None else columns.power
+                columns = columns or columns_by_content(line)
+                power = (
+                    power_by_size(split_fields(line)[columns.time])
+                    if columns.power is None
+                    else columns.power
+                )
             assert columns is not None
-            stamp, pose = _pose(fields_of(line), columns, power)
+            stamp, pose = _pose_of_line(split_fields(line), columns, power)
         except (ValueError, IndexError) as error:
-            raise InputDataError(name, str(error), REMEDY, line=number) from error
+            raise InputDataError(name, str(error), TUM_REMEDY, line=number) from error
         values.extend(pose)
         stamps.append(stamp)
     if not stamps:
-        raise InputDataError(name, "no pose in it", REMEDY)
+        raise InputDataError(name, "no pose in it", TUM_REMEDY)
     return Trajectory.in_space(stamps, np.array(values).reshape(-1, 7))
 
 
-def _pose(fields: list[str], columns: PoseColumns, power: int) -> tuple[str, list[float]]:
+def _pose_of_line(fields: list[str], columns: PoseColumns, power: int) -> tuple[str, list[float]]:
     """The stamp (s), and x, y, z and quaternion of a line. Raises ValueError saying what is wrong."""
     if len(fields) != (columns.count or max(len(fields), columns.least)):
         raise ValueError(f"{len(fields)} columns instead of {columns.count or columns.least}")

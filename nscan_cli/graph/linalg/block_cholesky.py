@@ -53,7 +53,7 @@ def solve(factor: Factor, right: Array) -> Array:
     return x[place]
 
 
-def loose_nodes(factor: Factor, share: float = 1e-6) -> NDArray[np.bool_]:
+def undetermined_nodes(factor: Factor, share: float = 1e-6) -> NDArray[np.bool_]:
     """Which nodes (F,) have a part in a direction that the matrix does not hold.
 
     Each pivot has its direction v, with Lᵗv = e there and vᵗAv the pivot for v = 1 there. With long levers
@@ -105,7 +105,7 @@ def _factorise(pattern: Pattern, blocks: Array, diagonal: Array, loose: NDArray[
         rows, panel = rows_of(pattern, j), panel_of(pattern, panels, j)
         for p in range(rows.shape[0]):
             where[rows[p]] = p
-        _lay_in(blocks[starts[begin] : starts[end]], panel)
+        _copy_blocks(blocks[starts[begin] : starts[end]], panel)
         for i in range(panel.shape[0]):
             least[i] = LEAST_PIVOT * panel[i, i]
         k = first[j]
@@ -128,7 +128,7 @@ def _factorise(pattern: Pattern, blocks: Array, diagonal: Array, loose: NDArray[
 
 
 @leaf_kernel
-def _lay_in(blocks: Array, panel: Array) -> None:
+def _copy_blocks(blocks: Array, panel: Array) -> None:
     """The blocks of a supernode's columns, as they lie in the matrix, into its panel."""
     p, height = 0, panel.shape[1] // 3
     for column in range(panel.shape[0] // 3):
@@ -188,7 +188,7 @@ def _factorise_panel(
                 pivot = np.sqrt(pivot)
             else:
                 loose[column] = True
-                pivot = _substitute(panel, rows, diagonal, least[column] / LEAST_PIVOT, column)
+                pivot = _substitute_pivot(panel, rows, diagonal, least[column] / LEAST_PIVOT, column)
             for i in range(column + 1, height):
                 panel[column, i] /= pivot
             panel[column, column] = pivot
@@ -196,7 +196,7 @@ def _factorise_panel(
 
 
 @leaf_kernel
-def _substitute(panel: Array, rows: Indices, diagonal: Array, own: float, column: int) -> float:
+def _substitute_pivot(panel: Array, rows: Indices, diagonal: Array, own: float, column: int) -> float:
     """The root of what takes the place of a pivot: its own entry of the matrix's diagonal, or more.
 
     No entry of L is above the root of the diagonal entry of its row then. In a positive matrix none ever is.

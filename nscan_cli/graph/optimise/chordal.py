@@ -17,7 +17,7 @@ from nscan_cli.graph.optimise.term_columns import TermColumns
 from nscan_cli.matching.damped_newton import GRAPH
 from nscan_cli.poses import Array, Indices
 
-LEAST_SHARE = 1e-9
+REGULARISATION = 1e-9
 """What information a direction gets at the least, as a share of the largest, so that all can be solved."""
 
 
@@ -44,7 +44,7 @@ def chordal_start(energy: GraphEnergy, poses: Array) -> Array:
 def _rotations(energy: GraphEnergy, angle: float) -> Array:
     """The angles (K,) that minimise Σ w |r_b − r_a exp(i θ_ab)|², r free but for the fixed pose's."""
     a, b, turns, weights = _turns(energy.columns)
-    weights = np.maximum(weights, LEAST_SHARE * (weights.max(initial=0.0) or 1.0))
+    weights = np.maximum(weights, REGULARISATION * (weights.max(initial=0.0) or 1.0))
     # r as (re, im, 0): blocks of three, for the pattern that is there.
     own = weights[:, None, None] * np.eye(3)
     turned = np.zeros_like(own)
@@ -96,6 +96,6 @@ def _marginal_weights(information: Array) -> Array:
     """1/σ² (R, m) of the angles of m poses from their information (R, 3 m, 3 m)."""
     size = information.shape[1]
     largest = np.abs(information).max(axis=(1, 2), initial=0.0)[:, None, None]
-    regular = information + LEAST_SHARE * np.where(largest > 0, largest, 1.0) * np.eye(size)
+    regular = information + REGULARISATION * np.where(largest > 0, largest, 1.0) * np.eye(size)
     weights: Array = 1 / np.diagonal(np.linalg.inv(regular), axis1=1, axis2=2)[:, 2::3]
     return weights

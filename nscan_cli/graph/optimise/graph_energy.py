@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nscan_cli.graph.linalg.factor_pattern import block_targets, find_pattern
-from nscan_cli.graph.optimise.term_columns import TermColumns, Terms
+from nscan_cli.graph.optimise.term_columns import TermCache, TermColumns
 from nscan_cli.graph.optimise.terms import nscan_term, nscan_value
 from nscan_cli.graph.relations.base import Relation
 from nscan_cli.kernels.decorators import kernel
@@ -38,7 +38,7 @@ class GraphEnergy:
         relations: Sequence[Relation],
         positions: Indices,
         fixed: int = 0,
-        terms: Terms | None = None,
+        terms: TermCache | None = None,
         free: NDArray[np.bool_] | None = None,
     ) -> None:
         """Take relations between node ids; `positions[id]` is a node's place among the `nodes` poses.
@@ -46,7 +46,7 @@ class GraphEnergy:
         The pose at place `fixed` is held where it is, and so are those that are not `free` (K,), if given.
         With `terms`, those of the relations are kept there.
         """
-        terms = terms or Terms()
+        terms = terms or TermCache()
         self.columns = terms.columns(relations, positions)
         self._not_linear = terms.not_linear(relations)
         self.fixed = fixed
@@ -57,7 +57,7 @@ class GraphEnergy:
         self.free_row: Indices = np.full(nodes, -1)
         """(K,) the place of a pose among those; −1 for one that is held."""
         self.free_row[self.free] = np.arange(len(self.free))
-        edges = _edges(self.columns, self.free_row)
+        edges = _block_edges(self.columns, self.free_row)
         self.pattern = find_pattern(edges, len(self.free))
         self._targets = block_targets(edges, self.pattern)
 
@@ -72,7 +72,7 @@ class GraphEnergy:
         poses = np.ascontiguousarray(poses, dtype=np.float64)
         columns = self._columns_at(poses) if self._not_linear else self.columns
         terms = np.zeros(len(columns.fixed))
-        _values(columns, poses, terms)
+        _evaluate_values(columns, poses, terms)
         return _not_negative(terms)
 
     def evaluate(self, poses: Array, exact: bool) -> System:
@@ -106,18 +106,18 @@ def _not_negative(terms: Array) -> Array:
 
 
 @kernel
-def _edges(columns: TermColumns, free_row: Indices) -> Indices:
+def _block_edges(columns: TermColumns, free_row: Indices) -> Indices:
     """The blocks of the lower triangle of each term, in order, as pairs of rows; −1 is a pose held."""
     sizes = columns.starts[1:] - columns.starts[:-1]
     edges = np.empty(((sizes * (sizes + 1)).sum() // 2, 2), dtype=np.int64)
     e = 0
     for k in range(columns.fixed.shape[0]):
-        e = _add_edges(columns.members[columns.starts[k] : columns.starts[k + 1]], free_row, edges, e)
+        e = _add_block_edges(columns.members[columns.starts[k] : columns.starts[k + 1]], free_row, edges, e)
     return edges
 
 
 @kernel
-def _add_edges(members: Indices, free_row: Indices, edges: Indices, e: int) -> int:
+def _add_block_edges(members: Indices, free_row: Indices, edges: Indices, e: int) -> int:
     for i in range(members.shape[0]):
         for j in range(i + 1):
             edges[e, 0], edges[e, 1] = free_row[members[i]], free_row[members[j]]
@@ -147,7 +147,13 @@ def _evaluate(
             m, m
         )
         terms[k] = nscan_term(
-            _at(poses, members), columns.local[start:end], hessian, columns.fixed[k], curvature, part, block
+            _poses_of(poses, members),
+            columns.local[start:end],
+            hessian,
+            columns.fixed[k],
+            curvature,
+            part,
+            block,
         )
         weight = columns.weights[k]
         if weight != 1.0:
@@ -158,7 +164,7 @@ def _evaluate(
 
 
 @kernel
-def _values(columns: TermColumns, poses: Array, terms: Array) -> None:
+def _evaluate_values(columns: TermColumns, poses: Array, terms: Array) -> None:
     """Each relation's value into terms (Q,)."""
     for k in range(columns.fixed.shape[0]):
         start, end = columns.starts[k], columns.starts[k + 1]
@@ -167,12 +173,12 @@ def _values(columns: TermColumns, poses: Array, terms: Array) -> None:
             m, m
         )
         terms[k] = columns.weights[k] * nscan_value(
-            _at(poses, members), columns.local[start:end], hessian, columns.fixed[k]
+            _poses_of(poses, members), columns.local[start:end], hessian, columns.fixed[k]
         )
 
 
 @kernel
-def _at(poses: Array, members: Indices) -> Array:
+def _poses_of(poses: Array, members: Indices) -> Array:
     gathered = np.empty((members.shape[0], 3))
     for i in range(members.shape[0]):
         for a in range(3):

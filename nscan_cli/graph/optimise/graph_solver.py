@@ -12,10 +12,10 @@ from nscan_cli.graph.optimise.graph_energy import GraphEnergy, System
 from nscan_cli.matching.damped_newton import GRAPH, is_accepted, is_last, next_damping
 from nscan_cli.poses import Array, wrap
 
-SETTLED = 0.1
+EXACT_HESSIAN_STEP = 0.1
 """m, rad: the exact Hessian is used once a step is shorter. It needs fewer steps there than the
 Gauss–Newton part; farther away it needs more, and often is not positive definite."""
-NOTHING = 1e-7
+NEGLIGIBLE_GAIN = 1e-7
 """Of the energy, or of a χ² of 1: where relations leave a direction open, a step that gains less is the
 last: it moves less than a thousandth of a standard deviation."""
 
@@ -60,13 +60,13 @@ def optimise(
                 if is_accepted(here.value, value, GRAPH):
                     return Optimum(_wrapped(trial), value, iteration, True)
                 return Optimum(_wrapped(poses), here.value, iteration, True)
-            there = energy.evaluate(trial, exact=length < SETTLED)
+            there = energy.evaluate(trial, exact=length < EXACT_HESSIAN_STEP)
             accepted = is_accepted(here.value, there.value, GRAPH)
             if accepted:
-                gains = here.value - there.value > NOTHING * (1 + here.value)
+                gains = here.value - there.value > NEGLIGIBLE_GAIN * (1 + here.value)
                 if is_open and damping <= GRAPH.least_raised and not gains:
                     return Optimum(_wrapped(trial), there.value, iteration, True)
-                poses, here, exact = trial, there, length < SETTLED
+                poses, here, exact = trial, there, length < EXACT_HESSIAN_STEP
         damping = next_damping(damping, accepted, GRAPH)
         if damping > GRAPH.greatest:
             break

@@ -34,7 +34,7 @@ class TermColumns(NamedTuple):
     """(Q,) by which the terms are multiplied."""
 
 
-class Terms:
+class TermCache:
     """The terms of all relations that were asked for; a relation is known by being the same object."""
 
     def __init__(self) -> None:

@@ -15,11 +15,11 @@ from nscan_cli.graph.optimise.robust import unfolded
 from nscan_cli.graph.relations.base import Relation
 from nscan_cli.poses import Array, Indices
 
-TRIAL = 100
+TRIAL_ITERATIONS = 100
 """Iterations after which two starts are compared; only the better one goes on."""
-UNFOLDINGS = 3
+MAX_UNFOLDINGS = 3
 """How often a start is looked for from where a graph may be folded wrong, as long as each leads lower."""
-ROUNDING = 1e-6
+SAME_ENERGY = 1e-6
 """Energies that differ by less, of themselves or of a χ² of 1, are the same: then the poses given stay."""
 
 
@@ -61,7 +61,7 @@ def optimise_graph(graph: Graph, max_iterations: int = 1000, tolerance: float = 
     for part in parts:
         if len(part.keyframes) == 1:
             continue
-        lowest = _lowest(part.energy(len(graph)), poses[part.keyframes], max_iterations, tolerance)
+        lowest = _lowest_minimum(part.energy(len(graph)), poses[part.keyframes], max_iterations, tolerance)
         poses[part.keyframes] = lowest.poses
         total += lowest.energy
         iterations += lowest.iterations
@@ -71,7 +71,7 @@ def optimise_graph(graph: Graph, max_iterations: int = 1000, tolerance: float = 
     return GraphOptimum(total, iterations, converged, len(parts))
 
 
-def _lowest(energy: GraphEnergy, given: Array, max_iterations: int, tolerance: float) -> Optimum:
+def _lowest_minimum(energy: GraphEnergy, given: Array, max_iterations: int, tolerance: float) -> Optimum:
     """The lowest minimum from the poses given (K, 3), the chordal start, and the unfolded best of both.
 
     The iterations are those of all starts together.
@@ -79,7 +79,7 @@ def _lowest(energy: GraphEnergy, given: Array, max_iterations: int, tolerance: f
     iterations = 0
     best: Optimum | None = None
     for start in (given, chordal_start(energy, given)):
-        found = optimise(energy, start, min(TRIAL, max_iterations), tolerance)
+        found = optimise(energy, start, min(TRIAL_ITERATIONS, max_iterations), tolerance)
         iterations += found.iterations
         if best is None or _is_lower(found, best):
             best = found
@@ -87,7 +87,7 @@ def _lowest(energy: GraphEnergy, given: Array, max_iterations: int, tolerance: f
     if not best.converged:
         best = optimise(energy, best.poses, max_iterations, tolerance)
         iterations += best.iterations
-    for _ in range(UNFOLDINGS):
+    for _ in range(MAX_UNFOLDINGS):
         unbent = unfolded(energy, best.poses)
         if unbent is None:
             break
@@ -101,7 +101,7 @@ def _lowest(energy: GraphEnergy, given: Array, max_iterations: int, tolerance: f
 
 def _is_lower(found: Optimum, best: Optimum) -> bool:
     """Whether a minimum is clearly lower than the best so far, or that is none at all."""
-    return found.energy < best.energy - ROUNDING * (1 + best.energy) or not np.isfinite(best.energy)
+    return found.energy < best.energy - SAME_ENERGY * (1 + best.energy) or not np.isfinite(best.energy)
 
 
 def components(graph: Graph) -> list[Component]:

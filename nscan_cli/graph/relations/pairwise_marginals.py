@@ -8,7 +8,7 @@ from nscan_cli.graph.relations.base import Relation
 from nscan_cli.graph.relations.pairwise import Pairwise
 from nscan_cli.poses import Array, inverse, relative, rotated_information
 
-LEAST_SHARE = 1e-9
+LEAST_EIGENVALUE_SHARE = 1e-9
 """Of the greatest eigenvalue of a marginal's information."""
 
 
@@ -59,6 +59,6 @@ def _marginal_blocks(information: Array) -> Array:
             H_ir = H[np.ix_(i, r)]
             blocks[block] = H[np.ix_(i, i)] - H_ir @ np.linalg.pinv(H[np.ix_(r, r)], 1e-12, True) @ H_ir.T
     eigenvalues, vectors = np.linalg.eigh(0.5 * (blocks + blocks.transpose(0, 2, 1)))
-    held = np.maximum(eigenvalues, LEAST_SHARE * eigenvalues[:, -1:])
+    held = np.maximum(eigenvalues, LEAST_EIGENVALUE_SHARE * eigenvalues[:, -1:])
     sound: Array = (vectors * held[:, None, :]) @ vectors.transpose(0, 2, 1)
     return 0.5 * (sound + sound.transpose(0, 2, 1))

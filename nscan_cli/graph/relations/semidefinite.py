@@ -10,11 +10,11 @@ import numpy as np
 
 from nscan_cli.poses import Array
 
-WRITTEN = 5e-6
+WRITTEN_ROUNDING = 5e-6
 """Files keep six significant digits: an entry is off by so much of itself at most, and the least eigenvalue
 by so much of the trace. (In a semi-definite matrix no |a_ij| is above √(a_ii a_jj), and the matrix of these
 has one eigenvalue besides 0, its trace.) Six decimals are no fewer digits where entries are above 1."""
-COMPUTED = 1e-13
+EIGENVALUE_ROUNDING = 1e-13
 """Eigenvalues are computed to so much of the trace."""
 
 
@@ -38,11 +38,11 @@ def semidefinite(matrices: Array) -> Array:
         return matrices
     eigenvalues = np.linalg.eigvalsh(matrices)
     least, trace = eigenvalues[:, 0], _trace(matrices)
-    wrong = np.flatnonzero(least < -WRITTEN * trace)
+    wrong = np.flatnonzero(least < -WRITTEN_ROUNDING * trace)
     if len(wrong):
         first = int(wrong[0])
         raise IndefiniteError(first, float(least[first]), float(eigenvalues[first, -1]))
-    negative = least < -COMPUTED * trace
+    negative = least < -EIGENVALUE_ROUNDING * trace
     if not negative.any():
         return matrices
     matrices = matrices.copy()
@@ -50,7 +50,7 @@ def semidefinite(matrices: Array) -> Array:
     return matrices
 
 
-def as_information(hessians: Array, rounding: float = COMPUTED) -> Array:
+def as_information(hessians: Array, rounding: float = EIGENVALUE_ROUNDING) -> Array:
     """The Hessians (…, m, m) of matches as the information that they are: where one curves down, none.
 
     Those that have no eigenvalue below 0 but for `rounding` (of their trace) are the same, bit for bit.

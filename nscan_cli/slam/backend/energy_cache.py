@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nscan_cli.graph.optimise.graph_energy import GraphEnergy
-from nscan_cli.graph.optimise.term_columns import Terms
+from nscan_cli.graph.optimise.term_columns import TermCache
 from nscan_cli.graph.relations.base import Relation
 from nscan_cli.slam.keyframes.keyframe import Route
 
@@ -17,11 +17,11 @@ class EnergyCache:
     """Those of the keyframes of a route in a log of so many `scans`; terms of relations are kept."""
 
     def __init__(self, scans: int) -> None:
-        self._scans, self._terms = scans, Terms()
+        self._scans, self._terms = scans, TermCache()
 
     def forget(self) -> None:
         """Keep no terms any more: the relations that they are of have been replaced."""
-        self._terms = Terms()
+        self._terms = TermCache()
 
     def of(
         self,

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from nscan_cli.graph.linalg.block_cholesky import Factor, factorise, loose_nodes, solve
+from nscan_cli.graph.linalg.block_cholesky import Factor, factorise, solve, undetermined_nodes
 from nscan_cli.graph.linalg.selected_inverse import inverse_diagonal
 from nscan_cli.graph.optimise.graph_energy import GraphEnergy
 from nscan_cli.kernels.decorators import kernel
@@ -77,7 +77,7 @@ def known(energy: GraphEnergy, poses: Array) -> Known:
     covariances = np.full((len(poses), 3, 3), np.inf)
     covariances[energy.fixed], covariances[energy.free] = 0.0, inverse_diagonal(factor)
     if factor.loose.any():
-        covariances[energy.free[loose_nodes(factor)]] = np.inf
+        covariances[energy.free[undetermined_nodes(factor)]] = np.inf
     return Known(energy.fixed, poses, energy.free, factor, covariances)
 
 

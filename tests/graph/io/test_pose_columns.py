@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from nscan_cli.errors import InputDataError
-from nscan_cli.graph.io.pose_columns import are_poses
+from nscan_cli.graph.io.pose_columns import is_pose_table
 from nscan_cli.graph.io.tum import parse_tum
 
 # Two poses: yaw 90° and 180°, at 1403636580.838555574 and .938555574 s.
@@ -78,7 +78,7 @@ DIGITS = {"µs": 6, "ms": 3}
 @pytest.mark.parametrize("name", FORMS)
 def test_every_form_gives_the_same_poses(name: str):
     data = FORMS[name].encode()
-    assert are_poses(data)
+    assert is_pose_table(data)
     found = parse_tum(data, "a.csv")
     np.testing.assert_allclose(found.poses, [[1.5, -2.25, np.pi / 2], [2.5, 3.0, np.pi]], atol=1e-7)
     digits = DIGITS.get(name, 9)
@@ -102,7 +102,7 @@ def test_times_of_a_simulation_in_ns_are_known_by_their_header():
      "date,x,y,z\n1,2,3,4\n", "time,quality,x,y\n1,2,3,4\n"],
 )  # fmt: skip
 def test_what_is_no_table_of_poses(text: str):
-    assert not are_poses(text.encode())
+    assert not is_pose_table(text.encode())
 
 
 @pytest.mark.parametrize(

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from nscan_cli.graph.linalg.block_cholesky import Factor, factorise, loose_nodes, solve
+from nscan_cli.graph.linalg.block_cholesky import Factor, factorise, solve, undetermined_nodes
 from nscan_cli.graph.linalg.factor_pattern import block_targets, find_pattern
 from nscan_cli.graph.linalg.selected_inverse import inverse_diagonal
 from nscan_cli.poses import Array
@@ -119,7 +119,7 @@ def test_nodes_of_a_loose_direction_are_named_and_the_others_keep_their_inverse(
     matrix += link.T @ link
     factor = factor_of(matrix, [(1, 2), (0, 3)])
     assert factor.loose.sum() == 1
-    assert loose_nodes(factor).tolist() == [False, True, True, False]
+    assert undetermined_nodes(factor).tolist() == [False, True, True, False]
     blocks = inverse_diagonal(factor)
     held = np.linalg.inv(matrix[np.ix_([0, 9], [0, 9])])
     np.testing.assert_allclose(blocks[0], held[0, 0] * np.eye(3))

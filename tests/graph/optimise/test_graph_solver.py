@@ -50,7 +50,7 @@ def test_the_exact_hessian_ends_in_fewer_steps(monkeypatch: pytest.MonkeyPatch):
     truth, pairwise, nscan = mixed_ring(30, noise=6.0)
     energy = energy_of(truth, pairwise, nscan)
     found = optimise(energy, truth)
-    monkeypatch.setattr("nscan_cli.graph.optimise.graph_solver.SETTLED", 0.0)
+    monkeypatch.setattr("nscan_cli.graph.optimise.graph_solver.EXACT_HESSIAN_STEP", 0.0)
     slow = optimise(energy, truth)
     assert found.converged
     assert found.energy == pytest.approx(slow.energy, rel=1e-6)
@@ -63,7 +63,7 @@ def test_an_exact_hessian_that_is_not_positive_definite_is_left_for_the_part_tha
     truth, pairwise, nscan = mixed_ring(30, noise=1.0)
     energy, start = energy_of(truth, pairwise, nscan), disturbed(truth, 3.0)
     best = optimise(energy, truth)
-    monkeypatch.setattr("nscan_cli.graph.optimise.graph_solver.SETTLED", np.inf)
+    monkeypatch.setattr("nscan_cli.graph.optimise.graph_solver.EXACT_HESSIAN_STEP", np.inf)
     found = optimise(energy, start)
     assert found.energy == pytest.approx(best.energy, rel=1e-9)
     assert found.iterations <= 15

@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from nscan_cli.graph.optimise.graph_energy import GraphEnergy
-from nscan_cli.graph.optimise.term_columns import TermColumns, Terms
+from nscan_cli.graph.optimise.term_columns import TermCache, TermColumns
 from nscan_cli.graph.optimise.whole_graph import optimise_graph
 from nscan_cli.graph.relations.base import Relation
 from tests.graph.simulated import disturbed, graph_of, mixed_ring
@@ -32,15 +32,15 @@ def assert_same(found: TermColumns, wanted: TermColumns) -> None:
 @settings(max_examples=50, deadline=None)
 def test_columns_are_those_of_the_relations_asked_for(orders, data):
     """Whatever was asked for before, in whatever order, at whatever places."""
-    terms = Terms()
+    terms = TermCache()
     for order in orders:
         chosen = [RELATIONS[k] for k in order[: data.draw(st.integers(0, len(order)))]]
         positions = np.array(data.draw(st.permutations(range(SIZE))))
-        assert_same(terms.columns(chosen, positions), Terms().columns(chosen, positions))
+        assert_same(terms.columns(chosen, positions), TermCache().columns(chosen, positions))
 
 
 def test_an_energy_does_not_change_when_the_graph_grows():
-    poses, terms, positions = disturbed(TRUTH, 0.3), Terms(), np.arange(SIZE)
+    poses, terms, positions = disturbed(TRUTH, 0.3), TermCache(), np.arange(SIZE)
     first = GraphEnergy(SIZE, PAIRWISE, positions, terms=terms)
     before = first.evaluate(poses, exact=True)
     both = GraphEnergy(SIZE, RELATIONS, positions, terms=terms)
@@ -53,11 +53,11 @@ def test_an_energy_does_not_change_when_the_graph_grows():
 
 
 def test_a_relation_in_the_place_of_another_is_one_of_its_own():
-    terms, positions = Terms(), np.arange(SIZE)
+    terms, positions = TermCache(), np.arange(SIZE)
     terms.columns(RELATIONS, positions)
     other = replace(PAIRWISE[0], measurement=PAIRWISE[0].measurement + 0.5)
     relations = [other, *RELATIONS[1:]]
-    assert_same(terms.columns(relations, positions), Terms().columns(relations, positions))
+    assert_same(terms.columns(relations, positions), TermCache().columns(relations, positions))
 
 
 def test_a_node_without_a_place_is_an_error_and_not_the_last_pose():
