@@ -24,7 +24,7 @@ from nscan_cli.logs.reading_options import ReadingOptions
 if TYPE_CHECKING:
     from nscan_cli.files.source import Source
     from nscan_cli.logs.laser_log import LaserLog
-    from nscan_cli.matching.joint.index_set import Kind
+    from nscan_cli.matching.joint.index_set import IndexSetKind
     from nscan_cli.matching.joint.nscan_match import NScanMatch, PriorsAmong
     from nscan_cli.matching.joint.outliers import ExcludedScan
     from nscan_cli.matching.priors import MotionModel
@@ -70,7 +70,7 @@ LISTED_SCANS = 6
 def command(
     log: tuple[str, ...],
     numbers: tuple[int, ...],
-    pairs: Kind,
+    pairs: IndexSetKind,
     gauge: str,
     fixed: int | None,
     initial: str | None,
@@ -100,8 +100,8 @@ def command(
     from nscan_cli.cli.match_document import document
     from nscan_cli.files.inputs import base_name
     from nscan_cli.logs.load import read_log
-    from nscan_cli.matching.joint.joint_match import JointOptions
     from nscan_cli.matching.joint.nscan_match import nscan_match
+    from nscan_cli.matching.joint.options import JointOptions
     from nscan_cli.matching.pairwise import PairOptions, matched_points
     from nscan_cli.matching.priors import MotionModel
 

@@ -1,10 +1,10 @@
-"""Find the pose of a scan without a good start: branch and bound over a likelihood field.
+"""Correlative search for the pose of a scan without a good start: branch and bound over a likelihood field.
 
-The field says of each small cell how near it is to a point of the reference; a pose scores the mean of the
-cells that the scan's points fall into. Coarser levels of the field hold the greatest value of a square of
-cells, so that one look bounds all shifts of a square from above, and whatever cannot beat the best pose
-found so far is never looked at (Olson 2009; Hess et al. 2016, section V). The pose found is the best of its
-lattice; NDT matching makes it exact.
+A cell of the field has a greater value the nearer it is to a point of the reference. The score of a pose is
+the mean over the cells that the scan's points fall into. Coarser levels of the field hold the maximum of a
+square of cells, which bounds the scores of all shifts within the square, so squares that cannot beat the best
+pose are skipped (Olson 2009; Hess et al. 2016, section V). The result is the best pose of a lattice; NDT
+matching refines it.
 """
 
 from __future__ import annotations
@@ -18,57 +18,64 @@ from numpy.typing import NDArray
 from nscan_cli.kernels.decorators import kernel
 from nscan_cli.poses import Array
 
-LEVELS = 4
-PAD = 1 << (LEVELS - 1)
-"""The coarsest level has squares of 2³ cells to a side."""
+FIELD_LEVELS = 4
+"""Levels of a field. This and the next three are the layout of its arrays, compiled into the kernels."""
+PAD = 1 << (FIELD_LEVELS - 1)
+"""Cells on a side of a square of the coarsest level."""
 LANES = 8
-"""So many numbers are summed or compared side by side."""
+"""Numbers that are summed or compared side by side."""
 SPLAT = 2
-"""Cells to each side that a point reaches."""
+"""Cells to each side that a point raises."""
 
 
 @dataclass(frozen=True)
 class SearchOptions:
-    """How far, and how finely, a pose is searched."""
+    """How far and how finely a pose is searched."""
 
     distance: float = 4.5
-    """m to each side: two starts that are 1.5 m off, and one that is turned by 30° seen 3 m away."""
+    """Greatest shift to each side, m: covers two starts that are 1.5 m off, one of them turned by 30° and 3 m
+    away. A larger value takes longer, and finds poses farther away."""
     turn: float = 1.1
-    """rad to each side: two starts that are turned by 30° each."""
+    """Greatest rotation to each side, rad: covers two starts that are turned by 30° each. A larger value
+    takes longer."""
     cell: float = 0.2
-    """Side of a cell of the field, m."""
+    """Side of a cell of the field and of the lattice of poses, m. Larger cells are faster and less exact."""
     spread: float = 0.15
-    """Standard deviation (m) by which a point is blurred."""
+    """Standard deviation by which points are blurred, m. With a larger value poses score similarly."""
     beams: int = 90
-    """A scan with more points is searched with so many of them."""
+    """Most points of a scan that are used. More take longer, and tell similar places apart better."""
     lever: float = 15.0
-    """A turn moves a point at this distance (m) by one cell from one angle of the search to the next."""
+    """Distance at which the step between two angles moves a point by one cell, m. A larger value gives a
+    finer step, which takes longer."""
 
 
-class Field(NamedTuple):
-    """A likelihood field and its levels, with nothing around it: PAD cells before, one behind."""
+class LikelihoodField(NamedTuple):
+    """A likelihood field and its levels, with a border of zeros: PAD cells before, one behind."""
 
     levels: NDArray[np.float32]
-    """(LEVELS − 1, w, h) values in [0, 1]; level l at (ix, iy): the greatest of 2ˡ × 2ˡ cells from there."""
+    """(FIELD_LEVELS − 1, w, h) values in [0, 1]; level l has at (ix, iy) the maximum of 2ˡ × 2ˡ cells from
+    there."""
     coarsest: NDArray[np.float32]
     """(PAD, w, ⌈h / PAD⌉ + 2 LANES) the last level; [r, ix, LANES + q] is its value at (ix, PAD q + r), so
     that squares side by side are neighbours."""
     x: float
-    """m, left border of the cell at PAD."""
+    """Left border of the cell at PAD, m."""
     y: float
+    """Lower border of the cell at PAD, m."""
     cell: float
+    """Side of a cell, m."""
 
 
-class Spot(NamedTuple):
+class FoundPose(NamedTuple):
     """The best pose of a search."""
 
     score: float
-    """In [0, 1]; the score asked for where there is nothing better."""
+    """In [0, 1]."""
     pose: Array
     """(3,)"""
 
 
-def likelihood_field(points: Array, options: SearchOptions) -> Field:
+def likelihood_field(points: Array, options: SearchOptions) -> LikelihoodField:
     """The field of reference points (m, 2)."""
     margin = SPLAT * options.cell
     (left, right), (bottom, top) = ((float(each.min()), float(each.max())) for each in points.T)
@@ -76,34 +83,34 @@ def likelihood_field(points: Array, options: SearchOptions) -> Field:
     width, height = (
         int((end - begin) / options.cell) + 2 for begin, end in ((x, right + margin), (y, top + margin))
     )
-    levels = np.zeros((LEVELS - 1, width + PAD + 1, height + PAD + 1), dtype=np.float32)
+    levels = np.zeros((FIELD_LEVELS - 1, width + PAD + 1, height + PAD + 1), dtype=np.float32)
     coarsest = np.zeros((PAD, width + PAD + 1, -(-levels.shape[2] // PAD) + 2 * LANES), dtype=np.float32)
-    field = Field(levels, coarsest, x, y, options.cell)
+    field = LikelihoodField(levels, coarsest, x, y, options.cell)
     _splat(field, points, options.spread)
-    for level in range(1, LEVELS - 1):
+    for level in range(1, FIELD_LEVELS - 1):
         _coarsen(levels[level - 1], 1 << (level - 1), levels[level])
     _coarsen_last(levels[-1], coarsest)
     return field
 
 
 class Search:
-    """The poses about `centre` (3,) of a scan with points (m, 2), and what squares of them score at most."""
+    """A search for the pose of a scan with points (m, 2) near `centre` (3,), by upper bounds of scores."""
 
-    def __init__(self, field: Field, points: Array, centre: Array, options: SearchOptions) -> None:
-        some = np.linspace(0, len(points) - 1, min(options.beams, len(points))).astype(np.int64)
-        chosen = np.ascontiguousarray(points[some])
+    def __init__(self, field: LikelihoodField, points: Array, centre: Array, options: SearchOptions) -> None:
+        indices = np.linspace(0, len(points) - 1, min(options.beams, len(points))).astype(np.int64)
+        chosen = np.ascontiguousarray(points[indices])
         step = options.cell / min(float(np.hypot(chosen[:, 0], chosen[:, 1]).max()), options.lever)
         turns = int(options.turn / step)
         self._field, self._centre = field, centre
         self._angles = centre[2] + step * np.arange(-turns, turns + 1)
-        self._reach = int(options.distance / options.cell)
-        self._cells = _cells(field, chosen, centre, self._angles)
-        self._bounds = _tile_bounds(field.coarsest, self._cells, self._reach)
+        self._steps = int(options.distance / options.cell)
+        self._cells = _point_cells(field, chosen, centre, self._angles)
+        self._bounds = _tile_bounds(field.coarsest, self._cells, self._steps)
 
-    def best(self, least: float, without: tuple[Array, float] | None = None) -> Spot | None:
-        """The best pose, if it scores more than `least`.
+    def best(self, least: float, without: tuple[Array, float] | None = None) -> FoundPose | None:
+        """The best pose that scores more than `least`; None if there is none.
 
-        `without` is a place, as a pose (3,) and a distance (m) from it, where none is looked for.
+        `without` excludes poses within a distance (m) of a pose (3,).
         """
         pose = np.empty(3)
         place, away = (self._centre, -1.0) if without is None else without
@@ -113,23 +120,25 @@ class Search:
             self._bounds,
             self._centre,
             self._angles,
-            self._reach,
+            self._steps,
             least,
             place,
             away,
             pose,
         )
-        return Spot(score, pose) if score > least else None
+        return FoundPose(score, pose) if score > least else None
 
 
-def search(field: Field, points: Array, centre: Array, least: float, options: SearchOptions) -> Spot | None:
-    """The best pose of a scan with points (m, 2) about `centre` (3,), if it scores more than `least`."""
+def search(
+    field: LikelihoodField, points: Array, centre: Array, least: float, options: SearchOptions
+) -> FoundPose | None:
+    """The best pose near `centre` (3,) of a scan with points (m, 2), if it scores more than `least`."""
     return Search(field, points, centre, options).best(least)
 
 
 @kernel
-def _splat(field: Field, points: Array, spread: float) -> None:
-    """The finest level: by the nearest of the points whose cells are not more than SPLAT away."""
+def _splat(field: LikelihoodField, points: Array, spread: float) -> None:
+    """Write the finest level, from the nearest point within SPLAT cells."""
     finest, cell = field.levels[0], field.cell
     width, height = finest.shape[0] - PAD - 1, finest.shape[1] - PAD - 1
     squares = np.full((width + 2 * SPLAT, height + SPLAT + LANES), np.inf)
@@ -154,7 +163,7 @@ def _splat(field: Field, points: Array, spread: float) -> None:
 
 @kernel
 def _coarsen(finer: NDArray[np.float32], half: int, coarser: NDArray[np.float32]) -> None:
-    """Squares of twice as many cells to a side as the finer ones have, `half`; behind the last is nothing."""
+    """Write a level with squares of 2 · `half` cells on a side, from one with squares of `half` cells."""
     width, height = finer.shape
     for ix in range(width):
         here, there, row = finer[ix], finer[min(ix + half, width - 1)], coarser[ix]
@@ -166,7 +175,7 @@ def _coarsen(finer: NDArray[np.float32], half: int, coarser: NDArray[np.float32]
 
 @kernel
 def _coarsen_last(finer: NDArray[np.float32], coarsest: NDArray[np.float32]) -> None:
-    """As _coarsen, into the order of the coarsest level."""
+    """As `_coarsen`, into the layout of the coarsest level."""
     row = np.empty((1, finer.shape[1]), dtype=np.float32)
     for ix in range(finer.shape[0]):
         there = min(ix + PAD // 2, finer.shape[0] - 1)
@@ -178,8 +187,8 @@ def _coarsen_last(finer: NDArray[np.float32], coarsest: NDArray[np.float32]) -> 
 
 
 @kernel
-def _cells(field: Field, points: Array, centre: Array, angles: Array) -> NDArray[np.int32]:
-    """(a, m, 2) the cells of the field that the points fall into, at the centre turned to each angle."""
+def _point_cells(field: LikelihoodField, points: Array, centre: Array, angles: Array) -> NDArray[np.int32]:
+    """(a, m, 2) the cells that the points fall into at the centre, with each of the angles (a,)."""
     cells = np.empty((angles.shape[0], points.shape[0], 2), dtype=np.int32)
     for a in range(angles.shape[0]):
         cos, sin = np.cos(angles[a]), np.sin(angles[a])
@@ -193,7 +202,7 @@ def _cells(field: Field, points: Array, centre: Array, angles: Array) -> NDArray
 
 @kernel
 def _tile_bounds(coarsest: NDArray[np.float32], cells: NDArray[np.int32], reach: int) -> Array:
-    """(a, t, t) what the shifts of each square of PAD × PAD score at most, from −reach on."""
+    """(a, t, t) upper bounds of the scores in each square of PAD × PAD shifts, from −`reach` cells on."""
     tiles = (2 * reach) // PAD + 1
     lanes = -(-tiles // LANES)
     width, height = coarsest.shape[1], coarsest.shape[2]
@@ -220,9 +229,9 @@ def _tile_bounds(coarsest: NDArray[np.float32], cells: NDArray[np.int32], reach:
 def _quarter_bounds(
     level: NDArray[np.float32], half: int, cells: NDArray[np.int32], ox: int, oy: int, bounds: Array
 ) -> None:
-    """What the four squares of `half` × `half` shifts from (ox, oy) on score at most: x first, then y.
+    """Write upper bounds (4,) of the scores of the four squares of `half` × `half` shifts from (ox, oy) on.
 
-    Of single shifts these are the scores.
+    x varies fastest. For single shifts they are the scores.
     """
     right, top = level.shape[0] - 1, level.shape[1] - 1
     a, b, c, d = 0.0, 0.0, 0.0, 0.0
@@ -241,7 +250,7 @@ def _quarter_bounds(
 
 @kernel
 def _branch_and_bound(
-    field: Field,
+    field: LikelihoodField,
     cells: NDArray[np.int32],
     tile_bounds: Array,
     centre: Array,
@@ -254,19 +263,19 @@ def _branch_and_bound(
 ) -> float:
     """Write the pose (3,) of the best score above `least`; returns that score, or `least`.
 
-    Poses within `away` of the `place` (3,) do not count.
+    Poses within `away` (m) of `place` (3,) do not count.
     """
     tiles = tile_bounds.shape[1]
     bounds = tile_bounds.ravel()
-    hopeful = np.flatnonzero(bounds > least)
+    candidates = np.flatnonzero(bounds > least)
     best = least
-    stack, stack_bounds = np.empty((4 * LEVELS, 3), dtype=np.int64), np.empty(4 * LEVELS)
+    stack, stack_bounds = np.empty((4 * FIELD_LEVELS, 3), dtype=np.int64), np.empty(4 * FIELD_LEVELS)
     quarters = np.empty(4)
-    for tile in hopeful[np.argsort(-bounds[hopeful], kind="mergesort")]:
+    for tile in candidates[np.argsort(-bounds[candidates], kind="mergesort")]:
         if bounds[tile] <= best:
             break
         a, i, j = tile // (tiles * tiles), (tile // tiles) % tiles, tile % tiles
-        stack[0, 0], stack[0, 1], stack[0, 2] = i * PAD - reach, j * PAD - reach, LEVELS - 1
+        stack[0, 0], stack[0, 1], stack[0, 2] = i * PAD - reach, j * PAD - reach, FIELD_LEVELS - 1
         stack_bounds[0] = bounds[tile]
         size = 1
         while size > 0:
@@ -286,7 +295,7 @@ def _branch_and_bound(
                 bound = quarters[quarter]
                 if bound <= best:
                     continue
-                # The most promising quarter lies on top.
+                # The quarter with the greatest bound lies on top.
                 at = size
                 while at > first and stack_bounds[at - 1] > bound:
                     stack[at], stack_bounds[at] = stack[at - 1], stack_bounds[at - 1]

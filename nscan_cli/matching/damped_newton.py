@@ -33,13 +33,13 @@ class StepControl(NamedTuple):
     """Relative increase of the value that is accepted as rounding."""
 
 
-PAIRWISE = StepControl(1e-3, 1e-7, 1e-7, 0.0, 1e6, 1e-3, 0.1, 0.0)
+PAIRWISE_STEPS = StepControl(1e-3, 1e-7, 1e-7, 0.0, 1e6, 1e-3, 0.1, 0.0)
 """Starts are rough, so steps are damped from the first on. One NDT is cheap to evaluate: 1e6 allows long
 searches where the energy jumps at borders of cells."""
-JOINT = StepControl(1e-3, 1e-8, 1e-8, 0.0, 1e4, np.inf, 0.0, 0.0)
+JOINT_STEPS = StepControl(1e-3, 1e-8, 1e-8, 0.0, 1e4, np.inf, 0.0, 0.0)
 """An evaluation costs n (n − 1) times as much: it gives up earlier, and any step within the tolerance is the
 last one."""
-GRAPH = StepControl(0.0, 0.0, 1e-9, 1e-6, 1e8, 1.0, 0.0, 1e-12)
+GRAPH_STEPS = StepControl(0.0, 0.0, 1e-9, 1e-6, 1e8, 1.0, 0.0, 1e-12)
 """The energy is smooth and nearly quadratic, so steps are undamped unless they fail. Sums over thousands of
 relations carry rounding errors."""
 

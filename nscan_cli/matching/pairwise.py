@@ -1,26 +1,26 @@
-"""Match one scan with another: the pose, and what is known about it (paper, III-E, III-F; [19])."""
+"""Pairwise matching: the relative pose of two scans and its uncertainty (paper, III-E, III-F; [19])."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from nscan_cli.errors import InputDataError
 from nscan_cli.logs.laser_log import LaserLog
-from nscan_cli.matching.joint.overlap import INLIER_BOUND, LEAST_OVERLAP
-from nscan_cli.matching.pairwise_solver import PairProblem, minimise, objective
+from nscan_cli.matching.pairwise_solver import PairProblem, minimise_pairwise, pairwise_objective
 from nscan_cli.matching.priors import Prior
 from nscan_cli.matching.uncertainty import (
+    ConvergenceOptions,
     Weakest,
     covariance_of,
     decrement,
-    is_settled,
+    is_minimum,
     weakest_translation,
 )
-from nscan_cli.ndt.association import begin
-from nscan_cli.ndt.energy import OUT, inlier_share
-from nscan_cli.ndt.hash_grid import STRAIGHT
+from nscan_cli.ndt.association import begin_association
+from nscan_cli.ndt.energy import ENERGY_NUMBERS, inlier_share
+from nscan_cli.ndt.hash_grid import WALL_DIRECTION
 from nscan_cli.ndt.transform import Ndt
 from nscan_cli.poses import Array, wrap
 
@@ -28,7 +28,7 @@ NO_OVERLAP = "no overlap"
 STEP_LIMIT = "step limit"
 NO_DESCENT = "no step lowers the energy"
 INDEFINITE = "the Hessian is not positive definite"
-HELD = "held at a cell border, where the energy jumps"
+CELL_BORDER = "held at a cell border, where the energy jumps"
 
 
 @dataclass(frozen=True)
@@ -36,56 +36,65 @@ class PairOptions:
     """How single scans become Gaussians, and how one is matched with another."""
 
     cell: float = 1.0
-    """Side of a cell, m ([19])."""
+    """Side of a cell, m ([19]). Larger cells converge from farther away, and describe walls more coarsely."""
     minimum: int = 3
-    """Least number of points that make a Gaussian."""
+    """Least number of points that make a Gaussian. A larger number leaves out what few beams hit."""
     floor: float = 0.02
-    """Least standard deviation of a Gaussian, m."""
+    """Least standard deviation of a Gaussian, m. A larger value makes walls softer."""
     reach: float = 40.0
-    """Longer beams are not matched, m."""
+    """Longest beam that is matched, m."""
     widenings: tuple[float, ...] = (0.05, 0.3, 1.0)
-    """One stage each: w of the energy; the last is 1, the energy itself."""
+    """The w of the energy in each stage; the last is 1, the energy itself. Smaller first values converge from
+    farther away."""
     scale: float = 0.6
-    """What the energy is multiplied with to be a negative log likelihood. Found on simulated scans with
-    range noise of 1.5 cm, where it makes the errors of matches as large as their covariances say."""
+    """Factor that makes a negative log likelihood of the energy. On simulated scans with range noise of 1.5
+    cm the errors of matches are as large as their covariances with this value; a larger one makes these
+    smaller."""
     max_iterations: int = 50
-    """In each stage."""
+    """Most iterations in each stage."""
     tolerance: float = 1e-5
-    """A stage has converged when a step moves the pose by less (m, rad)."""
+    """A stage has converged when a step moves the pose by less, m and rad."""
+    inlier_bound: float = 9.0
+    """Squared Mahalanobis distance from a Gaussian within which a point lies on it."""
+    least_overlap: float = 0.1
+    """A match with a smaller share of the scan's points on the reference has not converged."""
+    convergence: ConvergenceOptions = field(default_factory=ConvergenceOptions)
 
 
 @dataclass(frozen=True)
 class PairMatch:
-    """The relative pose of two scans and what is known about it."""
+    """The relative pose of two scans and its uncertainty."""
 
     pose: Array
     """(3,) of the scan in the frame of the reference, eq. (2)."""
     energy: float
-    """E itself, neither scaled nor with the prior."""
+    """E, neither scaled nor with the prior."""
     gradient_norm: float
-    """Of the objective, scale · E + prior."""
+    """That of the objective, scale · E + prior."""
     decrement: float | None
-    """The Newton step that is left, in standard deviations; None where there is no covariance."""
+    """Length of the remaining Newton step in standard deviations; None without a covariance."""
     hessian: Array
     """(3, 3) exact Hessian of the objective."""
     covariance: Array | None
-    """(3, 3) its inverse; None when it is not positive definite."""
+    """(3, 3) inverse of the Hessian; None when that is not positive definite."""
     eigenvalues: Array
-    """(3,) of the Hessian, increasing."""
+    """(3,) those of the Hessian, increasing."""
     weakest: Weakest
     overlap: float
     """Share of the scan's points that lie on a Gaussian of the reference."""
     iterations: int
+    """Number in all stages."""
     evaluations: int
-    """These of all stages."""
+    """Number of evaluations of the energy in all stages."""
     unsettled: int
-    """Stages before the last that did not settle within their iterations: where they led is less sure."""
+    """Stages before the last that did not converge within their iterations, so that the pose is less
+    certain."""
     reason: str | None
     """Why the match did not converge; None when it did."""
 
     @property
     def converged(self) -> bool:
-        """Whether the pose is a minimum that can be relied on."""
+        """Whether the pose is a reliable minimum."""
         return self.reason is None
 
 
@@ -103,9 +112,11 @@ def matched_points(log: LaserLog, row: int, options: PairOptions) -> Array:
 
 
 def scan_ndt(points: Array, options: PairOptions) -> Ndt:
-    """The NDT of one scan's points (m, 2), in the frame that they are given in."""
+    """The NDT of one scan's points (m, 2), in their own frame."""
     ends, poses = np.array([0, len(points)]), np.zeros((1, 3))
-    return Ndt.of_scans(points, ends, poses, options.cell, options.minimum, options.floor, around=STRAIGHT)
+    return Ndt.of_scans(
+        points, ends, poses, options.cell, options.minimum, options.floor, neighbourhood=WALL_DIRECTION
+    )
 
 
 def match_pair(
@@ -113,16 +124,16 @@ def match_pair(
 ) -> PairMatch:
     """Match points (m, 2) of a scan with the NDT of another, from the relative pose `start` (3,).
 
-    Minimises scale · E plus the prior (14) stage by stage. E jumps where points cross the borders of
-    cells, so a minimum may be a place where the gradient is not zero: `decrement` tells how much.
+    Minimises scale · E plus the prior (14) stage by stage. E jumps where points cross the borders of cells,
+    so the gradient at a minimum need not be zero: `decrement` tells the step that is left.
     """
     prior = prior or Prior(np.zeros(3), np.zeros((3, 3)))
-    problem = PairProblem(reference.grid, reference.half, begin(points), options.scale, prior)
-    pose, hessian, gradient, out = start.copy(), np.empty((3, 3)), np.empty(3), np.empty(OUT)
-    iterations, evaluations, last, settled = 0, 1, 0, [True]
-    # One by one: the end of the last tells whether the match has converged.
+    problem = PairProblem(reference.grid, reference.half, begin_association(points), options.scale, prior)
+    pose, hessian, gradient, out = start.copy(), np.empty((3, 3)), np.empty(3), np.empty(ENERGY_NUMBERS)
+    iterations, evaluations, last, converged = 0, 1, 0, [True]
+    # One stage a call: whether the match has converged depends on the last stage alone.
     for widening in options.widenings:
-        _, _, last, evaluated, ended = minimise(
+        _, _, last, evaluated, ended = minimise_pairwise(
             problem,
             pose,
             np.array([widening]),
@@ -133,19 +144,19 @@ def match_pair(
         )
         iterations += last
         evaluations += evaluated
-        settled.append(ended)
-    objective(problem, pose, 1.0, 1.0, out, gradient, hessian)
-    overlap = inlier_share(reference.grid, reference.half, points, pose, INLIER_BOUND)
+        converged.append(ended)
+    pairwise_objective(problem, pose, 1.0, 1.0, out, gradient, hessian)
+    overlap = inlier_share(reference.grid, reference.half, points, pose, options.inlier_bound)
     covariance = covariance_of(hessian)
     reason = None
-    if overlap < LEAST_OVERLAP:
+    if overlap < options.least_overlap:
         reason = NO_OVERLAP
-    elif not settled[-1]:
+    elif not converged[-1]:
         reason = STEP_LIMIT if last == options.max_iterations else NO_DESCENT
     elif covariance is None:
         reason = INDEFINITE
-    elif not is_settled(gradient, covariance):
-        reason = HELD
+    elif not is_minimum(gradient, covariance, options.convergence):
+        reason = CELL_BORDER
     return PairMatch(
         pose=np.array([pose[0], pose[1], float(wrap(pose[2]))]),
         energy=float(out[0]),
@@ -158,6 +169,6 @@ def match_pair(
         overlap=overlap,
         iterations=iterations,
         evaluations=evaluations,
-        unsettled=settled[:-1].count(False),
+        unsettled=converged[:-1].count(False),
         reason=reason,
     )

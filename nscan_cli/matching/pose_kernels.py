@@ -1,4 +1,4 @@
-"""SE(2) inside the kernels: `nscan_cli.poses` for one pose at a time, without an array made for each."""
+"""SE(2) inside kernels: `nscan_cli.poses` for one pose at a time, without new arrays."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from nscan_cli.poses import Array
 
 @leaf_kernel
 def relative_pose(a: Array, b: Array, out: Array) -> None:
-    """Eq. (2), a ⊖ b; the angle is left as it is."""
+    """Write a ⊖ b, eq. (2); the angle is not normalised."""
     cos, sin = np.cos(b[2]), np.sin(b[2])
     dx, dy = a[0] - b[0], a[1] - b[1]
     out[0], out[1], out[2] = cos * dx + sin * dy, cos * dy - sin * dx, a[2] - b[2]
@@ -18,7 +18,7 @@ def relative_pose(a: Array, b: Array, out: Array) -> None:
 
 @leaf_kernel
 def composed_pose(a: Array, b: Array, out: Array) -> None:
-    """a ⊕ b; the angle is left as it is."""
+    """Write a ⊕ b; the angle is not normalised."""
     cos, sin = np.cos(a[2]), np.sin(a[2])
     x, y = cos * b[0] - sin * b[1] + a[0], sin * b[0] + cos * b[1] + a[1]
     out[0], out[1], out[2] = x, y, a[2] + b[2]

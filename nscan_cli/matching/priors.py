@@ -1,4 +1,4 @@
-"""What is known of a relative pose before matching: the odometry as a prior (paper, III-E, eq. (14))."""
+"""Priors on relative poses from odometry (paper, III-E, eq. (14))."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from nscan_cli.poses import Array, relative
 
 
 class Prior(NamedTuple):
-    """−log of a Gaussian on a relative pose u: ½ (u − z)ᵗ P (u − z)."""
+    """A Gaussian on a relative pose u, as −log: ½ (u − z)ᵗ P (u − z)."""
 
     mean: Array
     """(3,) z"""
@@ -22,23 +22,26 @@ class Prior(NamedTuple):
 
 @dataclass(frozen=True)
 class MotionModel:
-    """Standard deviations of an odometry step of d metres and a turn of a radians.
+    """Standard deviations of a step of the odometry.
 
-    Wide on purpose: wheels slip and carts are pushed, and what the odometry says beyond that the scans
-    say better. A strong prior breaks maps where the odometry does.
+    They are large on purpose: wheels slip, and carts are pushed. A strong prior breaks maps where the
+    odometry is wrong, and scans know better where it is right. Larger values weaken the prior.
     """
 
     distance: float = 0.05
-    """m, at no motion."""
+    """Standard deviation of the position without any motion, m."""
     distance_per_metre: float = 0.2
+    """Increase of it for each metre travelled."""
     angle: float = 0.05
-    """rad, at no motion."""
+    """Standard deviation of the angle without any motion, rad."""
     angle_per_radian: float = 0.2
+    """Increase of it for each radian turned."""
     angle_per_metre: float = 0.1
+    """Increase of it for each metre travelled, rad."""
 
 
-class Motion(NamedTuple):
-    """The numbers of a MotionModel as the kernels take them."""
+class MotionParameters(NamedTuple):
+    """A MotionModel as the kernels take it."""
 
     distance: float
     distance_per_metre: float
@@ -47,14 +50,14 @@ class Motion(NamedTuple):
     angle_per_metre: float
 
     @classmethod
-    def of(cls, model: MotionModel) -> Motion:
-        """Those of a model."""
+    def of(cls, model: MotionModel) -> MotionParameters:
+        """The parameters of a model."""
         return cls(*astuple(model))
 
 
 @kernel
-def sigmas(step: Array, motion: Motion) -> tuple[float, float]:
-    """Standard deviations of a step (3,): of its place (m), along as across, and of its turn (rad)."""
+def motion_sigmas(step: Array, motion: MotionParameters) -> tuple[float, float]:
+    """Standard deviations of a step (3,): of its position in x and in y (m), and of its angle (rad)."""
     distance = np.hypot(step[0], step[1])
     along = motion.distance + motion.distance_per_metre * distance
     turned = motion.angle_per_radian * abs(step[2]) + motion.angle_per_metre * distance
@@ -64,5 +67,5 @@ def sigmas(step: Array, motion: Motion) -> tuple[float, float]:
 def odometry_prior(reference: Array, pose: Array, model: MotionModel) -> Prior:
     """The prior on pose ⊖ reference from the odometry poses (3,) of two scans."""
     step = relative(pose, reference)
-    along, about = sigmas(step, Motion.of(model))
+    along, about = motion_sigmas(step, MotionParameters.of(model))
     return Prior(step, np.diag([along**-2, along**-2, about**-2]))

@@ -1,4 +1,4 @@
-"""Small dense matrices inside the kernels, where numba's own products would need SciPy."""
+"""Small dense matrices inside kernels, where numba's own products would need SciPy."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def multiply(matrix: Array, vector: Array, out: Array) -> None:
 
 @kernel
 def inverted(matrix: Array) -> Array:
-    """The inverse of a symmetric matrix (3, 3), from its cofactors: a tenth of what NumPy's takes."""
+    """The inverse of a matrix (3, 3) from its cofactors, in a tenth of NumPy's time."""
     inverse = np.empty((3, 3))
     for a in range(3):
         for b in range(3):
@@ -36,7 +36,7 @@ def inverted(matrix: Array) -> Array:
 def solve_definite(matrix: Array, right: Array, out: Array) -> bool:
     """Solve a symmetric positive definite system (m, m) by Cholesky; False when it is not definite.
 
-    Reads the lower triangle of `matrix`, and writes its factor there.
+    Reads the lower triangle of `matrix`, and overwrites it with its factor.
     """
     m = right.shape[0]
     for j in range(m):

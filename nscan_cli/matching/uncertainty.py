@@ -1,7 +1,8 @@
-"""What the Hessian at a match says about its uncertainty."""
+"""The uncertainty of a match, from its Hessian."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -9,27 +10,33 @@ import numpy as np
 from nscan_cli.poses import Array
 
 SINGULAR = 1e-10
-"""An eigenvalue below this share of the greatest is no information, but rounding."""
-
-SETTLED_DEVIATIONS = 0.5
-SETTLED_STEP = 0.01
-"""m, rad; half of the least standard deviation of a Gaussian."""
+"""An eigenvalue below this share of the greatest one is rounding, not information."""
 WEAK_SIGMA = 0.05
-"""m; a scan that is held with a larger standard deviation in some direction is held weakly. In rooms it is
-0.003 to 0.015, in a corridor without any doors about 0.1."""
+"""m; matches with a larger standard deviation in some direction get a notice. In rooms it is 0.003 to 0.015,
+in a corridor without any doors about 0.1."""
+
+
+@dataclass(frozen=True)
+class ConvergenceOptions:
+    """The Newton step that may be left at a minimum: one of the bounds has to hold."""
+
+    deviations: float = 0.5
+    """Its length in standard deviations. With a larger value more matches count as converged."""
+    step: float = 0.01
+    """Its greatest component, m and rad: half of the least standard deviation of a Gaussian."""
 
 
 class Weakest(NamedTuple):
-    """The direction of translation that a match knows least, whatever the rotation is."""
+    """The direction of translation in which a match is least certain, with the rotation unknown."""
 
     direction: float
     """Angle of the direction in the frame of the reference, rad in (−π/2, π/2]."""
     sigma: float | None
-    """Standard deviation (m) along it; None when nothing holds the scan there."""
+    """Standard deviation (m) along it; None when the match has no information there."""
 
     @property
     def is_weak(self) -> bool:
-        """Whether it is worth a word: a corridor, or less."""
+        """Whether the user should know: as in a corridor, or worse."""
         return self.sigma is None or self.sigma > WEAK_SIGMA
 
 
@@ -43,27 +50,26 @@ def covariance_of(information: Array) -> Array | None:
 
 
 def decrement(gradient: Array, covariance: Array) -> float:
-    """√(gᵗ H⁻¹ g): the Newton step that is left at a point, counted in standard deviations."""
+    """√(gᵗ H⁻¹ g): the length of the Newton step at a point, in standard deviations."""
     return float(np.sqrt(gradient @ covariance @ gradient))
 
 
-def is_settled(gradient: Array, covariance: Array) -> bool:
-    """Whether the Newton step that is left at a point is nothing: against the uncertainty, or at all."""
+def is_minimum(gradient: Array, covariance: Array, options: ConvergenceOptions) -> bool:
+    """Whether the Newton step at a point is short against the uncertainty, or in metres and radians."""
     step = covariance @ gradient
-    return decrement(gradient, covariance) <= SETTLED_DEVIATIONS or bool(np.abs(step).max() <= SETTLED_STEP)
+    return decrement(gradient, covariance) <= options.deviations or bool(np.abs(step).max() <= options.step)
 
 
 def weakest_translation(information: Array) -> Weakest:
     """The weakest direction of the translation of a pose with an information matrix (3, 3).
 
-    Metres and radians do not compare, so the rotation is eliminated first (Schur complement): what is
-    left is the information on the translation alone.
+    Metres and radians do not compare, so the rotation is eliminated first (Schur complement).
     """
     translation, coupling, rotation = information[:2, :2], information[:2, 2], information[2, 2]
     if rotation > 0.0:
         translation = translation - np.outer(coupling, coupling) / rotation
     eigenvalues, vectors = np.linalg.eigh(translation)
-    # Of the two ways along an axis, the one ahead.
+    # Of the two directions along an axis, the one with x > 0.
     x, y = vectors[:, 0] if vectors[0, 0] > 0.0 else -vectors[:, 0]
     direction = float(np.arctan2(y, x)) if x > 0.0 else np.pi / 2
     known = eigenvalues[0] > SINGULAR * eigenvalues[1]

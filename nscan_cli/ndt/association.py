@@ -1,4 +1,4 @@
-"""Which Gaussians the points of a scan meet at a pose: looked up once, or kept while the pose changes."""
+"""Association of a scan's points with Gaussians: looked up at one pose, or updated while the pose changes."""
 
 from __future__ import annotations
 
@@ -8,49 +8,55 @@ import numpy as np
 
 from nscan_cli.kernels.decorators import kernel, leaf_kernel, numba_inline_kernel
 from nscan_cli.ndt.gaussians import make_gaussian
-from nscan_cli.ndt.hash_grid import OUTDATED, Grid, find_row, pack, shown
+from nscan_cli.ndt.hash_grid import OUTDATED, Grid, facing_gaussian, find_row, pack_key
 from nscan_cli.poses import Array
 
 BLOCKS = 4
-"""A point meets at most so many."""
-MET = 7
-"""Numbers of a point that meets a Gaussian; see RoomToMeet."""
-GAUSSIAN = 7
-"""Numbers of a Gaussian; see Grid."""
+"""Blocks of a lattice cell: the most Gaussians that a point is associated with."""
+PAIR_NUMBERS = 7
+"""Numbers of a pair of a point and a Gaussian; see AssociationBuffers."""
+GAUSSIAN_NUMBERS = 7
+"""Numbers of a Gaussian that the energy needs; see Grid."""
 
 
-class RoomToMeet(NamedTuple):
-    """Room for n points and what they meet."""
+class AssociationBuffers(NamedTuple):
+    """Buffers for n points and their pairs with Gaussians."""
 
     moved: Array
     """(4, n) R(φ) x, and the lattice coordinates of x'."""
-    met: Array
-    """(7, 4 n) of each point on each Gaussian: R(φ) x, v, and Σ⁻¹ as (xx, xy, yy)."""
+    pairs: Array
+    """(7, 4 n) of each pair: R(φ) x, v, and Σ⁻¹ as (xx, xy, yy)."""
 
 
 @kernel
-def room_to_meet(points: int, stride: int) -> RoomToMeet:
-    """Room for so many points, of which every so-manyth counts by `stride`."""
+def association_buffers(points: int, stride: int) -> AssociationBuffers:
+    """Buffers for a number of points, of which one in `stride` counts."""
     n = (points + stride - 1) // stride
-    return RoomToMeet(np.empty((4, n)), np.empty((MET, BLOCKS * n)))
+    return AssociationBuffers(np.empty((4, n)), np.empty((PAIR_NUMBERS, BLOCKS * n)))
 
 
 @leaf_kernel
-def associate(
-    grid: Grid, half: float, points: Array, x: float, y: float, phi: float, stride: int, room: RoomToMeet
+def associate_once(
+    grid: Grid,
+    half: float,
+    points: Array,
+    x: float,
+    y: float,
+    phi: float,
+    stride: int,
+    buffers: AssociationBuffers,
 ) -> int:
-    """Write the numbers of every point that meets a Gaussian to the columns of `room.met`; how many do.
+    """Write the pairs of points (m, 2) and Gaussians to the columns of `buffers.pairs`; the number of pairs.
 
-    Of the points (m, 2), every so-manyth counts by `stride`.
+    Of the points, one in `stride` counts.
     """
-    moved, met = room.moved, room.met
+    moved, pairs = buffers.moved, buffers.pairs
     n = (points.shape[0] + stride - 1) // stride
-    # All at first, side by side in lanes: where a look-up ends nobody can foresee, and what comes after it
-    # waits.
-    _place(points, x, y, np.cos(phi), np.sin(phi), half, stride, n, moved)
+    # All points first, in lanes: the processor cannot predict where a look-up ends.
+    _transform_points(points, x, y, np.cos(phi), np.sin(phi), half, stride, n, moved)
     count, row, key = 0, -1, -1
     for k in range(n):
-        cell = pack(int(moved[2, k]), int(moved[3, k]))
+        cell = pack_key(int(moved[2, k]), int(moved[3, k]))
         # Neighbouring beams mostly fall into the same cell.
         if cell != key:
             key, row = cell, find_row(grid, cell)
@@ -58,24 +64,24 @@ def associate(
             continue
         rx, ry = moved[0, k], moved[1, k]
         for block in range(BLOCKS):
-            link = shown(grid, grid.links[row, block], rx, ry)
+            link = facing_gaussian(grid, grid.links[row, block], rx, ry)
             if link < 0:
                 continue
             gaussian = grid.gaussians[link]
-            # Unsigned, so that nobody asks whether it counts from the end.
+            # An unsigned index needs no test for negative values.
             c = np.uint64(count)
-            met[0, c], met[1, c] = rx, ry
-            met[2, c], met[3, c] = rx + x - gaussian[0], ry + y - gaussian[1]
-            met[4, c], met[5, c], met[6, c] = gaussian[2], gaussian[3], gaussian[4]
+            pairs[0, c], pairs[1, c] = rx, ry
+            pairs[2, c], pairs[3, c] = rx + x - gaussian[0], ry + y - gaussian[1]
+            pairs[4, c], pairs[5, c], pairs[6, c] = gaussian[2], gaussian[3], gaussian[4]
             count += 1
     return count
 
 
 @leaf_kernel
-def _place(
+def _transform_points(
     points: Array, x: float, y: float, cos: float, sin: float, half: float, stride: int, n: int, moved: Array
 ) -> None:
-    """Write where n points and their cells are; see RoomToMeet."""
+    """Write n moved points and their cells; see AssociationBuffers."""
     for k in range(n):
         at = np.uint64(k * stride)
         rx = cos * points[at, 0] - sin * points[at, 1]
@@ -85,63 +91,67 @@ def _place(
 
 
 class Association(NamedTuple):
-    """m points where they were last, and the Gaussians of the lattice cells there."""
+    """m points at the last pose, and the Gaussians that they are associated with there."""
 
     points: Array
     """(2, m) in their own frame."""
     cells: Array
-    """(2, m) lattice coordinates; nan before the first time."""
+    """(2, m) lattice coordinates of the Gaussians; nan before the first pose."""
     cells_now: Array
-    """(2, m) the same, before what is there is looked up."""
+    """(2, m) lattice coordinates at the new pose, before the look-up."""
     moved: Array
     """(4, m) R(φ) x, and x'."""
     gaussians: Array
-    """(4, 7, m) those of the four blocks; all 0 where there is none."""
+    """(4, 7, m) those of the four blocks; 0 where there is none."""
 
 
 @kernel
-def begin(points: Array) -> Association:
-    """Room for the meeting of points (m, 2), which have met nothing yet."""
+def begin_association(points: Array) -> Association:
+    """The association of points (m, 2) before the first pose."""
     m = points.shape[0]
     cells = np.full((2, m), np.nan)
-    meeting = Association(
-        np.empty((2, m)), cells, np.empty((2, m)), np.empty((4, m)), np.empty((BLOCKS, GAUSSIAN, m))
+    association = Association(
+        np.empty((2, m)), cells, np.empty((2, m)), np.empty((4, m)), np.empty((BLOCKS, GAUSSIAN_NUMBERS, m))
     )
     for k in range(m):
-        meeting.points[0, k], meeting.points[1, k] = points[k, 0], points[k, 1]
-    return meeting
+        association.points[0, k], association.points[1, k] = points[k, 0], points[k, 1]
+    return association
 
 
 @leaf_kernel
-def associate_again(grid: Grid, half: float, meeting: Association, x: float, y: float, phi: float) -> None:
-    """Move the points to the pose (x, y, phi), and look up what those meet that get into another cell.
+def update_association(
+    grid: Grid, half: float, association: Association, x: float, y: float, phi: float
+) -> None:
+    """Move the points to the pose (x, y, phi), and look up the Gaussians of points that change their cell.
 
-    Gaussians there that are outdated are made anew.
+    Outdated Gaussians there are made again.
     """
-    cells, cells_now = meeting.cells, meeting.cells_now
-    left = _move(meeting.points, x, y, np.cos(phi), np.sin(phi), half, meeting.moved, cells, cells_now)
-    # A short step takes no point into another cell, most of the times.
-    for k in range(cells.shape[1] if left else 0):
+    cells, cells_now = association.cells, association.cells_now
+    changed = _move_points(
+        association.points, x, y, np.cos(phi), np.sin(phi), half, association.moved, cells, cells_now
+    )
+    # After a short step mostly no point changes its cell.
+    for k in range(cells.shape[1] if changed else 0):
         ix, iy = cells_now[0, k], cells_now[1, k]
         if ix != cells[0, k] or iy != cells[1, k]:
             cells[0, k], cells[1, k] = ix, iy
-            row = find_row(grid, pack(int(ix), int(iy)))
+            row = find_row(grid, pack_key(int(ix), int(iy)))
             if row >= 0:
                 _make_outdated(grid, row, half)
             for block in range(BLOCKS):
                 link = -1 if row < 0 else grid.links[row, block]
-                link = shown(grid, link, meeting.moved[0, k], meeting.moved[1, k])
+                link = facing_gaussian(grid, link, association.moved[0, k], association.moved[1, k])
                 if link < 0:
-                    meeting.gaussians[block, :, k] = 0.0
+                    association.gaussians[block, :, k] = 0.0
                     continue
                 gaussian = grid.gaussians[link]
-                for number in range(GAUSSIAN):
-                    meeting.gaussians[block, number, k] = gaussian[number]
+                for number in range(GAUSSIAN_NUMBERS):
+                    association.gaussians[block, number, k] = gaussian[number]
 
 
 @numba_inline_kernel
 def _make_outdated(grid: Grid, row: int, half: float) -> None:
-    """Make the Gaussians of a lattice cell anew that are outdated."""
+    """Make the outdated Gaussians of a lattice cell again."""
     for block in range(BLOCKS):
         link = grid.links[row, block]
         if link >= 0 and grid.gaussians[link, 2] == OUTDATED:
@@ -149,24 +159,24 @@ def _make_outdated(grid: Grid, row: int, half: float) -> None:
 
 
 @leaf_kernel
-def count_inliers(meeting: Association, bound: float) -> int:
-    """How many points are within a Mahalanobis distance² of `bound` of a Gaussian that they meet."""
-    moved, gaussians = meeting.moved, meeting.gaussians
+def count_inliers(association: Association, bound: float) -> int:
+    """The number of points within a Mahalanobis distance² of `bound` of an associated Gaussian."""
+    moved, gaussians = association.moved, association.gaussians
     count = 0
     for k in range(moved.shape[1]):
-        on = False
+        is_inlier = False
         for block in range(BLOCKS):
             vx, vy = moved[2, k] - gaussians[block, 0, k], moved[3, k] - gaussians[block, 1, k]
             xx, xy, yy = gaussians[block, 2, k], gaussians[block, 3, k], gaussians[block, 4, k]
-            shows = gaussians[block, 5, k] * moved[0, k] + gaussians[block, 6, k] * moved[1, k] <= 0.0
-            # Without `and`, which would be a branch.
-            on |= shows & (xx > 0.0) & (xx * vx * vx + 2 * xy * vx * vy + yy * vy * vy < bound)
-        count += on
+            faces = gaussians[block, 5, k] * moved[0, k] + gaussians[block, 6, k] * moved[1, k] <= 0.0
+            # `&` is no branch, unlike `and`.
+            is_inlier |= faces & (xx > 0.0) & (xx * vx * vx + 2 * xy * vx * vy + yy * vy * vy < bound)
+        count += is_inlier
     return count
 
 
 @leaf_kernel
-def _move(
+def _move_points(
     points: Array,
     x: float,
     y: float,
@@ -177,13 +187,13 @@ def _move(
     cells: Array,
     cells_now: Array,
 ) -> int:
-    """Write where the points and their cells are; how many have left their cell."""
-    left = 0
+    """Write the moved points and their cells; the number of points that change their cell."""
+    changed = 0
     for k in range(points.shape[1]):
         rx = cos * points[0, k] - sin * points[1, k]
         ry = sin * points[0, k] + cos * points[1, k]
         ix, iy = np.floor((rx + x) / half), np.floor((ry + y) / half)
         moved[0, k], moved[1, k], moved[2, k], moved[3, k] = rx, ry, rx + x, ry + y
         cells_now[0, k], cells_now[1, k] = ix, iy
-        left += (ix != cells[0, k]) | (iy != cells[1, k])
-    return left
+        changed += (ix != cells[0, k]) | (iy != cells[1, k])
+    return changed

@@ -1,4 +1,4 @@
-"""An NDT that has grown, with nothing in it but what matching needs."""
+"""A compact copy of the grid of an NDT, with the arrays that matching needs."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ from nscan_cli.ndt.hash_grid import Grid, rehash, table_size
 
 @kernel
 def compacted(grid: Grid, rows: int) -> Grid:
-    """The Gaussians that can be used of the first `rows`, and the lattice cells that meet one.
+    """The Gaussians of the first `rows` that have enough points, and the lattice cells in their blocks.
 
-    Those that show the other face of a wall stand behind all others. Nothing can be added any more.
+    Those of the other face of a wall follow all others. No points can be added to the copy.
     """
     capacity = grid.keys.shape[0]
     places, fronts, backs = np.full(rows, -1, dtype=np.int32), 0, 0
@@ -33,13 +33,13 @@ def compacted(grid: Grid, rows: int) -> Grid:
                 back += 1
     keys, links, kept = np.empty(rows, dtype=np.int64), np.empty((rows, 4), dtype=np.int32), 0
     for row in range(rows):
-        met = False
+        is_used = False
         for block in range(4):
             link = grid.links[row, block]
             links[kept, block] = places[link] if link >= 0 else -1
-            met |= links[kept, block] >= 0
+            is_used |= links[kept, block] >= 0
         keys[kept] = grid.keys[row]
-        kept += met
+        kept += is_used
     compact = Grid(
         np.full(table_size(kept), -1, dtype=np.int32),
         keys[:kept].copy(),

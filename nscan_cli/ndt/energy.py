@@ -1,8 +1,8 @@
 """The energy of points against Gaussians, its gradient and its Hessian ([19]; paper, III-F).
 
 With x' = f_u(x), v = x' − q and s = exp(−½ w vᵗΣ⁻¹v), the energy is E(u) = −Σ s over all points and the four
-Gaussians that each meets, but for those that its beam would hit from behind. `w` is 1 for the energy
-itself; less widens every Gaussian by 1/√w, and with it the basin of convergence.
+Gaussians that each is associated with, except those that its beam would hit from behind. `w` is 1 for the
+energy itself; a smaller value widens every Gaussian by 1/√w, and with it the basin of convergence.
 """
 
 from __future__ import annotations
@@ -13,8 +13,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nscan_cli.kernels.decorators import kernel, leaf_kernel, reduction_kernel
-from nscan_cli.ndt.association import BLOCKS, Association, RoomToMeet, associate, room_to_meet
-from nscan_cli.ndt.hash_grid import Grid, find_row, pack, shown
+from nscan_cli.ndt.association import (
+    BLOCKS,
+    Association,
+    AssociationBuffers,
+    associate_once,
+    association_buffers,
+)
+from nscan_cli.ndt.hash_grid import Grid, facing_gaussian, find_row, pack_key
 from nscan_cli.ndt.transform import Ndt
 from nscan_cli.poses import Array
 
@@ -22,17 +28,17 @@ Vector = tuple[float, float]
 Symmetric = tuple[float, float, float]
 Terms = tuple[float, float, float, float, float, float, float, float, float, float]
 
-OUT = 10
-"""Numbers that an evaluation gives: E, gradient (3), upper triangle of the Hessian (6)."""
+ENERGY_NUMBERS = 10
+"""Numbers of an evaluation: E, gradient (3), upper triangle of the Hessian (6)."""
 LEAST_EXPONENT = -700.0
-"""So far away a point counts 10⁻³⁰⁴."""
+"""Lower bound of the exponent of s; the exponential of it is 10⁻³⁰⁴."""
 LOG2_E = 1.4426950408889634
 LN2_HIGH, LN2_LOW = 0.6931471803691238, 1.9082149292705877e-10
-"""ln 2 in two parts, of which the first times a whole number is exact."""
+"""ln 2 in two parts; the first one times a whole number is exact."""
 
 
 @leaf_kernel
-def accumulate(
+def evaluate_energy(
     grid: Grid,
     half: float,
     points: Array,
@@ -43,30 +49,31 @@ def accumulate(
     curvature: float,
     baseline: float,
     stride: int,
-    room: RoomToMeet,
+    buffers: AssociationBuffers,
     out: Array,
 ) -> None:
     """Write E, gradient and Hessian at the pose u = (x, y, phi) of points (m, 2) into out (10,).
 
-    With `curvature` 1 the Hessian is exact; with 0 its two terms that can be negative are left out, so
-    that it is positive semi-definite everywhere. `baseline` is what every Gaussian that a point meets
-    costs, well hit or not; it only counts when energies are compared. Of the points, every so-manyth
-    counts by `stride`. `room` is to work in.
+    With `curvature` 1 the Hessian is exact. With 0 it lacks the two terms that can be negative, so that it is
+    positive semi-definite everywhere. Every pair of a point and a Gaussian adds `baseline` to E. Of the
+    points, one in `stride` counts.
     """
-    count = associate(grid, half, points, x, y, phi, stride, room)
-    _sum(room.met, count, widening, curvature, baseline, out)
+    count = associate_once(grid, half, points, x, y, phi, stride, buffers)
+    _sum_pairs(buffers.pairs, count, widening, curvature, baseline, out)
 
 
 @reduction_kernel
-def _sum(met: Array, count: int, widening: float, curvature: float, baseline: float, out: Array) -> None:
-    """Write E, gradient and Hessian of `count` points on Gaussians into out (10,).
+def _sum_pairs(
+    pairs: Array, count: int, widening: float, curvature: float, baseline: float, out: Array
+) -> None:
+    """Write E, gradient and Hessian of `count` pairs into out (10,).
 
-    There is no branch in the loop and no call, so that the processor takes several points at a time.
+    The loop has no branch and no call, so that the processor evaluates several pairs at a time.
     """
     e = gx = gy = gp = hxx = hxy = hxp = hyy = hyp = hpp = 0.0
     for k in range(count):
-        v, sigma = (met[2, k], met[3, k]), (met[4, k], met[5, k], met[6, k])
-        t = _terms(met[0, k], met[1, k], v, sigma, 1.0, widening, curvature)
+        v, sigma = (pairs[2, k], pairs[3, k]), (pairs[4, k], pairs[5, k], pairs[6, k])
+        t = _pair_terms(pairs[0, k], pairs[1, k], v, sigma, 1.0, widening, curvature)
         e += baseline - t[0]
         gx, gy, gp = gx + t[1], gy + t[2], gp + t[3]
         hxx, hxy, hxp, hyy, hyp, hpp = hxx + t[4], hxy + t[5], hxp + t[6], hyy + t[7], hyp + t[8], hpp + t[9]
@@ -75,18 +82,18 @@ def _sum(met: Array, count: int, widening: float, curvature: float, baseline: fl
 
 
 @reduction_kernel
-def sum_meeting(meeting: Association, widening: float, curvature: float, out: Array) -> None:
-    """Write E, gradient and Hessian of the points of a meeting into out (10,), as `accumulate` does."""
-    moved, gaussians = meeting.moved, meeting.gaussians
+def sum_association(association: Association, widening: float, curvature: float, out: Array) -> None:
+    """Write E, gradient and Hessian of an association into out (10,), as `evaluate_energy` does."""
+    moved, gaussians = association.moved, association.gaussians
     e = gx = gy = gp = hxx = hxy = hxp = hyy = hyp = hpp = 0.0
     for block in range(BLOCKS):
         for k in range(moved.shape[1]):
             rx, ry = moved[0, k], moved[1, k]
             v = moved[2, k] - gaussians[block, 0, k], moved[3, k] - gaussians[block, 1, k]
             sigma = gaussians[block, 2, k], gaussians[block, 3, k], gaussians[block, 4, k]
-            shows = gaussians[block, 5, k] * rx + gaussians[block, 6, k] * ry <= 0.0
-            # Without `and`, which would be a branch.
-            t = _terms(rx, ry, v, sigma, 1.0 if shows & (sigma[0] > 0.0) else 0.0, widening, curvature)
+            faces = gaussians[block, 5, k] * rx + gaussians[block, 6, k] * ry <= 0.0
+            # `&` is no branch, unlike `and`.
+            t = _pair_terms(rx, ry, v, sigma, 1.0 if faces & (sigma[0] > 0.0) else 0.0, widening, curvature)
             e -= t[0]
             gx, gy, gp = gx + t[1], gy + t[2], gp + t[3]
             hxx, hxy, hxp, hyy, hyp, hpp = (
@@ -102,10 +109,10 @@ def sum_meeting(meeting: Association, widening: float, curvature: float, out: Ar
 
 
 @reduction_kernel
-def _terms(
+def _pair_terms(
     rx: float, ry: float, v: Vector, sigma: Symmetric, weight: float, widening: float, curvature: float
 ) -> Terms:
-    """The s, gradient and Hessian of a point on a Gaussian, times its weight."""
+    """s, gradient and Hessian of a pair of a point and a Gaussian, times its weight."""
     (vx, vy), (xx, xy, yy) = v, sigma
     cw = curvature * widening
     # Σ⁻¹v; vᵗΣ⁻¹ ∂x'/∂φ and Σ⁻¹ ∂x'/∂φ, with ∂x'/∂φ = (−ry, rx) and ∂²x'/∂φ² = −(rx, ry).
@@ -130,17 +137,17 @@ def _terms(
 
 @leaf_kernel
 def _exp(t: float) -> float:
-    """eᵗ for −700 ≤ t ≤ 0, to 10⁻¹⁴ of it: 2ⁿ eʳ with |r| ≤ ½ ln 2, and eʳ by its series."""
+    """eᵗ for −700 ≤ t ≤ 0 to a relative error of 10⁻¹⁴: 2ⁿ eʳ with |r| ≤ ½ ln 2, and eʳ by its series."""
     n = np.floor(t * LOG2_E + 0.5)
     r = t - n * LN2_HIGH - n * LN2_LOW
     tail = 1 / 5040 + r * (1 / 40320 + r * (1 / 362880 + r * (1 / 3628800 + r * (1 / 39916800))))
     series = 1 + r * (1 + r * (1 / 2 + r * (1 / 6 + r * (1 / 24 + r * (1 / 120 + r * (1 / 720 + r * tail))))))
-    # 2ⁿ by its bits: the exponent stands above the 52 of the fraction.
+    # 2ⁿ from its bits: the exponent is above the 52 bits of the fraction.
     return float(series * np.int64((np.int64(n) + 1023) << 52).view(np.float64))
 
 
 @leaf_kernel
-def unpack(out: Array, scale: float, gradient: Array, hessian: Array) -> None:
+def unpack_derivatives(out: Array, scale: float, gradient: Array, hessian: Array) -> None:
     """Write gradient (3,) and Hessian (3, 3) of scale · E from the numbers (10,) of an evaluation."""
     index = 4
     for a in range(3):
@@ -164,7 +171,7 @@ def find_inliers(
 ) -> int:
     """Mark the points (m, 2) within a Mahalanobis distance² of `bound` of some Gaussian in `inliers` (m,).
 
-    How many they are; other marks are left as they were.
+    Returns their number. Other marks stay.
     """
     cos, sin = np.cos(pose[2]), np.sin(pose[2])
     count, row, key = 0, -1, -1
@@ -172,13 +179,13 @@ def find_inliers(
         rx = cos * points[k, 0] - sin * points[k, 1]
         ry = sin * points[k, 0] + cos * points[k, 1]
         px, py = rx + pose[0], ry + pose[1]
-        cell = pack(int(np.floor(px / half)), int(np.floor(py / half)))
+        cell = pack_key(int(np.floor(px / half)), int(np.floor(py / half)))
         if cell != key:
             key, row = cell, find_row(grid, cell)
         if row < 0:
             continue
         for block in range(4):
-            link = shown(grid, grid.links[row, block], rx, ry)
+            link = facing_gaussian(grid, grid.links[row, block], rx, ry)
             if link < 0:
                 continue
             gaussian = grid.gaussians[link]
@@ -201,12 +208,12 @@ class Energy(NamedTuple):
 def energy(ndt: Ndt, points: Array, pose: Array, widening: float = 1.0, exact: bool = True) -> Energy:
     """E_ij(u) of points (m, 2) of scan j at the pose u (3,) in the frame of the NDT of scan i.
 
-    `exact=False` leaves the parts of the Hessian out that can be negative.
+    `exact=False` leaves out the parts of the Hessian that can be negative.
     """
-    out = np.empty(OUT)
+    out = np.empty(ENERGY_NUMBERS)
     x, y, phi = (float(part) for part in pose)
-    room = room_to_meet(len(points), 1)
-    accumulate(ndt.grid, ndt.half, points, x, y, phi, widening, float(exact), 0.0, 1, room, out)
+    buffers = association_buffers(len(points), 1)
+    evaluate_energy(ndt.grid, ndt.half, points, x, y, phi, widening, float(exact), 0.0, 1, buffers, out)
     gradient, hessian = np.empty(3), np.empty((3, 3))
-    unpack(out, 1.0, gradient, hessian)
+    unpack_derivatives(out, 1.0, gradient, hessian)
     return Energy(float(out[0]), gradient, hessian)

@@ -1,10 +1,9 @@
-"""The grid of an NDT: how it grows and shrinks by the points of scans ([19]; paper, III-F).
+"""Points of scans are added to the grid of an NDT and removed again ([19]; paper, III-F).
 
-The plane is cut into four overlapping grids, shifted by half a cell against each other. Their common
-refinement is a lattice of half cells: a point falls into one lattice cell, and the four Gaussians that it
-meets are those of the 2 × 2 blocks of lattice cells around it. The sums of a point are therefore kept once,
-in its lattice cell, and a Gaussian is made from the sums of its four. Sums can be taken away again, which
-lets a map follow the robot.
+The plane has four overlapping grids, shifted by half a cell against each other. Their common refinement is a
+lattice of half cells. A point falls into one lattice cell, and is associated with the Gaussians of the four 2
+× 2 blocks that contain the cell. Sums are therefore kept for lattice cells, and a Gaussian is made from those
+of its block. They can be subtracted again, so that a map follows the robot.
 """
 
 from __future__ import annotations
@@ -16,32 +15,32 @@ from nscan_cli.kernels.assign import assign, assign_rows
 from nscan_cli.kernels.decorators import kernel, leaf_kernel
 from nscan_cli.ndt.gaussians import make_gaussian
 from nscan_cli.ndt.hash_grid import (
-    AROUND,
-    OPEN,
+    NEIGHBOURHOOD,
     OUTDATED,
-    STRAIGHT,
+    WALL_DIRECTION,
+    WALL_END,
     Grid,
     empty_grid,
     find_row,
-    insert,
-    pack,
-    unpack,
+    insert_key,
+    pack_key,
+    unpack_key,
 )
-from nscan_cli.ndt.neighbourhood import drop_along_wall_information, straighten
-from nscan_cli.ndt.scan_tangents import tangent
+from nscan_cli.ndt.neighbourhood import align_with_neighbourhood, drop_along_wall_information
+from nscan_cli.ndt.scan_tangents import scan_tangent
 from nscan_cli.poses import Array
 
-NEW_NEIGHBOURS = 9
-"""A point in new land creates at most its own lattice cell and the eight around it."""
+CELLS_PER_POINT = 9
+"""Most lattice cells that a point adds: its own and the eight around it."""
 
 
 @leaf_kernel
 def add_points(
     grid: Grid, rows: int, half: float, points: Array, pose: Array, sign: float, touched: NDArray[np.int32]
 ) -> int:
-    """Add (sign +1) or take away (−1) points (m, 2), moved by `pose`; returns the number of rows.
+    """Add (`sign` +1) or remove (−1) points (m, 2), moved by `pose`; returns the number of rows.
 
-    The row of each point is written to `touched` (m,); the Gaussians there are to be made again.
+    The row of each point is written to `touched` (m,). The Gaussians there have to be made again.
     """
     cos, sin = np.cos(pose[2]), np.sin(pose[2])
     row, key = -1, -1
@@ -52,16 +51,17 @@ def add_points(
         x, y = bx + pose[0], by + pose[1]
         ix, iy = int(np.floor(x / half)), int(np.floor(y / half))
         # Neighbouring beams mostly fall into the same cell.
-        if pack(ix, iy) != key:
-            key = pack(ix, iy)
+        if pack_key(ix, iy) != key:
+            key = pack_key(ix, iy)
             row = find_row(grid, key)
-            if row < 0 or not _is_settled(grid, row):
-                row, rows = _settle(grid, rows, ix, iy)
+            if row < 0 or not _has_all_blocks(grid, row):
+                row, rows = _insert_with_neighbours(grid, rows, ix, iy)
         touched[k] = row
         facing, sums = grid.facing[row], grid.sums[row]
-        # What is subtracted finds the part that it was added to: an empty cell alone chooses anew.
+        # Only an empty cell gets a new normal, so that points are removed from the part that they were added
+        # to.
         if sums[0, 0] + sums[1, 0] < 0.5:
-            tx, ty = tangent(points, k)
+            tx, ty = scan_tangent(points, k)
             facing[0], facing[1] = -(sin * tx + cos * ty), cos * tx - sin * ty
         part = sums[1 if facing[0] * bx + facing[1] * by > 0.0 else 0]
         dx, dy = x - (ix + 0.5) * half, y - (iy + 0.5) * half
@@ -81,7 +81,7 @@ def add_points(
 
 @kernel
 def make_gaussians(grid: Grid, rows: int, touched: NDArray[np.int32], half: float) -> None:
-    """Make the Gaussians of all lattice cells in `touched` (m,), of the first `rows`."""
+    """Make the Gaussians of the lattice cells in `touched` (m,), which are among the first `rows`."""
     made = np.zeros(rows, dtype=np.bool_)
     previous = -1
     for k in range(touched.shape[0]):
@@ -93,17 +93,17 @@ def make_gaussians(grid: Grid, rows: int, touched: NDArray[np.int32], half: floa
             if row >= 0 and not made[row]:
                 made[row] = True
                 make_gaussian(grid, row, half)
-    # On its own: what is done for few scans would slow down what is done for all.
-    for row in range(rows if grid.making[AROUND] == STRAIGHT else 0):
+    # In loops of their own, which most scans skip.
+    for row in range(rows if grid.settings[NEIGHBOURHOOD] == WALL_DIRECTION else 0):
         if made[row]:
-            straighten(grid, row, half)
-    for row in range(rows if grid.making[AROUND] == OPEN else 0):
+            align_with_neighbourhood(grid, row, half)
+    for row in range(rows if grid.settings[NEIGHBOURHOOD] == WALL_END else 0):
         if made[row]:
             drop_along_wall_information(grid, row, half)
 
 
 @kernel
-def change(
+def change_points(
     grid: Grid,
     rows: int,
     half: float,
@@ -112,9 +112,9 @@ def change(
     sign: float,
     at_once: bool,
 ) -> int:
-    """Both: the sums, and the Gaussians made of them; when they are met first, if not `at_once`.
+    """Add or remove points as `add_points`, and make the Gaussians, at once or when they are looked up.
 
-    Those that are made later do not know their surroundings.
+    Gaussians that are made later are not corrected by their neighbourhood. Returns the number of rows.
     """
     touched = np.empty(points.shape[0], dtype=np.int32)
     rows = add_points(grid, rows, half, points, pose, sign, touched)
@@ -127,7 +127,7 @@ def change(
 
 @leaf_kernel
 def _outdate_gaussians(grid: Grid, touched: NDArray[np.int32]) -> None:
-    """Have the Gaussians of all lattice cells in `touched` (m,) made anew when they are met."""
+    """Mark the Gaussians of all lattice cells in `touched` (m,) as outdated."""
     previous = -1
     for k in range(touched.shape[0]):
         if touched[k] != previous:
@@ -139,39 +139,39 @@ def _outdate_gaussians(grid: Grid, touched: NDArray[np.int32]) -> None:
 
 
 @leaf_kernel
-def _is_settled(grid: Grid, row: int) -> bool:
+def _has_all_blocks(grid: Grid, row: int) -> bool:
     links = grid.links
     return bool(links[row, 0] >= 0 and links[row, 1] >= 0 and links[row, 2] >= 0 and links[row, 3] >= 0)
 
 
 @leaf_kernel
-def _settle(grid: Grid, rows: int, ix: int, iy: int) -> tuple[int, int]:
-    """Make a lattice cell that gets its first point, and all cells that share a Gaussian with it."""
+def _insert_with_neighbours(grid: Grid, rows: int, ix: int, iy: int) -> tuple[int, int]:
+    """Insert a lattice cell that gets its first point, and all cells that share a Gaussian with it."""
     centre = -1
     for dy in range(-1, 2):
         for dx in range(-1, 2):
-            row, rows = insert(grid, rows, pack(ix + dx, iy + dy))
+            row, rows = insert_key(grid, rows, pack_key(ix + dx, iy + dy))
             if dx == 0 and dy == 0:
                 centre = row
             for block in range(4):
                 bx, by = dx - block % 2, dy - block // 2
                 if -1 <= bx <= 0 and -1 <= by <= 0:
-                    block_row, rows = insert(grid, rows, pack(ix + bx, iy + by))
+                    block_row, rows = insert_key(grid, rows, pack_key(ix + bx, iy + by))
                     grid.links[row, block] = block_row
     return centre, rows
 
 
 @kernel
-def take_over(old: Grid, rows: int, new: Grid) -> int:
-    """Enter what is in the first `rows` of a grid into an empty one, which has room; returns its rows.
+def copy_occupied(old: Grid, rows: int, new: Grid) -> int:
+    """Copy the first `rows` of a grid into an empty one with enough capacity; returns its number of rows.
 
-    Cells without points, far from any that has some, are left behind. A map that moves on would else grow.
+    Cells that have no points and no neighbours with points are left out, or a map that moves would grow.
     """
     count = 0
     for row in range(rows):
         if old.sums[row, 0, 0] + old.sums[row, 1, 0] > 0.5:
-            ix, iy = unpack(old.keys[row])
-            centre, count = _settle(new, count, ix, iy)
+            ix, iy = unpack_key(old.keys[row])
+            centre, count = _insert_with_neighbours(new, count, ix, iy)
             assign(new.facing[centre], old.facing[row])
             assign_rows(new.sums[centre], old.sums[row])
     for row in range(count):
@@ -186,42 +186,42 @@ def take_over(old: Grid, rows: int, new: Grid) -> int:
 
 
 @kernel
-def _renewed(old: Grid, rows: int, capacity: int) -> tuple[Grid, int]:
-    """What is in the first `rows` of a grid in a new one, and its number of rows."""
-    new = empty_grid(capacity, old.making)
-    return new, take_over(old, rows, new)
+def _copied(old: Grid, rows: int, capacity: int) -> tuple[Grid, int]:
+    """A new grid with a copy of the first `rows` of an old one, and its number of rows."""
+    new = empty_grid(capacity, old.settings)
+    return new, copy_occupied(old, rows, new)
 
 
 @kernel
-def with_room(grid: Grid, rows: int, points: int) -> tuple[Grid, int]:
-    """The grid, or a new one that has room for so many more points. Cells that have become empty go first."""
-    room, capacity = NEW_NEIGHBOURS * points, grid.keys.shape[0]
-    if rows + room <= capacity:
+def with_capacity(grid: Grid, rows: int, points: int) -> tuple[Grid, int]:
+    """The grid, or a copy without empty cells, that has capacity for a number of new points; its rows."""
+    needed, capacity = CELLS_PER_POINT * points, grid.keys.shape[0]
+    if rows + needed <= capacity:
         return grid, rows
-    grid, rows = _renewed(grid, rows, capacity)
-    # Half must be free, or it would have to be done again before long.
-    if rows + room > capacity // 2:
-        grid, rows = _renewed(grid, rows, 2 * max(rows + room, capacity))
+    grid, rows = _copied(grid, rows, capacity)
+    # With less than half of it free, the next copy would follow soon.
+    if rows + needed > capacity // 2:
+        grid, rows = _copied(grid, rows, 2 * max(rows + needed, capacity))
     return grid, rows
 
 
 @kernel
-def gathered(
+def with_scans(
     grid: Grid, rows: int, half: float, points: Array, ends: NDArray[np.int64], poses: Array
 ) -> tuple[Grid, int]:
-    """The grid, and its number of rows, with n scans added, moved by `poses` (n, 3).
+    """The grid with n scans added, moved by `poses` (n, 3), and its number of rows.
 
-    Scan k has points[ends[k] : ends[k + 1]]. The Gaussians are left to be made.
+    Scan k has points[ends[k] : ends[k + 1]]. The Gaussians have to be made.
     """
     touched = np.empty(points.shape[0], dtype=np.int32)
     for k in range(poses.shape[0]):
         scan = points[ends[k] : ends[k + 1]]
-        grid, rows = with_room(grid, rows, scan.shape[0])
+        grid, rows = with_capacity(grid, rows, scan.shape[0])
         rows = add_points(grid, rows, half, scan, poses[k], 1.0, touched)
     return grid, rows
 
 
 @kernel
-def make_all(grid: Grid, rows: int, half: float) -> None:
+def make_all_gaussians(grid: Grid, rows: int, half: float) -> None:
     """Make the Gaussians of all lattice cells in the first `rows`."""
     make_gaussians(grid, rows, np.arange(rows, dtype=np.int32), half)

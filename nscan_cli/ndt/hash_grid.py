@@ -1,4 +1,4 @@
-"""The arrays of an NDT, and the hash table that finds a lattice cell in them."""
+"""The arrays of an NDT, and the hash table that finds lattice cells in them."""
 
 from __future__ import annotations
 
@@ -13,24 +13,22 @@ from nscan_cli.poses import Array
 HALF_KEY = 1 << 30
 """Offset that makes lattice coordinates positive in a packed key."""
 OUTDATED = -1.0
-"""In place of the first number of Σ⁻¹: the Gaussian is to be made anew before it is met. `meet_again` does
-so; before anything else looks Gaussians up, `Ndt.make` has to make them all."""
-
-
-MINIMUM, FLOOR, AROUND, FACES = 0, 1, 2, 3
-"""How Gaussians are made: of at least so many points, with at least this standard deviation (m), what their
-surroundings tell of them, and whether they have faces (0 or 1); see gaussians.py."""
-ALONE, STRAIGHT, OPEN = 0, 1, 2
-"""What surroundings tell: nothing; the direction of a piece of wall; where it ends, and holds nothing along
-itself; see surroundings.py."""
+"""Stands for the first number of Σ⁻¹ of a Gaussian that has to be made again. `update_association` does so;
+before any other look-up, `Ndt.make` has to make all Gaussians."""
+MINIMUM, FLOOR, NEIGHBOURHOOD, FACES = 0, 1, 2, 3
+"""Places in `Grid.settings`: the least number of points of a Gaussian, its least standard deviation (m), the
+use of its neighbourhood, and whether walls have two faces (0 or 1); see gaussians.py."""
+NO_NEIGHBOURS, WALL_DIRECTION, WALL_END = 0, 1, 2
+"""Uses of the neighbourhood of a Gaussian: none; the direction of a wall; the ends of a wall, which hold
+nothing along it; see neighbourhood.py."""
 
 
 class Grid(NamedTuple):
-    """The arrays of an NDT as the kernels take them. R rows, one for each lattice cell that was touched.
+    """The arrays of an NDT as the kernels take them, with R rows, one for each lattice cell.
 
-    While it grows, row r stands for its lattice cell and for the Gaussian of the block whose lower left
-    cell it is, and row R + r of the Gaussians for the other face of a wall there; a compact one has the
-    Gaussians that can be used and the cells that meet one.
+    While it grows, row r is that of a lattice cell and of the Gaussian of the block whose lower left cell it
+    is. Row R + r of the Gaussians is the other face of a wall there. A compact grid has only Gaussians with
+    enough points, and only cells that are part of their blocks.
     """
 
     table: NDArray[np.int32]
@@ -38,24 +36,23 @@ class Grid(NamedTuple):
     keys: NDArray[np.int64]
     """(R,) packed lattice coordinates."""
     links: NDArray[np.int32]
-    """(R, 4) rows of the Gaussians of the four blocks that the lattice cell is part of, or −1."""
+    """(R, 4) rows of the Gaussians of the four blocks that contain the lattice cell, or −1."""
     facing: Array
-    """(R, 2) across what is in a lattice cell: beams against it count to the first part, others to the
-    second."""
+    """(R, 2) the normal of what is in a lattice cell: beams against it belong to the first part of its sums,
+    others to the second."""
     sums: Array
-    """(R, 2, 8) of both parts n, Σx, Σy, Σx², Σxy, Σy² about the centre of the lattice cell, and the sum of
+    """(R, 2, 8) of both parts: n, Σx, Σy, Σx², Σxy, Σy² about the centre of the lattice cell, and the sum of
     the unit vectors along the beams."""
     gaussians: Array
-    """(G, 8) mean x, y; Σ⁻¹ as (xx, xy, yy), 0 where a Gaussian has too few points; the normal (x, y) of the
-    face that it shows, 0 where it was seen from both sides; and the row of the one that shows the other
-    face, or 0."""
-    making: Array
-    """(4,) MINIMUM, FLOOR, AROUND and FACES; (0,) in a compact one."""
+    """(G, 8) mean x, y; Σ⁻¹ as (xx, xy, yy), 0 if there are too few points; the normal (x, y) of the face
+    that was seen, 0 if both were; and the row of the Gaussian of the other face, or 0."""
+    settings: Array
+    """(4,) MINIMUM, FLOOR, NEIGHBOURHOOD and FACES; (0,) in a compact grid."""
 
 
 @leaf_kernel
 def table_size(rows: int) -> int:
-    """Slots for so many rows: twice to four times as many, a power of two."""
+    """Number of hash slots for a number of rows: a power of two, twice to four times as many."""
     size = 2
     while size < 2 * rows:
         size *= 2
@@ -63,8 +60,8 @@ def table_size(rows: int) -> int:
 
 
 @kernel
-def empty_grid(capacity: int, making: Array) -> Grid:
-    """One with room for so many rows."""
+def empty_grid(capacity: int, settings: Array) -> Grid:
+    """A grid with capacity for a number of rows."""
     rows = max(capacity, 16)
     return Grid(
         np.full(table_size(rows), -1, dtype=np.int32),
@@ -73,7 +70,7 @@ def empty_grid(capacity: int, making: Array) -> Grid:
         np.empty((rows, 2)),
         np.empty((rows, 2, 8)),
         np.zeros((2 * rows, 8)),
-        making,
+        settings,
     )
 
 
@@ -90,10 +87,10 @@ def find_row(grid: Grid, key: int) -> int:
 
 
 @leaf_kernel
-def shown(grid: Grid, link: int, beam_x: float, beam_y: float) -> int:
-    """The row of the Gaussian that shows its face to a beam of that direction, or −1.
+def facing_gaussian(grid: Grid, link: int, beam_x: float, beam_y: float) -> int:
+    """The row of the Gaussian whose face a beam of that direction hits, or −1.
 
-    `link` is the row of its block's Gaussian, or −1.
+    `link` is the row of the Gaussian of a block, or −1.
     """
     if link < 0 or grid.gaussians[link, 2] == 0.0:
         return -1
@@ -106,13 +103,13 @@ def shown(grid: Grid, link: int, beam_x: float, beam_y: float) -> int:
 
 
 @leaf_kernel
-def pack(ix: int, iy: int) -> int:
-    """One key for the lattice cell (ix, iy)."""
+def pack_key(ix: int, iy: int) -> int:
+    """The key of the lattice cell (ix, iy)."""
     return (ix + HALF_KEY) * (2 * HALF_KEY) + (iy + HALF_KEY)
 
 
 @leaf_kernel
-def unpack(key: int) -> tuple[int, int]:
+def unpack_key(key: int) -> tuple[int, int]:
     """The lattice cell (ix, iy) of a key."""
     return key // (2 * HALF_KEY) - HALF_KEY, key % (2 * HALF_KEY) - HALF_KEY
 
@@ -124,8 +121,8 @@ def _hash(key: int) -> int:
 
 
 @leaf_kernel
-def insert(grid: Grid, rows: int, key: int) -> tuple[int, int]:
-    """The row of a key, made when it is new; and the number of rows then."""
+def insert_key(grid: Grid, rows: int, key: int) -> tuple[int, int]:
+    """The row of a key, which is added if it is new, and the new number of rows."""
     mask = grid.table.shape[0] - 1
     slot = _hash(key) & mask
     while grid.table[slot] >= 0:
@@ -143,7 +140,7 @@ def insert(grid: Grid, rows: int, key: int) -> tuple[int, int]:
 
 @leaf_kernel
 def rehash(grid: Grid, rows: int) -> None:
-    """Enter the first `rows` keys into an empty table."""
+    """Add the first `rows` keys to an empty table."""
     mask = grid.table.shape[0] - 1
     for row in range(rows):
         slot = _hash(grid.keys[row]) & mask

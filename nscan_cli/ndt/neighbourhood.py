@@ -1,107 +1,107 @@
-"""What the surroundings of a piece of wall tell of it: its direction, and whether it only ends here.
+"""Corrections of a Gaussian by its neighbourhood: the direction of a wall, and the ends of walls.
 
-Neither is in [19], where each Gaussian stands for itself. In the Gaussians of a single scan the direction
-counts, in those of a keyframe, which many scans fill, where a wall ends.
+Neither is in [19]. The direction is corrected in the NDT of a single scan, the ends of walls in that of a
+keyframe, to which many scans contribute. The numbers below are constants of the kernels, for speed.
 """
 
 from __future__ import annotations
 
 from nscan_cli.kernels.decorators import leaf_kernel
 from nscan_cli.ndt.gaussians import (
-    NOTHING,
+    NO_MOMENTS,
     Direction,
     Moments,
-    divided,
+    eigenvalue_radius,
     eigenvalues,
-    faces,
+    face_moments,
     long_axis_of,
-    plus,
-    radius_of,
-    shape,
+    moments_of_sums,
+    plus_cell,
+    write_gaussian,
 )
 from nscan_cli.ndt.hash_grid import FLOOR, HALF_KEY, Grid, find_row
 from nscan_cli.poses import Array
 
-THIN = 10.0
-"""A Gaussian is a piece of wall when its larger eigenvalue is so many times the smaller one."""
-SAME_DIRECTION = 0.9
-"""Cosine of twice the angle by which the direction from a larger block may differ."""
-FILLED = 0.75
-"""A wall ends in a block of which it fills less than such a share of the side,"""
-AS_FLAT = 1.5
-"""and nothing stands out if the variance across is no more than so many times that of what is around."""
-WIDE, NARROW = 2, 1
-"""Lattice cells around a block that are asked, the wider surroundings first."""
+LEAST_ELONGATION = 10.0
+"""Least ratio of the larger to the smaller eigenvalue of a piece of wall."""
+LEAST_COSINE = 0.9
+"""Cosine of twice the greatest angle by which the direction from the neighbourhood may differ."""
+WALL_END_SHARE = 0.75
+"""A wall ends in a block if it is shorter than this share of the block's side."""
+FLATNESS_RATIO = 1.5
+"""Greatest ratio of the variance across the end of a wall to that of its neighbourhood; a corner has more."""
+WIDE_MARGIN, NARROW_MARGIN = 2, 1
+"""Widths of the neighbourhood around a block in lattice cells; the wider one is tried first."""
 
 
 @leaf_kernel
-def straighten(grid: Grid, row: int, half: float) -> None:
-    """Let a piece of wall take its direction from the block of twice the size around it.
+def align_with_neighbourhood(grid: Grid, row: int, half: float) -> None:
+    """Give a piece of wall the direction of its neighbourhood, where that is as flat.
 
-    Where the points there lie as flat as its own. A direction that is off by the noise of its few points
-    tells a way along the wall that nobody knows, and eight times less from twice the length.
+    The noise of few points turns a Gaussian, so that it claims information along the wall; from twice the
+    length it claims eight times less.
     """
     key, gaussian = grid.keys[row], grid.gaussians[row]
-    front, back = faces(grid, row, half)
+    front, back = face_moments(grid, row, half)
     if front[0] > 0.0:
-        shape(grid, key, front, _long_axis_around(grid, key, front, half), half, gaussian)
+        write_gaussian(grid, key, front, _long_axis_around(grid, key, front, half), half, gaussian)
     if back[0] > 0.0:
         other = grid.gaussians[int(gaussian[7])]
-        shape(grid, key, back, _long_axis_around(grid, key, back, half), half, other)
+        write_gaussian(grid, key, back, _long_axis_around(grid, key, back, half), half, other)
 
 
 @leaf_kernel
 def drop_along_wall_information(grid: Grid, row: int, half: float) -> None:
-    """Let the end of a wall hold nothing along the wall.
+    """Remove the information of a wall's end along the wall.
 
-    Mostly it is where the view ended. The mean of the few points there lies at one side of the block, and
-    draws whatever is seen of the rest of it: scans of a laser that sees no farther than a few metres are
-    pulled together along a corridor by 2 % of the way. A corner or a door post stands out, and holds.
+    Mostly the view ended there. The few points lie at one side of the block, and their mean attracts the
+    points of the rest of it: with a laser that sees a few metres, scans along a corridor are pulled together
+    by 2 % of the distance. A corner or a door post is not flat, and keeps its information.
     """
     gaussian = grid.gaussians[row]
     has_back = gaussian[7] > 0.0
-    front_ends = _is_short(gaussian, half)
-    back_ends = has_back and _is_short(grid.gaussians[int(gaussian[7])], half)
+    front_ends = _is_wall_end(gaussian, half)
+    back_ends = has_back and _is_wall_end(grid.gaussians[int(gaussian[7])], half)
     if not (front_ends or back_ends):
         return
-    for around in (WIDE, NARROW):
-        wide = _around(grid, grid.keys[row], around, half)
+    for margin in (WIDE_MARGIN, NARROW_MARGIN):
+        wide = _moments_around(grid, grid.keys[row], margin, half)
         small, large = eigenvalues(grid, wide)
-        if THIN * small < min(large, _variance_of(2 * half)):
-            front, back = faces(grid, row, half)
+        if LEAST_ELONGATION * small < min(large, _wall_variance(2 * half)):
+            front, back = face_moments(grid, row, half)
             if front_ends:
-                _hold_across(grid, front, wide, gaussian)
+                _write_line(grid, front, wide, gaussian)
             if back_ends:
-                _hold_across(grid, back, wide, grid.gaussians[int(gaussian[7])])
+                _write_line(grid, back, wide, grid.gaussians[int(gaussian[7])])
             return
 
 
 @leaf_kernel
-def _is_short(gaussian: Array, half: float) -> bool:
-    """Whether the larger eigenvalue λ of a Gaussian is that of a wall as long as FILLED of a block's side.
+def _is_wall_end(gaussian: Array, half: float) -> bool:
+    """Whether a Gaussian is shorter than a wall of WALL_END_SHARE of a block's side.
 
-    Or of a shorter one. With a smaller eigenvalue of σ² the inverse has σ⁴/λ³ along it, see gaussians.py.
+    With eigenvalues λ > σ² of its covariance, the inverse is σ⁴/λ³ along the wall; see gaussians.py.
     """
     xx, xy, yy = gaussian[2], gaussian[3], gaussian[4]
-    middle, radius = 0.5 * (xx + yy), radius_of(xx, xy, yy)
+    middle, radius = 0.5 * (xx + yy), eigenvalue_radius(xx, xy, yy)
     along, across = middle - radius, middle + radius
-    return bool(along * across**2 * _variance_of(FILLED * 2 * half) ** 3 > 1.0)
+    return bool(along * across**2 * _wall_variance(WALL_END_SHARE * 2 * half) ** 3 > 1.0)
 
 
 @leaf_kernel
-def _variance_of(length: float) -> float:
-    """That of points all along a piece of wall."""
+def _wall_variance(length: float) -> float:
+    """The variance of points spread evenly over a piece of wall."""
     return length * length / 12
 
 
 @leaf_kernel
-def _hold_across(grid: Grid, moments: Moments, wide: Moments, gaussian: Array) -> None:
-    """Make a Gaussian with these moments a line that runs as its surroundings do, if it lies as flat."""
+def _write_line(grid: Grid, moments: Moments, wide: Moments, gaussian: Array) -> None:
+    """Make a Gaussian with these moments a line in the direction of its neighbourhood, if it is as flat."""
     (_, _, _, xx, xy, yy, _, _), (c2, s2) = moments, long_axis_of(wide)
     variance, small = 0.5 * (xx + yy - (xx - yy) * c2) - xy * s2, eigenvalues(grid, wide)[0]
-    if variance > AS_FLAT * small:
+    if variance > FLATNESS_RATIO * small:
         return
-    half_across = 0.5 / max(variance, grid.making[FLOOR] * grid.making[FLOOR])
+    half_across = 0.5 / max(variance, grid.settings[FLOOR] * grid.settings[FLOOR])
     gaussian[2] = half_across * (1 - c2)
     gaussian[3] = -half_across * s2
     gaussian[4] = half_across * (1 + c2)
@@ -109,28 +109,28 @@ def _hold_across(grid: Grid, moments: Moments, wide: Moments, gaussian: Array) -
 
 @leaf_kernel
 def _long_axis_around(grid: Grid, key: int, moments: Moments, half: float) -> Direction:
-    """The direction of a piece of wall, from around it if possible; see straighten."""
+    """The direction of a piece of wall, from its neighbourhood where that is as flat."""
     long_axis = long_axis_of(moments)
     small, large = eigenvalues(grid, moments)
-    if large <= THIN * small:
+    if large <= LEAST_ELONGATION * small:
         return long_axis
-    for around in (WIDE, NARROW):
-        wide = _around(grid, key, around, half)
+    for margin in (WIDE_MARGIN, NARROW_MARGIN):
+        wide = _moments_around(grid, key, margin, half)
         _, _, _, xx, xy, yy, _, _ = wide
         c2, s2 = long_axis_of(wide)
-        flat = 0.5 * (xx + yy) - radius_of(xx, xy, yy) < small
-        if flat and c2 * long_axis[0] + s2 * long_axis[1] > SAME_DIRECTION:
+        flat = 0.5 * (xx + yy) - eigenvalue_radius(xx, xy, yy) < small
+        if flat and c2 * long_axis[0] + s2 * long_axis[1] > LEAST_COSINE:
             return c2, s2
     return long_axis
 
 
 @leaf_kernel
-def _around(grid: Grid, key: int, around: int, half: float) -> Moments:
-    """Of a block and so many lattice cells around it, from the centre of the cell of `key`."""
-    sums = NOTHING
-    for oy in range(-around, 2 + around):
-        for ox in range(-around, 2 + around):
+def _moments_around(grid: Grid, key: int, margin: int, half: float) -> Moments:
+    """The moments of a block and a margin of lattice cells, about the centre of the cell of `key`."""
+    sums = NO_MOMENTS
+    for oy in range(-margin, 2 + margin):
+        for ox in range(-margin, 2 + margin):
             cell = find_row(grid, key + ox * 2 * HALF_KEY + oy)
             for side in range(2 if cell >= 0 else 0):
-                sums = plus(sums, grid.sums[cell, side], ox * half, oy * half)
-    return divided(sums)
+                sums = plus_cell(sums, grid.sums[cell, side], ox * half, oy * half)
+    return moments_of_sums(sums)

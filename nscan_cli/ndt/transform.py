@@ -1,4 +1,4 @@
-"""The normal distributions transform of points: built from one scan, grown by more ([19]; paper, III-F)."""
+"""The normal distributions transform of the points of scans ([19]; paper, III-F)."""
 
 from __future__ import annotations
 
@@ -9,32 +9,33 @@ from numpy.typing import NDArray
 
 from nscan_cli.kernels.decorators import kernel
 from nscan_cli.ndt.compaction import compacted
-from nscan_cli.ndt.grid_growth import change, gathered, make_all, with_room
-from nscan_cli.ndt.hash_grid import ALONE, AROUND, FACES, FLOOR, MINIMUM, Grid, empty_grid
+from nscan_cli.ndt.grid_growth import change_points, make_all_gaussians, with_capacity, with_scans
+from nscan_cli.ndt.hash_grid import FACES, FLOOR, MINIMUM, NEIGHBOURHOOD, NO_NEIGHBOURS, Grid, empty_grid
 from nscan_cli.poses import Array
 
-LEAST_CAPACITY = 512
-"""Rows that an NDT has at first, unless it is known to need more."""
+INITIAL_CAPACITY = 512
+"""Rows of a new NDT."""
 
 
 @kernel
-def _compact_grid(
-    points: Array, ends: NDArray[np.int64], poses: Array, half: float, capacity: int, making: Array
+def _grid_of_scans(
+    points: Array, ends: NDArray[np.int64], poses: Array, half: float, capacity: int, settings: Array
 ) -> Grid:
-    """What is left of a grid that n scans were added to: see `of_scans`."""
-    grid, rows = gathered(empty_grid(capacity, making), 0, half, points, ends, poses)
-    make_all(grid, rows, half)
+    """The compact grid of n scans; see `Ndt.of_scans`."""
+    grid, rows = with_scans(empty_grid(capacity, settings), 0, half, points, ends, poses)
+    make_all_gaussians(grid, rows, half)
     return compacted(grid, rows)
 
 
 @dataclass(eq=False)
 class Ndt:
-    """A normal distributions transform of the points of scans, in cells of a side (m)."""
+    """A normal distributions transform of the points of scans."""
 
     cell: float
+    """Side of a cell, m."""
     grid: Grid
     rows: int
-    """So many rows of the grid are in use."""
+    """Number of rows of the grid that are in use."""
 
     @classmethod
     def empty(
@@ -42,17 +43,17 @@ class Ndt:
         cell: float,
         minimum: int = 3,
         floor: float = 0.02,
-        capacity: int = LEAST_CAPACITY,
-        around: int = ALONE,
+        capacity: int = INITIAL_CAPACITY,
+        neighbourhood: int = NO_NEIGHBOURS,
         faces: bool = True,
     ) -> Ndt:
-        """One that grows and shrinks by scans.
+        """An NDT to which points are added.
 
         `minimum` is the least number of points that make a Gaussian, `floor` its least standard deviation
-        (m). `around` says what its surroundings tell of it: ALONE, STRAIGHT or OPEN. With `faces` there are
-        two where a wall has two faces; see gaussians.py.
+        (m), `neighbourhood` one of NO_NEIGHBOURS, WALL_DIRECTION and WALL_END. With `faces` a wall can have
+        two Gaussians, one for each face; see gaussians.py.
         """
-        return cls(cell, empty_grid(capacity, _making(minimum, floor, around, faces)), 0)
+        return cls(cell, empty_grid(capacity, _settings(minimum, floor, neighbourhood, faces)), 0)
 
     @classmethod
     def of_scans(
@@ -63,16 +64,15 @@ class Ndt:
         cell: float,
         minimum: int,
         floor: float,
-        capacity: int = LEAST_CAPACITY,
-        around: int = ALONE,
+        capacity: int = INITIAL_CAPACITY,
+        neighbourhood: int = NO_NEIGHBOURS,
     ) -> Ndt:
-        """That of n scans, moved by `poses` (n, 3), with nothing in it but what matching needs.
+        """The compact NDT of n scans, moved by `poses` (n, 3), to which no points can be added.
 
-        Scan k has points[ends[k] : ends[k + 1]]. Nothing can be added any more. Other arguments as for
-        `empty`.
+        Scan k has points[ends[k] : ends[k + 1]]. Other arguments as for `empty`.
         """
-        making = _making(minimum, floor, around, faces=True)
-        grid = _compact_grid(points, ends, poses, 0.5 * cell, capacity, making)
+        settings = _settings(minimum, floor, neighbourhood, faces=True)
+        grid = _grid_of_scans(points, ends, poses, 0.5 * cell, capacity, settings)
         return cls(cell, grid, len(grid.keys))
 
     @property
@@ -81,31 +81,20 @@ class Ndt:
         return 0.5 * self.cell
 
     def add(self, points: Array, pose: Array) -> None:
-        """Grow by points (m, 2), moved by `pose` (3,)."""
-        self._change(points, pose, 1.0)
-
-    def subtract(self, points: Array, pose: Array) -> None:
-        """Take away points that were added with the very same pose."""
-        self._change(points, pose, -1.0)
+        """Add points (m, 2), moved by `pose` (3,)."""
+        self.reserve(len(points))
+        self.rows = change_points(self.grid, self.rows, self.half, points, pose, 1.0, True)
 
     def make(self) -> None:
-        """Make all Gaussians that are outdated."""
-        make_all(self.grid, self.rows, self.half)
-
-    def _change(self, points: Array, pose: Array, sign: float) -> None:
-        self.reserve(len(points))
-        self.rows = change(self.grid, self.rows, self.half, points, pose, sign, True)
+        """Make all Gaussians, so that none is outdated."""
+        make_all_gaussians(self.grid, self.rows, self.half)
 
     def reserve(self, points: int) -> None:
-        """Make room for so many more points."""
-        self.grid, self.rows = with_room(self.grid, self.rows, points)
-
-    def gaussian_count(self) -> int:
-        """How many Gaussians have points enough; two where a wall has two faces."""
-        return int(np.count_nonzero(self.grid.gaussians[:, 2]))
+        """Get capacity for a number of new points."""
+        self.grid, self.rows = with_capacity(self.grid, self.rows, points)
 
 
-def _making(minimum: int, floor: float, around: int, faces: bool) -> Array:
-    making = np.empty(4)
-    making[[MINIMUM, FLOOR, AROUND, FACES]] = minimum, floor, around, faces
-    return making
+def _settings(minimum: int, floor: float, neighbourhood: int, faces: bool) -> Array:
+    settings = np.empty(4)
+    settings[[MINIMUM, FLOOR, NEIGHBOURHOOD, FACES]] = minimum, floor, neighbourhood, faces
+    return settings

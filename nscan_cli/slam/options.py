@@ -7,9 +7,10 @@ from typing import Literal
 
 from nscan_cli.graph.optimise.robust import RobustOptions
 from nscan_cli.matching.correlative_search import SearchOptions
+from nscan_cli.matching.joint.options import AmbiguityOptions
+from nscan_cli.ndt.options import GaussianOptions
 from nscan_cli.slam.diagnostics.options import DiagnosticsOptions
 from nscan_cli.slam.frontend.options import BreakOptions, OdometryCheckOptions, TrackingOptions
-from nscan_cli.slam.gaussian_options import GaussianOptions
 from nscan_cli.slam.keyframes.options import KeyframeOptions
 
 Relations = Literal["pairwise", "nscan", "both"]
@@ -43,6 +44,10 @@ class NScanOptions:
     """m, rad"""
     overlap: float = 0.65
     """Share of inliers, one of the other, that holds two scans together."""
+    inlier_bound: float = 9.0
+    """Squared Mahalanobis distance from a Gaussian within which a point lies on it."""
+    ambiguity: AmbiguityOptions = field(default_factory=AmbiguityOptions)
+    """How a joint match is checked for other places where its scans fit."""
     settled: float = 0.1
     """When the last stage alone moves a scan further (m), or one is too far off to take part in it, all
     stages are run."""

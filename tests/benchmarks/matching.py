@@ -12,11 +12,11 @@ import numpy as np
 from nscan_cli.cli.known_poses import odometry_priors
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.logs.load import read_log
-from nscan_cli.matching.joint.index_set import Kind
+from nscan_cli.matching.joint.index_set import IndexSetKind
 from nscan_cli.matching.joint.joint_energy import JointProblem, all_pairs, joint_energy, no_priors
-from nscan_cli.matching.joint.joint_match import JointOptions
 from nscan_cli.matching.joint.nscan_match import nscan_match
-from nscan_cli.matching.joint.scan_set import lay_out
+from nscan_cli.matching.joint.options import JointOptions
+from nscan_cli.matching.joint.scan_set import scan_set
 from nscan_cli.matching.pairwise import PairOptions, match_pair, matched_points, scan_ndt
 from nscan_cli.matching.priors import MotionModel
 from nscan_cli.poses import Array, relative
@@ -37,7 +37,7 @@ def timings() -> Iterator[Timing]:
         ten, six, two = (list(_windows(log, n)) for n in (10, 6, 2))
         yield Timing(f"{name}: joint energy of 10 scans, all pairs", median_of(_energies(log, ten)))
         for n, windows in ((10, ten), (6, six)):
-            for kind in get_args(Kind):
+            for kind in get_args(IndexSetKind):
                 calls = [partial(_joint, log, window, kind) for window in windows]
                 yield Timing(f"{name}: joint match of {n} scans, pairs: {kind}", median_of(calls))
         calls = [partial(_pair, log, window) for window in two]
@@ -59,13 +59,13 @@ def _energies(log: LaserLog, windows: list[Array]) -> list[Callable[[], object]]
     calls: list[Callable[[], object]] = []
     for rows in windows:
         points = [matched_points(log, int(row), PairOptions()) for row in rows]
-        scans = lay_out([scan_ndt(part, PairOptions()) for part in points], points)
+        scans = scan_set([scan_ndt(part, PairOptions()) for part in points], points)
         problem = JointProblem(scans, all_pairs(len(rows)), no_priors(), 1.0)
         calls.append(partial(joint_energy, problem, log.odometry[rows]))
     return calls
 
 
-def _joint(log: LaserLog, rows: Array, pairs: Kind) -> object:
+def _joint(log: LaserLog, rows: Array, pairs: IndexSetKind) -> object:
     """All that `nscan` does from the odometry once the log is read."""
     assert log.odometry is not None
     odometry = log.odometry[rows]

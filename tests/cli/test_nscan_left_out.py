@@ -29,7 +29,7 @@ def test_scans_that_cannot_meet_the_others_are_named_and_left_out(tmp_path, caps
     document, said = matched(capsys, OFFICE_LOG, *arguments)
     assert document["relation"]["scans"] == [2000, 2016, 2024]
     assert document["relation"]["fixed"] == 2000
-    reason = "starts too far from all others to meet one"
+    reason = "starts too far from all others to overlap one"
     assert document["left_out"] == [{"scan": 2008, "reason": reason, "overlap": 0, "chi2": None}]
     assert len(document["relation"]["hessian"]) == 45
     assert len(document["covariance"]) == 21
@@ -54,7 +54,7 @@ def test_a_scan_out_of_its_bounds_is_named_with_its_deviation(tmp_path, capsys, 
     (out,) = document["left_out"]
     # One prior of the two that it breaks, 0.5 m at 0.05 m.
     assert (out["scan"], out["chi2"]) == (2016, pytest.approx(100, rel=0.1))
-    assert out["reason"] == f"falls outside the bounds of its priors (χ² {out['chi2']:.1f}, at most 16.27)"
+    assert out["reason"] == f"contradicts its priors (χ² {out['chi2']:.1f}, at most 16.27)"
     assert " ".join(said[-2:]).split() == f"left out scan 2016 {out['reason']}".split()
     assert max(map(len, said)) <= 80
     assert_true(document, office)

@@ -12,12 +12,13 @@ from numpy.typing import NDArray
 
 from nscan_cli.cli.known_poses import no_priors_among
 from nscan_cli.mapping.figures.match_plots import plot_nscan
-from nscan_cli.matching.joint.index_set import Kind
+from nscan_cli.matching.joint.index_set import IndexSetKind
 from nscan_cli.matching.joint.joint_energy import JointProblem, all_pairs, no_priors
-from nscan_cli.matching.joint.joint_match import JointMatch, JointOptions, match_near_and_far
+from nscan_cli.matching.joint.joint_match import JointMatch, match_near_and_far
 from nscan_cli.matching.joint.nscan_match import NScanMatch, nscan_match
+from nscan_cli.matching.joint.options import JointOptions
 from nscan_cli.matching.joint.outliers import ExcludedScan
-from nscan_cli.matching.joint.scan_set import lay_out
+from nscan_cli.matching.joint.scan_set import scan_set
 from nscan_cli.matching.pairwise import matched_points, scan_ndt
 from nscan_cli.poses import Array, compose, relative, wrap
 from tests.experiments.reference import ReferenceLog
@@ -61,7 +62,7 @@ class Case:
     truth: Array
     """(n, 3), in any frame."""
 
-    def matched(self, fixed: int | None = None, pairs: Kind = "overlap") -> Matched:
+    def matched(self, fixed: int | None = None, pairs: IndexSetKind = "overlap") -> Matched:
         """Matched as `nscan --prior none` does, the gauge free or a scan fixed.
 
         Raises RuntimeError when no two of the scans match.
@@ -76,7 +77,7 @@ class Case:
     def from_good_start(self, fixed: int | None = None) -> JointMatch:
         """Matched as nscan does, with all pairs, from near the truth."""
         count = len(self.points)
-        scans = lay_out([scan_ndt(points, OPTIONS) for points in self.points], self.points)
+        scans = scan_set([scan_ndt(points, OPTIONS) for points in self.points], self.points)
         problem = JointProblem(scans, all_pairs(count), no_priors(), 2 * OPTIONS.scale / count)
         start = near(self.truth, GOOD_SEED, GOOD, GOOD_ANGLE)
         return match_near_and_far(problem, start, JointOptions(fixed=fixed))

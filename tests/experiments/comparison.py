@@ -13,9 +13,10 @@ from nscan_cli.cli.known_poses import no_priors_among
 from nscan_cli.graph.model import Graph, Pairwise
 from nscan_cli.graph.optimise.whole_graph import optimise_graph
 from nscan_cli.matching.joint.joint_energy import JointProblem, all_pairs, no_priors
-from nscan_cli.matching.joint.joint_match import JointOptions, match_near_and_far
+from nscan_cli.matching.joint.joint_match import match_near_and_far
 from nscan_cli.matching.joint.nscan_match import nscan_match
-from nscan_cli.matching.joint.scan_set import lay_out
+from nscan_cli.matching.joint.options import JointOptions
+from nscan_cli.matching.joint.scan_set import scan_set
 from nscan_cli.matching.pairwise import PairMatch, match_pair
 from nscan_cli.poses import Array, compose, relative
 from tests.experiments.charts import line_chart
@@ -81,7 +82,7 @@ def from_start(problem: Drawn) -> Array:
     """(c) The joint match as it is from the start alone."""
     n = len(problem.start)
     joint = JointProblem(
-        lay_out(problem.ndts, problem.points), all_pairs(n), no_priors(), 2 * OPTIONS.scale / n
+        scan_set(problem.ndts, problem.points), all_pairs(n), no_priors(), 2 * OPTIONS.scale / n
     )
     return match_near_and_far(joint, problem.start, JointOptions()).poses
 

@@ -9,8 +9,9 @@ from numpy.typing import NDArray
 
 from nscan_cli.errors import InputDataError
 from nscan_cli.logs.laser_log import LaserLog
+from nscan_cli.matching.joint.options import JointOptions
 from nscan_cli.matching.joint.overlap import overlaps, weakest_link
-from nscan_cli.matching.joint.scan_set import lay_out
+from nscan_cli.matching.joint.scan_set import scan_set
 from nscan_cli.matching.pairwise import matched_points, scan_ndt
 from nscan_cli.ndt.transform import Ndt
 from nscan_cli.poses import Array, relative, wrap
@@ -78,7 +79,7 @@ def _draw(log: LaserLog, rows: NDArray[np.int64], poses: Array, count: int, seed
         except InputDataError:
             continue
         ndts, truth = [scan_ndt(part, OPTIONS) for part in points], poses[chosen]
-        link = weakest_link(overlaps(lay_out(ndts, points), truth).pairs)
+        link = weakest_link(overlaps(scan_set(ndts, points), truth, JointOptions.inlier_bound).pairs)
         drawn.append(Drawn(points, ndts, truth, truth + off, float(error), link))
     return drawn
 

@@ -18,8 +18,9 @@ from nscan_cli.mapping.figures.axes import TITLE_MARGINS, LegendEntry, draw_titl
 from nscan_cli.mapping.figures.canvas import GREEN, ORANGE, PURPLE, SKY, VERMILLION, Canvas
 from nscan_cli.mapping.figures.panels import hstack_images, vstack_images
 from nscan_cli.matching.joint.joint_energy import JointProblem, all_pairs, joint_energy, no_priors
-from nscan_cli.matching.joint.joint_match import JointOptions, match_jointly
-from nscan_cli.matching.joint.scan_set import lay_out
+from nscan_cli.matching.joint.joint_match import match_jointly
+from nscan_cli.matching.joint.options import JointOptions
+from nscan_cli.matching.joint.scan_set import scan_set
 from nscan_cli.matching.pairwise import PairOptions, scan_ndt
 from nscan_cli.poses import Array
 from tests.experiments.charts import heat_map, line_chart
@@ -90,7 +91,7 @@ def problem(*which: int) -> JointProblem:
     """Some of the shapes, all pairs of them, E itself."""
     points = [shape(each) for each in which]
     ndts = [scan_ndt(part, OPTIONS) for part in points]
-    return JointProblem(lay_out(ndts, points), all_pairs(len(which)), no_priors(), 1.0)
+    return JointProblem(scan_set(ndts, points), all_pairs(len(which)), no_priors(), 1.0)
 
 
 @functools.cache

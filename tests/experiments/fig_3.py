@@ -18,8 +18,9 @@ from nscan_cli.mapping.figures.canvas import BLUE, GREEN, PURPLE, VERMILLION
 from nscan_cli.mapping.figures.panels import bounds_around, hstack_images, panel, vstack_images
 from nscan_cli.mapping.figures.symbols import draw_robots
 from nscan_cli.matching.joint.joint_energy import JointProblem, Priors, joint_energy
-from nscan_cli.matching.joint.joint_match import JointMatch, JointOptions, match_near_and_far
+from nscan_cli.matching.joint.joint_match import JointMatch, match_near_and_far
 from nscan_cli.matching.joint.neutral_energy import neutral_energy
+from nscan_cli.matching.joint.options import JointOptions
 from nscan_cli.matching.uncertainty import Weakest, weakest_translation
 from nscan_cli.poses import Array, compose, relative, transform
 from tests.experiments.charts import line_chart
@@ -149,7 +150,7 @@ def profile(which: tuple[int, ...], moved: int, axis: int) -> Array:
             mean[axis] += SHIFTS[at]
             held = energy_of(which, Priors(np.array([[0, place]]), mean[None], hold))
             here = match_near_and_far(held, here, options).poses
-            energies[at] = neutral_energy(energy_of(which), here)
+            energies[at] = neutral_energy(energy_of(which), here, options.overlap_reward)
     return energies
 
 

@@ -17,7 +17,7 @@ from nscan_cli.graph.linalg.factor_pattern import Pattern, block_targets
 from nscan_cli.graph.model import NScan, Pairwise
 from nscan_cli.graph.optimise.graph_energy import GraphEnergy, System
 from nscan_cli.graph.optimise.graph_solver import Optimum, newton_step
-from nscan_cli.matching.damped_newton import GRAPH, is_accepted, is_last, next_damping
+from nscan_cli.matching.damped_newton import GRAPH_STEPS, is_accepted, is_last, next_damping
 from nscan_cli.poses import Array, Indices
 from tests.experiments.mappings import Mapping, Relations, differences, grouped
 
@@ -118,20 +118,20 @@ def minimise(energy: Stepwise, poses: Array, max_iterations: int = MAX_ITERATION
     A step counts as good when it lowers the function of its iteration.
     """
     held = energy.hold(poses)
-    here, damping, iteration = energy.evaluate_held(poses, held), GRAPH.first, 0
+    here, damping, iteration = energy.evaluate_held(poses, held), GRAPH_STEPS.first, 0
     for iteration in range(1, max_iterations + 1):
         step, accepted = newton_step(energy.pattern, here, damping), False
         if step is not None:
             trial = poses.copy()
             trial[energy.free] += step
             length = float(np.abs(step).max(initial=0.0))
-            accepted = is_accepted(here.value, energy.value_held(trial, held), GRAPH)
+            accepted = is_accepted(here.value, energy.value_held(trial, held), GRAPH_STEPS)
             if accepted:
                 poses, held = trial, energy.hold(trial)
                 here = energy.evaluate_held(poses, held)
-            if is_last(length, TOLERANCE, damping, GRAPH):
+            if is_last(length, TOLERANCE, damping, GRAPH_STEPS):
                 return Optimum(poses, here.value, iteration, True)
-        damping = next_damping(damping, accepted, GRAPH)
-        if damping > GRAPH.greatest:
+        damping = next_damping(damping, accepted, GRAPH_STEPS)
+        if damping > GRAPH_STEPS.greatest:
             break
     return Optimum(poses, here.value, iteration, False)

@@ -6,7 +6,7 @@ from typing import get_args
 
 import numpy as np
 
-from nscan_cli.matching.joint.index_set import Kind
+from nscan_cli.matching.joint.index_set import IndexSetKind
 from tests.experiments.cases import SUCCESS, Case
 from tests.experiments.gauge import intel_cases, office_cases
 from tests.experiments.report import Report
@@ -28,13 +28,13 @@ def report() -> Report:
             [name, kind, *_row(cases, kind)]
             for name, cases in sets.items()
             if cases is not None
-            for kind in get_args(Kind)
+            for kind in get_args(IndexSetKind)
         ],
         () if sets["intel"] is not None else ("Left out: intel, since its log is not there.",),
     )
 
 
-def _row(cases: tuple[Case, ...], kind: Kind) -> list[str]:
+def _row(cases: tuple[Case, ...], kind: IndexSetKind) -> list[str]:
     matched = [case.matched(pairs=kind) for case in cases]
     joint = [each.match.joint for each in matched]
     return [

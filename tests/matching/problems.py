@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nscan_cli.matching.joint.joint_energy import JointProblem, Priors, all_pairs, no_priors
-from nscan_cli.matching.joint.scan_set import lay_out
+from nscan_cli.matching.joint.scan_set import scan_set
 from nscan_cli.matching.pairwise import PairOptions, matched_points, scan_ndt
 from nscan_cli.ndt.transform import Ndt
 from nscan_cli.poses import Array, relative, wrap
@@ -40,7 +40,7 @@ class Problem:
     ) -> JointProblem:
         """Some of the scans, or all, to be matched jointly: all pairs and no priors if none are given."""
         kept = chosen or range(len(self))
-        scans = lay_out([self.ndts[scan] for scan in kept], [self.points[scan] for scan in kept])
+        scans = scan_set([self.ndts[scan] for scan in kept], [self.points[scan] for scan in kept])
         index_set = all_pairs(len(kept)) if pairs is None else pairs
         return JointProblem(scans, index_set, priors or no_priors(), scale)
 

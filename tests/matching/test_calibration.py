@@ -10,8 +10,8 @@ import pytest
 
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.matching.joint.joint_energy import Priors
-from nscan_cli.matching.joint.joint_match import JointOptions
 from nscan_cli.matching.joint.nscan_match import NScanMatch, nscan_match
+from nscan_cli.matching.joint.options import JointOptions
 from nscan_cli.matching.pairwise import PairOptions, matched_points
 from nscan_cli.matching.priors import MotionModel, odometry_prior
 from nscan_cli.poses import Array, compose, relative, wrap

@@ -5,13 +5,13 @@ import pytest
 from numpy.typing import NDArray
 
 from nscan_cli.matching.correlative_search import (
+    FIELD_LEVELS,
     LANES,
-    LEVELS,
     PAD,
-    Field,
+    FoundPose,
+    LikelihoodField,
     Search,
     SearchOptions,
-    Spot,
     likelihood_field,
     search,
 )
@@ -27,7 +27,7 @@ def two() -> Problem:
     return office_problem((200, 206))
 
 
-def finest(field: Field) -> NDArray[np.float32]:
+def finest(field: LikelihoodField) -> NDArray[np.float32]:
     """(w, h) the cells of the field itself."""
     return field.levels[0, PAD:-1, PAD:-1]
 
@@ -100,7 +100,7 @@ def test_a_coarser_level_has_the_greatest_value_of_a_square_of_cells(two):
     width, height = padded.shape
     behind = np.pad(padded, (0, PAD))
     squares = np.lib.stride_tricks.sliding_window_view
-    for level in range(1, LEVELS - 1):
+    for level in range(1, FIELD_LEVELS - 1):
         side = 1 << level
         greatest = squares(behind, (side, side)).max(axis=(2, 3))[:width, :height]
         np.testing.assert_array_equal(field.levels[level], greatest)
@@ -150,7 +150,7 @@ def test_without_a_place_the_best_pose_lies_outside_of_it(two):
     assert Search(field, two.points[1], true, OPTIONS).best(0.0, without=everywhere) is None
 
 
-def assert_found(found: Spot | None, wanted: Spot) -> None:
+def assert_found(found: FoundPose | None, wanted: FoundPose) -> None:
     assert found is not None
     assert found.score == wanted.score
     np.testing.assert_array_equal(found.pose, wanted.pose)

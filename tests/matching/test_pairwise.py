@@ -8,7 +8,7 @@ import pytest
 from nscan_cli.errors import InputDataError
 from nscan_cli.logs.load import read_log
 from nscan_cli.matching.pairwise import (
-    HELD,
+    CELL_BORDER,
     NO_OVERLAP,
     STEP_LIMIT,
     PairMatch,
@@ -21,6 +21,7 @@ from nscan_cli.ndt.energy import energy
 from nscan_cli.poses import Array, relative, wrap
 from tests.data import OFFICE_LOG
 from tests.matching.problems import OPTIONS, fig_3, near, office_problem, office_truth, problem
+from tests.ndt.transforms import gaussian_count
 from tests.simulation.laser import Laser
 from tests.simulation.scenes import corridor_and_room, office
 
@@ -64,7 +65,7 @@ def test_relative_poses_are_found_within_the_noise():
         assert match.overlap > 0.5
         assert match.covariance is not None
         assert off @ np.linalg.solve(match.covariance, off) < 16.3
-        assert match.converged or match.reason == HELD
+        assert match.converged or match.reason == CELL_BORDER
     assert np.mean([match.converged for match, _ in matches]) > 0.9
 
 
@@ -169,9 +170,9 @@ def test_a_border_that_holds_the_match_is_reported():
         at_pose = energy(scans.ndts[at], scans.points[at + 1], match.pose)
         left = match.covariance @ (OPTIONS.scale * at_pose.gradient)
         counts = match.decrement > 0.5 and np.abs(left).max() > 0.01
-        held += match.reason == HELD
+        held += match.reason == CELL_BORDER
         assert not (counts and match.converged)
-        assert counts or match.reason != HELD
+        assert counts or match.reason != CELL_BORDER
     assert held > 0
 
 
@@ -195,4 +196,4 @@ def test_the_ndt_of_a_scan_is_compact():
     points = office_problem((0,)).points[0]
     ndt = scan_ndt(points, OPTIONS)
     assert len(ndt.grid.keys) == ndt.rows
-    assert ndt.gaussian_count() > 10
+    assert gaussian_count(ndt) > 10

@@ -3,10 +3,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from nscan_cli.matching.pairwise_solver import PairProblem, minimise, objective
+from nscan_cli.matching.pairwise_solver import PairProblem, minimise_pairwise, pairwise_objective
 from nscan_cli.matching.priors import Prior
-from nscan_cli.ndt.association import begin
-from nscan_cli.ndt.energy import OUT
+from nscan_cli.ndt.association import begin_association
+from nscan_cli.ndt.energy import ENERGY_NUMBERS
 from nscan_cli.ndt.transform import Ndt
 from nscan_cli.poses import Array
 from tests.ndt import plain
@@ -26,15 +26,15 @@ def ndt_of(points: Array) -> Ndt:
 
 def evaluate(ndt: Ndt, points: Array, pose: Array, curvature: float = 1.0) -> tuple[float, Array, Array]:
     gradient, hessian = np.empty(3), np.empty((3, 3))
-    problem = PairProblem(ndt.grid, ndt.half, begin(points), SCALE, Prior(MEAN, INFORMATION))
-    value = objective(problem, pose, 1.0, curvature, np.empty(OUT), gradient, hessian)
+    problem = PairProblem(ndt.grid, ndt.half, begin_association(points), SCALE, Prior(MEAN, INFORMATION))
+    value = pairwise_objective(problem, pose, 1.0, curvature, np.empty(ENERGY_NUMBERS), gradient, hessian)
     return value, gradient, hessian
 
 
 def run(ndt: Ndt, points: Array, start: Array, mean: Array, information: Array, near: float = 1e-6):
     pose, hessian = start.copy(), np.empty((3, 3))
-    problem = PairProblem(ndt.grid, ndt.half, begin(points), SCALE, Prior(mean, information))
-    outcome = minimise(problem, pose, np.array([0.05, 0.3, 1.0]), 30, near, 1e-6, hessian)
+    problem = PairProblem(ndt.grid, ndt.half, begin_association(points), SCALE, Prior(mean, information))
+    outcome = minimise_pairwise(problem, pose, np.array([0.05, 0.3, 1.0]), 30, near, 1e-6, hessian)
     return pose, hessian, outcome
 
 

@@ -3,9 +3,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from nscan_cli.ndt.association import associate_again, begin, count_inliers, room_to_meet
-from nscan_cli.ndt.energy import OUT, accumulate, inlier_share, sum_meeting
-from nscan_cli.ndt.grid_growth import change
+from nscan_cli.ndt.association import (
+    association_buffers,
+    begin_association,
+    count_inliers,
+    update_association,
+)
+from nscan_cli.ndt.energy import ENERGY_NUMBERS, evaluate_energy, inlier_share, sum_association
+from nscan_cli.ndt.grid_growth import change_points
 from nscan_cli.ndt.hash_grid import OUTDATED
 from nscan_cli.ndt.transform import Ndt
 from tests.ndt.rooms import room
@@ -23,16 +28,18 @@ def outside_in(count: int) -> Ndt:
 @pytest.mark.parametrize("step", [1e-3, 0.05, 1.0, 30.0])
 def test_what_was_kept_on_the_way_says_the_same_as_what_is_looked_up_anew(step, curvature):
     ndt, points = outside_in(3), room(7)
-    meeting, kept, anew = begin(points), np.empty(OUT), np.empty(OUT)
+    meeting, kept, anew = begin_association(points), np.empty(ENERGY_NUMBERS), np.empty(ENERGY_NUMBERS)
     rng, start = np.random.default_rng(5), np.array([0.1, -0.1, 0.05])
     counted = 0
     for n in range(40):
         # Every other time back where something is met.
         pose = start + (n % 2) * step * rng.uniform(-1, 1, 3)
-        associate_again(ndt.grid, ndt.half, meeting, *pose)
-        sum_meeting(meeting, 0.3, curvature, kept)
-        met = room_to_meet(len(points), 1)
-        accumulate(ndt.grid, ndt.half, points, pose[0], pose[1], pose[2], 0.3, curvature, 0.0, 1, met, anew)
+        update_association(ndt.grid, ndt.half, meeting, *pose)
+        sum_association(meeting, 0.3, curvature, kept)
+        met = association_buffers(len(points), 1)
+        evaluate_energy(
+            ndt.grid, ndt.half, points, pose[0], pose[1], pose[2], 0.3, curvature, 0.0, 1, met, anew
+        )
         np.testing.assert_allclose(kept, anew, rtol=1e-9, atol=1e-9 * np.abs(anew).max())
         counted += anew[0] < -1.0
     assert counted >= 20
@@ -43,8 +50,8 @@ def test_inliers_of_a_meeting_are_those_that_are_looked_up_anew():
     rng, counts = np.random.default_rng(6), set()
     for _ in range(20):
         pose = rng.uniform(-0.3, 0.3, 3)
-        meeting = begin(points)
-        associate_again(ndt.grid, ndt.half, meeting, *pose)
+        meeting = begin_association(points)
+        update_association(ndt.grid, ndt.half, meeting, *pose)
         counts.add(count_inliers(meeting, 9.0))
         assert count_inliers(meeting, 9.0) / len(points) == inlier_share(
             ndt.grid, ndt.half, points, pose, 9.0
@@ -57,14 +64,14 @@ def test_gaussians_that_are_outdated_are_made_when_they_are_met():
     for scan, pose, sign in ((room(5), np.array([0.1, 0.0, 0.02]), 1.0), (room(0), np.zeros(3), -1.0)):
         for ndt, now in ((at_once, True), (later, False)):
             ndt.reserve(len(scan))
-            ndt.rows = change(ndt.grid, ndt.rows, ndt.half, scan, pose, sign, now)
+            ndt.rows = change_points(ndt.grid, ndt.rows, ndt.half, scan, pose, sign, now)
     outdated = np.count_nonzero(later.grid.gaussians[: later.rows, 2] == OUTDATED)
-    points, expected, found = room(7)[:100], np.empty(OUT), np.empty(OUT)
+    points, expected, found = room(7)[:100], np.empty(ENERGY_NUMBERS), np.empty(ENERGY_NUMBERS)
     for pose in np.random.default_rng(8).uniform(-0.3, 0.3, (10, 3)):
         for ndt, out in ((at_once, expected), (later, found)):
-            meeting = begin(points)
-            associate_again(ndt.grid, ndt.half, meeting, *pose)
-            sum_meeting(meeting, 1.0, 1.0, out)
+            meeting = begin_association(points)
+            update_association(ndt.grid, ndt.half, meeting, *pose)
+            sum_association(meeting, 1.0, 1.0, out)
         assert expected[0] < -1.0
         np.testing.assert_array_equal(found, expected)
     left = np.count_nonzero(later.grid.gaussians[: later.rows, 2] == OUTDATED)
@@ -74,18 +81,18 @@ def test_gaussians_that_are_outdated_are_made_when_they_are_met():
 
 
 def test_no_points_meet_nothing():
-    ndt, out = outside_in(1), np.empty(OUT)
-    meeting = begin(np.empty((0, 2)))
-    associate_again(ndt.grid, ndt.half, meeting, 0.0, 0.0, 0.0)
-    sum_meeting(meeting, 1.0, 1.0, out)
+    ndt, out = outside_in(1), np.empty(ENERGY_NUMBERS)
+    meeting = begin_association(np.empty((0, 2)))
+    update_association(ndt.grid, ndt.half, meeting, 0.0, 0.0, 0.0)
+    sum_association(meeting, 1.0, 1.0, out)
     assert (out == 0.0).all()
     assert count_inliers(meeting, 9.0) == 0
 
 
 def test_poses_that_are_not_numbers_meet_nothing():
     ndt = outside_in(1)
-    meeting, out = begin(room(1)), np.empty(OUT)
+    meeting, out = begin_association(room(1)), np.empty(ENERGY_NUMBERS)
     for x in (np.nan, np.inf, 1e300):
-        associate_again(ndt.grid, ndt.half, meeting, x, 0.0, 0.0)
-        sum_meeting(meeting, 1.0, 0.0, out)
+        update_association(ndt.grid, ndt.half, meeting, x, 0.0, 0.0)
+        sum_association(meeting, 1.0, 0.0, out)
         assert not out[0] < -1e-300

@@ -5,11 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from nscan_cli.ndt.association import associate_again, begin, room_to_meet
-from nscan_cli.ndt.energy import OUT, accumulate, energy, inlier_share, sum_meeting
+from nscan_cli.ndt.association import association_buffers, begin_association, update_association
+from nscan_cli.ndt.energy import ENERGY_NUMBERS, energy, evaluate_energy, inlier_share, sum_association
 from nscan_cli.ndt.transform import Ndt
 from nscan_cli.poses import Array, compose, relative, transform
 from tests.ndt.test_grid_growth import assert_same, entries
+from tests.ndt.transforms import gaussian_count, subtract
 
 THICK = 0.12
 """m"""
@@ -101,7 +102,7 @@ def test_a_wall_that_is_passed_by_has_one_face():
     """Ahead and behind, at a grazing angle, from the same side."""
     poses = [np.array([x, 1.2, turn]) for x in (-6.0, -3.0, 0.0, 3.0, 6.0) for turn in (0.0, 3.0)]
     ndt = added(*((face(2.0, seed), pose) for seed, pose in enumerate(poses)))
-    assert ndt.gaussian_count() == len(entries(ndt)) > 10
+    assert gaussian_count(ndt) == len(entries(ndt)) > 10
     assert (ndt.grid.gaussians[: ndt.rows, 7] == 0.0).all()
     for gaussian in entries(ndt).values():
         np.testing.assert_allclose(gaussian[5:7], [0.0, -1.0], atol=0.01)
@@ -109,16 +110,16 @@ def test_a_wall_that_is_passed_by_has_one_face():
 
 def test_a_face_is_subtracted_from_its_own():
     both = added(FRONT, BACK)
-    both.subtract(seen(*BACK), BACK[1])
+    subtract(both, seen(*BACK), BACK[1])
     assert_same(both, added(FRONT))
     both.add(seen(*BACK), BACK[1])
     assert_same(both, added(FRONT, BACK))
-    both.subtract(seen(*FRONT), FRONT[1])
+    subtract(both, seen(*FRONT), FRONT[1])
     scan = seen(*BACK)
     assert energy(both, scan, NORTH).value == pytest.approx(energy(added(BACK), scan, NORTH).value, rel=1e-9)
     assert energy(both, seen(*FRONT), SOUTH).value == 0.0
-    both.subtract(seen(*BACK), BACK[1])
-    assert both.gaussian_count() == 0
+    subtract(both, seen(*BACK), BACK[1])
+    assert gaussian_count(both) == 0
 
 
 def test_growing_and_compacting_keep_both_faces():
@@ -138,13 +139,13 @@ def test_growing_and_compacting_keep_both_faces():
 @pytest.mark.parametrize(("points", "pose"), [FRONT, BACK], ids=["south", "north"])
 def test_what_is_kept_while_the_pose_changes_is_of_the_right_face(points, pose):
     ndt, scan = added(FRONT, BACK), seen(points, pose)
-    meeting, kept, anew = begin(scan), np.empty(OUT), np.empty(OUT)
+    meeting, kept, anew = begin_association(scan), np.empty(ENERGY_NUMBERS), np.empty(ENERGY_NUMBERS)
     rng = np.random.default_rng(3)
     for _ in range(30):
         at = pose + rng.uniform(-0.1, 0.1, 3)
-        associate_again(ndt.grid, ndt.half, meeting, *at)
-        sum_meeting(meeting, 0.3, 0.0, kept)
-        met = room_to_meet(len(scan), 1)
-        accumulate(ndt.grid, ndt.half, scan, at[0], at[1], at[2], 0.3, 0.0, 0.0, 1, met, anew)
+        update_association(ndt.grid, ndt.half, meeting, *at)
+        sum_association(meeting, 0.3, 0.0, kept)
+        met = association_buffers(len(scan), 1)
+        evaluate_energy(ndt.grid, ndt.half, scan, at[0], at[1], at[2], 0.3, 0.0, 0.0, 1, met, anew)
         assert anew[0] < -10
         np.testing.assert_allclose(kept, anew, rtol=1e-9, atol=1e-9 * np.abs(anew).max())

@@ -9,7 +9,7 @@ import pytest
 
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.ndt.energy import energy
-from nscan_cli.ndt.hash_grid import ALONE, OPEN
+from nscan_cli.ndt.hash_grid import NO_NEIGHBOURS, WALL_END
 from nscan_cli.ndt.transform import Ndt
 from nscan_cli.poses import Array, compose, relative
 from tests.simulation.laser import Laser
@@ -33,7 +33,7 @@ def wall(*places: tuple[float, float], seed: int = 1) -> Array:
 
 
 def ndt_of(points: Array, around: int, frame: Array = HERE) -> Ndt:
-    return Ndt.of_scans(points, np.array([0, len(points)]), frame[None], 1.0, 5, 0.02, around=around)
+    return Ndt.of_scans(points, np.array([0, len(points)]), frame[None], 1.0, 5, 0.02, neighbourhood=around)
 
 
 def held(ndt: Ndt, points: Array, frame: Array, direction: Array) -> float:
@@ -49,7 +49,7 @@ def test_the_end_of_a_wall_holds_across_and_not_along(frame, end):
     """Of the blocks there, a metre wide and half a metre apart, some are filled by less than half."""
     points = wall((0.0, 2.0), (end, 2.0))
     last = points[points[:, 0] > end - 0.3]
-    alone, open_ended = (ndt_of(points, around, frame) for around in (ALONE, OPEN))
+    alone, open_ended = (ndt_of(points, around, frame) for around in (NO_NEIGHBOURS, WALL_END))
     # One that is filled whole has (12 · 0.02²)² of 1 / 0.02² along itself, and the noise of its direction.
     assert held(open_ended, last, frame, ALONG) < 1
     assert held(open_ended, last, frame, ACROSS) == pytest.approx(held(alone, last, frame, ACROSS), rel=0.2)
@@ -58,7 +58,7 @@ def test_the_end_of_a_wall_holds_across_and_not_along(frame, end):
 def test_alone_the_end_of_a_wall_holds_along():
     """What is done away with: of the wall above, a tenth of a metre into a block, far more."""
     points = wall((0.0, 2.0), (4.1, 2.0))
-    assert held(ndt_of(points, ALONE), points[points[:, 0] > 3.8], HERE, ALONG) > 1000
+    assert held(ndt_of(points, NO_NEIGHBOURS), points[points[:, 0] > 3.8], HERE, ALONG) > 1000
 
 
 @pytest.mark.parametrize("frame", FRAMES, ids=["along", "half a radian", "backwards"])
@@ -73,7 +73,7 @@ def test_alone_the_end_of_a_wall_holds_along():
 def test_what_stands_out_holds(frame, places):
     """Of the Gaussians there those may let go that have the end of one of the walls alone."""
     points = wall(*places)
-    alone, open_ended = (ndt_of(points, around, frame) for around in (ALONE, OPEN))
+    alone, open_ended = (ndt_of(points, around, frame) for around in (NO_NEIGHBOURS, WALL_END))
     for direction in (ALONG, ACROSS):
         assert held(alone, points, frame, direction) > 1000
         assert held(open_ended, points, frame, direction) > 0.3 * held(alone, points, frame, direction)
@@ -85,7 +85,7 @@ def test_short_sighted_scans_are_not_pulled_together_along_a_corridor():
     E rises by so much for each metre that they are farther apart; mean of 40 draws.
     """
     laser = Laser(360, -np.radians(120), np.radians(240) / 359, 4.0, noise=0.02, resolution=0.0)
-    slopes: dict[int, list[float]] = {ALONE: [], OPEN: []}
+    slopes: dict[int, list[float]] = {NO_NEIGHBOURS: [], WALL_END: []}
     for seed in range(40):
         # Anywhere in the grid.
         at = 0.5 * np.random.default_rng(seed).random(2)
@@ -98,8 +98,8 @@ def test_short_sighted_scans_are_not_pulled_together_along_a_corridor():
                 gradient = energy(ndt_of(here, around), there, pose).gradient
                 away = compose(np.array([0.0, 0.0, -poses[0, 2]]), np.array([ahead, 0.0, 0.0]))
                 found.append(float(gradient[:2] @ away[:2]))
-    assert np.mean(slopes[ALONE]) > 10
-    assert abs(np.mean(slopes[OPEN])) < np.mean(slopes[ALONE]) / 3
+    assert np.mean(slopes[NO_NEIGHBOURS]) > 10
+    assert abs(np.mean(slopes[WALL_END])) < np.mean(slopes[NO_NEIGHBOURS]) / 3
 
 
 def scans(log: LaserLog) -> list[Array]:

@@ -14,7 +14,7 @@ from nscan_cli.graph.linalg.factor_pattern import block_targets
 from nscan_cli.graph.optimise.graph_energy import GraphEnergy
 from nscan_cli.graph.optimise.graph_solver import newton_step
 from nscan_cli.graph.optimise.term_columns import TermColumns
-from nscan_cli.matching.damped_newton import GRAPH
+from nscan_cli.matching.damped_newton import GRAPH_STEPS
 from nscan_cli.poses import Array, Indices
 
 REGULARISATION = 1e-9
@@ -34,7 +34,7 @@ def chordal_start(energy: GraphEnergy, poses: Array) -> Array:
     system = energy.evaluate(start, exact=False)
     step = newton_step(energy.pattern, system)
     if step is None:
-        step = newton_step(energy.pattern, system, GRAPH.least_raised)
+        step = newton_step(energy.pattern, system, GRAPH_STEPS.least_raised)
     if step is not None:
         start[energy.free] += step
     start[:, :2] += poses[energy.fixed, :2]

@@ -9,7 +9,7 @@ import numpy as np
 from nscan_cli.graph.linalg.block_cholesky import factorise, solve
 from nscan_cli.graph.linalg.factor_pattern import Pattern
 from nscan_cli.graph.optimise.graph_energy import GraphEnergy, System
-from nscan_cli.matching.damped_newton import GRAPH, is_accepted, is_last, next_damping
+from nscan_cli.matching.damped_newton import GRAPH_STEPS, is_accepted, is_last, next_damping
 from nscan_cli.poses import Array, wrap
 
 EXACT_HESSIAN_STEP = 0.1
@@ -41,7 +41,7 @@ def optimise(
     Marquardt, when they would raise the energy or the relations leave a direction open. In such a direction
     poses could go on for ever, for less and less, so there the minimum is where nothing is gained.
     """
-    here, exact, damping, is_open = energy.evaluate(poses, exact=False), False, GRAPH.first, False
+    here, exact, damping, is_open = energy.evaluate(poses, exact=False), False, GRAPH_STEPS.first, False
     iteration = 0
     for iteration in range(1, max_iterations + 1):
         step = newton_step(energy.pattern, here, damping)
@@ -55,20 +55,20 @@ def optimise(
             trial = poses.copy()
             trial[energy.free] += step
             length = float(np.abs(step).max(initial=0.0))
-            if is_last(length, tolerance, damping, GRAPH):
+            if is_last(length, tolerance, damping, GRAPH_STEPS):
                 value = float(energy.terms(trial).sum())
-                if is_accepted(here.value, value, GRAPH):
+                if is_accepted(here.value, value, GRAPH_STEPS):
                     return Optimum(_wrapped(trial), value, iteration, True)
                 return Optimum(_wrapped(poses), here.value, iteration, True)
             there = energy.evaluate(trial, exact=length < EXACT_HESSIAN_STEP)
-            accepted = is_accepted(here.value, there.value, GRAPH)
+            accepted = is_accepted(here.value, there.value, GRAPH_STEPS)
             if accepted:
                 gains = here.value - there.value > NEGLIGIBLE_GAIN * (1 + here.value)
-                if is_open and damping <= GRAPH.least_raised and not gains:
+                if is_open and damping <= GRAPH_STEPS.least_raised and not gains:
                     return Optimum(_wrapped(trial), there.value, iteration, True)
                 poses, here, exact = trial, there, length < EXACT_HESSIAN_STEP
-        damping = next_damping(damping, accepted, GRAPH)
-        if damping > GRAPH.greatest:
+        damping = next_damping(damping, accepted, GRAPH_STEPS)
+        if damping > GRAPH_STEPS.greatest:
             break
     return Optimum(_wrapped(poses), here.value, iteration, False)
 

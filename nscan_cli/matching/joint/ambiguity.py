@@ -1,8 +1,8 @@
-"""How far off a joint match may be where its scans fit elsewhere, too: what its Hessian does not know.
+"""The uncertainty of a joint match whose scans fit elsewhere, too: what its Hessian does not know.
 
-Along a corridor scans fit again and again: a door farther on, or anywhere. The Hessian knows how sharp the
-place is that was found, to a centimetre. That there are others shows in the energy farther off alone, and by
-the neutral one: any scans fit better by the energy itself where they cover more of each other.
+Along a corridor scans fit again and again: a door farther on, or anywhere. The Hessian tells how sharp the
+minimum is, to a centimetre. Other minima show only in the energy farther away, and only in the neutral one,
+since the energy itself falls wherever scans cover more of each other.
 """
 
 from __future__ import annotations
@@ -12,56 +12,45 @@ import numpy as np
 from nscan_cli.matching.joint.gauge import gauge_directions
 from nscan_cli.matching.joint.joint_energy import NEUTRAL, JointProblem
 from nscan_cli.matching.joint.neutral_energy import neutral_energies
+from nscan_cli.matching.joint.options import AmbiguityOptions
 from nscan_cli.matching.joint.scan_set import with_usual
 from nscan_cli.poses import Array
 
-WEAK = 0.015
-"""m; a motion that the Hessian knows better is not looked into. In rooms all are known better."""
-HELD_BY_NOTHING = 1.0
-"""m; a motion that the Hessian itself knows no better is known well enough for what it is."""
-MOTIONS = 3
-"""So many are looked into, those that it knows least."""
-FARTHEST, PLACES = 1.9, 10
-"""The energy is compared up to so far off (m) on both sides, at so many places on each, denser near by."""
-STRIDE = 4
-"""Of every so-manyth point."""
-DEPENDENT = 3.0
-"""Energies count for so many times less here: beams next to each other are off together."""
 
+def with_ambiguity(problem: JointProblem, poses: Array, hessian: Array, options: AmbiguityOptions) -> Array:
+    """The Hessian (3n, 3n) of a joint match at its poses (n, 3), reduced where scans fit elsewhere.
 
-def with_ambiguity(problem: JointProblem, poses: Array, hessian: Array) -> Array:
-    """The Hessian (3n, 3n) of a joint match at its poses (n, 3), less sure where the scans fit elsewhere.
-
-    Along the motions of the scans against each other that it knows least, the variance grows by the mean
-    square of how far off they fit as well. All else that it knows stays, and so does the gauge.
+    Along the least certain motions of the scans against each other, the variance grows by the mean square of
+    the distances at which they fit as well. Other directions and the gauge keep their information.
     """
-    sounder = None
-    for motion in _weakest_motions(poses, hessian):
+    neutral = None
+    for motion in _weakest_motions(poses, hessian, options.motions):
         row = hessian @ motion
-        known = float(motion @ row)
-        if not HELD_BY_NOTHING**-2 < known < WEAK**-2:
+        information = float(motion @ row)
+        if not options.greatest_sigma**-2 < information < options.least_sigma**-2:
             continue
-        sounder = sounder or problem._replace(scans=with_usual(problem.scans))
-        variance = _variance_along(sounder, poses, motion.reshape(-1, 3))
-        # No other eigenvector has a part in this one.
-        hessian = hessian - np.outer(row, row) * (variance / (1.0 + known * variance))
+        neutral = neutral or problem._replace(scans=with_usual(problem.scans))
+        variance = _variance_along(neutral, poses, motion.reshape(-1, 3), options)
+        # The motion is an eigenvector, so no other direction changes.
+        hessian = hessian - np.outer(row, row) * (variance / (1.0 + information * variance))
     return hessian
 
 
-def _weakest_motions(poses: Array, hessian: Array) -> list[Array]:
-    """The motions (3n,) of which a Hessian knows least, eigenvectors; two scans move apart by 1 m in each."""
+def _weakest_motions(poses: Array, hessian: Array, count: int) -> list[Array]:
+    """The eigenvectors (3n,) of least information, scaled so that in each two scans move apart by 1 m."""
     gauge = gauge_directions(poses)
     held = hessian + max(float(np.trace(hessian)), 1.0) * gauge @ gauge.T
-    motions = np.linalg.eigh(held)[1][:, :MOTIONS].T
+    motions = np.linalg.eigh(held)[1][:, :count].T
     moved = motions.reshape(len(motions), -1, 3)[:, :, :2]
     apart = np.linalg.norm(moved[:, :, None] - moved[:, None], axis=3).max(axis=(1, 2))
     return list(motions / np.maximum(apart, 1e-9)[:, None])
 
 
-def _variance_along(problem: JointProblem, poses: Array, motion: Array) -> float:
-    """Mean square (m²) of the way along a motion (n, 3), by how well the scans fit on it."""
-    aside = FARTHEST * (np.arange(1, PLACES + 1) / PLACES) ** 1.5
-    ways = np.concatenate([-aside[::-1], [0.0], aside])
-    energies = neutral_energies(problem, poses + ways[:, None, None] * motion, NEUTRAL, STRIDE)
-    likelihoods = np.exp((energies.min() - energies) / DEPENDENT) * np.gradient(ways)
-    return float((likelihoods * ways**2).sum() / likelihoods.sum())
+def _variance_along(problem: JointProblem, poses: Array, motion: Array, options: AmbiguityOptions) -> float:
+    """Mean square (m²) of the distance along a motion (n, 3), weighed by how well the scans fit there."""
+    aside = options.distance * (np.arange(1, options.places + 1) / options.places) ** 1.5
+    distances = np.concatenate([-aside[::-1], [0.0], aside])
+    trials = poses + distances[:, None, None] * motion
+    energies = neutral_energies(problem, trials, NEUTRAL, options.stride)
+    likelihoods = np.exp((energies.min() - energies) / options.correlation) * np.gradient(distances)
+    return float((likelihoods * distances**2).sum() / likelihoods.sum())

@@ -1,4 +1,4 @@
-"""Newton's step of n poses whose common place is open: a gauge is chosen for it (paper, III-D)."""
+"""Newton's step of n poses that are free to move as a whole: the choice of the gauge (paper, III-D)."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ from nscan_cli.matching.small_matrices import solve_definite
 from nscan_cli.poses import Array
 
 FREE = -1
-"""In place of a fixed scan: the gauge is free."""
+"""Stands for a fixed scan where the gauge is free."""
 
 
 def gauge_of(fixed: int | None) -> int:
-    """The gauge in which a scan stays where it is, as the kernels take it; None leaves it free."""
+    """The fixed scan as the kernels take it; None leaves the gauge free."""
     return FREE if fixed is None else fixed
 
 
@@ -24,8 +24,8 @@ def gauge_fixed_step(
 ) -> bool:
     """Write the step (n, 3) that solves (H + damping · diag H) Δp = −g, eq. (5), in the chosen gauge (III-D).
 
-    With `fixed` −1 the step is the smallest one: without any part along the three null directions. False
-    when the matrix is not positive definite.
+    With `fixed` FREE the step is the shortest one, with no part along the three null directions. False when
+    the matrix is not positive definite.
     """
     size = gradient.shape[0]
     matrix, right, solution = hessian.copy(), -gradient, np.empty(size)
@@ -53,7 +53,7 @@ def gauge_fixed_step(
 
 @kernel
 def gauge_directions(poses: Array) -> Array:
-    """An orthonormal basis (3n, 3) of the global motions that leave the energy as it is."""
+    """An orthonormal basis (3n, 3) of the global motions, which do not change the energy."""
     n = poses.shape[0]
     directions = np.zeros((3 * n, 3))
     mean_x = mean_y = squares = 0.0
@@ -62,7 +62,7 @@ def gauge_directions(poses: Array) -> Array:
         mean_y += poses[i, 1] / n
     for i in range(n):
         squares += (poses[i, 0] - mean_x) ** 2 + (poses[i, 1] - mean_y) ** 2
-    # About the centre a turn is orthogonal to the shifts.
+    # A rotation about the centre is orthogonal to the translations.
     along, turn = np.sqrt(n), np.sqrt(n + squares)
     for i in range(n):
         x, y = poses[i, 0] - mean_x, poses[i, 1] - mean_y

@@ -1,8 +1,7 @@
-"""Where n scans lie when their start is poor: placed one by one, by search, among those placed before.
+"""Initial poses of n scans whose start is poor: each is searched among those that are placed already.
 
-What two scans leave open, a third one decides: each scan is searched against all that are placed already,
-and of those that are left the one that fits best comes next. It depends on where one begins, so every scan
-is tried as the first; the neutral energy chooses.
+What two scans leave open, a third one decides. Of the scans that are left, the one that fits best is placed
+next. The result depends on the first scan, so each is tried as the first, and the neutral energy decides.
 """
 
 from __future__ import annotations
@@ -12,24 +11,18 @@ from dataclasses import replace
 
 import numpy as np
 
-from nscan_cli.matching.correlative_search import Field, SearchOptions, Spot, likelihood_field, search
+from nscan_cli.matching.correlative_search import FoundPose, LikelihoodField, likelihood_field, search
 from nscan_cli.matching.joint.joint_energy import JointProblem
-from nscan_cli.matching.joint.joint_match import JointMatch, JointOptions, PairsAt, match_near_and_far
+from nscan_cli.matching.joint.joint_match import JointMatch, PairsAt, match_near_and_far
 from nscan_cli.matching.joint.neutral_energy import neutral_energy, pair_energies
-from nscan_cli.matching.joint.overlap import SOUND_OVERLAP, Overlaps, overlaps, weakest_link
+from nscan_cli.matching.joint.options import InitialisationOptions, JointOptions
+from nscan_cli.matching.joint.overlap import Overlaps, overlaps, weakest_link
 from nscan_cli.matching.pairwise import PairOptions
-from nscan_cli.matching.pairwise_solver import PairProblem, minimise
+from nscan_cli.matching.pairwise_solver import PairProblem, minimise_pairwise
 from nscan_cli.matching.priors import Prior
-from nscan_cli.ndt.association import begin
+from nscan_cli.ndt.association import begin_association
 from nscan_cli.ndt.transform import Ndt
 from nscan_cli.poses import Array, compose, relative, transform
-
-LEVER = 2.0
-"""m"""
-SWEEPS = 3
-"""How often every scan is searched again among all others, as long as that helps."""
-WIDENINGS = np.array([0.3, 1.0])
-"""Stages in which a pose that was found becomes exact: the search leaves 0.1 m or so."""
 
 
 def match_or_search(
@@ -40,25 +33,26 @@ def match_or_search(
     joint: JointOptions,
     pairs_at: PairsAt | None = None,
 ) -> tuple[JointMatch, Overlaps]:
-    """Match n scans with points (m_i, 2) from the poses `start` (n, 3), and search where that does not do.
+    """Match n scans with points (m_i, 2) from the poses `start` (n, 3), with a search if that is not sound.
 
-    A match is sound when all scans hang together by large overlaps, and each adds to the neutral energy
-    what lowers it. If it is not, the scans are placed by search and matched from there; the result counts
-    if they hang together then, and its neutral energy is lower. With the match come the overlaps there.
+    A match is sound when large overlaps connect all scans, and each scan lowers the neutral energy. If it is
+    not, the scans are placed by search and matched from there. That match is taken if overlaps connect its
+    scans and its neutral energy is lower. Returns the overlaps of the match, too.
     """
     match = match_near_and_far(problem, start, joint, pairs_at)
-    shares = overlaps(problem.scans, match.poses)
-    if weakest_link(shares.pairs) >= SOUND_OVERLAP and _all_fit(problem, match.poses):
+    shares = overlaps(problem.scans, match.poses, joint.inlier_bound)
+    share = joint.overlap_reward
+    if weakest_link(shares.pairs) >= joint.sound_overlap and _all_fit(problem, match.poses, share):
         return match, shares
-    placed = Initialisation(problem, points, start, options, SearchOptions()).best()
+    placed = Initialisation(problem, points, start, options, joint).best()
     if joint.fixed is None:
-        motion = _motion(placed, start)
+        motion = _rigid_motion(placed, start, joint.initialisation.lever)
     else:
         motion = compose(start[joint.fixed], relative(np.zeros(3), placed[joint.fixed]))
     other = match_near_and_far(problem, compose(motion, placed), joint, pairs_at)
-    energies = [neutral_energy(problem, each.poses) for each in (match, other)]
-    other_shares = overlaps(problem.scans, other.poses)
-    better = energies[1] < energies[0] and weakest_link(other_shares.pairs) >= SOUND_OVERLAP
+    energies = [neutral_energy(problem, each.poses, share) for each in (match, other)]
+    other_shares = overlaps(problem.scans, other.poses, joint.inlier_bound)
+    better = energies[1] < energies[0] and weakest_link(other_shares.pairs) >= joint.sound_overlap
     both = replace(
         other if better else match,
         iterations=match.iterations + other.iterations,
@@ -68,14 +62,14 @@ def match_or_search(
     return both, other_shares if better else shares
 
 
-def _all_fit(problem: JointProblem, poses: Array) -> bool:
-    """Whether the pairs of every scan together have a neutral energy below zero."""
-    values = pair_energies(problem, poses)
+def _all_fit(problem: JointProblem, poses: Array, share: float) -> bool:
+    """Whether the neutral energy of each scan's pairs is below zero."""
+    values = pair_energies(problem, poses, share)
     return bool(np.all(values.sum(axis=0) + values.sum(axis=1) <= 0.0))
 
 
 class Initialisation:
-    """n scans with points (m_i, 2) about poses `start` (n, 3)."""
+    """The search for the poses of n scans with points (m_i, 2) near `start` (n, 3)."""
 
     def __init__(
         self,
@@ -83,10 +77,11 @@ class Initialisation:
         points: Sequence[Array],
         start: Array,
         options: PairOptions,
-        window: SearchOptions,
+        joint: JointOptions,
     ) -> None:
         self.problem, self.points, self.start = problem, points, start
-        self.options, self.window = options, window
+        self.options, self.share = options, joint.overlap_reward
+        self.initialisation: InitialisationOptions = joint.initialisation
 
     def best(self) -> Array:
         """The poses (n, 3) of the lowest neutral energy that were found."""
@@ -94,15 +89,15 @@ class Initialisation:
         return self._placed_again(min(placed, key=self._energy))
 
     def _energy(self, poses: Array) -> float:
-        return neutral_energy(self.problem, poses)
+        return neutral_energy(self.problem, poses, self.share)
 
     def _placed_from(self, first: int) -> Array:
         """Place all scans one by one, the best fitting next; `first` stays at its start."""
         poses = self.start.copy()
         placed, left = [first], [scan for scan in range(len(poses)) if scan != first]
         while left:
-            field = likelihood_field(self._cloud(placed, poses), self.window)
-            best: tuple[int, Spot] | None = None
+            field = likelihood_field(self._points_of(placed, poses), self.initialisation.search)
+            best: tuple[int, FoundPose] | None = None
             for scan in left:
                 least = best[1].score if best else 0.0
                 found = self._search(scan, field, placed, poses, least)
@@ -111,7 +106,7 @@ class Initialisation:
             if best is None:
                 break
             scan, found = best
-            poses[scan] = self._exact(scan, found.pose, placed, poses)
+            poses[scan] = self._refined(scan, found.pose, placed, poses)
             placed.append(scan)
             left.remove(scan)
         return poses
@@ -119,44 +114,46 @@ class Initialisation:
     def _placed_again(self, poses: Array) -> Array:
         """Search every scan among all others, and take what lowers the energy."""
         energy = self._energy(poses)
-        for _ in range(SWEEPS):
+        for _ in range(self.initialisation.sweeps):
             before = energy
             for scan in range(len(poses)):
                 others = [other for other in range(len(poses)) if other != scan]
-                field = likelihood_field(self._cloud(others, poses), self.window)
+                field = likelihood_field(self._points_of(others, poses), self.initialisation.search)
                 found = self._search(scan, field, others, poses, 0.0)
                 if found is None:
                     continue
                 trial = poses.copy()
-                trial[scan] = self._exact(scan, found.pose, others, poses)
+                trial[scan] = self._refined(scan, found.pose, others, poses)
                 if self._energy(trial) < energy:
                     poses, energy = trial, self._energy(trial)
             if energy == before:
                 break
         return poses
 
-    def _cloud(self, placed: Sequence[int], poses: Array) -> Array:
+    def _points_of(self, placed: Sequence[int], poses: Array) -> Array:
         return np.concatenate([transform(poses[scan], self.points[scan]) for scan in placed])
 
     def _search(
-        self, scan: int, field: Field, placed: Sequence[int], poses: Array, least: float
-    ) -> Spot | None:
-        """Search a scan about where it lies if the placed ones have moved as a whole from their start."""
-        expected = compose(_motion(self.start[placed], poses[placed]), self.start[scan])
-        return search(field, self.points[scan], expected, least, self.window)
+        self, scan: int, field: LikelihoodField, placed: Sequence[int], poses: Array, least: float
+    ) -> FoundPose | None:
+        """Search a scan near its start, moved as the placed scans have moved as a whole."""
+        options = self.initialisation
+        motion = _rigid_motion(self.start[placed], poses[placed], options.lever)
+        expected = compose(motion, self.start[scan])
+        return search(field, self.points[scan], expected, least, options.search)
 
-    def _exact(self, scan: int, pose: Array, placed: Sequence[int], poses: Array) -> Array:
+    def _refined(self, scan: int, pose: Array, placed: Sequence[int], poses: Array) -> Array:
         """The pose (3,) matched with the NDT of all placed scans."""
         options, pose = self.options, pose.copy()
         ndt = Ndt.empty(options.cell, options.minimum, options.floor)
         for other in placed:
             ndt.add(self.points[other], poses[other])
         none = Prior(np.zeros(3), np.zeros((3, 3)))
-        problem = PairProblem(ndt.grid, ndt.half, begin(self.points[scan]), options.scale, none)
-        minimise(
+        problem = PairProblem(ndt.grid, ndt.half, begin_association(self.points[scan]), options.scale, none)
+        minimise_pairwise(
             problem,
             pose,
-            WIDENINGS,
+            np.array(self.initialisation.widenings),
             options.max_iterations,
             options.tolerance,
             options.tolerance,
@@ -165,13 +162,12 @@ class Initialisation:
         return pose
 
 
-def _motion(before: Array, after: Array) -> Array:
-    """The rigid motion (3,) that takes poses (k, 3) nearest to others: by their places and their angles."""
+def _rigid_motion(before: Array, after: Array, lever: float) -> Array:
+    """The rigid motion (3,) that best takes poses (k, 3) to others; `lever` metres weigh as a radian."""
     a, b = before[:, :2] - before[:, :2].mean(axis=0), after[:, :2] - after[:, :2].mean(axis=0)
     turns = after[:, 2] - before[:, 2]
-    # A radian weighs as much as LEVER metres.
-    cos = (a * b).sum() + LEVER**2 * np.cos(turns).sum()
-    sin = (a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]).sum() + LEVER**2 * np.sin(turns).sum()
+    cos = (a * b).sum() + lever**2 * np.cos(turns).sum()
+    sin = (a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]).sum() + lever**2 * np.sin(turns).sum()
     turn = np.array([0.0, 0.0, np.arctan2(sin, cos)])
     shift = after[:, :2].mean(axis=0) - transform(turn, before[:, :2].mean(axis=0)[None])[0]
     return np.array([shift[0], shift[1], turn[2]])

@@ -15,12 +15,12 @@ from nscan_cli.kernels.decorators import kernel, leaf_kernel
 from nscan_cli.matching.joint.scan_set import ScanSet, most_points, scan_grid, scan_points
 from nscan_cli.matching.pose_kernels import relative_pose
 from nscan_cli.matching.small_matrices import multiply
-from nscan_cli.ndt.association import RoomToMeet, room_to_meet
-from nscan_cli.ndt.energy import OUT, accumulate, unpack
+from nscan_cli.ndt.association import AssociationBuffers, association_buffers
+from nscan_cli.ndt.energy import ENERGY_NUMBERS, evaluate_energy, unpack_derivatives
 from nscan_cli.poses import Array
 
 NEUTRAL = 1.0
-"""Share of the usual s that a point must reach to lower the neutral energy: a perfect match gains nothing."""
+"""Share of the usual s with which overlap neither raises nor lowers the neutral energy of a perfect match."""
 
 
 class Priors(NamedTuple):
@@ -35,18 +35,18 @@ class Priors(NamedTuple):
 
 
 class JointProblem(NamedTuple):
-    """What is minimised: scale · Σ over (i, j) ∈ J of E_ij, plus priors; see joint_energy."""
+    """The objective: scale · Σ over (i, j) ∈ J of E_ij, plus priors."""
 
     scans: ScanSet
     pairs: NDArray[np.int64]
     """(m, 2) the index set J of ordered pairs (i, j)."""
     priors: Priors
     scale: float
-    """What E is multiplied with to be a negative log likelihood."""
+    """Factor that makes a negative log likelihood of E."""
 
 
-class Room(NamedTuple):
-    """Room for one pair after the other."""
+class PairBuffers(NamedTuple):
+    """Arrays to evaluate one pair after the other in."""
 
     u: Array
     """(3,) p_j ⊖ p_i"""
@@ -55,9 +55,8 @@ class Room(NamedTuple):
     h: Array
     """(3, 3) Hessian."""
     out: Array
-    """(OUT,) both as an evaluation gives them."""
-    met: RoomToMeet
-    """Of the points."""
+    """(OUT,) both as `evaluate_energy` gives them."""
+    met: AssociationBuffers
 
 
 class JointEnergy(NamedTuple):
@@ -94,19 +93,19 @@ def joint_energy(
     """
     n = len(poses)
     gradient, hessian = np.empty(3 * n), np.empty((3 * n, 3 * n))
-    value = evaluate(problem, poses, widening, float(exact), False, 1, gradient, hessian)
+    value = evaluate_joint(problem, poses, widening, float(exact), False, 1, gradient, hessian)
     return JointEnergy(value, gradient, hessian)
 
 
 @kernel
-def room_for(scans: ScanSet, stride: int) -> Room:
-    """For any pair of the scans, of whose points every so-manyth counts."""
-    met = room_to_meet(most_points(scans), stride)
-    return Room(np.empty(3), np.empty(3), np.empty((3, 3)), np.empty(OUT), met)
+def buffers_for(scans: ScanSet, stride: int) -> PairBuffers:
+    """Buffers for any pair of the scans, of whose points one in `stride` counts."""
+    met = association_buffers(most_points(scans), stride)
+    return PairBuffers(np.empty(3), np.empty(3), np.empty((3, 3)), np.empty(ENERGY_NUMBERS), met)
 
 
 @kernel
-def evaluate(
+def evaluate_joint(
     problem: JointProblem,
     poses: Array,
     widening: float,
@@ -118,12 +117,12 @@ def evaluate(
 ) -> float:
     """The joint energy; writes its gradient (3n,) and Hessian (3n, 3n), exact with a `curvature` of 1.
 
-    With a `stride` every so-manyth point stands for its neighbours.
+    Of the points, one in `stride` stands for its neighbours.
     """
     gradient[:] = 0.0
     hessian[:, :] = 0.0
-    share, room = NEUTRAL if neutral else 0.0, room_for(problem.scans, stride)
-    value = _add_pairs(problem, poses, widening, curvature, share, stride, room, gradient, hessian)
+    share, buffers = NEUTRAL if neutral else 0.0, buffers_for(problem.scans, stride)
+    value = _add_pairs(problem, poses, widening, curvature, share, stride, buffers, gradient, hessian)
     return float(value + add_priors(problem.priors, poses, curvature, gradient, hessian))
 
 
@@ -135,17 +134,17 @@ def _add_pairs(
     curvature: float,
     neutral: float,
     stride: int,
-    room: Room,
+    buffers: PairBuffers,
     gradient: Array,
     hessian: Array,
 ) -> float:
     scans, pairs, scale = problem.scans, problem.pairs, stride * problem.scale
-    u, g, h, out, met = room
+    u, g, h, out, met = buffers
     value = 0.0
     for pair in range(pairs.shape[0]):
         i, j = pairs[pair, 0], pairs[pair, 1]
         relative_pose(poses[j], poses[i], u)
-        accumulate(
+        evaluate_energy(
             scan_grid(scans, i),
             scans.half,
             scan_points(scans, j),
@@ -160,14 +159,14 @@ def _add_pairs(
             out,
         )
         value += scale * out[0]
-        unpack(out, scale, g, h)
-        _chain(i, j, poses[i, 2], u, g, h, curvature, gradient, hessian)
+        unpack_derivatives(out, scale, g, h)
+        _add_by_chain_rule(i, j, poses[i, 2], u, g, h, curvature, gradient, hessian)
     return value
 
 
 @kernel
 def add_priors(priors: Priors, poses: Array, curvature: float, gradient: Array, hessian: Array) -> float:
-    """What the priors say at the poses (n, 3); adds it to the gradient (3n,) and the Hessian (3n, 3n)."""
+    """The priors' value at the poses (n, 3); their gradient (3n,) and Hessian (3n, 3n) are added to these."""
     u, g, difference = np.empty(3), np.empty(3), np.empty(3)
     value = 0.0
     for q in range(priors.pairs.shape[0]):
@@ -178,12 +177,12 @@ def add_priors(priors: Priors, poses: Array, curvature: float, gradient: Array, 
         difference[2] -= 2 * np.pi * np.round(difference[2] / (2 * np.pi))
         multiply(priors.information[q], difference, g)
         value += 0.5 * (difference[0] * g[0] + difference[1] * g[1] + difference[2] * g[2])
-        _chain(i, j, poses[i, 2], u, g, priors.information[q], curvature, gradient, hessian)
+        _add_by_chain_rule(i, j, poses[i, 2], u, g, priors.information[q], curvature, gradient, hessian)
     return value
 
 
 @leaf_kernel
-def _chain(
+def _add_by_chain_rule(
     i: int,
     j: int,
     phi: float,
@@ -194,10 +193,10 @@ def _chain(
     gradient: Array,
     hessian: Array,
 ) -> None:
-    """Eqs. (10) to (13): add what a term in u = p_j ⊖ p_i gives to the gradient and Hessian in p.
+    """Eqs. (10) to (13): add the derivatives of a term in u = p_j ⊖ p_i to the gradient and Hessian in p.
 
     With R the turn by φ_i and w = (u_y, −u_x), eq. (9) is ∂u/∂p_j = [Rᵗ 0; 0 1] and
-    ∂u/∂p_i = [−Rᵗ w; 0 −1]. Multiplied out it takes a fifth of the time of products of matrices.
+    ∂u/∂p_i = [−Rᵗ w; 0 −1]. Written out, it takes a fifth of the time of matrix products.
     """
     c, s = np.cos(phi), np.sin(phi)
     wx, wy = u[1], -u[0]
@@ -246,7 +245,7 @@ def _add_symmetric(
 
 @leaf_kernel
 def _add_row(matrix: Array, row: int, column: int, x: float, y: float, p: float) -> None:
-    """Add a row (3,) of a block, and as a column what mirrors it."""
+    """Add a row (3,) of a block, and its mirror image as a column."""
     matrix[row, column] += x
     matrix[row, column + 1] += y
     matrix[row, column + 2] += p

@@ -10,43 +10,16 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from nscan_cli.matching.joint.gauge import gauge_of
 from nscan_cli.matching.joint.joint_energy import NEUTRAL, JointProblem, joint_energy
 from nscan_cli.matching.joint.joint_solver import approach, approach_and_finish
-from nscan_cli.matching.joint.neutral_energy import COVERING, neutral_energy
-from nscan_cli.matching.joint.overlap import SOUND_OVERLAP, overlaps, weakest_link
+from nscan_cli.matching.joint.neutral_energy import neutral_energy
+from nscan_cli.matching.joint.options import JointOptions
+from nscan_cli.matching.joint.overlap import overlaps, weakest_link
 from nscan_cli.matching.joint.weak_directions import replace_weak_directions
 from nscan_cli.poses import Array, wrap
 
 PairsAt = Callable[[Array], NDArray[np.int64]]
 """The index set J (m, 2) at the poses (n, 3)."""
-
-
-@dataclass(frozen=True)
-class JointOptions:
-    """How a joint match is minimised."""
-
-    widenings: tuple[float, ...] = (0.05, 0.3, 1.0)
-    """Stages of the approach: w of the energy; 1 is the energy itself, in which the last steps are done."""
-    near: float = 0.01
-    """A wide stage is left when no pose moves by more (m, rad), the one of w = 1 at half of that."""
-    stride: int = 2
-    """On the approach every so-manyth point is matched."""
-    approach_iterations: int = 30
-    """In each stage of the approach."""
-    max_iterations: int = 30
-    """In the last stage."""
-    tolerance: float = 1e-4
-    """The match has converged when no pose moves by more (m, rad)."""
-    thorough: bool = True
-    """Whether energy and derivatives are those after the last step, and not those before it."""
-    fixed: int | None = None
-    """The scan that stays where it is; None leaves the gauge free (paper, III-D)."""
-
-    @property
-    def of_approach(self) -> tuple[int, int, int, float, bool]:
-        """Stride, gauge, iterations, near and thorough, as the kernels take them."""
-        return self.stride, gauge_of(self.fixed), self.approach_iterations, self.near, self.thorough
 
 
 @dataclass(frozen=True)
@@ -66,31 +39,32 @@ class JointMatch:
     iterations: int
     evaluations: int
     last_iterations: int
-    """Those of the iterations that were done in the last stage."""
+    """Number in the last stage."""
     unsettled: int
-    """Stages of the way here before the last that did not settle within their iterations."""
+    """Stages before the last that did not converge within their iterations."""
     converged: bool
     searched: bool = False
-    """Whether the scans were placed by search, because the start led nowhere."""
+    """Whether the poses come from scans that were placed by search, because the start led to nothing
+    better."""
 
     @property
     def gradient_norm(self) -> float:
-        """Of the objective."""
+        """That of the objective, scale · E with priors."""
         return float(np.linalg.norm(self.gradient))
 
 
-class Approached(NamedTuple):
-    """Where an approach has come."""
+class Approach(NamedTuple):
+    """Poses (n, 3) that an approach led to, and what it took."""
 
     poses: Array
     iterations: int
     evaluations: int
     unsettled: int
-    """Stages that did not settle."""
+    """Stages that did not converge."""
 
-    def further(self, iterations: int, evaluations: int, unsettled: int) -> Approached:
-        """The way after so many more; the poses have moved by themselves."""
-        return Approached(
+    def extended(self, iterations: int, evaluations: int, unsettled: int) -> Approach:
+        """With these added to its numbers. The poses are the same array, which the kernels change."""
+        return Approach(
             self.poses,
             self.iterations + iterations,
             self.evaluations + evaluations,
@@ -104,7 +78,7 @@ def match_jointly(problem: JointProblem, start: Array, options: JointOptions) ->
     The steps are Newton's, eq. (5) to (8), damped as by Levenberg and Marquardt: with the semi-definite
     part of the Hessian in the wide stages, with the exact one in the last where it is positive definite.
     """
-    return _finish(problem, Approached(start.copy(), 0, 0, 0), options, options.widenings, neutral=False)
+    return _last_stage(problem, Approach(start.copy(), 0, 0, 0), options, options.widenings, neutral=False)
 
 
 def match_near_and_far(
@@ -112,32 +86,34 @@ def match_near_and_far(
 ) -> JointMatch:
     """Approach in two ways from `start` (n, 3), and finish from where the neutral energy is lower.
 
-    Through all stages a far optimum is found; but the reward for overlap slides scans together where a
-    corridor leaves them room. There they go back to where the priors want them, if that is no worse. By the
-    energy itself, judged by the neutral one, they stay apart from the start; but only a near optimum is
-    found. If the scans hang together, covering more of each other counts no further. `pairs_at` chooses the
-    index set again before each stage; the pairs of `problem` serve for comparison.
+    The approach through all stages finds a far optimum, but its reward for overlap slides scans together
+    along corridors. In such directions they go back to where the priors want them, if the neutral energy is
+    no higher there. The approach by the last stage and the neutral energy slides nothing, but finds only a
+    near optimum. If the scans are connected by overlap, more overlap counts no further. `pairs_at` chooses
+    the index set again before each stage; the pairs of `problem` serve for comparison.
     """
     last = options.widenings[-1:]
     far = _approach(problem, start, options, options.widenings, neutral=False, pairs_at=pairs_at)
     near = _approach(problem, start, options, last, neutral=True, pairs_at=pairs_at)
-    ways = [far, near]
-    opened = replace_weak_directions(problem, far.poses)
+    approaches = [far, near]
+    opened = replace_weak_directions(problem, far.poses, options.prior_share)
     if opened is not None:
         back = _approach(problem, opened, options, last, neutral=True, pairs_at=pairs_at)
-        ways.append(back)
-        far = min(back, far, key=partial(_judge, problem, options, NEUTRAL))
-    together = weakest_link(overlaps(problem.scans, far.poses).pairs) >= SOUND_OVERLAP
-    best = min(far, near, key=partial(_judge, problem, options, NEUTRAL if together else COVERING))
-    work = best._replace(
-        iterations=sum(way.iterations for way in ways),
-        evaluations=sum(way.evaluations for way in ways) + len(ways),
+        approaches.append(back)
+        far = min(back, far, key=partial(_neutral_energy, problem, options, NEUTRAL))
+    shares = overlaps(problem.scans, far.poses, options.inlier_bound)
+    connected = weakest_link(shares.pairs) >= options.sound_overlap
+    share = NEUTRAL if connected else options.overlap_reward
+    best = min(far, near, key=partial(_neutral_energy, problem, options, share))
+    total = best._replace(
+        iterations=sum(each.iterations for each in approaches),
+        evaluations=sum(each.evaluations for each in approaches) + len(approaches),
     )
-    return _finish(_at(problem, pairs_at, best.poses), work, options, (), neutral=True)
+    return _last_stage(_with_pairs(problem, pairs_at, best.poses), total, options, (), neutral=True)
 
 
-def _judge(problem: JointProblem, options: JointOptions, share: float, way: Approached) -> float:
-    return neutral_energy(problem, way.poses, share, options.stride)
+def _neutral_energy(problem: JointProblem, options: JointOptions, share: float, reached: Approach) -> float:
+    return neutral_energy(problem, reached.poses, share, options.stride)
 
 
 def _approach(
@@ -147,21 +123,26 @@ def _approach(
     widenings: tuple[float, ...],
     neutral: bool,
     pairs_at: PairsAt | None = None,
-) -> Approached:
-    way = Approached(start.copy(), 0, 0, 0)
+) -> Approach:
+    reached = Approach(start.copy(), 0, 0, 0)
     for part in [widenings] if pairs_at is None else [(widening,) for widening in widenings]:
-        at = _at(problem, pairs_at, way.poses)
-        way = way.further(*approach(at, way.poses, np.array(part), neutral, *options.of_approach))
-    return way
+        chosen = _with_pairs(problem, pairs_at, reached.poses)
+        found = approach(chosen, reached.poses, np.array(part), neutral, *options.of_approach)
+        reached = reached.extended(*found)
+    return reached
 
 
-def _finish(
-    problem: JointProblem, way: Approached, options: JointOptions, widenings: tuple[float, ...], neutral: bool
+def _last_stage(
+    problem: JointProblem,
+    reached: Approach,
+    options: JointOptions,
+    widenings: tuple[float, ...],
+    neutral: bool,
 ) -> JointMatch:
-    """What is left of an approach, and the last steps with the exact Hessian."""
-    poses, n = way.poses, len(way.poses)
+    """The rest of an approach by `widenings`, and the last stage with the exact Hessian."""
+    poses, n = reached.poses, len(reached.poses)
     gradient, hessian = np.empty(3 * n), np.empty((3 * n, 3 * n))
-    value, last, converged, *approached = approach_and_finish(
+    value, last, converged, *approached = approach_and_last_stage(
         problem,
         poses,
         np.array(widenings),
@@ -172,11 +153,11 @@ def _finish(
         gradient,
         hessian,
     )
-    way = way.further(*approached)
+    reached = reached.extended(*approached)
     if neutral:
-        # The derivatives are the same.
+        # The derivatives of both energies are the same.
         value = joint_energy(problem, poses).value
-        way = way.further(0, 1, 0)
+        reached = reached.extended(0, 1, 0)
     poses[:, 2] = wrap(poses[:, 2])
     return JointMatch(
         poses=poses,
@@ -184,13 +165,13 @@ def _finish(
         hessian=hessian,
         pairs=problem.pairs,
         energy=value,
-        iterations=way.iterations,
-        evaluations=way.evaluations,
+        iterations=reached.iterations,
+        evaluations=reached.evaluations,
         last_iterations=last,
-        unsettled=way.unsettled,
+        unsettled=reached.unsettled,
         converged=converged,
     )
 
 
-def _at(problem: JointProblem, pairs_at: PairsAt | None, poses: Array) -> JointProblem:
+def _with_pairs(problem: JointProblem, pairs_at: PairsAt | None, poses: Array) -> JointProblem:
     return problem if pairs_at is None else problem._replace(pairs=pairs_at(poses))

@@ -1,4 +1,4 @@
-"""nScan-Matching in compiled code: damped Newton steps on the joint energy, stage by stage (paper, III)."""
+"""The minimum of the joint energy: damped Newton steps, stage by stage (paper, III)."""
 
 from __future__ import annotations
 
@@ -6,9 +6,9 @@ import numpy as np
 
 from nscan_cli.kernels.assign import assign, assign_rows
 from nscan_cli.kernels.decorators import kernel
-from nscan_cli.matching.damped_newton import JOINT, is_accepted, is_last, next_damping
+from nscan_cli.matching.damped_newton import JOINT_STEPS, is_accepted, is_last, next_damping
 from nscan_cli.matching.joint.gauge import gauge_fixed_step
-from nscan_cli.matching.joint.joint_energy import JointProblem, evaluate
+from nscan_cli.matching.joint.joint_energy import JointProblem, evaluate_joint
 from nscan_cli.poses import Array
 
 
@@ -24,10 +24,10 @@ def approach_and_finish(
     gradient: Array,
     hessian: Array,
 ) -> tuple[float, int, bool, int, int, int]:
-    """All stages, from the poses (n, 3) in place, those of the approach and the last one.
+    """The stages of the approach and the last one, from the poses (n, 3) in place.
 
-    Returns the value, the last stage's iterations, whether it converged, and what `approach` does, of all.
-    Writes gradient (3n,) and Hessian (3n, 3n) at the poses; other arguments as in JointOptions.
+    Returns the value, the last stage's iterations, whether it converged, and the numbers of `approach` for
+    all stages. Writes gradient (3n,) and Hessian (3n, 3n). Other arguments are those of JointOptions.
     """
     stride, fixed, approach_iterations, near, thorough = of_approach
     iterations, evaluations, unsettled = approach(
@@ -51,13 +51,13 @@ def approach(
     near: float,
     thorough: bool,
 ) -> tuple[int, int, int]:
-    """An approach, from the poses (n, 3) in place: iterations, evaluations, stages that did not settle."""
+    """An approach, from the poses (n, 3) in place: iterations, evaluations, stages that did not converge."""
     n = poses.shape[0]
     gradient, hessian = np.empty(3 * n), np.empty((3 * n, 3 * n))
     iterations = evaluations = unsettled = 0
     for widening in widenings:
         enough = near if widening < 1.0 else 0.5 * near
-        _, steps, evaluated, settled = descend(
+        _, steps, evaluated, converged = descend(
             problem,
             poses,
             widening,
@@ -73,7 +73,7 @@ def approach(
         )
         iterations += steps
         evaluations += evaluated
-        unsettled += not settled
+        unsettled += not converged
     return iterations, evaluations, unsettled
 
 
@@ -94,22 +94,22 @@ def descend(
 ) -> tuple[float, int, int, bool]:
     """One stage, from the poses (n, 3) in place: the value, iterations, evaluations, whether it converged.
 
-    Writes gradient (3n,) and Hessian (3n, 3n) at the poses; `thorough` as in JointOptions.
+    Writes gradient (3n,) and Hessian (3n, 3n) at the poses. `thorough` is that of JointOptions.
     """
     trial_gradient, trial_hessian = np.empty_like(gradient), np.empty_like(hessian)
     step, trial = np.empty_like(poses), np.empty_like(poses)
     curvature = 1.0 if exact else 0.0
-    value = evaluate(problem, poses, widening, curvature, neutral, stride, gradient, hessian)
-    iterations, evaluations, damping, converged = 0, 1, JOINT.first, False
+    value = evaluate_joint(problem, poses, widening, curvature, neutral, stride, gradient, hessian)
+    iterations, evaluations, damping, converged = 0, 1, JOINT_STEPS.first, False
     for _ in range(max_iterations):
         solved = gauge_fixed_step(gradient, hessian, poses, damping, fixed, step)
         if not solved and exact:
-            # Not positive definite: go on with the part that is.
-            evaluate(problem, poses, widening, 0.0, neutral, stride, trial_gradient, trial_hessian)
+            # The exact Hessian is not positive definite here.
+            evaluate_joint(problem, poses, widening, 0.0, neutral, stride, trial_gradient, trial_hessian)
             evaluations += 1
             solved = gauge_fixed_step(gradient, trial_hessian, poses, damping, fixed, step)
         if not solved:
-            damping = next_damping(damping, False, JOINT)
+            damping = next_damping(damping, False, JOINT_STEPS)
             continue
         iterations += 1
         longest = 0.0
@@ -117,19 +117,21 @@ def descend(
             for a in range(3):
                 trial[i, a] = poses[i, a] + step[i, a]
                 longest = max(longest, abs(step[i, a]))
-        converged = is_last(longest, tolerance, damping, JOINT)
+        converged = is_last(longest, tolerance, damping, JOINT_STEPS)
         if converged and not thorough:
             assign_rows(poses, trial)
             break
-        there = evaluate(problem, trial, widening, curvature, neutral, stride, trial_gradient, trial_hessian)
+        there = evaluate_joint(
+            problem, trial, widening, curvature, neutral, stride, trial_gradient, trial_hessian
+        )
         evaluations += 1
-        accepted = is_accepted(value, there, JOINT)
+        accepted = is_accepted(value, there, JOINT_STEPS)
         if accepted:
             value = there
             assign_rows(poses, trial)
             assign(gradient, trial_gradient)
             assign_rows(hessian, trial_hessian)
-        damping = next_damping(damping, accepted, JOINT)
-        if converged or damping > JOINT.greatest:
+        damping = next_damping(damping, accepted, JOINT_STEPS)
+        if converged or damping > JOINT_STEPS.greatest:
             break
     return value, iterations, evaluations, converged

@@ -1,4 +1,4 @@
-"""How much of what each of n scans sees the others see as well."""
+"""Overlap of n scans: the share of each scan's points that lie on Gaussians of others."""
 
 from __future__ import annotations
 
@@ -13,14 +13,6 @@ from nscan_cli.matching.pose_kernels import relative_pose
 from nscan_cli.ndt.energy import find_inliers
 from nscan_cli.poses import Array
 
-INLIER_BOUND = 9.0
-"""A point within this squared Mahalanobis distance of a Gaussian lies on it."""
-LEAST_OVERLAP = 0.1
-"""With a smaller share of its points on another scan, a scan does not overlap it."""
-
-SOUND_OVERLAP = 0.5
-"""Scans that lie where they belong hang together by so much of what they see, mostly."""
-
 
 class Overlaps(NamedTuple):
     """Shares of points that lie on Gaussians."""
@@ -31,36 +23,43 @@ class Overlaps(NamedTuple):
     """(n,) of each scan's points, on those of at least one other scan."""
 
 
-def overlaps(scans: ScanSet, poses: Array) -> Overlaps:
-    """The overlaps of n scans at the poses (n, 3)."""
-    return Overlaps(*_overlaps(scans, poses))
+def overlaps(scans: ScanSet, poses: Array, inlier_bound: float) -> Overlaps:
+    """The overlaps of n scans at the poses (n, 3), of points within a Mahalanobis distance² of the bound."""
+    return Overlaps(*_overlaps(scans, poses, inlier_bound))
 
 
 @kernel
-def _overlaps(scans: ScanSet, poses: Array) -> tuple[Array, Array]:
+def _overlaps(scans: ScanSet, poses: Array, inlier_bound: float) -> tuple[Array, Array]:
     n = poses.shape[0]
     pairs, shares = np.zeros((n, n)), np.zeros(n)
-    _count(scans, poses, np.empty(3), np.empty(most_points(scans), dtype=np.bool_), pairs, shares)
+    inliers = np.empty(most_points(scans), dtype=np.bool_)
+    _write_overlaps(scans, poses, inlier_bound, np.empty(3), inliers, pairs, shares)
     return pairs, shares
 
 
 @leaf_kernel
-def _count(
-    scans: ScanSet, poses: Array, u: Array, seen: NDArray[np.bool_], pairs: Array, shares: Array
+def _write_overlaps(
+    scans: ScanSet,
+    poses: Array,
+    inlier_bound: float,
+    u: Array,
+    inliers: NDArray[np.bool_],
+    pairs: Array,
+    shares: Array,
 ) -> None:
-    """Write both shares; `u` (3,) and `seen`, of the points of any scan, are room."""
+    """Write the fields of Overlaps; `u` (3,) and `inliers`, for the points of any scan, are buffers."""
     n = poses.shape[0]
     for j in range(n):
-        seen[:] = False
+        inliers[:] = False
         for i in range(n):
             if i != j:
-                pairs[i, j] = _share(scans, poses, i, j, u, seen)
-        shares[j] = seen.sum() / max(scan_points(scans, j).shape[0], 1)
+                pairs[i, j] = _pair_overlap(scans, poses, i, j, inlier_bound, u, inliers)
+        shares[j] = inliers.sum() / max(scan_points(scans, j).shape[0], 1)
 
 
 @kernel
-def held_together(pairs: Array, least: float, scan: int) -> NDArray[np.bool_]:
-    """(n,) the scans that hang together with `scan` by overlaps (n, n) of at least `least` either way."""
+def connected_to(pairs: Array, least: float, scan: int) -> NDArray[np.bool_]:
+    """(n,) the scans that are connected to `scan` by overlaps (n, n) of at least `least`, either way."""
     n = pairs.shape[0]
     reached = np.zeros(n, dtype=np.bool_)
     waiting = np.empty(n, dtype=np.int64)
@@ -76,25 +75,31 @@ def held_together(pairs: Array, least: float, scan: int) -> NDArray[np.bool_]:
 
 
 @kernel
-def hold(scans: ScanSet, poses: Array, least: float, scan: int) -> tuple[NDArray[np.bool_], float]:
-    """What held_together says of the overlaps at the poses (n, 3), and their weakest link."""
-    pairs, _ = _overlaps(scans, poses)
-    return held_together(pairs, least, scan), weakest_link(pairs)
+def connectivity(
+    scans: ScanSet, poses: Array, inlier_bound: float, least: float, scan: int
+) -> tuple[NDArray[np.bool_], float]:
+    """The scans (n,) connected to `scan` by overlap at the poses (n, 3), and the weakest link of all."""
+    pairs, _ = _overlaps(scans, poses, inlier_bound)
+    return connected_to(pairs, least, scan), weakest_link(pairs)
 
 
 @kernel
-def held_at(scans: ScanSet, poses: Array, least: float, scan: int) -> NDArray[np.bool_]:
-    """What held_together says of the overlaps at the poses (n, 3), of which only those needed are counted."""
+def connected_at(
+    scans: ScanSet, poses: Array, inlier_bound: float, least: float, scan: int
+) -> NDArray[np.bool_]:
+    """As `connected_to` at the poses (n, 3), where only the overlaps that are needed are counted."""
     n = poses.shape[0]
     reached = np.zeros(n, dtype=np.bool_)
-    waiting, u, seen = np.empty(n, dtype=np.int64), np.empty(3), np.empty(most_points(scans), dtype=np.bool_)
+    waiting, u = np.empty(n, dtype=np.int64), np.empty(3)
+    inliers = np.empty(most_points(scans), dtype=np.bool_)
     reached[scan], waiting[0], count = True, scan, 1
     while count > 0:
         count -= 1
         i = waiting[count]
         for j in range(n):
             if not reached[j] and (
-                _share(scans, poses, i, j, u, seen) >= least or _share(scans, poses, j, i, u, seen) >= least
+                _pair_overlap(scans, poses, i, j, inlier_bound, u, inliers) >= least
+                or _pair_overlap(scans, poses, j, i, inlier_bound, u, inliers) >= least
             ):
                 reached[j], waiting[count] = True, j
                 count += 1
@@ -102,17 +107,19 @@ def held_at(scans: ScanSet, poses: Array, least: float, scan: int) -> NDArray[np
 
 
 @leaf_kernel
-def _share(scans: ScanSet, poses: Array, i: int, j: int, u: Array, seen: NDArray[np.bool_]) -> float:
-    """The share of scan j's points on Gaussians of scan i, which are marked; `u` (3,) is room."""
+def _pair_overlap(
+    scans: ScanSet, poses: Array, i: int, j: int, inlier_bound: float, u: Array, inliers: NDArray[np.bool_]
+) -> float:
+    """The share of scan j's points on Gaussians of scan i; marks them in `inliers`. `u` (3,) is a buffer."""
     points = scan_points(scans, j)
     relative_pose(poses[j], poses[i], u)
-    count = find_inliers(scan_grid(scans, i), scans.half, points, u, INLIER_BOUND, seen)
+    count = find_inliers(scan_grid(scans, i), scans.half, points, u, inlier_bound, inliers)
     return float(count / max(points.shape[0], 1))
 
 
 @kernel
 def weakest_link(pairs: Array) -> float:
-    """The least overlap on the tree of greatest overlaps (n, n) that connects all scans, 0 for one scan."""
+    """The least overlap on the maximum spanning tree of overlaps (n, n); 0 for one scan."""
     n = pairs.shape[0]
     reached, best = np.zeros(n, dtype=np.bool_), np.zeros(n)
     weakest, last = np.inf, 0

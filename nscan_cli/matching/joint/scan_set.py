@@ -1,4 +1,4 @@
-"""n scans as the kernels of joint matching take them: their NDTs and points, laid end to end."""
+"""n scans as the kernels of joint matching take them: concatenated NDTs and points."""
 
 from __future__ import annotations
 
@@ -9,32 +9,33 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nscan_cli.kernels.decorators import kernel, numba_inline_kernel
-from nscan_cli.ndt.association import room_to_meet
-from nscan_cli.ndt.energy import OUT, accumulate
+from nscan_cli.ndt.association import association_buffers
+from nscan_cli.ndt.energy import ENERGY_NUMBERS, evaluate_energy
 from nscan_cli.ndt.hash_grid import Grid
 from nscan_cli.ndt.transform import Ndt
 from nscan_cli.poses import Array
 
 
 class ScanSet(NamedTuple):
-    """The NDTs and points of n scans, laid end to end for the kernels."""
+    """The NDTs and points of n scans, concatenated."""
 
     grid: Grid
-    """The arrays of all NDTs, one behind the other; rows count from the start of their own NDT."""
+    """The concatenated arrays of all NDTs; row numbers count from the start of their own NDT."""
     points: Array
     """(Σ m, 2) the points of all scans, each in its own frame."""
     starts: NDArray[np.int64]
-    """(4, n + 1) where each scan's slots of the table begin, its rows, its Gaussians and its points."""
+    """(4, n + 1) the first hash slot, row, Gaussian and point of each scan."""
     half: float
-    """Side (m) of a lattice cell, the same for all."""
+    """Side (m) of a lattice cell."""
     usual: Array
-    """(n,) mean s of each scan's points on its own Gaussians: what a perfect match would reach; or nan."""
+    """(n,) the usual s: the mean of each scan's points on its own Gaussians, as in a perfect match; or
+    nan."""
 
 
-def lay_out(ndts: Sequence[Ndt], points: Sequence[Array], neutral: bool = True) -> ScanSet:
-    """Lay n NDTs of one cell size and the points (m_i, 2) of n scans end to end.
+def scan_set(ndts: Sequence[Ndt], points: Sequence[Array], neutral: bool = True) -> ScanSet:
+    """Concatenate n NDTs of one cell size and the points (m_i, 2) of n scans.
 
-    Without `neutral` the `usual` is nan: the neutral energy is not to be asked for.
+    Without `neutral` the `usual` s is nan, and the neutral energy cannot be computed.
     """
     sizes = [
         (len(ndt.grid.table), ndt.rows, len(ndt.grid.gaussians), len(part))
@@ -44,7 +45,7 @@ def lay_out(ndts: Sequence[Ndt], points: Sequence[Array], neutral: bool = True) 
     np.array(sizes).T.cumsum(axis=1, out=starts[:, 1:])
     keys = np.concatenate([ndt.grid.keys[: ndt.rows] for ndt in ndts])
     links = np.concatenate([ndt.grid.links[: ndt.rows] for ndt in ndts])
-    # The sums are for growing; matching needs the Gaussians alone.
+    # The sums are needed for growing only.
     grid = Grid(
         np.concatenate([ndt.grid.table for ndt in ndts]),
         keys,
@@ -60,8 +61,8 @@ def lay_out(ndts: Sequence[Ndt], points: Sequence[Array], neutral: bool = True) 
 
 
 def with_usual(scans: ScanSet) -> ScanSet:
-    """The scans with what is `usual`, so that the neutral energy can be asked for."""
-    return scans._replace(usual=_own_means(scans))
+    """The scans with their `usual` s, which the neutral energy needs."""
+    return scans._replace(usual=_usual_s(scans))
 
 
 @numba_inline_kernel
@@ -78,7 +79,7 @@ def scan_grid(scans: ScanSet, i: int) -> Grid:
         grid.facing,
         grid.sums,
         grid.gaussians[g0:g1],
-        grid.making,
+        grid.settings,
     )
 
 
@@ -90,7 +91,7 @@ def scan_points(scans: ScanSet, i: int) -> Array:
 
 @kernel
 def most_points(scans: ScanSet) -> int:
-    """Those of the scan that has most."""
+    """The greatest number of points of a scan."""
     most, starts = 0, scans.starts
     for i in range(starts.shape[1] - 1):
         most = max(most, starts[3, i + 1] - starts[3, i])
@@ -98,14 +99,18 @@ def most_points(scans: ScanSet) -> int:
 
 
 @kernel
-def _own_means(scans: ScanSet) -> Array:
-    """(n,) mean s of each scan's points on its own Gaussians."""
-    means, out, room = np.empty(len(scans.usual)), np.empty(OUT), room_to_meet(most_points(scans), 1)
+def _usual_s(scans: ScanSet) -> Array:
+    """(n,) the mean s of each scan's points on its own Gaussians."""
+    means, out, buffers = (
+        np.empty(len(scans.usual)),
+        np.empty(ENERGY_NUMBERS),
+        association_buffers(most_points(scans), 1),
+    )
     for i in range(len(means)):
         grid, points = scan_grid(scans, i), scan_points(scans, i)
-        accumulate(grid, scans.half, points, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 1, room, out)
+        evaluate_energy(grid, scans.half, points, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 1, buffers, out)
         energy = out[0]
-        accumulate(grid, scans.half, points, 0.0, 0.0, 0.0, 1.0, 0.0, 1.0, 1, room, out)
-        # The difference is the number of Gaussians met.
+        evaluate_energy(grid, scans.half, points, 0.0, 0.0, 0.0, 1.0, 0.0, 1.0, 1, buffers, out)
+        # With a baseline of 1 the energy grows by the number of points on Gaussians.
         means[i] = -energy / max(out[0] - energy, 1.0)
     return means

@@ -1,14 +1,14 @@
-"""The walls that n scans see in common, and the poses that fit them best.
+"""Walls that several scans see, and the poses that fit them best.
 
-The Gaussians of one scan show a wall by pieces of a cell, each from a few points. Once the scans lie where
-they belong, the points of all of them show it over its whole length, and how well the points of each scan lie
-on it is a matter of least squares: with every wall a line that is estimated along with the poses, as in
-bundle adjustment. The lines are eliminated (Schur complement); cells that adapt to what is flat find them, as
-in Z. Liu, F. Zhang, "BALM: Bundle Adjustment for Lidar Mapping", RA-L 2021.
+The Gaussians of one scan describe a wall cell by cell, each from few points. Once scans are matched, the
+points of all of them show the wall over its whole length. Every wall is a line that is estimated along with
+the poses by least squares, as in bundle adjustment, and eliminated (Schur complement). Adaptive cells find
+the walls, as in Z. Liu, F. Zhang, "BALM: Bundle Adjustment for Lidar Mapping", RA-L 2021.
 """
 
 from __future__ import annotations
 
+from dataclasses import astuple
 from typing import NamedTuple
 
 import numpy as np
@@ -17,74 +17,78 @@ from numpy.typing import NDArray
 from nscan_cli.kernels.assign import assign
 from nscan_cli.kernels.decorators import kernel
 from nscan_cli.matching.joint.gauge import gauge_fixed_step, gauge_of
+from nscan_cli.matching.joint.options import WallFitOptions
 from nscan_cli.matching.joint.scan_set import ScanSet
 from nscan_cli.matching.small_matrices import multiply
 from nscan_cli.poses import Array, wrap
 
-CELL = 0.25
-"""m; side of the smallest cell in which a wall is looked for."""
-LEVELS = 5
-"""Cells of twice the side each are looked at first: 4 m, 2 m and so on."""
-LEAST_POINTS = 6
-THIN = 0.02
-"""m; greatest standard deviation of points across a wall: the noise of ranges, and little more."""
-SLENDER = 10.0
-"""A wall's variance along itself is at least so many times the one across."""
-RANGE_SIGMA, WALL_SIGMA = 0.02, 0.005
-"""m; standard deviations of a range along its beam, and of a wall from a line. A wall that the beams graze
-is known more exactly across itself than one that they hit head-on."""
-HELD = 0.2
-"""Share of the Hessian of the match that holds the poses where no wall does."""
-LOOSE = 10.0
-"""The direction of a wall is known from its points, and off by their noise: along itself the wall then seems
-to know as well. By so many times as much as that is, the poses are held there."""
-STEPS = 2
-"""Of Gauss and Newton. The problem is all but linear."""
+
+class WallFitParameters(NamedTuple):
+    """WallFitOptions as the kernels take them."""
+
+    cell: float
+    levels: int
+    minimum: int
+    thickness: float
+    elongation: float
+    range_variance: float
+    wall_variance: float
+    prior_share: float
+    direction_noise: float
+    steps: int
+
+    @classmethod
+    def of(cls, options: WallFitOptions) -> WallFitParameters:
+        """The parameters of options."""
+        cell, levels, minimum, thickness, elongation, range_sigma, wall_sigma, *others = astuple(options)
+        return cls(cell, levels, minimum, thickness, elongation, range_sigma**2, wall_sigma**2, *others)
 
 
-class Cloud(NamedTuple):
+class PointCloud(NamedTuple):
     """The points of n scans in one frame."""
 
     points: Array
     """(m, 2)"""
     arms: Array
-    """(m, 2) from the robot to the point."""
+    """(m, 2) the vector from the robot to each point."""
     scans: NDArray[np.int64]
-    """(m,) which scan a point is of."""
+    """(m,) the scan of each point."""
 
 
-def fit_to_walls(scans: ScanSet, poses: Array, hessian: Array, fixed: int | None) -> Array:
-    """The poses (n, 3) near those of a joint match that fit the walls which two scans or more see best.
+def fit_to_walls(
+    scans: ScanSet, poses: Array, hessian: Array, fixed: int | None, options: WallFitOptions
+) -> Array:
+    """The poses (n, 3) of a joint match, fitted to the walls that at least two scans see.
 
-    `hessian` (3n, 3n) is that of the match's objective, `fixed` the scan that stays where it is; None
-    leaves the gauge free.
+    `hessian` (3n, 3n) is that of the match's objective, `fixed` the scan that stays where it is; None leaves
+    the gauge free.
     """
     fitted = poses.copy()
-    _fit(scans, fitted, hessian, gauge_of(fixed))
+    _fit(scans, fitted, hessian, gauge_of(fixed), WallFitParameters.of(options))
     fitted[:, 2] = wrap(fitted[:, 2])
     return fitted
 
 
 @kernel
-def _fit(scans: ScanSet, poses: Array, hessian: Array, fixed: int) -> None:
-    """Minimise Σ d² / σ² over the points on walls + ½ Δᵗ (HELD · H) Δ, from the poses (n, 3) in place."""
+def _fit(scans: ScanSet, poses: Array, hessian: Array, fixed: int, parameters: WallFitParameters) -> None:
+    """Minimise Σ d² / σ² of points on walls + ½ Δᵗ (prior_share · H) Δ, from the poses (n, 3) in place."""
     start, step, gradient = poses.copy(), np.empty_like(poses), np.empty(poses.size)
-    for _ in range(STEPS):
-        cloud = _cloud(scans, poses)
-        members, ends = common_walls(cloud)
-        known = HELD * hessian
-        multiply(known, (poses - start).ravel(), gradient)
+    for _ in range(parameters.steps):
+        cloud = _point_cloud(scans, poses)
+        members, ends = common_walls(cloud, parameters)
+        information = parameters.prior_share * hessian
+        multiply(information, (poses - start).ravel(), gradient)
         first = 0
         for end in ends:
-            _add_wall(cloud, members[first:end], gradient, known)
+            _add_wall(cloud, members[first:end], parameters, gradient, information)
             first = end
-        if not gauge_fixed_step(gradient, known, poses, 0.0, fixed, step):
+        if not gauge_fixed_step(gradient, information, poses, 0.0, fixed, step):
             return
         poses += step
 
 
 @kernel
-def _cloud(scans: ScanSet, poses: Array) -> Cloud:
+def _point_cloud(scans: ScanSet, poses: Array) -> PointCloud:
     points, arms = np.empty_like(scans.points), np.empty_like(scans.points)
     of_scan = np.empty(points.shape[0], dtype=np.int64)
     for i in range(poses.shape[0]):
@@ -94,38 +98,43 @@ def _cloud(scans: ScanSet, poses: Array) -> Cloud:
             arms[k, 1] = sin * scans.points[k, 0] + cos * scans.points[k, 1]
             points[k, 0], points[k, 1] = arms[k, 0] + poses[i, 0], arms[k, 1] + poses[i, 1]
             of_scan[k] = i
-    return Cloud(points, arms, of_scan)
+    return PointCloud(points, arms, of_scan)
 
 
 @kernel
-def common_walls(cloud: Cloud) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """The walls that more than one scan sees: the points on them, wall by wall, and where each ends there.
+def common_walls(
+    cloud: PointCloud, parameters: WallFitParameters
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """The walls that more than one scan sees: their points, wall by wall, and the end of each among them.
 
-    A cell is a wall when its points lie flat, those seen from either side for themselves; where they do
-    not, its quarters are looked at.
+    A cell holds a wall when the points seen from each side of it lie on a line. Otherwise its quarters are
+    tested.
     """
     m = cloud.points.shape[0]
-    codes = _quadtree_codes(cloud.points)
+    codes = _quadtree_codes(cloud.points, parameters.cell)
     order = np.argsort(codes)
     taken = np.zeros(m, dtype=np.bool_)
     members, ends = np.empty(m, dtype=np.int64), np.empty(m, dtype=np.int64)
     sides = np.empty(m, dtype=np.int64)
     count = walls = 0
-    for level in range(LEVELS - 1, -1, -1):
+    for level in range(parameters.levels - 1, -1, -1):
         end = 0
         while end < m:
             first, cell = end, codes[order[end]] >> (2 * level)
             while end < m and codes[order[end]] >> (2 * level) == cell:
                 end += 1
-            if taken[first] or end - first < LEAST_POINTS:
+            if taken[first] or end - first < parameters.minimum:
                 continue
-            front = _split(cloud, order[first:end], sides)
+            front = _split_by_side(cloud, order[first:end], sides)
             back = end - first - front
-            if not (_is_flat(cloud, sides[:front]) and _is_flat(cloud, sides[front : front + back])):
+            if not (
+                _is_line(cloud, sides[:front], parameters)
+                and _is_line(cloud, sides[front : front + back], parameters)
+            ):
                 continue
             taken[first:end] = True
             for a, b in ((0, front), (front, front + back)):
-                if b - a >= LEAST_POINTS and (cloud.scans[sides[a:b]] != cloud.scans[sides[a]]).any():
+                if b - a >= parameters.minimum and (cloud.scans[sides[a:b]] != cloud.scans[sides[a]]).any():
                     assign(members[count : count + b - a], sides[a:b])
                     count += b - a
                     ends[walls] = count
@@ -134,19 +143,19 @@ def common_walls(cloud: Cloud) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
 
 
 @kernel
-def _quadtree_codes(points: Array) -> NDArray[np.int64]:
-    """The cells (m,) of points (m, 2), numbered so that those of a larger cell follow each other (Morton)."""
+def _quadtree_codes(points: Array, cell: float) -> NDArray[np.int64]:
+    """The Morton codes (m,) of the cells of points (m, 2): quarters of a larger cell follow each other."""
     codes = np.zeros(points.shape[0], dtype=np.int64)
     left, bottom = points[:, 0].min(), points[:, 1].min()
     for k in range(points.shape[0]):
-        ix, iy = int((points[k, 0] - left) / CELL), int((points[k, 1] - bottom) / CELL)
+        ix, iy = int((points[k, 0] - left) / cell), int((points[k, 1] - bottom) / cell)
         for bit in range(16):
             codes[k] |= ((ix >> bit) & 1) << (2 * bit) | ((iy >> bit) & 1) << (2 * bit + 1)
     return codes
 
 
 @kernel
-def _moments(cloud: Cloud, chosen: NDArray[np.int64]) -> tuple[float, float, float, float, float]:
+def _moments(cloud: PointCloud, chosen: NDArray[np.int64]) -> tuple[float, float, float, float, float]:
     """Mean (x, y) and covariance (xx, xy, yy) of some points."""
     x = y = xx = xy = yy = 0.0
     for k in chosen:
@@ -162,18 +171,19 @@ def _moments(cloud: Cloud, chosen: NDArray[np.int64]) -> tuple[float, float, flo
 
 
 @kernel
-def _is_flat(cloud: Cloud, chosen: NDArray[np.int64]) -> bool:
-    """Whether points lie on a line; so few that they make no wall are in nobody's way."""
-    if chosen.shape[0] < LEAST_POINTS:
+def _is_line(cloud: PointCloud, chosen: NDArray[np.int64], parameters: WallFitParameters) -> bool:
+    """Whether points lie on a line, or are too few for a wall."""
+    if chosen.shape[0] < parameters.minimum:
         return True
     _, _, xx, xy, yy = _moments(cloud, chosen)
     middle, radius = 0.5 * (xx + yy), np.hypot(0.5 * (xx - yy), xy)
-    return bool(middle - radius <= min(THIN * THIN, (middle + radius) / SLENDER))
+    thickness, elongation = parameters.thickness, parameters.elongation
+    return bool(middle - radius <= min(thickness * thickness, (middle + radius) / elongation))
 
 
 @kernel
-def _split(cloud: Cloud, chosen: NDArray[np.int64], sides: NDArray[np.int64]) -> int:
-    """Write the points to `sides`, first those whose beams run to one side of their line; how many are."""
+def _split_by_side(cloud: PointCloud, chosen: NDArray[np.int64], sides: NDArray[np.int64]) -> int:
+    """Write the points to `sides`, first those seen from one side of their line; the number of these."""
     _, _, xx, xy, yy = _moments(cloud, chosen)
     along = 0.5 * np.arctan2(2 * xy, xx - yy)
     nx, ny = -np.sin(along), np.cos(along)
@@ -189,32 +199,40 @@ def _split(cloud: Cloud, chosen: NDArray[np.int64], sides: NDArray[np.int64]) ->
 
 
 @kernel
-def _add_wall(cloud: Cloud, chosen: NDArray[np.int64], gradient: Array, hessian: Array) -> None:
-    """Add what the points on one wall say of the poses, with the wall's line eliminated.
+def _add_wall(
+    cloud: PointCloud,
+    chosen: NDArray[np.int64],
+    parameters: WallFitParameters,
+    gradient: Array,
+    hessian: Array,
+) -> None:
+    """Add the derivatives of the points' distances from one wall, with the wall's line eliminated.
 
-    A point's residual is its distance d from the line, with J = ∂d/∂p_i = nᵗ ∂x'/∂p_i. The line may shift
-    and turn: with u the place along it, counted from the weighted mean, these two directions are orthogonal,
-    and take (Σ wJ)(Σ wJ)ᵗ / Σ w and (Σ wuJ)(Σ wuJ)ᵗ / Σ wu² from Σ wJJᵗ. The variance of the line's angle is
-    1 / Σ wu²; so much of what the points would say along the line gets into Σ wJJᵗ by noise.
+    A point's residual is its distance d from the line, with J = ∂d/∂p_i = nᵗ ∂x'/∂p_i. The line may shift and
+    turn. With u the position along it from the weighted mean, these two directions are orthogonal, and their
+    elimination subtracts (Σ wJ)(Σ wJ)ᵗ / Σ w and (Σ wuJ)(Σ wuJ)ᵗ / Σ wu² from Σ wJJᵗ. The variance of the
+    line's angle is 1 / Σ wu²; by its noise Σ wJJᵗ claims that much information along the line.
     """
     x, y, xx, xy, yy = _moments(cloud, chosen)
     along = 0.5 * np.arctan2(2 * xy, xx - yy)
     nx, ny = -np.sin(along), np.cos(along)
     m = chosen.shape[0]
-    weights, places, off = np.empty(m), np.empty(m), np.empty(m)
+    weights, along_line, distances = np.empty(m), np.empty(m), np.empty(m)
     for at, k in enumerate(chosen):
         ax, ay = cloud.arms[k, 0], cloud.arms[k, 1]
         head_on = (ax * nx + ay * ny) ** 2 / (ax * ax + ay * ay + 1e-12)
-        weights[at] = 1.0 / (RANGE_SIGMA * RANGE_SIGMA * head_on + WALL_SIGMA * WALL_SIGMA)
+        weights[at] = 1.0 / (parameters.range_variance * head_on + parameters.wall_variance)
         dx, dy = cloud.points[k, 0] - x, cloud.points[k, 1] - y
-        places[at], off[at] = dx * ny - dy * nx, dx * nx + dy * ny
+        along_line[at], distances[at] = dx * ny - dy * nx, dx * nx + dy * ny
     total = weights.sum()
-    places -= (weights * places).sum() / total
-    spread = (weights * places * places).sum()
-    off -= (weights * off).sum() / total + places * ((weights * places * off).sum() / spread)
-    loose = LOOSE / spread
+    along_line -= (weights * along_line).sum() / total
+    spread = (weights * along_line * along_line).sum()
+    distances -= (weights * distances).sum() / total + along_line * (
+        (weights * along_line * distances).sum() / spread
+    )
+    angle_noise = parameters.direction_noise / spread
     size = gradient.shape[0]
-    shifts, turns, slips = np.zeros(size), np.zeros(size), np.zeros(size)
+    shifts, turns, slides = np.zeros(size), np.zeros(size), np.zeros(size)
     across, by = np.empty(3), np.empty(3)
     for at, k in enumerate(chosen):
         ax, ay = cloud.arms[k, 0], cloud.arms[k, 1]
@@ -222,15 +240,17 @@ def _add_wall(cloud: Cloud, chosen: NDArray[np.int64], gradient: Array, hessian:
         by[0], by[1], by[2] = ny, -nx, -ax * nx - ay * ny
         first, weight = 3 * cloud.scans[k], weights[at]
         for a in range(3):
-            gradient[first + a] += weight * off[at] * across[a]
+            gradient[first + a] += weight * distances[at] * across[a]
             shifts[first + a] += weight * across[a]
-            turns[first + a] += weight * places[at] * across[a]
-            slips[first + a] += weight * by[a]
+            turns[first + a] += weight * along_line[at] * across[a]
+            slides[first + a] += weight * by[a]
             for b in range(3):
-                hessian[first + a, first + b] += weight * (across[a] * across[b] + loose * by[a] * by[b])
+                hessian[first + a, first + b] += weight * (
+                    across[a] * across[b] + angle_noise * by[a] * by[b]
+                )
     for a in range(size):
-        if slips[a] == 0.0 and shifts[a] == 0.0:
+        if slides[a] == 0.0 and shifts[a] == 0.0:
             continue
         for b in range(size):
-            hessian[a, b] -= (shifts[a] * shifts[b] + loose * slips[a] * slips[b]) / total
+            hessian[a, b] -= (shifts[a] * shifts[b] + angle_noise * slides[a] * slides[b]) / total
             hessian[a, b] -= turns[a] * turns[b] / spread

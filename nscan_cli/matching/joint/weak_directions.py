@@ -1,4 +1,4 @@
-"""Directions in which the scans of a joint match hold each other hardly, and the priors say more."""
+"""Directions in which the scans of a joint match hardly hold each other, so that priors decide."""
 
 from __future__ import annotations
 
@@ -7,16 +7,13 @@ import numpy as np
 from nscan_cli.matching.joint.joint_energy import JointProblem, joint_energy, no_priors
 from nscan_cli.poses import Array
 
-SHARE = 0.05
-"""In a direction where so much of the knowledge comes from the priors, the scans do not decide. Along a
-corridor without doors it is mostly a quarter or more, across it 0.0002 or less."""
 
+def replace_weak_directions(problem: JointProblem, poses: Array, prior_share: float) -> Array | None:
+    """The poses (n, 3), moved to where the priors want them in the directions that the scans leave open.
 
-def replace_weak_directions(problem: JointProblem, poses: Array) -> Array | None:
-    """The poses (n, 3) moved to where the priors want them, in the directions that the scans leave open.
-
-    Wide Gaussians slide scans together along a corridor, and nothing there brings them back; what the
-    slide has found across the corridor and in rotation stays. None when the scans hold all directions.
+    Those are the directions with a greater share of their information from the priors than `prior_share`.
+    Wide Gaussians slide scans together along a corridor, and nothing there brings them back. What the match
+    has found across the corridor and in rotation stays. None when the scans hold all directions.
     """
     from scipy.linalg import eigh
 
@@ -24,11 +21,11 @@ def replace_weak_directions(problem: JointProblem, poses: Array) -> Array | None
         return None
     scans = joint_energy(problem._replace(priors=no_priors()), poses, exact=False).hessian[3:, 3:]
     priors = joint_energy(problem._replace(pairs=problem.pairs[:0]), poses, exact=False)
-    known = scans + priors.hessian[3:, 3:]
-    known += 1e-9 * np.trace(known) / len(known) * np.eye(len(known))
+    information = scans + priors.hessian[3:, 3:]
+    information += 1e-9 * np.trace(information) / len(information) * np.eye(len(information))
     # The share λ of the priors in each direction v: H_priors v = λ H v, with vᵗHv = 1.
-    shares, directions = eigh(priors.hessian[3:, 3:], known)
-    open_ = shares > SHARE
+    shares, directions = eigh(priors.hessian[3:, 3:], information)
+    open_ = shares > prior_share
     if not open_.any():
         return None
     along = directions[:, open_]

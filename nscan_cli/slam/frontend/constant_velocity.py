@@ -16,10 +16,10 @@ import numpy as np
 
 from nscan_cli.kernels.assign import assign, assign_rows
 from nscan_cli.kernels.decorators import kernel, leaf_kernel
-from nscan_cli.matching.pairwise_solver import PairProblem, objective
+from nscan_cli.matching.pairwise_solver import PairProblem, pairwise_objective
 from nscan_cli.matching.priors import Prior
-from nscan_cli.ndt.association import begin
-from nscan_cli.ndt.energy import OUT
+from nscan_cli.ndt.association import begin_association
+from nscan_cli.ndt.energy import ENERGY_NUMBERS
 from nscan_cli.ndt.hash_grid import Grid
 from nscan_cli.poses import Array
 from nscan_cli.slam.frontend.scan_to_map import match_and_count
@@ -106,15 +106,15 @@ def profile(
 
     The places are how far (m) they lie ahead of what the prior expects.
     """
-    problem = PairProblem(grid, settings.half, begin(points), settings.scale, prior)
-    out, gradient, hessian, there = np.empty(OUT), np.empty(3), np.empty((3, 3)), pose.copy()
+    problem = PairProblem(grid, settings.half, begin_association(points), settings.scale, prior)
+    out, gradient, hessian, there = np.empty(ENERGY_NUMBERS), np.empty(3), np.empty((3, 3)), pose.copy()
     own, farthest = ahead(pose, prior, along), int(np.ceil(SPAN / np.sqrt(prior.information[0, 0]) / APART))
     places, values = np.empty(2 * farthest + 1), np.empty(2 * farthest + 1)
     for at in range(len(places)):
         places[at] = APART * (at - farthest)
         there[0] = pose[0] + (places[at] - own) * along[0]
         there[1] = pose[1] + (places[at] - own) * along[1]
-        values[at] = objective(problem, there, 1.0, 0.0, out, gradient, hessian)
+        values[at] = pairwise_objective(problem, there, 1.0, 0.0, out, gradient, hessian)
     return places, values
 
 

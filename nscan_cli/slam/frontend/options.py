@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 
 from nscan_cli.matching.correlative_search import SearchOptions
 from nscan_cli.matching.priors import MotionModel
-from nscan_cli.slam.gaussian_options import GaussianOptions
+from nscan_cli.ndt.options import GaussianOptions
 
 
 @dataclass(frozen=True)

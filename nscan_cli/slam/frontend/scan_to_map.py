@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from nscan_cli.kernels.decorators import kernel
-from nscan_cli.matching.pairwise_solver import PairProblem, minimise
+from nscan_cli.matching.pairwise_solver import PairProblem, minimise_pairwise
 from nscan_cli.matching.priors import Prior
-from nscan_cli.ndt.association import associate_again, begin, count_inliers
+from nscan_cli.ndt.association import begin_association, count_inliers, update_association
 from nscan_cli.ndt.hash_grid import Grid
 from nscan_cli.poses import Array
 from nscan_cli.slam.frontend.tracking_parameters import TrackingParameters
@@ -20,10 +20,10 @@ def match_and_count(
     Writes the Hessian (3, 3) of the objective.
     """
     half, scale, widenings = settings.half, settings.scale, settings.widenings
-    meeting = begin(points)
+    meeting = begin_association(points)
     problem = PairProblem(grid, half, meeting, scale, prior)
-    value, _, _, _, _ = minimise(
+    value, _, _, _, _ = minimise_pairwise(
         problem, pose, widenings, settings.max_iterations, settings.near, settings.tolerance, hessian
     )
-    associate_again(grid, half, meeting, pose[0], pose[1], pose[2])
+    update_association(grid, half, meeting, pose[0], pose[1], pose[2])
     return value, count_inliers(meeting, settings.inlier_bound) / max(points.shape[0], 1)

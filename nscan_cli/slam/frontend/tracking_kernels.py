@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 from nscan_cli.kernels.assign import assign, assign_rows
 from nscan_cli.kernels.decorators import kernel
 from nscan_cli.matching.pose_kernels import composed_pose, relative_pose, wrapped
-from nscan_cli.matching.priors import Prior, sigmas
-from nscan_cli.ndt.grid_growth import NEW_NEIGHBOURS, change
+from nscan_cli.matching.priors import Prior, motion_sigmas
+from nscan_cli.ndt.grid_growth import CELLS_PER_POINT, change_points
 from nscan_cli.ndt.hash_grid import Grid
 from nscan_cli.poses import Array, transform
 from nscan_cli.slam.frontend.constant_velocity import UNSTEADY, constant_velocity
@@ -144,12 +144,12 @@ def predict(track: Track, settings: TrackingParameters, odometry: Array, prior: 
     if np.isfinite(odometry[0]) and np.isfinite(track.odometry[0]):
         relative_pose(odometry, track.odometry, step)
         step[2] = wrapped(step[2])
-        along, about = sigmas(step, settings.odometry)
+        along, about = motion_sigmas(step, settings.odometry)
     else:
         relative_pose(last, track.poses[-known], step)
         step[2] = wrapped(step[2])
         step /= max(known - 1, 1)
-        along, about = sigmas(step, settings.steady_motion)
+        along, about = motion_sigmas(step, settings.steady_motion)
     composed_pose(last, step, prior.mean)
     prior.mean[2] = wrapped(prior.mean[2])
     # As sure along the path as across it: no need to turn the information.
@@ -233,7 +233,7 @@ def _join(track: Track, grid: Grid, settings: TrackingParameters, points: Array,
 def _change(track: Track, grid: Grid, settings: TrackingParameters, scan: int, sign: float) -> None:
     points, pose = track.points[track.ends[scan] : track.ends[scan + 1]], track.placed[scan, :3]
     # Half of the Gaussians change again before any point meets them.
-    track.counts[ROWS] = change(grid, track.counts[ROWS], settings.half, points, pose, sign, False)
+    track.counts[ROWS] = change_points(grid, track.counts[ROWS], settings.half, points, pose, sign, False)
 
 
 @kernel
@@ -256,7 +256,7 @@ def follow(
     """
     for k in range(first, ends.shape[0] - 1):
         scan = points[ends[k] : ends[k + 1]]
-        if track.counts[ROWS] + NEW_NEIGHBOURS * scan.shape[0] > grid.keys.shape[0]:
+        if track.counts[ROWS] + CELLS_PER_POINT * scan.shape[0] > grid.keys.shape[0]:
             found.inliers[k] = np.nan
             return k
         if track.counts[KNOWN] == 0:

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from nscan_cli.matching.priors import Motion
+from nscan_cli.matching.priors import MotionParameters
 from nscan_cli.poses import Array
 from nscan_cli.slam.frontend.options import TrackingOptions
 
@@ -30,8 +30,8 @@ class TrackingParameters(NamedTuple):
     far_share: float
     turns: Array
     """(rings, angles), with nan where a ring has fewer."""
-    odometry: Motion
-    steady_motion: Motion
+    odometry: MotionParameters
+    steady_motion: MotionParameters
 
     @classmethod
     def of(
@@ -57,6 +57,6 @@ class TrackingParameters(NamedTuple):
             options.restart_inliers,
             options.far_restart_inliers,
             turns,
-            Motion.of(options.odometry),
-            Motion.of(options.constant_velocity),
+            MotionParameters.of(options.odometry),
+            MotionParameters.of(options.constant_velocity),
         )

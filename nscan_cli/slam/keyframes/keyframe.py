@@ -18,12 +18,12 @@ from nscan_cli.graph.model import Pairwise
 from nscan_cli.graph.relations.semidefinite import as_information
 from nscan_cli.kernels.decorators import kernel
 from nscan_cli.matching.pose_kernels import wrapped
-from nscan_cli.ndt.hash_grid import OPEN
+from nscan_cli.ndt.hash_grid import WALL_END
+from nscan_cli.ndt.options import GaussianOptions
 from nscan_cli.ndt.transform import Ndt
 from nscan_cli.poses import Array, Indices, compose, relative
 from nscan_cli.slam.frontend.scan_batch import ScanBatch
 from nscan_cli.slam.frontend.tracked_scans import Tracked, TrackedScans
-from nscan_cli.slam.gaussian_options import GaussianOptions
 from nscan_cli.slam.keyframes.options import KeyframeOptions
 from nscan_cli.slam.keyframes.slip_detection import SlipDetector
 
@@ -74,7 +74,7 @@ class Keyframe:
             points, sizes, poses = (np.concatenate(columns) for columns in zip(*around, strict=True))
             ends = np.append(0, np.cumsum(sizes))
             poses, own, room = relative(poses, self.tracked.pose), self.gaussians, ROOM * len(self.points)
-            ndt = Ndt.of_scans(points, ends, poses, own.cell, own.minimum, own.floor, room, OPEN)
+            ndt = Ndt.of_scans(points, ends, poses, own.cell, own.minimum, own.floor, room, WALL_END)
             # In this order: another thread that makes it too has what it needs.
             self._ndt, self.around = ndt, []
         return self._ndt

@@ -13,9 +13,10 @@ from nscan_cli.graph.model import Loop, NScan, Pairwise
 from nscan_cli.kernels.decorators import kernel
 from nscan_cli.matching.joint.ambiguity import with_ambiguity
 from nscan_cli.matching.joint.joint_energy import JointProblem, Priors, all_pairs, no_priors
-from nscan_cli.matching.joint.joint_match import JointMatch, JointOptions, match_jointly
-from nscan_cli.matching.joint.overlap import held_at, hold
-from nscan_cli.matching.joint.scan_set import ScanSet, lay_out
+from nscan_cli.matching.joint.joint_match import JointMatch, match_jointly
+from nscan_cli.matching.joint.options import JointOptions
+from nscan_cli.matching.joint.overlap import connected_at, connectivity
+from nscan_cli.matching.joint.scan_set import ScanSet, scan_set
 from nscan_cli.matching.pose_kernels import relative_pose
 from nscan_cli.poses import Array, Indices, compose, relative
 from nscan_cli.slam.keyframes.keyframe import Keyframe, Route, points_per_cell
@@ -135,7 +136,13 @@ def _match_held(
     keyframes, poses = route.keyframes, route.poses
     kept, start, scans = np.arange(len(tried)), poses[tried], _laid_out(keyframes, tried)
     if len(widenings) == 1:
-        held = held_at(scans, start, POSSIBLE * options.overlap, int(tried.searchsorted(centre)))
+        held = connected_at(
+            scans,
+            start,
+            options.inlier_bound,
+            POSSIBLE * options.overlap,
+            int(tried.searchsorted(centre)),
+        )
         kept, start = kept[held], start[held]
     all_began = len(kept) == len(tried)
     while len(kept) >= LEAST_SCANS:
@@ -145,7 +152,7 @@ def _match_held(
         problem = _problem(scans, members, route, options)
         match = match_jointly(problem, start, _stages(widenings, options))
         at = int(members.searchsorted(centre))
-        held, score = hold(scans, match.poses, options.overlap, at)
+        held, score = connectivity(scans, match.poses, options.inlier_bound, options.overlap, at)
         if not held.all():
             kept, start = kept[held], match.poses[held]
             continue
@@ -154,7 +161,7 @@ def _match_held(
             return LocalMatch((), None, loop, 0.0, False), False
         closed = bool(seen_before[kept].any())
         origin = "loop" if closed else "nscan"
-        relation = _relation(route.rows[members], at, problem, match, origin, score)
+        relation = _relation(route.rows[members], at, problem, match, origin, score, options)
         whole = len(kept) == len(tried)
         reason = "" if whole else f"{counted(len(tried) - len(kept), 'scan')} left out"
         used, before = (members, seen_before[kept]) if closed else (tried, seen_before)
@@ -167,7 +174,7 @@ def _match_held(
 
 def _laid_out(keyframes: Sequence[Keyframe], members: Indices) -> ScanSet:
     chosen = [keyframes[k] for k in members.tolist()]
-    return lay_out([each.ndt for each in chosen], [each.points for each in chosen], neutral=False)
+    return scan_set([each.ndt for each in chosen], [each.points for each in chosen], neutral=False)
 
 
 def _problem(scans: ScanSet, members: Indices, route: Route, options: NScanOptions) -> JointProblem:
@@ -205,7 +212,13 @@ def scale_of(keyframes: Sequence[Keyframe], options: NScanOptions) -> float:
 
 
 def _relation(
-    nodes: Indices, fixed: int, problem: JointProblem, match: JointMatch, origin: str, score: float
+    nodes: Indices,
+    fixed: int,
+    problem: JointProblem,
+    match: JointMatch,
+    origin: str,
+    score: float,
+    options: NScanOptions,
 ) -> NScan:
     eigenvalues, vectors = np.linalg.eigh(match.hessian)
     # What is left of negative curvature at the optimum is rounding, or a cell's border.
@@ -213,7 +226,7 @@ def _relation(
     return NScan(
         nodes=tuple(nodes.tolist()),
         poses=match.poses,
-        hessian=with_ambiguity(problem, match.poses, definite),
+        hessian=with_ambiguity(problem, match.poses, definite, options.ambiguity),
         fixed=fixed,
         origin=origin,
         score=score,

@@ -13,10 +13,9 @@ import numpy as np
 
 from nscan_cli.files.counting import counted
 from nscan_cli.graph.model import Pairwise
-from nscan_cli.matching.joint.overlap import INLIER_BOUND
-from nscan_cli.matching.pairwise_solver import PairProblem, minimise
+from nscan_cli.matching.pairwise_solver import PairProblem, minimise_pairwise
 from nscan_cli.matching.priors import Prior
-from nscan_cli.ndt.association import begin
+from nscan_cli.ndt.association import begin_association
 from nscan_cli.ndt.energy import energy, inlier_share
 from nscan_cli.poses import Array, inverse, relative, relative_jacobians, wrap
 from nscan_cli.slam.keyframes.keyframe import Keyframe, Route
@@ -84,11 +83,13 @@ def _match(route: Route, other: int, centre: int, options: NScanOptions) -> _Sin
     start, origin, tolerance = relative(poses[centre], poses[other]), np.zeros(3), options.tolerance
     for widenings in options.attempts:
         pose, hessian = start.copy(), np.empty((3, 3))
-        problem = PairProblem(reference.grid, reference.half, begin(points), scale, prior)
-        minimise(problem, pose, np.array(widenings), options.max_iterations, tolerance, tolerance, hessian)
+        problem = PairProblem(reference.grid, reference.half, begin_association(points), scale, prior)
+        minimise_pairwise(
+            problem, pose, np.array(widenings), options.max_iterations, tolerance, tolerance, hessian
+        )
         pose[2] = wrap(pose[2])
         moved = moved_by(np.stack([origin, start]), np.stack([origin, pose]), 1)
-        overlap = _overlap(keyframes[other], keyframes[centre], pose)
+        overlap = _overlap(keyframes[other], keyframes[centre], pose, options.inlier_bound)
         if overlap >= options.overlap and moved < options.settled:
             break
     information = scale * energy(reference, points, pose, exact=False).hessian
@@ -107,11 +108,11 @@ def _prior(chain: Sequence[Pairwise], other: int, centre: int) -> Prior:
     return Prior(np.zeros(3), np.zeros((3, 3)))
 
 
-def _overlap(other: Keyframe, centre: Keyframe, pose: Array) -> float:
+def _overlap(other: Keyframe, centre: Keyframe, pose: Array, inlier_bound: float) -> float:
     """As in matching.overlap, of two: `pose` (3,) is the centre's in the other's frame."""
     ndt, own = other.ndt, centre.ndt
-    on_other = inlier_share(ndt.grid, ndt.half, centre.points, pose, INLIER_BOUND)
-    on_centre = inlier_share(own.grid, own.half, other.points, inverse(pose), INLIER_BOUND)
+    on_other = inlier_share(ndt.grid, ndt.half, centre.points, pose, inlier_bound)
+    on_centre = inlier_share(own.grid, own.half, other.points, inverse(pose), inlier_bound)
     return max(on_other, on_centre)
 
 

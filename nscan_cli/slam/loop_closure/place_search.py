@@ -15,7 +15,13 @@ from numpy.typing import NDArray
 
 from nscan_cli.graph.model import Loop
 from nscan_cli.kernels.decorators import kernel
-from nscan_cli.matching.correlative_search import Field, Search, SearchOptions, likelihood_field, search
+from nscan_cli.matching.correlative_search import (
+    LikelihoodField,
+    Search,
+    SearchOptions,
+    likelihood_field,
+    search,
+)
 from nscan_cli.poses import Array, compose, relative
 from nscan_cli.slam.keyframes.keyframe import Keyframe, Route
 from nscan_cli.slam.local_matching.joint_relations import LocalMatch, MatchNearby, match_at, visit_moved
@@ -149,7 +155,7 @@ def _sought(
     earlier: NDArray[np.int64],
     window: SearchOptions,
     closing: ClosingOptions,
-) -> tuple[Array, Field] | None:
+) -> tuple[Array, LikelihoodField] | None:
     """The points (m, 2) around keyframe `centre`, in its frame, and the field of the `earlier` ones (m,).
 
     None when one of them has no points.

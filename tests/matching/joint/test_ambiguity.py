@@ -7,16 +7,18 @@ import functools
 import numpy as np
 import pytest
 
-from nscan_cli.matching.joint.ambiguity import FARTHEST, MOTIONS, WEAK, with_ambiguity
+from nscan_cli.matching.joint.ambiguity import with_ambiguity
 from nscan_cli.matching.joint.gauge import gauge_directions
 from nscan_cli.matching.joint.joint_energy import JointProblem, Priors
-from nscan_cli.matching.joint.joint_match import JointMatch, JointOptions, match_jointly
+from nscan_cli.matching.joint.joint_match import JointMatch, match_jointly
+from nscan_cli.matching.joint.options import AmbiguityOptions, JointOptions
 from nscan_cli.poses import Array, relative
 from tests.matching.problems import Problem, errors, office_problem, problem
 from tests.simulation.laser import Laser
 from tests.simulation.scenes import Scene
 from tests.simulation.world import Builder
 
+OPTIONS = AmbiguityOptions()
 APART = 1.0
 """m from pier to pier."""
 CHI2_OF_THREE = 16.27
@@ -46,7 +48,7 @@ def matched(case: JointProblem, start: Array) -> tuple[JointMatch, Array]:
     """A match, and its Hessian where the scans may fit elsewhere."""
     match = match_jointly(case, start, JointOptions())
     assert match.converged
-    return match, with_ambiguity(case, match.poses, match.hessian)
+    return match, with_ambiguity(case, match.poses, match.hessian, OPTIONS)
 
 
 def sigma_along(hessian: Array) -> float:
@@ -64,7 +66,7 @@ def test_where_all_is_known_well_nothing_changes():
 def test_a_pier_farther_on_is_known_to_be_possible(scale):
     match, less = matched(corridor().joint(scale=scale), TRUTH)
     assert sigma_along(match.hessian) < 0.1
-    assert APART / 3 < sigma_along(less) < FARTHEST
+    assert APART / 3 < sigma_along(less) < OPTIONS.distance
     # Across and in rotation it is known as well as before.
     before, after = (np.linalg.inv(each[3:, 3:]).diagonal()[1:] ** 0.5 for each in (match.hessian, less))
     assert (after < 1.5 * before).all()
@@ -91,7 +93,7 @@ def test_all_that_is_known_of_other_motions_stays():
     several = problem(piers_alike(), np.array([(0.5 * k, 0.05 * k, 0.1 * k) for k in range(6)]), noise=True)
     match, less = matched(several.joint(scale=0.02), several.truth)
     lost = np.linalg.eigvalsh(match.hessian - less)
-    assert np.count_nonzero(lost > 1e-6 * lost[-1]) in range(1, MOTIONS + 1)
+    assert np.count_nonzero(lost > 1e-6 * lost[-1]) in range(1, OPTIONS.motions + 1)
     assert lost[0] > -1e-9 * lost[-1]
     before, after = (np.linalg.eigvalsh(each[3:, 3:]) for each in (match.hessian, less))
     assert 0.0 < after[0] < before[0]
@@ -106,16 +108,16 @@ def test_the_variance_of_a_motion_is_added():
     values, vectors = np.linalg.eigh(added)
     assert np.abs(values[:-1]).max() < 1e-3 * values[-1]
     assert np.abs(vectors[0, -1]) > 0.99
-    assert APART / 3 < values[-1] ** 0.5 < FARTHEST
+    assert APART / 3 < values[-1] ** 0.5 < OPTIONS.distance
 
 
 def test_scans_that_nothing_holds_are_left_as_they_are():
     """No variance can be added to an infinite one."""
     case, hessian = corridor().joint(), np.zeros((6, 6))
-    assert with_ambiguity(case, TRUTH, hessian) is hessian
+    assert with_ambiguity(case, TRUTH, hessian, OPTIONS) is hessian
 
 
 def test_what_the_hessian_knows_better_than_a_centimetre_and_a_half_is_believed():
     match, less = matched(corridor().joint(scale=1.0), TRUTH)
-    assert sigma_along(match.hessian) < WEAK
+    assert sigma_along(match.hessian) < OPTIONS.least_sigma
     assert less is match.hessian

@@ -6,11 +6,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from nscan_cli.matching.joint import index_set as pairs
-from nscan_cli.matching.joint.index_set import BESIDE, index_set
+from nscan_cli.matching.joint.index_set import index_set, overlap_shares
 from nscan_cli.matching.joint.joint_energy import all_pairs
-from nscan_cli.matching.joint.joint_match import JointOptions, match_near_and_far
-from nscan_cli.ndt.hash_grid import find_row, pack
+from nscan_cli.matching.joint.joint_match import match_near_and_far
+from nscan_cli.matching.joint.options import IndexSetOptions, JointOptions
+from nscan_cli.ndt.hash_grid import find_row, pack_key
 from nscan_cli.poses import Array, relative, transform
 from tests.matching.problems import Problem, errors, fig_3, near, office_problem
 from tests.simulation.scenes import office
@@ -18,6 +18,8 @@ from tests.simulation.world import World
 
 ROWS = tuple(range(0, 400, 40))
 """Out of a room, along the corridor, and into another room."""
+
+OPTIONS = IndexSetOptions()
 
 
 @pytest.fixture(scope="module")
@@ -36,7 +38,7 @@ def as_set(found: np.ndarray) -> set[tuple[int, int]]:
 
 @pytest.mark.parametrize("kind", ["all", "visible", "overlap"])
 def test_pairs_go_both_ways_and_are_sorted(ten, kind):
-    found = index_set(kind, ten.joint().scans, ten.truth)
+    found = index_set(kind, OPTIONS, ten.joint().scans, ten.truth)
     assert found.dtype == np.int64
     assert found.flags.c_contiguous
     assert found.tolist() == sorted(found.tolist())
@@ -56,7 +58,9 @@ def sees(i: np.ndarray, j: np.ndarray) -> bool | None:
     on_the_way = i[:2] + np.linspace(0, 1, 100)[:, None] * (j - i)[:2]
     clearance = plan().clearance(on_the_way).min()
     through = crosses_a_wall(i[:2], j[:2])
-    if not through and (clearance < 2 * BESIDE * distance or abs(beyond) < 2 * BESIDE + 0.1 / distance):
+    if not through and (
+        clearance < 2 * OPTIONS.beam_angle * distance or abs(beyond) < 2 * OPTIONS.beam_angle + 0.1 / distance
+    ):
         return None
     return not through and beyond < 0
 
@@ -73,7 +77,7 @@ def crosses_a_wall(a: Any, b: Any) -> bool:
 
 
 def test_visible_is_what_the_floor_plan_leaves_free(ten):
-    found = as_set(index_set("visible", ten.joint().scans, ten.truth))
+    found = as_set(index_set("visible", OPTIONS, ten.joint().scans, ten.truth))
     told = {True: 0, False: 0}
     for i in range(10):
         for j in range(i):
@@ -91,7 +95,7 @@ def test_a_position_at_hand_is_visible_however_the_robot_is_turned(ten):
     scans = ten.joint(4, 4, 4, 4).scans
     back = relative(poses[1], poses[0])
     assert back[0] < 0
-    found = as_set(index_set("visible", scans, poses))
+    found = as_set(index_set("visible", OPTIONS, scans, poses))
     assert {(0, 1), (0, 2), (1, 2)} <= found
 
 
@@ -105,8 +109,7 @@ def faces(gaussians: Array, link: int, beam: Array) -> bool:
 def test_overlap_is_the_share_of_points_in_cells_with_gaussians(ten):
     """Against a count in plain Python of every third point; sides are taken from the Gaussians."""
     scans = ten.joint().scans
-    shares = np.zeros((10, 10))
-    pairs._meet(scans, ten.truth, np.empty(3), shares)
+    shares = overlap_shares(scans, ten.truth, OPTIONS.stride)
     for i in range(10):
         grid, half = ten.ndts[i].grid, ten.ndts[i].half
         for j in range(10):
@@ -115,7 +118,7 @@ def test_overlap_is_the_share_of_points_in_cells_with_gaussians(ten):
             moved, beams = transform(u, points), transform([0, 0, u[2]], points)
             hits = 0
             for (x, y), beam in zip(moved, beams, strict=True):
-                row = find_row(grid, pack(int(np.floor(x / half)), int(np.floor(y / half))))
+                row = find_row(grid, pack_key(int(np.floor(x / half)), int(np.floor(y / half))))
                 links = grid.links[row] if row >= 0 else []
                 hits += any(link >= 0 and faces(grid.gaussians, link, beam) for link in links)
             assert shares[i, j] == pytest.approx(hits / len(points) if i != j else 0.0)
@@ -124,13 +127,13 @@ def test_overlap_is_the_share_of_points_in_cells_with_gaussians(ten):
 def test_pairs_with_little_in_common_can_be_what_ties_all_together():
     """The paper's Fig. 3: scans 2 and 3 share a cabinet only."""
     scans = fig_3(noise=True)
-    assert as_set(index_set("overlap", scans.joint().scans, scans.truth)) == as_set(all_pairs(3))
+    assert as_set(index_set("overlap", OPTIONS, scans.joint().scans, scans.truth)) == as_set(all_pairs(3))
 
 
-def test_a_scan_keeps_the_one_that_it_has_most_in_common_with(ten, monkeypatch):
-    monkeypatch.setattr(pairs, "LEAST_SHARE", 2.0)
+def test_a_scan_keeps_the_one_that_it_has_most_in_common_with(ten):
+    none_by_share = IndexSetOptions(least_share=2.0)
     scans = ten.joint().scans
-    found = index_set("overlap", scans, ten.truth)
+    found = index_set("overlap", none_by_share, scans, ten.truth)
     assert np.unique(found).tolist() == list(range(10))
     assert len(found) < 20
 
@@ -139,7 +142,7 @@ def test_a_scan_keeps_the_one_that_it_has_most_in_common_with(ten, monkeypatch):
 def test_a_scan_far_away_is_in_no_pair(ten, kind):
     poses = ten.truth.copy()
     poses[3] += [200, 0, 0]
-    found = index_set(kind, ten.joint().scans, poses)
+    found = index_set(kind, OPTIONS, ten.joint().scans, poses)
     assert 3 not in found
     assert 0 in found
 
@@ -150,7 +153,7 @@ def test_a_scan_in_no_pair_stays_and_the_others_match_as_without_it(fixed):
     start = near(four.truth, 1)
     start[2] += [200, 0, 0]
     problem, options = four.joint(), JointOptions(fixed=fixed)
-    match = match_near_and_far(problem, start, options, partial(index_set, "overlap", problem.scans))
+    match = match_near_and_far(problem, start, options, partial(index_set, "overlap", OPTIONS, problem.scans))
     assert match.converged
     assert np.unique(match.pairs).tolist() == [0, 1, 3]
     if fixed is not None:

@@ -5,7 +5,8 @@ import pytest
 
 from nscan_cli.matching.joint import initialisation as placing
 from nscan_cli.matching.joint.initialisation import match_or_search
-from nscan_cli.matching.joint.joint_match import JointOptions, match_near_and_far
+from nscan_cli.matching.joint.joint_match import match_near_and_far
+from nscan_cli.matching.joint.options import JointOptions
 from nscan_cli.poses import Array, compose, relative
 from tests.matching.problems import OPTIONS, Problem, errors, near, office_problem
 

@@ -7,9 +7,10 @@ import pytest
 
 from nscan_cli.matching.joint.gauge import FREE, gauge_directions, gauge_fixed_step
 from nscan_cli.matching.joint.joint_energy import JointProblem, Priors, all_pairs, joint_energy, no_priors
-from nscan_cli.matching.joint.joint_match import JointOptions, match_jointly
+from nscan_cli.matching.joint.joint_match import match_jointly
+from nscan_cli.matching.joint.options import JointOptions
 from nscan_cli.matching.joint.overlap import overlaps
-from nscan_cli.matching.joint.scan_set import lay_out
+from nscan_cli.matching.joint.scan_set import scan_set
 from nscan_cli.matching.uncertainty import weakest_translation
 from nscan_cli.ndt.transform import Ndt
 from nscan_cli.poses import relative
@@ -163,7 +164,7 @@ def test_lean_kernels_keep_no_reference_and_give_none_back():
     """What they are given is counted by nobody in between: after many calls all is owned as before."""
     points, poses = [room(1), room(2)], np.array([[0.0, 0, 0], [0.1, 0, 0.05]])
     ndts = [Ndt.of_scans(part, np.array([0, len(part)]), np.zeros((1, 3)), 0.5, 3, 0.02) for part in points]
-    problem = JointProblem(lay_out(ndts, points), all_pairs(2), no_priors(), 1.0)
+    problem = JointProblem(scan_set(ndts, points), all_pairs(2), no_priors(), 1.0)
     arrays = [
         np.asarray(array) for array in (*problem.scans.grid, problem.scans.points, problem.pairs, poses)
     ]
@@ -172,11 +173,11 @@ def test_lean_kernels_keep_no_reference_and_give_none_back():
         return [sys.getrefcount(array) for array in arrays]
 
     joint_energy(problem, poses)
-    overlaps(problem.scans, poses)
+    overlaps(problem.scans, poses, JointOptions.inlier_bound)
     before, values = owned(), [array.copy() for array in arrays]
     for _ in range(100):
         joint_energy(problem, poses)
-        overlaps(problem.scans, poses)
+        overlaps(problem.scans, poses, JointOptions.inlier_bound)
     assert owned() == before
     for array, value in zip(arrays, values, strict=True):
         np.testing.assert_array_equal(array, value)

@@ -9,11 +9,11 @@ import pytest
 from nscan_cli.matching.joint import nscan_match as nscan_module
 from nscan_cli.matching.joint.index_set import index_set
 from nscan_cli.matching.joint.joint_energy import Priors, all_pairs, joint_energy, no_priors
-from nscan_cli.matching.joint.joint_match import JointOptions
 from nscan_cli.matching.joint.nscan_match import nscan_match
-from nscan_cli.matching.joint.outliers import ALONE, OUT_OF_BOUNDS, OUT_OF_REACH, OVERLAPS_NONE
-from nscan_cli.matching.joint.overlap import INLIER_BOUND, overlaps
-from nscan_cli.matching.joint.scan_set import ScanSet, lay_out
+from nscan_cli.matching.joint.options import JointOptions
+from nscan_cli.matching.joint.outliers import CONTRADICTS_PRIORS, ONLY_ONE_LEFT, OVERLAPS_NONE, TOO_FAR
+from nscan_cli.matching.joint.overlap import overlaps
+from nscan_cli.matching.joint.scan_set import ScanSet, scan_set
 from nscan_cli.ndt.energy import inlier_share
 from nscan_cli.poses import relative, relative_jacobians
 from tests.matching.problems import OPTIONS, Problem, errors, fig_3, near, office_problem
@@ -67,7 +67,7 @@ def test_a_fixed_gauge_holds_the_scan_that_was_named(four):
 
 
 def test_overlaps_count_points_on_gaussians(four):
-    shares = overlaps(four.joint().scans, four.truth)
+    shares = overlaps(four.joint().scans, four.truth, FREE.inlier_bound)
     seen = np.zeros((4, len(four.points[3])), dtype=bool)
     for i in range(4):
         for j in range(4):
@@ -75,9 +75,11 @@ def test_overlaps_count_points_on_gaussians(four):
             expected = 0.0
             if i != j:
                 grid, half = four.ndts[i].grid, four.ndts[i].half
-                expected = inlier_share(grid, half, four.points[j], u, INLIER_BOUND)
+                expected = inlier_share(grid, half, four.points[j], u, FREE.inlier_bound)
                 if j == 3:
-                    seen[i] = [inlier_share(grid, half, p[None], u, INLIER_BOUND) for p in four.points[3]]
+                    seen[i] = [
+                        inlier_share(grid, half, p[None], u, FREE.inlier_bound) for p in four.points[3]
+                    ]
             assert shares.pairs[i, j] == pytest.approx(expected)
     assert shares.scans[3] == pytest.approx(seen.any(axis=0).mean())
 
@@ -88,15 +90,15 @@ def test_scans_too_far_to_meet_any_are_left_out_before_the_match(four, monkeypat
 
     def counted(*parts: Any) -> ScanSet:
         laid_out.append(parts)
-        return lay_out(*parts)
+        return scan_set(*parts)
 
     monkeypatch.setattr(nscan_module, "lay_out", counted)
     match, left_out = nscan_match(four.points, away, none, 1, OPTIONS, FIXED)
     assert match is not None
     assert match.kept == (0, 2)
     assert [(out.scan, out.reason, out.overlap) for out in left_out] == [
-        (1, OUT_OF_REACH, 0.0),
-        (3, OUT_OF_REACH, 0.0),
+        (1, TOO_FAR, 0.0),
+        (3, TOO_FAR, 0.0),
     ]
     assert len(laid_out) == 1
     # The scan to be held is gone: the first one left takes its place.
@@ -126,7 +128,7 @@ def test_a_scan_out_of_the_bounds_of_its_priors_is_left_out(four):
     match, left_out = nscan_match(four.points, four.truth, chain(expected, 0.05), 0, OPTIONS, FREE)
     assert match is not None
     assert [out.scan for out in left_out] == [2]
-    assert left_out[0].reason.startswith(OUT_OF_BOUNDS)
+    assert left_out[0].reason.startswith(CONTRADICTS_PRIORS)
     assert left_out[0].chi2 == pytest.approx(0.5 / 0.05**2, rel=0.05)
     assert left_out[0].overlap > 0.5
     assert match.kept == (0, 1, 3)
@@ -145,8 +147,8 @@ def test_two_scans_that_break_their_prior_are_no_relation(four):
     match, left_out = nscan_match(four.points[:2], four.truth[:2], chain(expected, 0.05), 0, OPTIONS, FREE)
     assert match is None
     assert {out.scan for out in left_out} == {0, 1}
-    assert left_out[0].reason.startswith(OUT_OF_BOUNDS)
-    assert left_out[1].reason == ALONE
+    assert left_out[0].reason.startswith(CONTRADICTS_PRIORS)
+    assert left_out[1].reason == ONLY_ONE_LEFT
 
 
 def test_the_index_set_is_chosen_at_the_poses():
@@ -158,7 +160,8 @@ def test_the_index_set_is_chosen_at_the_poses():
         match, left_out = nscan_match(ten.points, start, chain(ten.truth, 0.2), 0, OPTIONS, FREE, kind)
         assert match is not None
         assert not left_out
-        np.testing.assert_array_equal(match.pairs, index_set(kind, ten.joint().scans, match.joint.poses))
+        chosen = index_set(kind, FREE.index_set, ten.joint().scans, match.joint.poses)
+        np.testing.assert_array_equal(match.pairs, chosen)
         assert np.abs(errors(match.joint.poses, ten.truth)[:, :2]).max() < 0.1
         # E is that of the pairs.
         alone = joint_energy(ten.joint(pairs=match.pairs, scale=1.0), match.joint.poses)
@@ -198,7 +201,7 @@ def test_along_a_corridor_no_scan_is_out_of_bounds(shift, count):
     pair = pair_in_a_corridor()
     priors = chain(pair.truth + np.array([[0, 0, 0], shift]), 0.2)
     _, left_out = nscan_match(pair.points, pair.truth, priors, 0, OPTIONS, FREE)
-    assert len([out for out in left_out if out.reason.startswith(OUT_OF_BOUNDS)]) == count
+    assert len([out for out in left_out if out.reason.startswith(CONTRADICTS_PRIORS)]) == count
 
 
 def test_the_covariance_does_not_depend_on_the_scan_that_is_held(four):

@@ -7,18 +7,20 @@ from hypothesis import strategies as st
 from scipy.stats import chi2
 
 from nscan_cli.matching.joint.joint_energy import Priors, all_pairs, no_priors
+from nscan_cli.matching.joint.options import JointOptions
 from nscan_cli.matching.joint.outliers import (
+    CONTRADICTS_PRIORS,
     IN_NO_PAIR,
-    OUT_OF_BOUNDS,
     OVERLAPS_NONE,
-    out_of_reach,
     outliers,
     squared_deviation,
     squared_deviations,
+    too_far,
 )
 from nscan_cli.matching.joint.overlap import Overlaps
 from nscan_cli.poses import Array, compose, relative
 
+OPTIONS = JointOptions()
 CERTAIN = np.tile(np.eye(3) * 1e12, (4, 1, 1))
 """Matches that leave nothing open."""
 SIGMA = 0.05
@@ -53,11 +55,11 @@ def test_a_scan_that_can_meet_no_other_is_out_of_reach(gap, lost):
     """Points 5 m and 3 m away, whatever their direction: behind, they may be ahead if a start is turned."""
     points = [np.array([[-5.0, 0], [1, 0]]), np.array([[0, 3.0]]), np.array([[0, 2.0], [1, 0]])]
     start = np.array([[-(8.0 + gap), 0, 0], [0, 0, 1.0], [0, 0.5, 0]])
-    assert out_of_reach(points, start, 4.5) == lost
+    assert too_far(points, start, 4.5) == lost
 
 
 def test_a_scan_alone_meets_no_other():
-    assert out_of_reach([np.ones((3, 2))], np.zeros((1, 3)), 4.5) == [0]
+    assert too_far([np.ones((3, 2))], np.zeros((1, 3)), 4.5) == [0]
 
 
 @given(st.integers(0, 99), st.integers(0, 99))
@@ -101,7 +103,7 @@ def test_one_prior_is_broken_as_much_for_either_scan(seed, turn, x):
 
 
 @pytest.mark.parametrize("wrong", [0, 1, 2, 3])
-def test_a_scan_at_a_wrong_place_is_the_one_out_of_bounds(wrong):
+def test_a_scan_at_a_wrong_place_is_the_one_that_contradicts_its_priors(wrong):
     """0.4 m off by priors of 0.05 m: 64 a prior; the ends of the chain have one only."""
     poses = POSES.copy()
     poses[wrong, :2] += [0.4, 0]
@@ -109,26 +111,31 @@ def test_a_scan_at_a_wrong_place_is_the_one_out_of_bounds(wrong):
     assert by_most[wrong] == pytest.approx(64)
     assert by_all[wrong] == pytest.approx(128 if wrong in (1, 2) else 64)
     assert by_most[2 if wrong == 1 else 1 if wrong == 2 else 3 - wrong] == pytest.approx(0, abs=1e-6)
-    out = outliers(all_overlap(4), all_pairs(4), chain(POSES), poses, CERTAIN)
-    assert [(stray.scan, stray.overlap, stray.chi2) for stray in out] == [(wrong, 0.8, by_most[wrong])]
-    assert out[0].reason == f"{OUT_OF_BOUNDS} (χ² 64.0, at most 16.27)"
+    out = outliers(all_overlap(4), all_pairs(4), chain(POSES), poses, CERTAIN, OPTIONS)
+    assert [(outlier.scan, outlier.overlap, outlier.chi2) for outlier in out] == [
+        (wrong, 0.8, by_most[wrong])
+    ]
+    assert out[0].reason == f"{CONTRADICTS_PRIORS} (χ² 64.0, at most 16.27)"
 
 
-def test_an_odometry_that_slipped_once_puts_no_scan_out_of_bounds():
+def test_an_odometry_that_slipped_once_makes_no_outlier():
     """Between scans 1 and 2 it says 0.4 m too much; all other priors are met."""
     priors = chain(POSES)
     priors.means[1, 0] += 0.4
     by_all, by_most = squared_deviations(priors, POSES, CERTAIN)
     assert by_all.max() > chi2.ppf(0.999, 3)
     assert by_most.max() < 1e-6
-    assert outliers(all_overlap(4), all_pairs(4), priors, POSES, CERTAIN) == []
+    assert outliers(all_overlap(4), all_pairs(4), priors, POSES, CERTAIN, OPTIONS) == []
 
 
 def test_within_the_bounds_a_scan_stays():
     """√16.27 = 4.03 standard deviations."""
     for deviations, count in ((3.9, 0), (4.2, 1)):
         poses = POSES[:2] + np.array([[0.0, 0, 0], [0, deviations * SIGMA, 0]])
-        assert len(outliers(all_overlap(2), all_pairs(2), chain(POSES[:2]), poses, CERTAIN[:2])) == count
+        assert (
+            len(outliers(all_overlap(2), all_pairs(2), chain(POSES[:2]), poses, CERTAIN[:2], OPTIONS))
+            == count
+        )
 
 
 def test_angles_are_compared_as_angles():
@@ -143,8 +150,8 @@ def test_all_scans_that_overlap_none_go_before_any_bound_is_looked_at():
     shares.pairs[[1, 3]] = shares.pairs[:, [1, 3]] = 0.02
     poses = POSES.copy()
     poses[0] += 5
-    out = outliers(shares, all_pairs(4), chain(POSES), poses, CERTAIN)
-    assert [(stray.scan, stray.reason, stray.overlap, stray.chi2) for stray in out] == [
+    out = outliers(shares, all_pairs(4), chain(POSES), poses, CERTAIN, OPTIONS)
+    assert [(outlier.scan, outlier.reason, outlier.overlap, outlier.chi2) for outlier in out] == [
         (1, OVERLAPS_NONE, 0.02, None),
         (3, OVERLAPS_NONE, 0.02, None),
     ]
@@ -152,5 +159,5 @@ def test_all_scans_that_overlap_none_go_before_any_bound_is_looked_at():
 
 def test_a_scan_in_no_pair_is_left_out_though_it_overlaps():
     pairs = np.array([[0, 1], [1, 0], [1, 3], [3, 1]])
-    out = outliers(all_overlap(4), pairs, no_priors(), POSES, CERTAIN)
-    assert [(stray.scan, stray.reason) for stray in out] == [(2, IN_NO_PAIR)]
+    out = outliers(all_overlap(4), pairs, no_priors(), POSES, CERTAIN, OPTIONS)
+    assert [(outlier.scan, outlier.reason) for outlier in out] == [(2, IN_NO_PAIR)]

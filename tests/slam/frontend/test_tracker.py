@@ -22,6 +22,7 @@ from nscan_cli.slam.frontend.tracker import Tracker
 from nscan_cli.slam.frontend.tracking_kernels import CLEARLY
 from tests.ndt.rooms import room
 from tests.ndt.test_grid_growth import assert_same
+from tests.ndt.transforms import gaussian_count
 from tests.simulation.scenes import Scene
 from tests.simulation.world import Builder
 from tests.slam.runs import office_log, part, poses_of, scans_of, sensed, sensed_in, tracked, truth_of
@@ -160,7 +161,7 @@ def test_the_map_holds_no_more_than_the_scans_of_the_window():
     tracker.map.make()
     # 150 scans came and went: what their sums leave behind is rounding.
     assert_same(tracker.map, expected, tolerance=1e-5)
-    assert tracker.map.gaussian_count() < 0.7 * tracked(log)[1].map.gaussian_count()
+    assert gaussian_count(tracker.map) < 0.7 * gaussian_count(tracked(log)[1].map)
 
 
 def jumped(log: LaserLog, row: int, off: tuple[float, float, float]) -> LaserLog:

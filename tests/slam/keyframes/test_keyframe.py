@@ -12,11 +12,11 @@ from hypothesis import strategies as st
 
 from nscan_cli.graph.model import Pairwise
 from nscan_cli.ndt.energy import energy
-from nscan_cli.ndt.hash_grid import OPEN
+from nscan_cli.ndt.hash_grid import WALL_END
+from nscan_cli.ndt.options import GaussianOptions
 from nscan_cli.ndt.transform import Ndt
 from nscan_cli.poses import Array, compose, relative, rotated_information
 from nscan_cli.slam.frontend.tracked_scans import Tracked
-from nscan_cli.slam.gaussian_options import GaussianOptions
 from nscan_cli.slam.keyframes.keyframe import Keyframes, relations_along
 from nscan_cli.slam.keyframes.options import KeyframeOptions
 from tests.ndt.rooms import room
@@ -87,7 +87,7 @@ def test_the_same_scans_become_keyframes_however_many_are_taken_in_at_a_time(siz
 
 def expected(keyframe: Array, *scans: tuple[int, Array]) -> Ndt:
     """The NDT of the scans (seed, pose) seen from a keyframe's pose."""
-    ndt = Ndt.empty(GAUSSIANS.cell, GAUSSIANS.minimum, GAUSSIANS.floor, around=OPEN)
+    ndt = Ndt.empty(GAUSSIANS.cell, GAUSSIANS.minimum, GAUSSIANS.floor, neighbourhood=WALL_END)
     for seed, pose in scans:
         ndt.add(room(seed), relative(pose, keyframe))
     # What was made before the last scan came does not know all its surroundings.

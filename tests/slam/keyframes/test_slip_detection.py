@@ -10,12 +10,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from nscan_cli.ndt.options import GaussianOptions
 from nscan_cli.poses import Array, compose, relative
 from nscan_cli.slam.frontend.options import TrackingOptions
 from nscan_cli.slam.frontend.tracked_scans import TrackedScans
 from nscan_cli.slam.frontend.tracker import Tracker
 from nscan_cli.slam.frontend.tracking_kernels import CLEARLY
-from nscan_cli.slam.gaussian_options import GaussianOptions
 from nscan_cli.slam.keyframes.keyframe import Keyframes
 from nscan_cli.slam.keyframes.options import KeyframeOptions
 from nscan_cli.slam.keyframes.slip_detection import SlipDetector

@@ -9,7 +9,8 @@ import pytest
 
 from nscan_cli.matching.joint.gauge import gauge_directions
 from nscan_cli.matching.joint.joint_energy import JointProblem
-from nscan_cli.matching.joint.joint_match import JointMatch, JointOptions, match_jointly
+from nscan_cli.matching.joint.joint_match import JointMatch, match_jointly
+from nscan_cli.matching.joint.options import JointOptions
 from nscan_cli.poses import Array, compose, relative, wrap
 from nscan_cli.slam.keyframes.keyframe import Keyframe, route_of
 from nscan_cli.slam.local_matching import joint_relations as nearby

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from nscan_cli.graph.model import Pairwise
+from nscan_cli.ndt.options import GaussianOptions
 from nscan_cli.slam.frontend.tracked_scans import Tracked
-from nscan_cli.slam.gaussian_options import GaussianOptions
 from nscan_cli.slam.keyframes.keyframe import Keyframe, Route, extended, route_of
 from nscan_cli.slam.local_matching.coverage import Coverage
 from nscan_cli.slam.local_matching.joint_relations import LocalMatch

@@ -1,0 +1,20 @@
+"""What tests ask of a normal distributions transform."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from nscan_cli.ndt.grid_growth import change_points
+from nscan_cli.ndt.transform import Ndt
+from nscan_cli.poses import Array
+
+
+def gaussian_count(ndt: Ndt) -> int:
+    """The number of Gaussians with enough points; two where a wall has two faces."""
+    return int(np.count_nonzero(ndt.grid.gaussians[:, 2]))
+
+
+def subtract(ndt: Ndt, points: Array, pose: Array) -> None:
+    """Remove points (m, 2) that were added with the same pose (3,)."""
+    ndt.reserve(len(points))
+    ndt.rows = change_points(ndt.grid, ndt.rows, ndt.half, points, pose, -1.0, True)
