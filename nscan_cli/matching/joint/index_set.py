@@ -48,7 +48,7 @@ def index_set(
 
 
 def overlap_shares(scans: ScanSet, poses: Array, stride: int) -> Array:
-    """(n, n) at [i, j] the share of scan j's points in cells where scan i has a Gaussian, of one in `stride`."""
+    """(n, n) at [i, j] the share of scan j's points in cells of scan i's Gaussians, of one in `stride`."""
     shares = np.zeros((len(poses), len(poses)))
     _write_shares(scans, poses, stride, np.empty(3), shares)
     return shares

@@ -142,7 +142,7 @@ def _last_stage(
     """The rest of an approach by `widenings`, and the last stage with the exact Hessian."""
     poses, n = reached.poses, len(reached.poses)
     gradient, hessian = np.empty(3 * n), np.empty((3 * n, 3 * n))
-    value, last, converged, *approached = approach_and_last_stage(
+    value, last, converged, *approached = approach_and_finish(
         problem,
         poses,
         np.array(widenings),
