@@ -3,7 +3,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from nscan_cli.matching.joint import initialisation as placing
+from nscan_cli.matching.joint import initialisation
 from nscan_cli.matching.joint.initialisation import match_or_search
 from nscan_cli.matching.joint.joint_match import match_near_and_far
 from nscan_cli.matching.joint.options import JointOptions
@@ -38,7 +38,7 @@ def test_scans_are_found_where_their_starts_lead_nowhere(five, seed):
 
 
 def test_a_good_start_needs_no_search(five, monkeypatch):
-    monkeypatch.setattr(placing, "Placing", None)
+    monkeypatch.setattr(initialisation, "Initialisation", None)
     joint = five.joint(scale=2 * OPTIONS.scale / 5)
     match, _ = match_or_search(joint, five.points, near(five.truth, 1), OPTIONS, JointOptions())
     assert not match.searched

@@ -92,7 +92,7 @@ def test_scans_too_far_to_meet_any_are_left_out_before_the_match(four, monkeypat
         laid_out.append(parts)
         return scan_set(*parts)
 
-    monkeypatch.setattr(nscan_module, "lay_out", counted)
+    monkeypatch.setattr(nscan_module, "scan_set", counted)
     match, left_out = nscan_match(four.points, away, none, 1, OPTIONS, FIXED)
     assert match is not None
     assert match.kept == (0, 2)
