@@ -32,50 +32,49 @@ commands by `python -m tests.reference docs/reference.md`; do not edit it.
 """
 GENERAL = f"""\
 `nscan-cli COMMAND [OPTIONS] ARGUMENTS`, or `python -m nscan_cli`. Options may stand before and after
-arguments. A log is found to be of its form from its content, never from its name:
+arguments. The format of a log is detected from its content, never from its name:
 {readable()}. `-` is standard input or output.
 
 Scans are numbered from 0 in order of time, and have the same numbers in every command. Lengths are metres,
 times seconds, angles radians in files and degrees on the command line and in tables. A pose is x, y and the
 angle from the x axis to the left.
 
-What people read goes to standard error, results go to files or to standard output; of `info` and `evaluate`
-the tables are the result. On a terminal a bar shows scans done, scans a second, keyframes, loops closed and
-the time left, and then that the graph is refined; elsewhere nothing does. An error is one line that names the
-file, the place and what helps; `-vv` adds where it arose.
+Messages go to standard error, results to files or to standard output; the tables of `info` and `evaluate` are
+results. On a terminal a progress bar shows scans done, scans per second, keyframes, closed loops and the time
+left. An error is one line with the file, the place and a remedy; `-vv` adds the traceback.
 """
 CONFIG = """\
-An option's value is taken from the command line, else from the environment, else from the TOML file that
-`--config` names, else from the default. In the file, an option has its long name without dashes. Keys at the
-top hold for every command that has such an option, those in a table of a command's name for that one alone.
-What no command knows is an error, and so is a key at the top that means another thing in another command,
-such as `relations`. `--dump-config` writes the options in force in this form.
+The value of an option comes from the command line, else from the environment, else from the TOML file of
+`--config`, else it is the default. Keys in the file are long names of options without dashes. Keys at the top
+apply to every command with such an option; keys in a table with a command's name apply to that command only.
+Unknown keys are errors, and so are keys at the top with another meaning in each command, such as `relations`.
+`--dump-config` prints the options in force in this form.
 
 ```toml
 max-range = 30.0
 mount = [0.1, 0, 0]      # x, y in m, degrees
 
 [slam]
-relations = "both"       # another thing than in [evaluate]
+relations = "both"       # has another meaning in [evaluate]
 no-loops = true
 ```
 """
 MANIFEST = """\
-The manifest of `nightly` has a table for every log. All keys but `name` may be left out; without `path`, a
-log of that name and a usual ending is looked for, or the file that `source` ends with. Paths are relative to
-the manifest, or to `--data`. A log that is not there has failed, unless it is optional.
+The manifest of `nightly` has a table for every log. All keys except `name` are optional. Without `path`, a
+log with that name and a usual suffix is looked for, or the file name of `source`. Paths are relative to the
+manifest, or to `--data`. A missing log counts as failed, unless it is optional.
 
 ```toml
 [[log]]
 name = "intel"
 path = "intel.log.gz"                      # or also = ["intel-lab"], other names to look for
-optional = true                            # left out where it is not there, or unmeasured
+optional = true                            # skipped if missing; not evaluated without reference
 relations = "intel.relations"              # or reference = "intel.tum", or a log with TRUEPOS
 max_translation = 0.02                     # m; a larger error fails the log
 max_rotation = 0.4                         # degrees
 published = { "Cartographer" = 0.0229 }    # m, shown beside ours
 parameters = { end = 600, max-scans = 8 }  # options of slam and of reading, by their long names
-source = "http://example.org/intel.clf"    # where to get it, said when it is not there
+source = "http://example.org/intel.clf"    # download address, printed if it is missing
 relations_source = "http://example.org/intel.relations"
 sha256 = "9f86d081884c7d659a2feaa0c55ad015a3bf4f1b2b0b822cd15d6c15b0f00a08"  # of the log that bounds are for
 ```
@@ -84,9 +83,9 @@ sha256 = "9f86d081884c7d659a2feaa0c55ad015a3bf4f1b2b0b822cd15d6c15b0f00a08"  # o
 address) are for the report.
 """
 FILES = """\
-Files appear whole or not at all: they are written under a name that begins with `.nscan-cli.` in the same
-folder, and renamed. Folders are not made, but for the one of `nightly`. What a killed run has left is cleared
-by the next.
+Files are written atomically: first under a name that begins with `.nscan-cli.` in the same folder, then
+renamed. Folders are not created, except that of `nightly`. The next run removes temporary files of a killed
+run.
 """
 WRITTEN = (
     ("GRAPH.json", "`slam -o`", "the pose graph, described by the JSON Schema that it names; read by "
@@ -105,51 +104,48 @@ WRITTEN = (
     ("FILE", "`slam --depfile`", "`outputs: inputs` for `include` in a Makefile"),
     ("FOLDER", "`nightly -o`", "report.html, report.json, and for each log a folder with graph, trajectory, "
      "map and history"),
-    ("~/.cache/nscan-cli", "all that match", "compiled kernels; may be deleted, but compiled anew they may "
-     "round otherwise"),
+    ("~/.cache/nscan-cli", "all that match", "compiled kernels; can be deleted, but kernels that are "
+     "compiled again can round differently"),
 )  # fmt: skip
 RESULTS = """\
-What `match` and `nscan` write, one key a line, in m and rad. A matrix is its upper triangle, row by row: a
-covariance of x, y and the angle is `[xx, xy, xθ, yy, yθ, θθ]`.
+The keys of the results of `match` and `nscan`, in m and rad. A matrix is given by its upper triangle, row by
+row: a covariance of x, y and the angle is `[xx, xy, xθ, yy, yθ, θθ]`.
 """
 KEYS = (
     ("format, version, units, provenance", "both",
-     "what this is, and the logs and parameters that it was made from"),
+     "type and version of the document, and the logs and parameters that it was made from"),
     ("reference, scan", "`match`", "the numbers of the scans I and J"),
-    ("initial", "`match`", "the pose that the match began with"),
+    ("initial", "`match`", "the initial pose"),
     ("pose", "`match`", "of J in the frame of I"),
     ("relation", "`nscan`",
-     "as in a graph, with `scans` in place of `nodes`: their `poses` in one local frame, `hessian` with "
-     "the gauge in it, and `fixed`, the place among them of the scan that stays"),
+     "as in a graph, with `scans` instead of `nodes`: `poses` in a local frame, `hessian` with the gauge, "
+     "and `fixed`, the index of the fixed scan"),
     ("covariance", "both",
-     "of the pose; of `nscan` that of the other scans' poses, in their order, relative to the fixed one; "
-     "null where the Hessian leaves them open"),
+     "of the pose; for `nscan` of the other scans' poses, in their order, relative to the fixed scan; null "
+     "if the Hessian is singular"),
     ("energy", "both", "E of eqs. (3) and (4), neither scaled nor with priors"),
-    ("gradient_norm", "both", "of what is minimised: E scaled to a negative log likelihood, with priors"),
-    ("hessian, eigenvalues", "`match`", "of the same, at the pose"),
-    ("decrement", "both", "the Newton step that is left, in standard deviations"),
+    ("gradient_norm", "both", "of the objective: E scaled to a negative log likelihood, with priors"),
+    ("hessian, eigenvalues", "`match`", "of the objective, at the pose"),
+    ("decrement", "both", "the remaining Newton step, in standard deviations"),
     ("iterations, evaluations", "both",
-     "of all stages, and of all ways that were tried; `max_iterations` of the parameters holds for one "
-     "stage"),
+     "of all stages and all attempts; the parameter `max_iterations` is for one stage"),
     ("unsettled_stages", "both",
-     "stages before the last that did not settle within their iterations: the match may have converged at a "
-     "wrong place"),
-    ("searched", "`nscan`", "whether the scans were placed by search"),
+     "number of stages before the last that did not converge within their iterations: the result may be a "
+     "wrong local minimum"),
+    ("searched", "`nscan`", "whether the initial poses come from a search"),
     ("converged, reason", "both",
-     "whether the last stage, that of the energy itself, ended at a minimum within its iterations, and if "
-     "not, why"),
-    ("pairs", "`nscan`", "which scans were matched with each other"),
-    ("overlap", "both", "the share of a scan's points that lie on the other scan, or on another"),
+     "whether the last stage, of the energy itself, reached a minimum, and if not, why"),
+    ("pairs", "`nscan`", "the pairs of scans that were matched"),
+    ("overlap", "both", "the fraction of a scan's points that lie on the other scan, or on any other"),
     ("weakest", "both",
-     "the direction (rad) in which the translation is known least, and the standard deviation (m) along "
-     "it, null where nothing holds it; of `nscan` for each scan, by the scans alone"),
+     "the direction (rad) in which the translation is least certain, and the standard deviation (m) along "
+     "it, null if it is undetermined; for `nscan` of each scan, without priors"),
     ("left_out", "`nscan`",
-     "the scans that are not in the relation, each with `reason`, `overlap`, and its χ² against its priors "
-     "(`chi2`)"),
+     "the scans that are not in the relation, with `reason`, `overlap`, and χ² against priors (`chi2`)"),
 )  # fmt: skip
 COMPLETION = """\
-Commands, options, choices and file names are completed by the shell after one of these lines, in the file
-that the comment names (bash from 4.4):
+These lines enable completion of commands, options, choices and file names; put one into the file in its
+comment (bash from 4.4):
 
 ```sh
 eval "$(_NSCAN_CLI_COMPLETE=bash_source nscan-cli)"    # ~/.bashrc

@@ -1,6 +1,6 @@
-"""Completion: of any names of files, and of `--option=value`, which zsh and fish take as one word.
+"""Shell completion of file names that are not UTF-8, and of `--option=value` in zsh and fish.
 
-click takes that as its value alone.
+zsh and fish take `--option=value` as one word; click completes only the value.
 """
 
 from __future__ import annotations
@@ -21,26 +21,26 @@ from click.shell_completion import (
 
 
 class EncodedNames(str):
-    """Text that becomes the bytes that the names in it have."""
+    """Text that is encoded as file names are."""
 
     def encode(self, *_encoding: str) -> bytes:
-        """As click does it for the shell; names that are no UTF-8 would stop it."""
+        """Encode for the shell; UTF-8, which click asks for, fails for some names."""
         return super().encode(sys.getfilesystemencoding(), sys.getfilesystemencodeerrors())
 
 
 class AnyNameComplete(ShellComplete):
-    """What goes to the shell may be no UTF-8."""
+    """Completion with names that need not be UTF-8."""
 
     def complete(self) -> str:
-        """The lines that the shell reads."""
+        """The completions as lines for the shell."""
         return EncodedNames(super().complete())
 
 
 class WholeWordComplete(AnyNameComplete):
-    """What completes a value stands behind its option again."""
+    """Completion of `--option=value` as one word."""
 
     def get_completions(self, args: list[str], incomplete: str) -> list[CompletionItem[str]]:
-        """How the word `incomplete`, which follows `args`, may go on."""
+        """The completions of the word `incomplete`, which follows `args`."""
         option, joined, value = incomplete.partition("=")
         found = super().get_completions(args, incomplete)
         if not joined or not option.startswith("--"):
@@ -53,7 +53,7 @@ class WholeWordComplete(AnyNameComplete):
 
 
 def _expanded_values(item: CompletionItem[str], value: str) -> Iterator[str]:
-    """Those that an item stands for: shells look for files by a whole word, and would find none."""
+    """The values of an item. File names are listed here, since shells would look for the whole word."""
     if item.type == "plain":
         yield item.value
         return
@@ -74,7 +74,7 @@ class FishCompletion(WholeWordComplete, FishComplete):
 
 
 def add_completions() -> None:
-    """Let click complete so."""
+    """Register the classes with click."""
     add_completion_class(BashCompletion)
     add_completion_class(ZshCompletion)
     add_completion_class(FishCompletion)

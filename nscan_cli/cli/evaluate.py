@@ -1,4 +1,4 @@
-"""`nscan-cli evaluate`: a result against reference relations or a reference trajectory."""
+"""`nscan-cli evaluate`: errors of a result against reference relations or a reference trajectory."""
 
 from __future__ import annotations
 
@@ -18,16 +18,19 @@ if TYPE_CHECKING:
     from nscan_cli.evaluation.evaluation_report import Evaluation
 
 DEFAULT_DRAWN = 10
-"""The worst relations that a picture shows where --worst does not say."""
+"""Number of worst relations in a picture without --worst."""
 
 
 @subcommand(
     "evaluate",
-    ("nscan-cli evaluate intel.json --relations intel.relations --worst 5", "on a benchmark's relations"),
+    (
+        "nscan-cli evaluate intel.json --relations intel.relations --worst 5",
+        "against relations of a benchmark",
+    ),
     ("nscan-cli evaluate robot.json --reference truth.tum --plot errors.png", "against a trajectory"),
     (
         "nscan-cli evaluate robot.json --reference robot.log.gz --max-translation 0.05",
-        "as a test: exit code 3",
+        "as a test: exit code 3 if it fails",
     ),
 )
 @argument("result", type=PATH, tells="A graph, a TUM trajectory, or a CARMEN log with corrected poses; - is "
@@ -40,14 +43,19 @@ DEFAULT_DRAWN = 10
     help="A trajectory (TUM, or EuRoC's CSV), a graph, a log with TRUEPOS, or a recording.",
 )
 @option("--reference-topic", metavar="TOPIC",
-        help="Topic of the poses in the recording --reference, such as /vicon/robot/pose; of transforms "
-        "/tf:PARENT.CHILD.")  # fmt: skip
+        help="Topic of the poses in a recording given as --reference, such as /vicon/robot/pose, or "
+        "/tf:PARENT.CHILD for transforms.")  # fmt: skip
 @option("--worst", type=click.IntRange(0), metavar="N", help="List the N worst relations.")
 @option("--max-translation", type=click.FloatRange(0), metavar="M",
-        help="Exit with 3 when the mean on relations, or the RMSE of the ATE, is above.")  # fmt: skip
-@option("--max-rotation", type=click.FloatRange(0), metavar="DEG", help="The same for the rotation.")
+        help="Exit with code 3 if the mean on relations, or the RMSE of the ATE, is larger.")  # fmt: skip
+@option(
+    "--max-rotation",
+    type=click.FloatRange(0),
+    metavar="DEG",
+    help="Exit with code 3 if the rotational error is larger.",
+)
 @option("--json", "as_json", is_flag=True, help="Print one JSON object (m, s, degrees).")
-@plot_option("the worst relations (10, or N) over the trajectory, or the error against the reference")
+@plot_option("the worst relations (10, or N) over the trajectory, or the error along the reference")
 @reading_options
 @common_options
 def command(
@@ -64,22 +72,20 @@ def command(
     quiet: bool,
     **_verbosity: int,
 ) -> None:
-    """Measure RESULT against reference relations or a reference trajectory.
+    """Compare RESULT with reference relations or a reference trajectory.
 
-    With --relations, the relative poses of pairs of stamps are compared, and no common frame is
-    needed: translational and rotational error, mean ± sd, median, mean square and maximum. With
-    --reference, the trajectory is aligned first: absolute error (ATE), and relative error (RPE) per
-    metre of path. The options that say how to read a log hold where RESULT or the reference is one.
+    With --relations, relative poses of pairs of stamps are compared, without a common frame: translational
+    and rotational error, mean ± sd, median, mean square and maximum. With --reference, the trajectory is
+    aligned first, then the absolute error (ATE) and the relative error (RPE) per metre of path are computed.
+    The options of reading a log apply if RESULT or the reference is a log.
 
-    What the two show of each other beside the errors is noted: clocks that differ, another unit, turned
-    frames, a reference of another point of the robot or out of the plane, two runs in one file.
+    Notes report other differences: clocks, units, turned frames, a reference at another point of the robot or
+    out of the plane, two runs in one file.
     """
     if relations is None and reference is None:
-        raise WrongUsageError("nothing to measure against; give --relations or --reference")
+        raise WrongUsageError("there is no reference; give --relations or --reference")
     if reference is None and reference_topic is not None:
-        raise WrongUsageError(
-            "--reference-topic is of a recording that is the reference; give --reference too"
-        )
+        raise WrongUsageError("--reference-topic needs a recording as the reference; give --reference, too")
     if [result, relations, reference].count("-") > 1:
         raise WrongUsageError("standard input (-) can be one input only; give the others by their path")
     check_plot(plot, None, [result, relations, reference])

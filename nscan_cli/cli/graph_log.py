@@ -1,4 +1,4 @@
-"""The log of a graph: found through it, checked to be the one, and read as slam has read it."""
+"""The log of a graph: finds it, checks that it is the right one, and reads it with the options of slam."""
 
 from __future__ import annotations
 
@@ -31,9 +31,10 @@ GRAPH_LOG_REMEDY = "give the log that the graph was made from"
 def read_graph_log(
     graph_file: str, graph: Graph, paths: Sequence[str], reading: ReadingOptions
 ) -> tuple[LaserLog, NDArray[np.int64], NDArray[np.int64]]:
-    """The graph's log at `paths`; the nodes (N,) whose scans `reading` leaves in, and the rows (N,) of these.
+    """Read the graph's log at `paths`.
 
-    Raises InputMissingError when it cannot be read, InputDataError when it is another log than the graph's.
+    Returns the log, the nodes (N,) whose scans `reading` includes, and their rows (N,) in the log.
+    Raises InputMissingError if it cannot be read, InputDataError if it is not the graph's log.
     """
     import numpy as np
 
@@ -59,14 +60,14 @@ def read_graph_log(
 
 
 def find_log(graph_file: str, graph: Graph) -> tuple[str, ...]:
-    """The paths of the graph's log: beside the graph or in the current folder, or in a folder that is there.
+    """Find the graph's log: beside the graph, in the current folder, or in a folder in one of them.
 
-    Raises InputMissingError.
+    Raises InputMissingError if it is not found.
     """
     inputs = _graph_inputs(graph)
     if not inputs:
         raise InputMissingError(f"{graph_file}: does not name its log; give its path as LOG")
-    # What stands beside a database is found by its name.
+    # Journals of a database are found by the database's name.
     bases = [source["name"] for source in inputs]
     sizes = {
         Path(source["name"]).name: source["bytes"]
@@ -91,7 +92,7 @@ def find_log(graph_file: str, graph: Graph) -> tuple[str, ...]:
 
 
 def _file_named(name: str, folder: Path) -> Path | None:
-    """The file in the folder that a graph calls so, also one whose name is no UTF-8; None without one."""
+    """The file in the folder with this name in the graph, which may not be UTF-8; None if there is none."""
     path = folder / path_of_name(name)
     if path.is_file():
         return path
@@ -103,7 +104,7 @@ def _file_named(name: str, folder: Path) -> Path | None:
 
 
 def _folders(folder: Path) -> list[Path]:
-    """The folders in a folder, by name; none where it cannot be read."""
+    """The folders in a folder, sorted; none if it cannot be read."""
     try:
         return sorted(path for path in folder.iterdir() if path.is_dir())
     except OSError:
@@ -115,15 +116,15 @@ def _has_size(path: Path, size: int) -> bool:
 
 
 def _graph_inputs(graph: Graph) -> list[dict[str, Any]]:
-    """What the graph says of the files that it was made from."""
+    """The records of the files that the graph was made from."""
     inputs: list[dict[str, Any]] = graph.provenance.get("inputs") or []
     return inputs
 
 
 def _difference(inputs: Sequence[dict[str, Any]], source: Source) -> str:
-    """How the files of a log differ from those that a graph was made from."""
+    """The difference between the files of a log and those of the graph, for a message."""
     if len(inputs) == 1 and not source.parts:
-        return "its SHA-256 is another"
+        return "its SHA-256 differs"
     there = {file.sha256 for file in source.files}
     missing = [file["name"] for file in inputs if file["sha256"] not in there]
     if missing:
@@ -132,10 +133,10 @@ def _difference(inputs: Sequence[dict[str, Any]], source: Source) -> str:
 
 
 def _options_of_slam(reading: ReadingOptions, graph_file: str, provenance: dict[str, Any]) -> ReadingOptions:
-    """The options that the graph's log was read with, where `reading` does not say otherwise.
+    """`reading`, with the options that slam has read the graph's log with in place of defaults.
 
-    But which scans there are, the graph itself says; `reading` may leave out more.
-    Raises InputDataError where the graph has options that the log cannot have been read with.
+    Except start, end and every: the graph itself has its scans.
+    Raises InputDataError if the graph has an option of the wrong type.
     """
     choices = {"start", "end", "every"}
     tracked = provenance.get("parameters", {}).get("reading", {})
@@ -147,13 +148,13 @@ def _options_of_slam(reading: ReadingOptions, graph_file: str, provenance: dict[
             value = tracked[option.name]
             if not _is_value_of(value, str(option.type)):
                 problem = f"provenance.parameters.reading: {option.name} is {str(value)[:40]!r}"
-                raise InputDataError(graph_file, problem, "mend it, or write the graph again")
+                raise InputDataError(graph_file, problem, "correct it, or create the graph again")
             kept[option.name] = tuple(value) if isinstance(value, list) else value
     return dataclasses.replace(reading, **kept)
 
 
 def _is_value_of(value: Any, kind: str) -> bool:
-    """Whether a value of the graph is one for a field of ReadingOptions with this annotation."""
+    """Whether a value of the graph fits a field of ReadingOptions with this annotation."""
     if value is None:
         return "None" in kind
     if isinstance(value, list):

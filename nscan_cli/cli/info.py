@@ -1,4 +1,4 @@
-"""`nscan-cli info`: what is in a log, and what the other commands will use of it."""
+"""`nscan-cli info`: what a log contains, and what the other commands use of it."""
 
 from __future__ import annotations
 
@@ -22,20 +22,20 @@ if TYPE_CHECKING:
 
 @subcommand(
     "info",
-    ("nscan-cli info robot.log.gz", "what is in a log"),
-    ("nscan-cli info --json robot.mcap | jq .scans", "one fact of it, for a script"),
+    ("nscan-cli info robot.log.gz", "what a log contains"),
+    ("nscan-cli info --json robot.mcap | jq .scans", "one value, for a script"),
 )
 @log_argument()
 @option("--json", "as_json", is_flag=True, help="Print one JSON object (m, s, degrees).")
 @reading_options
 @common_options
 def command(log: tuple[str, ...], as_json: bool, reading: ReadingOptions, **_common: Any) -> None:
-    """Tell what is in LOG, and what the other commands will use of it.
+    """Show what LOG contains, and what the other commands use of it.
 
-    These are scans, laser, mounting, odometry, what stands for no return, and what was skipped and why.
-    The reading options change what the other commands see in the same way. Where the other commands need an
-    option to choose a laser or odometry, all that there are are listed. What they refuse, a laser or a log
-    of which no reading counts, is listed too, and then refused.
+    This is the scans, the laser and its mounting, odometry, the value for no return, and skipped records with
+    reasons. The reading options have the same effect as in the other commands. If the other commands need an
+    option to choose a laser or odometry, all choices are listed. If they refuse the log, info prints what it
+    has found, then fails with the same error.
     """
     survey = survey_of(log, reading)
     facts = survey.without_unchosen(facts_of(survey.log) | survey.facts(reading))
@@ -49,7 +49,7 @@ def command(log: tuple[str, ...], as_json: bool, reading: ReadingOptions, **_com
 
 
 def facts_of(log: LaserLog) -> dict[str, Any]:
-    """What `info --json` prints; lengths in m, times in s, angles in degrees, keys always the same."""
+    """The object that `info --json` prints, in m, s and degrees. Its keys are always the same."""
     import numpy as np
 
     from nscan_cli.logs.field_of_view import beams_lost, field_of_view
@@ -106,7 +106,7 @@ def facts_of(log: LaserLog) -> dict[str, Any]:
 
 
 def facts_table(facts: dict[str, Any]) -> str:
-    """The facts as aligned lines, one a fact; those that may repeat as several lines."""
+    """The facts as a table; a fact with several values has several lines."""
     of_laser = [] if facts["laser"] is None else _of_laser(facts)
     return summary_table([*_of_file(facts), *of_laser, *_of_whole(facts)])
 
@@ -138,7 +138,7 @@ def _of_laser(facts: dict[str, Any]) -> list[Row]:
                            f"{_interval(finest, coarsest, '°')} a beam"]),
         ("range limits", [f"{low:g} m to {high:g} m",
                           f"lower: {used['range_min']}", f"upper: {used['range_max']}"]),
-        ("no return", ["no such value" if no_return is None else f"{no_return:g} m and above"]),
+        ("no return", ["no special value" if no_return is None else f"{no_return:g} m and above"]),
         ("beams lost", [f"{facts['beams_without_return']:.1%} without return, "
                         f"{facts['beams_unusable']:.1%} unusable",
                         *(f"{count:,} {why}" for why, count in facts["beams_lost"].items())]),
@@ -165,14 +165,14 @@ def _of_whole(facts: dict[str, Any]) -> list[Row]:
 
 
 def _odometry_lines(odometries: list[dict[str, Any]]) -> list[str]:
-    """All odometries, where there are several."""
+    """A line for each odometry, if there are several."""
     if len(odometries) < 2:
         return []
     return [f"{one['name']} ({one['type']}): {counted(one['records'], 'record')}" for one in odometries]
 
 
 def _mounting_line(x: float, y: float, degrees: float) -> str:
-    """A laser's place on the robot (m)."""
+    """The pose of a laser on the robot in words (m, degrees)."""
     ahead, left = "ahead" if x >= 0 else "behind", "left" if y >= 0 else "right"
     return f"{abs(x):g} m {ahead}, {abs(y):g} m to the {left}, turned by {degrees:g}°"
 

@@ -1,4 +1,4 @@
-"""What `nscan` knows before it matches: poses to start from, and priors, from the log or from files."""
+"""Initial poses and priors of `nscan`, from the log or from files."""
 
 from __future__ import annotations
 
@@ -31,19 +31,19 @@ LOG_REMEDY = "give the graph that was made from this log"
 
 @dataclass(frozen=True)
 class PoseFile:
-    """A graph or a trajectory, and the file that it comes from."""
+    """A graph or a trajectory, and its file."""
 
     content: Graph | Trajectory
     source: Source
     name: str
-    """The file as messages call it."""
+    """The name of the file in messages."""
 
 
 def read_pose_file(path: str, log: LaserLog) -> PoseFile:
-    """The graph or TUM trajectory at `path`, told apart by content.
+    """Read the graph or TUM trajectory at `path`; its content decides which.
 
-    Raises InputMissingError when it cannot be read, InputDataError when it is neither, or the graph of
-    another log.
+    Raises InputMissingError if it cannot be read, InputDataError if it is neither or the graph of another
+    log.
     """
     data, name = read_bytes(path, GRAPH), label(path)
     source = Source(base_name(path), hashlib.sha256(data).hexdigest(), len(data))
@@ -58,7 +58,7 @@ def read_pose_file(path: str, log: LaserLog) -> PoseFile:
 
 
 def initial_poses(knowledge: PoseFile, log: LaserLog, rows: Sequence[int]) -> Array:
-    """The poses (n, 3) of the scans in `rows`. Raises InputDataError naming the first without one."""
+    """The poses (n, 3) of the scans in `rows`. Raises InputDataError if one has no pose."""
     content = knowledge.content
     if isinstance(content, Graph):
         numbers = log.numbers[rows]
@@ -75,12 +75,12 @@ def initial_poses(knowledge: PoseFile, log: LaserLog, rows: Sequence[int]) -> Ar
 
 
 def no_priors_among(_kept: Sequence[int]) -> Priors:
-    """No priors, whichever the scans are."""
+    """No priors for any scans."""
     return no_priors()
 
 
 def odometry_priors(odometry: Array, numbers: Sequence[int], model: MotionModel) -> PriorsAmong:
-    """The odometry (n, 3) of the scans `numbers` as priors from each scan to the next in time."""
+    """Priors from the odometry (n, 3) of the scans `numbers`, from each scan to the next in time."""
 
     def among(kept: Sequence[int]) -> Priors:
         order = sorted(range(len(kept)), key=lambda at: numbers[kept[at]])
@@ -92,10 +92,10 @@ def odometry_priors(odometry: Array, numbers: Sequence[int], model: MotionModel)
 
 
 def graph_priors(graph: Graph, numbers: Sequence[int]) -> PriorsAmong:
-    """What the graph knows of the scans `numbers` as priors (paper, V, step 3).
+    """Priors for the scans `numbers` from a graph (paper, V, step 3).
 
-    These are its pairwise relations among them; and where these leave parts of them apart that other
-    relations connect, the relative poses of scans that are next in time, as all relations give them.
+    These are its pairwise relations among the scans. Groups of scans that only other relations connect get
+    the marginal relative pose of two scans that are next in time.
     """
     nodes = {int(scan): node for node, scan in enumerate(graph.scans)}
     between = RelativePoses(graph, [nodes[number] for number in numbers if number in nodes])
@@ -116,7 +116,7 @@ def graph_priors(graph: Graph, numbers: Sequence[int]) -> PriorsAmong:
 def _connecting_relations(
     between: RelativePoses, nodes: list[int], joined: list[tuple[int, int]]
 ) -> list[Pairwise]:
-    """The relations that connect what the graph connects, but those that are `joined` do not yet."""
+    """Marginal relations between the groups of nodes that the pairs in `joined` leave unconnected."""
     group = {node: node for node in nodes}
 
     def join(a: int, b: int) -> None:

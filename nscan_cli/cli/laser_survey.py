@@ -1,4 +1,4 @@
-"""What `info` finds out beyond the laser that is used: the others, and what an option has to choose."""
+"""What `info` reports beyond the laser in use: the other lasers, and choices that need an option."""
 
 from __future__ import annotations
 
@@ -20,28 +20,28 @@ if TYPE_CHECKING:
 ZERO_MOUNT = (0.0, 0.0, 0.0)
 LASER_INDEPENDENT = ("file", "sha256", "bytes", "files", "format", "odometry", "used", "records", "truth",
                  "warnings", "lasers", "odometries", "corrected")  # fmt: skip
-"""Facts that hold also where no laser is chosen."""
+"""Facts that are known if no laser is chosen."""
 
 
 class Survey(NamedTuple):
-    """A log with all that is in it."""
+    """A log and all lasers and odometries in it."""
 
     log: LaserLog
-    """Of the laser that is used; of the first one, where none is chosen."""
+    """The log of the laser in use, or of the first one if none is chosen."""
     lasers: list[dict[str, Any]]
-    """What `info --json` says of each laser."""
+    """The facts of each laser for `info --json`."""
     choices: dict[str, OpenChoiceError]
-    """What an option has to choose, by "laser" and "odometry"."""
+    """Choices that need an option, by "laser" and "odometry"."""
     unmounted: MountingError | None
-    """Why the other commands do not take the laser as it is mounted."""
+    """Why the other commands refuse the mounting of the laser, if they do."""
 
     @property
     def refused(self) -> InputDataError | None:
-        """Why the other commands do not take what is used: its mounting, or that no reading counts."""
+        """Why the other commands refuse the log: the mounting, or no usable reading. None if they do not."""
         return self.unmounted or (None if "laser" in self.choices else self.log.report.unusable)
 
     def facts(self, reading: ReadingOptions) -> dict[str, Any]:
-        """What there is beside the log of one laser, and what is to be said of it."""
+        """The facts that replace those of the log of one laser."""
         report = self.log.report
         used = dict(report.used)
         if report.corrected and reading.odometry and not reading.allow_corrected:
@@ -60,7 +60,7 @@ class Survey(NamedTuple):
         }
 
     def without_unchosen(self, facts: dict[str, Any]) -> dict[str, Any]:
-        """The facts of the log, null where they would be of a laser that nobody chose, or of no mounting."""
+        """The facts, with null for what depends on a choice of laser or on a mounting that is not there."""
         unknown = {"mounting"} if self.unmounted is not None else set()
         if "laser" in self.choices:
             unknown = facts.keys() - set(LASER_INDEPENDENT)
@@ -68,10 +68,10 @@ class Survey(NamedTuple):
 
 
 def survey_of(paths: Sequence[str], reading: ReadingOptions) -> Survey:
-    """What is in the log at the `paths`, whatever the user has left open.
+    """Read the log at `paths`, also if choices are open or the other commands refuse it.
 
-    Raises what read_log does but for choices, corrected poses, lasers that are not level or not still, and
-    readings of which none counts.
+    Raises what read_log raises, except for open choices, corrected poses, mountings that are refused, and
+    logs without usable readings.
     """
     from nscan_cli.logs.choices import OpenChoiceError
     from nscan_cli.logs.recordings.mounting import MountingError
@@ -97,7 +97,7 @@ def survey_of(paths: Sequence[str], reading: ReadingOptions) -> Survey:
             unmounted = error
             options = dataclasses.replace(options, mount=ZERO_MOUNT)
         except InputDataError:
-            # Where none is chosen, any laser that can be read tells of the whole log.
+            # If none is chosen, any laser that can be read gives the facts of the whole log.
             if not others:
                 raise
             options = dataclasses.replace(options, **others.pop(0))
@@ -112,13 +112,13 @@ def survey_of(paths: Sequence[str], reading: ReadingOptions) -> Survey:
 
 
 def rate_of(log: LaserLog) -> float | None:
-    """Scans a second; None where they take no time."""
+    """Scans per second; None if the log has no duration."""
     duration = float(log.times[-1] - log.times[0])
     return round((len(log) - 1) / duration, 3) if duration > 0 else None
 
 
 def laser_line(laser: dict[str, Any]) -> str:
-    """What `info` says of a laser."""
+    """A laser in the table of `info`."""
     kind = "" if laser["type"] == laser["name"] else f" ({laser['type']})"
     said = counted(laser["records"], "record")
     if laser["scans"] is not None:
@@ -130,7 +130,7 @@ def laser_line(laser: dict[str, Any]) -> str:
 def _laser_facts(
     laser: Device, option: str, chosen: LaserLog | None, read: Read, alone: ReadingOptions
 ) -> dict[str, Any]:
-    """What `info --json` says of a laser: of the log that is read already, or of one that is read for it."""
+    """The facts of a laser for `info --json`; the log is read again unless it is the `chosen` one."""
     from nscan_cli.logs.recordings.mounting import MountingError
 
     facts = {**_device_facts(laser), "scans": None, "beams": None, "rate": None, "problem": None}
@@ -154,7 +154,7 @@ def _device_facts(device: Device) -> dict[str, Any]:
 
 
 def _reader(paths: Sequence[str]) -> Read:
-    """What reads the log again with other options; standard input is read once."""
+    """A function that reads the log with other options; standard input is read only once."""
     from nscan_cli.files.inputs import STANDARD_INPUT, read_bytes
     from nscan_cli.logs.load import log_from, read_log
 

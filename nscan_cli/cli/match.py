@@ -1,4 +1,4 @@
-"""`nscan-cli match`: the relative pose of two scans, and what is known about it."""
+"""`nscan-cli match`: the relative pose of two scans, with its covariance."""
 
 from __future__ import annotations
 
@@ -27,12 +27,12 @@ MATCH_FORMAT = "nscan-match"
 
 
 class StartType(click.ParamType[Any]):
-    """odometry, identity or X,Y,DEG; kept as it was typed."""
+    """odometry, identity or X,Y,DEG; kept as typed."""
 
     name = "start"
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
-        """Check the form; a wrong one is a usage error."""
+        """Check the form; another form is a usage error."""
         if value not in ("odometry", "identity"):
             try:
                 PoseType().convert(value, param, ctx)
@@ -46,26 +46,33 @@ class StartType(click.ParamType[Any]):
     ("nscan-cli match robot.log.gz --reference 100 --scan 105", "scan 105 in the frame of scan 100"),
     (
         "nscan-cli match robot.log.gz --reference 100 --scan 105 --prior none -o match.json --plot match.png",
-        "by the scans alone, with a picture",
+        "without odometry as a prior, with a picture",
     ),
 )
 @log_argument()
-@option("--reference", type=click.IntRange(0), required=True, metavar="I", help="The scan that stays.")
-@option("--scan", type=click.IntRange(0), required=True, metavar="J", help="The scan that moves.")
+@option(
+    "--reference",
+    type=click.IntRange(0),
+    required=True,
+    metavar="I",
+    help="Number of the reference scan, which stays fixed.",
+)
+@option(
+    "--scan", type=click.IntRange(0), required=True, metavar="J", help="Number of the scan that is moved."
+)
 @option(
     "--initial",
     type=StartType(),
     metavar="odometry|identity|X,Y,DEG",
-    help="Pose of J in the frame of I to start from (m, degrees); if not given, that of the odometry where "
-    "the log has it, or else identity.",
+    help="Initial pose of J in the frame of I (m, degrees). Default: odometry, or identity if there is none.",
 )
 @option(
     "--prior",
     type=click.Choice(["odometry", "none"]),
-    help="What is known before matching; if not given, the odometry where the log has it.",
+    help="Prior of the relative pose. Default: odometry, or none if there is none.",
 )
 @result_option
-@plot_option("both scans before and after, with the uncertainty")
+@plot_option("both scans before and after the match, with the uncertainty")
 @reading_options
 @common_options
 def command(
@@ -80,10 +87,11 @@ def command(
     quiet: bool,
     **_verbosity: int,
 ) -> None:
-    """Match two scans of LOG (NDT), and say how well their relative pose is known.
+    """Match two scans of LOG (NDT), and report their relative pose with its covariance.
 
-    The result is the pose of scan J in the frame of scan I (m, rad) with energy, Hessian and covariance.
-    What a corridor leaves open shows as the weakest direction, and best with --prior none.
+    The result is the pose of scan J in the frame of scan I (m, rad), with energy, Hessian and covariance.
+    A direction that the scans do not determine, as along a corridor, shows as the weakest direction, most
+    clearly with --prior none.
     """
     check_writable(output)
     from nscan_cli.logs.log_files import files_of
@@ -119,9 +127,9 @@ def command(
 
 
 def with_defaults(log: LaserLog, initial: str | None, prior: str | None, quiet: bool) -> tuple[str, str]:
-    """`initial` and `prior` with the log's odometry for what was not given, or without where it has none.
+    """`initial` and `prior`, with odometry as the default if the log has it.
 
-    Raises WrongUsageError when odometry was asked for that is not there.
+    Raises WrongUsageError if odometry was requested and the log has none.
     """
     if log.odometry is not None:
         return initial or "odometry", prior or "odometry"
@@ -134,7 +142,7 @@ def with_defaults(log: LaserLog, initial: str | None, prior: str | None, quiet: 
 
 
 def _initial_pose(log: LaserLog, rows: tuple[int, int], initial: str) -> Array:
-    """The relative pose (3,) to start from."""
+    """The initial relative pose (3,)."""
     import numpy as np
 
     from nscan_cli.poses import relative
@@ -189,7 +197,7 @@ def _match_rows(reference: int, scan: int, match: PairMatch) -> list[Row]:
         known = f"{sigmas[0]:.2g} m, {sigmas[1]:.2g} m, {math.degrees(sigmas[2]):.2g}°"
     least = "open" if weakest.sigma is None else f"σ {weakest.sigma:.2g} m"
     along = f"along {math.degrees(weakest.direction):.1f}° from scan {reference}'s x axis"
-    # Adding 0.0 makes no number −0.
+    # Adding 0.0 turns −0 into 0.
     return [
         ("scan", [f"{scan} in the frame of scan {reference}"]),
         ("pose", [f"{round(x, 3) + 0.0:.3f} m, {round(y, 3) + 0.0:.3f} m, "

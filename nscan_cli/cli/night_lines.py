@@ -1,4 +1,4 @@
-"""What a person sees of a night: a line for every log, alive on a terminal, plain elsewhere."""
+"""The progress of `nightly`: a bar for every log on a terminal, elsewhere a line for each finished log."""
 
 from __future__ import annotations
 
@@ -21,15 +21,15 @@ if TYPE_CHECKING:
 
 @contextlib.contextmanager
 def night_progress(names: list[str], quiet: bool) -> Iterator[RunObserver]:
-    """The lines of the logs that are to be done, as long as the block lasts."""
+    """Show the progress of the logs `names` during the block."""
     if quiet or not sys.stderr.isatty():
         yield PlainProgress(quiet)
         return
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn
 
-    # The bar has the room that the words leave.
-    # A reason may quote anything: none of it is rich's own markup.
+    # The bar fills the rest of the line.
+    # A reason may quote anything, so it is not parsed as markup of rich.
     detail = TextColumn("{task.fields[detail]}", markup=False)
     columns = (TextColumn("{task.description}"), BarColumn(None), detail)
     with Progress(*columns, console=Console(stderr=True), refresh_per_second=4, expand=True) as bars:
@@ -37,28 +37,28 @@ def night_progress(names: list[str], quiet: bool) -> Iterator[RunObserver]:
 
 
 class PlainProgress:
-    """A line when a log is done."""
+    """Prints a line for each finished log."""
 
     def __init__(self, quiet: bool) -> None:
         self.quiet = quiet
 
     def progress(self, name: str, done: int, total: int, keyframes: int) -> None:
-        """Nothing."""
+        """Show nothing."""
 
     def finished(self, entry: ManifestEntry, night: RunRecord) -> None:
-        """Say what became of it."""
+        """Print the outcome."""
         say(f"{entry.name}: {_outcome_line(night)}", self.quiet)
 
 
 class LiveProgress:
-    """A bar for every log, from the beginning."""
+    """A bar for every log on a terminal."""
 
     def __init__(self, bars: Progress, names: list[str]) -> None:
         self.bars = bars
         self.tasks: dict[str, TaskID] = {name: self._line(name) for name in names}
 
     def progress(self, name: str, done: int, total: int, keyframes: int) -> None:
-        """Move its bar."""
+        """Move the bar of the log."""
         task = self.tasks[name]
         if not self.bars.tasks[task].started:
             self.bars.start_task(task)
@@ -67,7 +67,7 @@ class LiveProgress:
         self.bars.update(task, completed=done, total=total, detail=detail)
 
     def finished(self, entry: ManifestEntry, night: RunRecord) -> None:
-        """Say in its line what became of it."""
+        """Show the outcome in the line of the log."""
         if entry.name not in self.tasks:
             self.tasks[entry.name] = self._line(entry.name)
         task = self.tasks[entry.name]

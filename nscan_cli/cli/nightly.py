@@ -1,4 +1,4 @@
-"""`nscan-cli nightly`: every log of a manifest mapped, measured, and compared with the night before."""
+"""`nscan-cli nightly`: maps and evaluates every log of a manifest, and compares with the last run."""
 
 from __future__ import annotations
 
@@ -22,20 +22,25 @@ if TYPE_CHECKING:
 
 @subcommand(
     "nightly",
-    ("nscan-cli nightly robots.toml -o nights", "every log of a manifest; again the next night"),
-    ("nscan-cli nightly kuemmerle --data logs -o nights", "a benchmark, with published figures"),
+    ("nscan-cli nightly robots.toml -o nights", "every log of a manifest"),
+    ("nscan-cli nightly kuemmerle --data logs -o nights", "a benchmark, with published errors"),
 )
-@argument("manifest", metavar="MANIFEST.toml", type=PATH, tells="A manifest; or kuemmerle or radish, which "
-          "come with nscan-cli.")  # fmt: skip
+@argument("manifest", metavar="MANIFEST.toml", type=PATH, tells="A manifest, or one of those that come "
+          "with nscan-cli: kuemmerle, radish.")  # fmt: skip
 @option("-o", "--output", type=PATH, required=True, metavar="FOLDER",
-        help="Results, history and report; made if new.")  # fmt: skip
-@option("--data", type=PATH, metavar="FOLDER", help="Where the logs are, if not beside the manifest.")
-@option("--jobs", type=click.IntRange(1), metavar="N", help="Logs at a time; one a processor if not given.")
+        help="Folder for results, history and report; it is created.")  # fmt: skip
+@option("--data", type=PATH, metavar="FOLDER", help="Folder of the logs. Default: that of the manifest.")
+@option(
+    "--jobs",
+    type=click.IntRange(1),
+    metavar="N",
+    help="Number of logs to run at a time. Default: one per processor.",
+)
 @option("--scheduler", metavar="ADDRESS",
-        help="Run on the Dask cluster of this scheduler, tcp://HOST:PORT.")  # fmt: skip
+        help="Run on a Dask cluster with this scheduler, tcp://HOST:PORT.")  # fmt: skip
 @option("--timeout", type=click.FloatRange(0, min_open=True), default=3600, show_default=True, metavar="S",
-        help="Stop a log that takes longer, seconds.")  # fmt: skip
-@option("--force", is_flag=True, help="Do what is up to date as well.")
+        help="Time limit for a log, seconds; a log that takes longer fails.")  # fmt: skip
+@option("--force", is_flag=True, help="Run logs that are up to date, too.")
 @common_options
 def command(
     manifest: str,
@@ -48,15 +53,15 @@ def command(
     quiet: bool,
     **_verbosity: int,
 ) -> None:
-    """Map and measure every log of MANIFEST.toml, and report what changed since the night before.
+    """Map and evaluate every log of MANIFEST.toml, and report what has changed since the last run.
 
-    The manifests that come with nscan-cli need --data, the folder of their logs; those that are not there
-    are listed with the place to get them from. In a manifest of your own a log that is not there has failed,
-    unless it is optional. A log is done again when its bytes, its reference, its parameters or the code of
-    nscan-cli have changed, or it failed; the report says why. Whenever this is stopped, the next call goes on
-    from there.
+    The manifests that come with nscan-cli need --data, the folder of their logs. Missing logs are listed with
+    their download addresses. In other manifests a missing log counts as failed, unless it is optional. A log
+    runs again if its bytes, its reference, its parameters or the code of nscan-cli have changed, or if it
+    failed; the report gives the reason. If one log fails or times out, the others still run. After an
+    interruption, the next call continues.
 
-    FOLDER/report.html and report.json are the report. Exit code 3 when a log fails or is above its bound.
+    The report is FOLDER/report.html and report.json. Exit code 3 if a log fails or exceeds its bound.
     """
     from nscan_cli.nightly.manifest import read_manifest
     from nscan_cli.nightly.plan import make_plan
@@ -72,13 +77,13 @@ def command(
                 _say_absent(entry, quiet)
         first = entries[0].inputs["log"]
         raise InputMissingError(
-            f"{manifest}: none of its logs is there, not even {first}; give --data FOLDER"
+            f"{manifest}: none of its logs was found, such as {first}; give --data FOLDER"
         )
     with locked_folder(output) as folder:
         planned = make_plan(entries, folder, force)
         if len(planned.absent) > 1:
             listed = ", ".join(entry.name for entry in planned.absent)
-            say(f"not there, skipped: {listed}; the report says where to get them", quiet)
+            say(f"not found, skipped: {listed}; the report has their sources", quiet)
         for entry in planned.absent if len(planned.absent) == 1 else ():
             _say_absent(entry, quiet)
         for name, notes in planned.notes.items():
@@ -107,19 +112,19 @@ def command(
 
 
 def _say_absent(entry: ManifestEntry, quiet: bool) -> None:
-    remedy = f"; to be had from {' and '.join(entry.sources.values())}" if entry.sources else ""
-    say(f"{entry.name}: {entry.inputs['log']} is not there, skipped{remedy}", quiet)
+    remedy = f"; download from {' and '.join(entry.sources.values())}" if entry.sources else ""
+    say(f"{entry.name}: {entry.inputs['log']} was not found, skipped{remedy}", quiet)
 
 
 def _engine(jobs: int | None, scheduler: str | None, timeout: float) -> Executor:
-    """What does the tasks: processes here, or a cluster."""
+    """The function that runs tasks, in processes here or on a cluster."""
 
     def here(tasks: list[Task], scratch: Path, report: ProgressCallback) -> Outcomes:
         from nscan_cli.nightly import local_executor
         from nscan_cli.threads import available_threads
 
         side_by_side = min(jobs or available_threads(), len(tasks))
-        # Processors that are left over help along.
+        # The remaining processors become threads of the logs.
         threads = max(1, available_threads() // side_by_side)
         return local_executor.run_locally(tasks, side_by_side, timeout, scratch, report, threads)
 

@@ -33,9 +33,9 @@ if TYPE_CHECKING:
 
 NSCAN_FORMAT = "nscan-joint-match"
 INITIAL_WORDS, PRIOR_WORDS = ("odometry", "identity"), ("odometry", "none")
-"""What is no file in --initial and in --prior."""
+"""Words in --initial and in --prior that are not files."""
 LISTED_SCANS = 6
-"""Weakly held scans that the summary names; the result has all."""
+"""Most scans with a weak direction that the summary lists; the result has all."""
 
 
 @subcommand(
@@ -43,28 +43,27 @@ LISTED_SCANS = 6
     ("nscan-cli nscan robot.log.gz --scans 100-190:10 -o nscan.json --plot nscan.png", "ten scans"),
     (
         "nscan-cli nscan robot.log.gz --scans 10,12,200 --initial robot.json --prior robot.json",
-        "from what a graph knows of them",
+        "with initial poses and priors from a graph",
     ),
 )
 @log_argument()
 @option("--scans", "numbers", type=ScanSpecType(), required=True,
-        help="The scans to match, such as 10,12,14-20 or 100-190:10.")  # fmt: skip
+        help="Numbers of the scans to match, such as 10,12,14-20 or 100-190:10.")  # fmt: skip
 @option("--pairs", type=click.Choice(["all", "visible", "overlap"]), default="overlap", show_default=True,
-        help="Which scans are matched with each other: all, those of which one saw the other's position, "
-        "or those that overlap.")  # fmt: skip
+        help="Pairs of scans to match: all, those of which one saw the other's position (visible), or those "
+        "that overlap.")  # fmt: skip
 @option("--gauge", type=click.Choice(["free", "fixed"]), default="free", show_default=True,
-        help="Estimate all poses and take the smallest steps, or hold one scan where it is.")  # fmt: skip
+        help="Estimate all poses by steps of least norm (free), or keep one scan fixed.")  # fmt: skip
 @option("--fixed", type=click.IntRange(0), metavar="K",
-        help="The scan that a fixed gauge holds and the covariance is relative to; the first of SPEC if not "
-        "given.")  # fmt: skip
+        help="The scan that --gauge fixed keeps, and that the covariance is relative to. Default: the "
+        "first of SPEC.")  # fmt: skip
 @option("--initial", type=PATH, metavar="odometry|identity|GRAPH.json|TRAJECTORY.tum",
-        help="Poses to start from; if not given, the odometry where the log has it, or else "
-        "identity.")  # fmt: skip
+        help="Initial poses. Default: odometry, or identity if there is none.")  # fmt: skip
 @option("--prior", type=PATH, metavar="odometry|none|GRAPH.json",
-        help="What is known before matching, or what a graph says of the scans; if not given, the odometry "
-        "where the log has it.")  # fmt: skip
+        help="Priors of relative poses, from odometry or a graph. Default: odometry, or none if there is "
+        "none.")  # fmt: skip
 @result_option
-@plot_option("all scans before and after, with circles at their poses")
+@plot_option("all scans before and after the match, with circles at their poses")
 @reading_options
 @common_options
 def command(
@@ -81,15 +80,14 @@ def command(
     quiet: bool,
     **_verbosity: int,
 ) -> None:
-    """Match n scans of LOG jointly (nScan-Matching): all of them at once, each against many others.
+    """Match several scans of LOG jointly (nScan-Matching).
 
-    The result is an nScan relation: local poses and their Hessian, which still has the gauge in it, with
-    the covariance relative to one scan. Scans that overlap none of the others, and scans that fall outside
-    the bounds of their priors, are named and left out; scans that are held weakly in one direction, as in
-    a corridor, are named.
+    The result is an nScan relation: local poses and their Hessian, gauge included, with the covariance
+    relative to one scan. Scans that overlap no other scan, or contradict their priors, are left out and
+    reported. Scans with a weak direction, as along a corridor, are reported, too.
     """
     if fixed is not None and fixed not in numbers:
-        raise WrongUsageError(f"--fixed {fixed}: is none of the scans to match; choose one of them")
+        raise WrongUsageError(f"--fixed {fixed}: is not one of the scans to match; choose one of them")
     if "-" in log and "-" in (initial, prior):
         raise WrongUsageError("standard input (-) can be one input only; give the others by their path")
     check_writable(output)
@@ -113,7 +111,7 @@ def command(
     joint = JointOptions(fixed=0 if gauge == "fixed" else None)
     start, priors, sources = _initial_and_priors(scans, numbers, initial, prior, model)
     if prior not in PRIOR_WORDS and not len(priors(range(len(numbers))).pairs):
-        say(f"warning: {prior} does not connect any two of the scans", quiet)
+        say(f"warning: {prior} has no relation between these scans", quiet)
     points = [matched_points(scans, row, options) for row in rows]
     held = 0 if fixed is None else numbers.index(fixed)
     match, left_out = nscan_match(points, start, priors, held, options, joint, pairs)
@@ -145,7 +143,7 @@ def command(
 def _initial_and_priors(
     log: LaserLog, numbers: tuple[int, ...], initial: str, prior: str, model: MotionModel
 ) -> tuple[Array, PriorsAmong, list[Source]]:
-    """The poses (n, 3) to start from, the priors, and the files that they come from."""
+    """The initial poses (n, 3), the priors, and the files that they come from."""
     import numpy as np
 
     from nscan_cli.cli.known_poses import (
@@ -179,7 +177,7 @@ def _initial_and_priors(
 
 
 def _fields(numbers: tuple[int, ...], match: NScanMatch, left_out: list[ExcludedScan]) -> dict[str, Any]:
-    """What the document says of the match."""
+    """The fields of the result."""
     from nscan_cli.cli.match_document import weakest_record
     from nscan_cli.graph.io.json_fields import six_digits, triangle
     from nscan_cli.graph.model import NScan
@@ -189,7 +187,7 @@ def _fields(numbers: tuple[int, ...], match: NScanMatch, left_out: list[Excluded
     kept = [numbers[scan] for scan in match.kept]
     joint = match.joint
     score = float(match.overlap.min())
-    # Along the gauge it is 0 but for rounding.
+    # Along the gauge it is 0 except for rounding.
     information = as_information(joint.hessian, WRITTEN_ROUNDING)
     relation = NScan(tuple(kept), match.poses, information, match.fixed, "nscan", score)
     return {
@@ -227,7 +225,7 @@ def _nscan_rows(numbers: tuple[int, ...], match: NScanMatch, left_out: list[Excl
         if weakest.is_weak
     ]
     more = [f"and {len(weak) - LISTED_SCANS} more"] if len(weak) > LISTED_SCANS else []
-    searched = "by search: the start by itself led to a poorer match"
+    searched = "by search: the match from the initial poses was worse"
     return [
         ("scans", [f"{len(match.kept)} of {len(numbers)}, matched in {counted(len(match.pairs), 'pair')}"]),
         ("overlap", [f"{match.overlap.min():.0%} at least"]),

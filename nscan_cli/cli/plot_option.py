@@ -1,4 +1,4 @@
-"""The option --plot, which several commands have: a picture beside their result."""
+"""The option --plot of several commands: a picture in addition to the result."""
 
 from __future__ import annotations
 
@@ -21,24 +21,24 @@ OTHER_SUFFIXES = (
 
 
 def plot_option(shows: str) -> Callable[[Command], Command]:
-    """The option; `shows` is what the picture shows."""
+    """The option --plot; `shows` describes the picture."""
     return option("--plot", type=PATH, metavar="PICTURE.png", help=f"Draw {shows}, as a PNG.")
 
 
 def check_png(place: str, path: str) -> None:
-    """Refuse a name that says that the picture is of another format, or of none. Raises WrongUsageError."""
+    """Raises WrongUsageError if the name of a picture has the suffix of another format, or none."""
     named = Path(path)
     if named.suffix.lower() in OTHER_SUFFIXES:
         raise WrongUsageError(f"{place}: pictures are PNG; name it like {named.stem}.png")
-    # A folder is refused in its own words, where there is nothing to write.
+    # check_writable refuses a folder with its own message.
     is_file = path != "-" and not is_device(path) and not os.path.isdir(path) and named.name
     if is_file and not named.suffix:
         name = named.with_name(f"{named.name.strip('.') or 'map'}.png")
-        raise WrongUsageError(f"{place}: the name has no ending; pictures are PNG: name it {name}")
+        raise WrongUsageError(f"{place}: the name has no suffix; pictures are PNG: name it {name}")
 
 
 def check_plot(plot: str | None, output: str | None, inputs: Sequence[str | None]) -> None:
-    """Refuse a picture that could never be written, or that would replace another file of the command.
+    """Check that a picture can be written, and replaces no other file of the command.
 
     Raises WrongUsageError and OutputError.
     """
@@ -48,7 +48,7 @@ def check_plot(plot: str | None, output: str | None, inputs: Sequence[str | None
         raise WrongUsageError("--plot -: only the result can go to standard output; name a file")
     file = os.path.realpath(plot)
     if output not in (None, "-") and os.path.realpath(str(output)) == file:
-        raise WrongUsageError(f"--plot {plot}: is the result's name too; give each its own")
+        raise WrongUsageError(f"--plot {plot}: the result has the same name; choose another")
     if file in (os.path.realpath(path) for path in inputs if path and path != "-"):
         raise WrongUsageError(f"--plot {plot}: is an input, and would be replaced; choose another name")
     check_png(f"--plot {plot}", plot)
@@ -56,7 +56,7 @@ def check_plot(plot: str | None, output: str | None, inputs: Sequence[str | None
 
 
 def write_plot(plot: str, picture: Image) -> None:
-    """Write the picture whole or not at all. Raises OutputError."""
+    """Write the picture atomically. Raises OutputError."""
     from nscan_cli.mapping.figures.canvas import figure_png
 
     write_atomically(plot, figure_png(picture))

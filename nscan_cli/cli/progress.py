@@ -1,4 +1,4 @@
-"""What a person sees while a command runs: a bar on a terminal, warnings and summaries; all on stderr."""
+"""Messages and progress bars of a running command, on standard error."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 def say(message: str, quiet: bool = False) -> None:
-    """One line for people."""
+    """Print a message, unless `quiet`."""
     if not quiet:
         print(printable(message), file=sys.stderr)
 
@@ -25,10 +25,7 @@ COMPILING = "compiling the kernels, once for this version on this machine"
 
 
 def announce_compiling(kernel: str, quiet: bool) -> bool:
-    """Say so where the kernels are still to be compiled, among them one that is needed; whether they are.
-
-    This is for kernels of other processes.
-    """
+    """Print a message and return True if `kernel`, which other processes need, is not compiled yet."""
     from nscan_cli.kernels.machine_code import is_uncompiled
 
     compiling = is_uncompiled(kernel)
@@ -38,9 +35,9 @@ def announce_compiling(kernel: str, quiet: bool) -> bool:
 
 
 class Compiling:
-    """Whether the running command has compiled kernels since this was made; it is said when that begins.
+    """Prints a message when this process begins to compile kernels, and records that it did.
 
-    `takes` is how long, as people say it.
+    `takes` is the usual time in words.
     """
 
     def __init__(self, takes: str, quiet: bool) -> None:
@@ -59,35 +56,35 @@ class Compiling:
 
 
 class Bar:
-    """How far the work is. This one shows nothing, where there is no terminal."""
+    """A progress bar. This one shows nothing; it is used without a terminal."""
 
     def begin(self, title: str, total: int | None) -> None:
-        """A piece of work of so many steps, of which the bar tells from now on; None where nobody knows."""
+        """Begin a task of `total` steps, None if the number is unknown."""
 
     def advance(self, done: int, detail: str) -> None:
-        """So many steps are done; cheap enough to be called at every scan."""
+        """Set the number of steps done. It is fast enough to be called at every scan."""
 
 
 class LiveBar(Bar):
-    """One on a terminal."""
+    """A progress bar on a terminal."""
 
     def __init__(self, live: Progress, title: str, total: int | None) -> None:
         self._live, self._task = live, live.add_task(title, total=total, detail="")
 
     def begin(self, title: str, total: int | None) -> None:
-        """The last state of the work before is shown once more, and its line used again."""
+        """Show the final state of the task before, then replace it."""
         self._live.refresh()
         self._live.remove_task(self._task)
         self._task = self._live.add_task(title, total=total, detail="")
 
     def advance(self, done: int, detail: str) -> None:
-        """Shown at the next of ten times a second."""
+        """Set the number of steps done; the bar is drawn ten times per second."""
         self._live.update(self._task, completed=done, detail=detail)
 
 
 @contextlib.contextmanager
 def progress(title: str, total: int | None, quiet: bool) -> Iterator[Bar]:
-    """A bar that has begun, and is gone at the end; shown on a terminal only."""
+    """A progress bar for the block, shown on a terminal only and removed at the end."""
     if quiet or not sys.stderr.isatty():
         yield Bar()
         return
@@ -96,7 +93,7 @@ def progress(title: str, total: int | None, quiet: bool) -> Iterator[Bar]:
     from rich.text import Text
 
     class Steps(ProgressColumn):
-        """How many are done, and a second."""
+        """Steps done, and steps per second."""
 
         def render(self, task: Task) -> Text:
             if task.total is None:
@@ -106,6 +103,6 @@ def progress(title: str, total: int | None, quiet: bool) -> Iterator[Bar]:
 
     columns = (TextColumn("{task.description}"), BarColumn(None), Steps(),
                TextColumn("{task.fields[detail]}"), TimeRemainingColumn())  # fmt: skip
-    # The bar has the room that the words leave.
+    # The bar fills the rest of the line.
     with Progress(*columns, console=Console(stderr=True), transient=True, expand=True) as live:
         yield LiveBar(live, title, total)

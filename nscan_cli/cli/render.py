@@ -1,4 +1,4 @@
-"""`nscan-cli render`: the map of a graph, for robots or for people."""
+"""`nscan-cli render`: the map of a graph, as a map for robots or as a figure."""
 
 from __future__ import annotations
 
@@ -33,20 +33,25 @@ if TYPE_CHECKING:
 )
 @argument("graph_file", metavar="GRAPH.json", type=PATH, tells="A result of slam; - is standard input.")
 @argument("log", nargs=-1, type=PATH,
-          tells="The log that the graph was made from; if not given, it is looked for beside the graph, then "
-          "in the current folder.")  # fmt: skip
+          tells="The log that the graph was made from. Default: looked for beside the graph, then in the "
+          "current folder.")  # fmt: skip
 @option("-o", "--output", type=PATH, required=True, metavar="MAP.png",
-        help="The picture; - is standard output.")  # fmt: skip
+        help="File for the picture; - is standard output.")  # fmt: skip
 @option("--resolution", type=click.FloatRange(0.001, 10), default=0.05, show_default=True, metavar="M",
-        help="Size of a cell.")  # fmt: skip
+        help="Cell size. Smaller cells take more time and memory.")  # fmt: skip
 @option("--trajectory", is_flag=True, help="Draw the path.")
 @option("--graph", is_flag=True, help="Draw keyframes and relations.")
 @option("--uncertainty", is_flag=True, help="Draw the uncertainty of the keyframes' positions.")
 @option("--style", type=click.Choice(["map_server", "paper"]), default="map_server", show_default=True,
-        help="A map for robots, or points and path on white with axes.")  # fmt: skip
+        help="A map for robots (map_server), or points and path on white with axes (paper).")  # fmt: skip
 @option("--yaml/--no-yaml", default=None,
-        help="Write MAP.yaml for map_server and Nav2 beside the map; done for plain maps.")  # fmt: skip
-@option("--mcap", type=PATH, metavar="OUT.mcap", help="Map, path, graph and scans for Foxglove and RViz too.")
+        help="Write MAP.yaml for map_server and Nav2. Default: for plain maps only.")  # fmt: skip
+@option(
+    "--mcap",
+    type=PATH,
+    metavar="OUT.mcap",
+    help="Also write map, path, graph and scans for Foxglove and RViz.",
+)
 @reading_options
 @common_options
 def command(
@@ -66,16 +71,16 @@ def command(
 ) -> None:
     """Draw the occupancy map of a graph from the scans of its LOG.
 
-    LOG is read as slam has read it where no option says otherwise. The map is an 8-bit gray PNG with a
-    YAML for map_server and Nav2. With overlays or in the style of a paper it is a picture in colour for
-    people, which robots cannot load: no YAML is written then.
+    LOG is read with the options of slam, unless an option here overrides them. The map is an 8-bit gray PNG
+    with a YAML for map_server and Nav2. With overlays or --style paper it is a colour picture, which robots
+    cannot load, and no YAML is written.
 
-    OUT.mcap is a recording of ROS 2 messages on the topics /map, /path, /graph, /scan, /tf and /tf_static;
-    the frame of the result is map, and the others are called odom, base_link and laser or as in LOG.
+    OUT.mcap is a recording of ROS 2 messages on the topics /map, /path, /graph, /scan, /tf and /tf_static.
+    Poses of the result are in the frame map; the other frames are odom, base_link and laser, or as in LOG.
     """
     picture = trajectory or graph or uncertainty or style == "paper"
     if yaml and picture:
-        raise WrongUsageError("--yaml describes a plain map, not a picture in colour; leave one of them out")
+        raise WrongUsageError("--yaml is for plain maps, not for colour pictures; leave one of them out")
     in_file = output != "-" and not is_device(output)
     if yaml and not in_file:
         raise WrongUsageError("--yaml needs a map in a file; give -o MAP.png, or leave out --yaml")
@@ -122,7 +127,7 @@ def command(
 
 
 def check_map_outputs(output: str, yaml: bool) -> None:
-    """Refuse a map, and the YAML beside it, that could never be written.
+    """Check that a map, and its YAML, can be written.
 
     Raises WrongUsageError and OutputError.
     """
@@ -135,12 +140,12 @@ def check_map_outputs(output: str, yaml: bool) -> None:
 
 
 def write_map(output: str, image: MapImage, yaml: bool, quiet: bool) -> None:
-    """Write a map for map_server, and with `yaml` the YAML beside it, which a loader looks for last."""
+    """Write a map for map_server, then its YAML if `yaml`."""
     name = base_name(output)
     if yaml and path_of_name(name) != Path(output).name:
         say(
-            f"warning: {printable(yaml_path(output))} calls the map {name}, under which no loader finds it: "
-            "its name is no UTF-8, as YAML is",
+            f"warning: {printable(yaml_path(output))} names the map {name}, which no loader will find: "
+            "its real name is not UTF-8, which YAML needs",
             quiet,
         )
     from nscan_cli.mapping.map_server import map_png, map_yaml
@@ -151,12 +156,12 @@ def write_map(output: str, image: MapImage, yaml: bool, quiet: bool) -> None:
 
 
 def yaml_path(output: str) -> str:
-    """Where the YAML of a map is: beside it."""
+    """The path of a map's YAML."""
     return str(Path(output).with_suffix(".yaml"))
 
 
 def _check_mcap(mcap: str | None, others: Sequence[str | None]) -> None:
-    """Refuse a recording that could never be written, or would replace another file of the command."""
+    """Check that a recording can be written, and replaces no other file of the command."""
     if mcap is None:
         return
     if mcap == "-":

@@ -1,4 +1,4 @@
-"""SPEC, the scans of an nScan on the command line: `10,12,14-20`, `100-190:10`."""
+"""The scans of a joint match on the command line: `10,12,14-20`, `100-190:10`."""
 
 from __future__ import annotations
 
@@ -9,16 +9,16 @@ import click
 
 SPEC_PART = re.compile(r"(\d+)(?:-(\d+)(?::(\d+))?)?")
 MOST_SCANS = 500
-"""The Hessian grows with the square of the scans; more than these are a slip of the keyboard."""
+"""The Hessian grows with the square of the number of scans; a longer list is taken for a typing error."""
 
 
 class ScanSpecType(click.ParamType[Any]):
-    """A list of scan numbers and ranges on the command line, a tuple of scan numbers inside."""
+    """Converts a list of scan numbers and ranges to a tuple of scan numbers."""
 
     name = "SPEC"
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
-        """Parse the scan numbers; a wrong form, a single scan and a scan twice are usage errors."""
+        """Parse the scan numbers; another form, a single scan and a repeated scan are usage errors."""
         scans: list[int] = []
         for part in value.split(","):
             match = SPEC_PART.fullmatch(part.strip())
@@ -34,7 +34,7 @@ class ScanSpecType(click.ParamType[Any]):
                 self.fail(f"{value!r} has more than {MOST_SCANS} scans", param, ctx)
             scans += chosen
         if len(scans) < 2:
-            self.fail(f"{value!r} has one scan only; at least two are matched", param, ctx)
+            self.fail(f"{value!r} has only one scan; give two or more", param, ctx)
         if len(set(scans)) < len(scans):
             twice = next(scan for at, scan in enumerate(scans) if scan in scans[:at])
             self.fail(f"{value!r} has scan {twice} twice", param, ctx)

@@ -1,4 +1,4 @@
-"""Options that commands share, and where their values come from: flag > environment > TOML > default."""
+"""Options that several commands have. A value comes from the flag, the environment, TOML or the default."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ class PoseType(click.ParamType[Any]):
 
 
 def common_options(command: Command) -> Command:
-    """-q, -v, --config and --dump-config; the command gets `quiet` and `verbose`."""
+    """Add -q, -v, --config and --dump-config; the command gets `quiet` and `verbose`."""
 
     @functools.wraps(command)
     def wrapped(*args: Any, **kwargs: Any) -> Any:
@@ -51,11 +51,11 @@ def common_options(command: Command) -> Command:
 
     say = functools.partial(option, section=COMMON)
     options = [
-        say("-q", "--quiet", is_flag=True, help="Say nothing but errors."),
-        say("-v", "--verbose", count=True, help="Say more; -vv shows where an error arose."),
+        say("-q", "--quiet", is_flag=True, help="Print errors only."),
+        say("-v", "--verbose", count=True, help="Print more; -vv adds the traceback of an error."),
         say("--config", type=click.Path(), metavar="FILE.toml", is_eager=True, callback=_read_config,
-            help="Take option values from a TOML file."),
-        say("--dump-config", is_flag=True, help="Print the options in force as TOML, and stop."),
+            help="Read option values from a TOML file."),
+        say("--dump-config", is_flag=True, help="Print the options in force as TOML, then exit."),
     ]  # fmt: skip
     return _with_options(wrapped, options)
 
@@ -68,28 +68,28 @@ def _with_options(command: Command, options: Sequence[Callable[[Command], Comman
 
 
 def reading_options(command: Command) -> Command:
-    """How a log is to be read; the command gets `reading`, a ReadingOptions."""
+    """Add the options of reading a log; the command gets them as `reading`, a ReadingOptions."""
     read = functools.partial(option, section=READING)
     options = [
-        read("--laser", metavar="TAG", help="Laser of a text log, such as FLASER or laser:0."),
-        read("--topic", metavar="TOPIC", help="Laser of an MCAP or a bag, such as /scan."),
-        read("--odom-topic", metavar="TOPIC", help="Odometry to use, such as /odom or /tf."),
+        read("--laser", metavar="TAG", help="Laser to use of a text log, such as FLASER or laser:0."),
+        read("--topic", metavar="TOPIC", help="Laser topic to use of an MCAP or bag, such as /scan."),
+        read("--odom-topic", metavar="TOPIC", help="Odometry topic to use, such as /odom or /tf."),
         read("--mount", type=PoseType(), help="Pose of the laser on the robot (m, degrees)."),
         read("--flip", is_flag=True, help="The laser is mounted upside down."),
-        read("--min-range", type=click.FloatRange(0), metavar="M", help="Drop shorter beams."),
+        read("--min-range", type=click.FloatRange(0), metavar="M", help="Drop shorter readings."),
         read("--max-range", type=click.FloatRange(0, min_open=True), metavar="M",
-             help="Take longer beams for no return."),
+             help="Treat longer readings as no return."),
         read("--angle-min", type=float, metavar="DEG", help="Direction of the first beam."),
         read("--angle-increment", type=float, metavar="DEG", help="Angle from beam to beam."),
-        read("--start", type=float, metavar="T", help="Leave out the first T seconds."),
+        read("--start", type=float, metavar="T", help="Skip the first T seconds."),
         read("--end", type=float, metavar="T", help="Stop T seconds after the first scan."),
         read("--every", type=click.IntRange(1), default=1, show_default=True, metavar="N",
              help="Use every Nth scan."),
-        read("--no-odometry", is_flag=True, help="Do as if the log had no odometry."),
-        read("--strict", is_flag=True, help="A malformed record is an error, not a warning."),
-        read("--salvage", is_flag=True, help="Use what is readable of a damaged or cut-off file."),
+        read("--no-odometry", is_flag=True, help="Ignore odometry."),
+        read("--strict", is_flag=True, help="Treat a malformed record as an error, not as a warning."),
+        read("--salvage", is_flag=True, help="Use the readable part of a damaged or cut-off file."),
         read("--allow-corrected", is_flag=True,
-             help="Accept a log whose poses a mapper has corrected already."),
+             help="Use poses that a mapper has already corrected as odometry."),
     ]  # fmt: skip
 
     @functools.wraps(command)
@@ -121,27 +121,27 @@ def reading_options(command: Command) -> Command:
 
 
 def _read_config(ctx: click.Context, _param: click.Parameter, value: str | None) -> str | None:
-    """Take a TOML file as the command's defaults.
+    """Use the values of a TOML file as the command's defaults.
 
-    Keys at the top and in the table of the command's name are long options without their dashes. At the
-    top, those that only other commands have are left alone, as are the tables of other commands.
+    Keys at the top and in the command's table are long options without dashes. Options at the top that only
+    other commands have, and the tables of other commands, are ignored.
     """
     if value is None:
         return None
-    document = read_toml(value, "mend it, or leave out --config")
+    document = read_toml(value, "correct it, or leave out --config")
     from nscan_cli.cli.main import COMMANDS
 
     name = ctx.command.name or ""
     own = document.get(name, {})
     if not isinstance(own, dict):
-        raise InputDataError(value, f"{name} is no table", f"write [{name}], and its options below")
+        raise InputDataError(value, f"{name} is not a table", f"write [{name}], and its options below")
     options = {param.long_name: param for param in _parameters(ctx.command)}
     settings = {key: entry for key, entry in document.items() if key not in COMMANDS}
     for key in list(settings):
         if key in COMMAND_SPECIFIC:
             tables = " or ".join(f"[{command}]" for command in _commands_having(key))
-            problem = f"{key} stands for all commands, and means another thing in each"
-            raise InputDataError(value, problem, f"write it below {tables}")
+            problem = f"{key} is set for all commands, and has another meaning in each"
+            raise InputDataError(value, problem, f"set it below {tables}")
         if key not in options and _commands_having(key):
             del settings[key]
     settings.update(own)
@@ -163,7 +163,7 @@ def _read_config(ctx: click.Context, _param: click.Parameter, value: str | None)
 
 
 def _commands_having(key: str) -> list[str]:
-    """The commands that have an option of this long name, which a TOML file can have."""
+    """The commands with an option of this long name that a TOML file can set."""
     from nscan_cli.cli.main import COMMANDS, cli
 
     context = click.Context(cli)
@@ -176,7 +176,7 @@ def _commands_having(key: str) -> list[str]:
 
 
 def _as_argument(entry: Any) -> str:
-    """A TOML value as one would type it on the command line. Raises BadParameter for what none would."""
+    """A TOML value as it is typed on the command line. Raises BadParameter for dates and tables."""
     if isinstance(entry, list):
         return ",".join(_as_argument(part) for part in entry)
     if isinstance(entry, (str, int, float)):
@@ -185,7 +185,7 @@ def _as_argument(entry: Any) -> str:
 
 
 def _parameters(command: click.Command) -> list[Option]:
-    """The options of a command that a TOML file can have, in the order of --help."""
+    """The options of a command that a TOML file can set, in the order of --help."""
     return [
         param for param in command.params if isinstance(param, Option) and param.name not in NOT_PARAMETERS
     ]
@@ -215,7 +215,7 @@ def _toml_value(value: Any) -> str:
         text = os.fsencode(str(value)).decode()
     except UnicodeError as error:
         raise WrongUsageError(
-            f"--dump-config: {value} is no UTF-8, as TOML is; choose another name"
+            f"--dump-config: {value} is not UTF-8, which TOML needs; choose another name"
         ) from error
-    # JSON escapes what TOML does, but for one.
+    # JSON escapes the same characters as TOML, except DEL.
     return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")

@@ -1,4 +1,4 @@
-"""`nscan-cli slam`: a log in, a pose graph and a map out."""
+"""`nscan-cli slam`: from a log to a pose graph and a map."""
 
 from __future__ import annotations
 
@@ -20,16 +20,16 @@ if TYPE_CHECKING:
     from nscan_cli.slam.options import Relations
 
 MAPPING_OPTIONS = ("max_scans", "relations", "no_loops")
-"""Options that say how a log is mapped."""
+"""Options of mapping a log; they do not go with --from."""
 
 
 @subcommand(
     "slam",
     ("nscan-cli slam robot.log.gz -o robot.json --map robot.png", "a graph, a map and its YAML"),
-    ("nscan-cli slam robot.mcap --no-odometry -o robot.json", "by the laser alone"),
-    ("nscan-cli slam my_bag/ -o my_bag.json", "a folder that `ros2 bag record` has left"),
-    ("nscan-cli slam robot.log.gz -o robot.json --depfile robot.d", "in a Makefile"),
-    ("nscan-cli slam --from robot.json -o refined.json", "a saved graph, optimised and refined again"),
+    ("nscan-cli slam robot.mcap --no-odometry -o robot.json", "without odometry"),
+    ("nscan-cli slam my_bag/ -o my_bag.json", "a folder written by `ros2 bag record`"),
+    ("nscan-cli slam robot.log.gz -o robot.json --depfile robot.d", "with a rule for make"),
+    ("nscan-cli slam --from robot.json -o refined.json", "a saved graph, optimised and refined"),
 )
 @log_argument(required=False)
 @option(
@@ -38,23 +38,25 @@ MAPPING_OPTIONS = ("max_scans", "relations", "no_loops")
     type=PATH,
     default="-",
     metavar="GRAPH.json",
-    help="The graph; standard output if not given.",
+    help="File for the graph. Default: standard output.",
 )
-@option("--map", "map_file", type=PATH, metavar="MAP.png", help="The map too, and MAP.yaml beside it.")
-@option("--trajectory", type=PATH, metavar="OUT.tum", help="The pose of every scan too, in TUM's form.")
+@option("--map", "map_file", type=PATH, metavar="MAP.png", help="Also write the map, and MAP.yaml beside it.")
+@option("--trajectory", type=PATH, metavar="OUT.tum", help="Also write the pose of every scan in TUM format.")
 @option(
     "--g2o",
     type=PATH,
     metavar="OUT.g2o",
-    help="The keyframes' graph too, in g2o's form; nScan relations become pairwise ones.",
+    help="Also write the graph of keyframes in g2o format; nScan relations become pairwise edges.",
 )
-@option("--carmen", type=PATH, metavar="OUT.log", help="The log with corrected poses too, in CARMEN's form.")
+@option(
+    "--carmen", type=PATH, metavar="OUT.log", help="Also write the log with corrected poses in CARMEN format."
+)
 @option(
     "--from",
     "from_file",
     type=PATH,
     metavar="GRAPH",
-    help="Optimise a saved graph (JSON or g2o) and refine it with its LOG; nothing is tracked.",
+    help="Optimise a saved graph (JSON or g2o), and refine it with its LOG; nothing is tracked.",
 )
 @option(
     "--max-scans",
@@ -62,25 +64,25 @@ MAPPING_OPTIONS = ("max_scans", "relations", "no_loops")
     default=10,
     show_default=True,
     metavar="N",
-    help="Most scans in an nScan relation.",
+    help="Maximum number of scans in an nScan relation.",
 )
 @option(
     "--relations",
     type=click.Choice(["pairwise", "nscan", "both"]),
     default="both",
     show_default=True,
-    help="Match scans near each other one by one (pairwise) or jointly (nscan); both is nscan with the "
-    "whole chain of tracking.",
+    help="Relations of neighbouring keyframes: pairwise matches, joint matches (nscan), or joint matches "
+    "plus the chain of tracked relations (both).",
 )
-@option("--no-loops", is_flag=True, help="Match nothing with what an earlier visit saw: drift stays.")
+@option("--no-loops", is_flag=True, help="Do not close loops: drift remains.")
 @option(
     "--threads",
     type=click.IntRange(1),
     metavar="N",
-    help="Work in so many threads, one a processor if not given; the result is the same.",
+    help="Number of threads. Default: one per processor. The result does not depend on it.",
 )
 @option(
-    "--depfile", type=PATH, metavar="FILE", help="Write what the outputs were made from as a rule for make."
+    "--depfile", type=PATH, metavar="FILE", help="Also write the inputs of all outputs as a rule for make."
 )
 @reading_options
 @common_options
@@ -101,14 +103,14 @@ def command(
     quiet: bool,
     verbose: int,
 ) -> None:
-    """Turn LOG into a globally consistent pose graph, and a map if asked.
+    """Build a globally consistent pose graph from LOG, and a map with --map.
 
-    Every scan gets a pose: tracked against the map of the last metres, then moved along with its
-    keyframe when the graph of pairwise and nScan relations is optimised.
+    Every scan gets a pose: it is tracked against a local map, and moves with its keyframe when the graph of
+    pairwise and nScan relations is optimised.
 
-    With --from, LOG is looked for beside the graph, then in the current folder, when it is not given; it
-    is read, and its scans are matched, with the options that the graph was made with. When it is not
-    there, the graph is optimised only.
+    With --from and without LOG, the log is looked for beside the graph, then in the current folder. It is
+    read and matched with the options that the graph was made with. If the log is not found, the graph is
+    optimised but not refined.
     """
     if not log and from_file is None:
         raise WrongUsageError("slam: give LOG, or --from GRAPH")
@@ -118,8 +120,8 @@ def command(
         raise WrongUsageError("standard input (-) can be one input only; give the other by its path")
     if from_file is not None and (reading != ReadingOptions() or _given(*MAPPING_OPTIONS)):
         raise WrongUsageError(
-            "slam: reading options, --max-scans, --relations and --no-loops do not go with --from; "
-            "those that the graph was made with hold"
+            "slam: reading options, --max-scans, --relations and --no-loops cannot be combined with --from; "
+            "the graph keeps its own"
         )
     outputs = SlamOutputs(output, map_file, trajectory, g2o, carmen, depfile)
     from nscan_cli.cli.slam_runs import run_on_graph, run_on_log
@@ -139,11 +141,11 @@ def command(
         run = run_on_log(log, reading, options, threads, quiet, verbose)
     else:
         run = run_on_graph(from_file, log or None, outputs.need_scans, threads, quiet)
-        # A log that was found must not be replaced either.
+        # The log that was found must not be replaced, either.
         outputs.check(run.inputs)
     outputs.write(run.graph, run.scans, run.rows, run.inputs, threads, quiet)
     seconds = time.perf_counter() - began
-    took = [f"{seconds:.1f} s" + (", the kernels' compilation included" if run.compiled else "")]
+    took = [f"{seconds:.1f} s" + (", including the compilation of kernels" if run.compiled else "")]
     if from_file is None and run.scans is not None and not run.compiled:
         rate, span = len(run.scans) / seconds, float(run.scans.times[-1] - run.scans.times[0])
         took = [f"{took[0]}, {rate:.0f} scans a second, {span / seconds:.0f} times real time"]
@@ -151,6 +153,6 @@ def command(
 
 
 def _given(*options: str) -> bool:
-    """Whether one of the options stands on the command line."""
+    """Whether one of the options was given on the command line."""
     sources = [click.get_current_context().get_parameter_source(option) for option in options]
     return any(source is not None and source.name == "COMMANDLINE" for source in sources)

@@ -1,4 +1,4 @@
-"""What `slam` writes: the graph, and beside it whatever else was asked for."""
+"""The outputs of `slam`: the graph, and other files on request."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class SlamOutputs:
-    """Paths, None where nothing was asked for; only the graph's may be "-", standard output."""
+    """Paths of the outputs, None for those not requested. Only the graph's may be "-", standard output."""
 
     graph: str
     map: str | None
@@ -37,17 +37,17 @@ class SlamOutputs:
 
     @property
     def need_scans(self) -> bool:
-        """Whether the graph alone does not do."""
+        """Whether an output needs the scans, not only the graph."""
         return self.map is not None or self.carmen is not None
 
     def files(self) -> list[str]:
-        """The paths of all outputs, the graph's first; standard output is none."""
+        """The paths of all output files, the graph's first, without standard output."""
         maps = [] if self.map is None else [self.map, yaml_path(self.map)]
         paths = [self.graph, *maps, self.trajectory, self.g2o, self.carmen, self.depfile]
         return [path for path in paths if path not in (None, "-")]
 
     def check(self, inputs: Sequence[str]) -> None:
-        """Refuse what can never be written, shares a name, or would replace an input.
+        """Check that all outputs can be written, have different names, and replace no input.
 
         Raises WrongUsageError and OutputError.
         """
@@ -63,9 +63,7 @@ class SlamOutputs:
             raise WrongUsageError("slam: two outputs have the same name; give each its own")
         for source in inputs:
             if source != "-" and os.path.realpath(source) in files:
-                raise WrongUsageError(
-                    f"slam: {source} is an input, and an output too; choose another name for it"
-                )
+                raise WrongUsageError(f"slam: {source} is both an input and an output; choose another name")
         for path in (self.graph, *others):
             check_writable(path)
 
@@ -78,7 +76,7 @@ class SlamOutputs:
         threads: int,
         quiet: bool,
     ) -> None:
-        """Write all; `rows` (N,) are those of the graph's scans, `inputs` what the depfile names."""
+        """Write all outputs; `rows` (N,) are those of the graph's scans, `inputs` are for the depfile."""
         from nscan_cli.graph.io.json_graph import write_graph
         from nscan_cli.memory import release_memory
         from nscan_cli.threads import in_background, short_switch_interval
@@ -86,7 +84,7 @@ class SlamOutputs:
         release_memory()
         farthest = float(abs(graph.poses[:, :2]).max())
         if farthest > DISTANCE.value:
-            problem = f"leads to a pose {farthest:.3g} m away, which no graph may have"
+            problem = f"leads to a pose {farthest:.3g} m away, beyond the limit for graphs"
             raise InputDataError(
                 label(inputs[0]), problem, f"look for jumps, or set {DISTANCE.variable} higher"
             )
@@ -108,25 +106,25 @@ class SlamOutputs:
 
             write_atomically(self.carmen, corrected_log(scans, rows, graph.poses))
         if image is not None and self.map is not None:
-            # Last, since it may be refused for its size: the rest is then there.
+            # The map comes last: if it is too large, the other outputs are there.
             write_map(self.map, image(), yaml=True, quiet=quiet)
         if self.depfile is not None:
             write_atomically(self.depfile, self._rule(inputs))
 
     def _rule(self, inputs: Sequence[str]) -> bytes:
-        """`outputs: inputs` for make's include, with spaces and dollars escaped."""
+        """`outputs: inputs` as a rule for make, with spaces, # and $ escaped."""
 
         def escaped(path: str) -> str:
             return path.replace("$", "$$").replace(" ", "\\ ").replace("#", "\\#")
 
         targets = " ".join(escaped(path) for path in self.files() if path != self.depfile)
-        # Standard input is no file that make could look for.
+        # make cannot look for standard input.
         prerequisites = "".join(f" {escaped(path)}" for path in inputs if path != "-")
         return os.fsencode(f"{targets}:{prerequisites}\n")
 
 
 def _draw_map(scans: LaserLog, rows: NDArray[np.int64], poses: Array, threads: int) -> MapImage:
-    """The map; the counts that it is made of, and what else came before, make room for it."""
+    """The picture of the map. Memory of earlier steps is released before."""
     from nscan_cli.mapping.map_server import map_image
     from nscan_cli.mapping.occupancy import occupancy_grid
     from nscan_cli.memory import trim_heap

@@ -1,4 +1,4 @@
-"""The two ways in which `slam` comes to a graph: from a log, and from a saved graph."""
+"""The two modes of `slam`: from a log, and from a saved graph."""
 
 from __future__ import annotations
 
@@ -26,24 +26,24 @@ if TYPE_CHECKING:
 
 @dataclasses.dataclass(frozen=True)
 class SlamRun:
-    """What there is to write and to say."""
+    """The results of a run, and its summary."""
 
     graph: Graph
     scans: LaserLog | None
-    """The graph's log, where there is one."""
+    """The graph's log, if there is one."""
     rows: NDArray[np.int64]
-    """(N,) the rows of its scans."""
+    """(N,) the row of each node's scan in the log."""
     inputs: list[str]
-    """The paths that were read."""
+    """The paths of all files that were read."""
     summary: list[Row]
     compiled: bool = False
-    """Whether the kernels had to be compiled first."""
+    """Whether kernels were compiled."""
 
 
 def run_on_log(
     log: Sequence[str], reading: ReadingOptions, options: SlamOptions, threads: int, quiet: bool, verbose: int
 ) -> SlamRun:
-    """Run the whole loop over a log."""
+    """Map a log."""
     import numpy as np
 
     from nscan_cli.kernels.decorators import load_runtime
@@ -61,8 +61,8 @@ def run_on_log(
         def report(done: int, keyframes: int, loops: int) -> None:
             bar.advance(done, f"{counted(keyframes, 'keyframe')}, {counted(loops, 'loop')}")
             if done == len(scans):
-                # The last optimisation, and matches that are made again until nothing moves.
-                bar.begin("closing up and refining", None)
+                # Tracking is done; the final optimisation and refinement have no known length.
+                bar.begin("optimising and refining", None)
 
         state, graph = map_log(scans, reading, options, threads, report)
     for warning in graph.provenance["notices"]:
@@ -85,7 +85,7 @@ def run_on_log(
 
 
 def _graph_rows(graph: Graph) -> list[Row]:
-    """What a graph is made of, and why loops were refused."""
+    """Counts of keyframes, relations and loops, reasons of refused loops, and standard deviations."""
     from nscan_cli.slam.map_log import Counts
 
     counts = Counts.of(graph)
@@ -106,7 +106,7 @@ def _graph_rows(graph: Graph) -> list[Row]:
 
 
 def _sigma_lines(graph: Graph) -> list[str]:
-    """How well the graph knows where its keyframes are, in the direction of which it knows least."""
+    """Standard deviations of the keyframes' positions, each along its least certain direction."""
     import numpy as np
 
     first = int(graph.keyframes[0])
@@ -121,12 +121,12 @@ def _sigma_lines(graph: Graph) -> list[str]:
             f"from scan {graph.scans[first]}"
         )
     if unknown:
-        lines.append(f"not known of {counted(unknown, 'keyframe')}")
+        lines.append(f"unknown for {counted(unknown, 'keyframe')}")
     return lines
 
 
 def without_numbers(reason: str) -> str:
-    """The reason as all loops have it that are alike but for a number of scans."""
+    """The reason without its numbers of scans, so that equal reasons are counted together."""
     reason = re.sub(r"\d+ of \d+ scans", "some of the scans", reason)
     return re.sub(r"(all )?\d+ scans?\b", "some scans", reason)
 
@@ -134,7 +134,7 @@ def without_numbers(reason: str) -> str:
 def run_on_graph(
     path: str, log_files: Sequence[str] | None, needs_log: bool, threads: int, quiet: bool
 ) -> SlamRun:
-    """Optimise a saved graph, and refine it where its log is there."""
+    """Optimise a saved graph, and refine it if its log is found."""
     import numpy as np
 
     from nscan_cli.graph.io.load_graph import load_graph
@@ -150,7 +150,7 @@ def run_on_graph(
     before = graph.poses
     optimum = optimise_graph(graph)
     if not optimum.converged:
-        say(f"warning: {path}: the optimum was not reached, its relations contradict each other", quiet)
+        say(f"warning: {path}: the optimisation did not converge: its relations contradict each other", quiet)
     scans, rows, inputs = None, np.arange(0), [path]
     if read is None:
         graph.marginals = marginal_covariances(graph)
@@ -175,7 +175,7 @@ def run_on_graph(
 def _graph_log(
     path: str, graph: Graph, log_files: Sequence[str] | None, needed: bool, quiet: bool
 ) -> tuple[LaserLog, NDArray[np.int64], list[str]] | None:
-    """The log of a saved graph, the rows of its scans, and its files' paths; None where it has none."""
+    """The log of a saved graph, the rows of its scans, and its files' paths; None without a log."""
     from nscan_cli.cli.graph_log import find_log, read_graph_log
     from nscan_cli.logs.log_files import files_of
     from nscan_cli.slam.backend.resume import can_refine, options_of
@@ -183,22 +183,22 @@ def _graph_log(
     if not can_refine(graph):
         if needed or log_files is not None:
             raise WrongUsageError(
-                f"slam: {path} is no graph that slam made from a log; leave out LOG, --map and --carmen"
+                f"slam: {path} was not made from a log by slam; leave out LOG, --map and --carmen"
             )
-        say(f"{path}: is no graph that slam made from a log: it is optimised only", quiet)
+        say(f"{path}: was not made from a log by slam: it is optimised but not refined", quiet)
         return None
     try:
         options_of(graph)
     except ValueError as error:
         raise InputDataError(
-            label(path), f"provenance.parameters: {error}", "mend it, or write it again"
+            label(path), f"provenance.parameters: {error}", "correct it, or create the graph again"
         ) from error
     try:
         log_files = find_log(path, graph) if log_files is None else log_files
     except InputMissingError as error:
         if needed:
             raise
-        say(f"warning: optimised only, and not refined: {error}", quiet)
+        say(f"warning: optimised but not refined: {error}", quiet)
         return None
     scans, _nodes, rows = read_graph_log(path, graph, log_files, ReadingOptions())
     return scans, rows, files_of(log_files)

@@ -1,4 +1,4 @@
-"""Standard output and standard error: whatever their encoding, nothing that is printed stops the work."""
+"""Standard output and standard error, configured so that printing does not fail in any encoding."""
 
 from __future__ import annotations
 
@@ -9,13 +9,13 @@ import sys
 from nscan_cli.files.text import encode_fallback, printable
 
 HANDLER = "nscan-cli"
-"""Name of the error handler of both streams."""
+"""Name of the encoding error handler of both streams."""
 
 
 def configure_streams() -> None:
-    """Let characters that an encoding lacks be printed in others."""
+    """Replace characters that the encoding of a stream lacks."""
     if isinstance(raw := getattr(sys.stdout, "buffer", None), io.RawIOBase):
-        # With PYTHONUNBUFFERED, what a pipe does not take at once would be lost without an error.
+        # With PYTHONUNBUFFERED, output that a pipe does not accept at once is lost without an error.
         sys.stdout = io.TextIOWrapper(
             io.BufferedWriter(raw), sys.stdout.encoding, sys.stdout.errors, line_buffering=True
         )
@@ -26,7 +26,7 @@ def configure_streams() -> None:
 
 
 def print_result(text: str) -> None:
-    """Print to standard output, in its own encoding, what is for people."""
+    """Print text for people to standard output, in its encoding."""
     if sys.stdout is not None:
         sys.stdout.write(printable(text))
         sys.stdout.flush()

@@ -1,4 +1,4 @@
-"""What every subcommand has: help in sections, with examples, and options that the environment sets too."""
+"""The base of all subcommands: help in sections with examples, and options that the environment can set."""
 
 from __future__ import annotations
 
@@ -16,23 +16,23 @@ from nscan_cli.errors import WrongUsageError
 from nscan_cli.logs.formats import readable
 
 CONTEXT: dict[str, Any] = {"help_option_names": ["-h", "--help"]}
-# One prefix for all commands: what is set once in a shell or a Makefile holds for each of them.
+# All commands share the prefix, so a shell or a Makefile can set an option for all of them at once.
 VARIABLE_PREFIX = "NSCAN_CLI_"
 ARGUMENTS, OWN, READING, COMMON = "Arguments", "Options", "Reading the log", "For all commands"
 SECTIONS = (ARGUMENTS, OWN, READING, COMMON)
-"""Of the help, in this order."""
+"""The sections of the help, in order."""
 COMMAND_SPECIFIC = {"initial", "output", "plot", "prior", "reference", "relations", "trajectory"}
-"""Long names of options that mean another thing in another command. What is set for all commands sets none of
-them: neither a variable without the command's name nor a key at the top of a TOML file."""
+"""Long names of options with another meaning in each command. A variable without the command's name does not
+set them, and neither does a key at the top of a TOML file."""
 PATH = click.Path()
-"""A file's name, which a shell can complete; "-" too."""
+"""The type of file names, which shells complete; "-" is allowed."""
 
 Example = tuple[str, str]
-"""A command line, and what it is for."""
+"""A command line, and its purpose."""
 
 
 class Option(click.Option):
-    """An option of a section of the help, which PREFIX with its long name in capitals sets too."""
+    """An option in a section of the help, which environment variables set, too."""
 
     def __init__(self, *args: Any, section: str = OWN, **attributes: Any) -> None:
         super().__init__(*args, **attributes)
@@ -46,36 +46,37 @@ class Option(click.Option):
 
     @property
     def is_shared(self) -> bool:
-        """Whether it means the same in all commands that have it."""
+        """Whether it has the same meaning in all commands."""
         return self.long_name not in COMMAND_SPECIFIC
 
     def variables(self, ctx: click.Context) -> list[str]:
-        """Those that set it, the command's own first."""
+        """The environment variables that set it, the command's own first."""
         own = f"{VARIABLE_PREFIX}{_upper_case(ctx.command.name or '')}_{_upper_case(self.long_name)}"
         return [own, self.envvar] if self.is_shared else [own]
 
     def resolve_envvar_value(self, ctx: click.Context) -> str | None:
-        """The value of the first of its variables that is set to something.
+        """The value of the first of its variables that is set and not empty.
 
-        Raises WrongUsageError where only one is set that would have to mean several things.
+        Raises WrongUsageError if only the variable for all commands is set, and the option has another
+        meaning in each.
         """
         variables = self.variables(ctx)
         value = next((value for name in variables if (value := os.environ.get(name))), None)
         if value is None and os.environ.get(self.envvar) and not ctx.resilient_parsing:
             raise WrongUsageError(
-                f"{self.envvar} in the environment: --{self.long_name} means another thing in each command; "
+                f"{self.envvar} in the environment: --{self.long_name} has another meaning in each command; "
                 f"set {variables[0]} instead"
             )
         return value
 
     def consume_value(self, ctx: click.Context, opts: Mapping[str, Any]) -> tuple[Any, ParameterSource]:
-        """The value and where it is from, which a message about it has to know."""
+        """The value and its source, which is kept for error messages."""
         value, source = super().consume_value(ctx, opts)
         ctx.meta[f"{__name__}.{self.name}"] = source
         return value, source
 
     def type_cast_value(self, ctx: click.Context, value: Any) -> Any:
-        """The value as the command gets it. Raises BadParameter, in our words, also for nan and inf."""
+        """The value as the command gets it. Raises BadParameter, also for nan and inf."""
         try:
             found = super().type_cast_value(ctx, value)
         except click.BadParameter as error:
@@ -86,7 +87,7 @@ class Option(click.Option):
         return found
 
     def get_error_hint(self, ctx: click.Context | None) -> str:
-        """The option as messages name it; the variable where the value is from there."""
+        """The name of the option in messages, or of the variable that has set it."""
         if ctx and ctx.meta.get(f"{__name__}.{self.name}") is ParameterSource.ENVIRONMENT:
             variable = next(name for name in self.variables(ctx) if os.environ.get(name))
             return f"{variable} in the environment"
@@ -94,12 +95,12 @@ class Option(click.Option):
 
 
 def _upper_case(name: str) -> str:
-    """The part of a variable's name that stands for a command or an option."""
+    """The name of a command or an option as part of a variable's name."""
     return name.upper().replace("-", "_")
 
 
 class Argument(click.Argument):
-    """An argument that the help tells about."""
+    """An argument with a help text."""
 
     section = ARGUMENTS
 
@@ -108,7 +109,7 @@ class Argument(click.Argument):
         self.tells = tells
 
     def get_help_record(self, ctx: click.Context) -> tuple[str, str]:
-        """Its name, and what it is."""
+        """Its name and its help text."""
         return self.make_metavar(ctx), self.tells
 
 
@@ -120,8 +121,8 @@ log_argument = functools.partial(
     nargs=-1,
     required=True,
     type=PATH,
-    tells=f"A laser log: {readable()}. - is standard input. A folder that `ros2 bag record` has left, and "
-    "several files of one recording, are one log.",
+    tells=f"A laser log: {readable()}. - is standard input. Several files of one recording, or a folder "
+    "written by `ros2 bag record`, count as one log.",
 )
 
 result_option = option(
@@ -130,27 +131,27 @@ result_option = option(
     type=PATH,
     default="-",
     metavar="RESULT.json",
-    help="The result; standard output if not given.",
+    help="File for the result. Default: standard output.",
 )
-"""Of commands whose result is a short document."""
+"""The output option of commands whose result is a short document."""
 
 
 class Subcommand(click.Command):
-    """A command with examples, whose help lists the options in sections."""
+    """A command whose help has examples, and its options in sections."""
 
     def __init__(self, *args: Any, examples: Sequence[Example] = (), **attributes: Any) -> None:
         super().__init__(*args, **attributes)
         self.examples = examples
 
     def format_options(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
-        """Arguments, the options that the command alone has, and those that others have too."""
+        """Write arguments, the command's own options, then shared options."""
         for title in SECTIONS:
             if records := self.records(ctx, title):
                 with formatter.section(title):
                     formatter.write_dl(records)
 
     def records(self, ctx: click.Context, title: str) -> list[tuple[str, str]]:
-        """Each parameter of a section as the help shows it, and what the help says of it."""
+        """The parameters of a section: each one's name in the help, and its help text."""
         found = (
             parameter.get_help_record(ctx)
             for parameter in self.get_params(ctx)
@@ -159,12 +160,12 @@ class Subcommand(click.Command):
         return [record for record in found if record]
 
     def format_epilog(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
-        """The examples."""
+        """Write the examples."""
         write_examples(formatter, self.examples)
 
 
 def write_examples(formatter: click.HelpFormatter, examples: Sequence[Example]) -> None:
-    """A section of the help with command lines that can be copied: none is broken."""
+    """Write a section with command lines, unbroken, so that they can be copied."""
     with formatter.section("Examples"):
         for line, purpose in examples:
             formatter.write_text(f"# {purpose}")
@@ -172,10 +173,10 @@ def write_examples(formatter: click.HelpFormatter, examples: Sequence[Example]) 
 
 
 def section_of(parameter: click.Parameter) -> str:
-    """The section of the help that an option is in; --help is everybody's."""
+    """The section of the help that a parameter belongs to; --help is in COMMON."""
     return parameter.section if isinstance(parameter, (Argument, Option)) else COMMON
 
 
 def subcommand(name: str, *examples: Example) -> Callable[[Callable[..., Any]], Subcommand]:
-    """The decorator that makes a function the subcommand `name`."""
+    """Decorator: make a function the subcommand `name`."""
     return click.command(name, cls=Subcommand, context_settings=CONTEXT, examples=examples)

@@ -1,4 +1,4 @@
-"""What a command has done, as a table that fits a terminal of 80 columns."""
+"""The summary of a command as a table for a terminal of 80 columns."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ from nscan_cli.files.counting import counted
 
 TERMINAL_WIDTH = 80
 Row = tuple[str, Sequence[str]]
-"""A title, and the lines beside it; no line, no row."""
+"""A title, and the lines beside it. A row without lines is left out."""
 
 
 def summary_table(rows: Sequence[Row], width: int | None = TERMINAL_WIDTH) -> str:
-    """The rows with their titles in a column of its own; lines are broken at `width`, where it is given."""
+    """The rows, with titles in the first column. Lines are wrapped at `width`, None for not at all."""
     filled = [(title, lines) for title, lines in rows if lines]
     aside = max(len(title) for title, _lines in filled) + 2
     shown = []
@@ -28,9 +28,9 @@ def summary_table(rows: Sequence[Row], width: int | None = TERMINAL_WIDTH) -> st
 
 
 def match_outcome(reason: str | None, iterations: int, evaluations: int, unsettled: int) -> list[str]:
-    """How a match ended: converged, or why not (`reason`), what it took, and what was cut off on its way."""
+    """The outcome of a match: converged or why not, iterations, and stages that did not settle."""
     outcome = "converged" if reason is None else f"not converged ({reason})"
-    cut = f"{counted(unsettled, 'stage')} before the last did not settle: the place is less sure"
+    cut = f"{counted(unsettled, 'stage')} before the last did not settle: the result is less certain"
     return [
         f"{outcome}, {counted(iterations, 'iteration')}, {counted(evaluations, 'evaluation')}",
         *([cut] if unsettled else []),

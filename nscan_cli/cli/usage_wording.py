@@ -1,4 +1,4 @@
-"""What is wrong with a value or a command line, in one line and in words that need no manual of click's."""
+"""Usage errors in one line of plain words, instead of those of click."""
 
 from __future__ import annotations
 
@@ -7,18 +7,18 @@ from typing import Any
 import click
 
 SUBCOMMAND_OPTIONS = ("-q", "--quiet", "-v", "--verbose", "--config", "--dump-config")
-"""Options that every command has, and nothing has before its name."""
+"""Options that stand after the name of a command, not before it."""
 METAVAR_UNITS = {"M": "m", "DEG": "degrees", "T": "s", "SECONDS": "s"}
-"""Units of numbers, by what the help writes in their place."""
+"""Units of numbers by their metavar in the help."""
 
 
 def value_problem(kind: click.ParamType[Any], value: Any, metavar: str | None) -> str | None:
-    """What is wrong with a value that a type of click's refuses; None for types that have words of their own.
+    """The problem with a value that a type of click refuses; None for types with messages of their own.
 
-    `metavar` is what the help writes for the value.
+    `metavar` is the placeholder of the value in the help.
     """
     if isinstance(kind, click.Choice):
-        return f"{value!r} is none of {', '.join(map(str, kind.choices))}"
+        return f"{value!r} is not one of {', '.join(map(str, kind.choices))}"
     if isinstance(kind, click.types.BoolParamType):
         return f"{value!r} is neither true nor false"
     whole = isinstance(kind, click.types.IntParamType)
@@ -29,11 +29,11 @@ def value_problem(kind: click.ParamType[Any], value: Any, metavar: str | None) -
     except (ValueError, TypeError, OverflowError):
         return f"{value!r} is not a {'whole ' if whole else ''}number"
     unit = METAVAR_UNITS.get(metavar or "")
-    return f"has to be {_range_text(kind)}{f' ({unit})' if unit else ''}, and is {number:g}"
+    return f"must be {_range_text(kind)}{f' ({unit})' if unit else ''}, but is {number:g}"
 
 
 def _range_text(kind: Any) -> str:
-    """Between which numbers one of a range has to be."""
+    """The range of a number in words."""
     low, high = kind.min, kind.max
     if low is not None and high is not None and not kind.min_open and not kind.max_open:
         return f"from {low:g} to {high:g}"
@@ -43,7 +43,7 @@ def _range_text(kind: Any) -> str:
 
 
 def usage_problem(error: click.ClickException) -> str:
-    """What click says of a command line, which may be several lines, without the end of the sentence."""
+    """The message of click, without its full stop."""
     if isinstance(error, click.BadParameter) and not isinstance(error, click.MissingParameter):
         place = error.param_hint or (error.param.get_error_hint(error.ctx) if error.param else "")
         return f"{place}: {error.message.rstrip('.')}".removeprefix(": ")

@@ -83,7 +83,7 @@ def test_every_command_takes_and_writes_such_names(log, capsys):
     assert run(["nscan", log, "--scans", "0-8:4", "--initial", tum, "-o", f"{NAME}.n"]) == 0
     assert run(["slam", log, "-o", graph, *outputs]) == 0
     said = capsys.readouterr().err
-    assert f"warning: {SHOWN}.yaml calls the map {SHOWN}.png, under which no loader finds it" in said
+    assert f"warning: {SHOWN}.yaml names the map {SHOWN}.png, which no loader will find" in said
     for name, inputs in ((graph, [log]), (f"{NAME}.m", [log]), (f"{NAME}.n", [log, tum])):
         named = [entry["name"] for entry in json.loads(Path(name).read_bytes())["provenance"]["inputs"]]
         assert named == [entry.replace(NAME, SHOWN) for entry in inputs]
@@ -97,7 +97,10 @@ def test_every_command_takes_and_writes_such_names(log, capsys):
     assert run(["info", f"{NAME}.mcap"]) == 0
     assert run(["evaluate", graph, "--reference", tum, "--plot", f"{NAME}.e.png"]) == 0
     assert run(["slam", log, "-o", graph, "--dump-config"]) == 2
-    assert f"--dump-config: {SHOWN}.json is no UTF-8, as TOML is; choose another" in capsys.readouterr().err
+    assert (
+        f"--dump-config: {SHOWN}.json is not UTF-8, which TOML needs; choose another"
+        in capsys.readouterr().err
+    )
 
 
 def test_a_log_with_a_backslash_in_its_name_is_found_too(folder):

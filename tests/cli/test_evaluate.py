@@ -120,7 +120,7 @@ def test_the_result_may_come_from_standard_input(
 @pytest.mark.parametrize(
     ("arguments", "code", "problem"),
     [
-        (["result.tum"], 2, "nothing to measure against; give --relations or --reference"),
+        (["result.tum"], 2, "there is no reference; give --relations or --reference"),
         (["-", "--relations", "-"], 2, "standard input (-) can be one input only"),
         (["nowhere.json", "--relations", "floor.relations"], 66, "nowhere.json: no such file"),
         (["result.tum", "--relations", "nowhere"], 66, "nowhere: no such file"),

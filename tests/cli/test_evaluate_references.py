@@ -125,7 +125,7 @@ THERE = "/vicon/pose (PoseStamped, 5 messages)"
         ),
         (
             ["--relations", "a.relations", "--reference-topic", "/a"],
-            "--reference-topic is of a recording that is the reference; give --reference too",
+            "--reference-topic needs a recording as the reference; give --reference, too",
         ),
     ],
 )

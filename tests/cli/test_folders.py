@@ -125,7 +125,7 @@ def test_the_other_commands_take_folders(here, capsys):
 
 def test_outputs_replace_no_file_of_a_recording(here, capsys):
     assert run(["slam", "my_bag", "-q", "-o", "my_bag/my_bag_1.mcap"]) == 2
-    assert "my_bag_1.mcap is an input, and an output too" in capsys.readouterr().err
+    assert "my_bag_1.mcap is both an input and an output" in capsys.readouterr().err
     assert run(["match", "my_bag", "--reference", "1", "--scan", "2", "--plot", "my_bag/my_bag_1.mcap"]) == 2
     assert run(["render", "a.json", "-o", "b.png", "--mcap", "my_bag/my_bag_1.mcap"]) == 2
 

@@ -43,7 +43,7 @@ def test_help_and_version_are_no_failures(capsys):
 def test_the_command_has_the_garbage_collection_look_through_new_objects_only():
     script = (
         "import atexit, gc, sys; from nscan_cli.cli import main as frame; sys.argv[1:] = ['--version']; "
-        "told = lambda: print(gc.get_threshold()[0] == frame.OBJECTS, gc.get_freeze_count() > 0); "
+        "told = lambda: print(gc.get_threshold()[0] == frame.GC_THRESHOLD, gc.get_freeze_count() > 0); "
         "atexit.register(told); frame.main()"
     )
     done = subprocess.run([sys.executable, "-c", script], check=True, capture_output=True, text=True)
@@ -74,7 +74,8 @@ def test_help_and_version_import_nothing_heavy():
         (["render"], "nscan-cli: render: Missing argument 'GRAPH.json'; see nscan-cli render --help\n"),
         (
             ["render", "g.json", "-o", "m.png", "--style", "oil"],
-            "nscan-cli: render: --style: 'oil' is none of map_server, paper; see nscan-cli render --help\n",
+            "nscan-cli: render: --style: 'oil' is not one of map_server, paper; "
+            "see nscan-cli render --help\n",
         ),
     ],
 )
@@ -119,7 +120,7 @@ def test_a_bug_is_code_1_and_shows_no_traceback_unasked(failing, capsys):
     failing(RuntimeError("odd\nthing"))
     assert run(["fail"]) == 1
     assert capsys.readouterr().err == (
-        "nscan-cli: internal error, please report it: RuntimeError: odd thing; -vv shows where\n"
+        "nscan-cli: internal error, please report it: RuntimeError: odd thing; -vv shows the traceback\n"
     )
 
 

@@ -177,7 +177,7 @@ def test_a_match_that_failed_has_a_plot_too(tmp_path, capsys):
     [
         (["--plot", "-"], 2, "--plot -: only the result can go to standard output; name a file"),
         (["--plot", "match.pdf"], 2, "pictures are PNG; name it like match.png"),
-        (["-o", "match", "--plot", "./match"], 2, "is the result's name too"),
+        (["-o", "match", "--plot", "./match"], 2, "the result has the same name"),
         (["--plot", OFFICE_LOG], 2, "is an input, and would be replaced"),
         (["--plot", "no/such.png"], 73, "the folder no does not exist"),
         (["--plot", "."], 73, "is a folder"),
@@ -258,4 +258,4 @@ def test_a_stage_that_was_cut_off_is_told_though_the_match_has_converged(capsys)
     document, said = matched(capsys, OFFICE_LOG, *arguments)
     assert np.hypot(*off(document, OFFICE_LOG)[:2]) > 0.4
     assert (document["converged"], document["reason"], document["unsettled_stages"]) == (True, None, 1)
-    assert said[-1].strip() == "1 stage before the last did not settle: the place is less sure"
+    assert said[-1].strip() == "1 stage before the last did not settle: the result is less certain"

@@ -103,7 +103,7 @@ def test_failures_have_their_reasons_and_code_3(manifest, first, tmp_path, capsy
     assert one.startswith("nscan-cli: one: log/one.log: is ")
     assert two.startswith("nscan-cli: two: RMSE of the ATE 0.")
     assert two.endswith(" m is above 0 m")
-    assert four == ("nscan-cli: four: four.log.gz is not there; to be had from https://example.org/four.log")
+    assert four == ("nscan-cli: four: four.log.gz is not there; download from https://example.org/four.log")
     assert last == f"nscan-cli: Not good: of 4 logs 2 failed, 1 above bound; see {folder}/report.html"
     document = report(folder)
     assert document["good"] is False
@@ -115,7 +115,7 @@ def test_failures_have_their_reasons_and_code_3(manifest, first, tmp_path, capsy
     assert run(["nightly", str(logs / "small.toml"), "-o", str(folder)]) == 3
     lines = capsys.readouterr().err.splitlines()
     assert lines[0] == (
-        f"five: {logs}/five.log.gz is not there, skipped; to be had from https://example.org/five.log"
+        f"five: {logs}/five.log.gz was not found, skipped; download from https://example.org/five.log"
     )
     said = [line.partition(":")[0] for line in lines[1:]]
     assert sorted(said) == ["four", "nscan-cli", "nscan-cli", "nscan-cli", "nscan-cli", "one"]
@@ -133,7 +133,7 @@ def test_optional_logs_that_are_not_there_are_one_line(manifest, first, tmp_path
     (logs / "small.toml").write_text((logs / "small.toml").read_text() + "".join(more))
     assert run(["nightly", str(logs / "small.toml"), "-o", str(folder)]) == 0
     first_line, *_ = capsys.readouterr().err.splitlines()
-    assert first_line == "not there, skipped: four, five, six; the report says where to get them"
+    assert first_line == "not found, skipped: four, five, six; the report has their sources"
     page = (folder / "report.html").read_text()
     assert page.count('<section class="log missing">') == 1
     for name in ("four", "five", "six"):
@@ -157,7 +157,7 @@ def test_force(manifest, first, tmp_path, capsys):
     [
         (["none.toml", "-o", "out"], 66, "none.toml: no such file; check the path"),
         (["bad.toml", "-o", "out"], 65, "bad.toml, log 1 (a): has an unknown key 'pth'; known: name, path,"),
-        (["empty.toml", "-o", "out"], 66, "empty.toml: none of its logs is there, not even a.log.gz; give"),
+        (["empty.toml", "-o", "out"], 66, "empty.toml: none of its logs was found, such as a.log.gz; give"),
         (["kuemmerle", "-o", "out"], 2, "nightly: kuemmerle has no logs of its own; give their folder with"),
         (["kuemmerle", "-o", "out", "--data", "nowhere"], 66, "--data nowhere: is no folder; give that"),
         (["fine.toml", "-o", "no/out"], 73, "no/out: the folder no does not exist; create it first"),
@@ -193,10 +193,10 @@ def test_where_no_log_of_ones_own_is_there_the_night_has_failed_and_the_report_s
 def test_where_no_log_is_there_it_is_said_where_to_get_them(tmp_path, capsys):
     assert run(["nightly", "kuemmerle", "--data", str(tmp_path), "-o", str(tmp_path / "nights")]) == 66
     *lines, error = capsys.readouterr().err.splitlines()
-    assert error.startswith("nscan-cli: kuemmerle: none of its logs is there")
+    assert error.startswith("nscan-cli: kuemmerle: none of its logs was found")
     assert [line.partition(":")[0] for line in lines][:4] == ["intel", "fr079", "mit-csail", "mit-killian"]
     assert len(lines) == 6
-    assert all("is not there, skipped; to be had from http" in line for line in lines)
+    assert all("was not found, skipped; download from http" in line for line in lines)
     assert all(line.endswith(".relations") for line in lines[:4])
     assert list(tmp_path.iterdir()) == []
 

@@ -77,7 +77,7 @@ def test_such_an_option_is_set_by_its_commands_variable_and_table_alone(
     monkeypatch.setenv(shared, value)
     assert run(arguments) == 2
     assert capsys.readouterr().err == (
-        f"nscan-cli: {shared} in the environment: --{key} means another thing in each command; "
+        f"nscan-cli: {shared} in the environment: --{key} has another meaning in each command; "
         f"set {own} instead\n"
     )
     monkeypatch.setenv(own, value)
@@ -128,8 +128,8 @@ def test_a_key_at_the_top_that_means_several_things_is_refused_with_the_tables(c
     Path("all.toml").write_text('relations = "pairwise"\n')
     assert run(["slam", "a.log", "--config", "all.toml"]) == 65
     assert capsys.readouterr().err == (
-        "nscan-cli: all.toml: relations stands for all commands, and means another thing in each; "
-        "write it below [slam] or [evaluate]\n"
+        "nscan-cli: all.toml: relations is set for all commands, and has another meaning in each; "
+        "set it below [slam] or [evaluate]\n"
     )
 
 
@@ -190,13 +190,13 @@ def test_so_is_a_flag_that_is_set_to_neither_true_nor_false(name, option, monkey
     ("arguments", "said"),
     [
         (["render", "g.json", "-o", "m.png", "--resolution", "11"],
-         "--resolution: has to be from 0.001 to 10 (m), and is 11"),
-        (["info", "a.log", "--max-range", "0"], "--max-range: has to be above 0 (m), and is 0"),
-        (["info", "a.log", "--every", "0"], "--every: has to be 1 or more, and is 0"),
+         "--resolution: must be from 0.001 to 10 (m), but is 11"),
+        (["info", "a.log", "--max-range", "0"], "--max-range: must be above 0 (m), but is 0"),
+        (["info", "a.log", "--every", "0"], "--every: must be 1 or more, but is 0"),
         (["info", "a.log", "--start", "soon"], "--start: 'soon' is not a number"),
         (["match", "a.log", "--reference", "0", "--scan", "1", "--initial", "here"],
          "--initial: 'here' is not of the form X,Y,DEG, as in 0.1,0,90, nor odometry or identity"),
-        (["slam", "a.log", "--relations", "all"], "--relations: 'all' is none of pairwise, nscan, both"),
+        (["slam", "a.log", "--relations", "all"], "--relations: 'all' is not one of pairwise, nscan, both"),
     ],
 )  # fmt: skip
 def test_what_is_said(arguments, said, capsys):
@@ -217,7 +217,7 @@ def test_what_is_said(arguments, said, capsys):
 def test_a_picture_needs_a_name_that_says_so(arguments, capsys):
     assert run(arguments) == 2
     err = capsys.readouterr().err
-    assert err.endswith(": the name has no ending; pictures are PNG: name it map.png\n")
+    assert err.endswith(": the name has no suffix; pictures are PNG: name it map.png\n")
     assert not list(Path().iterdir())
 
 

@@ -135,7 +135,7 @@ def test_another_log_of_the_same_name_is_refused(room, capsys, explicit):
     arguments = ["room.log"] if explicit else []
     assert run(["render", "room.json", *arguments, "-o", "map.png"]) == 65
     error = capsys.readouterr().err
-    assert "room.log: is not the log of room.json: its SHA-256 is another" in error
+    assert "room.log: is not the log of room.json: its SHA-256 differs" in error
     assert error.count("\n") == 1
     assert not list(room.glob("map*"))
 

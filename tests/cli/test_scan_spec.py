@@ -26,8 +26,8 @@ def test_spec(spec, scans):
     [
         ("", "not of the form"), ("a", "not of the form"), ("1,,2", "not of the form"),
         ("1-", "not of the form"), ("1:2", "not of the form"), ("-3", "not of the form"),
-        ("1.5,2", "not of the form"), ("9-3", "backwards"), ("1-9:0", "step of 0"), ("5", "one scan only"),
-        ("5-9:10", "one scan only"), ("1,2,1", "scan 1 twice"), ("1-5,3-7", "scan 3 twice"),
+        ("1.5,2", "not of the form"), ("9-3", "backwards"), ("1-9:0", "step of 0"), ("5", "only one scan"),
+        ("5-9:10", "only one scan"), ("1,2,1", "scan 1 twice"), ("1-5,3-7", "scan 3 twice"),
         ("0-99999999999", "more than 500"),
     ],
 )  # fmt: skip

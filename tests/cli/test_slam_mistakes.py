@@ -26,14 +26,14 @@ PNG = b"\x89PNG\r\n\x1a\n" + bytes(40)
         (["good.log", "--relations", "some"], 2, "--relations"),
         ([], 2, "slam: give LOG, or --from GRAPH"),
         (["--from", "none.json"], 66, "none.json: no such file"),
-        (["--from", "graph.json"], 2, "graph.json is no graph that slam made from a log; leave out LOG"),
+        (["--from", "graph.json"], 2, "graph.json was not made from a log by slam; leave out LOG"),
         (["-", "--from", "-"], 2, "standard input (-) can be one input only"),
         (["good.log", "-o", "none/out.json"], 73, "none/out.json: the folder none does not exist"),
         (["good.log", "--map", "none/out.png"], 73, "none/out.png: the folder none does not exist"),
         (["good.log", "--trajectory", "none/out.tum"], 73, "none/out.tum: the folder none"),
         (["good.log", "--g2o", "folder"], 73, "folder: is a folder"),
         (["good.log", "--carmen", "none/out.log"], 73, "none/out.log: the folder none does not exist"),
-        (["good.log", "--carmen", "good.log"], 2, "good.log is an input, and an output too"),
+        (["good.log", "--carmen", "good.log"], 2, "good.log is both an input and an output"),
         (["good.log", "--carmen", "out.json"], 2, "two outputs have the same name"),
         (["good.log", "--depfile", "none/out.d"], 73, "none/out.d: the folder none does not exist"),
         (["good.log", "--map", "out.yaml"], 2, "out.yaml: the map would have the name of its YAML"),
@@ -89,7 +89,7 @@ def test_options_of_mapping_do_not_go_with_a_saved_graph(folder, capsys, options
     assert run(["slam", "--from", "saved.json", "-o", "out.json", *options]) == 2
     out, err = capsys.readouterr()
     assert (out, len(err.splitlines())) == ("", 1)
-    assert "--max-scans, --relations and --no-loops do not go with --from" in err
+    assert "--max-scans, --relations and --no-loops cannot be combined with --from" in err
     assert not (folder / "out.json").exists()
 
 

@@ -77,7 +77,7 @@ def test_the_progress_has_rate_keyframes_loops_and_time_left(folder, monkeypatch
     assert run(["slam", *SHORT, "--map", "map.png", "-o", "graph.json"]) == 0
     shown = words(capsys.readouterr().err)
     assert re.search(r"mapping .*201/201 \d+/s \d+ keyframes, \d+ loops? \d:\d\d:\d\d", shown)
-    mapping, _, refining = shown.partition("closing up and refining ━")
+    mapping, _, refining = shown.partition("optimising and refining ━")
     assert "201/201" in mapping
     assert refining
     assert "201/201" not in refining
