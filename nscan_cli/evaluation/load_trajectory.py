@@ -22,7 +22,7 @@ from nscan_cli.logs.load import (
     stored_bytes,
 )
 from nscan_cli.logs.reading_options import ReadingOptions
-from nscan_cli.logs.recordings.pose_topics import poses_on
+from nscan_cli.logs.recordings.pose_topics import poses_on_topic
 
 
 def load_trajectory(
@@ -68,7 +68,7 @@ def load_reference(
         recording = recording_in(stored, path, options.salvage)
     if recording is not None:
         notices += [f"{name}: {warning}" for warning in recording.warnings]
-        return Trajectory.in_space(*poses_on(recording, topic, name, notices))
+        return Trajectory.in_space(*poses_on_topic(recording, topic, name, notices))
     if topic is not None:
         raise WrongUsageError(f"{name}: is no recording, and has no topics; leave out --reference-topic")
     loaded = _loaded(bytes(stored), path, options, notices)

@@ -20,8 +20,8 @@ from nscan_cli.logs.formats import FORMS, Form, foreign, readable
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.logs.log_files import Parts, beside, first_bytes, parts_of
 from nscan_cli.logs.reading_options import ReadingOptions
-from nscan_cli.logs.recordings import joined as joining
-from nscan_cli.logs.recordings.container import DAMAGED, Recording
+from nscan_cli.logs.recordings import split_recordings
+from nscan_cli.logs.recordings.container import DAMAGE_REMEDY, Recording
 
 
 class Reader(Protocol):
@@ -34,14 +34,16 @@ class Reader(Protocol):
 class Container(Protocol):
     """What a module that reads a container of messages has."""
 
-    def recording(self, data: FileBytes, file: str, salvage: bool) -> Recording:
-        """The messages; `file` is what errors call it. Raises InputDataError and ExceededError."""
+    def read_recording(self, data: FileBytes, file: str, salvage: bool) -> Recording:
+        """The messages; `file` is what errors call it. Raises InputDataError and LimitExceededError."""
 
 
 class Database(Container, Protocol):
     """What a module has that opens a file itself."""
 
-    def recording_at(self, path: str, beside: Mapping[str, str], file: str, salvage: bool) -> Recording:
+    def read_recording_file(
+        self, path: str, beside: Mapping[str, str], file: str, salvage: bool
+    ) -> Recording:
         """The messages in the file and in what parts.beside has found. Raises the same errors."""
 
 
@@ -145,7 +147,7 @@ def content_of(stored: bytes, path: str, salvage: bool) -> tuple[bytes, str | No
     if problem is None:
         return content, None
     if not salvage:
-        raise InputDataError(label(path), problem, DAMAGED)
+        raise InputDataError(label(path), problem, DAMAGE_REMEDY)
     return content, f"{problem}: the rest is lost"
 
 
@@ -175,15 +177,15 @@ def _joined(parts: Parts, salvage: bool) -> tuple[Recording, Source]:
                 raise WrongUsageError(f"{problem}; several LOGs have to be the files of one recording")
             first = first or (path, form.name)
             if form.name != first[1]:
-                raise joining.differing(first, (path, form.name))
+                raise split_recordings.different_forms(first, (path, form.name))
             sources.append(_source(stored, path).files)
             del stored
             recording = _recording(form, data, path, salvage)
             del data
             recording.warnings[:0] = [] if lost is None else [lost]
             found.append((base_name(path), recording))
-        order = joining.in_order_of_time(found)
-        whole = joining.joined([found[place] for place in order], parts.are_parts)
+        order = split_recordings.order_by_start(found)
+        whole = split_recordings.merge_recordings([found[place] for place in order], parts.are_parts)
     except LimitExceededError as error:
         raise InputDataError(parts.title, str(error), error.remedy) from error
     del found
@@ -192,9 +194,9 @@ def _joined(parts: Parts, salvage: bool) -> tuple[Recording, Source]:
 
 def _scans(recording: Recording, name: str, source: Source, options: ReadingOptions) -> LaserLog:
     """The scans of a recording; texts need none of what decodes messages."""
-    from nscan_cli.logs.recordings import laser_scans as recorded
+    from nscan_cli.logs.recordings.laser_scans import log_from_recording
 
-    return recorded.read(recording, name, source, options)
+    return log_from_recording(recording, name, source, options)
 
 
 def _form(data: FileBytes, name: str) -> Form:
@@ -210,9 +212,9 @@ def _recording(form: Form, data: FileBytes, path: str, salvage: bool) -> Recordi
     """The messages in a container: of a database from its file, where it is one and not compressed."""
     if form.by_path and isinstance(data, mmap):
         database: Database = form.reader()
-        return database.recording_at(path, beside(path), label(path), salvage)
+        return database.read_recording_file(path, beside(path), label(path), salvage)
     container: Container = form.reader()
-    return container.recording(data, label(path), salvage)
+    return container.read_recording(data, label(path), salvage)
 
 
 def _source(stored: FileBytes, path: str) -> Source:

@@ -14,15 +14,15 @@ from nscan_cli.files.counting import counted
 from nscan_cli.files.inputs import STANDARD_INPUT, base_name, label, read_bytes
 from nscan_cli.files.limits import CONFIG
 from nscan_cli.logs.formats import FORMS
-from nscan_cli.logs.recordings.recording_names import (
-    RECORDINGS,
-    common,
-    distinct,
-    gaps,
-    in_order,
-    some,
-    taken_apart,
-    without_packing,
+from nscan_cli.logs.recordings.split_file_names import (
+    RECORDING_SUFFIXES,
+    common_name,
+    have_own_numbers,
+    missing_parts,
+    parse_name,
+    shortened_list,
+    sorted_parts,
+    without_compression,
 )
 
 METADATA = "metadata.yaml"
@@ -74,11 +74,11 @@ def parts_of(paths: str | Sequence[str]) -> Parts:
             )
     if len({os.path.realpath(path) for path in named}) < len(named):
         raise WrongUsageError(f"{named[-1]}: one of the LOGs is given twice; give each once")
-    parts = in_order(named)
-    agree = len({part.recording for part in parts}) == 1 and distinct(parts)
-    name = common(parts) if agree else ", ".join(base_name(part.file) for part in parts)
+    parts = sorted_parts(named)
+    agree = len({part.recording for part in parts}) == 1 and have_own_numbers(parts)
+    name = common_name(parts) if agree else ", ".join(base_name(part.file) for part in parts)
     title = f"{parts[0].file} and {counted(len(parts) - 1, 'other')}"
-    return Parts(title, name, tuple(part.file for part in parts), gaps(parts, first=None), agree)
+    return Parts(title, name, tuple(part.file for part in parts), missing_parts(parts, first=None), agree)
 
 
 def _recorded(paths: Sequence[str]) -> list[str]:
@@ -119,23 +119,27 @@ def _of_folder(path: str) -> Parts:
     name = Path(os.path.abspath(path)).name
     warnings: list[str] = []
     listed = _listed(folder, warnings) if METADATA in names else []
-    known = {without_packing(one): one for one in there}
-    found = [one if one in there else known.get(without_packing(one)) for one in listed]
+    known = {without_compression(one): one for one in there}
+    found = [one if one in there else known.get(without_compression(one)) for one in listed]
     files = [one for one in found if one is not None]
     if listed and not files and there:
-        warnings.append(f"{METADATA} names other files than {some(there)}, which is there and is read")
+        warnings.append(
+            f"{METADATA} names other files than {shortened_list(there)}, which is there and is read"
+        )
     elif listed:
         gone = [one for one, other in zip(listed, found, strict=True) if other is None]
         if gone and files:
-            warnings.append(f"{some(gone)} is not there, which {METADATA} names: what it held is missing")
-        twins = {without_packing(one) for one in files}
-        more = [one for one in there if without_packing(one) not in twins]
+            warnings.append(
+                f"{shortened_list(gone)} is not there, which {METADATA} names: what it held is missing"
+            )
+        twins = {without_compression(one) for one in files}
+        more = [one for one in there if without_compression(one) not in twins]
         if more:
-            warnings.append(f"{some(more)} is not in {METADATA}, and is left out")
+            warnings.append(f"{shortened_list(more)} is not in {METADATA}, and is left out")
     if not files:
         files = _alone(path, there, names)
-        warnings += gaps(in_order(files), first=0)
-    ordered = tuple(str(folder / part.file) for part in in_order(files))
+        warnings += missing_parts(sorted_parts(files), first=0)
+    ordered = tuple(str(folder / part.file) for part in sorted_parts(files))
     return Parts(path, name, ordered, tuple(warnings))
 
 
@@ -143,21 +147,23 @@ def _alone(path: str, there: list[str], names: list[str]) -> list[str]:
     """The files of the only recording among those of a folder."""
     if not there:
         held = [f"{name}/" if os.path.isdir(os.path.join(path, name)) else name for name in names]
-        holds = f"it holds {some(held)}" if held else "it is empty"
+        holds = f"it holds {shortened_list(held)}" if held else "it is empty"
         raise InputMissingError(
             f"{path}: is a folder without a recording, {holds}; "
             "name a log, or a folder that `ros2 bag record` has left"
         )
-    plain = {without_packing(one): one for one in sorted(there, key=len, reverse=True)}
-    parts = in_order(plain.values())
-    if len({part.recording for part in parts}) > 1 or not distinct(parts):
-        raise WrongUsageError(f"{path}: holds several recordings, {some(there)}; name the files of one")
+    plain = {without_compression(one): one for one in sorted(there, key=len, reverse=True)}
+    parts = sorted_parts(plain.values())
+    if len({part.recording for part in parts}) > 1 or not have_own_numbers(parts):
+        raise WrongUsageError(
+            f"{path}: holds several recordings, {shortened_list(there)}; name the files of one"
+        )
     return [part.file for part in parts]
 
 
 def _siblings(path: str) -> tuple[str, ...]:
     """What a user should know who has named one of several files of a recording."""
-    if taken_apart(path).number is None or not any(end in path for end in RECORDINGS):
+    if parse_name(path).number is None or not any(end in path for end in RECORDING_SUFFIXES):
         return ()
     file = Path(os.path.realpath(path))
     if (file.parent / METADATA).is_file():
@@ -165,12 +171,12 @@ def _siblings(path: str) -> tuple[str, ...]:
         if len(listed) > 1 and file.name in listed:
             place, whole = listed.index(file.name) + 1, f"its folder {Path(path).parent}"
             return (f"it is file {place} of {len(listed)} of a recording: give {whole} to read all of it",)
-    own = taken_apart(file.name)
+    own = parse_name(file.name)
     try:
         names = os.listdir(file.parent)
     except OSError:
         return ()
-    parts = in_order(name for name in names if taken_apart(name).recording == own.recording)
+    parts = sorted_parts(name for name in names if parse_name(name).recording == own.recording)
     numbers = [part.number for part in parts]
     if len(parts) < 2 or numbers != list(range(len(parts))):
         return ()
@@ -202,7 +208,7 @@ def _is_recording(path: Path) -> bool:
         return False
     head = first_bytes(str(path))
     magic = any(form.magic is not None and head.startswith(form.magic) for form in FORMS if form.container)
-    return magic or taken_apart(path.name).recording[1] != ""
+    return magic or parse_name(path.name).recording[1] != ""
 
 
 def first_bytes(path: str) -> bytes:

@@ -8,7 +8,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from nscan_cli.logs.load import read_log
-from nscan_cli.logs.recordings.mcap_records import MAGIC
+from nscan_cli.logs.recordings.mcap import MCAP_MAGIC
 from tests.benchmarks.clock import Timing, best_of
 from tests.data import find_data
 from tests.logs.forms import FORMS
@@ -31,7 +31,7 @@ def timings() -> Iterator[Timing]:
             path = Path(folder, "recording")
             data = FORMS[form](written, Path(folder))
             # Chunks of the size that recorders write; the tests have smaller ones.
-            path.write_bytes(repacked(data, chunk_size=1 << 20) if data.startswith(MAGIC) else data)
+            path.write_bytes(repacked(data, chunk_size=1 << 20) if data.startswith(MCAP_MAGIC) else data)
             yield _timed(f"{form}, {BEAMS} beams", SCANS, path)
 
 

@@ -42,7 +42,7 @@ NEVER_ONE = {
     ("logs/text/carmen.py", " records"): "a tag",
     ("logs/text/carmen.py", " scans; --laser can be "): "a tag",
     ("logs/text/corrected_poses.py", " records"): "a tag",
-    ("logs/recordings/mcap_records.py", " messages on "): "so many of so many",
+    ("logs/recordings/mcap.py", " messages on "): "so many of so many",
     ("mapping/figures/match_plots.py", " scans, least overlap "): "of a joint match",
     ("slam/local_matching/joint_relations.py", " scans hang together"): "so many of so many",
 }

@@ -1,12 +1,13 @@
-"""Foxglove's own messages, in protobuf or JSON, as the reader needs them.
+"""Decoders of Foxglove's own messages, in protobuf or JSON.
 
-Source of the form: docs.foxglove.dev, schemas LaserScan, FrameTransform, FrameTransforms, Odometry. What a
-message leaves out has its type's zero, but a quaternion without w, which means no rotation.
+Source: docs.foxglove.dev, schemas LaserScan, FrameTransform, FrameTransforms, Odometry, PoseInFrame. A field
+that a message leaves out is zero; a quaternion of zeros means no rotation.
 """
 
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Callable, Mapping
 from typing import Any
 
@@ -15,109 +16,111 @@ import numpy as np
 from nscan_cli.errors import InputDataError
 from nscan_cli.logs.recordings.container import Channel
 from nscan_cli.logs.recordings.decoded_messages import (
-    FramePose,
-    Rigid,
-    Sweep,
-    frame_name,
+    Pose3D,
+    ScanMessage,
+    StampedTransform,
     nanoseconds,
     unknown_encoding,
 )
+from nscan_cli.logs.recordings.frame_ids import normalised
 
-ENDLESS = float("inf")
+JSON_OBJECTS = ("timestamp", "pose", "position", "orientation", "translation", "rotation")
+"""Fields that are objects, not numbers."""
 
 
 def decoder(channel: Channel, file: str) -> Callable[[bytes], Any]:
-    """What makes a message of its bytes: of protobuf an object, of JSON one with the same attributes.
+    """The decoder of a channel; objects from JSON have the same attributes as those from protobuf.
 
-    Raises InputDataError when the encoding is neither of them or the schema cannot be read.
+    Raises InputDataError when the encoding is neither of them, or the schema cannot be read.
     """
     if channel.encoding == "json":
-        return lambda data: _Fields(json.loads(data))
+        return lambda data: _JsonObject(json.loads(data))
     if channel.encoding == "protobuf" and channel.schema_encoding == "protobuf":
-        return _protobuf(channel, file)
+        return _protobuf_decoder(channel, file)
     raise unknown_encoding(channel, file)
 
 
-def sweep(message: Any) -> Sweep:
-    """foxglove.LaserScan: the beams go from start_angle to end_angle, both included; no range limits."""
-    # JSON has null where a beam met nothing, NumPy makes nan of it.
+def scan(message: Any) -> ScanMessage:
+    """foxglove.LaserScan: beams from start_angle to end_angle, both included, without range limits."""
+    # JSON has null for an invalid range; NumPy turns it into nan.
     ranges = np.array(message.ranges, dtype=np.float64)
     if ranges.ndim != 1:
         raise ValueError("its ranges are no list of numbers")
     first, last = float(message.start_angle), float(message.end_angle)
     step = (last - first) / max(len(ranges) - 1, 1)
-    frame = frame_name(message.frame_id)
-    pose = _rigid(message.pose.position, message.pose.orientation)
-    # A single beam has no step, and needs one to be a scan at all.
-    return Sweep(_stamp(message), frame, first, step or 1.0, 0.0, ENDLESS, ranges, pose)
+    frame = normalised(message.frame_id)
+    pose = _pose3d(message.pose.position, message.pose.orientation)
+    # The increment of a scan is never 0, not even that of a single beam.
+    return ScanMessage(_timestamp(message), frame, first, step or 1.0, 0.0, math.inf, ranges, pose)
 
 
-def odometry(message: Any) -> list[FramePose]:
+def odometry(message: Any) -> list[StampedTransform]:
     """foxglove.Odometry"""
-    pose = _rigid(message.pose.position, message.pose.orientation)
-    return [FramePose(_stamp(message), frame_name(message.frame_id), frame_name(message.body_frame_id), pose)]
+    at, rotation = message.pose.position, message.pose.orientation
+    return [_stamped_pose(message, message.frame_id, message.body_frame_id, at, rotation)]
 
 
-def pose_in_frame(message: Any) -> list[FramePose]:
+def pose_in_frame(message: Any) -> list[StampedTransform]:
     """foxglove.PoseInFrame"""
-    pose = _rigid(message.pose.position, message.pose.orientation)
-    return [FramePose(_stamp(message), frame_name(message.frame_id), "", pose)]
+    return [_stamped_pose(message, message.frame_id, "", message.pose.position, message.pose.orientation)]
 
 
-def transform(message: Any) -> list[FramePose]:
+def frame_transform(message: Any) -> list[StampedTransform]:
     """foxglove.FrameTransform"""
-    pose = _rigid(message.translation, message.rotation)
-    parent, child = frame_name(message.parent_frame_id), frame_name(message.child_frame_id)
-    return [FramePose(_stamp(message), parent, child, pose)]
+    parent, child = message.parent_frame_id, message.child_frame_id
+    return [_stamped_pose(message, parent, child, message.translation, message.rotation)]
 
 
-def transforms(message: Any) -> list[FramePose]:
+def frame_transforms(message: Any) -> list[StampedTransform]:
     """foxglove.FrameTransforms"""
-    return [placed for part in message.transforms for placed in transform(part)]
+    return [transform for part in message.transforms for transform in frame_transform(part)]
 
 
-VIEWS: Mapping[str, Callable[[Any], list[FramePose]]] = {
+CONVERTERS: Mapping[str, Callable[[Any], list[StampedTransform]]] = {
     "foxglove.Odometry": odometry,
     "foxglove.PoseInFrame": pose_in_frame,
-    "foxglove.FrameTransform": transform,
-    "foxglove.FrameTransforms": transforms,
+    "foxglove.FrameTransform": frame_transform,
+    "foxglove.FrameTransforms": frame_transforms,
 }
 
 
-class _Fields:
-    """A JSON object, its fields as attributes; one that is not there is zero, as in protobuf."""
+class _JsonObject:
+    """A JSON object with its fields as attributes; a missing one is zero, as in protobuf."""
 
     def __init__(self, fields: Any) -> None:
         self.fields: Mapping[str, Any] = {} if fields is None else dict(fields)
 
     def __getattr__(self, name: str) -> Any:
         value = self.fields.get(name)
-        if isinstance(value, Mapping) or (value is None and name in OBJECTS):
-            return _Fields(value)
+        if isinstance(value, Mapping) or (value is None and name in JSON_OBJECTS):
+            return _JsonObject(value)
         if name == "transforms":
-            return [_Fields(part) for part in value or []]
+            return [_JsonObject(part) for part in value or []]
         if value is None:
             return {"ranges": [], "frame_id": ""}.get(name, "" if name.endswith("_id") else 0.0)
         return value
 
 
-OBJECTS = ("timestamp", "pose", "position", "orientation", "translation", "rotation")
-
-
-def _stamp(message: Any) -> int:
+def _timestamp(message: Any) -> int:
     time = message.timestamp
-    if isinstance(time, _Fields):
-        # Foxglove's JSON schema says sec and nsec; some writers use protobuf's names.
+    if isinstance(time, _JsonObject):
+        # Foxglove's JSON schema has sec and nsec; some writers use the names of protobuf.
         return nanoseconds(time.sec or time.seconds, time.nsec or time.nanos)
     return nanoseconds(time.seconds, time.nanos)
 
 
-def _rigid(at: Any, turned: Any) -> Rigid:
+def _pose3d(at: Any, turned: Any) -> Pose3D:
     rotation = (float(turned.x), float(turned.y), float(turned.z), float(turned.w))
-    return Rigid((float(at.x), float(at.y), float(at.z)), rotation if any(rotation) else (0.0, 0.0, 0.0, 1.0))
+    translation = (float(at.x), float(at.y), float(at.z))
+    return Pose3D(translation, rotation if any(rotation) else (0.0, 0.0, 0.0, 1.0))
 
 
-def _protobuf(channel: Channel, file: str) -> Callable[[bytes], Any]:
+def _stamped_pose(message: Any, parent: str, child: str, at: Any, turned: Any) -> StampedTransform:
+    pose = _pose3d(at, turned)
+    return StampedTransform(_timestamp(message), normalised(parent), normalised(child), pose)
+
+
+def _protobuf_decoder(channel: Channel, file: str) -> Callable[[bytes], Any]:
     from google.protobuf.descriptor_pb2 import FileDescriptorSet
     from google.protobuf.descriptor_pool import DescriptorPool
     from google.protobuf.message import DecodeError
@@ -129,17 +132,17 @@ def _protobuf(channel: Channel, file: str) -> Callable[[bytes], Any]:
         while waiting:
             ready = [name for name, part in waiting.items() if not waiting.keys() & set(part.dependency)]
             if not ready:
-                raise TypeError("its files need each other")
+                raise TypeError("its files depend on each other")
             for name in ready:
                 pool.Add(waiting.pop(name))
-        made = GetMessageClass(pool.FindMessageTypeByName(channel.type))
+        message_class = GetMessageClass(pool.FindMessageTypeByName(channel.type))
     except (DecodeError, KeyError, TypeError) as error:
         problem = f"the definition of {channel.type} on {channel.topic} cannot be read"
         raise InputDataError(file, problem, "record it with its protobuf definition") from error
 
     def decode(data: bytes) -> Any:
         try:
-            return made.FromString(data)
+            return message_class.FromString(data)
         except DecodeError as error:
             raise ValueError(str(error)) from error
 

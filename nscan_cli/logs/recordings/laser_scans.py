@@ -1,4 +1,4 @@
-"""A recording's messages → the scans of one topic, with odometry and mounting."""
+"""A laser log from a recording: the scans of one topic, with odometry and mounting."""
 
 from __future__ import annotations
 
@@ -14,48 +14,49 @@ from nscan_cli.logs.frame_names import frame_names
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.logs.range_limits import FARTHEST
 from nscan_cli.logs.reading_options import ReadingOptions
-from nscan_cli.logs.recordings import robot_motion as recorded_motion
-from nscan_cli.logs.recordings.container import ODOMETRY, SCANS, Channel, Message, Recording
-from nscan_cli.logs.recordings.decoded_messages import S, Sweep
-from nscan_cli.logs.recordings.decoding import UNDECODABLE, sweep_decoder
-from nscan_cli.logs.recordings.message_stamps import is_clock, stamps_set
-from nscan_cli.logs.recordings.mounting import mounting
-from nscan_cli.logs.recordings.tf_messages import Transforms
+from nscan_cli.logs.recordings.container import Message, Recording
+from nscan_cli.logs.recordings.decoded_messages import ScanMessage, decimal_seconds
+from nscan_cli.logs.recordings.decoding import UNDECODABLE, scan_decoder
+from nscan_cli.logs.recordings.message_stamps import order_messages, valid_stamps
+from nscan_cli.logs.recordings.message_types import ODOMETRY_TYPES, SCAN_TYPES
+from nscan_cli.logs.recordings.mounting import laser_mounting
+from nscan_cli.logs.recordings.robot_motion import robot_odometry
+from nscan_cli.logs.recordings.tf_tree import TransformTree
 from nscan_cli.logs.recordings.topics import devices, scan_topic
 from nscan_cli.logs.skips import Skips
 from nscan_cli.logs.text.line_records import beams_problem
 from nscan_cli.poses import Array
 
 
-def read(recording: Recording, file: str, source: Source, options: ReadingOptions) -> LaserLog:
+def log_from_recording(recording: Recording, file: str, source: Source, options: ReadingOptions) -> LaserLog:
     """The scans of one topic in order of time.
 
     Raises InputDataError when there are none, or the laser is tilted; WrongUsageError when the options do
-    not fit the recording or have to choose between topics.
+    not fit the recording, or do not say which of several topics is meant.
     """
     if options.laser is not None:
         raise WrongUsageError(f"{file}: has topics, no lasers by tag; leave out --laser, see --topic")
     choice = scan_topic(recording, options, file)
     skips = Skips(file, options.strict, place="message")
-    findings = Findings(skips, recording.listed(), recording.warnings)
+    findings = Findings(skips, recording.topic_counts(), recording.warnings)
     findings.used = {"laser": choice.why, "checksums": recording.checksums}
-    findings.lasers, findings.laser_option = tuple(devices(recording, SCANS)), "--topic"
-    findings.odometries = tuple(devices(recording, ODOMETRY))
-    sweeps, messages = _sweeps(recording.messages.get(choice.topic, []), choice.topic, skips, file)
-    stamps = stamps_set([sweep.stamp for sweep in sweeps])
-    header_time = is_clock(stamps)
-    if not header_time:
+    findings.lasers, findings.laser_option = tuple(devices(recording, SCAN_TYPES)), "--topic"
+    findings.odometries = tuple(devices(recording, ODOMETRY_TYPES))
+    scans, log_times = _decoded_scans(recording.messages.get(choice.topic, []), choice.topic, skips, file)
+    stamps = valid_stamps([scan.stamp for scan in scans])
+    use_stamps = order_messages(stamps)
+    if not use_stamps:
         findings.warnings.append("the scans' own time stamps say nothing: the times of recording are used")
-        stamps = [message.log_time for message in messages]
-    raw = _raw(sweeps, [_written(stamp) for stamp in stamps])
+        stamps = [*log_times]
+    raw = _raw_scans(scans, [decimal_seconds(stamp) for stamp in stamps])
     times = order.by_time(raw.stamps)
     findings.warnings += times.warnings
-    frames = Transforms(recording, skips, file)
-    motion = recorded_motion.robot_odometry(recording, frames, times, header_time, options, findings, file)
-    mount, hanging, robot = mounting(sweeps, motion.robot, frames, options, findings, file)
-    findings.frames = frame_names(sweeps[0].frame, robot, motion.parent, mount)
+    tree = TransformTree(recording, skips, file)
+    motion = robot_odometry(recording, tree, times, use_stamps, options, findings, file)
+    mount, hanging, robot = laser_mounting(scans, motion.robot, tree, options, findings, file)
+    findings.frames = frame_names(scans[0].frame, robot, motion.parent, mount)
     if hanging and not options.flip:
-        # Seen from above, the beams of a laser that hangs run clockwise.
+        # Seen from above, the beams of a laser that is upside down run clockwise.
         raw = raw.mirrored()
     return laser_log(
         source,
@@ -71,73 +72,67 @@ def read(recording: Recording, file: str, source: Source, options: ReadingOption
     )
 
 
-def _sweeps(
+def _decoded_scans(
     messages: Sequence[Message], topic: str, skips: Skips, file: str
-) -> tuple[list[Sweep], list[Message]]:
-    """The scans that can be decoded, of one frame, and their messages."""
-    decoders = {channel: sweep_decoder(channel, file) for channel in _channels(messages)}
-    sweeps, kept = [], []
-    frame = None
+) -> tuple[list[ScanMessage], list[int]]:
+    """The scans that can be decoded and share the frame of the first, and when they were recorded (ns)."""
+    decoders = {
+        channel: scan_decoder(channel, file) for channel in dict.fromkeys(m.channel for m in messages)
+    }
+    scans: list[ScanMessage] = []
+    log_times: list[int] = []
     for number, message in enumerate(messages, 1):
         try:
-            sweep = decoders[message.channel](message.data)
-            problem = _problem(sweep)
+            scan = decoders[message.channel](message.data)
+            problem = _scan_problem(scan)
         except UNDECODABLE:
             problem = f"{topic}: cannot be decoded"
-        if not problem and frame not in (None, sweep.frame):
-            problem = f"{topic}: a scan in another frame than {frame}"
+        if not problem and scans and scan.frame != scans[0].frame:
+            problem = f"{topic}: a scan in another frame than {scans[0].frame}"
         if problem:
             skips.add(problem, number)
             continue
-        frame = sweep.frame
-        sweeps.append(sweep)
-        kept.append(message)
-    if not sweeps:
+        scans.append(scan)
+        log_times.append(message.log_time)
+    if not scans:
         reason = next(iter(skips.reasons), "there is none")
         raise InputDataError(file, f"no scan of {topic} can be read: {reason}",
                              "give a recording with whole messages")  # fmt: skip
-    return sweeps, kept
+    return scans, log_times
 
 
-def _channels(messages: Sequence[Message]) -> list[Channel]:
-    return list(dict.fromkeys(message.channel for message in messages))
-
-
-def _problem(sweep: Sweep) -> str:
-    """What makes a scan unusable; empty when nothing does."""
-    problem = beams_problem(len(sweep.ranges))
-    turns = 4 * np.pi
-    if not (abs(sweep.angle_min) <= turns and 0 < abs(sweep.angle_increment) <= turns):
+def _scan_problem(scan: ScanMessage) -> str:
+    """Why a scan cannot be used; empty when it can."""
+    problem = beams_problem(len(scan.ranges))
+    two_turns = 4 * np.pi
+    if not (abs(scan.angle_min) <= two_turns and 0 < abs(scan.angle_increment) <= two_turns):
         problem = problem or "an angle is out of bounds"
     return problem
 
 
-def _written(stamp: int | None) -> str:
-    return "" if stamp is None else f"{stamp // S}.{stamp % S:09d}"
-
-
-def _raw(sweeps: Sequence[Sweep], stamps: list[str]) -> RawScans:
-    """The scans as columns, with their own limits."""
-    low, low_from = _limit("range_min", [sweep.range_min for sweep in sweeps], 0.0)
-    high, high_from = _limit("range_max", [sweep.range_max for sweep in sweeps], FARTHEST)
+def _raw_scans(scans: Sequence[ScanMessage], stamps: list[str]) -> RawScans:
+    """The scans as columns, with the range limits of the messages."""
+    low, low_from = _range_limit("range_min", [scan.range_min for scan in scans], 0.0)
+    high, high_from = _range_limit("range_max", [scan.range_max for scan in scans], FARTHEST)
     return RawScans(
-        stacked([sweep.ranges for sweep in sweeps]),
-        np.array([sweep.angle_min for sweep in sweeps], dtype=np.float64),
-        np.array([sweep.angle_increment for sweep in sweeps], dtype=np.float64),
+        stacked([scan.ranges for scan in scans]),
+        np.array([scan.angle_min for scan in scans], dtype=np.float64),
+        np.array([scan.angle_increment for scan in scans], dtype=np.float64),
         stamps,
-        # A reading at a limit counts (sensor_msgs/LaserScan); one at those of RawScans does not.
+        # A reading at a limit is valid in sensor_msgs/LaserScan, and is not in RawScans.
         (
             np.maximum(0.0, np.nextafter(low.astype(np.float32), np.float32(-1))),
             np.nextafter(high.astype(np.float32), np.float32(np.inf)),
         ),
         (low_from, high_from),
-        angle_max=np.array([sweep.angle_max for sweep in sweeps], dtype=np.float64),
-        beams=np.array([len(sweep.ranges) for sweep in sweeps], dtype=np.int64),
+        angle_max=np.array([scan.angle_max for scan in scans], dtype=np.float64),
+        beams=np.array([len(scan.ranges) for scan in scans], dtype=np.int64),
     )
 
 
-def _limit(name: str, values: list[float], unsaid: float) -> tuple[Array, str]:
-    """Limits (S,) where they say something, between 0 and FARTHEST, and where they are from."""
-    found = np.array(values, dtype=np.float64)
-    says = (found > 0) & (found < FARTHEST)
-    return np.where(says, found, unsaid), f"{name} of the messages" if says.any() else "none in the messages"
+def _range_limit(name: str, values: list[float], default: float) -> tuple[Array, str]:
+    """The limits (S,) between 0 and FARTHEST, `default` for others, and where they are from."""
+    limits = np.array(values, dtype=np.float64)
+    valid = (limits > 0) & (limits < FARTHEST)
+    origin = f"{name} of the messages" if valid.any() else "none in the messages"
+    return np.where(valid, limits, default), origin

@@ -1,4 +1,4 @@
-"""The time stamps of messages: whether they say when the messages were, and which of them were never set."""
+"""The time stamps of messages: which of them were ever set, and whether they order the messages."""
 
 from __future__ import annotations
 
@@ -8,23 +8,23 @@ import numpy as np
 
 from nscan_cli.logs.recordings.decoded_messages import S
 
-LONGEST_START = 1 * S
-"""ns; a clock that begins at 0 may take so long to the second message, or as long as to any later one."""
+LONGEST_FIRST_STEP = 1 * S
+"""ns; with a longer first step 0 is no stamp of a simulated clock, unless a later step is as long."""
 
 
-def stamps_set(stamps: Sequence[int]) -> list[int | None]:
-    """The stamps (ns) of messages, None where one was never set.
+def valid_stamps(stamps: Sequence[int]) -> list[int | None]:
+    """The stamps (ns) of messages; None for a 0 that was never set.
 
-    A clock of a simulation begins at 0: there 0 is a stamp, since the others follow it closely. Of a clock
-    that began long ago, such as in 1970, a message with 0 has none.
+    A simulated clock begins at 0, and the next stamps follow closely: there 0 is valid. Where the other
+    stamps are far from 0, such as those since 1970, it was never set.
     """
     others = np.unique([stamp for stamp in stamps if stamp > 0])
-    longest = max(LONGEST_START, int(np.diff(others).max(initial=0)))
+    longest = max(LONGEST_FIRST_STEP, int(np.diff(others).max(initial=0)))
     begins_at_zero = others.size > 0 and int(others[0]) <= longest
     return [stamp if stamp > 0 or begins_at_zero else None for stamp in stamps]
 
 
-def is_clock(stamps: Sequence[int | None]) -> bool:
-    """Whether stamps tell the order of their messages: most are set, and most of these differ."""
-    there = [stamp for stamp in stamps if stamp is not None]
-    return 2 * len(there) >= len(stamps) and (len(stamps) == 1 or 2 * len(set(there)) >= len(stamps))
+def order_messages(stamps: Sequence[int | None]) -> bool:
+    """Whether stamps give the order of their messages: at least half are set, and half of these differ."""
+    valid = [stamp for stamp in stamps if stamp is not None]
+    return 2 * len(valid) >= len(stamps) and (len(stamps) == 1 or 2 * len(set(valid)) >= len(stamps))

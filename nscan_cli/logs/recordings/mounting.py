@@ -1,4 +1,4 @@
-"""How the laser of a recording sits on its robot: as the user says, else as its transforms do."""
+"""The pose of the laser on the robot: from --mount, else from the transforms of the recording (tf)."""
 
 from __future__ import annotations
 
@@ -10,152 +10,153 @@ import numpy as np
 from nscan_cli.errors import InputDataError
 from nscan_cli.logs.assemble import Findings
 from nscan_cli.logs.reading_options import ReadingOptions
-from nscan_cli.logs.recordings.decoded_messages import Sweep
-from nscan_cli.logs.recordings.moving_mount import Course, Link, at_rest, course, links
-from nscan_cli.logs.recordings.tf_chains import LARGEST_TILT, Pair, Timed, over_time, planar, way
-from nscan_cli.logs.recordings.tf_messages import BASES, Transforms, base_of, is_world, robot_of
+from nscan_cli.logs.recordings.decoded_messages import ScanMessage
+from nscan_cli.logs.recordings.frame_ids import BASE_FRAMES, is_world_frame, tf_prefix, without_prefix
+from nscan_cli.logs.recordings.moving_mount import MountingLimits, MovingMount, moving_mount
+from nscan_cli.logs.recordings.poses_3d import TimedPoses, planar_mount
+from nscan_cli.logs.recordings.tf_chains import ChainLink, chain_links, composed, shortest_chain
+from nscan_cli.logs.recordings.tf_tree import FramePair, TransformTree
 from nscan_cli.poses import Array
 
 
 class MountingError(InputDataError):
-    """A laser is mounted so that no map can be made of its scans; --mount can say otherwise."""
+    """A laser is tilted or moves, so that no map can be made of its scans; --mount overrides it."""
 
     def __init__(self, file: str, problem: str, remedy: str) -> None:
         super().__init__(file, problem, remedy)
         self.problem = problem
 
 
-def mounting(
-    sweeps: Sequence[Sweep],
+def laser_mounting(
+    scans: Sequence[ScanMessage],
     robot: str,
-    transforms: Transforms,
+    tree: TransformTree,
     options: ReadingOptions,
     findings: Findings,
     file: str,
 ) -> tuple[Array, bool, str]:
-    """The laser on the robot, whether it hangs upside down, and the robot's frame as far as it is known.
+    """The laser's pose on the robot (3,), whether it is upside down, and the robot's frame if it is known.
 
-    As the user says, else by the transforms between `robot` (empty where nothing names it) and the laser.
-    Of some that move as a stabiliser's do, the mean is taken. Raises MountingError when the laser is
-    tilted, or moves otherwise.
+    Without --mount, the transforms between `robot` (empty when odometry does not name it) and the laser
+    give the pose, or their mean when they rock as those of a stabiliser. Raises MountingError when the
+    laser is tilted, or moves otherwise.
     """
     if options.mount is not None:
         findings.used["mounting"] = "--mount"
         return np.array(options.mount, dtype=np.float64), False, robot
-    chain, names, why = _chain(transforms, robot, sweeps[0].frame, file)
-    if names is None:
+    links, frames, how = _laser_chain(tree, robot, scans[0].frame, file)
+    if frames is None:
         findings.used["mounting"] = "assumed: at the robot's centre"
-        findings.warnings.append(f"{why}: the laser is taken as at the robot's centre; see --mount")
-        names = [sweeps[0].frame]
-    elif len(names) == 1:
-        findings.used["mounting"] = f"none: the scans are in the robot's frame, {names[0]}"
-        robot = names[0]
+        findings.warnings.append(f"{how}: the laser is taken as at the robot's centre; see --mount")
+        frames = [scans[0].frame]
     else:
-        findings.used["mounting"] = why
-        robot = names[0]
-    chain += _own(sweeps)
-    moved = course(chain)
-    if moved is None:
-        mount, hanging, tilt = planar(at_rest(chain))
-        if tilt > LARGEST_TILT:
-            problem = f"its laser is tilted by {math.degrees(tilt):.1f}° (tf {' → '.join(names)})"
+        robot = frames[0]
+        at_robot = f"none: the scans are in the robot's frame, {robot}"
+        findings.used["mounting"] = at_robot if len(frames) == 1 else how
+    links += _poses_in_scans(scans)
+    moving = moving_mount(links)
+    if moving is None:
+        mount, hanging, tilt = planar_mount(composed(links)[0])
+        if tilt > MountingLimits().tilt:
+            problem = f"its laser is tilted by {math.degrees(tilt):.1f}° (tf {' → '.join(frames)})"
             raise MountingError(file, problem, "give --mount X,Y,DEG to use its scans as if it were not")
-    elif moved.unfit():
-        raise _unfit(moved, chain, names, file)
+    elif moving.problem():
+        raise _moving_laser(moving, links, frames, file)
     else:
-        mount, hanging = moved.mount, moved.hangs
-        findings.used["mounting"] += f"; {_movers(chain)}, {moved.extent()}: its mean is taken"
+        mount, hanging = moving.mount, moving.hangs
+        findings.used["mounting"] += f"; {_moving_links(links)}, {moving.extent()}: its mean is taken"
     if hanging:
         findings.used["mounting"] += ", upside down"
     return mount, hanging, robot
 
 
-def _chain(
-    transforms: Transforms, robot: str, laser: str, file: str
-) -> tuple[list[Link], list[str] | None, str]:
-    """The transforms from the robot's frame to the laser's with the frames' names, and why these.
+def _laser_chain(
+    tree: TransformTree, robot: str, laser: str, file: str
+) -> tuple[list[ChainLink], list[str] | None, str]:
+    """The transforms from the robot's frame to the laser's, the frames, and which these are in words.
 
-    Without such transforms there are no names, and it is said why. Raises MountingError where the laser
-    nods on whatever it hangs on, the robot or not.
+    The frames are None when no transforms lead there; the words say so then. Raises MountingError where
+    the laser nods on the frame that it hangs on, whether that is the robot's or not.
     """
-    for base, moving in _tries(transforms, robot):
-        fixed = transforms.frames.fixed
-        names = way([*fixed, *moving], base, laser)
-        if names is not None:
-            why = f"tf {' → '.join(names)}"
+    for base, moving in _base_frames(tree, robot):
+        frames = shortest_chain([*tree.fixed, *moving], base, laser)
+        if frames is not None:
+            how = f"tf {' → '.join(frames)}"
             if robot and base != robot:
-                why += f", as if {base} were {robot}, from which no transforms lead"
-            return links(names, fixed, moving), names, why
-    if not robot and base_of(laser) in BASES:
+                how += f", as if {base} were {robot}, from which no transforms lead"
+            return chain_links(frames, tree.fixed, moving), frames, how
+    if not robot and without_prefix(laser) in BASE_FRAMES:
         return [], [laser], ""
-    fixed, moving = transforms.frames.fixed, _on_robot(transforms)
-    names = _hanging_on([*fixed, *moving], laser)
-    chain = links(names, fixed, moving)
-    moved = course(chain)
-    if moved is not None and moved.nods:
-        raise _unfit(moved, chain, names, file)
+    moving = _moving_on_robot(tree)
+    frames = _ancestors([*tree.fixed, *moving], laser)
+    links = chain_links(frames, tree.fixed, moving)
+    mount = moving_mount(links)
+    if mount is not None and mount.nods:
+        raise _moving_laser(mount, links, frames, file)
     scans = laser or "the unnamed frame of the scans"
-    if not robot and not fixed and not moving:
+    if not robot and not tree.fixed and not moving:
         return [], None, f"the recording has no transforms, so none lead to {scans}"
-    return [], None, f"no transforms lead from {robot or ' or '.join(BASES)} to {scans}"
+    return [], None, f"no transforms lead from {robot or ' or '.join(BASE_FRAMES)} to {scans}"
 
 
-def _tries(transforms: Transforms, robot: str) -> Iterator[tuple[str, Mapping[Pair, Timed]]]:
-    """The frames to look for the laser from, and the moving transforms to go along beside the fixed ones.
+def _base_frames(tree: TransformTree, robot: str) -> Iterator[tuple[str, Mapping[FramePair, TimedPoses]]]:
+    """Frames that can be the robot's, in order of preference, each with the moving transforms to use.
 
-    First in those that are fixed by name, then in all that never move, then in those that move. A robot
-    that odometry calls by one of BASES may have the other one in tf: REP 105 has one above the other.
+    Transforms of tf_static come first, then all that never change, then also those that move. When
+    odometry names one of BASE_FRAMES, the other one is tried after it (REP 105 has both in one robot).
     """
     if robot:
         yield robot, {}
-        transforms.others()
+        tree.dynamic()
         yield robot, {}
-        yield robot, _on_robot(transforms)
-    if robot and base_of(robot) not in BASES:
+        yield robot, _moving_on_robot(tree)
+    if robot and without_prefix(robot) not in BASE_FRAMES:
         return
-    for stage in ("fixed by name", "never moves", "moves"):
-        if stage != "fixed by name":
-            transforms.others()
-        moving = _on_robot(transforms) if stage == "moves" else {}
-        known = transforms.frames.names() | {name for pair in moving for name in pair}
-        for base in BASES:
-            for name in sorted(known):
-                is_other = not robot or (name != robot and robot_of(name) == robot_of(robot))
-                if base_of(name) == base and is_other:
-                    yield name, moving
+    for stage in ("tf_static", "constant", "moving"):
+        if stage != "tf_static":
+            tree.dynamic()
+        moving = _moving_on_robot(tree) if stage == "moving" else {}
+        known = {frame for pairs in (tree.fixed, moving) for pair in pairs for frame in pair}
+        for base in BASE_FRAMES:
+            for frame in sorted(known):
+                is_other = not robot or (frame != robot and tf_prefix(frame) == tf_prefix(robot))
+                if without_prefix(frame) == base and is_other:
+                    yield frame, moving
 
 
-def _on_robot(transforms: Transforms) -> dict[Pair, Timed]:
-    """The transforms that move and are no robot's own motion."""
-    return {pair: rows for pair, rows in transforms.moving().items() if not is_world(pair[0])}
+def _moving_on_robot(tree: TransformTree) -> dict[FramePair, TimedPoses]:
+    """The transforms that move and are not the robot's own motion in the world."""
+    return {pair: timed for pair, timed in tree.moving().items() if not is_world_frame(pair[0])}
 
 
-def _hanging_on(pairs: Sequence[Pair], laser: str) -> list[str]:
-    """The frames from the one that the laser hangs on at last, short of the world, to the laser."""
-    parents = {child: parent for parent, child in pairs if not is_world(parent)}
-    names = [laser]
-    while names[0] in parents and parents[names[0]] not in names:
-        names.insert(0, parents[names[0]])
-    return names
+def _ancestors(pairs: Sequence[FramePair], laser: str) -> list[str]:
+    """The frames from the laser's topmost parent below the world down to the laser."""
+    parents = {child: parent for parent, child in pairs if not is_world_frame(parent)}
+    frames = [laser]
+    while frames[0] in parents and parents[frames[0]] not in frames:
+        frames.insert(0, parents[frames[0]])
+    return frames
 
 
-def _own(sweeps: Sequence[Sweep]) -> list[Link]:
-    """The laser's poses in its scans' frame, where the messages have them."""
-    found = [(sweep.stamp, sweep.pose) for sweep in sweeps if sweep.pose is not None]
+def _poses_in_scans(scans: Sequence[ScanMessage]) -> list[ChainLink]:
+    """The laser's poses in its frame as one more link, where the scan messages have them."""
+    found = [(scan.stamp, scan.pose) for scan in scans if scan.pose is not None]
     if len({pose for _, pose in found}) == 1:
         del found[1:]
-    timed = over_time([pose for _, pose in found], [stamp for stamp, _ in found])
-    return [Link("the pose in its scans", timed)] if len(timed.times) else []
+    timed = TimedPoses.of([pose for _, pose in found], [stamp for stamp, _ in found])
+    return [ChainLink("the pose in its scans", timed)] if len(timed.times) else []
 
 
-def _unfit(moved: Course, chain: Sequence[Link], names: Sequence[str], file: str) -> MountingError:
+def _moving_laser(
+    mount: MovingMount, links: Sequence[ChainLink], frames: Sequence[str], file: str
+) -> MountingError:
     """The error that a laser moves on its robot so that no map can be made."""
-    path = f" (tf {' → '.join(names)})" if len(names) > 1 else ""
-    problem = f"its laser {moved.unfit()}: {_movers(chain)}{path}"
+    chain = f" (tf {' → '.join(frames)})" if len(frames) > 1 else ""
+    problem = f"its laser {mount.problem()}: {_moving_links(links)}{chain}"
     return MountingError(file, problem, "give --mount X,Y,DEG to take it as still")
 
 
-def _movers(chain: Sequence[Link]) -> str:
-    """The sentence that says which transforms of a chain move."""
-    movers = [link.name for link in chain if link.moves]
+def _moving_links(links: Sequence[ChainLink]) -> str:
+    """Which transforms of a chain move, as a sentence."""
+    movers = [link.name for link in links if link.moves]
     return f"{' and '.join(movers)} move{'s' if len(movers) == 1 else ''}"

@@ -1,4 +1,4 @@
-"""The poses that one topic of a recording has, as of motion capture: a reference for results."""
+"""The poses on one topic of a recording, such as those of motion capture: a reference trajectory."""
 
 from __future__ import annotations
 
@@ -6,107 +6,81 @@ import numpy as np
 
 from nscan_cli.errors import InputDataError, WrongUsageError
 from nscan_cli.files.counting import counted
-from nscan_cli.logs.recordings.container import ODOMETRY, POSES, TRANSFORMS, Recording
-from nscan_cli.logs.recordings.decoded_messages import FramePose, S
-from nscan_cli.logs.recordings.decoding import UNDECODABLE, placed_decoder
-from nscan_cli.logs.recordings.tf_chains import heading, unmoved
+from nscan_cli.logs.recordings.container import Recording
+from nscan_cli.logs.recordings.decoded_messages import StampedTransform, decimal_seconds
+from nscan_cli.logs.recordings.message_types import REFERENCE_TYPES, TRANSFORM_TYPES
+from nscan_cli.logs.recordings.poses_3d import heading
+from nscan_cli.logs.recordings.tf_tree import FramePair, constant_transforms, decoded_transforms
+from nscan_cli.logs.recordings.topics import type_problem
+from nscan_cli.logs.skips import Skips
 from nscan_cli.poses import Array
 
-PLACING = POSES + ODOMETRY + TRANSFORMS
-BETWEEN = ":"
-"""Stands between a topic of transforms and the frames: /tf:world.robot."""
+BEFORE_FRAMES = ":"
+"""Separates a topic of transforms from the frames in --reference-topic: /tf:world.robot."""
 
 
-def poses_on(
+def poses_on_topic(
     recording: Recording, topic: str | None, file: str, notices: list[str]
 ) -> tuple[list[str], Array]:
-    """Stamps (s, as text) and poses (N, 7), x, y, z and quaternion x, y, z, w, of a topic, in file order.
+    """Stamps (s, as text) and poses (N, 7) of a topic: x, y, z, quaternion x, y, z, w; in file order.
 
-    A topic of transforms between several frames needs those that are meant: TOPIC:PARENT.CHILD. What a
-    user should know is added to the notices. Raises WrongUsageError where the topic is not one that has
-    poses, InputDataError where none of them can be read.
+    Where a topic has transforms of several pairs of frames that move, the user has to give the pair:
+    TOPIC:PARENT.CHILD. Messages without a pose and unset stamps are added to the `notices`. Raises
+    WrongUsageError when the topic has no poses, InputDataError when none of them can be read.
     """
-    name, frames = _chosen(recording, topic, file)
-    placed, log_times, wrong = _decoded(recording, name, file)
-    pairs = dict.fromkeys((one.parent, one.child) for one in placed)
-    if frames or len(pairs) > 1:
-        pair = _pair(placed, list(pairs), frames, f"{file}: {name}")
-        chosen = [row for row, one in enumerate(placed) if (one.parent, one.child) == pair]
-        placed, log_times = [placed[row] for row in chosen], [log_times[row] for row in chosen]
-    sound = [row for row, one in enumerate(placed) if heading(one.pose) is not None]
-    wrong += len(placed) - len(sound)
-    if wrong:
-        notices.append(f"{file}: {counted(wrong, 'message')} on {name} skipped: no pose in it")
-    if not sound:
+    name, frames = _topic_and_frames(recording, topic, file)
+    skips = Skips(file, strict=False, place="message")
+    rows = list(decoded_transforms(recording, name, skips, file))
+    transforms = [transform for transform, _ in rows]
+    if frames or len({(one.parent, one.child) for one in transforms}) > 1:
+        pair = _frame_pair(transforms, frames, f"{file}: {name}")
+        rows = [row for row in rows if (row[0].parent, row[0].child) == pair]
+    valid = [row for row in rows if heading(row[0].pose) is not None]
+    skipped = len(rows) - len(valid) + sum(count for count, _first in skips.reasons.values())
+    if skipped:
+        notices.append(f"{file}: {counted(skipped, 'message')} on {name} skipped: no pose in it")
+    if not valid:
         raise InputDataError(file, f"no pose on {name} can be read", "choose another topic")
-    stamps = [placed[row].stamp for row in sound]
+    stamps = [transform.stamp for transform, _ in valid]
     if 2 * len(set(stamps)) < len(stamps):
         notices.append(f"{file}: the stamps on {name} say nothing: the times of recording are used")
-        stamps = [log_times[row] for row in sound]
-    poses = np.array([(*placed[row].pose.translation, *placed[row].pose.rotation) for row in sound])
+        stamps = [log_time for _, log_time in valid]
+    poses = np.array([(*one.pose.translation, *one.pose.rotation) for one, _ in valid])
     poses[:, 3:] /= np.linalg.norm(poses[:, 3:], axis=1, keepdims=True)
-    return [f"{stamp // S}.{stamp % S:09d}" for stamp in stamps], poses
+    return [decimal_seconds(stamp) for stamp in stamps], poses
 
 
-def _chosen(recording: Recording, topic: str | None, file: str) -> tuple[str, str]:
-    """The topic, and what it says of frames."""
-    there = recording.topics(PLACING)
+def _topic_and_frames(recording: Recording, topic: str | None, file: str) -> tuple[str, str]:
+    """The topic that --reference-topic names, and PARENT.CHILD (empty where it names none)."""
+    there = recording.topics_of(REFERENCE_TYPES)
     if not there:
-        found = ", ".join(recording.listed()) or "nothing"
+        found = ", ".join(recording.topic_counts()) or "nothing"
         raise InputDataError(file, f"has no topic with poses, only {found}", "give another reference")
+    types = {channel.topic: channel.type.rpartition("/")[2] for channel in recording.counts}
+    known = ", ".join(f"{name} ({types[name]}, {counted(count, 'message')})" for name, count in there.items())
     if topic is None:
         raise WrongUsageError(
-            f"{file}: is a recording; say by --reference-topic which poses are the reference: "
-            f"{_said(recording)}"
+            f"{file}: is a recording; say by --reference-topic which poses are the reference: {known}"
         )
-    name, _between, frames = topic.partition(BETWEEN)
+    name, _separator, frames = topic.partition(BEFORE_FRAMES)
     if topic in there:
         return topic, ""
-    if name in recording.topics(TRANSFORMS):
+    if name in recording.topics_of(TRANSFORM_TYPES):
         return name, frames
-    types = [channel.type or "no schema" for channel in recording.counts if channel.topic == topic]
-    problem = f"{topic} is of {types[0]}, which has no poses" if types else f"has no topic {topic}"
-    raise WrongUsageError(f"{file}: {problem}; --reference-topic can be {_said(recording)}")
+    problem = type_problem(recording, topic) + (", which has no poses" if topic in types else "")
+    raise WrongUsageError(f"{file}: {problem}; --reference-topic can be {known}")
 
 
-def _decoded(recording: Recording, topic: str, file: str) -> tuple[list[FramePose], list[int], int]:
-    """What messages place, with the times when they were recorded (ns), and how many cannot be decoded."""
-    messages = recording.messages.get(topic, [])
-    decoders = {
-        channel: placed_decoder(channel, file) for channel in dict.fromkeys(m.channel for m in messages)
-    }
-    placed: list[FramePose] = []
-    log_times: list[int] = []
-    wrong = 0
-    for message in messages:
-        try:
-            found = decoders[message.channel](message.data)
-        except UNDECODABLE:
-            wrong += 1
-            continue
-        placed += found
-        log_times += [message.log_time] * len(found)
-    return placed, log_times, wrong
-
-
-def _pair(placed: list[FramePose], pairs: list[tuple[str, str]], frames: str, place: str) -> tuple[str, str]:
-    """The frames that are asked for, or the only ones that move against each other."""
-    still = {(one.parent, one.child) for one in unmoved(placed)}
-    moving = [pair for pair in pairs if pair not in still] or pairs
+def _frame_pair(transforms: list[StampedTransform], frames: str, place: str) -> FramePair:
+    """The pair of frames that the user names, else the only one that moves. Raises WrongUsageError."""
+    pairs = list(dict.fromkeys((one.parent, one.child) for one in transforms))
+    fixed = {(one.parent, one.child) for one in constant_transforms(transforms)}
+    moving = [pair for pair in pairs if pair not in fixed] or pairs
     fitting = [pair for pair in pairs if ".".join(pair) == frames] if frames else moving
     if len(fitting) != 1:
         known = ", ".join(".".join(pair) for pair in moving)
         problem = f"has no transforms of {frames}" if frames else "has transforms of several frames"
         raise WrongUsageError(
-            f"{place} {problem}; give --reference-topic TOPIC{BETWEEN}FRAMES, these are {known}"
+            f"{place} {problem}; give --reference-topic TOPIC{BEFORE_FRAMES}FRAMES, these are {known}"
         )
     return fitting[0]
-
-
-def _said(recording: Recording) -> str:
-    """The topics that can be chosen."""
-    types = {channel.topic: channel.type.rpartition("/")[2] for channel in recording.counts}
-    return ", ".join(
-        f"{topic} ({types[topic]}, {counted(count, 'message')})"
-        for topic, count in recording.topics(PLACING).items()
-    )

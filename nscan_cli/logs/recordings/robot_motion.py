@@ -1,4 +1,4 @@
-"""Where the robot was, from a recording's odometry and transforms."""
+"""The robot's odometry in a recording: from a topic, or from the transforms (tf) out of odom."""
 
 from __future__ import annotations
 
@@ -11,126 +11,134 @@ from nscan_cli.logs.assemble import Findings
 from nscan_cli.logs.choices import Device, OpenChoiceError
 from nscan_cli.logs.odometry_interpolation import interpolated
 from nscan_cli.logs.reading_options import ReadingOptions
-from nscan_cli.logs.recordings.container import ODOMETRY, TRANSFORMS, Recording
+from nscan_cli.logs.recordings.container import Recording
 from nscan_cli.logs.recordings.decoded_messages import S
-from nscan_cli.logs.recordings.tf_chains import heading
-from nscan_cli.logs.recordings.tf_messages import BASES, ODOM, Logged, Transforms, base_of, decoded, stamps_of
-from nscan_cli.logs.recordings.topics import devices, named, odometry_topic
+from nscan_cli.logs.recordings.frame_ids import BASE_FRAMES, ODOM_FRAMES, without_prefix
+from nscan_cli.logs.recordings.message_types import ODOMETRY_TYPES, TRANSFORM_TYPES
+from nscan_cli.logs.recordings.poses_3d import heading
+from nscan_cli.logs.recordings.tf_tree import (
+    LoggedTransform,
+    TransformTree,
+    decoded_transforms,
+    transform_times,
+)
+from nscan_cli.logs.recordings.topics import devices, find_topic, odometry_topic
 from nscan_cli.logs.scan_order import Order
 from nscan_cli.logs.skips import Skips
 from nscan_cli.poses import Array
 
 
 class RobotMotion(NamedTuple):
-    """What a recording says of the robot's motion."""
+    """The odometry of a recording, at the times of the scans."""
 
     poses: Array | None
-    """(S, 3) at the times of the scans, in order of time."""
+    """(S, 3) in order of time; None without odometry."""
     robot: str
-    """The frame that is placed; empty where nothing names it."""
+    """The child frame of the odometry; empty where nothing names it."""
     parent: str
-    """The frame that it is placed in, likewise."""
+    """The parent frame of the odometry; empty where nothing names it."""
 
 
 def robot_odometry(
     recording: Recording,
-    transforms: Transforms,
+    tree: TransformTree,
     times: Order,
-    header_time: bool,
+    use_stamps: bool,
     options: ReadingOptions,
     findings: Findings,
     file: str,
 ) -> RobotMotion:
-    """The robot's motion by the topic that is asked for, by the only one, or by tf.
+    """The robot's motion from the topic that --odom-topic names, from the only one, or from tf.
 
-    Raises WrongUsageError and OpenChoiceError when topics have to be chosen.
+    `times` are those of the scans: stamps with `use_stamps`, else times of recording. Raises WrongUsageError
+    and OpenChoiceError when topics have to be chosen.
     """
     if not options.odometry:
         findings.used["odometry"] = "none: --no-odometry"
-        return RobotMotion(None, _robot(recording, transforms, findings.skips, file), "")
-    placed = _in_odom(transforms) if _is_no_topic(recording, options.odom_topic) else {}
-    choice = None if options.odom_topic in placed else odometry_topic(recording, options, file)
+        return RobotMotion(None, _robot_frame(recording, tree, findings.skips, file), "")
+    asked = options.odom_topic
+    is_frame = (
+        asked is not None and find_topic(asked, devices(recording, ODOMETRY_TYPES + TRANSFORM_TYPES)) is None
+    )
+    by_frame = _transforms_from_odom(tree) if is_frame else {}
+    choice = None if asked in by_frame else odometry_topic(recording, options, file)
     if choice is not None:
-        rows = list(decoded(recording, choice.topic, findings.skips, file))
+        rows = list(decoded_transforms(recording, choice.topic, findings.skips, file))
         source, why = choice.topic, choice.why
     else:
-        rows = placed.get(options.odom_topic or "", []) or _odometry_in_tf(transforms, file)
+        rows = by_frame.get(asked or "", []) or _odometry_in_tf(tree, file)
         source = f"tf from {rows[0][0].parent} to {rows[0][0].child}" if rows else ""
-        why = "no topic has odometry" if options.odom_topic is None else f"{options.odom_topic} is asked for"
-    poses = _poses(rows, source or "tf", times, header_time, findings)
+        why = "no topic has odometry" if asked is None else f"{asked} is asked for"
+    poses = _poses_at_scans(rows, source or "tf", times, use_stamps, findings)
     if poses is not None:
         findings.used["odometry"] = f"{source}, {why}, interpolated"
+    elif rows:
+        findings.used["odometry"] = f"none: {source} is of no use"
     else:
-        findings.used["odometry"] = "none in the recording" if not rows else f"none: {source} is of no use"
-        if not rows:
-            findings.warnings.append("no nav_msgs/Odometry, and no transform from odom: no odometry")
+        findings.used["odometry"] = "none in the recording"
+        findings.warnings.append("no nav_msgs/Odometry, and no transform from odom: no odometry")
     if not rows:
         return RobotMotion(poses, "", "")
     return RobotMotion(poses, rows[0][0].child, rows[0][0].parent)
 
 
-def _robot(recording: Recording, transforms: Transforms, skips: Skips, file: str) -> str:
-    """The robot's frame, as far as all odometry agrees on it."""
-    topics = recording.topics(ODOMETRY)
+def _robot_frame(recording: Recording, tree: TransformTree, skips: Skips, file: str) -> str:
+    """The child frame of the odometry; empty where there is none, or topics name different ones."""
+    topics = recording.topics_of(ODOMETRY_TYPES)
     if topics:
-        placed = [next(decoded(recording, topic, skips, file), None) for topic in topics]
-        names = {one[0].child for one in placed if one is not None}
-        return names.pop() if len(names) == 1 else ""
+        first = [next(decoded_transforms(recording, topic, skips, file), None) for topic in topics]
+        frames = {logged[0].child for logged in first if logged is not None}
+        return frames.pop() if len(frames) == 1 else ""
     try:
-        rows = _odometry_in_tf(transforms, file)
+        rows = _odometry_in_tf(tree, file)
     except OpenChoiceError:
         return ""
     return rows[0][0].child if rows else ""
 
 
-def _odometry_in_tf(transforms: Transforms, file: str) -> list[Logged]:
+def _odometry_in_tf(tree: TransformTree, file: str) -> list[LoggedTransform]:
     """The transforms from odom to the robot.
 
-    Raises OpenChoiceError when several frames are placed in odom and may be the robot.
+    Raises OpenChoiceError when odom has several child frames that may be the robot.
     """
-    placed = _in_odom(transforms)
-    bases = [name for name in placed if base_of(name) in BASES]
-    robots = bases if len(bases) == 1 else list(placed)
+    by_frame = _transforms_from_odom(tree)
+    bases = [frame for frame in by_frame if without_prefix(frame) in BASE_FRAMES]
+    robots = bases if len(bases) == 1 else list(by_frame)
     if len(robots) > 1:
-        found = [Device(name, f"tf from {rows[0][0].parent}", len(rows)) for name, rows in placed.items()]
+        found = [Device(frame, f"tf from {rows[0][0].parent}", len(rows)) for frame, rows in by_frame.items()]
         raise OpenChoiceError(file, "odometry", found, "--odom-topic", "transform")
-    return placed[robots[0]] if robots else []
+    return by_frame[robots[0]] if robots else []
 
 
-def _in_odom(transforms: Transforms) -> dict[str, list[Logged]]:
-    """The transforms from odom, by the frame that they place there."""
-    placed: dict[str, list[Logged]] = {}
-    for row in transforms.others():
-        if base_of(row[0].parent) in ODOM:
-            placed.setdefault(row[0].child, []).append(row)
-    return dict(sorted(placed.items()))
+def _transforms_from_odom(tree: TransformTree) -> dict[str, list[LoggedTransform]]:
+    """The transforms from odom, by their child frame."""
+    by_frame: dict[str, list[LoggedTransform]] = {}
+    for logged in tree.dynamic():
+        if without_prefix(logged[0].parent) in ODOM_FRAMES:
+            by_frame.setdefault(logged[0].child, []).append(logged)
+    return dict(sorted(by_frame.items()))
 
 
-def _is_no_topic(recording: Recording, asked: str | None) -> bool:
-    """Whether something else than a topic is asked for as odometry: it may be a frame of tf."""
-    return asked is not None and named(asked, devices(recording, ODOMETRY + TRANSFORMS)) is None
-
-
-def _poses(
-    rows: Sequence[Logged], source: str, times: Order, header_time: bool, findings: Findings
+def _poses_at_scans(
+    rows: Sequence[LoggedTransform], source: str, times: Order, use_stamps: bool, findings: Findings
 ) -> Array | None:
-    """Poses (S, 3) at the times of the scans, by the clock that these have."""
-    found, at = [], []
-    stamps = stamps_of(rows) if header_time else [log_time for _, log_time in rows]
-    for number, ((one, _), stamp) in enumerate(zip(rows, stamps, strict=True), 1):
-        angle = heading(one.pose)
+    """Interpolated poses (S, 3) at the times of the scans; None without a valid pose."""
+    found, found_at = [], []
+    stamps = transform_times(rows) if use_stamps else [log_time for _, log_time in rows]
+    for number, ((transform, _), stamp) in enumerate(zip(rows, stamps, strict=True), 1):
+        angle = heading(transform.pose)
         if angle is None or stamp is None:
             findings.skips.add(f"{source}: {'not a pose' if angle is None else 'without a time'}", number)
             continue
-        found.append((one.pose.translation[0], one.pose.translation[1], angle))
-        at.append(stamp / S)
+        found.append((*transform.pose.translation[:2], angle))
+        found_at.append(stamp / S)
     if not found:
         return None
     if times.nominal:
         findings.warnings.append(f"the scans have no times that lead to {source}: no odometry")
         return None
-    moments = np.array(at)
-    in_order = np.argsort(moments, kind="stable")
+    seconds = np.array(found_at)
+    in_order = np.argsort(seconds, kind="stable")
     return interpolated(
-        times.times, moments[in_order], np.array(found)[in_order], f"pose of {source}", findings.warnings
+        times.times, seconds[in_order], np.array(found)[in_order], f"pose of {source}", findings.warnings
     )

@@ -1,7 +1,7 @@
-"""The records that ROS 1 bags (format 2.0) consist of.
+"""The records of ROS 1 bags (format 2.0), and the fields of their headers.
 
-Source of the form: wiki.ros.org/Bags/Format/2.0. A record is a header of named fields, and data; each begins
-with its length.
+Source: wiki.ros.org/Bags/Format/2.0. A record is a header of named fields, then data; both begin with their
+length.
 """
 
 from __future__ import annotations
@@ -13,46 +13,46 @@ from typing import NamedTuple
 from nscan_cli.files.inputs import FileBytes
 
 LENGTH, LONG, TIME = struct.Struct("<I"), struct.Struct("<Q"), struct.Struct("<II")
-MAGIC = b"#ROSBAG V2.0\n"
+BAG_MAGIC = b"#ROSBAG V2.0\n"
 MESSAGE, HEADER, INDEX, CHUNK, CHUNK_INFO, CONNECTION = 2, 3, 4, 5, 6, 7
-KINDS = range(MESSAGE, CONNECTION + 1)
-ENTRY = {INDEX: 12, CHUNK_INFO: 8}
-"""Bytes of each entry in the records that make up the index."""
+"""Types of records: the field op of their headers."""
+INDEX_ENTRY_SIZE = {INDEX: 12, CHUNK_INFO: 8}
+"""FileBytes of each entry in the two types of records that make up the index."""
 CHUNK_FIELD = b"\x04\x00\x00\x00op=\x05"
-"""A field of the header of each chunk."""
+"""The field op in the header of a chunk, with its length."""
 LONGEST_CHUNK_HEADER = 200
-"""Bytes."""
+"""FileBytes"""
 
 
 class DamagedBagError(Exception):
-    """The records cannot be followed beyond a byte."""
+    """No valid record begins at a byte."""
 
     def __init__(self, at: int, problem: str, in_index: bool = False) -> None:
         super().__init__(problem)
         self.at, self.in_index = at, in_index
-        """Whether it is a record of the index that is broken, and no message with it."""
+        """in_index: only a record of the index is broken, so that no message is lost."""
 
 
 class BagRecord(NamedTuple):
-    """One record of some bytes: what it is, its fields, and where its data begin and end."""
+    """One record: the byte where it begins, its type, its fields, and where its data begin and end."""
 
     at: int
-    kind: int
+    op: int
     fields: dict[bytes, bytes]
     begin: int
     end: int
 
     def number(self, name: bytes, form: struct.Struct = LENGTH) -> int:
-        """A field that is a number. Raises BrokenError when it is none."""
+        """A field with a number. Raises DamagedBagError when it is missing or of another length."""
         return int(form.unpack(self._field(name, form.size))[0])
 
     def time(self) -> int:
-        """The field with the time of a message, ns."""
+        """The field time, ns. Raises DamagedBagError when it is missing or of another length."""
         seconds, nanoseconds = TIME.unpack(self._field(b"time", TIME.size))
         return int(seconds) * 10**9 + int(nanoseconds)
 
     def text(self, name: bytes) -> str:
-        """A field that is a text. Raises BrokenError when it is not there."""
+        """A field with text. Raises DamagedBagError when it is missing."""
         if name not in self.fields:
             raise DamagedBagError(self.at, f"a record without {name.decode()}")
         return self.fields[name].decode("utf-8", "replace")
@@ -65,22 +65,23 @@ class BagRecord(NamedTuple):
 
 
 def record_at(data: FileBytes, at: int, end: int) -> BagRecord:
-    """The record that begins at a byte, and ends before `end`. Raises BrokenError when there is none."""
+    """The record that begins at a byte and ends before `end`. Raises DamagedBagError when there is none."""
     fields, begin = fields_at(data, at, end, "a record's header")
     if begin + LENGTH.size > end:
         raise DamagedBagError(at, "it ends within a record")
     (size,) = LENGTH.unpack_from(data, begin)
     begin += LENGTH.size
-    kind = fields.get(b"op", b"")
-    if len(kind) != 1 or kind[0] not in KINDS:
+    op_field = fields.get(b"op", b"")
+    op = op_field[0] if len(op_field) == 1 else 0
+    if not MESSAGE <= op <= CONNECTION:
         raise DamagedBagError(at, "a record of no known kind")
     if begin + size > end:
-        raise DamagedBagError(at, "it ends within a record", kind[0] in ENTRY)
-    return BagRecord(at, kind[0], fields, begin, begin + size)
+        raise DamagedBagError(at, "it ends within a record", op in INDEX_ENTRY_SIZE)
+    return BagRecord(at, op, fields, begin, begin + size)
 
 
 def records(data: FileBytes, start: int, end: int) -> Iterator[BagRecord]:
-    """One record after the other. Raises BrokenError where there is none."""
+    """The records in a range of bytes. Raises DamagedBagError where none begins."""
     at = start
     while at < end:
         record = record_at(data, at, end)
@@ -89,18 +90,18 @@ def records(data: FileBytes, start: int, end: int) -> Iterator[BagRecord]:
 
 
 def fields_at(data: FileBytes, at: int, end: int, what: str) -> tuple[dict[bytes, bytes], int]:
-    """Fields that begin with their common length, and the byte behind them. Raises BrokenError."""
+    """The fields of a header that begins with its length, and the byte behind it. Raises DamagedBagError."""
     if at + LENGTH.size > end:
         raise DamagedBagError(at, f"it ends within {what}")
     (size,) = LENGTH.unpack_from(data, at)
     begin, stop = at + LENGTH.size, at + LENGTH.size + size
     if stop > end:
         raise DamagedBagError(at, f"it ends within {what}")
-    return named(data, begin, stop, at), stop
+    return parse_fields(data, begin, stop, at), stop
 
 
-def named(data: FileBytes, begin: int, stop: int, at: int) -> dict[bytes, bytes]:
-    """The fields in some bytes; `at` is what an error names. Raises BrokenError."""
+def parse_fields(data: FileBytes, begin: int, stop: int, at: int) -> dict[bytes, bytes]:
+    """The fields in a range of bytes. Raises DamagedBagError, which names the byte `at`."""
     fields = {}
     while begin < stop:
         if begin + LENGTH.size > stop:
@@ -118,11 +119,11 @@ def named(data: FileBytes, begin: int, stop: int, at: int) -> dict[bytes, bytes]
 
 
 def after_index(data: FileBytes, record: BagRecord) -> int:
-    """The byte behind a record of the index, whose length some recorders have written wrong.
+    """The byte behind a record of the index, whose length some recorders write wrong.
 
-    Raises BrokenError when no record begins where one has to.
+    Raises DamagedBagError when no record begins there, by its length or by its number of entries.
     """
-    entries = record.begin + ENTRY[record.kind] * record.number(b"count")
+    entries = record.begin + INDEX_ENTRY_SIZE[record.op] * record.number(b"count")
     for at in (record.end, entries):
         if at == len(data) or (at < len(data) and _is_record(data, at)):
             return at
@@ -130,7 +131,7 @@ def after_index(data: FileBytes, record: BagRecord) -> int:
 
 
 def next_chunk(data: FileBytes, start: int) -> int | None:
-    """The byte at or behind `start` where the next chunk begins that is whole; None where there is none."""
+    """The byte where the next whole chunk begins, from `start` on; None without one."""
     found = data.find(CHUNK_FIELD, start)
     while found >= 0:
         for at in range(found - LENGTH.size, max(start, found - LONGEST_CHUNK_HEADER) - 1, -1):

@@ -1,4 +1,4 @@
-"""ROS 2 bags in SQLite (.db3), without the metadata.yaml that goes with them."""
+"""ROS 2 bags in SQLite (.db3); their metadata.yaml is not needed."""
 
 from __future__ import annotations
 
@@ -10,44 +10,46 @@ from urllib.parse import quote
 
 from nscan_cli.errors import InputDataError
 from nscan_cli.files.limits import INPUT
-from nscan_cli.logs.recordings.container import WANTED, Channel, Recording, ros_name
-from nscan_cli.logs.recordings.sqlite_journal import merged
+from nscan_cli.logs.recordings.container import Channel, Recording
+from nscan_cli.logs.recordings.message_types import READ_TYPES, ros2_type_name
+from nscan_cli.logs.recordings.sqlite_journal import recovered_database
 
-LEGACY_JOURNAL = b"\x01\x01"
-JOURNAL = slice(18, 20)
-"""Bytes of the header that ask for a write-ahead log, which does not exist in memory."""
+JOURNAL_MODE = slice(18, 20)
+"""FileBytes of the header that can ask for a write-ahead log, which a database in memory cannot have."""
+ROLLBACK_JOURNAL = b"\x01\x01"
+FETCH_AGAIN = "fetch the file again"
 
 
-def recording(data: bytes, file: str, salvage: bool) -> Recording:
-    """All messages that are of use, in file order. Raises InputDataError and ExceededError."""
+def read_recording(data: bytes, file: str, salvage: bool) -> Recording:
+    """The messages of a bag in memory, in file order. Raises InputDataError and LimitExceededError."""
     with closing(sqlite3.connect(":memory:")) as bag:
         try:
-            bag.deserialize(data[: JOURNAL.start] + LEGACY_JOURNAL + data[JOURNAL.stop :])
+            bag.deserialize(data[: JOURNAL_MODE.start] + ROLLBACK_JOURNAL + data[JOURNAL_MODE.stop :])
         except (sqlite3.Error, OverflowError) as error:
-            raise _damaged(file, error) from error
-        return _recording(bag, len(data), file, salvage)
+            raise InputDataError(file, _damage(error), FETCH_AGAIN) from error
+        return _read_bag(bag, len(data), file, salvage)
 
 
-def recording_at(path: str, beside: Mapping[str, str], file: str, salvage: bool) -> Recording:
-    """The same of the database at a path, with what parts.beside has found beside it.
+def read_recording_file(path: str, beside: Mapping[str, str], file: str, salvage: bool) -> Recording:
+    """The messages of the bag at a path, with its journals `beside` it (suffix → path), in file order.
 
-    Only what is wanted of it is taken into memory. Raises OutputError too, when there is no room for copies
-    of several files that SQLite has to put together.
+    Only messages that are read are taken into memory. Raises InputDataError and LimitExceededError, and
+    OutputError when there is no room for copies of the bag and its journals.
     """
-    with merged(path, beside, file, salvage) as (place, warnings):
-        # Nothing may be made or changed where the file is.
+    with recovered_database(path, beside, file, salvage) as (place, warnings):
+        # Immutable: SQLite neither changes the file nor creates others beside it.
         address = f"file:{quote(os.path.abspath(place))}?mode=ro&immutable=1"
         with closing(sqlite3.connect(address, uri=True)) as bag:
-            found = _recording(bag, min(os.path.getsize(place), INPUT.bytes), file, salvage)
+            found = _read_bag(bag, min(os.path.getsize(place), INPUT.bytes), file, salvage)
     found.warnings[:0] = warnings
     return found
 
 
-def _recording(bag: sqlite3.Connection, longest: int, file: str, salvage: bool) -> Recording:
-    """What is in a database in which no value may be longer than `longest` bytes."""
+def _read_bag(bag: sqlite3.Connection, longest: int, file: str, salvage: bool) -> Recording:
+    """The messages of a database in which no value may be longer than `longest` bytes."""
     recording = Recording("ROS 2 bag (SQLite)")
     try:
-        # A column may be made from a formula: its values need not be in the file.
+        # A generated column can produce values that are much larger than the file.
         bag.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, longest)
         tables = {name for (name,) in bag.execute("SELECT name FROM sqlite_master WHERE type = 'table'")}
         if not {"topics", "messages"} <= tables:
@@ -58,18 +60,13 @@ def _recording(bag: sqlite3.Connection, longest: int, file: str, salvage: bool) 
             raise sqlite3.DatabaseError(str(problem))
         _read_tables(bag, "message_definitions" in tables, recording)
     except (sqlite3.Error, OverflowError, UnicodeDecodeError, TypeError) as error:
-        damaged = _damaged(file, error)
         if not salvage or not recording.messages:
-            raise damaged from error
-        recording.warnings.append(f"{_said(error)}: the messages before it are used")
+            raise InputDataError(file, _damage(error), FETCH_AGAIN) from error
+        recording.warnings.append(f"{_damage(error)}: the messages before it are used")
     return recording
 
 
-def _damaged(file: str, error: Exception) -> InputDataError:
-    return InputDataError(file, _said(error), "fetch the file again")
-
-
-def _said(error: Exception) -> str:
+def _damage(error: Exception) -> str:
     return f"the database is damaged ({' '.join(str(error).split())})"
 
 
@@ -82,10 +79,10 @@ def _read_tables(bag: sqlite3.Connection, with_schemas: bool, recording: Recordi
         "SELECT id, name, type, serialization_format FROM topics"
     ):
         schema_encoding, text = schemas.get(name, ("", ""))
-        channel = Channel(topic, ros_name(name), encoding, schema_encoding, text.encode())
+        channel = Channel(topic, ros2_type_name(name), encoding, schema_encoding, text.encode())
         (count,) = next(bag.execute("SELECT count(*) FROM messages WHERE topic_id = ?", (number,)))
         recording.counts[channel] = recording.counts.get(channel, 0) + count
-        if channel.type in WANTED:
+        if channel.type in READ_TYPES:
             query = "SELECT timestamp, data FROM messages WHERE topic_id = ? ORDER BY id"
             for time, message in bag.execute(query, (number,)):
-                recording.keep(channel, time, message)
+                recording.add(channel, time, message)

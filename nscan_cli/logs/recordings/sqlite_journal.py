@@ -1,7 +1,7 @@
-"""What a database has not taken into its file yet: SQLite's write-ahead log, or its rollback journal.
+"""The write-ahead log or rollback journal beside an SQLite database, applied to a copy of it.
 
-A recorder that was killed, or a copy that was made while it ran, leaves them beside the file. SQLite itself
-puts them together, on copies: nothing changes where the files are.
+They stay beside the file when a recorder is killed, or when the file is copied while it runs. SQLite itself
+applies them to copies in a temporary folder, so the given files do not change.
 """
 
 from __future__ import annotations
@@ -20,18 +20,21 @@ from nscan_cli.files.counting import counted
 
 WAL, JOURNAL = "-wal", "-journal"
 JOURNAL_END = b"\xd9\xd5\x05\xf9\x20\xa1\x63\xd7"
-"""The last bytes of a journal that ends with the name of a file."""
-HEAD, FRAME = 32, 24
-"""Bytes of the header of a write-ahead log, and of each frame's in it (sqlite.org/fileformat2.html)."""
+"""The last bytes of a journal that ends with the name of another file."""
+WAL_HEADER, FRAME_HEADER = 32, 24
+"""FileBytes of the header of a write-ahead log, and of each frame in it (sqlite.org/fileformat2.html)."""
 SALTS = slice(16, 24)
 FRAME_SALTS = slice(8, 16)
 
 
 @contextlib.contextmanager
-def merged(path: str, beside: Mapping[str, str], file: str, salvage: bool) -> Iterator[tuple[str, list[str]]]:
-    """Where a database is with all that stands beside it taken in, and what of that is of no use.
+def recovered_database(
+    path: str, beside: Mapping[str, str], file: str, salvage: bool
+) -> Iterator[tuple[str, list[str]]]:
+    """The path of a database with its journals `beside` it (suffix → path) applied, and warnings of losses.
 
-    Raises InputDataError when it is sound only without it, OutputError when there is no room for copies.
+    Raises InputDataError when the journals do not fit it (with `salvage` they are left out), OutputError
+    when there is no room for the copies.
     """
     if not beside:
         yield path, []
@@ -42,12 +45,12 @@ def merged(path: str, beside: Mapping[str, str], file: str, salvage: bool) -> It
             for end, source in {"": path, **beside}.items():
                 shutil.copyfile(source, place + end)
             _check_journal(place)
-            taken = _put_together(place)
+            applied = apply_journals(place)
         except OSError as error:
             problem = f"{folder}: has no copy of {file}: {error.strerror or error}"
             raise OutputError(f"{problem}; make room there, or set TMPDIR") from error
         except (sqlite3.Error, UnicodeDecodeError) as error:
-            # Of another database, or damaged, what SQLite quotes of it too: the file alone may be sound.
+            # The journal is damaged or of another database; the file alone may be sound.
             names = " and ".join(f"{file}{end}" for end in beside)
             problem = f"does not go together with {names} ({' '.join(str(error).split())})"
             if not salvage:
@@ -55,14 +58,14 @@ def merged(path: str, beside: Mapping[str, str], file: str, salvage: bool) -> It
                 raise InputDataError(file, problem, remedy) from error
             yield path, [f"{problem}: what that held is lost"]
             return
-        lost = _left_over(beside[WAL], taken) if WAL in beside else ""
+        lost = _lost_pages(beside[WAL], applied) if WAL in beside else ""
         yield place, [f"{file}{WAL}: {lost}"] if lost else []
 
 
 def _check_journal(path: str) -> None:
-    """Refuse a journal with the name of another file at its end, which SQLite would read, and remove.
+    """Refuse a journal that names another file at its end, because SQLite would read and remove that file.
 
-    Only transactions over several databases have one. Raises sqlite3.Error.
+    Only transactions over several databases name one. Raises sqlite3.Error.
     """
     with contextlib.suppress(FileNotFoundError), open(path + JOURNAL, "rb") as journal:
         journal.seek(-min(len(JOURNAL_END), os.path.getsize(path + JOURNAL)), os.SEEK_END)
@@ -70,31 +73,31 @@ def _check_journal(path: str) -> None:
             raise sqlite3.DatabaseError("its journal leads to other files")
 
 
-def _put_together(path: str) -> int:
-    """Let SQLite do it; how many frames of the write-ahead log it has taken. Raises sqlite3.Error."""
+def apply_journals(path: str) -> int:
+    """Let SQLite apply them; how many frames of the write-ahead log were used. Raises sqlite3.Error."""
     with closing(sqlite3.connect(path)) as bag:
-        # The first reading plays a journal back.
+        # The first query applies a rollback journal.
         next(bag.execute("SELECT count(*) FROM sqlite_master"))
-        _busy, taken, _written = next(bag.execute("PRAGMA wal_checkpoint(FULL)"))
+        _busy, applied, _written = next(bag.execute("PRAGMA wal_checkpoint(FULL)"))
         problem = next(bag.execute("PRAGMA integrity_check"))[0]
         if problem != "ok":
             raise sqlite3.DatabaseError(str(problem))
-    return max(0, int(taken))
+    return max(0, int(applied))
 
 
-def _left_over(path: str, taken: int) -> str:
-    """What is lost of a write-ahead log of which the first frames were taken; empty when nothing is."""
+def _lost_pages(path: str, applied: int) -> str:
+    """What is lost of a write-ahead log whose first frames were applied; empty when nothing is."""
     with open(path, "rb") as wal:
-        head = wal.read(HEAD)
-        if len(head) < HEAD:
+        head = wal.read(WAL_HEADER)
+        if len(head) < WAL_HEADER:
             return ""
         (page,) = struct.unpack_from(">I", head, 8)
-        if taken == 0:
+        if applied == 0:
             return "does not fit the file or is damaged: what it held is lost"
         left = 0
-        wal.seek(HEAD + taken * (FRAME + page))
-        while frame := wal.read(FRAME):
-            # Frames with other salts are of times past: the file was begun anew over them.
+        wal.seek(WAL_HEADER + applied * (FRAME_HEADER + page))
+        while frame := wal.read(FRAME_HEADER):
+            # Frames with other salts are older: the log was begun again over them.
             left += frame[FRAME_SALTS] == head[SALTS]
             wal.seek(page, os.SEEK_CUR)
     return f"{counted(left, 'page')} at its end are not whole: what they held is lost" if left else ""

@@ -5,23 +5,23 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from nscan_cli.logs.recordings.message_stamps import is_clock, stamps_set
+from nscan_cli.logs.recordings.message_stamps import order_messages, valid_stamps
 from tests.logs.forms import FORMS
 from tests.logs.recordings.drives import PERIOD, START, Odom, S, Scan, Tf, Written, drive
 
 
 def test_zero_is_a_stamp_of_a_clock_that_begins_there():
-    assert stamps_set([0, S // 10, S // 5]) == [0, S // 10, S // 5]
+    assert valid_stamps([0, S // 10, S // 5]) == [0, S // 10, S // 5]
     # The second of several messages at the beginning; of messages that are 5 s apart, the first too.
-    assert stamps_set([0, 0, S // 10, S // 10]) == [0, 0, S // 10, S // 10]
-    assert stamps_set([0, 5 * S, 10 * S]) == [0, 5 * S, 10 * S]
+    assert valid_stamps([0, 0, S // 10, S // 10]) == [0, 0, S // 10, S // 10]
+    assert valid_stamps([0, 5 * S, 10 * S]) == [0, 5 * S, 10 * S]
 
 
 def test_zero_was_never_set_where_the_clock_began_long_ago():
-    assert stamps_set([START, 0, START + S]) == [START, None, START + S]
-    assert stamps_set([0, 37 * S, 38 * S]) == [None, 37 * S, 38 * S]
-    assert stamps_set([0, 0, 0]) == [None, None, None]
-    assert stamps_set([]) == []
+    assert valid_stamps([START, 0, START + S]) == [START, None, START + S]
+    assert valid_stamps([0, 37 * S, 38 * S]) == [None, 37 * S, 38 * S]
+    assert valid_stamps([0, 0, 0]) == [None, None, None]
+    assert valid_stamps([]) == []
 
 
 @pytest.mark.parametrize(
@@ -29,7 +29,7 @@ def test_zero_was_never_set_where_the_clock_began_long_ago():
     [([0, 1, 2], True), ([5], True), ([None, 1, 2], True), ([None, None, 2], False), ([7, 7, 7], False)],
 )
 def test_stamps_tell_the_order_where_most_are_set_and_differ(stamps, tell):
-    assert is_clock(stamps) == tell
+    assert order_messages(stamps) == tell
 
 
 def simulated(count: int, odom_in_tf: bool = False) -> list[Written]:

@@ -12,8 +12,8 @@ import pytest
 
 from nscan_cli.errors import InputDataError, WrongUsageError
 from nscan_cli.logs.load import recording_in
-from nscan_cli.logs.recordings.container import PATH
-from nscan_cli.logs.recordings.pose_topics import poses_on
+from nscan_cli.logs.recordings.message_types import PATH_TYPE
+from nscan_cli.logs.recordings.pose_topics import poses_on_topic
 from tests.logs.recordings import ros_text
 from tests.logs.recordings.drives import START, S, turned
 
@@ -52,7 +52,7 @@ def fields(kind: str, k: int, with_seq: bool, stamped: bool = True) -> dict[str,
         spread = np.zeros(36)
         return {"header": head, "child_frame_id": "robot", "pose": {"pose": pose, "covariance": spread},
                 "twist": {"twist": still, "covariance": spread}}  # fmt: skip
-    if kind == PATH:
+    if kind == PATH_TYPE:
         return {"header": head, "poses": [fields(POSE, at, with_seq) for at in range(k + 1)]}
     if kind == TRANSFORMS:
         fixed = {
@@ -100,7 +100,7 @@ def mcap(kinds: dict[str, str], folder: Path, **how: bool) -> bytes:
 
 
 CONTAINERS: list[Callable[..., bytes]] = [bag1, bag2, mcap]
-PLACING = {"/pose": POSE, "/sure": COVARIANCE, "/vicon": MOVED, "/odom": ODOMETRY, "/path": PATH}
+PLACING = {"/pose": POSE, "/sure": COVARIANCE, "/vicon": MOVED, "/odom": ODOMETRY, "/path": PATH_TYPE}
 ALL = PLACING | {"/tf": TRANSFORMS, "/talk": IMAGE}
 
 
@@ -108,7 +108,7 @@ def read(data: bytes, topic: str | None) -> tuple[list[str], np.ndarray, list[st
     recording = recording_in(data, "a.bag", salvage=False)
     assert recording is not None
     notices: list[str] = []
-    stamps, poses = poses_on(recording, topic, "a.bag", notices)
+    stamps, poses = poses_on_topic(recording, topic, "a.bag", notices)
     return stamps, poses, notices
 
 
@@ -125,10 +125,10 @@ def test_every_type_gives_the_same_poses(container, tmp_path: Path):
 
 @pytest.mark.parametrize("container", CONTAINERS)
 def test_of_paths_the_last_is_kept(container, tmp_path: Path):
-    recording = recording_in(container({"/path": PATH}, tmp_path), "a.bag", salvage=False)
+    recording = recording_in(container({"/path": PATH_TYPE}, tmp_path), "a.bag", salvage=False)
     assert recording is not None
     assert [len(messages) for messages in recording.messages.values()] == [1]
-    assert recording.topics((PATH,)) == {"/path": COUNT}
+    assert recording.topics_of((PATH_TYPE,)) == {"/path": COUNT}
 
 
 def test_stamps_that_say_nothing_give_way_to_the_times_of_recording(tmp_path: Path):

@@ -144,12 +144,12 @@ def test_a_write_ahead_log_of_another_database(bag, tmp_path):
 
 
 def test_a_write_ahead_log_that_breaks_the_database(bag, monkeypatch):
-    from nscan_cli.logs.recordings import sqlite_journal as unmerged
+    from nscan_cli.logs.recordings import sqlite_journal
 
     def broken(*_given):
         raise sqlite3.DatabaseError("malformed")
 
-    monkeypatch.setattr(unmerged, "_put_together", broken)
+    monkeypatch.setattr(sqlite_journal, "apply_journals", broken)
     with pytest.raises(
         InputDataError, match=r"lab\.db3-wal \(malformed\); move that away, or give --salvage"
     ):
