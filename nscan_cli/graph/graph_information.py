@@ -1,9 +1,8 @@
-"""What the relations of a graph together say of its keyframes: half the Hessian, every pair counted once.
+"""The information of a graph's relations: half their Hessian, with each pair of scans counted once.
 
-Relations that share a pair of scans share the noise of its match. Where they overlap, each is a measurement,
-and the optimum of all is as good as they say; but the more there are of one pair, the less they know by
-themselves. So that the covariance does not shrink with their number, each is weighed by how many its pairs
-take part in.
+Relations that share a pair of scans share the noise of its match, so they are not independent. Each relation
+is weighted by one over the number of relations that its pairs take part in: the covariance does not shrink
+with the number of relations of one pair.
 """
 
 from __future__ import annotations
@@ -22,22 +21,22 @@ from nscan_cli.graph.relations.base import Relation
 from nscan_cli.poses import Array
 
 
-def component_information(graph: Graph, part: Component) -> tuple[GraphEnergy, Factor]:
-    """The energy of a part of the graph, and the factor of its information at the graph's poses.
+def component_information(graph: Graph, component: Component) -> tuple[GraphEnergy, Factor]:
+    """The energy of a component, and the factor of its information at the graph's poses.
 
-    The energies (17) and (23) have no ½, so the information is half their Hessian; its Gauss–Newton part
-    is taken. The part's first keyframe is held.
+    The energies (17) and (23) have no factor ½, so the information is half the Gauss–Newton part of their
+    Hessian. The component's first keyframe is fixed.
     """
-    energy = part.energy(len(graph)).weighted(_each_pair_once(part.relations))
-    system = energy.evaluate(graph.poses[part.keyframes], exact=False)
+    energy = component.energy(len(graph)).weighted(_each_pair_once(component.relations))
+    system = energy.evaluate(graph.poses[component.keyframes], exact=False)
     return energy, factorise(energy.pattern, 0.5 * system.hessian)
 
 
 def _each_pair_once(relations: Sequence[Relation]) -> Array:
-    """The weights (R,) of the relations: 1/m, of how many a pair of scans is in on the (harmonic) average.
+    """The weights (R,) of the relations: 1/m, with m the harmonic mean of the relations per pair of scans.
 
-    Pairwise relations by themselves are measured apart from each other. To joint matches they are priors:
-    what they say is in H already. What relations of further types say is not of scans, and counts whole.
+    Pairwise relations are independent of each other. Joint matches take them as priors, so H contains their
+    information. Relations of other types do not come from scans, and have weight 1.
     """
     of_scans = [k for k, relation in enumerate(relations) if isinstance(relation, NScan | Pairwise)]
     pairs = [_pair_keys(relations[k].nodes) for k in of_scans]
@@ -53,7 +52,7 @@ def _each_pair_once(relations: Sequence[Relation]) -> Array:
 
 
 def _pair_keys(nodes: Sequence[int]) -> NDArray[np.int64]:
-    """(n (n − 1) / 2,) the pairs of n nodes, each as one number."""
+    """(n (n − 1) / 2,) the pairs of n nodes, each packed into one integer."""
     ordered = np.sort(np.array(nodes, dtype=np.int64))
     a, b = _all_pairs(len(ordered))
     pairs: NDArray[np.int64] = ordered[a] << 32 | ordered[b]

@@ -1,4 +1,4 @@
-"""How well the graph knows its keyframes: marginal covariances of their global poses (paper, III-D, IV)."""
+"""Marginal covariances of the keyframes' global poses (paper, III-D, IV)."""
 
 from __future__ import annotations
 
@@ -13,18 +13,18 @@ from nscan_cli.poses import Array
 
 
 def marginal_covariances(graph: Graph) -> dict[int, Array]:
-    """Keyframe id → covariance (3, 3) of its global pose (x, y, φ), with the first keyframe held fixed.
+    """Keyframe id → covariance (3, 3) of its global pose (x, y, φ), with the first keyframe fixed.
 
-    The first keyframe gets zeros. A keyframe is left out when it is not determined: no relations lead to it
-    from the first one, or they leave a direction open.
+    The first keyframe gets zeros. A keyframe is left out where no relations connect it to the first one, or
+    where they leave one of its directions undetermined.
     """
     part = components(graph)[0]
     first, others = int(part.keyframes[0]), part.keyframes[1:]
     _, factor = component_information(graph, part)
     covariances = inverse_diagonal(factor)
-    loose = undetermined_nodes(factor)
+    undetermined = undetermined_nodes(factor)
     marginals = {first: np.zeros((3, 3))}
-    for keyframe, covariance, open_direction in zip(others.tolist(), covariances, loose, strict=True):
-        if not open_direction:
+    for keyframe, covariance, is_open in zip(others.tolist(), covariances, undetermined, strict=True):
+        if not is_open:
             marginals[keyframe] = covariance
     return marginals

@@ -18,7 +18,7 @@ __all__ = ["Graph", "Loop", "NScan", "Pairwise"]
 
 @dataclass(frozen=True)
 class Loop:
-    """A loop that was tried between two keyframes, and why it was accepted or refused."""
+    """A candidate loop between two keyframes, and why it was accepted or refused."""
 
     nodes: tuple[int, int]
     accepted: bool
@@ -30,7 +30,7 @@ class Loop:
 class Graph:
     """Nodes as columns (N scans; a node's id is its row), relations as lists.
 
-    A keyframe is its own anchor; any other node moves with the keyframe that `anchors` names.
+    A keyframe is its own anchor. Every other node moves rigidly with the keyframe that `anchors` names.
     """
 
     scans: NDArray[np.int64]
@@ -39,7 +39,7 @@ class Graph:
     poses: Array
     """(N, 3) global poses of the robot."""
     odometry: Array | None
-    """(N, 3) or None."""
+    """(N, 3) poses by odometry, or None."""
     anchors: NDArray[np.int64]
     """(N,) id of the keyframe that the node is attached to."""
     pairwise: list[Pairwise] = field(default_factory=list)
@@ -50,9 +50,9 @@ class Graph:
     marginals: dict[int, Array] = field(default_factory=dict)
     """Keyframe id → (3, 3) marginal covariance of its global pose, the first keyframe held fixed."""
     vertices: list[int] | None = None
-    """(N,) the keys that the nodes had in a g2o file, up to 64 bits, where these are no scan numbers."""
+    """(N,) the vertex keys in the g2o file, up to 64 bits; None where they are the scan numbers."""
     provenance: dict[str, Any] = field(default_factory=dict)
-    """As in the JSON: tool, inputs (name, sha256, bytes), parameters."""
+    """The JSON field: tool, inputs (name, sha256, bytes), parameters."""
 
     def __len__(self) -> int:
         return len(self.stamps)
@@ -63,7 +63,7 @@ class Graph:
         return [*self.pairwise, *self.nscan, *self.others]
 
     def add(self, relation: Relation) -> None:
-        """Put a relation of any type among those of its type."""
+        """Append a relation to the list of its type."""
         if isinstance(relation, Pairwise):
             self.pairwise.append(relation)
         elif isinstance(relation, NScan):
@@ -82,7 +82,7 @@ class Graph:
         return np.array([float(stamp) for stamp in self.stamps])
 
     def move_keyframes(self, keyframes: NDArray[np.int64], poses: Array) -> None:
-        """Give keyframes (K,) new poses (K, 3); every attached node moves along rigidly."""
+        """Set the poses (K, 3) of keyframes (K,), and move the nodes attached to them rigidly along."""
         moved = self.poses.copy()
         moved[keyframes] = poses
         attached = np.flatnonzero(self.anchors != np.arange(len(self)))

@@ -1,4 +1,4 @@
-"""What a graph knows of how two of its nodes lie to each other: the marginal of their relative pose."""
+"""The marginal of the relative pose of two nodes of a graph."""
 
 from __future__ import annotations
 
@@ -13,31 +13,31 @@ from nscan_cli.graph.optimise.whole_graph import Component, components
 from nscan_cli.poses import Array, relative, relative_jacobians
 
 ATTACHMENT_SIGMA = np.array([0.05, 0.05, 0.05])
-"""m, m, rad; standard deviations of a node in the frame of the keyframe that it is attached to. The graph
-holds no measurement of it."""
+"""m, m, rad: standard deviations assumed for a node in the frame of its keyframe. The graph holds no
+measurement of it."""
 
 
 class RelativePoses:
-    """The relative poses of some nodes of a graph at its optimum, with what all its relations say of them."""
+    """The relative poses of some nodes of a graph at its optimum, with their covariances."""
 
     def __init__(self, graph: Graph, nodes: Sequence[int]) -> None:
         self._graph = graph
         anchors = set(graph.anchors[list(nodes)].tolist())
-        self._parts: list[tuple[list[int], Array]] = []
+        self._components: list[tuple[list[int], Array]] = []
         for part in components(graph):
             chosen = [int(keyframe) for keyframe in part.keyframes if int(keyframe) in anchors]
             if chosen:
-                self._parts.append(_joint_covariance(graph, part, chosen))
+                self._components.append(_joint_covariance(graph, part, chosen))
 
     def relation(self, a: int, b: int) -> Pairwise | None:
-        """The pose of node b in the frame of node a, with the information that all relations together give.
+        """The pose of node b in the frame of node a, with its information from all relations of the graph.
 
         A node that is no keyframe moves with the one that it is attached to, within ATTACHED. None when no
         relations lead from one to the other, or they leave a direction open.
         """
         graph, nodes = self._graph, (a, b)
         anchors = [int(graph.anchors[node]) for node in nodes]
-        part = next((part for part in self._parts if set(anchors) <= set(part[0])), None)
+        part = next((part for part in self._components if set(anchors) <= set(part[0])), None)
         if part is None:
             return None
         chosen, covariance = part
@@ -53,24 +53,24 @@ class RelativePoses:
 
 
 def _joint_covariance(graph: Graph, part: Component, chosen: list[int]) -> tuple[list[int], Array]:
-    """The keyframes (m,) of those chosen that are determined, and the covariance (3m, 3m) of their poses.
+    """The chosen keyframes (m,) that are determined, and the covariance (3m, 3m) of their poses.
 
-    The component's first keyframe is held; relative poses do not depend on that.
+    The component's first keyframe is fixed, which does not affect relative poses.
     """
     energy, factor = component_information(graph, part)
-    loose = undetermined_nodes(factor)
+    undetermined = undetermined_nodes(factor)
     rows = energy.free_row[np.searchsorted(part.keyframes, chosen)]
-    known = [at for at, row in enumerate(rows) if row < 0 or not loose[row]]
+    known = [at for at, row in enumerate(rows) if row < 0 or not undetermined[row]]
     covariance = np.zeros((len(known), 3, len(known), 3))
     free = [at for at, k in enumerate(known) if rows[k] >= 0]
     for at in free:
         for component in range(3):
-            unit = np.zeros((len(loose), 3))
+            unit = np.zeros((len(undetermined), 3))
             unit[rows[known[at]], component] = 1.0
             covariance[free, :, at, component] = solve(factor, unit)[rows[known][free]]
     return [chosen[at] for at in known], covariance.reshape(3 * len(known), 3 * len(known))
 
 
 def _rigid_jacobian(offset: Array) -> Array:
-    """∂p/∂a (3, 3) of a pose p that moves with a rigidly, p − a = offset."""
+    """∂p/∂a (3, 3) of a pose p that moves rigidly with a, where p − a = offset."""
     return np.array([[1.0, 0.0, -offset[1]], [0.0, 1.0, offset[0]], [0.0, 0.0, 1.0]])

@@ -203,7 +203,7 @@ def changed_graph(path: Path, **values: object) -> str:
         ("relations__0__information", [1e300, 0, 0, 1, 0, 1], "finite numbers up to 1e\\+30"),
         ("nodes__2__stamp", "1e12", "a time in seconds, as text, up to 1e\\+11 s"),
         ("nodes__2__scan", 2**53 + 1, "an integer of at least 0"),
-        ("nodes__2__attached", 2**53, "'attached' is 9007199254740992, which is no keyframe"),
+        ("nodes__2__attached", 2**53, "'attached' is 9007199254740992, which is not a keyframe"),
     ],
 )
 def test_a_graph_with_numbers_beyond_reason(tmp_path, place, value, said):

@@ -1,8 +1,7 @@
-"""Pose graphs in g2o's text format, and TORO's: what g2o_lines.py reads, as a graph; and a graph as g2o.
+"""Reading and writing of pose graphs in the text formats of g2o and TORO.
 
-The error of an edge is z⁻¹ ∘ (x_i⁻¹ ∘ x_j) in g2o, so its translation stands in the frame of the
-measurement z; in eq. (16) it is (x̂_j ⊖ x̂_i) − z. The information is rotated by the angle of z between
-the two, which leaves the energy as it is.
+The error of an edge is z⁻¹ ∘ (x_i⁻¹ ∘ x_j) in g2o, with its translation in the frame of the measurement z.
+In eq. (16) it is (x̂_j ⊖ x̂_i) − z. Rotating the information by the angle of z keeps the energy the same.
 """
 
 from __future__ import annotations
@@ -33,15 +32,14 @@ from nscan_cli.poses import Array, Indices, compose, inverse, rotated_informatio
 def read_g2o(path: str) -> Graph:
     """The graph of a g2o file; "-" reads standard input.
 
-    Nodes are the vertices in order of their keys, all of them keyframes; a node's scan number is the
-    vertex's key, its stamp its row. Where a key is too large for a scan number, all numbers are rows, and
-    the keys are the graph's `vertices`. Edges between vertices that follow each other get the origin
-    odometry, the others loop. A file without vertices gets its poses from the edges: the fewest from
-    the vertex of the smallest key, which is at the origin. FIX only chooses the frame, which is free
-    here, so it is checked and dropped; one vertex may be fixed. How many lines of which tags were
-    skipped is in provenance["skipped"]; g2o_tags.losses says what that means.
+    The nodes are the vertices in order of their keys, all of them keyframes. A node's scan number is its
+    vertex key, and its stamp is its row. Where a key is too large for a scan number, the scan numbers are
+    rows, and the keys are the graph's `vertices`. Edges between consecutive vertices have the origin
+    odometry, the others loop. Without vertices, poses come from the fewest edges to the vertex of the
+    smallest key, which is at the origin. FIX only chooses the frame, so it is checked and ignored; one vertex
+    may be fixed. provenance["skipped"] counts the skipped lines by tag; g2o_tags.losses explains them.
 
-    Raises InputMissingError when the file cannot be read, InputDataError on a malformed line.
+    Raises InputMissingError where the file cannot be read, InputDataError on a malformed line.
     """
     return parse_g2o(read_bytes(path, GRAPH), path)
 
@@ -64,13 +62,12 @@ def parse_g2o(data: bytes, path: str) -> Graph:
 def write_g2o(graph: Graph) -> bytes:
     """The keyframes and relations as g2o text; the first keyframe is fixed.
 
-    A vertex's key is the one that it had in a g2o file, or else its scan number.
+    A vertex's key is its key in the g2o file that the graph came from, or its scan number.
 
-    g2o has a form for pairwise relations alone: any other is replaced by the marginals of its Hessian
-    between pose c and every other pose, as pairwise edges. This loses what it says about the other poses
-    among each other, and a graph optimised from the file differs from one that has the whole Hessian.
-    Nodes that are no keyframes are left out. Numbers have the digits that read back exactly. Raises
-    NotFiniteError.
+    g2o has pairwise relations only: any other relation is replaced by the marginals of its Hessian between
+    pose c and every other pose. This loses the correlations between the other poses, so a graph optimised
+    from the file differs from one with the whole Hessian. Nodes that are not keyframes are left out. Numbers
+    have the digits that read back exactly. Raises NotFiniteError.
     """
     check_finite("the poses of the graph", graph.poses)
     keyframes = graph.keyframes.tolist()
@@ -96,7 +93,7 @@ def _number_texts(values: Array) -> str:
 
 
 def _poses_along_edges(lines: G2oLines, name: str) -> dict[int, Array]:
-    """Poses by the fewest edges from the vertex of the smallest key, breadth first in file order."""
+    """Poses by the fewest edges from the vertex of the smallest key, breadth first in order of the file."""
     steps: dict[int, list[tuple[int, Array]]] = {}
     ends = keys(lines.ends).reshape(-1, 2).tolist()
     for (i, j), z in zip(ends, rows(lines.measurements, 3), strict=True):
@@ -140,13 +137,13 @@ def _graph_of_lines(lines: G2oLines, name: str) -> Graph:
         graph.vertices = vertices.tolist()
     graph.pairwise = _pairwise_relations(lines, vertices, name)
     for key, line in lines.fixed.items():
-        if key not in lines.passed_over:
+        if key not in lines.other_vertices:
             _rows_of(np.array([key], dtype=np.uint64), vertices, [line], name)
     return graph
 
 
 def _pairwise_relations(lines: G2oLines, vertices: NDArray[np.uint64], name: str) -> list[Pairwise]:
-    """The edges between the vertices with keys (V,), which increase."""
+    """The edges between the vertices with increasing keys (V,)."""
     ends = keys(lines.ends)
     pairs = _rows_of(ends, vertices, np.repeat(lines.edge_lines, 2).tolist(), name).reshape(-1, 2)
     measurements = rows(lines.measurements, 3)
@@ -166,7 +163,7 @@ def _pairwise_relations(lines: G2oLines, vertices: NDArray[np.uint64], name: str
 def _rows_of(
     wanted: NDArray[np.uint64], vertices: NDArray[np.uint64], lines: Sequence[int], name: str
 ) -> Indices:
-    """Where the keys that are wanted (n,), on so many lines, are among those of all vertices (V,)."""
+    """The rows of the keys `wanted` (n,), of the n `lines`, among those of all vertices (V,)."""
     found = np.minimum(np.searchsorted(vertices, wanted), len(vertices) - 1)
     missing = np.flatnonzero(vertices[found] != wanted)
     if len(missing):

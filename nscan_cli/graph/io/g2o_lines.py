@@ -1,4 +1,4 @@
-"""The lines of a 2D pose graph as g2o and TORO write them, by their tags.
+"""The lines of a 2D pose graph in the formats of g2o and TORO, by their tags.
 
     VERTEX_SE2 id x y θ
     EDGE_SE2 i j dx dy dθ I11 I12 I13 I22 I23 I33
@@ -8,8 +8,8 @@
     EDGE2 i j dx dy dθ I11 I12 I22 I33 I13 I23
     FIX id …
 
-VERTEX2 and EDGE2 are TORO's. Poses in space (SE3) have to lie in the plane. The information of their edges
-is that of (x, y, z, qx, qy, qz), and with qz = sin(θ/2) a quarter of qz's is θ's.
+VERTEX2 and EDGE2 are TORO's. SE3 poses have to lie in the plane. The information of their edges is that of
+(x, y, z, qx, qy, qz); as qz = sin(θ/2), the information on θ is a quarter of that on qz.
 """
 
 from __future__ import annotations
@@ -33,20 +33,20 @@ from nscan_cli.poses import Array
 G2O_REMEDY = "mend or remove the line"
 LARGEST_KEY = 2**64 - 1
 GTSAM_SYMBOL = re.compile("([A-Za-z])([0-9]{1,17})")
-"""A key as GTSAM shows it, x12: the letter is in the highest of its eight bytes."""
+"""A key as GTSAM shows it, such as x12: the letter is the highest of the key's eight bytes."""
 PLANAR_TOLERANCE = 1e-6
-"""m, and of a quaternion: no more is left of z, roll and pitch by rounding to six decimals."""
+"""Largest z (m), qx and qy of a planar pose: the rounding to six decimals."""
 LENGTH = 0.01
-"""So far from 1 the length of a quaternion can be."""
+"""Largest difference of a quaternion's length from 1."""
 
 
 class _NotPlanarError(ValueError):
-    """A pose that is none of the plane."""
+    """A pose does not lie in the plane."""
 
 
 @dataclass
 class G2oLines:
-    """What a file holds: V vertices and E edges as columns, and the rest by tag."""
+    """The content of a file: V vertices and E edges as columns, and the other lines by tag."""
 
     vertices: dict[int, int] = field(default_factory=dict)
     """Key → row."""
@@ -57,19 +57,19 @@ class G2oLines:
     ends: array[int] = field(default_factory=lambda: array("Q"))
     """2 E keys."""
     measurements: array[float] = field(default_factory=lambda: array("d"))
-    """3 E"""
+    """3 E: dx, dy, dθ."""
     information: array[float] = field(default_factory=lambda: array("d"))
     """6 E: the upper triangle, row by row, in the frame of the measurement."""
     fixed: dict[int, int] = field(default_factory=dict)
     """Key → line."""
     skipped: Counter[str] = field(default_factory=Counter)
-    """Tag → how many lines."""
-    passed_over: set[int] = field(default_factory=set)
-    """Keys of vertices that are no poses."""
+    """Tag → number of lines."""
+    other_vertices: set[int] = field(default_factory=set)
+    """Keys of vertices that are not poses."""
 
 
 def read_lines(data: bytes, name: str) -> G2oLines:
-    """All lines of a file; `name` is what errors call it. Raises InputDataError naming the line."""
+    """All lines of a file; errors name the file `name` and the line. Raises InputDataError."""
     lines = G2oLines()
     for number, line in enumerate(io.BytesIO(data.removeprefix(BYTE_ORDER_MARK)), start=1):
         fields = line.decode("utf-8", errors="replace").split("#", 1)[0].split()
@@ -88,7 +88,7 @@ def read_lines(data: bytes, name: str) -> G2oLines:
         (lines.information, 6, lines.edge_lines, INFORMATION),
     ):
         _check_limits(rows(values, width), at, limit, name)
-    fixed = [line for key, line in lines.fixed.items() if key not in lines.passed_over]
+    fixed = [line for key, line in lines.fixed.items() if key not in lines.other_vertices]
     if len(fixed) > 1:
         problem = "a second vertex is fixed, but only one can be"
         raise InputDataError(name, problem, G2O_REMEDY, line=fixed[1])
@@ -106,13 +106,13 @@ def keys(values: array[int]) -> NDArray[np.uint64]:
 
 
 def key_text(key: int) -> str:
-    """A key as messages name it; one that is a symbol of GTSAM, with that."""
+    """A key as messages show it, with GTSAM's symbol where it is one."""
     letter, number = chr(key >> 56), key & (1 << 56) - 1
     return f"{key} ({letter}{number})" if letter.isascii() and letter.isalpha() else f"{key}"
 
 
 def _read_line(lines: G2oLines, number: int, fields: list[str]) -> None:
-    """Put one line among the others. Raises ValueError saying what is wrong with it."""
+    """Add one line to the others. Raises ValueError where it is malformed."""
     tag = fields[0]
     if tag in VERTEX_TAGS:
         values, pose = VERTEX_TAGS[tag]
@@ -143,7 +143,7 @@ def _read_line(lines: G2oLines, number: int, fields: list[str]) -> None:
         lines.skipped[tag if known else "others"] += 1
         key_there = _key_of(fields[1]) if tag.startswith("VERTEX") and len(fields) > 1 else None
         if key_there is not None:
-            lines.passed_over.add(key_there)
+            lines.other_vertices.add(key_there)
 
 
 def _check_length(fields: list[str], values: int) -> None:
@@ -154,12 +154,12 @@ def _check_length(fields: list[str], values: int) -> None:
 def _key(text: str) -> int:
     key = _key_of(text)
     if key is None:
-        raise ValueError(f"{text!r} is no vertex id")
+        raise ValueError(f"{text!r} is not a vertex id")
     return key
 
 
 def _key_of(text: str) -> int | None:
-    """The key that a text is, of 64 bits at most; None where it is none."""
+    """The key in a text, of at most 64 bits; None where the text is not a key."""
     symbol = GTSAM_SYMBOL.fullmatch(text)
     if symbol and int(symbol[2]) < 1 << 56:
         return (ord(symbol[1]) << 56) + int(symbol[2])
@@ -169,7 +169,7 @@ def _key_of(text: str) -> int | None:
 
 
 def _check_limits(values: Array, lines: Sequence[int], limit: Limit, name: str) -> None:
-    """Raises InputDataError naming the first line whose row of values has a number that cannot be."""
+    """Check rows of values. Raises InputDataError for the first line with a number beyond the limit."""
     wrong = np.flatnonzero(~(np.abs(values) <= limit.value).all(axis=1))
     if len(wrong):
         first = int(wrong[0])
@@ -183,7 +183,7 @@ def _unchanged(numbers: list[float]) -> list[float]:
 
 
 def _in_the_plane(numbers: list[float]) -> list[float]:
-    """x, y, θ of a pose x, y, z, qx, qy, qz, qw. Raises _NotPlanarError where there is more to it."""
+    """x, y, θ of a pose x, y, z, qx, qy, qz, qw. Raises _NotPlanarError where it is not planar."""
     x, y, z, *quaternion = numbers
     if not all(map(math.isfinite, numbers)):
         raise ValueError("a number is not finite")
@@ -198,14 +198,14 @@ def _in_the_plane(numbers: list[float]) -> list[float]:
 
 
 def _from_toro(numbers: list[float]) -> list[float]:
-    """The upper triangle row by row, of TORO's I11 I12 I22 I33 I13 I23."""
+    """The upper triangle, row by row, from TORO's I11 I12 I22 I33 I13 I23."""
     return [numbers[k] for k in (0, 1, 4, 2, 5, 3)]
 
 
 def _from_quaternion(numbers: list[float]) -> list[float]:
-    """The upper triangle of x, y and θ, of that of x, y, z, qx, qy, qz.
+    """The upper triangle of (x, y, θ), from that of (x, y, z, qx, qy, qz).
 
-    z, qx and qy are measured as 0 and are 0, so what it says of them adds nothing.
+    z, qx and qy are measured as 0 and are 0, so their information adds nothing.
     """
     if not all(map(math.isfinite, numbers)):
         raise ValueError("a number is not finite")
@@ -219,10 +219,11 @@ VERTEX_TAGS: dict[str, tuple[int, Conversion]] = {
     "VERTEX2": (4, _unchanged),
     "VERTEX_SE3:QUAT": (8, _in_the_plane),
 }
-"""How many values stand after a tag, and what makes x, y, θ of all but the key."""
+"""Tag → the number of values, and the conversion of those after the key to x, y, θ."""
 EDGE_TAGS: dict[str, tuple[int, Conversion, Conversion]] = {
     "EDGE_SE2": (3, _unchanged, _unchanged),
     "EDGE2": (3, _unchanged, _from_toro),
     "EDGE_SE3:QUAT": (7, _in_the_plane, _from_quaternion),
 }
-"""How many values the measurement has, and what makes x, y, θ of it, and 6 of its information."""
+"""Tag → the length of the measurement, its conversion to x, y, θ, and that of the information to 6
+numbers."""

@@ -1,4 +1,4 @@
-"""The tags of g2o files that are not read, and what is lost with them."""
+"""The tags of g2o files that are not read, and what is lost without them."""
 
 from __future__ import annotations
 
@@ -26,15 +26,15 @@ LOSSES = (
     ("LASER|TAG|IMU|IMAGE", "what sensors saw is not read from a graph"),
     ("", "this tag is not known, and what it says is lost"),
 )  # fmt: skip
-"""The first one that fits a tag."""
+"""Pattern of tags, and what is lost; the first pattern that matches a tag counts."""
 NAMED_TAGS = 5
-"""So many tags of one kind are named."""
+"""Largest number of tags that one sentence names."""
 SHOWN_TAG_LENGTH = 40
 """Characters of a tag that are shown."""
 
 
 def losses(skipped: Mapping[str, int]) -> list[str]:
-    """A sentence for each kind of loss, of how many lines of which tags were skipped."""
+    """A sentence for each kind of loss, with the number of skipped lines by tag."""
     kinds: dict[str, list[str]] = {}
     for tag, count in skipped.items():
         lost = next(lost for pattern, lost in LOSSES if re.search(pattern, tag))

@@ -1,8 +1,8 @@
-"""The parts of the graph's JSON: numbers as they are written, and records that are checked as they are read.
+"""The fields of the graph's JSON: rounding of numbers, and records that check each field that is read.
 
-Poses keep 9 decimals (nm, nrad), matrices 6 significant digits, and no zero has a sign, so that a graph
-that is read and written again gives the same bytes. (But for a matrix with an eigenvalue that rounding has
-made negative: it is 0 when it is read.)
+Poses have 9 decimals (nm, nrad), matrices 6 significant digits, and no zero has a sign, so that a graph that
+is read and written again gives the same bytes. The exception is a matrix with an eigenvalue that rounding
+made negative: reading sets it to 0.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from nscan_cli.poses import Array, wrap
 
 POSE_DECIMALS = 9
 LARGEST_ANGLE = 3.141592653
-"""The last angle before π, rad, that 9 decimals can give."""
+"""rad; the largest angle below π with 9 decimals."""
 LARGEST_INTEGER = 2**53
 """Above it, not every JSON reader keeps integers exact."""
 
@@ -48,14 +48,14 @@ def six_digits(number: float) -> float:
 
 
 class MalformedError(Exception):
-    """What is wrong with a document, and at what place in it."""
+    """A document is malformed at a place in it."""
 
     def __init__(self, place: str, problem: str) -> None:
         super().__init__(f"{place}: {problem}")
 
 
 class JsonRecord:
-    """A JSON object at a known place. Every access checks what it takes, and raises MalformedError."""
+    """A JSON object at a known place. Every access checks the value and raises MalformedError."""
 
     def __init__(self, value: Any, place: str) -> None:
         if not isinstance(value, dict):
@@ -67,17 +67,17 @@ class JsonRecord:
         return key in self.value
 
     def get(self, key: str) -> Any:
-        """The value of a key that has to be there."""
+        """The value of a required key."""
         if key not in self.value:
             raise MalformedError(self.place, f"{key!r} is missing")
         return self.value[key]
 
     def wrong(self, key: str, expected: str) -> MalformedError:
-        """The error of a key whose value is not what it should be."""
+        """The error of a key whose value is not as expected."""
         return MalformedError(self.place, f"{key!r} is not {expected}")
 
     def text(self, key: str, choices: tuple[str, ...] = ()) -> str:
-        """A string; one of `choices` where these are given."""
+        """A string; one of `choices`, if given."""
         value = self.get(key)
         if choices and value not in choices:
             raise self.wrong(key, "one of " + ", ".join(choices))
@@ -134,15 +134,15 @@ class JsonRecord:
         error = self.wrong(key, f"the upper triangle of a {size} × {size} matrix: {numbers}")
         return from_upper_triangle(_checked_numbers(self.get(key), count, error, INFORMATION), size)
 
-    def information(self, key: str, size: int, held: int | None = None) -> Array:
-        """The same, and positive semi-definite; what rounding has made negative is 0.
+    def information(self, key: str, size: int, fixed: int | None = None) -> Array:
+        """A positive semi-definite matrix (size, size); eigenvalues that rounding made negative are 0.
 
-        What it has in the rows and columns of pose `held`, three of them, does not count.
+        The three rows and columns of pose `fixed` are not checked.
         """
         matrix = self.matrix(key, size)
         block: Any = ...
-        if held is not None:
-            others = np.delete(np.arange(size), slice(3 * held, 3 * held + 3))
+        if fixed is not None:
+            others = np.delete(np.arange(size), slice(3 * fixed, 3 * fixed + 3))
             block = np.ix_(others, others)
         try:
             (matrix[block],) = semidefinite(matrix[block][None])
@@ -151,7 +151,7 @@ class JsonRecord:
         return matrix
 
     def records(self, key: str) -> Iterator[JsonRecord]:
-        """The objects of a list, each with its place."""
+        """The objects of a list, each with its place in the document."""
         values = self.get(key)
         if not isinstance(values, list):
             raise self.wrong(key, "a list")
@@ -170,7 +170,7 @@ def _bounded(limit: Limit) -> str:
 def _checked_numbers(values: Any, count: int, error: MalformedError, limit: Limit | None = None) -> Array:
     if not isinstance(values, list) or len(values) != count:
         raise error
-    # A bool is an int for Python, but no number of JSON.
+    # A bool is an int in Python, but not a number in JSON.
     if not all(type(value) in (int, float) for value in values):
         raise error
     try:

@@ -1,6 +1,7 @@
 """The pose graph as a JSON file; pose-graph.schema.json beside this module describes it.
 
-One record a line, keys in fixed order: equal graphs give equal bytes, and text tools can work on them.
+It has one record per line and keys in fixed order, so equal graphs give equal bytes and text tools work on
+it.
 """
 
 from __future__ import annotations
@@ -34,11 +35,11 @@ VERSION = "1.0"
 SCHEMA = "urn:nscan-cli:pose-graph:1.0"
 GRAPH_UNITS = {"length": "m", "angle": "rad", "time": "s"}
 POSES_AT_A_TIME = 1000
-"""So many poses are written at a time."""
+"""Poses that are converted to lists at a time; a larger value takes more memory."""
 VERTEX_KEY = re.compile("0|[1-9][0-9]{0,19}")
-"""A vertex of g2o: a number of 64 bits, which as text is exact for every reader of JSON."""
+"""A g2o vertex key: an integer of 64 bits as text, which every JSON reader keeps exact."""
 RECORD_SEPARATOR = ",\n"
-"""From one record to the next."""
+"""Between two records."""
 _compact = json.JSONEncoder(separators=(",", ":"), allow_nan=False, check_circular=False).encode
 JSON_REMEDY = "mend it, or write the graph again with nscan-cli slam"
 
@@ -46,8 +47,8 @@ JSON_REMEDY = "mend it, or write the graph again with nscan-cli slam"
 def write_graph(graph: Graph) -> bytes:
     """The graph as a JSON document in UTF-8, with a final line feed.
 
-    Poses are rounded to 9 decimals and matrices to 6 significant digits. Raises NotFiniteError, and
-    ValueError where it is the provenance that has a number that is not finite.
+    Poses have 9 decimals, matrices 6 significant digits. Raises NotFiniteError, and ValueError for a number
+    in the provenance that is not finite.
     """
     check_finite("the poses of the graph", graph.poses, graph.odometry)
     check_finite("the covariances of the graph", *graph.marginals.values())
@@ -73,7 +74,7 @@ def write_graph(graph: Graph) -> bytes:
             for node, covariance in sorted(graph.marginals.items())
         ),
     }
-    # Piece by piece: as lists of numbers all records at once take many times the room of the document.
+    # Record by record: all records as lists of numbers take many times the memory of the document.
     document = io.BytesIO()
     for key, value in {**head, "provenance": provenance}.items():
         document.write(f'{RECORD_SEPARATOR if document.tell() else "{"}"{key}":{_compact(value)}'.encode())
@@ -91,14 +92,14 @@ def write_graph(graph: Graph) -> bytes:
 def read_graph(path: str) -> Graph:
     """The graph of a JSON file; "-" reads standard input.
 
-    Raises InputMissingError when the file cannot be read, InputDataError when it is no graph or its
-    parts do not fit each other.
+    Raises InputMissingError where the file cannot be read, InputDataError where it is not a graph or is
+    inconsistent.
     """
     return parse_graph(read_text(path, GRAPH), label(path))
 
 
 def parse_graph(data: bytes, name: str) -> Graph:
-    """The graph of a JSON document; `name` is the file that errors name. Raises InputDataError."""
+    """The graph of a JSON document; errors name the file `name`. Raises InputDataError."""
     try:
         document = json.loads(data, parse_constant=_refuse_constant)
     except (ValueError, RecursionError) as error:
@@ -110,7 +111,7 @@ def parse_graph(data: bytes, name: str) -> Graph:
 
 
 def _not_json(data: bytes, name: str, error: Exception) -> InputDataError:
-    """What is wrong with a file that is no JSON: where it is broken, or what it is instead."""
+    """The error of a file that is not JSON: where it is broken, or what it contains instead."""
     if data.strip() and data.lstrip()[:1] not in (b"{", b"["):
         return InputDataError(
             name, f"is {_kind_of_content(data)}", "give a graph in JSON, as nscan-cli slam writes it"
@@ -134,7 +135,7 @@ def _refuse_constant(constant: str) -> NoReturn:
 
 
 def _node_records(graph: Graph) -> Iterator[str]:
-    """The nodes in JSON. There is one for every scan, and objects made of them would take longer."""
+    """The nodes in JSON, formatted directly: there is one per scan, and JSON objects would take longer."""
     poses = _pose_blocks(graph.poses)
     odometry = itertools.repeat(None, len(graph)) if graph.odometry is None else _pose_blocks(graph.odometry)
     scans, anchors = graph.scans.tolist(), graph.anchors.tolist()
@@ -152,7 +153,7 @@ def _node_records(graph: Graph) -> Iterator[str]:
 
 
 def _pose_blocks(poses: Array) -> Iterator[list[float]]:
-    """The rows of poses (N, 3), not all at once: as lists they take many times the room."""
+    """The rows of poses (N, 3), in blocks: as lists they take many times the memory."""
     for first in range(0, len(poses), POSES_AT_A_TIME):
         yield from pose_rows(poses[first : first + POSES_AT_A_TIME])
 
@@ -168,7 +169,7 @@ def _loop_record(loop: Loop) -> dict[str, Any]:
 
 def _graph_of_document(document: JsonRecord) -> Graph:
     if "format" not in document or document.get("format") != GRAPH_FORMAT:
-        raise MalformedError("document", f"'format' is not {GRAPH_FORMAT!r}, so this is no pose graph")
+        raise MalformedError("document", f"'format' is not {GRAPH_FORMAT!r}, so this is not a pose graph")
     if document.get("version") != VERSION:
         raise MalformedError("document", f"'version' is {document.get('version')!r}; {VERSION!r} can be read")
     if document.get("units") != GRAPH_UNITS:
@@ -236,10 +237,10 @@ def _nodes(document: JsonRecord) -> Graph:
     if odometry and len(odometry) != len(poses):
         raise MalformedError("nodes", f"{len(odometry)} of {len(poses)} have 'odometry'; all or none may")
     if vertices and len(set(vertices)) != len(poses):
-        raise MalformedError("nodes", "'vertex' is not another one for each of them")
+        raise MalformedError("nodes", "'vertex' is not unique to each of them")
     for node, anchor in enumerate(anchors):
         if anchor >= len(anchors) or anchors[anchor] != anchor:
-            raise MalformedError(f"nodes[{node}]", f"'attached' is {anchor}, which is no keyframe")
+            raise MalformedError(f"nodes[{node}]", f"'attached' is {anchor}, which is not a keyframe")
     return Graph(
         scans=np.array(scans, dtype=np.int64),
         stamps=stamps,
@@ -268,7 +269,7 @@ def _node_anchor(record: JsonRecord, node: int) -> int:
     if not record.flag("keyframe"):
         anchor = record.integer("attached")
         if anchor == node:
-            raise MalformedError(record.place, "'attached' is the node itself, which is no keyframe")
+            raise MalformedError(record.place, "'attached' is the node itself, which is not a keyframe")
         return anchor
     if "attached" in record:
         raise MalformedError(record.place, "a keyframe cannot be 'attached'")
@@ -298,4 +299,4 @@ def _loop_nodes(record: JsonRecord, keyframes: set[int]) -> tuple[int, int]:
 def _check_keyframes(record: JsonRecord, nodes: tuple[int, ...], keyframes: set[int]) -> None:
     for node in nodes:
         if node not in keyframes:
-            raise MalformedError(record.place, f"node {node} is no keyframe of this graph")
+            raise MalformedError(record.place, f"node {node} is not a keyframe of this graph")

@@ -1,4 +1,4 @@
-"""A saved graph of any form, found from its content."""
+"""Loading of a saved graph; the format is detected from the content."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ from nscan_cli.graph.model import Graph
 def load_graph(path: str, notices: list[str] | None = None) -> Graph:
     """The graph in a JSON or a g2o file; "-" reads standard input.
 
-    What was skipped, and is lost with it, is added to the `notices`. Raises InputMissingError when there is
-    nothing to read, InputDataError when it is no graph.
+    Notices of skipped lines are added to `notices`. Raises InputMissingError where the file cannot be read,
+    InputDataError where it is not a graph.
     """
     data = read_bytes(path, GRAPH)
     text = without_byte_order_mark(data, label(path))

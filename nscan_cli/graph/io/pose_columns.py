@@ -1,4 +1,4 @@
-"""Which columns of a table of poses hold the time, the position and the quaternion, by their names or number.
+"""The columns of time, position and quaternion in a table of poses, by their names or their number.
 
 TUM: https://cvg.cit.tum.de/data/datasets/rgbd-dataset/file_formats. EuRoC (state_groundtruth_estimate0):
 M. Burri et al., "The EuRoC micro aerial vehicle datasets", IJRR 2016; times in ns, w before x, y, z.
@@ -14,15 +14,15 @@ from dataclasses import dataclass
 from nscan_cli.files.encoding import BYTE_ORDER_MARK
 
 COMMENT_MARKS = "#%"
-"""What a line begins with that is a comment, or names the columns."""
+"""First characters of comment lines, which may name the columns."""
 UNIT_IN_NAME = re.compile(r"[\[(].*?[\])]")
 WORD_IN_NAME = re.compile(r"[a-z]+|[0-9]+")
 ROTATION_PREFIXES = ("quat", "orient", "rot")
-"""What a part of a name begins with that is of a quaternion; another one is q."""
+"""Beginnings of the words that name a quaternion, besides q."""
 OTHER_VECTORS = ("v", "w", "b", "a", "twist", "vel", "linear", "angular", "covariance", "cov", "acc", "gyro")
-"""Parts of the names of what has an x, y and z, too: velocities, biases."""
+"""Words that name other vectors with x, y and z, such as velocities and biases."""
 POSITION_NAMES = ("", "t", "p", "pos", "position", "trans", "translation")
-"""What stands before the axis in the name of a coordinate."""
+"""Words before the axis in the name of a coordinate."""
 SECOND_UNITS, NANOSECOND_UNITS = (
     ("s", "sec", "secs", "seconds"),
     ("ns", "nsec", "nsecs", "nanosec", "nanoseconds"),
@@ -30,49 +30,49 @@ SECOND_UNITS, NANOSECOND_UNITS = (
 TIME_POWERS = (
     {"ms": 3, "us": 6, "µs": 6} | dict.fromkeys(SECOND_UNITS, 0) | dict.fromkeys(NANOSECOND_UNITS, 9)
 )
-"""Units of times: so many powers of ten to a second."""
+"""Unit of time → the power of ten of its count per second."""
 LATEST_SECONDS, POWER_STEP = 1e11, 1000
-"""A time beyond is in ms, another thousand times as far in µs, and then in ns."""
+"""Later times are in ms, times POWER_STEP later in µs, and later still in ns."""
 
 
 @dataclass(frozen=True)
 class PoseColumns:
-    """Where a line has what; numbers of columns from 0."""
+    """The column numbers of a table, from 0."""
 
     time: int
     position: tuple[int, int, int | None]
-    """x, y and z, which may be missing."""
+    """x, y and z; z may be missing."""
     rotation: tuple[int, int, int, int]
     """x, y, z and w of the quaternion."""
     power: int | None = None
-    """Of ten, by which times are to be divided; None where nothing says so."""
+    """The power of ten that times are divided by; None where it is not known."""
     count: int | None = None
-    """How many a line has to have; None: those that are used."""
-    rest: int | None = None
-    """The nanoseconds, where the time is whole seconds."""
+    """The number of columns that a line must have; None: at least those that are used."""
+    nanoseconds: int | None = None
+    """The column of the nanoseconds, where the time is in whole seconds."""
 
     @property
     def least(self) -> int:
-        """How many columns a line needs."""
-        places = (self.time, *self.rotation, *self.position, self.rest)
+        """The smallest number of columns of a line."""
+        places = (self.time, *self.rotation, *self.position, self.nanoseconds)
         return 1 + max(place for place in places if place is not None)
 
     def stamp(self, fields: Sequence[str], power: int) -> str:
         """The time of a line as text in seconds, with all its digits."""
         time = fields[self.time]
-        if self.rest is not None:
-            return in_seconds(str(int(time) * 10**9 + int(fields[self.rest])), 9)
+        if self.nanoseconds is not None:
+            return in_seconds(str(int(time) * 10**9 + int(fields[self.nanoseconds])), 9)
         return in_seconds(time, power)
 
 
 TUM = PoseColumns(0, (1, 2, 3), (4, 5, 6, 7), count=8)
 EUROC = PoseColumns(0, (1, 2, 3), (5, 6, 7, 4), power=9)
 EUROC_COUNT = 17
-"""With velocity and biases."""
+"""The columns of EuRoC with velocity and biases."""
 
 
 def split_fields(line: str) -> list[str]:
-    """What a line has between commas, semicolons, tabs or spaces. Beside semicolons, commas are decimal."""
+    """The fields between commas, semicolons, tabs or spaces. With semicolons, commas are decimal."""
     if ";" in line:
         fields = line.replace(",", ".").split(";")
     elif "," in line:
@@ -84,7 +84,7 @@ def split_fields(line: str) -> list[str]:
 
 
 def numbered_lines(data: bytes) -> Iterator[tuple[int, str]]:
-    """The lines of a text that are not blank, each with its number; a byte-order mark is no part of one."""
+    """The lines of a text that are not blank, with their numbers, without a byte-order mark."""
     for number, line in enumerate(io.BytesIO(data.removeprefix(BYTE_ORDER_MARK)), start=1):
         text = line.decode("utf-8", errors="replace").strip()
         if text:
@@ -92,7 +92,7 @@ def numbered_lines(data: bytes) -> Iterator[tuple[int, str]]:
 
 
 def columns_by_name(line: str) -> PoseColumns | None:
-    """The columns by the names in a line; None without those of a time, a position and a quaternion."""
+    """The columns by the names in a line; None where a time, a position or a quaternion is missing."""
     found: dict[str, int] = {}
     power, whole = None, False
     fields = split_fields(line.lstrip(COMMENT_MARKS).strip())
@@ -106,19 +106,19 @@ def columns_by_name(line: str) -> PoseColumns | None:
             unit = "".join(UNIT_IN_NAME.findall(field)).strip("[]() ").lower() or words[-1]
             power, whole = TIME_POWERS.get(unit), words[-1] in SECOND_UNITS
         elif what == "time" and whole and words[-1] in NANOSECOND_UNITS:
-            what = "rest"
+            what = "nanoseconds"
         if what:
             found.setdefault(what, at)
     try:
         rotation = found["qx"], found["qy"], found["qz"], found["qw"]
         position = found["x"], found["y"], found.get("z")
-        return PoseColumns(found["time"], position, rotation, power, rest=found.get("rest"))
+        return PoseColumns(found["time"], position, rotation, power, nanoseconds=found.get("nanoseconds"))
     except KeyError:
         return None
 
 
 def _quantity(words: list[str]) -> str:
-    """What a column is that is called so: time, x, y, z, qx, qy, qz, qw, or nothing of use."""
+    """The quantity of a column by the words of its name: time, x, y, z, qx, qy, qz, qw, or "" for others."""
     if words[0].startswith("time") or words[-1] in ("t", "stamp", *SECOND_UNITS, *NANOSECOND_UNITS):
         return "time"
     axis, before = words[-1][-1], words[-1][:-1]
@@ -133,9 +133,9 @@ def _quantity(words: list[str]) -> str:
 
 
 def columns_by_content(line: str) -> PoseColumns:
-    """The columns by the first line of numbers, where nothing names them.
+    """The columns by the first line of numbers, where no line names them.
 
-    Nanoseconds and commas are EuRoC's; other lines have to be of TUM's form.
+    A line with nanoseconds and commas is EuRoC's; other lines have to be TUM's.
     """
     fields = split_fields(line)
     if len(fields) >= EUROC_COUNT or (
@@ -146,12 +146,12 @@ def columns_by_content(line: str) -> PoseColumns:
 
 
 def is_header(line: str) -> bool:
-    """Whether a line says what the columns are, in whichever words, or is a comment."""
+    """Whether a line is a header of column names or a comment."""
     return line[0] in COMMENT_MARKS or not _is_number(split_fields(line)[0])
 
 
 def power_by_size(time: str) -> int:
-    """The power of ten that makes seconds of a time, by its size: no clock that counts seconds is so late."""
+    """The power of ten that converts a time to seconds, by its size; see LATEST_SECONDS."""
     size, power = abs(float(time)), 0
     while size > LATEST_SECONDS * POWER_STEP ** (power / 3) and power < TIME_POWERS["ns"]:
         power += 3
@@ -159,7 +159,7 @@ def power_by_size(time: str) -> int:
 
 
 def in_seconds(time: str, power: int) -> str:
-    """A time as text in seconds, with all its digits."""
+    """A time in seconds as text, with all its digits."""
     if power == 0:
         return time
     try:
@@ -170,7 +170,7 @@ def in_seconds(time: str, power: int) -> str:
 
 
 def is_pose_table(data: bytes) -> bool:
-    """Whether a text is a table of poses: its first line names their columns, or is of numbers alone."""
+    """Whether a text is a table of poses: its first line names their columns, or has numbers only."""
     for _number, line in numbered_lines(data):
         if columns_by_name(line) is not None:
             return True

@@ -1,4 +1,4 @@
-"""Symmetric matrices as files keep them: the upper triangle, row by row."""
+"""Symmetric matrices as upper triangles, row by row, as in files."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 
 from nscan_cli.poses import Array
 
-# Matrices have few sizes, and to find the places takes longer than to take what is there.
+# Matrices have few sizes, and computing the indices takes longer than taking the entries.
 _upper = functools.lru_cache(maxsize=16)(np.triu_indices)
 
 

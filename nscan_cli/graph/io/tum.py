@@ -1,7 +1,7 @@
 """Trajectories in the TUM format: `t x y z qx qy qz qw`, one pose a line, `#` comments.
 
-https://cvg.cit.tum.de/data/datasets/rgbd-dataset/file_formats. What others make of it is read as well: with
-commas, other columns, and times in ns (pose_columns.py).
+https://cvg.cit.tum.de/data/datasets/rgbd-dataset/file_formats. Variants are read
+as well: with commas, other columns, and times in ns (pose_columns.py).
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ from nscan_cli.poses import Array, wrap
 
 TUM_REMEDY = "TUM lines are 't x y z qx qy qz qw'"
 UNIT_TOLERANCE = 0.01
-"""How far the length of a quaternion may be from 1: what rounding to a few digits does, and no more."""
+"""Largest difference of a quaternion's length from 1, as rounding to a few digits makes it."""
 
 
 @dataclass(frozen=True)
@@ -44,11 +44,11 @@ class Trajectory:
     poses: Array
     """(N, 3)"""
     stamps: tuple[str, ...]
-    """N times as the source wrote them."""
+    """N times, as written in the source."""
     rows: NDArray[np.int64] | None = None
-    """(N,) where each stood in the source, in which another order can be; None: in the same order."""
+    """(N,) the row of each pose in the source; None: in the same order."""
     spatial: Array | None = None
-    """(N, 4) what a plane has no place for: z (m), and the direction upwards as the body has it."""
+    """(N, 4) z (m), and the direction upwards in the frame of the body."""
 
     def __len__(self) -> int:
         return len(self.stamps)
@@ -57,17 +57,14 @@ class Trajectory:
     def in_order(
         cls, times: Array, poses: Array, stamps: Sequence[str], spatial: Array | None = None
     ) -> Trajectory:
-        """The trajectory of poses in any order; those of equal time keep theirs."""
+        """The trajectory of poses in any order; poses of equal time keep their order."""
         order = np.argsort(times, kind="stable")
         texts = tuple(stamps[row] for row in order.tolist())
         return cls(times[order], poses[order], texts, order, None if spatial is None else spatial[order])
 
     @classmethod
     def in_space(cls, stamps: Sequence[str], poses: Array) -> Trajectory:
-        """The trajectory of poses (N, 7) in space, in any order: x, y, z and quaternion x, y, z, w.
-
-        Of the rotation, the yaw is kept.
-        """
+        """The trajectory of poses (N, 7), in any order: x, y, z and quaternion x, y, z, w; φ is the yaw."""
         x, y, z, qx, qy, qz, qw = poses.T
         yaw = np.arctan2(2 * (qw * qz + qx * qy), qw**2 + qx**2 - qy**2 - qz**2)
         up = 2 * (qx * qz - qw * qy), 2 * (qy * qz + qw * qx), qw**2 + qz**2 - qx**2 - qy**2
@@ -76,7 +73,7 @@ class Trajectory:
 
 
 def write_tum(stamps: Sequence[str], poses: Array) -> bytes:
-    """Poses (N, 3) at N stamps, which are kept as they are; positions and quaternions with 9 decimals.
+    """The TUM text of poses (N, 3) at N stamps; positions and quaternions have 9 decimals.
 
     Raises NotFiniteError.
     """
@@ -92,14 +89,14 @@ def write_tum(stamps: Sequence[str], poses: Array) -> bytes:
 def read_tum(path: str) -> Trajectory:
     """The trajectory of a TUM file, sorted by time; "-" reads standard input.
 
-    z is left out, and of the rotation only the yaw is kept. Raises InputMissingError when the file
-    cannot be read, InputDataError on a line that is not of the format or when there is no pose.
+    Raises InputMissingError where the file cannot be read, InputDataError on a malformed line or where there
+    is no pose.
     """
     return parse_tum(read_text(path, GRAPH), label(path))
 
 
 def parse_tum(data: bytes, name: str) -> Trajectory:
-    """The trajectory of TUM text; `name` is the file that errors name. Raises InputDataError."""
+    """The trajectory of TUM text; errors name the file `name`. Raises InputDataError."""
     stamps: list[str] = []
     values = array("d")
     columns: PoseColumns | None = None
@@ -132,7 +129,7 @@ def parse_tum(data: bytes, name: str) -> Trajectory:
 
 
 def _pose_of_line(fields: list[str], columns: PoseColumns, power: int) -> tuple[str, list[float]]:
-    """The stamp (s), and x, y, z and quaternion of a line. Raises ValueError saying what is wrong."""
+    """The stamp (s), and x, y, z and quaternion of a line. Raises ValueError where it is malformed."""
     if len(fields) != (columns.count or max(len(fields), columns.least)):
         raise ValueError(f"{len(fields)} columns instead of {columns.count or columns.least}")
     x, y, z = columns.position

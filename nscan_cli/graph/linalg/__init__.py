@@ -1,1 +1,1 @@
-"""Sparse matrices of 3 × 3 blocks: what SciPy does not have."""
+"""Block Cholesky factorisation and selected inverse of sparse matrices, which SciPy lacks."""

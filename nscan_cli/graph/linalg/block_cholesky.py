@@ -1,7 +1,7 @@
-"""Sparse Cholesky factorisation of symmetric matrices made of 3 × 3 blocks, one row of blocks a node.
+"""Sparse Cholesky factorisation A = LLᵗ of symmetric matrices of 3 × 3 blocks, one row of blocks per node.
 
-A = LLᵗ in an order of little fill, supernode by supernode: its columns make a dense panel, one after another,
-with the rows of its own columns first. The factor tells which directions the matrix does not hold.
+The order is fill-reducing. The columns of a supernode make a dense panel, which begins with the rows of its
+own columns. The factor tells which directions the matrix leaves undetermined.
 """
 
 from __future__ import annotations
@@ -16,34 +16,36 @@ from nscan_cli.kernels.decorators import kernel, leaf_kernel, numba_inline_kerne
 from nscan_cli.poses import Array, Indices
 
 LEAST_PIVOT = 1e-12
-"""A pivot below this share of the diagonal entry that it comes from counts as none."""
+"""A pivot below this share of its diagonal entry counts as 0."""
 SUSPICIOUS_PIVOT = 1e-6
+"""The directions of pivots below this share of their diagonal entries are checked by their curvature."""
 LEAST_CURVATURE = 1e-15
-"""vᵗAv / Σ A_ii v_i² below which nothing holds the direction v: rounding leaves 1e-16, and the bend of an
-open chain of 20,000 keyframes has 1e-14."""
+"""A direction v is undetermined where vᵗAv / Σ A_ii v_i² is below this. Rounding leaves 1e-16, and the
+bending of an open chain of 20,000 keyframes has 1e-14."""
 
 
 class Factor(NamedTuple):
-    """L, and the directions that the matrix does not hold."""
+    """The factor L, and the pivots that failed."""
 
     pattern: Pattern
     panels: Array
-    """Those of all supernodes, end to end; what lies above the diagonal is 0."""
+    """The panels of all supernodes, end to end; entries above the diagonal are 0."""
     loose: NDArray[np.bool_]
-    """(F, 3) by row: the pivot was not positive, and the diagonal entry, or more, was put in its place."""
+    """(F, 3) by row: whether the pivot was not positive, so that the diagonal entry or more took its
+    place."""
     diagonal: Array
     """(F, 3) by row: the diagonal of the matrix."""
 
 
 def factorise(pattern: Pattern, blocks: Array) -> Factor:
-    """The factor of the matrix whose lower triangle is in blocks (B, 3, 3), which are left as they are."""
+    """The factor of the matrix whose lower triangle is in blocks (B, 3, 3), which stay unchanged."""
     diagonal = np.ascontiguousarray(np.diagonal(blocks[pattern.starts[:-1]], axis1=1, axis2=2))
     loose = np.zeros((len(pattern.place), 3), dtype=np.bool_)
     return Factor(pattern, _factorise(pattern, blocks, diagonal, loose), loose, diagonal)
 
 
 def solve(factor: Factor, right: Array) -> Array:
-    """The solution (F, 3) for a right-hand side (F, 3), both by node."""
+    """The solution (F, 3) of a right-hand side (F, 3), both by node."""
     place = factor.pattern.place
     x = np.empty((len(place), 3))
     x[place] = right
@@ -54,11 +56,11 @@ def solve(factor: Factor, right: Array) -> Array:
 
 
 def undetermined_nodes(factor: Factor, share: float = 1e-6) -> NDArray[np.bool_]:
-    """Which nodes (F,) have a part in a direction that the matrix does not hold.
+    """Which nodes (F,) take part in a direction that the matrix leaves undetermined.
 
-    Each pivot has its direction v, with Lᵗv = e there and vᵗAv the pivot for v = 1 there. With long levers
-    rounding alone makes pivots of 1e-9 of the diagonal, so the directions of all small ones are looked at.
-    A node has a part in one when what it adds to Σ A_ii v_i² is not below share² of the largest.
+    A pivot belongs to the direction v with Lᵗv = e, scaled so that vᵗAv is the pivot. Rounding alone makes
+    pivots of 1e-9 of the diagonal where levers are long, so the directions of all small pivots are checked.
+    A node takes part in v where its part of Σ A_ii v_i² exceeds share² times the largest part of a node.
     """
     pattern = factor.pattern
     found = np.zeros(len(pattern.place), dtype=np.bool_)
@@ -90,11 +92,11 @@ def rows_of(pattern: Pattern, supernode: int) -> Indices:
 
 @kernel
 def _factorise(pattern: Pattern, blocks: Array, diagonal: Array, loose: NDArray[np.bool_]) -> Array:
-    """Left-looking: panel by panel, minus what the panels before it bring."""
+    """Left-looking factorisation: from each panel, the products of the earlier panels are subtracted."""
     supernodes, starts = pattern.supernodes, pattern.starts
     count, nodes = supernodes.shape[0] - 1, starts.shape[0] - 1
     panels = np.zeros(pattern.panels[count])
-    # first[j]: the supernodes whose next row to be used is one of j's, linked by `following`; at[k]: which.
+    # first[j]: the first of the supernodes whose next row is in j, linked by `following`; at[k]: that row.
     first, following, at = np.full(count, -1), np.full(count, -1), np.zeros(count, dtype=np.int64)
     owner, where = np.zeros(nodes, dtype=np.int64), np.zeros(nodes, dtype=np.int64)
     for j in range(count):
@@ -129,7 +131,7 @@ def _factorise(pattern: Pattern, blocks: Array, diagonal: Array, loose: NDArray[
 
 @leaf_kernel
 def _copy_blocks(blocks: Array, panel: Array) -> None:
-    """The blocks of a supernode's columns, as they lie in the matrix, into its panel."""
+    """Copy the blocks of a supernode's columns of the matrix into its panel."""
     p, height = 0, panel.shape[1] // 3
     for column in range(panel.shape[0] // 3):
         for row in range(column, height):
@@ -158,7 +160,7 @@ def subtract_products(
 def _subtract_panel(
     other: Array, rows: Indices, source: int, where: Indices, column: int, panel: Array, product: Array
 ) -> None:
-    """Take from three columns of a panel what another one brings that has them as its rows `source`."""
+    """Subtract the product of an earlier panel from the three columns that are its rows `source`."""
     product[:, 3 * source : other.shape[1]] = 0.0
     for k in range(0, other.shape[0], 3):
         subtract_products(other, 3 * source, other, k, 3 * source, product, 0)
@@ -173,7 +175,7 @@ def _subtract_panel(
 def _factorise_panel(
     panel: Array, rows: Indices, diagonal: Array, least: Array, loose: NDArray[np.bool_]
 ) -> None:
-    """Three columns after the other, minus what those before them bring; pivots are more than `least`."""
+    """Factorise a panel three columns at a time; pivots up to `least` are replaced."""
     height = panel.shape[1]
     for j in range(0, panel.shape[0], 3):
         for k in range(0, j, 3):
@@ -197,10 +199,10 @@ def _factorise_panel(
 
 @leaf_kernel
 def _substitute_pivot(panel: Array, rows: Indices, diagonal: Array, own: float, column: int) -> float:
-    """The root of what takes the place of a pivot: its own entry of the matrix's diagonal, or more.
+    """The square root of the replacement of a pivot: the matrix's diagonal entry, or more.
 
-    No entry of L is above the root of the diagonal entry of its row then. In a positive matrix none ever is.
-    In one that is indefinite by rounding they would grow from column to column, beyond all numbers.
+    It keeps each entry of L below the root of the diagonal entry of its row, as in a positive matrix. Without
+    it, the entries of a matrix that is indefinite by rounding would grow from column to column.
     P. Gill, W. Murray, "Newton-type methods for unconstrained and linearly constrained optimization", 1974.
     """
     square = own if own > 0.0 else 1.0
@@ -213,7 +215,7 @@ def _substitute_pivot(panel: Array, rows: Indices, diagonal: Array, own: float, 
 
 @leaf_kernel
 def _solve_lower(pattern: Pattern, panels: Array, x: Array, gathered: Array) -> None:
-    """In place; x and room for as much, `gathered`, are (3 F,) by row."""
+    """Solve L y = x in place. x and the buffer `gathered` are (3 F,) by row."""
     for j in range(pattern.supernodes.shape[0] - 1):
         rows, panel = rows_of(pattern, j), panel_of(pattern, panels, j)
         width, height, begin = panel.shape[0], panel.shape[1], 3 * rows[0]
@@ -236,7 +238,7 @@ def _solve_lower(pattern: Pattern, panels: Array, x: Array, gathered: Array) -> 
 
 @leaf_kernel
 def _solve_upper(pattern: Pattern, panels: Array, x: Array, gathered: Array) -> None:
-    """The same for Lᵗ."""
+    """Solve Lᵗ y = x in place, as _solve_lower."""
     for j in range(pattern.supernodes.shape[0] - 2, -1, -1):
         rows, panel = rows_of(pattern, j), panel_of(pattern, panels, j)
         for p in range(rows.shape[0]):
@@ -254,7 +256,7 @@ def _solve_upper(pattern: Pattern, panels: Array, x: Array, gathered: Array) -> 
 
 @reduction_kernel
 def _dots(panel: Array, k: int, x: Array) -> tuple[float, float, float]:
-    """Of what is below a block of three columns with as much of x."""
+    """The products of three columns, below their diagonal block, with x."""
     u, v, w = 0.0, 0.0, 0.0
     for i in range(k + 3, panel.shape[1]):
         u += panel[k, i] * x[i]
@@ -265,7 +267,7 @@ def _dots(panel: Array, k: int, x: Array) -> tuple[float, float, float]:
 
 @kernel
 def _diagonal(pattern: Pattern, panels: Array) -> Array:
-    """(F, 3) that of the factor, by row."""
+    """(F, 3) the diagonal of the factor, by row."""
     diagonal = np.empty((pattern.place.shape[0], 3))
     for j in range(pattern.supernodes.shape[0] - 1):
         rows, panel = rows_of(pattern, j), panel_of(pattern, panels, j)

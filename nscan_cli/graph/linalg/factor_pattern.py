@@ -1,6 +1,6 @@
-"""Where the factor of a sparse symmetric matrix of 3 × 3 blocks has blocks, in an order of little fill.
+"""The sparsity pattern of the Cholesky factor of a matrix of 3 × 3 blocks, in a fill-reducing order.
 
-Columns that follow each other with blocks in the same rows make a supernode (C. Ashcraft, R. Grimes, "The
+Adjacent columns with blocks in the same rows make a supernode (C. Ashcraft, R. Grimes, "The
 influence of relaxed supernode partitions on the multifrontal method", 1989): a dense panel of the factor.
 """
 
@@ -15,24 +15,25 @@ from nscan_cli.poses import Indices
 
 
 class Pattern(NamedTuple):
-    """Which blocks of the factor of F nodes are there, and where."""
+    """The blocks of the factor of F nodes, and their places."""
 
     place: Indices
-    """(F,) the row of a node."""
+    """(F,) the row of each node."""
     starts: Indices
-    """(F + 1,) where the blocks of each column begin."""
+    """(F + 1,) where the blocks of each column start."""
     rows: Indices
     """(B,) the row of each block."""
     supernodes: Indices
     """(N + 1,) the first column of each supernode."""
     panels: Indices
-    """(N + 1,) where the panel of each supernode begins: 9 w h numbers, of w columns and h rows of blocks."""
+    """(N + 1,) where the panel of each supernode starts. It has 9 w h numbers, for w columns and h rows of
+    blocks."""
 
 
 def find_pattern(edges: Indices, nodes: int) -> Pattern:
-    """The pattern of the factor when the matrix has blocks at the edges (E, 2), and on its diagonal.
+    """The pattern of the factor of a matrix with blocks at the edges (E, 2) and on its diagonal.
 
-    An edge with a node of −1 is none.
+    Edges with a node of −1 are ignored.
     """
     if nodes == 0:
         none = np.zeros(1, np.int64)
@@ -40,11 +41,10 @@ def find_pattern(edges: Indices, nodes: int) -> Pattern:
     indptr, indices, place = _fill_reducing_order(edges, nodes)
     starts, rows = _fill(indptr, indices, place, np.argsort(place))
     heights = np.diff(starts)
-    # The rows of a column are those of the one before, less one, when there are as many and it is the first
-    # of them.
+    # A column continues a supernode when it is the first row below the column before, which has one row more.
     next_row = rows[np.minimum(starts[:-1] + 1, len(rows) - 1)]
-    goes_on = (heights[:-1] == heights[1:] + 1) & (next_row[:-1] == np.arange(1, nodes))
-    supernodes = np.concatenate([[0], np.flatnonzero(~goes_on) + 1, [nodes]])
+    continues = (heights[:-1] == heights[1:] + 1) & (next_row[:-1] == np.arange(1, nodes))
+    supernodes = np.concatenate([[0], np.flatnonzero(~continues) + 1, [nodes]])
     numbers = 9 * np.diff(supernodes) * heights[supernodes[:-1]]
     return Pattern(place, starts, rows, supernodes, np.concatenate([[0], np.cumsum(numbers)]))
 
@@ -77,9 +77,9 @@ def _fill_reducing_order(edges: Indices, nodes: int) -> tuple[Indices, Indices, 
 
 @kernel
 def block_targets(edges: Indices, pattern: Pattern) -> Indices:
-    """Where the block (row, column) of each edge (E, 2) goes among the blocks of the factor's lower triangle.
+    """Where the block (row, column) of each edge (E, 2) is stored in the factor's lower triangle.
 
-    2 × its index there, + 1 when it is its transpose that lies there; −1 when a node is −1.
+    2 × the index of the block, + 1 where its transpose is stored; −1 where a node is −1.
     """
     targets = np.full(edges.shape[0], -1)
     for e in range(edges.shape[0]):
@@ -102,7 +102,7 @@ def block_targets(edges: Indices, pattern: Pattern) -> Indices:
 
 @kernel
 def _fill(indptr: Indices, indices: Indices, place: Indices, order: Indices) -> tuple[Indices, Indices]:
-    """The columns of the factor: each takes over the rows of those whose first row it is."""
+    """(starts, rows) of the factor's columns. Each takes over the rows of its elimination tree's children."""
     nodes = order.shape[0]
     starts = np.zeros(nodes + 1, dtype=np.int64)
     rows = np.empty(4 * indices.shape[0] + 4 * nodes, dtype=np.int64)

@@ -1,4 +1,4 @@
-"""The diagonal blocks of the inverse of a sparse matrix, from its factor, without the rest of the inverse.
+"""The diagonal blocks of the inverse of a sparse matrix, from its factor, without the other blocks.
 
 K. Takahashi, J. Fagan, M.-S. Chen, "Formation of a sparse bus impedance matrix", 1973; A. Erisman, W. Tinney,
 "On computing certain elements of the inverse of a sparse matrix", 1975.
@@ -16,7 +16,7 @@ from nscan_cli.poses import Array, Indices
 
 
 def inverse_diagonal(factor: Factor) -> Array:
-    """The diagonal blocks (F, 3, 3) of the inverse, by node; the matrix has to hold every direction."""
+    """The diagonal blocks (F, 3, 3) of the inverse, by node. The matrix has to be positive definite."""
     pattern = factor.pattern
     diagonal = _invert_on_pattern(pattern, factor.panels)[pattern.place]
     return 0.5 * (diagonal + diagonal.transpose(0, 2, 1))
@@ -24,11 +24,11 @@ def inverse_diagonal(factor: Factor) -> Array:
 
 @kernel
 def _invert_on_pattern(pattern: Pattern, factor: Array) -> Array:
-    """The diagonal blocks (F, 3, 3) by row; the inverse Z is found where the factor has blocks.
+    """The diagonal blocks (F, 3, 3) by row. The inverse Z is computed on the factor's pattern only.
 
-    Column by column from the last: with M = L_kj L_jj⁻¹ of the rows k below j, Z_ij = −Σ Z_ik M_k and
-    Z_jj = (L_jj L_jjᵗ)⁻¹ − Σ Z_kjᵗ M_k. Any two of these rows share a block of the factor, so all that is
-    needed is there: for the columns of a supernode, in the dense matrix of all its rows.
+    Columns are processed from the last to the first. With M = L_kj L_jj⁻¹ of the rows k below j,
+    Z_ij = −Σ Z_ik M_k and Z_jj = (L_jj L_jjᵗ)⁻¹ − Σ Z_kjᵗ M_k. Any two of these rows share a block of the
+    factor, so Z is known there. A supernode's columns use the dense matrix of all its rows.
     """
     nodes, count = pattern.place.shape[0], pattern.supernodes.shape[0] - 1
     inverse, diagonal = np.zeros_like(factor), np.zeros((nodes, 3, 3))
@@ -64,7 +64,7 @@ def _invert_on_pattern(pattern: Pattern, factor: Array) -> Array:
 
 @leaf_kernel
 def _gather(known: Array, where: Indices, rows: Indices, p: int, dense: Array) -> None:
-    """What is known of the block column of the row p, from the rows after it, into both halves."""
+    """Copy the inverse's block column of row p, from row p on, into both triangles of `dense`."""
     column = 3 * where[rows[p]]
     for q in range(p, rows.shape[0]):
         row = 3 * where[rows[q]]
@@ -77,7 +77,7 @@ def _gather(known: Array, where: Indices, rows: Indices, p: int, dense: Array) -
 
 @leaf_kernel
 def _invert_columns(panel: Array, j: int, dense: Array, m: Array) -> None:
-    """Three columns of the inverse, and their transpose, from those after them."""
+    """Compute three columns of the inverse, and their transpose, from the columns after them."""
     height, below = panel.shape[1], j + 3
     # The inverse of the triangular block L_jj.
     i00, i11, i22 = 1.0 / panel[j, j], 1.0 / panel[j + 1, j + 1], 1.0 / panel[j + 2, j + 2]

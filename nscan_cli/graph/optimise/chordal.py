@@ -1,8 +1,8 @@
-"""A start for graphs whose given poses lie too far from the minimum: rotations first, then positions.
+"""Chordal initialisation, for graphs whose given poses are far from the minimum: rotations, then positions.
 
-The chordal relaxation (Martinec, Pajdla 2007; Carlone et al. 2015): with the rotation of pose i as the
-complex number r_i = exp(i φ_i), a measured turn asks for r_b = r_a exp(i θ_ab), which is linear in r; with
-the rotations known, so are the positions.
+D. Martinec, T. Pajdla 2007; L. Carlone et al. 2015. With the rotation of pose i as the complex number
+r_i = exp(i φ_i), a measured rotation asks for r_b = r_a exp(i θ_ab), which is linear in r. Once the rotations
+are known, the problem is linear in the positions.
 """
 
 from __future__ import annotations
@@ -18,19 +18,20 @@ from nscan_cli.matching.damped_newton import GRAPH_STEPS
 from nscan_cli.poses import Array, Indices
 
 REGULARISATION = 1e-9
-"""What information a direction gets at the least, as a share of the largest, so that all can be solved."""
+"""Lower bound of the information on a direction, as a share of the largest, so that the systems are
+regular."""
 
 
 def chordal_start(energy: GraphEnergy, poses: Array) -> Array:
-    """Poses (K, 3) from the relations alone, with the fixed pose kept where it is in `poses`.
+    """Poses (K, 3) from the relations alone; the fixed pose stays as it is in `poses`.
 
-    A relation gives the turns from its pose c to each of its other poses, weighed by their marginals; for
-    the positions it counts as it is. The relations have to connect all poses.
+    Each relation gives the rotations from its pose c to its other poses, weighted by their marginals. The
+    positions use the whole relation. The relations have to connect all poses.
     """
     start = np.zeros_like(poses)
     start[:, 2] = _rotations(energy, float(poses[energy.fixed, 2]))
-    # With all positions in one place the derivatives by the rotations of what stands in a relation's
-    # translations are 0, so that one Gauss–Newton step finds the positions from any distance.
+    # With all positions equal, the translations have no derivative by the rotations, so that one Gauss–Newton
+    # step finds the positions.
     system = energy.evaluate(start, exact=False)
     step = newton_step(energy.pattern, system)
     if step is None:
@@ -42,10 +43,10 @@ def chordal_start(energy: GraphEnergy, poses: Array) -> Array:
 
 
 def _rotations(energy: GraphEnergy, angle: float) -> Array:
-    """The angles (K,) that minimise Σ w |r_b − r_a exp(i θ_ab)|², r free but for the fixed pose's."""
+    """The angles (K,) that minimise Σ w |r_b − r_a exp(i θ_ab)|², with all r free but the fixed pose's."""
     a, b, turns, weights = _turns(energy.columns)
     weights = np.maximum(weights, REGULARISATION * (weights.max(initial=0.0) or 1.0))
-    # r as (re, im, 0): blocks of three, for the pattern that is there.
+    # r as (re, im, 0): blocks of three, which fit the energy's pattern.
     own = weights[:, None, None] * np.eye(3)
     turned = np.zeros_like(own)
     turned[:, 0, 0] = turned[:, 1, 1] = weights * np.cos(turns)
@@ -69,7 +70,7 @@ def _rotations(energy: GraphEnergy, angle: float) -> Array:
 
 
 def _turns(columns: TermColumns) -> tuple[Indices, Indices, Array, Array]:
-    """The turns θ_ab that the relations measured, with their weights 1/σ²: (a, b, θ, w)."""
+    """The measured rotations θ_ab with their weights 1/σ²: (a, b, θ, w)."""
     nobody = np.zeros(0, dtype=np.int64)
     parts = [(nobody, nobody, np.zeros(0), np.zeros(0))]
     sizes = np.diff(columns.starts)
@@ -93,7 +94,7 @@ def _turns(columns: TermColumns) -> tuple[Indices, Indices, Array, Array]:
 
 
 def _marginal_weights(information: Array) -> Array:
-    """1/σ² (R, m) of the angles of m poses from their information (R, 3 m, 3 m)."""
+    """1/σ² (R, m) of the angles of m poses, from their information (R, 3 m, 3 m)."""
     size = information.shape[1]
     largest = np.abs(information).max(axis=(1, 2), initial=0.0)[:, None, None]
     regular = information + REGULARISATION * np.where(largest > 0, largest, 1.0) * np.eye(size)

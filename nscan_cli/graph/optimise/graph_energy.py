@@ -1,4 +1,4 @@
-"""The energy of a whole graph: all relations' terms summed into sparse blocks (paper, eqs. (17) and (23))."""
+"""The energy of a graph: all relations' terms, summed into sparse blocks (paper, eqs. (17) and (23))."""
 
 from __future__ import annotations
 
@@ -18,19 +18,19 @@ from nscan_cli.poses import Array, Indices
 
 
 class System(NamedTuple):
-    """The energy at some poses and its derivatives by the free poses: all but those held, in order."""
+    """The energy at some poses, and its derivatives with respect to the F free poses, in order."""
 
     value: float
     terms: Array
-    """(Q,) what each relation gives: χ² at the poses."""
+    """(Q,) the value of each relation: its χ² at the poses."""
     gradient: Array
-    """(F, 3)"""
+    """(F, 3) by node."""
     hessian: Array
-    """(B, 3, 3) the lower triangle, in the blocks of the factor's pattern."""
+    """(B, 3, 3) the lower triangle, on the factor's pattern."""
 
 
 class GraphEnergy:
-    """Evaluates the energy of K poses; the sparsity pattern is found once."""
+    """Evaluates the energy of K poses; the sparsity pattern is computed once."""
 
     def __init__(
         self,
@@ -43,8 +43,8 @@ class GraphEnergy:
     ) -> None:
         """Take relations between node ids; `positions[id]` is a node's place among the `nodes` poses.
 
-        The pose at place `fixed` is held where it is, and so are those that are not `free` (K,), if given.
-        With `terms`, those of the relations are kept there.
+        The pose at place `fixed` is fixed, and so are those that are not `free` (K,), if given. `terms`
+        caches the terms of the relations.
         """
         terms = terms or TermCache()
         self.columns = terms.columns(relations, positions)
@@ -53,22 +53,22 @@ class GraphEnergy:
         can_move = np.ones(nodes, dtype=np.bool_) if free is None else free.copy()
         can_move[fixed] = False
         self.free: Indices = np.flatnonzero(can_move)
-        """(F,) the places of the poses that can move."""
+        """(F,) the places of the free poses."""
         self.free_row: Indices = np.full(nodes, -1)
-        """(K,) the place of a pose among those; −1 for one that is held."""
+        """(K,) the index of each pose among these; −1 where it is fixed."""
         self.free_row[self.free] = np.arange(len(self.free))
         edges = _block_edges(self.columns, self.free_row)
         self.pattern = find_pattern(edges, len(self.free))
         self._targets = block_targets(edges, self.pattern)
 
     def weighted(self, weights: Array) -> GraphEnergy:
-        """The energy with every relation's term multiplied by its weight (Q,)."""
+        """The energy with each relation's term multiplied by its weight (Q,)."""
         other = copy.copy(self)
         other.columns = self.columns._replace(weights=self.columns.weights * weights)
         return other
 
     def terms(self, poses: Array) -> Array:
-        """(Q,) what each relation gives at the poses (K, 3)."""
+        """(Q,) the value of each relation at the poses (K, 3)."""
         poses = np.ascontiguousarray(poses, dtype=np.float64)
         columns = self._columns_at(poses) if self._not_linear else self.columns
         terms = np.zeros(len(columns.fixed))
@@ -87,7 +87,7 @@ class GraphEnergy:
         return System(float(terms.sum()), terms, gradient[self.free], blocks)
 
     def _columns_at(self, poses: Array) -> TermColumns:
-        """The columns with those terms that are others at other poses."""
+        """The columns with the nonlinear terms taken at the poses (K, 3)."""
         columns = self.columns
         columns = columns._replace(local=columns.local.copy(), hessians=columns.hessians.copy())
         for k, at in self._not_linear:
@@ -100,14 +100,14 @@ class GraphEnergy:
 
 
 def _not_negative(terms: Array) -> Array:
-    """The terms (Q,), where those that rounding has brought below 0 are now 0."""
+    """The terms (Q,), with values below 0, which are rounding errors, set to 0."""
     np.maximum(terms, 0.0, out=terms)
     return terms
 
 
 @kernel
 def _block_edges(columns: TermColumns, free_row: Indices) -> Indices:
-    """The blocks of the lower triangle of each term, in order, as pairs of rows; −1 is a pose held."""
+    """The blocks of each term's lower triangle, as pairs of rows (E, 2); −1 is a fixed pose."""
     sizes = columns.starts[1:] - columns.starts[:-1]
     edges = np.empty(((sizes * (sizes + 1)).sum() // 2, 2), dtype=np.int64)
     e = 0
@@ -135,7 +135,7 @@ def _evaluate(
     gradient: Array,
     blocks: Array,
 ) -> None:
-    """Each relation's value into terms (Q,), its gradient and Hessian added to their nodes."""
+    """Write each relation's value to terms (Q,), and add its gradient and Hessian to those of its nodes."""
     e = 0
     part, block = np.empty(6), np.empty((6, 6))
     for k in range(columns.fixed.shape[0]):
@@ -165,7 +165,7 @@ def _evaluate(
 
 @kernel
 def _evaluate_values(columns: TermColumns, poses: Array, terms: Array) -> None:
-    """Each relation's value into terms (Q,)."""
+    """Write each relation's value to terms (Q,)."""
     for k in range(columns.fixed.shape[0]):
         start, end = columns.starts[k], columns.starts[k + 1]
         members, m = columns.members[start:end], 3 * (end - start)

@@ -1,4 +1,4 @@
-"""The poses that minimise the energy of a graph: sparse damped Newton steps (paper, IV)."""
+"""Minimisation of a graph's energy by sparse damped Newton steps (paper, IV)."""
 
 from __future__ import annotations
 
@@ -13,22 +13,22 @@ from nscan_cli.matching.damped_newton import GRAPH_STEPS, is_accepted, is_last, 
 from nscan_cli.poses import Array, wrap
 
 EXACT_HESSIAN_STEP = 0.1
-"""m, rad: the exact Hessian is used once a step is shorter. It needs fewer steps there than the
-Gauss–Newton part; farther away it needs more, and often is not positive definite."""
+"""m, rad: the exact Hessian is used after a shorter step. Near the minimum it takes fewer steps than the
+Gauss–Newton part; farther away it takes more, and often is not positive definite."""
 NEGLIGIBLE_GAIN = 1e-7
-"""Of the energy, or of a χ² of 1: where relations leave a direction open, a step that gains less is the
-last: it moves less than a thousandth of a standard deviation."""
+"""Smallest relative decrease of 1 + energy. Where relations leave a direction undetermined, a step that gains
+less is the last: it moves less than a thousandth of a standard deviation."""
 
 
 @dataclass(frozen=True)
 class Optimum:
-    """Poses (K, 3) at a minimum, the energy there, and how it was reached."""
+    """The result of a minimisation: poses (K, 3), the energy there, and how it was reached."""
 
     poses: Array
     energy: float
     iterations: int
     converged: bool
-    """Whether the last step was within the tolerance, and not because it was damped."""
+    """Whether the last step was within the tolerance without being damped."""
 
 
 def optimise(
@@ -36,10 +36,10 @@ def optimise(
 ) -> Optimum:
     """Minimise from the poses (K, 3) until a step moves no pose by more than `tolerance` (m, rad).
 
-    The steps are Newton's with the Gauss–Newton part of the Hessian while the poses move far, with the
-    exact Hessian (25) when they settle and it is positive definite. They are damped, after Levenberg and
-    Marquardt, when they would raise the energy or the relations leave a direction open. In such a direction
-    poses could go on for ever, for less and less, so there the minimum is where nothing is gained.
+    Newton steps use the Gauss–Newton part of the Hessian while they are long, and the exact Hessian (25) once
+    they are short and it is positive definite. They are damped, after Levenberg and Marquardt, where they
+    would raise the energy or the relations leave a direction undetermined. In such a direction the poses
+    could move without end, so the minimisation stops where a step gains a negligible amount.
     """
     here, exact, damping, is_open = energy.evaluate(poses, exact=False), False, GRAPH_STEPS.first, False
     iteration = 0
@@ -74,13 +74,13 @@ def optimise(
 
 
 def newton_step(pattern: Pattern, system: System, damping: float = 0.0) -> Array | None:
-    """The step (F, 3) of the free poses; None when the damped Hessian is not positive definite."""
+    """The step (F, 3) of the free poses; None where the damped Hessian is not positive definite."""
     matrix = system.hessian
     if damping:
         matrix = matrix.copy()
         block, component = pattern.starts[:-1, None], np.arange(3)
         diagonal = matrix[block, component, component]
-        # The second part is for a direction in which no relation has any information.
+        # The second term is for directions without information.
         matrix[block, component, component] += damping * (diagonal + 1e-9 * diagonal.max(initial=0.0))
     factor = factorise(pattern, matrix)
     return None if factor.loose.any() else -solve(factor, system.gradient)

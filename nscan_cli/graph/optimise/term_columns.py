@@ -1,7 +1,7 @@
-"""The terms of a graph's relations as columns, kept while the graph grows.
+"""The terms of a graph's relations as columns, cached while the graph grows.
 
-The energy of a growing graph is made anew for each of its states, and all but a few of the relations are the
-same each time: their terms are laid end to end once.
+A growing graph builds its energy anew for each of its states, with few new relations each time. The terms of
+a relation are stored once.
 """
 
 from __future__ import annotations
@@ -19,23 +19,23 @@ class TermColumns(NamedTuple):
     """The terms of Q relations as columns for the kernels; nodes are places 0 … K − 1."""
 
     starts: Indices
-    """(Q + 1,) where the nodes of each relation begin."""
+    """(Q + 1,) where the nodes of each relation start."""
     members: Indices
-    """(Σ n,)"""
+    """(Σ n,) the nodes of the relations."""
     local: Array
-    """(Σ n, 3)"""
+    """(Σ n, 3) their local poses."""
     hessian_starts: Indices
-    """(Q,) where the 9 n² entries of each H begin."""
+    """(Q,) where the 9 n² entries of each H start."""
     hessians: Array
-    """Those of all relations, and of others."""
+    """The entries of all H, also of relations that are not among the Q."""
     fixed: Indices
-    """(Q,)"""
+    """(Q,) the index of pose c among the nodes of each relation."""
     weights: Array
-    """(Q,) by which the terms are multiplied."""
+    """(Q,) factors on the terms."""
 
 
 class TermCache:
-    """The terms of all relations that were asked for; a relation is known by being the same object."""
+    """The terms of all relations asked for so far; relations are identified as objects."""
 
     def __init__(self) -> None:
         self._relations: list[Relation] = []
@@ -47,9 +47,9 @@ class TermCache:
         self._at: dict[int, Callable[[Array], Term]] = {}
 
     def columns(self, relations: Sequence[Relation], positions: Indices) -> TermColumns:
-        """The columns of some relations (Q); `positions[id]` is the place of a node, −1 where it has none.
+        """The columns of Q relations; `positions[id]` is the place of a node, −1 where it has none.
 
-        Raises ValueError where a relation has such a node: as an index, −1 would be the last pose.
+        Raises ValueError where a relation has a node without a place.
         """
         slots = self._slots_of(relations)
         sizes = self._sizes[slots]
@@ -58,7 +58,7 @@ class TermCache:
         members = positions[self._nodes[entries]]
         if members.min(initial=0) < 0:
             node = self._nodes[entries][int(np.argmin(members))]
-            raise ValueError(f"a relation has node {node}, which is no keyframe of this energy")
+            raise ValueError(f"a relation has node {node}, which is not a keyframe of this energy")
         return TermColumns(
             starts=starts,
             members=members,
@@ -70,10 +70,7 @@ class TermCache:
         )
 
     def not_linear(self, relations: Sequence[Relation]) -> list[tuple[int, Callable[[Array], Term]]]:
-        """Which of the relations (Q) have terms that are others at other poses: (index, Term.at).
-
-        Columns were asked for them before.
-        """
+        """The relations (Q) whose terms depend on the poses: (index, Term.at). Call `columns` first."""
         if not self._at:
             return []
         slots = [self._slots[id(relation)] for relation in relations]
@@ -104,7 +101,7 @@ class TermCache:
     def _append(self, hessians: Array) -> None:
         begin, self._used = self._used, self._used + len(hessians)
         if self._used > len(self._hessians):
-            # Energies that were made before keep what they have.
+            # Earlier energies keep their array.
             longer = np.empty(max(self._used, 2 * begin))
             longer[:begin] = self._hessians[:begin]
             self._hessians = longer
@@ -112,7 +109,7 @@ class TermCache:
 
 
 def _starts(sizes: Indices) -> Indices:
-    """(Q + 1,) where each of Q parts begins, laid end to end."""
+    """(Q + 1,) where each of Q parts starts, end to end."""
     starts = np.zeros(len(sizes) + 1, dtype=np.int64)
     np.cumsum(sizes, out=starts[1:])
     return starts

@@ -1,7 +1,7 @@
-"""What each relation adds to the energy of a graph, with exact derivatives (paper, IV, eqs. (18) to (25)).
+"""The terms of a graph's energy with exact derivatives (paper, IV, eqs. (18) to (25)).
 
-Every relation gives fᵗHf, eq. (23), without a ½: also a pairwise one, of two poses
-(graph/relations/pairwise.py). A term of n poses writes its value, gradient (3n,) and Hessian (3n, 3n).
+Every relation gives fᵗHf, eq. (23), without a factor ½. A pairwise relation is one of two poses
+(graph/relations/pairwise.py).
 """
 
 from __future__ import annotations
@@ -22,14 +22,14 @@ def nscan_term(
     gradient: Array,
     hessian: Array,
 ) -> float:
-    """fᵗHf, eq. (23), with gradient (24) and Hessian (25); f is eqs. (19) to (22).
+    """fᵗHf, eq. (23); writes its gradient (3n,), (24), and Hessian (3n, 3n), (25); f is (19) to (22).
 
-    poses (n, 3) are global; pose c of them, c = `fixed`, takes part in the mapping alone: its own f is
-    0. `curvature` 1 gives the exact Hessian, 0 leaves out its term in ∂²f (the Gauss–Newton part).
+    poses (n, 3) are global. Pose c, c = `fixed`, only defines the mapping: its own f is 0. `curvature` 1
+    gives the exact Hessian, 0 leaves out the term in ∂²f (Gauss–Newton).
 
-    With d_i = t̂_i − t̂_c and the rotation R by θ = φ_c − φ̂_c, f_i = (R d_i, φ̂_i + θ) − what is constant.
-    So ∂f_i/∂x̂_i = R and ∂f_i/∂x̂_c = R A_i, A_i = [[−1, 0, d_y], [0, −1, −d_x], [0, 0, −1]]: with H and its
-    pull Hf turned back into the global frame, only pose c needs products, and those are sums.
+    With d_i = t̂_i − t̂_c and the rotation R by θ = φ_c − φ̂_c, f_i = (R d_i, φ̂_i + θ) minus a constant. So
+    ∂f_i/∂x̂_i = R and ∂f_i/∂x̂_c = R A_i, A_i = [[−1, 0, d_y], [0, −1, −d_x], [0, 0, −1]]: with H and Hf
+    rotated back into the global frame, only pose c needs products, and these are sums.
     """
     n, c = poses.shape[0], fixed
     d, f = np.empty((n, 2)), np.empty(3 * n)
@@ -44,7 +44,7 @@ def nscan_term(
         if i == c:
             continue
         r = 3 * i
-        # The pull 2 Hf, turned back by Rᵗ.
+        # 2 Hf, rotated back by Rᵗ.
         x, y, turn = 0.0, 0.0, 0.0
         for b in range(3 * n):
             x += information[r, b] * f[b]
@@ -60,7 +60,7 @@ def nscan_term(
         for j in range(i + 1):
             if j != c:
                 _turn_block(information, r, 3 * j, cos, sin, hessian)
-        # ∂²f: R turns with φ̂_c, and again.
+        # ∂²f: the first and second derivatives of R by φ̂_c.
         hessian[k + 2, k + 2] -= curvature * (x * dx + y * dy)
         hessian[r, k + 2] = -curvature * y
         hessian[r + 1, k + 2] = curvature * x
@@ -73,7 +73,7 @@ def nscan_term(
 
 @kernel
 def nscan_value(poses: Array, local: Array, information: Array, fixed: int) -> float:
-    """fᵗHf alone."""
+    """fᵗHf without derivatives."""
     n = poses.shape[0]
     f = np.empty(3 * n)
     _residual(poses, local, fixed, np.empty((n, 2)), f)

@@ -1,4 +1,4 @@
-"""Optimise a whole graph: all keyframes from all relations (paper, IV)."""
+"""Optimisation of a whole graph: all keyframes, all relations (paper, IV)."""
 
 from __future__ import annotations
 
@@ -16,34 +16,35 @@ from nscan_cli.graph.relations.base import Relation
 from nscan_cli.poses import Array, Indices
 
 TRIAL_ITERATIONS = 100
-"""Iterations after which two starts are compared; only the better one goes on."""
+"""Iterations after which the starts are compared; only the better one continues."""
 MAX_UNFOLDINGS = 3
-"""How often a start is looked for from where a graph may be folded wrong, as long as each leads lower."""
+"""Largest number of attempts to leave a local minimum; each has to reach a lower energy than the one
+before."""
 SAME_ENERGY = 1e-6
-"""Energies that differ by less, of themselves or of a χ² of 1, are the same: then the poses given stay."""
+"""Energies that differ by less, relative to 1 + energy, count as equal: then the given poses are kept."""
 
 
 @dataclass(frozen=True)
 class GraphOptimum:
-    """The energy Σ fᵗHf of all relations that is left, and how it was reached."""
+    """The energy Σ fᵗHf at the optimum, and how it was reached."""
 
     energy: float
     iterations: int
     converged: bool
     components: int
-    """Parts that no relation connects; a keyframe without any relation is one."""
+    """The number of connected components; a keyframe without relations is one."""
 
 
 @dataclass(frozen=True)
 class Component:
-    """Keyframes that relations connect."""
+    """A connected component of the graph."""
 
     keyframes: Indices
-    """Ids, increasing; the first one is held where it is."""
+    """Ids, increasing; the first one is fixed."""
     relations: list[Relation]
 
     def energy(self, nodes: int) -> GraphEnergy:
-        """The energy of the keyframes' poses; `nodes` is the number of nodes of the graph."""
+        """The energy of the keyframes' poses; the graph has `nodes` nodes."""
         positions = np.full(nodes, -1)
         positions[self.keyframes] = np.arange(len(self.keyframes))
         return GraphEnergy(len(self.keyframes), self.relations, positions)
@@ -52,8 +53,8 @@ class Component:
 def optimise_graph(graph: Graph, max_iterations: int = 1000, tolerance: float = 1e-6) -> GraphOptimum:
     """Move the keyframes to the minimum of the graph's energy, and the attached nodes with them.
 
-    The lowest minimum of several starts is kept. The first keyframe of each component stays. Marginals in
-    the graph belonged to the poses before: they are removed.
+    The lowest minimum of several starts is kept. The first keyframe of each component stays. The graph's
+    marginals belong to the old poses and are removed.
     """
     total, iterations, converged = 0.0, 0, True
     parts = components(graph)
@@ -88,10 +89,10 @@ def _lowest_minimum(energy: GraphEnergy, given: Array, max_iterations: int, tole
         best = optimise(energy, best.poses, max_iterations, tolerance)
         iterations += best.iterations
     for _ in range(MAX_UNFOLDINGS):
-        unbent = unfolded(energy, best.poses)
-        if unbent is None:
+        other_start = unfolded(energy, best.poses)
+        if other_start is None:
             break
-        found = optimise(energy, unbent, max_iterations, tolerance)
+        found = optimise(energy, other_start, max_iterations, tolerance)
         iterations += found.iterations
         if not _is_lower(found, best):
             break
@@ -100,7 +101,7 @@ def _lowest_minimum(energy: GraphEnergy, given: Array, max_iterations: int, tole
 
 
 def _is_lower(found: Optimum, best: Optimum) -> bool:
-    """Whether a minimum is clearly lower than the best so far, or that is none at all."""
+    """Whether a minimum is clearly lower than the best so far, or the best is not finite."""
     return found.energy < best.energy - SAME_ENERGY * (1 + best.energy) or not np.isfinite(best.energy)
 
 

@@ -1,4 +1,4 @@
-"""What every type of relation gives: a term of the graph's energy, and what a file keeps of it."""
+"""The interface of relation types: a term of the graph's energy, and the fields that files keep."""
 
 from __future__ import annotations
 
@@ -10,46 +10,46 @@ from nscan_cli.poses import Array
 
 
 class Term(NamedTuple):
-    """fᵗHf of n local poses, eq. (23): f are the relation's global poses, mapped by pose c, minus these."""
+    """fᵗHf, eq. (23), where f is the global poses of n nodes, mapped by pose c, minus the local poses."""
 
     local: Array
     """(n, 3), in any frame."""
     hessian: Array
-    """(3n, 3n) H, positive semi-definite, an inverse covariance; 0 where the relation says nothing. What it
-    has in the rows and columns of pose c does not count."""
+    """(3n, 3n) H, an inverse covariance, positive semi-definite; 0 in directions that are not measured. The
+    rows and columns of pose c are ignored."""
     fixed: int
     """Index among the n of pose c, which carries the mapping from global to local coordinates."""
     at: Callable[[Array], Term] | None = None
-    """What it is at global poses (n, 3), for an error e that is not linear in f: with e's information W and
-    J = ∂e/∂f there, H is JᵗWJ, and the local poses are such that J f is e. Pose c is the same, and at poses
-    where e has no derivative H is 0: a graph is also begun with all keyframes in one place. The second
-    derivatives of e are left out of the exact Hessian. None: the term is the same everywhere."""
+    """The term at global poses (n, 3), for an error e that is not linear in f; None for a constant term. With
+    the information W of e and J = ∂e/∂f there, H is JᵗWJ, and the local poses give J f = e. Pose c stays the
+    same. H is 0 where e has no derivative: the chordal start puts all keyframes in one place. The exact
+    Hessian leaves out the second derivatives of e."""
 
 
 class Relation(Protocol):
-    """A relation between keyframes, of any type; frozen."""
+    """A relation of any type between keyframes; its classes are frozen."""
 
     kind: ClassVar[str]
     """The type's name in files."""
 
     @property
     def nodes(self) -> tuple[int, ...]:
-        """Ids of two keyframes or more."""
+        """Ids of two or more keyframes."""
 
     @property
     def origin(self) -> str:
-        """Where it comes from, one of ORIGINS. A loop is doubted: it goes when it contradicts the others."""
+        """Its source, one of ORIGINS. A loop is removed when it contradicts the other relations."""
 
     @property
     def score(self) -> float:
-        """How well what it was made from agrees, 0 to 1; 0 where nobody knows."""
+        """Overlap of the scans that were matched, 0 to 1; 0 where it is not known."""
 
     def term(self) -> Term:
-        """What it gives to the energy, of its nodes in their order."""
+        """Its term of the energy, with the nodes in their order."""
 
     def content(self) -> dict[str, Any]:
-        """The fields of its JSON object that other types do not have."""
+        """The fields of its JSON object that are special to this type."""
 
     @classmethod
     def from_content(cls, record: JsonRecord, nodes: tuple[int, ...], origin: str, score: float) -> Self:
-        """The relation of such an object again. Raises MalformedError."""
+        """The relation of such a JSON object. Raises MalformedError."""

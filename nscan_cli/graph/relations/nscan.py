@@ -17,9 +17,9 @@ class NScan:
     kind: ClassVar[str] = "nscan"
     nodes: tuple[int, ...]
     poses: Array
-    """(n, 3) local poses, in a frame of their own."""
+    """(n, 3) local poses, in the frame of the relation."""
     hessian: Array
-    """(3n, 3n) H, at the local poses, variables (x, y, φ) scan by scan; its null space is the gauge."""
+    """(3n, 3n) H at the local poses, with variables (x, y, φ) scan by scan; its null space is the gauge."""
     fixed: int
     """Index into nodes of pose c, which carries the mapping from global to local coordinates."""
     origin: str
@@ -42,7 +42,7 @@ class NScan:
         """The relation of such a JSON object. Raises MalformedError."""
         fixed = record.integer("fixed")
         if fixed not in nodes:
-            raise MalformedError(record.place, f"'fixed' is {fixed}, which is none of its nodes")
-        poses, held = record.poses("poses", len(nodes)), nodes.index(fixed)
-        hessian = record.information("hessian", 3 * len(nodes), held)
-        return cls(nodes, poses, hessian, held, origin, score)
+            raise MalformedError(record.place, f"'fixed' is {fixed}, which is not one of its nodes")
+        poses, c = record.poses("poses", len(nodes)), nodes.index(fixed)
+        hessian = record.information("hessian", 3 * len(nodes), c)
+        return cls(nodes, poses, hessian, c, origin, score)

@@ -1,4 +1,4 @@
-"""The relation of two keyframes: a relative pose that was measured (paper, IV, eqs. (16) and (17))."""
+"""The relation of two keyframes: a measured relative pose (paper, IV, eqs. (16) and (17))."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from nscan_cli.poses import Array
 
 @dataclass(frozen=True)
 class Pairwise:
-    """A pairwise relation, eqs. (16) and (17): x̂_b ⊖ x̂_a was measured, where (a, b) = nodes."""
+    """A measurement of x̂_b ⊖ x̂_a, eqs. (16) and (17), where (a, b) = nodes."""
 
     kind: ClassVar[str] = "pairwise"
     nodes: tuple[int, int]
@@ -30,13 +30,14 @@ class Pairwise:
     def term(self) -> Term:
         """ΔᵗC⁻¹Δ with Δ = (b ⊖ a) − p_ab, eqs. (16) and (17).
 
-        That is (23) of two poses, a at the local frame's origin and c = a: (19) to (22) are (16) there.
+        This is (23) for two poses with c = a at the origin of the local frame, where (19) to (22) reduce to
+        (16).
         """
         return self._term
 
     @cached_property
     def _term(self) -> Term:
-        # Kept: while a graph grows, its energy is made for each new keyframe.
+        # Cached: a growing graph builds its energy anew for each new keyframe.
         local, hessian = np.zeros((2, 3)), np.zeros((6, 6))
         local[1], hessian[3:, 3:] = self.measurement, self.information
         return Term(local, hessian, 0)

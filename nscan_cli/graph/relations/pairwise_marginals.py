@@ -1,4 +1,4 @@
-"""Relations of any type as pairwise ones, for formats that have no others: the marginals of their Hessian."""
+"""Relations of any type as pairwise relations, by the marginals of their Hessians, for g2o files."""
 
 from __future__ import annotations
 
@@ -9,16 +9,16 @@ from nscan_cli.graph.relations.pairwise import Pairwise
 from nscan_cli.poses import Array, inverse, relative, rotated_information
 
 LEAST_EIGENVALUE_SHARE = 1e-9
-"""Of the greatest eigenvalue of a marginal's information."""
+"""Lower bound of the eigenvalues of a marginal's information, as a share of its greatest one."""
 
 
 def pairwise_marginals(relation: Relation, poses: Array) -> list[Pairwise]:
-    """A relation as pairwise relations from pose c to each of the others: a lossy replacement.
+    """A relation as pairwise relations from pose c to each other pose, which loses correlations.
 
     With pose c held fixed, the information on pose i alone is the Schur complement
     H_ii − H_ir H_rr⁺ H_ri over all other poses r (the inverse of its block of the covariance, where H has
     an inverse), turned from the relation's frame into that of pose c.
-    One that is not linear counts as it is at its global poses (n, 3).
+    A term that is not linear is taken at the global poses (n, 3).
     Directions that the relation does not hold get next to no information, LEAST_SHARE of the greatest: with
     none at all, readers that factorise after Cholesky (GTSAM) would make much out of rounding. The
     Hessian's negative eigenvalues count as 0.

@@ -1,4 +1,4 @@
-"""The types of relations that there are, and what a file keeps of a relation of any of them."""
+"""The registered relation types, and their JSON objects."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ RELATION_TYPES: list[type[Relation]] = [
     Pairwise,
     NScan,
 ]
-"""A new type of relation is a module and a line here."""
+"""A new relation type takes one module and one line here."""
 
 ORIGINS = ("odometry", "track", "nscan", "loop")
 
 
 def relation_record(relation: Relation, key: str = "nodes") -> dict[str, Any]:
-    """The JSON object of a relation; `key` says what its members are: "nodes" or "scans"."""
+    """The JSON object of a relation; `key` names its members: "nodes" or "scans"."""
     return {
         "type": relation.kind,
         key: list(relation.nodes),
@@ -30,7 +30,7 @@ def relation_record(relation: Relation, key: str = "nodes") -> dict[str, Any]:
 
 
 def relation_of(record: JsonRecord, key: str = "nodes") -> Relation:
-    """The relation of such a JSON object. Raises MalformedError when its parts do not fit each other."""
+    """The relation of such a JSON object. Raises MalformedError where its fields are inconsistent."""
     types = {each.kind: each for each in RELATION_TYPES}
     found = types[record.text("type", tuple(types))]
     origin, score = record.text("origin", ORIGINS), record.number("score")

@@ -1,7 +1,7 @@
-"""Information matrices are positive semi-definite: a negative eigenvalue is rounding, or an error.
+"""Repair and check of information matrices, which have to be positive semi-definite.
 
-The energy of a direction with a negative eigenvalue falls for ever. Where information comes from a file, or
-from a match, it becomes sound here, and no energy is below 0.
+Along an eigenvector with a negative eigenvalue the energy would fall without bound. Small negative
+eigenvalues, of matrices from files or matches, are rounding errors and set to 0; larger ones are errors.
 """
 
 from __future__ import annotations
@@ -11,28 +11,28 @@ import numpy as np
 from nscan_cli.poses import Array
 
 WRITTEN_ROUNDING = 5e-6
-"""Files keep six significant digits: an entry is off by so much of itself at most, and the least eigenvalue
-by so much of the trace. (In a semi-definite matrix no |a_ij| is above √(a_ii a_jj), and the matrix of these
-has one eigenvalue besides 0, its trace.) Six decimals are no fewer digits where entries are above 1."""
+"""Greatest rounding error of the least eigenvalue of a matrix in a file, as a share of the trace. Six
+significant digits bound the relative error of each entry by this. In a semi-definite matrix |a_ij| ≤ √(a_ii
+a_jj), and the matrix of these bounds has the trace as its one nonzero eigenvalue."""
 EIGENVALUE_ROUNDING = 1e-13
-"""Eigenvalues are computed to so much of the trace."""
+"""Greatest error of a computed eigenvalue, as a share of the trace."""
 
 
 class IndefiniteError(ValueError):
-    """A matrix has an eigenvalue below 0 that rounding does not explain."""
+    """A matrix has a negative eigenvalue that rounding does not explain."""
 
     def __init__(self, index: int, least: float, greatest: float) -> None:
         super().__init__(
             f"has a negative eigenvalue, {least:.3g} beside {greatest:.3g}, which rounding does not explain"
         )
         self.index = index
-        """Which one of the matrices."""
+        """The index of the matrix."""
 
 
 def semidefinite(matrices: Array) -> Array:
-    """Symmetric matrices (Q, m, m) as they were written, with 0 for what rounding has made negative.
+    """Symmetric matrices (Q, m, m) of a file, with negative eigenvalues that are due to rounding set to 0.
 
-    Those without a negative eigenvalue are the same, bit for bit. Raises IndefiniteError.
+    Matrices without negative eigenvalues are returned unchanged. Raises IndefiniteError.
     """
     if _are_definite(matrices):
         return matrices
@@ -51,9 +51,9 @@ def semidefinite(matrices: Array) -> Array:
 
 
 def as_information(hessians: Array, rounding: float = EIGENVALUE_ROUNDING) -> Array:
-    """The Hessians (…, m, m) of matches as the information that they are: where one curves down, none.
+    """The Hessians (…, m, m) of matches as information matrices: negative eigenvalues are set to 0.
 
-    Those that have no eigenvalue below 0 but for `rounding` (of their trace) are the same, bit for bit.
+    Matrices without eigenvalues below −`rounding` times their trace are returned unchanged.
     """
     wrong = np.linalg.eigvalsh(hessians)[..., 0] < -rounding * _trace(hessians)
     if not wrong.any():
@@ -68,13 +68,13 @@ def _without_negative(matrices: Array) -> Array:
 
 
 def _trace(matrices: Array) -> Array:
-    """(…,) that of matrices (…, m, m), or 0 where it is negative."""
+    """(…,) the traces of matrices (…, m, m), or 0 where they are negative."""
     trace: Array = np.maximum(np.trace(matrices, axis1=-2, axis2=-1), 0.0)
     return trace
 
 
 def _are_definite(matrices: Array) -> bool:
-    """Whether all are positive definite for certain, which takes a tenth of the time of eigenvalues."""
+    """Whether all are positive definite, by Cholesky: it takes a tenth of the time of the eigenvalues."""
     try:
         np.linalg.cholesky(matrices)
     except np.linalg.LinAlgError:

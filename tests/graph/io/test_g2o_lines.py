@@ -127,8 +127,8 @@ def test_gtsam_agrees_on_poses_in_space(tmp_path: Path):
         ("VERTEX_SE3:QUAT 1 0 0 0 0 0 nan 1", "a number is not finite"),
         ("VERTEX_SE3:QUAT 1 0 0 0", "VERTEX_SE3:QUAT has 4 values instead of 8"),
         ("EDGE_SE3:QUAT 0 1 1 0 0 0 0 0 1" + " inf" * 21, "a number is not finite"),
-        ("VERTEX_SE2 18446744073709551616 0 0 0", "'18446744073709551616' is no vertex id"),
-        ("VERTEX_SE2 x72057594037927936 0 0 0", "'x72057594037927936' is no vertex id"),
+        ("VERTEX_SE2 18446744073709551616 0 0 0", "'18446744073709551616' is not a vertex id"),
+        ("VERTEX_SE2 x72057594037927936 0 0 0", "'x72057594037927936' is not a vertex id"),
         ("EDGE_SE2 0 x3 0 0 0 1 0 0 1 0 1", re.escape(f"there is no vertex {GTSAM_X0 + 3} (x3)")),
         ("EDGE2 0 1 0 0 0 1 0 1 -1 0 0\nVERTEX2 1 0 0 0", "the information matrix has a negative eigenvalue"),
     ],
@@ -206,11 +206,11 @@ def test_gtsam_reads_the_keys_that_are_written(tmp_path: Path):
         ),
         (
             lambda text: text.replace('"vertex":"7",', ""),
-            "nodes: 'vertex' is not another one for each of them",
+            "nodes: 'vertex' is not unique to each of them",
         ),
         (
             lambda text: text.replace('"vertex":"7"', f'"vertex":"{2**64 - 1}"'),
-            "nodes: 'vertex' is not another one for each of them",
+            "nodes: 'vertex' is not unique to each of them",
         ),
     ],
 )

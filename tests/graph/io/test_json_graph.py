@@ -171,10 +171,10 @@ WRONG_IN_ITSELF: list[tuple[Change, str]] = [
     (lambda d: d["nodes"][2].update(scan=5), "'scan' is not greater"),
     (lambda d: d["nodes"][2].pop("odometry"), "2 of 3 have 'odometry'"),
     (lambda d: d["nodes"][1].update(attached=1), r"nodes\[1\]: 'attached' is the node itself"),
-    (lambda d: d["nodes"][1].update(attached=9), "'attached' is 9, which is no keyframe"),
+    (lambda d: d["nodes"][1].update(attached=9), "'attached' is 9, which is not a keyframe"),
     (lambda d: d["relations"][1].update(id=0), r"relations\[1\]: 'id' is 0"),
-    (lambda d: d["relations"][0].update(nodes=[0, 1]), "node 1 is no keyframe of this graph"),
-    (lambda d: d["relations"][0].update(nodes=[0, 9]), "node 9 is no keyframe"),
+    (lambda d: d["relations"][0].update(nodes=[0, 1]), "node 1 is not a keyframe of this graph"),
+    (lambda d: d["relations"][0].update(nodes=[0, 9]), "node 9 is not a keyframe"),
     (lambda d: d["relations"][0].update(information=[-1, 0, 0, 1, 0, 1]), "positive semi-definite"),
     (
         lambda d: d["relations"][1].update(hessian=(-5.0 * np.eye(6)[np.triu_indices(6)]).tolist()),
@@ -186,7 +186,7 @@ WRONG_IN_ITSELF: list[tuple[Change, str]] = [
     ),
     (lambda d: d["relations"][1].update(nodes=[0, 2, 1]), "list of 3 poses"),
     (lambda d: d["relations"][1]["hessian"].append(0), "6 × 6 matrix: 21 finite numbers"),
-    (lambda d: d["relations"][1].update(fixed=1), "'fixed' is 1, which is none of its nodes"),
+    (lambda d: d["relations"][1].update(fixed=1), "'fixed' is 1, which is not one of its nodes"),
     (lambda d: d["marginals"].append(d["marginals"][0]), "node 2 has a covariance already"),
 ]
 

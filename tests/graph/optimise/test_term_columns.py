@@ -63,7 +63,9 @@ def test_a_relation_in_the_place_of_another_is_one_of_its_own():
 def test_a_node_without_a_place_is_an_error_and_not_the_last_pose():
     positions = np.arange(SIZE)
     positions[PAIRWISE[2].nodes[1]] = -1
-    with pytest.raises(ValueError, match=f"a relation has node {PAIRWISE[2].nodes[1]}, which is no keyframe"):
+    with pytest.raises(
+        ValueError, match=f"a relation has node {PAIRWISE[2].nodes[1]}, which is not a keyframe"
+    ):
         GraphEnergy(SIZE, RELATIONS, positions)
 
 
@@ -73,5 +75,5 @@ def test_a_scan_that_is_attached_to_a_keyframe_is_in_no_energy():
     graph = graph_of(TRUTH, relations, [])
     optimise_graph(graph)
     graph.anchors[1] = 0
-    with pytest.raises(ValueError, match="a relation has node 1, which is no keyframe"):
+    with pytest.raises(ValueError, match="a relation has node 1, which is not a keyframe"):
         optimise_graph(graph)

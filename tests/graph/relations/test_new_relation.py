@@ -224,7 +224,7 @@ def test_it_is_written_and_read_back():
 @pytest.mark.parametrize(
     ("old", "new", "problem"),
     [
-        (b'"nodes":[0,5]', b'"nodes":[0,99]', r"relations\[23\]: node 99 is no keyframe"),
+        (b'"nodes":[0,5]', b'"nodes":[0,99]', r"relations\[23\]: node 99 is not a keyframe"),
         (b'"sigma":0.25', b'"sigma":0', r"relations\[23\]: 'sigma' is not a length above 0"),
         (b'"fix"', b'"fox"', "'type' is not one of pairwise, nscan, fix, range"),
     ],
