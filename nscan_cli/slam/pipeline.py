@@ -10,8 +10,8 @@ from nscan_cli.slam.backend.finish import finish_graph
 from nscan_cli.slam.backend.optimisation import optimise, optimise_if_due
 from nscan_cli.slam.backend.refinement import refine
 from nscan_cli.slam.backend.rejection import reject_contradicting_loops
+from nscan_cli.slam.frontend.break_detection import SegmentTracker, TrackedBatch, tracker_of
 from nscan_cli.slam.frontend.scan_batch import ScanBatch, scan_batches
-from nscan_cli.slam.frontend.track_segments import SegmentTracker, TrackedSegments, tracker_of
 from nscan_cli.slam.keyframes.growing_route import add_keyframes, extend_route
 from nscan_cli.slam.local_matching.match_ahead import MatchAhead
 from nscan_cli.slam.local_matching.match_keyframe import match_keyframe
@@ -37,14 +37,14 @@ def run_slam(state: SlamState, report: Report) -> Graph:
         for scans in scan_batches(
             state.log, state.options.tracking.max_range, state.odometry, state.frozen_scans
         ):
-            for segments in track(tracker, scans, is_last=scans.first + len(scans) == len(state.log)):
-                if add_keyframes(state, segments):
+            for batch in track(tracker, scans, is_last=scans.first + len(scans) == len(state.log)):
+                if add_keyframes(state, batch):
                     # The newest keyframe still collects scans.
                     beside(partial(grow, state, ahead), len(state.keyframes) - 1)
             report(scans.first + len(scans), len(state.keyframes))
         ahead.open()
     state.tracking_restarts, state.tracking_searches = tracker.restarts, tracker.searches
-    state.keyframes.part()
+    state.keyframes.end_segment()
     grow(state, ahead, len(state.keyframes))
     for centre in range(len(state.keyframes) - behind, len(state.keyframes)):
         relate(state, ahead, centre)
@@ -54,7 +54,7 @@ def run_slam(state: SlamState, report: Report) -> Graph:
     return finish_graph(state)
 
 
-def track(tracker: SegmentTracker, scans: ScanBatch, is_last: bool) -> list[TrackedSegments]:
+def track(tracker: SegmentTracker, scans: ScanBatch, is_last: bool) -> list[TrackedBatch]:
     """Step 1: match each scan with the map of the last metres; returns the scans that are settled by it."""
     settled = tracker.follow(scans)
     return settled + tracker.finish() if is_last else settled
@@ -63,7 +63,7 @@ def track(tracker: SegmentTracker, scans: ScanBatch, is_last: bool) -> list[Trac
 def grow(state: SlamState, ahead: MatchAhead, size: int) -> None:
     """Let the first `size` keyframes join the graph; relate those that have enough keyframes after them."""
     for keyframe in state.keyframes.list[len(state.poses) : size]:
-        keyframe.finish()
+        keyframe.make_ndt()
         extend_route(state, keyframe)
         relate(state, ahead, len(state.poses) - 1 - state.options.nscan.behind)
 

@@ -13,8 +13,9 @@ from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.poses import Array, Indices
 from nscan_cli.slam.backend.energy_cache import EnergyCache
 from nscan_cli.slam.backend.schedule import OptimisationSchedule
-from nscan_cli.slam.frontend.odometry_checks import believed_odometry, hanging
-from nscan_cli.slam.keyframes.keyframe import Keyframes, Route, route_of
+from nscan_cli.slam.frontend.odometry_checks import frozen_scans, without_jumps
+from nscan_cli.slam.keyframes.keyframe_selection import Keyframes
+from nscan_cli.slam.keyframes.route import Route, route_of
 from nscan_cli.slam.local_matching.coverage import Coverage
 from nscan_cli.slam.local_matching.joint_relations import MatchNearby, match_neighbours
 from nscan_cli.slam.local_matching.pairwise_relations import match_neighbours_pairwise
@@ -76,7 +77,7 @@ class SlamState:
         """The state before the first scan of a log."""
         odometry, jumps = log.odometry, np.zeros(0, dtype=np.int64)
         if odometry is not None:
-            odometry, jumps = believed_odometry(odometry, log.times)
+            odometry, jumps = without_jumps(odometry, log.times, options.odometry_checks)
         seen = log.ranges[log.ranges < options.tracking.max_range]
         median_range = float(np.median(seen)) if len(seen) else 0.0
         keyframes, chain = (
@@ -84,7 +85,7 @@ class SlamState:
             list[Pairwise](),
         )
         route = route_of(keyframes.list, chain, np.zeros((0, 3)))
-        frozen = hanging(log, odometry)
+        frozen = frozen_scans(log, odometry, options.odometry_checks)
         return cls(log, options, threads, odometry, jumps, frozen, keyframes, route, chain)
 
     @property

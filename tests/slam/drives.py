@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import functools
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -12,9 +12,12 @@ import numpy as np
 from nscan_cli.graph.model import Pairwise
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.poses import Array, compose, relative
-from nscan_cli.slam.frontend.tracked_scans import Tracked
-from nscan_cli.slam.keyframes.keyframe import Keyframe, Keyframes, Route, relations_along, route_of
+from nscan_cli.slam.frontend.tracked_scans import TrackedScan
+from nscan_cli.slam.keyframes.keyframe import Keyframe
+from nscan_cli.slam.keyframes.keyframe_selection import Keyframes
 from nscan_cli.slam.keyframes.options import KeyframeOptions
+from nscan_cli.slam.keyframes.route import Route, chain_relations, route_of
+from nscan_cli.slam.keyframes.tracked_path import TrackedPath
 from nscan_cli.slam.local_matching.joint_relations import LocalMatch, MatchNearby
 from nscan_cli.slam.local_matching.neighbours import choose_neighbours
 from nscan_cli.slam.loop_closure.loop_detector import LoopDetector
@@ -44,17 +47,17 @@ def keyframe_of(scene: Scene, row: int, pose: Array, path: float, seen: Array) -
     """A keyframe at a pose (3,) that saw what there is to see from poses (n, 3), the first its own."""
     log = scene.record_at(seen, seed=row).log()
     poses = compose(pose, relative(seen, seen[0]))
-    scans = [Tracked(place, np.diag([1e5, 1e5, 1e6]), np.eye(3), 0.95, path, True) for place in poses]
+    scans = [TrackedScan(place, np.diag([1e5, 1e5, 1e6]), np.eye(3), 0.95, path, True) for place in poses]
     found = Keyframes(KeyframeOptions(), NScanOptions().gaussians)
     found.add(row, log.points(0), scans[0])
     found.attach(sensed_in(log), found_of(*scans), 1, len(scans))
-    found.part()
+    found.end_segment()
     return found.list[0]
 
 
 def relation_to_previous(keyframes: list[Keyframe]) -> Pairwise:
     """The relation of the last keyframe to the one before."""
-    (relation,) = relations_along(keyframes[-2:], KeyframeOptions())
+    (relation,) = chain_relations(keyframes[-2:], KeyframeOptions())
     return relation
 
 
@@ -219,3 +222,11 @@ def closed_along(
         if places:
             found.append((centre, places))
     return found
+
+
+def exact_path(relations: Iterable[Pairwise]) -> TrackedPath:
+    """The path of these relations, without slips."""
+    path = TrackedPath(0.0, 0.0)
+    for relation in relations:
+        path.extend(relation, 0.0)
+    return path

@@ -18,7 +18,7 @@ from nscan_cli.logs.reading_options import ReadingOptions
 from nscan_cli.poses import Array
 from nscan_cli.slam.frontend.options import TrackingOptions
 from nscan_cli.slam.frontend.scan_batch import ScanBatch
-from nscan_cli.slam.frontend.tracked_scans import Tracked, TrackedScans
+from nscan_cli.slam.frontend.tracked_scans import TrackedScan, TrackedScans
 from nscan_cli.slam.frontend.tracker import Tracker
 from nscan_cli.slam.options import NScanOptions, Relations, SlamOptions
 from nscan_cli.slam.pipeline import run_slam
@@ -103,7 +103,7 @@ def without_returns(log: LaserLog, rows: Rows, reading: float = np.inf) -> Laser
     return dataclasses.replace(log, ranges=ranges)
 
 
-def tracked(log: LaserLog, options: TrackingOptions | None = None) -> tuple[list[Tracked], Tracker]:
+def tracked(log: LaserLog, options: TrackingOptions | None = None) -> tuple[list[TrackedScan], Tracker]:
     """Step 1 alone, over a whole log."""
     tracker = Tracker(options or TrackingOptions())
     return scans_of(tracker.track(sensed_in(log))), tracker
@@ -120,18 +120,18 @@ def sensed_in(log: LaserLog) -> ScanBatch:
     return sensed([log.points(row) for row in range(len(log))], log.odometry)
 
 
-def scans_of(found: TrackedScans) -> list[Tracked]:
+def scans_of(found: TrackedScans) -> list[TrackedScan]:
     """One by one."""
     return [found.scan(k) for k in range(len(found.paths))]
 
 
-def found_of(*scans: Tracked) -> TrackedScans:
+def found_of(*scans: TrackedScan) -> TrackedScans:
     """The same as columns; the objective's value is nobody's."""
-    names = ("pose", "hessian", "expected", "inliers", "path", "joined", "off")
+    names = ("pose", "hessian", "prior_covariance", "inliers", "path", "in_map", "odometry_sigmas")
     columns = ([getattr(scan, name) for scan in scans] for name in names)
     return TrackedScans(np.full(len(scans), np.nan), *map(np.array, columns))
 
 
-def poses_of(found: list[Tracked]) -> Array:
+def poses_of(found: list[TrackedScan]) -> Array:
     """(S, 3)"""
     return np.array([scan.pose for scan in found])

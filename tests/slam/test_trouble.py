@@ -15,8 +15,8 @@ from nscan_cli.logs.load import read_log
 from nscan_cli.logs.reading_options import ReadingOptions
 from nscan_cli.poses import Array, relative
 from nscan_cli.slam.diagnostics.notices import notices
-from nscan_cli.slam.frontend.odometry_checks import believed_odometry, hanging
-from nscan_cli.slam.frontend.options import BreakOptions
+from nscan_cli.slam.frontend.odometry_checks import frozen_scans, without_jumps
+from nscan_cli.slam.frontend.options import BreakOptions, OdometryCheckOptions
 from tests.data import data_file
 from tests.simulation import trouble
 from tests.slam import troubles
@@ -31,6 +31,7 @@ MENDED = ("3 m without a return", "3 m of nan", "15 m without a return", "3 s of
           "people who pass")  # fmt: skip
 """As if it had not happened."""
 FOUND_AGAIN = ("carried by 2 m", "carried by 5 m", "carried by 30 m", "kidnapped to a place seen before")
+CHECKS = OdometryCheckOptions()
 NEVER_SEEN_AGAIN = "carried by 30 m, nothing seen again"
 
 
@@ -74,13 +75,13 @@ def test_a_robot_that_was_carried_is_found_again_by_a_loop(name, odometry):
 def test_what_went_wrong_is_said_by_the_numbers_of_the_scans():
     made, found = case("carried by 5 m")
     state, numbers = copy.copy(found.state), made.log.numbers
-    broken = f"tracking broke at scan {numbers[made.before]}; of the way there nothing is known"
+    broken = f"tracking broke at scan {numbers[made.before]}; the motion to there is unknown"
     assert notices(state) == [broken]
     state.odometry_jumps, state.frozen_scans = np.arange(12), np.array([3, 7])
     several = ", ".join(str(number) for number in numbers[:10])
     assert notices(state)[1:] == [
-        f"the odometry jumps at scans {several} and 2 more; these steps are not believed",
-        f"the laser repeats itself at scans {numbers[3]}, {numbers[7]}; these are not matched",
+        f"the odometry jumps at scans {several} and 2 more; each is replaced by the step before it",
+        f"the laser repeats itself at scans {numbers[3]}, {numbers[7]}; these scans are not matched",
     ]
 
 
@@ -89,8 +90,8 @@ def test_without_odometry_a_jump_along_a_corridor_is_said():
     made, found = case("carried by 10 m", odometry=False)
     assert errors(made, found.graph.poses).whole > 5.0
     said = (
-        f"the scans jump at scan {made.log.numbers[made.before]}, farther than the robot drives from one to "
-        "the next: scans are missing, it was carried, or tracking has slipped; how far it came is not known"
+        f"the scans jump at scan {made.log.numbers[made.before]}, farther than the robot drives between "
+        "two scans: scans are missing, it was carried, or tracking slipped; how far it moved is unknown"
     )
     assert said in notices(found.state)
     assert notices(case("none", odometry=False)[1].state) == []
@@ -174,18 +175,18 @@ def steady(scans: int = 150, step: float = 0.1) -> Array:
 
 def test_odometry_without_jumps_is_left_alone():
     odometry = steady()
-    believed, jumps = believed_odometry(odometry, clock(150))
+    believed, jumps = without_jumps(odometry, clock(150), CHECKS)
     assert believed is odometry
     assert len(jumps) == 0
     # Two scans, or one, say nothing of what is usual.
     for few in (1, 2):
-        assert len(believed_odometry(odometry[:few], clock(few))[1]) == 0
+        assert len(without_jumps(odometry[:few], clock(few), CHECKS)[1]) == 0
 
 
 def test_a_reset_goes_on_as_in_the_step_before():
     odometry = steady()
     odometry[20:] = relative(odometry[20:], odometry[20])
-    believed, jumps = believed_odometry(odometry, clock(150))
+    believed, jumps = without_jumps(odometry, clock(150), CHECKS)
     assert jumps.tolist() == [20]
     np.testing.assert_allclose(
         relative(believed[1:], believed[:-1]),
@@ -197,21 +198,21 @@ def test_a_reset_goes_on_as_in_the_step_before():
 def test_a_pause_in_which_the_robot_drove_on_is_believed():
     """2 m from scan to scan where 0.1 m are usual: 2 s of scans are missing."""
     rows = np.delete(np.arange(150), np.arange(20, 39))
-    _, jumps = believed_odometry(steady()[rows], clock(150)[rows])
+    _, jumps = without_jumps(steady()[rows], clock(150)[rows], CHECKS)
     assert len(jumps) == 0
-    _, jumps = believed_odometry(steady()[rows], clock(len(rows)))
+    _, jumps = without_jumps(steady()[rows], clock(len(rows)), CHECKS)
     assert jumps.tolist() == [20]
 
 
 def test_a_laser_hangs_only_if_the_robot_moves():
     moves = trouble.frozen(log(), slice(40, 45))
-    assert hanging(moves, moves.odometry).tolist() == list(range(40, 45))
-    assert hanging(moves, None).tolist() == []
+    assert frozen_scans(moves, moves.odometry, CHECKS).tolist() == list(range(40, 45))
+    assert frozen_scans(moves, None, CHECKS).tolist() == []
     assert moves.odometry is not None
     stands = np.repeat(moves.odometry[:1], len(moves), axis=0)
-    assert hanging(moves, stands).tolist() == []
+    assert frozen_scans(moves, stands, CHECKS).tolist() == []
     # Where nothing is met, nothing repeats.
-    assert hanging(trouble.blind(log(), slice(40, 45)), moves.odometry).tolist() == []
+    assert frozen_scans(trouble.blind(log(), slice(40, 45)), moves.odometry, CHECKS).tolist() == []
 
 
 # ----------------------------------------------------------------------------- real logs

@@ -53,13 +53,13 @@ REAL: dict[str, tuple[ReadingOptions, dict[str, Make]]] = {
 
 
 TOLD = {
-    "there are no scans": "scans are missing",
+    "scans are missing before": "scans are missing",
     "disagree": "odometry and scans disagree",
     "contradict": "relations contradict each other",
     "other things": "scans see other things",
-    "looked through": "places do not look as before",
+    "looks through": "places do not look as before",
     "the scans jump": "the scans jump",
-    "it hangs, or": "the laser hangs, or the robot stands",
+    "it is frozen, or": "the laser hangs, or the robot stands",
 }
 """Words of a notice → what the table says of it."""
 

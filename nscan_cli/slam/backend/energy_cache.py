@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from nscan_cli.graph.optimise.graph_energy import GraphEnergy
 from nscan_cli.graph.optimise.term_columns import TermCache
 from nscan_cli.graph.relations.base import Relation
-from nscan_cli.slam.keyframes.keyframe import Route
+from nscan_cli.slam.keyframes.route import Route
 
 
 class EnergyCache:

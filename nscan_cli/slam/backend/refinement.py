@@ -18,7 +18,7 @@ from nscan_cli.matching.pose_kernels import relative_pose, wrapped
 from nscan_cli.poses import Array, Indices
 from nscan_cli.slam.backend.optimisation import optimise
 from nscan_cli.slam.backend.rejection import reject_contradicting_loops
-from nscan_cli.slam.keyframes.keyframe import Route
+from nscan_cli.slam.keyframes.route import Route
 from nscan_cli.slam.local_matching.coverage import Coverage
 from nscan_cli.slam.local_matching.joint_relations import LocalMatch, MatchNearby
 from nscan_cli.slam.local_matching.neighbours import Neighbours, choose_neighbours

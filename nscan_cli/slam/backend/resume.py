@@ -21,7 +21,7 @@ from nscan_cli.slam.backend.refinement import refine
 from nscan_cli.slam.backend.rejection import reject_contradicting_loops
 from nscan_cli.slam.frontend.scan_batch import scan_batches
 from nscan_cli.slam.frontend.tracked_scans import TrackedScans
-from nscan_cli.slam.keyframes.keyframe import route_of
+from nscan_cli.slam.keyframes.route import route_of
 from nscan_cli.slam.local_matching.joint_relations import LocalMatch
 from nscan_cli.slam.loop_closure.loop_detector import NO_SECOND, SO_FAR_OFF
 from nscan_cli.slam.loop_closure.place_search import AMBIGUOUS, ELSEWHERE, NO_MATCH, Place
@@ -111,27 +111,27 @@ def _add_keyframes(state: SlamState, graph: Graph, breaks: set[int]) -> None:
         those = found.part(scans.first, scans.first + len(scans))
         for k, row in enumerate(range(scans.first, scans.first + len(scans))):
             if row in breaks:
-                keyframes.part()
+                keyframes.end_segment()
             if graph.anchors[row] == row:
                 keyframes.add(row, scans.of(k), those.scan(k))
                 for whole in keyframes.list[-2:-1]:
-                    whole.finish()
+                    whole.make_ndt()
             else:
                 keyframes.attach(scans, those, k, k + 1)
-    keyframes.part()
+    keyframes.end_segment()
 
 
 def _as_tracked(graph: Graph, breaks: set[int], options: SlamOptions) -> TrackedScans:
     """The scans as if tracking had found them at the graph's poses, and knew nothing of how well."""
     found, step, path = TrackedScans.room(len(graph)), options.tracking.min_motion, 0.0
     found.poses[:], found.values[:], found.inliers[:] = graph.poses, 0.0, 1.0
-    found.hessians[:], found.expected[:], found.off[:] = 0.0, 0.0, 0.0
+    found.hessians[:], found.prior_covariances[:], found.odometry_sigmas[:] = 0.0, 0.0, 0.0
     joined_at = graph.poses[0]
     for row, pose in enumerate(graph.poses):
         moved = relative(pose, joined_at)
         distance = float(np.hypot(moved[0], moved[1]))
-        found.joined[row] = row == 0 or distance > step or abs(moved[2]) > step
-        if found.joined[row]:
+        found.in_map[row] = row == 0 or distance > step or abs(moved[2]) > step
+        if found.in_map[row]:
             path, joined_at = path + distance, pose
         if row in breaks:
             path += options.breaks.path

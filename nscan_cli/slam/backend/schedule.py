@@ -10,7 +10,7 @@ from collections.abc import Sequence
 
 from nscan_cli.graph.relations.base import Relation
 from nscan_cli.slam.backend.subgraph import Subgraph, held_by_others, nearest_keyframes
-from nscan_cli.slam.keyframes.keyframe import Route
+from nscan_cli.slam.keyframes.route import Route
 from nscan_cli.slam.options import GrowthOptions
 
 

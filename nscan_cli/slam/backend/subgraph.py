@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from nscan_cli.graph.relations.base import Relation
 from nscan_cli.kernels.decorators import kernel
 from nscan_cli.poses import Array
-from nscan_cli.slam.keyframes.keyframe import Route
+from nscan_cli.slam.keyframes.route import Route
 
 Chosen = NDArray[np.bool_]
 """(K,) keyframes of a graph."""

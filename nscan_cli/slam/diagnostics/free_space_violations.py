@@ -1,11 +1,11 @@
-"""Where one visit looks through what another one saw: what stands still does not let it.
+"""Free-space violations: where one visit of a place looks through what another one saw.
 
 A joint match asks where points meet walls. In a corridor they do 6 m farther on, too, and a map that is wrong
-by so much closes its loops without any contradiction between relations. What gives it away are the beams
-that end behind a wall: there the other visit stood before a door.
+by this much closes its loops without any contradiction between relations. The beams that end behind a wall
+give it away: from there the other visit saw a door.
 
-Glass, people and low things are looked through in a sound map, too, in one building more than in another. How
-much is usual, the same comparison within a visit tells: there the map is right.
+Glass, people and low things are looked through in a sound map, too, in one building more than in another. The
+same comparison within a visit, where the map is right, measures how much is usual.
 """
 
 from __future__ import annotations
@@ -19,48 +19,26 @@ from nscan_cli.kernels.decorators import kernel, leaf_kernel
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.matching.pose_kernels import relative_pose
 from nscan_cli.poses import Array, Indices, inverse, transform
-from nscan_cli.slam.keyframes.keyframe import Route
+from nscan_cli.slam.diagnostics.options import FreeSpaceOptions
+from nscan_cli.slam.keyframes.route import Route
 from nscan_cli.slam.options import NScanOptions
 from nscan_cli.threads import map_in_threads
 
-STRETCH = 40
-"""Keyframes that came by again, one after another, are judged together. What differs in a sound map is seen
-from few: the worst ten of fr-campus look through 24 % of what was there before, the worst forty 8 %."""
-AT_A_TIME = 64
-"""Keyframes that a thread compares."""
-LEAST_KEYFRAMES = 3
-LEAST_POINTS = 50
-"""Of a keyframe that counts so many must lie within what earlier visits saw."""
-COMPARED = 8
-"""Earlier keyframes of other visits that one is compared with, the nearest, and of its own."""
-TIMES, MORE = 2.5, 0.01
-"""A sound map explains so many times what is looked through within a visit, and so much more. In real
-buildings it is 0.5 to 1.6 times as much, without odometry too; in simulated maps that are metres wrong, 4 to
-300 times;"""
-MOST = 0.15
-"""and no more than this. It is 8 % in mit-killian and fr-campus; in maps of these that are metres wrong, 26 %
-and more."""
-APART = 0.2
-"""A point lies clearly before what was measured there with so much (m),"""
-APART_PER_METRE = 0.02
-"""and so much more for each metre of its range; of four neighbouring beams the shortest counts."""
+KEYFRAMES_PER_THREAD = 64
+"""Keyframes that a thread compares at a time."""
 
 
 class FreeSpaceViolation(NamedTuple):
     """The stretch of the path whose keyframes contradict earlier visits most."""
 
     share: float
-    """Of the points that the other visit has in view, as many were looked through."""
+    """Share of the points in view of another visit that it looked through."""
     within: float
     """The greatest such share of a stretch within visits; nan where too little was compared."""
     first: int
-    """Rows of the first keyframe of the stretch and of its last."""
+    """Row of the first keyframe of the stretch."""
     last: int
-
-    @property
-    def most(self) -> float:
-        """The greatest share that a sound map explains."""
-        return MOST if np.isnan(self.within) else min(TIMES * self.within + MORE, MOST)
+    """Row of its last keyframe."""
 
 
 class VisitViews(NamedTuple):
@@ -75,17 +53,35 @@ class VisitViews(NamedTuple):
     ends: Indices
     """(K + 1,) scan k has points[ends[k] : ends[k + 1]]."""
     ranges: NDArray[np.float32]
-    """(K, B) m; what is not finite tells nothing."""
+    """(K, B) m, not finite where nothing is known."""
     beams: Array
     """(K, 2) direction of the first beam, and from one to the next, rad."""
 
 
-def free_space_violations(
-    log: LaserLog, route: Route, options: NScanOptions, threads: int = 1
-) -> FreeSpaceViolation | None:
-    """The worst stretch of the route's K keyframes where it is; None where no place was seen again.
+class _Comparison(NamedTuple):
+    """What is compared; see FreeSpaceOptions."""
 
-    Those within the radius that are another visit are compared, as for joint matches.
+    radius: float
+    """Largest distance of two keyframes, m."""
+    recent: float
+    """Length of path up to which two keyframes are of the same visit, m."""
+    compared: int
+    tolerance: float
+    tolerance_per_metre: float
+
+
+def sound_share(within: float, options: FreeSpaceOptions) -> float:
+    """The largest share that a sound map explains, where this share is looked through within visits."""
+    allowed = options.within_factor * within + options.margin
+    return options.max_share if np.isnan(within) else min(allowed, options.max_share)
+
+
+def free_space_violations(
+    log: LaserLog, route: Route, nscan: NScanOptions, options: FreeSpaceOptions, threads: int = 1
+) -> FreeSpaceViolation | None:
+    """The worst stretch of the route's K keyframes; None where no place was seen again.
+
+    Keyframes of other visits within the radius of joint matches are compared.
     """
     rows = route.rows
     if not len(rows) or log.ranges.shape[1] < 2:
@@ -100,19 +96,21 @@ def free_space_violations(
         log.ranges[rows],
         np.stack([log.angle_min[rows], log.angle_increment[rows]], axis=1),
     )
+    bounds = options.compared, options.tolerance, options.tolerance_per_metre
+    comparison = _Comparison(nscan.radius, nscan.recent, *bounds)
     parts = map_in_threads(
         threads,
-        lambda first: _compare(views, first, first + AT_A_TIME, options.radius, options.recent),
-        range(0, len(rows), AT_A_TIME),
+        lambda first: _compare_views(views, first, first + KEYFRAMES_PER_THREAD, comparison),
+        range(0, len(rows), KEYFRAMES_PER_THREAD),
     )
     counts = np.concatenate(parts)
-    again = np.flatnonzero(counts[:, 0].sum(axis=1) >= LEAST_POINTS)
-    if len(again) < LEAST_KEYFRAMES:
+    again = np.flatnonzero(counts[:, 0].sum(axis=1) >= options.min_points)
+    if len(again) < options.min_keyframes:
         return None
-    size = min(STRETCH, len(again))
+    size = min(options.keyframes, len(again))
     sums = np.cumsum(np.concatenate([np.zeros((1, 2, 2), dtype=np.int64), counts[again]]), axis=0)
     compared = sums[size:] - sums[:-size]
-    others, within = compared[:, 0], compared[compared[:, 1].sum(axis=1) >= LEAST_POINTS, 1]
+    others, within = compared[:, 0], compared[compared[:, 1].sum(axis=1) >= options.min_points, 1]
     shares = others[:, 1] / others.sum(axis=1)
     worst = int(np.argmax(shares))
     first, last = rows[again[[worst, worst + size - 1]]].tolist()
@@ -121,44 +119,47 @@ def free_space_violations(
 
 
 @kernel
-def _compare(views: VisitViews, first: int, end: int, radius: float, recent: float) -> NDArray[np.int64]:
-    """What keyframes `first` to `end` and earlier ones see of each other: (k, 2, 2) points.
+def _compare_views(views: VisitViews, first: int, end: int, comparison: _Comparison) -> NDArray[np.int64]:
+    """What keyframes `first` to `end` and earlier ones see of each other: (k, 2, 2) numbers of points.
 
-    First with those of other visits, more than `recent` (m) of path back, then with those of the same one:
-    how many are where the other saw them, and how many it looked through. Compared are the nearest of each
-    within the radius (m).
+    The second axis is other visits, same visit; the third is points where the other saw them, points that it
+    looked through. The nearest keyframes of each kind are compared.
     """
     poses, ends, end = views.poses, views.ends, min(end, len(views.paths))
     counts, pose = np.zeros((end - first, 2, 2), dtype=np.int64), np.empty(3)
     near, distances = np.empty(end, dtype=np.int64), np.empty(end)
     for k in range(first, end):
-        # A laser that hangs saw nothing that could be compared.
+        # Of a frozen laser nothing can be compared.
         if ends[k + 1] == ends[k]:
             continue
         for within in range(2):
             n = 0
             for j in range(k):
-                is_recent = views.paths[k] - views.paths[j] <= recent
+                is_recent = views.paths[k] - views.paths[j] <= comparison.recent
                 if is_recent != (within == 1) or ends[j + 1] == ends[j]:
                     continue
                 distance = np.hypot(poses[j, 0] - poses[k, 0], poses[j, 1] - poses[k, 1])
-                if distance <= radius:
+                if distance <= comparison.radius:
                     near[n], distances[n] = j, distance
                     n += 1
             order = np.argsort(distances[:n], kind="mergesort")
-            for at in order[:COMPARED]:
+            for at in order[: comparison.compared]:
                 j = near[at]
                 relative_pose(poses[k], poses[j], pose)
-                _count(views, k, j, pose, counts[k - first, within])
+                _count_violations(views, comparison, k, j, pose, counts[k - first, within])
                 relative_pose(poses[j], poses[k], pose)
-                _count(views, j, k, pose, counts[k - first, within])
+                _count_violations(views, comparison, j, k, pose, counts[k - first, within])
     return counts
 
 
 @leaf_kernel
-def _count(views: VisitViews, seen: int, by: int, pose: Array, counts: NDArray[np.int64]) -> None:
-    """Add how many points of the scan `seen`, at a pose (3,) relative to the laser of another, that one saw
-    where they are, and how many it looked through. What is hidden from it does not count."""
+def _count_violations(
+    views: VisitViews, comparison: _Comparison, seen: int, by: int, pose: Array, counts: NDArray[np.int64]
+) -> None:
+    """Add to the counts (2,) the points of scan `seen` that scan `by` saw too, and those it looked through.
+
+    `pose` (3,) is that of the first laser relative to the second. Points hidden from the second do not count.
+    """
     ranges, first, between = views.ranges[by], views.beams[by, 0], views.beams[by, 1]
     cos, sin = np.cos(pose[2]), np.sin(pose[2])
     if between == 0.0:
@@ -167,7 +168,7 @@ def _count(views: VisitViews, seen: int, by: int, pose: Array, counts: NDArray[n
         x = cos * views.points[p, 0] - sin * views.points[p, 1] + pose[0]
         y = sin * views.points[p, 0] + cos * views.points[p, 1] + pose[1]
         turned = np.arctan2(y, x) - first
-        # Counted on from the first beam, whichever way the laser turns.
+        # From the first beam on, whichever way the laser turns.
         turned -= 2 * np.pi * np.floor(turned / (2 * np.pi))
         beam = int(np.floor((turned if between > 0.0 else turned - 2 * np.pi) / between))
         if beam + 1 >= len(ranges) or not (np.isfinite(ranges[beam]) and np.isfinite(ranges[beam + 1])):
@@ -177,8 +178,8 @@ def _count(views: VisitViews, seen: int, by: int, pose: Array, counts: NDArray[n
             if np.isfinite(ranges[b]):
                 shortest, longest = min(shortest, float(ranges[b])), max(longest, float(ranges[b]))
         distance = np.hypot(x, y)
-        apart = APART + APART_PER_METRE * distance
-        if distance < shortest - apart:
+        tolerance = comparison.tolerance + comparison.tolerance_per_metre * distance
+        if distance < shortest - tolerance:
             counts[1] += 1
-        elif distance <= longest + apart:
+        elif distance <= longest + tolerance:
             counts[0] += 1

@@ -1,8 +1,8 @@
 """Where odometry and scans disagree about how far the robot came.
 
-Tracking believes the scans: wheels spin, and some count the way back as one ahead. But along a bare corridor,
-behind glass, or with somebody who walks along, scans tell of less way than there was, and nothing but the
-odometry knows.
+Tracking trusts the scans: wheels spin, and some count the way back as one ahead. But along a bare corridor,
+behind glass, or beside somebody who walks along, scans show less motion than there was, and only the odometry
+knows.
 """
 
 from __future__ import annotations
@@ -13,42 +13,40 @@ from typing import NamedTuple
 import numpy as np
 
 from nscan_cli.poses import Array, Indices
-
-STRETCH = 5.0
-"""It is compared how far the robot came, from end to end, in so many metres of way: in less, noise counts too
-much. Where it turns, the length of its way from keyframe to keyframe depends on how many there are."""
-SHARE = 0.4
-"""They disagree when one has come farther than the other by more than this share of the way. Odometry that is
-sound is off by little more than half of this at most, with disturbed steps too."""
+from nscan_cli.slam.diagnostics.options import OdometryDisagreementOptions
 
 
 class OdometryDisagreement(NamedTuple):
     """A stretch of the path."""
 
     first: int
-    """Rows of the keyframes at its ends."""
+    """Row of its first keyframe."""
     last: int
+    """Row of its last keyframe."""
     by_odometry: float
-    """How far the robot came in one stretch after the other, m."""
+    """Distance that the robot came by odometry, m."""
     by_scans: float
+    """The same by the scans, m."""
 
 
 def odometry_disagreements(
-    rows: Indices, poses: Array, odometry: Array, breaks: Sequence[int]
+    rows: Indices, poses: Array, odometry: Array, breaks: Sequence[int], options: OdometryDisagreementOptions
 ) -> list[OdometryDisagreement]:
     """The stretches over which they disagree, of K keyframes in rows (K,), at poses (K, 3).
 
-    Odometry (S, 3) has all scans; nothing is compared over the rows at which tracking broke.
+    Odometry (S, 3) is that of all scans. Nothing is compared over the rows `breaks`, at which tracking broke.
+    From end to end of a stretch is compared: the length of the path between depends on how many keyframes
+    there are where the robot turns.
     """
     pieces = np.searchsorted(np.asarray(breaks, dtype=np.int64), rows, side="right")
     tracks = np.stack([odometry[rows, :2], poses[:, :2]])
     steps = np.linalg.norm(np.diff(tracks, axis=1), axis=2).max(axis=0)
     along = np.cumsum(np.append(0.0, np.where(pieces[1:] > pieces[:-1], 0.0, steps)))
-    until = np.searchsorted(along, along + STRETCH)
+    until = np.searchsorted(along, along + options.path)
     since = np.flatnonzero(until < len(rows))
     since = since[pieces[since] == pieces[until[since]]]
     came = np.linalg.norm(tracks[:, until[since]] - tracks[:, since], axis=2)
-    wrong = since[np.abs(came[0] - came[1]) > SHARE * (along[until[since]] - along[since])]
+    wrong = since[np.abs(came[0] - came[1]) > options.max_share * (along[until[since]] - along[since])]
     # Stretches that overlap are one.
     change = np.zeros(len(rows) + 1, dtype=np.int64)
     np.add.at(change, wrong, 1)
@@ -70,6 +68,6 @@ def _ends(until: Indices, first: int, last: int) -> list[int]:
 
 
 def _lengths(tracks: Array) -> Array:
-    """(2,) of two ways (2, n, 2), straight from position to position, m."""
+    """(2,) lengths of two paths (2, n, 2), straight from position to position, m."""
     lengths: Array = np.linalg.norm(np.diff(tracks, axis=1), axis=2).sum(axis=1)
     return lengths

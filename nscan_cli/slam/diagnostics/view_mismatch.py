@@ -1,7 +1,7 @@
 """Scans that see other things than the keyframe beside which tracking has them.
 
-Someone who walks along with the robot stands still as it sees him. Tracking can hold on to him while the
-corridor goes by: the robot seems to stand, and half of its beams meet something else every second.
+Someone who walks along with the robot seems to stand still. Tracking can hold on to him while the corridor
+goes by: the robot seems to stand, too, and half of its beams meet other things every second.
 """
 
 from __future__ import annotations
@@ -14,28 +14,25 @@ from nscan_cli.kernels.decorators import kernel
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.matching.pose_kernels import relative_pose
 from nscan_cli.poses import Array, Indices
-from nscan_cli.slam.frontend.options import BreakOptions
-from nscan_cli.slam.frontend.view_similarity import BEARINGS, nearest_ranges, share_alike
+from nscan_cli.slam.diagnostics.options import ViewMismatchOptions
+from nscan_cli.slam.frontend.options import ViewSimilarityOptions
+from nscan_cli.slam.frontend.view_similarity import ViewSimilarityParameters, nearest_ranges, share_alike
 from nscan_cli.slam.keyframes.keyframe import Keyframe
 from nscan_cli.threads import map_in_threads
 
-AT_A_TIME = 256
-"""Scans that a thread compares."""
-TOGETHER = 10
-"""Scans that are judged together: someone who comes close hides what was seen for a moment."""
-LEAST = 0.25
-"""In such a share of bearings scans see the same as their keyframe, on the average of those. It is 0.53 or
-more in four real buildings, 0.40 outdoors, and 0.02 to 0.24 where someone walks along."""
+SCANS_PER_THREAD = 256
+"""Scans that a thread compares at a time."""
 
 
 class ViewMismatch(NamedTuple):
     """A stretch of scans that see other things."""
 
     first: int
-    """Rows of its first scan and of its last."""
+    """Row of its first scan."""
     last: int
+    """Row of its last scan."""
     share: float
-    """The least share of bearings in which scans that are judged together see the same as their keyframe."""
+    """Least mean share of sectors in which scans judged together see the same as their keyframe."""
 
 
 class KeyframeViews(NamedTuple):
@@ -55,14 +52,14 @@ def view_mismatches(
     log: LaserLog,
     poses: Array,
     keyframes: list[Keyframe],
-    reach: float,
-    breaking: BreakOptions,
+    max_range: float,
+    similarity: ViewSimilarityOptions,
+    options: ViewMismatchOptions,
     threads: int = 1,
 ) -> ViewMismatch | None:
-    """The first stretch of scans that see other things than the keyframe before them, and of it the worst.
+    """The first stretch of scans that see other things than the keyframe before them; None without any.
 
-    `poses` (S, 3) are those of all scans as tracked, `reach` (m) is how far points are matched. None where
-    all scans see what they should.
+    `poses` (S, 3) are those of all scans as tracked, `max_range` (m) is that of the points that are matched.
     """
     if not keyframes:
         return None
@@ -73,39 +70,40 @@ def view_mismatches(
         np.concatenate(points),
         np.cumsum([0, *map(len, points)]),
     )
-    bounds = breaking.view.tolerance, breaking.view.tolerance_per_metre
+    settings = ViewSimilarityParameters.of(similarity)
     shares = np.concatenate(
         map_in_threads(
             threads,
             lambda first: _shares(
-                views, first, *log.points_of(slice(first, first + AT_A_TIME), reach), *bounds
+                views, first, *log.points_of(slice(first, first + SCANS_PER_THREAD), max_range), settings
             ),
-            range(0, len(log), AT_A_TIME),
+            range(0, len(log), SCANS_PER_THREAD),
         )
     )
     told = np.flatnonzero(np.isfinite(shares))
-    if len(told) < TOGETHER:
+    together = options.scans
+    if len(told) < together:
         return None
-    means = np.convolve(shares[told], np.full(TOGETHER, 1 / TOGETHER), "valid")
-    low = np.flatnonzero(means < LEAST)
+    means = np.convolve(shares[told], np.full(together, 1 / together), "valid")
+    low = np.flatnonzero(means < options.min_similarity)
     if not len(low):
         return None
-    # Those that follow each other without a gap longer than what is judged together.
-    end = int(np.append(np.flatnonzero(np.diff(low) > TOGETHER), len(low) - 1)[0])
-    first, last = told[[low[0], low[end] + TOGETHER - 1]].tolist()
+    # The first run of them, without a gap longer than what is judged together.
+    end = int(np.append(np.flatnonzero(np.diff(low) > together), len(low) - 1)[0])
+    first, last = told[[low[0], low[end] + together - 1]].tolist()
     return ViewMismatch(first, last, float(means[low[: end + 1]].min()))
 
 
 @kernel
 def _shares(
-    views: KeyframeViews, first: int, points: Array, ends: Indices, apart: float, apart_per_metre: float
+    views: KeyframeViews, first: int, points: Array, ends: Indices, settings: ViewSimilarityParameters
 ) -> Array:
-    """(n,) in which share of bearings scans from row `first` on see the same as the keyframe before them.
+    """(n,) the share of sectors in which scans from row `first` on see the same as the keyframe before them.
 
-    Scan k of them has points[ends[k] : ends[k + 1]]; nan for keyframes, and where too little tells.
+    Scan k of them has points[ends[k] : ends[k + 1]]; nan for keyframes, and where too few can be compared.
     """
     shares, pose = np.full(len(ends) - 1, np.nan), np.empty(3)
-    own, other = np.empty(BEARINGS), np.empty(BEARINGS)
+    own, other = np.empty(settings.sectors), np.empty(settings.sectors)
     for k in range(len(shares)):
         row = first + k
         at = np.searchsorted(views.rows, row, side="right") - 1
@@ -115,5 +113,5 @@ def _shares(
         nearest_ranges(views.points[views.ends[at] : views.ends[at + 1]], pose, other)
         pose[:] = 0.0
         nearest_ranges(points[ends[k] : ends[k + 1]], pose, own)
-        shares[k] = share_alike(own, other, apart, apart_per_metre)
+        shares[k] = share_alike(own, other, settings)
     return shares

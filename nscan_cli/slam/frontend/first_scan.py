@@ -1,8 +1,7 @@
-"""Step 1 of the loop, where a track begins: the first scan, matched with those after it.
+"""Step 1 where a track segment begins: the first scan is matched with those after it.
 
-The second scan has nothing but the first to be matched with, the third two; so what the second one is off by
-stays the first one's error, while all later ones agree with each other. Seen from the first keyframe, the
-whole map is then turned by it.
+The second scan has nothing but the first to be matched with, the third has two. So the error of that match
+stays with the first scan, while all later ones agree with each other, and the whole map is turned by it.
 """
 
 from __future__ import annotations
@@ -18,27 +17,21 @@ from nscan_cli.slam.frontend.scan_to_map import match_and_count
 from nscan_cli.slam.frontend.tracked_scans import TrackedScans
 from nscan_cli.slam.frontend.tracking_parameters import TrackingParameters
 
-PATH = 5.0
-"""Those after it are the scans of so much path, m,"""
-SCANS = 2_000
-"""and no more than these: a robot may stand for hours."""
-
 
 def place_first(scans: ScanBatch, found: TrackedScans, options: TrackingOptions) -> Array:
-    """The pose (3,) of the first of some scans where the others have it.
+    """The pose (3,) of the first of some scans, matched with the others; the step to the next is the prior.
 
-    The odometry between it and the next one holds what these leave open. It stays where it was found when
-    they do not see what it sees.
+    It stays where it was found if too few of its points are inliers.
     """
     first: Array = found.poses[0]
-    joined = np.flatnonzero(found.joined[1:]) + 1
+    joined = np.flatnonzero(found.in_map[1:]) + 1
     if not len(joined):
         return first
     gaussians = options.gaussians
     points, ends = scans.chosen(joined)
     ndt = Ndt.of_scans(points, ends, found.poses[joined], gaussians.cell, gaussians.minimum, gaussians.floor)
     pose, hessian = first.copy(), np.empty((3, 3))
-    step: Array = np.linalg.inv(found.expected[1]).astype(np.float64)
+    step: Array = np.linalg.inv(found.prior_covariances[1]).astype(np.float64)
     prior = Prior(first, step)
     _, inliers = match_and_count(ndt.grid, TrackingParameters.of(options), scans.of(0), prior, pose, hessian)
     return pose if inliers >= options.restart_inliers else first

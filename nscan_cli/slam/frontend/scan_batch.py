@@ -1,4 +1,4 @@
-"""What the robot sensed, as tracking takes it: scans of the log that follow each other, laid end to end."""
+"""Scans as tracking takes them: some that follow each other in the log, with their points laid end to end."""
 
 from __future__ import annotations
 
@@ -17,22 +17,22 @@ SCANS_PER_BATCH = 128
 
 @dataclass(frozen=True)
 class ScanBatch:
-    """n scans that follow each other, and what the odometry says."""
+    """n scans that follow each other, and their odometry."""
 
     first: int
-    """The row of the first of them in the log."""
+    """Row of the first scan in the log."""
     points: Array
-    """(P, 2) of these and maybe of other scans, one after another, each in its robot's frame."""
+    """(P, 2) of these and maybe other scans, one after another, each in its robot's frame."""
     ends: Indices
     """(n + 1,) scan k has points[ends[k] : ends[k + 1]]."""
     odometry: Array | None
-    """(n, 3) poses of the robot; of all scans or of none."""
+    """(n, 3) poses of the robot, or None."""
 
     def __len__(self) -> int:
         return len(self.ends) - 1
 
     def of(self, k: int) -> Array:
-        """The points (m, 2) of one of them."""
+        """The points (m, 2) of scan k."""
         return self.points[self.ends[k] : self.ends[k + 1]]
 
     def part(self, first: int, end: int) -> ScanBatch:
@@ -41,12 +41,12 @@ class ScanBatch:
         return ScanBatch(self.first + first, self.points, self.ends[first : end + 1], odometry)
 
     def chosen(self, chosen: Indices) -> tuple[Array, Indices]:
-        """The points (P, 2) of some of the scans, of indices (c,), copied, and where they end (c + 1,)."""
-        return _chosen(self.points, self.ends, chosen)
+        """A copy of the points (P, 2) of the scans with indices `chosen` (c,), and their `ends` (c + 1,)."""
+        return _copy_scans(self.points, self.ends, chosen)
 
     @classmethod
     def together(cls, parts: Sequence[ScanBatch]) -> ScanBatch:
-        """The scans of several, of which each begins where the one before ends."""
+        """The scans of several batches, each of which begins where the one before ends."""
         scans = [part.chosen(np.arange(len(part))) for part in parts]
         sizes = np.concatenate([np.diff(ends) for _, ends in scans])
         odometry = [part.odometry for part in parts if part.odometry is not None]
@@ -76,8 +76,8 @@ def scan_batches(log: LaserLog, reach: float, odometry: Array | None, frozen: In
 
 
 @kernel
-def _chosen(points: Array, ends: Indices, chosen: Indices) -> tuple[Array, Indices]:
-    """What `chosen` of Sensed returns."""
+def _copy_scans(points: Array, ends: Indices, chosen: Indices) -> tuple[Array, Indices]:
+    """What ScanBatch.chosen returns."""
     own = np.zeros(len(chosen) + 1, dtype=np.int64)
     for c in range(len(chosen)):
         own[c + 1] = own[c] + ends[chosen[c] + 1] - ends[chosen[c]]

@@ -1,4 +1,4 @@
-"""Step 1: one scan matched with the map of the last metres, from one start."""
+"""Step 1: one scan matched with the local map, from one start."""
 
 from __future__ import annotations
 
@@ -23,7 +23,13 @@ def match_and_count(
     meeting = begin_association(points)
     problem = PairProblem(grid, half, meeting, scale, prior)
     value, _, _, _, _ = minimise_pairwise(
-        problem, pose, widenings, settings.max_iterations, settings.near, settings.tolerance, hessian
+        problem,
+        pose,
+        widenings,
+        settings.max_iterations,
+        settings.coarse_tolerance,
+        settings.tolerance,
+        hessian,
     )
     update_association(grid, half, meeting, pose[0], pose[1], pose[2])
     return value, count_inliers(meeting, settings.inlier_bound) / max(points.shape[0], 1)

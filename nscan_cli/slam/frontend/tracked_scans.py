@@ -13,27 +13,27 @@ from nscan_cli.poses import Array
 
 
 @dataclass(frozen=True)
-class Tracked:
-    """Where a scan was found."""
+class TrackedScan:
+    """What tracking found of one scan."""
 
     pose: Array
     """(3,) of the robot in the tracker's frame."""
     hessian: Array
     """(3, 3) of scale · E there, without the prior."""
-    expected: Array
-    """(3, 3) covariance of the step to here before the match: the odometry's, or of steady motion."""
+    prior_covariance: Array
+    """(3, 3) of the step to here before the match, by odometry or by constant velocity."""
     inliers: float
     """Share of the points that lie on a Gaussian of the map."""
     path: float
     """Length of the path up to here, m."""
-    joined: bool
-    """Whether the scan's points joined the map."""
-    off: float = 0.0
-    """How far it lies off where the odometry has it, in standard deviations of the place; 0 without any."""
+    in_map: bool
+    """Whether the scan's points joined the local map."""
+    odometry_sigmas: float = 0.0
+    """Distance from where the odometry has the scan, in standard deviations; 0 without odometry."""
 
 
 class TrackedScans(NamedTuple):
-    """What tracking finds of n scans, each as Tracked says."""
+    """What tracking finds of n scans, as TrackedScan says, and the objective of each match."""
 
     values: Array
     """(n,) the objective's."""
@@ -41,24 +41,24 @@ class TrackedScans(NamedTuple):
     """(n, 3)"""
     hessians: Array
     """(n, 3, 3)"""
-    expected: Array
+    prior_covariances: Array
     """(n, 3, 3)"""
     inliers: Array
     """(n,)"""
     paths: Array
     """(n,)"""
-    joined: NDArray[np.bool_]
+    in_map: NDArray[np.bool_]
     """(n,)"""
-    off: Array
+    odometry_sigmas: Array
     """(n,)"""
 
     @classmethod
     def room(cls, n: int) -> TrackedScans:
-        """For so many scans."""
-        values, inliers, paths, off = np.empty((4, n))
-        hessians, expected = np.empty((2, n, 3, 3))
-        joined = np.empty(n, dtype=np.bool_)
-        return cls(values, np.empty((n, 3)), hessians, expected, inliers, paths, joined, off)
+        """Columns for n scans, to be filled."""
+        values, inliers, paths, sigmas = np.empty((4, n))
+        hessians, covariances = np.empty((2, n, 3, 3))
+        in_map = np.empty(n, dtype=np.bool_)
+        return cls(values, np.empty((n, 3)), hessians, covariances, inliers, paths, in_map, sigmas)
 
     @classmethod
     def together(cls, parts: Iterable[TrackedScans]) -> TrackedScans:
@@ -70,14 +70,14 @@ class TrackedScans(NamedTuple):
         columns: Iterable[Any] = (column[first:end] for column in self)
         return TrackedScans(*columns)
 
-    def scan(self, k: int) -> Tracked:
+    def scan(self, k: int) -> TrackedScan:
         """That of one scan, with arrays of its own."""
-        return Tracked(
+        return TrackedScan(
             self.poses[k].copy(),
             self.hessians[k].copy(),
-            self.expected[k].copy(),
+            self.prior_covariances[k].copy(),
             float(self.inliers[k]),
             float(self.paths[k]),
-            bool(self.joined[k]),
-            float(self.off[k]),
+            bool(self.in_map[k]),
+            float(self.odometry_sigmas[k]),
         )

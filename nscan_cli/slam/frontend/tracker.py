@@ -1,7 +1,7 @@
-"""Step 1 of the loop (paper, V): the pose of every scan by matching it with the map of the last metres.
+"""Step 1 of the loop (paper, V): the pose of every scan, by matching it with the local map.
 
-The map is one NDT that grows by the scans ahead and loses those behind, in a frame of its own: what
-loops later correct in the graph never tears it.
+The local map is one NDT that grows by the scans ahead and loses those behind. It has a frame of its own, so
+that corrections of the graph by loops never tear it.
 """
 
 from __future__ import annotations
@@ -12,31 +12,25 @@ from nscan_cli.matching.correlative_search import likelihood_field, search
 from nscan_cli.matching.priors import Prior
 from nscan_cli.ndt.transform import Ndt
 from nscan_cli.poses import Array
+from nscan_cli.slam.frontend.local_map import ROWS
 from nscan_cli.slam.frontend.options import TrackingOptions
 from nscan_cli.slam.frontend.scan_batch import ScanBatch
 from nscan_cli.slam.frontend.scan_to_map import match_and_count
+from nscan_cli.slam.frontend.track_state import RESTARTS, TrackState
 from nscan_cli.slam.frontend.tracked_scans import TrackedScans
 from nscan_cli.slam.frontend.tracking_kernels import (
-    LEAST_SCORE,
-    RESTARTS,
-    ROWS,
-    Track,
-    follow,
-    take,
-    told_points,
+    points_in_view,
+    settle,
+    track_scans,
 )
 from nscan_cli.slam.frontend.tracking_parameters import TrackingParameters
 
-RECENT = 5.0
-"""A lost scan is searched among those of the last stretch of path, m."""
-
 
 class Tracker:
-    """Follows the robot from scan to scan. `odometry` tells whether there is any.
+    """Follows the robot from scan to scan. `odometry` says whether the scans have any; `range_limit` in m.
 
-    Without it each face of a wall on the map is no Gaussian of its own: exact ones hold the robot where it is
-    in corridors that come into view, as nothing else does. And the start of a match is a guess: its wide
-    stages are done to their end.
+    Without odometry, the faces of a wall are not Gaussians of their own: exact ones hold the robot in place
+    in corridors that come into view. And all stages converge, since the start of a match is a guess.
     """
 
     def __init__(self, options: TrackingOptions, odometry: bool = True, range_limit: float = np.inf) -> None:
@@ -47,46 +41,48 @@ class Tracker:
         )
         self.searches = 0
         self._settings = TrackingParameters.of(options, odometry, range_limit)
-        self._track = Track.begin(options.velocity_scans + 1)
+        self._track = TrackState.begin(options.velocity_scans + 1, options.degeneracy.initial_sigma)
         self._prior = Prior(np.zeros(3), np.zeros((3, 3)))
 
     @property
     def restarts(self) -> int:
-        """How often scans were matched from more angles."""
+        """How often matches were started from other angles."""
         return int(self._track.counts[RESTARTS])
 
     def track(self, scans: ScanBatch) -> TrackedScans:
-        """Where the next scans are found."""
+        """Track the next scans."""
         n, k = len(scans), 0
         points, ends = scans.points, scans.ends
         odometry = np.full((n, 3), np.nan) if scans.odometry is None else scans.odometry
-        self._track = self._track.with_room(n, int(ends[-1] - ends[0]))
+        roomy = self._track.map.with_room(n, int(ends[-1] - ends[0]))
+        self._track = self._track._replace(map=roomy)
         found = TrackedScans.room(n)
         while k < n:
             self.map.reserve(int(ends[k + 1] - ends[k]))
-            self._track.counts[ROWS] = self.map.rows
+            self._track.map.counts[ROWS] = self.map.rows
             track, grid, settings, prior = self._track, self.map.grid, self._settings, self._prior
-            k = follow(track, grid, settings, points, ends, odometry, k, prior, found)
+            k = track_scans(track, grid, settings, points, ends, odometry, k, prior, found)
             if k < n and np.isfinite(found.inliers[k]):
                 self._search(scans.of(k), found, k)
-                take(track, grid, settings, scans.of(k), odometry[k], prior, found, k)
+                settle(track, grid, settings, scans.of(k), odometry[k], prior, found, k)
                 k += 1
-            self.map.rows = int(self._track.counts[ROWS])
+            self.map.rows = int(self._track.map.counts[ROWS])
         return found
 
     def _search(self, points: Array, found: TrackedScans, k: int) -> None:
-        """Match scan k from where a search among the last scans leads, too; the lower objective counts."""
-        cloud = self._track.recent(RECENT)
+        """Match scan k from where a search among the last scans finds it too; keep the lower objective."""
+        options = self.options
+        cloud = self._track.map.recent_points(options.lost_search_path)
         if not len(cloud) or not len(points):
             return
-        field = likelihood_field(cloud, self.options.lost_search)
-        place = search(field, points, self._prior.mean, LEAST_SCORE, self.options.lost_search)
+        field = likelihood_field(cloud, options.lost_search)
+        place = search(field, points, self._prior.mean, options.lost_inliers, options.lost_search)
         if place is None:
             return
         self.searches += 1
         pose, hessian = place.pose.copy(), np.empty((3, 3))
-        told = told_points(self._track, self._settings, points, self._prior.mean)
-        value, inliers = match_and_count(self.map.grid, self._settings, told, self._prior, pose, hessian)
+        in_view = points_in_view(self._track, self._settings, points, self._prior.mean)
+        value, inliers = match_and_count(self.map.grid, self._settings, in_view, self._prior, pose, hessian)
         if value < found.values[k]:
             found.values[k], found.inliers[k] = value, inliers
             found.poses[k], found.hessians[k] = pose, hessian

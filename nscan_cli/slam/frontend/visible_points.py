@@ -1,9 +1,9 @@
-"""Step 1: the points of a scan of which the map of the last metres can tell, because its scans saw so far.
+"""Step 1: the points of a scan that scans of the local map had in view too.
 
-A laser that sees no farther than a few metres ends a wall where its sight ends. The map has a piece of a wall
-there, in a cell that the next scan sees more of; its points are drawn to the middle of that piece, back to
-where the robot was, by 1 mm a step. In a corridor little speaks against it: with a laser of 4 m the robot
-lost 1.3 % of its way with odometry, and 4 to 10 % without.
+To a laser that sees a few metres, a wall ends at the range limit. The map has a piece of the wall there, in
+a cell that the next scan sees more of. Its points are drawn to the middle of that piece, back to where the
+robot was, by 1 mm a step. In a corridor little holds against it: with a laser of 4 m the robot lost 1.3 % of
+its way with odometry, and 4 to 10 % without.
 """
 
 from __future__ import annotations
@@ -13,31 +13,22 @@ from numpy.typing import NDArray
 
 from nscan_cli.kernels.decorators import kernel
 from nscan_cli.poses import Array
-
-LONGER = 0.001
-"""Share of the ranges that may be longer than the sight: some are no walls."""
-LEAST = 0.01
-"""Sight ends walls if such a share of the ranges ends in the last cell before it. It is 0.1 to 0.4 % with
-lasers of 12 m and more, 2 to 5 % with those of 6 m and less."""
+from nscan_cli.slam.frontend.options import TrackingOptions
 
 
-def sight(ranges: NDArray[np.float32], cell: float) -> float:
-    """How far (m) a laser with such ranges (m) sees, if its sight ends walls, in cells of a side (m).
-
-    Else infinity.
-    """
+def range_limit(ranges: NDArray[np.float32], options: TrackingOptions) -> float:
+    """The range (m) at which walls end for a laser with such ranges (m); infinity if they do not."""
     if not len(ranges):
         return np.inf
-    farthest = float(np.quantile(ranges, 1 - LONGER))
-    return farthest if np.mean(ranges > farthest - cell) >= LEAST else np.inf
+    limit, cell = float(np.quantile(ranges, 1 - options.range_limit_outliers)), options.gaussians.cell
+    return limit if np.mean(ranges > limit - cell) >= options.range_limit_share else np.inf
 
 
 @kernel
 def visible_points(points: Array, pose: Array, placed: Array, far: float) -> Array:
-    """Those of the points (m, 2) that lie within `far` (m) of where a scan of the map was taken.
+    """The points (m, 2) within `far` (m) of where a scan of the map was taken, or of their own `pose` (3,).
 
-    Or of where theirs is expected, at `pose` (3,): the newest of the map was taken a step from there. The
-    first columns of `placed` (W, 4) say where those of the map were, the newest last.
+    The first columns of `placed` (W, 4) are the positions of the map's scans, the newest last.
     """
     seen, n = np.empty((points.shape[0], 2)), 0
     cos, sin = np.cos(pose[2]), np.sin(pose[2])

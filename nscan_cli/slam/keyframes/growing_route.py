@@ -4,24 +4,25 @@ from __future__ import annotations
 
 import numpy as np
 
-from nscan_cli.slam.frontend.track_segments import TrackedSegments
-from nscan_cli.slam.keyframes.keyframe import Keyframe, extended, relations_along, route_of
+from nscan_cli.slam.frontend.break_detection import TrackedBatch
+from nscan_cli.slam.keyframes.keyframe import Keyframe
+from nscan_cli.slam.keyframes.route import chain_relations, extended, route_of
 from nscan_cli.slam.state import SlamState
 
 
-def add_keyframes(state: SlamState, segments: TrackedSegments) -> bool:
+def add_keyframes(state: SlamState, batch: TrackedBatch) -> bool:
     """Choose keyframes among tracked scans; returns whether there are any.
 
     Changes keyframes, chain, tracked and breaks.
     """
     known = len(state.keyframes)
-    if segments.begins:
-        state.keyframes.part()
-    if segments.breaks:
-        state.breaks.append(segments.sensed.first)
-    state.keyframes.take(segments.sensed, segments.found, segments.begins)
-    state.chain += relations_along(state.keyframes.list[max(known - 1, 0) :], state.options.keyframes)
-    state.tracked.append(segments.found.poses)
+    if batch.starts_segment:
+        state.keyframes.end_segment()
+    if batch.after_break:
+        state.breaks.append(batch.scans.first)
+    state.keyframes.select(batch.scans, batch.tracked, batch.starts_segment)
+    state.chain += chain_relations(state.keyframes.list[max(known - 1, 0) :], state.options.keyframes)
+    state.tracked.append(batch.tracked.poses)
     return len(state.keyframes) > known
 
 

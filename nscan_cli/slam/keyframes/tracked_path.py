@@ -1,8 +1,7 @@
-"""The way as tracking has it, with the slips allowed for that it does not know of (paper, V: large loops)."""
+"""The tracked path with the uncertainty of slips that tracking does not notice (paper, V: large loops)."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from dataclasses import replace
 
 import numpy as np
@@ -14,22 +13,13 @@ from nscan_cli.poses import Array
 
 
 class TrackedPath:
-    """The relations from each keyframe to the next. `drift` (m/√m) and `drift_angle` (rad/√m) are those of
-    slips."""
+    """The relations from each keyframe to the next. Slips add `drift` (m/√m) and `drift_angle` (rad/√m)."""
 
     def __init__(self, drift: float, drift_angle: float) -> None:
         self.relations: list[Pairwise] = []
         """`relations[k]` leads from keyframe k to k + 1."""
         self._variances = drift**2, drift**2, drift_angle**2
         self._covariances = np.empty((16, 3, 3))
-
-    @classmethod
-    def without_slips(cls, relations: Iterable[Pairwise]) -> TrackedPath:
-        """One of which tracking knows all."""
-        way = cls(0.0, 0.0)
-        for relation in relations:
-            way.extend(relation, 0.0)
-        return way
 
     def __len__(self) -> int:
         return len(self.relations)
@@ -40,7 +30,7 @@ class TrackedPath:
         return self._covariances[: len(self.relations)]
 
     def extend(self, relation: Pairwise, length: float) -> None:
-        """Follow a relation over a way of `length` (m)."""
+        """Add the next relation, over a path of this `length` (m)."""
         slips = self._variances[0] * length, self._variances[1] * length, self._variances[2] * length
         covariance, information = _with_slips(relation.information, slips)
         end = len(self.relations)
@@ -52,7 +42,7 @@ class TrackedPath:
 
 @kernel
 def _with_slips(information: Array, slips: tuple[float, float, float]) -> tuple[Array, Array]:
-    """Covariance and information (3, 3) after these variances have been added."""
+    """Covariance and information (3, 3) with these variances added."""
     covariance = inverted(information)
     for a in range(3):
         covariance[a, a] += slips[a]

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Collection, Iterable
 
-from nscan_cli.slam.keyframes.keyframe import Route
+from nscan_cli.slam.keyframes.route import Route
 from nscan_cli.slam.local_matching.joint_relations import LocalMatch
 from nscan_cli.slam.local_matching.neighbours import Neighbours
 from nscan_cli.slam.options import NScanOptions

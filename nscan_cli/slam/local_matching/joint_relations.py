@@ -19,7 +19,8 @@ from nscan_cli.matching.joint.overlap import connected_at, connectivity
 from nscan_cli.matching.joint.scan_set import ScanSet, scan_set
 from nscan_cli.matching.pose_kernels import relative_pose
 from nscan_cli.poses import Array, Indices, compose, relative
-from nscan_cli.slam.keyframes.keyframe import Keyframe, Route, points_per_cell
+from nscan_cli.slam.keyframes.keyframe import Keyframe, points_per_cell
+from nscan_cli.slam.keyframes.route import Route
 from nscan_cli.slam.local_matching.neighbours import Neighbours, choose_neighbours
 from nscan_cli.slam.options import NScanOptions
 

@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from nscan_cli.slam.keyframes.keyframe import Route, extended
+from nscan_cli.slam.keyframes.route import Route, extended
 from nscan_cli.slam.local_matching.coverage import Coverage
 from nscan_cli.slam.local_matching.joint_relations import LocalMatch, MatchNearby
 from nscan_cli.slam.local_matching.neighbours import Neighbours, choose_neighbours

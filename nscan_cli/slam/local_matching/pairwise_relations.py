@@ -18,7 +18,8 @@ from nscan_cli.matching.priors import Prior
 from nscan_cli.ndt.association import begin_association
 from nscan_cli.ndt.energy import energy, inlier_share
 from nscan_cli.poses import Array, inverse, relative, relative_jacobians, wrap
-from nscan_cli.slam.keyframes.keyframe import Keyframe, Route
+from nscan_cli.slam.keyframes.keyframe import Keyframe
+from nscan_cli.slam.keyframes.route import Route
 from nscan_cli.slam.local_matching.joint_relations import LocalMatch, moved_by, scale_of, verdict
 from nscan_cli.slam.local_matching.neighbours import Neighbours
 from nscan_cli.slam.options import NScanOptions

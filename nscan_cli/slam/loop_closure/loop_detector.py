@@ -20,7 +20,7 @@ from nscan_cli.matching.correlative_search import SearchOptions
 from nscan_cli.poses import Array, Indices, compose, relative, wrap
 from nscan_cli.slam.backend.energy_cache import EnergyCache
 from nscan_cli.slam.backend.subgraph import Subgraph, nearest_keyframes, without_others
-from nscan_cli.slam.keyframes.keyframe import Route
+from nscan_cli.slam.keyframes.route import Route
 from nscan_cli.slam.keyframes.tracked_path import TrackedPath
 from nscan_cli.slam.local_matching.joint_relations import LocalMatch, MatchNearby
 from nscan_cli.slam.loop_closure.most_certain_paths import Linked, most_certain_paths, relations_on_paths

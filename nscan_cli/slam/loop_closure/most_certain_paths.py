@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from nscan_cli.graph.relations.base import Relation
 from nscan_cli.kernels.decorators import kernel
 from nscan_cli.poses import Array, Indices
-from nscan_cli.slam.keyframes.keyframe import Route
+from nscan_cli.slam.keyframes.route import Route
 from nscan_cli.slam.keyframes.tracked_path import TrackedPath
 
 LEVER = 20.0

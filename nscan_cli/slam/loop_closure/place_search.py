@@ -23,7 +23,8 @@ from nscan_cli.matching.correlative_search import (
     search,
 )
 from nscan_cli.poses import Array, compose, relative
-from nscan_cli.slam.keyframes.keyframe import Keyframe, Route
+from nscan_cli.slam.keyframes.keyframe import Keyframe
+from nscan_cli.slam.keyframes.route import Route
 from nscan_cli.slam.local_matching.joint_relations import LocalMatch, MatchNearby, match_at, visit_moved
 from nscan_cli.slam.local_matching.neighbours import choose_neighbours
 from nscan_cli.slam.options import ClosingOptions, NScanOptions

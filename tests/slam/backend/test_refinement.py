@@ -11,7 +11,7 @@ import pytest
 from nscan_cli.evaluation.trajectory_errors import trajectory_errors
 from nscan_cli.graph.io.tum import Trajectory
 from nscan_cli.slam.backend.refinement import Refinement
-from nscan_cli.slam.keyframes.keyframe import Route
+from nscan_cli.slam.keyframes.route import Route
 from nscan_cli.slam.local_matching.joint_relations import LocalMatch, MatchNearby, match_neighbours
 from nscan_cli.slam.local_matching.neighbours import Neighbours, choose_neighbours
 from nscan_cli.slam.local_matching.pairwise_relations import match_neighbours_pairwise

@@ -7,7 +7,7 @@ import numpy as np
 from nscan_cli.graph.model import Pairwise
 from nscan_cli.slam.backend.schedule import OptimisationSchedule
 from nscan_cli.slam.backend.subgraph import Subgraph
-from nscan_cli.slam.keyframes.keyframe import Route
+from nscan_cli.slam.keyframes.route import Route
 from nscan_cli.slam.options import ClosingOptions, GrowthOptions, SlamOptions
 from tests.simulation.building import growing
 from tests.slam.runs import mapped

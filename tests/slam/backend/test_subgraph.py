@@ -22,10 +22,10 @@ from nscan_cli.slam.backend.subgraph import (
     nearest_keyframes,
     without_others,
 )
-from nscan_cli.slam.keyframes.keyframe import Route
-from nscan_cli.slam.keyframes.tracked_path import TrackedPath
+from nscan_cli.slam.keyframes.route import Route
 from nscan_cli.slam.loop_closure.most_certain_paths import Linked, most_certain_paths, relations_on_paths
 from nscan_cli.slam.loop_closure.relative_uncertainty import RelativeSigma, RelativeUncertainty, known
+from tests.slam.drives import exact_path
 from tests.slam.loop_closure.test_relative_uncertainty import Walk, straight, walk
 
 APART = 7
@@ -47,7 +47,7 @@ class Walked(NamedTuple):
 
     def led_to(self, origin: int, wanted: Chosen) -> Chosen:
         """Those wanted, and what is on the surest ways to them."""
-        way = TrackedPath.without_slips([relation for relation in self.way if isinstance(relation, Pairwise)])
+        way = exact_path([relation for relation in self.way if isinstance(relation, Pairwise)])
         links = Linked().links(self.route, way, self.loops)
         return relations_on_paths(most_certain_paths(links, self.route.poses, origin)[1], wanted)
 
@@ -150,7 +150,7 @@ def test_from_another_keyframe_the_part_is_seen_and_no_more():
 def test_what_was_not_asked_keeps_its_bound():
     drive = straight(12)
     graph, whereabouts = of(drive), RelativeUncertainty()
-    bound = whereabouts.bound(11, TrackedPath.without_slips(drive.way), drive.poses)
+    bound = whereabouts.bound(11, exact_path(drive.way), drive.poses)
     part = without_others(graph.route, graph.way, [], chosen(12, 8, 9, 10, 11))
     asked = whereabouts.ask(graph.energy(part, 11), drive.poses)
     answer = known(graph.energy(graph.whole(), 11), drive.poses).reach()

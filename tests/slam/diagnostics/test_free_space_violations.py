@@ -11,21 +11,21 @@ import pytest
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.poses import Array
 from nscan_cli.slam.diagnostics.free_space_violations import (
-    LEAST_KEYFRAMES,
-    MORE,
-    MOST,
-    TIMES,
     FreeSpaceViolation,
     free_space_violations,
+    sound_share,
 )
-from nscan_cli.slam.frontend.tracked_scans import Tracked
-from nscan_cli.slam.keyframes.keyframe import Keyframes, Route, route_of
+from nscan_cli.slam.diagnostics.options import FreeSpaceOptions
+from nscan_cli.slam.frontend.tracked_scans import TrackedScan
+from nscan_cli.slam.keyframes.keyframe_selection import Keyframes
 from nscan_cli.slam.keyframes.options import KeyframeOptions
+from nscan_cli.slam.keyframes.route import Route, route_of
 from nscan_cli.slam.options import NScanOptions
 from tests.simulation.laser import Laser
 from tests.slam.drives import ROUND, path_of, round_scene
 from tests.slam.runs import mapped_real, truth_of
 
+OPTIONS = FreeSpaceOptions()
 EVERY = 1.5
 """m of path from keyframe to keyframe."""
 
@@ -43,13 +43,13 @@ def route_at(log: LaserLog, poses: Array, blind: slice = slice(0, 0)) -> Route:
     keyframes = Keyframes(KeyframeOptions(), NScanOptions().gaussians)
     for k, row in enumerate(rows.tolist()):
         points = log.points(row)[: 0 if k in range(*blind.indices(len(rows))) else None]
-        found = Tracked(poses[row], np.eye(3), np.eye(3), 1.0, float(path[row]), True)
+        found = TrackedScan(poses[row], np.eye(3), np.eye(3), 1.0, float(path[row]), True)
         keyframes.add(row, points, found)
     return route_of(keyframes.list, [], poses[rows])
 
 
 def worst(log: LaserLog, poses: Array) -> FreeSpaceViolation:
-    found = free_space_violations(log, route_at(log, poses), NScanOptions())
+    found = free_space_violations(log, route_at(log, poses), NScanOptions(), OPTIONS)
     assert found is not None
     return found
 
@@ -67,7 +67,7 @@ def test_what_stands_still_is_not_looked_through(mount):
     found = worst(log, truth_of(log))
     assert found.share < 0.005
     assert found.within < 0.005
-    assert found.share < found.most
+    assert found.share < sound_share(found.within, OPTIONS)
 
 
 @pytest.mark.parametrize("seed", [5, 6, 7])
@@ -75,7 +75,7 @@ def test_what_stands_still_is_not_looked_through(mount):
 def test_a_visit_that_is_off_along_the_corridor_looks_through_walls(metres, seed):
     log = simulated(seed=seed)
     found = worst(log, slipped(log, metres))
-    assert found.share > MOST
+    assert found.share > OPTIONS.max_share
     assert path_of(truth_of(log))[found.last] > ROUND
 
 
@@ -102,25 +102,24 @@ def with_ghosts(share: float) -> LaserLog:
 def test_where_much_is_looked_through_at_all_times_as_much_is_expected():
     log = with_ghosts(0.02)
     sound, wrong = worst(log, truth_of(log)), worst(log, slipped(log, 3.0))
-    assert sound.within > MORE
-    assert sound.share > MORE
-    assert sound.share < sound.most == pytest.approx(TIMES * sound.within + MORE)
-    assert wrong.share > wrong.most
+    assert sound.within > OPTIONS.margin
+    assert sound.share > OPTIONS.margin
+    most = sound_share(sound.within, OPTIONS)
+    assert sound.share < most == pytest.approx(OPTIONS.within_factor * sound.within + OPTIONS.margin)
+    assert wrong.share > sound_share(wrong.within, OPTIONS)
 
 
 def test_the_bound_is_never_above_what_wrong_maps_have():
-    assert FreeSpaceViolation(0.2, 0.1, 0, 1).most == MOST
-    assert FreeSpaceViolation(0.2, float("nan"), 0, 1).most == MOST
+    assert sound_share(0.1, OPTIONS) == OPTIONS.max_share
+    assert sound_share(float("nan"), OPTIONS) == OPTIONS.max_share
 
 
 def test_where_no_place_is_seen_again_there_is_nothing_to_compare():
     log = simulated()
     route = route_at(log, truth_of(log))
     once = int(np.searchsorted(route.paths, ROUND / 2))
-    assert (
-        free_space_violations(log, route_of(route.keyframes, [], route.poses[:once]), NScanOptions()) is None
-    )
-    assert free_space_violations(log, route_of([], [], np.zeros((0, 3))), NScanOptions()) is None
+    for part in (route_of(route.keyframes, [], route.poses[:once]), route_of([], [], np.zeros((0, 3)))):
+        assert free_space_violations(log, part, NScanOptions(), OPTIONS) is None
 
 
 def test_of_a_laser_that_hangs_nothing_is_compared():
@@ -128,15 +127,15 @@ def test_of_a_laser_that_hangs_nothing_is_compared():
     log = simulated()
     poses = slipped(log, 3.0)
     again = int(np.searchsorted(route_at(log, poses).paths, ROUND))
-    some = free_space_violations(log, route_at(log, poses, slice(0, again)), NScanOptions())
-    assert some is None or some.last < again + LEAST_KEYFRAMES
+    some = free_space_violations(log, route_at(log, poses, slice(0, again)), NScanOptions(), OPTIONS)
+    assert some is None or some.last < again + OPTIONS.min_keyframes
 
 
 @pytest.mark.logs
 @pytest.mark.parametrize("name", ["fr079", "mit-csail", "intel"])
 def test_in_real_buildings_little_is_looked_through(name):
     found = mapped_real(name)
-    seen = free_space_violations(found.log, found.state.route, found.state.options.nscan)
+    seen = free_space_violations(found.log, found.state.route, found.state.options.nscan, OPTIONS)
     assert seen is not None
-    assert seen.share < seen.most / 2
+    assert seen.share < sound_share(seen.within, OPTIONS) / 2
     assert seen.share < 2 * seen.within

@@ -6,8 +6,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from nscan_cli.poses import Array
-from nscan_cli.slam.diagnostics.odometry_disagreement import SHARE, STRETCH, odometry_disagreements
+from nscan_cli.slam.diagnostics.odometry_disagreement import odometry_disagreements
+from nscan_cli.slam.diagnostics.options import OdometryDisagreementOptions
 
+OPTIONS = OdometryDisagreementOptions()
 EVERY = 4
 """Scans from keyframe to keyframe."""
 
@@ -21,7 +23,7 @@ def drive(steps: Array) -> Array:
 
 def found(odometry: Array, truth: Array, breaks: tuple[int, ...] = ()):
     rows = np.arange(0, len(truth), EVERY)
-    return odometry_disagreements(rows, truth[rows], odometry, breaks)
+    return odometry_disagreements(rows, truth[rows], odometry, breaks, OPTIONS)
 
 
 STEPS = np.full(400, 0.1)
@@ -40,7 +42,7 @@ def test_the_stretch_that_is_too_short_or_too_long_is_found_with_both_lengths(fa
     slipped[100:200] *= factor
     (stretch,) = found(drive(STEPS), drive(slipped))
     # A stretch that is partly sound counts, too.
-    widest = STRETCH / 0.1
+    widest = OPTIONS.path / 0.1
     assert 100 - widest <= stretch.first <= 100 + EVERY
     assert 200 - EVERY <= stretch.last <= 200 + widest
     # 5 m of a bow of 20 m radius are longer than their chord by 1 − sin(0.125) / 0.125, 2.6 mm a metre.
@@ -72,7 +74,7 @@ def test_who_goes_back_where_odometry_goes_on_has_not_come_as_far():
     (stretch,) = found(ahead, there_and_back)
     assert stretch.by_odometry == pytest.approx(0.1 * (stretch.last - stretch.first))
     assert stretch.first <= 50 <= stretch.last
-    assert stretch.by_odometry - stretch.by_scans > SHARE * STRETCH
+    assert stretch.by_odometry - stretch.by_scans > OPTIONS.max_share * OPTIONS.path
 
 
 def test_a_short_way_says_nothing():

@@ -9,9 +9,9 @@ import pytest
 
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.poses import Array, relative
+from nscan_cli.slam.frontend.break_detection import SegmentTracker, TrackedBatch
 from nscan_cli.slam.frontend.first_scan import place_first
 from nscan_cli.slam.frontend.options import BreakOptions, TrackingOptions
-from nscan_cli.slam.frontend.track_segments import SegmentTracker, TrackedSegments
 from tests.simulation.scenes import office
 from tests.slam.drives import round_scene
 from tests.slam.runs import found_of, office_log, part, sensed, sensed_in, tracked, truth_of
@@ -20,15 +20,15 @@ from tests.slam.troubles import carried
 SCANS = 120
 
 
-def followed(log: LaserLog) -> list[TrackedSegments]:
+def followed(log: LaserLog) -> list[TrackedBatch]:
     follower = SegmentTracker(TrackingOptions(), BreakOptions())
     found = follower.follow(sensed_in(log))
     return found + follower.finish()
 
 
-def turned(found: list[TrackedSegments], truth: Array, first: int) -> float:
+def turned(found: list[TrackedBatch], truth: Array, first: int) -> float:
     """How far (rad) a scan is turned against the 20 after it, more than in truth (S, 3)."""
-    poses = np.concatenate([scans.found.poses for scans in found])
+    poses = np.concatenate([scans.tracked.poses for scans in found])
     rows = slice(first + 1, first + 21)
     off = relative(poses[rows], poses[first]) - relative(truth[rows], truth[first])
     return float(np.median(off[:, 2]))
@@ -57,7 +57,7 @@ def test_nor_is_the_first_scan_after_a_break_left_where_it_was():
         made = carried(round_scene().record(seed).log(), 20.0, 28.0)
         log = part(made.log, slice(made.before - 40, made.before + SCANS))
         found = followed(log)
-        first = next(scans.sensed.first for scans in found if scans.begins)
+        first = next(scans.scans.first for scans in found if scans.starts_segment)
         off.append(turned(found, truth_of(log), first))
     assert np.sqrt(np.mean(np.square(off))) < 0.002
 
@@ -67,7 +67,7 @@ def test_it_stays_where_nothing_says_better():
     found, _ = tracked(log)
     scans, options = [log.points(row) for row in range(len(log))], TrackingOptions()
     # A robot that stands still: no scan has joined the map.
-    still = [scan for scan in found[1:] if not scan.joined]
+    still = [scan for scan in found[1:] if not scan.in_map]
     # Those after it see something else: they do not have it.
     elsewhere = [scan + np.array([50.0, 0.0]) for scan in scans[1:]]
     for points, poses in (
@@ -82,5 +82,5 @@ def test_it_stays_where_nothing_says_better():
 def test_a_log_that_ends_at_once_keeps_all_its_scans():
     for count in (1, 2, 5):
         found = followed(part(office_log(), slice(0, count)))
-        rows = [scans.sensed.first + k for scans in found for k in range(len(scans))]
+        rows = [scans.scans.first + k for scans in found for k in range(len(scans))]
         assert rows == list(range(count))

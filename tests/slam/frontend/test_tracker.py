@@ -17,9 +17,8 @@ from nscan_cli.matching.correlative_search import SearchOptions
 from nscan_cli.ndt.transform import Ndt
 from nscan_cli.poses import Array, compose, relative, transform, wrap
 from nscan_cli.slam.frontend.options import TrackingOptions
-from nscan_cli.slam.frontend.tracked_scans import Tracked
+from nscan_cli.slam.frontend.tracked_scans import TrackedScan
 from nscan_cli.slam.frontend.tracker import Tracker
-from nscan_cli.slam.frontend.tracking_kernels import CLEARLY
 from tests.ndt.rooms import room
 from tests.ndt.test_grid_growth import assert_same
 from tests.ndt.transforms import gaussian_count
@@ -122,7 +121,7 @@ def test_the_first_scan_is_at_the_origin():
     tracker = Tracker(TrackingOptions())
     (first,) = scans_of(tracker.track(sensed([room(1)], np.array([[7.0, -3.0, 2.0]]))))
     np.testing.assert_array_equal(first.pose, 0)
-    assert (first.inliers, first.path, first.joined) == (1.0, 0.0, True)
+    assert (first.inliers, first.path, first.in_map) == (1.0, 0.0, True)
     alone = Ndt.empty(0.5, 5, 0.03)
     alone.add(room(1), np.zeros(3))
     # Tracking makes the Gaussians that it meets, and no others.
@@ -137,17 +136,17 @@ def test_a_scan_joins_the_map_when_the_robot_has_moved():
     points = [room(1) - pose[:2] for pose in truth]
     tracker = Tracker(TrackingOptions())
     found = tracker.track(sensed(points, truth))
-    assert found.joined.tolist() == [k % 3 == 0 for k in range(10)]
+    assert found.in_map.tolist() == [k % 3 == 0 for k in range(10)]
     assert found.paths[-1] == pytest.approx(0.216, abs=0.005)
     assert found.paths[-2] == found.paths[-3] == found.paths[-4]
 
 
-def window_map(found: list[Tracked], log: LaserLog, options: TrackingOptions) -> Ndt:
+def window_map(found: list[TrackedScan], log: LaserLog, options: TrackingOptions) -> Ndt:
     """The NDT of just the scans that joined within the window's length of path."""
     gaussians = options.gaussians
     ndt = Ndt.empty(gaussians.cell, gaussians.minimum, gaussians.floor)
     for row, scan in enumerate(found):
-        if scan.joined and scan.path >= found[-1].path - options.window:
+        if scan.in_map and scan.path >= found[-1].path - options.window:
             ndt.add(log.points(row), scan.pose)
     return ndt
 
@@ -198,7 +197,7 @@ def test_a_scan_with_fewer_inliers_than_the_one_before_is_matched_from_other_ang
     log = part(jumped(office_log(), row, off), slice(row - 700, row + 1))
     found, _ = tracked(log)
     assert np.abs(end_off(poses_of(found), truth_of(log))).max() < 0.05
-    assert found[-1].inliers > found[-2].inliers - CLEARLY
+    assert found[-1].inliers > found[-2].inliers - TrackingOptions().inlier_margin
 
 
 def test_without_odometry_a_jump_is_found_by_search():
@@ -231,7 +230,7 @@ def test_scans_are_found_where_they_are_however_many_come_at_a_time(odometry):
         for first in range(0, len(log), size):
             found += scans_of(tracker.track(scans.part(first, min(first + size, len(scans)))))
         for one, other in zip(found, together, strict=True):
-            for name in ("pose", "hessian", "expected", "inliers", "path", "joined"):
+            for name in ("pose", "hessian", "prior_covariance", "inliers", "path", "in_map"):
                 np.testing.assert_array_equal(getattr(one, name), getattr(other, name))
         assert tracker.restarts > 0 or not odometry
 

@@ -12,13 +12,16 @@ from hypothesis import strategies as st
 
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.poses import Array, compose, relative
+from nscan_cli.slam.frontend.break_detection import tracker_of
+from nscan_cli.slam.frontend.options import TrackingOptions
 from nscan_cli.slam.frontend.scan_batch import scan_batches
-from nscan_cli.slam.frontend.track_segments import tracker_of
-from nscan_cli.slam.frontend.visible_points import sight, visible_points
+from nscan_cli.slam.frontend.visible_points import range_limit, visible_points
 from nscan_cli.slam.options import SlamOptions
 from tests.benchmarks.lasers import KINDS, WAY
 from tests.simulation.building import building, drive
 from tests.slam.runs import office_log
+
+TRACKING = TrackingOptions()
 
 
 @functools.cache
@@ -49,15 +52,15 @@ def test_points_count_that_lie_within_view_of_a_scan(seed, far):
     np.testing.assert_array_equal(visible_points(points, pose, placed, far), points[seen])
 
 
-def test_sight_counts_where_many_ranges_end_there():
+def test_the_range_limit_counts_where_many_ranges_end_there():
     """Of a laser that sees 4 m, a few echoes of 30 m among them; not of one that sees the whole office."""
     log, _ = short_drive()
-    assert sight(log.ranges[log.ranges < 40.0], 0.5) == pytest.approx(4.0, abs=0.05)
+    assert range_limit(log.ranges[log.ranges < 40.0], TRACKING) == pytest.approx(4.0, abs=0.05)
     log = dataclasses.replace(log, ranges=log.ranges.copy())
     log.ranges[::500, 100] = 30.0
-    assert sight(log.ranges[log.ranges < 40.0], 0.5) == pytest.approx(4.0, abs=0.05)
-    assert sight(office_log().ranges[np.isfinite(office_log().ranges)], 0.5) == np.inf
-    assert sight(log.ranges[:0, 0], 0.5) == np.inf
+    assert range_limit(log.ranges[log.ranges < 40.0], TRACKING) == pytest.approx(4.0, abs=0.05)
+    assert range_limit(office_log().ranges[np.isfinite(office_log().ranges)], TRACKING) == np.inf
+    assert range_limit(log.ranges[:0, 0], TRACKING) == np.inf
 
 
 @pytest.mark.parametrize("odometry", [True, False], ids=["odometry", "no odometry"])
@@ -74,5 +77,5 @@ def test_corridors_are_as_long_as_they_are_with_a_laser_of_four_metres(odometry)
         for scans in scan_batches(log, options.max_range, log.odometry, np.zeros(0, dtype=np.int64))
         for each in tracker.follow(scans)
     ]
-    tracked = [each.found.poses for each in segments + tracker.finish()]
+    tracked = [each.tracked.poses for each in segments + tracker.finish()]
     assert abs(along(np.concatenate(tracked), truth) - 1) < (0.01 if odometry else 0.02)

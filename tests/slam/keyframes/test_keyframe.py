@@ -16,9 +16,10 @@ from nscan_cli.ndt.hash_grid import WALL_END
 from nscan_cli.ndt.options import GaussianOptions
 from nscan_cli.ndt.transform import Ndt
 from nscan_cli.poses import Array, compose, relative, rotated_information
-from nscan_cli.slam.frontend.tracked_scans import Tracked
-from nscan_cli.slam.keyframes.keyframe import Keyframes, relations_along
+from nscan_cli.slam.frontend.tracked_scans import TrackedScan
+from nscan_cli.slam.keyframes.keyframe_selection import Keyframes
 from nscan_cli.slam.keyframes.options import KeyframeOptions
+from nscan_cli.slam.keyframes.route import chain_relations
 from tests.ndt.rooms import room
 from tests.slam.runs import found_of, sensed
 
@@ -28,11 +29,11 @@ EXPECTED = np.diag([1e3, 1e3, 1e3])
 HESSIAN = np.array([[9e4, 1e4, 2e3], [1e4, 4e4, -3e3], [2e3, -3e3, 1.6e5]])
 
 
-def tracked(pose: Array, hessian: Array = HESSIAN, path: float = 0.0, joined: bool = True) -> Tracked:
-    return Tracked(np.asarray(pose, dtype=np.float64), hessian, EXPECTED, 0.9, path, joined)
+def tracked(pose: Array, hessian: Array = HESSIAN, path: float = 0.0, joined: bool = True) -> TrackedScan:
+    return TrackedScan(np.asarray(pose, dtype=np.float64), hessian, EXPECTED, 0.9, path, joined)
 
 
-def attach(found: Keyframes, seed: int, scan: Tracked) -> None:
+def attach(found: Keyframes, seed: int, scan: TrackedScan) -> None:
     found.attach(sensed([room(seed)]), found_of(scan), 0, 1)
 
 
@@ -60,7 +61,7 @@ def keyframes(*poses: Array) -> Keyframes:
 def test_near_enough_by_distance_and_by_turn(pose, near):
     """Within 1 m and 0.5 rad of the last keyframe, at (0, 0, 3); the first is far away."""
     found = keyframes(np.array([50.0, 0, 0]), np.array([0.0, 0, 3.0]))
-    found.take(sensed([room(2)]), found_of(tracked(pose)))
+    found.select(sensed([room(2)]), found_of(tracked(pose)))
     assert [keyframe.row for keyframe in found.list[2:]] == ([] if near else [0])
 
 
@@ -72,7 +73,7 @@ def test_the_same_scans_become_keyframes_however_many_are_taken_in_at_a_time(siz
     tracks = found_of(*(tracked(poses[k], path=float(k)) for k in range(12)))
     for first in range(0, 12, size):
         rows = first, min(first + size, 12)
-        found.take(scans.part(*rows), tracks.part(*rows))
+        found.select(scans.part(*rows), tracks.part(*rows))
     assert [keyframe.row for keyframe in found.list] == [0, 3, 6, 9]
     assert [keyframe.tracked.path for keyframe in found.list] == [0.0, 3.0, 6.0, 9.0]
     for keyframe, those in zip(found.list, [(0, 1, 2), (3, 1, 2, 4, 5), (6, 4, 5, 7, 8)], strict=False):
@@ -80,8 +81,8 @@ def test_the_same_scans_become_keyframes_however_many_are_taken_in_at_a_time(siz
         np.testing.assert_array_equal(points, np.concatenate([room(k) for k in those]))
         assert sizes.tolist() == [len(room(k)) for k in those]
         np.testing.assert_array_equal(at, [poses[k] for k in those])
-    np.testing.assert_allclose([keyframe.expected for keyframe in found.list[1:]], 3 * [3 * EXPECTED])
-    found.take(replace(sensed([room(12)]), first=12), found_of(tracked(poses[11])), begins=True)
+    np.testing.assert_allclose([keyframe.prior_covariance for keyframe in found.list[1:]], 3 * [3 * EXPECTED])
+    found.select(replace(sensed([room(12)]), first=12), found_of(tracked(poses[11])), begins=True)
     assert found.list[-1].row == 12
 
 
@@ -110,7 +111,7 @@ def test_a_keyframes_gaussians_are_of_the_scans_between_its_neighbours():
         else:
             # The tracker's map does not want every scan, and nor do the keyframes.
             attach(found, k, tracked(pose, joined=k != 4))
-    found.part()
+    found.end_segment()
     around = {0: (0, 1, 2), 3: (1, 2, 3, 5), 6: (5, 6, 7, 8)}
     assert [keyframe.row for keyframe in found.list] == list(around)
     for keyframe in found.list:
@@ -133,7 +134,7 @@ def test_gaussians_are_made_once_by_whatever_thread_asks_and_the_scans_are_let_g
     found.add(0, room(0), tracked(poses[0]))
     for k in (1, 2, 3):
         attach(found, k, tracked(poses[k]))
-    found.part()
+    found.end_segment()
     (keyframe,) = found.list
     assert len(keyframe.around) > 1
     with ThreadPoolExecutor(4) as pool:
@@ -149,22 +150,22 @@ def test_a_keyframe_keeps_nothing_of_the_scans_that_were_tracked_with_it():
     several = np.concatenate([room(0), room(1)])
     scans = [several[: len(room(0))], several[len(room(0)) :]]
     found = Keyframes(OPTIONS, GAUSSIANS)
-    found.take(sensed(scans), found_of(tracked(np.zeros(3)), tracked(np.array([5.0, 0.0, 0.0]))))
+    found.select(sensed(scans), found_of(tracked(np.zeros(3)), tracked(np.array([5.0, 0.0, 0.0]))))
     for keyframe, seen in zip(found.list, scans, strict=True):
         np.testing.assert_array_equal(keyframe.points, seen)
         scan = keyframe.tracked
-        for array in (keyframe.points, scan.pose, scan.hessian, scan.expected):
+        for array in (keyframe.points, scan.pose, scan.hessian, scan.prior_covariance):
             assert array.base is None
 
 
 def test_finishing_no_keyframes_is_nothing():
     found = Keyframes(OPTIONS, GAUSSIANS)
-    found.part()
+    found.end_segment()
     assert len(found) == 0
 
 
 def relation_to_previous(found: Keyframes) -> Pairwise:
-    (relation,) = relations_along(found.list[-2:], found.options)
+    (relation,) = chain_relations(found.list[-2:], found.options)
     return relation
 
 
@@ -223,7 +224,7 @@ def test_the_relation_does_not_depend_on_the_trackers_frame(turn, x, y):
 
 def test_a_match_that_says_nothing_leaves_the_motion_that_was_expected():
     """Three steps of 0.1 m and 0.05 rad (σ) each add up; drift is nothing against them."""
-    step = Tracked(np.zeros(3), np.zeros((3, 3)), np.diag([0.01, 0.01, 0.0025]), 0.0, 0.0, False)
+    step = TrackedScan(np.zeros(3), np.zeros((3, 3)), np.diag([0.01, 0.01, 0.0025]), 0.0, 0.0, False)
     found = Keyframes(OPTIONS, GAUSSIANS)
     found.add(0, room(0), step)
     attach(found, 1, step)
@@ -240,6 +241,6 @@ def test_a_match_that_curves_down_says_nothing_in_that_direction(curve):
     found.add(0, room(0), tracked(np.zeros(3)))
     for hessian in (np.diag([9e4, curve, 1.6e5]), np.diag([9e4, 0.0, 1.6e5])):
         found.add(len(found.list), room(1), tracked(np.zeros(3), hessian, path=0.5))
-    down, flat = relations_along(found.list, found.options)
+    down, flat = chain_relations(found.list, found.options)
     assert np.linalg.eigvalsh(down.information)[0] > 0
     np.testing.assert_allclose(down.information[1, 1], flat.information[1, 1], rtol=0.1)

@@ -15,8 +15,7 @@ from nscan_cli.poses import Array, compose, relative
 from nscan_cli.slam.frontend.options import TrackingOptions
 from nscan_cli.slam.frontend.tracked_scans import TrackedScans
 from nscan_cli.slam.frontend.tracker import Tracker
-from nscan_cli.slam.frontend.tracking_kernels import CLEARLY
-from nscan_cli.slam.keyframes.keyframe import Keyframes
+from nscan_cli.slam.keyframes.keyframe_selection import Keyframes
 from nscan_cli.slam.keyframes.options import KeyframeOptions
 from nscan_cli.slam.keyframes.slip_detection import SlipDetector
 from tests.benchmarks.robustness import false_loops, mapped, undisturbed
@@ -24,7 +23,7 @@ from tests.data import data_file
 from tests.ndt.rooms import room
 from tests.slam.runs import sensed
 
-FAR = 1.5
+OPTIONS = KeyframeOptions(slip_sigmas=1.5)
 SLIPPED = [(0.1, 0.90), (1.6, 0.82), (0.7, 0.84), (2.1, 0.81), (0.7, 0.77), (2.0, 0.83), (0.2, 0.91)]
 """How far off and what share of the points fits: one scan slips, and four more until the track is back."""
 
@@ -33,7 +32,7 @@ def found_with(off: Array, inliers: Array, poses: Array | None = None) -> Tracke
     found = TrackedScans.room(len(off))
     for column in found:
         column[:] = 0
-    found.off[:], found.inliers[:] = off, inliers
+    found.odometry_sigmas[:], found.inliers[:] = off, inliers
     if poses is not None:
         found.poses[:], found.paths[:] = poses, np.arange(len(off))
     return found
@@ -41,19 +40,19 @@ def found_with(off: Array, inliers: Array, poses: Array | None = None) -> Tracke
 
 def test_from_a_slip_on_until_as_much_fits_again():
     found = found_with(*np.transpose(SLIPPED))
-    assert SlipDetector(FAR).among(found).tolist() == [False, True, True, True, True, True, False]
+    assert SlipDetector(OPTIONS).find(found).tolist() == [False, True, True, True, True, True, False]
 
 
-@pytest.mark.parametrize("one", [(9.0, 0.9 - 0.9 * CLEARLY), (1.4, 0.5)])
+@pytest.mark.parametrize("one", [(9.0, 0.9 - 0.9 * OPTIONS.slip_inlier_drop), (1.4, 0.5)])
 def test_neither_a_spinning_wheel_nor_a_new_view_alone_is_a_slip(one):
     found = found_with(*np.transpose([SLIPPED[0], one, SLIPPED[0]]))
-    assert not SlipDetector(FAR).among(found).any()
+    assert not SlipDetector(OPTIONS).find(found).any()
 
 
 def test_less_of_what_follows_a_new_view_is_measured_by_that():
     """What fits of the first scan is long past when the third slips."""
     found = found_with(*np.transpose([(0.1, 0.9), (0.1, 0.6), (1.6, 0.58), (1.6, 0.5)]))
-    assert SlipDetector(FAR).among(found).tolist() == [False, False, False, True]
+    assert SlipDetector(OPTIONS).find(found).tolist() == [False, False, False, True]
 
 
 @given(
@@ -61,10 +60,10 @@ def test_less_of_what_follows_a_new_view_is_measured_by_that():
     st.lists(st.integers(1, 29), max_size=4),
 )
 def test_however_many_scans_come_at_a_time(scans, cuts):
-    found, several = found_with(*np.transpose(scans)), SlipDetector(FAR)
+    found, several = found_with(*np.transpose(scans)), SlipDetector(OPTIONS)
     ends = [0, *sorted(cut for cut in set(cuts) if cut < len(scans)), len(scans)]
-    parts = [several.among(found.part(a, b)) for a, b in itertools.pairwise(ends)]
-    np.testing.assert_array_equal(np.concatenate(parts), SlipDetector(FAR).among(found))
+    parts = [several.find(found.part(a, b)) for a, b in itertools.pairwise(ends)]
+    np.testing.assert_array_equal(np.concatenate(parts), SlipDetector(OPTIONS).find(found))
 
 
 @pytest.mark.parametrize(
@@ -77,7 +76,7 @@ def test_what_may_have_slipped_is_a_keyframe_only_where_it_is_twice_as_far(ahead
     off, inliers = np.zeros(12), np.full(12, 0.9)
     off[1 : 1 + slipped], inliers[1 : 1 + slipped] = 2.0, 0.7
     keyframes = Keyframes(KeyframeOptions(distance=1.0, turn=0.5), GaussianOptions(cell=1.0, minimum=4))
-    keyframes.take(sensed([room(k) for k in range(12)]), found_with(off, inliers, poses))
+    keyframes.select(sensed([room(k) for k in range(12)]), found_with(off, inliers, poses))
     assert [keyframe.row for keyframe in keyframes.list] == rows
 
 
@@ -87,12 +86,12 @@ def test_tracking_says_how_far_off_the_odometry_a_scan_lies():
     odometry[2] = compose(odometry[1], np.array([0.3, 0.0, 0.0]))
     scans = sensed([room(1)] * 3, odometry)
     found = Tracker(TrackingOptions()).track(scans)
-    assert found.off[:2] == pytest.approx(0.0, abs=0.02)
+    assert found.odometry_sigmas[:2] == pytest.approx(0.0, abs=0.02)
     moved = relative(found.poses[2], found.poses[1])
-    assert found.off[2] == pytest.approx(np.hypot(moved[0] - 0.3, moved[1]) / 0.11)
-    assert found.off[2] > 2.5
+    assert found.odometry_sigmas[2] == pytest.approx(np.hypot(moved[0] - 0.3, moved[1]) / 0.11)
+    assert found.odometry_sigmas[2] > 2.5
     without = Tracker(TrackingOptions(), odometry=False).track(replace(scans, odometry=None))
-    np.testing.assert_array_equal(without.off, 0.0)
+    np.testing.assert_array_equal(without.odometry_sigmas, 0.0)
 
 
 def test_along_the_campus_no_loop_is_closed_where_the_track_slips():

@@ -7,6 +7,7 @@ import pytest
 
 from nscan_cli.graph.model import Pairwise
 from nscan_cli.slam.keyframes.tracked_path import TrackedPath
+from tests.slam.drives import exact_path
 from tests.slam.loop_closure.test_relative_uncertainty import information
 
 
@@ -27,7 +28,7 @@ def test_slips_add_their_variances_by_the_length():
 def test_it_keeps_the_covariance_of_each_relation_however_long_it_grows(count):
     rng = np.random.default_rng(count)
     relations = [Pairwise((k, k + 1), np.zeros(3), information(rng), "track") for k in range(count)]
-    way = TrackedPath.without_slips(relations)
+    way = exact_path(relations)
     assert len(way) == count
     assert way.covariances.shape == (count, 3, 3)
     for one, relation, covariance in zip(way.relations, relations, way.covariances, strict=True):

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from nscan_cli.graph.model import NScan, Pairwise
-from nscan_cli.slam.keyframes.keyframe import Route
+from nscan_cli.slam.keyframes.route import Route
 from nscan_cli.slam.local_matching.coverage import Coverage
 from nscan_cli.slam.local_matching.joint_relations import LocalMatch
 from nscan_cli.slam.local_matching.neighbours import choose_neighbours

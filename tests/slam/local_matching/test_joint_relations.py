@@ -12,7 +12,8 @@ from nscan_cli.matching.joint.joint_energy import JointProblem
 from nscan_cli.matching.joint.joint_match import JointMatch, match_jointly
 from nscan_cli.matching.joint.options import JointOptions
 from nscan_cli.poses import Array, compose, relative, wrap
-from nscan_cli.slam.keyframes.keyframe import Keyframe, route_of
+from nscan_cli.slam.keyframes.keyframe import Keyframe
+from nscan_cli.slam.keyframes.route import route_of
 from nscan_cli.slam.local_matching import joint_relations as nearby
 from nscan_cli.slam.local_matching.joint_relations import LocalMatch, match_at, match_neighbours
 from nscan_cli.slam.options import NScanOptions

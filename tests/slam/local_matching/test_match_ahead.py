@@ -9,8 +9,9 @@ import pytest
 
 from nscan_cli.graph.model import Pairwise
 from nscan_cli.ndt.options import GaussianOptions
-from nscan_cli.slam.frontend.tracked_scans import Tracked
-from nscan_cli.slam.keyframes.keyframe import Keyframe, Route, extended, route_of
+from nscan_cli.slam.frontend.tracked_scans import TrackedScan
+from nscan_cli.slam.keyframes.keyframe import Keyframe
+from nscan_cli.slam.keyframes.route import Route, extended, route_of
 from nscan_cli.slam.local_matching.coverage import Coverage
 from nscan_cli.slam.local_matching.joint_relations import LocalMatch
 from nscan_cli.slam.local_matching.match_ahead import AHEAD, MatchAhead
@@ -26,7 +27,7 @@ NEAR = Neighbours(np.arange(4, 9), np.zeros(5, dtype=np.bool_), 0)
 
 def keyframe(k: int) -> Keyframe:
     """The k-th, 1 m further along a straight line."""
-    tracked = Tracked(np.array([k, 0.0, 0.0]), np.eye(3), np.eye(3), 1.0, float(k), True)
+    tracked = TrackedScan(np.array([k, 0.0, 0.0]), np.eye(3), np.eye(3), 1.0, float(k), True)
     return Keyframe(k, tracked, np.eye(3), np.empty((0, 2)), 0, GaussianOptions(), [])
 
 

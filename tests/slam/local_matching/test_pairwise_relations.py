@@ -10,8 +10,9 @@ import pytest
 from nscan_cli.graph.model import Pairwise
 from nscan_cli.ndt.energy import energy
 from nscan_cli.poses import Array, compose, relative, wrap
-from nscan_cli.slam.frontend.tracked_scans import Tracked
-from nscan_cli.slam.keyframes.keyframe import Keyframe, KeyframePoints, route_of
+from nscan_cli.slam.frontend.tracked_scans import TrackedScan
+from nscan_cli.slam.keyframes.keyframe import Keyframe, KeyframePoints
+from nscan_cli.slam.keyframes.route import route_of
 from nscan_cli.slam.local_matching.joint_relations import LocalMatch
 from nscan_cli.slam.local_matching.pairwise_relations import match_neighbours_pairwise
 from nscan_cli.slam.options import NScanOptions
@@ -83,7 +84,7 @@ def test_a_match_that_knows_nothing_is_no_relation():
         return KeyframePoints(wall, np.array([len(wall)]), pose[None])
 
     def at(row: int, pose: list[float], *around: KeyframePoints) -> Keyframe:
-        here = Tracked(np.array(pose), np.eye(3), np.eye(3), 1.0, 50.0 * row, True)
+        here = TrackedScan(np.array(pose), np.eye(3), np.eye(3), 1.0, 50.0 * row, True)
         return Keyframe(row, here, np.eye(3), wall, 13, options, [seen_from(here.pose), *around])
 
     one = at(0, [0.0, 0.0, 0.0])

@@ -11,7 +11,7 @@ from nscan_cli.graph.model import Loop, Pairwise
 from nscan_cli.poses import compose, relative
 from nscan_cli.slam.backend.energy_cache import EnergyCache
 from nscan_cli.slam.frontend.options import BreakOptions
-from nscan_cli.slam.keyframes.keyframe import route_of
+from nscan_cli.slam.keyframes.route import route_of
 from nscan_cli.slam.local_matching.joint_relations import LocalMatch, match_neighbours
 from nscan_cli.slam.local_matching.pairwise_relations import match_neighbours_pairwise
 from nscan_cli.slam.loop_closure.loop_detector import NO_SECOND, SO_FAR_OFF, LoopDetector

@@ -10,9 +10,9 @@ from hypothesis import strategies as st
 from nscan_cli.graph.model import Pairwise
 from nscan_cli.graph.relations.base import Relation
 from nscan_cli.poses import Array
-from nscan_cli.slam.keyframes.keyframe import Route
-from nscan_cli.slam.keyframes.tracked_path import TrackedPath
+from nscan_cli.slam.keyframes.route import Route
 from nscan_cli.slam.loop_closure.most_certain_paths import Linked, most_certain_paths
+from tests.slam.drives import exact_path
 from tests.slam.loop_closure.test_relative_uncertainty import Walk, seen_from, straight, walk
 
 
@@ -20,7 +20,7 @@ def bound(walked: Walk, origin: int) -> Array:
     """The covariances (K, 3, 3) along the surest ways."""
     size = len(walked.poses)
     route = Route([], np.arange(size), walked.way, np.zeros(size), walked.poses)
-    links = Linked().links(route, TrackedPath.without_slips(walked.way), [*walked.loops, *walked.nscan])
+    links = Linked().links(route, exact_path(walked.way), [*walked.loops, *walked.nscan])
     return most_certain_paths(links, walked.poses, origin)[0]
 
 
@@ -58,7 +58,7 @@ def test_a_loop_is_a_shorter_way():
 def test_what_no_relation_leads_to_is_nowhere():
     walked = straight(4)
     route = Route([], np.arange(5), walked.way, np.zeros(5), np.zeros((5, 3)))
-    links = Linked().links(route, TrackedPath.without_slips(walked.way), [])
+    links = Linked().links(route, exact_path(walked.way), [])
     found, before = most_certain_paths(links, np.zeros((5, 3)), 0)
     np.testing.assert_array_equal(before, [-1, 0, 1, 2, -1])
     assert np.isfinite(found[:4]).all()
@@ -82,7 +82,7 @@ def test_directions_that_a_loop_does_not_hold_are_no_way():
 def test_links_that_are_kept_are_those_that_are_made_anew():
     """While loops join, and after one has gone."""
     walked = walk(7, 9, loops=4)
-    size, way = len(walked.poses), TrackedPath.without_slips(walked.way)
+    size, way = len(walked.poses), exact_path(walked.way)
     route = Route([], np.arange(size), walked.way, np.zeros(size), walked.poses)
     loops: list[Relation] = [*walked.nscan, *walked.loops]
     kept = Linked()

@@ -10,7 +10,8 @@ import pytest
 from nscan_cli.graph.model import Loop
 from nscan_cli.matching.correlative_search import SearchOptions
 from nscan_cli.poses import Array, compose, relative, wrap
-from nscan_cli.slam.keyframes.keyframe import Keyframe, route_of
+from nscan_cli.slam.keyframes.keyframe import Keyframe
+from nscan_cli.slam.keyframes.route import route_of
 from nscan_cli.slam.local_matching.joint_relations import LocalMatch, MatchNearby, match_neighbours
 from nscan_cli.slam.local_matching.pairwise_relations import match_neighbours_pairwise
 from nscan_cli.slam.loop_closure.place_search import (

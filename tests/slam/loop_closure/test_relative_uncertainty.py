@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 from nscan_cli.graph.model import NScan, Pairwise
 from nscan_cli.graph.optimise.graph_energy import GraphEnergy
 from nscan_cli.poses import Array, Indices, compose, relative, relative_jacobians
-from nscan_cli.slam.keyframes.tracked_path import TrackedPath
 from nscan_cli.slam.loop_closure.relative_uncertainty import RelativeSigma, RelativeUncertainty, known
+from tests.slam.drives import exact_path
 
 
 def seen_from(energy: GraphEnergy, poses: Array) -> RelativeSigma:
@@ -189,7 +189,7 @@ def asked_and_bound(
         walked.until(now + ahead + 1),
     )
     whereabouts.ask(before.energy(origin), before.poses)
-    bound = whereabouts.bound(now, TrackedPath.without_slips(after.way), after.poses)
+    bound = whereabouts.bound(now, exact_path(after.way), after.poses)
     answer = seen_from(after.energy(now), after.poses)
     return RelativeSigma(bound.distance[:now], bound.angle[:now]), RelativeSigma(
         answer.distance[:now], answer.angle[:now]
@@ -200,7 +200,7 @@ def test_the_bound_is_the_answer_itself_at_first():
     walked = walk(5, 8, loops=2)
     whereabouts = RelativeUncertainty()
     asked = whereabouts.ask(walked.energy(7), walked.poses)
-    bound = whereabouts.bound(7, TrackedPath.without_slips(walked.way), walked.poses)
+    bound = whereabouts.bound(7, exact_path(walked.way), walked.poses)
     np.testing.assert_allclose(bound.distance, asked.distance, rtol=1e-12)
     np.testing.assert_allclose(bound.angle, asked.angle, rtol=1e-12)
 
@@ -226,7 +226,7 @@ def test_nor_is_it_too_great():
 
 def test_before_anything_was_asked_the_first_keyframe_counts_as_known():
     walked = straight(6)
-    bound = RelativeUncertainty().bound(5, TrackedPath.without_slips(walked.way), walked.poses)
+    bound = RelativeUncertainty().bound(5, exact_path(walked.way), walked.poses)
     answer = seen_from(walked.energy(5), walked.poses)
     np.testing.assert_allclose(bound.angle[:5], answer.angle[:5], rtol=1e-6)
     assert (bound.distance[:5] >= (1 - 1e-6) * answer.distance[:5]).all()

@@ -7,10 +7,9 @@ import functools
 import numpy as np
 import pytest
 
-from nscan_cli.slam.frontend.first_scan import SCANS
+from nscan_cli.slam.frontend.break_detection import SegmentTracker, TrackedBatch
 from nscan_cli.slam.frontend.options import BreakOptions, TrackingOptions
 from nscan_cli.slam.frontend.scan_batch import ScanBatch
-from nscan_cli.slam.frontend.track_segments import SegmentTracker, TrackedSegments
 from tests.slam.drives import round_scene
 from tests.slam.runs import part, sensed_in
 from tests.slam.troubles import carried, standing
@@ -25,7 +24,7 @@ def scans() -> ScanBatch:
     return sensed_in(log)
 
 
-def followed(size: int) -> list[TrackedSegments]:
+def followed(size: int) -> list[TrackedBatch]:
     """All scans, so many at a time; one by one."""
     follower, found, count = SegmentTracker(TrackingOptions(), BreakOptions()), [], len(scans())
     for first in range(0, count, size):
@@ -37,11 +36,11 @@ def followed(size: int) -> list[TrackedSegments]:
 def test_a_track_breaks_where_it_does_however_many_scans_come_at_a_time(size):
     """Scans that were tracked ahead of a break are tracked anew, as of the piece that begins there."""
     found, together = followed(size), followed(100)
-    assert [scan.sensed.first for scan in found] == list(range(100))
-    assert [scan.sensed.first for scan in found if scan.breaks] == [40]
+    assert [scan.scans.first for scan in found] == list(range(100))
+    assert [scan.scans.first for scan in found if scan.after_break] == [40]
     for one, other in zip(found, together, strict=True):
-        assert (one.begins, one.breaks) == (other.begins, other.breaks)
-        for of_one, of_other in zip(one.found, other.found, strict=True):
+        assert (one.starts_segment, one.after_break) == (other.starts_segment, other.after_break)
+        for of_one, of_other in zip(one.tracked, other.tracked, strict=True):
             np.testing.assert_array_equal(of_one, of_other)
 
 
@@ -50,16 +49,17 @@ def test_when_all_is_tracked_the_map_goes_and_what_was_counted_stays():
     follower.follow(scans())
     counted = follower.restarts, follower.searches
     assert counted > (0, 0)
-    assert follower._tracker.map.rows > 0
+    assert follower.tracker.map.rows > 0
     follower.finish()
-    assert follower._tracker.map.rows == 0
+    assert follower.tracker.map.rows == 0
     assert (follower.restarts, follower.searches) == counted
 
 
 def test_of_a_robot_that_stands_few_scans_wait_for_it_to_drive():
     """They would be kept for hours: the first scan of a piece is placed by those of its first metres."""
-    log = standing(SCANS + 200)
+    most = TrackingOptions().first_scan_max_count
+    log = standing(most + 200)
     follower, settled = SegmentTracker(TrackingOptions(), BreakOptions(), odometry=False), 0
     for first in range(0, len(log), 100):
         settled += sum(map(len, follower.follow(sensed_in(part(log, slice(first, first + 100))))))
-        assert settled == (0 if first + 100 < SCANS else first + 100)
+        assert settled == (0 if first + 100 < most else first + 100)

@@ -13,15 +13,11 @@ from nscan_cli.matching.priors import Prior
 from nscan_cli.ndt.energy import energy
 from nscan_cli.ndt.transform import Ndt
 from nscan_cli.poses import Array, wrap
-from nscan_cli.slam.frontend.constant_velocity import (
-    APART,
-    LEARNED,
-    SPAN,
-    UNSTEADY,
+from nscan_cli.slam.frontend.degeneracy import (
     ahead,
-    constant_velocity,
+    keep_prediction,
+    measured_variance,
     profile,
-    told_within,
     weakest_direction,
 )
 from nscan_cli.slam.frontend.options import TrackingOptions
@@ -39,10 +35,11 @@ from tests.slam.frontend.test_tracker import end_off
 from tests.slam.runs import mapped, poses_of, tracked, truth_of
 
 SETTINGS = TrackingParameters.of(TrackingOptions())
+OPTIONS = SETTINGS.degeneracy
 SIGMA = 0.3
 """m; of steady motion."""
 EXPECTED = Prior(np.array([0.11, 0.0, 0.0]), np.diag([SIGMA**-2, SIGMA**-2, SIGMA**-2]))
-PLACES: Array = APART * np.arange(-25.0, 26.0)
+PLACES: Array = OPTIONS.profile_step * np.arange(-25.0, 26.0)
 """2.5 standard deviations are 0.75 m."""
 numbers = st.floats(-3, 3)
 
@@ -110,10 +107,12 @@ def test_the_profile_is_the_objective_along_a_line(pose):
 @pytest.mark.parametrize("centre", [0.0, 0.2])
 def test_what_a_scan_tells_is_what_the_prior_does_not(deviation, centre):
     """A product of two Gaussians: the one that is not the prior comes out again."""
-    assert pytest.approx(PLACES[-1]) == SPAN * SIGMA
+    assert pytest.approx(PLACES[-1]) == OPTIONS.profile_sigmas * SIGMA
     values = 0.5 * (PLACES / SIGMA) ** 2 + 0.5 * ((PLACES - centre) / deviation) ** 2
-    assert told_within(PLACES, values, EXPECTED) == pytest.approx(deviation**2, rel=0.1)
-    nothing = told_within(PLACES, 0.5 * (PLACES / SIGMA) ** 2, EXPECTED)
+    assert measured_variance(PLACES, values, EXPECTED, OPTIONS.profile_step) == pytest.approx(
+        deviation**2, rel=0.1
+    )
+    nothing = measured_variance(PLACES, 0.5 * (PLACES / SIGMA) ** 2, EXPECTED, OPTIONS.profile_step)
     assert nothing > 1e3
 
 
@@ -122,12 +121,12 @@ def test_along_a_corridor_a_scan_stays_where_it_is_expected():
     ndt, points = ndt_of(corridor(1, 1000)), corridor(2, 100)
     for start in (-0.1, 0.0, 0.1, 0.25):
         found = matched(ndt, points, np.array([start, 0.0, 0.0]))
-        before, unsteady = found.poses[0].copy(), np.array([UNSTEADY**2])
-        constant_velocity(ndt.grid, SETTINGS, points, EXPECTED, unsteady, found, 0)
+        before, unsteady = found.poses[0].copy(), np.array([OPTIONS.initial_sigma**2])
+        keep_prediction(ndt.grid, SETTINGS, points, EXPECTED, unsteady, found, 0)
         # Two thirds of what the match moved it are taken back, or more.
         assert abs(found.poses[0, 0] - 0.11) < 0.4 * abs(before[0] - 0.11) + 1e-3
         np.testing.assert_allclose(found.poses[0, 1:], before[1:], atol=2e-3)
-        assert unsteady[0] == UNSTEADY**2
+        assert unsteady[0] == OPTIONS.initial_sigma**2
 
 
 @pytest.mark.parametrize("end", [5.0, 6.0])
@@ -137,8 +136,8 @@ def test_with_its_end_in_sight_a_scan_is_where_it_is_matched(end):
     for true in (-0.05, 0.0, 0.2):
         seen = points - np.array([true, 0.0])
         found = matched(ndt, seen, np.array([true + 0.03, 0.0, 0.0]))
-        unsteady = np.array([UNSTEADY**2])
-        constant_velocity(ndt.grid, SETTINGS, seen, EXPECTED, unsteady, found, 0)
+        unsteady = np.array([OPTIONS.initial_sigma**2])
+        keep_prediction(ndt.grid, SETTINGS, seen, EXPECTED, unsteady, found, 0)
         np.testing.assert_allclose(found.poses[0], [true, 0.0, 0.0], atol=0.02)
 
 
@@ -148,18 +147,20 @@ def test_a_place_that_fits_better_is_found_though_it_is_far_from_where_the_match
     found = matched(ndt, points, np.array([0.0, 0.0, 0.0]))
     found.poses[0] = 0.0
     found.values[0] = SETTINGS.scale * energy(ndt, points, np.zeros(3)).value
-    constant_velocity(ndt.grid, SETTINGS, points, EXPECTED, np.array([UNSTEADY**2]), found, 0)
+    keep_prediction(ndt.grid, SETTINGS, points, EXPECTED, np.array([OPTIONS.initial_sigma**2]), found, 0)
     np.testing.assert_allclose(found.poses[0], [0.5, 0.0, 0.0], atol=0.03)
 
 
 def test_scans_that_tell_teach_how_steady_the_robot_goes():
-    ndt, points, unsteady = ndt_of(room(1)), room(1), np.array([UNSTEADY**2])
+    ndt, points, unsteady = ndt_of(room(1)), room(1), np.array([OPTIONS.initial_sigma**2])
     found = matched(ndt, points, np.zeros(3))
     before = found.poses[0].copy()
-    constant_velocity(ndt.grid, SETTINGS, points, EXPECTED, unsteady, found, 0)
+    keep_prediction(ndt.grid, SETTINGS, points, EXPECTED, unsteady, found, 0)
     np.testing.assert_array_equal(found.poses[0], before)
     off = before[:2] - EXPECTED.mean[:2]
-    assert unsteady[0] == pytest.approx((1 - LEARNED) * UNSTEADY**2 + LEARNED * 0.5 * off @ off)
+    assert unsteady[0] == pytest.approx(
+        (1 - OPTIONS.smoothing) * OPTIONS.initial_sigma**2 + OPTIONS.smoothing * 0.5 * off @ off
+    )
 
 
 @pytest.mark.parametrize("seed", [4, 5])

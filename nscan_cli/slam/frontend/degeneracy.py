@@ -1,0 +1,146 @@
+"""Step 1 without odometry: a scan keeps to its prediction in a direction that it tells little of.
+
+The walls of a corridor look alike all along. What is left of the energy in that direction is a ripple of
+some centimetres, from how points fall into cells. A match ends in its nearest minimum, mostly a little
+behind; so the velocity falls, and the robot seems to stop while its corridor goes by. The Hessian gives no
+warning: it knows the ripple alone.
+
+How well the position is known shows in the objective over all that constant velocity allows. Where it is
+flat, the scan stays at its prediction, as in a Kalman filter: the less the scan tells, the more so, and the
+steadier the robot goes where scans do tell.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from nscan_cli.kernels.assign import assign, assign_rows
+from nscan_cli.kernels.decorators import kernel, leaf_kernel
+from nscan_cli.matching.pairwise_solver import PairProblem, pairwise_objective
+from nscan_cli.matching.priors import Prior
+from nscan_cli.ndt.association import begin_association
+from nscan_cli.ndt.energy import ENERGY_NUMBERS
+from nscan_cli.ndt.hash_grid import Grid
+from nscan_cli.poses import Array
+from nscan_cli.slam.frontend.scan_to_map import match_and_count
+from nscan_cli.slam.frontend.tracked_scans import TrackedScans
+from nscan_cli.slam.frontend.tracking_parameters import TrackingParameters
+
+
+@kernel
+def keep_prediction(
+    grid: Grid,
+    settings: TrackingParameters,
+    points: Array,
+    prior: Prior,
+    mean_square_deviation: Array,
+    found: TrackedScans,
+    k: int,
+) -> None:
+    """Move scan k, which was matched, back to its prediction as far as it does not tell its position.
+
+    `points` (m, 2) are its own. `mean_square_deviation` (1,) of scans from their predictions (m²) is updated.
+    """
+    options, pose, along = settings.degeneracy, found.poses[k], np.empty(2)
+    if weakest_direction(found.hessians[k], along) > options.max_information_ratio:
+        x, y = pose[0] - prior.mean[0], pose[1] - prior.mean[1]
+        mean_square_deviation[0] += options.smoothing * (0.5 * (x * x + y * y) - mean_square_deviation[0])
+        return
+    places, values = profile(grid, settings, points, prior, pose, along)
+    best = np.argmin(values)
+    if values[best] < found.values[k] - options.rematch_gain:
+        further = places[best] - ahead(pose, prior, along)
+        _match_from(grid, settings, points, prior, further, along, found, k)
+    off = ahead(pose, prior, along)
+    untold = max(
+        measured_variance(places, values, prior, options.profile_step) - options.trusted_sigma**2, 0.0
+    )
+    if untold == 0.0:
+        mean_square_deviation[0] += options.smoothing * (off * off - mean_square_deviation[0])
+    allowed = max(options.min_deviation**2, options.deviation_factor**2 * mean_square_deviation[0])
+    back = off * untold / (allowed + untold)
+    pose[0] -= back * along[0]
+    pose[1] -= back * along[1]
+
+
+@leaf_kernel
+def ahead(pose: Array, prior: Prior, along: Array) -> float:
+    """How far (m) a pose (3,) lies ahead of its prediction, in the direction `along` (2,)."""
+    return float((pose[0] - prior.mean[0]) * along[0] + (pose[1] - prior.mean[1]) * along[1])
+
+
+@kernel
+def weakest_direction(hessian: Array, along: Array) -> float:
+    """Write the direction (2,) with the least information in the Hessian (3, 3) of a pose, its angle free.
+
+    Returns the ratio of that information to the one across.
+    """
+    turn = max(hessian[2, 2], 1e-9)
+    xx = hessian[0, 0] - hessian[0, 2] * hessian[0, 2] / turn
+    xy = hessian[0, 1] - hessian[0, 2] * hessian[1, 2] / turn
+    yy = hessian[1, 1] - hessian[1, 2] * hessian[1, 2] / turn
+    middle, radius = 0.5 * (xx + yy), np.hypot(0.5 * (xx - yy), xy)
+    angle = 0.5 * (np.arctan2(2 * xy, xx - yy) + np.pi)
+    along[0], along[1] = np.cos(angle), np.sin(angle)
+    return float((middle - radius) / max(middle + radius, 1e-9))
+
+
+@kernel
+def profile(
+    grid: Grid, settings: TrackingParameters, points: Array, prior: Prior, pose: Array, along: Array
+) -> tuple[Array, Array]:
+    """The objective on the line `along` (2,) through `pose` (3,): places (n,), in m ahead of the prediction,
+    and its values (n,)."""
+    problem = PairProblem(grid, settings.half, begin_association(points), settings.scale, prior)
+    out, gradient, hessian, there = np.empty(ENERGY_NUMBERS), np.empty(3), np.empty((3, 3)), pose.copy()
+    own, apart = ahead(pose, prior, along), settings.degeneracy.profile_step
+    farthest = int(np.ceil(settings.degeneracy.profile_sigmas / np.sqrt(prior.information[0, 0]) / apart))
+    places, values = np.empty(2 * farthest + 1), np.empty(2 * farthest + 1)
+    for at in range(len(places)):
+        places[at] = apart * (at - farthest)
+        there[0] = pose[0] + (places[at] - own) * along[0]
+        there[1] = pose[1] + (places[at] - own) * along[1]
+        values[at] = pairwise_objective(problem, there, 1.0, 0.0, out, gradient, hessian)
+    return places, values
+
+
+@kernel
+def measured_variance(places: Array, values: Array, prior: Prior, apart: float) -> float:
+    """The variance (m²) of the position that a scan itself measures: the prior's part is taken out."""
+    expected = entropy_power(0.5 * prior.information[0, 0] * places * places, apart)
+    told = 1 / max(entropy_power(values, apart), 1e-12) - 1 / expected
+    return 1 / max(told, 1e-6)
+
+
+@kernel
+def entropy_power(values: Array, apart: float) -> float:
+    """The variance (m²) of the Gaussian with the entropy of places `apart` (m), with likelihood exp(−value).
+
+    That of a Gaussian is its variance; a little likelihood far away counts for little.
+    """
+    weights = np.exp(values.min() - values)
+    weights /= weights.sum()
+    entropy = np.log(apart) - (weights * np.log(np.maximum(weights, 1e-300))).sum()
+    return float(np.exp(2 * entropy - 1) / (2 * np.pi))
+
+
+@kernel
+def _match_from(
+    grid: Grid,
+    settings: TrackingParameters,
+    points: Array,
+    prior: Prior,
+    further: float,
+    along: Array,
+    found: TrackedScans,
+    k: int,
+) -> None:
+    """Match scan k from a start `further` (m) along too; it stays there if its objective is clearly lower."""
+    pose, hessian = found.poses[k].copy(), np.empty((3, 3))
+    pose[0] += further * along[0]
+    pose[1] += further * along[1]
+    value, inliers = match_and_count(grid, settings, points, prior, pose, hessian)
+    if value < found.values[k] - settings.degeneracy.rematch_gain:
+        found.values[k], found.inliers[k] = value, inliers
+        assign(found.poses[k], pose)
+        assign_rows(found.hessians[k], hessian)

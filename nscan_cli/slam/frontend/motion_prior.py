@@ -1,0 +1,35 @@
+"""Where the next scan is expected: the odometry as a prior of its match, or without it constant velocity."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from nscan_cli.kernels.decorators import kernel
+from nscan_cli.matching.pose_kernels import composed_pose, relative_pose, wrapped
+from nscan_cli.matching.priors import Prior, motion_sigmas
+from nscan_cli.poses import Array
+from nscan_cli.slam.frontend.track_state import KNOWN, TrackState
+from nscan_cli.slam.frontend.tracking_parameters import TrackingParameters
+
+
+@kernel
+def predict(track: TrackState, settings: TrackingParameters, odometry: Array, prior: Prior) -> None:
+    """Write the prior on the next scan's pose, in the tracker's frame; its odometry (3,) may be nan."""
+    known, last = track.counts[KNOWN], track.poses[-1]
+    step = np.empty(3)
+    if np.isfinite(odometry[0]) and np.isfinite(track.odometry[0]):
+        relative_pose(odometry, track.odometry, step)
+        step[2] = wrapped(step[2])
+        along, about = motion_sigmas(step, settings.odometry)
+    else:
+        # Constant velocity: the mean of the last steps.
+        relative_pose(last, track.poses[-known], step)
+        step[2] = wrapped(step[2])
+        step /= max(known - 1, 1)
+        along, about = motion_sigmas(step, settings.constant_velocity)
+    composed_pose(last, step, prior.mean)
+    prior.mean[2] = wrapped(prior.mean[2])
+    # The same variance along the path as across it: the information needs no rotation.
+    prior.information[:, :] = 0.0
+    prior.information[0, 0] = prior.information[1, 1] = along**-2
+    prior.information[2, 2] = about**-2
