@@ -1,13 +1,13 @@
-"""The errors that a user can cause; each carries its exit code and prints as one line."""
+"""Errors that a user can cause. Each has an exit code, and is printed as one line."""
 
 from nscan_cli.files.text import printable
 
 LONGEST_MESSAGE = 2000
-"""Characters of a message: it may quote an input, in which anything can stand."""
+"""Maximum length of a message in characters, since it can quote an input."""
 
 
 class NscanError(Exception):
-    """A failure that the user can mend. The message names file, place and remedy."""
+    """A failure that the user can correct. The message names the file, the place and a remedy."""
 
     exit_code = 1
 
@@ -19,7 +19,7 @@ class NscanError(Exception):
 
 
 class InputDataError(NscanError):
-    """What was read is not what it should be: a damaged file, a file of another kind."""
+    """The content of an input is invalid: a damaged file, or one of another kind."""
 
     exit_code = 65
 
@@ -29,24 +29,24 @@ class InputDataError(NscanError):
 
 
 class InputMissingError(NscanError):
-    """An input that is not there or cannot be read."""
+    """An input is missing or cannot be read."""
 
     exit_code = 66
 
 
 class OutputError(NscanError):
-    """An output that cannot be written."""
+    """An output cannot be written."""
 
     exit_code = 73
 
 
 class WrongUsageError(NscanError):
-    """Options or arguments that do not fit each other or the log."""
+    """Options or arguments contradict each other or the log."""
 
     exit_code = 2
 
 
 class CheckFailedError(NscanError):
-    """The work is done, but a check that was asked for failed."""
+    """The command is done, but a requested check failed."""
 
     exit_code = 3

@@ -1,4 +1,4 @@
-"""Memory that was freed is used again, or goes back to the system."""
+"""Control of glibc's allocator, so that freed memory is reused or returned to the system."""
 
 from __future__ import annotations
 
@@ -7,29 +7,28 @@ import ctypes
 import gc
 
 M_ARENA_MAX = -8
-"""The name of mallopt's parameter in glibc: M_ARENA_MAX."""
+"""The parameter M_ARENA_MAX of mallopt in glibc."""
 
 
 def use_one_arena() -> None:
-    """Let all threads that are begun from now on take memory from one heap, where that can be chosen (glibc).
+    """Let all threads that start from now on allocate from one arena (glibc).
 
-    Each has its own else, and what one of them has freed the others cannot use.
+    By default each thread has its own, and cannot reuse what another thread has freed.
     """
     with contextlib.suppress(AttributeError, OSError, TypeError):
         ctypes.CDLL(None).mallopt(ctypes.c_int(M_ARENA_MAX), ctypes.c_int(1))
 
 
 def release_memory() -> None:
-    """Let the allocator return what it keeps for later, where it can be asked to (glibc).
+    """Collect garbage, and return free memory to the system (glibc).
 
-    After millions of small arrays that are gone, the room between those that are left is in pieces that
-    large ones do not fit into.
+    After millions of small arrays, free memory is fragmented, and large arrays do not fit into it.
     """
     gc.collect()
     trim_heap()
 
 
 def trim_heap() -> None:
-    """The same for what is known to be free, which takes no time."""
+    """Return free memory to the system without a garbage collection (glibc). This takes no time."""
     with contextlib.suppress(AttributeError, OSError, TypeError):
         ctypes.CDLL(None).malloc_trim(ctypes.c_size_t(0))

@@ -21,7 +21,7 @@ def wrap(angle: ArrayLike) -> Array:
 
 
 def transform(pose: ArrayLike, points: ArrayLike) -> Array:
-    """Eq. (1): points (…, 2) of the pose's frame in the frame that the pose is given in."""
+    """Eq. (1): transform points (…, 2) from the pose's frame to the frame that the pose is given in."""
     p, x = np.asarray(pose, dtype=np.float64), np.asarray(points, dtype=np.float64)
     c, s = np.cos(p[..., 2]), np.sin(p[..., 2])
     moved = np.empty((*np.broadcast_shapes(p.shape[:-1], x.shape[:-1]), 2))
@@ -52,7 +52,7 @@ def relative(a: ArrayLike, b: ArrayLike) -> Array:
     return seen
 
 
-# Of two poses alone: where every scan asks, arrays of one number each cost ten times more.
+# Fast paths for a single pair of poses: numpy takes ten times as long for arrays of one number.
 
 
 def _compose(a: list[float], b: list[float]) -> Array:
@@ -77,13 +77,13 @@ def _wrap(angle: float) -> float:
 
 
 def inverse(a: ArrayLike) -> Array:
-    """⊖a: the frame that a is given in, seen from a."""
+    """⊖a: the inverse pose, that is the frame that a is given in, seen from a."""
     a = np.asarray(a, dtype=np.float64)
     return relative(np.zeros_like(a), a)
 
 
 def relative_jacobians(a: ArrayLike, b: ArrayLike) -> tuple[Array, Array]:
-    """Eq. (9): the derivatives (3, 3) of u = a ⊖ b with respect to a and to b; one pair of poses."""
+    """Eq. (9): the derivatives (3, 3) of u = a ⊖ b with respect to a and b, for one pair of poses."""
     u = relative(a, b)
     c, s = np.cos(np.asarray(b)[2]), np.sin(np.asarray(b)[2])
     by_a = np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
@@ -92,7 +92,7 @@ def relative_jacobians(a: ArrayLike, b: ArrayLike) -> tuple[Array, Array]:
 
 
 def rotated_information(pose: ArrayLike, information: Array) -> Array:
-    """Information matrices (…, 3, 3) of the frame of `pose` in the frame that the pose is given in."""
+    """Rotate information matrices (…, 3, 3) from the frame of `pose` to the frame that it is given in."""
     angle = np.asarray(pose, dtype=np.float64)[..., 2]
     rotation = np.zeros((*angle.shape, 3, 3))
     rotation[..., 0, 0] = rotation[..., 1, 1] = np.cos(angle)

@@ -1,4 +1,4 @@
-"""Work beside other work: the kernels hold no lock, and what comes out does not depend on the threads."""
+"""Threads. Kernels release the GIL; results do not depend on the number of threads."""
 
 from __future__ import annotations
 
@@ -11,20 +11,20 @@ from types import TracebackType
 from typing import Any, TypeVar
 
 SWITCH_INTERVAL = 2e-4
-"""s; a thread that comes out of a kernel waits for the interpreter so long at most. The kernels take about as
-long, and by Python's own 5 ms both threads would wait most of the time."""
+"""The longest wait for the GIL, s. It is about the time of a kernel. With Python's 5 ms, threads that leave
+kernels would wait most of the time."""
 
 Item = TypeVar("Item")
 Result = TypeVar("Result")
 
 
 def available_threads() -> int:
-    """As many as this process may use at a time."""
+    """The number of processors that this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def map_in_threads(threads: int, function: Callable[[Item], Result], items: Iterable[Item]) -> list[Result]:
-    """What a function gives for each of the items, in their order."""
+    """The results of a function for all items, in their order."""
     if threads < 2:
         return [function(item) for item in items]
     with ThreadPoolExecutor(threads) as pool:
@@ -32,9 +32,9 @@ def map_in_threads(threads: int, function: Callable[[Item], Result], items: Iter
 
 
 def in_background(threads: int, function: Callable[[], Result]) -> Callable[[], Result]:
-    """Call a function beside the caller's own work; with one thread, when its result is asked for.
+    """Call a function in another thread; if `threads` is 1, when the result is requested.
 
-    Returns what gives the result, or raises the function's error.
+    Returns a function that waits for the result, or raises the error of the call.
     """
     if threads < 2:
         return function
@@ -45,7 +45,7 @@ def in_background(threads: int, function: Callable[[], Result]) -> Callable[[], 
 
 
 def completed_call(function: Callable[[], Result]) -> Future[Result]:
-    """A call that is made here and now, as one that another thread has made: its error is kept in it."""
+    """Call a function in this thread, and return a completed Future with its result or error."""
     future: Future[Result] = Future()
     try:
         future.set_result(function())
@@ -56,7 +56,7 @@ def completed_call(function: Callable[[], Result]) -> Future[Result]:
 
 @contextlib.contextmanager
 def short_switch_interval(threads: int) -> Iterator[None]:
-    """Let several threads wait for the interpreter no longer than SWITCH, until it ends."""
+    """Set the switch interval to SWITCH_INTERVAL during the block, if there are several threads."""
     interval = sys.getswitchinterval()
     if threads > 1:
         sys.setswitchinterval(SWITCH_INTERVAL)
@@ -67,10 +67,10 @@ def short_switch_interval(threads: int) -> Iterator[None]:
 
 
 class BackgroundCalls:
-    """Calls that are made one after another beside the caller's own work; at once if there is one thread.
+    """A queue of calls in one background thread, in order; with one thread, each call is made at once.
 
-    To be used with `with`: at its end all calls are made. The first error of a call is raised at the next
-    call or there; after an error, the calls that still wait are not made.
+    A context manager: at its end it waits for all calls. The first error of a call is raised at the next call
+    or at the end, and the remaining calls are dropped.
     """
 
     def __init__(self, threads: int) -> None:
@@ -79,7 +79,7 @@ class BackgroundCalls:
         self._calls: list[Future[Any]] = []
 
     def __call__(self, function: Callable[[Item], Any], item: Item) -> None:
-        """Make this call when those before it are done."""
+        """Queue a call."""
         if self._pool is None:
             function(item)
             return
@@ -100,5 +100,5 @@ class BackgroundCalls:
         finally:
             self._turns.__exit__(None, None, None)
             if self._pool is not None:
-                # Who interrupts does not wait for what would be thrown away.
+                # After Ctrl-C, do not wait for results that are dropped.
                 self._pool.shutdown(wait=kind is not KeyboardInterrupt, cancel_futures=True)

@@ -16,7 +16,7 @@ from nscan_cli import __version__
 from nscan_cli.cli.manual import ENVIRONMENT, EXAMPLES, EXIT_CODES
 from nscan_cli.cli.standard_streams import configure_streams
 from nscan_cli.cli.subcommand import CONTEXT, write_examples
-from nscan_cli.cli.usage_wording import usage_problem
+from nscan_cli.cli.usage_errors import usage_problem
 from nscan_cli.errors import InputDataError, NscanError, OutputError
 from nscan_cli.files.text import printable
 

@@ -90,7 +90,7 @@ def command(
             for note in notes:
                 say(f"{name}: warning: {note}", quiet)
         if planned.to_do or planned.unreadable:
-            from nscan_cli.cli.night_lines import night_progress
+            from nscan_cli.cli.nightly_progress import night_progress
 
             if scheduler is None:
                 announce_compiling("follow", quiet)

@@ -146,7 +146,7 @@ def _initial_and_priors(
     """The initial poses (n, 3), the priors, and the files that they come from."""
     import numpy as np
 
-    from nscan_cli.cli.known_poses import (
+    from nscan_cli.cli.initial_and_priors import (
         graph_priors,
         initial_poses,
         no_priors_among,

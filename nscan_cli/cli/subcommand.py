@@ -11,7 +11,7 @@ from typing import Any
 import click
 from click.core import ParameterSource
 
-from nscan_cli.cli.usage_wording import value_problem
+from nscan_cli.cli.usage_errors import value_problem
 from nscan_cli.errors import WrongUsageError
 from nscan_cli.logs.formats import readable
 

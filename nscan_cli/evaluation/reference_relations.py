@@ -140,7 +140,7 @@ def _values(fields: list[str]) -> list[float]:
     if not all(math.isfinite(value) for value in values):
         raise ValueError("a number is not finite")
     if max(map(abs, values[:2])) > TIME.value or max(map(abs, values[2:])) > DISTANCE.value:
-        raise ValueError(f"a number is beyond {DISTANCE.value:g}, or a time beyond {TIME.shown()}")
+        raise ValueError(f"a number is beyond {DISTANCE.value:g}, or a time beyond {TIME.text()}")
     if max(abs(value) for value in values[4:7]) > PLANAR:
         raise ValueError("z, roll or pitch is not 0, but only 2D poses can be compared")
     return values

@@ -1,1 +1,1 @@
-"""Bytes in and out: inputs and outputs whole or not at all, their limits, what a result was made from."""
+"""Bytes in and out: reading inputs within limits, writing outputs atomically, and provenance."""

@@ -1,4 +1,4 @@
-"""The bytes of an input: a path or standard input, and an error with a remedy when there are none."""
+"""Reading the bytes of an input: a file or standard input, with errors that name a remedy."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ from nscan_cli.files.text import name_of_path
 
 STANDARD_INPUT = "-"
 FileBytes = bytes | mmap.mmap
-"""Those of a file: in memory, or where they are."""
+"""The bytes of a file, in memory or memory-mapped."""
 
 
 def read_bytes(path: str, limit: Limit = INPUT) -> bytes:
-    """All bytes of the file `path`, or of standard input when it is "-".
+    """Read all bytes of the file `path`, or of standard input if it is "-".
 
-    Raises InputMissingError when there is no such file, or it cannot be read; InputDataError when there
-    are more than the limit allows.
+    Raises InputMissingError if the file is missing or cannot be read, InputDataError if it is larger than the
+    limit.
     """
     try:
         with _as_input_errors(path):
@@ -43,23 +43,20 @@ def read_bytes(path: str, limit: Limit = INPUT) -> bytes:
 
 
 def memory_map(path: str) -> mmap.mmap:
-    """The bytes of a regular file, which stay where they are until they are looked at.
-
-    Raises InputMissingError as read_bytes does.
-    """
+    """Map a regular file into memory; bytes are read when they are used. Raises InputMissingError."""
     with _as_input_errors(path), open(path, "rb") as file:
         return mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ)
 
 
 def sha256_of(path: str) -> str:
-    """The SHA-256 of a regular file, which is never in memory as a whole. Raises InputMissingError."""
+    """The SHA-256 of a regular file, read in blocks. Raises InputMissingError."""
     with _as_input_errors(path), open(path, "rb") as file:
         return hashlib.file_digest(file, "sha256").hexdigest()
 
 
 @contextlib.contextmanager
 def _as_input_errors(path: str) -> Iterator[None]:
-    """What goes wrong when a file is read, as InputMissingError."""
+    """Turn errors of reading a file into InputMissingError."""
     try:
         yield
     except FileNotFoundError as error:
@@ -73,12 +70,12 @@ def _as_input_errors(path: str) -> Iterator[None]:
 
 
 def read_text(path: str, limit: Limit = INPUT) -> bytes:
-    """The bytes of a text without a byte-order mark; raises also InputDataError for one that is not UTF-8."""
+    """Read a text without byte-order mark. Also raises InputDataError if it is in UTF-16 or UTF-32."""
     return without_byte_order_mark(read_bytes(path, limit), label(path))
 
 
 def read_all(read: Callable[[int], bytes], limit: Limit, problem: str = "goes on and on") -> bytes:
-    """All that can be read from where nobody knows the length. Raises ExceededError beyond the limit."""
+    """Read a stream of unknown length. Raises LimitExceededError if it is longer than the limit."""
     pieces, size, most = [], 0, limit.bytes
     while piece := read(MB):
         size += len(piece)
@@ -89,24 +86,24 @@ def read_all(read: Callable[[int], bytes], limit: Limit, problem: str = "goes on
 
 
 def read_toml(path: str, remedy: str) -> dict[str, Any]:
-    """The tables of a TOML file. Raises InputMissingError, and InputDataError when it is no TOML."""
+    """Read a TOML file. Raises InputMissingError, and InputDataError if it is not valid TOML."""
     try:
         return tomllib.loads(read_text(path, CONFIG).decode())
     except (ValueError, RecursionError) as error:
-        # Not only TOML's own error: bytes that are no text, a number of thousands of digits.
+        # Besides TOMLDecodeError: bytes that are not UTF-8, a number of thousands of digits.
         raise InputDataError(label(path), f"not TOML: {error}", remedy) from error
 
 
 def common_hash(hashes: Iterable[str]) -> str:
-    """The SHA-256 of several files together: that of theirs (hexadecimal digits), in whatever order."""
+    """One SHA-256 for several files: that of their sorted hexadecimal digests."""
     return hashlib.sha256("".join(sorted(hashes)).encode()).hexdigest()
 
 
 def label(path: str) -> str:
-    """An input as messages call it: the path that the user gave."""
+    """The name of an input in messages: the path as the user gave it."""
     return "standard input" if path == STANDARD_INPUT else path
 
 
 def base_name(path: str) -> str:
-    """An input as results call it: its name without its folder, the same on every machine."""
+    """The name of an input in results: without its folder, so that it is the same on every machine."""
     return "standard input" if path == STANDARD_INPUT else name_of_path(path)

@@ -1,7 +1,7 @@
-"""How much of an input is taken before it is refused. Each limit has a name, and can be raised or lowered.
+"""Limits on inputs, so that damaged files do not exhaust memory.
 
-NSCAN_CLI_MAX_BEAMS=50000 in the environment sets the limit BEAMS, and likewise the others. docs/limits.md
-says what each costs in memory.
+An environment variable sets each, for instance NSCAN_CLI_MAX_BEAMS=50000. docs/limits.md gives the memory
+that each allows.
 """
 
 from __future__ import annotations
@@ -17,21 +17,21 @@ MB = 1 << 20
 
 
 class LimitExceededError(Exception):
-    """An input is beyond a limit; who knows the input's name makes a message of it."""
+    """An input exceeds a limit. The caller adds the name of the input."""
 
     def __init__(self, limit: Limit, problem: str) -> None:
-        super().__init__(f"{problem}, more than the {limit.shown()} that are taken")
+        super().__init__(f"{problem}, more than the limit of {limit.text()}")
         self.remedy = f"set {limit.variable} higher if it is right"
 
 
 @dataclass(frozen=True)
 class Limit:
-    """A number that nothing in an input may exceed."""
+    """An upper bound on something in an input."""
 
     name: str
     default: float
     unit: str
-    """What follows the number in a message."""
+    """The unit, written after the number in messages."""
 
     @property
     def variable(self) -> str:
@@ -40,7 +40,7 @@ class Limit:
 
     @property
     def value(self) -> float:
-        """The limit in force. Raises WrongUsageError when the variable holds no positive number."""
+        """The limit in force. Raises WrongUsageError if the variable is not a positive number."""
         text = os.environ.get(self.variable)
         if text is None:
             return self.default
@@ -50,47 +50,47 @@ class Limit:
             value = math.nan
         if not 0 < value < math.inf:
             raise WrongUsageError(
-                f"{self.variable}={text}: is no number above 0; leave it unset for {self.default:g}"
+                f"{self.variable}={text}: is not a number above 0; leave it unset for {self.default:g}"
             )
         return value
 
     @property
     def bytes(self) -> int:
-        """A limit that is in MB, as bytes."""
+        """The limit in bytes, if its unit is MB."""
         return int(self.value * MB)
 
-    def shown(self) -> str:
-        """As messages say it."""
+    def text(self) -> str:
+        """The limit in messages, with its unit."""
         value = float(self.value)
         number = f"{value:,.0f}" if value.is_integer() and value < 1e9 else f"{value:g}"
         return f"{number} {self.unit}".strip()
 
     def check(self, value: float, problem: str) -> None:
-        """Raises ExceededError when the value, which `problem` tells of, is greater."""
+        """Raises LimitExceededError if the value is greater; `problem` describes it."""
         if value > self.value:
             raise LimitExceededError(self, problem)
 
 
 INPUT = Limit("INPUT_MB", 1024, "MB")
-"""Of a log: as it is stored, and again of all that it unpacks to and that is kept."""
+"""Size of a stored log, and of the data that is kept of it when unpacked."""
 UNPACKED = Limit("UNPACKED_MB", 65_536, "MB")
-"""Of the chunks of a recording, one after the other: of them only the wanted messages are kept."""
+"""Total size of the unpacked chunks of a recording, of which only the messages in use are kept."""
 GRAPH = Limit("GRAPH_MB", 256, "MB")
-"""Of a graph, a trajectory or a file of relations."""
+"""Size of a graph, a trajectory or a file of relations."""
 CONFIG = Limit("CONFIG_MB", 1, "MB")
-"""Of a TOML file."""
+"""Size of a TOML file."""
 BEAMS = Limit("BEAMS", 16384, "beams")
-"""Of a scan; a record with more is skipped."""
+"""Beams of a scan. A record with more is skipped."""
 READINGS = Limit("READINGS", 250_000_000, "readings")
-"""Of a log: its scans times the beams of the widest one; 4 bytes each."""
+"""Readings of a log: scans times the beams of the longest scan, 4 bytes each."""
 MAP_CELLS = Limit("MAP_CELLS", 200_000_000, "cells")
-"""Of a map; 700 m × 700 m at 0.05 m. 8 bytes each for what is seen."""
+"""Cells of a map, 8 bytes for each that is seen. The default is 700 m × 700 m at 0.05 m."""
 RECORD_KINDS = Limit("KINDS", 1000, "kinds")
-"""Of records (tags, devices) in a text that are told from each other."""
+"""Kinds of records (tags, devices) that are distinguished in a text log."""
 DISTANCE = Limit("DISTANCE", 1e9, "m")
-"""No coordinate of a pose, and no other number of its record, is beyond."""
+"""Largest coordinate of a pose, or other number in its record."""
 TIME = Limit("TIME", 1e11, "s")
-"""No time stamp is beyond, before 0 or after."""
+"""Largest absolute time stamp."""
 INFORMATION = Limit("INFORMATION", 1e30, "")
-"""No entry of an information, Hessian or covariance matrix is beyond."""
+"""Largest absolute entry of an information, Hessian or covariance matrix."""
 ALL = (INPUT, UNPACKED, GRAPH, CONFIG, BEAMS, READINGS, MAP_CELLS, RECORD_KINDS, DISTANCE, TIME, INFORMATION)

@@ -1,4 +1,4 @@
-"""Where results go: whole files or none, standard output for data, standard error for people."""
+"""Writing of results: atomically to files, or to standard output."""
 
 from __future__ import annotations
 
@@ -14,16 +14,15 @@ from typing import BinaryIO
 from nscan_cli.errors import OutputError
 
 TEMPORARY_PREFIX = ".nscan-cli."
-"""What the name of a file begins with that is not whole yet; a process that is killed leaves it behind."""
+"""Prefix of the names of temporary files. A process that is killed leaves them behind."""
 
 
 @contextlib.contextmanager
 def atomic_file(path: str) -> Iterator[BinaryIO]:
-    """A binary file that appears under `path` whole when the block ends well, and not at all otherwise.
+    """A binary file that appears under `path` when the block ends without an error, and otherwise not at all.
 
-    "-" is standard output; what is no regular file, such as /dev/null or a named pipe, is written to as
-    it is. What killed processes have left in the folder is cleared away. Raises OutputError when the
-    folder is missing or nothing can be written.
+    "-" is standard output. A device or a named pipe is written to directly. Temporary files of killed
+    processes in the folder are removed. Raises OutputError if the folder is missing or cannot be written.
     """
     if path == "-":
         if sys.stdout is None:
@@ -32,7 +31,7 @@ def atomic_file(path: str) -> Iterator[BinaryIO]:
         sys.stdout.buffer.flush()
         return
     check_writable(path)
-    # A symbolic link stays what it is: the file that it names is replaced.
+    # A symbolic link is kept, and its target replaced.
     target = Path(os.path.realpath(path))
     try:
         if is_device(path):
@@ -53,17 +52,17 @@ def atomic_file(path: str) -> Iterator[BinaryIO]:
 
 @contextlib.contextmanager
 def _temporary(folder: Path) -> Iterator[tuple[BinaryIO, str]]:
-    """A new file in the folder, and its name; gone when the block ends, unless it was renamed.
+    """A new temporary file in the folder, and its name. It is removed at the end unless it was renamed.
 
-    It is locked as long as it is open: by that, others see that somebody is at work on it.
+    It is locked while it is open, so that other processes do not remove it as left behind.
     """
     while True:
-        # A name that nobody can guess, and the rights of any other new file: the umask applies.
+        # The name cannot be guessed, and the umask applies as for any other new file.
         name = str(folder / f"{TEMPORARY_PREFIX}{os.urandom(8).hex()}")
         descriptor = os.open(name, os.O_CREAT | os.O_EXCL | os.O_WRONLY | os.O_CLOEXEC, 0o666)
         with os.fdopen(descriptor, "wb") as file:
             try:
-                # Before it is locked, another process may take it for left over.
+                # Before it is locked, another process may remove it.
                 with contextlib.suppress(OSError):
                     fcntl.flock(descriptor, fcntl.LOCK_EX)
                 if os.fstat(descriptor).st_nlink == 0:
@@ -76,7 +75,7 @@ def _temporary(folder: Path) -> Iterator[tuple[BinaryIO, str]]:
 
 
 def remove_leftovers(folder: Path) -> None:
-    """Remove the files that killed processes have begun to write in the folder."""
+    """Remove temporary files of killed processes from the folder."""
     with contextlib.suppress(OSError):
         for left_over in folder.glob(f"{TEMPORARY_PREFIX}*"):
             with contextlib.suppress(OSError), left_over.open("rb") as file:
@@ -85,13 +84,10 @@ def remove_leftovers(folder: Path) -> None:
 
 
 def check_writable(path: str | None) -> None:
-    """Refuse an output that can never be written, before the work that it takes is done.
-
-    Raises OutputError.
-    """
+    """Raises OutputError if `path` cannot be written. Commands call it before they start to compute."""
     if path is None or path == "-":
         return
-    # os.path asks in a way that a name too long for the file system is no error yet.
+    # os.path accepts names that are too long for the file system.
     folder = os.path.dirname(os.path.realpath(path))
     if os.path.isdir(path):
         raise OutputError(f"{path}: is a folder; name a file in it")
@@ -106,7 +102,7 @@ def check_writable(path: str | None) -> None:
 
 
 def is_device(path: str) -> bool:
-    """Whether there is something under `path` that is neither a file nor a folder."""
+    """Whether `path` exists and is neither a regular file nor a folder."""
     try:
         mode = os.stat(path).st_mode
     except OSError:
@@ -115,13 +111,13 @@ def is_device(path: str) -> bool:
 
 
 def write_atomically(path: str, data: bytes) -> None:
-    """Write `data` to `path` ("-": standard output), whole or not at all. Raises OutputError."""
+    """Write `data` atomically to `path`; "-" is standard output. Raises OutputError."""
     with atomic_file(path) as file:
         file.write(data)
 
 
 def write_once(path: Path, data: bytes) -> None:
-    """Write `data` whole to a file that nobody has written before; what is there stays. Raises OSError."""
+    """Write `data` atomically to a new file; an existing file is kept. Raises OSError."""
     remove_leftovers(path.parent)
     with _temporary(path.parent) as (file, name):
         file.write(data)
@@ -131,5 +127,5 @@ def write_once(path: Path, data: bytes) -> None:
         except FileExistsError:
             pass
         except OSError:
-            # Some file systems know one name for a file only.
+            # Some file systems have no hard links.
             os.replace(name, path)

@@ -1,4 +1,4 @@
-"""What a result was made from, as every document says it: the tool, the inputs and the parameters."""
+"""The provenance in every result: tool, inputs and parameters."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from nscan_cli.files.source import Source
 
 
 def provenance_of(sources: Iterable[Source], parameters: dict[str, Any]) -> dict[str, Any]:
-    """Tool with version, inputs by base name, SHA-256 and size, and all parameters (m, rad)."""
+    """The tool with version, the inputs with base name, SHA-256 and size, and all parameters (m, rad)."""
     return {
         "tool": {"name": "nscan-cli", "version": __version__},
         "inputs": [
@@ -23,5 +23,5 @@ def provenance_of(sources: Iterable[Source], parameters: dict[str, Any]) -> dict
 
 
 def is_made_from(inputs: Sequence[dict[str, Any]], source: Source) -> bool:
-    """Whether the inputs of a document are the files of this source, in whatever order."""
+    """Whether the inputs of a document are the files of this source, in any order."""
     return sorted(file["sha256"] for file in inputs) == sorted(file.sha256 for file in source.files)

@@ -1,4 +1,4 @@
-"""What an input was read from: one file, or several that belong together."""
+"""The files that an input was read from."""
 
 from __future__ import annotations
 
@@ -7,18 +7,18 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Source:
-    """What an input was read from: base name, SHA-256 of its bytes as stored, size in bytes.
+    """One file, or several that form one input: base name, SHA-256 of the stored bytes, size in bytes.
 
-    Several files are one source: its SHA-256 is then inputs.common_hash of theirs.
+    The SHA-256 of several files is inputs.common_hash of theirs.
     """
 
     name: str
     sha256: str
     bytes: int
     parts: tuple[Source, ...] = ()
-    """The files, where there are several."""
+    """The files, if there are several."""
 
     @property
     def files(self) -> tuple[Source, ...]:
-        """Each file."""
+        """All files."""
         return self.parts or (self,)

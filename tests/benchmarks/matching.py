@@ -9,7 +9,7 @@ from typing import get_args
 
 import numpy as np
 
-from nscan_cli.cli.known_poses import odometry_priors
+from nscan_cli.cli.initial_and_priors import odometry_priors
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.logs.load import read_log
 from nscan_cli.matching.joint.index_set import IndexSetKind

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from nscan_cli.cli.known_poses import no_priors_among
+from nscan_cli.cli.initial_and_priors import no_priors_among
 from nscan_cli.mapping.figures.match_plots import plot_nscan
 from nscan_cli.matching.joint.index_set import IndexSetKind
 from nscan_cli.matching.joint.joint_energy import JointProblem, all_pairs, no_priors

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from nscan_cli.cli.known_poses import no_priors_among
+from nscan_cli.cli.initial_and_priors import no_priors_among
 from nscan_cli.graph.model import Graph, Pairwise
 from nscan_cli.graph.optimise.whole_graph import optimise_graph
 from nscan_cli.matching.joint.joint_energy import JointProblem, all_pairs, no_priors

@@ -32,7 +32,7 @@ THINGS = re.compile(
 )
 
 NEVER_ONE = {
-    ("cli/night_lines.py", " scans, "): "so many of so many",
+    ("cli/nightly_progress.py", " scans, "): "so many of so many",
     ("cli/scan_spec.py", " scans"): "a limit",
     ("cli/slam.py", " scans a second, "): "a rate",
     ("evaluation/evaluation_report.py", " poses match within "): "a trajectory is aligned by several",

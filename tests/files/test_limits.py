@@ -49,7 +49,7 @@ def test_the_docs_have_every_limit_with_its_default():
 @pytest.mark.parametrize("value", ["much", "", "0", "-1", "nan", "inf"])
 def test_a_limit_that_is_no_number_is_wrong_usage(monkeypatch, value):
     monkeypatch.setenv("NSCAN_CLI_MAX_BEAMS", value)
-    with pytest.raises(WrongUsageError, match=r"NSCAN_CLI_MAX_BEAMS=.*: is no number above 0"):
+    with pytest.raises(WrongUsageError, match=r"NSCAN_CLI_MAX_BEAMS=.*: is not a number above 0"):
         _ = limits.BEAMS.value
 
 
@@ -73,10 +73,10 @@ def test_a_file_beyond_the_limit_is_not_read(tmp_path, monkeypatch):
     with large.open("wb") as file:
         file.truncate(3 * MB)
     with pytest.raises(
-        InputDataError, match=r"large\.log: has 3 MB, more than the 1 MB .*NSCAN_CLI_MAX_INPUT"
+        InputDataError, match=r"large\.log: has 3 MB, more than the limit of 1 MB.*NSCAN_CLI_MAX_INPUT"
     ):
         read_bytes(str(large))
-    with pytest.raises(InputDataError, match="/dev/zero: goes on and on, more than the 1 MB"):
+    with pytest.raises(InputDataError, match="/dev/zero: goes on and on, more than the limit of 1 MB"):
         read_bytes("/dev/zero")
     monkeypatch.setattr("sys.stdin", io.TextIOWrapper(io.BytesIO(bytes(2 * MB))))
     with pytest.raises(InputDataError, match="standard input: goes on and on"):
@@ -90,7 +90,9 @@ def test_a_gzip_bomb_is_refused(tmp_path, monkeypatch, options):
     set_limit(monkeypatch, limits.INPUT, 2)
     path = tmp_path / "bomb.log.gz"
     path.write_bytes(gzip.compress(bytes(5 * MB)))
-    with pytest.raises(InputDataError, match=r"bomb\.log\.gz: unpacks to more and more, more than the 2 MB"):
+    with pytest.raises(
+        InputDataError, match=r"bomb\.log\.gz: unpacks to more and more, more than the limit of 2 MB"
+    ):
         read_log(str(path), options)
 
 
@@ -116,7 +118,9 @@ def test_a_chunk_that_unpacks_to_too_much_is_refused(tmp_path, monkeypatch, comp
     assert len(read_log(str(path))) == 3
     set_limit(monkeypatch, limits.INPUT, 0.1)
     monkeypatch.setattr("nscan_cli.logs.load.read_bytes", lambda path: data)
-    with pytest.raises(InputDataError, match=r"chunk of \d+ MB, more than the 0.1 MB|unpacks to more"):
+    with pytest.raises(
+        InputDataError, match=r"chunk of \d+ MB, more than the limit of 0.1 MB|unpacks to more"
+    ):
         read_log(str(path), SALVAGE)
 
 
@@ -153,7 +157,7 @@ def test_one_wide_scan_among_many_narrow_ones_takes_no_memory(tmp_path, monkeypa
     lines = [flaser(1.0, (1.0,) * 1000), *(flaser(2.0 + k, (1.0,)) for k in range(50))]
     assert read(tmp_path, *lines).ranges.shape == (51, 1000)
     set_limit(monkeypatch, limits.READINGS, 50_000)
-    with pytest.raises(InputDataError, match="51,000 readings, more than the 50,000 readings"):
+    with pytest.raises(InputDataError, match="51,000 readings, more than the limit of 50,000 readings"):
         read(tmp_path, *lines)
 
 

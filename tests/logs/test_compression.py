@@ -101,7 +101,7 @@ def test_bombs_are_refused(pack, path, monkeypatch, options):
     monkeypatch.setenv(limits.INPUT.variable, "2")
     path.write_bytes(pack(bytes(40 * MB)))
     with pytest.raises(
-        InputDataError, match=r"unpacks to more and more, more than the 2 MB|Memory usage limit"
+        InputDataError, match=r"unpacks to more and more, more than the limit of 2 MB|Memory usage limit"
     ):
         read_log(str(path), options)
 

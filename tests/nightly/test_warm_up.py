@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from nscan_cli.cli.night_lines import PlainProgress
+from nscan_cli.cli.nightly_progress import PlainProgress
 from nscan_cli.kernels import machine_code
 from nscan_cli.logs.load import log_from
 from nscan_cli.nightly import bootstrap, local_executor, warm_up, worker

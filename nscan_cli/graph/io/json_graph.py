@@ -261,7 +261,7 @@ def _node_vertex(record: JsonRecord) -> int:
 def _node_stamp(record: JsonRecord) -> str:
     stamp = record.text("stamp")
     if not STAMP.fullmatch(stamp) or abs(float(stamp)) > TIME.value:
-        raise record.wrong("stamp", f"a time in seconds, as text, up to {TIME.shown()}")
+        raise record.wrong("stamp", f"a time in seconds, as text, up to {TIME.text()}")
     return stamp
 
 

@@ -139,7 +139,7 @@ def _pose_of_line(fields: list[str], columns: PoseColumns, power: int) -> tuple[
     if not all(math.isfinite(value) for value in (time, *values)):
         raise ValueError("a number is not finite")
     if abs(time) > TIME.value * 10**power or max(map(abs, values)) > DISTANCE.value:
-        raise ValueError(f"a number is beyond {DISTANCE.value:g}, or the time beyond {TIME.shown()}")
+        raise ValueError(f"a number is beyond {DISTANCE.value:g}, or the time beyond {TIME.text()}")
     if abs(math.hypot(*values[3:]) - 1) > UNIT_TOLERANCE:
         raise ValueError("the quaternion is not of length 1")
     return columns.stamp(fields, power), values

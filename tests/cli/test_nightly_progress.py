@@ -9,7 +9,7 @@ import pytest
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn
 
-from nscan_cli.cli.night_lines import LiveProgress, night_progress
+from nscan_cli.cli.nightly_progress import LiveProgress, night_progress
 from nscan_cli.nightly.manifest import ManifestEntry
 from nscan_cli.nightly.run_history import RunRecord
 
