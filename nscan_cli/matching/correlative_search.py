@@ -101,11 +101,11 @@ class Search:
         chosen = np.ascontiguousarray(points[indices])
         step = options.cell / min(float(np.hypot(chosen[:, 0], chosen[:, 1]).max()), options.lever)
         turns = int(options.turn / step)
-        self._field, self._centre = field, centre
-        self._angles = centre[2] + step * np.arange(-turns, turns + 1)
-        self._steps = int(options.distance / options.cell)
-        self._cells = _point_cells(field, chosen, centre, self._angles)
-        self._bounds = _tile_bounds(field.coarsest, self._cells, self._steps)
+        angles = centre[2] + step * np.arange(-turns, turns + 1)
+        steps = int(options.distance / options.cell)
+        cells = _point_cells(field, chosen, centre, angles)
+        self._centre = centre
+        self._lattice = field, cells, _tile_bounds(field.coarsest, cells, steps), centre, angles, steps
 
     def best(self, least: float, without: tuple[Array, float] | None = None) -> FoundPose | None:
         """The best pose that scores more than `least`; None if there is none.
@@ -114,18 +114,7 @@ class Search:
         """
         pose = np.empty(3)
         place, away = (self._centre, -1.0) if without is None else without
-        score = _branch_and_bound(
-            self._field,
-            self._cells,
-            self._bounds,
-            self._centre,
-            self._angles,
-            self._steps,
-            least,
-            place,
-            away,
-            pose,
-        )
+        score = _branch_and_bound(*self._lattice, least, place, away, pose)
         return FoundPose(score, pose) if score > least else None
 
 

@@ -104,13 +104,7 @@ def make_gaussians(grid: Grid, rows: int, touched: NDArray[np.int32], half: floa
 
 @kernel
 def change_points(
-    grid: Grid,
-    rows: int,
-    half: float,
-    points: Array,
-    pose: Array,
-    sign: float,
-    at_once: bool,
+    grid: Grid, rows: int, half: float, points: Array, pose: Array, sign: float, at_once: bool
 ) -> int:
     """Add or remove points as `add_points`, and make the Gaussians, at once or when they are looked up.
 

@@ -28,32 +28,30 @@ def outside_in(count: int) -> Ndt:
 @pytest.mark.parametrize("step", [1e-3, 0.05, 1.0, 30.0])
 def test_what_was_kept_on_the_way_says_the_same_as_what_is_looked_up_anew(step, curvature):
     ndt, points = outside_in(3), room(7)
-    meeting, kept, anew = begin_association(points), np.empty(ENERGY_NUMBERS), np.empty(ENERGY_NUMBERS)
+    association, kept, anew = begin_association(points), np.empty(ENERGY_NUMBERS), np.empty(ENERGY_NUMBERS)
     rng, start = np.random.default_rng(5), np.array([0.1, -0.1, 0.05])
     counted = 0
     for n in range(40):
         # Every other time back where something is met.
         pose = start + (n % 2) * step * rng.uniform(-1, 1, 3)
-        update_association(ndt.grid, ndt.half, meeting, *pose)
-        sum_association(meeting, 0.3, curvature, kept)
-        met = association_buffers(len(points), 1)
-        evaluate_energy(
-            ndt.grid, ndt.half, points, pose[0], pose[1], pose[2], 0.3, curvature, 0.0, 1, met, anew
-        )
+        update_association(ndt.grid, ndt.half, association, *pose)
+        sum_association(association, 0.3, curvature, kept)
+        buffers = association_buffers(len(points), 1)
+        evaluate_energy(ndt.grid, ndt.half, points, pose, 0.3, curvature, 0.0, 1, buffers, anew)
         np.testing.assert_allclose(kept, anew, rtol=1e-9, atol=1e-9 * np.abs(anew).max())
         counted += anew[0] < -1.0
     assert counted >= 20
 
 
-def test_inliers_of_a_meeting_are_those_that_are_looked_up_anew():
+def test_inliers_of_an_association_are_those_that_are_looked_up_anew():
     ndt, points = outside_in(3), room(7)
     rng, counts = np.random.default_rng(6), set()
     for _ in range(20):
         pose = rng.uniform(-0.3, 0.3, 3)
-        meeting = begin_association(points)
-        update_association(ndt.grid, ndt.half, meeting, *pose)
-        counts.add(count_inliers(meeting, 9.0))
-        assert count_inliers(meeting, 9.0) / len(points) == inlier_share(
+        association = begin_association(points)
+        update_association(ndt.grid, ndt.half, association, *pose)
+        counts.add(count_inliers(association, 9.0))
+        assert count_inliers(association, 9.0) / len(points) == inlier_share(
             ndt.grid, ndt.half, points, pose, 9.0
         )
     assert len(counts) > 10
@@ -69,9 +67,9 @@ def test_gaussians_that_are_outdated_are_made_when_they_are_met():
     points, expected, found = room(7)[:100], np.empty(ENERGY_NUMBERS), np.empty(ENERGY_NUMBERS)
     for pose in np.random.default_rng(8).uniform(-0.3, 0.3, (10, 3)):
         for ndt, out in ((at_once, expected), (later, found)):
-            meeting = begin_association(points)
-            update_association(ndt.grid, ndt.half, meeting, *pose)
-            sum_association(meeting, 1.0, 1.0, out)
+            association = begin_association(points)
+            update_association(ndt.grid, ndt.half, association, *pose)
+            sum_association(association, 1.0, 1.0, out)
         assert expected[0] < -1.0
         np.testing.assert_array_equal(found, expected)
     left = np.count_nonzero(later.grid.gaussians[: later.rows, 2] == OUTDATED)
@@ -82,17 +80,17 @@ def test_gaussians_that_are_outdated_are_made_when_they_are_met():
 
 def test_no_points_meet_nothing():
     ndt, out = outside_in(1), np.empty(ENERGY_NUMBERS)
-    meeting = begin_association(np.empty((0, 2)))
-    update_association(ndt.grid, ndt.half, meeting, 0.0, 0.0, 0.0)
-    sum_association(meeting, 1.0, 1.0, out)
+    association = begin_association(np.empty((0, 2)))
+    update_association(ndt.grid, ndt.half, association, 0.0, 0.0, 0.0)
+    sum_association(association, 1.0, 1.0, out)
     assert (out == 0.0).all()
-    assert count_inliers(meeting, 9.0) == 0
+    assert count_inliers(association, 9.0) == 0
 
 
 def test_poses_that_are_not_numbers_meet_nothing():
     ndt = outside_in(1)
-    meeting, out = begin_association(room(1)), np.empty(ENERGY_NUMBERS)
+    association, out = begin_association(room(1)), np.empty(ENERGY_NUMBERS)
     for x in (np.nan, np.inf, 1e300):
-        update_association(ndt.grid, ndt.half, meeting, x, 0.0, 0.0)
-        sum_association(meeting, 1.0, 0.0, out)
+        update_association(ndt.grid, ndt.half, association, x, 0.0, 0.0)
+        sum_association(association, 1.0, 0.0, out)
         assert not out[0] < -1e-300

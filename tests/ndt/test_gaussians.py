@@ -139,13 +139,13 @@ def test_growing_and_compacting_keep_both_faces():
 @pytest.mark.parametrize(("points", "pose"), [FRONT, BACK], ids=["south", "north"])
 def test_what_is_kept_while_the_pose_changes_is_of_the_right_face(points, pose):
     ndt, scan = added(FRONT, BACK), seen(points, pose)
-    meeting, kept, anew = begin_association(scan), np.empty(ENERGY_NUMBERS), np.empty(ENERGY_NUMBERS)
+    association, kept, anew = begin_association(scan), np.empty(ENERGY_NUMBERS), np.empty(ENERGY_NUMBERS)
     rng = np.random.default_rng(3)
     for _ in range(30):
         at = pose + rng.uniform(-0.1, 0.1, 3)
-        update_association(ndt.grid, ndt.half, meeting, *at)
-        sum_association(meeting, 0.3, 0.0, kept)
-        met = association_buffers(len(scan), 1)
-        evaluate_energy(ndt.grid, ndt.half, scan, at[0], at[1], at[2], 0.3, 0.0, 0.0, 1, met, anew)
+        update_association(ndt.grid, ndt.half, association, *at)
+        sum_association(association, 0.3, 0.0, kept)
+        buffers = association_buffers(len(scan), 1)
+        evaluate_energy(ndt.grid, ndt.half, scan, at, 0.3, 0.0, 0.0, 1, buffers, anew)
         assert anew[0] < -10
         np.testing.assert_allclose(kept, anew, rtol=1e-9, atol=1e-9 * np.abs(anew).max())
