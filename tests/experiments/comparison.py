@@ -33,8 +33,8 @@ METRES, DEGREES = 0.1, 1.0
 BINS = np.array([ERROR[0], 0.3, 0.5, 0.8, 1.1, ERROR[1]])
 """Of the error of the start, m."""
 ENOUGH = 0.5
-"""Scans overlap enough to be matched when at the true poses a tree of overlaps of so much connects them;
-a pair match enters (b) with so much."""
+"""Least overlap on a tree that connects the scans of a problem at the true poses, and least overlap of a
+pairwise match that enters (b)."""
 
 TEXT = (
     "{count} problems, drawn with a fixed seed: 3 to 10 scans each, half of them along the path 0.3 to "

@@ -1,4 +1,4 @@
-"""Draws matching problems: some scans of a place, and starts that are off by so much."""
+"""Random matching problems: scans of one place, and starts with a given error."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ ERROR, TURN = (0.1, 1.5), (np.radians(2.0), np.radians(30.0))
 GAP = (0.3, 1.2)
 """Along the path from scan to scan, m; a turn of a radian counts half a metre."""
 PLACE, APART = 3.0, 0.3
-"""Scans of one place lie within so much (m) of one of them, and no two nearer than so much."""
+"""Greatest distance (m) of a problem's scans from one of them, and least distance between two."""
 
 
 @dataclass(frozen=True)

@@ -108,7 +108,7 @@ def report() -> Report:
 
 
 def _spread(count: int, step: int) -> Iterator[NDArray[np.int64]]:
-    """The rows of each problem, of so many."""
+    """The rows of each problem, spread over `count` rows."""
     for first in np.linspace(0, count - SCANS * step, PROBLEMS).astype(np.int64):
         yield np.arange(first, first + SCANS * step, step)
 

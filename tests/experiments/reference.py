@@ -63,7 +63,7 @@ def reference_log(name: str) -> ReferenceLog | None:
 
 
 def _largest_part(nodes: NDArray[np.int64], count: int) -> NDArray[np.int64]:
-    """Of so many nodes those of the largest part that the pairs (R, 2) connect, increasing."""
+    """The nodes of the largest component of the graph with these pairs (R, 2), increasing."""
     links = coo_array((np.ones(len(nodes)), (nodes[:, 0], nodes[:, 1])), shape=(count, count))
     labels = connected_components(links, directed=False)[1]
     return np.flatnonzero(labels == np.bincount(labels).argmax()).astype(np.int64)

@@ -11,7 +11,7 @@ from nscan_cli.graph.model import Graph
 from nscan_cli.graph.optimise.graph_solver import optimise
 from nscan_cli.poses import Array, compose, relative
 from tests.experiments import transformation
-from tests.experiments.held import MAX_ITERATIONS, Followed, Held, minimise
+from tests.experiments.fixed_mapping import MAX_ITERATIONS, FixedMapping, VariableMapping, minimise
 from tests.experiments.mappings import Mapping, differences, grouped, mean, of_pose_c, optimal, with_c_held
 from tests.experiments.transformation import MAPPINGS, NEAR, problem_of, report
 from tests.graph.simulated import (
@@ -28,16 +28,16 @@ from tests.graph.simulated import (
 COUNT = 12
 
 
-def chosen_ring(noise: float) -> tuple[Array, Followed]:
+def chosen_ring(noise: float) -> tuple[Array, VariableMapping]:
     truth, pairwise, nscan = mixed_ring(COUNT, noise)
-    return truth, Followed(COUNT, [*pairwise, *nscan], np.arange(COUNT))
+    return truth, VariableMapping(COUNT, [*pairwise, *nscan], np.arange(COUNT))
 
 
-def held_ring(mapping: Mapping, noise: float, c_held: bool = False) -> Held:
+def held_ring(mapping: Mapping, noise: float, c_held: bool = False) -> FixedMapping:
     _, pairwise, nscan = mixed_ring(COUNT, noise)
     if c_held:
         nscan = [with_c_held(relation) for relation in nscan]
-    return Held(COUNT, pairwise, nscan, np.arange(COUNT), mapping)
+    return FixedMapping(COUNT, pairwise, nscan, np.arange(COUNT), mapping)
 
 
 @pytest.mark.parametrize("c_held", [False, True])
@@ -87,7 +87,7 @@ def test_the_chosen_way_steps_as_the_tool_does():
 def test_the_mapping_of_c_gives_the_energy_of_the_chosen_one(c_held):
     truth, chosen = chosen_ring(1.0)
     poses, held = disturbed(truth, 0.5), held_ring(of_pose_c, 1.0, c_held)
-    assert held.value_held(poses, held.hold(poses)) == pytest.approx(
+    assert held.value_with(poses, held.mappings_at(poses)) == pytest.approx(
         chosen.evaluate(poses, exact=False).value
     )
 
@@ -96,15 +96,15 @@ def test_the_mapping_of_c_gives_the_energy_of_the_chosen_one(c_held):
 def test_the_held_function_has_the_derivatives_that_it_says(mapping):
     _, _, nscan = mixed_ring(COUNT, 1.0)
     # Without pairwise relations nothing is left out of the Hessian.
-    held = Held(COUNT, [], nscan, np.arange(COUNT), mapping)
+    held = FixedMapping(COUNT, [], nscan, np.arange(COUNT), mapping)
     poses = disturbed(ring(COUNT), 0.3)
-    mappings = held.hold(poses)
-    system = held.evaluate_held(poses, mappings)
-    assert system.value == pytest.approx(held.value_held(poses, mappings))
+    mappings = held.mappings_at(poses)
+    system = held.evaluate_with(poses, mappings)
+    assert system.value == pytest.approx(held.value_with(poses, mappings))
     h, gradient, hessian = 1e-4, [], []
     for index in range(3 * COUNT):
         by = h * np.eye(3 * COUNT)[index].reshape(COUNT, 3)
-        after, before = (held.evaluate_held(poses + sign * by, mappings) for sign in (1, -1))
+        after, before = (held.evaluate_with(poses + sign * by, mappings) for sign in (1, -1))
         gradient.append((after.value - before.value) / (2 * h))
         hessian.append((after.gradient - before.gradient).ravel() / (2 * h))
     # A quadratic function: central differences are exact but for rounding.

@@ -21,7 +21,7 @@ from nscan_cli.slam.options import SlamOptions
 from nscan_cli.slam.pipeline import run_slam
 from nscan_cli.slam.state import SlamState
 from tests.data import OFFICE_LOG, find_data
-from tests.experiments.held import MAX_ITERATIONS, TOLERANCE, Followed, Held, minimise
+from tests.experiments.fixed_mapping import MAX_ITERATIONS, TOLERANCE, FixedMapping, VariableMapping, minimise
 from tests.experiments.mappings import Mapping, mean, of_pose_c, optimal, with_c_held
 from tests.experiments.report import Report
 from tests.graph.simulated import disturbed
@@ -68,14 +68,14 @@ class Problem:
     pairwise: list[Pairwise]
     nscan: list[NScan]
     positions: Indices
-    chosen: Followed
+    chosen: VariableMapping
     starts: dict[str, Array]
     """(K, 3) each."""
 
-    def held(self, mapping: Mapping, c_held: bool) -> Held:
+    def held(self, mapping: Mapping, c_held: bool) -> FixedMapping:
         """Another way; with the relations' Hessians as they are, or with pose c held in them."""
         nscan = [with_c_held(relation) for relation in self.nscan] if c_held else self.nscan
-        return Held(len(self.chosen.free_row), self.pairwise, nscan, self.positions, mapping)
+        return FixedMapping(len(self.chosen.free_row), self.pairwise, nscan, self.positions, mapping)
 
 
 def problem_of(name: str, graph: Graph) -> Problem:
@@ -83,7 +83,7 @@ def problem_of(name: str, graph: Graph) -> Problem:
     keyframes = graph.keyframes
     positions = np.full(len(graph), -1)
     positions[keyframes] = np.arange(len(keyframes))
-    energy = Followed(len(keyframes), graph.relations, positions)
+    energy = VariableMapping(len(keyframes), graph.relations, positions)
     return Problem(name, graph.pairwise, graph.nscan, positions, energy, dict(_starts(graph)))
 
 

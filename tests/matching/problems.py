@@ -76,7 +76,7 @@ def errors(poses: Array, truth: Array) -> Array:
 
 
 def near(truth: Array, seed: int, metres: float = 0.03, radians: float = 0.01) -> Array:
-    """Poses (n, 3) a little off the truth, by so much at most."""
+    """Poses (n, 3) near the truth, with errors up to these bounds (m, rad)."""
     rng = np.random.default_rng(seed)
     off: Array = truth + rng.uniform(-1, 1, truth.shape) * [metres, metres, radians]
     return off

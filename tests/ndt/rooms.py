@@ -8,7 +8,7 @@ from nscan_cli.poses import Array
 
 
 def room(seed: int) -> Array:
-    """(150, 2) points of noisy walls, a cluster and strays, on both sides of 0."""
+    """(150, 2) points of noisy walls, a cluster and outliers, on both sides of 0."""
     rng = np.random.default_rng(seed)
     along = rng.uniform(-4, 4, 100)
     walls = np.concatenate(

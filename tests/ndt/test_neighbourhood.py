@@ -82,7 +82,7 @@ def test_what_stands_out_holds(frame, places):
 def test_short_sighted_scans_are_not_pulled_together_along_a_corridor():
     """Two scans 1.8 m apart that see 4 m, where nothing tells the way: the energy's slope at the true poses.
 
-    E rises by so much for each metre that they are farther apart; mean of 40 draws.
+    The rise of E for each metre of distance; the mean of 40 draws.
     """
     laser = Laser(360, -np.radians(120), np.radians(240) / 359, 4.0, noise=0.02, resolution=0.0)
     slopes: dict[int, list[float]] = {NO_NEIGHBOURS: [], WALL_END: []}

@@ -160,8 +160,8 @@ def test_stages_that_are_cut_off_on_the_way_are_counted():
         assert (match.converged, match.unsettled) == (True, unsettled)
 
 
-def test_lean_kernels_keep_no_reference_and_give_none_back():
-    """What they are given is counted by nobody in between: after many calls all is owned as before."""
+def test_leaf_kernels_keep_no_reference_and_give_none_back():
+    """Leaf kernels count no references: after many calls every array has as many as before."""
     points, poses = [room(1), room(2)], np.array([[0.0, 0, 0], [0.1, 0, 0.05]])
     ndts = [Ndt.of_scans(part, np.array([0, len(part)]), np.zeros((1, 3)), 0.5, 3, 0.02) for part in points]
     problem = JointProblem(scan_set(ndts, points), all_pairs(2), no_priors(), 1.0)

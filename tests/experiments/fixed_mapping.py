@@ -1,7 +1,7 @@
-"""Graphs minimised with a mapping to the local coordinates that is held in each iteration (paper, IV).
+"""Graphs minimised with a mapping to local coordinates that is fixed in each iteration (paper, IV).
 
-Held, f has simple derivatives; it is found again for the next iteration. The same steps for the chosen
-mapping, which follows pose c.
+With a fixed mapping f has simple derivatives; the next iteration computes the mapping again. For comparison,
+the same steps are done with the mapping of the package, which depends on the poses.
 """
 
 from __future__ import annotations
@@ -24,37 +24,37 @@ from tests.experiments.mappings import Mapping, Relations, differences, grouped
 MAX_ITERATIONS, TOLERANCE = 200, 1e-6
 
 
-class Stepwise(Protocol):
-    """An energy whose function is another one in each iteration."""
+class IteratedEnergy(Protocol):
+    """An energy whose function changes from iteration to iteration."""
 
     pattern: Pattern
     free: Indices
 
-    def hold(self, poses: Array) -> list[Array]:
-        """The mappings of the iteration that starts at the poses (K, 3)."""
+    def mappings_at(self, poses: Array) -> list[Array]:
+        """The mappings for the iteration that starts at the poses (K, 3)."""
 
-    def evaluate_held(self, poses: Array, held: list[Array]) -> System:
-        """The function of that iteration, with the Gauss–Newton part of its Hessian."""
+    def evaluate_with(self, poses: Array, held: list[Array]) -> System:
+        """The function with these mappings, and the Gauss–Newton part of its Hessian."""
 
-    def value_held(self, poses: Array, held: list[Array]) -> float:
-        """The function alone."""
+    def value_with(self, poses: Array, held: list[Array]) -> float:
+        """The value of the function with these mappings."""
 
 
-class Followed(GraphEnergy):
-    """The chosen way: nothing is held."""
+class VariableMapping(GraphEnergy):
+    """The mapping of the package, which depends on the poses."""
 
-    def hold(self, poses: Array) -> list[Array]:
+    def mappings_at(self, poses: Array) -> list[Array]:
         return []
 
-    def evaluate_held(self, poses: Array, held: list[Array]) -> System:
+    def evaluate_with(self, poses: Array, held: list[Array]) -> System:
         return self.evaluate(poses, exact=False)
 
-    def value_held(self, poses: Array, held: list[Array]) -> float:
+    def value_with(self, poses: Array, held: list[Array]) -> float:
         return self.evaluate(poses, exact=False).value
 
 
-class Held(GraphEnergy):
-    """The mapping of every nScan relation held in each iteration."""
+class FixedMapping(GraphEnergy):
+    """The mapping of every nScan relation is fixed in each iteration."""
 
     def __init__(
         self,
@@ -64,14 +64,14 @@ class Held(GraphEnergy):
         positions: Indices,
         mapping: Mapping,
     ) -> None:
-        # Without information they give the pattern its places, and nothing else.
+        # Relations without information reserve their blocks in the pattern.
         empty = [dataclasses.replace(each, hessian=np.zeros_like(each.hessian)) for each in nscan]
         super().__init__(nodes, [*pairwise, *empty], positions)
         self.mapping = mapping
         self.groups = [(group, *self._lower(group)) for group in grouped(nscan, positions)]
 
     def _lower(self, group: Relations) -> tuple[Array, csr_array[np.float64]]:
-        """The blocks (Q, T, 3, 3) of the lower triangles of H, and what adds them to those of the factor."""
+        """The blocks (Q, T, 3, 3) of the lower triangles of H, and what adds them to the factor."""
         count, n = group.members.shape
         i, j = np.tril_indices(n)
         blocks = group.hessians.reshape(count, n, 3, n, 3)[:, i, :, j].swapaxes(0, 1)
@@ -84,17 +84,17 @@ class Held(GraphEnergy):
         add = csr_array((np.ones(len(chosen)), places), shape=(len(self.pattern.rows), targets.size))
         return blocks, add
 
-    def hold(self, poses: Array) -> list[Array]:
+    def mappings_at(self, poses: Array) -> list[Array]:
         return [self.mapping(group, poses[group.members]) for group, _, _ in self.groups]
 
-    def value_held(self, poses: Array, held: list[Array]) -> float:
+    def value_with(self, poses: Array, held: list[Array]) -> float:
         value = self.evaluate(poses, exact=False).value
         for (group, _, _), mapping in zip(self.groups, held, strict=True):
             f = differences(group, poses[group.members], mapping).reshape(len(mapping), -1, 1)
             value += float((f * (group.hessians @ f)).sum())
         return value
 
-    def evaluate_held(self, poses: Array, held: list[Array]) -> System:
+    def evaluate_with(self, poses: Array, held: list[Array]) -> System:
         value, terms, gradient, hessian = self.evaluate(poses, exact=False)
         pulls = np.zeros_like(poses)
         for (group, blocks, add), mapping in zip(self.groups, held, strict=True):
@@ -112,23 +112,23 @@ class Held(GraphEnergy):
         return System(value, terms, gradient + pulls[self.free], hessian)
 
 
-def minimise(energy: Stepwise, poses: Array, max_iterations: int = MAX_ITERATIONS) -> Optimum:
-    """graph_solver.optimise with the same damping, for a function that is another one in each iteration.
+def minimise(energy: IteratedEnergy, poses: Array, max_iterations: int = MAX_ITERATIONS) -> Optimum:
+    """As graph_solver.optimise, for a function that changes from iteration to iteration.
 
-    A step counts as good when it lowers the function of its iteration.
+    A step is accepted when it lowers the function of its own iteration.
     """
-    held = energy.hold(poses)
-    here, damping, iteration = energy.evaluate_held(poses, held), GRAPH_STEPS.first, 0
+    held = energy.mappings_at(poses)
+    here, damping, iteration = energy.evaluate_with(poses, held), GRAPH_STEPS.first, 0
     for iteration in range(1, max_iterations + 1):
         step, accepted = newton_step(energy.pattern, here, damping), False
         if step is not None:
             trial = poses.copy()
             trial[energy.free] += step
             length = float(np.abs(step).max(initial=0.0))
-            accepted = is_accepted(here.value, energy.value_held(trial, held), GRAPH_STEPS)
+            accepted = is_accepted(here.value, energy.value_with(trial, held), GRAPH_STEPS)
             if accepted:
-                poses, held = trial, energy.hold(trial)
-                here = energy.evaluate_held(poses, held)
+                poses, held = trial, energy.mappings_at(trial)
+                here = energy.evaluate_with(poses, held)
             if is_last(length, TOLERANCE, damping, GRAPH_STEPS):
                 return Optimum(poses, here.value, iteration, True)
         damping = next_damping(damping, accepted, GRAPH_STEPS)
