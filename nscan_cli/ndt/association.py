@@ -37,14 +37,20 @@ def association_buffers(points: int, stride: int) -> AssociationBuffers:
 
 @leaf_kernel
 def associate_once(
-    grid: Grid, half: float, points: Array, pose: Array, stride: int, buffers: AssociationBuffers
+    grid: Grid,
+    half: float,
+    points: Array,
+    x: float,
+    y: float,
+    phi: float,
+    stride: int,
+    buffers: AssociationBuffers,
 ) -> int:
-    """Write the pairs of points (m, 2) at a pose (3,) and Gaussians to `buffers.pairs`; their number.
+    """Write the pairs of points (m, 2) and Gaussians to the columns of `buffers.pairs`; the number of pairs.
 
     Of the points, one in `stride` counts.
     """
     moved, pairs = buffers.moved, buffers.pairs
-    x, y, phi = pose[0], pose[1], pose[2]
     n = (points.shape[0] + stride - 1) // stride
     # All points first, in lanes: the processor cannot predict where a look-up ends.
     _transform_points(points, x, y, np.cos(phi), np.sin(phi), half, stride, n, moved)

@@ -42,7 +42,9 @@ def evaluate_energy(
     grid: Grid,
     half: float,
     points: Array,
-    pose: Array,
+    x: float,
+    y: float,
+    phi: float,
     widening: float,
     curvature: float,
     baseline: float,
@@ -50,13 +52,13 @@ def evaluate_energy(
     buffers: AssociationBuffers,
     out: Array,
 ) -> None:
-    """Write E, gradient and Hessian at the pose u (3,) of points (m, 2) into out (10,).
+    """Write E, gradient and Hessian at the pose u = (x, y, phi) of points (m, 2) into out (10,).
 
     With `curvature` 1 the Hessian is exact. With 0 it lacks the two terms that can be negative, so that it is
     positive semi-definite everywhere. Every pair of a point and a Gaussian adds `baseline` to E. Of the
     points, one in `stride` counts.
     """
-    count = associate_once(grid, half, points, pose, stride, buffers)
+    count = associate_once(grid, half, points, x, y, phi, stride, buffers)
     _sum_pairs(buffers.pairs, count, widening, curvature, baseline, out)
 
 
@@ -209,9 +211,9 @@ def energy(ndt: Ndt, points: Array, pose: Array, widening: float = 1.0, exact: b
     `exact=False` leaves out the parts of the Hessian that can be negative.
     """
     out = np.empty(ENERGY_NUMBERS)
-    u = np.asarray(pose, dtype=np.float64)
+    x, y, phi = (float(part) for part in pose)
     buffers = association_buffers(len(points), 1)
-    evaluate_energy(ndt.grid, ndt.half, points, u, widening, float(exact), 0.0, 1, buffers, out)
+    evaluate_energy(ndt.grid, ndt.half, points, x, y, phi, widening, float(exact), 0.0, 1, buffers, out)
     gradient, hessian = np.empty(3), np.empty((3, 3))
     unpack_derivatives(out, 1.0, gradient, hessian)
     return Energy(float(out[0]), gradient, hessian)

@@ -144,9 +144,20 @@ def _add_pairs(
     for pair in range(pairs.shape[0]):
         i, j = pairs[pair, 0], pairs[pair, 1]
         relative_pose(poses[j], poses[i], u)
-        baseline = neutral * scans.usual[i] if neutral > 0.0 else 0.0
-        grid, points = scan_grid(scans, i), scan_points(scans, j)
-        evaluate_energy(grid, scans.half, points, u, widening, curvature, baseline, stride, met, out)
+        evaluate_energy(
+            scan_grid(scans, i),
+            scans.half,
+            scan_points(scans, j),
+            u[0],
+            u[1],
+            u[2],
+            widening,
+            curvature,
+            neutral * scans.usual[i] if neutral > 0.0 else 0.0,
+            stride,
+            met,
+            out,
+        )
         value += scale * out[0]
         unpack_derivatives(out, scale, g, h)
         _add_by_chain_rule(i, j, poses[i, 2], u, g, h, curvature, gradient, hessian)

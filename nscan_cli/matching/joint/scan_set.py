@@ -106,12 +106,11 @@ def _usual_s(scans: ScanSet) -> Array:
         np.empty(ENERGY_NUMBERS),
         association_buffers(most_points(scans), 1),
     )
-    origin = np.zeros(3)
     for i in range(len(means)):
         grid, points = scan_grid(scans, i), scan_points(scans, i)
-        evaluate_energy(grid, scans.half, points, origin, 1.0, 0.0, 0.0, 1, buffers, out)
+        evaluate_energy(grid, scans.half, points, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 1, buffers, out)
         energy = out[0]
-        evaluate_energy(grid, scans.half, points, origin, 1.0, 0.0, 1.0, 1, buffers, out)
+        evaluate_energy(grid, scans.half, points, 0.0, 0.0, 0.0, 1.0, 0.0, 1.0, 1, buffers, out)
         # With a baseline of 1 the energy grows by the number of points on Gaussians.
         means[i] = -energy / max(out[0] - energy, 1.0)
     return means
