@@ -26,7 +26,7 @@ EXPERIMENTS: tuple[Callable[[], Report], ...] = (
 
 
 def main(folder: str) -> None:
-    """Run every experiment, and write what they give; `folder` has to exist."""
+    """Run every experiment and write its results to `folder`, which has to exist."""
     reports = [experiment() for experiment in EXPERIMENTS]
     for path in write_reports(reports, Path(folder)):
         print(path.name)

@@ -44,9 +44,9 @@ HEADER = (
 SEED = 2
 """Of the simulated office's odometry and range noise."""
 GOOD, GOOD_ANGLE, GOOD_SEED = 0.03, 0.01, 1
-"""How far off (m, rad) the poses of a good start are at most, and how they are drawn."""
+"""Greatest errors (m, rad) of the poses of a good start, and the seed of their draws."""
 SUCCESS = 0.1
-"""m; how far off the truth a scan is at most after a match that succeeds."""
+"""Greatest error (m) of a scan after a match that succeeds."""
 
 
 @dataclass(frozen=True)

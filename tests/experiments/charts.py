@@ -37,7 +37,7 @@ SHAPE = 0.62
 MARGINS = (76.0, 84.0, 24.0, 96.0)
 """Left, top, right, bottom, units."""
 SPARE = 0.05
-"""Share of the range of the values that is left free around them."""
+"""Margin around the values, as a share of their range."""
 MOST_DOTTED = 30
 """Points of a line that are marked one by one at most."""
 GRID = (222, 222, 222)
@@ -67,7 +67,7 @@ class Plane:
             self._lines(np.array([low_x, high_x]), np.array([y, y]), GRID, 1.0)
 
     def frame(self, x_label: str, y_label: str, title: str, entries: Sequence[LegendEntry]) -> None:
-        """The frame with numbers, labels, title and legend; over whatever reached beyond the plot."""
+        """The frame with numbers, labels, title and legend; it covers lines that leave the plot."""
         canvas, unit = self.canvas, self.canvas.unit
         canvas.clear_margins()
         left, top, right, bottom = canvas.plot
@@ -172,7 +172,7 @@ def ticks(low: float, high: float) -> list[float]:
 
 
 def _range(values: Array) -> tuple[float, float]:
-    """What an axis spans: the values with some room, and 0 where that is not far."""
+    """The range of an axis: the values with a margin, and 0 where that is near."""
     low, high = float(values.min()), float(values.max())
     spare = SPARE * max(high - low, 1e-9)
     if 0 <= low < high - low:

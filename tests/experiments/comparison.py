@@ -29,7 +29,7 @@ from tests.simulation.scenes import corridor_and_room, office
 EACH, SEED = 120, 2006
 """Problems from each floor or log."""
 METRES, DEGREES = 0.1, 1.0
-"""A problem is solved when no pose is further off."""
+"""A problem is solved when no pose has a greater error (m, °)."""
 BINS = np.array([ERROR[0], 0.3, 0.5, 0.8, 1.1, ERROR[1]])
 """Of the error of the start, m."""
 ENOUGH = 0.5

@@ -40,7 +40,7 @@ class Drawn:
     start: Array
     """(n, 3)"""
     error: float
-    """m; how far the start of every scan is off. Its angle is off in proportion."""
+    """Error (m) of the start of every scan. The error of the angle is in proportion."""
     link: float
     """The least overlap on the tree of greatest overlaps at the true poses."""
 
@@ -93,7 +93,7 @@ def _along(rng: np.random.Generator, path: Array, n: int) -> NDArray[np.int64] |
 
 
 def _about(rng: np.random.Generator, poses: Array, n: int) -> NDArray[np.int64] | None:
-    """Scans near one that is drawn, in order of time."""
+    """Scans near a random one, in order of time."""
     centre = rng.integers(len(poses))
     near = np.flatnonzero(np.hypot(*(poses[:, :2] - poses[centre, :2]).T) < PLACE)
     chosen: list[int] = []

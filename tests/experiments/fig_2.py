@@ -57,7 +57,7 @@ STARTS = np.linspace(-1.25, 2.5, 16)
 GAP = 1.5
 """m between the shapes in the picture."""
 SMALL = 0.75
-"""Of its text, so that it is as large as that of the charts below."""
+"""Scale of its text, which makes it as large as that of the charts below."""
 APART = 0.1
 """m; minima that are nearer are one."""
 
@@ -70,7 +70,7 @@ class Minimum:
     shifts: Array
     """(n − 1,) of the shapes but the first, along the wall, m."""
     least_eigenvalue: float
-    """Of the Hessian without the gauge: the first shape held."""
+    """Those of the Hessian with the first shape fixed."""
 
 
 def shape(which: int) -> Array:

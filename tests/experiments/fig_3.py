@@ -36,13 +36,13 @@ MINIMUM = 1e-3
 """Gradient norm of a minimum. Many joint matches are held at a cell's border instead, where the energy jumps
 and its gradient is not zero: there the turn of all scans has some curvature too."""
 DRAWS = 20
-"""Seeds of the matches that tell how far off they usually end."""
+"""Seeds of the matches that give the usual errors."""
 OFF, OFF_ANGLE = 0.1, 0.05
-"""How far (m, rad) the poses are off at most that the matches start from."""
+"""Greatest errors (m, rad) of the poses that the matches start from."""
 PAIRS = ((0, 1), (0, 2), (1, 2))
 ALL = (0, 1, 2)
 ENLARGED = 30.0
-"""Standard deviations of the ellipses, ten times what is usual, to be seen."""
+"""Standard deviations of the ellipses, ten times the usual number, so that they are visible."""
 SHIFTS = np.linspace(-0.5, 0.5, 81)
 """m, of the curves."""
 SINGULAR = 1e-10
@@ -57,11 +57,11 @@ class Subset:
 
     scans: tuple[int, ...]
     eigenvalues: Array
-    """(3n − 3,) of the Hessian with the first scan held, at the joint minimum of all three."""
+    """(3n − 3,) those of the Hessian with the first scan fixed, at the joint minimum of all three."""
     weakest: tuple[Weakest, ...]
     """Of each scan's position but the first's."""
     error: float
-    """m; how far off the truth their own match ends, the worst of the scans."""
+    """Greatest error (m) of a scan in their own match."""
     usual_error: float
     """m; its median over all DRAWS."""
 
@@ -90,7 +90,7 @@ def matched(which: Sequence[int], seed: int | None = None) -> JointMatch:
 
 
 def error(which: Sequence[int], seed: int | None = None) -> float:
-    """How far (m) off the truth their own match ends, the worst of the scans."""
+    """The greatest error (m) of a scan in their own match."""
     off = errors(matched(which, seed).poses, scans(seed).truth[list(which)])
     return float(np.hypot(off[:, 0], off[:, 1]).max())
 
@@ -199,13 +199,13 @@ def _name(which: Sequence[int]) -> str:
 
 
 def _marginal(hessian: Array, which: int) -> Array:
-    """The information (3, 3) on one of the poses, whatever the others are."""
+    """The marginal information (3, 3) on one of the poses."""
     at = slice(3 * which, 3 * which + 3)
     return np.linalg.inv(np.linalg.inv(hessian)[at, at]).astype(np.float64)
 
 
 def _picture() -> Image:
-    """The scans with what each subset knows, and the energies along what the pairs leave open."""
+    """The scans with the information of each subset, and the energies where the pairs leave them open."""
     chart = line_chart(
         {
             f"{_name(which)}, {way}": (SHIFTS, energies - energies.min())

@@ -1,4 +1,4 @@
-"""Mappings from global to local coordinates of nScan relations that are held in an iteration (paper, IV)."""
+"""Mappings from global to local coordinates of nScan relations, fixed in an iteration (paper, IV)."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ GRID = np.linspace(-np.pi, np.pi, 361)
 """Angles, from the mean one, among which the optimal one is sought."""
 BISECTIONS = 30
 LEAST_SHARE = 1e-9
-"""Of the greatest entry of H: what holds a shift that H does not see."""
+"""Share of the greatest entry of H that holds a shift without information in H."""
 
 
 class Relations(NamedTuple):
@@ -24,7 +24,7 @@ class Relations(NamedTuple):
     members: Indices
     """(Q, n) places of the poses."""
     local: Array
-    """(Q, n, 3), shifted so that the middle of the positions is 0."""
+    """(Q, n, 3), shifted so that the mean of the positions is 0."""
     hessians: Array
     """(Q, 3 n, 3 n)"""
     fixed: Indices
@@ -114,7 +114,7 @@ def grouped(nscan: Sequence[NScan], positions: Indices) -> list[Relations]:
 
 
 def with_c_held(relation: NScan) -> NScan:
-    """The relation with the Hessian that it has when pose c is held: nothing in c's rows and columns."""
+    """The relation with the Hessian for a fixed pose c: zeros in the rows and columns of c."""
     hessian = relation.hessian.copy()
     rows = slice(3 * relation.fixed, 3 * relation.fixed + 3)
     hessian[rows] = hessian[:, rows] = 0.0

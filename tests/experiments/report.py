@@ -1,4 +1,4 @@
-"""What an experiment gives: pictures, a table, and what they show."""
+"""The result of an experiment: pictures, a table, and text about them."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ class Report:
 
     title: str
     text: str
-    """Markdown: what was done, and what is to be seen."""
+    """Markdown: what was done, and what the pictures show."""
     pictures: Mapping[str, Image]
     """By the names of their files, without ending."""
     header: Sequence[str]

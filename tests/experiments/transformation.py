@@ -28,7 +28,7 @@ from tests.graph.simulated import disturbed
 
 REAL = ("mit-csail", "intel")
 CHAIN_NOISE = np.array([0.03, 0.03, 0.015])
-"""m, m, rad; standard deviations of what a noisy chain adds to each relation."""
+"""Standard deviations (m, m, rad) of the noise of each relation of a chain."""
 CHAIN_SEEDS = (0, 1)
 NEAR, NEAR_NOISE = "near", 0.1
 """m, and a tenth of it in rad: the noise of the poses of this start."""
@@ -73,7 +73,7 @@ class Problem:
     """(K, 3) each."""
 
     def held(self, mapping: Mapping, c_held: bool) -> FixedMapping:
-        """Another way; with the relations' Hessians as they are, or with pose c held in them."""
+        """The energy with another mapping, with the relations' Hessians, or with those for a fixed pose c."""
         nscan = [with_c_held(relation) for relation in self.nscan] if c_held else self.nscan
         return FixedMapping(len(self.chosen.free_row), self.pairwise, nscan, self.positions, mapping)
 
@@ -130,7 +130,7 @@ class Minimiser(Protocol):
 
 
 def ways(problem: Problem) -> Iterator[tuple[str, str, Minimiser]]:
-    """The mapping, the gauge in the relations' Hessians, and what minimises."""
+    """The mapping, the gauge in the relations' Hessians, and the function that minimises."""
     yield (
         "follows c, as in the tool",
         "either",

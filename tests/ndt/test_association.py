@@ -26,7 +26,7 @@ def outside_in(count: int) -> Ndt:
 
 @pytest.mark.parametrize("curvature", [0.0, 1.0])
 @pytest.mark.parametrize("step", [1e-3, 0.05, 1.0, 30.0])
-def test_what_was_kept_on_the_way_says_the_same_as_what_is_looked_up_anew(step, curvature):
+def test_an_updated_association_equals_a_new_look_up(step, curvature):
     ndt, points = outside_in(3), room(7)
     association, kept, anew = begin_association(points), np.empty(ENERGY_NUMBERS), np.empty(ENERGY_NUMBERS)
     rng, start = np.random.default_rng(5), np.array([0.1, -0.1, 0.05])
@@ -45,7 +45,7 @@ def test_what_was_kept_on_the_way_says_the_same_as_what_is_looked_up_anew(step, 
     assert counted >= 20
 
 
-def test_inliers_of_an_association_are_those_that_are_looked_up_anew():
+def test_inliers_of_an_association_are_those_of_a_new_look_up():
     ndt, points = outside_in(3), room(7)
     rng, counts = np.random.default_rng(6), set()
     for _ in range(20):
@@ -59,7 +59,7 @@ def test_inliers_of_an_association_are_those_that_are_looked_up_anew():
     assert len(counts) > 10
 
 
-def test_gaussians_that_are_outdated_are_made_when_they_are_met():
+def test_outdated_gaussians_are_made_when_they_are_looked_up():
     at_once, later = outside_in(3), outside_in(3)
     for scan, pose, sign in ((room(5), np.array([0.1, 0.0, 0.02]), 1.0), (room(0), np.zeros(3), -1.0)):
         for ndt, now in ((at_once, True), (later, False)):
@@ -80,7 +80,7 @@ def test_gaussians_that_are_outdated_are_made_when_they_are_met():
     np.testing.assert_array_equal(later.grid.gaussians[: later.rows], at_once.grid.gaussians[: later.rows])
 
 
-def test_no_points_meet_nothing():
+def test_no_points_have_no_gaussians():
     ndt, out = outside_in(1), np.empty(ENERGY_NUMBERS)
     association = begin_association(np.empty((0, 2)))
     update_association(ndt.grid, ndt.half, association, 0.0, 0.0, 0.0)
@@ -89,7 +89,7 @@ def test_no_points_meet_nothing():
     assert count_inliers(association, 9.0) == 0
 
 
-def test_poses_that_are_not_numbers_meet_nothing():
+def test_poses_that_are_not_numbers_have_no_gaussians():
     ndt = outside_in(1)
     association, out = begin_association(room(1)), np.empty(ENERGY_NUMBERS)
     for x in (np.nan, np.inf, 1e300):

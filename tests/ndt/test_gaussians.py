@@ -21,13 +21,13 @@ FRAMES = [np.zeros(3), np.array([-3.1, 0.7, 0.5]), np.array([5.3, 2.2, 2.3])]
 
 
 def face(y: float, seed: int) -> Array:
-    """(200, 2) points along a face of the wall, 5 mm off it."""
+    """(200, 2) points along a face of the wall, with noise of 5 mm."""
     rng = np.random.default_rng(seed)
     return np.stack([np.linspace(-2.45, 2.45, 200), y + 0.005 * rng.standard_normal(200)], axis=1)
 
 
 def seen(points: Array, pose: Array) -> Array:
-    """What a robot at the pose sees of them: in the order of its beams."""
+    """The points in the order in which beams of a robot at the pose hit them."""
     found = relative_points(points, pose)
     return found[np.argsort(np.arctan2(found[:, 1], found[:, 0]))]
 
@@ -50,7 +50,7 @@ FRONT, BACK = (face(2.0, 1), SOUTH), (face(2.0 + THICK, 2), NORTH)
 
 @pytest.mark.parametrize("frame", FRAMES, ids=["along", "half a radian", "backwards"])
 @pytest.mark.parametrize("order", [(FRONT, BACK), (BACK, FRONT)], ids=["south first", "north first"])
-def test_each_side_meets_its_own_face_and_nothing_else(frame, order):
+def test_each_side_is_associated_with_its_own_face(frame, order):
     both = added(*order, frame=frame)
     for points, pose in order:
         alone, scan, at = added((points, pose), frame=frame), seen(points, pose), compose(frame, pose)
@@ -89,7 +89,7 @@ def test_the_means_lie_on_the_faces(frame):
         assert gaussian[5:7] @ other[5:7] < -0.99
 
 
-def test_a_face_of_too_few_points_spoils_the_other_no_more():
+def test_a_face_of_too_few_points_does_not_change_the_other():
     few = BACK[0][::12]
     # 17 points on 5 m: two to five in a block of 1 m.
     both, alone = added(FRONT, (few, NORTH), minimum=6), added(FRONT, minimum=6)
@@ -137,7 +137,7 @@ def test_growing_and_compacting_keep_both_faces():
 
 
 @pytest.mark.parametrize(("points", "pose"), [FRONT, BACK], ids=["south", "north"])
-def test_what_is_kept_while_the_pose_changes_is_of_the_right_face(points, pose):
+def test_an_updated_association_has_the_right_face(points, pose):
     ndt, scan = added(FRONT, BACK), seen(points, pose)
     association, kept, anew = begin_association(scan), np.empty(ENERGY_NUMBERS), np.empty(ENERGY_NUMBERS)
     rng = np.random.default_rng(3)

@@ -23,7 +23,7 @@ def grown(points, cell=1.0, minimum=3, floor=0.02, capacity=512, pose=HERE) -> N
 
 
 def entries(ndt: Ndt) -> dict[int, tuple[float, ...]]:
-    """Key → Gaussian, of all that have points enough."""
+    """Key → Gaussian, of all with enough points."""
     grid = ndt.grid
     return {
         int(grid.keys[row]): tuple(grid.gaussians[row])
@@ -83,7 +83,7 @@ def test_adding_moves_by_the_pose():
         np.testing.assert_allclose(gaussian[:5], there[key][:5], rtol=1e-9, atol=1e-9)
 
 
-def test_a_wall_is_met_from_the_side_that_it_was_seen_from():
+def test_a_wall_is_associated_from_the_side_that_it_was_seen_from():
     """A wall at y = 2 seen from the origin: a robot beyond it sees the other face, at the same place."""
     x = np.linspace(-1.5, 1.5, 61)
     wall = np.stack([x, np.full(61, 2.0)], axis=1)
@@ -146,7 +146,7 @@ def test_compacting_keeps_the_energy_in_less_memory():
 
 
 def test_scans_taken_together_are_as_if_added_one_by_one():
-    """Whatever the room that there is at first: where none is left, cells are entered into a greater grid."""
+    """With any initial capacity: a full grid is copied into a larger one."""
     scans = [room(seed) for seed in range(12)]
     poses = np.array([[3.0 * k, 0.5 * k, 0.1 * k] for k in range(12)])
     grown_by_each = Ndt.empty(0.5, capacity=16)
@@ -163,14 +163,14 @@ def test_scans_taken_together_are_as_if_added_one_by_one():
             np.testing.assert_allclose(found.hessian, expected.hessian, rtol=1e-9, atol=1e-6)
 
 
-def test_nothing_added_is_nothing():
+def test_an_ndt_without_points_has_no_gaussians():
     ndt = grown(np.empty((0, 2)))
     assert gaussian_count(ndt) == 0
     assert energy(ndt, room(1), HERE).value == 0.0
 
 
-def test_a_map_that_moves_on_leaves_behind_what_is_empty():
-    """It says the same, to the bit, as one that has room for all cells that it was ever in."""
+def test_a_map_that_moves_drops_empty_cells():
+    """It has the same bits as a map with capacity for all cells that it ever had."""
     small, large = Ndt.empty(0.5, capacity=16), Ndt.empty(0.5, capacity=1 << 17)
     poses = [np.array([3.0 * k, 0.5 * k, 0.1 * k]) for k in range(40)]
     sizes = []

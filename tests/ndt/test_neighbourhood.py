@@ -22,7 +22,7 @@ ALONG, ACROSS = np.array([1.0, 0.0, 0.0]), np.array([0.0, 1.0, 0.0])
 
 
 def wall(*places: tuple[float, float], seed: int = 1) -> Array:
-    """Points (n, 2) on the line from place to place, a centimetre apart and 5 mm off it."""
+    """Points (n, 2) on a line from place to place, 1 cm apart, with noise of 5 mm."""
     rng = np.random.default_rng(seed)
     parts = []
     for a, b in itertools.pairwise(places):
@@ -37,7 +37,7 @@ def ndt_of(points: Array, around: int, frame: Array = HERE) -> Ndt:
 
 
 def held(ndt: Ndt, points: Array, frame: Array, direction: Array) -> float:
-    """What the Hessian of the energy says of a direction (3,), in the frame of what was seen."""
+    """The information of the energy in a direction (3,), in the frame of the walls."""
     hessian = energy(ndt, points, frame, exact=False).hessian
     turned = compose(np.array([0.0, 0.0, frame[2]]), direction) - np.array([0.0, 0.0, frame[2]])
     return float(turned @ hessian @ turned)
@@ -46,7 +46,7 @@ def held(ndt: Ndt, points: Array, frame: Array, direction: Array) -> float:
 @pytest.mark.parametrize("frame", FRAMES, ids=["along", "half a radian", "backwards"])
 @pytest.mark.parametrize("end", [3.6, 3.85, 4.1, 4.35])
 def test_the_end_of_a_wall_holds_across_and_not_along(frame, end):
-    """Of the blocks there, a metre wide and half a metre apart, some are filled by less than half."""
+    """Blocks are 1 m wide and 0.5 m apart, so that the wall fills less than half of some."""
     points = wall((0.0, 2.0), (end, 2.0))
     last = points[points[:, 0] > end - 0.3]
     alone, open_ended = (ndt_of(points, around, frame) for around in (NO_NEIGHBOURS, WALL_END))
@@ -56,7 +56,7 @@ def test_the_end_of_a_wall_holds_across_and_not_along(frame, end):
 
 
 def test_alone_the_end_of_a_wall_holds_along():
-    """What is done away with: of the wall above, a tenth of a metre into a block, far more."""
+    """Without the correction, the wall of the test above has far more information along it."""
     points = wall((0.0, 2.0), (4.1, 2.0))
     assert held(ndt_of(points, NO_NEIGHBOURS), points[points[:, 0] > 3.8], HERE, ALONG) > 1000
 
@@ -70,8 +70,8 @@ def test_alone_the_end_of_a_wall_holds_along():
         pytest.param([(0.0, 2.0), (2.1, 2.0), (2.1, 2.15)], id="door post"),
     ],
 )
-def test_what_stands_out_holds(frame, places):
-    """Of the Gaussians there those may let go that have the end of one of the walls alone."""
+def test_corners_keep_their_information(frame, places):
+    """Only Gaussians that contain nothing but the end of one wall lose information."""
     points = wall(*places)
     alone, open_ended = (ndt_of(points, around, frame) for around in (NO_NEIGHBOURS, WALL_END))
     for direction in (ALONG, ACROSS):
