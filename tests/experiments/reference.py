@@ -15,7 +15,7 @@ from nscan_cli.evaluation.reference_relations import read_relations
 from nscan_cli.graph.model import Pairwise
 from nscan_cli.graph.optimise.chordal import chordal_start
 from nscan_cli.graph.optimise.graph_energy import GraphEnergy
-from nscan_cli.graph.optimise.graph_solver import optimise
+from nscan_cli.graph.optimise.graph_solver import optimise_poses
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.logs.load import read_log
 from nscan_cli.poses import Array
@@ -58,7 +58,7 @@ def reference_log(name: str) -> ReferenceLog | None:
         if positions[a] >= 0
     ]
     energy = GraphEnergy(len(part), pairwise, positions)
-    poses = optimise(energy, chordal_start(energy, np.zeros((len(part), 3)))).poses
+    poses = optimise_poses(energy, chordal_start(energy, np.zeros((len(part), 3)))).poses
     return ReferenceLog(log, nearest_in_time(log.times, times[part]), poses)
 
 

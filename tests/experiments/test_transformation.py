@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from nscan_cli.graph.model import Graph
-from nscan_cli.graph.optimise.graph_solver import optimise
+from nscan_cli.graph.optimise.graph_solver import optimise_poses
 from nscan_cli.poses import Array, compose, relative
 from tests.experiments import transformation
 from tests.experiments.fixed_mapping import MAX_ITERATIONS, FixedMapping, VariableMapping, minimise
@@ -61,7 +61,7 @@ def test_all_ways_reach_the_minimum_of_a_small_consistent_graph(mapping, c_held)
 @pytest.mark.parametrize("mapping", [of_pose_c, mean])
 def test_with_the_gauge_free_a_held_mapping_ends_near_the_minimum_of_a_noisy_graph(mapping):
     truth, chosen = chosen_ring(1.0)
-    best, found = optimise(chosen, truth), minimise(held_ring(mapping, 1.0), truth)
+    best, found = optimise_poses(chosen, truth), minimise(held_ring(mapping, 1.0), truth)
     assert found.converged
     assert chosen.evaluate(found.poses, exact=False).value == pytest.approx(best.energy, rel=1e-4)
     np.testing.assert_allclose(relative(found.poses, best.poses), 0, atol=1e-3)
@@ -70,7 +70,7 @@ def test_with_the_gauge_free_a_held_mapping_ends_near_the_minimum_of_a_noisy_gra
 @pytest.mark.parametrize("mapping", MAPPINGS.values())
 def test_with_pose_c_held_a_held_mapping_ends_elsewhere_on_a_noisy_graph(mapping):
     truth, chosen = chosen_ring(1.0)
-    best, found = optimise(chosen, truth), minimise(held_ring(mapping, 1.0, True), truth, 2000)
+    best, found = optimise_poses(chosen, truth), minimise(held_ring(mapping, 1.0, True), truth, 2000)
     assert found.converged
     assert chosen.evaluate(found.poses, exact=False).value > 2 * best.energy
 
@@ -78,7 +78,7 @@ def test_with_pose_c_held_a_held_mapping_ends_elsewhere_on_a_noisy_graph(mapping
 def test_the_chosen_way_steps_as_the_tool_does():
     truth, chosen = chosen_ring(1.0)
     start = disturbed(truth, 0.5)
-    tool, found = optimise(chosen, start), minimise(chosen, start)
+    tool, found = optimise_poses(chosen, start), minimise(chosen, start)
     assert abs(tool.iterations - found.iterations) <= 2
     np.testing.assert_allclose(relative(found.poses, tool.poses), 0, atol=1e-6)
 

@@ -56,12 +56,8 @@ def write_graph(graph: Graph) -> bytes:
         term = relation.term()
         check_finite(f"the relation of {relation.nodes}", term.local, term.hessian, relation.score)
     provenance = {**provenance_of([], {}), **graph.provenance}
-    head: dict[str, Any] = {
-        "$schema": SCHEMA,
-        "format": GRAPH_FORMAT,
-        "version": VERSION,
-        "units": GRAPH_UNITS,
-    }
+    head: dict[str, Any] = {"$schema": SCHEMA, "format": GRAPH_FORMAT, "version": VERSION}
+    head |= {"units": GRAPH_UNITS, "provenance": provenance}
     lists: dict[str, Iterable[str]] = {
         "nodes": _node_records(graph),
         "relations": (
@@ -76,7 +72,7 @@ def write_graph(graph: Graph) -> bytes:
     }
     # Record by record: all records as lists of numbers take many times the memory of the document.
     document = io.BytesIO()
-    for key, value in {**head, "provenance": provenance}.items():
+    for key, value in head.items():
         document.write(f'{RECORD_SEPARATOR if document.tell() else "{"}"{key}":{_compact(value)}'.encode())
     for key, records in lists.items():
         document.write(f'{RECORD_SEPARATOR}"{key}":['.encode())

@@ -31,7 +31,7 @@ class Optimum:
     """Whether the last step was within the tolerance without being damped."""
 
 
-def optimise(
+def optimise_poses(
     energy: GraphEnergy, poses: Array, max_iterations: int = 100, tolerance: float = 1e-6
 ) -> Optimum:
     """Minimise from the poses (K, 3) until a step moves no pose by more than `tolerance` (m, rad).

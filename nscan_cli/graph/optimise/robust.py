@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nscan_cli.graph.optimise.graph_energy import GraphEnergy
-from nscan_cli.graph.optimise.graph_solver import optimise
+from nscan_cli.graph.optimise.graph_solver import optimise_poses
 from nscan_cli.poses import Array
 
 
@@ -81,7 +81,7 @@ def _graduated(
     while width > 1.0:
         width = max(width / narrowing, 1.0)
         weights[doubted] = (width / (width + excess[doubted])) ** 2
-        poses = optimise(energy.weighted(weights), poses, options.iterations, 1e-4).poses
+        poses = optimise_poses(energy.weighted(weights), poses, options.iterations, 1e-4).poses
         excess = energy.terms(poses) / bounds
     return poses
 

@@ -10,7 +10,7 @@ import numpy as np
 from nscan_cli.graph.model import Graph
 from nscan_cli.graph.optimise.chordal import chordal_start
 from nscan_cli.graph.optimise.graph_energy import GraphEnergy
-from nscan_cli.graph.optimise.graph_solver import Optimum, optimise
+from nscan_cli.graph.optimise.graph_solver import Optimum, optimise_poses
 from nscan_cli.graph.optimise.robust import unfolded
 from nscan_cli.graph.relations.base import Relation
 from nscan_cli.poses import Array, Indices
@@ -80,19 +80,19 @@ def _lowest_minimum(energy: GraphEnergy, given: Array, max_iterations: int, tole
     iterations = 0
     best: Optimum | None = None
     for start in (given, chordal_start(energy, given)):
-        found = optimise(energy, start, min(TRIAL_ITERATIONS, max_iterations), tolerance)
+        found = optimise_poses(energy, start, min(TRIAL_ITERATIONS, max_iterations), tolerance)
         iterations += found.iterations
         if best is None or _is_lower(found, best):
             best = found
     assert best is not None
     if not best.converged:
-        best = optimise(energy, best.poses, max_iterations, tolerance)
+        best = optimise_poses(energy, best.poses, max_iterations, tolerance)
         iterations += best.iterations
     for _ in range(MAX_UNFOLDINGS):
         other_start = unfolded(energy, best.poses)
         if other_start is None:
             break
-        found = optimise(energy, other_start, max_iterations, tolerance)
+        found = optimise_poses(energy, other_start, max_iterations, tolerance)
         iterations += found.iterations
         if not _is_lower(found, best):
             break

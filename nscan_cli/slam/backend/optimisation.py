@@ -14,7 +14,7 @@ def optimise(state: SlamState, max_iterations: int, tolerance: float, part: Subg
     if len(state.poses) < 2:
         return
     energy = state.energies.of(state.route, part.relations, 0, part.free)
-    optimum = graph_solver.optimise(energy, state.poses, max_iterations, tolerance)
+    optimum = graph_solver.optimise_poses(energy, state.poses, max_iterations, tolerance)
     state.route = state.route._replace(poses=optimum.poses)
 
 

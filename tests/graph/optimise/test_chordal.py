@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from nscan_cli.graph.model import NScan, Pairwise
 from nscan_cli.graph.optimise.chordal import chordal_start
-from nscan_cli.graph.optimise.graph_solver import optimise
+from nscan_cli.graph.optimise.graph_solver import optimise_poses
 from nscan_cli.poses import relative
 from tests.graph.simulated import energy_of, mixed_ring, nscan_relation, pairwise_relations, ring, ring_edges
 
@@ -31,13 +31,13 @@ def test_it_finds_the_minimum_where_the_given_poses_end_in_another(kind: str):
         pairwise = []
         nscan = [nscan_relation(truth, [(i + k) % 60 for k in range(3)], rng, 1.0) for i in range(60)]
     energy = energy_of(truth, pairwise, nscan)
-    best = optimise(energy, truth)
+    best = optimise_poses(energy, truth)
     # A start that winds round twice.
     wound = ring(60)
     wound[:, 2] = wound[0, 2] + 2 * (wound[:, 2] - wound[0, 2])
     wound[1:, :2] = wound[0, :2] + np.cumsum(np.stack([np.cos(wound[:-1, 2]), np.sin(wound[:-1, 2])], 1), 0)
-    assert optimise(energy, wound, max_iterations=200).energy > 10 * best.energy
-    found = optimise(energy, chordal_start(energy, wound))
+    assert optimise_poses(energy, wound, max_iterations=200).energy > 10 * best.energy
+    found = optimise_poses(energy, chordal_start(energy, wound))
     assert found.energy == pytest.approx(best.energy, rel=1e-9)
     np.testing.assert_allclose(relative(found.poses, best.poses), 0, atol=1e-5)
 
@@ -50,7 +50,7 @@ def test_one_large_error_of_the_odometry_is_undone():
     energy = energy_of(truth, pairwise, [])
     start = rng.normal(size=(40, 3)) * [30, 30, 3]
     start[0] = truth[0]
-    found, best = optimise(energy, chordal_start(energy, start)), optimise(energy, truth)
+    found, best = optimise_poses(energy, chordal_start(energy, start)), optimise_poses(energy, truth)
     assert found.energy == pytest.approx(best.energy, rel=1e-9)
 
 

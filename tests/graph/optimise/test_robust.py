@@ -9,7 +9,7 @@ import pytest
 from scipy.stats import chi2
 
 from nscan_cli.graph.model import NScan, Pairwise
-from nscan_cli.graph.optimise.graph_solver import optimise
+from nscan_cli.graph.optimise.graph_solver import optimise_poses
 from nscan_cli.graph.optimise.robust import (
     UNFOLDING,
     RobustOptions,
@@ -61,7 +61,7 @@ def with_loops(wrong: int, seed: int) -> tuple[list[Pairwise], list[bool]]:
 def test_the_wrong_loops_are_found_and_no_right_one(wrong, seed):
     relations, expected = with_loops(wrong, seed)
     energy = energy_of(ring(COUNT), relations, [])
-    poses = optimise(energy, ring(COUNT)).poses
+    poses = optimise_poses(energy, ring(COUNT)).poses
     doubted = np.array([relation.origin == "loop" for relation in relations])
     assert contradicting(energy, poses, doubted).tolist() == expected
 
@@ -88,11 +88,11 @@ def test_those_named_are_the_ones_beyond_the_bound_without_them(seed, off):
         wrong = rng.normal(size=3) * np.array([0.15, 0.15, 0.03]) * off
         relations.append(replace(loop, measurement=loop.measurement + wrong))
     energy = energy_of(truth, relations, [])
-    poses = optimise(energy, truth).poses
+    poses = optimise_poses(energy, truth).poses
     doubted = np.array([relation.origin == "loop" for relation in relations])
     named = contradicting(energy, poses, doubted)
     kept = [relation for relation, wrong in zip(relations, named, strict=True) if not wrong]
-    without = optimise(energy_of(truth, kept, []), poses).poses
+    without = optimise_poses(energy_of(truth, kept, []), poses).poses
     beyond = energy.terms(without) > chi2_bounds(energy, RobustOptions())
     np.testing.assert_array_equal(named, doubted & beyond)
 
@@ -106,7 +106,7 @@ def test_a_wrong_joint_relation_is_found():
     chain = pairwise_relations(truth, ring_edges(COUNT)[:-1], rng, 1.0)
     nscan: list[NScan] = [*right, wrong]
     energy = energy_of(truth, chain, nscan)
-    poses = optimise(energy, truth).poses
+    poses = optimise_poses(energy, truth).poses
     doubted = np.array([False] * len(chain) + [True] * len(nscan))
     assert np.flatnonzero(contradicting(energy, poses, doubted)).tolist() == [len(doubted) - 1]
 
@@ -147,7 +147,7 @@ def test_quantiles_are_those_of_chi2():
 def test_where_all_relations_fit_there_is_no_other_start():
     truth, pairwise, nscan = mixed_ring(12, noise=0.3)
     energy = energy_of(truth, pairwise, nscan)
-    assert unfolded(energy, optimise(energy, truth).poses) is None
+    assert unfolded(energy, optimise_poses(energy, truth).poses) is None
 
 
 def test_a_chi2_beyond_all_numbers_is_no_reason_to_narrow_for_ever():
@@ -161,7 +161,7 @@ def test_a_chi2_beyond_all_numbers_is_no_reason_to_narrow_for_ever():
 def test_what_is_not_doubted_is_never_named():
     relations, _ = with_loops(3, seed=1)
     energy = energy_of(ring(COUNT), relations, [])
-    poses = optimise(energy, ring(COUNT)).poses
+    poses = optimise_poses(energy, ring(COUNT)).poses
     assert (energy.terms(poses) / chi2_bounds(energy, RobustOptions())).max() > 1.0
     assert not contradicting(energy, poses, np.zeros(len(relations), dtype=bool)).any()
 

@@ -8,7 +8,7 @@ import pytest
 from nscan_cli.graph.io.g2o import read_g2o
 from nscan_cli.graph.model import Graph
 from nscan_cli.graph.optimise.chordal import chordal_start
-from nscan_cli.graph.optimise.graph_solver import optimise
+from nscan_cli.graph.optimise.graph_solver import optimise_poses
 from nscan_cli.graph.optimise.whole_graph import components, optimise_graph
 from nscan_cli.poses import compose, relative
 from tests.data import data_file
@@ -107,11 +107,11 @@ def test_a_town_that_the_chordal_start_folds_wrong_is_unfolded(count, turn_noise
     """As low as from the true poses; the minimum next to the chordal start is a tenth above that."""
     truth, pairwise = streets(count, 300, turn_noise, seed)
     energy = energy_of(truth, pairwise, [])
-    lowest = optimise(energy, truth, max_iterations=1000).energy
+    lowest = optimise_poses(energy, truth, max_iterations=1000).energy
     given = [truth[0]]
     for relation in pairwise[: count - 1]:
         given.append(compose(given[-1], relation.measurement))
-    assert optimise(energy, chordal_start(energy, np.array(given))).energy > 1.1 * lowest
+    assert optimise_poses(energy, chordal_start(energy, np.array(given))).energy > 1.1 * lowest
     result = optimise_graph(graph_of(np.array(given), pairwise, []))
     assert result.converged
     assert result.energy == pytest.approx(lowest, rel=1e-9)
