@@ -15,7 +15,7 @@ from nscan_cli.cli.main import run
 from nscan_cli.errors import InputDataError, InputMissingError
 from nscan_cli.graph.io.json_graph import write_graph
 from nscan_cli.logs.load import read_log
-from tests.cli.room_log import room_log
+from tests.cli.room import room_log
 from tests.data import PACKAGE
 from tests.graph.small_graph import small_graph
 from tests.logs.forms import FORMS

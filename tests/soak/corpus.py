@@ -14,7 +14,7 @@ import zstandard
 from nscan_cli.graph.io.g2o import write_g2o
 from nscan_cli.graph.io.json_graph import write_graph
 from nscan_cli.graph.io.tum import write_tum
-from tests.cli.room_log import room_log
+from tests.cli.room import room_log
 from tests.data import find_data
 from tests.graph.small_graph import small_graph
 from tests.logs.forms import FORMS
