@@ -1,8 +1,7 @@
-"""The motion that takes a result into the frame of its reference, and what decides its angle.
+"""The rigid alignment of a result to its reference (S. Umeyama, PAMI 13, 1991, without scale).
 
-Where the robot has moved, the positions do: that is the ATE as others have it. Of a robot that stands, or
-turns where it is, the positions are noise and the lever arms of markers, and any angle fits them; there the
-headings decide.
+Where the robot has moved, the positions decide the angle, as in the usual ATE. Where it stands, or turns on
+the spot, the positions are only noise and lever arms of markers; there the headings decide the angle.
 """
 
 from __future__ import annotations
@@ -14,50 +13,53 @@ import numpy as np
 
 from nscan_cli.poses import Array, compose, wrap
 
-ACCURACY = 0.02
-"""m by which positions are off at least: where markers sit, nobody knows better."""
-OPEN = 0.2
-"""rad; where the positions know the angle no better, it is open."""
-DRIVE = 0.3
-"""m (RMS about the mean) that both have moved together: beyond, they have driven, whatever the result."""
+LEAST_POSITION_ERROR = 0.02
+"""m; error of positions that is always assumed, because markers are not placed more exactly."""
+LARGEST_ANGLE_SIGMA = 0.2
+"""rad; where positions leave the angle more uncertain, headings may decide it."""
+DRIVEN_DISTANCE = 0.3
+"""m (RMS about the mean) of common motion from which on positions always decide the angle."""
 
 
 @dataclass(frozen=True)
 class Alignment:
-    """A rigid motion, and what its angle is from."""
+    """A rigid motion, and what decides its angle."""
 
     motion: Array
     """(3,)"""
     by: Literal["positions", "headings"]
     common: float
-    """m (RMS about the mean) that result and reference have moved together."""
+    """Common motion of result and reference, m (RMS about the mean)."""
 
 
 def alignment(poses: Array, truth: Array) -> Alignment:
     """The rigid motion that brings `poses` (N, 3) nearest to `truth` (N, 3).
 
-    Least squares in closed form: with positions from their means, a and b, the angle is that of
-    Σ (a·b, a×b). What a and b have not in common, and ACCURACY, leave it uncertain: where by more than OPEN,
-    and the headings know it better, it is the mean of what these differ by. Errors of trajectories go
-    together, and so neither becomes surer by more poses.
+    Least squares in closed form: with positions a and b about their means, the angle is that of
+    Σ (a·b, a×b). Residuals and LEAST_POSITION_ERROR make it uncertain. Where that exceeds
+    LARGEST_ANGLE_SIGMA and the spread of the headings' differences, the angle is the mean of these
+    differences. Errors of trajectories are correlated, so more poses do not reduce the uncertainty.
     """
     centre, true_centre = poses[:, :2].mean(axis=0), truth[:, :2].mean(axis=0)
     a, b = poses[:, :2] - centre, truth[:, :2] - true_centre
     dot, cross = (a * b).sum() / len(a), (a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]).sum() / len(a)
     common = float(np.hypot(dot, cross))
     apart = max(((a**2).sum() + (b**2).sum()) / (2 * len(a)) - common, 0.0)
-    angle, by_headings, spread = float(np.arctan2(cross, dot)), *_mean_angle(truth[:, 2] - poses[:, 2])
-    # As long as common is small: it can be 0.
-    is_open = apart + ACCURACY**2 > max(OPEN, spread) ** 2 * common and common < DRIVE**2
-    if is_open:
-        angle = by_headings
+    angle, heading_angle, spread = float(np.arctan2(cross, dot)), *circular_mean(truth[:, 2] - poses[:, 2])
+    # Multiplied out, because common can be 0.
+    by_heading = (
+        apart + LEAST_POSITION_ERROR**2 > max(LARGEST_ANGLE_SIGMA, spread) ** 2 * common
+        and common < DRIVEN_DISTANCE**2
+    )
+    if by_heading:
+        angle = heading_angle
     turned = compose([0.0, 0.0, angle], [*centre, 0.0])
     motion = np.array([*(true_centre - turned[:2]), angle])
-    return Alignment(motion, "headings" if is_open else "positions", common**0.5)
+    return Alignment(motion, "headings" if by_heading else "positions", common**0.5)
 
 
-def _mean_angle(angles: Array) -> tuple[float, float]:
-    """The mean direction of angles (N,), and their circular standard deviation; rad."""
+def circular_mean(angles: Array) -> tuple[float, float]:
+    """The mean direction of angles (N,), and their circular standard deviation, rad."""
     cos, sin = float(np.cos(angles).mean()), float(np.sin(angles).mean())
     length = min(np.hypot(cos, sin), 1.0)
     spread = float(np.sqrt(-2 * np.log(length))) if length > 0 else np.inf
@@ -65,6 +67,6 @@ def _mean_angle(angles: Array) -> tuple[float, float]:
 
 
 def spread_about(angles: Array) -> tuple[float, float]:
-    """The mean (rad) of angles (N,) that lie together, and their standard deviation about it."""
-    mean, _ = _mean_angle(angles)
+    """The mean direction of angles (N,), and their standard deviation about it, rad."""
+    mean, _ = circular_mean(angles)
     return mean, float(np.sqrt((wrap(angles - mean) ** 2).mean()))

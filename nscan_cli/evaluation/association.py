@@ -1,4 +1,4 @@
-"""Which poses of two trajectories belong together: those nearest in time."""
+"""Association of the poses of two trajectories by time."""
 
 from __future__ import annotations
 
@@ -10,21 +10,21 @@ from nscan_cli.files.counting import counted
 from nscan_cli.poses import Array
 
 TOLERANCE = 0.1
-"""Seconds by which a stamp may miss a pose, as in Kümmerle's metric."""
+"""s; largest distance in time of a match, as in Kümmerle's metric."""
 
 
 def nearest_in_time(times: Array, wanted: Array) -> NDArray[np.int64]:
-    """The rows (M,) of `times` (N,), not decreasing, nearest to `wanted` (M,); the earlier of two as near."""
+    """The rows (M,) of `times` (N,), not decreasing, nearest to `wanted` (M,); of two as near the earlier."""
     right = np.clip(np.searchsorted(times, wanted), 1, max(len(times) - 1, 1))
     left = right - 1
     right = np.minimum(right, len(times) - 1)
     return np.where(wanted - times[left] <= times[right] - wanted, left, right).astype(np.int64)
 
 
-def mutual(times: Array, reference: Array) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def mutual_nearest(times: Array, reference: Array) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Rows of `times` and of `reference`, pair by pair, that are each other's nearest within TOLERANCE.
 
-    Each row occurs once at most, whichever of the two is the denser. Both must not decrease.
+    Each row occurs at most once. Both times must not decrease.
     """
     rows = np.arange(len(times))
     partner = nearest_in_time(reference, times)
@@ -36,9 +36,9 @@ def mutual(times: Array, reference: Array) -> tuple[NDArray[np.int64], NDArray[n
 def no_match(
     result: str, times: Array, reference: str, reference_times: Array, fits: str = ""
 ) -> InputDataError:
-    """The error of a result that has no stamp in common with its reference; it shows both spans.
+    """The error that a result has no stamp in common with its reference, with the spans of both.
 
-    `fits` says by how much the stamps would have to differ, where that is known.
+    `fits` is the end of the sentence, such as a lag with which they would match.
     """
     a, b, c, d = times.min(), times.max(), reference_times.min(), reference_times.max()
     problem = (

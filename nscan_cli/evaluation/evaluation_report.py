@@ -30,10 +30,10 @@ class Evaluation:
     worst: int = 0
     """How many of the worst relations are listed."""
     remarks: tuple[str, ...] = ()
-    """What result and reference show of each other that no error says."""
+    """Sentences on other differences of result and reference (remarks.py)."""
 
     def bounded(self) -> list[tuple[str, float, float]]:
-        """What limits are held against: (name, m, degrees); means on relations, RMSE of the ATE."""
+        """The errors that limits apply to, as (name, m, degrees): mean on relations, RMSE of the ATE."""
         figures = []
         if self.relations:
             errors = self.relations[1]
@@ -54,7 +54,9 @@ def as_text(evaluation: Evaluation) -> str:
             f"relations  {relations.name}: {len(errors.used)} of {len(relations)} used, "
             f"{errors.exact} at exact stamps,\n"
             f"           {near} within {TOLERANCE} s; {errors.too_far} not used, with no pose so near\n\n"
-            + _table({"translation, m": errors.translation_spread, "rotation, deg": errors.rotation_spread})
+            + _statistics_table(
+                {"translation, m": errors.translation_spread, "rotation, deg": errors.rotation_spread}
+            )
         )
         if evaluation.worst:
             blocks.append(_worst_table(evaluation))
@@ -68,13 +70,13 @@ def as_text(evaluation: Evaluation) -> str:
         }
         blocks.append(
             f"reference  {name}: {errors_.matched} poses match within {TOLERANCE} s, "
-            f"{errors_.unmatched} do not\n{_aligned(errors_.alignment)}\n" + _table(rows)
+            f"{errors_.unmatched} do not\n{_alignment_note(errors_.alignment)}\n" + _statistics_table(rows)
         )
     return "\n\n".join(blocks) + "\n"
 
 
-def _aligned(alignment: Alignment) -> str:
-    """A line for an alignment that is not the usual one."""
+def _alignment_note(alignment: Alignment) -> str:
+    """A note where the headings decide the alignment; else empty."""
     if alignment.by == "positions":
         return ""
     return (
@@ -84,7 +86,7 @@ def _aligned(alignment: Alignment) -> str:
 
 
 def as_document(evaluation: Evaluation) -> dict[str, Any]:
-    """The same as an object for JSON; lengths in m, angles in degrees."""
+    """The evaluation as an object for JSON; lengths in m, angles in degrees."""
     document: dict[str, Any] = {"result": evaluation.result, "poses": evaluation.poses, "units": UNITS}
     if evaluation.relations:
         relations, errors = evaluation.relations
@@ -95,8 +97,8 @@ def as_document(evaluation: Evaluation) -> dict[str, Any]:
             "exact": errors.exact,
             "near": len(errors.used) - errors.exact,
             "too_far": errors.too_far,
-            "translation": _figures(errors.translation_spread),
-            "rotation": _figures(errors.rotation_spread),
+            "translation": _statistics_record(errors.translation_spread),
+            "rotation": _statistics_record(errors.rotation_spread),
             "worst": _worst_rows(evaluation),
         }
     if evaluation.reference:
@@ -107,13 +109,13 @@ def as_document(evaluation: Evaluation) -> dict[str, Any]:
             "unmatched": against.unmatched,
             "alignment": _alignment_record(against),
             "ate": {
-                "translation": _figures(against.absolute_translation),
-                "rotation": _figures(against.absolute_rotation),
+                "translation": _statistics_record(against.absolute_translation),
+                "rotation": _statistics_record(against.absolute_rotation),
             },
             "rpe": {
                 "distance": RPE_DISTANCE,
-                "translation": _figures(against.relative_translation),
-                "rotation": _figures(against.relative_rotation),
+                "translation": _statistics_record(against.relative_translation),
+                "rotation": _statistics_record(against.relative_rotation),
             },
         }
     document["notes"] = list(evaluation.remarks)
@@ -121,7 +123,7 @@ def as_document(evaluation: Evaluation) -> dict[str, Any]:
 
 
 def _alignment_record(errors: TrajectoryErrors) -> dict[str, Any]:
-    """What takes the result to the reference, what its angle is from, and of how many pairs."""
+    """The motion from the result to the reference, what decides its angle, and the number of pairs."""
     x, y, angle = errors.alignment.motion.tolist()
     return {
         "translation": [round(x, 9) + 0.0, round(y, 9) + 0.0],
@@ -131,23 +133,23 @@ def _alignment_record(errors: TrajectoryErrors) -> dict[str, Any]:
     }
 
 
-def _table(rows: Mapping[str, Spread | None]) -> str:
-    """A row of figures for each spread."""
+def _statistics_table(rows: Mapping[str, Spread | None]) -> str:
+    """A table with a row for each spread."""
     lines = [" " * 18 + "".join(f"{heading:>{_width(heading)}}" for heading in HEADINGS)]
     for name, spread in rows.items():
         if spread is None:
             lines.append(f"{name:<18}  none: the matched path is too short")
             continue
         cells = (
-            f"{_short(heading, figure):>{_width(heading)}}"
-            for heading, figure in zip(HEADINGS, _figures_of(spread), strict=True)
+            f"{_cell(heading, figure):>{_width(heading)}}"
+            for heading, figure in zip(HEADINGS, _statistics(spread), strict=True)
         )
         lines.append(f"{name:<18}" + "".join(cells))
     return "\n".join(lines)
 
 
-def _short(heading: str, figure: float) -> str:
-    """At most 10 characters. Squares of small errors would vanish in four decimals."""
+def _cell(heading: str, figure: float) -> str:
+    """At most 10 characters; four decimals are too few for squares of small errors."""
     return f"{figure:.4g}" if heading == "mean square" or figure >= 99_999 else f"{figure:.4f}"
 
 
@@ -155,15 +157,15 @@ def _width(heading: str) -> int:
     return max(len(heading) + 1, 10)
 
 
-def _figures_of(spread: Spread) -> tuple[float, ...]:
+def _statistics(spread: Spread) -> tuple[float, ...]:
     return spread.mean, spread.sd, spread.median, spread.mean_square, spread.rmse, spread.maximum
 
 
-def _figures(spread: Spread | None) -> dict[str, float] | None:
+def _statistics_record(spread: Spread | None) -> dict[str, float] | None:
     if spread is None:
         return None
     names = (heading.replace(" ", "_") for heading in HEADINGS)
-    return {name: round(figure, 9) for name, figure in zip(names, _figures_of(spread), strict=True)}
+    return {name: round(figure, 9) for name, figure in zip(names, _statistics(spread), strict=True)}
 
 
 def _worst_rows(evaluation: Evaluation) -> list[dict[str, Any]]:

@@ -1,4 +1,4 @@
-"""Trajectories from what the tool and others write: graph, TUM file or log, told apart by content."""
+"""Trajectories from graphs, TUM files, logs and recordings, told apart by their content."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def load_trajectory(
 ) -> Trajectory:
     """The poses of all scans of a graph, of a TUM file, or the robot's poses in a (corrected) log.
 
-    What a user should know of the file is added to the `notices`. Raises InputMissingError,
+    Warnings are added to the `notices`. Raises InputMissingError,
     InputDataError, and WrongUsageError where the options do not fit a log.
     """
     notices = [] if notices is None else notices
@@ -39,7 +39,7 @@ def load_trajectory(
         notices += [f"{label(path)}: {notice}" for notice in log.report.notices()]
         loaded: Trajectory | LaserLog = log
     else:
-        loaded = _loaded(read_bytes(path), path, options, notices)
+        loaded = _trajectory_or_log(read_bytes(path), path, options, notices)
     if isinstance(loaded, Trajectory):
         return loaded
     if loaded.odometry is None:
@@ -57,7 +57,7 @@ def load_reference(
 ) -> Trajectory:
     """The poses of a table (TUM, EuRoC) or a graph, the true poses (TRUEPOS) in a log, or those on a topic.
 
-    A recording needs the topic, and nothing else may have one. Raises likewise.
+    A recording needs the topic, and nothing else may have one. Raises as load_trajectory does.
     """
     name, notices = label(path), [] if notices is None else notices
     stored: FileBytes = b""
@@ -71,7 +71,7 @@ def load_reference(
         return Trajectory.in_space(*poses_on_topic(recording, topic, name, notices))
     if topic is not None:
         raise WrongUsageError(f"{name}: is no recording, and has no topics; leave out --reference-topic")
-    loaded = _loaded(bytes(stored), path, options, notices)
+    loaded = _trajectory_or_log(bytes(stored), path, options, notices)
     if isinstance(loaded, Trajectory):
         return loaded
     if loaded.truth is None or loaded.truth_times is None:
@@ -81,7 +81,9 @@ def load_reference(
     return Trajectory.in_order(loaded.truth_times, loaded.truth, stamps)
 
 
-def _loaded(stored: bytes, path: str, options: ReadingOptions, notices: list[str]) -> Trajectory | LaserLog:
+def _trajectory_or_log(
+    stored: bytes, path: str, options: ReadingOptions, notices: list[str]
+) -> Trajectory | LaserLog:
     """The trajectory or the log in the bytes that `path` has."""
     name = label(path)
     data, lost = content_of(stored, path, options.salvage)
@@ -91,7 +93,7 @@ def _loaded(stored: bytes, path: str, options: ReadingOptions, notices: list[str
     if not is_graph and not is_pose_table(data):
         del data
         log = log_from(stored, path, replace(options, allow_corrected=True), even_unusable=True)
-        # That its poses are corrected ones is as it should be; what is lost or skipped is not.
+        # Corrected poses are expected here; only losses and skipped records are reported.
         told = log.report.notices()[0 if options.salvage else len(log.report.warnings) :]
         notices += [f"{name}: {notice}" for notice in told]
         return log
@@ -101,7 +103,7 @@ def _loaded(stored: bytes, path: str, options: ReadingOptions, notices: list[str
         raise InputDataError(name, str(error), error.remedy) from error
     if lost is not None:
         notices.append(f"{name}: {lost}")
-        # The last line is cut off somewhere, and what it still has may be wrong.
+        # The last line may be cut off within a number.
         data = data[: data.rfind(b"\n") + 1]
     if is_graph:
         graph = parse_graph(data, name)

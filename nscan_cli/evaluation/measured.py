@@ -1,4 +1,4 @@
-"""A result measured against what is given: relations, a reference trajectory, or both."""
+"""A result measured against relations, a reference trajectory, or both."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ class Measured:
     trajectory: Trajectory
     reference: Trajectory | None
     notices: tuple[str, ...] = ()
-    """What a user should know of the files."""
+    """Warnings from reading the files."""
 
 
 def measure(
@@ -36,7 +36,7 @@ def measure(
 ) -> Measured:
     """The errors of the file `result`, and its `worst` relations.
 
-    Of a recording, the reference's poses are those on `reference_topic`.
+    `reference_topic` is the topic of the poses when the reference is a recording.
 
     Raises InputMissingError, InputDataError, and WrongUsageError where the options do not fit a log.
     """

@@ -1,7 +1,7 @@
 """The error of a trajectory on reference relations.
 
 R. Kümmerle et al., "On measuring the accuracy of SLAM algorithms", Autonomous Robots 27, 2009: the
-relative pose of each pair of stamps is compared with the reference's, and so no common frame is needed.
+relative pose of each pair of stamps is compared with the reference's, so that no common frame is needed.
 """
 
 from __future__ import annotations
@@ -22,11 +22,11 @@ from nscan_cli.graph.io.tum import Trajectory
 from nscan_cli.poses import Array, relative, wrap
 
 COLUMNS = 8
-REMEDY = "relations are lines 't1 t2 x y z roll pitch yaw'"
-EXACT = 1e-5
-"""Seconds up to which stamps are the same: relation files keep five decimals or six."""
-PLANAR = 1e-6
-"""m and rad up to which a relation is one of 2D poses."""
+RELATIONS_FORMAT = "relations are lines 't1 t2 x y z roll pitch yaw'"
+SAME_STAMP = 1e-5
+"""s; stamps that differ by no more are the same, as relation files have five or six decimals."""
+LARGEST_SPATIAL_PART = 1e-6
+"""m and rad; larger z, roll or pitch is refused."""
 
 
 @dataclass(frozen=True)
@@ -50,14 +50,14 @@ class Relations:
 
 @dataclass(frozen=True)
 class RelationErrors:
-    """What a trajectory's error is on the relations that it has stamps for."""
+    """The errors of a trajectory on the relations whose stamps it has."""
 
     used: NDArray[np.int64]
     """(U,) rows of the relations that were used."""
     exact: int
     """How many of them found both stamps in the trajectory."""
     too_far: int
-    """How many relations were left out: a stamp of theirs is more than 0.1 s from every pose."""
+    """How many relations were left out, because no pose is within 0.1 s of a stamp."""
     rows: NDArray[np.int64]
     """(U, 2) rows of the trajectory."""
     translation: Array
@@ -67,12 +67,12 @@ class RelationErrors:
 
     @property
     def translation_spread(self) -> Spread:
-        """Figures of the translational error, m."""
+        """Statistics of the translational error, m."""
         return Spread.of(self.translation)
 
     @property
     def rotation_spread(self) -> Spread:
-        """Figures of the rotational error, degrees."""
+        """Statistics of the rotational error, degrees."""
         return Spread.of(self.rotation)
 
     def worst(self, count: int) -> NDArray[np.int64]:
@@ -94,13 +94,13 @@ def read_relations(path: str) -> Relations:
         if line.startswith("#"):
             continue
         try:
-            rows.append(_values(fields))
+            rows.append(_relation_numbers(fields))
         except ValueError as error:
-            raise InputDataError(label(path), str(error), REMEDY, line=number) from error
+            raise InputDataError(label(path), str(error), RELATIONS_FORMAT, line=number) from error
         stamps.append((fields[0], fields[1]))
         lines.append(number)
     if not rows:
-        raise InputDataError(label(path), "no relation in it", REMEDY)
+        raise InputDataError(label(path), "no relation in it", RELATIONS_FORMAT)
     table = np.array(rows)
     return Relations(
         base_name(path), tuple(stamps), table[:, :2], table[:, [2, 3, 7]], np.array(lines, dtype=np.int64)
@@ -124,7 +124,7 @@ def relation_errors(trajectory: Trajectory, relations: Relations, name: str = "r
     error = u - relations.poses[used]
     return RelationErrors(
         used=used.astype(np.int64),
-        exact=int((distance <= EXACT).sum()),
+        exact=int((distance <= SAME_STAMP).sum()),
         too_far=len(relations) - len(used),
         rows=rows,
         translation=np.hypot(error[:, 0], error[:, 1]),
@@ -132,7 +132,7 @@ def relation_errors(trajectory: Trajectory, relations: Relations, name: str = "r
     )
 
 
-def _values(fields: list[str]) -> list[float]:
+def _relation_numbers(fields: list[str]) -> list[float]:
     """The numbers of a line. Raises ValueError saying what is wrong."""
     if len(fields) != COLUMNS:
         raise ValueError(f"{len(fields)} columns instead of {COLUMNS}")
@@ -141,6 +141,6 @@ def _values(fields: list[str]) -> list[float]:
         raise ValueError("a number is not finite")
     if max(map(abs, values[:2])) > TIME.value or max(map(abs, values[2:])) > DISTANCE.value:
         raise ValueError(f"a number is beyond {DISTANCE.value:g}, or a time beyond {TIME.text()}")
-    if max(abs(value) for value in values[4:7]) > PLANAR:
+    if max(abs(value) for value in values[4:7]) > LARGEST_SPATIAL_PART:
         raise ValueError("z, roll or pitch is not 0, but only 2D poses can be compared")
     return values

@@ -1,4 +1,4 @@
-"""How well a path fits another one when it may be moved, turned, made larger, and be of another point."""
+"""Fits of one path to another: similarity transforms, mirror images, and lever arms."""
 
 from __future__ import annotations
 
@@ -13,18 +13,18 @@ from nscan_cli.poses import Array, compose
 
 @dataclass(frozen=True)
 class Fit:
-    """Of positions a (N, 2) to b (N, 2); lengths in the unit of b, RMS."""
+    """Least-squares fits of positions a (N, 2) to b (N, 2); RMS lengths in the unit of b."""
 
     factor: float
-    """By which a is made larger."""
+    """Scale of a."""
     spread: float
-    """Of b about its mean."""
+    """Spread of b about its mean."""
     apart: float
-    """What is left between them without the factor."""
+    """Residual without the factor."""
     apart_scaled: float
-    """And with it."""
+    """Residual with the factor."""
     apart_mirrored: float
-    """With the factor, and a mirrored."""
+    """Residual with the factor and a mirrored."""
 
 
 def fit(poses: Array, truth: Array) -> Fit:
@@ -47,30 +47,30 @@ def fit(poses: Array, truth: Array) -> Fit:
 
 
 @dataclass(frozen=True)
-class Lever:
-    """The point of the robot that a reference is of, seen from the point that the result is of."""
+class LeverArm:
+    """The point of the robot that the reference tracks, seen from the point that the result tracks."""
 
     point: Array
     """(2,) ahead and to the left, in the unit of the result."""
     sigma: float
-    """Of it, in the direction in which it is known least."""
+    """Of the point, in its most uncertain direction."""
     apart: float
-    """What is left between the positions with it (RMS), in the unit of the reference."""
+    """Residual of the positions (RMS), in the unit of the reference."""
 
 
-def lever(poses: Array, truth: Array) -> Lever | None:
-    """The lever arm of poses (N, 3) to positions in truth (N, 3); None where the angles leave it open.
+def lever_arm(poses: Array, truth: Array) -> LeverArm | None:
+    """The lever arm of poses (N, 3) to positions in truth (N, 3); None where the headings leave it open.
 
     b = t + k R(θ) a + k R(θ + φ) l by least squares, linear in t, in k (cos θ, sin θ), and in k R(θ) l.
-    Where the positions leave θ open, it is that of the headings, and k is 1.
+    Where the headings decide the alignment (alignment.py), θ is theirs, and k is 1.
     """
     aligned = alignment(poses, truth)
     a, b = poses[:, :2] - poses[:, :2].mean(axis=0), truth[:, :2] - truth[:, :2].mean(axis=0)
     cos, sin = np.cos(poses[:, 2]), np.sin(poses[:, 2])
     one, none = np.ones(len(a)), np.zeros(len(a))
     rows = [[one, none, cos, -sin], [none, one, sin, cos]]
-    is_open = aligned.by == "headings"
-    if is_open:
+    by_headings = aligned.by == "headings"
+    if by_headings:
         b = b - compose([0.0, 0.0, aligned.motion[2]], np.column_stack([a, none]))[:, :2]
     else:
         rows = [[*rows[0], a[:, 0], -a[:, 1]], [*rows[1], a[:, 1], a[:, 0]]]
@@ -82,18 +82,15 @@ def lever(poses: Array, truth: Array) -> Lever | None:
     found = np.linalg.solve(scatter, design.T @ wanted / len(a))
     apart = float(np.sqrt(((wanted - design @ found) ** 2).sum() / len(a)))
     angle, factor = aligned.motion[2], 1.0
-    if not is_open:
+    if not by_headings:
         angle, factor = np.arctan2(found[5], found[4]), float(np.hypot(found[4], found[5]))
-    # As errors of trajectories go together, more poses make nothing surer.
+    # Errors of trajectories are correlated: more poses do not reduce the uncertainty.
     sigma = apart * float(np.sqrt(np.linalg.eigvalsh(np.linalg.inv(scatter)[2:4, 2:4])[-1]))
     point = compose([0.0, 0.0, -float(angle)], [*found[2:4], 0.0])[:2]
-    return Lever(point / factor, sigma / factor, apart)
+    return LeverArm(point / factor, sigma / factor, apart)
 
 
 def heading_difference(poses: Array, truth: Array) -> tuple[float, float]:
-    """By how much headings of truth (N, 3) are left of those of poses (N, 3), and ± (rad).
-
-    They are compared as the positions align them.
-    """
+    """The mean difference of the headings after alignment (rad, positive: truth is to the left), and ±."""
     motion = alignment(poses, truth).motion
     return spread_about(truth[:, 2] - poses[:, 2] - motion[2])

@@ -1,4 +1,4 @@
-"""How errors are summed up."""
+"""Statistics of errors."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from nscan_cli.poses import Array
 
 @dataclass(frozen=True)
 class Spread:
-    """Figures of a set of errors, in the unit of the errors."""
+    """Statistics of a set of errors, in their unit."""
 
     mean: float
     sd: float
@@ -24,7 +24,7 @@ class Spread:
 
     @classmethod
     def of(cls, errors: Array) -> Spread:
-        """The figures of errors (n,), n ≥ 1."""
+        """The statistics of errors (n,), n ≥ 1."""
         return cls(
             mean=float(errors.mean()),
             sd=float(errors.std(ddof=1)) if len(errors) > 1 else 0.0,

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from nscan_cli.errors import InputDataError
 from nscan_cli.evaluation.alignment import Alignment, alignment
-from nscan_cli.evaluation.association import mutual, no_match
-from nscan_cli.evaluation.clock_lag import far_lag
+from nscan_cli.evaluation.association import mutual_nearest, no_match
+from nscan_cli.evaluation.clock_lag import lag_without_overlap
 from nscan_cli.evaluation.statistics import Spread
 from nscan_cli.graph.io.tum import Trajectory
 from nscan_cli.poses import Array, compose, relative, wrap
@@ -27,15 +27,15 @@ class TrajectoryErrors:
     """Translations in m, rotations in degrees."""
 
     matched: int
-    """Poses of the result that have their match in the reference."""
+    """Number of poses of the result with a match in the reference."""
     unmatched: int
-    """Poses of the result that have none."""
+    """Number of poses of the result without a match."""
     alignment: Alignment
-    """What takes the result into the frame of the reference."""
+    """Takes the result into the frame of the reference."""
     rows: NDArray[np.int64]
-    """(matched,) rows of the result's poses that have their match."""
+    """(matched,) rows of the result with a match."""
     partners: NDArray[np.int64]
-    """(matched,) rows of the reference that these match."""
+    """(matched,) rows of the reference that match them."""
     translation: Array
     """(matched,) m, absolute, of the poses in `rows`."""
     absolute_translation: Spread
@@ -51,12 +51,12 @@ def trajectory_errors(
     """ATE after the best rigid alignment (alignment.py), and RPE, of the poses that match in time.
 
     Poses match that are each other's nearest in time, at most 0.1 s apart. The RPE compares the motion
-    from every matched pose to the first one at least 1 m of path later. The names are for messages.
+    from every matched pose to the first one at least 1 m of path later. Messages use the names.
     Raises InputDataError when fewer than two poses match.
     """
-    rows, partners = mutual(result.times, reference.times)
+    rows, partners = mutual_nearest(result.times, reference.times)
     if len(rows) == 0:
-        lag = far_lag(result, reference)
+        lag = lag_without_overlap(result, reference)
         fits = "" if lag is None else f"; stamps off by {lag:+.2f} s fit best"
         raise no_match(name, result.times, reference_name, reference.times, fits)
     if len(rows) == 1:
@@ -84,7 +84,7 @@ def trajectory_errors(
 def _relative_errors(poses: Array, truth: Array) -> tuple[Array, Array]:
     """Errors (M,) in m and degrees of the motions over RPE_DISTANCE of the true path."""
     path = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(truth[:, :2], axis=0).T))])
-    # Sums of steps miss a round distance by rounding; that must not decide which pose is taken.
+    # Rounding of the sum of steps must not decide which pose is taken.
     ends = np.searchsorted(path, path + RPE_DISTANCE - 1e-9)
     starts = np.flatnonzero(ends < len(path))
     ends = ends[starts]

@@ -1,8 +1,8 @@
-"""A log with corrected poses as CARMEN text, for the relations metric and for other readers of CARMEN logs.
+"""Export of a log with corrected poses as CARMEN text, as the relations metric and other tools read it.
 
 Laser records carry two poses: that of the laser, then that of the robot (CARMEN,
-src/logger/writelog.c). Here both are corrected ones, the laser's with its mounting on the robot, and the
-time stamps are those of the source, so that tools find the same scans by them.
+src/logger/writelog.c). Both are corrected here. The time stamps are those of the source, so that tools
+find the same scans by them.
 """
 
 from __future__ import annotations
@@ -23,33 +23,32 @@ HEADER = """\
 # CARMEN Logfile
 # the poses are corrected ones, a result of nscan-cli, and no odometry
 """
-SAME_ANGLES = 1e-6
-"""rad; directions of the beams that differ by less are the same."""
+ANGLE_TOLERANCE = 1e-6
+"""rad; largest difference of beam directions that counts as none."""
 
 
 def corrected_log(log: LaserLog, rows: NDArray[np.int64], poses: Array) -> bytes:
     """The scans in `rows` (N,) of a log as CARMEN text, taken at the robot's `poses` (N, 3).
 
-    The records are FLASER where the beams have the directions that CARMEN gives to so many of them and
-    end within CARMEN's greatest range, else ROBOTLASER1, which says both. A beam that met nothing gets
-    the least value that stands for it in the log (PARAM robot_front_laser_max says so), one that says
-    nothing 0. Ranges keep all digits, poses 9 decimals, and read back they are the same. Raises
-    NotFiniteError.
+    The records are FLASER where the beams have the directions that CARMEN assumes for their number and
+    end within CARMEN's largest range, else ROBOTLASER1, which states both. A beam without return gets the
+    least range that means so in the log (PARAM robot_front_laser_max), an invalid one 0. Ranges keep all
+    digits and poses 9 decimals, so that reading gives the same values. Raises NotFiniteError.
     """
     check_finite("the corrected poses", poses)
     ranges = log.ranges[rows]
     greatest = ranges[np.isfinite(ranges)].max(initial=np.float32(0.0))
-    limit = _limit(log, float(greatest))
+    limit = _no_return_limit(log, float(greatest))
     nothing = limit if log.no_return is None else max(np.float32(log.no_return), limit)
     first, step = log.angle_min[rows], log.angle_increment[rows]
     own = log.own_beams()[rows]
-    plain = greatest < CARMEN_MAX_RANGE and _by_convention(first, step, own)
-    lines = [HEADER, *_params(log, limit, float(step[0]))]
+    plain = greatest < CARMEN_MAX_RANGE and _has_carmen_angles(first, step, own)
+    lines = [HEADER, *_param_lines(log, limit, float(step[0]))]
     lasers = log.laser_pose(poses)
     since = log.times - log.times[0]
-    beams = _texts(ranges, own, nothing)
+    beams = _beam_texts(ranges, own, nothing)
     for k, row in enumerate(rows.tolist()):
-        triples = f"{_pose(lasers[k])} {_pose(poses[k])}"
+        triples = f"{_pose_text(lasers[k])} {_pose_text(poses[k])}"
         end = f"{log.stamps[row]} {OWN_HOST.decode()} {since[row]:.6f}\n"
         if plain:
             lines.append(f"FLASER {next(beams)} {triples} {end}")
@@ -60,24 +59,24 @@ def corrected_log(log: LaserLog, rows: NDArray[np.int64], poses: Array) -> bytes
     return "".join(lines).encode()
 
 
-def _limit(log: LaserLog, greatest: float) -> np.float32:
-    """The range (m) at and beyond which a beam met nothing; where the log has no limit, one that fits."""
+def _no_return_limit(log: LaserLog, greatest: float) -> np.float32:
+    """The range (m) from which on a beam has no return; without a limit in the log, one that fits."""
     limit = log.range_limits[1]
     if math.isfinite(limit):
         return np.float32(limit)
     return np.float32(max(CARMEN_MAX_RANGE, math.floor(greatest) + 1.0))
 
 
-def _by_convention(first: Array, step: Array, beams: NDArray[np.int64]) -> bool:
-    """Whether all scans have as many beams, and the directions that CARMEN gives to so many."""
+def _has_carmen_angles(first: Array, step: Array, beams: NDArray[np.int64]) -> bool:
+    """Whether all scans have the same number of beams, in the directions that CARMEN assumes for it."""
     if (beams != beams[0]).any():
         return False
     usual_first, usual_step = beam_angles(int(beams[0]))
     off = np.abs(first - usual_first) + beams * np.abs(step - usual_step)
-    return bool((off < SAME_ANGLES).all())
+    return bool((off < ANGLE_TOLERANCE).all())
 
 
-def _params(log: LaserLog, limit: np.float32, step: float) -> Iterator[str]:
+def _param_lines(log: LaserLog, limit: np.float32, step: float) -> Iterator[str]:
     x, y, angle = log.mount.tolist()
     for name, value in (
         ("robot_frontlaser_offset", x + 0.0),
@@ -89,20 +88,20 @@ def _params(log: LaserLog, limit: np.float32, step: float) -> Iterator[str]:
         yield f"PARAM {name} {value!s} 0 {OWN_HOST.decode()} 0\n"
 
 
-def _texts(ranges: NDArray[np.float32], own: NDArray[np.int64], nothing: np.float32) -> Iterator[str]:
-    """Of each scan, the number of its beams and their ranges, in the fewest digits that read back."""
+def _beam_texts(ranges: NDArray[np.float32], own: NDArray[np.int64], nothing: np.float32) -> Iterator[str]:
+    """The number of beams and the ranges of each scan, in the fewest digits that give the same value."""
     values, places = np.unique(ranges, return_inverse=True, equal_nan=True)
-    texts = np.array([_range(value, nothing) for value in values], dtype=object)
+    texts = np.array([_range_text(value, nothing) for value in values], dtype=object)
     for scan, beams in zip(places.reshape(ranges.shape), own.tolist(), strict=True):
         yield f"{beams} {' '.join(texts[scan[:beams]])}"
 
 
-def _range(value: np.float32, nothing: np.float32) -> str:
+def _range_text(value: np.float32, nothing: np.float32) -> str:
     if np.isnan(value):
         return "0"
     return str(nothing if np.isinf(value) else value)
 
 
-def _pose(pose: Array) -> str:
+def _pose_text(pose: Array) -> str:
     x, y, angle = (np.round([pose[0], pose[1], wrap(pose[2])], 9) + 0.0).tolist()
     return f"{x:.9f} {y:.9f} {angle:.9f}"

@@ -1,10 +1,10 @@
-"""Map, path, graph and scans as an MCAP recording of ROS 2 messages, for Foxglove and RViz.
+"""Export of map, path, graph and scans as an MCAP recording of ROS 2 messages, for Foxglove and RViz.
 
 The topics: /map (nav_msgs/OccupancyGrid), /path (nav_msgs/Path), /graph (visualization_msgs/MarkerArray)
 and /tf_static once, at the time of the first scan; /scan (sensor_msgs/LaserScan) and /tf for every scan.
-Frames as in REP 105: map, odom where there is odometry, base_link (the robot) and laser; where the log
-calls the last three otherwise, so does the recording. What is written
-once is kept for subscribers that come later (transient local), as map_server, tf2 and RViz expect it.
+Frames as in REP 105: map, odom where there is odometry, base_link (the robot) and laser; the last three have
+the names of the log where it has some. Topics with one message are transient local, so that late subscribers
+get it, as map_server, tf2 and RViz expect.
 
 https://mcap.dev/spec, https://mcap.dev/spec/registry (profile ros2, schemas ros2msg, messages cdr)
 """
@@ -22,12 +22,12 @@ from numpy.typing import NDArray
 from nscan_cli import __version__
 from nscan_cli.errors import WrongUsageError
 from nscan_cli.exports.ros_messages import (
-    Messages,
+    MessageFactory,
     graph_markers,
     map_message,
     path_message,
     scan_message,
-    transforms,
+    tf_message,
 )
 from nscan_cli.files.finite import check_finite
 from nscan_cli.graph.model import Graph
@@ -47,7 +47,7 @@ TOPICS = {
 STREAMS = ("/tf", "/scan")
 """Topics with a message for every scan; the others have one that stays valid."""
 NANOSECONDS = 10**9
-YEAR = 365.25 * 86400
+SECONDS_A_YEAR = 365.25 * 86400
 """s"""
 LAST_SECOND = 2**31
 """A stamp's seconds are 32 bits wide."""
@@ -58,12 +58,12 @@ def ros2_recording(
 ) -> bytes:
     """The MCAP of a graph and its map `grid`, with the scans in `rows` (N,) of the log at `nodes` (N,).
 
-    Stamps are those of the log; where ROS has no room for them (before 0, from 2³¹ s on), all count from
-    the log's first second. Equal inputs give equal bytes. Raises NotFiniteError, and WrongUsageError when
-    the stamps are too far apart even for that.
+    Stamps are those of the log. Where ROS cannot hold one (before 0, from 2³¹ s on), all count from the
+    first second of the log. Equal inputs give equal bytes. Raises NotFiniteError, and WrongUsageError when
+    the stamps span 2³¹ s or more.
     """
     check_finite("the poses of the recording", graph.poses, graph.odometry)
-    messages = Messages()
+    messages = MessageFactory()
     file = _File(messages)
     stamps = _nanoseconds(graph.stamps)
     times = [stamps[node] for node in nodes.tolist()]
@@ -74,7 +74,7 @@ def ros2_recording(
     names = log.frames
     if names.laser != names.robot:
         link = (names.robot, names.laser, log.mount)
-        file.write("/tf_static", transforms(messages, first, [link]), first)
+        file.write("/tf_static", tf_message(messages, first, [link]), first)
     robots = graph.poses[nodes]
     odometry = None if graph.odometry is None else graph.odometry[nodes]
     corrections = None if odometry is None else compose(robots, inverse(odometry))
@@ -83,15 +83,15 @@ def ros2_recording(
             links = [(MAP, names.robot, robots[k])]
         else:
             links = [(MAP, names.odometry, corrections[k]), (names.odometry, names.robot, odometry[k])]
-        file.write("/tf", transforms(messages, time, links), time)
+        file.write("/tf", tf_message(messages, time, links), time)
         file.write("/scan", scan_message(messages, log, row, time), time)
     return file.finished()
 
 
 class _File:
-    """The MCAP that is being written, chunk by chunk, compressed by zstd."""
+    """Writes the MCAP in chunks that are compressed by zstd."""
 
-    def __init__(self, messages: Messages) -> None:
+    def __init__(self, messages: MessageFactory) -> None:
         from mcap.writer import Writer
 
         self._messages, self._stream = messages, io.BytesIO()
@@ -102,7 +102,7 @@ class _File:
             for name in dict.fromkeys(TOPICS.values())
         }
         self._channels = {
-            topic: self._writer.register_channel(topic, "cdr", schemas[name], _quality_of_service(topic))
+            topic: self._writer.register_channel(topic, "cdr", schemas[name], _offered_qos_profiles(topic))
             for topic, name in TOPICS.items()
         }
         self._written = dict.fromkeys(TOPICS, 0)
@@ -119,10 +119,10 @@ class _File:
         return self._stream.getvalue()
 
 
-def _quality_of_service(topic: str) -> dict[str, str]:
-    """What the player of rosbag2 offers on a topic, as its recorder keeps it with the channel (YAML).
+def _offered_qos_profiles(topic: str) -> dict[str, str]:
+    """The QoS profile that the player of rosbag2 offers on a topic, as its recorder stores it (YAML).
 
-    Policies are the numbers of rmw, which every version reads; names are read by the later ones alone.
+    Policies are the numbers of rmw: old versions of rosbag2 cannot read the names.
     """
     keep_last, reliable, automatic = 1, 1, 1
     transient_local, volatile = 1, 2
@@ -137,14 +137,14 @@ def _quality_of_service(topic: str) -> dict[str, str]:
 
 
 def _nanoseconds(stamps: Sequence[str]) -> list[int]:
-    """The stamps (s, as text) in ns, exactly as far as they are written."""
+    """The stamps (s, as text) in ns, without rounding through floats."""
     times = [int((Decimal(stamp) * NANOSECONDS).to_integral_value()) for stamp in stamps]
     first, last = min(times), max(times)
     if first >= 0 and last < LAST_SECOND * NANOSECONDS:
         return times
     start = first // NANOSECONDS * NANOSECONDS
     if last - start >= LAST_SECOND * NANOSECONDS:
-        years = (last - first) / NANOSECONDS / YEAR
+        years = (last - first) / NANOSECONDS / SECONDS_A_YEAR
         problem = f"the stamps span {years:.0f} years, and those of ROS 68 at most"
         raise WrongUsageError(f"{problem}; leave out the recording, or choose other scans")
     return [time - start for time in times]

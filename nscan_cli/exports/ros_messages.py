@@ -1,4 +1,4 @@
-"""The ROS 2 messages of a recording, made from what the graph, its map and its log are.
+"""ROS 2 messages made from a graph, its map and its log.
 
 Conventions: REP 103 (m, rad, x forward), REP 105 (frames), REP 117 (inf: no return, nan: no measurement).
 """
@@ -24,14 +24,14 @@ if TYPE_CHECKING:
 
 LINE_LIST, SPHERE_LIST = 5, 7
 """Types of visualization_msgs/Marker."""
-ADD = 0
+ADD_MARKER = 0
 KEYFRAME_SIZE, LINE_WIDTH = 0.15, 0.03
 """m"""
-HEIGHT = 0.05
-"""m; the graph is drawn above the map, which would hide it otherwise."""
+MARKER_HEIGHT = 0.05
+"""m above the map, which would hide the graph otherwise."""
 
 
-class Messages:
+class MessageFactory:
     """The message types of ROS 2 Humble, which later ones understand, and their encoding (CDR)."""
 
     def __init__(self) -> None:
@@ -75,7 +75,7 @@ class Messages:
         return self.make("geometry_msgs/Pose", position=self.point(x, y), orientation=self.rotation(angle))
 
 
-def map_message(ros: Messages, grid: OccupancyGrid, time: int) -> Any:
+def map_message(ros: MessageFactory, grid: OccupancyGrid, time: int) -> Any:
     """nav_msgs/OccupancyGrid: rows from the least y on, 0 free, 100 occupied, −1 unknown."""
     states = grid.states()
     height, width = states.shape
@@ -94,7 +94,7 @@ def map_message(ros: Messages, grid: OccupancyGrid, time: int) -> Any:
     )
 
 
-def path_message(ros: Messages, poses: Array, times: Sequence[int]) -> Any:
+def path_message(ros: MessageFactory, poses: Array, times: Sequence[int]) -> Any:
     """nav_msgs/Path of the robot's poses (N, 3) at N times (ns)."""
     stamped = [
         ros.make("geometry_msgs/PoseStamped", header=ros.header(time, MAP), pose=ros.pose(*pose))
@@ -103,7 +103,7 @@ def path_message(ros: Messages, poses: Array, times: Sequence[int]) -> Any:
     return ros.make("nav_msgs/Path", header=ros.header(min(times), MAP), poses=stamped)
 
 
-def transforms(ros: Messages, time: int, links: Sequence[tuple[str, str, Array]]) -> Any:
+def tf_message(ros: MessageFactory, time: int, links: Sequence[tuple[str, str, Array]]) -> Any:
     """tf2_msgs/TFMessage of (parent frame, child frame, pose (3,) of the child in the parent)."""
     found = []
     for parent, child, pose in links:
@@ -121,7 +121,7 @@ def transforms(ros: Messages, time: int, links: Sequence[tuple[str, str, Array]]
     return ros.make("tf2_msgs/TFMessage", transforms=found)
 
 
-def scan_message(ros: Messages, log: LaserLog, row: int, time: int) -> Any:
+def scan_message(ros: MessageFactory, log: LaserLog, row: int, time: int) -> Any:
     """sensor_msgs/LaserScan of one row of the log; its angles and ranges have the 32 bits of ROS."""
     low, high = log.range_limits
     first, step = float(log.angle_min[row]), float(log.angle_increment[row])
@@ -141,7 +141,7 @@ def scan_message(ros: Messages, log: LaserLog, row: int, time: int) -> Any:
     )
 
 
-def graph_markers(ros: Messages, graph: Graph, time: int) -> Any:
+def graph_markers(ros: MessageFactory, graph: Graph, time: int) -> Any:
     """visualization_msgs/MarkerArray: keyframes as balls, relations as lines, a colour for each kind."""
     edges = edges_by_kind(graph)
     parts = [("keyframes", SPHERE_LIST, KEYFRAME_SIZE, BLUE, graph.keyframes)]
@@ -155,9 +155,9 @@ def graph_markers(ros: Messages, graph: Graph, time: int) -> Any:
 
 
 def _marker(
-    ros: Messages, time: int, name: str, kind: int, size: float, colour: tuple[int, int, int], at: Array
+    ros: MessageFactory, time: int, name: str, kind: int, size: float, colour: tuple[int, int, int], at: Array
 ) -> Any:
-    """visualization_msgs/Marker of a list of points (P, 2), m; what it does not use is empty."""
+    """visualization_msgs/Marker of a list of points (P, 2), m; unused fields are empty."""
     red, green, blue = (part / 255 for part in colour)
     empty = {"header": ros.header(0, ""), "format": "", "data": np.zeros(0, dtype=np.uint8)}
     return ros.make(
@@ -166,13 +166,13 @@ def _marker(
         ns=name,
         id=0,
         type=kind,
-        action=ADD,
+        action=ADD_MARKER,
         pose=ros.pose(0.0, 0.0, 0.0),
         scale=ros.make("geometry_msgs/Vector3", x=size, y=size, z=size),
         color=ros.make("std_msgs/ColorRGBA", r=red, g=green, b=blue, a=1.0),
         lifetime=ros.make("builtin_interfaces/Duration", sec=0, nanosec=0),
         frame_locked=False,
-        points=[ros.point(x, y, HEIGHT) for x, y in at.tolist()],
+        points=[ros.point(x, y, MARKER_HEIGHT) for x, y in at.tolist()],
         colors=[],
         texture_resource="",
         texture=ros.make("sensor_msgs/CompressedImage", **empty),

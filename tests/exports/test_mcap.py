@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from nscan_cli.exports.mcap import TOPICS, ros2_recording
-from nscan_cli.exports.ros_messages import Messages, scan_message
+from nscan_cli.exports.ros_messages import MessageFactory, scan_message
 from nscan_cli.graph.model import Graph
 from nscan_cli.logs.frame_names import FrameNames
 from nscan_cli.logs.laser_log import LaserLog
@@ -238,7 +238,7 @@ def test_a_recording_is_a_log_for_slam_too(run, tmp_path, odometry):
 
 def test_a_scan_has_its_own_beams():
     log = dataclasses.replace(small_log(), beams=np.array([181, 90, 181, 181, 2]))
-    message = scan_message(Messages(), log, 1, 0)
+    message = scan_message(MessageFactory(), log, 1, 0)
     assert len(message.ranges) == 90
     assert message.angle_max == pytest.approx(log.angle_min[1] + 89 * log.angle_increment[1])
 
