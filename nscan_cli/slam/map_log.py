@@ -13,7 +13,8 @@ from nscan_cli.graph.model import Graph
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.logs.reading_options import ReadingOptions
 from nscan_cli.slam.diagnostics.notices import notices
-from nscan_cli.slam.options import NScanOptions, Relations, SlamOptions
+from nscan_cli.slam.local_matching.options import NScanOptions
+from nscan_cli.slam.options import Relations, SlamOptions
 from nscan_cli.slam.pipeline import run_slam
 from nscan_cli.slam.state import SlamState
 

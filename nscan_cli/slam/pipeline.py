@@ -29,7 +29,7 @@ def run_slam(state: SlamState, report: Report) -> Graph:
 
     Tracking needs nothing of the graph: with two threads the graph grows beside it.
     """
-    tracker, behind = tracker_of(state.log, state.options), state.options.nscan.behind
+    tracker, behind = tracker_of(state.log, state.options), state.options.nscan.centre_delay
     with (
         MatchAhead(state.match, state.options.nscan, state.threads) as ahead,
         BackgroundCalls(state.threads) as beside,
@@ -48,7 +48,7 @@ def run_slam(state: SlamState, report: Report) -> Graph:
     grow(state, ahead, len(state.keyframes))
     for centre in range(len(state.keyframes) - behind, len(state.keyframes)):
         relate(state, ahead, centre)
-    optimise(state, max_iterations=100, tolerance=1e-6)
+    optimise(state, state.options.optimisation.final)
     reject_contradicting_loops(state)
     refine(state)
     return finish_graph(state)
@@ -65,7 +65,7 @@ def grow(state: SlamState, ahead: MatchAhead, size: int) -> None:
     for keyframe in state.keyframes.list[len(state.poses) : size]:
         keyframe.make_ndt()
         extend_route(state, keyframe)
-        relate(state, ahead, len(state.poses) - 1 - state.options.nscan.behind)
+        relate(state, ahead, len(state.poses) - 1 - state.options.nscan.centre_delay)
 
 
 def relate(state: SlamState, ahead: MatchAhead, centre: int) -> None:

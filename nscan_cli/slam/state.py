@@ -20,7 +20,7 @@ from nscan_cli.slam.local_matching.coverage import Coverage
 from nscan_cli.slam.local_matching.joint_relations import MatchNearby, match_neighbours
 from nscan_cli.slam.local_matching.pairwise_relations import match_neighbours_pairwise
 from nscan_cli.slam.loop_closure.loop_detector import LoopDetector
-from nscan_cli.slam.loop_closure.place_search import Place
+from nscan_cli.slam.loop_closure.place import Place
 from nscan_cli.slam.options import SlamOptions
 
 
@@ -69,8 +69,8 @@ class SlamState:
         is_pairwise = options.relations == "pairwise"
         self.match: MatchNearby = match_neighbours_pairwise if is_pairwise else match_neighbours
         self.energies, self.coverage = EnergyCache(len(self.log)), Coverage()
-        self.detector = LoopDetector(options.closing, options.nscan, self.match, self.energies)
-        self.schedule = OptimisationSchedule(options.growth)
+        self.detector = LoopDetector(options.loop_closure, options.nscan, self.match, self.energies)
+        self.schedule = OptimisationSchedule(options.schedule)
 
     @classmethod
     def of_log(cls, log: LaserLog, options: SlamOptions, threads: int = 1) -> SlamState:

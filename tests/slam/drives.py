@@ -20,9 +20,9 @@ from nscan_cli.slam.keyframes.route import Route, chain_relations, route_of
 from nscan_cli.slam.keyframes.tracked_path import TrackedPath
 from nscan_cli.slam.local_matching.joint_relations import LocalMatch, MatchNearby
 from nscan_cli.slam.local_matching.neighbours import choose_neighbours
+from nscan_cli.slam.local_matching.options import NScanOptions
 from nscan_cli.slam.loop_closure.loop_detector import LoopDetector
-from nscan_cli.slam.loop_closure.place_search import Place
-from nscan_cli.slam.options import NScanOptions
+from nscan_cli.slam.loop_closure.place import Place
 from tests.simulation.drive import Drive
 from tests.simulation.laser import Laser
 from tests.simulation.office import office_world
@@ -34,7 +34,7 @@ ROWS = 10
 """From one keyframe's row to the next: rows and keyframes are not to be mixed up."""
 AROUND = np.array([0.0, -0.44, -0.22, 0.22, 0.44])
 """m along the heading: a keyframe's own scan, then those that grow its Gaussians."""
-BEHIND = NScanOptions().behind
+BEHIND = NScanOptions().centre_delay
 
 
 def about(match: MatchNearby, route: Route, centre: int, options: NScanOptions) -> LocalMatch | None:

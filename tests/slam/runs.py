@@ -16,11 +16,13 @@ from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.logs.load import read_log
 from nscan_cli.logs.reading_options import ReadingOptions
 from nscan_cli.poses import Array
+from nscan_cli.slam.backend.options import RefinementOptions
 from nscan_cli.slam.frontend.options import TrackingOptions
 from nscan_cli.slam.frontend.scan_batch import ScanBatch
 from nscan_cli.slam.frontend.tracked_scans import TrackedScan, TrackedScans
 from nscan_cli.slam.frontend.tracker import Tracker
-from nscan_cli.slam.options import NScanOptions, Relations, SlamOptions
+from nscan_cli.slam.local_matching.options import NScanOptions
+from nscan_cli.slam.options import Relations, SlamOptions
 from nscan_cli.slam.pipeline import run_slam
 from nscan_cli.slam.state import SlamState
 from tests.data import OFFICE_LOG, data_file
@@ -64,7 +66,7 @@ def mapped_office(odometry: bool, relations: Relations = "both", loops: bool = T
 @functools.cache
 def office_unrefined() -> Graph:
     """As the relations are found on the way: those of each keyframe with the ones before it."""
-    return mapped(office_log(), SlamOptions(refinements=0)).graph
+    return mapped(office_log(), SlamOptions(refinement=RefinementOptions(max_sweeps=0))).graph
 
 
 @functools.cache

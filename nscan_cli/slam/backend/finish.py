@@ -15,10 +15,11 @@ def finish_graph(state: SlamState) -> Graph:
     state.energies.forget()
     log, rows = state.log, state.route.rows
     anchors = rows[np.searchsorted(rows, np.arange(len(log)), side="right") - 1]
+    turn = state.options.optimisation.metres_per_radian
     graph = Graph(
         scans=log.numbers,
         stamps=list(log.stamps),
-        poses=between_keyframes(np.concatenate(state.tracked), rows, state.poses, state.breaks),
+        poses=between_keyframes(np.concatenate(state.tracked), rows, state.poses, state.breaks, turn),
         odometry=log.odometry,
         anchors=anchors,
         pairwise=state.pairwise_relations,

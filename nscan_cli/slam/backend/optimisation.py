@@ -3,18 +3,19 @@
 from __future__ import annotations
 
 from nscan_cli.graph.optimise import graph_solver
+from nscan_cli.slam.backend.options import StopOptions
 from nscan_cli.slam.backend.subgraph import Subgraph
 from nscan_cli.slam.state import SlamState
 
 
-def optimise(state: SlamState, max_iterations: int, tolerance: float, part: Subgraph | None = None) -> None:
+def optimise(state: SlamState, stop: StopOptions, part: Subgraph | None = None) -> None:
     """Optimise the poses of all keyframes, or of a part. Changes route, schedule."""
     part = Subgraph(state.relations) if part is None else part
     state.schedule.optimised(len(state.poses), part)
     if len(state.poses) < 2:
         return
     energy = state.energies.of(state.route, part.relations, 0, part.free)
-    optimum = graph_solver.optimise_poses(energy, state.poses, max_iterations, tolerance)
+    optimum = graph_solver.optimise_poses(energy, state.poses, stop.max_iterations, stop.tolerance)
     state.route = state.route._replace(poses=optimum.poses)
 
 
@@ -22,4 +23,4 @@ def optimise_if_due(state: SlamState) -> None:
     """Optimise what the schedule says once the graph has changed enough. Changes route, schedule."""
     if state.schedule.is_due(len(state.poses)):
         part = state.schedule.due(state.route, state.relations)
-        optimise(state, max_iterations=10, tolerance=1e-3, part=part)
+        optimise(state, state.options.optimisation.growing, part)

@@ -22,7 +22,7 @@ from nscan_cli.slam.keyframes.route import Route
 from nscan_cli.slam.local_matching.coverage import Coverage
 from nscan_cli.slam.local_matching.joint_relations import LocalMatch, MatchNearby
 from nscan_cli.slam.local_matching.neighbours import Neighbours, choose_neighbours
-from nscan_cli.slam.options import NScanOptions
+from nscan_cli.slam.local_matching.options import NScanOptions
 from nscan_cli.slam.state import SlamState
 from nscan_cli.threads import map_in_threads
 
@@ -34,13 +34,13 @@ def refine(state: SlamState) -> None:
     last = replace(options.nscan, widenings=options.nscan.widenings[-1:])
     wider = {place.centre: place.radius for place in state.places}
     refinement = Refinement(state.route, last, state.match, wider, state.threads)
-    for _ in range(options.refinements):
-        if not refinement.sweep(state.poses, options.refined):
+    for _ in range(options.refinement.max_sweeps):
+        if not refinement.sweep(state.poses, options.refinement.min_motion):
             break
         state.matched_pairs, state.nscan_relations = refinement.relations()
         state.energies.forget()
         state.loops = refinement.loops()
-        optimise(state, max_iterations=100, tolerance=1e-6)
+        optimise(state, options.optimisation.final)
         reject_contradicting_loops(state)
 
 

@@ -34,4 +34,4 @@ def reject_contradicting_loops(state: SlamState) -> None:
         else loop
         for loop in state.loops
     ]
-    optimise(state, max_iterations=100, tolerance=1e-6)
+    optimise(state, state.options.optimisation.final)

@@ -23,8 +23,8 @@ from nscan_cli.slam.frontend.scan_batch import scan_batches
 from nscan_cli.slam.frontend.tracked_scans import TrackedScans
 from nscan_cli.slam.keyframes.route import route_of
 from nscan_cli.slam.local_matching.joint_relations import LocalMatch
-from nscan_cli.slam.loop_closure.loop_detector import NO_SECOND, SO_FAR_OFF
-from nscan_cli.slam.loop_closure.place_search import AMBIGUOUS, ELSEWHERE, NO_MATCH, Place
+from nscan_cli.slam.loop_closure.place import Place
+from nscan_cli.slam.loop_closure.verification import AMBIGUOUS, ELSEWHERE, NO_MATCH, NO_SECOND, SO_FAR_OFF
 from nscan_cli.slam.options import Relations, SlamOptions
 from nscan_cli.slam.state import SlamState
 
@@ -180,7 +180,7 @@ def _places(graph: Graph, options: SlamOptions) -> list[Place]:
         farthest = nodes[int(np.argmax(distances))]
         if distances.max() > options.nscan.radius:
             measured = relative(graph.poses[centre], graph.poses[farthest])
-            radius = float(distances.max()) + options.refined
+            radius = float(distances.max()) + options.refinement.min_motion
             places.append(Place(position[farthest], position[centre], measured, radius, nearby))
     return places
 

@@ -9,15 +9,15 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from nscan_cli.graph.relations.base import Relation
+from nscan_cli.slam.backend.options import ScheduleOptions
 from nscan_cli.slam.backend.subgraph import Subgraph, held_by_others, nearest_keyframes
 from nscan_cli.slam.keyframes.route import Route
-from nscan_cli.slam.options import GrowthOptions
 
 
 class OptimisationSchedule:
     """What has come to the graph since it was optimised, and since it was as a whole."""
 
-    def __init__(self, options: GrowthOptions) -> None:
+    def __init__(self, options: ScheduleOptions) -> None:
         self.options = options
         self._moved, self._optimised, self._whole = 0.0, 0, 0
 
@@ -27,15 +27,18 @@ class OptimisationSchedule:
 
     def is_due(self, size: int) -> bool:
         """Whether a graph of so many keyframes has changed by so much that it is optimised."""
-        return self._moved > self.options.moved and size - self._optimised >= self.options.new * size
+        return (
+            self._moved > self.options.min_motion
+            and size - self._optimised >= self.options.min_new_share * size
+        )
 
     def due(self, route: Route, relations: Sequence[Relation]) -> Subgraph:
         """What is optimised then."""
         size, options = len(route.poses), self.options
-        if size <= options.most or size - self._whole >= options.new_of_all * size:
+        if size <= options.max_keyframes or size - self._whole >= options.whole_new_share * size:
             return Subgraph(relations)
         return held_by_others(
-            route, relations, nearest_keyframes(route.poses, self._optimised, size, options.most)
+            route, relations, nearest_keyframes(route.poses, self._optimised, size, options.max_keyframes)
         )
 
     def optimised(self, size: int, part: Subgraph) -> None:

@@ -21,7 +21,7 @@ from nscan_cli.matching.pose_kernels import relative_pose
 from nscan_cli.poses import Array, Indices, inverse, transform
 from nscan_cli.slam.diagnostics.options import FreeSpaceOptions
 from nscan_cli.slam.keyframes.route import Route
-from nscan_cli.slam.options import NScanOptions
+from nscan_cli.slam.local_matching.options import NScanOptions
 from nscan_cli.threads import map_in_threads
 
 KEYFRAMES_PER_THREAD = 64
@@ -97,7 +97,7 @@ def free_space_violations(
         np.stack([log.angle_min[rows], log.angle_increment[rows]], axis=1),
     )
     bounds = options.compared, options.tolerance, options.tolerance_per_metre
-    comparison = _Comparison(nscan.radius, nscan.recent, *bounds)
+    comparison = _Comparison(nscan.radius, nscan.visit_path, *bounds)
     parts = map_in_threads(
         threads,
         lambda first: _compare_views(views, first, first + KEYFRAMES_PER_THREAD, comparison),

@@ -8,7 +8,7 @@ from collections.abc import Collection, Iterable
 from nscan_cli.slam.keyframes.route import Route
 from nscan_cli.slam.local_matching.joint_relations import LocalMatch
 from nscan_cli.slam.local_matching.neighbours import Neighbours
-from nscan_cli.slam.options import NScanOptions
+from nscan_cli.slam.local_matching.options import NScanOptions
 
 
 class Coverage:
@@ -31,7 +31,9 @@ class Coverage:
             beside = route.rows[max(centre - half + 1, 0) : centre + half].tolist()
             if self._has_closed(beside):
                 return False
-        return self.share(int(route.rows[centre]), route.rows[near.tried].tolist()) < options.covered
+        return (
+            self.share(int(route.rows[centre]), route.rows[near.tried].tolist()) < options.max_covered_share
+        )
 
     def share(self, centre: int, others: Iterable[int]) -> float:
         """The share of the pairs of `centre` with each of the others that are there; 1 without any other."""

@@ -22,17 +22,7 @@ from nscan_cli.poses import Array, Indices, compose, relative
 from nscan_cli.slam.keyframes.keyframe import Keyframe, points_per_cell
 from nscan_cli.slam.keyframes.route import Route
 from nscan_cli.slam.local_matching.neighbours import Neighbours, choose_neighbours
-from nscan_cli.slam.options import NScanOptions
-
-LEAST_SCANS = 3
-"""Two scans are what a pairwise relation is for."""
-POSSIBLE = 0.5
-"""The last stage moves scans by centimetres: from less than this share of the overlap that holds two scans
-together, it brings none there."""
-NEAR = 5e-3
-"""m, rad; of some of the points no stage is worth more."""
-STRIDE = 4
-"""From a start that is right to centimetres, every so-manyth point leads to where all points are matched."""
+from nscan_cli.slam.local_matching.options import NScanOptions
 
 
 @dataclass(frozen=True)
@@ -77,18 +67,18 @@ def match_neighbours(route: Route, centre: int, near: Neighbours, options: NScan
     Scans that do not hang together with the `centre` by overlaps are left out, and the others matched
     again. None when there are too few keyframes near.
     """
-    if len(near.tried) < LEAST_SCANS:
+    if len(near.tried) < options.min_scans:
         return None
     for widenings in options.attempts:
         nearby, is_enough = _match_held(route, near.tried, near.seen_before, centre, widenings, options)
-        if is_enough and nearby.moved < options.settled:
+        if is_enough and nearby.moved < options.max_last_stage_motion:
             break
     return nearby
 
 
 def of_this_visit(route: Route, centre: int, options: NScanOptions) -> NDArray[np.bool_]:
     """(K,) whether the path came by not long before or after keyframe `centre`."""
-    this: NDArray[np.bool_] = np.abs(route.paths - route.paths[centre]) <= options.recent
+    this: NDArray[np.bool_] = np.abs(route.paths - route.paths[centre]) <= options.visit_path
     return this
 
 
@@ -141,19 +131,19 @@ def _match_held(
             scans,
             start,
             options.inlier_bound,
-            POSSIBLE * options.overlap,
+            options.start_overlap * options.min_overlap,
             int(tried.searchsorted(centre)),
         )
         kept, start = kept[held], start[held]
     all_began = len(kept) == len(tried)
-    while len(kept) >= LEAST_SCANS:
+    while len(kept) >= options.min_scans:
         members = tried[kept]
         if len(members) < len(scans.usual):
             scans = _laid_out(keyframes, members)
         problem = _problem(scans, members, route, options)
         match = match_jointly(problem, start, _stages(widenings, options))
         at = int(members.searchsorted(centre))
-        held, score = connectivity(scans, match.poses, options.inlier_bound, options.overlap, at)
+        held, score = connectivity(scans, match.poses, options.inlier_bound, options.min_overlap, at)
         if not held.all():
             kept, start = kept[held], match.poses[held]
             continue
@@ -198,8 +188,8 @@ def _problem(scans: ScanSet, members: Indices, route: Route, options: NScanOptio
 def _stages(widenings: tuple[float, ...], options: NScanOptions) -> JointOptions:
     return JointOptions(
         widenings,
-        near=NEAR,
-        stride=STRIDE if len(widenings) == 1 else JointOptions.stride,
+        near=options.wide_tolerance,
+        stride=options.thinning if len(widenings) == 1 else JointOptions.stride,
         max_iterations=options.max_iterations,
         tolerance=options.tolerance,
         # The last step is shorter than a millimetre: its end need not be looked at.

@@ -17,11 +17,11 @@ from nscan_cli.slam.keyframes.route import Route, extended
 from nscan_cli.slam.local_matching.coverage import Coverage
 from nscan_cli.slam.local_matching.joint_relations import LocalMatch, MatchNearby
 from nscan_cli.slam.local_matching.neighbours import Neighbours, choose_neighbours
-from nscan_cli.slam.options import NScanOptions
+from nscan_cli.slam.local_matching.options import NScanOptions
 from nscan_cli.threads import completed_call
 
-AHEAD = 2
-"""So many matches are begun ahead of their turn."""
+MATCHES_AHEAD = 2
+"""Number of matches that are begun ahead of their turn; it changes no result."""
 
 
 class _Begun(NamedTuple):
@@ -81,10 +81,10 @@ class MatchAhead:
         self._drop_outdated(route, centre)
         for other, begun in self._begun.items():
             assumed.assume(begun.route, other, begun.near)
-        behind = self._options.behind
+        behind = self._options.centre_delay
         following = range(max([centre, *self._begun]) + 1, max(whole, len(route.poses)) - behind)
         for keyframe in following:
-            if len(self._begun.keys() - {centre}) >= AHEAD:
+            if len(self._begun.keys() - {centre}) >= MATCHES_AHEAD:
                 return
             longer = extended(route, keyframe + behind + 1)
             near = choose_neighbours(longer.poses, longer.paths, keyframe, self._options)

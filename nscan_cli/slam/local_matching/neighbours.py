@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from nscan_cli.kernels.decorators import kernel
 from nscan_cli.poses import Array, Indices
-from nscan_cli.slam.options import NScanOptions
+from nscan_cli.slam.local_matching.options import NScanOptions
 
 
 class Neighbours(NamedTuple):
@@ -31,9 +31,9 @@ def choose_neighbours(poses: Array, paths: Array, centre: int, options: NScanOpt
     unless the options leave these out. Of these the first take part: going round and round, what had other
     corridors in view would else make room for what sees the same once more.
     """
-    first = options.first_visits if options.loops else 0
+    first = options.max_other_visits if options.loops else 0
     return Neighbours(
-        *_choose(poses, paths, centre, options.radius, options.recent, first, options.max_scans)
+        *_choose(poses, paths, centre, options.radius, options.visit_path, first, options.max_scans)
     )
 
 

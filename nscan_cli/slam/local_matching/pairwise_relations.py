@@ -22,7 +22,7 @@ from nscan_cli.slam.keyframes.keyframe import Keyframe
 from nscan_cli.slam.keyframes.route import Route
 from nscan_cli.slam.local_matching.joint_relations import LocalMatch, moved_by, scale_of, verdict
 from nscan_cli.slam.local_matching.neighbours import Neighbours
-from nscan_cli.slam.options import NScanOptions
+from nscan_cli.slam.local_matching.options import NScanOptions
 
 
 @dataclass(frozen=True)
@@ -57,7 +57,7 @@ def match_neighbours_pairwise(
         return None
     singles = [_match(route, int(other), centre, options) for other in tried]
     overlaps = np.array([single.overlap for single in singles])
-    kept = overlaps >= options.overlap
+    kept = overlaps >= options.min_overlap
     relations = tuple(
         _relation(keyframes[other], keyframes[centre], single, "loop" if seen else "track")
         for other, seen, single, keep in zip(tried, seen_before, singles, kept, strict=True)
@@ -91,7 +91,7 @@ def _match(route: Route, other: int, centre: int, options: NScanOptions) -> _Sin
         pose[2] = wrap(pose[2])
         moved = moved_by(np.stack([origin, start]), np.stack([origin, pose]), 1)
         overlap = _overlap(keyframes[other], keyframes[centre], pose, options.inlier_bound)
-        if overlap >= options.overlap and moved < options.settled:
+        if overlap >= options.min_overlap and moved < options.max_last_stage_motion:
             break
     information = scale * energy(reference, points, pose, exact=False).hessian
     return _Single(pose, overlap if information.any() else 0.0, moved, information)

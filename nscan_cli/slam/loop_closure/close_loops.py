@@ -6,7 +6,8 @@ from nscan_cli.slam.backend.optimisation import optimise
 from nscan_cli.slam.local_matching.joint_relations import LocalMatch
 from nscan_cli.slam.local_matching.match_keyframe import add_relations
 from nscan_cli.slam.local_matching.neighbours import Neighbours
-from nscan_cli.slam.loop_closure.place_search import TOO_LITTLE, piece_moved
+from nscan_cli.slam.loop_closure.place import move_segment
+from nscan_cli.slam.loop_closure.verification import TOO_LITTLE
 from nscan_cli.slam.state import SlamState
 
 
@@ -27,8 +28,8 @@ def close_loops(
     places = state.detector.close(state.route, centre, left_out, state.loop_relations)
     if not places:
         return
-    state.route = piece_moved(state.route, places[-1], state.breaks)
+    state.route = move_segment(state.route, places[-1], state.breaks)
     for place in places:
         add_relations(state, place.nearby)
     state.places.extend(places)
-    optimise(state, max_iterations=100, tolerance=1e-4)
+    optimise(state, state.options.optimisation.after_large_loop)

@@ -1,6 +1,6 @@
-"""A bound on how far keyframes may be off: what the surest way to each says, relation after relation.
+"""An upper bound on the uncertainty of keyframes: that along the most certain path to each.
 
-All other relations of the graph can only make it less. It takes a hundredth of the time of asking them all.
+All other relations of the graph can only lower it. It takes a hundredth of the time of the whole graph.
 """
 
 from __future__ import annotations
@@ -19,9 +19,6 @@ from nscan_cli.poses import Array, Indices
 from nscan_cli.slam.keyframes.route import Route
 from nscan_cli.slam.keyframes.tracked_path import TrackedPath
 
-LEVER = 20.0
-"""m; at this distance the angles of ways count when these are compared."""
-
 
 class Links(NamedTuple):
     """E links between keyframes: what each says of one of them when the other is held."""
@@ -34,32 +31,32 @@ class Links(NamedTuple):
     """(E, 3, 3) of the other one, in the global frame."""
 
 
-class Linked:
+class LinkCache:
     """The links of a graph that grows. Those of its loops are kept, as long as new ones come after the
     others; a loop is known by being the same object."""
 
     def __init__(self) -> None:
         self._loops: list[Relation] = []
-        self._links = _of_all([])
+        self._links = _concatenated([])
 
     def links(self, route: Route, way: TrackedPath, loops: Sequence[Relation]) -> Links:
         """From each keyframe to the next along the way, and those of all loops."""
         if len(loops) < len(self._loops) or not all(map(operator.is_, self._loops, loops)):
-            self._loops, self._links = [], _of_all([])
-        new = [_star(loop, route.rows) for loop in loops[len(self._loops) :]]
+            self._loops, self._links = [], _concatenated([])
+        new = [_links_of(loop, route.rows) for loop in loops[len(self._loops) :]]
         if new:
-            self._loops, self._links = [*loops], _of_all([self._links, *new])
+            self._loops, self._links = [*loops], _concatenated([self._links, *new])
         steps = np.arange(len(way))
-        return _of_all([Links(steps, steps + 1, _along(way, route.poses)), self._links])
+        return _concatenated([Links(steps, steps + 1, _path_covariances(way, route.poses)), self._links])
 
 
-def _of_all(parts: Sequence[Links]) -> Links:
+def _concatenated(parts: Sequence[Links]) -> Links:
     """Links one after another."""
     none = Links(np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64), np.zeros((0, 3, 3)))
     return Links(*(np.concatenate(columns) for columns in zip(none, *parts, strict=True)))
 
 
-def _along(way: TrackedPath, poses: Array) -> Array:
+def _path_covariances(way: TrackedPath, poses: Array) -> Array:
     """The covariances (len(way), 3, 3) of each keyframe's end of the way, in the global frame."""
     turned = np.zeros((len(way), 3, 3))
     cos, sin = np.cos(poses[: len(way), 2]), np.sin(poses[: len(way), 2])
@@ -69,7 +66,7 @@ def _along(way: TrackedPath, poses: Array) -> Array:
     return along
 
 
-def _star(relation: Relation, rows: Indices) -> Links:
+def _links_of(relation: Relation, rows: Indices) -> Links:
     """From the pose that carries the mapping to each of the others; the same in all directions.
 
     The keyframes of the nodes are those in `rows` (K,).
@@ -92,10 +89,10 @@ def _star(relation: Relation, rows: Indices) -> Links:
 
 
 @kernel
-def most_certain_paths(links: Links, poses: Array, origin: int) -> tuple[Array, Indices]:
-    """The surest way from one pose to each of all (K, 3): covariances (K, 3, 3) along it; inf without any.
+def most_certain_paths(links: Links, poses: Array, origin: int, lever_arm: float) -> tuple[Array, Indices]:
+    """The most certain path from one pose to each of all (K, 3): covariances (K, 3, 3) along it, or inf.
 
-    And (K,) which one is before each on its way, −1 where none is.
+    And (K,) the pose before each on its path, −1 without any. Angles count at a distance of `lever_arm` (m).
 
     E. Dijkstra, "A note on two problems in connexion with graphs", 1959.
     """
@@ -115,7 +112,7 @@ def most_certain_paths(links: Links, poses: Array, origin: int) -> tuple[Array, 
             _follow(links, by[here], here, poses, covariances)
         for link in incident[starts[here] : starts[here + 1]]:
             there, own = links.held[link] + links.other[link] - here, links.covariances[link]
-            farther = cost + own[0, 0] + own[1, 1] + LEVER * LEVER * own[2, 2]
+            farther = cost + own[0, 0] + own[1, 1] + lever_arm * lever_arm * own[2, 2]
             if farther < best[there]:
                 best[there], by[there] = farther, link
                 heapq.heappush(waiting, (farther, there))
@@ -124,7 +121,7 @@ def most_certain_paths(links: Links, poses: Array, origin: int) -> tuple[Array, 
 
 @kernel
 def relations_on_paths(before: Indices, wanted: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Those wanted (K,) and all on the ways to them; `before` (K,) as surest_ways has it."""
+    """Those wanted (K,) and all on the ways to them; `before` (K,) as of most_certain_paths."""
     on = wanted.copy()
     for k in range(len(before)):
         here = k

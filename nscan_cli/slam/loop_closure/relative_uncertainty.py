@@ -23,21 +23,21 @@ class RelativeSigma(NamedTuple):
     """(K,) rad"""
 
 
-class Known(NamedTuple):
+class HeldPoseMarginals(NamedTuple):
     """What a graph knows of its poses when one of them is held."""
 
     held: int
     poses: Array
     """(K, 3)"""
     free: Indices
-    """(F,) those that were asked for, the held one not among them, in the factor's order."""
+    """(F,) the others that are computed, the held one not among them, in the factor's order."""
     factor: Factor
     covariances: Array
-    """(K, 3, 3), 0 for the held one, inf for those that were not asked for, or that nothing holds."""
+    """(K, 3, 3), 0 for the held one, inf for those that are not computed or that nothing holds."""
 
-    def reach(self) -> RelativeSigma:
+    def sigma(self) -> RelativeSigma:
         """As seen from the held one."""
-        return _reach(self.covariances)
+        return _sigma_of(self.covariances)
 
     def seen_from(self, other: int) -> RelativeSigma:
         """As seen from another one, which is what would be known with that one held.
@@ -46,12 +46,12 @@ class Known(NamedTuple):
         its own motion plus A times that of the other.
         """
         if other == self.held:
-            return self.reach()
+            return self.sigma()
         if not np.isfinite(self.covariances[other]).all():
             # Nothing is known from where nobody knows where it is, but of itself.
             unknown = np.full_like(self.covariances, np.inf)
             unknown[other] = 0.0
-            return _reach(unknown)
+            return _sigma_of(unknown)
         with_other, row = np.zeros_like(self.covariances), int(np.searchsorted(self.free, other))
         for component in range(3):
             unit = np.zeros((len(self.free), 3))
@@ -65,10 +65,10 @@ class Known(NamedTuple):
         )
         relative = self.covariances + half + half.transpose(0, 2, 1)
         relative[other] = 0.0
-        return _reach(relative)
+        return _sigma_of(relative)
 
 
-def known(energy: GraphEnergy, poses: Array) -> Known:
+def held_pose_marginals(energy: GraphEnergy, poses: Array) -> HeldPoseMarginals:
     """The marginals of the poses (K, 3) with the energy's fixed one held.
 
     As in marginal_covariances, the information is half the Hessian's Gauss–Newton part.
@@ -78,78 +78,80 @@ def known(energy: GraphEnergy, poses: Array) -> Known:
     covariances[energy.fixed], covariances[energy.free] = 0.0, inverse_diagonal(factor)
     if factor.loose.any():
         covariances[energy.free[undetermined_nodes(factor)]] = np.inf
-    return Known(energy.fixed, poses, energy.free, factor, covariances)
+    return HeldPoseMarginals(energy.fixed, poses, energy.free, factor, covariances)
 
 
-def _reach(covariances: Array) -> RelativeSigma:
+def _sigma_of(covariances: Array) -> RelativeSigma:
     """Of covariances (K, 3, 3); inf where they are."""
     known = np.isfinite(covariances[:, 0, 0])
     distance, angle = np.full((2, len(covariances)), np.inf)
     xx, xy, yy = covariances[known, 0, 0], covariances[known, 0, 1], covariances[known, 1, 1]
-    distance[known] = np.sqrt(_greatest(xx, xy, yy))
+    distance[known] = np.sqrt(_largest_eigenvalues(xx, xy, yy))
     angle[known] = np.sqrt(np.maximum(covariances[known, 2, 2], 0.0))
     return RelativeSigma(distance, angle)
 
 
-def _greatest(xx: Array, xy: Array, yy: Array) -> Array:
+def _largest_eigenvalues(xx: Array, xy: Array, yy: Array) -> Array:
     """The greater eigenvalues (K,) of covariances [[xx, xy], [xy, yy]]."""
     return np.maximum(0.5 * (xx + yy) + np.hypot(0.5 * (xx - yy), xy), 0.0)
 
 
 class RelativeUncertainty:
-    """The reach of all keyframes from one that moves on, without asking the whole graph each time.
+    """How uncertain all keyframes are as seen from one that moves on, without the whole graph each time.
 
-    Since it was asked, the way is added as if nothing but its own relations held it. That is never too
-    little, and costs next to nothing.
+    Since the graph was last computed, the path is added as if only its own relations held it. That is never
+    too little, and costs next to nothing.
     """
 
     def __init__(self) -> None:
         self._origin = 0
-        self._reach = RelativeSigma(np.zeros(1), np.zeros(1))
-        self._known: Known | None = None
+        self._sigma = RelativeSigma(np.zeros(1), np.zeros(1))
+        self._marginals: HeldPoseMarginals | None = None
 
-    def ask(self, energy: GraphEnergy, poses: Array) -> RelativeSigma:
-        """The reach (K,) from the keyframe at which the graph's energy is fixed.
+    def compute(self, energy: GraphEnergy, poses: Array) -> RelativeSigma:
+        """By the graph: (K,) from the keyframe at which its energy is fixed.
 
         Where others are held too, theirs is the bound from that keyframe as it is.
         """
-        self._known = known(energy, poses)
-        reach = self._known.reach()
+        self._marginals = held_pose_marginals(energy, poses)
+        sigma = self._marginals.sigma()
         if len(energy.free) < len(poses) - 1:
-            reach = RelativeSigma(*np.where(np.isinf(reach), self._reach, reach))
-        self._origin, self._reach = energy.fixed, reach
-        return reach
+            sigma = RelativeSigma(*np.where(np.isinf(sigma), self._sigma, sigma))
+        self._origin, self._sigma = energy.fixed, sigma
+        return sigma
 
-    def asked_from(self, other: int) -> RelativeSigma:
-        """The reach (K,) from another keyframe, by the graph that was asked last."""
-        assert self._known is not None
-        return self._known.seen_from(other)
+    def seen_from(self, other: int) -> RelativeSigma:
+        """(K,) from another keyframe, by the graph that was computed last."""
+        assert self._marginals is not None
+        return self._marginals.seen_from(other)
 
-    def narrow(self, origin: int, covariances: Array) -> RelativeSigma:
-        """A bound again, by covariances (K, 3, 3) from `origin`, as last for `bound`, none too little."""
-        reach = _reach(covariances)
-        distance = np.minimum(self._reach.distance, reach.distance)
-        self._origin, self._reach = (
+    def tighten(self, origin: int, covariances: Array) -> RelativeSigma:
+        """Lower the last upper bound, of `origin`, by covariances (K, 3, 3), none of them too small."""
+        sigma = _sigma_of(covariances)
+        distance = np.minimum(self._sigma.distance, sigma.distance)
+        self._origin, self._sigma = (
             origin,
-            RelativeSigma(distance, np.minimum(self._reach.angle, reach.angle)),
+            RelativeSigma(distance, np.minimum(self._sigma.angle, sigma.angle)),
         )
-        return self._reach
+        return self._sigma
 
-    def bound(self, origin: int, way: TrackedPath, poses: Array) -> RelativeSigma:
-        """At most the reach from `origin`, of the keyframes before it. The origin never goes back."""
-        known = len(self._reach.distance)
+    def upper_bound(self, origin: int, way: TrackedPath, poses: Array) -> RelativeSigma:
+        """An upper bound from `origin` for the keyframes before it. The origin never goes back."""
+        known = len(self._sigma.distance)
         distance, angle = np.zeros(len(poses)), np.zeros(len(poses))
-        distance[:known], angle[:known] = self._reach.distance**2, self._reach.angle**2
+        distance[:known], angle[:known] = self._sigma.distance**2, self._sigma.angle**2
         for step in range(self._origin, origin):
             covariance = way.covariances[step]
-            _swing(covariance, way.relations[step].measurement, poses, step, distance)
+            _add_relation_variance(covariance, way.relations[step].measurement, poses, step, distance)
             angle[: step + 1] += covariance[2, 2]
-        self._origin, self._reach = origin, RelativeSigma(np.sqrt(distance), np.sqrt(angle))
-        return self._reach
+        self._origin, self._sigma = origin, RelativeSigma(np.sqrt(distance), np.sqrt(angle))
+        return self._sigma
 
 
 @kernel
-def _swing(covariance: Array, measurement: Array, poses: Array, step: int, variances: Array) -> None:
+def _add_relation_variance(
+    covariance: Array, measurement: Array, poses: Array, step: int, variances: Array
+) -> None:
     """Add to (K,) the greatest variances of positions up to `step`, seen from the end of its relation.
 
     By what the relation is off: what lies v from its end, in its frame, moves by its shift and by its turn

@@ -10,15 +10,17 @@ import pytest
 
 from nscan_cli.evaluation.trajectory_errors import trajectory_errors
 from nscan_cli.graph.io.tum import Trajectory
+from nscan_cli.slam.backend.options import RefinementOptions
 from nscan_cli.slam.backend.refinement import Refinement
 from nscan_cli.slam.keyframes.route import Route
 from nscan_cli.slam.local_matching.joint_relations import LocalMatch, MatchNearby, match_neighbours
 from nscan_cli.slam.local_matching.neighbours import Neighbours, choose_neighbours
+from nscan_cli.slam.local_matching.options import NScanOptions
 from nscan_cli.slam.local_matching.pairwise_relations import match_neighbours_pairwise
-from nscan_cli.slam.options import NScanOptions, Relations, SlamOptions
+from nscan_cli.slam.options import Relations, SlamOptions
 from tests.slam.runs import Mapped, mapped, mapped_office, office_log, part, truth_of
 
-MOVED = SlamOptions().refined
+MOVED = SlamOptions().refinement.min_motion
 BOTH_KINDS = pytest.mark.parametrize(
     "match", [match_neighbours, match_neighbours_pairwise], ids=["joint", "pairs"]
 )
@@ -27,7 +29,7 @@ BOTH_KINDS = pytest.mark.parametrize(
 @functools.cache
 def unrefined() -> Mapped:
     """80 m of the office."""
-    return mapped(part(office_log(), slice(0, 800)), SlamOptions(refinements=0))
+    return mapped(part(office_log(), slice(0, 800)), SlamOptions(refinement=RefinementOptions(max_sweeps=0)))
 
 
 class Recorded:
@@ -137,7 +139,7 @@ def test_refinement_leaves_the_office_about_as_it_is(relations: Relations, most:
             Trajectory(log.times, poses, log.stamps), Trajectory(log.times, truth_of(log), log.stamps)
         ).absolute_translation.rmse
         for poses in (
-            mapped(log, dataclasses.replace(options, refinements=0)).graph.poses,
+            mapped(log, dataclasses.replace(options, refinement=RefinementOptions(max_sweeps=0))).graph.poses,
             mapped_office(True, relations).graph.poses,
         )
     ]

@@ -15,8 +15,9 @@ from nscan_cli.graph.optimise.whole_graph import optimise_graph
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.poses import Array, compose
 from nscan_cli.slam.backend.resume import can_refine, options_of, resume
-from nscan_cli.slam.loop_closure.place_search import AMBIGUOUS
-from nscan_cli.slam.options import NScanOptions, Relations, SlamOptions
+from nscan_cli.slam.local_matching.options import NScanOptions
+from nscan_cli.slam.loop_closure.verification import AMBIGUOUS
+from nscan_cli.slam.options import Relations, SlamOptions
 from tests.slam.runs import mapped, office_log, part, truth_of
 
 

@@ -7,7 +7,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from nscan_cli.poses import Array, compose, relative, wrap
-from nscan_cli.slam.backend.scan_poses import METRES_PER_RADIAN, between_keyframes
+from nscan_cli.slam.backend.options import OptimisationOptions
+from nscan_cli.slam.backend.scan_poses import between_keyframes
 
 KEYFRAMES = np.array([0, 7, 12, 25, 26])
 SCANS = 31
@@ -79,7 +80,7 @@ def test_a_correction_is_spread_by_the_way():
 def test_a_turn_on_the_spot_wears_tracking_too():
     """Half a radian, then as much way as that is worth: the scan between has half of the correction."""
     tracked = np.array([[0.0, 0, 0], [0.0, 0, 0.5], [0.0, 0, 0.5]])
-    tracked[2, :2] = 0.5 * METRES_PER_RADIAN * np.array([np.cos(0.5), np.sin(0.5)])
+    tracked[2, :2] = 0.5 * OptimisationOptions.metres_per_radian * np.array([np.cos(0.5), np.sin(0.5)])
     poses = tracked[[0, 2]] + np.array([[0, 0, 0], [0.2, 0, 0]])
     found = between_keyframes(tracked, np.array([0, 2]), poses)
     np.testing.assert_allclose(found[1], [0.1, 0, 0.5], atol=1e-12)

@@ -5,14 +5,16 @@ from __future__ import annotations
 import numpy as np
 
 from nscan_cli.graph.model import Pairwise
+from nscan_cli.slam.backend.options import ScheduleOptions
 from nscan_cli.slam.backend.schedule import OptimisationSchedule
 from nscan_cli.slam.backend.subgraph import Subgraph
 from nscan_cli.slam.keyframes.route import Route
-from nscan_cli.slam.options import ClosingOptions, GrowthOptions, SlamOptions
+from nscan_cli.slam.loop_closure.options import LoopClosureOptions
+from nscan_cli.slam.options import SlamOptions
 from tests.simulation.building import growing
 from tests.slam.runs import mapped
 
-OPTIONS = GrowthOptions(moved=0.1, new=0.1, most=20, new_of_all=0.5)
+OPTIONS = ScheduleOptions(min_motion=0.1, min_new_share=0.1, max_keyframes=20, whole_new_share=0.5)
 
 
 def chain(size: int) -> tuple[Route, list[Pairwise]]:
@@ -60,8 +62,10 @@ def test_solved_in_parts_the_map_is_the_same():
     """Along two rows of a building and the loops between them, with parts of 20 of 390 keyframes."""
     log = growing(6_250).log()
     whole = mapped(log)
-    parts = SlamOptions(closing=ClosingOptions(asked=20), growth=GrowthOptions(most=20))
-    assert len(whole.state.poses) < SlamOptions().growth.most
+    parts = SlamOptions(
+        loop_closure=LoopClosureOptions(max_exact_keyframes=20), schedule=ScheduleOptions(max_keyframes=20)
+    )
+    assert len(whole.state.poses) < SlamOptions().schedule.max_keyframes
     found = mapped(log, parts)
     assert [(loop.nodes, loop.accepted) for loop in found.graph.loops] == [
         (loop.nodes, loop.accepted) for loop in whole.graph.loops

@@ -23,8 +23,13 @@ from nscan_cli.slam.backend.subgraph import (
     without_others,
 )
 from nscan_cli.slam.keyframes.route import Route
-from nscan_cli.slam.loop_closure.most_certain_paths import Linked, most_certain_paths, relations_on_paths
-from nscan_cli.slam.loop_closure.relative_uncertainty import RelativeSigma, RelativeUncertainty, known
+from nscan_cli.slam.loop_closure.most_certain_paths import LinkCache, most_certain_paths, relations_on_paths
+from nscan_cli.slam.loop_closure.options import LoopClosureOptions
+from nscan_cli.slam.loop_closure.relative_uncertainty import (
+    RelativeSigma,
+    RelativeUncertainty,
+    held_pose_marginals,
+)
 from tests.slam.drives import exact_path
 from tests.slam.loop_closure.test_relative_uncertainty import Walk, straight, walk
 
@@ -48,8 +53,10 @@ class Walked(NamedTuple):
     def led_to(self, origin: int, wanted: Chosen) -> Chosen:
         """Those wanted, and what is on the surest ways to them."""
         way = exact_path([relation for relation in self.way if isinstance(relation, Pairwise)])
-        links = Linked().links(self.route, way, self.loops)
-        return relations_on_paths(most_certain_paths(links, self.route.poses, origin)[1], wanted)
+        links = LinkCache().links(self.route, way, self.loops)
+        return relations_on_paths(
+            most_certain_paths(links, self.route.poses, origin, LoopClosureOptions.lever_arm)[1], wanted
+        )
 
 
 def walked(seed: int, size: int, loops: int) -> Walked:
@@ -117,8 +124,8 @@ def test_without_the_others_it_is_never_too_little(seed, size, loops, data):
     led_to = graph.led_to(origin, wanted)
     assert (led_to >= wanted).all()
     part = without_others(graph.route, graph.way, graph.loops, led_to)
-    found = known(graph.energy(part, origin), graph.route.poses).reach()
-    answer = known(graph.energy(graph.whole(), origin), graph.route.poses).reach()
+    found = held_pose_marginals(graph.energy(part, origin), graph.route.poses).sigma()
+    answer = held_pose_marginals(graph.energy(graph.whole(), origin), graph.route.poses).sigma()
     assert np.isfinite(found.distance[led_to]).all()
     assert (found.distance >= (1 - 1e-6) * answer.distance).all()
     assert (found.angle >= (1 - 1e-6) * answer.angle).all()
@@ -130,7 +137,8 @@ def test_with_all_keyframes_it_is_the_answer_itself():
     graph = walked(5, 10, loops=3)
     part = without_others(graph.route, graph.way, graph.loops, np.ones(10, dtype=np.bool_))
     asked, answer = (
-        known(graph.energy(each, 4), graph.route.poses).covariances for each in (part, graph.whole())
+        held_pose_marginals(graph.energy(each, 4), graph.route.poses).covariances
+        for each in (part, graph.whole())
     )
     np.testing.assert_array_equal(asked, answer)
 
@@ -139,8 +147,8 @@ def test_from_another_keyframe_the_part_is_seen_and_no_more():
     graph = walked(6, 12, loops=3)
     led_to = graph.led_to(11, chosen(12, 8, 9))
     part = without_others(graph.route, graph.way, graph.loops, led_to)
-    asked = known(graph.energy(part, 11), graph.route.poses)
-    direct = known(graph.energy(part, 9), graph.route.poses).reach()
+    asked = held_pose_marginals(graph.energy(part, 11), graph.route.poses)
+    direct = held_pose_marginals(graph.energy(part, 9), graph.route.poses).sigma()
     for found, expected in zip(asked.seen_from(9), direct, strict=True):
         np.testing.assert_allclose(found, expected, rtol=1e-8, atol=1e-12)
     assert part.free is not None
@@ -149,11 +157,11 @@ def test_from_another_keyframe_the_part_is_seen_and_no_more():
 
 def test_what_was_not_asked_keeps_its_bound():
     drive = straight(12)
-    graph, whereabouts = of(drive), RelativeUncertainty()
-    bound = whereabouts.bound(11, exact_path(drive.way), drive.poses)
+    graph, uncertainty = of(drive), RelativeUncertainty()
+    bound = uncertainty.upper_bound(11, exact_path(drive.way), drive.poses)
     part = without_others(graph.route, graph.way, [], chosen(12, 8, 9, 10, 11))
-    asked = whereabouts.ask(graph.energy(part, 11), drive.poses)
-    answer = known(graph.energy(graph.whole(), 11), drive.poses).reach()
+    asked = uncertainty.compute(graph.energy(part, 11), drive.poses)
+    answer = held_pose_marginals(graph.energy(graph.whole(), 11), drive.poses).sigma()
     for found, before, expected in zip(asked, bound, answer, strict=True):
         np.testing.assert_array_equal(found[:8], before[:8])
         np.testing.assert_allclose(found[8:], expected[8:], rtol=1e-8, atol=1e-12)
@@ -167,7 +175,7 @@ def test_a_keyframe_that_nothing_holds_in_a_direction_is_not_known():
     part = without_others(graph.route, graph.way, graph.loops, chosen(12, 9, 10, 11))
     assert part.free is not None
     assert part.free[0]
-    found: RelativeSigma = known(graph.energy(part, 10), drive.poses).reach()
+    found: RelativeSigma = held_pose_marginals(graph.energy(part, 10), drive.poses).sigma()
     np.testing.assert_array_equal(np.isfinite(found.distance), chosen(12, 9, 10, 11))
 
 

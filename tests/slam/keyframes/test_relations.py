@@ -55,7 +55,7 @@ def test_pairwise_has_the_chain_and_single_matches_and_no_joint_one():
     options = SlamOptions().nscan
     for relation in matches:
         assert set(relation.nodes) <= set(graph.keyframes.tolist())
-        assert options.overlap <= relation.score <= 1
+        assert options.min_overlap <= relation.score <= 1
     centres = [relation.nodes[1] for relation in matches]
     assert max(centres.count(node) for node in set(centres)) <= options.max_scans - 1
 
@@ -69,7 +69,7 @@ def test_pairwise_loops_have_one_verdict_for_each_centre():
     assert centres == sorted(set(centres))
     accepted = [loop for loop in graph.loops if loop.accepted]
     assert len(accepted) > 40
-    assert all(loop.score >= SlamOptions().nscan.overlap for loop in accepted)
+    assert all(loop.score >= SlamOptions().nscan.min_overlap for loop in accepted)
     for loop in graph.loops:
         assert loop.accepted or loop.reason
 
@@ -79,7 +79,7 @@ def test_pairwise_loops_have_one_verdict_for_each_centre():
 def test_without_loops_no_relation_joins_different_visits(relations: Relations, least: float):
     office = mapped_office(True, relations, loops=False)
     paths = {keyframe.row: keyframe.tracked.path for keyframe in office.state.keyframes.list}
-    recent = SlamOptions().nscan.recent
+    recent = SlamOptions().nscan.visit_path
     pairwise, nscan = office.graph.pairwise, office.graph.nscan
     found: list[tuple[tuple[int, ...], int]] = [(relation.nodes, relation.nodes[1]) for relation in pairwise]
     found += [(relation.nodes, relation.nodes[relation.fixed]) for relation in nscan]

@@ -14,7 +14,8 @@ from nscan_cli.slam.keyframes.route import Route
 from nscan_cli.slam.local_matching.coverage import Coverage
 from nscan_cli.slam.local_matching.joint_relations import LocalMatch
 from nscan_cli.slam.local_matching.neighbours import choose_neighbours
-from nscan_cli.slam.options import NScanOptions, SlamOptions
+from nscan_cli.slam.local_matching.options import NScanOptions
+from nscan_cli.slam.options import SlamOptions
 from tests.slam.runs import Mapped, mapped, mapped_office, office_log, part
 
 
@@ -135,7 +136,7 @@ def centres(run: Mapped) -> set[int]:
 def test_keyframes_that_others_cover_are_no_centres():
     """Along 30 m. A share that is never reached makes each the centre of a match, as there were no others."""
     log, options = part(office_log(), slice(0, 300)), SlamOptions()
-    always = dataclasses.replace(options, nscan=NScanOptions(covered=1.1))
+    always = dataclasses.replace(options, nscan=NScanOptions(max_covered_share=1.1))
     sparse, dense = mapped(log, options), mapped(log, always)
     keyframes = dense.graph.keyframes
     assert len(centres(dense)) >= 0.95 * len(keyframes)
@@ -158,5 +159,5 @@ def test_yet_each_keyframe_is_a_centre_or_others_hold_its_pairs():
         near, *_ = choose_neighbours(office.state.poses, paths, k, options)
         shares[k] = covered.share(rows[k], [rows[other] for other in near])
     assert (shares > 0).all()
-    held = (shares >= options.covered) | np.isin(rows, list(centres(office)))
+    held = (shares >= options.max_covered_share) | np.isin(rows, list(centres(office)))
     assert held.mean() > 0.98

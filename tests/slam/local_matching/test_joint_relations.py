@@ -16,7 +16,7 @@ from nscan_cli.slam.keyframes.keyframe import Keyframe
 from nscan_cli.slam.keyframes.route import route_of
 from nscan_cli.slam.local_matching import joint_relations as nearby
 from nscan_cli.slam.local_matching.joint_relations import LocalMatch, match_at, match_neighbours
-from nscan_cli.slam.options import NScanOptions
+from nscan_cli.slam.local_matching.options import NScanOptions
 from tests.matching.problems import office_truth
 from tests.simulation.scenes import office
 from tests.slam.drives import CABINETS, about, keyframe_of, like_doors_drive, path_of, relation_to_previous
@@ -102,7 +102,7 @@ def test_nodes_fixed_origin_and_score():
     assert relation.origin == "loop"
     assert relation.poses.shape == (len(relation.nodes), 3)
     assert found.loop is not None
-    assert NScanOptions().overlap <= relation.score == found.loop.score <= 1
+    assert NScanOptions().min_overlap <= relation.score == found.loop.score <= 1
 
 
 def test_without_a_revisit_the_relation_closes_no_loop():
@@ -153,7 +153,7 @@ def test_all_stages_are_run_for_what_the_last_one_cannot_try(foreign, overlap, a
         return match_jointly(problem, start, options)
 
     monkeypatch.setattr(nearby, "match_jointly", watched)
-    found = matched(revisit(foreign), np.zeros(3), NScanOptions(overlap=overlap))
+    found = matched(revisit(foreign), np.zeros(3), NScanOptions(min_overlap=overlap))
     assert found.whole == (overlap == 0.65 and not foreign)
     assert sorted(set(stages)) == [1, 3][:attempts]
 

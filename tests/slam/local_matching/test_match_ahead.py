@@ -14,9 +14,9 @@ from nscan_cli.slam.keyframes.keyframe import Keyframe
 from nscan_cli.slam.keyframes.route import Route, extended, route_of
 from nscan_cli.slam.local_matching.coverage import Coverage
 from nscan_cli.slam.local_matching.joint_relations import LocalMatch
-from nscan_cli.slam.local_matching.match_ahead import AHEAD, MatchAhead
+from nscan_cli.slam.local_matching.match_ahead import MATCHES_AHEAD, MatchAhead
 from nscan_cli.slam.local_matching.neighbours import Neighbours, choose_neighbours
-from nscan_cli.slam.options import NScanOptions
+from nscan_cli.slam.local_matching.options import NScanOptions
 
 OPTIONS = NScanOptions(radius=2.5)
 """Two keyframes to both sides of one are near."""
@@ -83,7 +83,7 @@ def test_what_is_due_next_is_begun_as_if_every_match_related_all():
     begun = [(centre, size) for _, centre, size in matches.made]
     # Each with the route as it will be at its turn, three keyframes further than the centre.
     assert begun == [(8, 12), (10, 14)]
-    assert len(begun) == AHEAD
+    assert len(begun) == MATCHES_AHEAD
 
 
 def test_a_match_counts_if_the_graph_lies_as_it_was_assumed():

@@ -11,9 +11,9 @@ from hypothesis import strategies as st
 
 from nscan_cli.poses import Array
 from nscan_cli.slam.local_matching.neighbours import choose_neighbours
-from nscan_cli.slam.options import NScanOptions
+from nscan_cli.slam.local_matching.options import NScanOptions
 
-OPTIONS = NScanOptions(max_scans=6, radius=5.0, recent=20.0)
+OPTIONS = NScanOptions(max_scans=6, radius=5.0, visit_path=20.0)
 
 
 def along(*x: float) -> Array:
@@ -45,10 +45,10 @@ def test_of_other_visits_the_first_take_part():
         near = choose_neighbours(poses, paths, centre, options)
         return set((near.tried[near.seen_before] // 11).tolist())
 
-    all_of_them = dataclasses.replace(OPTIONS, first_visits=99)
+    all_of_them = dataclasses.replace(OPTIONS, max_other_visits=99)
     assert visits_beside(60, all_of_them) == {2, 3, 4}
     assert visits_beside(60, OPTIONS) == {0, 1, 2}
-    assert visits_beside(60, dataclasses.replace(OPTIONS, first_visits=1)) == {0}
+    assert visits_beside(60, dataclasses.replace(OPTIONS, max_other_visits=1)) == {0}
     # Those that come later count, too, where there are not so many before.
     assert visits_beside(5, OPTIONS) == {1, 2, 3}
     assert visits_beside(16, OPTIONS) == {0, 2, 3}

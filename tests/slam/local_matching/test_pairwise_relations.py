@@ -14,8 +14,8 @@ from nscan_cli.slam.frontend.tracked_scans import TrackedScan
 from nscan_cli.slam.keyframes.keyframe import Keyframe, KeyframePoints
 from nscan_cli.slam.keyframes.route import route_of
 from nscan_cli.slam.local_matching.joint_relations import LocalMatch
+from nscan_cli.slam.local_matching.options import NScanOptions
 from nscan_cli.slam.local_matching.pairwise_relations import match_neighbours_pairwise
-from nscan_cli.slam.options import NScanOptions
 from tests.matching.problems import office_truth
 from tests.slam.drives import about, relation_to_previous
 from tests.slam.local_matching.test_joint_relations import BETWEEN, NEW, OLD, ROWS, revisit
@@ -143,7 +143,7 @@ def test_when_nothing_of_another_visit_overlaps_the_loop_is_refused_with_a_reaso
     assert found.loop.nodes == (OLD[0], NEW[-1])
     assert not found.loop.accepted
     assert found.loop.reason == f"too little overlap with {len(OLD)} scans of another visit"
-    assert 0 < found.loop.score < NScanOptions().overlap
+    assert 0 < found.loop.score < NScanOptions().min_overlap
 
 
 def test_a_keyframe_alone_is_matched_with_nothing():

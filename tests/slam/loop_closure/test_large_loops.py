@@ -11,7 +11,8 @@ from nscan_cli.evaluation.reference_relations import read_relations, relation_er
 from nscan_cli.graph.io.tum import Trajectory
 from nscan_cli.logs.load import read_log
 from nscan_cli.logs.reading_options import ReadingOptions
-from nscan_cli.slam.options import ClosingOptions, Relations, SlamOptions
+from nscan_cli.slam.loop_closure.options import LoopClosureOptions
+from nscan_cli.slam.options import Relations, SlamOptions
 from tests.data import data_file
 from tests.slam.drives import slipped_round
 from tests.slam.keyframes.test_relations import rmse
@@ -20,14 +21,14 @@ from tests.slam.troubles import rmse_of
 
 ALONG, ACROSS, ASLANT = (2.5, 0.0, 0.0), (0.0, 2.5, 0.0), (-2.5, 1.0, 0.05)
 ASIDE = (1.0, 2.0, -0.05)
-NEVER = ClosingOptions(score=1.1)
+NEVER = LoopClosureOptions(min_score=1.1)
 """No scan fits better than entirely."""
 
 
 @functools.cache
 def run(slip: tuple[float, float, float], closing: bool, relations: Relations = "both") -> Mapped:
-    options = ClosingOptions() if closing else NEVER
-    return mapped(slipped_round(slip), SlamOptions(relations=relations, closing=options))
+    options = LoopClosureOptions() if closing else NEVER
+    return mapped(slipped_round(slip), SlamOptions(relations=relations, loop_closure=options))
 
 
 def sighted_rmse(found: Mapped) -> float:

@@ -13,10 +13,12 @@ from nscan_cli.slam.backend.energy_cache import EnergyCache
 from nscan_cli.slam.frontend.options import BreakOptions
 from nscan_cli.slam.keyframes.route import route_of
 from nscan_cli.slam.local_matching.joint_relations import LocalMatch, match_neighbours
+from nscan_cli.slam.local_matching.options import NScanOptions
 from nscan_cli.slam.local_matching.pairwise_relations import match_neighbours_pairwise
-from nscan_cli.slam.loop_closure.loop_detector import NO_SECOND, SO_FAR_OFF, LoopDetector
-from nscan_cli.slam.loop_closure.place_search import AMBIGUOUS, OUTDONE, TOO_LITTLE, Place
-from nscan_cli.slam.options import ClosingOptions, NScanOptions
+from nscan_cli.slam.loop_closure.loop_detector import LoopDetector
+from nscan_cli.slam.loop_closure.options import LoopClosureOptions
+from nscan_cli.slam.loop_closure.place import Place
+from nscan_cli.slam.loop_closure.verification import AMBIGUOUS, NO_SECOND, OUTDONE, SO_FAR_OFF, TOO_LITTLE
 from tests.slam.drives import (
     CABINETS,
     ROUND,
@@ -39,11 +41,11 @@ SLIPS = pytest.mark.parametrize(
 SLIPPED = 34
 """The relation of round_drive() that is bent, 51 m from the start."""
 ACROSS = (0.0, 2.5, 0.0)
-NEVER = ClosingOptions(score=1.1)
+NEVER = LoopClosureOptions(min_score=1.1)
 """No scan fits better than entirely."""
 
 
-def closing(options: ClosingOptions = ClosingOptions()) -> LoopDetector:  # noqa: B008
+def closing(options: LoopClosureOptions = LoopClosureOptions()) -> LoopDetector:  # noqa: B008
     return LoopDetector(options, NSCAN, match_neighbours, EnergyCache(ROWS * len(round_drive().keyframes)))
 
 
@@ -92,7 +94,11 @@ def test_what_is_accepted_is_not_refused_as_well():
 
 @pytest.mark.parametrize(
     "options",
-    [ClosingOptions(agree=1e-4), ClosingOptions(agree_turn=1e-6), ClosingOptions(together=1.0)],
+    [
+        LoopClosureOptions(agreement_distance=1e-4),
+        LoopClosureOptions(agreement_turn=1e-6),
+        LoopClosureOptions(agreement_path=1.0),
+    ],
     ids=["off", "turned", "far from each other"],
 )
 def test_keyframes_that_do_not_agree_close_nothing(options):
@@ -114,7 +120,7 @@ def test_a_place_that_looks_alike_is_never_accepted():
     assert closed_along(cautious, doors) == []
     assert len(cautious.refused()) >= 5
     assert {(loop.accepted, loop.reason) for loop in cautious.refused()} == {(False, AMBIGUOUS)}
-    rash = closed_along(closing(ClosingOptions(rival=1.01)), doors)
+    rash = closed_along(closing(LoopClosureOptions(rival_score=1.01)), doors)
     places = [place for _, several in rash for place in several]
     off = [p.measured - relative(doors.truth[p.centre], doors.truth[p.old]) for p in places]
     assert max(np.abs(error[0]) for error in off) > 2.5
@@ -124,7 +130,7 @@ def test_a_twin_farther_off_than_tracking_can_be_is_not_taken_for_the_place():
     """A corridor beside the one driven first looks just the same; searched that far, it would be accepted."""
     twin = twin_drive()
     assert closed_along(closing(), twin) == []
-    rash = closed_along(closing(ClosingOptions(least=9.0)), twin)
+    rash = closed_along(closing(LoopClosureOptions(min_distance=9.0)), twin)
     place = rash[0][1][0]
     off = place.measured - relative(twin.truth[place.centre], twin.truth[place.old])
     assert abs(off[1]) > 5.0
@@ -139,19 +145,19 @@ def test_a_twin_farther_off_than_tracking_can_be_is_not_taken_for_the_place():
 
 def test_what_is_farther_off_than_the_path_drifts_must_be_seen_from_scans_far_apart():
     """A corridor beside the one driven first: taken for a slip of 9 m, two keyframes 3 m apart would do."""
-    twin, beside = twin_drive(), ClosingOptions().beside
+    twin, beside = twin_drive(), LoopClosureOptions().scan_path
 
     def span(places: list[Place]) -> float:
         first, last = (twin.keyframes[place.centre].tracked.path for place in (places[0], places[-1]))
         return last - first
 
-    hasty = closed_along(closing(ClosingOptions(least=9.0, slip=9.0)), twin)[0][1]
+    hasty = closed_along(closing(LoopClosureOptions(min_distance=9.0, slip_distance=9.0)), twin)[0][1]
     assert len(hasty) == 2
     assert span(hasty) < 2 * beside
-    late = closed_along(closing(ClosingOptions(least=9.0)), twin)[0][1]
+    late = closed_along(closing(LoopClosureOptions(min_distance=9.0)), twin)[0][1]
     assert len(late) >= 3
     assert span(late) >= 2 * beside
-    waits = closing(ClosingOptions(least=9.0))
+    waits = closing(LoopClosureOptions(min_distance=9.0))
     assert closed_along(waits, twin, until=late[-2].centre) == []
     assert {loop.reason for loop in waits.refused()} == {SO_FAR_OFF}
 
@@ -175,7 +181,7 @@ def test_who_is_lost_is_searched_for_in_all_that_was_seen_before():
         known = carried if k + 1 in firsts else relation
         chain.append(dataclasses.replace(known, nodes=(ROWS * k, ROWS * (k + 1))))
     drive = Driven(keyframes, chain, along(chain), office.truth)
-    lost = LoopDetector(ClosingOptions(), NSCAN, match_neighbours, EnergyCache(ROWS * size))
+    lost = LoopDetector(LoopClosureOptions(), NSCAN, match_neighbours, EnergyCache(ROWS * size))
     found = closed_along(lost, drive)
     assert found
     for _, places in found:
@@ -189,7 +195,7 @@ def test_who_is_lost_is_searched_for_in_all_that_was_seen_before():
 # ----------------------------------------------------------------------------- where is searched
 
 
-def doubted(off: tuple[float, float, float], options: ClosingOptions, origin: str = "loop") -> str | None:
+def doubted(off: tuple[float, float, float], options: LoopClosureOptions, origin: str = "loop") -> str | None:
     """What a joint match is told that puts the last but few keyframes of round_drive() off their place."""
     drive, tried, centre = round_drive(), closing(options), 49
     for k, relation in enumerate(drive.chain[:centre]):
@@ -205,12 +211,12 @@ def doubted(off: tuple[float, float, float], options: ClosingOptions, origin: st
 
 def test_a_loop_from_a_poor_start_must_stand_a_search():
     """66 m of way may have slipped by 1.3 m; 0.1 mm of slip a metre is nothing, whatever the match says."""
-    options = ClosingOptions()
+    options = LoopClosureOptions()
     assert doubted((0.05, 0.0, 0.01), options) is None
     assert doubted((2.0, 0.0, 0.0), options) == OUTDONE
     assert doubted((0.0, 0.0, 0.4), options) == TOO_LITTLE
     assert doubted((2.0, 0.0, 0.0), options, "track") is None
-    assert doubted((2.0, 0.0, 0.0), ClosingOptions(drift=1e-4, drift_angle=1e-5)) is None
+    assert doubted((2.0, 0.0, 0.0), LoopClosureOptions(drift=1e-4, drift_angle=1e-5)) is None
 
 
 @pytest.mark.parametrize(

@@ -11,17 +11,20 @@ from nscan_cli.graph.model import Pairwise
 from nscan_cli.graph.relations.base import Relation
 from nscan_cli.poses import Array
 from nscan_cli.slam.keyframes.route import Route
-from nscan_cli.slam.loop_closure.most_certain_paths import Linked, most_certain_paths
+from nscan_cli.slam.loop_closure.most_certain_paths import LinkCache, most_certain_paths
+from nscan_cli.slam.loop_closure.options import LoopClosureOptions
 from tests.slam.drives import exact_path
 from tests.slam.loop_closure.test_relative_uncertainty import Walk, seen_from, straight, walk
+
+LEVER_ARM = LoopClosureOptions.lever_arm
 
 
 def bound(walked: Walk, origin: int) -> Array:
     """The covariances (K, 3, 3) along the surest ways."""
     size = len(walked.poses)
     route = Route([], np.arange(size), walked.way, np.zeros(size), walked.poses)
-    links = Linked().links(route, exact_path(walked.way), [*walked.loops, *walked.nscan])
-    return most_certain_paths(links, walked.poses, origin)[0]
+    links = LinkCache().links(route, exact_path(walked.way), [*walked.loops, *walked.nscan])
+    return most_certain_paths(links, walked.poses, origin, LEVER_ARM)[0]
 
 
 @given(st.integers(0, 10**6), st.integers(3, 9), st.integers(0, 6), st.data())
@@ -58,8 +61,8 @@ def test_a_loop_is_a_shorter_way():
 def test_what_no_relation_leads_to_is_nowhere():
     walked = straight(4)
     route = Route([], np.arange(5), walked.way, np.zeros(5), np.zeros((5, 3)))
-    links = Linked().links(route, exact_path(walked.way), [])
-    found, before = most_certain_paths(links, np.zeros((5, 3)), 0)
+    links = LinkCache().links(route, exact_path(walked.way), [])
+    found, before = most_certain_paths(links, np.zeros((5, 3)), 0, LEVER_ARM)
     np.testing.assert_array_equal(before, [-1, 0, 1, 2, -1])
     assert np.isfinite(found[:4]).all()
     assert np.isinf(found[4]).all()
@@ -85,8 +88,8 @@ def test_links_that_are_kept_are_those_that_are_made_anew():
     size, way = len(walked.poses), exact_path(walked.way)
     route = Route([], np.arange(size), walked.way, np.zeros(size), walked.poses)
     loops: list[Relation] = [*walked.nscan, *walked.loops]
-    kept = Linked()
+    kept = LinkCache()
     for chosen in (loops[:2], loops[:2], loops[:5], loops, loops[1:], loops[:1], []):
-        anew = Linked().links(route, way, chosen)
+        anew = LinkCache().links(route, way, chosen)
         for one, other in zip(kept.links(route, way, chosen), anew, strict=True):
             np.testing.assert_array_equal(one, other)

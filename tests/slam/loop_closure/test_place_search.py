@@ -13,17 +13,18 @@ from nscan_cli.poses import Array, compose, relative, wrap
 from nscan_cli.slam.keyframes.keyframe import Keyframe
 from nscan_cli.slam.keyframes.route import route_of
 from nscan_cli.slam.local_matching.joint_relations import LocalMatch, MatchNearby, match_neighbours
+from nscan_cli.slam.local_matching.options import NScanOptions
 from nscan_cli.slam.local_matching.pairwise_relations import match_neighbours_pairwise
-from nscan_cli.slam.loop_closure.place_search import (
+from nscan_cli.slam.loop_closure.options import LoopClosureOptions
+from nscan_cli.slam.loop_closure.place import Place
+from nscan_cli.slam.loop_closure.place_search import find_place
+from nscan_cli.slam.loop_closure.verification import (
     AMBIGUOUS,
     ELSEWHERE,
     NO_MATCH,
     OUTDONE,
-    Place,
-    find_place,
-    why_doubted,
+    why_match_doubted,
 )
-from nscan_cli.slam.options import ClosingOptions, NScanOptions
 from tests.slam.drives import (
     CABINETS,
     ROWS,
@@ -36,7 +37,7 @@ from tests.slam.drives import (
     round_scene,
 )
 
-CLOSING, NSCAN = ClosingOptions(), NScanOptions()
+CLOSING, NSCAN = LoopClosureOptions(), NScanOptions()
 WINDOW = SearchOptions(distance=4.0, turn=0.2, beams=180)
 CENTRE = 49
 """A keyframe of round_drive() that is where keyframe 3 was."""
@@ -53,7 +54,7 @@ def moved(drive: Driven, centre: int, off: tuple[float, float, float]) -> Array:
     """(K, 3) true poses, but those of the centre's visit are off by one motion about it."""
     poses = drive.truth.copy()
     paths = np.array([keyframe.tracked.path for keyframe in drive.keyframes])
-    visit = np.abs(paths - paths[centre]) <= NSCAN.recent
+    visit = np.abs(paths - paths[centre]) <= NSCAN.visit_path
     there = poses[centre] + np.array(off)
     poses[visit] = compose(there, relative(poses[visit], poses[centre]))
     return poses
@@ -65,7 +66,7 @@ def found(
     centre: int = CENTRE,
     match: MatchNearby = match_neighbours,
     window: SearchOptions = WINDOW,
-    closing: ClosingOptions = CLOSING,
+    closing: LoopClosureOptions = CLOSING,
 ) -> Place | Loop | None:
     drive = drive or round_drive()
     poses = moved(drive, centre, off)
@@ -111,9 +112,12 @@ def test_from_there_a_joint_match_alone_does_not_find_it(off):
 
 def test_what_is_beyond_the_window_or_scores_too_little_is_not_found():
     assert found(window=dataclasses.replace(WINDOW, distance=1.0)) is None
-    assert found(window=dataclasses.replace(WINDOW, turn=0.05), closing=ClosingOptions(score=0.8)) is None
+    assert (
+        found(window=dataclasses.replace(WINDOW, turn=0.05), closing=LoopClosureOptions(min_score=0.8))
+        is None
+    )
     assert isinstance(found(), Place)
-    assert found(closing=ClosingOptions(score=1.01)) is None
+    assert found(closing=LoopClosureOptions(min_score=1.01)) is None
 
 
 @pytest.mark.parametrize("off", [(2.0, 0.0, 0.0), (0.3, 0.2, 0.05), (-1.4, -0.1, 0.0)])
@@ -125,7 +129,7 @@ def test_where_doors_are_alike_the_place_is_ambiguous(off):
     assert (refused.accepted, refused.reason) == (False, AMBIGUOUS)
     assert refused.nodes == (ROWS * EARLIER[0], ROWS * centre)
     assert refused.score > 0.8
-    assert isinstance(found(off, doors, centre, closing=ClosingOptions(rival=1.01)), Place)
+    assert isinstance(found(off, doors, centre, closing=LoopClosureOptions(rival_score=1.01)), Place)
 
 
 @pytest.mark.parametrize(
@@ -145,7 +149,7 @@ def test_where_the_earlier_visit_saw_something_else_nothing_is_accepted(view):
     for off in (OFF, (0.0, 0.0, 0.0)):
         assert not isinstance(found(off, drive), Place)
         # Nor if it stood alone.
-        assert not isinstance(found(off, drive, closing=ClosingOptions(rival=1.01)), Place)
+        assert not isinstance(found(off, drive, closing=LoopClosureOptions(rival_score=1.01)), Place)
 
 
 def blind(keyframe: Keyframe) -> Keyframe:
@@ -184,7 +188,7 @@ def test_a_place_that_no_match_confirms_is_refused():
     assert isinstance(refused, Loop)
     assert (refused.nodes, refused.accepted) == ((0, ROWS * CENTRE), False)
     assert refused.reason == NO_MATCH
-    assert CLOSING.score < refused.score <= 1.0
+    assert CLOSING.min_score < refused.score <= 1.0
     assert isinstance(found(match=matching((0.0, 0.0, 0.0))[0]), Place)
 
 
@@ -204,7 +208,7 @@ def test_both_visits_are_matched_from_the_place_found():
     poses, options = calls[0]
     truth, before = round_drive().truth, moved(round_drive(), CENTRE, OFF)
     paths = np.array([keyframe.tracked.path for keyframe in round_drive().keyframes])
-    visit = np.abs(paths - paths[CENTRE]) <= NSCAN.recent
+    visit = np.abs(paths - paths[CENTRE]) <= NSCAN.visit_path
     np.testing.assert_array_equal(poses[~visit], before[~visit])
     near = np.abs(paths - paths[CENTRE]) <= 5.0
     assert np.hypot(*(poses[near, :2] - truth[near, :2]).T).max() < 0.3
@@ -229,7 +233,7 @@ def doubted(off: float, nscan: NScanOptions | None, centre: int = 20) -> str | N
     doors = like_doors_drive(CABINETS)
     poses = moved(doors, centre, (off, 0.0, 0.0))
     known = route_of(doors.keyframes, doors.chain, poses)
-    return why_doubted(known, centre, poses[centre], EARLIER, WINDOW, CLOSING, nscan)
+    return why_match_doubted(known, centre, poses[centre], EARLIER, WINDOW, CLOSING, nscan)
 
 
 @pytest.mark.parametrize("centre", [20, 22, 24])

@@ -12,13 +12,17 @@ from hypothesis import strategies as st
 from nscan_cli.graph.model import NScan, Pairwise
 from nscan_cli.graph.optimise.graph_energy import GraphEnergy
 from nscan_cli.poses import Array, Indices, compose, relative, relative_jacobians
-from nscan_cli.slam.loop_closure.relative_uncertainty import RelativeSigma, RelativeUncertainty, known
+from nscan_cli.slam.loop_closure.relative_uncertainty import (
+    RelativeSigma,
+    RelativeUncertainty,
+    held_pose_marginals,
+)
 from tests.slam.drives import exact_path
 
 
 def seen_from(energy: GraphEnergy, poses: Array) -> RelativeSigma:
     """From the energy's fixed keyframe."""
-    return known(energy, poses).reach()
+    return held_pose_marginals(energy, poses).sigma()
 
 
 class Walk(NamedTuple):
@@ -119,7 +123,7 @@ def test_seen_from_gives_the_marginals_of_relative_poses(seed, origin):
 @pytest.mark.parametrize("seed", [1, 2, 3])
 def test_from_any_keyframe_it_is_as_if_that_one_were_held(seed, held):
     walked = walk(seed, 12, loops=3)
-    asked = known(walked.energy(held), walked.poses)
+    asked = held_pose_marginals(walked.energy(held), walked.poses)
     for other in range(12):
         direct, found = seen_from(walked.energy(other), walked.poses), asked.seen_from(other)
         np.testing.assert_allclose(found.distance, direct.distance, rtol=1e-8, atol=1e-12)
@@ -128,7 +132,7 @@ def test_from_any_keyframe_it_is_as_if_that_one_were_held(seed, held):
 
 def test_from_a_keyframe_that_nothing_holds_nothing_is_known_but_of_itself():
     walked = walk(2, 12, loops=3)
-    asked = known(walked.energy(0), walked.poses)
+    asked = held_pose_marginals(walked.energy(0), walked.poses)
     asked.covariances[7] = np.inf
     with np.errstate(all="raise"):
         found = asked.seen_from(7)
@@ -138,9 +142,9 @@ def test_from_a_keyframe_that_nothing_holds_nothing_is_known_but_of_itself():
 
 
 def test_what_was_asked_can_be_seen_from_another_keyframe():
-    walked, whereabouts = walk(4, 9, loops=2), RelativeUncertainty()
-    whereabouts.ask(walked.energy(8), walked.poses)
-    found, direct = whereabouts.asked_from(3), seen_from(walked.energy(3), walked.poses)
+    walked, uncertainty = walk(4, 9, loops=2), RelativeUncertainty()
+    uncertainty.compute(walked.energy(8), walked.poses)
+    found, direct = uncertainty.seen_from(3), seen_from(walked.energy(3), walked.poses)
     np.testing.assert_allclose(found.distance, direct.distance, rtol=1e-8, atol=1e-12)
 
 
@@ -183,13 +187,13 @@ def asked_and_bound(
 
     The centre of the loop has keyframes ahead of it already, then as now.
     """
-    whereabouts, before, after = (
+    uncertainty, before, after = (
         RelativeUncertainty(),
         walked.until(origin + ahead + 1),
         walked.until(now + ahead + 1),
     )
-    whereabouts.ask(before.energy(origin), before.poses)
-    bound = whereabouts.bound(now, exact_path(after.way), after.poses)
+    uncertainty.compute(before.energy(origin), before.poses)
+    bound = uncertainty.upper_bound(now, exact_path(after.way), after.poses)
     answer = seen_from(after.energy(now), after.poses)
     return RelativeSigma(bound.distance[:now], bound.angle[:now]), RelativeSigma(
         answer.distance[:now], answer.angle[:now]
@@ -198,9 +202,9 @@ def asked_and_bound(
 
 def test_the_bound_is_the_answer_itself_at_first():
     walked = walk(5, 8, loops=2)
-    whereabouts = RelativeUncertainty()
-    asked = whereabouts.ask(walked.energy(7), walked.poses)
-    bound = whereabouts.bound(7, exact_path(walked.way), walked.poses)
+    uncertainty = RelativeUncertainty()
+    asked = uncertainty.compute(walked.energy(7), walked.poses)
+    bound = uncertainty.upper_bound(7, exact_path(walked.way), walked.poses)
     np.testing.assert_allclose(bound.distance, asked.distance, rtol=1e-12)
     np.testing.assert_allclose(bound.angle, asked.angle, rtol=1e-12)
 
@@ -226,7 +230,7 @@ def test_nor_is_it_too_great():
 
 def test_before_anything_was_asked_the_first_keyframe_counts_as_known():
     walked = straight(6)
-    bound = RelativeUncertainty().bound(5, exact_path(walked.way), walked.poses)
+    bound = RelativeUncertainty().upper_bound(5, exact_path(walked.way), walked.poses)
     answer = seen_from(walked.energy(5), walked.poses)
     np.testing.assert_allclose(bound.angle[:5], answer.angle[:5], rtol=1e-6)
     assert (bound.distance[:5] >= (1 - 1e-6) * answer.distance[:5]).all()

@@ -11,10 +11,12 @@ from nscan_cli.graph.model import Loop, Pairwise
 from nscan_cli.matching.correlative_search import SearchOptions
 from nscan_cli.poses import Array, compose, relative
 from nscan_cli.slam.local_matching.joint_relations import LocalMatch
+from nscan_cli.slam.local_matching.options import NScanOptions
 from nscan_cli.slam.loop_closure import loop_detector as closing_module
-from nscan_cli.slam.loop_closure.loop_detector import NO_SECOND
-from nscan_cli.slam.loop_closure.place_search import Place
-from nscan_cli.slam.options import ClosingOptions, NScanOptions, SlamOptions
+from nscan_cli.slam.loop_closure.options import LoopClosureOptions
+from nscan_cli.slam.loop_closure.place import Place
+from nscan_cli.slam.loop_closure.verification import NO_SECOND
+from nscan_cli.slam.options import SlamOptions
 from tests.slam.drives import ROWS, Driven, closed_along, round_drive, slipped_round
 from tests.slam.loop_closure.test_loop_detector import ACROSS, NSCAN, bent, closing
 from tests.slam.runs import mapped
@@ -53,7 +55,7 @@ def searches(monkeypatch):
 def test_where_the_graph_knows_well_nothing_is_searched(searches):
     """Its own drift over the round is some centimetres; slips of 5 cm/√m are what makes a search worth it."""
     made = searches({})
-    sure = ClosingOptions(drift=1e-6, drift_angle=1e-6)
+    sure = LoopClosureOptions(drift=1e-6, drift_angle=1e-6)
     closed_along(closing(sure), round_drive())
     assert made == []
     closed_along(closing(), round_drive())
@@ -66,30 +68,30 @@ def test_where_the_graph_knows_well_nothing_is_searched(searches):
 
 def test_searches_are_a_few_metres_apart_and_among_older_keyframes_only(searches):
     made = searches({})
-    options = ClosingOptions()
+    options = LoopClosureOptions()
     closed_along(closing(options), bent())
     paths = np.array([keyframe.tracked.path for keyframe in bent().keyframes])
-    assert (np.diff(paths[[centre for centre, _, _ in made]]) >= options.step).all()
+    assert (np.diff(paths[[centre for centre, _, _ in made]]) >= options.search_interval).all()
     for centre, earlier, window in made:
-        assert (paths[centre] - paths[earlier] > NSCAN.recent).all()
+        assert (paths[centre] - paths[earlier] > NSCAN.visit_path).all()
         away = np.hypot(*(bent().poses[earlier, :2] - bent().poses[centre, :2]).T)
-        assert away.max() <= options.around + window.distance
+        assert away.max() <= options.earlier_radius + window.distance
 
 
 def test_the_window_is_as_wide_as_the_graph_is_unsure(searches):
     made = searches({})
-    options = ClosingOptions()
+    options = LoopClosureOptions()
     windows = []
     for drift, drift_angle in ((0.05, 0.002), (0.4, 0.03), (9.0, 1.0)):
         del made[:]
-        closed_along(closing(ClosingOptions(drift=drift, drift_angle=drift_angle)), round_drive())
+        closed_along(closing(LoopClosureOptions(drift=drift, drift_angle=drift_angle)), round_drive())
         windows.append([(window.distance, window.turn) for _, _, window in made])
-    assert set(windows[0]) == {(options.least, options.least_turn)}
+    assert set(windows[0]) == {(options.min_distance, options.min_turn)}
     # 3 · 0.4 m · √66 are 9.7 m, and the angles give some more; 3 · 0.03 · √66 are 0.73 rad.
     assert 9.0 < max(windows[1])[0] < 16.0
     assert 0.6 < max(windows[1])[1] < 0.8
     # Where not even the direction is known it is searched among all that there is.
-    assert options.farthest < max(windows[2])[0] <= options.lost
+    assert options.max_distance < max(windows[2])[0] <= options.max_distance_lost
     assert max(windows[2])[1] == np.pi
 
 

@@ -1,0 +1,68 @@
+"""Options of step 4 of the loop: where places seen before are searched, and how they are verified."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from nscan_cli.matching.correlative_search import SearchOptions
+
+
+@dataclass(frozen=True)
+class LoopClosureOptions:
+    """The search for a place seen before, and what its result has to stand."""
+
+    drift: float = 0.05
+    """Standard deviation of tracking slips, m/√m. A larger one searches more often and farther."""
+    drift_angle: float = 0.002
+    """Standard deviation of tracking slips, rad/√m. A larger one searches more often and farther."""
+    lever_arm: float = 20.0
+    """Distance at which angles count when paths are compared by their uncertainty, m. With a larger one,
+    paths with certain angles are preferred."""
+    sigmas: float = 3.0
+    """A keyframe may be off by this many standard deviations. A larger number searches more."""
+    match_reach: float = 1.0
+    """A joint match finds the place itself if a keyframe is off by less, m. A larger distance searches
+    less."""
+    max_exact_keyframes: int = 500
+    """Largest graph whose uncertainty is computed as a whole. Of a larger one the part nearest to the
+    keyframe is, of this many keyframes, with the paths to all that may be searched. A larger number is
+    slower."""
+    search_interval: float = 3.0
+    """Least length of path between two searches, m. A larger one searches less."""
+    search: SearchOptions = field(default_factory=lambda: SearchOptions(beams=180))
+    min_distance: float = 4.0
+    """Least distance that is searched, m: a slip while all else is well known. A larger one is slower."""
+    min_turn: float = 0.2
+    """Least angle that is searched, rad. A larger one is slower."""
+    max_distance: float = 25.0
+    """Largest distance that is searched, m. A larger one closes larger loops and is slower."""
+    max_distance_lost: float = 100.0
+    """Largest distance that is searched after the track has broken, m. A larger one is slower."""
+    scan_path: float = 6.0
+    """Keyframes within this length of path are searched together with the centre, m. A larger one tells
+    places apart better, and drifts more."""
+    earlier_radius: float = 15.0
+    """Largest distance of keyframes of the earlier visit from where the place may be, m. A larger one
+    compares with more of that visit."""
+    min_score: float = 0.55
+    """Least share of points that fit at a place. A larger share refuses more."""
+    rival_score: float = 0.88
+    """A place is ambiguous if another one scores this share of its score. A larger share refuses less."""
+    rival_distance: float = 1.5
+    """What is farther off than this is another place, m. A larger distance refuses less."""
+    agreement_distance: float = 0.5
+    """Largest difference between the places that two keyframes find, m. A larger one accepts more."""
+    agreement_turn: float = 0.05
+    """Largest difference between the places that two keyframes find, rad. A larger one accepts more."""
+    agreement_path: float = 30.0
+    """Largest length of path between keyframes that agree, m. A larger one accepts more."""
+    min_agreeing: int = 2
+    """Number of keyframes that have to find the same place. A larger number accepts less."""
+    min_agreeing_doubtful: int = 3
+    """The same number, if the track has broken since or the place is farther off than the path drifts: there
+    rooms that look alike are not told apart by their distance."""
+    drift_sigmas: float = 2.5
+    """A place is farther off than the path drifts if it is off by more standard deviations than this, and by
+    more than `slip_distance`. A larger number accepts more."""
+    slip_distance: float = 5.0
+    """Largest distance by which tracking slips, m. A larger one accepts more."""

@@ -1,0 +1,56 @@
+"""Input of a search: the points around a keyframe, and the likelihood field of an earlier visit."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nscan_cli.kernels.decorators import kernel
+from nscan_cli.matching.correlative_search import LikelihoodField, SearchOptions, likelihood_field
+from nscan_cli.poses import Array, relative
+from nscan_cli.slam.keyframes.keyframe import Keyframe
+from nscan_cli.slam.keyframes.route import Route
+from nscan_cli.slam.loop_closure.options import LoopClosureOptions
+
+
+def search_input(
+    route: Route,
+    centre: int,
+    earlier: NDArray[np.int64],
+    window: SearchOptions,
+    closing: LoopClosureOptions,
+) -> tuple[Array, LikelihoodField] | None:
+    """The points (m, 2) around keyframe `centre`, in its frame, and the field of the `earlier` ones (m,).
+
+    None when one of them has no points.
+    """
+    keyframes, paths, poses = route.keyframes, route.paths, route.poses
+    beside = np.flatnonzero(np.abs(paths - paths[centre]) <= closing.scan_path)
+    scan = _cloud(keyframes, beside, relative(poses[beside], poses[centre]))
+    cloud = _cloud(keyframes, earlier, poses[earlier])
+    if not len(scan) or not len(cloud):
+        return None
+    return scan, likelihood_field(cloud, window)
+
+
+def _cloud(keyframes: Sequence[Keyframe], chosen: NDArray[np.int64], poses: Array) -> Array:
+    """The points (m, 2) of the keyframes chosen (n,), at poses (n, 3)."""
+    points = [keyframes[k].points for k in chosen.tolist()]
+    cloud = np.concatenate([np.empty((0, 2)), *points])
+    _transform_clouds(poses, np.array([len(each) for each in points], dtype=np.int64), cloud)
+    return cloud
+
+
+@kernel
+def _transform_clouds(poses: Array, counts: NDArray[np.int64], points: Array) -> None:
+    """Transform the points (m, 2), in place: so many (n,) by each of the poses (n, 3), eq. (1)."""
+    end = 0
+    for k in range(len(poses)):
+        cos, sin = np.cos(poses[k, 2]), np.sin(poses[k, 2])
+        start, end = end, end + counts[k]
+        for p in range(start, end):
+            x, y = points[p, 0], points[p, 1]
+            points[p, 0] = cos * x - sin * y + poses[k, 0]
+            points[p, 1] = sin * x + cos * y + poses[k, 1]

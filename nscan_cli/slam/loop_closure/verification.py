@@ -1,0 +1,137 @@
+"""Verification of loops: what a place that was found, or the loop of a joint match, has to stand.
+
+A place must stand alone: no other may fit nearly as well. The scans of both visits must match from there, and
+enough keyframes must find the same. A wrong loop is worse than a missed one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nscan_cli.graph.model import Loop
+from nscan_cli.matching.correlative_search import FoundPose, Search, SearchOptions, search
+from nscan_cli.poses import Array, Indices, compose, relative, wrap
+from nscan_cli.slam.keyframes.route import Route
+from nscan_cli.slam.local_matching.joint_relations import MatchNearby, match_at, visit_moved
+from nscan_cli.slam.local_matching.neighbours import choose_neighbours
+from nscan_cli.slam.local_matching.options import NScanOptions
+from nscan_cli.slam.loop_closure.options import LoopClosureOptions
+from nscan_cli.slam.loop_closure.place import Place
+from nscan_cli.slam.loop_closure.relative_uncertainty import RelativeSigma
+from nscan_cli.slam.loop_closure.search_input import search_input
+
+AMBIGUOUS = "another place fits as well"
+OUTDONE = "another place fits better"
+TOO_LITTLE = "too little of an earlier visit is seen to tell the place"
+NO_MATCH = "the scans of both visits do not match"
+ELSEWHERE = "the match leads away from the place found"
+NO_SECOND = "no second keyframe finds the same"
+SO_FAR_OFF = "too few keyframes find the same, farther off than the path drifts"
+LOST = "tracking has broken since: the place must be searched"
+
+
+def verify_place(
+    route: Route,
+    centre: int,
+    earlier: Indices,
+    about: Search,
+    found: FoundPose,
+    match: MatchNearby,
+    closing: LoopClosureOptions,
+    nscan: NScanOptions,
+) -> Place | Loop:
+    """The place `found` of keyframe `centre`, or why it is refused."""
+    keyframes, poses = route.keyframes, route.poses
+    nodes = keyframes[int(earlier[0])].row, keyframes[centre].row
+    rival = about.best(closing.rival_score * found.score, without=(found.pose, closing.rival_distance))
+    if rival is not None:
+        return Loop(nodes, False, AMBIGUOUS, found.score)
+    moved = visit_moved(route, centre, found.pose, nscan)
+    away = np.hypot(*(poses[earlier, :2] - found.pose[:2]).T).min()
+    radius = max(nscan.radius, float(away) + nscan.radius)
+    wider = replace(nscan, radius=radius)
+    near = choose_neighbours(moved, route.paths, centre, wider)
+    nearby = match(route._replace(poses=moved), centre, near, wider)
+    tie = None if nearby is None else nearby.tie(keyframes[centre].row)
+    if nearby is None or tie is None:
+        return Loop(nodes, False, NO_MATCH, found.score)
+    old = int(np.searchsorted(route.rows, tie[0]))
+    off = compose(moved[old], tie[1]) - found.pose
+    if np.hypot(off[0], off[1]) > closing.match_reach:
+        return Loop(nodes, False, ELSEWHERE, found.score)
+    return Place(old, centre, tie[1], radius, nearby)
+
+
+def why_match_doubted(
+    route: Route,
+    centre: int,
+    pose: Array,
+    earlier: NDArray[np.int64],
+    window: SearchOptions,
+    closing: LoopClosureOptions,
+    nscan: NScanOptions | None,
+) -> str | None:
+    """Why keyframe `centre` may lie elsewhere among the `earlier` ones (m,) than at `pose` (3,), or None.
+
+    A joint match ends at the optimum that is next. Along a corridor there is one at every door. Where the
+    search finds another place that fits about as well, a joint match from there, of the same scans, decides:
+    by the energy both ways, and exact to the centimetre, where the search has points in cells. Without
+    `nscan`, for single matches, the search has the last word.
+    """
+    sought = search_input(route, centre, earlier, window, closing)
+    if sought is None:
+        return TOO_LITTLE
+    scan, field = sought
+    cells = replace(window, distance=2 * window.cell, turn=closing.agreement_turn)
+    here = search(field, scan, pose, closing.min_score, cells)
+    if here is None:
+        return TOO_LITTLE
+    about = Search(field, scan, route.poses[centre], window)
+    if about.best(here.score / closing.rival_score) is not None:
+        return OUTDONE
+    if nscan is None:
+        return None
+    other = about.best(closing.rival_score * here.score, without=(pose, closing.agreement_distance))
+    if other is None:
+        return None
+    (energy, _), (other_energy, there) = match_at(route, centre, (pose, other.pose), nscan)
+    is_elsewhere = np.hypot(*(there - pose)[:2]) > closing.agreement_distance
+    return OUTDONE if is_elsewhere and other_energy < energy else None
+
+
+def places_agree(one: Place, other: Place, route: Route, options: LoopClosureOptions) -> bool:
+    """Whether two keyframes, the `other` one later, find the same place."""
+    poses, paths = route.poses, route.paths
+    off = one.corrected(poses, other.centre) - other.corrected(poses, other.centre)
+    within = np.hypot(off[0], off[1]) <= options.agreement_distance
+    turned = abs(wrap(off[2])) <= options.agreement_turn
+    return bool(within and turned and paths[other.centre] - paths[one.centre] <= options.agreement_path)
+
+
+def why_too_few(
+    agreeing: Sequence[Place], route: Route, sigma: RelativeSigma, options: LoopClosureOptions
+) -> str | None:
+    """Why keyframes that agree on a place are too few, or None; `sigma` is that from the last of them.
+
+    A place that is farther off than the path drifts is mostly one that looks alike, while the right one
+    has never been seen. What looks alike ends somewhere: scans far apart have to agree there.
+    """
+    place, first = agreeing[-1], agreeing[0]
+    lost = bool(is_lost(sigma, options)[place.old])
+    off = relative(route.poses[place.centre], route.poses[place.old]) - place.measured
+    likely = max(options.drift_sigmas * sigma.distance[place.old], options.slip_distance)
+    surprises = not lost and np.hypot(off[0], off[1]) > likely
+    if len(agreeing) < (options.min_agreeing_doubtful if lost or surprises else options.min_agreeing):
+        return SO_FAR_OFF if surprises else NO_SECOND
+    share_scans = route.paths[place.centre] - route.paths[first.centre] < 2 * options.scan_path
+    return SO_FAR_OFF if surprises and share_scans else None
+
+
+def is_lost(sigma: RelativeSigma, options: LoopClosureOptions) -> NDArray[np.bool_]:
+    """(K,) whether not even the direction to a keyframe is known: the track has broken since."""
+    lost: NDArray[np.bool_] = options.sigmas * sigma.angle >= np.pi
+    return lost
