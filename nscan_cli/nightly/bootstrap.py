@@ -1,7 +1,7 @@
-"""What a process of a night begins with, called by its path: `python -P start.py MODULE [ARGUMENT …]`.
+"""The entry of a worker process, called by its path: `python -P bootstrap.py MODULE [ARGUMENT …]`.
 
-`python -m` would look for modules in the current folder first, and run what somebody has put there. The
-package is the one that this file is part of, whichever other one could be found.
+`python -m` would search the current folder first and run modules that somebody has put there. This imports
+the package that this file is part of, whichever other copies are on the search path.
 """
 
 import importlib
@@ -11,12 +11,12 @@ from pathlib import Path
 
 
 def worker_command(module: str, *arguments: str) -> list[str]:
-    """The command line of a process that runs `main` of a module of this folder."""
+    """The command line of a process that runs `main` of a module in this folder."""
     return [sys.executable, "-P", __file__, module, *arguments]
 
 
 def import_package_at(folder: Path) -> None:
-    """Let the package in this folder be the one that is imported from now on."""
+    """Import the package in this folder, so that later imports of its name find it."""
     found = importlib.util.spec_from_file_location(folder.name, folder / "__init__.py")
     assert found is not None
     assert found.loader is not None

@@ -1,7 +1,7 @@
-"""Logs on a Dask cluster: the same processes as here, started by its workers.
+"""Run tasks on a Dask cluster, whose workers start the same processes as `local_executor`.
 
-Inputs and outputs travel as bytes, so that the machines need no files in common. On a worker every log has
-a process of its own as well: one that dies costs that log alone, and the worker lives on.
+Inputs and outputs are sent as bytes, so that the machines need no shared files. On a worker, too, each log
+has a process of its own: if it dies, the worker and the other logs are not affected.
 """
 
 from __future__ import annotations
@@ -26,20 +26,20 @@ from nscan_cli.nightly.task import Outcome, ProgressCallback, Task
 
 ADDRESS = re.compile(r"[a-z]+://.+:\d+")
 CONNECT_TIMEOUT = 10.0
-"""For the scheduler to answer, s."""
+"""The longest time that the scheduler may take to answer, s."""
 InputFiles = dict[str, bytes]
-"""Name → content of the files of an input."""
+"""Name → content of each file of an input."""
 QUEUED_PER_THREAD = 2
-"""Logs that are sent ahead for each thread of the cluster: none has to wait, and not all are in memory."""
+"""Logs that are queued for each thread of the cluster: no thread waits, and not all logs are in memory."""
 
 
 def run_on_dask(
     tasks: Sequence[Task], address: str, timeout: float | None, report: ProgressCallback
 ) -> Generator[tuple[Task, Outcome]]:
-    """Do the tasks on the cluster whose scheduler has this address, and yield each when it is done.
+    """Run the tasks on the cluster of the scheduler with this address, and yield each when it is done.
 
-    When the iterator is closed, what has not begun yet is taken back. Raises WrongUsageError where Dask is
-    not installed, InputMissingError where no scheduler answers, or it is lost.
+    Closing the iterator cancels the tasks that have not begun. Raises WrongUsageError if Dask is not
+    installed, and InputMissingError if no scheduler answers or the connection is lost.
     """
     client = _connect(address)
     topic = f"nscan-cli-{client.id}"
@@ -64,7 +64,9 @@ def run_on_dask(
                 future = done.get(timeout=0.5)
                 yield sent.pop(future), _future_outcome(future)
             if client.status != "running":
-                raise InputMissingError(f"--scheduler {address}: is gone; start it, and call again to go on")
+                raise InputMissingError(
+                    f"--scheduler {address}: the connection is lost; start it and run this again"
+                )
     finally:
         with contextlib.suppress(Exception):
             client.cancel(list(sent))
@@ -74,18 +76,18 @@ def run_on_dask(
 def run_on_worker(
     task: Task, content: dict[str, InputFiles], timeout: float | None, tool: str, topic: str
 ) -> Outcome:
-    """On a worker: do a task whose inputs have come along, and say under the topic how far it is."""
+    """On a Dask worker: run a task with the inputs sent along, and report its progress under the topic."""
     from distributed import get_worker
 
     worker = get_worker()
     if tool != tool_key():
         return Outcome.failed(
-            f"a Dask worker has another nscan-cli, {tool_key()} in place of {tool}; install the same"
+            f"a Dask worker has nscan-cli {tool_key()} instead of {tool}; install the same version"
         )
     with tempfile.TemporaryDirectory(prefix="nscan-cli.") as folder:
         inputs = {}
         for role, files in content.items():
-            place = Path(folder, "come", role)
+            place = Path(folder, "received", role)
             for name, data in files.items():
                 (place / name).parent.mkdir(parents=True, exist_ok=True)
                 (place / name).write_bytes(data)
@@ -97,7 +99,7 @@ def run_on_worker(
 
 
 def _input_files(path: str, role: str) -> InputFiles:
-    """The files of an input; those of a folder have its name before their own. Raises NscanError."""
+    """The files of an input; names of files in a folder begin with the folder's. Raises NscanError."""
     folder = Path(path)
     if role != "log" or not folder.is_dir():
         more = beside(path) if role == "log" else {}
@@ -108,14 +110,14 @@ def _input_files(path: str, role: str) -> InputFiles:
 
 def _connect(address: str) -> Any:
     if not ADDRESS.fullmatch(address):
-        raise WrongUsageError(f"--scheduler {address}: is no address of the form tcp://HOST:PORT; give one")
+        raise WrongUsageError(f"--scheduler {address}: is not an address of the form tcp://HOST:PORT")
     try:
         import distributed
     except ImportError as error:
         raise WrongUsageError(
             "nightly: --scheduler needs Dask: pip install 'nscan-cli[distributed]'"
         ) from error
-    # What it logs on its own is said in one line here.
+    # Its log messages repeat what the error below says in one line.
     logging.getLogger("distributed").setLevel(logging.CRITICAL)
     connect: Any = distributed.Client
     try:
@@ -133,5 +135,5 @@ def _future_outcome(future: Any) -> Outcome:
         return outcome
     kind = type(error).__name__
     if kind == "KilledWorker":
-        return Outcome.failed("the Dask workers that had it died")
+        return Outcome.failed("the Dask workers that ran it died")
     return Outcome.failed(f"on a Dask worker: {kind}: {error}")

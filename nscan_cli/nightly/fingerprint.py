@@ -1,4 +1,4 @@
-"""When a result is up to date: while log, reference, parameters and the code that made it are the same."""
+"""Fingerprints: a result is up to date as long as its log, reference, parameters and code are the same."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ from nscan_cli.logs.log_files import files_of
 from nscan_cli.nightly.manifest import ManifestEntry
 
 OUTSIDE_RESULTS = ("cli/", "nightly/", "exports/", "files/outputs.py")
-"""Packages and modules whose code does not go into the results of a night."""
+"""Packages and modules whose code does not affect the results of a log."""
 MAKES_RESULTS = ("nightly/worker.py", "nightly/map_preview.py")
-"""But these files do."""
+"""Modules in OUTSIDE_RESULTS whose code affects the results nevertheless."""
 
 
 @functools.cache
 def tool_key() -> str:
-    """Version of the tool and hash of all its code that goes into the results of a night."""
+    """The version of nscan-cli and a hash of the code that affects the results of a log."""
     package = Path(__file__).parent.parent
     sources = hashlib.sha256()
     for path in sorted(package.rglob("*.py")):
@@ -36,36 +36,36 @@ def tool_key() -> str:
 
 
 def input_hash(path: Path, role: str) -> str:
-    """SHA-256 of an input; of a log of several files as inputs.common_hash, of any other of its bytes.
+    """SHA-256 of an input; of a log of several files it is inputs.common_hash of their hashes.
 
-    Raises InputMissingError when it cannot be read, or is no file at all, and the errors of files_of.
+    Raises InputMissingError if a file cannot be read or is not a regular file, and the errors of files_of.
     """
     files = files_of(str(path)) if role == "log" else [str(path)]
     hashes = []
     for file in files:
-        # From a named pipe nobody might ever write to, one would read for ever.
+        # Reading a named pipe would block for ever if nothing writes to it.
         if Path(file).exists() and not Path(file).is_file():
-            raise InputMissingError(f"{file}: is no file; name one")
+            raise InputMissingError(f"{file}: is not a file; name one")
         hashes.append(sha256_of(file))
     return hashes[0] if len(hashes) == 1 else common_hash(hashes)
 
 
 def log_size(path: Path) -> int:
-    """Bytes of the files that a log at `path` consists of."""
+    """The size of all files of the log at `path`, bytes."""
     return sum(Path(file).stat().st_size for file in files_of(str(path)))
 
 
 def inputs_and_parameters(entry: ManifestEntry, hashes: dict[str, str]) -> dict[str, Any]:
-    """Inputs and parameters of a log, so that what has changed can be told."""
+    """The inputs and parameters of a log, from which the next run tells what has changed."""
     inputs = {role: [path.name, hashes[role]] for role, path in entry.inputs.items()}
     return {"inputs": inputs, "parameters": entry.parameters.as_table()}
 
 
 def fingerprint(entry: ManifestEntry, hashes: dict[str, str]) -> str:
-    """The SHA-256 of all that the results of a log follow from; `hashes` are those of its inputs by role."""
+    """The SHA-256 of everything that a log's results depend on; `hashes` has those of its inputs by role."""
     everything = {
         "tool": tool_key(),
-        # The names too: the results carry them.
+        # Names of files count as well, since the results contain them.
         "inputs": {role: [path.name, hashes[role]] for role, path in entry.inputs.items()},
         "reading": dataclasses.asdict(entry.parameters.reading),
         "mapping": entry.parameters.mapping,

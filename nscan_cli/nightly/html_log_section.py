@@ -1,4 +1,4 @@
-"""The report's card of a log: its map, its errors beside the published ones, and how it went before."""
+"""The report's section on a log: its map, its errors beside published ones, and its history."""
 
 from __future__ import annotations
 
@@ -21,49 +21,49 @@ STATUS_WORDS: dict[Status, str] = {
 }
 
 
-def log_section(verdict: CheckResult, folder: Path) -> str:
-    """The card; map and layers are taken from the log's results in `folder`."""
-    entry, last = verdict.entry, verdict.last
+def log_section(check: CheckResult, folder: Path) -> str:
+    """The section on a log; the map preview is read from the log's results in `folder`."""
+    entry, last = check.entry, check.last
     parts = [
-        f'<section class="log {verdict.status}" id="{entry.name}">',
-        f"<header><h2>{entry.name}</h2>{status_badge(verdict)}</header>",
+        f'<section class="log {check.status}" id="{entry.name}">',
+        f"<header><h2>{entry.name}</h2>{status_badge(check)}</header>",
     ]
-    if verdict.status != "good":
-        parts += [f'<p class="reason">{escape(reason)}</p>' for reason in verdict.reasons]
+    if check.status != "good":
+        parts += [f'<p class="reason">{escape(reason)}</p>' for reason in check.reasons]
     if entry.about:
         parts.append(f'<p class="about">{escape(entry.about)}</p>')
-    if verdict.status == "absent" and "log" in entry.sources:
-        parts.append(f"<p>To be had from {_source_link(entry)}</p>")
-    if last is not None and verdict.status in ("failed", "absent"):
-        parts.append('<p class="about">Below: the last night that was done.</p>')
+    if check.status == "absent" and "log" in entry.sources:
+        parts.append(f"<p>Download: {_source_link(entry)}</p>")
+    if last is not None and check.status in ("failed", "absent"):
+        parts.append('<p class="about">Below: the last run that did not fail.</p>')
     if last is not None:
         parts += [
             '<div class="body"><div>',
-            *_map(verdict, folder),
-            *_history(verdict),
+            *_map(check, folder),
+            *_history(check),
             '</div><div class="facts">',
         ]
-        parts += [*_error_table(verdict), *_published_bars(verdict), *_run_table(verdict), "</div></div>"]
-    elif len(verdict.nights) > 1:
-        parts += _history(verdict)
+        parts += [*_error_table(check), *_published_bars(check), *_run_table(check), "</div></div>"]
+    elif len(check.runs) > 1:
+        parts += _history(check)
     return "\n".join([*parts, "</section>"])
 
 
-def status_badge(verdict: CheckResult) -> str:
-    """What is to be said of the log in a word or two."""
-    if verdict.status == "good" and not verdict.is_within_bounds:
-        words = "not measured" if verdict.errors is None else "no bound"
+def status_badge(check: CheckResult) -> str:
+    """The status of the log in a word or two."""
+    if check.status == "good" and not check.is_within_bounds:
+        words = "not measured" if check.errors is None else "no bound"
         return f'<span class="chip absent">{words}</span>'
-    return f'<span class="chip {verdict.status}">{STATUS_WORDS[verdict.status]}</span>'
+    return f'<span class="chip {check.status}">{STATUS_WORDS[check.status]}</span>'
 
 
-def absent_section(verdicts: list[CheckResult]) -> list[str]:
-    """What is not there and never was, in few words, with the places to get it from."""
-    if not verdicts:
+def absent_section(checks: list[CheckResult]) -> list[str]:
+    """The logs that are missing and were never run, with where to download them."""
+    if not checks:
         return []
     rows = []
-    for verdict in verdicts:
-        entry = verdict.entry
+    for check in checks:
+        entry = check.entry
         about = escape(entry.about)
         source = ("<br>" if about else "") + _source_link(entry) if "log" in entry.sources else ""
         rows.append(f'<dt id="{entry.name}">{entry.name}</dt><dd>{about}{source}</dd>')
@@ -75,10 +75,10 @@ def absent_section(verdicts: list[CheckResult]) -> list[str]:
     ]
 
 
-def error_change(verdict: CheckResult) -> str:
-    """By how much the error has changed since the night before, in per cent."""
-    errors, before = verdict.errors, MeasuredErrors.of(verdict.before)
-    if errors is None or before is None or before.what != errors.what or before.metres == 0:
+def error_change(check: CheckResult) -> str:
+    """The change of the error since the previous run, in per cent."""
+    errors, before = check.errors, MeasuredErrors.of(check.previous)
+    if errors is None or before is None or before.measure != errors.measure or before.metres == 0:
         return ""
     percent = 100 * (errors.metres - before.metres) / before.metres
     if abs(percent) < 0.05:
@@ -87,32 +87,32 @@ def error_change(verdict: CheckResult) -> str:
     return f'<span class="{tone}">{"+" if percent > 0 else "−"}{abs(percent):.1f} %</span>'
 
 
-def run_time(verdict: CheckResult) -> str:
-    """How long the log took; nothing where kernels were compiled meanwhile."""
-    took = None if verdict.last is None else verdict.last["times"]["seconds"]
+def run_time(check: CheckResult) -> str:
+    """How long the run took; empty if kernels were compiled during it."""
+    took = None if check.last is None else check.last["times"]["seconds"]
     return "" if took is None else f"{took:.1f} s"
 
 
-def real_time_factor(verdict: CheckResult) -> str:
-    """How much faster than it was recorded."""
-    if not run_time(verdict) or verdict.last is None or not verdict.last["counts"]["duration"]:
+def real_time_factor(check: CheckResult) -> str:
+    """The duration of the log divided by that of the run."""
+    if not run_time(check) or check.last is None or not check.last["counts"]["duration"]:
         return ""
-    return f"{verdict.last['counts']['duration'] / max(verdict.last['times']['seconds'], 0.001):.0f} ×"
+    return f"{check.last['counts']['duration'] / max(check.last['times']['seconds'], 0.001):.0f} ×"
 
 
 def time_span(text: str) -> str:
-    """In an element of the class that has all that differs from call to call."""
+    """The text in an element of the class for what differs between two runs on the same inputs."""
     return f'<span class="time">{text}</span>'
 
 
-def _map(verdict: CheckResult, folder: Path) -> list[str]:
-    """The map with its layers; nothing where the files are gone."""
-    name = verdict.entry.name
+def _map(check: CheckResult, folder: Path) -> list[str]:
+    """The map preview with its layers; a remark if the files are missing."""
+    name = check.entry.name
     try:
         picture = base64.b64encode((folder / name / "preview.png").read_bytes()).decode()
         layers = (folder / name / "preview.svg").read_text("utf-8")
     except OSError:
-        return ['<p class="soft">The map is gone.</p>']
+        return ['<p class="soft">The files of the map are missing.</p>']
     switches = "".join(
         f'<label><input type="checkbox" data-layer="{layer}"{checked}>'
         f'<span class="key" style="border-color:var(--{layer})">{text}</span></label>'
@@ -122,7 +122,7 @@ def _map(verdict: CheckResult, folder: Path) -> list[str]:
             ("refused", "refused loops", ""),
         )
     )
-    published = verdict.entry.published_map
+    published = check.entry.published_map
     theirs = f'<a href="{_link(published)}">published map</a>' if published else ""
     return [
         '<div class="map">',
@@ -139,33 +139,33 @@ def _map(verdict: CheckResult, folder: Path) -> list[str]:
 
 
 def _aspect(layers: str) -> float:
-    """Width by height of a preview, whose SVG says its size."""
+    """Width divided by height of a preview, from the size in its SVG."""
     size = re.search(r'viewBox="0 0 (\d+) (\d+)"', layers)
     return 1.0 if size is None else int(size[1]) / int(size[2])
 
 
-def _history(verdict: CheckResult) -> list[str]:
-    """The plot, where there is something to plot."""
-    if all(night["outcome"] == "done" and MeasuredErrors.of(night) is None for night in verdict.nights):
+def _history(check: CheckResult) -> list[str]:
+    """The plot of the errors by run; empty if nothing was measured and no run failed."""
+    if all(run["outcome"] == "done" and MeasuredErrors.of(run) is None for run in check.runs):
         return []
-    return ["<h3>Nights</h3>", f'<div class="nights">{history_svg(verdict)}</div>']
+    return ["<h3>History</h3>", f'<div class="history">{history_svg(check)}</div>']
 
 
-def _error_table(verdict: CheckResult) -> list[str]:
-    errors, entry = verdict.errors, verdict.entry
+def _error_table(check: CheckResult) -> list[str]:
+    errors, entry = check.errors, check.entry
     if errors is None:
-        return ['<p class="soft">There is nothing to measure it against.</p>']
+        return ['<p class="soft">No errors: the manifest names no relations and no reference.</p>']
     metres, degrees = errors.translation, errors.rotation
-    changed = error_change(verdict)
+    changed = error_change(check)
     rows = [
         ("mean ± sd", f"{metres['mean']:.4f} ± {metres['sd']:.4f} m"),
-        ("median, greatest", f"{metres['median']:.4f}, {metres['max']:.3f} m"),
+        ("median, maximum", f"{metres['median']:.4f}, {metres['max']:.3f} m"),
         ("rotation", f"{degrees['mean']:.3f} ± {degrees['sd']:.3f}°"),
         ("bound", _bound(entry.max_translation, entry.max_rotation)),
-        ("change", changed or "first night"),
+        ("change", changed or "first run"),
     ]
     return [
-        f"<h3>Error, {errors.what}</h3>",
+        f"<h3>Error, {errors.measure}</h3>",
         f'<p class="big number">{errors.metres:.4f} m</p>',
         _definition_list(rows),
     ]
@@ -176,13 +176,13 @@ def _bound(translation: float | None, rotation: float | None) -> str:
     return ", ".join(parts if rotation is None else [*parts, f"{rotation:g}°"]) or "none"
 
 
-def _published_bars(verdict: CheckResult) -> list[str]:
-    """Ours and the published errors, the least first."""
-    errors = verdict.errors
-    if errors is None or not verdict.entry.published:
+def _published_bars(check: CheckResult) -> list[str]:
+    """Bars of this run's error and of the published ones, the smallest first."""
+    errors = check.errors
+    if errors is None or not check.entry.published:
         return []
     bars = sorted([(errors.metres, "", "this run"), *((error, "theirs", method) for method, error
-                  in verdict.entry.published.items())])  # fmt: skip
+                  in check.entry.published.items())])  # fmt: skip
     longest = max(bars[-1][0], 1e-9)
     cells = []
     for error, kind, method in bars:
@@ -191,41 +191,40 @@ def _published_bars(verdict: CheckResult) -> list[str]:
             f'<span{tone}>{escape(method)}</span><i{tone} style="width:{100 * error / longest:.1f}%"></i>'
             f'<span class="number{"" if kind else " ours"}">{error:.4f}</span>'
         )
-    return ["<h3>Beside the published errors, m</h3>", f'<div class="bars">{"".join(cells)}</div>']
+    return ["<h3>Published errors, m</h3>", f'<div class="bars">{"".join(cells)}</div>']
 
 
-def _run_table(verdict: CheckResult) -> list[str]:
-    assert verdict.last is not None
-    counts = verdict.last["counts"]
+def _run_table(check: CheckResult) -> list[str]:
+    assert check.last is not None
+    counts = check.last["counts"]
     rows = [
         ("scans, keyframes", f"{counts['scans']:,}, {counts['keyframes']:,}"),
         ("relations", f"{counts['pairwise']:,} pairwise, {counts['nscan']:,} nScan"),
         ("loops", f"{counts['loops']['accepted']:,} accepted, {counts['loops']['refused']:,} refused"),
-        ("time", _time_row(verdict)),
-        ("made", _finish_and_reasons(verdict)),
+        ("time", _time_row(check)),
+        ("finished", _finish_and_reasons(check)),
     ]
-    notes = [f'<p class="note">{escape(note)}</p>' for note in verdict.notes]
+    notes = [f'<p class="note">{escape(note)}</p>' for note in check.notes]
     return ["<h3>Run</h3>", _definition_list(rows), *notes]
 
 
-def _time_row(verdict: CheckResult) -> str:
-    took, faster = run_time(verdict), real_time_factor(verdict)
+def _time_row(check: CheckResult) -> str:
+    took, faster = run_time(check), real_time_factor(check)
     if not took:
-        return time_span("not timed: kernels were compiled meanwhile")
+        return time_span("not timed: kernels were compiled during the run")
     return time_span(f"{took}, {faster} real time" if faster else took)
 
 
-def _finish_and_reasons(verdict: CheckResult) -> str:
-    """When, and why it was done although it was done before."""
-    assert verdict.last is not None
-    times = verdict.last["times"]
+def _finish_and_reasons(check: CheckResult) -> str:
+    """When the run was finished, and why the log was run again."""
+    assert check.last is not None
+    times = check.last["times"]
     why = "; ".join(times.get("anew", []))
-    anew = f", anew: {escape(why)}" if why else ""
-    return time_span(f"{readable_time(times['finished'])}{anew}")
+    return time_span(readable_time(times["finished"]) + (f"; run again: {escape(why)}" if why else ""))
 
 
 def readable_time(when: str) -> str:
-    """A time of ISO 8601 for people."""
+    """A time in ISO 8601 (UTC) as people write it."""
     return when.replace("T", " ").replace("Z", " UTC")
 
 
@@ -240,5 +239,5 @@ def _source_link(entry: ManifestEntry) -> str:
 
 
 def _link(source: str) -> str:
-    """Only what leads to a page; a manifest may come from anybody."""
+    """The address if it is one of the web, else none: a manifest may come from anybody."""
     return escape(source) if source.startswith(("https://", "http://")) else "#"

@@ -1,4 +1,4 @@
-"""Logs side by side in processes of this machine, one for each log: one that dies takes no other along."""
+"""Run tasks in parallel on this machine, each in a process of its own: if one dies, the others still run."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ from nscan_cli.nightly.task import OUTPUTS, RESULT, TASK, Outcome, ProgressCallb
 from nscan_cli.nightly.warm_up import compile_kernels
 
 THREADED_LIBRARIES = ("OPENBLAS", "MKL", "OMP")
-"""One thread each: there are as many processes as there is work for, and digits depend on how many."""
+"""Libraries that are limited to one thread a process: more would change the last digits of results."""
 EXIT_TIMEOUT = 10.0
-"""A process that has closed its output is given so long to end, s."""
+"""The longest time that a process may take to exit after it has closed its output, s."""
 
 
 def run_locally(
@@ -32,11 +32,11 @@ def run_locally(
     report: ProgressCallback,
     threads: int = 1,
 ) -> Generator[tuple[Task, Outcome]]:
-    """Do the tasks, `jobs` at a time, and yield each with its outcome when it is done.
+    """Run the tasks, `jobs` at a time, and yield each with its outcome when it is done.
 
-    Each works in so many `threads`. One that takes longer than `timeout` (s) is stopped. `scratch` is an
-    existing folder for what is only needed meanwhile. When the iterator is closed, or an interrupt comes,
-    what is running is killed. The kernels are compiled before the first one begins.
+    Each process uses this number of `threads` and is stopped if it takes longer than `timeout` (s). `scratch`
+    is an existing folder for temporary files. Closing the iterator, or an interrupt, kills the running
+    processes. All kernels are compiled before the first task starts.
     """
     compile_kernels(_environment())
     waiting, running = deque(tasks), set[WorkerProcess]()
@@ -60,22 +60,22 @@ def run_locally(
 
 
 class WorkerProcess:
-    """A log's process, from its start to its outcome."""
+    """The process of a task, from its start to its outcome."""
 
     def __init__(self, task: Task, scratch: Path, threads: int) -> None:
         self.task = task
-        self.place = scratch / task.name
+        self.workspace = scratch / task.name
         self.began = time.monotonic()
-        self._closed, self._said = False, b""
-        prepare_workspace(self.place, task, threads)
-        with (self.place / "stderr.txt").open("wb") as errors:
+        self._closed, self._unread = False, b""
+        prepare_workspace(self.workspace, task, threads)
+        with (self.workspace / "stderr.txt").open("wb") as errors:
             self.process = subprocess.Popen(
-                bootstrap.worker_command("worker", str(self.place)),
+                bootstrap.worker_command("worker", str(self.workspace)),
                 stdin=subprocess.PIPE,
                 stdout=subprocess.PIPE,
                 stderr=errors,
                 env=_environment(),
-                # An interrupt from the terminal is for the one that all are started by.
+                # An interrupt from the terminal is handled by the parent alone.
                 start_new_session=True,
             )
         assert self.process.stdout is not None
@@ -83,73 +83,73 @@ class WorkerProcess:
         os.set_blocking(self.output.fileno(), False)
 
     def listen(self, report: ProgressCallback) -> None:
-        """Pass on what it says; its latest word is enough."""
-        said = os.read(self.output.fileno(), 65536)
-        self._closed = not said
-        *lines, self._said = (self._said + said).split(b"\n")
+        """Read what the process prints, and report its latest progress."""
+        printed = os.read(self.output.fileno(), 65536)
+        self._closed = not printed
+        *lines, self._unread = (self._unread + printed).split(b"\n")
         with contextlib.suppress(ValueError, TypeError):
             if lines:
                 report(self.task.name, *json.loads(lines[-1]))
 
     def is_over(self, timeout: float | None) -> bool:
-        """Whether it has ended, or has had its time."""
+        """Whether the process has ended or exceeded its time."""
         return self._closed or self._is_late(timeout)
 
     def outcome(self, timeout: float | None) -> Outcome:
-        """What became of it; its place is cleared away."""
+        """The outcome of the task; the process is stopped and its workspace removed."""
         late = not self._closed and self._is_late(timeout)
         if not late:
             with contextlib.suppress(subprocess.TimeoutExpired):
                 self.process.wait(EXIT_TIMEOUT)
-        outcome = Outcome.failed(f"stopped after {timeout:g} s, see --timeout") if late else self._result()
+        outcome = Outcome.failed(f"timed out after {timeout:g} s; see --timeout") if late else self._result()
         self.stop()
         return outcome
 
     def stop(self) -> None:
-        """Kill it, and clear its place."""
+        """Kill the process, and remove its workspace."""
         self.process.kill()
         self.process.wait()
         for pipe in (self.process.stdin, self.output):
             if pipe is not None:
                 pipe.close()
-        shutil.rmtree(self.place, ignore_errors=True)
+        shutil.rmtree(self.workspace, ignore_errors=True)
 
     def _is_late(self, timeout: float | None) -> bool:
         return timeout is not None and time.monotonic() - self.began > timeout
 
     def _result(self) -> Outcome:
         try:
-            result: dict[str, Any] = json.loads((self.place / RESULT).read_bytes())
+            result: dict[str, Any] = json.loads((self.workspace / RESULT).read_bytes())
         except (OSError, ValueError):
-            return Outcome.failed(self._how_it_died())
+            return Outcome.failed(self._exit_reason())
         if "reason" in result:
             return Outcome.failed(result["reason"])
-        files = {path.name: path.read_bytes() for path in sorted((self.place / OUTPUTS).iterdir())}
+        files = {path.name: path.read_bytes() for path in sorted((self.workspace / OUTPUTS).iterdir())}
         return Outcome(result, files)
 
-    def _how_it_died(self) -> str:
+    def _exit_reason(self) -> str:
         code = self.process.poll()
         if code is not None and code < 0:
             return f"its process was killed by signal {-code}"
-        said = (self.place / "stderr.txt").read_text("utf-8", errors="replace").strip().splitlines()
-        return f"its process ended with code {code}" + (f": {said[-1]}" if said else "")
+        lines = (self.workspace / "stderr.txt").read_text("utf-8", errors="replace").strip().splitlines()
+        return f"its process ended with code {code}" + (f": {lines[-1]}" if lines else "")
 
 
-def prepare_workspace(place: Path, task: Task, threads: int) -> None:
-    """A place of work: the inputs under the same names on every machine, and the task."""
-    shutil.rmtree(place, ignore_errors=True)
-    (place / OUTPUTS).mkdir(parents=True)
-    for role, path in task.places().items():
-        (place / path).parent.mkdir()
-        (place / path).symlink_to(task.inputs[role])
-    (place / TASK).write_text(task.to_json(threads))
+def prepare_workspace(workspace: Path, task: Task, threads: int) -> None:
+    """Make a workspace: links to the inputs, under the same names on every machine, and the task."""
+    shutil.rmtree(workspace, ignore_errors=True)
+    (workspace / OUTPUTS).mkdir(parents=True)
+    for role, path in task.workspace_paths().items():
+        (workspace / path).parent.mkdir()
+        (workspace / path).symlink_to(task.inputs[role])
+    (workspace / TASK).write_text(task.to_json(threads))
 
 
 def _environment() -> dict[str, str]:
     environment = {**os.environ}
     for library in THREADED_LIBRARIES:
         environment.setdefault(f"{library}_NUM_THREADS", "1")
-    # The process works in another folder.
+    # The process has another current folder.
     if environment.get("NUMBA_CACHE_DIR"):
         environment["NUMBA_CACHE_DIR"] = os.path.abspath(environment["NUMBA_CACHE_DIR"])
     return environment

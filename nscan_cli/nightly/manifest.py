@@ -1,4 +1,4 @@
-"""The manifest: which logs there are, what they are measured against, and what is expected of them."""
+"""The manifest: which logs to run, what to compare them with, and which errors are acceptable."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ from nscan_cli.files.text import path_of_name
 from nscan_cli.nightly.manifest_parameters import LogParameters, parameters_from
 
 LOG_SUFFIXES = (".log.gz", ".log", ".clf.gz", ".clf", ".script.gz", ".script", ".mcap", ".bag", ".db3", "")
-"""Of a log that the manifest gives by its name alone; the first that is there is taken. "" is a folder."""
+"""Endings tried in this order for a log that the manifest gives by name alone. "" is a folder."""
 LOG_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,99}")
 RESERVED_NAMES = ("report.html", "report.json")
-"""Files of the folder that has the logs' folders."""
+"""Names of files in the results folder, which no log can have."""
 SHA256 = re.compile(r"[0-9a-f]{64}")
 ROLES = ("log", "relations", "reference")
 
@@ -29,38 +29,38 @@ class ManifestEntry:
     """A log of the manifest."""
 
     name: str
-    """What the log is called; its results are in a folder of this name."""
+    """Name of the log and of the folder of its results."""
     inputs: dict[str, Path]
-    """The paths by their role: log, and relations or reference where there are such."""
+    """Role → path; the roles are log, and relations or reference if given."""
     max_translation: float | None = None
-    """Bound, m: of the mean on relations, or of the RMSE against a reference."""
+    """Bound of the translational error (mean on relations, or RMSE against a reference), m."""
     max_rotation: float | None = None
-    """degrees"""
+    """Bound of the rotational error, degrees."""
     published: dict[str, float] = field(default_factory=dict)
-    """Method → its translational error (m) that somebody has published."""
+    """Method → its published translational error, m."""
     parameters: LogParameters = field(default_factory=LogParameters)
     sources: dict[str, str] = field(default_factory=dict)
-    """Role → where the file can be got."""
+    """Role → address to download the file from."""
     sha256: dict[str, str] = field(default_factory=dict)
-    """Role → SHA-256 of the file that bounds and figures are of."""
+    """Role → SHA-256 of the file for which the bounds were measured."""
     optional: bool = False
-    """What is not there is left out, and no failure: the log, or what it is measured against."""
+    """Whether a missing log or reference is skipped; otherwise it is a failure."""
     about: str = ""
-    """What is known of the log, for the report."""
+    """A description for the report."""
     published_map: str = ""
-    """Where a map that somebody has published can be seen."""
+    """Address of a published map."""
 
     @property
     def is_there(self) -> bool:
-        """Whether there is a log under the path."""
+        """Whether the log exists."""
         return self.inputs["log"].exists()
 
 
 def read_manifest(path: str, data: str | None) -> list[ManifestEntry]:
-    """The logs of the manifest at `path`, or of the one of that name which comes with the package.
+    """The logs of the manifest at `path`, or of the manifest of that name in the package.
 
-    Their paths are relative to the folder `data`, or to the manifest where there is none. Raises
-    InputMissingError when it cannot be read, InputDataError when it is not as it should be.
+    Paths are relative to the folder `data`, or to the manifest if that is None. Raises InputMissingError if
+    it cannot be read, and InputDataError if its content is wrong.
     """
     file, folder = path, Path(path).parent
     if path in bundled_manifests() and not Path(path).exists():
@@ -73,20 +73,20 @@ def read_manifest(path: str, data: str | None) -> list[ManifestEntry]:
     if data is not None:
         folder = Path(data)
         if not folder.is_dir():
-            raise InputMissingError(f"--data {data}: is no folder; give that of the logs")
+            raise InputMissingError(f"--data {data}: is not a folder; give the folder of the logs")
     document = read_toml(file, "mend it")
     unknown = [key for key in document if key != "log"]
     if unknown:
         raise InputDataError(path, f"has an unknown key {unknown[0]!r}", "a manifest has [[log]] tables only")
     tables = document.get("log")
     if not isinstance(tables, list) or not all(isinstance(table, dict) for table in tables) or not tables:
-        raise InputDataError(path, "has no logs", "begin each with [[log]], its name and path below")
+        raise InputDataError(path, "has no logs", "add a [[log]] table with a name and a path for each")
     entries: list[ManifestEntry] = []
     for number, table in enumerate(tables, 1):
         entry = _manifest_entry(path, number, table, folder)
-        # Folders of names that differ in their case only are one folder on some file systems.
+        # On some file systems, names that differ in case only are the same folder.
         if entry.name.lower() in (other.name.lower() for other in entries):
-            raise InputDataError(path, f"two logs have the name {entry.name}", "give each its own")
+            raise InputDataError(path, f"two logs have the name {entry.name}", "rename one")
         entries.append(entry)
     return entries
 
@@ -100,8 +100,8 @@ def _manifest_entry(file: str, number: int, table: dict[str, Any], folder: Path)
     place = f"{file}, log {number}"
     name = table.get("name")
     if not isinstance(name, str) or not LOG_NAME.fullmatch(name) or name.lower() in RESERVED_NAMES:
-        remedy = "letters, digits, '.', '_' and '-' make one, such as intel"
-        raise InputDataError(place, "has no name" if name is None else f"{name!r} is no name", remedy)
+        remedy = "use letters, digits, '.', '_' and '-', as in intel"
+        raise InputDataError(place, "has no name" if name is None else f"{name!r} is not a name", remedy)
     place += f" ({name})"
     for key, value in table.items():
         if key not in KEY_CHECKS:
@@ -110,15 +110,15 @@ def _manifest_entry(file: str, number: int, table: dict[str, Any], folder: Path)
         if problem is not None:
             raise InputDataError(place, f"{key} is {_abbreviated(value)}", f"give {problem}")
     if "relations" in table and "reference" in table:
-        raise InputDataError(place, "has relations and reference", "leave one of them out")
+        raise InputDataError(place, "has relations and reference", "remove one of them")
     for role in ROLES:
         for key in _origin_keys(role):
             if key in table and role != "log" and role not in table:
-                raise InputDataError(place, f"has {key}, but no {role}", f"give {role} too, or leave it out")
+                raise InputDataError(place, f"has {key}, but no {role}", f"add {role}, or remove {key}")
     bounds = [key for key in ("max_translation", "max_rotation", "published") if key in table]
     if bounds and "relations" not in table and "reference" not in table:
-        remedy = "give relations or reference too"
-        raise InputDataError(place, f"has {bounds[0]}, but nothing to measure against", remedy)
+        remedy = "add one of them"
+        raise InputDataError(place, f"has {bounds[0]}, but neither relations nor reference", remedy)
     inputs = {
         "log": folder / path_of_name(table["path"]) if "path" in table else _find_log(folder, name, table)
     }
@@ -139,12 +139,12 @@ def _manifest_entry(file: str, number: int, table: dict[str, Any], folder: Path)
 
 
 def _origin_keys(role: str) -> tuple[str, str]:
-    """The keys that say where a file can be got, and its SHA-256."""
+    """The keys of a file's address and of its SHA-256."""
     return ("source", "sha256") if role == "log" else (f"{role}_source", f"{role}_sha256")
 
 
 def _find_log(folder: Path, name: str, table: dict[str, Any]) -> Path:
-    """The log of this name, of one of its other names, or as the file at its source is called."""
+    """The log's file under its name, one of its other names, or the file name of its source."""
     paths = [folder / (each + ending) for each in _file_stems(name, table) for ending in LOG_SUFFIXES]
     source: str = table.get("source", "")
     downloaded = PurePosixPath(urlsplit(source).path).name
@@ -154,7 +154,7 @@ def _find_log(folder: Path, name: str, table: dict[str, Any]) -> Path:
 
 
 def _find_reference(folder: Path, name: str, table: dict[str, Any], role: str) -> Path:
-    """What the log is measured against: as named; of an optional log, also under a name of the log."""
+    """The file of relations or reference as named; for an optional log, also under one of the log's names."""
     named = folder / path_of_name(table[role])
     if not table.get("optional"):
         return named
@@ -228,4 +228,4 @@ KEY_CHECKS: dict[str, Callable[[Any], str | None]] = {
     "reference_source": _check_text,
     "reference_sha256": _check_sha256,
 }
-"""What a [[log]] may have; each says what it wants where a value is none."""
+"""The keys of a [[log]] table; each check returns None, or what the value has to be."""

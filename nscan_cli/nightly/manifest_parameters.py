@@ -1,4 +1,4 @@
-"""What a manifest says of how a log is read and mapped: the options of `slam`, by their long names."""
+"""The parameters of a log in a manifest: options of `slam` by their long names."""
 
 from __future__ import annotations
 
@@ -12,23 +12,23 @@ from nscan_cli.logs.reading_options import ReadingOptions
 
 RELATION_CHOICES = ("pairwise", "nscan", "both")
 DEGREE_OPTIONS = ("angle-min", "angle-increment")
-"""Degrees in the manifest, rad inside."""
+"""Options that are in degrees in a manifest, and in rad here."""
 
 
 @dataclass(frozen=True)
 class LogParameters:
-    """How one log is read and mapped; what is not said has the defaults of `slam`."""
+    """How a log is read and mapped; what a manifest does not give has the defaults of `slam`."""
 
     reading: ReadingOptions = field(default_factory=ReadingOptions)
     mapping: dict[str, Any] = field(default_factory=dict)
-    """max-scans, relations and no-loops, as far as the manifest has them."""
+    """Those of max-scans, relations and no-loops that the manifest gives."""
 
     def as_table(self) -> dict[str, Any]:
-        """As in a manifest, without what has its default."""
-        usual, table = dataclasses.asdict(ReadingOptions()), dict[str, Any]()
+        """The parameters as a table of a manifest, without those that have their defaults."""
+        defaults, table = dataclasses.asdict(ReadingOptions()), dict[str, Any]()
         for name, value in dataclasses.asdict(self.reading).items():
             key = name.replace("_", "-")
-            if value == usual[name]:
+            if value == defaults[name]:
                 continue
             if key == "odometry":
                 table["no-odometry"] = True
@@ -40,10 +40,7 @@ class LogParameters:
 
 
 def parameters_from(place: str, table: dict[str, Any]) -> LogParameters:
-    """The parameters of a table of the manifest; `place` says which one in messages.
-
-    Raises InputDataError.
-    """
+    """The parameters from a table of a manifest; messages begin with `place`. Raises InputDataError."""
     known = _reading_options() | {"max-scans": int, "relations": str, "no-loops": bool}
     reading: dict[str, Any] = {}
     mapping: dict[str, Any] = {}
@@ -75,7 +72,7 @@ def parameters_from(place: str, table: dict[str, Any]) -> LogParameters:
     try:
         return LogParameters(ReadingOptions(**reading), mapping)
     except WrongUsageError as error:
-        raise InputDataError(place, f"parameters: {error}", "mend them") from error
+        raise InputDataError(place, f"parameters: {error}", "correct them") from error
 
 
 TYPE_WORDS = {
@@ -88,7 +85,7 @@ TYPE_WORDS = {
 
 
 def _reading_options() -> dict[str, type]:
-    """Long option name → the type of its value in TOML."""
+    """Long name of each reading option → the type of its value in TOML."""
     types: dict[str, type] = {"str": str, "float": float, "int": int, "bool": bool, "tuple": list}
     options = {}
     for option in dataclasses.fields(ReadingOptions):
@@ -100,7 +97,7 @@ def _reading_options() -> dict[str, type]:
 
 
 def _is_a(value: Any, wanted: type) -> bool:
-    """Whether a value is of this type; true and false are no numbers."""
+    """Whether a value is of exactly this type, so that true and false are not numbers."""
     return type(value) is wanted
 
 

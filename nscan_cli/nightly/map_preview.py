@@ -1,4 +1,4 @@
-"""A small picture of a map for a page, and the path and the loops as an SVG of the same size over it."""
+"""The preview of a map for the report: a small PNG, and an SVG of the path and the loops to lay over it."""
 
 from __future__ import annotations
 
@@ -13,15 +13,15 @@ from nscan_cli.mapping.occupancy import OccupancyGrid
 from nscan_cli.poses import Array
 
 PREVIEW_PIXELS = 1400
-"""Most pixels of the longer side: sharp on a desk's screen, and some tens of kilobytes."""
+"""Greatest length of the longer side, pixels: sharp on a screen, and some tens of kilobytes."""
 MIN_PATH_STEP = 2.0
-"""From one corner of the path to the next, pixels at least."""
+"""Least distance between two corners of the drawn path, pixels."""
 
 
 def map_preview(grid: OccupancyGrid, graph: Graph) -> tuple[bytes, bytes]:
-    """The map as a PNG of three grays, and the SVG of the graph, in units of the PNG's pixels.
+    """The map as a PNG, and the SVG of the graph in units of the PNG's pixels.
 
-    Of the cells that share a pixel the darkest shows, so that walls can still be seen.
+    A pixel shows the darkest of its cells, so that walls stay visible.
     """
     cells = gray_image(grid, SOFT_GRAYS)
     side = -(-max(cells.shape) // PREVIEW_PIXELS)
@@ -43,7 +43,7 @@ def _darkest(cells: Gray, side: int) -> Gray:
 
 
 def _png(pixels: Gray) -> bytes:
-    """With a palette: a quarter of the bytes."""
+    """A PNG with a palette, which has a quarter of the bytes."""
     from PIL import Image
 
     shades, indices = np.unique(pixels, return_inverse=True)
@@ -53,7 +53,7 @@ def _png(pixels: Gray) -> bytes:
 
 
 def _svg(graph: Graph, places: Array, width: int, height: int, per_metre: float) -> str:
-    """Layers of the classes path, loops and refused, and a scale."""
+    """Layers of the classes path, loops and refused, and a scale bar."""
     unit = max(width, height) / 100
     metres = round_length(width / per_metre / 5)
     left, low = 1.5 * unit, height - 1.5 * unit
@@ -76,7 +76,7 @@ def _svg(graph: Graph, places: Array, width: int, height: int, per_metre: float)
 
 
 def _path_data(places: Array) -> str:
-    """Through the places (N, 2), but for those that lie too near the one before."""
+    """A line through the places (N, 2); those closer than MIN_PATH_STEP to the one before are left out."""
     kept = [places[0]]
     for place in places[1:]:
         if np.hypot(*(place - kept[-1])) >= MIN_PATH_STEP:

@@ -1,4 +1,4 @@
-"""Where the report goes: report.html and report.json in the folder of the nights."""
+"""Write the report: report.html and report.json in the results folder."""
 
 from __future__ import annotations
 
@@ -17,22 +17,17 @@ from nscan_cli.nightly.run_history import read_runs
 def write_reports(
     title: str, entries: Sequence[ManifestEntry], planned: Plan, folder: Path
 ) -> list[CheckResult]:
-    """Write the report on what is in the folder, and return what it says. Raises OutputError."""
-    absent = [entry.name for entry in planned.absent]
-    verdicts = [
-        check_log(
-            entry,
-            read_runs(folder / entry.name),
-            planned.notes.get(entry.name, []),
-            absent=entry.name in absent,
-        )
+    """Check every log with the results in the folder, and write the report. Raises OutputError."""
+    absent, notes = [entry.name for entry in planned.absent], planned.notes
+    checks = [
+        check_log(entry, read_runs(folder / entry.name), notes.get(entry.name, []), entry.name in absent)
         for entry in entries
     ]
     for name, content in (
-        ("report.json", json_report(verdicts)),
-        ("report.html", html_report(title, verdicts, folder)),
+        ("report.json", json_report(checks)),
+        ("report.html", html_report(title, checks, folder)),
     ):
         path = folder / name
         if not path.is_file() or path.read_bytes() != content:
             write_atomically(str(path), content)
-    return verdicts
+    return checks

@@ -1,4 +1,4 @@
-"""The folder of the nights: one caller at a time, and a place for what is only needed meanwhile."""
+"""The results folder: its lock, its scratch folder, and the folders of the logs."""
 
 from __future__ import annotations
 
@@ -17,10 +17,9 @@ LOCK, SCRATCH = ".lock", ".scratch"
 
 @contextlib.contextmanager
 def locked_folder(folder: str) -> Iterator[Path]:
-    """The folder, made where only its parent is there, and nobody else's until the block ends.
+    """Lock the folder until the block ends; it is made if its parent exists. Raises OutputError.
 
-    However the holder ends, its claim ends with it; what a killed one has begun to write is cleared away.
-    Raises OutputError.
+    The lock ends with the process, however that ends. Half-written files of a killed one are removed.
     """
     path = Path(folder)
     try:
@@ -29,14 +28,14 @@ def locked_folder(folder: str) -> Iterator[Path]:
     except FileNotFoundError as error:
         raise OutputError(f"{folder}: the folder {path.parent} does not exist; create it first") from error
     except (FileExistsError, NotADirectoryError) as error:
-        raise OutputError(f"{folder}: is no folder; name one, or a new one") from error
+        raise OutputError(f"{folder}: is not a folder; name another") from error
     except OSError as error:
         raise OutputError(f"{folder}: cannot be written to: {error.strerror}; choose another") from error
     try:
         fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except OSError as error:
         os.close(lock)
-        raise OutputError(f"{folder}: another nightly is at work there; wait for it") from error
+        raise OutputError(f"{folder}: another nightly is running there; wait for it") from error
     try:
         for left_over in (*path.glob(f"{TEMPORARY_PREFIX}*"), *path.glob(f"*/{TEMPORARY_PREFIX}*")):
             left_over.unlink()
@@ -47,7 +46,7 @@ def locked_folder(folder: str) -> Iterator[Path]:
 
 @contextlib.contextmanager
 def scratch_folder(folder: Path) -> Iterator[Path]:
-    """An empty folder in `folder`, gone when the block ends, or at the next call when it was cut off."""
+    """An empty folder in `folder`, removed when the block ends, or by the next call if this one is killed."""
     place = folder / SCRATCH
     shutil.rmtree(place, ignore_errors=True)
     place.mkdir(exist_ok=True)
@@ -58,9 +57,11 @@ def scratch_folder(folder: Path) -> Iterator[Path]:
 
 
 def log_folder(folder: Path, name: str) -> Path:
-    """The folder of one log's results, made where it is missing. Raises OutputError."""
+    """The folder of one log's results, made if it is missing. Raises OutputError."""
     try:
         (folder / name).mkdir(exist_ok=True)
     except OSError as error:
-        raise OutputError(f"{folder / name}: cannot be made: {error.strerror}; clear it away") from error
+        raise OutputError(
+            f"{folder / name}: cannot be made: {error.strerror}; remove what is there"
+        ) from error
     return folder / name

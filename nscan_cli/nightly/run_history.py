@@ -1,4 +1,4 @@
-"""What the folder knows of a log: one line for every night that changed it, the last line the state."""
+"""The history of a log: one line of JSON for each run; the last line is the present state."""
 
 from __future__ import annotations
 
@@ -13,24 +13,24 @@ from nscan_cli.files.text import json_bytes
 HISTORY_FILE = "nights.jsonl"
 
 RunRecord = dict[str, Any]
-"""One line: `key` (the fingerprint), `tool`, `made_from` (inputs and parameters), `outcome` ("done", or
-"failed" with `reason`), of what is done `counts`, `evaluation` and `outputs` (name → SHA-256), and `times`,
-all that may differ from call to call: among them `anew`, why it was made anew."""
+"""One line of the history: `key` (the fingerprint), `tool`, `made_from` (inputs and parameters), `outcome`
+("done", or "failed" with `reason`), of a run that is done also `counts`, `evaluation` and `outputs` (name →
+SHA-256), and `times`: what differs between two runs on the same inputs, with the rerun reasons in `anew`."""
 
 
 def read_runs(folder: Path) -> list[RunRecord]:
-    """The nights of the log with this folder, oldest first; none where the file is missing or damaged."""
+    """The runs of the log with this results folder, oldest first; none if the file is missing or damaged."""
     try:
         text = (folder / HISTORY_FILE).read_bytes().decode()
-        nights = [json.loads(line) for line in text.splitlines()]
+        runs = [json.loads(line) for line in text.splitlines()]
     except (OSError, ValueError):
         return []
     keys = {"key", "tool", "outcome", "times"}
-    return nights if all(isinstance(night, dict) and keys <= set(night) for night in nights) else []
+    return runs if all(isinstance(run, dict) and keys <= set(run) for run in runs) else []
 
 
 def is_up_to_date(folder: Path, key: str) -> bool:
-    """Whether the last night was made from the same, went well, and left outputs that are all there still."""
+    """Whether the last run has this fingerprint, did not fail, and its outputs are unchanged."""
     last = read_runs(folder)[-1:]
     if not last or last[0]["key"] != key or last[0]["outcome"] != "done":
         return False
@@ -38,21 +38,20 @@ def is_up_to_date(folder: Path, key: str) -> bool:
     return all(_sha256(folder / name) == sha256 for name, sha256 in outputs.items())
 
 
-def append_run(folder: Path, night: RunRecord, files: dict[str, bytes]) -> None:
-    """Write the outputs of a night, and when all are there the night itself.
+def append_run(folder: Path, run: RunRecord, files: dict[str, bytes]) -> None:
+    """Write the outputs of a run, then append the run to the history. Raises OutputError.
 
-    A night from the same things as the last one takes its place: whoever is cut off and goes on, or tries
-    again, has the same history as the one who gets through at once. But a failure never takes the place of
-    what went well. Raises OutputError.
+    A run with the fingerprint of the last one replaces it, so that a command that is interrupted and repeated
+    leaves the same history as one that is not. A failed run never replaces one that is done.
     """
     for name, content in files.items():
         write_atomically(str(folder / name), content)
-    nights = read_runs(folder)
-    again = bool(nights) and nights[-1]["key"] == night["key"]
-    if again and (night["outcome"] == "done" or nights[-1]["outcome"] == "failed"):
-        nights.pop()
+    runs = read_runs(folder)
+    is_repeated = bool(runs) and runs[-1]["key"] == run["key"]
+    if is_repeated and (run["outcome"] == "done" or runs[-1]["outcome"] == "failed"):
+        runs.pop()
     outputs = {name: hashlib.sha256(content).hexdigest() for name, content in files.items()}
-    lines = [*nights, {**night, "outputs": outputs} if outputs else night]
+    lines = [*runs, {**run, "outputs": outputs} if outputs else run]
     text = "".join(json.dumps(line, ensure_ascii=False, allow_nan=False) + "\n" for line in lines)
     write_atomically(str(folder / HISTORY_FILE), json_bytes(text))
 

@@ -1,4 +1,4 @@
-"""What a process is told to do for one log, and what comes back."""
+"""The task of a worker process: one log to map and measure; and the outcome it returns."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from nscan_cli.logs.reading_options import ReadingOptions
 from nscan_cli.nightly.manifest import ManifestEntry
 
 OUTPUTS, TASK, RESULT = "outputs", "task.json", "result.json"
-"""What a place of work has besides the inputs: a folder of outputs, the task, and at the end the result."""
+"""The names in a workspace beside the inputs: the folder of outputs, the task, and the result at the end."""
 
 
 @dataclass(frozen=True)
 class Task:
-    """One log to be mapped and measured."""
+    """One log to map and measure."""
 
     name: str
     inputs: dict[str, str]
@@ -33,13 +33,13 @@ class Task:
         reading = dataclasses.asdict(entry.parameters.reading)
         return cls(entry.name, inputs, reading, entry.parameters.mapping)
 
-    def places(self) -> dict[str, str]:
-        """Role → path in a place of work: the same everywhere, as results and messages are to be."""
+    def workspace_paths(self) -> dict[str, str]:
+        """Role → path in a workspace. It is the same on every machine, and so are results and messages."""
         return {role: f"{role}/{Path(path).name}" for role, path in self.inputs.items()}
 
     def to_json(self, threads: int) -> str:
-        """For the process that does it, in so many threads."""
-        told = {"inputs": self.places(), "reading": self.reading, "mapping": self.mapping}
+        """The task for a worker process that uses this number of threads."""
+        told = {"inputs": self.workspace_paths(), "reading": self.reading, "mapping": self.mapping}
         return json.dumps({**told, "threads": threads})
 
 
@@ -51,18 +51,18 @@ def reading_options_from(record: dict[str, Any]) -> ReadingOptions:
 
 @dataclass(frozen=True)
 class Outcome:
-    """What became of a log."""
+    """What a task has returned."""
 
     result: dict[str, Any]
-    """`counts`, `evaluation` and `times` of what is done; of what failed, the `reason`."""
+    """`counts`, `evaluation` and `times`; or, if the log failed, its `reason`."""
     files: dict[str, bytes]
-    """Name → content of the outputs; none of what failed."""
+    """Name → content of the outputs; empty if the log failed."""
 
     @classmethod
     def failed(cls, reason: str) -> Outcome:
-        """The log failed, and nothing else did. The reason is one line."""
+        """The outcome of a log that failed; the reason is joined to one line."""
         return cls({"reason": " ".join(reason.split())}, {})
 
 
 ProgressCallback = Callable[[str, int, int, int], None]
-"""Called with the name of a log, and its scans done, all its scans, and its keyframes so far."""
+"""Called with the name of a log, its scans done, all its scans, and its keyframes so far."""

@@ -1,8 +1,7 @@
-"""All kernels compiled before the first log of a night, so that no log's time has their compilation in it.
+"""Compile all kernels before the first log of a run, so that no log's time includes their compilation.
 
-It is started by `bootstrap.py`. What it maps is a corridor round a block, driven round
-one and a half times by a robot whose odometry drifts: there are keyframes, joint matches and loops. One side
-is bare, so that the way along it is hardly known.
+A process started by `bootstrap.py` maps a simulated drive through a square corridor, with drifting odometry:
+it has keyframes, joint matches and loops. One side is bare, so that motion along it is weakly determined.
 """
 
 from __future__ import annotations
@@ -22,26 +21,26 @@ if TYPE_CHECKING:
     from nscan_cli.poses import Array
 
 OUTER_WALL, INNER_WALL = 9.0, 6.0
-"""m from the middle to the corridor's walls."""
+"""Distance of the corridor's walls from its centre, m."""
 LAPS, SCAN_SPACING, BEAMS = 1.4, 0.3, 181
 """Times round, m from scan to scan."""
 LASER_RANGE, NO_RETURN, THREADS = 5.0, 81.91, 2
 ODOMETRY_DRIFT = 0.004
 """rad, per step."""
 COMPILED_FILE, LOCK_FILE = "all", ".compiling"
-"""Files of the cache folder: the first, with the machine in its name, is there when all kernels are."""
+"""Files of the cache folder. The first, with the machine in its name, exists once kernels are compiled."""
 
 
 def compile_kernels(environment: dict[str, str]) -> None:
-    """Compile what the cache folder does not have, in a process that is over then: once on each machine.
+    """Compile the kernels that the cache lacks, in a process of its own, once on each machine.
 
-    Where no folder is writable nothing is done. What goes wrong, the logs will say.
+    Does nothing if no cache folder is writable. Errors are ignored here: the logs will report them.
     """
     folder = cache_folder()
     if folder is None or _is_compiled(folder):
         return
     with contextlib.suppress(OSError), (folder / LOCK_FILE).open("w") as lock:
-        # Others wait here for the first, and find it done.
+        # Other processes wait here for the first one, and then find the kernels compiled.
         fcntl.flock(lock, fcntl.LOCK_EX)
         if not _is_compiled(folder):
             subprocess.run(
@@ -52,13 +51,13 @@ def compile_kernels(environment: dict[str, str]) -> None:
 
 
 def cached_files() -> set[str]:
-    """The files of the cache folder: one more, and something was compiled meanwhile."""
+    """The files of the cache folder; a new one shows that a kernel was compiled."""
     folder = cache_folder()
     return set() if folder is None else {name for _, _, files in os.walk(folder) for name in files}
 
 
 def _is_compiled(folder: Path) -> bool:
-    """Whether the kernels were compiled, and not cleared away since."""
+    """Whether the kernels were compiled and not deleted since."""
     return _compiled_file(folder).exists() and not machine_code.is_uncompiled("follow")
 
 
@@ -67,7 +66,7 @@ def _compiled_file(folder: Path) -> Path:
 
 
 def main() -> None:
-    """Do all that is done for a log of a night, so that the kernels are compiled."""
+    """Do everything that is done for a log, so that all kernels are compiled."""
     import numpy as np
 
     from nscan_cli.kernels import decorators as compiled
@@ -85,7 +84,7 @@ def main() -> None:
 
 
 def simulated_carmen_log() -> bytes:
-    """The drive as a CARMEN log."""
+    """The simulated drive as a CARMEN log."""
     import numpy as np
 
     from nscan_cli.poses import compose, relative
@@ -105,7 +104,7 @@ def simulated_carmen_log() -> bytes:
 
 
 def _simulated_poses() -> Array:
-    """Poses (S, 3) round the block in the middle of the corridor, turning on the spot at its corners."""
+    """Poses (S, 3) along the middle of the corridor, turning on the spot at its corners."""
     import numpy as np
 
     from nscan_cli.poses import wrap
@@ -127,7 +126,7 @@ def _simulated_poses() -> Array:
 
 
 def _simulated_ranges(poses: Array, angles: Array) -> Array:
-    """(S, B) m to the walls of the corridor, with pillars on three of its sides."""
+    """Ranges (S, B) to the walls of the corridor, m; three of its sides have pillars."""
     import numpy as np
 
     walls = [*_square_walls(OUTER_WALL), *_square_walls(INNER_WALL)]

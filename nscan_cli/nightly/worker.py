@@ -1,8 +1,7 @@
-"""One log from its bytes to map and errors, in a process of its own.
+"""The worker process, started by `bootstrap.py`: map one log and measure its errors.
 
-It is started by `bootstrap.py`. What it does is what `slam` with --map and
---trajectory, and `evaluate`, do. It says how far it is on its standard output, a line of JSON at a time, and
-ends itself when its standard input does: whoever started it is gone then.
+It does what `slam` with --map and --trajectory does, and then `evaluate`. It prints its progress as lines of
+JSON, and exits when its standard input is closed, since its parent has then ended.
 """
 
 from __future__ import annotations
@@ -22,11 +21,11 @@ from nscan_cli.errors import NscanError
 from nscan_cli.nightly.task import OUTPUTS, RESULT, TASK, reading_options_from
 
 REPORT_INTERVAL = 0.2
-"""s"""
+"""Least time between two lines of progress, s."""
 
 
 def main(place: str) -> None:
-    """Do the task of a place of work; its outputs and its result are there afterwards."""
+    """Run the task in a workspace, and write its outputs and its result there."""
     threading.Thread(target=_exit_with_parent, daemon=True).start()
     os.chdir(place)
     try:
@@ -34,7 +33,7 @@ def main(place: str) -> None:
     except NscanError as error:
         result = {"reason": str(error)}
     except OSError as error:
-        result = {"reason": f"cannot write its results: {error.strerror or error}"}
+        result = {"reason": f"cannot write the results: {error.strerror or error}"}
     except MemoryError:
         result = {"reason": "out of memory"}
     except Exception as error:
@@ -46,9 +45,9 @@ def main(place: str) -> None:
 def map_and_evaluate(
     task: dict[str, Any], outputs: Path, report: Callable[[int, int, int], None]
 ) -> dict[str, Any]:
-    """Map and measure; the counts, the evaluation and the times. Raises the errors of both.
+    """Map and evaluate a log; returns the counts, the evaluation and the times. Raises the errors of both.
 
-    There is no time where kernels were compiled meanwhile.
+    The time is None if kernels were compiled during the run.
     """
     import numpy as np
 
@@ -85,7 +84,7 @@ def map_and_evaluate(
     (outputs / "map.yaml").write_bytes(map_yaml("map.png", image))
     seconds: float | None = round(time.perf_counter() - began, 3)
     if "numba" in sys.modules and warm_up.cached_files() - kept:
-        # Kept code is loaded without numba. A time with compilation in it is none of mapping.
+        # Cached code is loaded without numba, so new files of the cache were compiled during this run.
         seconds = None
     picture, overlay = map_preview(grid, graph)
     (outputs / "preview.png").write_bytes(picture)
@@ -105,7 +104,7 @@ def map_and_evaluate(
 
 
 def _evaluation(inputs: dict[str, str], graph_file: str) -> dict[str, Any] | None:
-    """What `evaluate --json` says of the graph; None where there is nothing to measure against."""
+    """The document of `evaluate --json` for the graph; None without relations or a reference."""
     from nscan_cli.evaluation.evaluation_report import as_document
     from nscan_cli.evaluation.measured import measure
 
@@ -116,7 +115,7 @@ def _evaluation(inputs: dict[str, str], graph_file: str) -> dict[str, Any] | Non
 
 
 def _progress_printer() -> Callable[[int, int, int], None]:
-    """Says how far the work is, not too often."""
+    """A function that prints the progress, at most once in REPORT_INTERVAL."""
     next_time = 0.0
 
     def report(done: int, total: int, keyframes: int) -> None:

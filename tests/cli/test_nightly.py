@@ -161,8 +161,8 @@ def test_force(manifest, first, tmp_path, capsys):
         (["kuemmerle", "-o", "out"], 2, "nightly: kuemmerle has no logs of its own; give their folder with"),
         (["kuemmerle", "-o", "out", "--data", "nowhere"], 66, "--data nowhere: is no folder; give that"),
         (["fine.toml", "-o", "no/out"], 73, "no/out: the folder no does not exist; create it first"),
-        (["fine.toml", "-o", "fine.toml"], 73, "fine.toml: is no folder; name one, or a new one"),
-        (["fine.toml", "-o", "out", "--scheduler", "x"], 2, "--scheduler x: is no address of the form tcp://"),
+        (["fine.toml", "-o", "fine.toml"], 73, "fine.toml: is not a folder; name another"),
+        (["fine.toml", "-o", "out", "--scheduler", "x"], 2, "--scheduler x: is not an address of the form tcp://"),
         (["fine.toml"], 2, "nightly: Missing option --output"),
     ],
 )  # fmt: skip

@@ -75,7 +75,7 @@ def test_a_worker_with_another_version_is_named(scheduler, small, monkeypatch):
     monkeypatch.setattr(dask_executor, "tool_key", lambda: "9.9.9-0")
     task = Task.of(read_manifest(str(small), None)[0])
     ((_task, outcome),) = dask_executor.run_on_dask([task], scheduler, None, lambda *_: None)
-    assert "another nscan-cli" in outcome.result["reason"]
+    assert "a Dask worker has nscan-cli" in outcome.result["reason"]
     assert "in place of 9.9.9-0; install the same" in outcome.result["reason"]
 
 
@@ -86,5 +86,5 @@ def test_no_scheduler(monkeypatch):
         address = f"tcp://127.0.0.1:{port.getsockname()[1]}"
         with pytest.raises(InputMissingError, match="no Dask scheduler answers there"):
             next(dask_executor.run_on_dask([], address, None, lambda *_: None), None)
-    with pytest.raises(WrongUsageError, match="no address of the form tcp://HOST:PORT"):
+    with pytest.raises(WrongUsageError, match="not an address of the form tcp://HOST:PORT"):
         next(dask_executor.run_on_dask([], "here", None, lambda *_: None), None)

@@ -41,7 +41,7 @@ def test_all_lies_inside():
     dots = classes(svg, "dot")
     assert len(dots) == MAX_RUNS
     assert all(0 <= float(dot.get("cx")) <= 340 and 0 <= float(dot.get("cy")) <= 96 for dot in dots)
-    assert svg[-1].text == "59 nights"
+    assert svg[-1].text == "59 runs"
 
 
 def test_without_any_errors_there_is_still_a_plot():

@@ -104,7 +104,7 @@ def test_the_top_says_whether_the_night_was_good(pages):
     assert "<h1>All 3 logs are good</h1>" in pages["good"]
     assert 'class="look"' not in pages["good"]
     assert '<section class="banner failed">' in pages["bad"]
-    assert "<h1>Not good: of 5 logs 2 failed</h1>" in pages["bad"]
+    assert "<h1>Not good: of 5 logs, 2 failed</h1>" in pages["bad"]
     assert pages["bad"].index('class="look"') < pages["bad"].index("<table>")
 
 
@@ -149,5 +149,5 @@ def test_a_failed_log_has_no_figures_in_the_overview_and_its_last_good_map_below
     assert [len(error) for error in errors] == [1, 1, 1, 0, 0]
     # What never was there has its few words at the end alone.
     assert "One more log is not there" in pages["bad"]
-    assert pages["bad"].count("Below: the last night that was done.") == 1
+    assert pages["bad"].count("Below: the last run that did not fail.") == 1
     assert pages["bad"].count("data:image/png") == 4

@@ -59,7 +59,7 @@ def test_two_at_once_in_one_folder_are_refused(small, tmp_path, capsys):
     folder = tmp_path / "nights"
     with locked_folder(str(folder)):
         assert run(["nightly", str(small), "-o", str(folder)]) == 73
-    assert "another nightly is at work there" in capsys.readouterr().err
+    assert "another nightly is running there" in capsys.readouterr().err
 
 
 def test_what_was_half_written_is_cleared_away(small, undisturbed, tmp_path):

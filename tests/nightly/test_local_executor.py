@@ -48,7 +48,7 @@ def outcomes(*arguments: Any) -> dict[str, Outcome]:
 
 def test_a_log_that_never_ends_is_stopped(endless, scratch):
     found = outcomes([endless], 2, 0.5, scratch, nothing)
-    assert found["endless"].result == {"reason": "stopped after 0.5 s, see --timeout"}
+    assert found["endless"].result == {"reason": "timed out after 0.5 s; see --timeout"}
     assert found["endless"].files == {}
     assert list(scratch.iterdir()) == []
 

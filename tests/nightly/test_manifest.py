@@ -39,7 +39,7 @@ def test_a_log_with_paths_relative_to_the_manifest(tmp_path):
 
 def test_paths_relative_to_data(tmp_path):
     data = tmp_path / "data"
-    with pytest.raises(InputMissingError, match="is no folder"):
+    with pytest.raises(InputMissingError, match="is not a folder"):
         read(tmp_path, INTEL, str(data))
     data.mkdir()
     (entry,) = read(tmp_path, INTEL, str(data))
@@ -104,14 +104,14 @@ def test_parameters_are_options_of_slam(tmp_path):
     ("text", "message"),
     [
         ("[[log]\n", "night.toml: not TOML: .*; mend it"),
-        ("", "night.toml: has no logs; begin each with"),
+        ("", "night.toml: has no logs; add a"),
         ("log = 3", "night.toml: has no logs"),
         ("[[logs]]", "night.toml: has an unknown key 'logs'; a manifest has"),
-        ("[[log]]", "night.toml, log 1: has no name; letters"),
-        ('[[log]]\nname = "../up"', "log 1: '../up' is no name"),
-        ('[[log]]\nname = "Report.html"', "'Report.html' is no name"),
+        ("[[log]]", "night.toml, log 1: has no name; use letters"),
+        ('[[log]]\nname = "../up"', "log 1: '../up' is not a name"),
+        ('[[log]]\nname = "Report.html"', "'Report.html' is not a name"),
         ('[[log]]\nname = "a"\npth = "x"', r"log 1 \(a\): has an unknown key 'pth'; known: name, path"),
-        ('[[log]]\nname = "a"\n[[log]]\nname = "A"', "two logs have the name A; give each its own"),
+        ('[[log]]\nname = "a"\n[[log]]\nname = "A"', "two logs have the name A; rename one"),
         ('[[log]]\nname = "a"\npath = 3', "path is 3; give a text"),
         ('[[log]]\nname = "a"\noptional = "yes"', "optional is 'yes'; give true or false"),
         ('[[log]]\nname = "a"\nalso = ["../b"]', "also is .*; give names of files without their endings"),
@@ -120,11 +120,14 @@ def test_parameters_are_options_of_slam(tmp_path):
             "max_translation is -1; give a number",
         ),
         ('[[log]]\nname = "a"\nrelations = "r"\nmax_rotation = nan', "max_rotation is nan; give a number"),
-        ('[[log]]\nname = "a"\nmax_rotation = 1', "has max_rotation, but nothing to measure against; give"),
-        ('[[log]]\nname = "a"\nrelations = "r"\nreference = "t"', "has relations and reference; leave one"),
+        (
+            '[[log]]\nname = "a"\nmax_rotation = 1',
+            "has max_rotation, but neither relations nor reference; add",
+        ),
+        ('[[log]]\nname = "a"\nrelations = "r"\nreference = "t"', "has relations and reference; remove one"),
         ('[[log]]\nname = "a"\nrelations = "r"\npublished = { x = "1" }', "published is .*; give errors in"),
         ('[[log]]\nname = "a"\nsha256 = "12"', "sha256 is '12'; give 64 hexadecimal digits"),
-        ('[[log]]\nname = "a"\nrelations_source = "x"', "has relations_source, but no relations; give"),
+        ('[[log]]\nname = "a"\nrelations_source = "x"', "has relations_source, but no relations; add"),
         (
             '[[log]]\nname = "a"\nparameters = { topics = "x" }',
             "unknown key 'topics'; known: allow-corrected",

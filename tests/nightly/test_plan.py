@@ -202,14 +202,14 @@ def test_why_a_log_is_made_anew(entry, nights, tmp_path, monkeypatch):
     (nights / "a" / "map.png").unlink()
     assert why(entry, nights)[-1] == "results were missing or changed"
     entry = replace(entry, inputs={"log": entry.inputs["log"].rename(tmp_path / "b.log")})
-    assert why(entry, nights)[:2] == ["the log is called b.log, no longer a.log", "the reference is gone"]
+    assert why(entry, nights)[:2] == ["the log was renamed from a.log to b.log", "the reference was removed"]
     night(entry, nights, Outcome.failed("no room"))
-    assert why(entry, nights)[-1] == "it failed the night before"
+    assert why(entry, nights)[-1] == "the last run failed"
     night(entry, nights, good())
     for module in (fingerprint, plan_module):
         monkeypatch.setattr(module, "tool_key", lambda: "9.0.0-00")
     (reason,) = why(entry, nights)
-    assert re.fullmatch(r"the code of nscan-cli has changed: 9\.0\.0, no longer [\d.]+\w*", reason)
+    assert re.fullmatch(r"the code of nscan-cli has changed from version [\d.]+\w* to 9\.0\.0", reason)
 
 
 def test_a_history_of_before_this_was_noted(entry, nights):
@@ -220,7 +220,7 @@ def test_a_history_of_before_this_was_noted(entry, nights):
     file.write_text(json.dumps(line) + "\n")
     assert why(entry, nights) == ["nothing to do"]
     entry.inputs["log"].write_text("b")
-    assert why(entry, nights) == ["the log, what it is measured against, or its parameters have changed"]
+    assert why(entry, nights) == ["the log, its reference or its parameters have changed"]
 
 
 def test_the_largest_log_is_begun_first(nights, tmp_path):

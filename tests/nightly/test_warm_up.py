@@ -115,5 +115,5 @@ def test_what_is_not_timed_is_said(tmp_path, capsys):
     PlainProgress(False).finished(entry, night)
     assert capsys.readouterr().err == "a: not timed: kernels were compiled meanwhile\n"
     text = log_section(check_log(entry, [night], [], absent=False), tmp_path)
-    assert '<span class="time">not timed: kernels were compiled meanwhile</span>' in text
-    assert '<span class="time">2026-11-21 03:00:00 UTC, anew: the log has changed</span>' in text
+    assert '<span class="time">not timed: kernels were compiled during the run</span>' in text
+    assert '<span class="time">2026-11-21 03:00:00 UTC; run again: the log has changed</span>' in text
