@@ -104,7 +104,7 @@ def test_failures_have_their_reasons_and_code_3(manifest, first, tmp_path, capsy
     assert two.startswith("nscan-cli: two: RMSE of the ATE 0.")
     assert two.endswith(" m is above 0 m")
     assert four == ("nscan-cli: four: four.log.gz is not there; download from https://example.org/four.log")
-    assert last == f"nscan-cli: Not good: of 4 logs 2 failed, 1 above bound; see {folder}/report.html"
+    assert last == f"nscan-cli: Not good: of 4 logs, 2 failed, 1 above bound; see {folder}/report.html"
     document = report(folder)
     assert document["good"] is False
     assert [log["status"] for log in document["logs"]] == ["failed", "above", "good", "failed", "absent"]
@@ -159,7 +159,7 @@ def test_force(manifest, first, tmp_path, capsys):
         (["bad.toml", "-o", "out"], 65, "bad.toml, log 1 (a): has an unknown key 'pth'; known: name, path,"),
         (["empty.toml", "-o", "out"], 66, "empty.toml: none of its logs was found, such as a.log.gz; give"),
         (["kuemmerle", "-o", "out"], 2, "nightly: kuemmerle has no logs of its own; give their folder with"),
-        (["kuemmerle", "-o", "out", "--data", "nowhere"], 66, "--data nowhere: is no folder; give that"),
+        (["kuemmerle", "-o", "out", "--data", "nowhere"], 66, "--data nowhere: is not a folder; give the folder"),
         (["fine.toml", "-o", "no/out"], 73, "no/out: the folder no does not exist; create it first"),
         (["fine.toml", "-o", "fine.toml"], 73, "fine.toml: is not a folder; name another"),
         (["fine.toml", "-o", "out", "--scheduler", "x"], 2, "--scheduler x: is not an address of the form tcp://"),
@@ -186,7 +186,7 @@ def test_where_no_log_of_ones_own_is_there_the_night_has_failed_and_the_report_s
     assert run(["nightly", str(tmp_path / "own.toml"), "-o", str(tmp_path / "nights"), "-q"]) == 3
     first, last = capsys.readouterr().err.splitlines()
     assert first == "nscan-cli: a: a.log.gz is not there"
-    assert last == f"nscan-cli: Not good: of 1 log 1 failed; see {tmp_path}/nights/report.html"
+    assert last == f"nscan-cli: Not good: of 1 log, 1 failed; see {tmp_path}/nights/report.html"
     assert [log["status"] for log in report(tmp_path / "nights")["logs"]] == ["failed", "absent"]
 
 

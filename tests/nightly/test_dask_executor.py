@@ -76,7 +76,7 @@ def test_a_worker_with_another_version_is_named(scheduler, small, monkeypatch):
     task = Task.of(read_manifest(str(small), None)[0])
     ((_task, outcome),) = dask_executor.run_on_dask([task], scheduler, None, lambda *_: None)
     assert "a Dask worker has nscan-cli" in outcome.result["reason"]
-    assert "in place of 9.9.9-0; install the same" in outcome.result["reason"]
+    assert "instead of 9.9.9-0; install the same version" in outcome.result["reason"]
 
 
 def test_no_scheduler(monkeypatch):
