@@ -18,11 +18,11 @@ from nscan_cli.slam.diagnostics.notices import notices
 from nscan_cli.slam.frontend.odometry_checks import frozen_scans, without_jumps
 from nscan_cli.slam.frontend.options import BreakOptions, OdometryCheckOptions
 from tests.data import data_file
-from tests.simulation import trouble
-from tests.slam import troubles
+from tests.simulation import faults
+from tests.slam import trouble_cases
 from tests.slam.drives import round_scene
 from tests.slam.runs import Mapped, mapped
-from tests.slam.troubles import ROUND, Case, errors, without_odometry
+from tests.slam.trouble_cases import ROUND, Case, errors, without_odometry
 
 MENDED = ("3 m without a return", "3 m of nan", "15 m without a return", "3 s of scans dropped",
           "10 s of scans dropped", "laser frozen for 3 m", "laser frozen for 8 m", "odometry reset to 0",
@@ -139,7 +139,7 @@ def test_threads_change_nothing():
 
 
 def test_rooms_alike_are_not_taken_for_one_another():
-    alike = troubles.rooms_alike().record(1).log()
+    alike = trouble_cases.rooms_alike().record(1).log()
     made = Case(alike, len(alike) // 2, len(alike) // 2)
     found = mapped(alike)
     assert max(errors(made, found.graph.poses)) < 0.05
@@ -147,14 +147,14 @@ def test_rooms_alike_are_not_taken_for_one_another():
 
 
 def test_standing_still_makes_no_keyframes():
-    graph = mapped(troubles.standing(600)).graph
+    graph = mapped(trouble_cases.standing(600)).graph
     assert graph.keyframes.tolist() == [0]
     assert np.abs(graph.poses[:, :2]).max() < 0.02
 
 
 def test_someone_in_the_way_for_half_a_second_breaks_nothing():
     """In three scans all is hidden by something at 0.5 m; then the robot sees what it saw before."""
-    at = troubles.at_metre(log(), 30.0)
+    at = trouble_cases.at_metre(log(), 30.0)
     ranges = log().ranges.copy()
     ranges[at : at + 3] = 0.5
     found = mapped(dataclasses.replace(log(), ranges=ranges))
@@ -205,14 +205,14 @@ def test_a_pause_in_which_the_robot_drove_on_is_believed():
 
 
 def test_a_laser_hangs_only_if_the_robot_moves():
-    moves = trouble.frozen(log(), slice(40, 45))
+    moves = faults.frozen(log(), slice(40, 45))
     assert frozen_scans(moves, moves.odometry, CHECKS).tolist() == list(range(40, 45))
     assert frozen_scans(moves, None, CHECKS).tolist() == []
     assert moves.odometry is not None
     stands = np.repeat(moves.odometry[:1], len(moves), axis=0)
     assert frozen_scans(moves, stands, CHECKS).tolist() == []
     # Where nothing is met, nothing repeats.
-    assert frozen_scans(trouble.blind(log(), slice(40, 45)), moves.odometry, CHECKS).tolist() == []
+    assert frozen_scans(faults.blind(log(), slice(40, 45)), moves.odometry, CHECKS).tolist() == []
 
 
 # ----------------------------------------------------------------------------- real logs
@@ -225,7 +225,7 @@ def test_a_real_log_whose_robot_was_kidnapped():
     clean = mapped(real).graph
     real = dataclasses.replace(real, truth_times=real.times, truth=clean.poses)
     path = float(np.hypot(*np.diff(clean.poses[:, :2], axis=0).T).sum())
-    made = troubles.kidnapped(real, path, 0.2 * path, 0.9 * path)
+    made = trouble_cases.kidnapped(real, path, 0.2 * path, 0.9 * path)
     found = mapped(made.log)
     assert found.state.breaks == [made.before]
     assert max(errors(made, found.graph.poses)) < 0.05

@@ -19,34 +19,34 @@ from nscan_cli.logs.load import read_log
 from nscan_cli.logs.reading_options import ReadingOptions
 from nscan_cli.slam.diagnostics.notices import notices
 from tests.data import find_data
-from tests.slam import troubles
+from tests.slam import trouble_cases
 from tests.slam.drives import round_scene
 from tests.slam.runs import mapped
-from tests.slam.troubles import ROUND, Case, Make, errors, without_odometry
+from tests.slam.trouble_cases import ROUND, Case, Make, errors, without_odometry
 
 REAL: dict[str, tuple[ReadingOptions, dict[str, Make]]] = {
     "mit-csail": (
         ReadingOptions(),
         {
             "none": ROUND["none"],
-            "3 m without a return": lambda log: troubles.blind(log, 200, 203),
-            "5 s of scans dropped": lambda log: troubles.dropped(log, 200, 205),
-            "carried by 10 m": lambda log: troubles.carried(log, 200, 210),
-            "kidnapped to a place seen before": lambda log: troubles.kidnapped(log, 200, 20, 120),
-            "laser frozen for 5 m": lambda log: troubles.frozen(log, 200, 205),
-            "odometry reset to 0": lambda log: troubles.odometry_reset(log, 200),
-            "odometry wraps round": lambda log: troubles.odometry_wrapped(log, 100),
-            "clock set back by 30 s": lambda log: troubles.clock_jump(log, 200, -30.0),
+            "3 m without a return": lambda log: trouble_cases.blind(log, 200, 203),
+            "5 s of scans dropped": lambda log: trouble_cases.dropped(log, 200, 205),
+            "carried by 10 m": lambda log: trouble_cases.carried(log, 200, 210),
+            "kidnapped to a place seen before": lambda log: trouble_cases.kidnapped(log, 200, 20, 120),
+            "laser frozen for 5 m": lambda log: trouble_cases.frozen(log, 200, 205),
+            "odometry reset to 0": lambda log: trouble_cases.odometry_reset(log, 200),
+            "odometry wraps round": lambda log: trouble_cases.odometry_wrapped(log, 100),
+            "clock set back by 30 s": lambda log: trouble_cases.clock_jump(log, 200, -30.0),
         },
     ),
     "intel": (
         ReadingOptions(end=900.0),
         {
             "none": ROUND["none"],
-            "carried by 10 m": lambda log: troubles.carried(log, 100, 110),
-            "kidnapped to a place seen before": lambda log: troubles.kidnapped(log, 130, 10, 100),
-            "laser frozen for 5 m": lambda log: troubles.frozen(log, 100, 105),
-            "odometry reset to 0": lambda log: troubles.odometry_reset(log, 100),
+            "carried by 10 m": lambda log: trouble_cases.carried(log, 100, 110),
+            "kidnapped to a place seen before": lambda log: trouble_cases.kidnapped(log, 130, 10, 100),
+            "laser frozen for 5 m": lambda log: trouble_cases.frozen(log, 100, 105),
+            "odometry reset to 0": lambda log: trouble_cases.odometry_reset(log, 100),
         },
     ),
 }
@@ -97,7 +97,7 @@ def _without(make: Make) -> Make:
 
 
 def _standing(scans: int) -> None:
-    log = troubles.standing(scans)
+    log = trouble_cases.standing(scans)
     began = time.process_time()
     graph = mapped(log).graph
     seconds = time.process_time() - began
@@ -116,7 +116,7 @@ def main() -> None:
     blind = {name: make for name, make in ROUND.items() if not name.startswith("odometry")}
     without = {name: _without(make) for name, make in blind.items()}
     _table("without odometry", log, without)
-    alike = troubles.rooms_alike().record(1).log()
+    alike = trouble_cases.rooms_alike().record(1).log()
     _table("two rooms alike", alike, {"driven from one to the other": ROUND["none"]})
     _standing(36_000)
     for name, (reading, cases) in REAL.items():

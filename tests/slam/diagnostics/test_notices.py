@@ -19,7 +19,7 @@ from nscan_cli.slam.options import SlamOptions
 from tests.data import data_file
 from tests.slam.drives import round_scene
 from tests.slam.runs import mapped
-from tests.slam.troubles import ROUND, without_odometry
+from tests.slam.trouble_cases import ROUND, without_odometry
 
 
 @functools.cache

@@ -15,7 +15,7 @@ from nscan_cli.slam.frontend.options import ViewSimilarityOptions
 from nscan_cli.slam.frontend.view_similarity import view_similarity
 from tests.slam.drives import round_scene
 from tests.slam.runs import mapped, mapped_real
-from tests.slam.troubles import ROUND, without_odometry
+from tests.slam.trouble_cases import ROUND, without_odometry
 
 SIMILARITY = ViewSimilarityOptions()
 SECTORS = SIMILARITY.sectors

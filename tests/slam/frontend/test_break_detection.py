@@ -12,7 +12,7 @@ from nscan_cli.slam.frontend.options import BreakOptions, TrackingOptions
 from nscan_cli.slam.frontend.scan_batch import ScanBatch
 from tests.slam.drives import round_scene
 from tests.slam.runs import part, sensed_in
-from tests.slam.troubles import carried, standing
+from tests.slam.trouble_cases import carried, standing
 
 
 @functools.cache

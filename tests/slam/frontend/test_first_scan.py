@@ -15,7 +15,7 @@ from nscan_cli.slam.frontend.options import BreakOptions, TrackingOptions
 from tests.simulation.scenes import office
 from tests.slam.drives import round_scene
 from tests.slam.runs import found_of, office_log, part, sensed, sensed_in, tracked, truth_of
-from tests.slam.troubles import carried
+from tests.slam.trouble_cases import carried
 
 SCANS = 120
 

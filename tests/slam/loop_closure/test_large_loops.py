@@ -15,9 +15,9 @@ from nscan_cli.slam.loop_closure.options import LoopClosureOptions
 from nscan_cli.slam.options import Relations, SlamOptions
 from tests.data import data_file
 from tests.slam.drives import slipped_round
-from tests.slam.keyframes.test_relations import rmse
 from tests.slam.runs import Mapped, mapped, truth_of
-from tests.slam.troubles import rmse_of
+from tests.slam.test_relation_kinds import rmse
+from tests.slam.trouble_cases import rmse_of
 
 ALONG, ACROSS, ASLANT = (2.5, 0.0, 0.0), (0.0, 2.5, 0.0), (-2.5, 1.0, 0.05)
 ASIDE = (1.0, 2.0, -0.05)

@@ -10,7 +10,7 @@ import numpy as np
 
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.poses import Array
-from tests.simulation import trouble
+from tests.simulation import faults
 from tests.simulation.scenes import Scene, office
 from tests.simulation.world import Builder
 from tests.slam.drives import path_of
@@ -60,43 +60,43 @@ def at_metre(log: LaserLog, metre: float) -> int:
 
 def blind(log: LaserLog, since: float, until: float, reading: float = np.inf) -> Case:
     a, b = at_metre(log, since), at_metre(log, until)
-    return Case(trouble.blind(log, slice(a, b), reading), a, b)
+    return Case(faults.blind(log, slice(a, b), reading), a, b)
 
 
 def dropped(log: LaserLog, since: float, until: float) -> Case:
     a, b = at_metre(log, since), at_metre(log, until)
-    return Case(trouble.dropped(log, slice(a, b)), a, a)
+    return Case(faults.dropped(log, slice(a, b)), a, a)
 
 
 def carried(log: LaserLog, since: float, until: float) -> Case:
     a, b = at_metre(log, since), at_metre(log, until)
-    return Case(trouble.carried(log, slice(a, b)), a, a)
+    return Case(faults.carried(log, slice(a, b)), a, a)
 
 
 def kidnapped(log: LaserLog, at: float, since: float, until: float) -> Case:
     """Lifted after so many metres, and put down where it has been, to drive the same way again."""
     a, b, c = (at_metre(log, metre) for metre in (at, since, until))
-    return Case(trouble.spliced([trouble.taken(log, slice(0, a)), trouble.taken(log, slice(b, c))]), a, a)
+    return Case(faults.spliced([faults.taken(log, slice(0, a)), faults.taken(log, slice(b, c))]), a, a)
 
 
 def frozen(log: LaserLog, since: float, until: float) -> Case:
     a, b = at_metre(log, since), at_metre(log, until)
-    return Case(trouble.frozen(log, slice(a, b)), a, b)
+    return Case(faults.frozen(log, slice(a, b)), a, b)
 
 
 def odometry_reset(log: LaserLog, at: float) -> Case:
     row = at_metre(log, at)
-    return Case(trouble.odometry_reset(log, row), row, row)
+    return Case(faults.odometry_reset(log, row), row, row)
 
 
 def odometry_jump(log: LaserLog, at: float) -> Case:
     row = at_metre(log, at)
-    return Case(trouble.odometry_jump(log, row, (30.0, 5.0, 2.0)), row, row)
+    return Case(faults.odometry_jump(log, row, (30.0, 5.0, 2.0)), row, row)
 
 
 def odometry_spike(log: LaserLog, at: float) -> Case:
     row = at_metre(log, at)
-    return Case(trouble.odometry_spike(log, row, (300.0, 5.0, 2.0)), row, row + 1)
+    return Case(faults.odometry_spike(log, row, (300.0, 5.0, 2.0)), row, row + 1)
 
 
 def odometry_wrapped(log: LaserLog, at: float) -> Case:
@@ -104,12 +104,12 @@ def odometry_wrapped(log: LaserLog, at: float) -> Case:
     assert log.odometry is not None
     row = at_metre(log, at)
     limit = float(np.abs(log.odometry[:row, :2]).max())
-    return Case(trouble.odometry_wrapped(log, limit), row, row)
+    return Case(faults.odometry_wrapped(log, limit), row, row)
 
 
 def clock_jump(log: LaserLog, at: float, seconds: float) -> Case:
     row = at_metre(log, at)
-    jumped = trouble.clock_jump(log, row, seconds)
+    jumped = faults.clock_jump(log, row, seconds)
     # Set back by more than the log lasts, what was recorded last comes first.
     first = int(np.argmax(np.abs(np.diff(jumped.times)))) + 1 if abs(seconds) > 1000.0 else row
     return Case(jumped, first, first)
@@ -124,16 +124,16 @@ BESIDE = np.array([(9.0, 7.0, 31.0, 8.0)])
 
 
 def passing_people(log: LaserLog) -> Case:
-    return _throughout(trouble.people(log, PASSING))
+    return _throughout(faults.people(log, PASSING))
 
 
 def someone_beside(log: LaserLog) -> Case:
-    return _throughout(trouble.people(log, BESIDE))
+    return _throughout(faults.people(log, BESIDE))
 
 
 def glass(log: LaserLog) -> Case:
     """The northern wall of the northern corridor is seen nearly head-on only."""
-    return _throughout(trouble.glass(log, (0.0, 40.0), (17.5, 19.0), 0.3))
+    return _throughout(faults.glass(log, (0.0, 40.0), (17.5, 19.0), 0.3))
 
 
 def _throughout(log: LaserLog) -> Case:
@@ -159,7 +159,7 @@ ROUND: dict[str, Make] = {
     "carried by 10 m": lambda log: carried(log, 20, 30),
     "carried by 30 m": lambda log: carried(log, 20, 50),
     "carried by 30 m, nothing seen again": lambda log: carried(
-        trouble.taken(log, slice(0, at_metre(log, 64))), 20, 50
+        faults.taken(log, slice(0, at_metre(log, 64))), 20, 50
     ),
     "kidnapped to a place seen before": lambda log: kidnapped(log, 45, 5, 35),
     "laser frozen for 3 m": lambda log: frozen(log, 40, 43),
@@ -180,7 +180,7 @@ ROUND: dict[str, Make] = {
 def standing(scans: int) -> LaserLog:
     """A robot that stands in the office; its readings are drawn from 500 that were simulated."""
     log = office().record_at(np.repeat(office().truth()[1900:1901], 500, axis=0), seed=2).log()
-    chosen = trouble.taken(log, np.random.default_rng(1).integers(0, 500, scans))
+    chosen = faults.taken(log, np.random.default_rng(1).integers(0, 500, scans))
     times = 0.1 * np.arange(scans, dtype=np.float64)
     return dataclasses.replace(chosen, times=times, stamps=tuple(f"{time:.6f}" for time in times))
 
