@@ -22,7 +22,7 @@ from nscan_cli.cli.subcommand import (
 )
 from nscan_cli.files.limits import ALL, Limit
 from nscan_cli.files.outputs import write_atomically
-from nscan_cli.logs.formats import readable
+from nscan_cli.logs.formats import readable_forms
 
 HEAD = """\
 # Reference
@@ -33,7 +33,7 @@ commands by `python -m tests.reference docs/reference.md`; do not edit it.
 GENERAL = f"""\
 `nscan-cli COMMAND [OPTIONS] ARGUMENTS`, or `python -m nscan_cli`. Options may stand before and after
 arguments. The format of a log is detected from its content, never from its name:
-{readable()}. `-` is standard input or output.
+{readable_forms()}. `-` is standard input or output.
 
 Scans are numbered from 0 in order of time, and have the same numbers in every command. Lengths are metres,
 times seconds, angles radians in files and degrees on the command line and in tables. A pose is x, y and the

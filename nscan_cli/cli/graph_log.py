@@ -14,7 +14,7 @@ from nscan_cli.files.counting import counted
 from nscan_cli.files.limits import DISTANCE
 from nscan_cli.files.provenance import is_made_from
 from nscan_cli.files.text import name_of_path, path_of_name
-from nscan_cli.logs.log_files import BESIDE
+from nscan_cli.logs.log_files import JOURNAL_SUFFIXES
 from nscan_cli.logs.reading_options import ReadingOptions
 
 if TYPE_CHECKING:
@@ -72,7 +72,7 @@ def find_log(graph_file: str, graph: Graph) -> tuple[str, ...]:
     sizes = {
         Path(source["name"]).name: source["bytes"]
         for source in inputs
-        if not any(source["name"] == base + end for base in bases for end in BESIDE)
+        if not any(source["name"] == base + end for base in bases for end in JOURNAL_SUFFIXES)
     }
     for folder in (Path(graph_file).parent, Path()):
         files = [_file_named(name, folder) for name in sizes]

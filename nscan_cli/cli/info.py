@@ -54,7 +54,7 @@ def facts_of(log: LaserLog) -> dict[str, Any]:
 
     from nscan_cli.logs.field_of_view import beams_lost, field_of_view
 
-    fewest, beams = (int(count) for count in (log.own_beams().min(), log.own_beams().max()))
+    fewest, beams = (int(count) for count in (log.beam_counts().min(), log.beam_counts().max()))
     steps = np.diff(log.times)
     duration = float(log.times[-1] - log.times[0])
     first, last, step = (math.degrees(angle) for angle in field_of_view(log))

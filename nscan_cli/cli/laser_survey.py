@@ -11,7 +11,7 @@ from nscan_cli.files.counting import counted
 from nscan_cli.logs.reading_options import ReadingOptions
 
 if TYPE_CHECKING:
-    from nscan_cli.logs.choices import Device, OpenChoiceError
+    from nscan_cli.logs.device_choice import Device, OpenChoiceError
     from nscan_cli.logs.laser_log import LaserLog
     from nscan_cli.logs.recordings.mounting import MountingError
 
@@ -73,7 +73,7 @@ def survey_of(paths: Sequence[str], reading: ReadingOptions) -> Survey:
     Raises what read_log raises, except for open choices, corrected poses, mountings that are refused, and
     logs without usable readings.
     """
-    from nscan_cli.logs.choices import OpenChoiceError
+    from nscan_cli.logs.device_choice import OpenChoiceError
     from nscan_cli.logs.recordings.mounting import MountingError
 
     read = _reader(paths)
@@ -146,7 +146,7 @@ def _laser_facts(
                 alone = dataclasses.replace(alone, mount=ZERO_MOUNT)
     except NscanError as error:
         return facts | {"problem": str(error)}
-    return facts | {"scans": len(log), "beams": int(log.own_beams().max()), "rate": rate_of(log)}
+    return facts | {"scans": len(log), "beams": int(log.beam_counts().max()), "rate": rate_of(log)}
 
 
 def _device_facts(device: Device) -> dict[str, Any]:

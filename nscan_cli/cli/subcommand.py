@@ -13,7 +13,7 @@ from click.core import ParameterSource
 
 from nscan_cli.cli.usage_errors import value_problem
 from nscan_cli.errors import WrongUsageError
-from nscan_cli.logs.formats import readable
+from nscan_cli.logs.formats import readable_forms
 
 CONTEXT: dict[str, Any] = {"help_option_names": ["-h", "--help"]}
 # All commands share the prefix, so a shell or a Makefile can set an option for all of them at once.
@@ -121,8 +121,8 @@ log_argument = functools.partial(
     nargs=-1,
     required=True,
     type=PATH,
-    tells=f"A laser log: {readable()}. - is standard input. Several files of one recording, or a folder "
-    "written by `ros2 bag record`, count as one log.",
+    tells=f"A laser log: {readable_forms()}. - is standard input. Several files of one recording, or a "
+    "folder written by `ros2 bag record`, count as one log.",
 )
 
 result_option = option(

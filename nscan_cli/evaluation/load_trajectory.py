@@ -13,12 +13,12 @@ from nscan_cli.graph.io.pose_columns import is_pose_table
 from nscan_cli.graph.io.tum import Trajectory, parse_tum
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.logs.load import (
-    AS_FOUND,
+    DEFAULT_READING,
     content_of,
     log_from,
     read_log,
-    recording_at,
-    recording_in,
+    read_recording,
+    recording_from,
     stored_bytes,
 )
 from nscan_cli.logs.reading_options import ReadingOptions
@@ -26,7 +26,7 @@ from nscan_cli.logs.recordings.pose_topics import poses_on_topic
 
 
 def load_trajectory(
-    path: str, options: ReadingOptions = AS_FOUND, notices: list[str] | None = None
+    path: str, options: ReadingOptions = DEFAULT_READING, notices: list[str] | None = None
 ) -> Trajectory:
     """The poses of all scans of a graph, of a TUM file, or the robot's poses in a (corrected) log.
 
@@ -51,7 +51,7 @@ def load_trajectory(
 
 def load_reference(
     path: str,
-    options: ReadingOptions = AS_FOUND,
+    options: ReadingOptions = DEFAULT_READING,
     notices: list[str] | None = None,
     topic: str | None = None,
 ) -> Trajectory:
@@ -62,10 +62,10 @@ def load_reference(
     name, notices = label(path), [] if notices is None else notices
     stored: FileBytes = b""
     if os.path.isdir(path):
-        recording = recording_at(path, options.salvage)
+        recording = read_recording(path, options.salvage)
     else:
         stored = stored_bytes(path)
-        recording = recording_in(stored, path, options.salvage)
+        recording = recording_from(stored, path, options.salvage)
     if recording is not None:
         notices += [f"{name}: {warning}" for warning in recording.warnings]
         return Trajectory.in_space(*poses_on_topic(recording, topic, name, notices))

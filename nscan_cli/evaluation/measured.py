@@ -11,7 +11,7 @@ from nscan_cli.evaluation.remarks import remarks
 from nscan_cli.evaluation.trajectory_errors import trajectory_errors
 from nscan_cli.files.inputs import base_name, label
 from nscan_cli.graph.io.tum import Trajectory
-from nscan_cli.logs.load import AS_FOUND
+from nscan_cli.logs.load import DEFAULT_READING
 from nscan_cli.logs.reading_options import ReadingOptions
 
 
@@ -31,7 +31,7 @@ def measure(
     relations: str | None,
     reference: str | None,
     worst: int = 0,
-    reading: ReadingOptions = AS_FOUND,
+    reading: ReadingOptions = DEFAULT_READING,
     reference_topic: str | None = None,
 ) -> Measured:
     """The errors of the file `result`, and its `worst` relations.

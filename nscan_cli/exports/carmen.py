@@ -41,7 +41,7 @@ def corrected_log(log: LaserLog, rows: NDArray[np.int64], poses: Array) -> bytes
     limit = _no_return_limit(log, float(greatest))
     nothing = limit if log.no_return is None else max(np.float32(log.no_return), limit)
     first, step = log.angle_min[rows], log.angle_increment[rows]
-    own = log.own_beams()[rows]
+    own = log.beam_counts()[rows]
     plain = greatest < CARMEN_MAX_RANGE and _has_carmen_angles(first, step, own)
     lines = [HEADER, *_param_lines(log, limit, float(step[0]))]
     lasers = log.laser_pose(poses)

@@ -1,1 +1,1 @@
-"""Bytes → scans: one reader a format, found from the content."""
+"""FileBytes → scans: one reader a format, found from the content."""

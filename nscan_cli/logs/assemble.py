@@ -12,14 +12,14 @@ from numpy.typing import NDArray
 from nscan_cli.files.limits import READINGS
 from nscan_cli.files.source import Source
 from nscan_cli.logs.beam_angles import beam_directions
-from nscan_cli.logs.choices import Device
-from nscan_cli.logs.frame_names import AS_USUAL, FrameNames
+from nscan_cli.logs.device_choice import Device
+from nscan_cli.logs.frame_names import DEFAULT_FRAMES, FrameNames
 from nscan_cli.logs.laser_defaults import mark_no_returns
 from nscan_cli.logs.laser_log import LaserLog, LogReport
 from nscan_cli.logs.lost_readings import lost_readings
 from nscan_cli.logs.range_limits import limits_in_force
 from nscan_cli.logs.reading_options import ReadingOptions
-from nscan_cli.logs.scan_order import Order, selection
+from nscan_cli.logs.scan_order import ScanOrder, selected_numbers
 from nscan_cli.logs.skips import Skips
 from nscan_cli.poses import Array
 
@@ -47,7 +47,7 @@ class RawScans:
     beams: NDArray[np.int64] | None = None
     """(S,) how many beams each scan has; None: all have B."""
 
-    def own_beams(self) -> NDArray[np.int64]:
+    def beam_counts(self) -> NDArray[np.int64]:
         """(S,) how many beams each scan has."""
         if self.beams is not None:
             return self.beams
@@ -73,7 +73,7 @@ class Findings:
     odometries: tuple[Device, ...] = ()
     corrected: str = ""
     """As LogReport has them."""
-    frames: FrameNames = AS_USUAL
+    frames: FrameNames = DEFAULT_FRAMES
 
 
 @dataclass(frozen=True)
@@ -85,16 +85,16 @@ class RecordedMotion:
     truth: Array | None = None
 
 
-def empty_table(scans: int, beams: int) -> NDArray[np.float32]:
-    """The readings (S, B) of a log before they are filled in, nan. Raises ExceededError for too many."""
+def empty_scan_table(scans: int, beams: int) -> NDArray[np.float32]:
+    """The readings (S, B) of a log before they are filled in, nan. Raises LimitExceededError for too many."""
     problem = f"has {scans:,} scans of up to {beams:,} beams, {scans * beams:,} readings"
     READINGS.check(scans * beams, problem)
     return np.full((scans, beams), np.nan, dtype=np.float32)
 
 
-def stacked(readings: Sequence[NDArray[Any]]) -> NDArray[np.float32]:
-    """Scans of different lengths as rows (S, B), nan beyond a scan's own beams. Raises ExceededError."""
-    rows = empty_table(len(readings), max(map(len, readings), default=0))
+def scan_table(readings: Sequence[NDArray[Any]]) -> NDArray[np.float32]:
+    """Scans of different lengths as rows (S, B), nan beyond a scan's own beams. Raises LimitExceededError."""
+    rows = empty_scan_table(len(readings), max(map(len, readings), default=0))
     with np.errstate(over="ignore", invalid="ignore"):
         for row, values in zip(rows, readings, strict=True):
             row[: len(values)] = values
@@ -106,7 +106,7 @@ def laser_log(
     form: str,
     laser: str,
     raw: RawScans,
-    times: Order,
+    times: ScanOrder,
     mount: Array,
     motion: RecordedMotion,
     findings: Findings,
@@ -117,14 +117,14 @@ def laser_log(
 
     Raises WrongUsageError when the options leave no scan.
     """
-    numbers = selection(times.times, options, file)
+    numbers = selected_numbers(times.times, options, file)
     rows = times.rows[numbers]
     warnings = findings.warnings
     limits = limits_in_force(raw, options, warnings)
     angle_min, angle_increment = beam_directions(raw, options, warnings)
     findings.used |= {"range_min": limits.low_from, "range_max": limits.high_from}
     ranges = raw.ranges if np.array_equal(rows, np.arange(len(raw.stamps))) else raw.ranges[rows]
-    beams, limits = raw.own_beams()[rows], limits.of(rows)
+    beams, limits = raw.beam_counts()[rows], limits.of(rows)
     lost = lost_readings(ranges, beams, limits, file)
     mark_no_returns(ranges, limits.low, limits.high)
     odometry = motion.odometry

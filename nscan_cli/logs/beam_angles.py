@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from nscan_cli.files.counting import counted
 from nscan_cli.logs.reading_options import ReadingOptions
-from nscan_cli.logs.wall_straightness import straighter
+from nscan_cli.logs.wall_straightness import second_is_straighter
 from nscan_cli.poses import Array
 
 if TYPE_CHECKING:
@@ -45,7 +45,7 @@ def _steps(raw: RawScans, warnings: list[str]) -> Array:
     steps = raw.angle_increment
     if raw.angle_max is None:
         return steps
-    between = raw.own_beams() - 1
+    between = raw.beam_counts() - 1
     view = raw.angle_max - raw.angle_min
     with np.errstate(divide="ignore", invalid="ignore"):
         others = view / between
@@ -55,7 +55,7 @@ def _steps(raw: RawScans, warnings: list[str]) -> Array:
         return steps
     step, other, turn = steps[rows[0]], others[rows[0]], abs(steps[rows[0]]) * between[rows[0]]
     some = rows[:: -(-len(rows) // LOOKED_AT)]
-    straight = straighter(raw.ranges[some], steps[some], others[some])
+    straight = second_is_straighter(raw.ranges[some], steps[some], others[some])
     if straight is not None:
         last, why = straight, "walls are straight with"
     else:

@@ -1,4 +1,4 @@
-"""Bytes that are compressed whole: how each kind is known, and unpacked piece by piece."""
+"""FileBytes that are compressed whole: how each kind is known, and unpacked piece by piece."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ from nscan_cli.files.inputs import FileBytes
 from nscan_cli.files.limits import INPUT, LimitExceededError
 
 PIECE = 256
-"""Bytes that are unpacked at once: what goes before damage stays, and no piece becomes large."""
-UNPACKS = "unpacks to more and more"
+"""FileBytes that are unpacked at once: what goes before damage stays, and no piece becomes large."""
+KEEPS_GROWING = "unpacks to more and more"
 
 
-class Packing(NamedTuple):
+class Compression(NamedTuple):
     """A kind of compression of whole files."""
 
     name: str
@@ -55,25 +55,25 @@ def _lz4() -> Any:
     return LZ4FrameDecompressor()
 
 
-GZIP = Packing("gzip", b"\x1f\x8b", _gzip, "gunzip")
-BZIP2 = Packing("bzip2", b"BZh", _bzip2, "bunzip2")
-XZ = Packing("xz", b"\xfd7zXZ\0", _xz, "unxz")
-ZSTD = Packing("zstd", b"\x28\xb5\x2f\xfd", _zstd, "unzstd")
-LZ4 = Packing("lz4", b"\x04\x22\x4d\x18", _lz4, "unlz4")
-PACKINGS = (GZIP, BZIP2, XZ, ZSTD, LZ4)
+GZIP = Compression("gzip", b"\x1f\x8b", _gzip, "gunzip")
+BZIP2 = Compression("bzip2", b"BZh", _bzip2, "bunzip2")
+XZ = Compression("xz", b"\xfd7zXZ\0", _xz, "unxz")
+ZSTD = Compression("zstd", b"\x28\xb5\x2f\xfd", _zstd, "unzstd")
+LZ4 = Compression("lz4", b"\x04\x22\x4d\x18", _lz4, "unlz4")
+COMPRESSIONS = (GZIP, BZIP2, XZ, ZSTD, LZ4)
 SUFFIXES = (".gz", ".bz2", ".xz", ".zst", ".zstd", ".lz4")
 """What names of compressed files end with."""
 
 
-def packing_of(data: FileBytes) -> Packing | None:
+def compression_of(data: FileBytes) -> Compression | None:
     """How the data are compressed; None when they are not."""
-    return next((packing for packing in PACKINGS if data[: len(packing.magic)] == packing.magic), None)
+    return next((packing for packing in COMPRESSIONS if data[: len(packing.magic)] == packing.magic), None)
 
 
-def unpacked(stored: bytes, packing: Packing) -> tuple[bytes, str | None]:
+def decompressed(stored: bytes, packing: Compression) -> tuple[bytes, str | None]:
     """The content as far as it can be unpacked, and what is wrong with the rest; None when nothing is.
 
-    Compressed data may follow one another. Raises ExceededError when it is too much.
+    Compressed data may follow one another. Raises LimitExceededError when it is too much.
     """
     content: list[bytes] = []
     size, at, most = 0, 0, INPUT.bytes
@@ -87,7 +87,7 @@ def unpacked(stored: bytes, packing: Packing) -> tuple[bytes, str | None]:
                 content.append(piece)
                 size += len(piece)
                 if size > most:
-                    raise LimitExceededError(INPUT, UNPACKS)
+                    raise LimitExceededError(INPUT, KEEPS_GROWING)
         except LimitExceededError:
             raise
         except Exception as error:

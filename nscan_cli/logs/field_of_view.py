@@ -9,7 +9,7 @@ from nscan_cli.logs.laser_log import LaserLog
 
 def field_of_view(log: LaserLog) -> tuple[float, float, float]:
     """First and last direction and step (rad) of the scan that sees the most with its own beams."""
-    between = log.own_beams() - 1
+    between = log.beam_counts() - 1
     row = int(np.argmax(np.abs(log.angle_increment) * between))
     first, step = float(log.angle_min[row]), float(log.angle_increment[row])
     return first, first + int(between[row]) * step, step
@@ -17,7 +17,7 @@ def field_of_view(log: LaserLog) -> tuple[float, float, float]:
 
 def beams_lost(log: LaserLog) -> tuple[float, float]:
     """The shares of all scans' own beams that are without return, and that are unusable."""
-    total = int(log.own_beams().sum())
+    total = int(log.beam_counts().sum())
     missing = log.ranges.size - total
     unusable = np.count_nonzero(np.isnan(log.ranges)) - missing
     return np.count_nonzero(np.isinf(log.ranges)) / total, unusable / total

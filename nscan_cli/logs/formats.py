@@ -7,7 +7,7 @@ import re
 from typing import Any, NamedTuple
 
 from nscan_cli.files.inputs import FileBytes
-from nscan_cli.logs.compression import packing_of
+from nscan_cli.logs.compression import compression_of
 
 
 class Form(NamedTuple):
@@ -51,12 +51,12 @@ FORMS: tuple[Form, ...] = (
 """In order of trial. A new form of log is a module and a line here."""
 
 
-def readable() -> str:
+def readable_forms() -> str:
     """The forms that are read, as messages name them."""
     return f"{', '.join(form.name for form in FORMS)}; plain or packed by gzip, bzip2, xz, zstd or lz4"
 
 
-class Foreign(NamedTuple):
+class ForeignKind(NamedTuple):
     """What a file is that no log is read from."""
 
     name: str
@@ -67,51 +67,57 @@ class Foreign(NamedTuple):
 
 RENEW = "write it anew by ROS 1's `rosbag filter OLD.bag NEW.bag True`, and give the new one"
 UNPACK = "take the log out of it first"
-MAGIC = (
-    (b"#ROSBAG V", Foreign("a ROS 1 bag of an old version", RENEW)),
-    (b"#ROSRECORD V", Foreign("a ROS 1 bag of an old version", RENEW)),
-    (b"#ROSLOG V", Foreign("a ROS 1 bag of an old version", RENEW)),
+FOREIGN_MAGIC = (
+    (b"#ROSBAG V", ForeignKind("a ROS 1 bag of an old version", RENEW)),
+    (b"#ROSRECORD V", ForeignKind("a ROS 1 bag of an old version", RENEW)),
+    (b"#ROSLOG V", ForeignKind("a ROS 1 bag of an old version", RENEW)),
     (
         b"version https://git-lfs.github.com/spec/",
-        Foreign("a pointer of Git LFS, not the file that it stands for", "fetch that by `git lfs pull`"),
+        ForeignKind("a pointer of Git LFS, not the file that it stands for", "fetch that by `git lfs pull`"),
     ),
     (
         b"\x37\x7f\x06\x82",
-        Foreign("the write-ahead log of an SQLite database", "give the .db3 that it is of"),
+        ForeignKind("the write-ahead log of an SQLite database", "give the .db3 that it is of"),
     ),
     (
         b"\x37\x7f\x06\x83",
-        Foreign("the write-ahead log of an SQLite database", "give the .db3 that it is of"),
+        ForeignKind("the write-ahead log of an SQLite database", "give the .db3 that it is of"),
     ),
     (
         b"\xd9\xd5\x05\xf9\x20\xa1\x63\xd7",
-        Foreign("the journal of an SQLite database", "give the .db3 that it is of"),
+        ForeignKind("the journal of an SQLite database", "give the .db3 that it is of"),
     ),
-    (b"\xd4\xc3\xb2\xa1", Foreign("a capture of network packets (pcap)", "give a recording of laser scans")),
-    (b"\xa1\xb2\xc3\xd4", Foreign("a capture of network packets (pcap)", "give a recording of laser scans")),
+    (
+        b"\xd4\xc3\xb2\xa1",
+        ForeignKind("a capture of network packets (pcap)", "give a recording of laser scans"),
+    ),
+    (
+        b"\xa1\xb2\xc3\xd4",
+        ForeignKind("a capture of network packets (pcap)", "give a recording of laser scans"),
+    ),
     (
         b"\x0a\x0d\x0d\x0a",
-        Foreign("a capture of network packets (pcapng)", "give a recording of laser scans"),
+        ForeignKind("a capture of network packets (pcapng)", "give a recording of laser scans"),
     ),
-    (b"\x89PNG\r\n\x1a\n", Foreign("a PNG picture")),
-    (b"\xff\xd8\xff", Foreign("a JPEG picture")),
-    (b"P5", Foreign("a PGM picture")),
-    (b"%PDF", Foreign("a PDF document")),
-    (b"# .PCD v", Foreign("a point cloud (PCD)")),
-    (b"PK\x03\x04", Foreign("a ZIP archive", f"{UNPACK}, by `unzip`")),
-    (b"7z\xbc\xaf\x27\x1c", Foreign("a 7z archive", f"{UNPACK}, by `7z x`")),
-    (b"Rar!\x1a\x07", Foreign("a RAR archive", f"{UNPACK}, by `unrar x`")),
-    (b"\x1f\x9d", Foreign("compressed by compress", "unpack it first, by `uncompress`")),
-    (b"LZIP", Foreign("compressed by lzip", "unpack it first, by `lzip -d`")),
+    (b"\x89PNG\r\n\x1a\n", ForeignKind("a PNG picture")),
+    (b"\xff\xd8\xff", ForeignKind("a JPEG picture")),
+    (b"P5", ForeignKind("a PGM picture")),
+    (b"%PDF", ForeignKind("a PDF document")),
+    (b"# .PCD v", ForeignKind("a point cloud (PCD)")),
+    (b"PK\x03\x04", ForeignKind("a ZIP archive", f"{UNPACK}, by `unzip`")),
+    (b"7z\xbc\xaf\x27\x1c", ForeignKind("a 7z archive", f"{UNPACK}, by `7z x`")),
+    (b"Rar!\x1a\x07", ForeignKind("a RAR archive", f"{UNPACK}, by `unrar x`")),
+    (b"\x1f\x9d", ForeignKind("compressed by compress", "unpack it first, by `uncompress`")),
+    (b"LZIP", ForeignKind("compressed by lzip", "unpack it first, by `lzip -d`")),
     (
         b"rosbag2_bagfile_information:",
-        Foreign("the metadata of a ROS 2 bag", "give the folder that it is in"),
+        ForeignKind("the metadata of a ROS 2 bag", "give the folder that it is in"),
     ),
-    (b"\x7fELF", Foreign("a program")),
+    (b"\x7fELF", ForeignKind("a program")),
 )
 """What the first bytes say."""
 
-TEXT = (
+FOREIGN_FIRST_LINES = (
     (rb"\[{1,2}[\w.-]+\]{1,2}\s*$", "TOML or INI text"),
     (rb'\{"format": ?"nscan-pose-graph"', "a pose graph (JSON)"),
     (rb"[{\[]", "JSON text"),
@@ -133,27 +139,27 @@ RAWLOG = re.compile(
 """How MRPT begins an object: the length of its class's name, the name, and a version."""
 
 
-def foreign(data: bytes) -> Foreign:
+def foreign_kind(data: bytes) -> ForeignKind:
     """What `data` is; "of an unknown kind" when in doubt."""
-    for magic, found in MAGIC:
+    for magic, found in FOREIGN_MAGIC:
         if data.startswith(magic):
             return found
-    packing = packing_of(data)
+    packing = compression_of(data)
     if packing is not None:
-        return Foreign(f"compressed by {packing.name} twice", f"unpack it once, by `{packing.command}`")
+        return ForeignKind(f"compressed by {packing.name} twice", f"unpack it once, by `{packing.command}`")
     if data[257:262] == b"ustar":
-        return Foreign("a tar archive", f"{UNPACK}, by `tar -x`")
+        return ForeignKind("a tar archive", f"{UNPACK}, by `tar -x`")
     if RAWLOG.match(data):
-        return Foreign("an MRPT .rawlog", "make a ROS bag or a CARMEN log of it first")
+        return ForeignKind("an MRPT .rawlog", "make a ROS bag or a CARMEN log of it first")
     if b"\0" in data[:4096]:
-        return Foreign("binary data of an unknown kind")
+        return ForeignKind("binary data of an unknown kind")
     line = FIRST_LINE.search(data, 0, 1 << 16)
-    for pattern, name in TEXT:
+    for pattern, name in FOREIGN_FIRST_LINES:
         if line and re.match(pattern, line.group(1)):
-            return Foreign(name)
-    return Foreign("of an unknown kind")
+            return ForeignKind(name)
+    return ForeignKind("of an unknown kind")
 
 
-def name_of(data: bytes) -> str:
-    """The name of what `data` is, as in `foreign`."""
-    return foreign(data).name
+def foreign_kind_name(data: bytes) -> str:
+    """The name of what `data` is, as in `foreign_kind`."""
+    return foreign_kind(data).name

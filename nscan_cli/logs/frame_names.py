@@ -22,18 +22,20 @@ class FrameNames:
     odometry: str = "odom"
 
 
-AS_USUAL = FrameNames()
+DEFAULT_FRAMES = FrameNames()
 
 
-def frame_names(laser: str, robot: str, odometry: str, mount: Array) -> FrameNames:
+def distinct_frame_names(laser: str, robot: str, odometry: str, mount: Array) -> FrameNames:
     """The names that a recording has, empty where there is none; the usual ones where they would clash.
 
     A laser in the robot's own frame is at its origin. With another mounting (3,), as the user may give it,
     it gets a frame of its own.
     """
-    names = FrameNames(laser or AS_USUAL.laser, robot or AS_USUAL.robot, odometry or AS_USUAL.odometry)
+    names = FrameNames(
+        laser or DEFAULT_FRAMES.laser, robot or DEFAULT_FRAMES.robot, odometry or DEFAULT_FRAMES.odometry
+    )
     if names.laser == names.robot and mount.any():
-        names = replace(names, laser=AS_USUAL.laser)
+        names = replace(names, laser=DEFAULT_FRAMES.laser)
     count = 3 if names.laser == names.robot else 4
     different = {names.laser, names.robot, names.odometry, MAP}
-    return names if len(different) == count else AS_USUAL
+    return names if len(different) == count else DEFAULT_FRAMES

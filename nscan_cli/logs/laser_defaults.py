@@ -7,7 +7,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from nscan_cli.logs.range_peaks import FEWEST, piled_up
+from nscan_cli.logs.range_peaks import FEWEST, peak_at_limit
 from nscan_cli.poses import Array, relative, wrap
 
 RAD = math.pi / 180
@@ -66,7 +66,7 @@ def _single_value(usable: NDArray[np.float32], largest: float) -> float | None:
     """What no_return_value returns where readings of a wall may lie about, from readings (N,) above 0."""
     values, counts = np.unique(usable[usable > largest - 0.25], return_counts=True)
     value, count = values[counts.argmax()], counts.max()
-    stands_out = piled_up(usable[None], np.array([value], dtype=np.float64), inside=-1, times=10.0)
+    stands_out = peak_at_limit(usable[None], np.array([value], dtype=np.float64), inside=-1, times=10.0)
     if stands_out is None or 10 * np.count_nonzero(usable > value) > count:
         return None
     return _rounded(value) if np.unique(usable[usable < value]).size >= DISTINCT else None

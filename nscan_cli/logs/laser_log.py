@@ -14,11 +14,11 @@ from nscan_cli.errors import InputDataError, WrongUsageError
 from nscan_cli.files.counting import counted
 from nscan_cli.files.source import Source
 from nscan_cli.kernels.decorators import kernel
-from nscan_cli.logs.choices import Device
-from nscan_cli.logs.frame_names import AS_USUAL, FrameNames
+from nscan_cli.logs.device_choice import Device
+from nscan_cli.logs.frame_names import DEFAULT_FRAMES, FrameNames
 from nscan_cli.poses import Array, Indices, compose
 
-TOGETHER = 256
+SCANS_AT_ONCE = 256
 """Scans whose points are computed at once."""
 
 
@@ -100,12 +100,12 @@ class LaserLog:
     """(T,) seconds of the true poses (TRUEPOS), or None."""
     truth: Array | None = None
     """(T, 3) true poses of the robot, or None."""
-    frames: FrameNames = AS_USUAL
+    frames: FrameNames = DEFAULT_FRAMES
 
     def __len__(self) -> int:
         return len(self.stamps)
 
-    def own_beams(self) -> NDArray[np.int64]:
+    def beam_counts(self) -> NDArray[np.int64]:
         """(S,) how many beams each scan has."""
         if self.beams is not None:
             return self.beams
@@ -127,24 +127,24 @@ class LaserLog:
 
     def points(self, scan: int) -> Array:
         """The usable beams' end points (m, 2) of one row in the robot's frame, in beam order."""
-        points, _ = self.points_of(slice(scan, scan + 1), math.inf)
+        points, _ = self.batch_points(slice(scan, scan + 1), math.inf)
         return points
 
-    def each_points(self) -> Iterator[Array]:
+    def points_by_scan(self) -> Iterator[Array]:
         """The `points` of each scan, in order of time."""
-        for points, ends in self.stretches(TOGETHER):
+        for points, ends in self.point_batches(SCANS_AT_ONCE):
             for begin, end in itertools.pairwise(ends.tolist()):
                 yield points[begin:end]
 
-    def stretches(self, size: int, reach: float = math.inf) -> Iterator[tuple[Array, Indices]]:
+    def point_batches(self, size: int, reach: float = math.inf) -> Iterator[tuple[Array, Indices]]:
         """The `points` (m, 2) of `size` scans at a time that are nearer to the robot than `reach` (m).
 
         One scan after another; ends (n + 1,) tell that scan k has points[ends[k] : ends[k + 1]].
         """
         for first in range(0, len(self), size):
-            yield self.points_of(slice(first, first + size), reach)
+            yield self.batch_points(slice(first, first + size), reach)
 
-    def points_of(self, rows: slice, reach: float) -> tuple[Array, Indices]:
+    def batch_points(self, rows: slice, reach: float) -> tuple[Array, Indices]:
         """The points (m, 2) of R rows, one after another, and where each row's end, as in stretches."""
         first, between = self.angle_min[rows], self.angle_increment[rows]
         if (first == first[0]).all() and (between == between[0]).all():

@@ -15,10 +15,10 @@ from nscan_cli.files.encoding import without_byte_order_mark
 from nscan_cli.files.inputs import FileBytes, base_name, common_hash, label, memory_map, read_bytes, sha256_of
 from nscan_cli.files.limits import LimitExceededError
 from nscan_cli.files.source import Source
-from nscan_cli.logs.compression import packing_of, unpacked
-from nscan_cli.logs.formats import FORMS, Form, foreign, readable
+from nscan_cli.logs.compression import compression_of, decompressed
+from nscan_cli.logs.formats import FORMS, Form, foreign_kind, readable_forms
 from nscan_cli.logs.laser_log import LaserLog
-from nscan_cli.logs.log_files import Parts, beside, first_bytes, parts_of
+from nscan_cli.logs.log_files import Parts, first_bytes, journals_of, parts_of
 from nscan_cli.logs.reading_options import ReadingOptions
 from nscan_cli.logs.recordings import split_recordings
 from nscan_cli.logs.recordings.container import DAMAGE_REMEDY, Recording
@@ -42,16 +42,16 @@ class Database(Container, Protocol):
     """What a module has that opens a file itself."""
 
     def read_recording_file(
-        self, path: str, beside: Mapping[str, str], file: str, salvage: bool
+        self, path: str, journals: Mapping[str, str], file: str, salvage: bool
     ) -> Recording:
         """The messages in the file and in what parts.beside has found. Raises the same errors."""
 
 
-AS_FOUND = ReadingOptions()
+DEFAULT_READING = ReadingOptions()
 
 
 def read_log(
-    paths: str | Sequence[str], options: ReadingOptions = AS_FOUND, even_unusable: bool = False
+    paths: str | Sequence[str], options: ReadingOptions = DEFAULT_READING, even_unusable: bool = False
 ) -> LaserLog:
     """The log at a path ("-": standard input), or in a folder or several files that a recorder has left.
 
@@ -79,7 +79,7 @@ def stored_bytes(path: str) -> FileBytes:
     return read_bytes(path)
 
 
-def recording_in(stored: FileBytes, path: str, salvage: bool) -> Recording | None:
+def recording_from(stored: FileBytes, path: str, salvage: bool) -> Recording | None:
     """The messages of the recording whose bytes `path` has; None where it is none. Raises InputDataError."""
     data, lost = _content(stored, path, salvage)
     form = next((form for form in FORMS if form.container and form.fits(data)), None)
@@ -93,21 +93,21 @@ def recording_in(stored: FileBytes, path: str, salvage: bool) -> Recording | Non
     return recording
 
 
-def recording_at(folder: str, salvage: bool) -> Recording | None:
+def read_recording(folder: str, salvage: bool) -> Recording | None:
     """The messages of the recording in a folder; raises as read_log does."""
     parts = parts_of(folder)
     if len(parts.files) > 1:
         recording: Recording | None = _joined(parts, salvage)[0]
     else:
         (path,) = parts.files
-        recording = recording_in(stored_bytes(path), path, salvage)
+        recording = recording_from(stored_bytes(path), path, salvage)
     if recording is not None:
         recording.warnings[:0] = parts.warnings
     return recording
 
 
 def log_from(
-    stored: FileBytes, path: str, options: ReadingOptions = AS_FOUND, even_unusable: bool = False
+    stored: FileBytes, path: str, options: ReadingOptions = DEFAULT_READING, even_unusable: bool = False
 ) -> LaserLog:
     """The log in the bytes that `path` has; raises the same errors."""
     name = label(path)
@@ -136,11 +136,11 @@ def content_of(stored: bytes, path: str, salvage: bool) -> tuple[bytes, str | No
 
     Raises InputDataError.
     """
-    packing = packing_of(stored)
+    packing = compression_of(stored)
     if packing is None:
         return without_byte_order_mark(stored, label(path)), None
     try:
-        content, problem = unpacked(stored, packing)
+        content, problem = decompressed(stored, packing)
     except LimitExceededError as error:
         raise InputDataError(label(path), str(error), error.remedy) from error
     content = without_byte_order_mark(content, label(path))
@@ -203,8 +203,8 @@ def _form(data: FileBytes, name: str) -> Form:
     for form in FORMS:
         if form.fits(data):
             return form
-    found = foreign(bytes(data))
-    remedy = found.remedy or f"give a log: {readable()}"
+    found = foreign_kind(bytes(data))
+    remedy = found.remedy or f"give a log: {readable_forms()}"
     raise InputDataError(name, f"is {found.name}", remedy)
 
 
@@ -212,7 +212,7 @@ def _recording(form: Form, data: FileBytes, path: str, salvage: bool) -> Recordi
     """The messages in a container: of a database from its file, where it is one and not compressed."""
     if form.by_path and isinstance(data, mmap):
         database: Database = form.reader()
-        return database.read_recording_file(path, beside(path), label(path), salvage)
+        return database.read_recording_file(path, journals_of(path), label(path), salvage)
     container: Container = form.reader()
     return container.read_recording(data, label(path), salvage)
 
@@ -222,7 +222,8 @@ def _source(stored: FileBytes, path: str) -> Source:
     name = base_name(path)
     sha256 = hashlib.sha256(stored).hexdigest() if isinstance(stored, bytes) else sha256_of(path)
     more = [
-        Source(name + end, sha256_of(other), os.path.getsize(other)) for end, other in beside(path).items()
+        Source(name + end, sha256_of(other), os.path.getsize(other))
+        for end, other in journals_of(path).items()
     ]
     file = Source(name, sha256, len(stored))
     return _together(name, [file, *more]) if more else file

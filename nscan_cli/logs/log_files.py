@@ -27,9 +27,9 @@ from nscan_cli.logs.recordings.split_file_names import (
 
 METADATA = "metadata.yaml"
 SQLITE = b"SQLite format 3\0"
-BESIDE = ("-wal", "-journal")
+JOURNAL_SUFFIXES = ("-wal", "-journal")
 """What is added to the name of a database for what has not been taken into it yet."""
-SHARED = "-shm"
+SHARED_MEMORY_SUFFIX = "-shm"
 """The same for what processes share that have it open, which says nothing of its own."""
 LISTED = re.compile(r"^ *relative_file_paths:.*(\n *- .*)*", re.MULTILINE)
 """The part of metadata.yaml that names the files."""
@@ -83,8 +83,8 @@ def parts_of(paths: str | Sequence[str]) -> Parts:
 
 def _recorded(paths: Sequence[str]) -> list[str]:
     """Those of several paths that name files of a recording: a shell's * names what goes with them too."""
-    beside = {path + end for path in paths for end in (*BESIDE, SHARED)}
-    kept = [path for path in paths if path not in beside and Path(path).name != METADATA]
+    journals = {path + end for path in paths for end in (*JOURNAL_SUFFIXES, SHARED_MEMORY_SUFFIX)}
+    kept = [path for path in paths if path not in journals and Path(path).name != METADATA]
     return kept or list(paths)
 
 
@@ -93,10 +93,10 @@ def files_of(paths: str | Sequence[str]) -> list[str]:
 
     Raises the errors of parts_of.
     """
-    return [one for path in parts_of(paths).files for one in (path, *beside(path).values())]
+    return [one for path in parts_of(paths).files for one in (path, *journals_of(path).values())]
 
 
-def beside(path: str) -> dict[str, str]:
+def journals_of(path: str) -> dict[str, str]:
     """The paths of what has not been taken into the database at `path` yet, by what their names add.
 
     None when it is no database. As SQLite does, it is looked for beside the file that a link leads to.
@@ -104,7 +104,7 @@ def beside(path: str) -> dict[str, str]:
     if path == STANDARD_INPUT or not first_bytes(path).startswith(SQLITE):
         return {}
     database = os.path.realpath(path) if os.path.islink(path) else path
-    names = {end: database + end for end in BESIDE}
+    names = {end: database + end for end in JOURNAL_SUFFIXES}
     return {end: name for end, name in names.items() if os.path.isfile(name) and os.path.getsize(name)}
 
 

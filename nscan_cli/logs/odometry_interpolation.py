@@ -8,7 +8,7 @@ from nscan_cli.files.counting import counted
 from nscan_cli.poses import Array, wrap
 
 
-def interpolated(times: Array, at: Array, poses: Array, name: str, warnings: list[str]) -> Array | None:
+def interpolated_poses(times: Array, at: Array, poses: Array, name: str, warnings: list[str]) -> Array | None:
     """Poses (S, 3) at `times` (S,) from `poses` (P, 3) at the times `at` (P,), sorted.
 
     Linear in x, y and the unwrapped angle; before the first and after the last pose these hold. None,

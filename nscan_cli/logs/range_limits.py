@@ -8,14 +8,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nscan_cli.logs.laser_defaults import no_return_value
-from nscan_cli.logs.range_peaks import FEWEST, ROUNDING, piled_up
+from nscan_cli.logs.range_peaks import FEWEST, ROUNDING, peak_at_limit
 from nscan_cli.logs.reading_options import ReadingOptions
 from nscan_cli.poses import Array
 
 if TYPE_CHECKING:
     from nscan_cli.logs.assemble import RawScans
 
-FARTHEST = 1e4
+LARGEST_RANGE = 1e4
 """m; no reading is beyond, and no limit has to be said to be."""
 FOUND = "the no-return value found in the readings"
 ABOUT = 1.25
@@ -58,14 +58,14 @@ def limits_in_force(raw: RawScans, options: ReadingOptions, warnings: list[str])
     low_from, high_from = raw.limits_from
     no_return = no_return_value(raw.ranges)
     if options.max_range is None:
-        end = FARTHEST if no_return is None else no_return
+        end = LARGEST_RANGE if no_return is None else no_return
         high, high_from = _held_or_told(raw, high, high_from, end, warnings)
-    gap = piled_up(raw.ranges, low, inside=1)
+    gap = peak_at_limit(raw.ranges, low, inside=1)
     if gap is not None:
         low, low_from = low + gap, f"{low_from}, where readings pile up that say nothing"
     if options.min_range is not None:
         low, low_from = np.full(scans, options.min_range), "--min-range"
-    gap = piled_up(raw.ranges, high, inside=-1)
+    gap = peak_at_limit(raw.ranges, high, inside=-1)
     if gap is not None and options.max_range is not None:
         beyond = (raw.ranges > high[:, None]) & (raw.ranges < options.max_range)
         # Where more than chance readings are beyond, these are what is asked for.
@@ -125,7 +125,7 @@ def returns_beyond(ranges: NDArray[np.float32], limit: float, end: float) -> flo
     if (
         falls
         or 2 * counts.max() >= beyond.size
-        or piled_up(ranges, np.full(len(ranges), limit), -1) is not None
+        or peak_at_limit(ranges, np.full(len(ranges), limit), -1) is not None
     ):
         return 0.0
     return float(beyond.size / returns.size)

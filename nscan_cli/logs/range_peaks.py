@@ -19,7 +19,9 @@ USUALLY = 10.0
 """Times as many readings as others near by have."""
 
 
-def piled_up(ranges: NDArray[np.float32], limits: Array, inside: int, times: float = 2.0) -> float | None:
+def peak_at_limit(
+    ranges: NDArray[np.float32], limits: Array, inside: int, times: float = 2.0
+) -> float | None:
     """How far (m) inside of the limits (S,) readings (S, B) lie that pile up there; None where none do.
 
     `inside` is where readings count: −1 before a limit, 1 beyond. A pile is one value of a millimetre that

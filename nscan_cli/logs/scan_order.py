@@ -26,7 +26,7 @@ STAMP = re.compile(r"[-+]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][-+]?[0-9]+)?")
 
 
 @dataclass(frozen=True)
-class Order:
+class ScanOrder:
     """The scans of a log in order of time."""
 
     rows: NDArray[np.int64]
@@ -42,7 +42,7 @@ class Order:
     warnings: list[str]
 
 
-def by_time(stamps: list[str]) -> Order:
+def by_time(stamps: list[str]) -> ScanOrder:
     """Scans sorted stably by their stamps (one a scan, in file order; empty where there is none).
 
     Stamps that say nothing (fewer than half of them finite, or fewer than half of them distinct) leave
@@ -60,7 +60,7 @@ def by_time(stamps: list[str]) -> Order:
             f"the time stamps say nothing; scans are taken in file order, {NOMINAL_PERIOD:g} s apart"
         )
         texts = [f"{time:.6f}" for time in times]
-        return Order(np.arange(size), times, texts, 0, True, warnings)
+        return ScanOrder(np.arange(size), times, texts, 0, True, warnings)
     texts = list(stamps)
     if not good.all():
         places = np.arange(size)
@@ -80,7 +80,7 @@ def by_time(stamps: list[str]) -> Order:
     if backward:
         warnings.append(f"{counted(backward, 'step')} back in time; the scans are sorted by time")
     rows = np.argsort(times, kind="stable")
-    return Order(rows, times[rows], [texts[row] for row in rows], backward, False, warnings)
+    return ScanOrder(rows, times[rows], [texts[row] for row in rows], backward, False, warnings)
 
 
 def _set_back(times: Array) -> list[tuple[int, float]]:
@@ -102,7 +102,7 @@ def _set_back(times: Array) -> list[tuple[int, float]]:
     return found
 
 
-def selection(times: Array, options: ReadingOptions, file: str) -> NDArray[np.int64]:
+def selected_numbers(times: Array, options: ReadingOptions, file: str) -> NDArray[np.int64]:
     """Which scans (numbers, in order of time) start, end and every leave.
 
     Raises WrongUsageError when none is left.

@@ -24,7 +24,9 @@ CLEARLY = 1.5
 """Times as many than on the walls of the other step."""
 
 
-def straighter(rows: Iterable[Readings], ones: Iterable[float], others: Iterable[float]) -> bool | None:
+def second_is_straighter(
+    rows: Iterable[Readings], ones: Iterable[float], others: Iterable[float]
+) -> bool | None:
     """Whether the second of two steps (rad) of each scan makes straighter walls; None where it is not clear.
 
     rows: the readings (B,) of each scan, m; those that do not count are not above 0, or infinite.

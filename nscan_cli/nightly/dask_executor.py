@@ -19,7 +19,7 @@ from typing import Any
 
 from nscan_cli.errors import InputMissingError, NscanError, WrongUsageError
 from nscan_cli.files.inputs import read_bytes
-from nscan_cli.logs.log_files import METADATA, beside, files_of
+from nscan_cli.logs.log_files import METADATA, files_of, journals_of
 from nscan_cli.nightly.fingerprint import tool_key
 from nscan_cli.nightly.local_executor import run_locally
 from nscan_cli.nightly.task import Outcome, ProgressCallback, Task
@@ -102,7 +102,7 @@ def _input_files(path: str, role: str) -> InputFiles:
     """The files of an input; names of files in a folder begin with the folder's. Raises NscanError."""
     folder = Path(path)
     if role != "log" or not folder.is_dir():
-        more = beside(path) if role == "log" else {}
+        more = journals_of(path) if role == "log" else {}
         return {folder.name + end: read_bytes(name) for end, name in {"": path, **more}.items()}
     files = [*files_of(path), *(str(file) for file in (folder / METADATA,) if file.is_file())]
     return {f"{folder.name}/{Path(file).name}": read_bytes(file) for file in files}

@@ -100,7 +100,7 @@ def test_scans_have_their_own_beams(tmp_path):
         scan[beams:] = np.nan
     _, back = read_back(tmp_path, log)
     assert_the_same_scans(back, log)
-    assert back.own_beams().tolist() == own.tolist()
+    assert back.beam_counts().tolist() == own.tolist()
     assert back.report.warnings == (f"the poses are a mapper's result, not odometry ({SIGN})",)
 
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from nscan_cli.errors import InputDataError
 from nscan_cli.files.source import Source
-from nscan_cli.logs.assemble import Findings, RawScans, RecordedMotion, laser_log, stacked
+from nscan_cli.logs.assemble import Findings, RawScans, RecordedMotion, laser_log, scan_table
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.logs.reading_options import ReadingOptions
 from nscan_cli.logs.scan_order import by_time
@@ -34,7 +34,7 @@ def read(data: bytes, file: str, source: Source, options: ReadingOptions) -> Las
             findings.skips.add("a value is not a number", number)
     if not rows:
         raise InputDataError(file, "has no scan", "give a log with scans")
-    ranges = stacked([row[3:] for row in rows])
+    ranges = scan_table([row[3:] for row in rows])
     count, beams = ranges.shape
     half_turn = np.full(count, -math.pi / 2), np.full(count, math.pi / max(beams - 1, 1))
     times = by_time(stamps)

@@ -11,7 +11,7 @@ import pytest
 from nscan_cli.logs.assemble import RawScans
 from nscan_cli.logs.beam_angles import beam_directions
 from nscan_cli.logs.reading_options import ReadingOptions
-from nscan_cli.logs.wall_straightness import straighter
+from nscan_cli.logs.wall_straightness import second_is_straighter
 from tests.logs import lines
 from tests.logs.recordings.drives import Scan
 from tests.logs.room import BEAMS, FIRST, STEP, readings, recording
@@ -141,4 +141,4 @@ def test_the_angles_of_a_player_record_are_looked_at_too(tmp_path):
 
 @pytest.mark.parametrize(("one", "other"), [(STEP, STEP), (0.0, 0.0), (1.0, 2.0)])
 def test_steps_that_walls_cannot_tell_apart(one, other):
-    assert straighter(readings(), [one] * 40, [other] * 40) is None
+    assert second_is_straighter(readings(), [one] * 40, [other] * 40) is None

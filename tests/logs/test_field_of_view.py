@@ -28,7 +28,7 @@ def turns(counts: tuple[int, ...]) -> list[Written]:
 @pytest.mark.parametrize("counts", [COUNTS, COUNTS[::-1], (360, 360)])
 def test_scans_of_different_lengths(read, counts):
     log = read(turns(counts))
-    assert log.own_beams().tolist() == list(counts)
+    assert log.beam_counts().tolist() == list(counts)
     first, last, step = (math.degrees(angle) for angle in field_of_view(log))
     assert (first, last) == pytest.approx((0, 360), abs=1e-4)
     assert 360 / 601 - 1e-6 <= step <= 360 / 239 + 1e-6

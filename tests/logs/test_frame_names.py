@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from nscan_cli.logs.frame_names import AS_USUAL, FrameNames, frame_names
+from nscan_cli.logs.frame_names import DEFAULT_FRAMES, FrameNames, distinct_frame_names
 from tests.logs.recordings.drives import MOUNT, drive, with_scans
 
 AT_ORIGIN, AHEAD = np.zeros(3), np.array([0.2, 0.0, 0.0])
@@ -15,19 +15,19 @@ AT_ORIGIN, AHEAD = np.zeros(3), np.array([0.2, 0.0, 0.0])
     ("laser", "robot", "odometry", "mount", "expected"),
     [
         ("front", "chassis", "wheels", AHEAD, FrameNames("front", "chassis", "wheels")),
-        ("", "", "", AHEAD, AS_USUAL),
+        ("", "", "", AHEAD, DEFAULT_FRAMES),
         ("front", "", "", AHEAD, FrameNames("front", "base_link", "odom")),
         ("base_link", "base_link", "odom", AT_ORIGIN, FrameNames("base_link", "base_link", "odom")),
         # The user mounts a laser elsewhere than where its frame is.
-        ("base_link", "base_link", "odom", AHEAD, AS_USUAL),
+        ("base_link", "base_link", "odom", AHEAD, DEFAULT_FRAMES),
         # The result's own frame has to be none of the others.
-        ("front", "chassis", "map", AHEAD, AS_USUAL),
-        ("map", "chassis", "odom", AHEAD, AS_USUAL),
-        ("odom", "chassis", "odom", AHEAD, AS_USUAL),
+        ("front", "chassis", "map", AHEAD, DEFAULT_FRAMES),
+        ("map", "chassis", "odom", AHEAD, DEFAULT_FRAMES),
+        ("odom", "chassis", "odom", AHEAD, DEFAULT_FRAMES),
     ],
 )
 def test_names_that_clash_are_not_kept(laser, robot, odometry, mount, expected):
-    assert frame_names(laser, robot, odometry, mount) == expected
+    assert distinct_frame_names(laser, robot, odometry, mount) == expected
 
 
 def test_of_a_recording(read):

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from nscan_cli.errors import WrongUsageError
-from nscan_cli.logs.laser_log import TOGETHER, LaserLog
+from nscan_cli.logs.laser_log import SCANS_AT_ONCE, LaserLog
 from tests.logs.lines import flaser, read
 
-SCANS, BEAMS = TOGETHER + 44, 6
+SCANS, BEAMS = SCANS_AT_ONCE + 44, 6
 
 
 @pytest.fixture(scope="module")
@@ -45,7 +45,7 @@ def test_the_points_of_a_scan_are_its_usable_beams_in_the_robots_frame(log):
 
 
 def test_many_at_a_time_are_the_same_to_the_bit(log):
-    each = list(log.each_points())
+    each = list(log.points_by_scan())
     assert len(each) == SCANS
     for row, points in enumerate(each):
         np.testing.assert_array_equal(points, log.points(row))
@@ -54,7 +54,7 @@ def test_many_at_a_time_are_the_same_to_the_bit(log):
 @pytest.mark.parametrize("size", [1, 7, SCANS, 10 * SCANS])
 def test_stretches_are_of_so_many_scans_without_the_points_beyond_the_reach(log, size):
     found = []
-    for points, ends in log.stretches(size, 4.0):
+    for points, ends in log.point_batches(size, 4.0):
         assert len(ends) <= size + 1
         assert (ends[0], ends[-1]) == (0, len(points))
         found += [points[begin:end] for begin, end in itertools.pairwise(ends)]

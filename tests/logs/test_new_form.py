@@ -9,7 +9,7 @@ import pytest
 
 from nscan_cli.cli.main import run
 from nscan_cli.logs import formats as kinds
-from nscan_cli.logs.formats import Form, readable
+from nscan_cli.logs.formats import Form, readable_forms
 from nscan_cli.logs.load import read_log
 from nscan_cli.logs.reading_options import ReadingOptions
 from tests.logs import csv_form
@@ -51,7 +51,7 @@ def test_the_commands_take_it_and_their_messages_name_it(with_csv, tmp_path, mon
     assert run(["info", "letter"]) == 65
     assert "give a log: MCAP, " in (said := capsys.readouterr().err)
     assert ", CSV; plain or packed by gzip" in said
-    assert readable().partition(";")[0].count(",") == len(kinds.FORMS) - 1
+    assert readable_forms().partition(";")[0].count(",") == len(kinds.FORMS) - 1
 
 
 def test_it_takes_nothing_from_the_others(with_csv, tmp_path):

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from nscan_cli.errors import WrongUsageError
 from nscan_cli.logs.reading_options import ReadingOptions
-from nscan_cli.logs.scan_order import by_time, selection
+from nscan_cli.logs.scan_order import by_time, selected_numbers
 
 
 def test_sorted_stably_and_counted():
@@ -54,12 +54,12 @@ def test_selection_counts_from_the_first_scan():
     times = 100 + np.arange(10) / 2
     options = ReadingOptions(start=1.0, end=4.0, every=3)
     # 1.0 s … 4.0 s are the scans 2 … 8; of these every third.
-    assert selection(times, options, "a.log").tolist() == [2, 5, 8]
+    assert selected_numbers(times, options, "a.log").tolist() == [2, 5, 8]
 
 
 def test_selection_of_nothing_is_wrong_usage():
     with pytest.raises(WrongUsageError, match=r"a\.log.*lasts 4\.5 s"):
-        selection(np.arange(10) / 2, ReadingOptions(start=60.0), "a.log")
+        selected_numbers(np.arange(10) / 2, ReadingOptions(start=60.0), "a.log")
 
 
 def test_a_clock_that_is_set_back_while_the_robot_drives_on_goes_on():

@@ -25,8 +25,8 @@ from nscan_cli.graph.io.g2o_lines import LARGEST_KEY
 from nscan_cli.graph.io.json_fields import JsonRecord, MalformedError, pose_rows, six_digits, triangle
 from nscan_cli.graph.model import Graph, Loop
 from nscan_cli.graph.relations.registry import relation_of, relation_record
-from nscan_cli.logs.compression import packing_of
-from nscan_cli.logs.formats import FORMS, name_of
+from nscan_cli.logs.compression import compression_of
+from nscan_cli.logs.formats import FORMS, foreign_kind_name
 from nscan_cli.logs.scan_order import STAMP
 from nscan_cli.poses import Array
 
@@ -119,11 +119,11 @@ def _not_json(data: bytes, name: str, error: Exception) -> InputDataError:
 
 
 def _kind_of_content(data: bytes) -> str:
-    packing = packing_of(data)
+    packing = compression_of(data)
     if packing is not None:
         return f"compressed by {packing.name}"
     log = next((form.name for form in FORMS if form.fits(data)), None)
-    return f"a log ({log})" if log else name_of(data)
+    return f"a log ({log})" if log else foreign_kind_name(data)
 
 
 def _refuse_constant(constant: str) -> NoReturn:

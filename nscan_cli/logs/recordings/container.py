@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from typing import NamedTuple
 
 from nscan_cli.files.limits import INPUT, MB, UNPACKED
-from nscan_cli.logs.compression import UNPACKS, ZSTD, unpacked
+from nscan_cli.logs.compression import KEEPS_GROWING, ZSTD, decompressed
 from nscan_cli.logs.recordings.message_types import PATH_TYPE
 
 DAMAGE_REMEDY = "fetch the file again, or use what can be read with --salvage"
@@ -56,12 +56,12 @@ class Recording:
     def add_unpacked(self, size: int) -> None:
         """Count unpacked bytes. Raises LimitExceededError beyond the limit."""
         self.unpacked_bytes += size
-        UNPACKED.check(self.unpacked_bytes / MB, UNPACKS)
+        UNPACKED.check(self.unpacked_bytes / MB, KEEPS_GROWING)
 
     def add_kept(self, size: int) -> None:
         """Count bytes that stay in memory. Raises LimitExceededError beyond the limit."""
         self.kept_bytes += size
-        INPUT.check(self.kept_bytes / MB, UNPACKS)
+        INPUT.check(self.kept_bytes / MB, KEEPS_GROWING)
 
     def add(self, channel: Channel, log_time: int, data: bytes) -> None:
         """Keep a message. Raises LimitExceededError when the messages exceed the limit.
@@ -70,7 +70,7 @@ class Recording:
         cannot be unpacked stays as it is, and its decoder refuses it.
         """
         if channel.encoding == "cdr" and data.startswith(ZSTD.magic):
-            content, problem = unpacked(data, ZSTD)
+            content, problem = decompressed(data, ZSTD)
             data = data if problem else content
         kept = self.messages.setdefault(channel.topic, [])
         if channel.type == PATH_TYPE:

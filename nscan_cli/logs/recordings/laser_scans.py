@@ -9,10 +9,10 @@ import numpy as np
 from nscan_cli.errors import InputDataError, WrongUsageError
 from nscan_cli.files.source import Source
 from nscan_cli.logs import scan_order as order
-from nscan_cli.logs.assemble import Findings, RawScans, RecordedMotion, laser_log, stacked
-from nscan_cli.logs.frame_names import frame_names
+from nscan_cli.logs.assemble import Findings, RawScans, RecordedMotion, laser_log, scan_table
+from nscan_cli.logs.frame_names import distinct_frame_names
 from nscan_cli.logs.laser_log import LaserLog
-from nscan_cli.logs.range_limits import FARTHEST
+from nscan_cli.logs.range_limits import LARGEST_RANGE
 from nscan_cli.logs.reading_options import ReadingOptions
 from nscan_cli.logs.recordings.container import Message, Recording
 from nscan_cli.logs.recordings.decoded_messages import ScanMessage, decimal_seconds
@@ -54,7 +54,7 @@ def log_from_recording(recording: Recording, file: str, source: Source, options:
     tree = TransformTree(recording, skips, file)
     motion = robot_odometry(recording, tree, times, use_stamps, options, findings, file)
     mount, hanging, robot = laser_mounting(scans, motion.robot, tree, options, findings, file)
-    findings.frames = frame_names(scans[0].frame, robot, motion.parent, mount)
+    findings.frames = distinct_frame_names(scans[0].frame, robot, motion.parent, mount)
     if hanging and not options.flip:
         # Seen from above, the beams of a laser that is upside down run clockwise.
         raw = raw.mirrored()
@@ -113,9 +113,9 @@ def _scan_problem(scan: ScanMessage) -> str:
 def _raw_scans(scans: Sequence[ScanMessage], stamps: list[str]) -> RawScans:
     """The scans as columns, with the range limits of the messages."""
     low, low_from = _range_limit("range_min", [scan.range_min for scan in scans], 0.0)
-    high, high_from = _range_limit("range_max", [scan.range_max for scan in scans], FARTHEST)
+    high, high_from = _range_limit("range_max", [scan.range_max for scan in scans], LARGEST_RANGE)
     return RawScans(
-        stacked([scan.ranges for scan in scans]),
+        scan_table([scan.ranges for scan in scans]),
         np.array([scan.angle_min for scan in scans], dtype=np.float64),
         np.array([scan.angle_increment for scan in scans], dtype=np.float64),
         stamps,
@@ -131,8 +131,8 @@ def _raw_scans(scans: Sequence[ScanMessage], stamps: list[str]) -> RawScans:
 
 
 def _range_limit(name: str, values: list[float], default: float) -> tuple[Array, str]:
-    """The limits (S,) between 0 and FARTHEST, `default` for others, and where they are from."""
+    """The limits (S,) between 0 and LARGEST_RANGE, `default` for others, and where they are from."""
     limits = np.array(values, dtype=np.float64)
-    valid = (limits > 0) & (limits < FARTHEST)
+    valid = (limits > 0) & (limits < LARGEST_RANGE)
     origin = f"{name} of the messages" if valid.any() else "none in the messages"
     return np.where(valid, limits, default), origin

@@ -8,8 +8,8 @@ from typing import NamedTuple
 import numpy as np
 
 from nscan_cli.logs.assemble import Findings
-from nscan_cli.logs.choices import Device, OpenChoiceError
-from nscan_cli.logs.odometry_interpolation import interpolated
+from nscan_cli.logs.device_choice import Device, OpenChoiceError
+from nscan_cli.logs.odometry_interpolation import interpolated_poses
 from nscan_cli.logs.reading_options import ReadingOptions
 from nscan_cli.logs.recordings.container import Recording
 from nscan_cli.logs.recordings.decoded_messages import S
@@ -23,7 +23,7 @@ from nscan_cli.logs.recordings.tf_tree import (
     transform_times,
 )
 from nscan_cli.logs.recordings.topics import devices, find_topic, odometry_topic
-from nscan_cli.logs.scan_order import Order
+from nscan_cli.logs.scan_order import ScanOrder
 from nscan_cli.logs.skips import Skips
 from nscan_cli.poses import Array
 
@@ -42,7 +42,7 @@ class RobotMotion(NamedTuple):
 def robot_odometry(
     recording: Recording,
     tree: TransformTree,
-    times: Order,
+    times: ScanOrder,
     use_stamps: bool,
     options: ReadingOptions,
     findings: Findings,
@@ -120,7 +120,7 @@ def _transforms_from_odom(tree: TransformTree) -> dict[str, list[LoggedTransform
 
 
 def _poses_at_scans(
-    rows: Sequence[LoggedTransform], source: str, times: Order, use_stamps: bool, findings: Findings
+    rows: Sequence[LoggedTransform], source: str, times: ScanOrder, use_stamps: bool, findings: Findings
 ) -> Array | None:
     """Interpolated poses (S, 3) at the times of the scans; None without a valid pose."""
     found, found_at = [], []
@@ -139,6 +139,6 @@ def _poses_at_scans(
         return None
     seconds = np.array(found_at)
     in_order = np.argsort(seconds, kind="stable")
-    return interpolated(
+    return interpolated_poses(
         times.times, seconds[in_order], np.array(found)[in_order], f"pose of {source}", findings.warnings
     )

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from nscan_cli.errors import InputDataError, WrongUsageError
-from nscan_cli.logs.choices import Device, OpenChoiceError, listed
+from nscan_cli.logs.device_choice import Device, OpenChoiceError, device_list
 from nscan_cli.logs.reading_options import ReadingOptions
 from nscan_cli.logs.recordings.container import Recording
 from nscan_cli.logs.recordings.message_types import ODOMETRY_TYPES, SCAN_TYPES, TRANSFORM_TYPES
@@ -80,5 +80,5 @@ def type_problem(recording: Recording, topic: str) -> str:
 def _no_such_topic(
     recording: Recording, option: str, topic: str, there: Sequence[Device], file: str
 ) -> WrongUsageError:
-    known = listed(there, "message") or "left out"
+    known = device_list(there, "message") or "left out"
     return WrongUsageError(f"{file}: {type_problem(recording, topic)}; {option} can be {known}")

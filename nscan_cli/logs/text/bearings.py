@@ -15,7 +15,7 @@ UNEVEN = 0.05
 """Of a step: what a bearing may be off its place, beside what rounding does."""
 
 
-class Fan(NamedTuple):
+class EvenBearings(NamedTuple):
     """The directions of a scan's readings, evenly spaced; some may have been left out."""
 
     first: float
@@ -34,7 +34,7 @@ def are_degrees(greatest: Array) -> bool:
     return bool(len(greatest)) and float(np.median(greatest)) > 2 * np.pi + 0.01
 
 
-def fan(bearings: Array, in_degrees: bool) -> Fan | None:
+def even_bearings(bearings: Array, in_degrees: bool) -> EvenBearings | None:
     """The fan of bearings (n,) as written, or None when they are not evenly spaced.
 
     Hundredths of a degree, which Player has inside, are restored where the log has rounded them.
@@ -44,7 +44,7 @@ def fan(bearings: Array, in_degrees: bool) -> Fan | None:
     rounding = _rounding(bearings)
     bearings = np.unwrap(bearings, period=turn)
     if len(bearings) == 1:
-        return Fan(float(bearings[0]) * to_radians, np.pi / 180, np.zeros(1, dtype=np.int64))
+        return EvenBearings(float(bearings[0]) * to_radians, np.pi / 180, np.zeros(1, dtype=np.int64))
     for places in (np.arange(len(bearings)), _with_gaps(bearings, turn)):
         if places is None:
             continue
@@ -55,7 +55,7 @@ def fan(bearings: Array, in_degrees: bool) -> Fan | None:
             restored = np.radians(hundredths) / to_radians
             if restored[1] and np.abs(restored[0] + restored[1] * places - bearings).max() <= rounding:
                 first, step = restored
-            return Fan(float(first) * to_radians, float(step) * to_radians, places)
+            return EvenBearings(float(first) * to_radians, float(step) * to_radians, places)
     return None
 
 

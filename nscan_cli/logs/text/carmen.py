@@ -12,10 +12,10 @@ from nscan_cli.files.counting import counted
 from nscan_cli.files.source import Source
 from nscan_cli.logs import scan_order as order
 from nscan_cli.logs.assemble import Findings, RawScans, RecordedMotion, laser_log
-from nscan_cli.logs.choices import Device
+from nscan_cli.logs.device_choice import Device
 from nscan_cli.logs.laser_defaults import CARMEN_MAX_RANGE, beam_angles, mount_from_poses
 from nscan_cli.logs.laser_log import LaserLog
-from nscan_cli.logs.odometry_interpolation import interpolated
+from nscan_cli.logs.odometry_interpolation import interpolated_poses
 from nscan_cli.logs.reading_options import ReadingOptions
 from nscan_cli.logs.skips import Skips
 from nscan_cli.logs.text import carmen_records
@@ -67,14 +67,14 @@ def read(data: bytes, file: str, source: Source, options: ReadingOptions) -> Las
         warnings.append(
             f"{counted(sum(strange.values()), 'record')} of kinds unknown to CARMEN: {kinds}{more}"
         )
-    scans = carmen_records.scans(tag, lines[tag], skips)
+    scans = carmen_records.carmen_scans(tag, lines[tag], skips)
     if not scans.stamps:
         reason, (_, first) = next(iter(skips.reasons.items()))
         raise InputDataError(
             file, f"none of its {len(lines[tag])} {tag} records can be read: {reason}",
             "give a log with whole records", first,
         )  # fmt: skip
-    findings.corrected = sign = corrected.sign(lines, scans)
+    findings.corrected = sign = corrected.sign_of_correction(lines, scans)
     if sign and options.odometry and not options.allow_corrected:
         raise InputDataError(
             file, f"its poses are a mapper's result, not odometry ({sign})",
@@ -108,7 +108,7 @@ def read(data: bytes, file: str, source: Source, options: ReadingOptions) -> Las
 
 def _times(
     lines: list[tuple[int, bytes]], scans: CarmenScans, warnings: list[str]
-) -> tuple[order.Order, bool]:
+) -> tuple[order.ScanOrder, bool]:
     """The scans in order of time, and whether it is that of the logger: only where their own say nothing."""
     times = order.by_time(scans.stamps)
     if times.nominal or not times.times.any():
@@ -238,7 +238,7 @@ def _farthest(
 def _odometry(
     tag: str,
     scans: CarmenScans,
-    times: order.Order,
+    times: order.ScanOrder,
     by_logger: bool,
     lines: Lines,
     skips: Skips,
@@ -260,7 +260,7 @@ def _odometry(
     if times.nominal or moments.nominal:
         warnings.append(f"{tag} carries no pose, and the time stamps do not lead to ODOM's: no odometry")
         return None, "none: no time stamps"
-    found = interpolated(times.times, moments.times, values[moments.rows, :3], "ODOM record", warnings)
+    found = interpolated_poses(times.times, moments.times, values[moments.rows, :3], "ODOM record", warnings)
     return found, "none: at other times" if found is None else "ODOM records, interpolated"
 
 

@@ -14,9 +14,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nscan_cli.files.limits import RECORD_KINDS
-from nscan_cli.logs.assemble import empty_table
+from nscan_cli.logs.assemble import empty_scan_table
 from nscan_cli.logs.skips import Skips
-from nscan_cli.logs.text.line_records import Block, LineRecord, as_text, beam_count, blocks, sound, sound_rows
+from nscan_cli.logs.text.line_records import (
+    Block,
+    LineRecord,
+    ascii_text,
+    beam_count,
+    blocks,
+    rows_within_bounds,
+    within_bounds,
+)
 from nscan_cli.poses import Array
 
 TAG = re.compile(rb"[A-Z][A-Z0-9_]{2,31}\Z")
@@ -92,11 +100,11 @@ def numbers(
         except ValueError:
             skips.add("a value is not a number", number)
             continue
-        if not sound(row):
+        if not within_bounds(row):
             skips.add("a value is out of bounds", number)
             continue
         rows.append(row)
-        stamps.append(as_text(tokens[-1 if by_logger else count]) if len(tokens) > count else "")
+        stamps.append(ascii_text(tokens[-1 if by_logger else count]) if len(tokens) > count else "")
         places.append(number)
     return np.array(rows, dtype=np.float64).reshape(-1, count), stamps, places
 
@@ -105,13 +113,13 @@ def logger_stamps(lines: list[tuple[int, bytes]], scans: CarmenScans) -> list[st
     """When the scans were logged: the end of their lines; empty for those without a trailer."""
     ends = dict(lines)
     return [
-        as_text(ends[line].split()[-1]) if stamp else ""
+        ascii_text(ends[line].split()[-1]) if stamp else ""
         for line, stamp in zip(scans.lines, scans.stamps, strict=True)
     ]
 
 
-def scans(tag: str, lines: list[tuple[int, bytes]], skips: Skips) -> CarmenScans:
-    """The scans of all lines of one laser tag; malformed ones are skipped. Raises ExceededError."""
+def carmen_scans(tag: str, lines: list[tuple[int, bytes]], skips: Skips) -> CarmenScans:
+    """The scans of all lines of one laser tag; malformed ones are skipped. Raises LimitExceededError."""
     head = 7 if NEW.match(tag) else 0
     poses = 6 if tag in ("FLASER", "RLASER") or tag.startswith("ROBOT") else 0
     tail = poses + (5 if tag.startswith("ROBOT") else 0)
@@ -124,7 +132,7 @@ def scans(tag: str, lines: list[tuple[int, bytes]], skips: Skips) -> CarmenScans
     widest = max((n for _, n in records), default=0)
     size = len(records)
     result = CarmenScans(
-        ranges=empty_table(size, widest),
+        ranges=empty_scan_table(size, widest),
         beams=np.zeros(size, dtype=np.int64),
         head=np.zeros((size, head)),
         laser=np.zeros((size, poses // 2)),
@@ -180,7 +188,7 @@ def _record(
         skips.add("wrong number of values", number)
         return None
     values, stamp, host, _ = text.rsplit(b" ", TRAILER)
-    return LineRecord(number, values, tokens - TRAILER, as_text(stamp), host), beams
+    return LineRecord(number, values, tokens - TRAILER, ascii_text(stamp), host), beams
 
 
 def _without_problems(
@@ -192,11 +200,11 @@ def _without_problems(
     if head:
         after = head + 1 + block.beams
         remissions = values[:, after] == values.shape[1] - (after + 1 + tail)
-        angles = sound_rows(values[:, :head]) & (np.abs(values[:, [1, 3]]).max(axis=1) <= 4 * np.pi)
+        angles = rows_within_bounds(values[:, :head]) & (np.abs(values[:, [1, 3]]).max(axis=1) <= 4 * np.pi)
         problems += [("wrong number of values", ~remissions), ("an angle is out of bounds", ~angles)]
     if poses:
         at = values.shape[1] - tail
-        problems.append(("a pose is out of bounds", ~sound_rows(values[:, at : at + poses])))
+        problems.append(("a pose is out of bounds", ~rows_within_bounds(values[:, at : at + poses])))
     bad = np.zeros(len(values), dtype=np.bool_)
     for _, wrong in problems:
         bad |= wrong

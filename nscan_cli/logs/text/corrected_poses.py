@@ -12,7 +12,7 @@ OWN_HOST = b"nscan-cli"
 """The host of the records that this program writes, whose poses are corrected ones."""
 
 
-def sign(tags: Container[str], scans: CarmenScans) -> str:
+def sign_of_correction(tags: Container[str], scans: CarmenScans) -> str:
     """What gives the log away as corrected (by GMapping's gfs2log and its like), or an empty string.
 
     Equal poses of laser and robot alone are no sign: many raw logs have them. Together with stamps

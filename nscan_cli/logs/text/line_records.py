@@ -18,7 +18,7 @@ from nscan_cli.poses import Array
 
 CHUNK = 1024
 LONG = 1 << 16
-"""Bytes; to load a kernel for less takes longer than the work."""
+"""FileBytes; to load a kernel for less takes longer than the work."""
 MOST_PLACES = 22
 LARGEST_WHOLE = 2**53 // 10
 TAB, RETURN, SPACE, PLUS, MINUS, POINT, ZERO, NINE = b"\t\r +-.09"
@@ -159,17 +159,17 @@ def beams_problem(beams: int) -> str:
     return "" if 0 < beams <= most else f"the beam count is not in 1…{most:.0f}"
 
 
-def sound(values: ArrayLike) -> bool:
+def within_bounds(values: ArrayLike) -> bool:
     """Whether all values are finite and of a size that a pose or an angle can have."""
-    return bool(sound_rows(np.reshape(values, (1, -1)))[0])
+    return bool(rows_within_bounds(np.reshape(values, (1, -1)))[0])
 
 
-def sound_rows(values: Array) -> NDArray[np.bool_]:
+def rows_within_bounds(values: Array) -> NDArray[np.bool_]:
     """(R,) the same of each row of the values (R, V)."""
     found: NDArray[np.bool_] = np.all(np.abs(values) < DISTANCE.value, axis=1)
     return found
 
 
-def as_text(stamp: bytes) -> str:
+def ascii_text(stamp: bytes) -> str:
     """A time stamp as it is written in the log."""
     return stamp.decode("ascii", "replace")

@@ -12,10 +12,10 @@ from nscan_cli.errors import InputDataError, WrongUsageError
 from nscan_cli.files.source import Source
 from nscan_cli.logs import scan_order as order
 from nscan_cli.logs.assemble import Findings, RecordedMotion, laser_log
-from nscan_cli.logs.choices import Device, OpenChoiceError, listed
+from nscan_cli.logs.device_choice import Device, OpenChoiceError, device_list
 from nscan_cli.logs.formats import FIRST_LINE
 from nscan_cli.logs.laser_log import LaserLog
-from nscan_cli.logs.odometry_interpolation import interpolated
+from nscan_cli.logs.odometry_interpolation import interpolated_poses
 from nscan_cli.logs.reading_options import ReadingOptions
 from nscan_cli.logs.skips import Skips
 from nscan_cli.logs.text import player_bearings, player_records
@@ -62,7 +62,7 @@ def read(data: bytes, file: str, source: Source, options: ReadingOptions) -> Las
     if laser is None:
         found = ", ".join(findings.records) or "no record at all"
         raise InputDataError(file, f"has no laser scans, only {found}", "give a log of a laser device")
-    scans = player_records.scans(laser, lines, version, skips)
+    scans = player_records.player_scans(laser, lines, version, skips)
     if not scans.raw.stamps:
         reason, (_, first) = next(iter(skips.reasons.items()))
         problem = f"no record of {laser} can be read: {reason}"
@@ -111,7 +111,7 @@ def _chosen(
     none is asked for.
     """
     option = "--laser" if what == "laser" else "--odom-topic"
-    said = listed(there, "record") or "left out"
+    said = device_list(there, "record") or "left out"
     if asked is not None:
         if asked not in [device.name for device in there]:
             raise WrongUsageError(f"{file}: has no {asked}; {option} can be {said}")
@@ -140,7 +140,7 @@ def _mount(laser: str, lines: Lines, options: ReadingOptions, findings: Findings
 def _odometry(
     scans: PlayerScans,
     lines: Lines,
-    times: order.Order,
+    times: order.ScanOrder,
     options: ReadingOptions,
     findings: Findings,
     file: str,
@@ -172,7 +172,7 @@ def _odometry(
     if scans.bearings == "degrees" and player_bearings.has_degrees(poses):
         poses[:, 2] = np.radians(poses[:, 2])
         used["odometry"] += ", headings in degrees"
-    return interpolated(times.times, moments.times, poses, f"record of {device}", warnings)
+    return interpolated_poses(times.times, moments.times, poses, f"record of {device}", warnings)
 
 
 def _said(key: tuple[str, str]) -> str:

@@ -11,11 +11,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from nscan_cli.logs.assemble import RawScans, empty_table
+from nscan_cli.logs.assemble import RawScans, empty_scan_table
 from nscan_cli.logs.laser_defaults import CARMEN_MAX_RANGE
 from nscan_cli.logs.skips import Skips
-from nscan_cli.logs.text.bearings import Fan, are_degrees, fan
-from nscan_cli.logs.text.line_records import LineRecord, beams_problem, parsed, sound
+from nscan_cli.logs.text.bearings import EvenBearings, are_degrees, even_bearings
+from nscan_cli.logs.text.line_records import LineRecord, beams_problem, parsed, within_bounds
 from nscan_cli.poses import Array
 
 VALUES = 3
@@ -36,26 +36,26 @@ class Row(NamedTuple):
     """(n,) rad or degrees"""
 
 
-def are_written(records: list[LineRecord], headed: bool) -> bool:
+def have_bearings(records: list[LineRecord], headed: bool) -> bool:
     """Whether these laser records are of this kind; `headed`: they can have a head with a beam count."""
     if any(map(_has_head, records)):
         return False
     return not headed or any(record.count and record.count % VALUES == 0 for record in records)
 
 
-def scans(records: list[LineRecord], skips: Skips) -> tuple[RawScans, str]:
+def bearing_scans(records: list[LineRecord], skips: Skips) -> tuple[RawScans, str]:
     """The scans in file order, and the unit of the bearings; what cannot be read is skipped.
 
-    Raises ExceededError.
+    Raises LimitExceededError.
     """
     rows = _rows(records, skips)
     in_degrees = are_degrees(np.array([np.abs(row.bearings).max() for row in rows]))
-    fans: dict[bytes, Fan | None] = {}
-    whole: list[tuple[Row, Fan]] = []
+    fans: dict[bytes, EvenBearings | None] = {}
+    whole: list[tuple[Row, EvenBearings]] = []
     for row in rows:
         key = row.bearings.tobytes()
         if key not in fans:
-            fans[key] = fan(row.bearings, in_degrees)
+            fans[key] = even_bearings(row.bearings, in_degrees)
         found = fans[key]
         if found is None:
             skips.add("the bearings are not evenly spaced", row.record.line)
@@ -111,14 +111,14 @@ def _rows(records: list[LineRecord], skips: Skips) -> list[Row]:
     rows = []
     for record, _, values in parsed(whole, skips):
         bearings = values[1::VALUES]
-        if not sound(bearings) or np.abs(bearings).max() > LARGEST:
+        if not within_bounds(bearings) or np.abs(bearings).max() > LARGEST:
             skips.add("a bearing is out of bounds", record.line)
         else:
             rows.append(Row(record, values[::VALUES], bearings))
     return rows
 
 
-def _not_cut_off(whole: list[tuple[Row, Fan]], skips: Skips) -> list[tuple[Row, Fan]]:
+def _not_cut_off(whole: list[tuple[Row, EvenBearings]], skips: Skips) -> list[tuple[Row, EvenBearings]]:
     """All but those that begin as most scans do, and end before: no count says that a line is whole."""
     usual = Counter((found.first, found.step, int(found.places[-1])) for _, found in whole).most_common(1)
     kept = []
@@ -131,9 +131,9 @@ def _not_cut_off(whole: list[tuple[Row, Fan]], skips: Skips) -> list[tuple[Row, 
     return kept
 
 
-def _table(whole: list[tuple[Row, Fan]]) -> NDArray[np.float32]:
-    """The readings (S, B) by direction; nan where there is none. Raises ExceededError."""
-    table = empty_table(len(whole), max((int(found.places[-1]) + 1 for _, found in whole), default=0))
+def _table(whole: list[tuple[Row, EvenBearings]]) -> NDArray[np.float32]:
+    """The readings (S, B) by direction; nan where there is none. Raises LimitExceededError."""
+    table = empty_scan_table(len(whole), max((int(found.places[-1]) + 1 for _, found in whole), default=0))
     with np.errstate(over="ignore", invalid="ignore"):
         for readings, (row, found) in zip(table, whole, strict=True):
             readings[found.places] = row.ranges

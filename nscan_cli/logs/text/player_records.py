@@ -17,11 +17,11 @@ from typing import Literal
 import numpy as np
 
 from nscan_cli.files.limits import RECORD_KINDS
-from nscan_cli.logs.assemble import RawScans, stacked
+from nscan_cli.logs.assemble import RawScans, scan_table
 from nscan_cli.logs.laser_defaults import CARMEN_MAX_RANGE
 from nscan_cli.logs.skips import Skips
 from nscan_cli.logs.text import player_bearings
-from nscan_cli.logs.text.line_records import LineRecord, as_text, beam_count, parsed, sound
+from nscan_cli.logs.text.line_records import LineRecord, ascii_text, beam_count, parsed, within_bounds
 from nscan_cli.poses import Array
 
 Version = Literal[0, 1, 2]
@@ -84,7 +84,7 @@ def lines_by_device(data: bytes, version: Version, skips: Skips) -> Lines:
             parts.insert(0, robot)
         if len(hosts) > 1:
             parts.insert(0, host)
-        lines.setdefault((as_text(b":".join(parts)), as_text(kind)), []).extend(rows)
+        lines.setdefault((ascii_text(b":".join(parts)), ascii_text(kind)), []).extend(rows)
     return lines
 
 
@@ -104,7 +104,7 @@ def numbers(lines: list[Line], count: int, skips: Skips) -> tuple[Array, list[st
     for record, _, values in parsed([(_record(line), 0) for line in lines], skips):
         if values.size != count:
             skips.add("wrong number of values", record.line)
-        elif not sound(values):
+        elif not within_bounds(values):
             skips.add("a value is out of bounds", record.line)
         else:
             rows.append(values)
@@ -112,7 +112,7 @@ def numbers(lines: list[Line], count: int, skips: Skips) -> tuple[Array, list[st
     return np.array(rows, dtype=np.float64).reshape(-1, count), stamps
 
 
-def scans(laser: str, lines: Lines, version: Version, skips: Skips) -> PlayerScans:
+def player_scans(laser: str, lines: Lines, version: Version, skips: Skips) -> PlayerScans:
     """The scans of one laser; malformed ones are skipped.
 
     Version 1: `min max step count`, version 2: `id min max step farthest count`, and in its form 1:2 the
@@ -121,8 +121,8 @@ def scans(laser: str, lines: Lines, version: Version, skips: Skips) -> PlayerSca
     """
     if version < 2:
         unnamed = [_record(line) for line in lines.get((laser, ""), [])]
-        if player_bearings.are_written(unnamed, headed=version == 1):
-            raw, unit = player_bearings.scans(unnamed, skips)
+        if player_bearings.have_bearings(unnamed, headed=version == 1):
+            raw, unit = player_bearings.bearing_scans(unnamed, skips)
             return PlayerScans(raw, None, unit)
     forms = (("1:1", 6), ("1:2", 9)) if version == 2 else (("", 4),)
     rows: list[tuple[LineRecord, Array, Array]] = []
@@ -144,7 +144,7 @@ def scans(laser: str, lines: Lines, version: Version, skips: Skips) -> PlayerSca
     farthest = 0.0 if version < 2 or not heads else max(float(head[-2]) for head in heads)
     named = ((farthest, f"the greatest range in {laser}"),) if farthest > 0 else ()
     raw = RawScans(
-        stacked([readings for _, _, readings in rows]),
+        scan_table([readings for _, _, readings in rows]),
         angles[:, 0],
         angles[:, 2],
         [record.stamp for record, _, _ in rows],
@@ -165,7 +165,7 @@ def _number(text: bytes) -> int:
 def _record(line: Line) -> LineRecord:
     number, stamp, payload = line
     values = b" ".join(payload.split())
-    return LineRecord(number, values, values.count(b" ") + 1 if values else 0, as_text(stamp))
+    return LineRecord(number, values, values.count(b" ") + 1 if values else 0, ascii_text(stamp))
 
 
 def _scan_record(line: Line, head: int, skips: Skips) -> tuple[LineRecord, int] | None:
@@ -187,4 +187,4 @@ def _scan_record(line: Line, head: int, skips: Skips) -> tuple[LineRecord, int] 
 def _possible(head: Array, version: Version) -> bool:
     """Whether what stands before the ranges can be true: angles, step, pose."""
     angles = head[ANGLES[version]]
-    return sound(head) and bool(np.abs(angles).max() <= 4 * np.pi) and angles[2] != 0
+    return within_bounds(head) and bool(np.abs(angles).max() <= 4 * np.pi) and angles[2] != 0

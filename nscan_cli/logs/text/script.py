@@ -15,15 +15,15 @@ from nscan_cli.errors import InputDataError, WrongUsageError
 from nscan_cli.files.limits import RECORD_KINDS
 from nscan_cli.files.source import Source
 from nscan_cli.logs import scan_order as order
-from nscan_cli.logs.assemble import Findings, RawScans, RecordedMotion, laser_log, stacked
-from nscan_cli.logs.choices import Device, OpenChoiceError, listed
+from nscan_cli.logs.assemble import Findings, RawScans, RecordedMotion, laser_log, scan_table
+from nscan_cli.logs.device_choice import Device, OpenChoiceError, device_list
 from nscan_cli.logs.formats import FIRST_LINE
 from nscan_cli.logs.laser_defaults import CARMEN_MAX_RANGE
 from nscan_cli.logs.laser_log import LaserLog
-from nscan_cli.logs.odometry_interpolation import interpolated
+from nscan_cli.logs.odometry_interpolation import interpolated_poses
 from nscan_cli.logs.reading_options import ReadingOptions
 from nscan_cli.logs.skips import Skips
-from nscan_cli.logs.text.line_records import LineRecord, beam_count, parsed, sound
+from nscan_cli.logs.text.line_records import LineRecord, beam_count, parsed, within_bounds
 from nscan_cli.poses import Array, wrap
 
 BEGIN = re.compile(rb"(POS|LASER-RANGE|LASER-SCAN)\s+\d+\s+\d+[^:]*:")
@@ -53,7 +53,7 @@ def read(data: bytes, file: str, source: Source, options: ReadingOptions) -> Las
     findings = Findings(skips, {tag: len(found) for tag, found in lines.items()})
     lasers = [Device(tag, LASER, len(found)) for tag, found in lines.items() if tag.startswith(f"{LASER}:")]
     findings.lasers = tuple(lasers)
-    said = listed(lasers, "record")
+    said = device_list(lasers, "record")
     if not lasers:
         raise InputDataError(file, "has no LASER-RANGE record", "give a log with laser scans")
     if options.laser is not None and options.laser not in [laser.name for laser in lasers]:
@@ -123,7 +123,7 @@ def _scans(lines: list[tuple[LineRecord, bytes]], skips: Skips) -> RawScans:
     steps = np.array([max(len(row) - 1, 1) for _, row in rows])
     stamps = [record.stamp for record, _ in rows]
     return RawScans(
-        stacked([row for _, row in rows]),
+        scan_table([row for _, row in rows]),
         -fov / 2,
         fov / steps,
         stamps,
@@ -133,13 +133,15 @@ def _scans(lines: list[tuple[LineRecord, bytes]], skips: Skips) -> RawScans:
     )
 
 
-def _odometry(lines: Lines, times: order.Order, options: ReadingOptions, findings: Findings) -> Array | None:
+def _odometry(
+    lines: Lines, times: order.ScanOrder, options: ReadingOptions, findings: Findings
+) -> Array | None:
     if not options.odometry:
         findings.used["odometry"] = "none: --no-odometry"
         return None
     rows, stamps = [], []
     for record, _, values in parsed([(record, 0) for record, _ in lines.get("POS", [])], findings.skips):
-        if values.size not in (3, 5) or not sound(values):
+        if values.size not in (3, 5) or not within_bounds(values):
             findings.skips.add("not a pose of the robot", record.line)
             continue
         rows.append((values[0] * CM, values[1] * CM, wrap(np.radians(values[2]))))
@@ -155,4 +157,4 @@ def _odometry(lines: Lines, times: order.Order, options: ReadingOptions, finding
         return None
     findings.used["odometry"] = "POS records, interpolated"
     poses = np.array(rows)[moments.rows]
-    return interpolated(times.times, moments.times, poses, "POS record", findings.warnings)
+    return interpolated_poses(times.times, moments.times, poses, "POS record", findings.warnings)

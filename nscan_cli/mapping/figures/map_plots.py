@@ -161,7 +161,7 @@ def _points_of_occupied_cells(
     log: LaserLog, rows: NDArray[np.int64], poses: Array, grid: OccupancyGrid
 ) -> Array:
     """(M, 2) the end points of the beams, m, that lie in occupied cells."""
-    seen = list(log.each_points())
+    seen = list(log.points_by_scan())
     points = np.concatenate([transform(pose, seen[row]) for row, pose in zip(rows, poses, strict=True)])
     columns, lines = np.floor((points - np.array(grid.origin)) / grid.resolution).astype(np.int64).T
     height, width = grid.shape

@@ -75,7 +75,7 @@ def view_mismatches(
         map_in_threads(
             threads,
             lambda first: _shares(
-                views, first, *log.points_of(slice(first, first + SCANS_PER_THREAD), max_range), settings
+                views, first, *log.batch_points(slice(first, first + SCANS_PER_THREAD), max_range), settings
             ),
             range(0, len(log), SCANS_PER_THREAD),
         )

@@ -64,7 +64,7 @@ def scan_batches(log: LaserLog, reach: float, odometry: Array | None, frozen: In
     Scans in the `frozen` rows (H,) have no points.
     """
     first = 0
-    for points, ends in log.stretches(SCANS_PER_BATCH, reach):
+    for points, ends in log.point_batches(SCANS_PER_BATCH, reach):
         end = first + len(ends) - 1
         is_frozen = np.isin(np.arange(first, end), frozen)
         if is_frozen.any():

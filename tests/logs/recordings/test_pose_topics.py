@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from nscan_cli.errors import InputDataError, WrongUsageError
-from nscan_cli.logs.load import recording_in
+from nscan_cli.logs.load import recording_from
 from nscan_cli.logs.recordings.message_types import PATH_TYPE
 from nscan_cli.logs.recordings.pose_topics import poses_on_topic
 from tests.logs.recordings import ros_text
@@ -105,7 +105,7 @@ ALL = PLACING | {"/tf": TRANSFORMS, "/talk": IMAGE}
 
 
 def read(data: bytes, topic: str | None) -> tuple[list[str], np.ndarray, list[str]]:
-    recording = recording_in(data, "a.bag", salvage=False)
+    recording = recording_from(data, "a.bag", salvage=False)
     assert recording is not None
     notices: list[str] = []
     stamps, poses = poses_on_topic(recording, topic, "a.bag", notices)
@@ -125,7 +125,7 @@ def test_every_type_gives_the_same_poses(container, tmp_path: Path):
 
 @pytest.mark.parametrize("container", CONTAINERS)
 def test_of_paths_the_last_is_kept(container, tmp_path: Path):
-    recording = recording_in(container({"/path": PATH_TYPE}, tmp_path), "a.bag", salvage=False)
+    recording = recording_from(container({"/path": PATH_TYPE}, tmp_path), "a.bag", salvage=False)
     assert recording is not None
     assert [len(messages) for messages in recording.messages.values()] == [1]
     assert recording.topics_of((PATH_TYPE,)) == {"/path": COUNT}
@@ -159,4 +159,4 @@ def test_a_topic_has_to_be_chosen_and_have_poses(tmp_path: Path):
 
 
 def test_what_is_no_recording():
-    assert recording_in(io.BytesIO(b"1 2 3").getvalue(), "a.tum", salvage=False) is None
+    assert recording_from(io.BytesIO(b"1 2 3").getvalue(), "a.tum", salvage=False) is None

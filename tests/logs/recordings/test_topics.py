@@ -7,7 +7,7 @@ import dataclasses
 import pytest
 
 from nscan_cli.errors import WrongUsageError
-from nscan_cli.logs.choices import OpenChoiceError
+from nscan_cli.logs.device_choice import OpenChoiceError
 from nscan_cli.logs.frame_names import FrameNames
 from tests.logs.recordings.drives import PERIOD, START, Odom, Scan, Tf, Written, drive, turned
 

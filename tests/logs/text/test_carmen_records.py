@@ -36,7 +36,7 @@ def test_records_are_taken_or_skipped_each_by_itself(kinds):
     lines = [robotlaser(stamp, beams, **PROBLEMS[kind]) for stamp, (kind, beams) in enumerate(kinds, 1)]
     skips = Skips("log", strict=False)
     found = carmen_records.lines_by_tag("\n".join(lines).encode(), skips).get("ROBOTLASER1", [])
-    scans = carmen_records.scans("ROBOTLASER1", found, skips)
+    scans = carmen_records.carmen_scans("ROBOTLASER1", found, skips)
     whole = [(stamp, beams) for stamp, (kind, beams) in enumerate(kinds, 1) if kind == "whole"]
     assert scans.stamps == [str(stamp) for stamp, _ in whole]
     assert scans.lines == [stamp for stamp, _ in whole]

@@ -35,7 +35,7 @@ class OpenChoiceError(WrongUsageError):
         none = ", or none by --no-odometry" if what == "odometry" else ""
         self.what, self.devices, self.option = what, tuple(devices), option
         self.remedy = f"choose one by {option}{none}"
-        super().__init__(f"{file}: has several {several}, {listed(devices, thing)}; {self.remedy}")
+        super().__init__(f"{file}: has several {several}, {device_list(devices, thing)}; {self.remedy}")
 
     @property
     def chooses(self) -> str:
@@ -43,6 +43,6 @@ class OpenChoiceError(WrongUsageError):
         return self.option.removeprefix("--").replace("-", "_")
 
 
-def listed(devices: Sequence[Device], thing: str) -> str:
+def device_list(devices: Sequence[Device], thing: str) -> str:
     """The devices with how many things ("message", "record") each has, as messages list them."""
     return ", ".join(f"{one.name} ({counted(one.records, thing)})" for one in devices)
