@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import json
 import re
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -15,6 +15,7 @@ from nscan_cli.graph.io.triangles import from_upper_triangle
 from nscan_cli.logs.load import read_log
 from nscan_cli.mapping.figures.canvas import BLUE, PURPLE, VERMILLION
 from nscan_cli.poses import relative
+from tests.cli.documents import document_and_notices
 from tests.data import CORRIDOR_LOG, OFFICE_LOG, data_file
 from tests.logs.lines import flaser
 
@@ -25,12 +26,7 @@ KEYS = [
 ]  # fmt: skip
 
 
-def matched(capsys: pytest.CaptureFixture[str], *arguments: str) -> tuple[dict[str, Any], list[str]]:
-    """The document and what was said."""
-    assert run(["match", *arguments]) == 0
-    out, err = capsys.readouterr()
-    document: dict[str, Any] = json.loads(out, parse_constant=pytest.fail)
-    return document, [line for line in err.splitlines() if not line.startswith("compiling")]
+matched = partial(document_and_notices, "match")
 
 
 def off(document: dict[str, Any], log: str) -> np.ndarray:

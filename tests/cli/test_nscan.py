@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import json
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -18,6 +18,7 @@ from nscan_cli.graph.relations.registry import relation_of
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.logs.load import read_log
 from nscan_cli.poses import compose, relative
+from tests.cli.documents import document_and_notices
 from tests.data import CORRIDOR_LOG, OFFICE_LOG, data_file
 from tests.matching.problems import errors
 
@@ -35,12 +36,7 @@ def office() -> LaserLog:
     return read_log(OFFICE_LOG)
 
 
-def matched(capsys: pytest.CaptureFixture[str], *arguments: str) -> tuple[dict[str, Any], list[str]]:
-    """The document and what was said."""
-    assert run(["nscan", *arguments]) == 0
-    out, err = capsys.readouterr()
-    document: dict[str, Any] = json.loads(out, parse_constant=pytest.fail)
-    return document, [line for line in err.splitlines() if not line.startswith("compiling")]
+matched = partial(document_and_notices, "nscan")
 
 
 def graph_of(log: LaserLog, scans: list[int], relations: list[Pairwise] | None = None) -> Graph:

@@ -9,33 +9,20 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.logs.scan_order import by_time
 from nscan_cli.poses import Array, compose, relative, transform, wrap
-
-Rows = slice | NDArray[np.int64]
+from tests.logs.excerpts import Rows, excerpt, truth_of
 
 
 def taken(log: LaserLog, rows: Rows) -> LaserLog:
-    """The scans in `rows` alone, in that order; the numbers are those of a log that never had others."""
-    some = np.arange(len(log))[rows]
-    return replace(
-        log,
-        numbers=np.arange(len(some)),
-        stamps=tuple(log.stamps[row] for row in some.tolist()),
-        times=log.times[some],
-        ranges=log.ranges[some],
-        angle_min=log.angle_min[some],
-        angle_increment=log.angle_increment[some],
-        odometry=None if log.odometry is None else log.odometry[some],
-        truth_times=None if log.truth is None else log.times[some],
-        truth=None if log.truth is None else log.truth[some],
-    )
+    """The scans in `rows` alone, in that order, numbered like a log that never had others."""
+    part = excerpt(log, rows)
+    return replace(part, numbers=np.arange(len(part)))
 
 
-def blind(log: LaserLog, rows: Rows, reading: float = np.inf) -> LaserLog:
+def without_returns(log: LaserLog, rows: Rows, reading: float = np.inf) -> LaserLog:
     """No beam comes back: inf is "nothing met", nan "nothing said"."""
     ranges = log.ranges.copy()
     ranges[rows] = reading
@@ -48,7 +35,7 @@ def glass(log: LaserLog, x: tuple[float, float], y: tuple[float, float], angle: 
     The walls lie along x or y, whichever the box is longer in. The other beams go through, and nothing
     behind the glass is near.
     """
-    ranges, truth = log.ranges.copy(), _truth(log)
+    ranges, truth = log.ranges.copy(), truth_of(log)
     along = 0 if x[1] - x[0] > y[1] - y[0] else 1
     for row in range(len(log)):
         beams = log.angle_min[row] + log.angle_increment[row] * np.arange(ranges.shape[1])
@@ -101,7 +88,7 @@ def spliced(parts: list[LaserLog], pause: float = 5.0) -> LaserLog:
         angle_increment=np.concatenate([part.angle_increment for part in parts]),
         odometry=np.concatenate(known) if len(known) == len(parts) else None,
         truth_times=None if parts[0].truth is None else together,
-        truth=None if parts[0].truth is None else np.concatenate([_truth(part) for part in parts]),
+        truth=None if parts[0].truth is None else np.concatenate([truth_of(part) for part in parts]),
     )
 
 
@@ -150,7 +137,7 @@ def clock_jump(log: LaserLog, at: int, seconds: float) -> LaserLog:
 
 def people(log: LaserLog, walkers: Array, speed: float = 1.2, radius: float = 0.25) -> LaserLog:
     """People walk to and fro: discs, each between two points of the floor plan, walkers (W, 4)."""
-    ranges, truth = log.ranges.copy(), _truth(log)
+    ranges, truth = log.ranges.copy(), truth_of(log)
     start, leg = walkers[:, :2], walkers[:, 2:] - walkers[:, :2]
     length = np.hypot(leg[:, 0], leg[:, 1])
     for row, time in enumerate(log.times - log.times[0]):
@@ -166,12 +153,6 @@ def people(log: LaserLog, walkers: Array, speed: float = 1.2, radius: float = 0.
             near = away * np.cos(off) - np.sqrt(np.maximum(radius**2 - across**2, 0.0))
             ranges[row, hit] = np.fmin(ranges[row, hit], near[hit])
     return replace(log, ranges=ranges)
-
-
-def _truth(log: LaserLog) -> Array:
-    assert log.truth is not None
-    assert len(log.truth) == len(log)
-    return log.truth
 
 
 def _odometry(log: LaserLog) -> Array:

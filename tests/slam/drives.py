@@ -23,12 +23,14 @@ from nscan_cli.slam.local_matching.neighbours import choose_neighbours
 from nscan_cli.slam.local_matching.options import NScanOptions
 from nscan_cli.slam.loop_closure.loop_detector import LoopDetector
 from nscan_cli.slam.loop_closure.place import Place
+from tests.logs.excerpts import truth_of
 from tests.simulation.drive import Drive
+from tests.simulation.faults import without_returns
 from tests.simulation.laser import Laser
 from tests.simulation.office import office_world
 from tests.simulation.scenes import Scene
 from tests.simulation.world import Builder
-from tests.slam.runs import found_of, sensed_in, truth_of, without_returns
+from tests.slam.runs import found_of, sensed_in
 
 ROWS = 10
 """From one keyframe's row to the next: rows and keyframes are not to be mixed up."""

@@ -8,7 +8,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from nscan_cli.files.provenance import provenance_of
 from nscan_cli.graph.model import Graph
@@ -26,8 +25,7 @@ from nscan_cli.slam.options import Relations, SlamOptions
 from nscan_cli.slam.pipeline import run_slam
 from nscan_cli.slam.state import SlamState
 from tests.data import OFFICE_LOG, data_file
-
-Rows = slice | NDArray[np.int64]
+from tests.logs.excerpts import truth_of
 
 
 @dataclass(frozen=True)
@@ -38,6 +36,10 @@ class Mapped:
     graph: Graph
     state: SlamState
     """At the end of the loop."""
+
+    def rmse(self) -> float:
+        """Of the positions (m), after the best rigid motion."""
+        return position_rmse(self.graph.poses, truth_of(self.log))
 
 
 def mapped(log: LaserLog, options: SlamOptions | None = None, threads: int = 1) -> Mapped:
@@ -75,36 +77,6 @@ def mapped_real(name: str) -> Mapped:
     return mapped(read_log(str(data_file(f"{name}.log.gz"))))
 
 
-def truth_of(log: LaserLog) -> Array:
-    """(S, 3) true poses; the logs of the tests have one for every scan."""
-    assert log.truth is not None
-    assert len(log.truth) == len(log)
-    return log.truth
-
-
-def part(log: LaserLog, rows: Rows) -> LaserLog:
-    """The scans in `rows` as a log of their own."""
-    return dataclasses.replace(
-        log,
-        numbers=log.numbers[rows],
-        stamps=tuple(np.array(log.stamps)[rows].tolist()),
-        times=log.times[rows],
-        ranges=log.ranges[rows],
-        angle_min=log.angle_min[rows],
-        angle_increment=log.angle_increment[rows],
-        odometry=None if log.odometry is None else log.odometry[rows],
-        truth_times=log.times[rows],
-        truth=truth_of(log)[rows],
-    )
-
-
-def without_returns(log: LaserLog, rows: Rows, reading: float = np.inf) -> LaserLog:
-    """The log with no usable beam in the scans `rows`: inf is "nothing met", nan "nothing said"."""
-    ranges = log.ranges.copy()
-    ranges[rows] = reading
-    return dataclasses.replace(log, ranges=ranges)
-
-
 def tracked(log: LaserLog, options: TrackingOptions | None = None) -> tuple[list[TrackedScan], Tracker]:
     """Step 1 alone, over a whole log."""
     tracker = Tracker(options or TrackingOptions())
@@ -137,3 +109,14 @@ def found_of(*scans: TrackedScan) -> TrackedScans:
 def poses_of(found: list[TrackedScan]) -> Array:
     """(S, 3)"""
     return np.array([scan.pose for scan in found])
+
+
+def position_rmse(poses: Array, truth: Array) -> float:
+    """The rmse (m) after the rigid motion that makes it least (Horn 1987, in the plane)."""
+    if len(poses) < 2:
+        return 0.0
+    one, other = poses[:, :2] - poses[:, :2].mean(axis=0), truth[:, :2] - truth[:, :2].mean(axis=0)
+    turn = np.arctan2(np.sum(one[:, 0] * other[:, 1] - one[:, 1] * other[:, 0]), np.sum(one * other))
+    c, s = np.cos(turn), np.sin(turn)
+    off = one @ np.array([[c, s], [-s, c]]) - other
+    return float(np.sqrt(np.mean(np.sum(off**2, axis=1))))

@@ -11,8 +11,10 @@ from nscan_cli.graph.io.json_graph import parse_graph, write_graph
 from nscan_cli.graph.model import Graph
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.poses import relative, wrap
+from tests.logs.excerpts import excerpt, truth_of
+from tests.simulation.faults import without_returns
 from tests.simulation.scenes import office
-from tests.slam.runs import mapped, office_log, part, truth_of, without_returns
+from tests.slam.runs import mapped, office_log
 
 ODOMETRY = pytest.mark.parametrize("odometry", [True, False], ids=["odometry", "no odometry"])
 CORRIDOR = slice(1880, 2080)
@@ -38,7 +40,7 @@ def off_truth(graph: Graph, log: LaserLog) -> float:
 
 @ODOMETRY
 def test_a_log_of_one_scan(odometry):
-    graph = sound(part(office_log(odometry), slice(700, 701)))
+    graph = sound(excerpt(office_log(odometry), slice(700, 701)))
     np.testing.assert_array_equal(graph.poses, np.zeros((1, 3)))
     assert graph.keyframes.tolist() == [0]
     assert [*graph.pairwise, *graph.nscan, *graph.loops] == []
@@ -48,7 +50,7 @@ def test_a_log_of_one_scan(odometry):
 @pytest.mark.parametrize(("second", "keyframes"), [(201, [0]), (219, [0, 1])], ids=["near", "far"])
 def test_a_log_of_two_scans(odometry, second, keyframes):
     """0.1 m and 1.8 m apart; the far one is found with odometry only."""
-    log = part(office_log(odometry), np.array([200, second]))
+    log = excerpt(office_log(odometry), np.array([200, second]))
     graph = sound(log)
     assert graph.nscan == []
     assert len(graph.pairwise) == len(graph.keyframes) - 1
@@ -72,7 +74,7 @@ def test_a_robot_that_stands_still(odometry):
 @ODOMETRY
 @pytest.mark.parametrize("reading", [np.inf, np.nan], ids=["no return", "no reading"])
 def test_scans_without_a_usable_beam_in_between(odometry, reading):
-    log = without_returns(part(office_log(odometry), CORRIDOR), np.arange(5, 200, 5), reading)
+    log = without_returns(excerpt(office_log(odometry), CORRIDOR), np.arange(5, 200, 5), reading)
     graph = sound(log)
     assert off_truth(graph, log) < 0.1
     assert len(graph.keyframes) > 10
@@ -81,7 +83,7 @@ def test_scans_without_a_usable_beam_in_between(odometry, reading):
 @ODOMETRY
 def test_a_stretch_of_nothing_but_no_returns(odometry):
     """3.3 m blind: with odometry the way goes on by it; without, as the robot drove last."""
-    log = without_returns(part(office_log(odometry), CORRIDOR), np.arange(60, 90))
+    log = without_returns(excerpt(office_log(odometry), CORRIDOR), np.arange(60, 90))
     graph = sound(log)
     assert off_truth(graph, log) < (0.1 if odometry else 1.0)
     truth = truth_of(log)
@@ -91,7 +93,7 @@ def test_a_stretch_of_nothing_but_no_returns(odometry):
 
 
 def test_a_log_that_is_blind_at_its_start_and_its_end():
-    log = part(office_log(), CORRIDOR)
+    log = excerpt(office_log(), CORRIDOR)
     for rows in (np.arange(30), np.arange(140, 200), np.arange(200)):
         blind = without_returns(log, rows)
         # The odometry's scale is 1 % off: 0.22 m on this way, and it veers.
@@ -99,12 +101,12 @@ def test_a_log_that_is_blind_at_its_start_and_its_end():
 
 
 def test_a_log_that_is_blind_throughout_and_without_odometry():
-    graph = sound(without_returns(part(office_log(False), CORRIDOR), np.arange(200)))
+    graph = sound(without_returns(excerpt(office_log(False), CORRIDOR), np.arange(200)))
     np.testing.assert_array_equal(graph.poses, 0)
 
 
 def test_without_odometry_a_first_scan_that_sees_nothing_is_no_end():
-    log = without_returns(part(office_log(False), CORRIDOR), np.array([0]))
+    log = without_returns(excerpt(office_log(False), CORRIDOR), np.array([0]))
     graph = sound(log)
     assert len(graph.keyframes) > 10
     assert off_truth(graph, log) < 0.3

@@ -17,6 +17,7 @@ from nscan_cli.slam.options import SlamOptions
 from nscan_cli.slam.pipeline import run_slam
 from nscan_cli.slam.state import SlamState
 from tests.data import data_file
+from tests.logs.excerpts import excerpt, truth_of
 from tests.slam.runs import (
     Mapped,
     mapped,
@@ -24,8 +25,7 @@ from tests.slam.runs import (
     mapped_real,
     office_log,
     office_unrefined,
-    part,
-    truth_of,
+    position_rmse,
 )
 
 ODOMETRY = pytest.mark.parametrize("odometry", [True, False], ids=["odometry", "no odometry"])
@@ -48,20 +48,13 @@ def test_the_office_is_mapped_to_five_centimetres(odometry):
 def test_loops_mend_what_tracking_got_wrong(odometry):
     """Tracking alone drifts over the way; the joint matches bring the second round to the first."""
     office = mapped_office(odometry)
-    log = office.log
-    truth = truth_of(log)
-    rmse = [
-        trajectory_errors(
-            Trajectory(log.times, poses, log.stamps), Trajectory(log.times, truth, log.stamps)
-        ).absolute_translation.rmse
-        for poses in (np.concatenate(office.state.tracked), office.graph.poses)
-    ]
-    assert rmse[1] < 0.9 * rmse[0]
+    tracked = np.concatenate(office.state.tracked)
+    assert office.rmse() < 0.9 * position_rmse(tracked, truth_of(office.log))
 
 
 @ODOMETRY
 def test_two_runs_give_the_same_bytes_in_whatever_threads(odometry):
-    log = part(office_log(odometry), slice(0, 800))
+    log = excerpt(office_log(odometry), slice(0, 800))
     first = write_graph(mapped(log).graph)
     assert {write_graph(mapped(log, threads=threads).graph) for threads in (1, 2, 3)} == {first}
 
@@ -166,7 +159,7 @@ def test_read_back_and_optimised_again_it_hardly_moves(odometry):
 
 def test_progress_is_reported_stretch_by_stretch():
     said: list[tuple[int, int]] = []
-    log = part(office_log(), slice(0, SCANS_PER_BATCH + 10))
+    log = excerpt(office_log(), slice(0, SCANS_PER_BATCH + 10))
     graph = run_slam(
         SlamState.of_log(log, SlamOptions()), lambda done, keyframes: said.append((done, keyframes))
     )
@@ -176,7 +169,7 @@ def test_progress_is_reported_stretch_by_stretch():
 
 
 def test_scan_numbers_are_those_of_the_log():
-    log = part(office_log(), np.arange(300, 600, 3))
+    log = excerpt(office_log(), np.arange(300, 600, 3))
     graph = mapped(log).graph
     np.testing.assert_array_equal(graph.scans, np.arange(300, 600, 3))
     assert graph.keyframes[0] == 0

@@ -7,19 +7,10 @@ import itertools
 import numpy as np
 import pytest
 
-from nscan_cli.evaluation.trajectory_errors import trajectory_errors
-from nscan_cli.graph.io.tum import Trajectory
 from nscan_cli.graph.model import Graph
 from nscan_cli.graph.optimise.whole_graph import optimise_graph
 from nscan_cli.slam.options import Relations, SlamOptions
-from tests.slam.runs import Mapped, mapped_office, truth_of
-
-
-def rmse(office: Mapped) -> float:
-    """Of the ATE, m."""
-    log = office.log
-    found, truth = (Trajectory(log.times, poses, log.stamps) for poses in (office.graph.poses, truth_of(log)))
-    return trajectory_errors(found, truth).absolute_translation.rmse
+from tests.slam.runs import mapped_office
 
 
 def chain(graph: Graph) -> list[tuple[int, int]]:
@@ -30,7 +21,7 @@ def chain(graph: Graph) -> list[tuple[int, int]]:
 # Measured: 6.3, 6.2 and 7.5 mm.
 @pytest.mark.parametrize(("relations", "bound"), [("both", 0.01), ("nscan", 0.01), ("pairwise", 0.013)])
 def test_the_error_of_the_office(relations: Relations, bound: float):
-    assert rmse(mapped_office(True, relations)) < bound
+    assert mapped_office(True, relations).rmse() < bound
 
 
 def test_nscan_keeps_of_the_chain_what_nothing_else_holds_together():
@@ -93,4 +84,4 @@ def test_without_loops_no_relation_joins_different_visits(relations: Relations, 
 
 def test_without_loops_drift_remains():
     """Twice as far off and more, over the 243 m."""
-    assert rmse(mapped_office(True, loops=False)) > 2 * rmse(mapped_office(True))
+    assert mapped_office(True, loops=False).rmse() > 2 * mapped_office(True).rmse()

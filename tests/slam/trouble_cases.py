@@ -10,11 +10,12 @@ import numpy as np
 
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.poses import Array
+from tests.logs.excerpts import truth_of
 from tests.simulation import faults
 from tests.simulation.scenes import Scene, office
 from tests.simulation.world import Builder
 from tests.slam.drives import path_of
-from tests.slam.runs import truth_of
+from tests.slam.runs import position_rmse
 
 
 class Case(NamedTuple):
@@ -39,18 +40,7 @@ def errors(case: Case, poses: Array) -> Errors:
     """How far poses (S, 3) are from the truth, each part laid over it as well as can be."""
     truth = truth_of(case.log)
     parts = (slice(None), slice(0, case.before), slice(case.after, None))
-    return Errors(*(rmse_of(poses[rows], truth[rows]) for rows in parts))
-
-
-def rmse_of(poses: Array, truth: Array) -> float:
-    """The rmse (m) after the rigid motion that makes it least (Horn 1987, in the plane)."""
-    if len(poses) < 2:
-        return 0.0
-    one, other = poses[:, :2] - poses[:, :2].mean(axis=0), truth[:, :2] - truth[:, :2].mean(axis=0)
-    turn = np.arctan2(np.sum(one[:, 0] * other[:, 1] - one[:, 1] * other[:, 0]), np.sum(one * other))
-    c, s = np.cos(turn), np.sin(turn)
-    off = one @ np.array([[c, s], [-s, c]]) - other
-    return float(np.sqrt(np.mean(np.sum(off**2, axis=1))))
+    return Errors(*(position_rmse(poses[rows], truth[rows]) for rows in parts))
 
 
 def at_metre(log: LaserLog, metre: float) -> int:
@@ -60,7 +50,7 @@ def at_metre(log: LaserLog, metre: float) -> int:
 
 def blind(log: LaserLog, since: float, until: float, reading: float = np.inf) -> Case:
     a, b = at_metre(log, since), at_metre(log, until)
-    return Case(faults.blind(log, slice(a, b), reading), a, b)
+    return Case(faults.without_returns(log, slice(a, b), reading), a, b)
 
 
 def dropped(log: LaserLog, since: float, until: float) -> Case:

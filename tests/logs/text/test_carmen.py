@@ -219,38 +219,6 @@ def test_numbers_are_those_of_the_whole_log(tmp_path):
         log.row(2)
 
 
-MALFORMED = {
-    "FLASER 3 1 2 0 0 0 0 0 0 1.0 h 0": "wrong number of values",
-    "FLASER 999999999 1 2 0 0 0 0 0 0 1.0 h 0": "the beam count is not in 1…16384",
-    "FLASER 0 0 0 0 0 0 0 1.0 h 0": "the beam count is not in 1…16384",
-    "FLASER -1 0 0 0 0 0 0 1.0 h 0": "the beam count is not in 1…16384",
-    "FLASER x 1 2 0 0 0 0 0 0 1.0 h 0": "the beam count is not a number",
-    "FLASER 2 1 x 0 0 0 0 0 0 1.0 h 0": "a value is not a number",
-    "FLASER 2 1 1.2.3 0 0 0 0 0 0 1.0 h 0": "a value is not a number",
-    "FLASER 2 1 2 0 0 nan 0 0 0 1.0 h 0": "a pose is out of bounds",
-    "FLASER 2 1 2 0 0 0 1e300 0 0 1.0 h 0": "a pose is out of bounds",
-    "FLASER": "wrong number of values",
-    "\x07\x08 1 2": "not a CARMEN record",
-}
-
-
-@pytest.mark.parametrize("line", MALFORMED)
-def test_malformed_records_are_counted_or_refused(tmp_path, line):
-    lines = (flaser(1), flaser(2, laser=(1, 0, 0)), line, flaser(3), line)
-    log = read(tmp_path, *lines)
-    assert len(log) == 3
-    assert log.report.skipped == {MALFORMED[line]: (2, 3)}
-    with pytest.raises(InputDataError, match=r"test\.log, line 3: .*--strict"):
-        read(tmp_path, *lines, options=ReadingOptions(strict=True))
-
-
-def test_a_wrong_count_of_remissions(tmp_path):
-    good = "RAWLASER1 0 -1.5 3.0 0.5 20 0 0 2 1 2 1 9 11.0 h 0"
-    log = read(tmp_path, good, good.replace("2 1 9", "2 2 9"))
-    assert len(log) == 1
-    assert log.report.skipped == {"wrong number of values": (1, 2)}
-
-
 def test_nothing_but_malformed_records(tmp_path):
     with pytest.raises(
         InputDataError, match=r"line 1: none of its 1 FLASER records .*wrong number of values"
@@ -263,44 +231,10 @@ def test_no_laser(tmp_path):
         read(tmp_path, "PARAM a 1 nohost 0", "ODOM 0 0 0 0 0 0 1 h 0")
 
 
-CORRECTED = {
-    "NEFF": [flaser(1.5, laser=(1, 0, 0)), "NEFF 12.5"],
-    "WEIGHT": [flaser(1.5, laser=(1, 0, 0)), "WEIGHT 0.5"],
-    "pippo": [flaser(1.5, laser=(1, 0, 0)).replace("nohost", "pippo")],
-    "six digits": [flaser("1.13486e+09", laser=(1, 0, 0)), flaser("1.13487e+09", laser=(2, 0, 0))],
-}
-
-
-@pytest.mark.parametrize("sign", CORRECTED)
-def test_corrected_poses_are_refused_unless_allowed(tmp_path, sign):
-    with pytest.raises(InputDataError, match=f"{sign}.*--allow-corrected"):
-        read(tmp_path, *CORRECTED[sign])
-    log = read(tmp_path, *CORRECTED[sign], options=ReadingOptions(allow_corrected=True))
-    assert log.odometry is not None
-    assert log.odometry[0, 0] == 1
-    assert any("result" in warning for warning in log.report.warnings)
-
-
-@pytest.mark.parametrize("times", [("0", "0.2", "0.4"), ("976052857.337530", "976052857.5"), ("1.000000",)])
-def test_equal_poses_alone_are_no_sign_of_correction(tmp_path, times):
-    assert len(read(tmp_path, *(flaser(time, laser=(1, 0, 0)) for time in times))) == len(times)
-
-
-def test_six_digit_times_alone_are_no_sign_of_correction(tmp_path):
-    assert len(read(tmp_path, flaser("1.13486e+09", laser=(1.1, 0, 0), robot=(1, 0, 0)))) == 1
-
-
 def test_records_of_unknown_kinds_are_told(tmp_path):
     log = read(tmp_path, flaser(1), flaser(2).replace("FLASER", "FLASEQ"), flaser(3), "SONAR 1 2 3 h 4")
     assert len(log) == 2
     assert log.report.warnings[0] == "1 record of kinds unknown to CARMEN: FLASEQ (1)"
-
-
-def test_a_corrected_log_can_be_read_without_its_poses(tmp_path):
-    log = read(tmp_path, *CORRECTED["NEFF"], options=ReadingOptions(odometry=False))
-    assert log.odometry is None
-    assert log.report.corrected == "it has NEFF records"
-    assert log.report.warnings[0] == "the poses are a mapper's result, not odometry (it has NEFF records)"
 
 
 def test_where_no_time_was_measured_the_loggers_holds(tmp_path):

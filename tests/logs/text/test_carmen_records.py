@@ -57,3 +57,35 @@ def test_the_first_record_out_of_bounds_is_named(tmp_path):
     assert read(tmp_path, *lines).report.skipped == {"a pose is out of bounds": (2, 4)}
     with pytest.raises(InputDataError, match="line 4: a pose is out of bounds"):
         read(tmp_path, *lines, options=ReadingOptions(strict=True))
+
+
+MALFORMED = {
+    "FLASER 3 1 2 0 0 0 0 0 0 1.0 h 0": "wrong number of values",
+    "FLASER 999999999 1 2 0 0 0 0 0 0 1.0 h 0": "the beam count is not in 1…16384",
+    "FLASER 0 0 0 0 0 0 0 1.0 h 0": "the beam count is not in 1…16384",
+    "FLASER -1 0 0 0 0 0 0 1.0 h 0": "the beam count is not in 1…16384",
+    "FLASER x 1 2 0 0 0 0 0 0 1.0 h 0": "the beam count is not a number",
+    "FLASER 2 1 x 0 0 0 0 0 0 1.0 h 0": "a value is not a number",
+    "FLASER 2 1 1.2.3 0 0 0 0 0 0 1.0 h 0": "a value is not a number",
+    "FLASER 2 1 2 0 0 nan 0 0 0 1.0 h 0": "a pose is out of bounds",
+    "FLASER 2 1 2 0 0 0 1e300 0 0 1.0 h 0": "a pose is out of bounds",
+    "FLASER": "wrong number of values",
+    "\x07\x08 1 2": "not a CARMEN record",
+}
+
+
+@pytest.mark.parametrize("line", MALFORMED)
+def test_malformed_records_are_counted_or_refused(tmp_path, line):
+    lines = (flaser(1), flaser(2, laser=(1, 0, 0)), line, flaser(3), line)
+    log = read(tmp_path, *lines)
+    assert len(log) == 3
+    assert log.report.skipped == {MALFORMED[line]: (2, 3)}
+    with pytest.raises(InputDataError, match=r"test\.log, line 3: .*--strict"):
+        read(tmp_path, *lines, options=ReadingOptions(strict=True))
+
+
+def test_a_wrong_count_of_remissions(tmp_path):
+    good = "RAWLASER1 0 -1.5 3.0 0.5 20 0 0 2 1 2 1 9 11.0 h 0"
+    log = read(tmp_path, good, good.replace("2 1 9", "2 2 9"))
+    assert len(log) == 1
+    assert log.report.skipped == {"wrong number of values": (1, 2)}

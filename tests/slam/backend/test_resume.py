@@ -13,18 +13,19 @@ from nscan_cli.graph.io.json_graph import parse_graph, write_graph
 from nscan_cli.graph.model import Graph, Loop
 from nscan_cli.graph.optimise.whole_graph import optimise_graph
 from nscan_cli.logs.laser_log import LaserLog
-from nscan_cli.poses import Array, compose
+from nscan_cli.poses import Array
 from nscan_cli.slam.backend.resume import can_refine, options_of, resume
 from nscan_cli.slam.local_matching.options import NScanOptions
 from nscan_cli.slam.loop_closure.verification import AMBIGUOUS
 from nscan_cli.slam.options import Relations, SlamOptions
-from tests.slam.runs import mapped, office_log, part, truth_of
+from tests.logs.excerpts import excerpt, truth_of
+from tests.slam.runs import mapped, office_log, position_rmse
 
 
 @functools.cache
 def tenth() -> LaserLog:
     """Every tenth scan of the office, a round with loops."""
-    return part(office_log(), slice(None, None, 10))
+    return excerpt(office_log(), slice(None, None, 10))
 
 
 @functools.cache
@@ -34,21 +35,16 @@ def saved(relations: Relations = "both") -> Graph:
     return parse_graph(write_graph(graph), "saved.json")
 
 
+def rmse(poses: Array) -> float:
+    return position_rmse(poses, truth_of(tenth()))
+
+
 def refined(graph: Graph, log: LaserLog | None = None) -> Graph:
     """As `slam --from` does it."""
     graph = copy.deepcopy(graph)
     optimise_graph(graph)
     log = log or tenth()
     return resume(graph, log, np.searchsorted(log.numbers, graph.scans))
-
-
-def rmse(poses: Array) -> float:
-    """Of the positions (m), the poses moved onto the true ones as a whole."""
-    truth = truth_of(tenth())
-    a, b = poses[:, :2] - poses[:, :2].mean(axis=0), truth[:, :2] - truth[:, :2].mean(axis=0)
-    angle = np.arctan2((a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]).sum(), (a * b).sum())
-    turned = compose([0.0, 0.0, angle], np.column_stack([a, np.zeros(len(a))]))
-    return float(np.sqrt(((turned[:, :2] - b) ** 2).sum(axis=1).mean()))
 
 
 @pytest.mark.parametrize("relations", ["both", "nscan", "pairwise"])
@@ -123,7 +119,7 @@ def test_what_slam_did_not_make_cannot_be_refined():
 
 @pytest.mark.parametrize("count", [1, 2, 5])
 def test_graphs_of_a_few_scans(count: int):
-    log = part(tenth(), slice(0, count))
+    log = excerpt(tenth(), slice(0, count))
     graph = mapped(log).graph
     after = refined(graph, log)
     np.testing.assert_allclose(after.poses, graph.poses, atol=1e-3)

@@ -10,8 +10,9 @@ import pytest
 from nscan_cli.slam.frontend.break_detection import SegmentTracker, TrackedBatch
 from nscan_cli.slam.frontend.options import BreakOptions, TrackingOptions
 from nscan_cli.slam.frontend.scan_batch import ScanBatch
+from tests.logs.excerpts import excerpt
 from tests.slam.drives import round_scene
-from tests.slam.runs import part, sensed_in
+from tests.slam.runs import sensed_in
 from tests.slam.trouble_cases import carried, standing
 
 
@@ -19,7 +20,7 @@ from tests.slam.trouble_cases import carried, standing
 def scans() -> ScanBatch:
     """40 scans of a drive, and 60 more after the robot was carried by 8 m."""
     made = carried(round_scene().record(5).log(), 20.0, 28.0)
-    log = part(made.log, slice(made.before - 40, made.before + 60))
+    log = excerpt(made.log, slice(made.before - 40, made.before + 60))
     assert log.odometry is not None
     return sensed_in(log)
 
@@ -61,5 +62,5 @@ def test_of_a_robot_that_stands_few_scans_wait_for_it_to_drive():
     log = standing(most + 200)
     follower, settled = SegmentTracker(TrackingOptions(), BreakOptions(), odometry=False), 0
     for first in range(0, len(log), 100):
-        settled += sum(map(len, follower.follow(sensed_in(part(log, slice(first, first + 100))))))
+        settled += sum(map(len, follower.follow(sensed_in(excerpt(log, slice(first, first + 100))))))
         assert settled == (0 if first + 100 < most else first + 100)

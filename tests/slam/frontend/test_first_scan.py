@@ -12,9 +12,10 @@ from nscan_cli.poses import Array, relative
 from nscan_cli.slam.frontend.break_detection import SegmentTracker, TrackedBatch
 from nscan_cli.slam.frontend.first_scan import place_first
 from nscan_cli.slam.frontend.options import BreakOptions, TrackingOptions
+from tests.logs.excerpts import excerpt, truth_of
 from tests.simulation.scenes import office
 from tests.slam.drives import round_scene
-from tests.slam.runs import found_of, office_log, part, sensed, sensed_in, tracked, truth_of
+from tests.slam.runs import found_of, office_log, sensed, sensed_in, tracked
 from tests.slam.trouble_cases import carried
 
 SCANS = 120
@@ -44,7 +45,7 @@ def test_the_first_scan_lies_as_well_as_those_after_it(odometry):
     off = []
     for seed in range(1, 9):
         drive = office().record(seed)
-        log = part(drive.log(), slice(0, SCANS))
+        log = excerpt(drive.log(), slice(0, SCANS))
         log = log if odometry else dataclasses.replace(log, odometry=None)
         off.append(turned(followed(log), drive.truth, 0))
     assert np.sqrt(np.mean(np.square(off))) < 0.001
@@ -55,7 +56,7 @@ def test_nor_is_the_first_scan_after_a_break_left_where_it_was():
     off = []
     for seed in range(5, 11):
         made = carried(round_scene().record(seed).log(), 20.0, 28.0)
-        log = part(made.log, slice(made.before - 40, made.before + SCANS))
+        log = excerpt(made.log, slice(made.before - 40, made.before + SCANS))
         found = followed(log)
         first = next(scans.scans.first for scans in found if scans.starts_segment)
         off.append(turned(found, truth_of(log), first))
@@ -63,7 +64,7 @@ def test_nor_is_the_first_scan_after_a_break_left_where_it_was():
 
 
 def test_it_stays_where_nothing_says_better():
-    log = part(office_log(), slice(0, 40))
+    log = excerpt(office_log(), slice(0, 40))
     found, _ = tracked(log)
     scans, options = [log.points(row) for row in range(len(log))], TrackingOptions()
     # A robot that stands still: no scan has joined the map.
@@ -81,6 +82,6 @@ def test_it_stays_where_nothing_says_better():
 
 def test_a_log_that_ends_at_once_keeps_all_its_scans():
     for count in (1, 2, 5):
-        found = followed(part(office_log(), slice(0, count)))
+        found = followed(excerpt(office_log(), slice(0, count)))
         rows = [scans.scans.first + k for scans in found for k in range(len(scans))]
         assert rows == list(range(count))

@@ -19,12 +19,13 @@ from nscan_cli.poses import Array, compose, relative, transform, wrap
 from nscan_cli.slam.frontend.options import TrackingOptions
 from nscan_cli.slam.frontend.tracked_scans import TrackedScan
 from nscan_cli.slam.frontend.tracker import Tracker
+from tests.logs.excerpts import excerpt, truth_of
 from tests.ndt.rooms import room
 from tests.ndt.test_grid_growth import assert_same
 from tests.ndt.transforms import gaussian_count
 from tests.simulation.scenes import Scene
 from tests.simulation.world import Builder
-from tests.slam.runs import office_log, part, poses_of, scans_of, sensed, sensed_in, tracked, truth_of
+from tests.slam.runs import office_log, poses_of, scans_of, sensed, sensed_in, tracked
 
 STEP = 0.01
 """m"""
@@ -51,7 +52,7 @@ def test_the_office_is_tracked(rows, odometry):
 
     Errors of steps would add up to 10 mm · √200 = 14 cm if the map of the last metres did not hold them.
     """
-    log = part(office_log(odometry), rows)
+    log = excerpt(office_log(odometry), rows)
     found, _ = tracked(log)
     truth = truth_of(log)
     off = steps_off(poses_of(found), truth)
@@ -152,7 +153,7 @@ def window_map(found: list[TrackedScan], log: LaserLog, options: TrackingOptions
 
 
 def test_the_map_holds_no_more_than_the_scans_of_the_window():
-    log = part(office_log(), SOUTH)
+    log = excerpt(office_log(), SOUTH)
     options = TrackingOptions(window=4.0)
     found, tracker = tracked(log, options)
     assert found[-1].path > 20
@@ -174,7 +175,7 @@ def jumped(log: LaserLog, row: int, off: tuple[float, float, float]) -> LaserLog
 
 @pytest.mark.parametrize("turn", [1.0, -1.0])
 def test_odometry_that_is_off_by_a_radian_is_recovered_by_starts_at_other_angles(turn):
-    log = part(jumped(office_log(), 1920, (0.0, 0.0, turn)), slice(1880, 1960))
+    log = excerpt(jumped(office_log(), 1920, (0.0, 0.0, turn)), slice(1880, 1960))
     truth = truth_of(log)
     found, tracker = tracked(log)
     assert tracker.restarts > 0
@@ -194,7 +195,7 @@ def test_odometry_that_is_off_by_a_radian_is_recovered_by_starts_at_other_angles
 )
 def test_a_scan_with_fewer_inliers_than_the_one_before_is_matched_from_other_angles_too(row, off):
     """From where odometry has it, it is matched 0.4 m off, with 0.83 and 0.87 of inliers after 0.99."""
-    log = part(jumped(office_log(), row, off), slice(row - 700, row + 1))
+    log = excerpt(jumped(office_log(), row, off), slice(row - 700, row + 1))
     found, _ = tracked(log)
     assert np.abs(end_off(poses_of(found), truth_of(log))).max() < 0.05
     assert found[-1].inliers > found[-2].inliers - TrackingOptions().inlier_margin
@@ -221,7 +222,7 @@ def test_a_scan_without_points_is_not_searched():
 @pytest.mark.parametrize("odometry", [True, False], ids=["odometry", "no odometry"])
 def test_scans_are_found_where_they_are_however_many_come_at_a_time(odometry):
     """To the bit, a lost scan in the middle included; the map and its scans outgrow their first room."""
-    log = part(jumped(office_log(), 1920, (0.0, 0.0, 1.0)), slice(1860, 2000))
+    log = excerpt(jumped(office_log(), 1920, (0.0, 0.0, 1.0)), slice(1860, 2000))
     log = log if odometry else dataclasses.replace(log, odometry=None)
     scans = sensed_in(log)
     together, _ = tracked(log)

@@ -16,7 +16,8 @@ from nscan_cli.slam.local_matching.joint_relations import LocalMatch
 from nscan_cli.slam.local_matching.neighbours import choose_neighbours
 from nscan_cli.slam.local_matching.options import NScanOptions
 from nscan_cli.slam.options import SlamOptions
-from tests.slam.runs import Mapped, mapped, mapped_office, office_log, part
+from tests.logs.excerpts import excerpt
+from tests.slam.runs import Mapped, mapped, mapped_office, office_log
 
 
 def joint(*nodes: int) -> LocalMatch:
@@ -135,7 +136,7 @@ def centres(run: Mapped) -> set[int]:
 
 def test_keyframes_that_others_cover_are_no_centres():
     """Along 30 m. A share that is never reached makes each the centre of a match, as there were no others."""
-    log, options = part(office_log(), slice(0, 300)), SlamOptions()
+    log, options = excerpt(office_log(), slice(0, 300)), SlamOptions()
     always = dataclasses.replace(options, nscan=NScanOptions(max_covered_share=1.1))
     sparse, dense = mapped(log, options), mapped(log, always)
     keyframes = dense.graph.keyframes

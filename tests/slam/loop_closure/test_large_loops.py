@@ -14,10 +14,9 @@ from nscan_cli.logs.reading_options import ReadingOptions
 from nscan_cli.slam.loop_closure.options import LoopClosureOptions
 from nscan_cli.slam.options import Relations, SlamOptions
 from tests.data import data_file
+from tests.logs.excerpts import truth_of
 from tests.slam.drives import slipped_round
-from tests.slam.runs import Mapped, mapped, truth_of
-from tests.slam.test_relation_kinds import rmse
-from tests.slam.trouble_cases import rmse_of
+from tests.slam.runs import Mapped, mapped, position_rmse
 
 ALONG, ACROSS, ASLANT = (2.5, 0.0, 0.0), (0.0, 2.5, 0.0), (-2.5, 1.0, 0.05)
 ASIDE = (1.0, 2.0, -0.05)
@@ -34,7 +33,7 @@ def run(slip: tuple[float, float, float], closing: bool, relations: Relations = 
 def sighted_rmse(found: Mapped) -> float:
     """Of the scans that see something: what lies between, the odometry alone says after a break."""
     sighted = np.isfinite(found.log.ranges).any(axis=1)
-    return rmse_of(found.graph.poses[sighted], truth_of(found.log)[sighted])
+    return position_rmse(found.graph.poses[sighted], truth_of(found.log)[sighted])
 
 
 # Measured of all scans: 0.053, 0.061, 0.319 and 0.056 m; the third has a break where nothing is seen.
@@ -46,7 +45,7 @@ def test_the_loop_mends_a_slip_that_no_scan_saw(slip):
     assert sighted_rmse(run(slip, True)) < 0.1
     if slip != ALONG:
         # Along the way a joint match finds it too: what odometry alone says is held loosely.
-        assert rmse(run(slip, False)) > 0.5
+        assert run(slip, False).rmse() > 0.5
     state, graph = run(slip, True).state, run(slip, True).graph
     assert len(state.places) >= 2
     # All keyframes of the second visit, 12 m, lie in relations that close the loop, from where it was closed.
@@ -60,7 +59,7 @@ def test_the_loop_mends_a_slip_that_no_scan_saw(slip):
 
 def test_single_matches_mend_it_too():
     assert sighted_rmse(run(ASLANT, True, "pairwise")) < 0.1
-    assert rmse(run(ASLANT, False, "pairwise")) > 0.5
+    assert run(ASLANT, False, "pairwise").rmse() > 0.5
 
 
 def test_the_graph_has_the_verdicts_on_what_was_searched():

@@ -1,0 +1,20 @@
+"""JSON documents that commands write."""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+import pytest
+
+from nscan_cli.cli.main import run
+
+
+def document_and_notices(
+    command: str, capsys: pytest.CaptureFixture[str], *arguments: str
+) -> tuple[dict[str, Any], list[str]]:
+    """The document of a command that writes one to standard output, and the lines of standard error."""
+    assert run([command, *arguments]) == 0
+    out, err = capsys.readouterr()
+    document: dict[str, Any] = json.loads(out, parse_constant=pytest.fail)
+    return document, [line for line in err.splitlines() if not line.startswith("compiling")]
