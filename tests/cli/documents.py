@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -18,3 +19,8 @@ def document_and_notices(
     out, err = capsys.readouterr()
     document: dict[str, Any] = json.loads(out, parse_constant=pytest.fail)
     return document, [line for line in err.splitlines() if not line.startswith("compiling")]
+
+
+def document_of(path: Path) -> dict[str, Any]:
+    document: dict[str, Any] = json.loads(path.read_bytes(), parse_constant=pytest.fail)
+    return document

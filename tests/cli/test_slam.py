@@ -12,7 +12,6 @@ import shutil
 import subprocess
 from pathlib import Path
 from types import SimpleNamespace
-from typing import Any
 
 import numpy as np
 import pytest
@@ -25,9 +24,10 @@ from nscan_cli.graph.io.tum import read_tum
 from nscan_cli.logs.load import read_log
 from nscan_cli.logs.reading_options import ReadingOptions
 from nscan_cli.poses import relative
+from tests.cli.documents import document_of
 from tests.cli.room import ALL_OUTPUTS, room_log
 from tests.data import OFFICE_LOG
-from tests.graph.io.test_json_graph import validate
+from tests.graph.schema import validate
 
 SHORT = [OFFICE_LOG, "--end", "40"]
 """200 scans, 15 m."""
@@ -42,11 +42,6 @@ def everything(tmp_path_factory: pytest.TempPathFactory) -> Path:
     arguments = [part for option, name in files.items() for part in (option, str(folder / name))]
     assert run(["slam", *SHORT, "-q", *arguments]) == 0
     return folder
-
-
-def document_of(path: Path) -> dict[str, Any]:
-    document: dict[str, Any] = json.loads(path.read_bytes(), parse_constant=pytest.fail)
-    return document
 
 
 def test_outputs_appear_whole_and_nothing_else(everything):

@@ -6,9 +6,10 @@ import tomllib
 
 from nscan_cli.cli.main import run
 from nscan_cli.graph.io.json_graph import read_graph
-from tests.cli.test_slam import SHORT, document_of
+from tests.cli.documents import document_of
+from tests.cli.test_slam import SHORT
 from tests.data import OFFICE_LOG
-from tests.graph.io.test_json_graph import validate
+from tests.graph.schema import validate
 
 
 def test_without_odometry(folder):

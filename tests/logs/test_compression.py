@@ -22,9 +22,8 @@ from nscan_cli.logs.load import read_log
 from nscan_cli.logs.reading_options import ReadingOptions
 from tests.logs.forms import FORMS
 from tests.logs.lines import flaser
-from tests.logs.recordings.drives import drive
+from tests.logs.recordings.drives import check_drive, drive
 from tests.logs.recordings.ros import bag2
-from tests.logs.recordings.test_laser_scans import check_drive
 
 TEXT = "\n".join(flaser(1.0 + k, tuple(1.0 + i / 7 + k / 31 for i in range(180))) for k in range(60)).encode()
 PACKERS: dict[str, Callable[[bytes], bytes]] = {

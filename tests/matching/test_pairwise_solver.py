@@ -12,16 +12,11 @@ from nscan_cli.poses import Array
 from tests.ndt import plain
 from tests.ndt.differences import derivative
 from tests.ndt.rooms import room
+from tests.ndt.transforms import ndt_of
 
 MEAN = np.array([0.3, -0.2, 3.1])
 INFORMATION = np.array([[50.0, 10.0, 0.0], [10.0, 80.0, -5.0], [0.0, -5.0, 200.0]])
 SCALE = 0.1
-
-
-def ndt_of(points: Array) -> Ndt:
-    ndt = Ndt.empty(1.0)
-    ndt.add(points, np.zeros(3))
-    return ndt
 
 
 def evaluate(ndt: Ndt, points: Array, pose: Array, curvature: float = 1.0) -> tuple[float, Array, Array]:

@@ -4,19 +4,13 @@ import numpy as np
 import pytest
 
 from nscan_cli.ndt.energy import energy, inlier_share
-from nscan_cli.ndt.transform import Ndt
 from nscan_cli.poses import Array
 from tests.ndt import plain
 from tests.ndt.differences import derivative
 from tests.ndt.rooms import room
+from tests.ndt.transforms import ndt_of
 
 STEPS = np.array([1e-5, 1e-5, 2e-6])
-
-
-def ndt_of(points: Array, cell: float = 1.0) -> Ndt:
-    ndt = Ndt.empty(cell)
-    ndt.add(points, np.zeros(3))
-    return ndt
 
 
 def random_poses(seed: int, count: int) -> Array:

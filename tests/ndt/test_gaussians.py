@@ -9,8 +9,7 @@ from nscan_cli.ndt.association import association_buffers, begin_association, up
 from nscan_cli.ndt.energy import ENERGY_NUMBERS, energy, evaluate_energy, inlier_share, sum_association
 from nscan_cli.ndt.transform import Ndt
 from nscan_cli.poses import Array, compose, relative, transform
-from tests.ndt.test_grid_growth import assert_same, entries
-from tests.ndt.transforms import gaussian_count, subtract
+from tests.ndt.transforms import assert_same, entries, gaussian_count, subtract
 
 THICK = 0.12
 """m"""

@@ -9,7 +9,7 @@ from nscan_cli.ndt.transform import Ndt
 from nscan_cli.poses import relative, transform
 from tests.ndt import plain
 from tests.ndt.rooms import room
-from tests.ndt.transforms import gaussian_count, subtract
+from tests.ndt.transforms import assert_same, entries, gaussian_count, subtract
 
 HERE = np.zeros(3)
 ELSEWHERE = np.array([-7.3, 4.1, 2.2])
@@ -20,23 +20,6 @@ def grown(points, cell=1.0, minimum=3, floor=0.02, capacity=512, pose=HERE) -> N
     ndt = Ndt.empty(cell, minimum, floor, capacity)
     ndt.add(points, pose)
     return ndt
-
-
-def entries(ndt: Ndt) -> dict[int, tuple[float, ...]]:
-    """Key → Gaussian, of all with enough points."""
-    grid = ndt.grid
-    return {
-        int(grid.keys[row]): tuple(grid.gaussians[row])
-        for row in range(ndt.rows)
-        if grid.gaussians[row, 2] > 0
-    }
-
-
-def assert_same(a: Ndt, b: Ndt, tolerance: float = 1e-9) -> None:
-    first, second = entries(a), entries(b)
-    assert first.keys() == second.keys()
-    for key, gaussian in first.items():
-        np.testing.assert_allclose(gaussian, second[key], rtol=tolerance, atol=tolerance)
 
 
 @pytest.mark.parametrize(("cell", "minimum", "floor"), [(1.0, 3, 0.02), (0.5, 5, 0.02), (2.0, 4, 0.1)])

@@ -18,3 +18,26 @@ def subtract(ndt: Ndt, points: Array, pose: Array) -> None:
     """Remove points (m, 2) that were added with the same pose (3,)."""
     ndt.reserve(len(points))
     ndt.rows = change_points(ndt.grid, ndt.rows, ndt.half, points, pose, -1.0, True)
+
+
+def entries(ndt: Ndt) -> dict[int, tuple[float, ...]]:
+    """Key → Gaussian, of all with enough points."""
+    grid = ndt.grid
+    return {
+        int(grid.keys[row]): tuple(grid.gaussians[row])
+        for row in range(ndt.rows)
+        if grid.gaussians[row, 2] > 0
+    }
+
+
+def assert_same(a: Ndt, b: Ndt, tolerance: float = 1e-9) -> None:
+    first, second = entries(a), entries(b)
+    assert first.keys() == second.keys()
+    for key, gaussian in first.items():
+        np.testing.assert_allclose(gaussian, second[key], rtol=tolerance, atol=tolerance)
+
+
+def ndt_of(points: Array, cell: float = 1.0) -> Ndt:
+    ndt = Ndt.empty(cell)
+    ndt.add(points, np.zeros(3))
+    return ndt

@@ -13,12 +13,10 @@ from nscan_cli.graph.model import Pairwise
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.logs.load import read_log
 from nscan_cli.logs.reading_options import ReadingOptions
-from nscan_cli.poses import Array, relative
+from nscan_cli.poses import relative
 from nscan_cli.slam.diagnostics.notices import notices
-from nscan_cli.slam.frontend.odometry_checks import frozen_scans, without_jumps
-from nscan_cli.slam.frontend.options import BreakOptions, OdometryCheckOptions
+from nscan_cli.slam.frontend.options import BreakOptions
 from tests.data import data_file
-from tests.simulation import faults
 from tests.slam import trouble_cases
 from tests.slam.drives import round_scene
 from tests.slam.runs import Mapped, mapped
@@ -31,7 +29,6 @@ MENDED = ("3 m without a return", "3 m of nan", "15 m without a return", "3 s of
           "people who pass")  # fmt: skip
 """As if it had not happened."""
 FOUND_AGAIN = ("carried by 2 m", "carried by 5 m", "carried by 30 m", "kidnapped to a place seen before")
-CHECKS = OdometryCheckOptions()
 NEVER_SEEN_AGAIN = "carried by 30 m, nothing seen again"
 
 
@@ -160,62 +157,6 @@ def test_someone_in_the_way_for_half_a_second_breaks_nothing():
     found = mapped(dataclasses.replace(log(), ranges=ranges))
     assert found.state.breaks == []
     assert errors(Case(log(), at, at), found.graph.poses).whole < 0.05
-
-
-# ----------------------------------------------------------------------------- what is not believed
-
-
-def clock(scans: int) -> Array:
-    return 0.1 * np.arange(scans, dtype=np.float64)
-
-
-def steady(scans: int = 150, step: float = 0.1) -> Array:
-    return np.stack([step * np.arange(scans), np.zeros(scans), np.full(scans, 0.3)], axis=1)
-
-
-def test_odometry_without_jumps_is_left_alone():
-    odometry = steady()
-    believed, jumps = without_jumps(odometry, clock(150), CHECKS)
-    assert believed is odometry
-    assert len(jumps) == 0
-    # Two scans, or one, say nothing of what is usual.
-    for few in (1, 2):
-        assert len(without_jumps(odometry[:few], clock(few), CHECKS)[1]) == 0
-
-
-def test_a_reset_goes_on_as_in_the_step_before():
-    odometry = steady()
-    odometry[20:] = relative(odometry[20:], odometry[20])
-    believed, jumps = without_jumps(odometry, clock(150), CHECKS)
-    assert jumps.tolist() == [20]
-    np.testing.assert_allclose(
-        relative(believed[1:], believed[:-1]),
-        np.tile(relative(steady()[1], steady()[0]), (149, 1)),
-        atol=1e-9,
-    )
-
-
-def test_a_pause_in_which_the_robot_drove_on_is_believed():
-    """2 m from scan to scan where 0.1 m are usual: 2 s of scans are missing."""
-    rows = np.delete(np.arange(150), np.arange(20, 39))
-    _, jumps = without_jumps(steady()[rows], clock(150)[rows], CHECKS)
-    assert len(jumps) == 0
-    _, jumps = without_jumps(steady()[rows], clock(len(rows)), CHECKS)
-    assert jumps.tolist() == [20]
-
-
-def test_a_laser_hangs_only_if_the_robot_moves():
-    moves = faults.frozen(log(), slice(40, 45))
-    assert frozen_scans(moves, moves.odometry, CHECKS).tolist() == list(range(40, 45))
-    assert frozen_scans(moves, None, CHECKS).tolist() == []
-    assert moves.odometry is not None
-    stands = np.repeat(moves.odometry[:1], len(moves), axis=0)
-    assert frozen_scans(moves, stands, CHECKS).tolist() == []
-    # Where nothing is met, nothing repeats.
-    assert frozen_scans(faults.without_returns(log(), slice(40, 45)), moves.odometry, CHECKS).tolist() == []
-
-
-# ----------------------------------------------------------------------------- real logs
 
 
 @pytest.mark.logs

@@ -19,7 +19,7 @@ from nscan_cli.graph.io.json_graph import parse_graph, write_graph
 from nscan_cli.graph.model import Graph
 from nscan_cli.graph.optimise.whole_graph import optimise_graph
 from nscan_cli.poses import Array, relative
-from tests.graph.io.test_json_graph import validate
+from tests.graph.schema import validate
 from tests.graph.simulated import disturbed, graph_of, pairwise_relations, ring, ring_edges
 
 UPPER = np.triu_indices(6)

@@ -5,7 +5,6 @@ import io
 import json
 import sys
 from collections.abc import Callable
-from importlib import resources
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +19,7 @@ from nscan_cli.graph.io.json_graph import parse_graph, read_graph, write_graph
 from nscan_cli.graph.model import Graph, NScan, Pairwise
 from nscan_cli.graph.relations.registry import relation_of, relation_record
 from nscan_cli.poses import wrap
+from tests.graph.schema import schema, validate
 from tests.graph.small_graph import graphs, small_graph
 
 # π rounds up to 3.141592654 and would leave (−π, π]; −π is π; 7 rad is 7 − 2π = 0.716814692820.
@@ -262,16 +262,6 @@ def changed(change: Change) -> dict[str, Any]:
     document: dict[str, Any] = copy.deepcopy(json.loads(GOLDEN))
     change(document)
     return document
-
-
-def schema() -> dict[str, Any]:
-    text = resources.files("nscan_cli.graph.io").joinpath("pose-graph.schema.json").read_text("utf-8")
-    document: dict[str, Any] = json.loads(text)
-    return document
-
-
-def validate(document: dict[str, Any]) -> None:
-    jsonschema.Draft202012Validator(schema()).validate(document)
 
 
 def assert_same_poses(poses: np.ndarray, expected: np.ndarray) -> None:

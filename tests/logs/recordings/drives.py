@@ -9,9 +9,13 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from nscan_cli.logs.laser_log import LaserLog
+
 S = 10**9
 START = 1_700_000_000 * S + 123_456_789
 PERIOD = S // 10
+COUNT = 12
+"""Scans of drive()."""
 LEVEL = (0.0, 0.0, 0.0, 1.0)
 
 
@@ -81,7 +85,7 @@ MOUNT = Tf(START, "base_link", "laser", (0.2, 0.1, 0.5), turned(yaw=0.3))
 
 
 def drive(
-    count: int = 12,
+    count: int = COUNT,
     *,
     mount: Iterable[Tf] = (MOUNT,),
     odom_topic: str | None = "/odom",
@@ -111,3 +115,24 @@ def drive(
 def with_scans(**changes) -> list[Written]:
     """drive() with other fields in its scans."""
     return [one.with_scan(**changes) if isinstance(one.content, Scan) else one for one in drive()]
+
+
+def check_drive(log: LaserLog) -> None:
+    """The log is that of drive()."""
+    stamps = [START + k * PERIOD + PERIOD // 2 for k in range(COUNT)]
+    assert log.stamps == tuple(f"{stamp // S}.{stamp % S:09d}" for stamp in stamps)
+    assert log.numbers.tolist() == list(range(COUNT))
+    expected = [np.linspace(1.0 + 0.01 * k, 3.0, 5).astype(np.float32) for k in range(COUNT)]
+    np.testing.assert_array_equal(log.ranges, expected)
+    np.testing.assert_allclose(log.angle_min, -1.0)
+    np.testing.assert_allclose(log.angle_increment, 0.5)
+    np.testing.assert_allclose(log.mount, (0.2, 0.1, 0.3), atol=1e-9)
+    # Midway between odometry at 0.1 k and 0.1 (k + 1) m; times are known to 0.24 µs.
+    assert log.odometry is not None
+    middle = np.arange(COUNT) + 0.5
+    truth = np.stack([0.1 * middle, 0 * middle, 0.01 * middle], axis=-1)
+    np.testing.assert_allclose(log.odometry, truth, atol=1e-6)
+    assert log.report.skipped == {}
+    assert log.report.warnings == ()
+    assert log.report.used["odometry"] == "/odom, the only topic with odometry, interpolated"
+    assert log.report.used["mounting"] == "tf base_link → laser"

@@ -15,34 +15,21 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from nscan_cli.errors import InputDataError, WrongUsageError
-from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.logs.load import read_log
 from tests.logs.forms import FORMS
-from tests.logs.recordings.drives import PERIOD, START, Odom, S, Scan, Written, drive, with_scans
+from tests.logs.recordings.drives import (
+    COUNT,
+    PERIOD,
+    START,
+    Odom,
+    S,
+    Scan,
+    Written,
+    check_drive,
+    drive,
+    with_scans,
+)
 from tests.logs.recordings.ros import ros1, ros2
-
-COUNT = 12
-
-
-def check_drive(log: LaserLog) -> None:
-    """The log is that of drive()."""
-    stamps = [START + k * PERIOD + PERIOD // 2 for k in range(COUNT)]
-    assert log.stamps == tuple(f"{stamp // S}.{stamp % S:09d}" for stamp in stamps)
-    assert log.numbers.tolist() == list(range(COUNT))
-    expected = [np.linspace(1.0 + 0.01 * k, 3.0, 5).astype(np.float32) for k in range(COUNT)]
-    np.testing.assert_array_equal(log.ranges, expected)
-    np.testing.assert_allclose(log.angle_min, -1.0)
-    np.testing.assert_allclose(log.angle_increment, 0.5)
-    np.testing.assert_allclose(log.mount, (0.2, 0.1, 0.3), atol=1e-9)
-    # Midway between odometry at 0.1 k and 0.1 (k + 1) m; times are known to 0.24 µs.
-    assert log.odometry is not None
-    middle = np.arange(COUNT) + 0.5
-    truth = np.stack([0.1 * middle, 0 * middle, 0.01 * middle], axis=-1)
-    np.testing.assert_allclose(log.odometry, truth, atol=1e-6)
-    assert log.report.skipped == {}
-    assert log.report.warnings == ()
-    assert log.report.used["odometry"] == "/odom, the only topic with odometry, interpolated"
-    assert log.report.used["mounting"] == "tf base_link → laser"
 
 
 @pytest.mark.parametrize("form", FORMS)

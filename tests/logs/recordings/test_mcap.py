@@ -10,9 +10,8 @@ from mcap.reader import make_reader
 
 from nscan_cli.errors import InputDataError
 from tests.logs.recordings.containers import containers, repacked
-from tests.logs.recordings.drives import Scan, drive
+from tests.logs.recordings.drives import Scan, check_drive, drive
 from tests.logs.recordings.ros import ros2
-from tests.logs.recordings.test_laser_scans import check_drive
 
 
 @pytest.fixture(scope="module")

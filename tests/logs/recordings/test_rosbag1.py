@@ -7,9 +7,8 @@ from dataclasses import replace
 import pytest
 
 from nscan_cli.errors import InputDataError
-from tests.logs.recordings.drives import drive
+from tests.logs.recordings.drives import check_drive, drive
 from tests.logs.recordings.ros import bag1
-from tests.logs.recordings.test_laser_scans import check_drive
 
 
 @pytest.mark.parametrize("compression", ["BZ2", "LZ4"])

@@ -8,9 +8,8 @@ from pathlib import Path
 import pytest
 
 from nscan_cli.errors import InputDataError
-from tests.logs.recordings.drives import drive
+from tests.logs.recordings.drives import check_drive, drive
 from tests.logs.recordings.ros import db3
-from tests.logs.recordings.test_laser_scans import check_drive
 
 
 def changed(data: bytes, folder: Path, *statements: str) -> bytes:

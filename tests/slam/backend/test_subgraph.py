@@ -31,7 +31,7 @@ from nscan_cli.slam.loop_closure.relative_uncertainty import (
     held_pose_marginals,
 )
 from tests.slam.drives import exact_path
-from tests.slam.loop_closure.test_relative_uncertainty import Walk, straight, walk
+from tests.slam.keyframe_walks import Walk, straight, walk
 
 APART = 7
 """Scans of the log from one keyframe to the next: ids of nodes are none of places."""

@@ -21,8 +21,7 @@ from nscan_cli.slam.frontend.tracked_scans import TrackedScan
 from nscan_cli.slam.frontend.tracker import Tracker
 from tests.logs.excerpts import excerpt, truth_of
 from tests.ndt.rooms import room
-from tests.ndt.test_grid_growth import assert_same
-from tests.ndt.transforms import gaussian_count
+from tests.ndt.transforms import assert_same, gaussian_count
 from tests.simulation.scenes import Scene
 from tests.simulation.world import Builder
 from tests.slam.runs import office_log, poses_of, scans_of, sensed, sensed_in, tracked

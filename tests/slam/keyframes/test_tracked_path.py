@@ -8,7 +8,7 @@ import pytest
 from nscan_cli.graph.model import Pairwise
 from nscan_cli.slam.keyframes.tracked_path import TrackedPath
 from tests.slam.drives import exact_path
-from tests.slam.loop_closure.test_relative_uncertainty import information
+from tests.slam.keyframe_walks import information
 
 
 def test_slips_add_their_variances_by_the_length():

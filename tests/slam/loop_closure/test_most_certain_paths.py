@@ -14,7 +14,7 @@ from nscan_cli.slam.keyframes.route import Route
 from nscan_cli.slam.loop_closure.most_certain_paths import LinkCache, most_certain_paths
 from nscan_cli.slam.loop_closure.options import LoopClosureOptions
 from tests.slam.drives import exact_path
-from tests.slam.loop_closure.test_relative_uncertainty import Walk, seen_from, straight, walk
+from tests.slam.keyframe_walks import Walk, seen_from, straight, walk
 
 LEVER_ARM = LoopClosureOptions.lever_arm
 
