@@ -9,7 +9,7 @@ from typing import Any
 
 from nscan_cli.evaluation.alignment import Alignment
 from nscan_cli.evaluation.association import TOLERANCE
-from nscan_cli.evaluation.reference_relations import RelationErrors, Relations
+from nscan_cli.evaluation.reference_relations import ReferenceRelations, RelationErrors
 from nscan_cli.evaluation.statistics import Spread
 from nscan_cli.evaluation.trajectory_errors import RPE_DISTANCE, TrajectoryErrors
 from nscan_cli.files.counting import counted
@@ -25,7 +25,7 @@ class Evaluation:
     result: str
     """Base name, as are the names below."""
     poses: int
-    relations: tuple[Relations, RelationErrors] | None = None
+    relations: tuple[ReferenceRelations, RelationErrors] | None = None
     reference: tuple[str, TrajectoryErrors] | None = None
     worst: int = 0
     """How many of the worst relations are listed."""

@@ -30,7 +30,7 @@ LARGEST_SPATIAL_PART = 1e-6
 
 
 @dataclass(frozen=True)
-class Relations:
+class ReferenceRelations:
     """Reference relations: the pose at the second stamp in the frame of the pose at the first."""
 
     name: str
@@ -80,7 +80,7 @@ class RelationErrors:
         return np.argsort(-self.translation, kind="stable")[:count].astype(np.int64)
 
 
-def read_relations(path: str) -> Relations:
+def read_relations(path: str) -> ReferenceRelations:
     """The relations of a file; "-" reads standard input.
 
     Raises InputMissingError when the file cannot be read, InputDataError on a line that is no relation
@@ -102,12 +102,14 @@ def read_relations(path: str) -> Relations:
     if not rows:
         raise InputDataError(label(path), "no relation in it", RELATIONS_FORMAT)
     table = np.array(rows)
-    return Relations(
+    return ReferenceRelations(
         base_name(path), tuple(stamps), table[:, :2], table[:, [2, 3, 7]], np.array(lines, dtype=np.int64)
     )
 
 
-def relation_errors(trajectory: Trajectory, relations: Relations, name: str = "result") -> RelationErrors:
+def relation_errors(
+    trajectory: Trajectory, relations: ReferenceRelations, name: str = "result"
+) -> RelationErrors:
     """The errors of a trajectory; `name` is what a message calls it.
 
     A stamp takes the nearest pose within 0.1 s. With u the relative pose in the trajectory and z that of

@@ -7,7 +7,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from nscan_cli.logs.range_peaks import FEWEST, peak_at_limit
+from nscan_cli.logs.range_peaks import MIN_PEAK_READINGS, peak_at_limit
 from nscan_cli.poses import Array, relative, wrap
 
 RAD = math.pi / 180
@@ -53,7 +53,7 @@ def no_return_value(ranges: NDArray[np.float32]) -> float | None:
     top = values > round((largest - 0.25) * 100)
     peak, below = int(counts[top].sum()), int(counts[~top].sum())
     sharpest = int(counts[top].max())
-    if peak < FEWEST or 2 * sharpest < peak or peak < 10 * below:
+    if peak < MIN_PEAK_READINGS or 2 * sharpest < peak or peak < 10 * below:
         return _single_value(usable, largest)
     least = int(values[top & (counts >= 0.01 * sharpest)].min()) / 100 - 0.005
     lower = usable[usable < least]

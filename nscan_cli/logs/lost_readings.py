@@ -14,7 +14,7 @@ from nscan_cli.poses import Array
 
 ROWS = 4096
 NEARLY_ALL = 0.9
-UNITS = (("millimetres", 1000), ("centimetres", 100))
+READING_UNITS = (("millimetres", 1000), ("centimetres", 100))
 NEAREST, USUAL, FARTHEST_USUAL = 0.2, 3.0, 40.0
 """m; about what half of a laser's readings lie below."""
 REMOTE = 100.0
@@ -108,7 +108,7 @@ def _unit(ranges: NDArray[np.float32], limits: RangeLimits) -> tuple[str, str]:
         return "", ""
     fitting = [
         (abs(math.log(median / factor / USUAL)), name, factor)
-        for name, factor in UNITS
+        for name, factor in READING_UNITS
         if NEAREST <= median / factor <= FARTHEST_USUAL and most / factor < highest
     ]
     if not fitting:

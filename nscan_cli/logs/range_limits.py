@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nscan_cli.logs.laser_defaults import no_return_value
-from nscan_cli.logs.range_peaks import FEWEST, ROUNDING, peak_at_limit
+from nscan_cli.logs.range_peaks import MIN_PEAK_READINGS, ROUNDING, peak_at_limit
 from nscan_cli.logs.reading_options import ReadingOptions
 from nscan_cli.poses import Array
 
@@ -69,7 +69,7 @@ def limits_in_force(raw: RawScans, options: ReadingOptions, warnings: list[str])
     if gap is not None and options.max_range is not None:
         beyond = (raw.ranges > high[:, None]) & (raw.ranges < options.max_range)
         # Where more than chance readings are beyond, these are what is asked for.
-        gap = None if np.count_nonzero(beyond) >= FEWEST else gap
+        gap = None if np.count_nonzero(beyond) >= MIN_PEAK_READINGS else gap
     if gap is not None:
         high, high_from = high - gap, f"{high_from}, where readings pile up that met nothing"
         if (high == high[0]).all():
@@ -117,7 +117,7 @@ def returns_beyond(ranges: NDArray[np.float32], limit: float, end: float) -> flo
     """
     returns = ranges[(ranges > 0) & (ranges < end)]
     beyond = returns[returns > limit * (1 + ROUNDING)]
-    if beyond.size < FEWEST:
+    if beyond.size < MIN_PEAK_READINGS:
         return 0.0
     _, counts = np.unique(np.rint(beyond * 100), return_counts=True)
     before = np.count_nonzero((returns >= limit / ABOUT) & (returns <= limit * (1 + ROUNDING)))

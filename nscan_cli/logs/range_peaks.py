@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from nscan_cli.poses import Array
 
-FEWEST = 20
+MIN_PEAK_READINGS = 20
 """So many readings are no chance."""
 AT = 0.0015
 """m; so near to a limit are readings that are written for it: most lasers count millimetres."""
@@ -36,7 +36,7 @@ def peak_at_limit(
     gaps = inside * (ranges[near].astype(np.float64) - limits[rows])
     at = gaps <= AT
     count = np.count_nonzero(at)
-    if count < FEWEST:
+    if count < MIN_PEAK_READINGS:
         return None
     _, others = np.unique(np.rint(gaps[~at] * 1000), return_counts=True)
     if others.size and count < max(USUALLY * others.mean(), times * others.max()):

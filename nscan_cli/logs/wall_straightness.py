@@ -18,7 +18,7 @@ TELLING = 0.03
 """The least difference between the two values of 2 cos(k s) that noise of a hundredth does not hide."""
 FINEST = 0.02
 """Values that are nearer to each other than this are the same."""
-FEWEST = 200
+MIN_WALL_POINTS = 200
 """So many places on walls tell."""
 CLEARLY = 1.5
 """Times as many than on the walls of the other step."""
@@ -36,7 +36,7 @@ def second_is_straighter(
         votes = _on_walls(ranges, one, other)
         first, second = first + votes[0], second + votes[1]
     most = max(first, second)
-    return None if most < FEWEST or most < CLEARLY * min(first, second) else second > first
+    return None if most < MIN_WALL_POINTS or most < CLEARLY * min(first, second) else second > first
 
 
 def _on_walls(ranges: Readings, one: float, other: float) -> tuple[int, int]:

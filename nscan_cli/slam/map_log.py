@@ -18,7 +18,7 @@ from nscan_cli.slam.options import Relations, SlamOptions
 from nscan_cli.slam.pipeline import run_slam
 from nscan_cli.slam.state import SlamState
 
-Report = Callable[[int, int, int], None]
+MappingProgress = Callable[[int, int, int], None]
 """Called with the scans done, the keyframes, and the loops that are accepted so far."""
 
 
@@ -53,7 +53,7 @@ def slam_options(
 
 
 def map_log(
-    log: LaserLog, reading: ReadingOptions, options: SlamOptions, threads: int, report: Report
+    log: LaserLog, reading: ReadingOptions, options: SlamOptions, threads: int, report: MappingProgress
 ) -> tuple[SlamState, Graph]:
     """The state at the end of the loop, and the graph of a log that was read with `reading`."""
     state = SlamState.of_log(log, options, threads)

@@ -20,11 +20,11 @@ from nscan_cli.slam.loop_closure.close_loops import close_loops
 from nscan_cli.slam.state import SlamState
 from nscan_cli.threads import BackgroundCalls
 
-Report = Callable[[int, int], None]
+LoopProgress = Callable[[int, int], None]
 """Called with the number of scans tracked and of keyframes."""
 
 
-def run_slam(state: SlamState, report: Report) -> Graph:
+def run_slam(state: SlamState, report: LoopProgress) -> Graph:
     """Map a whole log, from its state before the first scan; returns the graph.
 
     Tracking needs nothing of the graph: with two threads the graph grows beside it.

@@ -9,13 +9,13 @@ from hypothesis import strategies as st
 
 from nscan_cli.errors import InputDataError, InputMissingError
 from nscan_cli.evaluation.load_trajectory import load_trajectory
-from nscan_cli.evaluation.reference_relations import Relations, read_relations, relation_errors
+from nscan_cli.evaluation.reference_relations import ReferenceRelations, read_relations, relation_errors
 from nscan_cli.graph.io.tum import Trajectory
 from nscan_cli.poses import compose, relative
 from tests.data import data_file
 
 
-def read(tmp_path: Path, text: str) -> Relations:
+def read(tmp_path: Path, text: str) -> ReferenceRelations:
     path = tmp_path / "floor.relations"
     path.write_text(text)
     return read_relations(str(path))
@@ -77,7 +77,7 @@ def test_relations_made_from_a_trajectory_fit_it_in_any_frame(seed: int):
     rng = np.random.default_rng(seed)
     poses = rng.uniform([-50, -50, -3], [50, 50, 3], size=(8, 3))
     pairs = rng.integers(0, 8, size=(10, 2))
-    relations = Relations(
+    relations = ReferenceRelations(
         "made",
         tuple((str(a), str(b)) for a, b in pairs.tolist()),
         pairs.astype(float),

@@ -37,7 +37,7 @@ SUMMARY_OPCODES = {Opcode.SCHEMA, Opcode.CHANNEL, Opcode.STATISTICS, Opcode.CHUN
                    Opcode.FOOTER}  # fmt: skip
 FIRST_PRIVATE_OPCODE = 0x80
 """Opcodes from here on are free for applications."""
-COMPRESSIONS = ("", "lz4", "zstd")
+CHUNK_COMPRESSIONS = ("", "lz4", "zstd")
 
 
 class DamagedMcapError(Exception):
@@ -215,7 +215,7 @@ class _McapReader:
         at = begin - RECORD_HEADER.size
         try:
             chunk = records.Chunk.read(_stream(self.data, begin, stop))
-            if chunk.compression not in COMPRESSIONS:
+            if chunk.compression not in CHUNK_COMPRESSIONS:
                 raise DamagedMcapError(at, f"compressed by {chunk.compression!r}, which is not known")
             self.checked &= chunk.uncompressed_crc != 0
             content = self._unpacked(chunk)

@@ -10,7 +10,7 @@ from nscan_cli.mapping.figures.axes import LegendEntry
 from nscan_cli.mapping.figures.canvas import Canvas, Colour
 from nscan_cli.poses import Array
 
-SIGMAS = 3.0
+ELLIPSE_SIGMAS = 3.0
 MAX_ENLARGEMENT = 1000.0
 """Times that an ellipse is enlarged at most."""
 
@@ -18,17 +18,17 @@ MAX_ENLARGEMENT = 1000.0
 def draw_ellipses(
     canvas: Canvas, centres: Array, covariances: Array, colour: Colour, seen: float
 ) -> LegendEntry:
-    """Ellipses of SIGMAS standard deviations of covariances (N, 2, 2), m², around (N, 2), m.
+    """Ellipses of ELLIPSE_SIGMAS standard deviations of covariances (N, 2, 2), m², around (N, 2), m.
 
     Where the longest half axis of all has less than `seen` units, all are enlarged alike. Returns the
     entry for the legend, which tells.
     """
-    largest = SIGMAS * math.sqrt(float(np.linalg.eigvalsh(covariances).max()))
+    largest = ELLIPSE_SIGMAS * math.sqrt(float(np.linalg.eigvalsh(covariances).max()))
     wanted = seen * canvas.unit / canvas.pixels_per_metre
     times = min(MAX_ENLARGEMENT, _round_factor(wanted / largest)) if largest > 0 else 1.0
-    canvas.ellipses(centres, covariances, SIGMAS * times, colour)
+    canvas.ellipses(centres, covariances, ELLIPSE_SIGMAS * times, colour)
     enlarged = f", enlarged {times:g} times" if times > 1 else ""
-    return "ellipse", colour, f"{SIGMAS:g} sigma{enlarged}"
+    return "ellipse", colour, f"{ELLIPSE_SIGMAS:g} sigma{enlarged}"
 
 
 def _round_factor(factor: float) -> float:
