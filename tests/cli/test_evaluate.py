@@ -14,6 +14,7 @@ from nscan_cli.graph.io.tum import write_tum
 from nscan_cli.mapping.figures.canvas import BLUE, VERMILLION
 from nscan_cli.mapping.figures.colormap import plasma
 from nscan_cli.mapping.figures.error_plots import REFERENCE_COLOUR
+from tests.mapping.figures.pixels import count
 
 # The robot drives 1 m a second along x; the relations say 1.1 m, and 1 m with 2° more.
 STAMPS = ["10.000000", "11.000000", "12.000000", "13.000000"]
@@ -149,10 +150,6 @@ def plotted(capsys: pytest.CaptureFixture[str], *arguments: str) -> np.ndarray:
         assert picture.format == "PNG"
         pixels: np.ndarray = np.asarray(picture).astype(int)
     return pixels
-
-
-def count(pixels: np.ndarray, colour: tuple[int, ...]) -> int:
-    return int(np.count_nonzero((pixels == colour).all(axis=-1)))
 
 
 def test_the_plot_shows_the_worst_relations(files: Path, capsys: pytest.CaptureFixture[str]):

@@ -31,11 +31,6 @@ KEYS = [
 ]  # fmt: skip
 
 
-@pytest.fixture(scope="module")
-def office() -> LaserLog:
-    return read_log(OFFICE_LOG)
-
-
 matched = partial(document_and_notices, "nscan")
 
 

@@ -8,16 +8,9 @@ import pytest
 from nscan_cli.cli.main import run
 from nscan_cli.graph.io.json_graph import write_graph
 from nscan_cli.graph.model import Pairwise
-from nscan_cli.logs.laser_log import LaserLog
-from nscan_cli.logs.load import read_log
 from nscan_cli.poses import relative
 from tests.cli.test_nscan import SCANS, SPEC, assert_true, graph_of, matched
 from tests.data import CORRIDOR_LOG, OFFICE_LOG
-
-
-@pytest.fixture(scope="module")
-def office() -> LaserLog:
-    return read_log(OFFICE_LOG)
 
 
 def test_scans_that_cannot_meet_the_others_are_named_and_left_out(tmp_path, capsys, office):

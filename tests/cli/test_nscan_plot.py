@@ -17,10 +17,7 @@ from nscan_cli.mapping.figures.colormap import plasma
 from nscan_cli.poses import relative
 from tests.cli.test_nscan import SCANS, SPEC, graph_of, matched
 from tests.data import OFFICE_LOG
-
-
-def count(pixels: np.ndarray, colour: tuple[int, ...]) -> int:
-    return int(np.count_nonzero((pixels == colour).all(axis=-1)))
+from tests.mapping.figures.pixels import count
 
 
 def test_the_plot_shows_the_start_above_the_result(tmp_path, capsys):

@@ -24,7 +24,7 @@ from nscan_cli.matching.joint.scan_set import scan_set
 from nscan_cli.matching.pairwise import PairOptions, scan_ndt
 from nscan_cli.poses import Array
 from tests.experiments.charts import heat_map, line_chart
-from tests.experiments.report import Report
+from tests.experiments.report import Report, scan_names
 
 if TYPE_CHECKING:
     from PIL.Image import Image
@@ -150,7 +150,7 @@ def _row(which: tuple[int, ...]) -> list[str]:
     lowest, second = minima(*which)[:2]
     share = (second.energy - lowest.energy) / abs(lowest.energy)
     return [
-        _name(which),
+        scan_names(which),
         _told(lowest),
         _told(second),
         f"{second.energy - lowest.energy:.1f} ({share:.1%})",
@@ -163,18 +163,13 @@ def _told(minimum: Minimum) -> str:
     return f"{minimum.energy:.1f} at {shifts} m"
 
 
-def _name(which: tuple[int, ...]) -> str:
-    *others, last = (str(each + 1) for each in which)
-    return f"{', '.join(others)} and {last}"
-
-
 def _picture() -> Image:
     """The shapes above the energies of the pairs and of all three."""
     curves: dict[tuple[int, ...], Array] = {pair: pair_energies(*pair) for pair in PAIRS}
     joint = joint_energies()
     curves[0, 1, 2] = joint.min(axis=0)
     chart = line_chart(
-        {_name(which): (SHIFTS, energies - energies.min()) for which, energies in curves.items()},
+        {scan_names(which): (SHIFTS, energies - energies.min()) for which, energies in curves.items()},
         "shift (m)",
         "energy above the lowest",
         "Energies over the shift",

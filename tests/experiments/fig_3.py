@@ -24,7 +24,7 @@ from nscan_cli.matching.joint.options import JointOptions
 from nscan_cli.matching.uncertainty import Weakest, weakest_translation
 from nscan_cli.poses import Array, compose, relative, transform
 from tests.experiments.charts import line_chart
-from tests.experiments.report import Report
+from tests.experiments.report import Report, scan_names
 from tests.matching.problems import OPTIONS, Problem, errors, fig_3, near
 
 if TYPE_CHECKING:
@@ -181,7 +181,7 @@ def _row(of: Subset) -> list[str]:
         for scan, weak in zip(of.scans[1:], of.weakest, strict=True)
     ]  # fmt: skip
     return [
-        _name(of.scans),
+        scan_names(of.scans),
         _told(of.eigenvalues),
         "; ".join(known),
         f"{of.error:.3f} m ({of.usual_error:.3f} m)",
@@ -191,11 +191,6 @@ def _row(of: Subset) -> list[str]:
 def _told(eigenvalues: Array) -> str:
     zero = SINGULAR * eigenvalues[-1]
     return ", ".join("0" if abs(value) < zero else f"{value:.3g}" for value in eigenvalues.tolist())
-
-
-def _name(which: Sequence[int]) -> str:
-    *others, last = (str(scan + 1) for scan in which)
-    return f"{', '.join(others)} and {last}"
 
 
 def _marginal(hessian: Array, which: int) -> Array:
@@ -208,7 +203,7 @@ def _picture() -> Image:
     """The scans with the information of each subset, and the energies where the pairs leave them open."""
     chart = line_chart(
         {
-            f"{_name(which)}, {way}": (SHIFTS, energies - energies.min())
+            f"{scan_names(which)}, {way}": (SHIFTS, energies - energies.min())
             for moved, axis, way in ((1, 0, "along"), (2, 1, "across"))
             for which in ((0, moved), ALL)
             for energies in (profile(which, moved, axis),)
@@ -239,5 +234,5 @@ def _panel(which: tuple[int, ...]) -> Image:
         pose = poses[scan]
         draw_robots(canvas, canvas.pixels(pose[None, :2]), pose[None, 2], 7.0, COLOURS[scan])
     entries.append(("ellipse", PURPLE, f"{ENLARGED:g} sigma"))
-    draw_title_and_legend(canvas, f"Scans {_name(which)}", entries)
+    draw_title_and_legend(canvas, f"Scans {scan_names(which)}", entries)
     return canvas.image()

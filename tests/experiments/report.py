@@ -24,3 +24,9 @@ class Report:
     rows: Sequence[Sequence[str]]
     left_out: Sequence[str] = field(default_factory=tuple)
     """What could not be done, and why; whole sentences."""
+
+
+def scan_names(which: Sequence[int]) -> str:
+    """Scans counted from 1: "1, 2 and 3"."""
+    *others, last = (str(scan + 1) for scan in which)
+    return f"{', '.join(others)} and {last}"

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from nscan_cli.cli.main import run
-from nscan_cli.logs import formats as kinds
+from nscan_cli.logs import formats
 from nscan_cli.logs.formats import Form, readable_forms
 from nscan_cli.logs.load import read_log
 from nscan_cli.logs.reading_options import ReadingOptions
@@ -22,8 +22,8 @@ CSV = csv_form.HEAD + LINES.encode()
 @pytest.fixture
 def with_csv(monkeypatch: pytest.MonkeyPatch) -> None:
     form = Form("CSV", "tests.logs.csv_form")
-    monkeypatch.setattr("nscan_cli.logs.load.FORMS", (*kinds.FORMS, form))
-    monkeypatch.setattr(kinds, "FORMS", (*kinds.FORMS, form))
+    monkeypatch.setattr("nscan_cli.logs.load.FORMS", (*formats.FORMS, form))
+    monkeypatch.setattr(formats, "FORMS", (*formats.FORMS, form))
 
 
 def test_a_new_form_is_read_plain_and_packed_with_all_reading_options(with_csv, tmp_path):
@@ -51,7 +51,7 @@ def test_the_commands_take_it_and_their_messages_name_it(with_csv, tmp_path, mon
     assert run(["info", "letter"]) == 65
     assert "give a log: MCAP, " in (said := capsys.readouterr().err)
     assert ", CSV; plain or packed by gzip" in said
-    assert readable_forms().partition(";")[0].count(",") == len(kinds.FORMS) - 1
+    assert readable_forms().partition(";")[0].count(",") == len(formats.FORMS) - 1
 
 
 def test_it_takes_nothing_from_the_others(with_csv, tmp_path):

@@ -80,3 +80,10 @@ def near(truth: Array, seed: int, metres: float = 0.03, radians: float = 0.01) -
     rng = np.random.default_rng(seed)
     off: Array = truth + rng.uniform(-1, 1, truth.shape) * [metres, metres, radians]
     return off
+
+
+def chain_priors(poses: Array, sigma: float) -> Priors:
+    """Priors from each pose to the next, of one σ (m, rad)."""
+    pairs = np.array([(at, at + 1) for at in range(len(poses) - 1)], dtype=np.int64).reshape(-1, 2)
+    means = relative(poses[1:], poses[:-1])
+    return Priors(pairs, means, np.tile(np.eye(3) * sigma**-2, (len(pairs), 1, 1)))

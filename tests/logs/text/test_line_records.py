@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from nscan_cli.kernels.decorators import load_runtime
-from nscan_cli.logs.text import line_records as text_records
+from nscan_cli.logs.text import line_records
 from nscan_cli.logs.text.line_records import LONG, floats
 
 plain = st.from_regex(r"[+-]?([0-9]{1,15}(\.[0-9]{0,6})?|\.[0-9]{1,22})", fullmatch=True)
@@ -62,6 +62,6 @@ def test_numpy_is_asked_only_where_numbers_are_not_plain_or_no_kernels_are_up(
     assert floats(long_text(["1076354563.123456", "-0.000", "81.83"], " ")) is not None
     with pytest.raises(AssertionError):
         floats(long_text(["1e5"], " "))
-    monkeypatch.setattr(text_records, "runtime_is_loaded", lambda: False)
+    monkeypatch.setattr(line_records, "runtime_is_loaded", lambda: False)
     with pytest.raises(AssertionError):
         floats(long_text(["1.5"], " "))

@@ -11,7 +11,7 @@ from nscan_cli.mapping.figures.axes import (
     draw_title_and_legend,
 )
 from nscan_cli.mapping.figures.canvas import BLUE, Canvas
-from tests.mapping.figures.test_canvas import pixels
+from tests.mapping.figures.pixels import pixels
 
 ENTRIES = [("line", BLUE, "path"), ("disc", BLUE, "keyframes")]
 

@@ -3,18 +3,9 @@ import pytest
 
 from nscan_cli.mapping.figures import canvas as canvas_module
 from nscan_cli.mapping.figures.canvas import BLUE, GREEN, ORANGE, PURPLE, VERMILLION, WHITE, Canvas
+from tests.mapping.figures.pixels import close_to, pixels
 
 BOUNDS = (-2.0, -1.0, 2.0, 1.0)
-
-
-def pixels(canvas: Canvas) -> np.ndarray:
-    picture: np.ndarray = np.asarray(canvas.image()).astype(int)
-    return picture
-
-
-def close_to(picture: np.ndarray, colour: tuple[int, ...]) -> np.ndarray:
-    close: np.ndarray = np.abs(picture - np.array(colour)).max(axis=-1) <= 3
-    return close
 
 
 def test_metres_become_pixels_with_y_upwards():

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from nscan_cli.graph.model import Graph, NScan, Pairwise
-from nscan_cli.mapping.figures import map_plots as drawing
+from nscan_cli.mapping.figures import map_plots
 from nscan_cli.mapping.figures.axes import round_length
 from nscan_cli.mapping.figures.canvas import BLUE, GRAY, GREEN, PURPLE, SKY, VERMILLION, Canvas
 from nscan_cli.mapping.figures.graph_edges import edges_by_kind
@@ -73,8 +73,8 @@ def test_an_uncertainty_too_small_to_be_seen_is_enlarged_and_the_legend_says_so(
 
 
 def test_walls_of_a_large_map_stay_when_cells_are_merged(monkeypatch):
-    monkeypatch.setattr(drawing, "MIN_PIXELS", 10)
-    monkeypatch.setattr(drawing, "MAX_PIXELS", 60)
+    monkeypatch.setattr(map_plots, "MIN_PIXELS", 10)
+    monkeypatch.setattr(map_plots, "MAX_PIXELS", 60)
     hits = np.zeros((121, 100), dtype=np.int32)
     hits[:, 50] = 9
     grid = OccupancyGrid(hits, np.ones_like(hits), 0.05, (0.0, 0.0))
@@ -83,7 +83,7 @@ def test_walls_of_a_large_map_stay_when_cells_are_merged(monkeypatch):
     left, top, right, bottom = canvas.plot
     assert (right - left, bottom - top) == (34, 41)
     picture = np.asarray(canvas.image())[top:bottom, :, 0]
-    assert (picture[:, 16] == drawing.SOFT_GRAYS[100]).all()
+    assert (picture[:, 16] == map_plots.SOFT_GRAYS[100]).all()
     # The uppermost row of pixels reaches beyond the map.
     assert (picture[1:, 10] == 255).all()
     assert 226 < picture[0, 10] < 255

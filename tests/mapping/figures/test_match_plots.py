@@ -2,9 +2,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from PIL.Image import Image
 
-from nscan_cli.mapping.figures import match_plots as plots
+from nscan_cli.mapping.figures import match_plots
 from nscan_cli.mapping.figures.axes import LegendEntry
 from nscan_cli.mapping.figures.canvas import BLACK, BLUE, GRAY, PURPLE, VERMILLION, Canvas
 from nscan_cli.mapping.figures.colormap import plasma
@@ -20,6 +19,7 @@ from nscan_cli.matching.joint.outliers import OVERLAPS_NONE, ExcludedScan
 from nscan_cli.matching.pairwise import NO_OVERLAP, PairMatch
 from nscan_cli.matching.uncertainty import Weakest
 from nscan_cli.poses import transform
+from tests.mapping.figures.pixels import close_to, pixels
 
 # Two walls of a room and a post; no scan has a point near its robot.
 ROOM = np.array([[x, 4.0] for x in np.arange(-4, 4.1, 0.5)] + [[4.0, y] for y in np.arange(-4, 4, 0.5)]
@@ -27,14 +27,8 @@ ROOM = np.array([[x, 4.0] for x in np.arange(-4, 4.1, 0.5)] + [[4.0, y] for y in
 COVARIANCE = np.diag([0.4**2, 0.2**2, 0.01])
 
 
-def pixels(picture: Image) -> np.ndarray:
-    array: np.ndarray = np.asarray(picture).astype(int)
-    return array
-
-
 def near(picture: np.ndarray, colour: tuple[int, ...], most: int = 6) -> np.ndarray:
-    close: np.ndarray = np.abs(picture - np.array(colour[:3])).max(axis=-1) <= most
-    return close
+    return close_to(picture, colour, most)
 
 
 def blended(colour: tuple[int, ...], below: tuple[int, ...] = (255, 255, 255)) -> tuple[int, ...]:
@@ -89,7 +83,7 @@ def test_robots_are_circles_with_their_heading():
     unit = canvas.unit
     for pose, colour in ((np.zeros(3), BLUE), (start, VERMILLION)):
         column, row = canvas.pixels(pose[:2])
-        ahead = np.array([np.cos(pose[2]), -np.sin(pose[2])]) * 1.7 * plots.ROBOT_RADIUS * unit
+        ahead = np.array([np.cos(pose[2]), -np.sin(pose[2])]) * 1.7 * match_plots.ROBOT_RADIUS * unit
         for x, y, drawn in (
             (column, row, True),
             (column + ahead[0], row + ahead[1], True),
@@ -205,7 +199,9 @@ def test_a_scan_that_was_left_out_far_away_does_not_shrink_the_others():
     ],
 )
 def test_scans_that_were_left_out_are_named(scans, seen, meanings):
-    entries: list[LegendEntry] = plots.excluded_legend([str(k) for k in range(len(seen))], np.array(seen))
+    entries: list[LegendEntry] = match_plots.excluded_legend(
+        [str(k) for k in range(len(seen))], np.array(seen)
+    )
     assert [entry[2] for entry in entries] == meanings
 
 
@@ -213,7 +209,7 @@ def test_scans_that_were_left_out_are_named(scans, seen, meanings):
     ("count", "meanings"), [(2, ["scan 0", "scan 1"]), (7, ["scans 0 to 6"])], ids=["few", "many"]
 )
 def test_few_scans_are_named_one_by_one(count, meanings):
-    assert [entry[2] for entry in plots.scan_legend([str(k) for k in range(count)])] == meanings
+    assert [entry[2] for entry in match_plots.scan_legend([str(k) for k in range(count)])] == meanings
 
 
 def test_the_colours_of_a_ramp_get_lighter_step_by_step():

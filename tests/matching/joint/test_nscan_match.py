@@ -1,6 +1,6 @@
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -15,8 +15,8 @@ from nscan_cli.matching.joint.outliers import CONTRADICTS_PRIORS, ONLY_ONE_LEFT,
 from nscan_cli.matching.joint.overlap import overlaps
 from nscan_cli.matching.joint.scan_set import ScanSet, scan_set
 from nscan_cli.ndt.energy import inlier_share
-from nscan_cli.poses import relative, relative_jacobians
-from tests.matching.problems import OPTIONS, Problem, errors, fig_3, near, office_problem
+from nscan_cli.poses import Array, relative, relative_jacobians
+from tests.matching.problems import OPTIONS, Problem, chain_priors, errors, fig_3, near, office_problem
 
 ROWS = (2000, 2008, 2016, 2024)
 FREE, FIXED = JointOptions(), JointOptions(fixed=0)
@@ -31,16 +31,9 @@ def none(_kept: Sequence[int]) -> Priors:
     return no_priors()
 
 
-def chain(truth, sigma: float):
+def chain(truth: Array, sigma: float) -> Callable[[Sequence[int]], Priors]:
     """Priors from each scan kept to the next, as true as `truth` (n, 3)."""
-
-    def among(kept: Sequence[int]) -> Priors:
-        pairs = [(at, at + 1) for at in range(len(kept) - 1)]
-        means = [relative(truth[kept[b]], truth[kept[a]]) for a, b in pairs]
-        information = np.tile(np.eye(3) * sigma**-2, (len(pairs), 1, 1))
-        return Priors(np.array(pairs, dtype=np.int64).reshape(-1, 2), np.array(means), information)
-
-    return among
+    return lambda kept: chain_priors(truth[list(kept)], sigma)
 
 
 def test_scans_that_belong_together_are_all_kept(four):

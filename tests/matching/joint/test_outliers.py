@@ -19,19 +19,13 @@ from nscan_cli.matching.joint.outliers import (
 )
 from nscan_cli.matching.joint.overlap import Overlaps
 from nscan_cli.poses import Array, compose, relative
+from tests.matching.problems import chain_priors
 
 OPTIONS = JointOptions()
 CERTAIN = np.tile(np.eye(3) * 1e12, (4, 1, 1))
 """Matches that leave nothing open."""
 SIGMA = 0.05
 POSES = np.array([[0.0, 0, 0], [1.0, 0, 0.4], [2.0, 0.5, -0.3], [2.5, 1.5, 2.0]])
-
-
-def chain(poses: Array, sigma: float = SIGMA) -> Priors:
-    """Priors from each pose to the next."""
-    pairs = np.array([(at, at + 1) for at in range(len(poses) - 1)])
-    means = relative(poses[1:], poses[:-1])
-    return Priors(pairs, means, np.tile(np.eye(3) * sigma**-2, (len(pairs), 1, 1)))
 
 
 def all_overlap(n: int) -> Overlaps:
@@ -107,11 +101,11 @@ def test_a_scan_at_a_wrong_place_is_the_one_that_contradicts_its_priors(wrong):
     """0.4 m off by priors of 0.05 m: 64 a prior; the ends of the chain have one only."""
     poses = POSES.copy()
     poses[wrong, :2] += [0.4, 0]
-    by_all, by_most = squared_deviations(chain(POSES), poses, CERTAIN)
+    by_all, by_most = squared_deviations(chain_priors(POSES, SIGMA), poses, CERTAIN)
     assert by_most[wrong] == pytest.approx(64)
     assert by_all[wrong] == pytest.approx(128 if wrong in (1, 2) else 64)
     assert by_most[2 if wrong == 1 else 1 if wrong == 2 else 3 - wrong] == pytest.approx(0, abs=1e-6)
-    out = outliers(all_overlap(4), all_pairs(4), chain(POSES), poses, CERTAIN, OPTIONS)
+    out = outliers(all_overlap(4), all_pairs(4), chain_priors(POSES, SIGMA), poses, CERTAIN, OPTIONS)
     assert [(outlier.scan, outlier.overlap, outlier.chi2) for outlier in out] == [
         (wrong, 0.8, by_most[wrong])
     ]
@@ -120,7 +114,7 @@ def test_a_scan_at_a_wrong_place_is_the_one_that_contradicts_its_priors(wrong):
 
 def test_an_odometry_that_slipped_once_makes_no_outlier():
     """Between scans 1 and 2 it says 0.4 m too much; all other priors are met."""
-    priors = chain(POSES)
+    priors = chain_priors(POSES, SIGMA)
     priors.means[1, 0] += 0.4
     by_all, by_most = squared_deviations(priors, POSES, CERTAIN)
     assert by_all.max() > chi2.ppf(0.999, 3)
@@ -133,14 +127,18 @@ def test_within_the_bounds_a_scan_stays():
     for deviations, count in ((3.9, 0), (4.2, 1)):
         poses = POSES[:2] + np.array([[0.0, 0, 0], [0, deviations * SIGMA, 0]])
         assert (
-            len(outliers(all_overlap(2), all_pairs(2), chain(POSES[:2]), poses, CERTAIN[:2], OPTIONS))
+            len(
+                outliers(
+                    all_overlap(2), all_pairs(2), chain_priors(POSES[:2], SIGMA), poses, CERTAIN[:2], OPTIONS
+                )
+            )
             == count
         )
 
 
 def test_angles_are_compared_as_angles():
     poses = np.array([[0.0, 0, 3.1], [1.0, 0, -3.1]])
-    priors = chain(poses)
+    priors = chain_priors(poses, SIGMA)
     priors.means[0, 2] += 2 * np.pi
     assert np.max(squared_deviations(priors, poses, CERTAIN[:2])) < 1e-6
 
@@ -150,7 +148,7 @@ def test_all_scans_that_overlap_none_go_before_any_bound_is_looked_at():
     shares.pairs[[1, 3]] = shares.pairs[:, [1, 3]] = 0.02
     poses = POSES.copy()
     poses[0] += 5
-    out = outliers(shares, all_pairs(4), chain(POSES), poses, CERTAIN, OPTIONS)
+    out = outliers(shares, all_pairs(4), chain_priors(POSES, SIGMA), poses, CERTAIN, OPTIONS)
     assert [(outlier.scan, outlier.reason, outlier.overlap, outlier.chi2) for outlier in out] == [
         (1, OVERLAPS_NONE, 0.02, None),
         (3, OVERLAPS_NONE, 0.02, None),

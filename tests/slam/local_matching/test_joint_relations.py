@@ -14,7 +14,7 @@ from nscan_cli.matching.joint.options import JointOptions
 from nscan_cli.poses import Array, compose, relative, wrap
 from nscan_cli.slam.keyframes.keyframe import Keyframe
 from nscan_cli.slam.keyframes.route import route_of
-from nscan_cli.slam.local_matching import joint_relations as nearby
+from nscan_cli.slam.local_matching import joint_relations
 from nscan_cli.slam.local_matching.joint_relations import LocalMatch, match_at, match_neighbours
 from nscan_cli.slam.local_matching.options import NScanOptions
 from tests.matching.problems import office_truth
@@ -152,7 +152,7 @@ def test_all_stages_are_run_for_what_the_last_one_cannot_try(foreign, overlap, a
         stages.append(len(options.widenings))
         return match_jointly(problem, start, options)
 
-    monkeypatch.setattr(nearby, "match_jointly", watched)
+    monkeypatch.setattr(joint_relations, "match_jointly", watched)
     found = matched(revisit(foreign), np.zeros(3), NScanOptions(min_overlap=overlap))
     assert found.whole == (overlap == 0.65 and not foreign)
     assert sorted(set(stages)) == [1, 3][:attempts]

@@ -12,7 +12,7 @@ from nscan_cli.matching.correlative_search import SearchOptions
 from nscan_cli.poses import Array, compose, relative
 from nscan_cli.slam.local_matching.joint_relations import LocalMatch
 from nscan_cli.slam.local_matching.options import NScanOptions
-from nscan_cli.slam.loop_closure import loop_detector as closing_module
+from nscan_cli.slam.loop_closure import loop_detector
 from nscan_cli.slam.loop_closure.options import LoopClosureOptions
 from nscan_cli.slam.loop_closure.place import Place
 from nscan_cli.slam.loop_closure.verification import NO_SECOND
@@ -46,7 +46,7 @@ def searches(monkeypatch):
 
     def made_up(corrections: dict[int, tuple[float, float, float]]) -> Searches:
         found = Searches(corrections)
-        monkeypatch.setattr(closing_module, "find_place", found)
+        monkeypatch.setattr(loop_detector, "find_place", found)
         return found
 
     return made_up
