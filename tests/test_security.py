@@ -15,12 +15,12 @@ from nscan_cli.cli.main import run
 from nscan_cli.errors import InputDataError, InputMissingError
 from nscan_cli.graph.io.json_graph import write_graph
 from nscan_cli.logs.load import read_log
-from tests.cli.room import room_log
+from tests.cli.room_logs import room_log
 from tests.data import PACKAGE
 from tests.graph.small_graph import small_graph
 from tests.logs.forms import FORMS
 from tests.logs.recordings.containers import repacked
-from tests.logs.recordings.drives import drive
+from tests.logs.recordings.messages import drive
 from tests.logs.recordings.ros import ros2
 from tests.logs.recordings.ros_text import definition
 

@@ -20,7 +20,7 @@ from nscan_cli.matching.pairwise import PairOptions, match_pair, matched_points,
 from nscan_cli.poses import Array
 from tests.benchmarks.clock import Timing, best_of, median_of
 from tests.data import OFFICE_LOG, find_data
-from tests.graph.simulated import disturbed, graph_of, mixed_ring
+from tests.graph.simulated_relations import disturbed, graph_of, mixed_ring
 
 PAIRS, APART = 40, 5
 """Matches, of scans so many rows apart."""

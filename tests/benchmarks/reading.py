@@ -13,7 +13,7 @@ from tests.benchmarks.clock import Timing, best_of
 from tests.data import find_data
 from tests.logs.forms import FORMS
 from tests.logs.recordings.containers import repacked
-from tests.logs.recordings.drives import drive
+from tests.logs.recordings.messages import drive
 
 SCANS, BEAMS = 10_000, 360
 

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from nscan_cli.cli.main import run
-from tests.cli.room import room_log
+from tests.cli.room_logs import room_log
 
 NAME = "\udcffθ"
 """As Python calls the file whose name is a byte that is no UTF-8, and a letter that is."""

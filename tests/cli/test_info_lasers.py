@@ -12,7 +12,7 @@ import pytest
 
 from nscan_cli.cli.main import run
 from tests.logs.lines import flaser
-from tests.logs.recordings.drives import MOUNT, PERIOD, START, Odom, Scan, Tf, Written, drive, turned
+from tests.logs.recordings.messages import MOUNT, PERIOD, START, Odom, Scan, Tf, Written, drive, turned
 from tests.logs.recordings.ros import ros2
 
 

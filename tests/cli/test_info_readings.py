@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from nscan_cli.cli.main import run
-from tests.logs.recordings.drives import Scan
+from tests.logs.noisy_room import carmen, readings, recording
+from tests.logs.recordings.messages import Scan
 from tests.logs.recordings.ros import ros2
-from tests.logs.room import carmen, readings, recording
 
 
 @pytest.fixture

@@ -11,7 +11,7 @@ import pytest
 from mcap.reader import make_reader
 
 from nscan_cli.cli.main import run
-from tests.logs.recordings.drives import drive
+from tests.logs.recordings.messages import drive
 from tests.logs.recordings.ros import ros2
 
 

@@ -15,7 +15,7 @@ from pathlib import Path
 import pytest
 
 from nscan_cli.files.outputs import TEMPORARY_PREFIX
-from tests.cli.room import ALL_OUTPUTS, room_log
+from tests.cli.room_logs import ALL_OUTPUTS, room_log
 
 SCANS = 40
 KILLS = int(os.environ.get("NSCAN_TEST_KILLS", "4"))

@@ -10,7 +10,7 @@ from PIL import Image
 
 from nscan_cli.cli.main import run
 from nscan_cli.graph.io.json_graph import write_graph
-from tests.cli.room import room_log
+from tests.cli.room_logs import room_log
 from tests.cli.test_render import graph_of, log_text
 
 

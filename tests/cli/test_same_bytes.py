@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.cli.room import ALL_OUTPUTS
+from tests.cli.room_logs import ALL_OUTPUTS
 from tests.data import CORRIDOR_LOG
 
 

@@ -25,7 +25,7 @@ from nscan_cli.logs.load import read_log
 from nscan_cli.logs.reading_options import ReadingOptions
 from nscan_cli.poses import relative
 from tests.cli.documents import document_of
-from tests.cli.room import ALL_OUTPUTS, room_log
+from tests.cli.room_logs import ALL_OUTPUTS, room_log
 from tests.data import OFFICE_LOG
 from tests.graph.schema import validate
 

@@ -6,7 +6,7 @@ import pytest
 
 from nscan_cli.cli.main import run
 from nscan_cli.graph.io.json_graph import write_graph
-from tests.cli.room import ALL_OUTPUTS, room_log
+from tests.cli.room_logs import ALL_OUTPUTS, room_log
 from tests.graph.small_graph import small_graph
 
 PNG = b"\x89PNG\r\n\x1a\n" + bytes(40)

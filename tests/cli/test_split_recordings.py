@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from nscan_cli.cli.main import run
-from tests.cli.room import COUNT, room_drive
+from tests.cli.room_logs import COUNT, room_drive
 from tests.logs.recordings.ros import split_bag2
 
 

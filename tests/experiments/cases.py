@@ -21,7 +21,7 @@ from nscan_cli.matching.joint.outliers import ExcludedScan
 from nscan_cli.matching.joint.scan_set import scan_set
 from nscan_cli.matching.pairwise import matched_points, scan_ndt
 from nscan_cli.poses import Array, compose, relative, wrap
-from tests.experiments.reference import ReferenceLog
+from tests.experiments.reference_logs import ReferenceLog
 from tests.matching.problems import OPTIONS, errors, near, office_truth
 from tests.simulation.drive import odometry
 from tests.simulation.scenes import office

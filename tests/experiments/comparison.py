@@ -21,7 +21,7 @@ from nscan_cli.matching.pairwise import PairMatch, match_pair
 from nscan_cli.poses import Array, compose, relative
 from tests.experiments.charts import line_chart
 from tests.experiments.drawing import ERROR, Drawn, draw_real, draw_simulated
-from tests.experiments.reference import reference_log
+from tests.experiments.reference_logs import reference_log
 from tests.experiments.report import Report
 from tests.matching.problems import OPTIONS, errors
 from tests.simulation.scenes import corridor_and_room, office

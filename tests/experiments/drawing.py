@@ -15,7 +15,7 @@ from nscan_cli.matching.joint.scan_set import scan_set
 from nscan_cli.matching.pairwise import matched_points, scan_ndt
 from nscan_cli.ndt.transform import Ndt
 from nscan_cli.poses import Array, relative, wrap
-from tests.experiments.reference import ReferenceLog
+from tests.experiments.reference_logs import ReferenceLog
 from tests.matching.problems import OPTIONS
 from tests.simulation.scenes import Scene
 

@@ -17,7 +17,7 @@ from tests.experiments.cases import (
     real_case,
     run,
 )
-from tests.experiments.reference import reference_log
+from tests.experiments.reference_logs import reference_log
 from tests.experiments.report import Report
 
 OFFICE_ROWS = np.arange(320, 620, 30)

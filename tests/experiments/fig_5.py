@@ -11,7 +11,7 @@ from nscan_cli.matching.pairwise import match_pair, matched_points, scan_ndt
 from nscan_cli.matching.priors import MotionModel, odometry_prior
 from nscan_cli.poses import Array, compose
 from tests.experiments.cases import HEADER, Case, Outcome, office_case, paper_row, real_case, run
-from tests.experiments.reference import ReferenceLog, reference_log
+from tests.experiments.reference_logs import ReferenceLog, reference_log
 from tests.experiments.report import Report
 from tests.matching.problems import OPTIONS
 

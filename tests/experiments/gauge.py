@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from nscan_cli.matching.joint.joint_match import JointMatch
 from tests.experiments.cases import SUCCESS, Case, Matched, office_case, real_case, told_iterations
-from tests.experiments.reference import reference_log
+from tests.experiments.reference_logs import reference_log
 from tests.experiments.report import Report
 from tests.matching.problems import office_truth
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from tests.experiments import __main__ as experiments
-from tests.experiments import fig_2, fig_3, fig_4, fig_5, gauge, reference
+from tests.experiments import fig_2, fig_3, fig_4, fig_5, gauge, reference_logs
 from tests.experiments.cases import SUCCESS, Outcome, farthest
 from tests.experiments.gauge import Convergence
 from tests.experiments.report import Report
@@ -88,7 +88,7 @@ def test_scans_of_the_office_find_their_places(figure):
 @pytest.mark.logs
 @pytest.mark.parametrize("figure", [fig_4, fig_5])
 def test_scans_of_intel_find_their_places(figure):
-    if reference.reference_log("intel") is None:
+    if reference_logs.reference_log("intel") is None:
         pytest.skip("intel is not there")
     check(figure.outcomes()[1])
 
@@ -114,12 +114,12 @@ def test_on_intel_a_free_gauge_converges_in_fewer_iterations():
 
 def test_without_the_real_logs_the_reports_say_so(tmp_path, monkeypatch):
     monkeypatch.setenv("NSCAN_DATA", str(tmp_path))
-    for cached in (reference.reference_log, fig_4.outcomes):
+    for cached in (reference_logs.reference_log, fig_4.outcomes):
         cached.cache_clear()
     try:
         report = fig_4.report()
     finally:
-        for cached in (reference.reference_log, fig_4.outcomes):
+        for cached in (reference_logs.reference_log, fig_4.outcomes):
             cached.cache_clear()
     assert list(report.pictures) == ["fig_4_office"]
     assert [row[0] for row in report.rows] == ["simulated office", "the paper's"]

@@ -14,7 +14,7 @@ from tests.experiments import transformation
 from tests.experiments.fixed_mapping import MAX_ITERATIONS, FixedMapping, VariableMapping, minimise
 from tests.experiments.mappings import Mapping, differences, grouped, mean, of_pose_c, optimal, with_c_held
 from tests.experiments.transformation import MAPPINGS, NEAR, problem_of, report
-from tests.graph.simulated import (
+from tests.graph.simulated_relations import (
     dense_matrix,
     disturbed,
     graph_of,

@@ -24,7 +24,7 @@ from tests.data import OFFICE_LOG, find_data
 from tests.experiments.fixed_mapping import MAX_ITERATIONS, TOLERANCE, FixedMapping, VariableMapping, minimise
 from tests.experiments.mappings import Mapping, mean, of_pose_c, optimal, with_c_held
 from tests.experiments.report import Report
-from tests.graph.simulated import disturbed
+from tests.graph.simulated_relations import disturbed
 
 REAL = ("mit-csail", "intel")
 CHAIN_NOISE = np.array([0.03, 0.03, 0.015])

@@ -10,7 +10,7 @@ import numpy as np
 from nscan_cli.graph.model import Graph, NScan, Pairwise
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.poses import Array, compose
-from tests.mapping.scenes import log_of
+from tests.mapping.handmade_logs import log_of
 
 POSES: Array = np.array(
     [[0.0, 0.0, 0.0], [0.5, 0.1, 0.3], [1.0, 0.3, -3.0], [1.5, 0.2, 3.14], [2.0, 0.0, 1.0]]

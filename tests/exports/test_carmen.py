@@ -18,7 +18,7 @@ from nscan_cli.logs.load import read_log
 from nscan_cli.logs.reading_options import ReadingOptions
 from nscan_cli.poses import Array, relative
 from tests.exports.small_run import POSES, small_log
-from tests.mapping.scenes import log_of
+from tests.mapping.handmade_logs import log_of
 
 SIGN = "its host is nscan-cli, which writes corrected poses"
 

@@ -21,7 +21,7 @@ from nscan_cli.graph.model import Graph
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.mapping.map_server import MapImage, gray_image, map_yaml
 from nscan_cli.mapping.occupancy import occupancy_grid
-from tests.cli.room import room_log
+from tests.cli.room_logs import room_log
 from tests.graph.small_graph import small_graph
 from tests.logs.lines import read
 

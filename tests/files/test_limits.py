@@ -18,13 +18,13 @@ from nscan_cli.files.limits import MB
 from nscan_cli.graph.io.json_graph import read_graph, write_graph
 from nscan_cli.logs.load import read_log
 from nscan_cli.logs.reading_options import ReadingOptions
-from tests.cli.room import room_log
+from tests.cli.room_logs import room_log
 from tests.data import REPOSITORY
 from tests.graph.small_graph import small_graph
 from tests.logs.forms import FORMS
 from tests.logs.lines import flaser, read
 from tests.logs.recordings.containers import repacked
-from tests.logs.recordings.drives import drive
+from tests.logs.recordings.messages import drive
 
 DOCS = REPOSITORY / "docs" / "limits.md"
 SALVAGE = ReadingOptions(salvage=True)

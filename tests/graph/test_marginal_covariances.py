@@ -10,7 +10,7 @@ from nscan_cli.graph.model import Pairwise
 from nscan_cli.graph.optimise.whole_graph import components, optimise_graph
 from nscan_cli.poses import compose, relative, rotated_information, wrap
 from tests.data import data_file
-from tests.graph.simulated import (
+from tests.graph.simulated_relations import (
     SIGMA,
     dense_matrix,
     disturbed,

@@ -9,7 +9,7 @@ from nscan_cli.graph.model import Graph, Pairwise
 from nscan_cli.graph.optimise.whole_graph import optimise_graph
 from nscan_cli.graph.relative_covariance import ATTACHMENT_SIGMA, RelativePoses
 from nscan_cli.poses import Array, compose, relative, relative_jacobians
-from tests.graph.simulated import dense_matrix, each_pair_once, energy_of, graph_of, mixed_ring
+from tests.graph.simulated_relations import dense_matrix, each_pair_once, energy_of, graph_of, mixed_ring
 
 CHOSEN = (0, 3, 4, 11, 25)
 

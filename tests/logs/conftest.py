@@ -10,7 +10,7 @@ import pytest
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.logs.load import read_log
 from nscan_cli.logs.reading_options import ReadingOptions
-from tests.logs.recordings.drives import Written
+from tests.logs.recordings.messages import Written
 from tests.logs.recordings.ros import ros2
 
 

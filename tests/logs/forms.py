@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
-from tests.logs.recordings.drives import Written
 from tests.logs.recordings.foxglove import foxglove_json, protobuf
+from tests.logs.recordings.messages import Written
 from tests.logs.recordings.ros import bag1, db3, ros1, ros2, ros2_idl, rosbags_mcap
 
 FORMS: dict[str, Callable[[list[Written], Path], bytes]] = {

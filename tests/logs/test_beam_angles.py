@@ -13,8 +13,8 @@ from nscan_cli.logs.beam_angles import beam_directions
 from nscan_cli.logs.reading_options import ReadingOptions
 from nscan_cli.logs.wall_straightness import second_is_straighter
 from tests.logs import lines
-from tests.logs.recordings.drives import Scan
-from tests.logs.room import BEAMS, FIRST, STEP, readings, recording
+from tests.logs.noisy_room import BEAMS, FIRST, STEP, readings, recording
+from tests.logs.recordings.messages import Scan
 
 LAST = FIRST + STEP * (BEAMS - 1)
 

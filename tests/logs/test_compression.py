@@ -22,7 +22,7 @@ from nscan_cli.logs.load import read_log
 from nscan_cli.logs.reading_options import ReadingOptions
 from tests.logs.forms import FORMS
 from tests.logs.lines import flaser
-from tests.logs.recordings.drives import check_drive, drive
+from tests.logs.recordings.messages import check_drive, drive
 from tests.logs.recordings.ros import bag2
 
 TEXT = "\n".join(flaser(1.0 + k, tuple(1.0 + i / 7 + k / 31 for i in range(180))) for k in range(60)).encode()

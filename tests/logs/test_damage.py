@@ -21,7 +21,7 @@ from nscan_cli.logs.reading_options import ReadingOptions
 from tests.logs.forms import FORMS
 from tests.logs.lines import flaser
 from tests.logs.recordings.containers import repacked
-from tests.logs.recordings.drives import drive
+from tests.logs.recordings.messages import drive
 from tests.logs.recordings.ros import ros2
 
 COUNT = 40

@@ -9,7 +9,7 @@ import pytest
 
 from nscan_cli.logs.field_of_view import beams_lost, field_of_view
 from tests.logs import lines
-from tests.logs.recordings.drives import PERIOD, START, Scan, Written
+from tests.logs.recordings.messages import PERIOD, START, Scan, Written
 
 COUNTS = (240, 602, 452, 300)
 

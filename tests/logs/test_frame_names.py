@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from nscan_cli.logs.frame_names import DEFAULT_FRAMES, FrameNames, distinct_frame_names
-from tests.logs.recordings.drives import MOUNT, drive, with_scans
+from tests.logs.recordings.messages import MOUNT, drive, with_scans
 
 AT_ORIGIN, AHEAD = np.zeros(3), np.array([0.2, 0.0, 0.0])
 

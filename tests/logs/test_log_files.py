@@ -16,7 +16,7 @@ from nscan_cli.logs.load import read_log
 from nscan_cli.logs.log_files import files_of
 from nscan_cli.logs.reading_options import ReadingOptions
 from tests.logs.lines import flaser
-from tests.logs.recordings.drives import S, Written, check_drive, drive
+from tests.logs.recordings.messages import S, Written, check_drive, drive
 from tests.logs.recordings.ros import bag1, bag2, ros2, split_bag2
 
 LATER = 3600 * S

@@ -10,8 +10,8 @@ import pytest
 
 from nscan_cli.errors import InputDataError
 from tests.logs import lines
-from tests.logs.recordings.drives import Scan
-from tests.logs.room import carmen, readings, recording
+from tests.logs.noisy_room import carmen, readings, recording
+from tests.logs.recordings.messages import Scan
 
 ALL = 40 * 180
 MILLIMETRES = "looks like millimetres; the ranges of a scan are metres: divide them by 1,000"

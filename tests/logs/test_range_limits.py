@@ -10,8 +10,8 @@ import pytest
 from nscan_cli.logs.reading_options import ReadingOptions
 from nscan_cli.mapping.occupancy import occupancy_grid
 from tests.logs import lines
-from tests.logs.recordings.drives import Scan
-from tests.logs.room import carmen, readings, recording, way
+from tests.logs.noisy_room import carmen, readings, recording, way
+from tests.logs.recordings.messages import Scan
 
 PILE = ", where readings pile up that met nothing"
 

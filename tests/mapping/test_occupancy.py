@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from nscan_cli.errors import WrongUsageError
 from nscan_cli.mapping.occupancy import FREE, OCCUPIED, REACH, UNKNOWN, OccupancyGrid, occupancy_grid
-from tests.mapping.scenes import half_circle, log_of
+from tests.mapping.handmade_logs import half_circle, log_of
 
 ORIGIN = np.zeros((1, 3))
 

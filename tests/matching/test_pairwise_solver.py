@@ -9,10 +9,10 @@ from nscan_cli.ndt.association import begin_association
 from nscan_cli.ndt.energy import ENERGY_NUMBERS
 from nscan_cli.ndt.transform import Ndt
 from nscan_cli.poses import Array
-from tests.ndt import plain
+from tests.ndt import reference_ndt
 from tests.ndt.differences import derivative
-from tests.ndt.rooms import room
 from tests.ndt.transforms import ndt_of
+from tests.ndt.wall_points import room
 
 MEAN = np.array([0.3, -0.2, 3.1])
 INFORMATION = np.array([[50.0, 10.0, 0.0], [10.0, 80.0, -5.0], [0.0, -5.0, 200.0]])
@@ -41,7 +41,7 @@ def test_gradient_and_hessian_of_the_objective_are_its_derivatives():
     for pose in MEAN + rng.uniform(-0.3, 0.3, (20, 3)) + np.array([0, 0, -2 * np.pi]):
         rows = derivative(
             lambda p: np.append(evaluate(ndt, points, p)[1], evaluate(ndt, points, p)[0]),
-            lambda p: plain.lattice(points, p, 0.5).tobytes(),
+            lambda p: reference_ndt.lattice(points, p, 0.5).tobytes(),
             pose,
             np.array([1e-5, 1e-5, 2e-6]),
         )

@@ -13,7 +13,7 @@ from nscan_cli.ndt.energy import ENERGY_NUMBERS, evaluate_energy, inlier_share, 
 from nscan_cli.ndt.grid_growth import change_points
 from nscan_cli.ndt.hash_grid import OUTDATED
 from nscan_cli.ndt.transform import Ndt
-from tests.ndt.rooms import room
+from tests.ndt.wall_points import room
 
 
 def outside_in(count: int) -> Ndt:

@@ -5,10 +5,10 @@ import pytest
 
 from nscan_cli.ndt.energy import energy, inlier_share
 from nscan_cli.poses import Array
-from tests.ndt import plain
+from tests.ndt import reference_ndt
 from tests.ndt.differences import derivative
-from tests.ndt.rooms import room
 from tests.ndt.transforms import ndt_of
+from tests.ndt.wall_points import room
 
 STEPS = np.array([1e-5, 1e-5, 2e-6])
 
@@ -23,10 +23,10 @@ def random_poses(seed: int, count: int) -> Array:
 
 @pytest.mark.parametrize("widening", [1.0, 0.05])
 def test_the_energy_is_that_of_its_definition(widening):
-    found = plain.gaussians(room(1), 1.0, 3, 0.02)
+    found = reference_ndt.gaussians(room(1), 1.0, 3, 0.02)
     ndt = ndt_of(room(1))
     for pose in random_poses(1, 8):
-        distances = plain.mahalanobis(found, 1.0, room(2), pose)
+        distances = reference_ndt.mahalanobis(found, 1.0, room(2), pose)
         expected = -np.exp(-0.5 * widening * distances).sum()
         assert expected < -0.1
         assert energy(ndt, room(2), pose, widening).value == pytest.approx(expected, rel=1e-7)
@@ -39,7 +39,7 @@ def test_gradient_and_hessian_are_the_derivatives(widening):
     ndt, points = ndt_of(room(3)), room(4)
 
     def piece(pose: Array) -> bytes:
-        return plain.lattice(points, pose, 0.5).tobytes()
+        return reference_ndt.lattice(points, pose, 0.5).tobytes()
 
     checked = 0
     for pose in random_poses(3, 60):

@@ -7,9 +7,9 @@ from nscan_cli.ndt.energy import energy, inlier_share
 from nscan_cli.ndt.hash_grid import find_row, pack_key
 from nscan_cli.ndt.transform import Ndt
 from nscan_cli.poses import relative, transform
-from tests.ndt import plain
-from tests.ndt.rooms import room
+from tests.ndt import reference_ndt
 from tests.ndt.transforms import assert_same, entries, gaussian_count, subtract
+from tests.ndt.wall_points import room
 
 HERE = np.zeros(3)
 ELSEWHERE = np.array([-7.3, 4.1, 2.2])
@@ -26,7 +26,7 @@ def grown(points, cell=1.0, minimum=3, floor=0.02, capacity=512, pose=HERE) -> N
 def test_gaussians_are_mean_and_covariance_of_the_points_in_each_cell(cell, minimum, floor):
     points = transform(ELSEWHERE, room(1))
     ndt = grown(points, cell, minimum, floor)
-    expected = plain.gaussians(points, cell, minimum, floor)
+    expected = reference_ndt.gaussians(points, cell, minimum, floor)
     assert len(expected) > 30
     assert gaussian_count(ndt) == len(expected)
     sided = 0

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from nscan_cli.nightly.manifest import ManifestEntry
-from tests.cli.room import room_drive, room_log
+from tests.cli.room_logs import room_drive, room_log
 from tests.logs.recordings.ros import split_bag2
 
 SCANS = {"one": 12, "two": 16, "three": 20}

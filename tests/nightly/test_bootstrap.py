@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.cli.room import room_log
+from tests.cli.room_logs import room_log
 from tests.data import PACKAGE, REPOSITORY
 
 NAMES = ("random", "json", "threading", "numpy", "nscan_cli/__init__", "nscan_cli/errors")

@@ -14,7 +14,7 @@ from nscan_cli.errors import InputMissingError, WrongUsageError
 from nscan_cli.nightly import dask_executor
 from nscan_cli.nightly.manifest import ManifestEntry, read_manifest
 from nscan_cli.nightly.task import Task
-from tests.cli.room import COUNT
+from tests.cli.room_logs import COUNT
 from tests.nightly.small_logs import recordings, results
 
 distributed = pytest.importorskip("distributed")

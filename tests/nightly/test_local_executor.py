@@ -15,7 +15,7 @@ from nscan_cli.nightly import bootstrap, local_executor
 from nscan_cli.nightly.local_executor import run_locally
 from nscan_cli.nightly.manifest import ManifestEntry
 from nscan_cli.nightly.task import Outcome, Task
-from tests.cli.room import COUNT, room_log
+from tests.cli.room_logs import COUNT, room_log
 from tests.nightly.small_logs import recordings
 
 

@@ -17,7 +17,7 @@ from nscan_cli.nightly.html_log_section import log_section
 from nscan_cli.nightly.manifest import ManifestEntry
 from nscan_cli.nightly.regression_check import check_log
 from nscan_cli.nightly.task import Task
-from tests.cli.room import room_log
+from tests.cli.room_logs import room_log
 
 
 @pytest.fixture

@@ -7,7 +7,7 @@ import numpy as np
 from nscan_cli.poses import compose, relative, wrap
 from nscan_cli.slam.options import SlamOptions
 from tests.simulation.scenes import office
-from tests.slam.runs import mapped
+from tests.slam.mapped_logs import mapped
 
 SEEDS = (1, 2, 3)
 

@@ -14,7 +14,7 @@ from nscan_cli.poses import relative, wrap
 from tests.logs.excerpts import excerpt, truth_of
 from tests.simulation.faults import without_returns
 from tests.simulation.scenes import office
-from tests.slam.runs import mapped, office_log
+from tests.slam.mapped_logs import mapped, office_log
 
 ODOMETRY = pytest.mark.parametrize("odometry", [True, False], ids=["odometry", "no odometry"])
 CORRIDOR = slice(1880, 2080)

@@ -18,7 +18,7 @@ from nscan_cli.slam.pipeline import run_slam
 from nscan_cli.slam.state import SlamState
 from tests.data import data_file
 from tests.logs.excerpts import excerpt, truth_of
-from tests.slam.runs import (
+from tests.slam.mapped_logs import (
     Mapped,
     mapped,
     mapped_office,

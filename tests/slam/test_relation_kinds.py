@@ -10,7 +10,7 @@ import pytest
 from nscan_cli.graph.model import Graph
 from nscan_cli.graph.optimise.whole_graph import optimise_graph
 from nscan_cli.slam.options import Relations, SlamOptions
-from tests.slam.runs import mapped_office
+from tests.slam.mapped_logs import mapped_office
 
 
 def chain(graph: Graph) -> list[tuple[int, int]]:

@@ -18,8 +18,8 @@ from nscan_cli.slam.diagnostics.notices import notices
 from nscan_cli.slam.frontend.options import BreakOptions
 from tests.data import data_file
 from tests.slam import trouble_cases
-from tests.slam.drives import round_scene
-from tests.slam.runs import Mapped, mapped
+from tests.slam.keyframe_drives import round_scene
+from tests.slam.mapped_logs import Mapped, mapped
 from tests.slam.trouble_cases import ROUND, Case, errors, without_odometry
 
 MENDED = ("3 m without a return", "3 m of nan", "15 m without a return", "3 s of scans dropped",

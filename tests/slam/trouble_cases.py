@@ -14,8 +14,8 @@ from tests.logs.excerpts import truth_of
 from tests.simulation import faults
 from tests.simulation.scenes import Scene, office
 from tests.simulation.world import Builder
-from tests.slam.drives import path_of
-from tests.slam.runs import position_rmse
+from tests.slam.keyframe_drives import path_of
+from tests.slam.mapped_logs import position_rmse
 
 
 class Case(NamedTuple):

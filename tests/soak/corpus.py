@@ -14,12 +14,12 @@ import zstandard
 from nscan_cli.graph.io.g2o import write_g2o
 from nscan_cli.graph.io.json_graph import write_graph
 from nscan_cli.graph.io.tum import write_tum
-from tests.cli.room import room_log
+from tests.cli.room_logs import room_log
 from tests.data import find_data
 from tests.graph.small_graph import small_graph
 from tests.logs.forms import FORMS
 from tests.logs.recordings.containers import repacked
-from tests.logs.recordings.drives import drive
+from tests.logs.recordings.messages import drive
 from tests.logs.test_radish_forms import FORMS as WITH_BEARINGS
 from tests.logs.text.test_player import V1, V2
 from tests.logs.text.test_script import LINES

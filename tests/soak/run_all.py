@@ -20,7 +20,7 @@ from nscan_cli.graph.io.json_graph import read_graph
 from nscan_cli.graph.io.tum import read_tum
 from nscan_cli.logs.load import read_log
 from nscan_cli.logs.reading_options import ReadingOptions
-from tests.cli.room import ALL_OUTPUTS, room_log
+from tests.cli.room_logs import ALL_OUTPUTS, room_log
 from tests.soak.corpus import RELATION, samples
 from tests.soak.mutations import damaged
 

@@ -20,8 +20,8 @@ from nscan_cli.logs.reading_options import ReadingOptions
 from nscan_cli.slam.diagnostics.notices import notices
 from tests.data import find_data
 from tests.slam import trouble_cases
-from tests.slam.drives import round_scene
-from tests.slam.runs import mapped
+from tests.slam.keyframe_drives import round_scene
+from tests.slam.mapped_logs import mapped
 from tests.slam.trouble_cases import ROUND, Case, Make, errors, without_odometry
 
 REAL: dict[str, tuple[ReadingOptions, dict[str, Make]]] = {

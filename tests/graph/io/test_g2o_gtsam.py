@@ -17,7 +17,7 @@ from nscan_cli.graph.io.g2o import read_g2o, write_g2o
 from nscan_cli.graph.model import Graph
 from nscan_cli.graph.optimise.whole_graph import GraphOptimum, optimise_graph
 from tests.data import data_file
-from tests.graph.simulated import disturbed, graph_of, mixed_ring
+from tests.graph.simulated_relations import disturbed, graph_of, mixed_ring
 
 gtsam = pytest.importorskip("gtsam", reason="gtsam is not installed: pip install nscan-cli[test]")
 

@@ -20,7 +20,7 @@ from nscan_cli.graph.model import Graph
 from nscan_cli.graph.optimise.whole_graph import optimise_graph
 from nscan_cli.poses import Array, relative
 from tests.graph.schema import validate
-from tests.graph.simulated import disturbed, graph_of, pairwise_relations, ring, ring_edges
+from tests.graph.simulated_relations import disturbed, graph_of, pairwise_relations, ring, ring_edges
 
 UPPER = np.triu_indices(6)
 GTSAM_X0 = 120 << 56

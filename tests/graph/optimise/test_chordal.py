@@ -9,7 +9,14 @@ from nscan_cli.graph.model import NScan, Pairwise
 from nscan_cli.graph.optimise.chordal import chordal_start
 from nscan_cli.graph.optimise.graph_solver import optimise_poses
 from nscan_cli.poses import relative
-from tests.graph.simulated import energy_of, mixed_ring, nscan_relation, pairwise_relations, ring, ring_edges
+from tests.graph.simulated_relations import (
+    energy_of,
+    mixed_ring,
+    nscan_relation,
+    pairwise_relations,
+    ring,
+    ring_edges,
+)
 
 
 @settings(max_examples=20, deadline=None)

@@ -8,8 +8,8 @@ import pytest
 from nscan_cli.graph.model import NScan, Pairwise
 from nscan_cli.graph.optimise.graph_energy import GraphEnergy
 from nscan_cli.poses import compose
-from tests.graph.reference import derivative, second_derivative, term
-from tests.graph.simulated import dense_matrix, disturbed, energy_of, mixed_ring, nscan_relation
+from tests.graph.reference_terms import derivative, second_derivative, term
+from tests.graph.simulated_relations import dense_matrix, disturbed, energy_of, mixed_ring, nscan_relation
 
 
 @pytest.mark.parametrize("fixed", [0, 3, 7])

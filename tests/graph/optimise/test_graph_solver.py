@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from nscan_cli.graph.model import NScan, Pairwise
 from nscan_cli.graph.optimise.graph_solver import optimise_poses
 from nscan_cli.poses import compose, relative, wrap
-from tests.graph.simulated import disturbed, energy_of, mixed_ring
+from tests.graph.simulated_relations import disturbed, energy_of, mixed_ring
 
 
 @settings(max_examples=20, deadline=None)

@@ -19,7 +19,7 @@ from nscan_cli.graph.optimise.robust import (
     unfolded,
 )
 from nscan_cli.poses import relative
-from tests.graph.simulated import (
+from tests.graph.simulated_relations import (
     energy_of,
     mixed_ring,
     nscan_relation,

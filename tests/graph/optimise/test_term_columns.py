@@ -13,7 +13,7 @@ from nscan_cli.graph.optimise.graph_energy import GraphEnergy
 from nscan_cli.graph.optimise.term_columns import TermCache, TermColumns
 from nscan_cli.graph.optimise.whole_graph import optimise_graph
 from nscan_cli.graph.relations.base import Relation
-from tests.graph.simulated import disturbed, graph_of, mixed_ring
+from tests.graph.simulated_relations import disturbed, graph_of, mixed_ring
 
 SIZE = 12
 TRUTH, PAIRWISE, NSCAN = mixed_ring(SIZE, noise=1.0)

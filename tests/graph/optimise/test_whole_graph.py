@@ -12,7 +12,7 @@ from nscan_cli.graph.optimise.graph_solver import optimise_poses
 from nscan_cli.graph.optimise.whole_graph import components, optimise_graph
 from nscan_cli.poses import compose, relative
 from tests.data import data_file
-from tests.graph.simulated import disturbed, energy_of, graph_of, mixed_ring, streets
+from tests.graph.simulated_relations import disturbed, energy_of, graph_of, mixed_ring, streets
 
 
 @pytest.mark.logs

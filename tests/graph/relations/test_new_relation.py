@@ -21,9 +21,9 @@ from nscan_cli.graph.optimise.whole_graph import components, optimise_graph
 from nscan_cli.graph.relations.base import Term
 from nscan_cli.graph.relations.registry import RELATION_TYPES
 from nscan_cli.poses import Array, compose, relative
-from tests.graph.reference import derivative
+from tests.graph.reference_terms import derivative
 from tests.graph.schema import validate
-from tests.graph.simulated import graph_of, mixed_ring, pairwise_relations, ring
+from tests.graph.simulated_relations import graph_of, mixed_ring, pairwise_relations, ring
 
 COUNT = 24
 

@@ -16,7 +16,7 @@ from nscan_cli.graph.optimise.graph_energy import GraphEnergy
 from nscan_cli.graph.optimise.whole_graph import optimise_graph
 from nscan_cli.graph.relations.semidefinite import IndefiniteError, as_information, semidefinite
 from nscan_cli.poses import Array, compose, inverse, relative, rotated_information
-from tests.graph.simulated import disturbed, graph_of, pairwise_relations, ring, ring_edges
+from tests.graph.simulated_relations import disturbed, graph_of, pairwise_relations, ring, ring_edges
 
 
 @st.composite

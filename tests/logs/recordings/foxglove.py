@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from mcap.writer import Writer as McapWriter
 
-from tests.logs.recordings.drives import LEVEL, Content, Odom, S, Scan, Written, turned
+from tests.logs.recordings.messages import LEVEL, Content, Odom, S, Scan, Written, turned
 
 
 def protobuf(written: Iterable[Written]) -> bytes:

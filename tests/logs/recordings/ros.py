@@ -13,7 +13,7 @@ import numpy as np
 
 from tests.logs.recordings import ros_text
 from tests.logs.recordings.containers import repacked
-from tests.logs.recordings.drives import Content, Odom, S, Scan, Written, turned
+from tests.logs.recordings.messages import Content, Odom, S, Scan, Written, turned
 
 
 def ros_type(content: Content) -> str:

@@ -13,7 +13,7 @@ from mcap.writer import Writer
 
 from nscan_cli.errors import InputDataError
 from nscan_cli.logs.laser_log import LaserLog
-from tests.logs.recordings.drives import turned
+from tests.logs.recordings.messages import turned
 
 
 @pytest.fixture

@@ -17,7 +17,7 @@ from hypothesis import strategies as st
 from nscan_cli.errors import InputDataError, WrongUsageError
 from nscan_cli.logs.load import read_log
 from tests.logs.forms import FORMS
-from tests.logs.recordings.drives import (
+from tests.logs.recordings.messages import (
     COUNT,
     PERIOD,
     START,

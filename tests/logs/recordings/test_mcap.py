@@ -10,7 +10,7 @@ from mcap.reader import make_reader
 
 from nscan_cli.errors import InputDataError
 from tests.logs.recordings.containers import containers, repacked
-from tests.logs.recordings.drives import Scan, check_drive, drive
+from tests.logs.recordings.messages import Scan, check_drive, drive
 from tests.logs.recordings.ros import ros2
 
 

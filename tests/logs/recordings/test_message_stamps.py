@@ -7,7 +7,7 @@ import pytest
 
 from nscan_cli.logs.recordings.message_stamps import order_messages, valid_stamps
 from tests.logs.forms import FORMS
-from tests.logs.recordings.drives import PERIOD, START, Odom, S, Scan, Tf, Written, drive
+from tests.logs.recordings.messages import PERIOD, START, Odom, S, Scan, Tf, Written, drive
 
 
 def test_zero_is_a_stamp_of_a_clock_that_begins_there():

@@ -9,7 +9,7 @@ import pytest
 
 from nscan_cli.errors import InputDataError
 from tests.logs.forms import FORMS
-from tests.logs.recordings.drives import MOUNT, START, S, Tf, Written, drive, turned, with_scans
+from tests.logs.recordings.messages import MOUNT, START, S, Tf, Written, drive, turned, with_scans
 
 
 def test_chains_of_transforms_in_several_messages(read):

@@ -10,7 +10,7 @@ import pytest
 
 from nscan_cli.errors import InputDataError
 from tests.logs.forms import FORMS
-from tests.logs.recordings.drives import PERIOD, START, Odom, Scan, Tf, Written, drive, turned
+from tests.logs.recordings.messages import PERIOD, START, Odom, Scan, Tf, Written, drive, turned
 
 Pose = tuple[tuple[float, float, float], tuple[float, float, float, float]]
 COUNT = 60

@@ -15,7 +15,7 @@ from nscan_cli.logs.load import recording_from
 from nscan_cli.logs.recordings.message_types import PATH_TYPE
 from nscan_cli.logs.recordings.pose_topics import poses_on_topic
 from tests.logs.recordings import ros_text
-from tests.logs.recordings.drives import START, S, turned
+from tests.logs.recordings.messages import START, S, turned
 
 COUNT = 5
 STAMPS = [f"{(START + k * S) // S}.{(START + k * S) % S:09d}" for k in range(COUNT)]

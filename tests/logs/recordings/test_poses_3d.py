@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from nscan_cli.logs.recordings.decoded_messages import Pose3D
 from nscan_cli.logs.recordings.poses_3d import as_matrix, heading, inverse_transform, planar_mount
 from nscan_cli.poses import wrap
-from tests.logs.recordings.drives import turned
+from tests.logs.recordings.messages import turned
 
 ANGLES = st.floats(-3.1, 3.1)
 METRES = st.floats(-10, 10)

@@ -7,7 +7,7 @@ from dataclasses import replace
 import pytest
 
 from nscan_cli.errors import InputDataError
-from tests.logs.recordings.drives import check_drive, drive
+from tests.logs.recordings.messages import check_drive, drive
 from tests.logs.recordings.ros import bag1
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from nscan_cli.errors import InputDataError
-from tests.logs.recordings.drives import check_drive, drive
+from tests.logs.recordings.messages import check_drive, drive
 from tests.logs.recordings.ros import db3
 
 

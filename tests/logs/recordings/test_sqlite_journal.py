@@ -15,7 +15,7 @@ from nscan_cli.errors import InputDataError
 from nscan_cli.logs.load import read_log
 from nscan_cli.logs.log_files import files_of
 from nscan_cli.logs.reading_options import ReadingOptions
-from tests.logs.recordings.drives import check_drive, drive
+from tests.logs.recordings.messages import check_drive, drive
 from tests.logs.recordings.ros import db3
 
 SALVAGE = ReadingOptions(salvage=True)

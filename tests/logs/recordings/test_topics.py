@@ -9,7 +9,7 @@ import pytest
 from nscan_cli.errors import WrongUsageError
 from nscan_cli.logs.device_choice import OpenChoiceError
 from nscan_cli.logs.frame_names import FrameNames
-from tests.logs.recordings.drives import PERIOD, START, Odom, Scan, Tf, Written, drive, turned
+from tests.logs.recordings.messages import PERIOD, START, Odom, Scan, Tf, Written, drive, turned
 
 
 def on(topic: str, kind: type) -> list[Written]:

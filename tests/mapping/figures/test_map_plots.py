@@ -8,7 +8,7 @@ from nscan_cli.mapping.figures.canvas import BLUE, GRAY, GREEN, PURPLE, SKY, VER
 from nscan_cli.mapping.figures.graph_edges import edges_by_kind
 from nscan_cli.mapping.figures.map_plots import Overlays, plot_over_map, plot_paper_figure
 from nscan_cli.mapping.occupancy import OccupancyGrid, occupancy_grid
-from tests.mapping.scenes import half_circle
+from tests.mapping.handmade_logs import half_circle
 
 PATH = np.array([[0.0, 0.0, 0.0], [4.0, 0.0, 0.0], [4.0, 4.0, 0.0], [0.0, 4.0, 0.0]])
 

@@ -11,7 +11,7 @@ from nscan_cli.matching.joint.joint_energy import Priors, all_pairs, joint_energ
 from nscan_cli.ndt.energy import energy
 from nscan_cli.poses import Array, compose, relative
 from tests.matching.problems import Problem, near, office_problem
-from tests.ndt import plain
+from tests.ndt import reference_ndt
 from tests.ndt.differences import derivative
 
 SCALE = 0.1
@@ -38,7 +38,9 @@ def first(problem: Problem, n: int) -> Problem:
 
 
 def pieces(problem: Problem, pairs: NDArray[np.int64], poses: Array) -> bytes:
-    cells = [plain.lattice(problem.points[j], relative(poses[j], poses[i]), 0.5) for i, j in pairs.tolist()]
+    cells = [
+        reference_ndt.lattice(problem.points[j], relative(poses[j], poses[i]), 0.5) for i, j in pairs.tolist()
+    ]
     return b"".join(part.astype(np.int32).tobytes() for part in cells)
 
 

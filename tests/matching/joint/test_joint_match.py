@@ -15,7 +15,7 @@ from nscan_cli.matching.uncertainty import weakest_translation
 from nscan_cli.ndt.transform import Ndt
 from nscan_cli.poses import relative
 from tests.matching.problems import Problem, errors, fig_3, near, office_problem
-from tests.ndt.rooms import room
+from tests.ndt.wall_points import room
 
 NOISE = 0.015
 """Standard deviation (m) of the simulated laser's ranges."""

@@ -16,7 +16,7 @@ from nscan_cli.slam.local_matching.options import NScanOptions
 from nscan_cli.slam.local_matching.pairwise_relations import match_neighbours_pairwise
 from nscan_cli.slam.options import Relations, SlamOptions
 from tests.logs.excerpts import excerpt
-from tests.slam.runs import Mapped, mapped, mapped_office, office_log
+from tests.slam.mapped_logs import Mapped, mapped, mapped_office, office_log
 
 MOVED = SlamOptions().refinement.min_motion
 BOTH_KINDS = pytest.mark.parametrize(

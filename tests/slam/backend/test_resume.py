@@ -19,7 +19,7 @@ from nscan_cli.slam.local_matching.options import NScanOptions
 from nscan_cli.slam.loop_closure.verification import AMBIGUOUS
 from nscan_cli.slam.options import Relations, SlamOptions
 from tests.logs.excerpts import excerpt, truth_of
-from tests.slam.runs import mapped, office_log, position_rmse
+from tests.slam.mapped_logs import mapped, office_log, position_rmse
 
 
 @functools.cache

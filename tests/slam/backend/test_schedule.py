@@ -12,7 +12,7 @@ from nscan_cli.slam.keyframes.route import Route
 from nscan_cli.slam.loop_closure.options import LoopClosureOptions
 from nscan_cli.slam.options import SlamOptions
 from tests.simulation.building import growing
-from tests.slam.runs import mapped
+from tests.slam.mapped_logs import mapped
 
 OPTIONS = ScheduleOptions(min_motion=0.1, min_new_share=0.1, max_keyframes=20, whole_new_share=0.5)
 

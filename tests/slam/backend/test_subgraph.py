@@ -30,7 +30,7 @@ from nscan_cli.slam.loop_closure.relative_uncertainty import (
     RelativeUncertainty,
     held_pose_marginals,
 )
-from tests.slam.drives import exact_path
+from tests.slam.keyframe_drives import exact_path
 from tests.slam.keyframe_walks import Walk, straight, walk
 
 APART = 7

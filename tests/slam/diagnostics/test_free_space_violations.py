@@ -23,8 +23,8 @@ from nscan_cli.slam.keyframes.route import Route, route_of
 from nscan_cli.slam.local_matching.options import NScanOptions
 from tests.logs.excerpts import truth_of
 from tests.simulation.laser import Laser
-from tests.slam.drives import ROUND, path_of, round_scene
-from tests.slam.runs import mapped_real
+from tests.slam.keyframe_drives import ROUND, path_of, round_scene
+from tests.slam.mapped_logs import mapped_real
 
 OPTIONS = FreeSpaceOptions()
 EVERY = 1.5

@@ -17,8 +17,8 @@ from nscan_cli.slam.diagnostics.notices import notices
 from nscan_cli.slam.map_log import map_log
 from nscan_cli.slam.options import SlamOptions
 from tests.data import data_file
-from tests.slam.drives import round_scene
-from tests.slam.runs import mapped
+from tests.slam.keyframe_drives import round_scene
+from tests.slam.mapped_logs import mapped
 from tests.slam.trouble_cases import ROUND, without_odometry
 
 

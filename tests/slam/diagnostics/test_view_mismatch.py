@@ -13,8 +13,8 @@ from nscan_cli.slam.diagnostics.options import ViewMismatchOptions
 from nscan_cli.slam.diagnostics.view_mismatch import ViewMismatch, view_mismatches
 from nscan_cli.slam.frontend.options import ViewSimilarityOptions
 from nscan_cli.slam.frontend.view_similarity import view_similarity
-from tests.slam.drives import round_scene
-from tests.slam.runs import mapped, mapped_real
+from tests.slam.keyframe_drives import round_scene
+from tests.slam.mapped_logs import mapped, mapped_real
 from tests.slam.trouble_cases import ROUND, without_odometry
 
 SIMILARITY = ViewSimilarityOptions()

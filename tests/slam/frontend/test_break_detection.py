@@ -11,8 +11,8 @@ from nscan_cli.slam.frontend.break_detection import SegmentTracker, TrackedBatch
 from nscan_cli.slam.frontend.options import BreakOptions, TrackingOptions
 from nscan_cli.slam.frontend.scan_batch import ScanBatch
 from tests.logs.excerpts import excerpt
-from tests.slam.drives import round_scene
-from tests.slam.runs import sensed_in
+from tests.slam.keyframe_drives import round_scene
+from tests.slam.mapped_logs import sensed_in
 from tests.slam.trouble_cases import carried, standing
 
 

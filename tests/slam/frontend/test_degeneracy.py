@@ -26,14 +26,14 @@ from nscan_cli.slam.frontend.tracked_scans import TrackedScans
 from nscan_cli.slam.frontend.tracking_parameters import TrackingParameters
 from tests.benchmarks.lasers import WAY, rms, turning
 from tests.logs.excerpts import truth_of
-from tests.ndt.rooms import room
+from tests.ndt.wall_points import room
 from tests.simulation.building import building, drive
 from tests.simulation.drive import Drive
 from tests.simulation.laser import Laser
 from tests.simulation.scenes import Scene
 from tests.simulation.world import Builder
 from tests.slam.frontend.test_tracker import end_off
-from tests.slam.runs import mapped, poses_of, tracked
+from tests.slam.mapped_logs import mapped, poses_of, tracked
 
 SETTINGS = TrackingParameters.of(TrackingOptions())
 OPTIONS = SETTINGS.degeneracy

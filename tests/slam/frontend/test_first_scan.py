@@ -14,8 +14,8 @@ from nscan_cli.slam.frontend.first_scan import place_first
 from nscan_cli.slam.frontend.options import BreakOptions, TrackingOptions
 from tests.logs.excerpts import excerpt, truth_of
 from tests.simulation.scenes import office
-from tests.slam.drives import round_scene
-from tests.slam.runs import found_of, office_log, sensed, sensed_in, tracked
+from tests.slam.keyframe_drives import round_scene
+from tests.slam.mapped_logs import found_of, office_log, sensed, sensed_in, tracked
 from tests.slam.trouble_cases import carried
 
 SCANS = 120

@@ -8,7 +8,7 @@ from nscan_cli.poses import Array, relative
 from nscan_cli.slam.frontend.odometry_checks import frozen_scans, without_jumps
 from nscan_cli.slam.frontend.options import OdometryCheckOptions
 from tests.simulation import faults
-from tests.slam.drives import round_scene
+from tests.slam.keyframe_drives import round_scene
 
 CHECKS = OdometryCheckOptions()
 

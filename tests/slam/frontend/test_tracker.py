@@ -20,11 +20,11 @@ from nscan_cli.slam.frontend.options import TrackingOptions
 from nscan_cli.slam.frontend.tracked_scans import TrackedScan
 from nscan_cli.slam.frontend.tracker import Tracker
 from tests.logs.excerpts import excerpt, truth_of
-from tests.ndt.rooms import room
 from tests.ndt.transforms import assert_same, gaussian_count
+from tests.ndt.wall_points import room
 from tests.simulation.scenes import Scene
 from tests.simulation.world import Builder
-from tests.slam.runs import office_log, poses_of, scans_of, sensed, sensed_in, tracked
+from tests.slam.mapped_logs import office_log, poses_of, scans_of, sensed, sensed_in, tracked
 
 STEP = 0.01
 """m"""

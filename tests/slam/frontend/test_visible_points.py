@@ -19,7 +19,7 @@ from nscan_cli.slam.frontend.visible_points import range_limit, visible_points
 from nscan_cli.slam.options import SlamOptions
 from tests.benchmarks.lasers import KINDS, WAY
 from tests.simulation.building import building, drive
-from tests.slam.runs import office_log
+from tests.slam.mapped_logs import office_log
 
 TRACKING = TrackingOptions()
 

@@ -20,8 +20,8 @@ from nscan_cli.slam.frontend.tracked_scans import TrackedScan
 from nscan_cli.slam.keyframes.keyframe_selection import Keyframes
 from nscan_cli.slam.keyframes.options import KeyframeOptions
 from nscan_cli.slam.keyframes.route import chain_relations
-from tests.ndt.rooms import room
-from tests.slam.runs import found_of, sensed
+from tests.ndt.wall_points import room
+from tests.slam.mapped_logs import found_of, sensed
 
 OPTIONS = KeyframeOptions(distance=1.0, turn=0.5)
 GAUSSIANS = GaussianOptions(cell=1.0, minimum=4)

@@ -20,8 +20,8 @@ from nscan_cli.slam.keyframes.options import KeyframeOptions
 from nscan_cli.slam.keyframes.slip_detection import SlipDetector
 from tests.benchmarks.robustness import false_loops, mapped, undisturbed
 from tests.data import data_file
-from tests.ndt.rooms import room
-from tests.slam.runs import sensed
+from tests.ndt.wall_points import room
+from tests.slam.mapped_logs import sensed
 
 OPTIONS = KeyframeOptions(slip_sigmas=1.5)
 SLIPPED = [(0.1, 0.90), (1.6, 0.82), (0.7, 0.84), (2.1, 0.81), (0.7, 0.77), (2.0, 0.83), (0.2, 0.91)]

@@ -7,7 +7,7 @@ import pytest
 
 from nscan_cli.graph.model import Pairwise
 from nscan_cli.slam.keyframes.tracked_path import TrackedPath
-from tests.slam.drives import exact_path
+from tests.slam.keyframe_drives import exact_path
 from tests.slam.keyframe_walks import information
 
 

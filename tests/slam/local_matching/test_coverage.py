@@ -17,7 +17,7 @@ from nscan_cli.slam.local_matching.neighbours import choose_neighbours
 from nscan_cli.slam.local_matching.options import NScanOptions
 from nscan_cli.slam.options import SlamOptions
 from tests.logs.excerpts import excerpt
-from tests.slam.runs import Mapped, mapped, mapped_office, office_log
+from tests.slam.mapped_logs import Mapped, mapped, mapped_office, office_log
 
 
 def joint(*nodes: int) -> LocalMatch:

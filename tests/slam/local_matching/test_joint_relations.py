@@ -19,7 +19,14 @@ from nscan_cli.slam.local_matching.joint_relations import LocalMatch, match_at, 
 from nscan_cli.slam.local_matching.options import NScanOptions
 from tests.matching.problems import office_truth
 from tests.simulation.scenes import office
-from tests.slam.drives import CABINETS, about, keyframe_of, like_doors_drive, path_of, relation_to_previous
+from tests.slam.keyframe_drives import (
+    CABINETS,
+    about,
+    keyframe_of,
+    like_doors_drive,
+    path_of,
+    relation_to_previous,
+)
 
 OLD, BETWEEN, NEW = (280, 290, 300, 310, 320), (700, 1200), (1880, 1890, 1900, 1910, 1920)
 """Rows of the office: along the corridor to the south; elsewhere; and along it again, 150 m later."""

@@ -17,7 +17,7 @@ from nscan_cli.slam.local_matching.joint_relations import LocalMatch
 from nscan_cli.slam.local_matching.options import NScanOptions
 from nscan_cli.slam.local_matching.pairwise_relations import match_neighbours_pairwise
 from tests.matching.problems import office_truth
-from tests.slam.drives import about, relation_to_previous
+from tests.slam.keyframe_drives import about, relation_to_previous
 from tests.slam.local_matching.test_joint_relations import BETWEEN, NEW, OLD, ROWS, revisit
 
 OFF = np.array([0.1, 0.1, 0.01])

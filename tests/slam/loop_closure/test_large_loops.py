@@ -15,8 +15,8 @@ from nscan_cli.slam.loop_closure.options import LoopClosureOptions
 from nscan_cli.slam.options import Relations, SlamOptions
 from tests.data import data_file
 from tests.logs.excerpts import truth_of
-from tests.slam.drives import slipped_round
-from tests.slam.runs import Mapped, mapped, position_rmse
+from tests.slam.keyframe_drives import slipped_round
+from tests.slam.mapped_logs import Mapped, mapped, position_rmse
 
 ALONG, ACROSS, ASLANT = (2.5, 0.0, 0.0), (0.0, 2.5, 0.0), (-2.5, 1.0, 0.05)
 ASIDE = (1.0, 2.0, -0.05)

@@ -19,7 +19,7 @@ from nscan_cli.slam.loop_closure.loop_detector import LoopDetector
 from nscan_cli.slam.loop_closure.options import LoopClosureOptions
 from nscan_cli.slam.loop_closure.place import Place
 from nscan_cli.slam.loop_closure.verification import AMBIGUOUS, NO_SECOND, OUTDONE, SO_FAR_OFF, TOO_LITTLE
-from tests.slam.drives import (
+from tests.slam.keyframe_drives import (
     CABINETS,
     ROUND,
     ROWS,

@@ -17,9 +17,9 @@ from nscan_cli.slam.loop_closure.options import LoopClosureOptions
 from nscan_cli.slam.loop_closure.place import Place
 from nscan_cli.slam.loop_closure.verification import NO_SECOND
 from nscan_cli.slam.options import SlamOptions
-from tests.slam.drives import ROWS, Driven, closed_along, round_drive, slipped_round
+from tests.slam.keyframe_drives import ROWS, Driven, closed_along, round_drive, slipped_round
 from tests.slam.loop_closure.test_loop_detector import ACROSS, NSCAN, bent, closing
-from tests.slam.runs import mapped
+from tests.slam.mapped_logs import mapped
 
 
 class Searches(list[tuple[int, Array, SearchOptions]]):

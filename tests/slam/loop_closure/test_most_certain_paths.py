@@ -13,7 +13,7 @@ from nscan_cli.poses import Array
 from nscan_cli.slam.keyframes.route import Route
 from nscan_cli.slam.loop_closure.most_certain_paths import LinkCache, most_certain_paths
 from nscan_cli.slam.loop_closure.options import LoopClosureOptions
-from tests.slam.drives import exact_path
+from tests.slam.keyframe_drives import exact_path
 from tests.slam.keyframe_walks import Walk, seen_from, straight, walk
 
 LEVER_ARM = LoopClosureOptions.lever_arm

@@ -25,7 +25,7 @@ from nscan_cli.slam.loop_closure.verification import (
     OUTDONE,
     why_match_doubted,
 )
-from tests.slam.drives import (
+from tests.slam.keyframe_drives import (
     CABINETS,
     ROWS,
     Driven,

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tests.logs.lines import flaser
-from tests.logs.recordings.drives import PERIOD, START, Odom, Scan, Written
+from tests.logs.recordings.messages import PERIOD, START, Odom, Scan, Written
 
 Readings = NDArray[np.float32]
 WIDTH, DEPTH = 14.0, 6.0

@@ -6,7 +6,7 @@ import numpy as np
 
 from nscan_cli.poses import Array
 from tests.logs.lines import flaser
-from tests.logs.recordings.drives import PERIOD, START, Odom, Scan, Tf, Written
+from tests.logs.recordings.messages import PERIOD, START, Odom, Scan, Tf, Written
 
 ALL_OUTPUTS = ["-o", "out.json", "--map", "out.png", "--trajectory", "out.tum", "--g2o", "out.g2o",
                "--carmen", "out.log", "--depfile", "out.d"]  # fmt: skip

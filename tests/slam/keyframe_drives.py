@@ -30,7 +30,7 @@ from tests.simulation.laser import Laser
 from tests.simulation.office import office_world
 from tests.simulation.scenes import Scene
 from tests.simulation.world import Builder
-from tests.slam.runs import found_of, sensed_in
+from tests.slam.mapped_logs import found_of, sensed_in
 
 ROWS = 10
 """From one keyframe's row to the next: rows and keyframes are not to be mixed up."""
