@@ -10,7 +10,7 @@ from nscan_cli.evaluation.evaluation_report import Evaluation
 from nscan_cli.graph.io.tum import Trajectory
 from nscan_cli.mapping.figures.canvas import Canvas
 from nscan_cli.mapping.figures.error_plots import plot_against_reference, plot_relations
-from nscan_cli.mapping.figures.panels import bounds_around, hstack_images, is_wide, vstack_images
+from nscan_cli.mapping.figures.panels import bounds_around, is_wide, stack_images
 from nscan_cli.poses import compose
 
 if TYPE_CHECKING:
@@ -46,5 +46,4 @@ def picture(evaluation: Evaluation, result: Trajectory, reference: Trajectory | 
         panels.append(
             plot_against_reference(aligned, against.rows, against.translation, reference.poses, title, beside)
         )
-    join = hstack_images if beside else vstack_images
-    return join([panel.image() for panel in panels])
+    return stack_images([panel.image() for panel in panels], beside)

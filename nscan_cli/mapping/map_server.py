@@ -1,4 +1,4 @@
-"""Occupancy grid → the PNG and the YAML that ROS's map_server and Nav2 load.
+"""The PNG and the YAML of a map that ROS's map_server and Nav2 load.
 
 Sources: ROS wiki, map_server; Nav2, nav2_map_server/src/map_io.cpp.
 """
@@ -22,18 +22,18 @@ Gray = NDArray[np.uint8]
 
 MAP_SERVER_GRAYS = {OCCUPIED: 0, UNKNOWN: 205, FREE: 254}
 OCCUPIED_THRESH, FREE_THRESH = 0.65, 0.196
-"""Shares of black. A gray of 205 has 0.19608: with a threshold of 0.25 it would load as free."""
-RUN_LENGTHS = 3
-"""zlib's strategy Z_RLE: on maps as small as the best level, in half the time of the default."""
+"""Thresholds of the share of black. UNKNOWN has 0.19608, so a free_thresh of 0.25 would load it as free."""
+Z_RLE = 3
+"""The strategy of zlib: maps are as small as at the best level, in half the time of the default."""
 
 
 def gray_image(grid: OccupancyGrid, grays: dict[int, int] = MAP_SERVER_GRAYS) -> Gray:
-    """(H, W) the gray of every cell's state; unlike the grid's, row 0 is that of greatest y."""
+    """(H, W) the gray of the state of every cell; row 0 has the greatest y."""
     table = np.zeros(256, dtype=np.uint8)
     for state, value in grays.items():
         table[state % 256] = value
     cells = grid.states().view(np.uint8)
-    # In place, two rows at a time: a map can be large.
+    # In place, two rows at a time, because a map can be large.
     for low in range((len(cells) + 1) // 2):
         pair = [low, len(cells) - 1 - low]
         cells[pair] = table[cells[pair[::-1]]]
@@ -41,10 +41,10 @@ def gray_image(grid: OccupancyGrid, grays: dict[int, int] = MAP_SERVER_GRAYS) ->
 
 
 class MapImage(NamedTuple):
-    """The map that map_server loads, without the counts that it was made of, which take more memory."""
+    """The map that map_server loads. It takes less memory than the counts of the grid."""
 
     cells: Gray
-    """(H, W) 0 occupied, 205 unknown, 254 free; row 0 is that of greatest y."""
+    """(H, W) MAP_SERVER_GRAYS; row 0 has the greatest y."""
     resolution: float
     """Size of a cell, m."""
     origin: tuple[float, float]
@@ -52,7 +52,7 @@ class MapImage(NamedTuple):
 
 
 def map_image(grid: OccupancyGrid) -> MapImage:
-    """That of a grid."""
+    """The image of a grid."""
     return MapImage(gray_image(grid), grid.resolution, grid.origin)
 
 
@@ -64,9 +64,9 @@ def map_png(image: MapImage) -> bytes:
 
 
 def map_yaml(image_name: str, image: MapImage) -> bytes:
-    """The YAML of the map; `image_name` is the image's name as seen from the YAML's folder.
+    """The YAML of the map; `image_name` is the path of the image, relative to the folder of the YAML.
 
-    The origin's yaw is 0: consumers ignore it.
+    The yaw of the origin is 0, because consumers ignore it.
     """
     check_finite("the origin of the map", image.origin, image.resolution)
     x, y = (_yaml_number(value) for value in image.origin)
@@ -82,16 +82,16 @@ def map_yaml(image_name: str, image: MapImage) -> bytes:
 
 
 def png_bytes(image: Image, dpi: int | None = None) -> bytes:
-    """A picture as a PNG file; the bytes depend on the picture and on Pillow's build alone.
+    """A picture as a PNG file, for print at `dpi` dots an inch.
 
-    With `dpi` the file says how large it is to be printed, in dots an inch.
+    The bytes depend only on the picture and on the build of Pillow.
     """
     file = io.BytesIO()
-    image.save(file, "PNG", compress_type=RUN_LENGTHS, dpi=dpi and (dpi, dpi))
+    image.save(file, "PNG", compress_type=Z_RLE, dpi=dpi and (dpi, dpi))
     return file.getvalue()
 
 
 def _yaml_number(value: float) -> str:
-    """Never with an exponent, which YAML 1.1 reads as text when there is no point before it."""
+    """The number without an exponent, which YAML 1.1 reads as text where no point precedes it."""
     text = f"{value + 0.0:.9f}".rstrip("0")
     return text + "0" if text.endswith(".") else text

@@ -1,6 +1,6 @@
-"""Poses + scans → how often each cell of the floor was hit by a beam and how often passed through.
+"""The occupancy grid of scans at known poses: hits and misses of each cell.
 
-A cell's share of hits estimates how likely it reflects a beam (the counting model of S. Thrun, W. Burgard,
+The share of hits estimates how likely a cell reflects a beam (the counting model of S. Thrun, W. Burgard,
 D. Fox, "Probabilistic Robotics", 2005, 9.2).
 """
 
@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any, TypeVar
 
 import numpy as np
@@ -19,87 +20,100 @@ from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.mapping.ray_casting import TILE, ScanRays, TileCounts, cast_rays, ray_bounds
 from nscan_cli.poses import Array
 
-RESOLUTION = 0.05
-"""Size of a cell, m."""
-REACH = 40.0
-"""A beam is followed so far (m): further out, neighbouring beams leave gaps of many cells, and a slip of
-the angle carries a wall away."""
-COARSEST = 10.0
-"""m; a map of larger cells shows nothing."""
-OCCUPIED_SHARE = 0.25
-"""A cell is occupied when at least this share of the beams that reached it ended in it. Under one half,
-since beams that run along a wall graze its cells on their way to the next ones, and a wall on the border
-of two cells shares its hits among them; well above the share that somebody leaves who walks by."""
-LEAST_HITS = 2
-"""A cell that a single beam has hit is not taken for occupied: that is what stray returns look like."""
+
+@dataclass(frozen=True)
+class OccupancyOptions:
+    """Decide how far beams are traced and which cells are occupied."""
+
+    max_beam_length: float = 40.0
+    """Length up to which a beam is traced, m. Longer beams leave gaps between them, and an error of the
+    heading displaces their ends more."""
+    min_occupied_ratio: float = 0.25
+    """Least share of hits among the beams of an occupied cell. It is below one half, because beams along a
+    wall graze its cells, and a wall between two cells divides its hits. A person who walks by leaves less."""
+    min_hits: int = 2
+    """Least number of hits of an occupied cell. With 1, a single stray return makes a cell occupied."""
+
+
+DEFAULT_OCCUPANCY = OccupancyOptions()
+DEFAULT_CELL_SIZE = 0.05
+"""m"""
+MAX_SUGGESTED_CELL_SIZE = 10.0
+"""m; a message suggests no larger cells, because such a map shows nothing."""
 
 FREE, OCCUPIED, UNKNOWN = 0, 100, -1
-"""The states of a cell, with the values of ROS's OccupancyGrid message."""
+"""The states of a cell, as in ROS's OccupancyGrid message."""
 
 Number = TypeVar("Number", bound=np.integer[Any])
 
 
 class OccupancyGrid:
-    """Counts of a grid of H × W cells; row 0 is the row of least y, column 0 that of least x."""
+    """Hits and misses of H × W cells; row 0 has the least y, column 0 the least x."""
 
     def __init__(
         self,
-        hits: NDArray[np.int32],
-        misses: NDArray[np.int32],
+        tiles: TileCounts,
+        shape: tuple[int, int],
         resolution: float,
         origin: tuple[float, float],
-    ) -> None:
-        """Take hits and misses (H, W) as the properties have them."""
-        self._take(_tiled(hits, misses), hits.shape, resolution, origin)
-
-    @classmethod
-    def of_tiles(
-        cls, tiles: TileCounts, shape: tuple[int, int], resolution: float, origin: tuple[float, float]
-    ) -> OccupancyGrid:
-        """The grid of `shape` (H, W) with the counts of its tiles."""
-        grid = cls.__new__(cls)
-        grid._take(tiles, shape, resolution, origin)
-        return grid
-
-    def _take(
-        self, tiles: TileCounts, shape: tuple[int, ...], resolution: float, origin: tuple[float, float]
+        options: OccupancyOptions = DEFAULT_OCCUPANCY,
     ) -> None:
         self._tiles = tiles
-        self.shape = shape[0], shape[1]
+        self.shape = shape
         """H, W"""
         self.resolution = resolution
         """Size of a cell, m."""
         self.origin = origin
         """x, y (m) of the lower left corner of the cell (0, 0)."""
+        self.options = options
+
+    @classmethod
+    def of_counts(
+        cls,
+        hits: NDArray[np.int32],
+        misses: NDArray[np.int32],
+        resolution: float,
+        origin: tuple[float, float],
+    ) -> OccupancyGrid:
+        """The grid with the given hits and misses (H, W)."""
+        height, width = hits.shape
+        return cls(_tiled(hits, misses), (height, width), resolution, origin)
 
     @property
     def hits(self) -> NDArray[np.int32]:
-        """(H, W) how many beams end in the cell."""
+        """(H, W) the number of beams that end in the cell."""
         return self._whole(lambda counts: counts[:, 0], 0)
 
     @property
     def misses(self) -> NDArray[np.int32]:
-        """(H, W) how many beams pass through the cell or start in it, and end in another."""
+        """(H, W) the number of beams that pass through the cell or start in it, and end in another."""
         return self._whole(lambda counts: counts[:, 1], 0)
 
     @property
     def bounds(self) -> tuple[float, float, float, float]:
-        """The least x, least y, greatest x and greatest y (m) that the grid covers."""
+        """The least x, least y, greatest x and greatest y of the grid, m."""
         (height, width), (x, y) = self.shape, self.origin
         return x, y, x + width * self.resolution, y + height * self.resolution
 
     def states(self) -> NDArray[np.int8]:
         """(H, W) FREE, OCCUPIED or UNKNOWN.
 
-        A cell that was passed through but not hit often enough to be occupied is free; one that was only
-        hit, by a single beam, stays unknown.
+        A cell with misses that is not occupied is free. A cell with too few hits and no misses is unknown.
         """
-        return self._whole(_states, UNKNOWN)
+
+        def classify(counts: NDArray[np.int32]) -> NDArray[np.int8]:
+            hits, misses = counts[:, 0], counts[:, 1]
+            states = np.where(misses > 0, np.int8(FREE), np.int8(UNKNOWN))
+            enough = hits >= self.options.min_occupied_ratio * (hits + misses)
+            states[(hits >= self.options.min_hits) & enough] = OCCUPIED
+            return states
+
+        return self._whole(classify, UNKNOWN)
 
     def _whole(
         self, of_tiles: Callable[[NDArray[np.int32]], NDArray[Number]], elsewhere: int
     ) -> NDArray[Number]:
-        """(H, W) what is made of the counts (n, 2, TILE, TILE) of tiles; `elsewhere` where there are none."""
+        """(H, W) `of_tiles` of the counts (n, 2, TILE, TILE); `elsewhere` in cells without counts."""
         (height, width), index, counts = self.shape, *self._tiles
         whole = np.full((height, width), elsewhere, dtype=of_tiles(counts[:0]).dtype)
         for row, numbers in enumerate(index):
@@ -111,16 +125,8 @@ class OccupancyGrid:
         return whole
 
 
-def _states(counts: NDArray[np.int32]) -> NDArray[np.int8]:
-    """(n, TILE, TILE) the states of tiles with the counts (n, 2, TILE, TILE)."""
-    hits, misses = counts[:, 0], counts[:, 1]
-    states = np.where(misses > 0, np.int8(FREE), np.int8(UNKNOWN))
-    states[(hits >= LEAST_HITS) & (hits >= OCCUPIED_SHARE * (hits + misses))] = OCCUPIED
-    return states
-
-
 def _tiled(hits: NDArray[np.int32], misses: NDArray[np.int32]) -> TileCounts:
-    """The tiles of counts (H, W), all of them."""
+    """All tiles of the counts (H, W)."""
     height, width = hits.shape
     rows, columns = -(-height // TILE), -(-width // TILE)
     padded = np.zeros((2, rows * TILE, columns * TILE), dtype=np.int32)
@@ -135,39 +141,44 @@ def occupancy_grid(
     log: LaserLog,
     rows: NDArray[np.int64],
     poses: Array,
-    resolution: float = RESOLUTION,
+    resolution: float = DEFAULT_CELL_SIZE,
     threads: int = 1,
+    options: OccupancyOptions = DEFAULT_OCCUPANCY,
 ) -> OccupancyGrid:
-    """The grid of the scans in `rows` (N,) of the log, taken at the robot's `poses` (N, 3).
+    """The grid of the scans in `rows` (N,) of the log at the robot's `poses` (N, 3).
 
-    A beam that met nothing clears nothing: it may as well have met black velvet, or glass. A beam longer
-    than REACH clears the cells up to there. The grid covers all beams and poses, and its cells lie on
-    multiples of the resolution. Raises WrongUsageError when there are no scans, or when the grid would
-    have more cells than the limit MAP_CELLS allows.
+    A beam without return clears nothing, because dark or transparent objects return nothing either. A beam
+    longer than `max_beam_length` clears the cells up to that length. The grid covers all beams and poses;
+    its corners are multiples of the resolution. Raises WrongUsageError when there are no scans, or when the
+    grid would have more than MAP_CELLS cells.
     """
     if len(rows) == 0:
-        raise WrongUsageError(f"{log.source.name}: no scans to draw a map of; choose some")
+        raise WrongUsageError(f"{log.source.name}: no scans for a map; choose some")
     lasers = np.ascontiguousarray(log.laser_pose(poses))
     scans = ScanRays(np.asarray(rows, dtype=np.int64), log.ranges, log.angle_min, log.angle_increment, lasers)
-    low_x, low_y, high_x, high_y = ray_bounds(scans, REACH)
-    # One cell to spare: the border of the map is then free of what is drawn in it, and rounding harmless.
+    low_x, low_y, high_x, high_y = ray_bounds(scans, options.max_beam_length)
+    # One more cell on each side: no beam reaches the border of the map, and rounding is harmless.
     left, bottom = math.floor(low_x / resolution) - 1, math.floor(low_y / resolution) - 1
     width = math.floor(high_x / resolution) + 2 - left
     height = math.floor(high_y / resolution) + 2 - bottom
-    most = MAP_CELLS.value
-    if width * height > most:
-        enough = _rounded_up(resolution * math.sqrt(width * height / most))
-        remedy = "some poses are far off" if enough > COARSEST else f"choose --resolution {enough:g}"
+    limit = MAP_CELLS.value
+    if width * height > limit:
+        enough = _rounded_up(resolution * math.sqrt(width * height / limit))
+        remedy = (
+            "some poses are far off"
+            if enough > MAX_SUGGESTED_CELL_SIZE
+            else f"choose --resolution {enough:g}"
+        )
         raise WrongUsageError(
             f"a map of {high_x - low_x:.0f} m × {high_y - low_y:.0f} m would have {width * height:,} cells "
-            f"of {resolution:g} m, more than {most:,.0f}; {remedy}, or set {MAP_CELLS.variable} higher"
+            f"of {resolution:g} m, more than {limit:,.0f}; {remedy}, or set {MAP_CELLS.variable} higher"
         )
     shape, corner = (height, width), (left * resolution, bottom * resolution)
-    tiles = cast_rays(scans, REACH, shape, resolution, left, bottom, threads)
-    return OccupancyGrid.of_tiles(tiles, shape, resolution, corner)
+    tiles = cast_rays(scans, options.max_beam_length, shape, resolution, left, bottom, threads)
+    return OccupancyGrid(tiles, shape, resolution, corner, options)
 
 
 def _rounded_up(value: float) -> float:
-    """To two significant digits, never less than `value`."""
+    """`value` rounded up to two significant digits."""
     unit = 10.0 ** (math.floor(math.log10(value)) - 1)
     return round(math.ceil(value / unit) * unit, 12)

@@ -1,4 +1,4 @@
-"""Beams followed through the cells of a grid, and counted there.
+"""Ray casting: counts the beams that pass through and end in each cell of a grid.
 
 J. Amanatides, A. Woo, "A fast voxel traversal algorithm for ray tracing", 1987.
 """
@@ -17,25 +17,25 @@ from nscan_cli.threads import map_in_threads
 TILE = 32
 """Cells along the side of a tile."""
 MAX_THREADS = 4
-"""So many threads cast at most, for each has counts of its own."""
-NO_BORDER = 1 << 62
-"""Where a ray crosses no border of this kind."""
+"""Largest number of threads; each thread has counts of its own."""
+NO_CROSSING = 1 << 62
+"""t_max of a ray that crosses no border between columns, or none between rows."""
 
 
 class TileCounts(NamedTuple):
-    """The counts of the parts of a grid that a beam has met; most of a large map none ever does."""
+    """The counts of those tiles of a grid that beams have met; beams meet few tiles of a large map."""
 
     numbers: NDArray[np.int32]
-    """(⌈H / TILE⌉, ⌈W / TILE⌉) the number of each tile; −1 for one that no beam has met."""
+    """(⌈H / TILE⌉, ⌈W / TILE⌉) the number of each tile; −1 if no beam has met it."""
     counts: NDArray[np.int32]
-    """(T, 2, TILE, TILE) hits, then misses, of each tile that has a number; those of others are 0."""
+    """(T, 2, TILE, TILE) hits and misses of each numbered tile; further rows are 0."""
 
 
 class ScanRays(NamedTuple):
-    """The scans of a log that are cast, and where from."""
+    """The scans of a log whose beams are traced, and the poses of the laser."""
 
     rows: NDArray[np.int64]
-    """(N,) of the log."""
+    """(N,) rows of the log."""
     ranges: NDArray[np.float32]
     """(S, B) m"""
     angle_min: Array
@@ -43,29 +43,29 @@ class ScanRays(NamedTuple):
     angle_increment: Array
     """(S,) rad"""
     lasers: Array
-    """(N, 3) poses of the laser."""
+    """(N, 3)"""
 
 
 def cast_rays(
     scans: ScanRays,
-    reach: float,
+    max_length: float,
     shape: tuple[int, int],
     resolution: float,
     left: int,
     bottom: int,
     threads: int,
 ) -> TileCounts:
-    """How the beams of all scans, up to `reach` (m), meet the cells of a grid of `shape` (H, W).
+    """The counts of a grid of `shape` (H, W) for the beams of all scans up to `max_length` (m).
 
-    Its cell (0, 0) has its lower left corner at (left, bottom) · resolution; no beam may leave it.
+    The lower left corner of the grid is at (left, bottom) · resolution. No beam may leave the grid.
     """
 
     def cast(some: NDArray[np.int64]) -> TileCounts:
         index = np.full((-(-shape[0] // TILE), -(-shape[1] // TILE)), -1, dtype=np.int32)
-        # There is room for all tiles, but only those that are written to take any memory: the first ones.
+        # The array has room for all tiles, but only the rows that are written take memory.
         tiles = TileCounts(index, np.zeros((index.size, 2, TILE, TILE), dtype=np.int32))
         part = scans._replace(rows=scans.rows[some], lasers=scans.lasers[some])
-        _cast_scans(part, reach, resolution, left, bottom, tiles)
+        _cast_scans(part, max_length, resolution, left, bottom, tiles)
         return tiles
 
     parts = min(threads, MAX_THREADS)
@@ -76,8 +76,8 @@ def cast_rays(
 
 
 @kernel
-def ray_bounds(scans: ScanRays, reach: float) -> tuple[float, float, float, float]:
-    """The least x and y and the greatest x and y of the lasers and of their beams' ends."""
+def ray_bounds(scans: ScanRays, max_length: float) -> tuple[float, float, float, float]:
+    """The least x and y and the greatest x and y of the laser poses and the ends of the beams."""
     rows, ranges, angle_min, angle_increment, lasers = scans
     low_x = high_x = lasers[0, 0]
     low_y = high_y = lasers[0, 1]
@@ -89,8 +89,8 @@ def ray_bounds(scans: ScanRays, reach: float) -> tuple[float, float, float, floa
         for beam in range(ranges.shape[1]):
             if not np.isfinite(ranges[row, beam]):
                 continue
-            r = min(float(ranges[row, beam]), reach)
-            # Most beams are so short that they end within, whatever their direction is.
+            r = min(float(ranges[row, beam]), max_length)
+            # Most beams end inside the bounds whatever their direction is.
             if x - r > low_x and x + r < high_x and y - r > low_y and y + r < high_y:
                 continue
             angle = heading + angle_min[row] + beam * angle_increment[row]
@@ -102,9 +102,9 @@ def ray_bounds(scans: ScanRays, reach: float) -> tuple[float, float, float, floa
 
 @kernel
 def _cast_scans(
-    scans: ScanRays, reach: float, resolution: float, left: int, bottom: int, tiles: TileCounts
+    scans: ScanRays, max_length: float, resolution: float, left: int, bottom: int, tiles: TileCounts
 ) -> None:
-    """Add the beams of all scans to the counts of the tiles."""
+    """Adds the beams of all scans to the counts of the tiles."""
     rows, ranges, angle_min, angle_increment, lasers = scans
     counts = tiles.counts.reshape(-1)
     used = 0
@@ -117,17 +117,17 @@ def _cast_scans(
             if not np.isfinite(r):
                 continue
             angle = lasers[k, 2] + angle_min[row] + beam * angle_increment[row]
-            length = min(r, reach) / resolution
+            length = min(r, max_length) / resolution
             end_x, end_y = x + length * np.cos(angle), y + length * np.sin(angle)
             used = _traverse(x, y, end_x, end_y, tiles.numbers, counts, used)
-            if r <= reach:
+            if r <= max_length:
                 hit, used = _hit_index(tiles.numbers, int(end_y), int(end_x), used)
                 counts[np.uint64(hit)] += 1
 
 
 @kernel
 def _add_counts(tiles: TileCounts, whole: TileCounts) -> None:
-    """Add the counts of tiles to those of others in the same grid."""
+    """Adds the counts of `tiles` to `whole`, which belongs to the same grid."""
     counts, sums = tiles.counts.reshape(-1, 2 * TILE * TILE), whole.counts.reshape(-1, 2 * TILE * TILE)
     used = np.count_nonzero(whole.numbers >= 0)
     for row in range(tiles.numbers.shape[0]):
@@ -144,7 +144,7 @@ def _add_counts(tiles: TileCounts, whole: TileCounts) -> None:
 
 @leaf_kernel
 def _hit_index(numbers: NDArray[np.int32], line: int, column: int, used: int) -> tuple[int, int]:
-    """Where a cell's hits are counted; its tile gets a number if it has none. How many have one."""
+    """The index of a cell's hits, and the number of numbered tiles; numbers the cell's tile if need be."""
     row, place = np.uint64(line // TILE), np.uint64(column // TILE)
     if numbers[row, place] < 0:
         numbers[row, place] = used
@@ -162,38 +162,40 @@ def _traverse(
     counts: NDArray[np.int32],
     used: int,
 ) -> int:
-    """Count the cells from (x, y) up to, and without, the cell of the end as missed; in cells.
+    """Counts a miss in each cell from (x, y) up to the cell before that of the end; lengths in cells.
 
-    Returns how many tiles are used. A ray through a corner takes the step in y first.
+    Returns the number of numbered tiles. A ray through a corner takes the step in y first.
     """
     column, line = int(x), int(y)
     dx, dy = end_x - x, end_y - y
     steps_x, steps_y = abs(int(end_x) - column), abs(int(end_y) - line)
     step_x, step_y = (1 if dx > 0 else -1), (1 if dy > 0 else -1)
-    # Where the ray crosses the next borders, from 0 to 1 along it, and how far apart they are.
-    between_x, between_y = _fixed_point(1 / abs(dx)), _fixed_point(1 / abs(dy))
-    next_x = _fixed_point((column + 1 - x if dx > 0 else x - column) / abs(dx)) if steps_x > 0 else NO_BORDER
-    next_y = _fixed_point((line + 1 - y if dy > 0 else y - line) / abs(dy)) if steps_y > 0 else NO_BORDER
+    # t runs from 0 to 1 along the ray. It is t_max at the next border, and t_delta from border to border.
+    t_delta_x, t_delta_y = _fixed_point(1 / abs(dx)), _fixed_point(1 / abs(dy))
+    t_max_x = (
+        _fixed_point((column + 1 - x if dx > 0 else x - column) / abs(dx)) if steps_x > 0 else NO_CROSSING
+    )
+    t_max_y = _fixed_point((line + 1 - y if dy > 0 else y - line) / abs(dy)) if steps_y > 0 else NO_CROSSING
     left = steps_x + steps_y
     while left > 0:
         at, used = _hit_index(numbers, line, column, used)
         at += TILE * TILE
-        # The steps one way that lead out of the tile, and those the other way before.
+        # The number of steps along one axis to leave the tile, and of steps along the other axis before.
         steps_x = TILE - column % TILE if dx > 0 else column % TILE + 1
         steps_y = TILE - line % TILE if dy > 0 else line % TILE + 1
-        out_x, out_y = next_x + (steps_x - 1) * between_x, next_y + (steps_y - 1) * between_y
-        if out_x < out_y:
-            steps_y = (out_x - next_y) // between_y + 1 if next_y <= out_x else 0
+        t_out_x, t_out_y = t_max_x + (steps_x - 1) * t_delta_x, t_max_y + (steps_y - 1) * t_delta_y
+        if t_out_x < t_out_y:
+            steps_y = (t_out_x - t_max_y) // t_delta_y + 1 if t_max_y <= t_out_x else 0
         else:
-            steps_x = (out_y - next_x - 1) // between_x + 1 if next_x < out_y else 0
+            steps_x = (t_out_y - t_max_x - 1) // t_delta_x + 1 if t_max_x < t_out_y else 0
         for _ in range(min(steps_x + steps_y, left)):
             counts[np.uint64(at)] += 1
-            # All bits are set where x comes first. As a comparison it would be made a branch, which nobody
-            # can foresee, and take twice the time.
-            sideways = int(np.int64(np.uint64(next_x) - np.uint64(next_y))) >> 63
+            # All bits are set if the step in x comes first. A comparison would become a branch, which the
+            # processor cannot predict, and take twice the time.
+            sideways = int(np.int64(np.uint64(t_max_x) - np.uint64(t_max_y))) >> 63
             at += (step_x & sideways) + (TILE * step_y & ~sideways)
-            next_x += between_x & sideways
-            next_y += between_y & ~sideways
+            t_max_x += t_delta_x & sideways
+            t_max_y += t_delta_y & ~sideways
         left -= steps_x + steps_y
         column += steps_x * step_x
         line += steps_y * step_y
@@ -202,5 +204,5 @@ def _traverse(
 
 @leaf_kernel
 def _fixed_point(t: float) -> int:
-    """A place along a ray in units of 2⁻⁵²; what is far beyond its end is somewhere beyond."""
+    """t in units of 2⁻⁵²; values above 16 become 16."""
     return int(min(t, 16.0) * 4503599627370496.0)

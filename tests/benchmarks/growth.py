@@ -100,7 +100,7 @@ def exponents(rows: list[Row]) -> tuple[float, float]:
 def draw(series: dict[str, list[Row]], path: str) -> None:
     """Time over scans, and memory, one above the other."""
     from nscan_cli.mapping.figures.canvas import figure_png
-    from nscan_cli.mapping.figures.panels import vstack_images
+    from nscan_cli.mapping.figures.panels import stack_images
 
     charts = []
     for key, label in (("seconds", "processor time, s"), ("megabytes", "peak memory, MB")):
@@ -112,7 +112,7 @@ def draw(series: dict[str, list[Row]], path: str) -> None:
             for name, rows in series.items()
         }
         charts.append(line_chart(lines, "thousand scans", label, "nscan-cli slam, one thread"))
-    Path(path).write_bytes(figure_png(vstack_images(charts)))
+    Path(path).write_bytes(figure_png(stack_images(charts)))
 
 
 if __name__ == "__main__":

@@ -14,7 +14,6 @@ from nscan_cli.mapping.figures.canvas import (
     BLACK,
     BLUE,
     GREEN,
-    ORANGE,
     PURPLE,
     SKY,
     TEXT_SIZE,
@@ -28,6 +27,7 @@ from nscan_cli.poses import Array
 if TYPE_CHECKING:
     from PIL.Image import Image
 
+ORANGE = (230, 159, 0)
 COLOURS = (BLUE, VERMILLION, GREEN, BLACK, PURPLE, ORANGE, SKY)
 PIXELS = 1200
 """Of the longer side of a chart without its margins."""

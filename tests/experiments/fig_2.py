@@ -15,15 +15,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from nscan_cli.mapping.figures.axes import TITLE_MARGINS, LegendEntry, draw_title_and_legend
-from nscan_cli.mapping.figures.canvas import GREEN, ORANGE, PURPLE, SKY, VERMILLION, Canvas
-from nscan_cli.mapping.figures.panels import hstack_images, vstack_images
+from nscan_cli.mapping.figures.canvas import GREEN, PURPLE, SKY, VERMILLION, Canvas
+from nscan_cli.mapping.figures.panels import stack_images
 from nscan_cli.matching.joint.joint_energy import JointProblem, all_pairs, joint_energy, no_priors
 from nscan_cli.matching.joint.joint_match import match_jointly
 from nscan_cli.matching.joint.options import JointOptions
 from nscan_cli.matching.joint.scan_set import scan_set
 from nscan_cli.matching.pairwise import PairOptions, scan_ndt
 from nscan_cli.poses import Array
-from tests.experiments.charts import heat_map, line_chart
+from tests.experiments.charts import ORANGE, heat_map, line_chart
 from tests.experiments.report import Report, scan_names
 
 if TYPE_CHECKING:
@@ -186,8 +186,8 @@ def _picture() -> Image:
         "Energy of all three (dark: low)",
         {"lowest": (GREEN, lowest), "second lowest": (VERMILLION, second)},
     )
-    energies = hstack_images([chart, image])
-    return vstack_images([_shapes(energies.width), energies])
+    energies = stack_images([chart, image], True)
+    return stack_images([_shapes(energies.width), energies])
 
 
 def _shapes(width: int) -> Image:

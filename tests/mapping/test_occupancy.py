@@ -7,10 +7,19 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from nscan_cli.errors import WrongUsageError
-from nscan_cli.mapping.occupancy import FREE, OCCUPIED, REACH, UNKNOWN, OccupancyGrid, occupancy_grid
+from nscan_cli.mapping.occupancy import (
+    DEFAULT_OCCUPANCY,
+    FREE,
+    OCCUPIED,
+    UNKNOWN,
+    OccupancyGrid,
+    occupancy_grid,
+)
 from tests.mapping.handmade_logs import half_circle, log_of
 
 ORIGIN = np.zeros((1, 3))
+
+MAX_LENGTH = DEFAULT_OCCUPANCY.max_beam_length
 
 
 def one_beam(x: float, y: float, end_x: float, end_y: float, resolution: float = 1.0) -> OccupancyGrid:
@@ -73,9 +82,11 @@ def test_a_beam_without_a_return_clears_nothing(nothing):
 
 
 def test_a_beam_beyond_the_reach_clears_up_to_it_and_hits_nothing():
-    grid = occupancy_grid(log_of([[REACH + 5]], 0.0, 0.1), np.array([0]), np.array([[0.5, 0.5, 0.0]]), 1.0)
+    grid = occupancy_grid(
+        log_of([[MAX_LENGTH + 5]], 0.0, 0.1), np.array([0]), np.array([[0.5, 0.5, 0.0]]), 1.0
+    )
     assert not grid.hits.any()
-    assert cells(grid, grid.misses) == {(k, 0) for k in range(int(REACH))}
+    assert cells(grid, grid.misses) == {(k, 0) for k in range(int(MAX_LENGTH))}
 
 
 def test_beams_are_counted_one_by_one():
@@ -89,7 +100,7 @@ def test_beams_are_counted_one_by_one():
 def test_states_follow_the_shares():
     hits = np.array([[0, 0, 1, 1, 2, 2, 2]], dtype=np.int32)
     misses = np.array([[0, 5, 0, 1, 0, 6, 7]], dtype=np.int32)
-    states = OccupancyGrid(hits, misses, 0.05, (0.0, 0.0)).states()
+    states = OccupancyGrid.of_counts(hits, misses, 0.05, (0.0, 0.0)).states()
     # 2 of 8 is a quarter and enough; 2 of 9 is less; a single hit is never enough.
     assert states.tolist() == [[UNKNOWN, FREE, UNKNOWN, FREE, OCCUPIED, OCCUPIED, FREE]]
 
@@ -175,7 +186,7 @@ def test_every_beam_within_reach_is_one_hit_and_neither_order_nor_threads_matter
     poses = random.uniform(-5, 5, (scans, 3))
     log, rows = half_circle(ranges), np.arange(scans)
     grid = occupancy_grid(log, rows, poses, 0.1)
-    assert grid.hits.sum() == np.count_nonzero(ranges <= REACH)
+    assert grid.hits.sum() == np.count_nonzero(ranges <= MAX_LENGTH)
     edges = np.concatenate([grid.hits[[0, -1]].ravel(), grid.hits[:, [0, -1]].ravel()])
     assert not edges.any()
     order = random.permutation(scans)
@@ -193,5 +204,5 @@ def test_every_end_is_hit_in_its_cell():
         ranges = log.ranges[k].astype(np.float64)
         angles = heading + np.radians(np.arange(-90, 91))
         ends = np.array([x, y]) + ranges[:, None] * np.stack([np.cos(angles), np.sin(angles)], axis=1)
-        columns, rows = np.floor((ends[ranges <= REACH] - grid.origin) / grid.resolution).astype(int).T
+        columns, rows = np.floor((ends[ranges <= MAX_LENGTH] - grid.origin) / grid.resolution).astype(int).T
         assert (grid.hits[rows, columns] > 0).all()

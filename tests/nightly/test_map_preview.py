@@ -32,7 +32,7 @@ def grid():
     hits, misses = np.zeros((5, 4), dtype=np.int32), np.zeros((5, 4), dtype=np.int32)
     misses[:, :2] = 1
     hits[0, 0] = 5
-    return OccupancyGrid(hits, misses, 0.5, (1.0, 2.0))
+    return OccupancyGrid.of_counts(hits, misses, 0.5, (1.0, 2.0))
 
 
 GRAPH = graph_of([(1.0, 2.0, 0), (2.0, 4.5, 0), (3.0, 2.0, 0)])

@@ -1,4 +1,4 @@
-"""What tells the reader of a picture its scale and its colours: axes in metres, and a legend."""
+"""Axes in metres, scale bars, titles and legends."""
 
 from __future__ import annotations
 
@@ -12,22 +12,22 @@ from nscan_cli.mapping.figures.colormap import plasma
 from nscan_cli.mapping.figures.symbols import draw_crosses, draw_robots
 
 LegendEntry = tuple[str, Colour, str]
-"""Of a legend: a shape (line, disc, robot, cross, ellipse or, all colours of it, ramp), colour, meaning."""
+"""Shape (line, disc, robot, cross, ellipse, or ramp for a whole colour map), colour, meaning."""
 AXES_MARGINS = (64.0, 44.0, 24.0, 64.0)
-"""What `draw_axes` needs around the plot, units."""
+"""Margins for `draw_axes`, units."""
 TITLE_MARGINS = (64.0, 48.0, 24.0, 92.0)
-"""What `draw_title_and_legend` and `draw_legend_below` need."""
+"""Margins for `draw_title_and_legend` and `draw_legend_below`, units."""
 SCALE_BAR_MARGINS = (0.0, 0.0, 0.0, 44.0)
-"""What `draw_scale_bar` needs."""
+"""Margins for `draw_scale_bar`, units."""
 SYMBOL_GAP, ENTRY_GAP = 8.0, 22.0
-"""Units from a symbol to its meaning, and from there to the next symbol."""
+"""Distances from a symbol to its meaning, and from there to the next symbol, units."""
 MIN_TEXT_SCALE = 0.1
-"""Text is shrunk to no less than such a share of its size, or left out."""
+"""Text that would have to shrink below this share of its size is left out."""
 RAMP_STEPS = 14
 
 
 def draw_axes(canvas: Canvas) -> None:
-    """A frame around the plot, with ticks and numbers in metres."""
+    """Draws a frame around the plot, with ticks and numbers in metres."""
     left, top, right, bottom = canvas.plot
     low_x, low_y, high_x, high_y = canvas.bounds
     unit = canvas.unit
@@ -47,10 +47,10 @@ def draw_axes(canvas: Canvas) -> None:
 
 
 def draw_title_and_legend(canvas: Canvas, title: str, entries: Sequence[LegendEntry]) -> None:
-    """Axes, a title above the plot, and a legend below it; over whatever was drawn in the margins."""
+    """Clears the margins; draws axes, a title above the plot and a legend below it."""
     draw_legend_below(canvas, entries)
     left, top, right, _bottom = canvas.plot
-    # Beside "y (m)".
+    # The title starts beside "y (m)".
     start = left + 40 * canvas.unit
     shrunk = min(1.0, (right - start) / canvas.text_width(title))
     if shrunk < MIN_TEXT_SCALE:
@@ -61,7 +61,7 @@ def draw_title_and_legend(canvas: Canvas, title: str, entries: Sequence[LegendEn
 
 
 def draw_legend_below(canvas: Canvas, entries: Sequence[LegendEntry]) -> None:
-    """Axes, and a legend below the plot; over whatever was drawn in the margins."""
+    """Clears the margins; draws axes, and a legend below the plot."""
     left, _top, right, bottom = canvas.plot
     canvas.clear_margins()
     draw_axes(canvas)
@@ -69,7 +69,7 @@ def draw_legend_below(canvas: Canvas, entries: Sequence[LegendEntry]) -> None:
 
 
 def draw_scale_bar(canvas: Canvas, entries: Sequence[LegendEntry]) -> None:
-    """A scale and a legend below the plot."""
+    """Draws a scale bar and a legend below the plot."""
     left, _top, right, bottom = canvas.plot
     unit, y = canvas.unit, bottom + 22 * canvas.unit
     length = round_length((canvas.bounds[2] - canvas.bounds[0]) / 8)
@@ -86,10 +86,10 @@ def draw_scale_bar(canvas: Canvas, entries: Sequence[LegendEntry]) -> None:
 def draw_legend(
     canvas: Canvas, entries: Sequence[LegendEntry], left: float, right: float, y: float, align: float = 1.0
 ) -> None:
-    """Symbols and what they stand for in a line at y, between left and right, all in pixels.
+    """Draws a legend in a line at `y`, between `left` and `right`, all in pixels.
 
-    Smaller where there is little room, and none where nobody could read it; `align` is the share of what is
-    left of it that comes first.
+    It shrinks where there is little room, and is left out where it would be too small to read. `align` is
+    the share of the remaining room that is on its left.
     """
     needed = sum(
         canvas.text_width(entry[2]) + (_symbol_width(entry) + SYMBOL_GAP + ENTRY_GAP) * canvas.unit
@@ -109,18 +109,18 @@ def draw_legend(
 
 
 def round_length(length: float) -> float:
-    """The greatest of …, 1, 2, 5, 10, 20, … that is not longer."""
+    """The greatest of …, 1, 2, 5, 10, 20, … that is at most `length`."""
     power = 10.0 ** math.floor(math.log10(length))
     return next(factor * power for factor in (5, 2, 1) if factor * power <= length * (1 + 1e-9))
 
 
 def _symbol_width(entry: LegendEntry) -> float:
-    """Units."""
+    """Width of the symbol, units."""
     return 70.0 if entry[0] == "ramp" else 28.0
 
 
 def _draw_symbol(canvas: Canvas, entry: LegendEntry, x: float, y: float, unit: float) -> None:
-    """A symbol from x to the right, with units of so many pixels."""
+    """Draws the symbol from x to the right; `unit` is in pixels."""
     shape, colour, _meaning = entry
     width = _symbol_width(entry)
     middle = np.array([[x + width / 2 * unit, y]])

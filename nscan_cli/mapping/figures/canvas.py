@@ -1,7 +1,7 @@
-"""A picture to draw on in metres: lines, discs, ellipses, clouds of points, text; smooth, of any size.
+"""A canvas with coordinates in metres: anti-aliased lines, discs, ellipses, point clouds and text.
 
-Widths, radii and sizes of text are given in units of a thousandth of the plot's longer side, so that a
-picture looks the same however many pixels it has.
+Widths, radii and sizes of text are in units. A unit is a thousandth of the longer side of the plot, so that
+a picture looks the same at any number of pixels.
 """
 
 from __future__ import annotations
@@ -23,60 +23,60 @@ if TYPE_CHECKING:
     from PIL.ImageFont import FreeTypeFont
 
 Colour = tuple[int, ...]
-"""Red, green, blue, and opacity where it is not 255; each 0..255."""
+"""Red, green, blue and, if it is not 255, opacity; each 0..255."""
 Bounds = tuple[float, float, float, float]
-"""The least x, least y, greatest x, greatest y, m."""
+"""The least x, least y, greatest x and greatest y, m."""
 Margins = tuple[float, float, float, float]
-"""Left, top, right, bottom, units."""
+"""Left, top, right and bottom, units."""
 
-# M. Okabe, K. Ito, "Color Universal Design": distinct to the colour-blind as well.
-ORANGE, SKY, GREEN = (230, 159, 0), (86, 180, 233), (0, 158, 115)
+# M. Okabe, K. Ito, "Color Universal Design": the colour-blind can tell these colours apart.
+SKY, GREEN = (86, 180, 233), (0, 158, 115)
 BLUE, VERMILLION, PURPLE = (0, 114, 178), (213, 94, 0), (204, 121, 167)
 BLACK, GRAY, WHITE = (20, 20, 20), (110, 110, 110), (255, 255, 255)
 
 SUPERSAMPLING = 3
-"""Every pixel is the mean of SAMPLES × SAMPLES."""
+"""Every pixel is the mean of SUPERSAMPLING × SUPERSAMPLING samples."""
 BAND_ROWS = 240
-"""Rows of pixels that are drawn at a time, so that large pictures take little memory."""
+"""Number of rows of pixels drawn at a time. Fewer take less memory."""
 TEXT_SIZE = 17.0
 """Units."""
 LINE_CORNERS = 32
-"""Corners of the pieces that long lines are drawn in."""
+"""Number of corners of the pieces into which long lines are divided."""
 ELLIPSE_CORNERS = 48
-"""Of the polygon that is drawn for an ellipse."""
+"""Number of corners of the polygon of an ellipse."""
 DOT_CORNERS = 12
-"""The same for a small dot."""
+"""Number of corners of the polygon of a small dot."""
 DPI = 300
-"""Of pictures for people: a plot of 2400 pixels is printed 20 cm long, with text of 10 points."""
+"""Dots an inch of figures: a plot of 2400 pixels is printed 20 cm long, with text of 10 points."""
 
 
 def figure_png(picture: Image) -> bytes:
-    """A picture for people as a PNG file that says how large it is to be printed."""
+    """A figure as a PNG file for print at DPI."""
     return png_bytes(picture, DPI)
 
 
 @dataclass(frozen=True)
 class Band:
-    """Rows of the picture while they are drawn, enlarged SAMPLES times."""
+    """Rows of the picture, enlarged SUPERSAMPLING times, while they are drawn."""
 
     pen: ImageDraw
     top: int
     rows: int
 
     def samples(self, pixels: Array) -> Array:
-        """Positions (…, 2) in the picture as whole positions in the enlarged band."""
-        # Pillow cuts fractions off, which is another rounding above a band than within it.
+        """Positions (…, 2) in the picture as whole samples in the enlarged band."""
+        # Pillow truncates, which rounds differently above a band and within it.
         whole: Array = np.floor((pixels - np.array([0, self.top])) * SUPERSAMPLING + 0.5)
         return whole
 
     def reached_by(self, shapes: Array, spare: float) -> Array:
-        """Those of the shapes (N, corners, 2), `spare` pixels thicker than their corners, in the band."""
+        """The shapes (N, corners, 2) that come within `spare` pixels of the band, in samples."""
         low, high = shapes[..., 1].min(axis=1) - spare, shapes[..., 1].max(axis=1) + spare
         return self.samples(shapes[(low <= self.top + self.rows) & (high >= self.top)])
 
 
 class Canvas:
-    """A plot of `bounds`; strokes are kept until `image` draws them, in the order they were made in."""
+    """A plot of `bounds`; it keeps strokes in their order until `image` draws them."""
 
     def __init__(
         self,
@@ -86,9 +86,9 @@ class Canvas:
         margins: Margins = (0, 0, 0, 0),
         scale: float = 1.0,
     ) -> None:
-        """A white picture, or one with a gray `background` (h, w) that covers the bounds.
+        """A white plot, or one with a gray `background` (h, w) that covers the bounds, within margins.
 
-        The margins are added around it. With a `scale`, units are larger, as a panel of a picture needs it.
+        `scale` enlarges the unit for a panel that is a part of a picture.
         """
         self.bounds = bounds
         self.pixels_per_metre = pixels_per_metre
@@ -98,12 +98,12 @@ class Canvas:
             background = np.full((height, width), 255, dtype=np.uint8)
         height, width = background.shape
         self.unit = scale * max(width, height) / 1000
-        """Pixels."""
+        """Size of a unit, pixels."""
         left, top, right, bottom = (round(margin * self.unit) for margin in margins)
         self.plot = (left, top, left + width, top + height)
-        """The plot's left, top, right and bottom edges, pixels."""
+        """Left, top, right and bottom edge of the plot, pixels."""
         self.size = (left + width + right, top + height + bottom)
-        """Width and height with the margins, pixels."""
+        """Width and height with margins, pixels."""
         self._pixels = np.full((self.size[1], self.size[0], 3), 255, dtype=np.uint8)
         self._pixels[top : top + height, left : left + width] = background[..., None]
         self._strokes: list[Callable[[Band], None]] = []
@@ -124,32 +124,32 @@ class Canvas:
         return np.stack([x, y], axis=-1)
 
     def line(self, points: Array, colour: Colour, width: float = 2.0) -> None:
-        """A line through the points (N, 2), m."""
+        """Draws a line through the points (N, 2), m."""
         corners = self.pixels(points)
-        # A robot that stands still adds nothing to see.
+        # Points where the robot stands still are left out.
         moved = np.any(np.diff(np.round(2 * corners), axis=0) != 0, axis=1)
         corners = corners[np.concatenate([[True], moved])]
-        # In pieces, since a band is reached by a few of them only; every corner lies within a piece.
+        # Each band then draws few pieces. They overlap, so that every corner lies inside a piece.
         pieces = [corners[k : k + LINE_CORNERS] for k in range(0, max(1, len(corners) - 2), LINE_CORNERS - 2)]
         pieces[-1] = np.pad(pieces[-1], ((0, LINE_CORNERS - len(pieces[-1])), (0, 0)), mode="edge")
         self.pixel_lines(np.stack(pieces), colour, width)
 
     def segments(self, starts: Array, ends: Array, colour: Colour, width: float = 1.0) -> None:
-        """Straight lines from each of the points (N, 2) to its partner (N, 2), m."""
+        """Draws straight lines from `starts` (N, 2) to `ends` (N, 2), m."""
         self.pixel_lines(np.stack([self.pixels(starts), self.pixels(ends)], axis=1), colour, width)
 
     def circles(self, centres: Array, radius: float, colour: Colour, ring: Colour | None = None) -> None:
-        """Discs at the points (N, 2), m, of `radius` units; with a `ring` around each if wanted."""
+        """Draws discs of `radius` units at the points (N, 2), m, with an optional `ring` around each."""
         self.pixel_ovals(self.pixels(centres), np.array([radius, radius]), colour, ring)
 
     def dots(self, points: Array, radius: float, colour: Colour) -> None:
-        """Many small discs at those of the points (N, 2), m, that lie in the plot, of `radius` units."""
+        """Draws small discs of `radius` units at the points (N, 2), m, that lie in the plot."""
         low, high = np.array(self.bounds[:2]), np.array(self.bounds[2:])
         inside = points[np.all((points >= low) & (points <= high), axis=1)]
         self.pixel_ovals(self.pixels(inside), np.array([radius, radius]), colour, corners=DOT_CORNERS)
 
     def ellipses(self, centres: Array, covariances: Array, sigmas: float, colour: Colour) -> None:
-        """Ellipses of `sigmas` standard deviations of covariances (N, 2, 2), m², around (N, 2), m."""
+        """Draws ellipses of `sigmas` standard deviations of covariances (N, 2, 2), m², around (N, 2), m."""
         angles = np.linspace(0, 2 * np.pi, ELLIPSE_CORNERS, endpoint=False)
         circle = np.stack([np.cos(angles), np.sin(angles)])
         values, vectors = np.linalg.eigh(covariances)
@@ -158,10 +158,7 @@ class Canvas:
         self._ovals(outlines, colour, (*colour[:3], 60))
 
     def cloud(self, points: Array, colour: Colour, opacity: float = 0.5) -> None:
-        """Very many points (N, 2), m, as dots of a pixel: the more in a pixel, the stronger its colour.
-
-        They lie beneath all strokes.
-        """
+        """Draws a point cloud (N, 2), m, beneath all strokes; more points make a pixel less transparent."""
         left, top, right, bottom = self.plot
         x, y = np.moveaxis(np.floor(self.pixels(points)).astype(np.int64), -1, 0)
         inside = (x >= left) & (x < right) & (y >= top) & (y < bottom)
@@ -174,7 +171,7 @@ class Canvas:
         pixels[dotted] = np.round(mixed).astype(np.uint8)
 
     def pixel_lines(self, lines: Array, colour: Colour, width: float) -> None:
-        """Lines (N, corners, 2), each through its corners, in pixels."""
+        """Draws lines (N, corners, 2), each through its corners, in pixels."""
         pixel_width = max(1.0, width * self.unit)
 
         def stroke(band: Band) -> None:
@@ -192,13 +189,13 @@ class Canvas:
         ring: Colour | None = None,
         corners: int = ELLIPSE_CORNERS,
     ) -> None:
-        """Ovals at (N, 2) in pixels, with two radii along the picture's axes, in units."""
+        """Draws ovals at (N, 2) in pixels; `radii` (2,) are along the axes of the picture, in units."""
         angles = np.linspace(0, 2 * np.pi, corners, endpoint=False)
         circle = np.stack([np.cos(angles), np.sin(angles)], axis=-1) * radii * self.unit
         self._ovals(centres[:, None, :] + circle, ring, colour)
 
     def clear_margins(self) -> None:
-        """White around the plot: cuts off what reaches beyond its edges."""
+        """Paints the margins white, over strokes that reach beyond the plot."""
         left, top, right, bottom = self.plot
         width, height = self.size
         sides = (
@@ -213,9 +210,9 @@ class Canvas:
     def text(
         self, place: tuple[float, float], text: str, anchor: str = "lm", size: float = TEXT_SIZE
     ) -> None:
-        """Text at a place in pixels; `anchor` is Pillow's: l m r, then a t m b (s: on the base line).
+        """Draws text at a place in pixels; `anchor` is one of Pillow's.
 
-        Pillow's own font has some signs of Latin 1 only: ° and ±, but no ×, ², Greek, or true minus.
+        The font of Pillow has a part of Latin-1 only: ° and ±, but no ×, ², Greek letters or minus sign.
         """
         font = self._font(size)
 
@@ -226,11 +223,11 @@ class Canvas:
         self._strokes.append(stroke)
 
     def text_width(self, text: str, size: float = TEXT_SIZE) -> float:
-        """How wide a text will be, pixels."""
+        """Width of a text, pixels."""
         return self._font(size).getlength(text) / SUPERSAMPLING
 
     def image(self) -> Image:
-        """The picture, RGB."""
+        """The picture in RGB."""
         from PIL import Image, ImageDraw
 
         width, height = self.size
@@ -240,7 +237,7 @@ class Canvas:
             enlarged = Image.fromarray(pixels).resize(
                 (width * SUPERSAMPLING, len(pixels) * SUPERSAMPLING), Image.Resampling.NEAREST
             )
-            # In this mode, drawing on RGB mixes colours by their opacity.
+            # In this mode, Pillow blends colours by their opacity.
             band = Band(ImageDraw.Draw(enlarged, "RGBA"), top, len(pixels))
             for stroke in self._strokes:
                 stroke(band)
@@ -252,7 +249,7 @@ class Canvas:
         return figure_png(self.image())
 
     def _ovals(self, outlines: Array, ring: Colour | None, inside: Colour) -> None:
-        """Polygons (N, corners, 2) in pixels."""
+        """Draws polygons (N, corners, 2) in pixels."""
 
         def stroke(band: Band) -> None:
             width = max(SUPERSAMPLING, round(1.2 * self.unit * SUPERSAMPLING))

@@ -1,4 +1,4 @@
-"""Colours in an order that all eyes see: from dark blue over purple to orange."""
+"""The colour map plasma, from dark blue over purple to orange, whose order the colour-blind see too."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import numpy as np
 
 from nscan_cli.mapping.figures.canvas import Colour
 
-# S. van der Walt, N. Smith, "plasma" (CC0), without its lightest fifth, which is lost on white.
+# S. van der Walt, N. Smith, "plasma" (CC0), without its lightest fifth, which is hard to see on white.
 PLASMA = np.array(
     [
         (13, 8, 135),
@@ -21,7 +21,7 @@ PLASMA = np.array(
 
 
 def plasma(count: int) -> list[Colour]:
-    """So many colours, evenly spaced."""
+    """`count` evenly spaced colours."""
     at = np.linspace(0, len(PLASMA) - 1, count)
     channels = [np.interp(at, np.arange(len(PLASMA)), channel) for channel in PLASMA.T]
     return [(red, green, blue) for red, green, blue in np.round(channels).astype(int).T.tolist()]

@@ -1,4 +1,4 @@
-"""Where a trajectory is wrong: its worst relations, or its distance from a reference trajectory."""
+"""Plots of errors along a trajectory: its worst relations, or its distance from a reference."""
 
 from __future__ import annotations
 
@@ -13,25 +13,24 @@ from nscan_cli.mapping.figures.panels import MIN_ASPECT, bounds_around, panel
 from nscan_cli.poses import Array
 
 MAX_LISTED = 20
-"""Relations that are numbered and listed beside the plot, where there is room; of others, see the lines."""
+"""Largest number of relations that are numbered and listed beside the plot."""
 LIST_WIDTH, LIST_LINE_HEIGHT = 215.0, 27.0
 """Units."""
 REFERENCE_COLOUR = (190, 190, 190)
 COLOUR_CLASSES = 16
-"""Colours of the error."""
+"""Number of colours of the error."""
 COLOUR_QUANTILE = 0.99
-"""Share of the errors that the colours tell apart; larger ones have the last colour."""
+"""Quantile of the errors from which on all have the last colour."""
 MIN_COLOUR_RANGE = 1e-6
-"""m of the last colour at least."""
+"""Least error with the last colour, m."""
 
 
 def plot_relations(
     poses: Array, pairs: NDArray[np.int64], errors: Array, title: str, beside: bool = False
 ) -> Canvas:
-    """Relations drawn over the trajectory `poses` (N, 3) as lines between their two poses.
+    """The worst relations as numbered lines over the trajectory `poses` (N, 3).
 
-    `pairs` (W, 2) are rows of poses, `errors` (W, 2) the relations' errors in m and degrees, in the order
-    that they are numbered in.
+    `pairs` (W, 2) are rows of `poses`, `errors` (W, 2) the errors of the relations in m and degrees.
     """
     margin = LIST_WIDTH if len(pairs) else TITLE_MARGINS[2]
     canvas = panel(bounds_around(poses[:, :2], MIN_ASPECT, 0.04), beside, margin)
@@ -56,9 +55,9 @@ def plot_against_reference(
     title: str,
     beside: bool = False,
 ) -> Canvas:
-    """A trajectory `poses` (N, 3), aligned to the `reference` (M, 3), and its error in colours.
+    """A trajectory `poses` (N, 3), aligned to the `reference` (M, 3), with its errors in colour.
 
-    `errors` (K,), m, are those of the poses in `rows` (K,).
+    `errors` (K,) are the errors in m of the poses in `rows` (K,).
     """
     both = np.concatenate([poses[:, :2], reference[:, :2]])
     canvas = panel(bounds_around(both, MIN_ASPECT, 0.04), beside)
@@ -66,7 +65,7 @@ def plot_against_reference(
     canvas.line(poses[:, :2], BLACK, 1.0)
     most = float(f"{max(float(np.quantile(errors, COLOUR_QUANTILE)), MIN_COLOUR_RANGE):.1e}")
     classes = np.minimum(errors / most * COLOUR_CLASSES, COLOUR_CLASSES - 1).astype(np.int64)
-    # The worst last, so that no other hides them.
+    # The worst are drawn last, so that no others hide them.
     for number, colour in enumerate(plasma(COLOUR_CLASSES)):
         canvas.dots(poses[rows[classes == number], :2], 2.4, colour)
     beyond = " and more" if errors.max() > most else ""
@@ -79,13 +78,13 @@ def plot_against_reference(
 
 
 def _list_length(canvas: Canvas) -> int:
-    """How many relations the list has room for, with a line for the others."""
+    """The number of relations that the list has room for, with a last line for the others."""
     _left, top, _right, bottom = canvas.plot
     return min(MAX_LISTED, int((bottom - top) / (canvas.unit * LIST_LINE_HEIGHT)) - 1)
 
 
 def _draw_list(canvas: Canvas, errors: Array) -> None:
-    """The numbers of the worst relations and their errors (W, 2), beside the plot."""
+    """Draws the numbers and the errors (W, 2) of the worst relations beside the plot."""
     listed = _list_length(canvas)
     _left, top, right, _bottom = canvas.plot
     unit = canvas.unit

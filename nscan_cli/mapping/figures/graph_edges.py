@@ -1,4 +1,4 @@
-"""What a graph's relations look like: lines between keyframes, of three kinds."""
+"""The edges of a graph as pairs of keyframes, by kind of relation."""
 
 from __future__ import annotations
 
@@ -10,16 +10,16 @@ from nscan_cli.graph.relations.base import Relation
 from nscan_cli.mapping.figures.canvas import GRAY, GREEN, VERMILLION
 
 REVISIT_DISTANCE = 20.0
-"""Scans so much path (m) apart are of different visits, as the joint matches of slam have it."""
+"""Least path between scans of different visits, m; the same as in the joint matches of slam."""
 EDGE_COLOURS = {"nScan": GREEN, "pairwise": GRAY, "loop": VERMILLION}
-"""In the order in which they are drawn: loops on top."""
+"""In the order of drawing, with loops on top."""
 
 
 def edges_by_kind(graph: Graph) -> dict[str, NDArray[np.int64]]:
-    """For each of EDGE_COLOURS, the nodes (E, 2) that are joined, sorted, each pair once.
+    """The sorted pairs (E, 2) of joined nodes for each of EDGE_COLOURS.
 
-    An nScan relation, or one of a further type, joins its fixed scan with each of the others. Of one that
-    closes a loop, those lines are the loop that lead to another visit, or all where none does.
+    A joint relation joins its fixed scan with each of the others. If it closes a loop, its edges to other
+    visits are of the kind loop, or all its edges if none leads to another visit.
     """
     path = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(graph.poses[:, :2], axis=0).T))])
     found: dict[str, set[tuple[int, int]]] = {kind: set() for kind in EDGE_COLOURS}

@@ -1,4 +1,4 @@
-"""Pictures of a map for people: what the graph knows drawn over the map, and a figure for a paper."""
+"""Pictures of a map for people: overlays from the graph on the map, and a figure for a paper."""
 
 from __future__ import annotations
 
@@ -19,14 +19,7 @@ from nscan_cli.mapping.figures.axes import (
     draw_legend_below,
     draw_scale_bar,
 )
-from nscan_cli.mapping.figures.canvas import (
-    BLACK,
-    BLUE,
-    PURPLE,
-    SKY,
-    Bounds,
-    Canvas,
-)
+from nscan_cli.mapping.figures.canvas import BLACK, BLUE, PURPLE, SKY, Bounds, Canvas
 from nscan_cli.mapping.figures.covariance_ellipses import draw_ellipses
 from nscan_cli.mapping.figures.graph_edges import EDGE_COLOURS, edges_by_kind
 from nscan_cli.mapping.figures.panels import bounds_around
@@ -35,20 +28,21 @@ from nscan_cli.mapping.occupancy import FREE, OCCUPIED, UNKNOWN, OccupancyGrid
 from nscan_cli.poses import Array, transform
 
 MIN_PIXELS, MAX_PIXELS = 1600, 3200
-"""Of the longer side of a picture with overlays. A small map's cells become squares of pixels; of a large
-map several cells become one pixel, which is dark when one of them is, so that walls can still be seen."""
+"""Limits of the longer side of a picture with overlays. The cells of a small map become squares of pixels.
+Several cells of a large map become one pixel, which is dark if one of them is, so that walls stay visible."""
 PAPER_PIXELS = 2400
-"""Of the longer side of a figure's plot: 20 cm at 300 dots an inch."""
+"""Longer side of the plot of a figure: 20 cm at 300 dots an inch."""
 SOFT_GRAYS = {OCCUPIED: 60, UNKNOWN: 226, FREE: 255}
-"""Softer than map_server's, so that colours stand out."""
+"""Lighter than MAP_SERVER_GRAYS, so that colours stand out."""
 OUTLIER_QUANTILE = 5e-4
+"""Share of the points that may lie outside a figure on each of its sides."""
 MIN_ELLIPSE = 8.0
-"""Units of the longer half axis that an ellipse needs to be seen."""
+"""Least longer half axis of a visible ellipse, units."""
 
 
 @dataclass(frozen=True)
 class Overlays:
-    """What is to be drawn over a map."""
+    """The things to draw over a map."""
 
     trajectory: bool = False
     graph: bool = False
@@ -59,7 +53,7 @@ class Overlays:
 
 
 def plot_over_map(grid: OccupancyGrid, graph: Graph, overlays: Overlays) -> Canvas:
-    """The map in soft grays, the overlays in colour, and below them a scale and what the colours mean."""
+    """The map in soft grays with coloured overlays; a scale bar and a legend below."""
     background, cells_per_pixel = _background_image(grid)
     canvas = Canvas(grid.bounds, 1 / (cells_per_pixel * grid.resolution), background, SCALE_BAR_MARGINS)
     draw_scale_bar(canvas, _draw_overlays(canvas, graph, overlays))
@@ -74,12 +68,11 @@ def plot_paper_figure(
     graph: Graph,
     overlays: Overlays,
 ) -> Canvas:
-    """Points and path on white with axes in metres, as the paper's Figs. 6 and 7.
+    """Points and path on white with axes in metres, as in Figs. 6 and 7 of the paper.
 
-    Of the points of the scans in `rows` (N,), taken at `poses` (N, 3), those are drawn that lie in
-    occupied cells of the grid: what moved through the scene is left out. The few points that lie far
-    outside, seen through a window, do not make the picture larger. Without overlays, the path is drawn;
-    what else is drawn, a legend tells.
+    The scans in `rows` (N,) have the `poses` (N, 3). Only points in occupied cells are drawn, so people who
+    walked by are left out. A few points far outside, seen through a window, do not enlarge the picture.
+    Without overlays, the path is drawn.
     """
     points = _points_of_occupied_cells(log, rows, poses, grid)
     margins = TITLE_MARGINS if overlays.graph or overlays.uncertainty else AXES_MARGINS
@@ -95,7 +88,7 @@ def plot_paper_figure(
 
 
 def _figure_bounds(points: Array, poses: Array) -> Bounds:
-    """Around the poses (N, 3), and the points (M, 2) but a share of FAR_OUT on each side."""
+    """Bounds around the poses (N, 3) and the points (M, 2) without OUTLIER_QUANTILE on each side."""
     seen = poses[:, :2]
     if len(points):
         seen = np.concatenate([np.quantile(points, [OUTLIER_QUANTILE, 1 - OUTLIER_QUANTILE], axis=0), seen])
@@ -103,10 +96,10 @@ def _figure_bounds(points: Array, poses: Array) -> Bounds:
 
 
 def _draw_overlays(canvas: Canvas, graph: Graph, overlays: Overlays) -> list[LegendEntry]:
-    """Draw them; the legend's entries for what was drawn."""
+    """Draws the overlays. Returns the legend entries."""
     entries: list[LegendEntry] = []
     if overlays.trajectory:
-        # Beneath relations, a broad and light band.
+        # A broad light band is visible beneath the relations.
         colour, width = (SKY, 5.0) if overlays.graph else (BLUE, 2.2)
         canvas.line(graph.poses[:, :2], colour, width)
         entries.append(("line", colour, "path"))
@@ -118,7 +111,7 @@ def _draw_overlays(canvas: Canvas, graph: Graph, overlays: Overlays) -> list[Leg
 
 
 def _background_image(grid: OccupancyGrid) -> tuple[NDArray[np.uint8], float]:
-    """The map in soft grays, (h, w), and how many of its cells lie along a pixel's side."""
+    """The map in soft grays (h, w), and the number of cells along the side of a pixel."""
     cells = gray_image(grid, SOFT_GRAYS)
     longest = max(cells.shape)
     if longest <= MAX_PIXELS:
@@ -126,7 +119,7 @@ def _background_image(grid: OccupancyGrid) -> tuple[NDArray[np.uint8], float]:
         return cells.repeat(zoom, axis=0).repeat(zoom, axis=1), 1 / zoom
     side = math.ceil(longest / MAX_PIXELS)
     height, width = -(-cells.shape[0] // side), -(-cells.shape[1] // side)
-    # Whole pixels, filled up above and to the right: the lower left corner keeps its place.
+    # Padded above and to the right, so that the lower left corner keeps its place.
     above, right = height * side - cells.shape[0], width * side - cells.shape[1]
     padded = np.pad(cells, ((above, 0), (0, right)), constant_values=SOFT_GRAYS[UNKNOWN])
     blocks = padded.reshape(height, side, width, side)
@@ -135,7 +128,7 @@ def _background_image(grid: OccupancyGrid) -> tuple[NDArray[np.uint8], float]:
 
 
 def _draw_graph(canvas: Canvas, graph: Graph) -> list[LegendEntry]:
-    """Relations as lines, of an nScan relation from its fixed scan to the others; keyframes as dots."""
+    """Draws relations as lines and keyframes as dots. Returns the legend entries."""
     entries: list[LegendEntry] = []
     edges = edges_by_kind(graph)
     for kind, width in (("nScan", 1.2), ("pairwise", 1.2), ("loop", 2.0)):
@@ -149,7 +142,7 @@ def _draw_graph(canvas: Canvas, graph: Graph) -> list[LegendEntry]:
 
 
 def _draw_uncertainty(canvas: Canvas, graph: Graph) -> list[LegendEntry]:
-    """Ellipses of the keyframes' positions."""
+    """Draws ellipses of the positions of keyframes. Returns the legend entries."""
     keyframes = sorted(graph.marginals)
     if not keyframes:
         return []
@@ -160,7 +153,7 @@ def _draw_uncertainty(canvas: Canvas, graph: Graph) -> list[LegendEntry]:
 def _points_of_occupied_cells(
     log: LaserLog, rows: NDArray[np.int64], poses: Array, grid: OccupancyGrid
 ) -> Array:
-    """(M, 2) the end points of the beams, m, that lie in occupied cells."""
+    """(M, 2) the end points of beams in occupied cells, m."""
     seen = list(log.points_by_scan())
     points = np.concatenate([transform(pose, seen[row]) for row, pose in zip(rows, poses, strict=True)])
     columns, lines = np.floor((points - np.array(grid.origin)) / grid.resolution).astype(np.int64).T

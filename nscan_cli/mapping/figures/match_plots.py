@@ -1,4 +1,4 @@
-"""Scans before and after a match, as the paper's Figs. 4 and 5: points, and circles at the robot's poses."""
+"""Scans before and after a match, as in Figs. 4 and 5 of the paper: points, and circles at the poses."""
 
 from __future__ import annotations
 
@@ -17,11 +17,10 @@ from nscan_cli.mapping.figures.covariance_ellipses import draw_ellipses
 from nscan_cli.mapping.figures.panels import (
     MIN_ASPECT,
     bounds_around,
-    hstack_images,
     is_wide,
     panel,
+    stack_images,
     stacked_panels,
-    vstack_images,
 )
 from nscan_cli.mapping.figures.symbols import draw_crosses, draw_robots
 from nscan_cli.matching.joint.nscan_match import NScanMatch
@@ -33,14 +32,14 @@ if TYPE_CHECKING:
     from PIL.Image import Image
 
 DOT_RADIUS, ROBOT_RADIUS = 2.2, 8.0
-"""Radii, units."""
+"""Units."""
 POINT_OPACITY = 170
 MAX_NAMED_SCANS = 6
-"""Scans that are named one by one; of more, the first and the last."""
+"""Largest number of scans that are named one by one. Otherwise the first and the last are named."""
 VIEW_MARGIN = 0.5
-"""Share of the picture's longer side that a scan that was left out may lie beyond the others to be shown."""
+"""Excluded scans are shown up to this distance from the others, as a share of the longer side."""
 MIN_PAIR_ELLIPSE = 26.0
-"""Units of the half axis of an ellipse that is seen around a circle."""
+"""Least half axis of an ellipse that is visible around a robot, units."""
 
 
 def plot_match(
@@ -48,8 +47,8 @@ def plot_match(
 ) -> Image:
     """Two scans before and after their match, in the frame of the reference, with the uncertainty.
 
-    `numbers` are the scans' numbers, `reference` (m, 2) and `moving` (k, 2) their points, each in the
-    frame of its own robot, `start` (3,) is the relative pose that the match began with.
+    `numbers` are the numbers of the scans; `reference` (m, 2) and `moving` (k, 2) are their points in the
+    frame of the robot; `start` (3,) is the initial relative pose.
     """
     placed = [transform(pose, moving) for pose in (start, match.pose)]
     origins = np.array([[0.0, 0.0], start[:2], match.pose[:2]])
@@ -73,12 +72,11 @@ def plot_match(
         ("robot", VERMILLION, f"scan {numbers[1]}"),
     ]
     outcome = "" if match.reason is None else f", {match.reason}"
-    draw_title_and_legend(before, f"before: {_pose_text(start)}", scans)
+    draw_title_and_legend(before, f"before: {_format_pose(start)}", scans)
     draw_title_and_legend(
-        after, f"after: {_pose_text(match.pose)}, overlap {match.overlap:.0%}{outcome}", known
+        after, f"after: {_format_pose(match.pose)}, overlap {match.overlap:.0%}{outcome}", known
     )
-    join = hstack_images if beside else vstack_images
-    return join([before.image(), after.image()])
+    return stack_images([before.image(), after.image()], beside)
 
 
 def plot_nscan(
@@ -88,10 +86,10 @@ def plot_nscan(
     match: NScanMatch,
     left_out: Sequence[ExcludedScan],
 ) -> Image:
-    """Scans before and after their joint match; those that were left out are gray and before it only.
+    """Scans before and after their joint match. Excluded scans are gray and appear only before it.
 
-    `numbers` are the scans' numbers, `points` (m_i, 2) theirs in the frame of each robot, `start` (n, 3)
-    the poses that the match began with.
+    `numbers` are the numbers of the scans, `points` (m_i, 2) their points in the frame of the robot,
+    `start` (n, 3) the initial poses.
     """
     kept, poses = list(match.kept), match.poses
     both = [
@@ -121,24 +119,24 @@ def plot_nscan(
     draw_title_and_legend(
         after, f"after: {len(kept)} scans, least overlap {match.overlap.min():.0%}, {outcome}", order
     )
-    return vstack_images([before.image(), after.image()])
+    return stack_images([before.image(), after.image()])
 
 
 def _in_bounds(points: Array, bounds: Bounds) -> NDArray[np.bool_]:
-    """Which of the points (N, 2) lie within the bounds."""
+    """(N,) whether each of the points (N, 2) lies within the bounds."""
     inside: NDArray[np.bool_] = np.all((points >= bounds[:2]) & (points <= bounds[2:]), axis=1)
     return inside
 
 
 def scan_legend(names: Sequence[str]) -> list[LegendEntry]:
-    """What the colours of scans stand for."""
+    """Legend entries of the matched scans."""
     if len(names) > MAX_NAMED_SCANS:
         return [("ramp", BLACK, f"scans {names[0]} to {names[-1]}")]
     return [("robot", colour, f"scan {name}") for colour, name in zip(plasma(len(names)), names, strict=True)]
 
 
 def excluded_legend(names: Sequence[str], near: NDArray[np.bool_]) -> list[LegendEntry]:
-    """The scans that were left out: those in the picture, and those too far off."""
+    """Legend entries of the excluded scans; `near` (N,) tells which are in the picture."""
     entries: list[LegendEntry] = []
     for seen, colour, meaning in ((True, BLACK, "left out"), (False, GRAY, "left out, not in view")):
         named = [name for name, is_near in zip(names, near.tolist(), strict=True) if is_near == seen]
@@ -152,7 +150,7 @@ def _draw_robot(canvas: Canvas, pose: Array, colour: Colour) -> None:
     draw_robots(canvas, canvas.pixels(pose[None, :2]), pose[None, 2], ROBOT_RADIUS, colour)
 
 
-def _pose_text(pose: Array) -> str:
-    # 0.0 is added since a small negative number would be told as -0.
+def _format_pose(pose: Array) -> str:
+    # Adding 0.0 turns -0 into 0.
     x, y = (np.round(pose[:2], 3) + 0.0).tolist()
     return f"{x:.3f} m, {y:.3f} m, {round(math.degrees(pose[2]), 2) + 0.0:.2f}°"

@@ -1,4 +1,4 @@
-"""Numbers beside what they stand for: near it, but neither over each other nor over a line."""
+"""Placement of number labels near their anchors, clear of each other and of a line."""
 
 from __future__ import annotations
 
@@ -8,18 +8,18 @@ from nscan_cli.mapping.figures.canvas import GRAY, WHITE, Canvas, Colour
 from nscan_cli.poses import Array
 
 LABEL_RADIUS, LABEL_TEXT_SIZE = 11.0, 15.0
-"""Of a label and the size of its number, units."""
+"""Radius of a label and size of its number, units."""
 LABEL_DISTANCES = (22.0, 32.0, 46.0, 64.0, 86.0, 112.0)
-"""Units from what it stands for to a label, the nearest first."""
+"""Candidate distances from an anchor to its label, units, in ascending order."""
 LABEL_DIRECTIONS = 16
 MAX_LINE_POINTS = 4000
-"""Of the line that is kept clear."""
+"""Largest number of points of the line that is kept clear."""
 
 
 def draw_number_labels(canvas: Canvas, places: Array, clear: Array, colour: Colour) -> None:
-    """Labels 1, 2, … beside the places (N, 2), where they hide least of a line through points `clear`.
+    """Draws labels 1, 2, … beside `places` (N, 2), where they hide least of a line through `clear` (M, 2).
 
-    Both are in metres; lines lead from the places to their labels.
+    Both are in metres. Lines lead from the places to their labels.
     """
     angles = np.arange(LABEL_DIRECTIONS) * (2 * np.pi / LABEL_DIRECTIONS)
     around = np.stack([np.cos(angles), np.sin(angles)], axis=-1)
@@ -51,7 +51,7 @@ def _within_plot(canvas: Canvas, pixels: Array, radius: float) -> Array:
 
 
 def _count_near(candidates: Array, others: Array, distance: float) -> Array:
-    """(C,) how many of the others (M, 2) are nearer than that to each of the candidates (C, 2)."""
+    """(C,) the number of `others` (M, 2) nearer than `distance` to each of the candidates (C, 2)."""
     apart = np.hypot(*np.moveaxis(candidates[:, None] - others[None], -1, 0))
     count: Array = (apart < distance).sum(axis=1).astype(np.float64)
     return count

@@ -1,4 +1,4 @@
-"""Plots put together: what part of the plane they show, and pictures in rows and columns."""
+"""Panels: the bounds of plots, and pictures in rows and columns."""
 
 from __future__ import annotations
 
@@ -15,24 +15,24 @@ if TYPE_CHECKING:
     from PIL.Image import Image
 
 PLOT_PIXELS = 2400
-"""Of the longer side of the plots of a picture together: 20 cm at 300 dots an inch."""
+"""Longer side of a picture, pixels: 20 cm at 300 dots an inch."""
 MAX_STACKED_HEIGHT = 1600
-"""Pixels; of each of two stacked panels at most."""
+"""Largest height of each of two stacked panels, pixels."""
 WIDE_RATIO = 1.5
-"""Width of a wide panel, measured by its height."""
+"""Panels with a larger ratio of width to height are stacked."""
 MIN_ASPECT = 0.35
-"""Share of a panel's longer side that the shorter has at least."""
+"""Least ratio of the shorter to the longer side of a panel."""
 
 
 def is_wide(bounds: Bounds) -> bool:
-    """Whether panels of these bounds are better stacked than side by side."""
+    """Whether panels with these bounds are stacked, not side by side."""
     return bounds[2] - bounds[0] > WIDE_RATIO * (bounds[3] - bounds[1])
 
 
 def panel(bounds: Bounds, beside: bool = False, right: float = TITLE_MARGINS[2]) -> Canvas:
     """An empty panel with room for a caption, and a margin of `right` units on the right.
 
-    One of two `beside` each other has half the pixels, and larger text and symbols for it.
+    With `beside`, it is one of two in a row and has half the pixels, but larger text and symbols.
     """
     left, top, _right, bottom = TITLE_MARGINS
     pixels, scale = (PLOT_PIXELS // 2, 1.5) if beside else (PLOT_PIXELS, 1.0)
@@ -40,41 +40,30 @@ def panel(bounds: Bounds, beside: bool = False, right: float = TITLE_MARGINS[2])
 
 
 def stacked_panels(bounds: Bounds) -> tuple[Canvas, Canvas]:
-    """Two empty panels with room for captions that make a picture of moderate height when stacked."""
+    """Two empty panels with room for captions, to be stacked."""
     width, height = bounds[2] - bounds[0], bounds[3] - bounds[1]
     pixels = min(PLOT_PIXELS, round(MAX_STACKED_HEIGHT * max(width, height) / height))
     above, below = (Canvas.blank(bounds, pixels, TITLE_MARGINS) for _ in range(2))
     return above, below
 
 
-def hstack_images(pictures: Sequence[Image]) -> Image:
-    """Pictures in a row on white."""
+def stack_images(pictures: Sequence[Image], beside: bool = False) -> Image:
+    """Pictures on white in a column, or in a row with `beside`."""
     from PIL import Image
 
-    row = Image.new("RGB", (sum(p.width for p in pictures), max(p.height for p in pictures)), WHITE)
-    left = 0
+    widths, heights = [p.width for p in pictures], [p.height for p in pictures]
+    size = (sum(widths), max(heights)) if beside else (max(widths), sum(heights))
+    whole, at = Image.new("RGB", size, WHITE), 0
     for picture in pictures:
-        row.paste(picture, (left, 0))
-        left += picture.width
-    return row
-
-
-def vstack_images(pictures: Sequence[Image]) -> Image:
-    """Pictures in a column on white."""
-    from PIL import Image
-
-    column = Image.new("RGB", (max(p.width for p in pictures), sum(p.height for p in pictures)), WHITE)
-    top = 0
-    for picture in pictures:
-        column.paste(picture, (0, top))
-        top += picture.height
-    return column
+        whole.paste(picture, (at, 0) if beside else (0, at))
+        at += picture.width if beside else picture.height
+    return whole
 
 
 def bounds_around(points: Array, least: float = 0.0, spare: float = 0.02) -> Bounds:
-    """The bounds of points (N, 2) with a share `spare` of the longer side around them.
+    """The bounds of points (N, 2), with `spare` times the longer side added on each side.
 
-    The shorter side has at least the share `least` of the longer, and the points in its middle.
+    The shorter side is at least `least` times the longer. The points lie in the middle.
     """
     low, high = points.min(axis=0), points.max(axis=0)
     longer = max(float((high - low).max()), 1e-3)

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from nscan_cli.mapping.figures import canvas as canvas_module
-from nscan_cli.mapping.figures.canvas import BLUE, GREEN, ORANGE, PURPLE, VERMILLION, WHITE, Canvas
+from nscan_cli.mapping.figures.canvas import BLUE, GREEN, PURPLE, SKY, VERMILLION, WHITE, Canvas
 from tests.mapping.figures.pixels import close_to, pixels
 
 BOUNDS = (-2.0, -1.0, 2.0, 1.0)
@@ -89,12 +89,12 @@ def test_an_ellipse_shows_the_covariance():
 
 def test_circles_have_their_radius_and_their_ring():
     canvas = Canvas(BOUNDS, 100)
-    canvas.circles(np.array([[0.0, 0.0]]), 50, ORANGE, ring=BLUE)
+    canvas.circles(np.array([[0.0, 0.0]]), 50, SKY, ring=BLUE)
     picture = pixels(canvas)
-    assert close_to(picture[100, 190:210], ORANGE).all()
+    assert close_to(picture[100, 190:210], SKY).all()
     drawn = np.flatnonzero(~close_to(picture[100], WHITE))
     assert drawn[-1] - drawn[0] == pytest.approx(40, abs=2)
-    assert not close_to(picture[100, drawn[1]], ORANGE)
+    assert not close_to(picture[100, drawn[1]], SKY)
 
 
 def test_a_cloud_is_darker_where_there_are_more_points_and_stays_below_strokes():
@@ -114,7 +114,7 @@ def test_the_bands_do_not_show(monkeypatch):
         canvas = Canvas(BOUNDS, 100, margins=(60, 60, 60, 60))
         random = np.random.default_rng(0)
         canvas.line(random.uniform(-1, 1, (30, 2)), BLUE, 7)
-        canvas.circles(random.uniform(-1, 1, (30, 2)), 20, ORANGE, VERMILLION)
+        canvas.circles(random.uniform(-1, 1, (30, 2)), 20, SKY, VERMILLION)
         canvas.ellipses(random.uniform(-1, 1, (5, 2)), np.tile(np.diag([0.01, 0.04]), (5, 1, 1)), 1, PURPLE)
         canvas.text((100, 100), "0.5 m", size=60)
         return pixels(canvas)

@@ -25,7 +25,7 @@ def graph_of_a_square() -> Graph:
 
 def empty_map() -> OccupancyGrid:
     counts = np.zeros((120, 120), dtype=np.int32)
-    return OccupancyGrid(counts, counts + 1, 0.05, (-1.0, -1.0))
+    return OccupancyGrid.of_counts(counts, counts + 1, 0.05, (-1.0, -1.0))
 
 
 def colour_at(canvas: Canvas, x: float, y: float) -> np.ndarray:
@@ -77,7 +77,7 @@ def test_walls_of_a_large_map_stay_when_cells_are_merged(monkeypatch):
     monkeypatch.setattr(map_plots, "MAX_PIXELS", 60)
     hits = np.zeros((121, 100), dtype=np.int32)
     hits[:, 50] = 9
-    grid = OccupancyGrid(hits, np.ones_like(hits), 0.05, (0.0, 0.0))
+    grid = OccupancyGrid.of_counts(hits, np.ones_like(hits), 0.05, (0.0, 0.0))
     canvas = plot_over_map(grid, graph_of_a_square(), Overlays(uncertainty=False))
     # Three cells along a pixel: 41 rows for 121 cells, the column of cell 50 is the seventeenth.
     left, top, right, bottom = canvas.plot

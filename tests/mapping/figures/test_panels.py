@@ -2,31 +2,30 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from nscan_cli.mapping.figures.canvas import BLUE, ORANGE, VERMILLION
+from nscan_cli.mapping.figures.canvas import BLUE, SKY, VERMILLION
 from nscan_cli.mapping.figures.panels import (
     MAX_STACKED_HEIGHT,
     PLOT_PIXELS,
     bounds_around,
-    hstack_images,
     panel,
+    stack_images,
     stacked_panels,
-    vstack_images,
 )
 
 
 def test_pictures_side_by_side():
-    row = hstack_images([Image.new("RGB", (10, 20), BLUE), Image.new("RGB", (5, 30), ORANGE)])
+    row = stack_images([Image.new("RGB", (10, 20), BLUE), Image.new("RGB", (5, 30), SKY)], True)
     assert row.size == (15, 30)
     assert row.getpixel((9, 19)) == BLUE
-    assert row.getpixel((10, 0)) == ORANGE
+    assert row.getpixel((10, 0)) == SKY
     assert row.getpixel((0, 25)) == (255, 255, 255)
 
 
 def test_pictures_in_a_column():
-    column = vstack_images([Image.new("RGB", (10, 20), BLUE), Image.new("RGB", (5, 30), ORANGE)])
+    column = stack_images([Image.new("RGB", (10, 20), BLUE), Image.new("RGB", (5, 30), SKY)])
     assert column.size == (10, 50)
     assert column.getpixel((9, 19)) == BLUE
-    assert column.getpixel((0, 20)) == ORANGE
+    assert column.getpixel((0, 20)) == SKY
     assert column.getpixel((9, 25)) == (255, 255, 255)
 
 
