@@ -1,26 +1,38 @@
-"""The report for people: one HTML file that needs no other files."""
+"""The report for people: one HTML file that needs no other files, from report.html and log_section.html."""
 
 from __future__ import annotations
 
-from html import escape
+import base64
+import re
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from nscan_cli import __version__
 from nscan_cli.files.counting import counted
 from nscan_cli.files.text import printable
-from nscan_cli.nightly.html_log_section import (
-    STATUS_SYMBOLS,
-    absent_section,
-    error_change,
-    log_section,
-    readable_time,
-    real_time_factor,
-    run_time,
-    status_badge,
-    time_span,
-)
+from nscan_cli.nightly.history_plot import history_svg
 from nscan_cli.nightly.json_report import finish_time
-from nscan_cli.nightly.regression_check import ATTENTION, STATUS_ORDER, CheckResult, Status, headline
+from nscan_cli.nightly.manifest import ManifestEntry
+from nscan_cli.nightly.regression_check import (
+    ATTENTION,
+    STATUS_ORDER,
+    CheckResult,
+    MeasuredErrors,
+    Status,
+    headline,
+)
+
+if TYPE_CHECKING:
+    from markupsafe import Markup
+
+STATUS_SYMBOLS: dict[Status, str] = {"good": "✓", "worse": "!", "above": "✗", "failed": "✗", "absent": "–"}
+STATUS_WORDS: dict[Status, str] = {
+    "good": "good",
+    "worse": "worse",
+    "above": "above bound",
+    "failed": "failed",
+    "absent": "not there",
+}
 
 
 def html_report(title: str, checks: list[CheckResult], folder: Path) -> bytes:
@@ -28,112 +40,101 @@ def html_report(title: str, checks: list[CheckResult], folder: Path) -> bytes:
 
     What differs between two runs on the same inputs stands in elements of the class `time`.
     """
-    status: Status = next(
-        (each for each in STATUS_ORDER if each in {check.status for check in checks}), "good"
+    import jinja2
+    from markupsafe import Markup
+
+    beside = Path(__file__).parent
+    environment = jinja2.Environment(
+        loader=jinja2.FileSystemLoader(beside),
+        autoescape=True,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        keep_trailing_newline=True,
     )
-    when = finish_time(checks)
-    stamp = "" if when is None else f'<time class="time" datetime="{when}">{readable_time(when)}</time>'
+    by_urgency = sorted(checks, key=lambda check: STATUS_ORDER.index(check.status))
+    status = by_urgency[0].status if checks else "good"
     never = [check for check in checks if check.status == "absent" and check.last is None]
-    seen = [check for check in checks if check not in never]
-    count = sum(check.status == "absent" for check in checks)
-    missing = f"{count} more {'is' if count == 1 else 'are'} not there. " if count else ""
-    style, script = (
-        Path(__file__).with_name(f"report.{ending}").read_text("utf-8") for ending in ("css", "js")
+    page = environment.get_template("report.html").render(
+        title=title,
+        headline=headline(checks),
+        version=__version__,
+        status=status,
+        symbol=STATUS_SYMBOLS[status],
+        status_words=STATUS_WORDS,
+        finished=finish_time(checks),
+        absent=sum(check.status == "absent" for check in checks),
+        urgent=[check for check in by_urgency if check.status in ATTENTION],
+        overview=[check for check in checks if check not in never],
+        sections=[check for check in by_urgency if check not in never],
+        never=never,
+        style=Markup((beside / "report.css").read_text("utf-8")),
+        script=Markup((beside / "report.js").read_text("utf-8")),
+        counted=counted,
+        error_change=_error_change,
+        run_time=_run_time,
+        real_time_factor=_real_time_factor,
+        readable_time=_readable_time,
+        map_preview=lambda name: _map_preview(folder / name),
+        has_history=_has_history,
+        history=lambda check: Markup(history_svg(check)),
+        bound_text=_bound_text,
+        published_errors=_published_errors,
     )
-    content = "\n".join(
-        [
-            "<!DOCTYPE html>",
-            '<html lang="en">',
-            "<head>",
-            '<meta charset="utf-8">',
-            '<meta name="viewport" content="width=device-width, initial-scale=1">',
-            f"<title>{STATUS_SYMBOLS[status]} {escape(title)}: {escape(headline(checks))}</title>",
-            '<link rel="icon" href="data:,">',
-            f"<style>\n{style}</style>",
-            "</head>",
-            "<body>",
-            "<main>",
-            f'<section class="banner {status}">',
-            f'<span class="sign" aria-hidden="true">{STATUS_SYMBOLS[status]}</span>',
-            f"<h1>{escape(headline(checks))}</h1>",
-            f'<p class="soft">{missing}{escape(title)} {stamp}</p>',
-            "</section>",
-            *_attention_list(checks),
-            *_overview(seen),
-            *(
-                log_section(check, folder)
-                for check in sorted(seen, key=lambda each: STATUS_ORDER.index(each.status))
-            ),
-            *absent_section(never),
-            f"<footer>nscan-cli {escape(__version__)}. Errors in metres: the mean on relations (Kümmerle et "
-            "al. 2009), or the RMSE of the ATE against a reference, after the rigid motion that fits best. "
-            "Worse: risen by more than 5 % and by more than 0.5 mm or 0.01° since the previous run.</footer>",
-            "</main>",
-            f"<script>\n{script}</script>",
-            "</body>",
-            "</html>",
-        ]
-    )
-    return printable(content + "\n").encode()
+    return printable(page).encode()
 
 
-def _attention_list(checks: list[CheckResult]) -> list[str]:
-    """The logs that need attention with the reasons, the most urgent first."""
-    items = [
-        f'<li class="{check.status}"><a href="#{check.entry.name}">{check.entry.name}</a> '
-        f"{escape('; '.join(check.reasons))}</li>"
-        for status in ATTENTION
-        for check in checks
-        if check.status == status
-    ]
-    return ['<ul class="look">', *items, "</ul>"] if items else []
+def _error_change(check: CheckResult) -> float | None:
+    """The change of the error since the previous run, in per cent."""
+    errors, before = check.errors, MeasuredErrors.of(check.previous)
+    if errors is None or before is None or before.measure != errors.measure or before.metres == 0:
+        return None
+    return 100 * (errors.metres - before.metres) / before.metres
 
 
-def _overview(checks: list[CheckResult]) -> list[str]:
-    """A table with a row for every log, in the manifest's order."""
-    heads = [
-        ("log", ""),
-        ("", ""),
-        ("error, m", ""),
-        ("change", ""),
-        ("bound", "wide"),
-        ("best published", "wide"),
-        ("rotation", "wide"),
-        ("time", "wide"),
-        ("real time", "wide"),
-    ]
-    rows = [f"<th{_class(kind)}>{name}</th>" for name, kind in heads]
-    return [
-        '<div class="overview"><table>',
-        f"<thead><tr>{''.join(rows)}</tr></thead>",
-        "<tbody>",
-        *(_row(check) for check in checks),
-        "</tbody></table></div>",
-    ]
+def _run_time(check: CheckResult) -> str:
+    """How long the run took; empty if kernels were compiled during it."""
+    took = None if check.last is None else check.last["times"]["seconds"]
+    return "" if took is None else f"{took:.1f} s"
 
 
-def _row(check: CheckResult) -> str:
-    entry, is_now = check.entry, check.status not in ("failed", "absent")
-    errors = check.errors if is_now else None
-    best = min(entry.published.values(), default=None)
-    cells = [
-        (status_badge(check) + (_notes(check) if is_now else ""), ""),
-        ("" if errors is None else f"{errors.metres:.4f}", "number"),
-        (error_change(check) if is_now else "", "number"),
-        ("" if entry.max_translation is None else f"{entry.max_translation:g}", "number wide"),
-        ("" if best is None else f"{best:.4f}", "number wide"),
-        ("" if errors is None else f"{errors.degrees:.2f}°", "number wide"),
-        (time_span(run_time(check)) if is_now else "", "number wide"),
-        (time_span(real_time_factor(check)) if is_now else "", "number wide"),
-    ]
-    name = f'<th><a href="#{entry.name}">{entry.name}</a></th>'
-    return f"<tr>{name}{''.join(f'<td{_class(kind)}>{text}</td>' for text, kind in cells)}</tr>"
+def _real_time_factor(check: CheckResult) -> str:
+    """The duration of the log divided by that of the run."""
+    if not _run_time(check) or check.last is None or not check.last["counts"]["duration"]:
+        return ""
+    return f"{check.last['counts']['duration'] / max(check.last['times']['seconds'], 0.001):.0f} ×"
 
 
-def _notes(check: CheckResult) -> str:
-    """The number of notes, which are shown in the log's section."""
-    return f' <span class="soft">{counted(len(check.notes), "note")}</span>' if check.notes else ""
+def _readable_time(when: str) -> str:
+    """A time in ISO 8601 (UTC) as people write it."""
+    return when.replace("T", " ").replace("Z", " UTC")
 
 
-def _class(kind: str) -> str:
-    return f' class="{kind}"' if kind else ""
+def _map_preview(results: Path) -> dict[str, str | Markup] | None:
+    """The preview of the map, its layers, and width divided by height; None if a file is missing."""
+    from markupsafe import Markup
+
+    try:
+        picture = base64.b64encode((results / "preview.png").read_bytes()).decode()
+        layers = (results / "preview.svg").read_text("utf-8")
+    except OSError:
+        return None
+    size = re.search(r'viewBox="0 0 (\d+) (\d+)"', layers)
+    aspect = 1.0 if size is None else int(size[1]) / int(size[2])
+    return {"png": picture, "svg": Markup(layers), "aspect": f"{aspect:.4f}"}
+
+
+def _has_history(check: CheckResult) -> bool:
+    """Whether a run was measured or failed."""
+    return any(run["outcome"] != "done" or MeasuredErrors.of(run) is not None for run in check.runs)
+
+
+def _bound_text(entry: ManifestEntry) -> str:
+    bounds = ((entry.max_translation, " m"), (entry.max_rotation, "°"))
+    return ", ".join(f"{bound:g}{unit}" for bound, unit in bounds if bound is not None) or "none"
+
+
+def _published_errors(check: CheckResult) -> list[tuple[float, str, str, bool]]:
+    """Error (m), sort key, method and whether it is ours, the smallest error first."""
+    assert check.errors is not None
+    theirs = [(error, "theirs", method, False) for method, error in check.entry.published.items()]
+    return sorted([(check.errors.metres, "", "this run", True), *theirs])

@@ -15,7 +15,7 @@ import numpy as np
 
 from nscan_cli.mapping.figures.axes import LegendEntry, draw_title_and_legend
 from nscan_cli.mapping.figures.canvas import BLUE, GREEN, PURPLE, VERMILLION
-from nscan_cli.mapping.figures.panels import bounds_around, panel
+from nscan_cli.mapping.figures.panels import bounds_around, panel, stack_images
 from nscan_cli.mapping.figures.symbols import draw_robots
 from nscan_cli.matching.joint.joint_energy import JointProblem, Priors, joint_energy
 from nscan_cli.matching.joint.joint_match import JointMatch, match_near_and_far

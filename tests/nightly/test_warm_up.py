@@ -13,7 +13,7 @@ from nscan_cli.cli.nightly_progress import PlainProgress
 from nscan_cli.kernels import machine_code
 from nscan_cli.logs.load import log_from
 from nscan_cli.nightly import bootstrap, local_executor, warm_up, worker
-from nscan_cli.nightly.html_log_section import log_section
+from nscan_cli.nightly.html_report import html_report
 from nscan_cli.nightly.manifest import ManifestEntry
 from nscan_cli.nightly.regression_check import check_log
 from nscan_cli.nightly.task import Task
@@ -114,6 +114,6 @@ def test_what_is_not_timed_is_said(tmp_path, capsys):
     entry = ManifestEntry("a", {"log": Path("a.log")})
     PlainProgress(False).finished(entry, night)
     assert capsys.readouterr().err == "a: not timed: kernels were compiled meanwhile\n"
-    text = log_section(check_log(entry, [night], [], absent=False), tmp_path)
+    text = html_report("small", [check_log(entry, [night], [], absent=False)], tmp_path).decode()
     assert '<span class="time">not timed: kernels were compiled during the run</span>' in text
     assert '<span class="time">2026-11-21 03:00:00 UTC; run again: the log has changed</span>' in text
