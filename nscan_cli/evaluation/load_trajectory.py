@@ -101,8 +101,8 @@ def _trajectory_or_log(
         GRAPH.check(len(data) / MB, f"has {len(data) / MB:,.0f} MB")
     except LimitExceededError as error:
         raise InputDataError(name, str(error), error.remedy) from error
-    if lost is not None:
-        notices.append(f"{name}: {lost}")
+    if lost:
+        notices += [f"{name}: {warning}" for warning in lost]
         # The last line may be cut off within a number.
         data = data[: data.rfind(b"\n") + 1]
     if is_graph:

@@ -15,7 +15,7 @@ from nscan_cli.logs.beam_angles import beam_directions
 from nscan_cli.logs.device_choice import Device
 from nscan_cli.logs.frame_names import DEFAULT_FRAMES, FrameNames
 from nscan_cli.logs.laser_defaults import mark_no_returns
-from nscan_cli.logs.laser_log import LaserLog, LogReport
+from nscan_cli.logs.laser_log import LaserLog, LogReport, beam_counts
 from nscan_cli.logs.lost_readings import lost_readings
 from nscan_cli.logs.range_limits import limits_in_force
 from nscan_cli.logs.reading_options import ReadingOptions
@@ -46,12 +46,6 @@ class RawScans:
     """(S,) rad, the direction of the last beam as the log has it beside the step; nan where it has none."""
     beams: NDArray[np.int64] | None = None
     """(S,) how many beams each scan has; None: all have B."""
-
-    def beam_counts(self) -> NDArray[np.int64]:
-        """(S,) how many beams each scan has."""
-        if self.beams is not None:
-            return self.beams
-        return np.full(len(self.stamps), self.ranges.shape[1], dtype=np.int64)
 
     def mirrored(self) -> RawScans:
         """The same with beams that run the other way round."""
@@ -124,7 +118,7 @@ def laser_log(
     angle_min, angle_increment = beam_directions(raw, options, warnings)
     findings.used |= {"range_min": limits.low_from, "range_max": limits.high_from}
     ranges = raw.ranges if np.array_equal(rows, np.arange(len(raw.stamps))) else raw.ranges[rows]
-    beams, limits = raw.beam_counts()[rows], limits.of(rows)
+    beams, limits = beam_counts(raw.ranges, raw.beams)[rows], limits.of(rows)
     lost = lost_readings(ranges, beams, limits, file)
     mark_no_returns(ranges, limits.low, limits.high)
     odometry = motion.odometry

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nscan_cli.files.counting import counted
+from nscan_cli.logs.laser_log import beam_counts
 from nscan_cli.logs.reading_options import ReadingOptions
 from nscan_cli.logs.wall_straightness import second_is_straighter
 from nscan_cli.poses import Array
@@ -45,7 +46,7 @@ def _steps(raw: RawScans, warnings: list[str]) -> Array:
     steps = raw.angle_increment
     if raw.angle_max is None:
         return steps
-    between = raw.beam_counts() - 1
+    between = beam_counts(raw.ranges, raw.beams) - 1
     view = raw.angle_max - raw.angle_min
     with np.errstate(divide="ignore", invalid="ignore"):
         others = view / between

@@ -1,4 +1,4 @@
-"""What a log leaves open to its user: which of several lasers, which of several odometries."""
+"""The choice between several lasers or several odometries of a log."""
 
 from __future__ import annotations
 
@@ -13,20 +13,23 @@ class Device(NamedTuple):
     """A laser or an odometry of a log."""
 
     name: str
-    """What the option that chooses it takes."""
+    """The value of the option that chooses it."""
     type: str
-    """Of its records or messages, such as sensor_msgs/msg/LaserScan."""
+    """Type of its records or messages, such as sensor_msgs/msg/LaserScan."""
     records: int
-    """How many there are: records of a text log, messages of a recording."""
+    """Number of records of a text log, or of messages of a recording."""
+
+
+DeviceKind = Literal["laser", "odometry"]
 
 
 class OpenChoiceError(WrongUsageError):
-    """A log has several lasers or odometries, and the user has chosen none."""
+    """A log has several lasers or odometries, and the user has not chosen one."""
 
     def __init__(
         self,
         file: str,
-        what: Literal["laser", "odometry"],
+        what: DeviceKind,
         devices: Sequence[Device],
         option: str,
         thing: str,
@@ -44,5 +47,24 @@ class OpenChoiceError(WrongUsageError):
 
 
 def device_list(devices: Sequence[Device], thing: str) -> str:
-    """The devices with how many things ("message", "record") each has, as messages list them."""
+    """The devices and their numbers of things ("message", "record"), as text."""
     return ", ".join(f"{one.name} ({counted(one.records, thing)})" for one in devices)
+
+
+def choose_device(
+    what: DeviceKind, requested: str | None, devices: Sequence[Device], file: str
+) -> tuple[str | None, str]:
+    """The name of the device of a text log to use, and the reason; None if there is no device.
+
+    Raises WrongUsageError if the requested one is not there, and OpenChoiceError if none is requested and
+    there are several.
+    """
+    option = "--laser" if what == "laser" else "--odom-topic"
+    if requested is not None:
+        if requested not in [device.name for device in devices]:
+            available = device_list(devices, "record") or "left out"
+            raise WrongUsageError(f"{file}: has no {requested}; {option} can be {available}")
+        return requested, f"chosen by {option}"
+    if len(devices) > 1:
+        raise OpenChoiceError(file, what, devices, option, "record")
+    return (devices[0].name, f"the only {what}") if devices else (None, "")

@@ -1,4 +1,4 @@
-"""What every reader of a log yields: the scans of one laser in order of time, as columns."""
+"""The scans of one laser in order of time, as columns: what every reader of a log returns."""
 
 from __future__ import annotations
 
@@ -19,40 +19,40 @@ from nscan_cli.logs.frame_names import DEFAULT_FRAMES, FrameNames
 from nscan_cli.poses import Array, Indices, compose
 
 SCANS_AT_ONCE = 256
-"""Scans whose points are computed at once."""
+"""Scans whose points are computed together."""
 
 
 @dataclass(frozen=True)
 class LogReport:
-    """What the reader found and did; `info` prints it."""
+    """What the reader found in the log, for `info`."""
 
     records: dict[str, int] = field(default_factory=dict)
-    """Records by their tag."""
+    """Number of records by tag."""
     skipped: dict[str, tuple[int, int]] = field(default_factory=dict)
-    """Reason → (how many records were skipped for it, line of the first)."""
+    """Number of skipped records and the place of the first, by reason."""
     skipped_place: str = "line"
-    """What the first is counted in: "line", or "message" of its topic."""
+    """What that place counts: "line", or "message" of its topic."""
     backward_stamps: int = 0
-    """Steps back in time in file order; the scans are sorted stably all the same."""
+    """Number of steps back in time in file order. The scans are sorted stably."""
     warnings: tuple[str, ...] = ()
-    """Whole sentences for the user."""
+    """Sentences for the user."""
     used: dict[str, str] = field(default_factory=dict)
-    """Why it is this "laser", and where "odometry", "mounting", "range_min" and "range_max" are from."""
+    """The reason for the choice of "laser", and the origin of "odometry", "mounting" and range limits."""
     lost: dict[str, int] = field(default_factory=dict)
-    """Why a reading is none that counts → how many there are of them."""
+    """Number of unusable readings by reason."""
     unusable: InputDataError | None = None
-    """What is wrong when no reading at all counts."""
+    """The error to raise if no reading is usable."""
     lasers: tuple[Device, ...] = ()
-    """All that the log has, this one too."""
+    """All lasers of the log, this one included."""
     laser_option: str = ""
-    """What chooses one of them: "--laser" or "--topic"."""
+    """The option that chooses a laser: "--laser" or "--topic"."""
     odometries: tuple[Device, ...] = ()
-    """All that --odom-topic can choose."""
+    """All odometries that --odom-topic can choose."""
     corrected: str = ""
-    """What tells that the log's poses are a mapper's result; empty where nothing does."""
+    """The sign that the poses are the result of a mapper; empty if there is none."""
 
     def notices(self) -> list[str]:
-        """The warnings, and what was skipped, for commands that do not list it."""
+        """The warnings, and one sentence for each reason of skipped records."""
         return [*self.warnings] + [
             f"{counted(count, 'record')} skipped: {reason}, first in {self.skipped_place} {first}"
             for reason, (count, first) in self.skipped.items()
@@ -64,40 +64,40 @@ class LaserLog:
     """The scans of one laser, sorted stably by time; S scans of at most B beams.
 
     A row is a scan. `numbers` are the scan numbers that users see: positions in order of time in the
-    whole log, so that they stay the same whatever `start`, `end` and `every` select.
+    whole log, independent of what `start`, `end` and `every` select.
     """
 
     source: Source
     format: str
-    """Such as "CARMEN"."""
+    """Name of the form, such as "CARMEN"."""
     laser: str
-    """The record tag or topic that the scans come from, such as "FLASER"."""
+    """Record tag or topic of the scans, such as "FLASER"."""
     numbers: NDArray[np.int64]
     """(S,) scan numbers, increasing."""
     stamps: tuple[str, ...]
-    """S time stamps as the source wrote them."""
+    """S time stamps as written in the source."""
     times: Array
-    """(S,) seconds."""
+    """(S,) time of each scan, s."""
     ranges: NDArray[np.float32]
-    """(S, B) metres from the laser; inf where a beam met nothing, nan where it says nothing
-    (outside the range limits, an error code, or a beam that this scan does not have)."""
+    """(S, B) distance from the laser, m; inf without return; nan if unusable (outside the range limits,
+    an error code, or a beam that the scan does not have)."""
     angle_min: Array
     """(S,) direction of the first beam in the laser's frame, rad."""
     angle_increment: Array
-    """(S,) rad from beam to beam."""
+    """(S,) angle from beam to beam, rad."""
     mount: Array
     """(3,) pose of the laser in the robot's frame."""
     odometry: Array | None
     """(S, 3) pose of the robot in the odometry frame, or None."""
     no_return: float | None
-    """The least value (m) that was taken for "no return", or None when the log has none."""
+    """Smallest reading that means "no return", m; None if the log has none."""
     range_limits: tuple[float, float]
-    """The effective range limits (m): a beam counts when min < r < max."""
+    """Range limits in force, m: a reading r is usable if min < r < max."""
     report: LogReport
     beams: NDArray[np.int64] | None = None
-    """(S,) how many beams each scan has; None: all have B."""
+    """(S,) number of beams of each scan; None if all have B."""
     truth_times: Array | None = None
-    """(T,) seconds of the true poses (TRUEPOS), or None."""
+    """(T,) times of the true poses (TRUEPOS), s, or None."""
     truth: Array | None = None
     """(T, 3) true poses of the robot, or None."""
     frames: FrameNames = DEFAULT_FRAMES
@@ -106,17 +106,15 @@ class LaserLog:
         return len(self.stamps)
 
     def beam_counts(self) -> NDArray[np.int64]:
-        """(S,) how many beams each scan has."""
-        if self.beams is not None:
-            return self.beams
-        return np.full(len(self), self.ranges.shape[1], dtype=np.int64)
+        """(S,) number of beams of each scan."""
+        return beam_counts(self.ranges, self.beams)
 
     def readings(self, row: int) -> NDArray[np.float32]:
-        """The ranges (m) of one row's own beams."""
+        """The readings (m) of one row, without those of beams that it does not have."""
         return self.ranges[row] if self.beams is None else self.ranges[row, : self.beams[row]]
 
     def row(self, number: int) -> int:
-        """The row of a scan number. Raises WrongUsageError when the log has no such scan."""
+        """The row of a scan number. Raises WrongUsageError if the log has no such scan."""
         row = int(np.searchsorted(self.numbers, number))
         if row == len(self) or self.numbers[row] != number:
             first, last = (int(self.numbers[0]), int(self.numbers[-1]))
@@ -126,7 +124,7 @@ class LaserLog:
         return row
 
     def points(self, scan: int) -> Array:
-        """The usable beams' end points (m, 2) of one row in the robot's frame, in beam order."""
+        """End points (m, 2) of the usable beams of one row in the robot's frame, in beam order."""
         points, _ = self.batch_points(slice(scan, scan + 1), math.inf)
         return points
 
@@ -137,18 +135,18 @@ class LaserLog:
                 yield points[begin:end]
 
     def point_batches(self, size: int, reach: float = math.inf) -> Iterator[tuple[Array, Indices]]:
-        """The `points` (m, 2) of `size` scans at a time that are nearer to the robot than `reach` (m).
+        """The points (m, 2) of `size` scans at a time that are nearer to the robot than `reach` (m).
 
-        One scan after another; ends (n + 1,) tell that scan k has points[ends[k] : ends[k + 1]].
+        Scan k of a batch has points[ends[k] : ends[k + 1]], with ends (n + 1,).
         """
         for first in range(0, len(self), size):
             yield self.batch_points(slice(first, first + size), reach)
 
     def batch_points(self, rows: slice, reach: float) -> tuple[Array, Indices]:
-        """The points (m, 2) of R rows, one after another, and where each row's end, as in stretches."""
+        """One batch of point_batches, of R rows: points (m, 2) and ends (R + 1,)."""
         first, between = self.angle_min[rows], self.angle_increment[rows]
         if (first == first[0]).all() and (between == between[0]).all():
-            # Mostly all scans have the same angles: a scan's cosines do for all.
+            # Mostly all scans have the same angles, and one row of cosines serves them all.
             first, between = first[:1], between[:1]
         angles = first[:, None] + between[:, None] * np.arange(self.ranges.shape[1])
         turn = np.array([np.cos(self.mount[2]), np.sin(self.mount[2])])
@@ -159,13 +157,18 @@ class LaserLog:
         return compose(robot, self.mount)
 
 
+def beam_counts(ranges: NDArray[np.float32], beams: NDArray[np.int64] | None) -> NDArray[np.int64]:
+    """(S,) number of beams of each scan with ranges (S, B): `beams` (S,), or B each if that is None."""
+    return np.full(len(ranges), ranges.shape[1], dtype=np.int64) if beams is None else beams
+
+
 @kernel
 def _end_points(
     ranges: NDArray[np.float32], cos: Array, sin: Array, mount: Array, turn: Array, reach: float
 ) -> tuple[Array, Indices]:
-    """What _points returns of ranges (R, B) in directions of these cosines and sines (1 or R, B).
+    """Points and ends, as batch_points returns them, of ranges (R, B).
 
-    `turn` (2,) are those of the mount (3,).
+    `cos` and `sin` (1 or R, B) are those of the beams' directions, `turn` (2,) those of the mount (3,).
     """
     points, ends = np.empty((ranges.size, 2)), np.zeros(ranges.shape[0] + 1, dtype=np.int64)
     m = 0

@@ -1,11 +1,12 @@
-"""A log by its path: the bytes, unpacked, and the reader that knows their form."""
+"""A log from its path: read the bytes, decompress them, recognise the form and call its reader."""
 
 from __future__ import annotations
 
 import hashlib
 import os
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import replace
 from mmap import mmap
 from typing import Protocol
@@ -25,26 +26,26 @@ from nscan_cli.logs.recordings.container import DAMAGE_REMEDY, Recording
 
 
 class Reader(Protocol):
-    """What a module that reads a form of log has."""
+    """The interface of a module that reads a text form of log."""
 
     def read(self, data: bytes, file: str, source: Source, options: ReadingOptions) -> LaserLog:
-        """The scans; `file` is what messages call it. Raises InputDataError and WrongUsageError."""
+        """The scans; `file` is the name for messages. Raises InputDataError and WrongUsageError."""
 
 
 class Container(Protocol):
-    """What a module that reads a container of messages has."""
+    """The interface of a module that reads a container of messages."""
 
     def read_recording(self, data: FileBytes, file: str, salvage: bool) -> Recording:
-        """The messages; `file` is what errors call it. Raises InputDataError and LimitExceededError."""
+        """The messages; `file` is the name for messages. Raises InputDataError and LimitExceededError."""
 
 
 class Database(Container, Protocol):
-    """What a module has that opens a file itself."""
+    """The interface of a module that can also open the file itself."""
 
     def read_recording_file(
         self, path: str, journals: Mapping[str, str], file: str, salvage: bool
     ) -> Recording:
-        """The messages in the file and in what parts.beside has found. Raises the same errors."""
+        """The messages in the file and in its journals (log_files.journals_of). Raises the same errors."""
 
 
 DEFAULT_READING = ReadingOptions()
@@ -53,25 +54,27 @@ DEFAULT_READING = ReadingOptions()
 def read_log(
     paths: str | Sequence[str], options: ReadingOptions = DEFAULT_READING, even_unusable: bool = False
 ) -> LaserLog:
-    """The log at a path ("-": standard input), or in a folder or several files that a recorder has left.
+    """The log at a path ("-": standard input), in a folder, or in the files of a split recording.
 
-    Its kind is found from its content. Raises InputMissingError when there is nothing to read,
-    InputDataError when it is no log, a damaged one, or one none of whose readings counts (but with
-    `even_unusable`), WrongUsageError when the options do not fit it, or the paths are of several.
+    The form is recognised by the content. Raises InputMissingError if there is nothing to read,
+    InputDataError if it is no log, is damaged, or has no usable reading (unless `even_unusable`), and
+    WrongUsageError if the options do not fit the log or the paths belong to several recordings.
     """
     parts = parts_of(paths)
     if len(parts.files) > 1:
-        log = _usable(_of_parts(parts, options), even_unusable)
+        recording, source = _merged_recording(parts, options.salvage)
+        log = _log_of_recording(recording, parts.title, source, options)
+        _check_usable(log, even_unusable)
     else:
         (path,) = parts.files
         log = log_from(stored_bytes(path), path, options, even_unusable)
-    return _noted(log, parts.warnings)
+    return _with_warnings(log, parts.warnings)
 
 
 def stored_bytes(path: str) -> FileBytes:
-    """The bytes of a log as they are stored. Those of a recording in a file are not taken into memory.
+    """The bytes of a log as stored. A recording in a file is mapped and not read into memory.
 
-    Raises InputMissingError, and InputDataError when there are more than the limit allows.
+    Raises InputMissingError, and InputDataError if the file exceeds the limit.
     """
     head = first_bytes(path)
     if any(form.container and form.fits(head) for form in FORMS if form.magic is not None):
@@ -80,24 +83,20 @@ def stored_bytes(path: str) -> FileBytes:
 
 
 def recording_from(stored: FileBytes, path: str, salvage: bool) -> Recording | None:
-    """The messages of the recording whose bytes `path` has; None where it is none. Raises InputDataError."""
+    """The messages of the recording at `path`, or None if it is no recording. Raises InputDataError."""
     data, lost = _content(stored, path, salvage)
     form = next((form for form in FORMS if form.container and form.fits(data)), None)
     if form is None:
         return None
-    try:
-        recording = _recording(form, data, path, salvage)
-    except LimitExceededError as error:
-        raise InputDataError(label(path), str(error), error.remedy) from error
-    recording.warnings[:0] = [] if lost is None else [lost]
-    return recording
+    with _limits_as_input_errors(label(path)):
+        return _messages(form, data, path, salvage, lost)
 
 
 def read_recording(folder: str, salvage: bool) -> Recording | None:
-    """The messages of the recording in a folder; raises as read_log does."""
+    """The messages of the recording in a folder. Raises the errors of read_log."""
     parts = parts_of(folder)
     if len(parts.files) > 1:
-        recording: Recording | None = _joined(parts, salvage)[0]
+        recording: Recording | None = _merged_recording(parts, salvage)[0]
     else:
         (path,) = parts.files
         recording = recording_from(stored_bytes(path), path, salvage)
@@ -109,65 +108,57 @@ def read_recording(folder: str, salvage: bool) -> Recording | None:
 def log_from(
     stored: FileBytes, path: str, options: ReadingOptions = DEFAULT_READING, even_unusable: bool = False
 ) -> LaserLog:
-    """The log in the bytes that `path` has; raises the same errors."""
+    """The log in the stored bytes of `path`. Raises the errors of read_log."""
     name = label(path)
     data, lost = _content(stored, path, options.salvage)
     if not re.search(rb"\S", data):
-        raise InputDataError(name, lost or "is empty", "give a log with laser scans")
+        raise InputDataError(name, lost[0] if lost else "is empty", "give a log with laser scans")
     form = _form(data, name)
     source = _source(stored, path)
+    # The bytes are freed before the scans are made.
     del stored
-    try:
+    with _limits_as_input_errors(name):
         if form.container:
-            recording = _recording(form, data, path, options.salvage)
+            recording = _messages(form, data, path, options.salvage, lost)
             del data
-            log = _scans(recording, name, source, options)
+            log = _log_of_recording(recording, name, source, options)
         else:
             assert isinstance(data, bytes)
             reader: Reader = form.reader()
-            log = reader.read(data, name, source, options)
-    except LimitExceededError as error:
-        raise InputDataError(name, str(error), error.remedy) from error
-    return _noted(_usable(log, even_unusable), () if lost is None else (lost,))
+            log = _with_warnings(reader.read(data, name, source, options), lost)
+    _check_usable(log, even_unusable)
+    return log
 
 
-def content_of(stored: bytes, path: str, salvage: bool) -> tuple[bytes, str | None]:
-    """What the bytes of `path` hold when they are unpacked, and what was lost when that was allowed.
+def content_of(stored: bytes, path: str, salvage: bool) -> tuple[bytes, list[str]]:
+    """The decompressed bytes of `path`, and with `salvage` a warning about what was lost.
 
-    Raises InputDataError.
+    Raises InputDataError if they are damaged or too many.
     """
     packing = compression_of(stored)
     if packing is None:
-        return without_byte_order_mark(stored, label(path)), None
-    try:
+        return without_byte_order_mark(stored, label(path)), []
+    with _limits_as_input_errors(label(path)):
         content, problem = decompressed(stored, packing)
-    except LimitExceededError as error:
-        raise InputDataError(label(path), str(error), error.remedy) from error
     content = without_byte_order_mark(content, label(path))
     if problem is None:
-        return content, None
+        return content, []
     if not salvage:
         raise InputDataError(label(path), problem, DAMAGE_REMEDY)
-    return content, f"{problem}: the rest is lost"
+    return content, [f"{problem}: the rest is lost"]
 
 
-def _content(stored: FileBytes, path: str, salvage: bool) -> tuple[FileBytes, str | None]:
-    """The same; what is in its place in a file is not compressed."""
-    return content_of(stored, path, salvage) if isinstance(stored, bytes) else (stored, None)
+def _content(stored: FileBytes, path: str, salvage: bool) -> tuple[FileBytes, list[str]]:
+    """As content_of; a mapped file is not compressed."""
+    return content_of(stored, path, salvage) if isinstance(stored, bytes) else (stored, [])
 
 
-def _of_parts(parts: Parts, options: ReadingOptions) -> LaserLog:
-    """The log in several files of one recording."""
-    whole, source = _joined(parts, options.salvage)
-    return _scans(whole, parts.title, source, options)
-
-
-def _joined(parts: Parts, salvage: bool) -> tuple[Recording, Source]:
-    """The messages in several files of one recording, of which one at a time is in memory, and the files."""
+def _merged_recording(parts: Parts, salvage: bool) -> tuple[Recording, Source]:
+    """The messages in several files of one recording, and the files. One file at a time is in memory."""
     found: list[tuple[str, Recording]] = []
     sources: list[tuple[Source, ...]] = []
     first: tuple[str, str] | None = None
-    try:
+    with _limits_as_input_errors(parts.title):
         for path in parts.files:
             stored = stored_bytes(path)
             data, lost = _content(stored, path, salvage)
@@ -180,70 +171,79 @@ def _joined(parts: Parts, salvage: bool) -> tuple[Recording, Source]:
                 raise split_recordings.different_forms(first, (path, form.name))
             sources.append(_source(stored, path).files)
             del stored
-            recording = _recording(form, data, path, salvage)
+            found.append((base_name(path), _messages(form, data, path, salvage, lost)))
             del data
-            recording.warnings[:0] = [] if lost is None else [lost]
-            found.append((base_name(path), recording))
         order = split_recordings.order_by_start(found)
         whole = split_recordings.merge_recordings([found[place] for place in order], parts.are_parts)
-    except LimitExceededError as error:
-        raise InputDataError(parts.title, str(error), error.remedy) from error
-    del found
-    return whole, _together(parts.name, [file for place in order for file in sources[place]])
+    return whole, _joint_source(parts.name, [file for place in order for file in sources[place]])
 
 
-def _scans(recording: Recording, name: str, source: Source, options: ReadingOptions) -> LaserLog:
-    """The scans of a recording; texts need none of what decodes messages."""
+def _log_of_recording(recording: Recording, name: str, source: Source, options: ReadingOptions) -> LaserLog:
+    """The scans of a recording. The decoders of messages are imported here, as text logs need none."""
     from nscan_cli.logs.recordings.laser_scans import log_from_recording
 
     return log_from_recording(recording, name, source, options)
 
 
 def _form(data: FileBytes, name: str) -> Form:
+    """The form of a log. Raises InputDataError if it is none that is read."""
     for form in FORMS:
         if form.fits(data):
             return form
     found = foreign_kind(bytes(data))
-    remedy = found.remedy or f"give a log: {readable_forms()}"
-    raise InputDataError(name, f"is {found.name}", remedy)
+    raise InputDataError(name, f"is {found.name}", found.remedy or f"give a log: {readable_forms()}")
 
 
-def _recording(form: Form, data: FileBytes, path: str, salvage: bool) -> Recording:
-    """The messages in a container: of a database from its file, where it is one and not compressed."""
+def _messages(form: Form, data: FileBytes, path: str, salvage: bool, warnings: list[str]) -> Recording:
+    """The messages in a container, with `warnings` before its own.
+
+    An SQLite database that is not compressed is read from its file.
+    """
     if form.by_path and isinstance(data, mmap):
         database: Database = form.reader()
-        return database.read_recording_file(path, journals_of(path), label(path), salvage)
-    container: Container = form.reader()
-    return container.read_recording(data, label(path), salvage)
+        recording = database.read_recording_file(path, journals_of(path), label(path), salvage)
+    else:
+        container: Container = form.reader()
+        recording = container.read_recording(data, label(path), salvage)
+    recording.warnings[:0] = warnings
+    return recording
 
 
 def _source(stored: FileBytes, path: str) -> Source:
-    """The file, and what stands beside it."""
+    """Name, hash and size of the file and of the journals beside it."""
     name = base_name(path)
     sha256 = hashlib.sha256(stored).hexdigest() if isinstance(stored, bytes) else sha256_of(path)
-    more = [
-        Source(name + end, sha256_of(other), os.path.getsize(other))
-        for end, other in journals_of(path).items()
+    journals = [
+        Source(name + suffix, sha256_of(journal), os.path.getsize(journal))
+        for suffix, journal in journals_of(path).items()
     ]
     file = Source(name, sha256, len(stored))
-    return _together(name, [file, *more]) if more else file
+    return _joint_source(name, [file, *journals]) if journals else file
 
 
-def _together(name: str, files: Sequence[Source]) -> Source:
-    """Files as one source."""
+def _joint_source(name: str, files: Sequence[Source]) -> Source:
+    """Several files as one source."""
     return Source(
         name, common_hash(file.sha256 for file in files), sum(file.bytes for file in files), tuple(files)
     )
 
 
-def _usable(log: LaserLog, even_unusable: bool) -> LaserLog:
-    """The log. Raises InputDataError where none of its readings counts, unless that is no matter."""
+@contextmanager
+def _limits_as_input_errors(file: str) -> Iterator[None]:
+    """Turn a LimitExceededError into an InputDataError that names the file."""
+    try:
+        yield
+    except LimitExceededError as error:
+        raise InputDataError(file, str(error), error.remedy) from error
+
+
+def _check_usable(log: LaserLog, even_unusable: bool) -> None:
+    """Raise the InputDataError of a log without usable readings, unless `even_unusable`."""
     if log.report.unusable is not None and not even_unusable:
         raise log.report.unusable
-    return log
 
 
-def _noted(log: LaserLog, warnings: Sequence[str]) -> LaserLog:
+def _with_warnings(log: LaserLog, warnings: Sequence[str]) -> LaserLog:
     """The log with more warnings, before its own."""
     if not warnings:
         return log

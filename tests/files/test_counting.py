@@ -38,7 +38,6 @@ NEVER_ONE = {
     ("evaluation/evaluation_report.py", " poses match within "): "a trajectory is aligned by several",
     ("graph/io/json_fields.py", " poses of three "): "of a joint relation",
     ("logs/assemble.py", " scans of up to "): "beyond a limit",
-    ("logs/text/carmen.py", " records can be read: "): "none of so many",
     ("logs/text/carmen.py", " records"): "a tag",
     ("logs/text/carmen.py", " scans; --laser can be "): "a tag",
     ("logs/text/corrected_poses.py", " records"): "a tag",

@@ -34,7 +34,7 @@ def test_outside_the_ends_hold_and_are_told():
     )
     assert found is not None
     np.testing.assert_allclose(found[:, 0], [1, 1.5, 2])
-    assert warnings == ["2 scans before the first record or after the last, which is taken for them"]
+    assert warnings == ["2 scans before the first record or after the last: that one's pose is used"]
 
 
 def test_none_inside_is_no_odometry():
@@ -44,6 +44,6 @@ def test_none_inside_is_no_odometry():
         is None
     )
     assert warnings == [
-        "no scan lies between the first record and the last: these are from 1.000 s to 2.000 s, "
-        "the scans from 5.000 s to 6.000 s: no odometry"
+        "no scan lies between the first record (1.000 s) and the last (2.000 s): "
+        "the scans go from 5.000 s to 6.000 s; no odometry"
     ]

@@ -73,7 +73,7 @@ def test_a_bearing_for_every_beam(tmp_path, form):
     # Each scan is half-way between two positions.
     assert log.odometry is not None
     np.testing.assert_allclose(log.odometry, WAY[:-1] + HALF, atol=1e-6)
-    assert log.report.used["laser"] == "the only laser device, bearings in rad"
+    assert log.report.used["laser"] == "the only laser, bearings in rad"
 
 
 @pytest.mark.parametrize("first", [-90, 0])
@@ -81,7 +81,7 @@ def test_bearings_in_degrees_are_told_by_their_size(tmp_path, first):
     log = read(tmp_path, *of_2002("degrees", 0, first))
     np.testing.assert_allclose(log.angle_min, math.radians(first), atol=1e-12)
     np.testing.assert_allclose(log.angle_increment, math.radians(1), atol=1e-12)
-    assert log.report.used["laser"] == "the only laser device, bearings in degrees"
+    assert log.report.used["laser"] == "the only laser, bearings in degrees"
     # Headings of a few rad stay so.
     assert log.odometry is not None
     assert log.odometry[-1, 2] == pytest.approx(0.75)

@@ -46,7 +46,7 @@ def log_from_recording(recording: Recording, file: str, source: Source, options:
     stamps = valid_stamps([scan.stamp for scan in scans])
     use_stamps = order_messages(stamps)
     if not use_stamps:
-        findings.warnings.append("the scans' own time stamps say nothing: the times of recording are used")
+        findings.warnings.append("the scans' own time stamps are unusable: the times of recording are used")
         stamps = [*log_times]
     raw = _raw_scans(scans, [decimal_seconds(stamp) for stamp in stamps])
     times = order.by_time(raw.stamps)

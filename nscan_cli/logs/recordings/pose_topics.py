@@ -43,7 +43,7 @@ def poses_on_topic(
         raise InputDataError(file, f"no pose on {name} can be read", "choose another topic")
     stamps = [transform.stamp for transform, _ in valid]
     if 2 * len(set(stamps)) < len(stamps):
-        notices.append(f"{file}: the stamps on {name} say nothing: the times of recording are used")
+        notices.append(f"{file}: the stamps on {name} are unusable: the times of recording are used")
         stamps = [log_time for _, log_time in valid]
     poses = np.array([(*one.pose.translation, *one.pose.rotation) for one, _ in valid])
     poses[:, 3:] /= np.linalg.norm(poses[:, 3:], axis=1, keepdims=True)

@@ -1,4 +1,4 @@
-"""Scans of logs that write the bearing of every beam: the first direction and the step that these make."""
+"""First direction and step of a scan whose log writes the bearing of every beam."""
 
 from __future__ import annotations
 
@@ -9,35 +9,36 @@ import numpy as np
 from nscan_cli.files.limits import BEAMS
 from nscan_cli.poses import Array, Indices
 
-FINEST = 6
-"""Decimals; bearings are not written finer than that."""
-UNEVEN = 0.05
-"""Of a step: what a bearing may be off its place, beside what rounding does."""
+MAX_DECIMALS = 6
+"""Largest number of decimals that bearings are written with."""
+MAX_UNEVENNESS = 0.05
+"""Largest distance of a bearing from its even place, beyond rounding, in steps. A larger value accepts less
+even bearings."""
 
 
 class EvenBearings(NamedTuple):
-    """The directions of a scan's readings, evenly spaced; some may have been left out."""
+    """Evenly spaced directions of the readings of a scan, possibly with gaps."""
 
     first: float
     """rad"""
     step: float
-    """rad; negative where the beams run clockwise."""
+    """rad; negative if the beams run clockwise"""
     places: Indices
-    """(n,) which direction each reading has, counted from 0; increasing."""
+    """(n,) index of the direction of each reading, from 0, increasing"""
 
 
 def are_degrees(greatest: Array) -> bool:
-    """Whether bearings are in degrees, from the greatest size (S,) that each of the scans has.
+    """Whether bearings are in degrees, from the largest size (S,) of the bearings of each scan.
 
-    No bearing in rad is beyond a whole turn. A laser that sees less than 6° to each side is none.
+    A bearing in rad is at most 2π. A laser that sees less than 6° to each side is not expected.
     """
     return bool(len(greatest)) and float(np.median(greatest)) > 2 * np.pi + 0.01
 
 
 def even_bearings(bearings: Array, in_degrees: bool) -> EvenBearings | None:
-    """The fan of bearings (n,) as written, or None when they are not evenly spaced.
+    """The even spacing of bearings (n,) as written, or None if they are not evenly spaced.
 
-    Hundredths of a degree, which Player has inside, are restored where the log has rounded them.
+    Player has hundredths of a degree internally. They are restored if the log has rounded them.
     """
     turn = 360.0 if in_degrees else 2 * np.pi
     to_radians = np.pi / 180 if in_degrees else 1.0
@@ -48,9 +49,9 @@ def even_bearings(bearings: Array, in_degrees: bool) -> EvenBearings | None:
     for places in (np.arange(len(bearings)), _with_gaps(bearings, turn)):
         if places is None:
             continue
-        first, step = _line(places, bearings)
+        first, step = _fitted_line(places, bearings)
         off = float(np.abs(first + step * places - bearings).max())
-        if step != 0 and off <= rounding + UNEVEN * abs(step):
+        if step != 0 and off <= rounding + MAX_UNEVENNESS * abs(step):
             hundredths = np.round(np.degrees(np.array([first, step]) * to_radians), 2)
             restored = np.radians(hundredths) / to_radians
             if restored[1] and np.abs(restored[0] + restored[1] * places - bearings).max() <= rounding:
@@ -60,26 +61,26 @@ def even_bearings(bearings: Array, in_degrees: bool) -> EvenBearings | None:
 
 
 def _rounding(values: Array) -> float:
-    """The last decimal that any of the values has."""
-    for decimals in range(FINEST):
+    """The value of the last decimal that any of the values has."""
+    for decimals in range(MAX_DECIMALS):
         scaled = values * 10.0**decimals
         if np.allclose(scaled, np.rint(scaled), rtol=0, atol=1e-6):
             return float(10.0**-decimals)
-    return float(10.0**-FINEST)
+    return float(10.0**-MAX_DECIMALS)
 
 
 def _with_gaps(bearings: Array, turn: float) -> Indices | None:
-    """The places of bearings of which some in between were left out; None where two would share one."""
-    usual = float(np.median(np.diff(bearings)))
-    most = min(BEAMS.value, 1 + turn / abs(usual)) if usual else 0
-    if not usual or abs(bearings[-1] - bearings[0]) > most * abs(usual):
+    """The places of bearings with gaps between them; None if two bearings would share a place."""
+    spacing = float(np.median(np.diff(bearings)))
+    max_places = min(BEAMS.value, 1 + turn / abs(spacing)) if spacing else 0
+    if not spacing or abs(bearings[-1] - bearings[0]) > max_places * abs(spacing):
         return None
-    places: Indices = np.rint((bearings - bearings[0]) / usual).astype(np.int64)
+    places: Indices = np.rint((bearings - bearings[0]) / spacing).astype(np.int64)
     return places if (np.diff(places) > 0).all() else None
 
 
-def _line(places: Indices, bearings: Array) -> tuple[float, float]:
-    """Bearing at place 0, and from place to place, of the line that fits best."""
+def _fitted_line(places: Indices, bearings: Array) -> tuple[float, float]:
+    """Bearing at place 0 and step between places, of the least-squares line."""
     middle = places.mean()
     off = places - middle
     step = float(off @ (bearings - bearings.mean()) / (off @ off))

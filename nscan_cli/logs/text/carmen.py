@@ -15,43 +15,43 @@ from nscan_cli.logs.assemble import Findings, RawScans, RecordedMotion, laser_lo
 from nscan_cli.logs.device_choice import Device
 from nscan_cli.logs.laser_defaults import CARMEN_MAX_RANGE, beam_angles, mount_from_poses
 from nscan_cli.logs.laser_log import LaserLog
-from nscan_cli.logs.odometry_interpolation import interpolated_poses
 from nscan_cli.logs.reading_options import ReadingOptions
 from nscan_cli.logs.skips import Skips
 from nscan_cli.logs.text import carmen_records
-from nscan_cli.logs.text import corrected_poses as corrected
-from nscan_cli.logs.text.carmen_records import CarmenScans
+from nscan_cli.logs.text.carmen_records import CarmenScans, TaggedLines
+from nscan_cli.logs.text.corrected_poses import sign_of_correction
+from nscan_cli.logs.text.odometry_records import odometry_of_records
 from nscan_cli.poses import Array, relative, wrap
 
-Lines = dict[str, list[tuple[int, bytes]]]
 LASERS = ("FLASER", "ROBOTLASER1", "ROBOTLASER0", "RAWLASER1", "RLASER", "ROBOTLASER2", "RAWLASER2",
           "RAWLASER3", "RAWLASER4", "RAWLASER5", "LASER3", "LASER4", "LASER5")  # fmt: skip
-"""Tags of laser records, the one to be preferred first: those of the laser in front, with poses."""
-LARGEST_OFFSET = 1e3
-"""m; what is beyond was never a mounting."""
-REAR = ("RLASER", "ROBOTLASER2", "RAWLASER2")
-FRONT = ("FLASER", "ROBOTLASER1", "ROBOTLASER0", "RAWLASER1")
-TAGS = re.compile(
+"""Tags of laser records in order of preference: first those of the front laser that carry poses."""
+MAX_MOUNT_OFFSET = 1e3
+"""Values of a mounting in PARAM of this size or more (m, rad) are ignored."""
+REAR_LASERS = ("RLASER", "ROBOTLASER2", "RAWLASER2")
+FRONT_LASERS = ("FLASER", "ROBOTLASER1", "ROBOTLASER0", "RAWLASER1")
+KNOWN_TAGS = re.compile(
     r"((RAW|ROBOT)?LASER\d|[FR]LASER|ODOM|TRUEPOS|GLOBALPOS|PARAM|SYNC|ODOMETRY|ARM|IMU|XSENS|INERTIAL"
     r"|SONAR|BUMPER|PANTILT|PTU\w*|GPS\w*|NMEA\w*|NEFF|WEIGHT|MARKER|COMMENT|SM_UPDATE|SCANMARK|POSITION)"
 )
-"""The tags that CARMEN and GMapping write, and some that go with them."""
-MOST_KINDS = 5
-KNOWN = re.compile(
+"""The tags that CARMEN and GMapping write, and others that are usual in such logs."""
+MAX_KINDS_LISTED = 5
+"""Number of unknown kinds of records that a warning lists."""
+CARMEN_LINE = re.compile(
     rb"^[ \t]*(FLASER|RLASER|(RAW|ROBOT)?LASER\d|ODOM|TRUEPOS|PARAM|SYNC|GLOBALPOS)[ \t]", re.MULTILINE
 )
 
 
 def recognises(data: bytes) -> bool:
-    """Whether it is text in which a line near the beginning starts with one of CARMEN's tags."""
-    return b"\0" not in data[:512] and KNOWN.search(data, 0, 1 << 20) is not None
+    """Whether a line near the beginning of a text starts with one of CARMEN's tags."""
+    return b"\0" not in data[:512] and CARMEN_LINE.search(data, 0, 1 << 20) is not None
 
 
 def read(data: bytes, file: str, source: Source, options: ReadingOptions) -> LaserLog:
     """The scans of one laser of a CARMEN log.
 
-    Raises InputDataError when no scan is left to read or the poses are corrected ones, WrongUsageError
-    when the options do not fit the log.
+    Raises InputDataError if there is no readable scan or the poses are corrected ones, and WrongUsageError
+    if the options do not fit the log.
     """
     skips = Skips(file, options.strict)
     lines = carmen_records.lines_by_tag(data, skips)
@@ -60,21 +60,17 @@ def read(data: bytes, file: str, source: Source, options: ReadingOptions) -> Las
     options.refuse_topics(file, "a CARMEN log", "--laser")
     findings.lasers = tuple(Device(tag, tag, len(lines[tag])) for tag in LASERS if tag in lines)
     tag, used["laser"] = _chosen_laser(lines, options, file, warnings)
-    strange = {name: count for name, count in findings.records.items() if not TAGS.fullmatch(name)}
-    if strange:
-        kinds = ", ".join(f"{name} ({count})" for name, count in list(strange.items())[:MOST_KINDS])
-        more = ", …" if len(strange) > MOST_KINDS else ""
+    unknown = {name: count for name, count in findings.records.items() if not KNOWN_TAGS.fullmatch(name)}
+    if unknown:
+        kinds = ", ".join(f"{name} ({count})" for name, count in list(unknown.items())[:MAX_KINDS_LISTED])
+        more = ", …" if len(unknown) > MAX_KINDS_LISTED else ""
         warnings.append(
-            f"{counted(sum(strange.values()), 'record')} of kinds unknown to CARMEN: {kinds}{more}"
+            f"{counted(sum(unknown.values()), 'record')} of kinds unknown to CARMEN: {kinds}{more}"
         )
     scans = carmen_records.carmen_scans(tag, lines[tag], skips)
     if not scans.stamps:
-        reason, (_, first) = next(iter(skips.reasons.items()))
-        raise InputDataError(
-            file, f"none of its {len(lines[tag])} {tag} records can be read: {reason}",
-            "give a log with whole records", first,
-        )  # fmt: skip
-    findings.corrected = sign = corrected.sign_of_correction(lines, scans)
+        raise skips.nothing_read(f"{tag} record")
+    findings.corrected = sign = sign_of_correction(lines, scans)
     if sign and options.odometry and not options.allow_corrected:
         raise InputDataError(
             file, f"its poses are a mapper's result, not odometry ({sign})",
@@ -83,10 +79,10 @@ def read(data: bytes, file: str, source: Source, options: ReadingOptions) -> Las
     if sign:
         warnings.append(f"the poses are a mapper's result, not odometry ({sign})")
     params = _params(lines)
-    times, by_logger = _times(lines[tag], scans, warnings)
-    mount, used["mounting"] = _mount(tag, scans, params, options, warnings)
+    times, by_logger = _scan_order(lines[tag], scans, warnings)
+    mount, used["mounting"] = _carmen_mount(tag, scans, params, options, warnings)
     angle_min, angle_increment, angle_max = _angles(scans)
-    farthest, doubtful = _farthest(tag, scans, params)
+    farthest, doubtful = _max_range(tag, scans, params)
     raw = RawScans(
         scans.ranges,
         angle_min,
@@ -98,30 +94,29 @@ def read(data: bytes, file: str, source: Source, options: ReadingOptions) -> Las
         angle_max,
         scans.beams,
     )
-    odometry: Array | None = None
-    used["odometry"] = "none: --no-odometry"
-    if options.odometry:
-        odometry, used["odometry"] = _odometry(tag, scans, times, by_logger, lines, skips, warnings)
-    motion = RecordedMotion(odometry, *_truth(lines, by_logger, skips, warnings))
+    odometry = _odometry(tag, scans, times, by_logger, lines, options, findings)
+    motion = RecordedMotion(odometry, *_true_poses(lines, by_logger, skips, warnings))
     return laser_log(source, "CARMEN", tag, raw, times, mount, motion, findings, options, file)
 
 
-def _times(
+def _scan_order(
     lines: list[tuple[int, bytes]], scans: CarmenScans, warnings: list[str]
 ) -> tuple[order.ScanOrder, bool]:
-    """The scans in order of time, and whether it is that of the logger: only where their own say nothing."""
+    """The scans in order of time, and whether the logger's stamps replace the scans' own, unusable ones."""
     times = order.by_time(scans.stamps)
     if times.nominal or not times.times.any():
         logged = order.by_time(carmen_records.logger_stamps(lines, scans))
         if not logged.nominal and logged.times[-1] > logged.times[0]:
-            warnings += ["the scans' own time stamps say nothing: the logger's are used", *logged.warnings]
+            warnings += ["the scans' own time stamps are unusable: the logger's are used", *logged.warnings]
             return logged, True
     warnings += times.warnings
     return times, False
 
 
-def _chosen_laser(lines: Lines, options: ReadingOptions, file: str, warnings: list[str]) -> tuple[str, str]:
-    """The tag of the laser to use, and why."""
+def _chosen_laser(
+    lines: TaggedLines, options: ReadingOptions, file: str, warnings: list[str]
+) -> tuple[str, str]:
+    """The tag of the laser to use, and the reason. Raises InputDataError and WrongUsageError."""
     present = [tag for tag in LASERS if tag in lines]
     if not present:
         found = ", ".join(lines) or "no record at all"
@@ -137,12 +132,12 @@ def _chosen_laser(lines: Lines, options: ReadingOptions, file: str, warnings: li
     others = ", ".join(f"{tag} ({len(lines[tag])})" for tag in present[1:])
     if others:
         warnings.append(f"{present[0]} is used; --laser would choose {others}")
-        return present[0], "the laser in front, with poses, before others"
+        return present[0], "the front laser, with poses, is preferred"
     return present[0], "the only laser"
 
 
-def _params(lines: Lines) -> dict[str, float]:
-    """PARAM values that are numbers; the last one of a name holds."""
+def _params(lines: TaggedLines) -> dict[str, float]:
+    """The PARAM values that are numbers; the last one of a name is used."""
     params = {}
     for _, text in lines.get("PARAM", []):
         tokens = text.split()
@@ -154,13 +149,13 @@ def _params(lines: Lines) -> dict[str, float]:
     return params
 
 
-def _mount(
+def _carmen_mount(
     tag: str, scans: CarmenScans, params: Mapping[str, float], options: ReadingOptions, warnings: list[str]
 ) -> tuple[Array, str]:
-    """The laser on the robot, and why: as the user says, else from both poses of the record, else from PARAM.
+    """Pose (3,) of the laser on the robot, and its origin: --mount, else the record's poses, else PARAM.
 
-    CARMEN: laser pose = robot pose ⊕ (offset, side offset, angular offset), for the rear laser too, whose
-    angular offset is half a turn where the log gives none.
+    CARMEN: laser pose = robot pose ⊕ (offset, side offset, angular offset). The angular offset of the rear
+    laser is 180° if the log has none.
     """
     if options.mount is not None:
         return np.array(options.mount, dtype=np.float64), "--mount"
@@ -171,42 +166,44 @@ def _mount(
             off = np.abs(relative(mount, given))
             if max(off[0], off[1]) > 0.01 or off[2] > np.radians(0.5):
                 warnings.append(
-                    f"PARAM mounts the laser at {_said(given)}, the poses at {_said(mount)}: these hold"
+                    f"PARAM mounts the laser at {_pose_text(given)}, the poses at {_pose_text(mount)}: "
+                    "that of the poses is used"
                 )
         return mount, f"both poses of {tag}"
     if given is not None:
         if scans.robot.shape[1] and given.any():
-            warnings.append(f"both poses of {tag} are equal; the mounting is PARAM's, {_said(given)}")
+            warnings.append(f"both poses of {tag} are equal; the mounting is PARAM's, {_pose_text(given)}")
         return given, "PARAM"
-    if tag in REAR:
-        warnings.append("the log does not say how the rear laser is mounted: taken as turned by 180°")
+    if tag in REAR_LASERS:
+        warnings.append("the log does not say how the rear laser is mounted: assumed turned by 180°")
         return np.array([0.0, 0.0, np.pi]), "assumed: turned by 180°"
-    if tag not in FRONT:
+    if tag not in FRONT_LASERS:
         warnings.append(
-            f"the log does not say how {tag} is mounted: taken as at the robot's centre; see --mount"
+            f"the log does not say how {tag} is mounted: assumed at the robot's centre; see --mount"
         )
     return np.zeros(3), "assumed: at the robot's centre"
 
 
 def _param_mount(tag: str, params: Mapping[str, float]) -> Array | None:
-    side = "front" if tag in FRONT else "rear" if tag in REAR else None
+    """The mounting (3,) that PARAM gives, or None if it gives none or an absurd one."""
+    side = "front" if tag in FRONT_LASERS else "rear" if tag in REAR_LASERS else None
     names = [f"robot_{side}laser_{what}" for what in ("offset", "side_offset", "angular_offset")]
     if not any(name in params for name in names):
         return None
     default = (0.0, 0.0, np.pi if side == "rear" else 0.0)
-    values = np.array([params.get(name, usual) for name, usual in zip(names, default, strict=True)])
-    if not (np.abs(values) < LARGEST_OFFSET).all():
+    values = np.array([params.get(name, value) for name, value in zip(names, default, strict=True)])
+    if not (np.abs(values) < MAX_MOUNT_OFFSET).all():
         return None
     values[2] = wrap(values[2])
     return values
 
 
-def _said(pose: Array) -> str:
+def _pose_text(pose: Array) -> str:
     return f"{pose[0]:g} m, {pose[1]:g} m, {np.degrees(pose[2]):g}°"
 
 
 def _angles(scans: CarmenScans) -> tuple[Array, Array, Array]:
-    """First direction, step and last direction (S,) of each scan, rad; nan for a last one that none says."""
+    """First direction, step and last direction (S,) of each scan, rad; nan for an unknown last one."""
     counts, which = np.unique(scans.beams, return_inverse=True)
     angles = np.array([beam_angles(beams) for beams in counts.tolist()])[which]
     last = np.full(len(angles), np.nan)
@@ -217,20 +214,20 @@ def _angles(scans: CarmenScans) -> tuple[Array, Array, Array]:
     return angles[:, 0], angles[:, 1], last
 
 
-def _farthest(
+def _max_range(
     tag: str, scans: CarmenScans, params: Mapping[str, float]
 ) -> tuple[float, Sequence[tuple[float, str]]]:
-    """The range (m) from which on a reading says that nothing was met, and others that the log names.
+    """The range (m) from which a reading means no return, and limits that may be the navigation's instead.
 
-    The PARAM is what CARMEN's robot module goes by; people set it to what they navigate with.
+    CARMEN's robot module uses the PARAM, which people often set for navigation.
     """
     named = []
     if scans.head.shape[1] and (scans.head[:, 4] > 0).any():
         named.append((float(scans.head[:, 4].max()), f"the greatest range in {tag}"))
     farthest = max([CARMEN_MAX_RANGE, *(limit for limit, _ in named)])
-    side = "front" if tag in FRONT else "rear"
+    side = "front" if tag in FRONT_LASERS else "rear"
     param = f"robot_{side}_laser_max"
-    if tag in (*FRONT, *REAR) and params.get(param, 0) > 0:
+    if tag in (*FRONT_LASERS, *REAR_LASERS) and params.get(param, 0) > 0:
         named.append((params[param], f"PARAM {param}"))
     return farthest, named
 
@@ -240,39 +237,38 @@ def _odometry(
     scans: CarmenScans,
     times: order.ScanOrder,
     by_logger: bool,
-    lines: Lines,
-    skips: Skips,
-    warnings: list[str],
-) -> tuple[Array | None, str]:
-    """Poses of the robot (S, 3) in order of time, and why: the record's own, else of the ODOM lines."""
-    if scans.robot.shape[1]:
-        if len(times.rows) > 1 and not scans.robot.any():
-            warnings.append("all poses are zero: taken as a log without odometry")
-            return None, "none: all poses are zero"
-        poses = scans.robot[times.rows]
-        poses[:, 2] = wrap(poses[:, 2])
-        return poses, f"the poses in {tag}"
-    values, stamps, _ = carmen_records.numbers(lines.get("ODOM", []), 6, skips, by_logger=by_logger)
-    if not len(values):
-        warnings.append(f"{tag} carries no pose and the log has no ODOM record: no odometry")
-        return None, "none: no pose in the log"
-    moments = order.by_time(stamps)
-    if times.nominal or moments.nominal:
-        warnings.append(f"{tag} carries no pose, and the time stamps do not lead to ODOM's: no odometry")
-        return None, "none: no time stamps"
-    found = interpolated_poses(times.times, moments.times, values[moments.rows, :3], "ODOM record", warnings)
-    return found, "none: at other times" if found is None else "ODOM records, interpolated"
+    lines: TaggedLines,
+    options: ReadingOptions,
+    findings: Findings,
+) -> Array | None:
+    """Poses of the robot (S, 3) in order of time: the scans' own, else those of the ODOM records."""
+    if not options.odometry:
+        findings.used["odometry"] = "none: --no-odometry"
+        return None
+    if not scans.robot.shape[1]:
+        values, stamps = carmen_records.carmen_poses(lines.get("ODOM", []), findings.skips, by_logger)
+        recorded = order.by_time(stamps)
+        name, origin = "ODOM record", "ODOM records, interpolated"
+        return odometry_of_records(times, recorded, values[recorded.rows], name, origin, findings)
+    if len(times.rows) > 1 and not scans.robot.any():
+        findings.used["odometry"] = "none: all poses are zero"
+        findings.warnings.append("all poses are zero: the log is read as one without odometry")
+        return None
+    findings.used["odometry"] = f"the poses in {tag}"
+    poses = scans.robot[times.rows]
+    poses[:, 2] = wrap(poses[:, 2])
+    return poses
 
 
-def _truth(
-    lines: Lines, by_logger: bool, skips: Skips, warnings: list[str]
+def _true_poses(
+    lines: TaggedLines, by_logger: bool, skips: Skips, warnings: list[str]
 ) -> tuple[Array | None, Array | None]:
     """Times (T,) and true poses (T, 3) of the TRUEPOS records, sorted by time."""
-    values, stamps, _ = carmen_records.numbers(lines.get("TRUEPOS", []), 6, skips, by_logger=by_logger)
+    values, stamps = carmen_records.carmen_poses(lines.get("TRUEPOS", []), skips, by_logger)
     if not len(values):
         return None, None
-    moments = order.by_time(stamps)
-    if moments.nominal:
-        warnings.append("the time stamps of TRUEPOS say nothing: no true poses")
+    recorded = order.by_time(stamps)
+    if recorded.nominal:
+        warnings.append("the time stamps of TRUEPOS are unusable: no true poses")
         return None, None
-    return moments.times, values[moments.rows, :3]
+    return recorded.times, values[recorded.rows]

@@ -1,4 +1,4 @@
-"""CARMEN text, line by line: which records there are, and the numbers in them.
+"""The records of a CARMEN log and the numbers in them.
 
 Source of the form: CARMEN, src/logger/writelog.c. A line is `TAG values… ipc_timestamp host
 logger_timestamp`; lines that begin with # are comments.
@@ -22,18 +22,25 @@ from nscan_cli.logs.text.line_records import (
     ascii_text,
     beam_count,
     blocks,
+    pose_rows,
     rows_within_bounds,
-    within_bounds,
 )
 from nscan_cli.poses import Array
 
 TAG = re.compile(rb"[A-Z][A-Z0-9_]{2,31}\Z")
-NEW = re.compile(r"(RAW|ROBOT)LASER\d\Z")
-LASER = re.compile(rb"((RAW|ROBOT)?LASER\d|[FR]LASER)\Z")
-USED = (b"ODOM", b"TRUEPOS", b"PARAM")
-UNUSED = (0, b"")
-"""Stands for a line that is only counted."""
+TAG_WITH_ANGLES = re.compile(r"(RAW|ROBOT)LASER\d\Z")
+"""Tags of the newer laser messages, which carry their angles."""
+LASER_TAG = re.compile(rb"((RAW|ROBOT)?LASER\d|[FR]LASER)\Z")
+TAGS_READ = (b"ODOM", b"TRUEPOS", b"PARAM")
+"""Other tags whose records are read."""
+ONLY_COUNTED = (0, b"")
+"""Placeholder for a line that is only counted."""
+POSE_VALUES = 6
+"""Number of values of ODOM and TRUEPOS: x, y, θ and three more."""
 TRAILER = 3
+"""Number of fields after the values: time stamp, host and the logger's time stamp."""
+TaggedLines = dict[str, list[tuple[int, bytes]]]
+"""Lines (number from 1, bytes without the tag) in file order, by tag."""
 
 
 @dataclass
@@ -43,23 +50,21 @@ class CarmenScans:
     ranges: NDArray[np.float32]
     """(S, B) as written; nan beyond a scan's own beams."""
     beams: NDArray[np.int64]
-    """(S,)"""
+    """(S,) number of beams."""
     head: Array
-    """(S, 7) of new messages: type, start angle, fov, resolution, maximum, accuracy, mode; else (S, 0)."""
+    """(S, 7) type, start angle, field of view, resolution, maximum, accuracy and mode of newer messages;
+    (S, 0) for older ones."""
     laser: Array
-    """(S, 3) pose of the laser in the odometry frame; (S, 0) when the message has none."""
+    """(S, 3) pose of the laser in the odometry frame; (S, 0) if the message has none."""
     robot: Array
-    """(S, 3) pose of the robot, likewise."""
+    """(S, 3) pose of the robot in the odometry frame; (S, 0) if the message has none."""
     stamps: list[str]
     lines: list[int]
     hosts: set[bytes]
 
 
-def lines_by_tag(data: bytes, skips: Skips) -> dict[str, list[tuple[int, bytes]]]:
-    """The lines of a log (number from 1, bytes without the tag), by their tag, in file order.
-
-    Of tags that are neither of a laser nor USED, there are as many UNUSED as lines.
-    """
+def lines_by_tag(data: bytes, skips: Skips) -> TaggedLines:
+    """The lines of a log by tag. A line with a tag that is not read is replaced by ONLY_COUNTED."""
     by_tag: dict[bytes, list[tuple[int, bytes]]] = {}
     used: set[bytes] = set()
     for number, line in enumerate(io.BytesIO(data), 1):
@@ -75,42 +80,30 @@ def lines_by_tag(data: bytes, skips: Skips) -> dict[str, list[tuple[int, bytes]]
                 skips.add("not a CARMEN record", number)
                 continue
             known = by_tag[tag] = []
-            if tag in USED or LASER.match(tag):
+            if tag in TAGS_READ or LASER_TAG.match(tag):
                 used.add(tag)
-        known.append((number, rest) if tag in used else UNUSED)
+        known.append((number, rest) if tag in used else ONLY_COUNTED)
     return {tag.decode(): lines for tag, lines in by_tag.items()}
 
 
-def numbers(
-    lines: list[tuple[int, bytes]], count: int, skips: Skips, stamped: bool = True, by_logger: bool = False
-) -> tuple[Array, list[str], list[int]]:
-    """Rows (R, count) of a short record such as ODOM, with stamps and line numbers.
+def carmen_poses(lines: list[tuple[int, bytes]], skips: Skips, by_logger: bool) -> tuple[Array, list[str]]:
+    """Poses (R, 3) and stamps of ODOM or TRUEPOS records; malformed ones are skipped.
 
-    `stamped`: a line without trailer is of no use. `by_logger`: the stamps are the logger's. Lines of
-    another length or with a value out of bounds are skipped.
+    The stamps are the logger's if `by_logger`.
     """
-    rows, stamps, places = [], [], []
+    records = []
     for number, text in lines:
         tokens = text.split()
-        if len(tokens) not in ((count + TRAILER,) if stamped else (count + TRAILER, count)):
+        if len(tokens) != POSE_VALUES + TRAILER:
             skips.add("wrong number of values", number)
             continue
-        try:
-            row = [float(token) for token in tokens[:count]]
-        except ValueError:
-            skips.add("a value is not a number", number)
-            continue
-        if not within_bounds(row):
-            skips.add("a value is out of bounds", number)
-            continue
-        rows.append(row)
-        stamps.append(ascii_text(tokens[-1 if by_logger else count]) if len(tokens) > count else "")
-        places.append(number)
-    return np.array(rows, dtype=np.float64).reshape(-1, count), stamps, places
+        values, stamp = b" ".join(tokens[:POSE_VALUES]), ascii_text(tokens[-1 if by_logger else POSE_VALUES])
+        records.append(LineRecord(number, values, POSE_VALUES, stamp))
+    return pose_rows(records, (POSE_VALUES,), skips)
 
 
 def logger_stamps(lines: list[tuple[int, bytes]], scans: CarmenScans) -> list[str]:
-    """When the scans were logged: the end of their lines; empty for those without a trailer."""
+    """The times at which the scans were logged, at the end of their lines; empty without a trailer."""
     ends = dict(lines)
     return [
         ascii_text(ends[line].split()[-1]) if stamp else ""
@@ -119,15 +112,15 @@ def logger_stamps(lines: list[tuple[int, bytes]], scans: CarmenScans) -> list[st
 
 
 def carmen_scans(tag: str, lines: list[tuple[int, bytes]], skips: Skips) -> CarmenScans:
-    """The scans of all lines of one laser tag; malformed ones are skipped. Raises LimitExceededError."""
-    head = 7 if NEW.match(tag) else 0
+    """The scans of one laser tag; malformed ones are skipped. Raises LimitExceededError."""
+    head = 7 if TAG_WITH_ANGLES.match(tag) else 0
     poses = 6 if tag in ("FLASER", "RLASER") or tag.startswith("ROBOT") else 0
     tail = poses + (5 if tag.startswith("ROBOT") else 0)
     counts: dict[bytes, int] = {}
     records = [
         record
         for number, text in lines
-        if (record := _record(number, text, head, tail, counts, skips)) is not None
+        if (record := _laser_record(number, text, head, tail, counts, skips)) is not None
     ]
     widest = max((n for _, n in records), default=0)
     size = len(records)
@@ -143,7 +136,7 @@ def carmen_scans(tag: str, lines: list[tuple[int, bytes]], skips: Skips) -> Carm
     )
     row = 0
     for block in blocks(records, skips):
-        good, values = _without_problems(block, head, poses, tail, skips)
+        good, values = _plausible_records(block, head, poses, tail, skips)
         rows = slice(row, row + len(good))
         with np.errstate(over="ignore"):
             result.ranges[rows, : block.beams] = values[:, head + 1 : head + 1 + block.beams]
@@ -162,13 +155,12 @@ def carmen_scans(tag: str, lines: list[tuple[int, bytes]], skips: Skips) -> Carm
     return result
 
 
-def _record(
+def _laser_record(
     number: int, text: bytes, head: int, tail: int, counts: dict[bytes, int], skips: Skips
 ) -> tuple[LineRecord, int] | None:
-    """One laser line and its number of beams, or None when it is malformed.
+    """A laser line and its number of beams, or None if the line is malformed.
 
-    The beam count is believed only as far as the line has that many values. `counts` are the beam counts
-    that were found to be some already: a log has few.
+    The line must have as many values as the beam count says. `counts` caches the beam counts by their text.
     """
     if b"  " in text or b"\t" in text:
         text = b" ".join(text.split())
@@ -181,20 +173,20 @@ def _record(
     if beams is None:
         return None
     counts[start[head]] = beams
-    least = head + 1 + beams + tail + (1 if head else 0)
-    if tokens == least and not head:
+    needed = head + 1 + beams + tail + (1 if head else 0)
+    if tokens == needed and not head:
         return LineRecord(number, text, tokens, ""), beams
-    if tokens < least + TRAILER or (tokens > least + TRAILER and not head):
+    if tokens < needed + TRAILER or (tokens > needed + TRAILER and not head):
         skips.add("wrong number of values", number)
         return None
     values, stamp, host, _ = text.rsplit(b" ", TRAILER)
     return LineRecord(number, values, tokens - TRAILER, ascii_text(stamp), host), beams
 
 
-def _without_problems(
+def _plausible_records(
     block: Block, head: int, poses: int, tail: int, skips: Skips
 ) -> tuple[list[LineRecord], Array]:
-    """The laser records of a block whose numbers can be true, and their values; the others are skipped."""
+    """The laser records of a block with plausible values, and these values; the others are skipped."""
     values = block.values
     problems: list[tuple[str, NDArray[np.bool_]]] = []
     if head:

@@ -1,4 +1,4 @@
-"""Signs that the poses of a CARMEN log are a mapper's result and no longer odometry."""
+"""Signs that the poses of a CARMEN log are the result of a mapper, not odometry."""
 
 from __future__ import annotations
 
@@ -9,14 +9,14 @@ import numpy as np
 from nscan_cli.logs.text.carmen_records import CarmenScans
 
 OWN_HOST = b"nscan-cli"
-"""The host of the records that this program writes, whose poses are corrected ones."""
+"""The host in the records that this program writes. Their poses are corrected."""
 
 
 def sign_of_correction(tags: Container[str], scans: CarmenScans) -> str:
-    """What gives the log away as corrected (by GMapping's gfs2log and its like), or an empty string.
+    """The sign that a mapper (such as GMapping's gfs2log) wrote the poses; empty if there is none.
 
-    Equal poses of laser and robot alone are no sign: many raw logs have them. Together with stamps
-    printed by %g, of six significant digits, they are.
+    Equal poses of laser and robot alone are no sign, as many raw logs have them. Together with stamps of six
+    significant digits, as %g prints, they are.
     """
     for tag in ("NEFF", "WEIGHT"):
         if tag in tags:
@@ -27,13 +27,13 @@ def sign_of_correction(tags: Container[str], scans: CarmenScans) -> str:
         return "its host is nscan-cli, which writes corrected poses"
     equal = scans.robot.shape[1] and np.array_equal(scans.laser, scans.robot)
     stamps = [stamp for stamp in scans.stamps if stamp]
-    if equal and stamps and all(map(_is_short, stamps)) and any(map(_lost_digits, stamps)):
+    if equal and stamps and all(map(_is_six_digit_stamp, stamps)) and any(map(_lost_digits, stamps)):
         return "both poses of each scan are equal, and its times have six digits"
     return ""
 
 
-def _is_short(stamp: str) -> bool:
-    """Whether a stamp is what %g prints."""
+def _is_six_digit_stamp(stamp: str) -> bool:
+    """Whether a stamp could be printed by %g."""
     try:
         return f"{float(stamp):g}" == stamp
     except ValueError:

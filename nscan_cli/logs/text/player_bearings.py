@@ -1,6 +1,6 @@
-"""Laser records of Player logs that have no head: a range, a bearing and an intensity for each beam.
+"""Laser records of Player logs with a range, a bearing and an intensity for each beam, and no header.
 
-So are they in logs of 2002, older than Player's writelog.cc, and in some with the lines' heads of version 1.
+Logs of 2002, older than Player's writelog.cc, have them, and so do some logs of version 1.
 """
 
 from __future__ import annotations
@@ -18,40 +18,39 @@ from nscan_cli.logs.text.bearings import EvenBearings, are_degrees, even_bearing
 from nscan_cli.logs.text.line_records import LineRecord, beams_problem, parsed, within_bounds
 from nscan_cli.poses import Array
 
-VALUES = 3
-"""Of a beam."""
-LONGEST_NUMBER = 10
-"""Digits of a beam count."""
-LARGEST = 720.0
-"""Degrees; what is beyond was never a bearing."""
+VALUES_PER_BEAM = 3
+MAX_DIGITS = 10
+"""An index, type or beam count of a Player record has fewer digits."""
+MAX_BEARING = 720.0
+"""Records with a bearing above this size are skipped, degrees."""
 
 
-class Row(NamedTuple):
-    """A scan as its line has it."""
+class BearingScan(NamedTuple):
+    """A scan as it is in its line."""
 
     record: LineRecord
     ranges: Array
     """(n,) m"""
     bearings: Array
-    """(n,) rad or degrees"""
+    """(n,) rad or degrees, as written"""
 
 
 def have_bearings(records: list[LineRecord], headed: bool) -> bool:
-    """Whether these laser records are of this kind; `headed`: they can have a head with a beam count."""
+    """Whether these laser records have bearings and no header. `headed`: the version has headers too."""
     if any(map(_has_head, records)):
         return False
-    return not headed or any(record.count and record.count % VALUES == 0 for record in records)
+    return not headed or any(record.count and record.count % VALUES_PER_BEAM == 0 for record in records)
 
 
 def bearing_scans(records: list[LineRecord], skips: Skips) -> tuple[RawScans, str]:
-    """The scans in file order, and the unit of the bearings; what cannot be read is skipped.
+    """The scans in file order and the unit of their bearings; malformed records are skipped.
 
     Raises LimitExceededError.
     """
     rows = _rows(records, skips)
     in_degrees = are_degrees(np.array([np.abs(row.bearings).max() for row in rows]))
     fans: dict[bytes, EvenBearings | None] = {}
-    whole: list[tuple[Row, EvenBearings]] = []
+    whole: list[tuple[BearingScan, EvenBearings]] = []
     for row in rows:
         key = row.bearings.tobytes()
         if key not in fans:
@@ -63,7 +62,7 @@ def bearing_scans(records: list[LineRecord], skips: Skips) -> tuple[RawScans, st
             whole.append((row, found))
     whole = _not_cut_off(whole, skips)
     raw = RawScans(
-        _table(whole),
+        _ranges_by_direction(whole),
         np.array([found.first for _, found in whole]),
         np.array([found.step for _, found in whole]),
         [row.record.stamp for row, _ in whole],
@@ -75,16 +74,16 @@ def bearing_scans(records: list[LineRecord], skips: Skips) -> tuple[RawScans, st
 
 
 def has_degrees(poses: Array) -> bool:
-    """Whether the headings of poses (P, 3) are in degrees: then the robot drives where they point.
+    """Whether the headings of poses (P, 3) are in degrees, because the robot then moves along them.
 
-    Headings within a turn of rad, and those of a robot that stands, are in rad.
+    Headings within 2π, and those of a robot that does not move, are taken as rad.
     """
-    if np.abs(poses[:, 2]).max() <= 2 * np.pi + 0.01:
+    if not len(poses) or np.abs(poses[:, 2]).max() <= 2 * np.pi + 0.01:
         return False
     x, y = np.diff(poses[:, 0]), np.diff(poses[:, 1])
     far = np.hypot(x, y) > 0
     way, headings = np.arctan2(y, x)[far], poses[:-1, 2][far]
-    # Twice the angle: it may drive backwards.
+    # Twice the angle, because the robot may drive backwards.
     lengths = np.hypot(x, y)[far]
     in_degrees, in_rad = (
         float(np.cos(2 * (way - angles)) @ lengths) for angles in (np.radians(headings), headings)
@@ -93,16 +92,17 @@ def has_degrees(poses: Array) -> bool:
 
 
 def _has_head(record: LineRecord) -> bool:
-    """Whether it is one of version 1: first and last angle, step, count, and two values for each beam."""
+    """Whether it is of version 1: first and last angle, step, count, and two values for each beam."""
     start = record.values.split(b" ", 4)[:4]
     count = start[3] if len(start) == 4 else b""
-    return count.isdigit() and len(count) < LONGEST_NUMBER and 4 + 2 * int(count) == record.count
+    return count.isdigit() and len(count) < MAX_DIGITS and 4 + 2 * int(count) == record.count
 
 
-def _rows(records: list[LineRecord], skips: Skips) -> list[Row]:
+def _rows(records: list[LineRecord], skips: Skips) -> list[BearingScan]:
+    """The scans with valid numbers of values and bearings; other records are skipped."""
     whole = []
     for record in records:
-        beams, more = divmod(record.count, VALUES)
+        beams, more = divmod(record.count, VALUES_PER_BEAM)
         problem = "wrong number of values" if more or not beams else beams_problem(beams)
         if problem:
             skips.add(problem, record.line)
@@ -110,20 +110,24 @@ def _rows(records: list[LineRecord], skips: Skips) -> list[Row]:
             whole.append((record, beams))
     rows = []
     for record, _, values in parsed(whole, skips):
-        bearings = values[1::VALUES]
-        if not within_bounds(bearings) or np.abs(bearings).max() > LARGEST:
+        bearings = values[1::VALUES_PER_BEAM]
+        if not within_bounds(bearings) or np.abs(bearings).max() > MAX_BEARING:
             skips.add("a bearing is out of bounds", record.line)
         else:
-            rows.append(Row(record, values[::VALUES], bearings))
+            rows.append(BearingScan(record, values[::VALUES_PER_BEAM], bearings))
     return rows
 
 
-def _not_cut_off(whole: list[tuple[Row, EvenBearings]], skips: Skips) -> list[tuple[Row, EvenBearings]]:
-    """All but those that begin as most scans do, and end before: no count says that a line is whole."""
-    usual = Counter((found.first, found.step, int(found.places[-1])) for _, found in whole).most_common(1)
+def _not_cut_off(
+    whole: list[tuple[BearingScan, EvenBearings]], skips: Skips
+) -> list[tuple[BearingScan, EvenBearings]]:
+    """The scans without those that begin as most do but end earlier: a line has no count of its beams."""
+    most_frequent = Counter(
+        (found.first, found.step, int(found.places[-1])) for _, found in whole
+    ).most_common(1)
     kept = []
     for row, found in whole:
-        first, step, last = usual[0][0]
+        first, step, last = most_frequent[0][0]
         if found.places[-1] < last and abs(found.first - first) < abs(step) / 2:
             skips.add("fewer beams than the other scans, from the same bearing on", row.record.line)
         else:
@@ -131,8 +135,8 @@ def _not_cut_off(whole: list[tuple[Row, EvenBearings]], skips: Skips) -> list[tu
     return kept
 
 
-def _table(whole: list[tuple[Row, EvenBearings]]) -> NDArray[np.float32]:
-    """The readings (S, B) by direction; nan where there is none. Raises LimitExceededError."""
+def _ranges_by_direction(whole: list[tuple[BearingScan, EvenBearings]]) -> NDArray[np.float32]:
+    """The readings (S, B) by direction; nan if there is none. Raises LimitExceededError."""
     table = empty_scan_table(len(whole), max((int(found.places[-1]) + 1 for _, found in whole), default=0))
     with np.errstate(over="ignore", invalid="ignore"):
         for readings, (row, found) in zip(table, whole, strict=True):

@@ -1,9 +1,9 @@
-"""Player text, line by line: which devices there are, and the numbers in their records.
+"""The devices of a Player log and the numbers in their records.
 
 Source of the form: Player, server/drivers/shell/writelog.cc. Version 1: `server_time host port interface
 index data_time payload`. Version 2: `time host robot interface index type subtype payload`. Logs of 2002,
-here version 0, are older than that file: `interface index time payload`. Lengths in m, angles in rad; lines
-that begin with # are comments.
+version 0 here, are older than that file: `interface index time payload`. Lengths are in m, angles in rad.
+Lines that begin with # are comments.
 """
 
 from __future__ import annotations
@@ -21,22 +21,25 @@ from nscan_cli.logs.assemble import RawScans, scan_table
 from nscan_cli.logs.laser_defaults import CARMEN_MAX_RANGE
 from nscan_cli.logs.skips import Skips
 from nscan_cli.logs.text import player_bearings
-from nscan_cli.logs.text.line_records import LineRecord, ascii_text, beam_count, parsed, within_bounds
+from nscan_cli.logs.text.line_records import (
+    LineRecord,
+    ascii_text,
+    beam_count,
+    parsed,
+    pose_rows,
+    within_bounds,
+)
 from nscan_cli.poses import Array
 
 Version = Literal[0, 1, 2]
-Line = tuple[int, bytes, bytes]
-"""Number in the file (from 1), time stamp, payload."""
-Lines = dict[tuple[str, str], list[Line]]
-"""By device, as in laser:0, and by type and subtype, as in 1:1; these are empty in version 1."""
-PLACES: dict[Version, tuple[int, int, int]] = {0: (3, 0, 2), 1: (6, 3, 5), 2: (7, 3, 0)}
-"""How many fields go before the payload, and which of them the interface and the time stamp are."""
+PayloadLine = tuple[int, bytes, bytes]
+"""Line number in the file (from 1), time stamp, payload."""
+DeviceLines = dict[tuple[str, str], list[PayloadLine]]
+"""Lines by device, such as laser:0, and by type and subtype, such as 1:1, which only version 2 has."""
+FIELD_POSITIONS: dict[Version, tuple[int, int, int]] = {0: (3, 0, 2), 1: (6, 3, 5), 2: (7, 3, 0)}
+"""Number of fields before the payload, position of the interface, position of the time stamp."""
 ANGLES: dict[Version, slice] = {0: slice(-4, -1), 1: slice(-4, -1), 2: slice(-5, -2)}
-"""Where first and last direction and step stand in what goes before the ranges."""
-FEWEST = 3
-"""Values of a pose."""
-LONGEST_NUMBER = 10
-"""Digits of an index or a type."""
+"""Positions of first direction, last direction and step in the values before the ranges."""
 INTERFACE = re.compile(rb"[a-z]\w*\Z")
 
 
@@ -46,19 +49,19 @@ class PlayerScans:
 
     raw: RawScans
     robot: Array | None
-    """(S, 3) pose of the robot in the scans of form 1:2, when all have one."""
+    """(S, 3) pose of the robot if all scans are of form 1:2, else None."""
     bearings: str | None = None
-    """Their unit, when the log writes one for each beam."""
+    """Unit of the bearings, if the log writes one for each beam."""
 
 
-def lines_by_device(data: bytes, version: Version, skips: Skips) -> Lines:
+def lines_by_device(data: bytes, version: Version, skips: Skips) -> DeviceLines:
     """The lines of a log by device and kind, in file order.
 
-    A device is named `interface:index`, with `robot:` (version 1: `port:`) in front where the log has
-    several robots, and `host:` where it has several hosts.
+    A device is named `interface:index`, after `robot:` (version 1: `port:`) if the log has several robots,
+    and after `host:robot:` if it has several hosts.
     """
-    fields, at, time = PLACES[version]
-    found: dict[tuple[bytes, bytes, bytes, bytes, bytes], list[Line]] = {}
+    fields, at, time = FIELD_POSITIONS[version]
+    found: dict[tuple[bytes, bytes, bytes, bytes, bytes], list[PayloadLine]] = {}
     for number, line in enumerate(io.BytesIO(data), 1):
         text = line.strip()
         if not text or text.startswith(b"#"):
@@ -73,11 +76,11 @@ def lines_by_device(data: bytes, version: Version, skips: Skips) -> Lines:
         stamp = parts[time]
         key = (host, robot, parts[at], parts[at + 1], kind)
         if key not in found and len(found) >= RECORD_KINDS.value:
-            skips.add("a device too many", number)
+            skips.add("too many devices", number)
             continue
         found.setdefault(key, []).append((number, stamp, payload))
     hosts, robots = ({key[at] for key in found} for at in (0, 1))
-    lines: Lines = {}
+    lines: DeviceLines = {}
     for (host, robot, interface, index, kind), rows in found.items():
         parts = [interface, b"%d" % int(index)]
         if len(robots) > 1 or len(hosts) > 1:
@@ -88,39 +91,30 @@ def lines_by_device(data: bytes, version: Version, skips: Skips) -> Lines:
     return lines
 
 
-def poses(lines: list[Line], skips: Skips) -> tuple[Array, list[str]]:
-    """Rows (R, V), of which x, y and θ are the first three, with stamps; malformed ones are skipped.
+def device_poses(lines: list[PayloadLine], skips: Skips) -> tuple[Array, list[str]]:
+    """Poses (R, 3) and stamps of the records of a position device; malformed ones are skipped.
 
-    How many values there are depends on the version and on the device: as many as most of the lines have.
+    The number of values depends on the version and the device: the most frequent one is taken as right.
     """
     counts = Counter(len(payload.split()) for _, _, payload in lines)
-    (usual, _), *_ = counts.most_common(1) or [(0, 0)]
-    return numbers(lines, max(usual, FEWEST), skips)
+    (most_frequent, _), *_ = counts.most_common(1) or [(0, 0)]
+    return poses_with_size(lines, max(most_frequent, 3), skips)
 
 
-def numbers(lines: list[Line], count: int, skips: Skips) -> tuple[Array, list[str]]:
-    """Rows (R, count) of a short record such as a geometry, with stamps; malformed ones are skipped."""
-    rows, stamps = [], []
-    for record, _, values in parsed([(_record(line), 0) for line in lines], skips):
-        if values.size != count:
-            skips.add("wrong number of values", record.line)
-        elif not within_bounds(values):
-            skips.add("a value is out of bounds", record.line)
-        else:
-            rows.append(values)
-            stamps.append(record.stamp)
-    return np.array(rows, dtype=np.float64).reshape(-1, count), stamps
+def poses_with_size(lines: list[PayloadLine], count: int, skips: Skips) -> tuple[Array, list[str]]:
+    """Poses (R, 3) and stamps of records with `count` values that begin with a pose; others are skipped."""
+    return pose_rows([_payload_record(line) for line in lines], (count,), skips)
 
 
-def player_scans(laser: str, lines: Lines, version: Version, skips: Skips) -> PlayerScans:
+def player_scans(laser: str, lines: DeviceLines, version: Version, skips: Skips) -> PlayerScans:
     """The scans of one laser; malformed ones are skipped.
 
-    Version 1: `min max step count`, version 2: `id min max step farthest count`, and in its form 1:2 the
-    robot's pose after the id; then a range and an intensity for each beam. Or nothing but a range, a bearing
-    and an intensity for each beam, as before version 1 and in some logs of that version.
+    Version 1: `min max step count`. Version 2: `id min max step max_range count`, in form 1:2 with the
+    robot's pose after the id. A range and an intensity for each beam follow. Before version 1, and in some
+    logs of that version, a record has a range, a bearing and an intensity for each beam and nothing else.
     """
     if version < 2:
-        unnamed = [_record(line) for line in lines.get((laser, ""), [])]
+        unnamed = [_payload_record(line) for line in lines.get((laser, ""), [])]
         if player_bearings.have_bearings(unnamed, headed=version == 1):
             raw, unit = player_bearings.bearing_scans(unnamed, skips)
             return PlayerScans(raw, None, unit)
@@ -130,7 +124,7 @@ def player_scans(laser: str, lines: Lines, version: Version, skips: Skips) -> Pl
         found = lines.get((laser, kind), [])
         records = [whole for line in found if (whole := _scan_record(line, head, skips)) is not None]
         for record, _, values in parsed(records, skips):
-            if not _possible(values[:head], version):
+            if not _is_plausible(values[:head], version):
                 skips.add("an angle or a pose is out of bounds", record.line)
             else:
                 rows.append((record, values[:head], values[head::2]))
@@ -139,16 +133,16 @@ def player_scans(laser: str, lines: Lines, version: Version, skips: Skips) -> Pl
     posed = bool(heads) and all(len(head) == 9 for head in heads)
     angles = np.array([head[ANGLES[version]] for head in heads]).reshape(-1, 3)
     if version < 2:
-        # Player 1 has hundredths of a degree inside; old files round them to 4 digits of a radian.
+        # Player 1 has hundredths of a degree internally; its files round them to 4 digits of a radian.
         angles = np.radians(np.round(np.degrees(angles), 2))
-    farthest = 0.0 if version < 2 or not heads else max(float(head[-2]) for head in heads)
-    named = ((farthest, f"the greatest range in {laser}"),) if farthest > 0 else ()
+    max_range = 0.0 if version < 2 or not heads else max(float(head[-2]) for head in heads)
+    named = ((max_range, f"the greatest range in {laser}"),) if max_range > 0 else ()
     raw = RawScans(
         scan_table([readings for _, _, readings in rows]),
         angles[:, 0],
         angles[:, 2],
         [record.stamp for record, _, _ in rows],
-        (0.0, max(farthest, CARMEN_MAX_RANGE)),
+        (0.0, max(max_range, CARMEN_MAX_RANGE)),
         ("none in a Player log", "assumed, as for CARMEN"),
         named,
         angles[:, 1],
@@ -158,19 +152,18 @@ def player_scans(laser: str, lines: Lines, version: Version, skips: Skips) -> Pl
 
 
 def _number(text: bytes) -> int:
-    """A small number; -1 where there is none."""
-    return int(text) if text.isdigit() and len(text) < LONGEST_NUMBER else -1
+    """A small whole number, or −1 if the text is none."""
+    return int(text) if text.isdigit() and len(text) < player_bearings.MAX_DIGITS else -1
 
 
-def _record(line: Line) -> LineRecord:
+def _payload_record(line: PayloadLine) -> LineRecord:
     number, stamp, payload = line
-    values = b" ".join(payload.split())
-    return LineRecord(number, values, values.count(b" ") + 1 if values else 0, ascii_text(stamp))
+    return LineRecord.from_payload(number, payload, ascii_text(stamp))
 
 
-def _scan_record(line: Line, head: int, skips: Skips) -> tuple[LineRecord, int] | None:
-    """A scan's record and number of beams, or None when it has fewer values than these need."""
-    record = _record(line)
+def _scan_record(line: PayloadLine, head: int, skips: Skips) -> tuple[LineRecord, int] | None:
+    """The record of a scan and its number of beams, or None if it has another number of values."""
+    record = _payload_record(line)
     start = record.values.split(b" ", head)
     if len(start) < head:
         skips.add("wrong number of values", record.line)
@@ -184,7 +177,7 @@ def _scan_record(line: Line, head: int, skips: Skips) -> tuple[LineRecord, int] 
     return record, beams
 
 
-def _possible(head: Array, version: Version) -> bool:
-    """Whether what stands before the ranges can be true: angles, step, pose."""
+def _is_plausible(head: Array, version: Version) -> bool:
+    """Whether angles, step and pose before the ranges are within bounds."""
     angles = head[ANGLES[version]]
     return within_bounds(head) and bool(np.abs(angles).max() <= 4 * np.pi) and angles[2] != 0

@@ -83,4 +83,4 @@ def test_where_no_message_was_ever_stamped_the_times_of_recording_hold(read):
     log = read(written, mount=(0.0, 0.0, 0.0))
     assert log.stamps[0] == f"{(START + 7) // S}.{(START + 7) % S:09d}"
     np.testing.assert_allclose(log.odometry[:, 0], [0.0, 0.1, 0.2, 0.3, 0.4], atol=1e-6)
-    assert "the scans' own time stamps say nothing: the times of recording are used" in log.report.warnings
+    assert "the scans' own time stamps are unusable: the times of recording are used" in log.report.warnings

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from nscan_cli.kernels.decorators import load_runtime
 from nscan_cli.logs.text import line_records
-from nscan_cli.logs.text.line_records import LONG, floats
+from nscan_cli.logs.text.line_records import KERNEL_MIN_BYTES, floats
 
 plain = st.from_regex(r"[+-]?([0-9]{1,15}(\.[0-9]{0,6})?|\.[0-9]{1,22})", fullmatch=True)
 other = st.sampled_from(
@@ -31,7 +31,7 @@ def kernels_are_up() -> None:
 
 def long_text(tokens: list[str], blank: str) -> bytes:
     """A text that is long enough for the kernel, and begins with these tokens."""
-    return blank.join([*tokens, *["0.25"] * (LONG // 4), "-7"]).encode("latin-1")
+    return blank.join([*tokens, *["0.25"] * (KERNEL_MIN_BYTES // 4), "-7"]).encode("latin-1")
 
 
 @settings(max_examples=60, deadline=None)
@@ -41,7 +41,7 @@ def test_numbers_of_a_long_text_are_the_nearest_there_are(tokens, blank):
     # Python's own are correctly rounded. Bytes, for −0 is 0.
     assert values is not None
     assert values[: len(tokens)].tobytes() == np.array([float(token) for token in tokens]).tobytes()
-    assert values.size == len(tokens) + LONG // 4 + 1
+    assert values.size == len(tokens) + KERNEL_MIN_BYTES // 4 + 1
     assert values[-1] == -7
 
 

@@ -53,8 +53,8 @@ def test_version_1(tmp_path):
     assert log.odometry is not None
     np.testing.assert_allclose(log.odometry, [[1.1, 0.5, 0.2], [1.15, 0.5, 0.25]], atol=1e-6)
     assert log.report.used == {
-        "laser": "the only laser device",
-        "odometry": "position:0, the only position device, interpolated",
+        "laser": "the only laser",
+        "odometry": "position:0, the only odometry, interpolated",
         "mounting": "assumed: at the robot's centre",
         "range_min": "none in a Player log",
         "range_max": "assumed, as for CARMEN",
@@ -102,6 +102,13 @@ def test_version_2_with_poses_in_its_scans(tmp_path):
     np.testing.assert_allclose(log.odometry, [[1, 2, 0.5], [3, 4, 4 - 2 * math.pi]])
     np.testing.assert_array_equal(log.ranges, [[1, 2, 3], [1, 2, 3]])
     assert log.report.used["odometry"] == "the poses in the scans (1:2)"
+
+
+def test_poses_at_other_times_are_no_odometry(tmp_path):
+    log = read(tmp_path, *(line.replace("0000000002.500", "0000000009.000") for line in V2))
+    assert log.odometry is None
+    assert log.report.used["odometry"] == "none: at other times"
+    assert "no odometry" in log.report.warnings[0]
 
 
 def test_options(tmp_path):

@@ -44,11 +44,10 @@ def test_malformed_records_are_counted(tmp_path):
     ]
     log = read(tmp_path, *LINES, *wrong)
     assert log.report.skipped == {
-        "wrong number of values": (1, 6),
+        "wrong number of values": (2, 6),
         "the beam count is not a number": (1, 7),
         "the field of view is not in 0°…360°": (1, 8),
         "a value is not a number": (1, 9),
-        "not a pose of the robot": (1, 10),
         "not a .script record": (1, 11),
     }
     assert len(log) == 1
@@ -73,3 +72,9 @@ def test_without_poses_or_scans(tmp_path):
         read(tmp_path, LINES[1])
     with pytest.raises(InputDataError, match="line 1: no LASER-RANGE:0 record can be read: wrong number"):
         read(tmp_path, LINES[2] + " 1")
+
+
+def test_poses_at_other_times_are_no_odometry(tmp_path):
+    log = read(tmp_path, LINES[1], LINES[3], LINES[2].replace("976052857", "976052900"))
+    assert log.odometry is None
+    assert log.report.used["odometry"] == "none: at other times"
