@@ -1,4 +1,4 @@
-"""What a file is, by its content: the forms of log that are read, and names for what is none of them."""
+"""The forms of log that are read, recognised by their content, and names for other files."""
 
 from __future__ import annotations
 
@@ -11,30 +11,30 @@ from nscan_cli.logs.compression import compression_of
 
 
 class Form(NamedTuple):
-    """A form of log, and the module that reads it, which is imported when such a log is met.
+    """A form of log and the module that reads it, which is imported when such a log is met.
 
-    The module has `read`, as logs.load.Reader says; for a text without `magic` also `recognises`.
+    The module has `read` (see logs.load.Reader), and `recognises` if the form has no `magic`.
     """
 
     name: str
     module: str
     magic: bytes | None = None
-    """The first bytes of such a file; None: the module is asked."""
+    """The first bytes of such a file; None if the module recognises it."""
     container: bool = False
-    """Whether it holds messages, and may be one of several files of a recording: the module then has
-    `recording`, as logs.load.Container says, in place of `read`."""
+    """Whether a file holds messages and may be one of several files of a recording. The module then has
+    `read_recording` (see logs.load.Container) instead of `read`."""
     by_path: bool = False
-    """Whether the module has `recording_at` too, as logs.load.Database says, which opens the file itself."""
+    """Whether the module also has `read_recording_file` (see logs.load.Database)."""
 
     def fits(self, data: FileBytes) -> bool:
-        """Whether these bytes are of this form."""
+        """Whether the bytes of a file are of this form."""
         if self.magic is not None:
             return data[: len(self.magic)] == self.magic
         recognised: bool = self.reader().recognises(data)
         return recognised
 
     def reader(self) -> Any:
-        """The module."""
+        """The module, imported."""
         return importlib.import_module(self.module)
 
 
@@ -48,74 +48,57 @@ FORMS: tuple[Form, ...] = (
     Form("Player text", "nscan_cli.logs.text.player"),
     Form(".script text", "nscan_cli.logs.text.script"),
 )
-"""In order of trial. A new form of log is a module and a line here."""
+"""The forms in the order in which they are tried. A new form of log is a module and a line here."""
 
 
 def readable_forms() -> str:
-    """The forms that are read, as messages name them."""
+    """The forms that are read, as text for messages."""
     return f"{', '.join(form.name for form in FORMS)}; plain or packed by gzip, bzip2, xz, zstd or lz4"
 
 
 class ForeignKind(NamedTuple):
-    """What a file is that no log is read from."""
+    """A kind of file that is no log."""
 
     name: str
-    """As the end of the sentence "the file is …"."""
+    """Ends the sentence "the file is …"."""
     remedy: str = ""
-    """What makes a log of it, where something does."""
+    """How to get a log from it, if there is a way."""
 
 
-RENEW = "write it anew by ROS 1's `rosbag filter OLD.bag NEW.bag True`, and give the new one"
-UNPACK = "take the log out of it first"
+EXTRACT = "take the log out of it first"
+FILTER_BAG = "convert it by ROS 1's `rosbag filter OLD.bag NEW.bag True`, and give the new one"
+GIVE_DATABASE = "give the .db3 that it belongs to"
+GIVE_RECORDING = "give a recording of laser scans"
 FOREIGN_MAGIC = (
-    (b"#ROSBAG V", ForeignKind("a ROS 1 bag of an old version", RENEW)),
-    (b"#ROSRECORD V", ForeignKind("a ROS 1 bag of an old version", RENEW)),
-    (b"#ROSLOG V", ForeignKind("a ROS 1 bag of an old version", RENEW)),
+    ("a ROS 1 bag of an old version", FILTER_BAG, (b"#ROSBAG V", b"#ROSRECORD V", b"#ROSLOG V")),
     (
-        b"version https://git-lfs.github.com/spec/",
-        ForeignKind("a pointer of Git LFS, not the file that it stands for", "fetch that by `git lfs pull`"),
+        "a Git LFS pointer, not the file itself", "fetch the file by `git lfs pull`",
+        (b"version https://git-lfs.github.com/spec/",),
     ),
     (
-        b"\x37\x7f\x06\x82",
-        ForeignKind("the write-ahead log of an SQLite database", "give the .db3 that it is of"),
+        "the write-ahead log of an SQLite database", GIVE_DATABASE,
+        (b"\x37\x7f\x06\x82", b"\x37\x7f\x06\x83"),
     ),
+    ("the journal of an SQLite database", GIVE_DATABASE, (b"\xd9\xd5\x05\xf9\x20\xa1\x63\xd7",)),
     (
-        b"\x37\x7f\x06\x83",
-        ForeignKind("the write-ahead log of an SQLite database", "give the .db3 that it is of"),
+        "a capture of network packets (pcap)", GIVE_RECORDING,
+        (b"\xd4\xc3\xb2\xa1", b"\xa1\xb2\xc3\xd4"),
     ),
-    (
-        b"\xd9\xd5\x05\xf9\x20\xa1\x63\xd7",
-        ForeignKind("the journal of an SQLite database", "give the .db3 that it is of"),
-    ),
-    (
-        b"\xd4\xc3\xb2\xa1",
-        ForeignKind("a capture of network packets (pcap)", "give a recording of laser scans"),
-    ),
-    (
-        b"\xa1\xb2\xc3\xd4",
-        ForeignKind("a capture of network packets (pcap)", "give a recording of laser scans"),
-    ),
-    (
-        b"\x0a\x0d\x0d\x0a",
-        ForeignKind("a capture of network packets (pcapng)", "give a recording of laser scans"),
-    ),
-    (b"\x89PNG\r\n\x1a\n", ForeignKind("a PNG picture")),
-    (b"\xff\xd8\xff", ForeignKind("a JPEG picture")),
-    (b"P5", ForeignKind("a PGM picture")),
-    (b"%PDF", ForeignKind("a PDF document")),
-    (b"# .PCD v", ForeignKind("a point cloud (PCD)")),
-    (b"PK\x03\x04", ForeignKind("a ZIP archive", f"{UNPACK}, by `unzip`")),
-    (b"7z\xbc\xaf\x27\x1c", ForeignKind("a 7z archive", f"{UNPACK}, by `7z x`")),
-    (b"Rar!\x1a\x07", ForeignKind("a RAR archive", f"{UNPACK}, by `unrar x`")),
-    (b"\x1f\x9d", ForeignKind("compressed by compress", "unpack it first, by `uncompress`")),
-    (b"LZIP", ForeignKind("compressed by lzip", "unpack it first, by `lzip -d`")),
-    (
-        b"rosbag2_bagfile_information:",
-        ForeignKind("the metadata of a ROS 2 bag", "give the folder that it is in"),
-    ),
-    (b"\x7fELF", ForeignKind("a program")),
-)
-"""What the first bytes say."""
+    ("a capture of network packets (pcapng)", GIVE_RECORDING, (b"\x0a\x0d\x0d\x0a",)),
+    ("a PNG picture", "", (b"\x89PNG\r\n\x1a\n",)),
+    ("a JPEG picture", "", (b"\xff\xd8\xff",)),
+    ("a PGM picture", "", (b"P5",)),
+    ("a PDF document", "", (b"%PDF",)),
+    ("a point cloud (PCD)", "", (b"# .PCD v",)),
+    ("a ZIP archive", f"{EXTRACT}, by `unzip`", (b"PK\x03\x04",)),
+    ("a 7z archive", f"{EXTRACT}, by `7z x`", (b"7z\xbc\xaf\x27\x1c",)),
+    ("a RAR archive", f"{EXTRACT}, by `unrar x`", (b"Rar!\x1a\x07",)),
+    ("compressed by compress", "decompress it first, by `uncompress`", (b"\x1f\x9d",)),
+    ("compressed by lzip", "decompress it first, by `lzip -d`", (b"LZIP",)),
+    ("the metadata of a ROS 2 bag", "give the folder that it is in", (b"rosbag2_bagfile_information:",)),
+    ("a program", "", (b"\x7fELF",)),
+)  # fmt: skip
+"""Name, remedy and first bytes of kinds of files."""
 
 FOREIGN_FIRST_LINES = (
     (rb"\[{1,2}[\w.-]+\]{1,2}\s*$", "TOML or INI text"),
@@ -126,31 +109,31 @@ FOREIGN_FIRST_LINES = (
     (rb"(LASER_READING|GFS_\w+)\s", "a GMapping .gfs file"),
     (rb"(@SENS|@OPEN|#ROBOT|#LASER)\s", "a BeeSoft .rec log"),
     (rb"(image|resolution):", "a map's YAML file"),
-    (rb"([-+.\deE]+[ \t]+){7}[-+.\deE]+\s*$", "a list of eight numbers a line, as of poses or relations"),
+    (rb"([-+.\deE]+[ \t]+){7}[-+.\deE]+\s*$", "a list of eight numbers per line, such as poses or relations"),
 )
-"""What the first line says that is neither blank nor a comment."""
+"""Kinds of texts by the first line that is neither blank nor a comment."""
 
 FIRST_LINE = re.compile(rb"^[ \t]*([^\s#][^\r\n]*)", re.MULTILINE)
-
-
 RAWLOG = re.compile(
     rb"[\x00-\xff]{1,4}(mrpt::(\w+::)?)?C(Observation|Action|SensoryFrame|Rawlog)\w*[\x00-\x1f]"
 )
-"""How MRPT begins an object: the length of its class's name, the name, and a version."""
+"""The beginning of an object of MRPT: the length of its class name, the name, and a version."""
 
 
 def foreign_kind(data: bytes) -> ForeignKind:
-    """What `data` is; "of an unknown kind" when in doubt."""
-    for magic, found in FOREIGN_MAGIC:
-        if data.startswith(magic):
-            return found
+    """The kind of a file that is no log, by its content."""
+    for name, remedy, magics in FOREIGN_MAGIC:
+        if data.startswith(magics):
+            return ForeignKind(name, remedy)
     packing = compression_of(data)
     if packing is not None:
-        return ForeignKind(f"compressed by {packing.name} twice", f"unpack it once, by `{packing.command}`")
+        return ForeignKind(
+            f"compressed by {packing.name} twice", f"decompress it once, by `{packing.command}`"
+        )
     if data[257:262] == b"ustar":
-        return ForeignKind("a tar archive", f"{UNPACK}, by `tar -x`")
+        return ForeignKind("a tar archive", f"{EXTRACT}, by `tar -x`")
     if RAWLOG.match(data):
-        return ForeignKind("an MRPT .rawlog", "make a ROS bag or a CARMEN log of it first")
+        return ForeignKind("an MRPT .rawlog", "convert it to a ROS bag or a CARMEN log first")
     if b"\0" in data[:4096]:
         return ForeignKind("binary data of an unknown kind")
     line = FIRST_LINE.search(data, 0, 1 << 16)
@@ -158,8 +141,3 @@ def foreign_kind(data: bytes) -> ForeignKind:
         if line and re.match(pattern, line.group(1)):
             return ForeignKind(name)
     return ForeignKind("of an unknown kind")
-
-
-def foreign_kind_name(data: bytes) -> str:
-    """The name of what `data` is, as in `foreign_kind`."""
-    return foreign_kind(data).name

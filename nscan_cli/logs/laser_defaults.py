@@ -1,4 +1,4 @@
-"""What a log does not say about its laser: beam angles, no-return values, range limits, mounting."""
+"""Defaults for what a log does not give: beam angles, no-return value, maximum range, mounting."""
 
 from __future__ import annotations
 
@@ -10,36 +10,35 @@ from numpy.typing import NDArray
 from nscan_cli.logs.range_peaks import MIN_PEAK_READINGS, peak_at_limit
 from nscan_cli.poses import Array, relative, wrap
 
-RAD = math.pi / 180
+RAD_PER_DEGREE = math.pi / 180
 CARMEN_MAX_RANGE = 80.0
-"""CARMEN's maximum range (m) for messages that carry none."""
+"""CARMEN's maximum range for messages that carry none, m."""
 SICK_CODES = (81.825, 81.915)
-"""Readings 8183 to 8191 (13 bits, cm) of a SICK LMS mean: beyond the maximum, or not measured."""
-DISTINCT = 50
-"""So many different readings tell one from others."""
+"""A SICK LMS writes readings of 8183 to 8191 (13 bits, cm) if a return is too far or missing; in m."""
+MIN_DISTINCT_READINGS = 50
+"""Smallest number of distinct lower readings from which a no-return value is recognised."""
 
 
 def beam_angles(beams: int) -> tuple[float, float]:
     """First direction and step (rad) of a message without angles, by CARMEN's convention.
 
-    180 and 181 beams have 1°, 360 and 361 0.5°, all from −90° on, so that 180 beams end at +89°; 400
-    and 401 have 0.25° and are centred, since their 100° do not begin at −90°; others spread over 180°.
+    180 and 181 beams have a step of 1°, 360 and 361 one of 0.5°, all from −90° on, so that 180 beams end at
+    +89°. 400 and 401 beams have 0.25° and are centred, as they cover 100° only. Others spread over 180°.
     """
     if beams in (400, 401):
-        return -(beams - 1) / 2 * 0.25 * RAD, 0.25 * RAD
+        return -(beams - 1) / 2 * 0.25 * RAD_PER_DEGREE, 0.25 * RAD_PER_DEGREE
     known = {180: 1.0, 181: 1.0, 360: 0.5, 361: 0.5}
-    return -math.pi / 2, known.get(beams, 180.0 / max(beams - 1, 1)) * RAD
+    return -math.pi / 2, known.get(beams, 180.0 / max(beams - 1, 1)) * RAD_PER_DEGREE
 
 
 def no_return_value(ranges: NDArray[np.float32]) -> float | None:
-    """The least reading (m) that stands for "no return", found in the readings of a whole log, or None.
+    """The smallest reading (m) that means "no return", from all readings of a log; None if there is none.
 
-    A laser without an echo writes one fixed value above all that it can measure. SICK's codes are known
-    and taken as such. Any other value is told by its place in the histogram: a peak within 0.25 m of the
-    largest reading that is sharp (half of its readings share one centimetre, which noise does not allow
-    a wall) and stands alone (ten times the readings of the metre below), or else a single value there with
-    ten times the readings of any other in that metre. A log of fewer than 50 distinct lower readings is too
-    small to tell.
+    Without a return a laser writes one fixed value above all that it can measure. SICK's codes are known. Any
+    other value is a peak of the histogram within 0.25 m of the largest reading. It is sharp, so that half of
+    its readings share one centimetre, which noise prevents for a wall, and isolated, with ten times the
+    readings of the metre below. Or it is a single value there with ten times the readings of any other in
+    that metre. At least 50 distinct readings must be lower.
     """
     usable = ranges[(ranges > 0) & (ranges < 1e4)]
     if usable.size == 0:
@@ -57,32 +56,34 @@ def no_return_value(ranges: NDArray[np.float32]) -> float | None:
         return _single_value(usable, largest)
     least = int(values[top & (counts >= 0.01 * sharpest)].min()) / 100 - 0.005
     lower = usable[usable < least]
-    if np.unique(lower).size < DISTINCT:
+    if np.unique(lower).size < MIN_DISTINCT_READINGS:
         return None
     return _rounded(usable[usable >= least].min())
 
 
 def _single_value(usable: NDArray[np.float32], largest: float) -> float | None:
-    """What no_return_value returns where readings of a wall may lie about, from readings (N,) above 0."""
+    """The no-return value among readings (N,) above 0 if readings of a wall may lie near it."""
     values, counts = np.unique(usable[usable > largest - 0.25], return_counts=True)
     value, count = values[counts.argmax()], counts.max()
-    stands_out = peak_at_limit(usable[None], np.array([value], dtype=np.float64), inside=-1, times=10.0)
+    stands_out = peak_at_limit(
+        usable[None], np.array([value], dtype=np.float64), inside=-1, ratio_to_largest=10.0
+    )
     if stands_out is None or 10 * np.count_nonzero(usable > value) > count:
         return None
-    return _rounded(value) if np.unique(usable[usable < value]).size >= DISTINCT else None
+    return _rounded(value) if np.unique(usable[usable < value]).size >= MIN_DISTINCT_READINGS else None
 
 
 def _rounded(value: np.float32) -> float:
-    """In mm where that is the same value or less."""
+    """The value rounded to mm, if that is not larger."""
     rounded = round(float(value), 3)
     return rounded if np.float32(rounded) <= value else float(value)
 
 
 def mark_no_returns(ranges: NDArray[np.float32], low: Array, high: Array) -> None:
-    """Write inf for readings at or above the upper limits, nan for those at or below the lower; in place.
+    """Write inf for readings at or above the upper limits and nan for those at or below the lower, in place.
 
-    ranges (S, B), limits (S,), m. A reading of 0 or less, or one that is not a number, says nothing and
-    becomes nan, and so do all of a scan whose lower limit is not below the upper.
+    ranges (S, B), limits (S,), m. A reading that is 0, negative or no number becomes nan, and so do all
+    readings of a scan whose lower limit is not below the upper.
     """
     with np.errstate(invalid="ignore"):
         ranges[ranges >= high[:, None].astype(np.float32)] = np.inf
@@ -91,9 +92,9 @@ def mark_no_returns(ranges: NDArray[np.float32], low: Array, high: Array) -> Non
 
 
 def mount_from_poses(laser: Array, robot: Array) -> Array:
-    """The laser's pose (3,) on the robot from poses (S, 3) of both in one frame: the median over scans.
+    """The pose (3,) of the laser on the robot from poses (S, 3) of both in one frame: the median over scans.
 
-    Rounded to 1e-6, the precision that logs are written with.
+    Rounded to 1e-6, the precision of logs.
     """
     mounts = relative(laser, robot)
     first = mounts[0, 2]

@@ -1,4 +1,4 @@
-"""How many readings of a log count, why the others do not, and what to say where these are nearly all."""
+"""The number of usable readings of a log, why others are unusable, and the warning if few are usable."""
 
 from __future__ import annotations
 
@@ -12,71 +12,75 @@ from nscan_cli.errors import InputDataError
 from nscan_cli.logs.range_limits import RangeLimits
 from nscan_cli.poses import Array
 
-ROWS = 4096
-NEARLY_ALL = 0.9
-READING_UNITS = (("millimetres", 1000), ("centimetres", 100))
-NEAREST, USUAL, FARTHEST_USUAL = 0.2, 3.0, 40.0
-"""m; about what half of a laser's readings lie below."""
-REMOTE = 100.0
-"""m; half of no planar laser's readings lie beyond."""
-SAMPLE = 1 << 20
+ROWS_AT_ONCE = 4096
+"""Scans that are counted together, to save memory."""
+MAX_LOST_SHARE = 0.9
+"""If a larger share of the readings is unusable, the user is told."""
+WRONG_UNITS = (("millimetres", 1000), ("centimetres", 100))
+"""Units that a log may have instead of metres, and their number in a metre."""
+MIN_MEDIAN, TYPICAL_MEDIAN, MAX_MEDIAN = 0.2, 3.0, 40.0
+"""Median reading of a log of a plausible unit, m."""
+REMOTE_MEDIAN = 100.0
+"""The median reading of no planar laser is larger, m."""
+SAMPLE_SIZE = 1 << 20
+"""Number of readings from which the unit is told."""
 
 
-class Lost(NamedTuple):
-    """What became of a log's readings."""
+class LostReadings(NamedTuple):
+    """The unusable readings of a log."""
 
     counts: dict[str, int]
-    """Why a reading does not count → how many there are of them."""
+    """Number of unusable readings by reason"""
     warnings: list[str]
     unusable: InputDataError | None
-    """What is wrong where none counts."""
+    """The error to raise if no reading is usable"""
 
 
 def lost_readings(
     ranges: NDArray[np.float32], beams: NDArray[np.int64], limits: RangeLimits, file: str
-) -> Lost:
-    """What becomes of readings (S, B; m) as they are in the log; a scan has so many of them (S,)."""
+) -> LostReadings:
+    """The unusable ones among readings (S, B; m) as written, of which scans have `beams` (S,)."""
     wrong = limits.low >= limits.high
-    low, high = _said(limits) if wrong.all() else _said(limits.of(np.flatnonzero(~wrong)))
-    lower, upper = _said(limits.of(np.flatnonzero(wrong))) if wrong.any() else (low, high)
+    low, high = _limit_texts(limits) if wrong.all() else _limit_texts(limits.of(np.flatnonzero(~wrong)))
+    lower, upper = _limit_texts(limits.of(np.flatnonzero(wrong))) if wrong.any() else (low, high)
     crossed = f"in scans whose lower limit, {lower}, is not below the upper, {upper}"
-    # What a user may say about limits that leave too little.
-    asked = {
+    # The option that changes the limit which makes readings unusable.
+    options_by_reason = {
         f"nearer than {low}": "--min-range",
         f"beyond {high}": "--max-range",
         crossed: "--min-range and --max-range",
     }
-    reasons = ("not a number", "0 or less", "infinite", *asked)
+    reasons = ("not a number", "0 or less", "infinite", *options_by_reason)
     found = zip(reasons, _counts(ranges, beams, limits).tolist(), strict=True)
     counts = {reason: count for reason, count in found if count}
     total, lost = int(beams.sum()), sum(counts.values())
-    unit, remedy = _unit(ranges, limits)
-    if lost <= NEARLY_ALL * total and not unit:
-        told = f"{counts.get(crossed, 0):,} of {_readings(total)} are {crossed}: they do not count"
-        return Lost(counts, [told] if crossed in counts else [], None)
+    unit, remedy = _wrong_unit(ranges, limits)
+    if lost <= MAX_LOST_SHARE * total and not unit:
+        told = f"{counts.get(crossed, 0):,} of {_readings(total)} are unusable: {crossed}"
+        return LostReadings(counts, [told] if crossed in counts else [], None)
     listed = ", ".join(f"{n:,} {'is' if n == 1 else 'are'} {why}" for why, n in counts.items()) + unit
     most = max(counts, key=lambda reason: counts[reason], default="")
     met_nothing = most == f"beyond {high}" and limits.no_return == limits.whole[1]
-    if not remedy and most in asked and not met_nothing:
-        remedy = f"if they are good, say so by {asked[most]}"
+    if not remedy and most in options_by_reason and not met_nothing:
+        remedy = f"if they are valid, set {options_by_reason[most]}"
     if lost < total:
-        few = "only " if lost > NEARLY_ALL * total else ""
-        said = f"{few}{total - lost:,} of {_readings(total)} count" + (f": {listed}" if counts else unit)
-        return Lost(counts, [f"{said}; {remedy}" if remedy else said], None)
+        few = "only " if lost > MAX_LOST_SHARE * total else ""
+        said = f"{few}{total - lost:,} of {_readings(total)} are usable" + (f": {listed}" if counts else unit)
+        return LostReadings(counts, [f"{said}; {remedy}" if remedy else said], None)
     options = [option for option in ("--min-range", "--max-range") if f"({option})" in most]
     if options:
         remedy = f"choose another {' and '.join(options)}"
-    problem = f"none of its {_readings(total)} counts: {listed}"
-    remedy = remedy or "give a log whose laser has measured something"
-    return Lost(counts, [], InputDataError(file, problem, remedy))
+    problem = f"none of its {_readings(total)} is usable: {listed}"
+    remedy = remedy or "give a log with valid readings"
+    return LostReadings(counts, [], InputDataError(file, problem, remedy))
 
 
 def _counts(ranges: NDArray[np.float32], beams: NDArray[np.int64], limits: RangeLimits) -> NDArray[np.int64]:
-    """(6,) how many readings do not count for each reason; some scans at a time, for memory."""
+    """(6,) number of unusable readings for each reason."""
     found = np.zeros(6, dtype=np.int64)
     found[0] = beams.sum() - ranges.size
-    for first in range(0, len(ranges), ROWS):
-        rows = slice(first, first + ROWS)
+    for first in range(0, len(ranges), ROWS_AT_ONCE):
+        rows = slice(first, first + ROWS_AT_ONCE)
         crossed = limits.low[rows] >= limits.high[rows]
         low, high = (values[rows][~crossed, None].astype(np.float32) for values in limits[:2])
         part = ranges[rows][~crossed]
@@ -86,44 +90,44 @@ def _counts(ranges: NDArray[np.float32], beams: NDArray[np.int64], limits: Range
             np.count_nonzero(np.isnan(part)), np.count_nonzero(part <= 0), np.count_nonzero(infinite),
             np.count_nonzero(nearer), np.count_nonzero(beyond & ~nearer), beams[rows][crossed].sum(),
         ]  # fmt: skip
-        # What a scan of the crossed limits lacks is no reading of its own either.
+        # Beams that a scan with crossed limits does not have are no readings either.
         found[0] += crossed.sum() * ranges.shape[1] - beams[rows][crossed].sum()
     return found
 
 
-def _unit(ranges: NDArray[np.float32], limits: RangeLimits) -> tuple[str, str]:
-    """In words, the unit that the readings seem to have, and the remedy; empty for metres or where none fits.
+def _wrong_unit(ranges: NDArray[np.float32], limits: RangeLimits) -> tuple[str, str]:
+    """The unit that the readings seem to have and the remedy, as text; empty for metres or if no unit fits.
 
-    Half of the returns lie beyond the limits, or farther than half of a laser's do, and all but a
-    quarter would be within in another unit.
+    The unit is wrong if the median return is beyond the limits or implausibly large, and three quarters of
+    the returns would be within the limits in another unit.
     """
-    some = ranges.reshape(-1)[:: -(-ranges.size // SAMPLE)]
+    some = ranges.reshape(-1)[:: -(-ranges.size // SAMPLE_SIZE)]
     end = np.inf if limits.no_return is None else limits.no_return
     some = some[(some > 0) & (some < end) & np.isfinite(some)]
     if not some.size:
         return "", ""
-    median, most = (float(value) for value in np.quantile(some, (0.5, 0.75)))
+    median, upper_quartile = (float(value) for value in np.quantile(some, (0.5, 0.75)))
     highest = float(limits.high.max())
-    if median < min(highest, REMOTE):
+    if median < min(highest, REMOTE_MEDIAN):
         return "", ""
     fitting = [
-        (abs(math.log(median / factor / USUAL)), name, factor)
-        for name, factor in READING_UNITS
-        if NEAREST <= median / factor <= FARTHEST_USUAL and most / factor < highest
+        (abs(math.log(median / factor / TYPICAL_MEDIAN)), name, factor)
+        for name, factor in WRONG_UNITS
+        if MIN_MEDIAN <= median / factor <= MAX_MEDIAN and upper_quartile / factor < highest
     ]
     if not fitting:
         return "", ""
     _, name, factor = min(fitting)
     seem = f"; half of the returns are beyond {median:,.0f}, which looks like {name}"
-    return seem, f"the ranges of a scan are metres: divide them by {factor:,} and write the log again"
+    return seem, f"ranges must be in metres: divide them by {factor:,} and write the log again"
 
 
 def _readings(count: int) -> str:
     return "1 reading" if count == 1 else f"{count:,} readings"
 
 
-def _said(limits: RangeLimits) -> tuple[str, str]:
-    """Both limits in words, and where they are from."""
+def _limit_texts(limits: RangeLimits) -> tuple[str, str]:
+    """Both limits and their origin, as text."""
     return (
         f"{_metres(limits.low)} ({limits.low_from})",
         f"{_metres(limits.high)} ({limits.high_from})",

@@ -1,4 +1,4 @@
-"""The time of each scan: from its stamp where that can be trusted, sorted, and cut to what was asked for."""
+"""The time of each scan, from its stamp if that is plausible; the order in time; the selection of scans."""
 
 from __future__ import annotations
 
@@ -15,14 +15,15 @@ from nscan_cli.logs.reading_options import ReadingOptions
 from nscan_cli.poses import Array
 
 NOMINAL_PERIOD = 0.1
-"""s between scans whose stamps say nothing."""
-MIXED = 20
-"""Sorted by time, the scans before and after a clock was set back alternate so often at least. Messages that
-come late fill a gap instead."""
-MOST_SET_BACK = 20
-"""With more steps back than that, lines are out of order, and the clock is not to blame."""
+"""Time between scans without usable stamps, s."""
+MIN_ALTERNATIONS = 20
+"""A clock was set back only if scans from before and after the step back alternate at least this often when
+sorted by time, and only if the step is longer than that number of scan periods. Messages that arrive late
+fill a gap instead."""
+MAX_STEPS_BACK = 20
+"""With more steps back, the lines are out of order, and no clock was set back."""
 STAMP = re.compile(r"[-+]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][-+]?[0-9]+)?")
-"""A time in seconds, as text; what else Python takes for a number is none."""
+"""A time in seconds as text. Other texts that float() accepts, such as 1_0, are none."""
 
 
 @dataclass(frozen=True)
@@ -30,24 +31,23 @@ class ScanOrder:
     """The scans of a log in order of time."""
 
     rows: NDArray[np.int64]
-    """(S,) positions in file order of the scans, in order of time."""
+    """(S,) positions in the file of the scans in order of time"""
     times: Array
-    """(S,) seconds, in order of time."""
+    """(S,) times in order, s"""
     stamps: list[str]
-    """S, likewise; as the source wrote them, unless the times are nominal."""
+    """S time stamps in order of time, as written in the source unless the times are nominal"""
     backward: int
-    """Steps back in time in file order."""
+    """Number of steps back in time in file order"""
     nominal: bool
-    """The stamps say nothing; the times are made up."""
+    """Whether the stamps are unusable and the times made up"""
     warnings: list[str]
 
 
 def by_time(stamps: list[str]) -> ScanOrder:
-    """Scans sorted stably by their stamps (one a scan, in file order; empty where there is none).
+    """The scans sorted stably by their stamps, one per scan in file order, empty if there is none.
 
-    Stamps that say nothing (fewer than half of them finite, or fewer than half of them distinct) leave
-    the scans in file order with nominal times. A single stamp that is missing or not finite is filled in
-    between its neighbours in the file.
+    If fewer than half of the stamps are finite, or fewer than half are distinct, the scans stay in file order
+    with nominal times. Otherwise a missing stamp is interpolated between its neighbours in the file.
     """
     times: Array = np.array([_seconds(stamp) for stamp in stamps], dtype=np.float64)
     times[np.abs(times) > TIME.value] = np.nan
@@ -57,7 +57,7 @@ def by_time(stamps: list[str]) -> ScanOrder:
     if 2 * good.sum() < size or (size > 1 and 2 * np.unique(times[good]).size < size):
         times = np.arange(size, dtype=np.float64) * NOMINAL_PERIOD
         warnings.append(
-            f"the time stamps say nothing; scans are taken in file order, {NOMINAL_PERIOD:g} s apart"
+            f"the time stamps are unusable; scans are read in file order, {NOMINAL_PERIOD:g} s apart"
         )
         texts = [f"{time:.6f}" for time in times]
         return ScanOrder(np.arange(size), times, texts, 0, True, warnings)
@@ -68,13 +68,13 @@ def by_time(stamps: list[str]) -> ScanOrder:
         for row in np.flatnonzero(~good):
             texts[row] = f"{times[row]:.6f}"
         warnings.append(
-            f"{counted(int(np.sum(~good)), 'scan')} without a usable time stamp: filled in between others"
+            f"{counted(int(np.sum(~good)), 'scan')} without a usable time stamp: interpolated between others"
         )
     for since, by in _set_back(times):
         times[since:] += by
         texts[since:] = [f"{time:.6f}" for time in times[since:]]
         warnings.append(
-            f"the clock is set back by {by:.1f} s at scan {since}; the times go on from those before"
+            f"the clock was set back by {by:.1f} s at scan {since}; later times are shifted to continue"
         )
     backward = int(np.sum(np.diff(times) < 0))
     if backward:
@@ -84,18 +84,18 @@ def by_time(stamps: list[str]) -> ScanOrder:
 
 
 def _set_back(times: Array) -> list[tuple[int, float]]:
-    """Where (positions in file order) the clock was set back, and by how much (s) to carry the times on."""
+    """Positions in the file at which the clock was set back, and the times (s) to add from there on."""
     if len(times) < 2:
         return []
     times, found = times.copy(), []
     period = float(np.median(np.abs(np.diff(times))))
-    steps = np.flatnonzero(np.diff(times) < -MIXED * period) + 1
-    for at in steps.tolist() if len(steps) <= MOST_SET_BACK else ():
+    steps = np.flatnonzero(np.diff(times) < -MIN_ALTERNATIONS * period) + 1
+    for at in steps.tolist() if len(steps) <= MAX_STEPS_BACK else ():
         latest = float(times[:at].max())
         caught_up = times[at:] > latest
         until = at + (int(np.argmax(caught_up)) if caught_up.any() else len(caught_up))
         is_behind = np.argsort(times[:until], kind="stable") >= at
-        if np.count_nonzero(np.diff(is_behind)) >= MIXED:
+        if np.count_nonzero(np.diff(is_behind)) >= MIN_ALTERNATIONS:
             by = latest + period - float(times[at])
             times[at:] += by
             found.append((at, by))
@@ -103,10 +103,7 @@ def _set_back(times: Array) -> list[tuple[int, float]]:
 
 
 def selected_numbers(times: Array, options: ReadingOptions, file: str) -> NDArray[np.int64]:
-    """Which scans (numbers, in order of time) start, end and every leave.
-
-    Raises WrongUsageError when none is left.
-    """
+    """The numbers of the scans that start, end and every select. Raises WrongUsageError if there is none."""
     since = times - times[0]
     kept = np.ones(len(times), dtype=bool)
     if options.start is not None:
@@ -120,4 +117,5 @@ def selected_numbers(times: Array, options: ReadingOptions, file: str) -> NDArra
 
 
 def _seconds(stamp: str) -> float:
+    """The time in a stamp, or nan."""
     return float(stamp) if STAMP.fullmatch(stamp) else np.nan

@@ -22,8 +22,8 @@ def millimetres(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> str:
 
 
 SAID = (
-    "mm.mcap: none of its 7,200 readings counts: 7,200 are beyond 12 m (range_max of the messages); half of "
-    "the returns are beyond "
+    "mm.mcap: none of its 7,200 readings is usable: 7,200 are beyond 12 m (range_max of the messages); half "
+    "of the returns are beyond "
 )
 
 
@@ -58,7 +58,7 @@ def test_the_source_of_each_limit(tmp_path, capsys):
     said = [" ".join(line.split()) for line in capsys.readouterr().out.splitlines()]
     at = said.index("range limits 0 m to 8 m")
     assert said[at + 1] == "lower: none in a CARMEN log"
-    assert said[at + 2] == "upper: PARAM robot_front_laser_max, where readings pile up that"
+    assert said[at + 2] == "upper: PARAM robot_front_laser_max, at a peak of readings without"
     assert "no return 8 m and above" in said
     assert run(["info", str(path), "--json", "--max-range", "5", "--min-range", "0.2"]) == 0
     facts = json.loads(capsys.readouterr().out)

@@ -31,8 +31,8 @@ def test_a_wrong_step_is_told_by_the_walls(read, factor):
     (warning,) = log.report.warnings
     assert "the last direction (angle_max) is 178°" in warning
     assert f"(angle_increment) of {2 * factor:g}° 180 beams end at" in warning
-    assert "walls are straight with 2° a beam, which is used" in warning
-    assert warning.endswith(f"--angle-increment {2 * factor:g} says otherwise")
+    assert "walls are straight with 2° per beam, which is used" in warning
+    assert warning.endswith(f"--angle-increment {2 * factor:g} chooses the other")
 
 
 @pytest.mark.parametrize("factor", [0.5, 0.8, 1.25, 2.0])
@@ -40,8 +40,8 @@ def test_a_wrong_last_direction_is_told_by_the_walls(read, factor):
     log = read(recording(readings(), last=FIRST + factor * STEP * (BEAMS - 1), range_max=20.0))
     assert used_step(log) == pytest.approx(STEP, rel=1e-6)
     (warning,) = log.report.warnings
-    assert "walls are straight with 2° a beam, which is used" in warning
-    assert warning.endswith(f"--angle-increment {2 * factor:g} says otherwise")
+    assert "walls are straight with 2° per beam, which is used" in warning
+    assert warning.endswith(f"--angle-increment {2 * factor:g} chooses the other")
 
 
 @pytest.mark.parametrize("option", [{"angle_increment": STEP}, {"angle_increment": 3 * STEP}])
@@ -75,11 +75,11 @@ def test_scans_that_tell_nothing_are_read_by_the_step(read):
     noise = np.random.default_rng(1).uniform(1, 9, (40, 180)).astype(np.float32)
     log = read(recording(noise, last=0.0, range_max=20.0))
     assert used_step(log) == pytest.approx(STEP, rel=1e-6)
-    assert "the scans do not tell which is right" in log.report.warnings[0]
+    assert "the scans do not show which is right" in log.report.warnings[0]
     # But not where it leads round more than once.
     log = read(recording(noise, step=3 * STEP, last=LAST, range_max=20.0))
     assert used_step(log) == pytest.approx(STEP, rel=1e-6)
-    assert "go round more than once" in log.report.warnings[0]
+    assert "cover more than a turn" in log.report.warnings[0]
 
 
 def test_some_scans_that_contradict_themselves(read):

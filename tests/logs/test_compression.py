@@ -108,7 +108,7 @@ def test_bombs_are_refused(pack, path, monkeypatch, options):
 def test_twice(pack, path):
     path.write_bytes(pack(pack(TEXT)))
     with pytest.raises(
-        InputDataError, match=r"twice; unpack it once, by `(gunzip|bunzip2|unxz|unzstd|unlz4)`"
+        InputDataError, match=r"twice; decompress it once, by `(gunzip|bunzip2|unxz|unzstd|unlz4)`"
     ):
         read_log(str(path))
 
@@ -150,7 +150,7 @@ def test_a_message_that_unpacks_to_too_much(tmp_path, monkeypatch):
         (b"#ROSRECORD V1.2\n0123", r"a ROS 1 bag of an old version; .*`rosbag filter"),
         (
             b"version https://git-lfs.github.com/spec/v1\noid sha256:0\nsize 5\n",
-            r"a pointer of Git LFS.*`git lfs pull`",
+            r"a Git LFS pointer.*`git lfs pull`",
         ),
         (b"\x97CObservation2DRangeScan\x06" + bytes(99), r"an MRPT \.rawlog; "),
         (b"\x91CActionCollection\x00" + bytes(99), r"an MRPT \.rawlog; "),

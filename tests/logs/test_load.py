@@ -59,7 +59,7 @@ def test_plain_packed_and_standard_input_give_the_same(tmp_path, monkeypatch):
         (b'{"format":"nscan-pose-graph",\n"version":"1.0"}', "a pose graph"),
         (b'{"name": "a"}', "JSON text"),
         (b"# graph\nVERTEX_SE2 0 0 0 0\n", "a pose graph"),
-        (b"1134864629.895182 0.1 0 0 0 0 0 1\n", "eight numbers a line"),
+        (b"1134864629.895182 0.1 0 0 0 0 0 1\n", "eight numbers per line"),
         (b"position 0 1014.5 1.0 2.0 0.5 0 0 0\n", "has no laser scans, only position:0"),
         (b"@OPEN 1-2-3\n@SENS 01-01-99 10:00:00.1\n", "a BeeSoft .rec log"),
         (b"LASER_READING 180 1.0\n", "GMapping .gfs"),

@@ -14,8 +14,8 @@ from tests.logs.noisy_room import carmen, readings, recording
 from tests.logs.recordings.messages import Scan
 
 ALL = 40 * 180
-MILLIMETRES = "looks like millimetres; the ranges of a scan are metres: divide them by 1,000"
-CENTIMETRES = "looks like centimetres; the ranges of a scan are metres: divide them by 100"
+MILLIMETRES = "looks like millimetres; ranges must be in metres: divide them by 1,000"
+CENTIMETRES = "looks like centimetres; ranges must be in metres: divide them by 100"
 
 
 def filled(value: float) -> np.ndarray:
@@ -25,19 +25,19 @@ def filled(value: float) -> np.ndarray:
 @pytest.mark.parametrize(
     ("ranges", "changes", "said"),
     [
-        (filled(math.inf), {}, "none of its 7,200 readings counts: 7,200 are infinite; give a log"),
-        (filled(math.nan), {}, "7,200 are not a number; give a log whose laser has measured something"),
+        (filled(math.inf), {}, "none of its 7,200 readings is usable: 7,200 are infinite; give a log"),
+        (filled(math.nan), {}, "7,200 are not a number; give a log with valid readings"),
         (filled(0.0), {}, "7,200 are 0 or less;"),
         (filled(-1.0), {}, "7,200 are 0 or less;"),
-        (filled(0.02), {}, "nearer than 0.05 m (range_min of the messages); if they are good, say so by"),
-        (filled(12.0), {}, "where readings pile up that met nothing); give a log"),
+        (filled(0.02), {}, "nearer than 0.05 m (range_min of the messages); if they are valid, set"),
+        (filled(12.0), {}, "at a peak of readings without return); give a log"),
         (1000 * readings(), {}, MILLIMETRES),
         (1000 * readings(), {"range_max": 25.0}, MILLIMETRES),
         (100 * readings(), {}, CENTIMETRES),
-        (readings(), {"range_max": 0.5}, "0.5 m (range_max of the messages); if they are good, say so by"),
+        (readings(), {"range_max": 0.5}, "0.5 m (range_max of the messages); if they are valid, set"),
         (readings(), {"range_min": 12.0, "range_max": 0.05},
          "in scans whose lower limit, 12 m (range_min of the messages), is not below the upper, 0.05 m "
-         "(range_max of the messages); if they are good, say so by --min-range and --max-range"),
+         "(range_max of the messages); if they are valid, set --min-range and --max-range"),
     ],
 )  # fmt: skip
 def test_no_reading_that_counts_is_an_error(read, ranges, changes: dict[str, Any], said):
@@ -103,7 +103,7 @@ def test_limits_the_wrong_way_round_in_some_scans(read):
         "(range_max of the messages)"
     )
     assert log.report.lost == {why: 1800}
-    assert log.report.warnings == (f"1,800 of 7,200 readings are {why}: they do not count",)
+    assert log.report.warnings == (f"1,800 of 7,200 readings are unusable: {why}",)
 
 
 def test_few_readings_that_count_are_told_with_the_reasons_and_used(read):
@@ -111,7 +111,9 @@ def test_few_readings_that_count_are_told_with_the_reasons_and_used(read):
     ranges[np.random.default_rng(1).random(ranges.shape) < 0.96] = 0.0
     log = read(recording(ranges, range_max=20.0))
     zeros = int((ranges == 0).sum())
-    assert log.report.warnings == (f"only {ALL - zeros:,} of 7,200 readings count: {zeros:,} are 0 or less",)
+    assert log.report.warnings == (
+        f"only {ALL - zeros:,} of 7,200 readings are usable: {zeros:,} are 0 or less",
+    )
     np.testing.assert_array_equal(np.isfinite(log.ranges), ranges > 0)
 
 

@@ -13,7 +13,7 @@ from tests.logs import lines
 from tests.logs.noisy_room import carmen, readings, recording, way
 from tests.logs.recordings.messages import Scan
 
-PILE = ", where readings pile up that met nothing"
+PILE = ", at a peak of readings without return"
 
 
 def some(ranges: np.ndarray, share: float) -> np.ndarray:
@@ -91,9 +91,7 @@ def test_what_is_written_at_the_lower_limit_says_nothing(read):
     ranges[lost] = 0.1
     log = read(recording(ranges, range_min=0.1, range_max=20.0))
     np.testing.assert_array_equal(np.isnan(log.ranges), lost)
-    assert (
-        log.report.used["range_min"] == "range_min of the messages, where readings pile up that say nothing"
-    )
+    assert log.report.used["range_min"] == "range_min of the messages, at a peak of invalid readings"
 
 
 def test_a_longer_range_that_is_asked_for_does_not_bring_the_code_back(read):
@@ -122,8 +120,8 @@ def test_limits_that_say_nothing_are_not_used(read, unsaid):
 def test_returns_beyond_range_max_are_told(read):
     log = read(recording(readings(), range_max=6.0))
     (warning,) = log.report.warnings
-    assert "of the returns lie beyond 6 m (range_max of the messages) and are taken for no return" in warning
-    assert "--max-range takes them" in warning
+    assert "of the returns lie beyond 6 m (range_max of the messages) and are read as no return" in warning
+    assert "give a larger --max-range" in warning
     assert read(recording(readings(), range_max=6.0), max_range=15.0).report.warnings == ()
 
 
@@ -135,8 +133,8 @@ def test_a_limit_of_navigation_cuts_no_returns(tmp_path, code):
     log = lines.read(tmp_path, *carmen(ranges, "robot_front_laser_max 4.0"))
     np.testing.assert_array_equal(np.isinf(log.ranges), lost)
     (warning,) = log.report.warnings
-    assert warning.startswith("PARAM robot_front_laser_max is 4 m, but returns go on beyond it (")
-    assert "--max-range 4 holds it" in warning
+    assert warning.startswith("PARAM robot_front_laser_max is 4 m, but ")
+    assert "--max-range 4 would use it" in warning
     held = lines.read(
         tmp_path, *carmen(ranges, "robot_front_laser_max 4.0"), options=ReadingOptions(max_range=4.0)
     )
@@ -181,6 +179,4 @@ def test_a_greatest_range_in_the_records_is_tried_likewise(tmp_path):
     assert "angle" not in " ".join(held.report.warnings)
     longer = lines.read(tmp_path, *robotlaser(readings()))
     assert longer.range_limits == (0.0, 80.0)
-    assert any(
-        "the greatest range in ROBOTLASER1 is 4 m, but returns go on" in w for w in longer.report.warnings
-    )
+    assert any("the greatest range in ROBOTLASER1 is 4 m, but" in w for w in longer.report.warnings)

@@ -26,7 +26,7 @@ from nscan_cli.graph.io.json_fields import JsonRecord, MalformedError, pose_rows
 from nscan_cli.graph.model import Graph, Loop
 from nscan_cli.graph.relations.registry import relation_of, relation_record
 from nscan_cli.logs.compression import compression_of
-from nscan_cli.logs.formats import FORMS, foreign_kind_name
+from nscan_cli.logs.formats import FORMS, foreign_kind
 from nscan_cli.logs.scan_order import STAMP
 from nscan_cli.poses import Array
 
@@ -123,7 +123,7 @@ def _kind_of_content(data: bytes) -> str:
     if packing is not None:
         return f"compressed by {packing.name}"
     log = next((form.name for form in FORMS if form.fits(data)), None)
-    return f"a log ({log})" if log else foreign_kind_name(data)
+    return f"a log ({log})" if log else foreign_kind(data).name
 
 
 def _refuse_constant(constant: str) -> NoReturn:

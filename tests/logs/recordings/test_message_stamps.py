@@ -62,7 +62,7 @@ def test_a_scan_that_was_never_stamped_lies_between_others(read):
     log = read(written)
     assert len(log) == 12
     np.testing.assert_allclose(np.diff(log.times), 0.1, atol=1e-6)
-    assert "1 scan without a usable time stamp: filled in between others" in log.report.warnings
+    assert "1 scan without a usable time stamp: interpolated between others" in log.report.warnings
 
 
 def test_odometry_that_was_never_stamped_is_skipped(read):
