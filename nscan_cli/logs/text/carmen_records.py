@@ -22,7 +22,7 @@ from nscan_cli.logs.text.line_records import (
     ascii_text,
     beam_count,
     blocks,
-    pose_rows,
+    parsed_poses,
     rows_within_bounds,
 )
 from nscan_cli.poses import Array
@@ -99,7 +99,7 @@ def carmen_poses(lines: list[tuple[int, bytes]], skips: Skips, by_logger: bool) 
             continue
         values, stamp = b" ".join(tokens[:POSE_VALUES]), ascii_text(tokens[-1 if by_logger else POSE_VALUES])
         records.append(LineRecord(number, values, POSE_VALUES, stamp))
-    return pose_rows(records, (POSE_VALUES,), skips)
+    return parsed_poses(records, (POSE_VALUES,), skips)
 
 
 def logger_stamps(lines: list[tuple[int, bytes]], scans: CarmenScans) -> list[str]:

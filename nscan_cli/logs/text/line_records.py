@@ -91,7 +91,7 @@ def _layout(record: tuple[LineRecord, int]) -> tuple[int, int]:
     return record[1], record[0].count
 
 
-def pose_rows(records: list[LineRecord], counts: tuple[int, ...], skips: Skips) -> tuple[Array, list[str]]:
+def parsed_poses(records: list[LineRecord], counts: tuple[int, ...], skips: Skips) -> tuple[Array, list[str]]:
     """Poses (R, 3) and time stamps of records that begin with x, y and θ.
 
     Records whose number of values is not in `counts`, or with a value out of bounds, are skipped.

@@ -26,7 +26,7 @@ from nscan_cli.logs.text.line_records import (
     ascii_text,
     beam_count,
     parsed,
-    pose_rows,
+    parsed_poses,
     within_bounds,
 )
 from nscan_cli.poses import Array
@@ -103,7 +103,7 @@ def device_poses(lines: list[PayloadLine], skips: Skips) -> tuple[Array, list[st
 
 def poses_with_size(lines: list[PayloadLine], count: int, skips: Skips) -> tuple[Array, list[str]]:
     """Poses (R, 3) and stamps of records with `count` values that begin with a pose; others are skipped."""
-    return pose_rows([_payload_record(line) for line in lines], (count,), skips)
+    return parsed_poses([_payload_record(line) for line in lines], (count,), skips)
 
 
 def player_scans(laser: str, lines: DeviceLines, version: Version, skips: Skips) -> PlayerScans:

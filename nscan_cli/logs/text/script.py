@@ -23,7 +23,7 @@ from nscan_cli.logs.laser_defaults import CARMEN_MAX_RANGE
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.logs.reading_options import ReadingOptions
 from nscan_cli.logs.skips import Skips
-from nscan_cli.logs.text.line_records import LineRecord, beam_count, parsed, pose_rows
+from nscan_cli.logs.text.line_records import LineRecord, beam_count, parsed, parsed_poses
 from nscan_cli.logs.text.odometry_records import odometry_of_records
 from nscan_cli.poses import Array, wrap
 
@@ -135,7 +135,7 @@ def _odometry(
     if not options.odometry:
         findings.used["odometry"] = "none: --no-odometry"
         return None
-    values, stamps = pose_rows([record for record, _ in records.get("POS", [])], (3, 5), findings.skips)
+    values, stamps = parsed_poses([record for record, _ in records.get("POS", [])], (3, 5), findings.skips)
     recorded = order.by_time(stamps)
     poses = values[recorded.rows] * (METRES_PER_CM, METRES_PER_CM, 1.0)
     poses[:, 2] = wrap(np.radians(poses[:, 2]))
