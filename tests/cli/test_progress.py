@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import os
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
 
-from tests.data import REPOSITORY
+from tests.kernels.kernels_kept import environment
 
 KERNELS = """
 from nscan_cli.kernels.decorators import kernel, leaf_kernel
@@ -48,15 +47,10 @@ TOLD = "compiling the kernels, once for this version on this machine: long\n"
 def told(folder: Path, settings: dict[str, str], *names: str, quiet: bool = False) -> tuple[str, bool]:
     """What a new process says that calls these kernels, and whether it knows that it has compiled."""
     (folder / "some_kernels.py").write_text(KERNELS)
-    kept = {name: value for name, value in os.environ.items() if not name.startswith(("NUMBA_", "XDG_"))}
-    places = {
-        "NUMBA_CACHE_DIR": str(folder / "cache"),
-        "PYTHONPATH": os.pathsep.join([str(folder), str(REPOSITORY)]),
-    }
     code = COMMAND.replace("NAMES", repr(names))
     done = subprocess.run(
         [sys.executable, "-c", code, *(["-q"] if quiet else [])],
-        env={**kept, **places, **settings},
+        env=environment(folder) | settings,
         capture_output=True,
         check=True,
         text=True,

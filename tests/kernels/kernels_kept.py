@@ -85,15 +85,20 @@ RESULTS = [
 ]
 
 
-def process(folder: Path, code: str, **settings: str) -> bytes:
-    """What a new process prints, which has the folder's modules, and keeps what it compiles there."""
+def environment(folder: Path) -> dict[str, str]:
+    """That of a process which has the folder's modules, and keeps what it compiles there."""
     kept = {name: value for name, value in os.environ.items() if not name.startswith(("NUMBA_", "XDG_"))}
     places = {
         "NUMBA_CACHE_DIR": str(folder / "cache"),
         "PYTHONPATH": os.pathsep.join([str(folder), str(REPOSITORY)]),
     }
+    return kept | places
+
+
+def process(folder: Path, code: str, **settings: str) -> bytes:
+    """What a new process prints that has this environment."""
     done = subprocess.run(
-        [sys.executable, "-c", code], env={**kept, **places, **settings}, capture_output=True, check=True
+        [sys.executable, "-c", code], env=environment(folder) | settings, capture_output=True, check=True
     )
     assert not done.stderr
     return done.stdout

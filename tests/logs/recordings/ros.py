@@ -5,7 +5,7 @@ from __future__ import annotations
 import io
 import shutil
 import struct
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -156,8 +156,22 @@ def ros2_idl(written: Iterable[Written]) -> bytes:
     )
 
 
+Message = tuple[str, str, int, dict[str, Any]]
+"""Topic, type, time (ns), fields."""
+
+
+def messages_of(written: Iterable[Written], with_seq: bool = False) -> Iterator[Message]:
+    for one in written:
+        yield one.topic, ros_type(one.content), one.log_time, ros_message(one.content, with_seq)
+
+
 def bag1(written: Iterable[Written], folder: Path, compression: str | None = None) -> bytes:
     """A ROS 1 bag by rosbags; its chunks may be compressed, by BZ2 or LZ4."""
+    return bag1_of(messages_of(written, with_seq=True), folder, compression)
+
+
+def bag1_of(messages: Iterable[Message], folder: Path, compression: str | None = None) -> bytes:
+    """The same, with messages of any type."""
     from rosbags.rosbag1 import Writer
 
     path = folder / "made.bag"
@@ -168,12 +182,11 @@ def bag1(written: Iterable[Written], folder: Path, compression: str | None = Non
         writer.set_compression(Writer.CompressionFormat[compression])
     with writer:
         connections: dict[str, Any] = {}
-        for one in written:
-            name = ros_type(one.content)
-            if one.topic not in connections:
-                connections[one.topic] = writer.add_connection(one.topic, name, typestore=store)
-            message = ros_text.as_message(store, name, ros_message(one.content, with_seq=True))
-            writer.write(connections[one.topic], one.log_time, store.serialize_ros1(message, name))
+        for topic, name, time, fields in messages:
+            if topic not in connections:
+                connections[topic] = writer.add_connection(topic, name, typestore=store)
+            message = ros_text.as_message(store, name, fields)
+            writer.write(connections[topic], time, store.serialize_ros1(message, name))
     return path.read_bytes()
 
 
@@ -189,6 +202,11 @@ def rosbags_mcap(written: Iterable[Written], folder: Path) -> bytes:
 
 def bag2(written: Iterable[Written], path: Path, plugin: str, compression: str | None = None) -> Path:
     """The folder of a ROS 2 bag by rosbags, as a recorder leaves one; compressed by FILE or MESSAGE."""
+    return bag2_of(messages_of(written), path, plugin, compression)
+
+
+def bag2_of(messages: Iterable[Message], path: Path, plugin: str, compression: str | None = None) -> Path:
+    """The same, with messages of any type."""
     from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin, Writer
 
     shutil.rmtree(path, ignore_errors=True)
@@ -198,12 +216,11 @@ def bag2(written: Iterable[Written], path: Path, plugin: str, compression: str |
         writer.set_compression(CompressionMode[compression], CompressionFormat.ZSTD)
     with writer:
         connections: dict[str, Any] = {}
-        for one in written:
-            name = ros_type(one.content)
-            if one.topic not in connections:
-                connections[one.topic] = writer.add_connection(one.topic, name, typestore=store)
-            message = ros_text.as_message(store, name, ros_message(one.content))
-            writer.write(connections[one.topic], one.log_time, store.serialize_cdr(message, name))
+        for topic, name, time, fields in messages:
+            if topic not in connections:
+                connections[topic] = writer.add_connection(topic, name, typestore=store)
+            message = ros_text.as_message(store, name, fields)
+            writer.write(connections[topic], time, store.serialize_cdr(message, name))
     return path
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -14,8 +14,8 @@ from nscan_cli.errors import InputDataError, WrongUsageError
 from nscan_cli.logs.load import recording_from
 from nscan_cli.logs.recordings.message_types import PATH_TYPE
 from nscan_cli.logs.recordings.pose_topics import poses_on_topic
-from tests.logs.recordings import ros_text
 from tests.logs.recordings.messages import START, S, turned
+from tests.logs.recordings.ros import Message, bag1_of, bag2_of
 
 COUNT = 5
 STAMPS = [f"{(START + k * S) // S}.{(START + k * S) % S:09d}" for k in range(COUNT)]
@@ -65,32 +65,18 @@ def fields(kind: str, k: int, with_seq: bool, stamped: bool = True) -> dict[str,
     return {"data": "nothing"}
 
 
-def bag1(kinds: dict[str, str], folder: Path, **how: bool) -> bytes:
-    from rosbags.rosbag1 import Writer
+def messages(kinds: dict[str, str], with_seq: bool, **how: bool) -> Iterator[Message]:
+    for topic, kind in kinds.items():
+        for k in range(COUNT):
+            yield topic, kind, START + k * S, fields(kind, k, with_seq, **how)
 
-    path = folder / "made.bag"
-    path.unlink(missing_ok=True)
-    store = ros_text.store(ros1=True)
-    with Writer(path) as writer:
-        for topic, kind in kinds.items():
-            connection = writer.add_connection(topic, kind, typestore=store)
-            for k in range(COUNT):
-                message = ros_text.as_message(store, kind, fields(kind, k, True, **how))
-                writer.write(connection, START + k * S, store.serialize_ros1(message, kind))
-    return path.read_bytes()
+
+def bag1(kinds: dict[str, str], folder: Path, **how: bool) -> bytes:
+    return bag1_of(messages(kinds, True, **how), folder)
 
 
 def bag2(kinds: dict[str, str], folder: Path, plugin: str = "SQLITE3", **how: bool) -> bytes:
-    from rosbags.rosbag2 import StoragePlugin, Writer
-
-    path = folder / f"made_{plugin}"
-    store = ros_text.store(ros1=False)
-    with Writer(path, version=9, storage_plugin=StoragePlugin[plugin]) as writer:
-        for topic, kind in kinds.items():
-            connection = writer.add_connection(topic, kind, typestore=store)
-            for k in range(COUNT):
-                message = ros_text.as_message(store, kind, fields(kind, k, False, **how))
-                writer.write(connection, START + k * S, store.serialize_cdr(message, kind))
+    path = bag2_of(messages(kinds, False, **how), folder / f"made_{plugin}", plugin)
     (file,) = (path for path in path.iterdir() if path.suffix in (".db3", ".mcap"))
     return file.read_bytes()
 
