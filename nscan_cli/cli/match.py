@@ -15,7 +15,7 @@ from nscan_cli.cli.subcommand import log_argument, option, result_option, subcom
 from nscan_cli.cli.summary import Row, match_outcome, summary_table
 from nscan_cli.errors import WrongUsageError
 from nscan_cli.files.outputs import check_writable, write_atomically
-from nscan_cli.files.provenance import provenance_of
+from nscan_cli.files.provenance import as_parameters, provenance_of
 from nscan_cli.logs.reading_options import ReadingOptions
 
 if TYPE_CHECKING:
@@ -114,9 +114,9 @@ def command(
     match = match_pair(scan_ndt(fixed, options), moving, start, known, options)
     parameters = {
         "reading": dataclasses.asdict(reading),
-        "matching": dataclasses.asdict(options),
+        "matching": as_parameters(options),
         "prior": prior,
-        "odometry": dataclasses.asdict(model),
+        "odometry": as_parameters(model),
     }
     write_atomically(output, _document(scans, (reference, scan), start, match, parameters))
     if plot is not None:

@@ -18,7 +18,7 @@ from nscan_cli.cli.summary import Row, match_outcome, summary_table
 from nscan_cli.errors import InputDataError, WrongUsageError
 from nscan_cli.files.counting import counted
 from nscan_cli.files.outputs import check_writable, write_atomically
-from nscan_cli.files.provenance import provenance_of
+from nscan_cli.files.provenance import as_parameters, provenance_of
 from nscan_cli.logs.reading_options import ReadingOptions
 
 if TYPE_CHECKING:
@@ -123,13 +123,13 @@ def command(
         )
     parameters = {
         "reading": dataclasses.asdict(reading),
-        "matching": dataclasses.asdict(options),
-        "joint": {key: value for key, value in dataclasses.asdict(joint).items() if key != "fixed"},
+        "matching": as_parameters(options),
+        "joint": {key: value for key, value in as_parameters(joint).items() if key != "fixed"},
         "pairs": pairs,
         "gauge": gauge,
         "initial": base_name(initial),
         "prior": base_name(prior),
-        "odometry": dataclasses.asdict(model),
+        "odometry": as_parameters(model),
     }
     provenance = provenance_of([scans.source, *sources], parameters)
     write_atomically(output, document(NSCAN_FORMAT, provenance, _fields(numbers, match, left_out)))

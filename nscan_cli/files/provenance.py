@@ -2,11 +2,25 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Iterable, Sequence
 from typing import Any
 
 from nscan_cli import __version__
 from nscan_cli.files.source import Source
+
+
+def option_fields(options: Any) -> dict[str, Any] | None:
+    """The fields of options, which are a dataclass or a named tuple; None for any other value."""
+    if dataclasses.is_dataclass(options):
+        return vars(options)
+    return options._asdict() if hasattr(options, "_asdict") else None
+
+
+def as_parameters(options: Any) -> Any:
+    """Options, and those within them, as dicts of their fields; any other value as it is."""
+    fields = option_fields(options)
+    return options if fields is None else {name: as_parameters(each) for name, each in fields.items()}
 
 
 def provenance_of(sources: Iterable[Source], parameters: dict[str, Any]) -> dict[str, Any]:

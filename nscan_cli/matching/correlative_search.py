@@ -89,7 +89,11 @@ def likelihood_field(points: Array, options: SearchOptions) -> LikelihoodField:
     _splat(field, points, options.spread)
     for level in range(1, FIELD_LEVELS - 1):
         _coarsen(levels[level - 1], 1 << (level - 1), levels[level])
-    _coarsen_last(levels[-1], coarsest)
+    last = np.empty_like(levels[-1])
+    _coarsen(levels[-1], PAD // 2, last)
+    for offset in range(PAD):
+        column = last[:, offset::PAD]
+        coarsest[offset, :, LANES : LANES + column.shape[1]] = column
     return field
 
 
@@ -160,19 +164,6 @@ def _coarsen(finer: NDArray[np.float32], half: int, coarser: NDArray[np.float32]
             row[iy] = here[iy] if here[iy] > there[iy] else there[iy]
         for iy in range(height - half):
             row[iy] = row[iy] if row[iy] > row[iy + half] else row[iy + half]
-
-
-@kernel
-def _coarsen_last(finer: NDArray[np.float32], coarsest: NDArray[np.float32]) -> None:
-    """As `_coarsen`, into the layout of the coarsest level."""
-    row = np.empty((1, finer.shape[1]), dtype=np.float32)
-    for ix in range(finer.shape[0]):
-        there = min(ix + PAD // 2, finer.shape[0] - 1)
-        for iy in range(finer.shape[1]):
-            row[0, iy] = max(finer[ix, iy], finer[there, iy])
-        for iy in range(finer.shape[1]):
-            other = min(iy + PAD // 2, finer.shape[1] - 1)
-            coarsest[iy % PAD, ix, LANES + iy // PAD] = max(row[0, iy], row[0, other])
 
 
 @kernel

@@ -15,8 +15,8 @@ from nscan_cli.matching.uncertainty import (
     Weakest,
     covariance_of,
     decrement,
-    is_minimum,
     weakest_translation,
+    why_no_minimum,
 )
 from nscan_cli.ndt.association import begin_association
 from nscan_cli.ndt.energy import ENERGY_NUMBERS, inlier_share
@@ -27,8 +27,6 @@ from nscan_cli.poses import Array, wrap
 NO_OVERLAP = "no overlap"
 STEP_LIMIT = "step limit"
 NO_DESCENT = "no step lowers the energy"
-INDEFINITE = "the Hessian is not positive definite"
-CELL_BORDER = "held at a cell border, where the energy jumps"
 
 
 @dataclass(frozen=True)
@@ -132,15 +130,10 @@ def match_pair(
     pose, hessian, gradient, out = start.copy(), np.empty((3, 3)), np.empty(3), np.empty(ENERGY_NUMBERS)
     iterations, evaluations, last, converged = 0, 1, 0, [True]
     # One stage a call: whether the match has converged depends on the last stage alone.
+    limits = options.max_iterations, options.tolerance, options.tolerance
     for widening in options.widenings:
         _, _, last, evaluated, ended = minimise_pairwise(
-            problem,
-            pose,
-            np.array([widening]),
-            options.max_iterations,
-            options.tolerance,
-            options.tolerance,
-            hessian,
+            problem, pose, np.array([widening]), *limits, hessian
         )
         iterations += last
         evaluations += evaluated
@@ -148,15 +141,12 @@ def match_pair(
     pairwise_objective(problem, pose, 1.0, 1.0, out, gradient, hessian)
     overlap = inlier_share(reference.grid, reference.half, points, pose, options.inlier_bound)
     covariance = covariance_of(hessian)
-    reason = None
     if overlap < options.least_overlap:
-        reason = NO_OVERLAP
+        reason: str | None = NO_OVERLAP
     elif not converged[-1]:
         reason = STEP_LIMIT if last == options.max_iterations else NO_DESCENT
-    elif covariance is None:
-        reason = INDEFINITE
-    elif not is_minimum(gradient, covariance, options.convergence):
-        reason = CELL_BORDER
+    else:
+        reason = why_no_minimum(gradient, covariance, options.convergence)
     return PairMatch(
         pose=np.array([pose[0], pose[1], float(wrap(pose[2]))]),
         energy=float(out[0]),

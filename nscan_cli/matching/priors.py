@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import astuple, dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -20,8 +19,7 @@ class Prior(NamedTuple):
     """(3, 3) P"""
 
 
-@dataclass(frozen=True)
-class MotionModel:
+class MotionModel(NamedTuple):
     """Standard deviations of a step of the odometry.
 
     They are large on purpose: wheels slip, and carts are pushed. A strong prior breaks maps where the
@@ -40,23 +38,8 @@ class MotionModel:
     """Increase of it for each metre travelled, rad."""
 
 
-class MotionParameters(NamedTuple):
-    """A MotionModel as the kernels take it."""
-
-    distance: float
-    distance_per_metre: float
-    angle: float
-    angle_per_radian: float
-    angle_per_metre: float
-
-    @classmethod
-    def of(cls, model: MotionModel) -> MotionParameters:
-        """The parameters of a model."""
-        return cls(*astuple(model))
-
-
 @kernel
-def motion_sigmas(step: Array, motion: MotionParameters) -> tuple[float, float]:
+def motion_sigmas(step: Array, motion: MotionModel) -> tuple[float, float]:
     """Standard deviations of a step (3,): of its position in x and in y (m), and of its angle (rad)."""
     distance = np.hypot(step[0], step[1])
     along = motion.distance + motion.distance_per_metre * distance
@@ -67,5 +50,5 @@ def motion_sigmas(step: Array, motion: MotionParameters) -> tuple[float, float]:
 def odometry_prior(reference: Array, pose: Array, model: MotionModel) -> Prior:
     """The prior on pose ⊖ reference from the odometry poses (3,) of two scans."""
     step = relative(pose, reference)
-    along, about = motion_sigmas(step, MotionParameters.of(model))
+    along, about = motion_sigmas(step, model)
     return Prior(step, np.diag([along**-2, along**-2, about**-2]))

@@ -9,6 +9,8 @@ import numpy as np
 
 from nscan_cli.poses import Array
 
+INDEFINITE = "the Hessian is not positive definite"
+CELL_BORDER = "held at a cell border, where the energy jumps"
 SINGULAR = 1e-10
 """An eigenvalue below this share of the greatest one is rounding, not information."""
 WEAK_SIGMA = 0.05
@@ -54,10 +56,12 @@ def decrement(gradient: Array, covariance: Array) -> float:
     return float(np.sqrt(gradient @ covariance @ gradient))
 
 
-def is_minimum(gradient: Array, covariance: Array, options: ConvergenceOptions) -> bool:
-    """Whether the Newton step at a point is short against the uncertainty, or in metres and radians."""
-    step = covariance @ gradient
-    return decrement(gradient, covariance) <= options.deviations or bool(np.abs(step).max() <= options.step)
+def why_no_minimum(gradient: Array, covariance: Array | None, options: ConvergenceOptions) -> str | None:
+    """Why a point is no minimum; None where the Newton step is short, in deviations or in m and rad."""
+    if covariance is None:
+        return INDEFINITE
+    short = np.abs(covariance @ gradient).max() <= options.step
+    return None if short or decrement(gradient, covariance) <= options.deviations else CELL_BORDER
 
 
 def weakest_translation(information: Array) -> Weakest:

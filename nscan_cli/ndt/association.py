@@ -40,16 +40,15 @@ def associate_once(
     grid: Grid,
     half: float,
     points: Array,
-    x: float,
-    y: float,
-    phi: float,
+    pose: Array,
     stride: int,
     buffers: AssociationBuffers,
 ) -> int:
-    """Write the pairs of points (m, 2) and Gaussians to the columns of `buffers.pairs`; the number of pairs.
+    """Write the pairs of points (m, 2), moved by `pose` (3,), and Gaussians to `buffers.pairs`.
 
-    Of the points, one in `stride` counts.
+    Of the points, one in `stride` counts. Returns the number of pairs.
     """
+    x, y, phi = pose[0], pose[1], pose[2]
     moved, pairs = buffers.moved, buffers.pairs
     n = (points.shape[0] + stride - 1) // stride
     # All points first, in lanes: the processor cannot predict where a look-up ends.

@@ -42,9 +42,7 @@ def evaluate_energy(
     grid: Grid,
     half: float,
     points: Array,
-    x: float,
-    y: float,
-    phi: float,
+    pose: Array,
     widening: float,
     curvature: float,
     baseline: float,
@@ -52,13 +50,13 @@ def evaluate_energy(
     buffers: AssociationBuffers,
     out: Array,
 ) -> None:
-    """Write E, gradient and Hessian at the pose u = (x, y, phi) of points (m, 2) into out (10,).
+    """Write E, gradient and Hessian at the pose u (3,) of points (m, 2) into out (10,).
 
     With `curvature` 1 the Hessian is exact. With 0 it lacks the two terms that can be negative, so that it is
     positive semi-definite everywhere. Every pair of a point and a Gaussian adds `baseline` to E. Of the
     points, one in `stride` counts.
     """
-    count = associate_once(grid, half, points, x, y, phi, stride, buffers)
+    count = associate_once(grid, half, points, pose, stride, buffers)
     _sum_pairs(buffers.pairs, count, widening, curvature, baseline, out)
 
 
@@ -96,14 +94,8 @@ def sum_association(association: Association, widening: float, curvature: float,
             t = _pair_terms(rx, ry, v, sigma, 1.0 if faces & (sigma[0] > 0.0) else 0.0, widening, curvature)
             e -= t[0]
             gx, gy, gp = gx + t[1], gy + t[2], gp + t[3]
-            hxx, hxy, hxp, hyy, hyp, hpp = (
-                hxx + t[4],
-                hxy + t[5],
-                hxp + t[6],
-                hyy + t[7],
-                hyp + t[8],
-                hpp + t[9],
-            )
+            hxx, hxy, hxp = hxx + t[4], hxy + t[5], hxp + t[6]
+            hyy, hyp, hpp = hyy + t[7], hyp + t[8], hpp + t[9]
     out[0], out[1], out[2], out[3] = e, gx, gy, gp
     out[4], out[5], out[6], out[7], out[8], out[9] = hxx, hxy, hxp, hyy, hyp, hpp
 
@@ -198,7 +190,7 @@ def find_inliers(
 
 
 class Energy(NamedTuple):
-    """E with gradient (3,) and Hessian (3, 3) with respect to the pose (x, y, φ)."""
+    """An energy with its gradient and Hessian: (3,) and (3, 3) for E of one pose (x, y, φ)."""
 
     value: float
     gradient: Array
@@ -211,9 +203,9 @@ def energy(ndt: Ndt, points: Array, pose: Array, widening: float = 1.0, exact: b
     `exact=False` leaves out the parts of the Hessian that can be negative.
     """
     out = np.empty(ENERGY_NUMBERS)
-    x, y, phi = (float(part) for part in pose)
     buffers = association_buffers(len(points), 1)
-    evaluate_energy(ndt.grid, ndt.half, points, x, y, phi, widening, float(exact), 0.0, 1, buffers, out)
+    at = np.asarray(pose, dtype=np.float64)
+    evaluate_energy(ndt.grid, ndt.half, points, at, widening, float(exact), 0.0, 1, buffers, out)
     gradient, hessian = np.empty(3), np.empty((3, 3))
     unpack_derivatives(out, 1.0, gradient, hessian)
     return Energy(float(out[0]), gradient, hessian)

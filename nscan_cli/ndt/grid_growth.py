@@ -27,11 +27,14 @@ from nscan_cli.ndt.hash_grid import (
     unpack_key,
 )
 from nscan_cli.ndt.neighbourhood import align_with_neighbourhood, drop_along_wall_information
-from nscan_cli.ndt.scan_tangents import scan_tangent
 from nscan_cli.poses import Array
 
 CELLS_PER_POINT = 9
 """Most lattice cells that a point adds: its own and the eight around it."""
+NEIGHBOUR_POINTS = 10
+"""Most points to each side that are tried as the neighbour. These are constants of the kernels."""
+LEAST_SPACING, GREATEST_SPACING = 0.1, 0.5
+"""Distances (m) of the neighbour: nearer points differ by noise, farther ones belong to something else."""
 
 
 @leaf_kernel
@@ -61,7 +64,7 @@ def add_points(
         # Only an empty cell gets a new normal, so that points are removed from the part that they were added
         # to.
         if sums[0, 0] + sums[1, 0] < 0.5:
-            tx, ty = scan_tangent(points, k)
+            tx, ty = _scan_tangent(points, k)
             facing[0], facing[1] = -(sin * tx + cos * ty), cos * tx - sin * ty
         part = sums[1 if facing[0] * bx + facing[1] * by > 0.0 else 0]
         dx, dy = x - (ix + 0.5) * half, y - (iy + 0.5) * half
@@ -133,6 +136,28 @@ def _outdate_gaussians(grid: Grid, touched: NDArray[np.int32]) -> None:
 
 
 @leaf_kernel
+def _scan_tangent(points: Array, k: int) -> tuple[float, float]:
+    """The direction of the surface at point k of a scan (m, 2), from its neighbours; else across its beam."""
+    x, y = points[k, 0], points[k, 1]
+    tx = ty = 0.0
+    for step in (-1, 1):
+        for beside in range(1, NEIGHBOUR_POINTS + 1):
+            other = k + step * beside
+            if other < 0 or other >= points.shape[0]:
+                break
+            dx, dy = points[other, 0] - x, points[other, 1] - y
+            apart = dx * dx + dy * dy
+            if apart > LEAST_SPACING * LEAST_SPACING:
+                if apart < GREATEST_SPACING * GREATEST_SPACING:
+                    tx += step * dx
+                    ty += step * dy
+                break
+    if tx == 0.0 and ty == 0.0:
+        return -y, x
+    return tx, ty
+
+
+@leaf_kernel
 def _has_all_blocks(grid: Grid, row: int) -> bool:
     links = grid.links
     return bool(links[row, 0] >= 0 and links[row, 1] >= 0 and links[row, 2] >= 0 and links[row, 3] >= 0)
@@ -156,12 +181,12 @@ def _insert_with_neighbours(grid: Grid, rows: int, ix: int, iy: int) -> tuple[in
 
 
 @kernel
-def copy_occupied(old: Grid, rows: int, new: Grid) -> int:
-    """Copy the first `rows` of a grid into an empty one with enough capacity; returns its number of rows.
+def _copied(old: Grid, rows: int, capacity: int) -> tuple[Grid, int]:
+    """A new grid with a copy of the first `rows` of an old one, and its number of rows.
 
     Cells that have no points and no neighbours with points are left out, or a map that moves would grow.
     """
-    count = 0
+    new, count = empty_grid(capacity, old.settings), 0
     for row in range(rows):
         if old.sums[row, 0, 0] + old.sums[row, 1, 0] > 0.5:
             ix, iy = unpack_key(old.keys[row])
@@ -176,14 +201,7 @@ def copy_occupied(old: Grid, rows: int, new: Grid) -> int:
             other = new.keys.shape[0] + row
             assign(new.gaussians[other], old.gaussians[old.keys.shape[0] + before])
             gaussian[7] = other
-    return count
-
-
-@kernel
-def _copied(old: Grid, rows: int, capacity: int) -> tuple[Grid, int]:
-    """A new grid with a copy of the first `rows` of an old one, and its number of rows."""
-    new = empty_grid(capacity, old.settings)
-    return new, copy_occupied(old, rows, new)
+    return new, count
 
 
 @kernel
@@ -196,22 +214,6 @@ def with_capacity(grid: Grid, rows: int, points: int) -> tuple[Grid, int]:
     # With less than half of it free, the next copy would follow soon.
     if rows + needed > capacity // 2:
         grid, rows = _copied(grid, rows, 2 * max(rows + needed, capacity))
-    return grid, rows
-
-
-@kernel
-def with_scans(
-    grid: Grid, rows: int, half: float, points: Array, ends: NDArray[np.int64], poses: Array
-) -> tuple[Grid, int]:
-    """The grid with n scans added, moved by `poses` (n, 3), and its number of rows.
-
-    Scan k has points[ends[k] : ends[k + 1]]. The Gaussians have to be made.
-    """
-    touched = np.empty(points.shape[0], dtype=np.int32)
-    for k in range(poses.shape[0]):
-        scan = points[ends[k] : ends[k + 1]]
-        grid, rows = with_capacity(grid, rows, scan.shape[0])
-        rows = add_points(grid, rows, half, scan, poses[k], 1.0, touched)
     return grid, rows
 
 

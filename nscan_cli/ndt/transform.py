@@ -7,10 +7,20 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from nscan_cli.kernels.assign import assign
 from nscan_cli.kernels.decorators import kernel
-from nscan_cli.ndt.compaction import compacted
-from nscan_cli.ndt.grid_growth import change_points, make_all_gaussians, with_capacity, with_scans
-from nscan_cli.ndt.hash_grid import FACES, FLOOR, MINIMUM, NEIGHBOURHOOD, NO_NEIGHBOURS, Grid, empty_grid
+from nscan_cli.ndt.grid_growth import add_points, change_points, make_all_gaussians, with_capacity
+from nscan_cli.ndt.hash_grid import (
+    FACES,
+    FLOOR,
+    MINIMUM,
+    NEIGHBOURHOOD,
+    NO_NEIGHBOURS,
+    Grid,
+    empty_grid,
+    rehash,
+    table_size,
+)
 from nscan_cli.poses import Array
 
 INITIAL_CAPACITY = 512
@@ -22,9 +32,57 @@ def _grid_of_scans(
     points: Array, ends: NDArray[np.int64], poses: Array, half: float, capacity: int, settings: Array
 ) -> Grid:
     """The compact grid of n scans; see `Ndt.of_scans`."""
-    grid, rows = with_scans(empty_grid(capacity, settings), 0, half, points, ends, poses)
+    grid, rows, touched = empty_grid(capacity, settings), 0, np.empty(points.shape[0], dtype=np.int32)
+    for k in range(poses.shape[0]):
+        scan = points[ends[k] : ends[k + 1]]
+        grid, rows = with_capacity(grid, rows, scan.shape[0])
+        rows = add_points(grid, rows, half, scan, poses[k], 1.0, touched)
     make_all_gaussians(grid, rows, half)
-    return compacted(grid, rows)
+    return _compacted(grid, rows)
+
+
+@kernel
+def _compacted(grid: Grid, rows: int) -> Grid:
+    """The Gaussians of the first `rows` that have enough points, and the lattice cells in their blocks.
+
+    Those of the other face of a wall follow all others. No points can be added to the copy.
+    """
+    capacity = grid.keys.shape[0]
+    places, fronts, backs = np.full(rows, -1, dtype=np.int32), 0, 0
+    for row in range(rows):
+        if grid.gaussians[row, 2] != 0.0:
+            places[row] = fronts
+            fronts += 1
+            backs += grid.gaussians[row, 7] > 0.0
+    gaussians, back = np.empty((fronts + backs, 8)), fronts
+    for row in range(rows):
+        if places[row] >= 0:
+            gaussian = gaussians[places[row]]
+            assign(gaussian, grid.gaussians[row])
+            if gaussian[7] > 0.0:
+                gaussian[7] = back
+                assign(gaussians[back], grid.gaussians[capacity + row])
+                back += 1
+    keys, links, kept = np.empty(rows, dtype=np.int64), np.empty((rows, 4), dtype=np.int32), 0
+    for row in range(rows):
+        is_used = False
+        for block in range(4):
+            link = grid.links[row, block]
+            links[kept, block] = places[link] if link >= 0 else -1
+            is_used |= links[kept, block] >= 0
+        keys[kept] = grid.keys[row]
+        kept += is_used
+    compact = Grid(
+        np.full(table_size(kept), -1, dtype=np.int32),
+        keys[:kept].copy(),
+        links[:kept].copy(),
+        np.empty((0, 2)),
+        np.empty((0, 2, 8)),
+        gaussians,
+        np.empty(0),
+    )
+    rehash(compact, kept)
+    return compact
 
 
 @dataclass(eq=False)

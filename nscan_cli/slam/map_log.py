@@ -8,7 +8,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-from nscan_cli.files.provenance import provenance_of
+from nscan_cli.files.provenance import as_parameters, provenance_of
 from nscan_cli.graph.model import Graph
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.logs.reading_options import ReadingOptions
@@ -70,7 +70,7 @@ def map_log(
     graph = run_slam(state, tell)
     parameters: dict[str, Any] = {
         "reading": dataclasses.asdict(reading),
-        "slam": dataclasses.asdict(options),
+        "slam": as_parameters(options),
     }
     graph.provenance = {**provenance_of([log.source], parameters), "notices": notices(state)}
     return state, graph

@@ -75,7 +75,7 @@ def test_a_temporary_folder_that_others_can_write_is_not_trusted(places, monkeyp
     private.mkdir()
     private.chmod(0o777)
     assert chosen() is None
-    assert is_uncompiled("approach_and_finish")
+    assert is_uncompiled("descend")
     private.rmdir()
     (places / "elsewhere").mkdir()
     private.symlink_to(places / "elsewhere")

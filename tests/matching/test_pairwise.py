@@ -8,7 +8,6 @@ import pytest
 from nscan_cli.errors import InputDataError
 from nscan_cli.logs.load import read_log
 from nscan_cli.matching.pairwise import (
-    CELL_BORDER,
     NO_OVERLAP,
     STEP_LIMIT,
     PairMatch,
@@ -17,6 +16,7 @@ from nscan_cli.matching.pairwise import (
     scan_ndt,
 )
 from nscan_cli.matching.priors import Prior
+from nscan_cli.matching.uncertainty import CELL_BORDER
 from nscan_cli.ndt.energy import energy
 from nscan_cli.poses import Array, relative, wrap
 from tests.data import OFFICE_LOG

@@ -37,9 +37,7 @@ def test_an_updated_association_equals_a_new_look_up(step, curvature):
         update_association(ndt.grid, ndt.half, association, *pose)
         sum_association(association, 0.3, curvature, kept)
         buffers = association_buffers(len(points), 1)
-        evaluate_energy(
-            ndt.grid, ndt.half, points, pose[0], pose[1], pose[2], 0.3, curvature, 0.0, 1, buffers, anew
-        )
+        evaluate_energy(ndt.grid, ndt.half, points, pose, 0.3, curvature, 0.0, 1, buffers, anew)
         np.testing.assert_allclose(kept, anew, rtol=1e-9, atol=1e-9 * np.abs(anew).max())
         counted += anew[0] < -1.0
     assert counted >= 20

@@ -145,6 +145,6 @@ def test_an_updated_association_has_the_right_face(points, pose):
         update_association(ndt.grid, ndt.half, association, *at)
         sum_association(association, 0.3, 0.0, kept)
         buffers = association_buffers(len(scan), 1)
-        evaluate_energy(ndt.grid, ndt.half, scan, at[0], at[1], at[2], 0.3, 0.0, 0.0, 1, buffers, anew)
+        evaluate_energy(ndt.grid, ndt.half, scan, at, 0.3, 0.0, 0.0, 1, buffers, anew)
         assert anew[0] < -10
         np.testing.assert_allclose(kept, anew, rtol=1e-9, atol=1e-9 * np.abs(anew).max())

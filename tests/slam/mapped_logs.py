@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from nscan_cli.files.provenance import provenance_of
+from nscan_cli.files.provenance import as_parameters, provenance_of
 from nscan_cli.graph.model import Graph
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.logs.load import read_log
@@ -47,7 +47,7 @@ def mapped(log: LaserLog, options: SlamOptions | None = None, threads: int = 1) 
     options = options or SlamOptions()
     state = SlamState.of_log(log, options, threads)
     graph = run_slam(state, lambda done, keyframes: None)
-    parameters = {"reading": dataclasses.asdict(ReadingOptions()), "slam": dataclasses.asdict(options)}
+    parameters = {"reading": as_parameters(ReadingOptions()), "slam": as_parameters(options)}
     graph.provenance = provenance_of([log.source], parameters)
     return Mapped(log, graph, state)
 

@@ -150,15 +150,9 @@ class Initialisation:
             ndt.add(self.points[other], poses[other])
         none = Prior(np.zeros(3), np.zeros((3, 3)))
         problem = PairProblem(ndt.grid, ndt.half, begin_association(self.points[scan]), options.scale, none)
-        minimise_pairwise(
-            problem,
-            pose,
-            np.array(self.initialisation.widenings),
-            options.max_iterations,
-            options.tolerance,
-            options.tolerance,
-            np.empty((3, 3)),
-        )
+        limits = options.max_iterations, options.tolerance, options.tolerance
+        widenings = np.array(self.initialisation.widenings)
+        minimise_pairwise(problem, pose, widenings, *limits, np.empty((3, 3)))
         return pose
 
 

@@ -16,7 +16,7 @@ from nscan_cli.matching.joint.scan_set import ScanSet, most_points, scan_grid, s
 from nscan_cli.matching.pose_kernels import relative_pose
 from nscan_cli.matching.small_matrices import multiply
 from nscan_cli.ndt.association import AssociationBuffers, association_buffers
-from nscan_cli.ndt.energy import ENERGY_NUMBERS, evaluate_energy, unpack_derivatives
+from nscan_cli.ndt.energy import ENERGY_NUMBERS, Energy, evaluate_energy, unpack_derivatives
 from nscan_cli.poses import Array
 
 NEUTRAL = 1.0
@@ -59,42 +59,26 @@ class PairBuffers(NamedTuple):
     met: AssociationBuffers
 
 
-class JointEnergy(NamedTuple):
-    """The value with gradient (3n,) and Hessian (3n, 3n), variables (x, y, φ) scan by scan."""
-
-    value: float
-    gradient: Array
-    hessian: Array
-
-
 def no_priors() -> Priors:
     """An empty list of priors."""
     return Priors(np.empty((0, 2), dtype=np.int64), np.empty((0, 3)), np.empty((0, 3, 3)))
 
 
-@kernel
 def all_pairs(n: int) -> NDArray[np.int64]:
     """The index set J of all n (n − 1) ordered pairs, (n (n − 1), 2)."""
-    pairs, m = np.empty((n * (n - 1), 2), dtype=np.int64), 0
-    for i in range(n):
-        for j in range(n):
-            if i != j:
-                pairs[m, 0], pairs[m, 1] = i, j
-                m += 1
-    return pairs
+    return np.ascontiguousarray(np.argwhere(~np.eye(n, dtype=np.bool_)), dtype=np.int64)
 
 
-def joint_energy(
-    problem: JointProblem, poses: Array, widening: float = 1.0, exact: bool = True
-) -> JointEnergy:
+def joint_energy(problem: JointProblem, poses: Array, widening: float = 1.0, exact: bool = True) -> Energy:
     """Scale · E(p) plus the priors at the poses (n, 3).
 
-    `exact=False` keeps the semi-definite part of the Hessian only: Σ (∂u/∂p)ᵗ H⁺ (∂u/∂p).
+    Gradient (3n,) and Hessian (3n, 3n) have the variables (x, y, φ) scan by scan. `exact=False` keeps the
+    semi-definite part of the Hessian only: Σ (∂u/∂p)ᵗ H⁺ (∂u/∂p).
     """
     n = len(poses)
     gradient, hessian = np.empty(3 * n), np.empty((3 * n, 3 * n))
     value = evaluate_joint(problem, poses, widening, float(exact), False, 1, gradient, hessian)
-    return JointEnergy(value, gradient, hessian)
+    return Energy(value, gradient, hessian)
 
 
 @kernel
@@ -144,20 +128,9 @@ def _add_pairs(
     for pair in range(pairs.shape[0]):
         i, j = pairs[pair, 0], pairs[pair, 1]
         relative_pose(poses[j], poses[i], u)
-        evaluate_energy(
-            scan_grid(scans, i),
-            scans.half,
-            scan_points(scans, j),
-            u[0],
-            u[1],
-            u[2],
-            widening,
-            curvature,
-            neutral * scans.usual[i] if neutral > 0.0 else 0.0,
-            stride,
-            met,
-            out,
-        )
+        grid, points = scan_grid(scans, i), scan_points(scans, j)
+        baseline = neutral * scans.usual[i] if neutral > 0.0 else 0.0
+        evaluate_energy(grid, scans.half, points, u, widening, curvature, baseline, stride, met, out)
         value += scale * out[0]
         unpack_derivatives(out, scale, g, h)
         _add_by_chain_rule(i, j, poses[i, 2], u, g, h, curvature, gradient, hessian)

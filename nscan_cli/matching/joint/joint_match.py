@@ -10,8 +10,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from nscan_cli.matching.joint.gauge import gauge_of
 from nscan_cli.matching.joint.joint_energy import NEUTRAL, JointProblem, joint_energy
-from nscan_cli.matching.joint.joint_solver import approach, approach_and_finish
+from nscan_cli.matching.joint.joint_solver import approach, descend
 from nscan_cli.matching.joint.neutral_energy import neutral_energy
 from nscan_cli.matching.joint.options import JointOptions
 from nscan_cli.matching.joint.overlap import overlaps, weakest_link
@@ -62,15 +63,6 @@ class Approach(NamedTuple):
     unsettled: int
     """Stages that did not converge."""
 
-    def extended(self, iterations: int, evaluations: int, unsettled: int) -> Approach:
-        """With these added to its numbers. The poses are the same array, which the kernels change."""
-        return Approach(
-            self.poses,
-            self.iterations + iterations,
-            self.evaluations + evaluations,
-            self.unsettled + unsettled,
-        )
-
 
 def match_jointly(problem: JointProblem, start: Array, options: JointOptions) -> JointMatch:
     """Minimise the joint energy from the poses `start` (n, 3), stage by stage.
@@ -78,7 +70,8 @@ def match_jointly(problem: JointProblem, start: Array, options: JointOptions) ->
     The steps are Newton's, eq. (5) to (8), damped as by Levenberg and Marquardt: with the semi-definite
     part of the Hessian in the wide stages, with the exact one in the last where it is positive definite.
     """
-    return _last_stage(problem, Approach(start.copy(), 0, 0, 0), options, options.widenings, neutral=False)
+    reached = _approach(problem, start, options, options.widenings, neutral=False)
+    return _last_stage(problem, reached, options, neutral=False)
 
 
 def match_near_and_far(
@@ -109,7 +102,7 @@ def match_near_and_far(
         iterations=sum(each.iterations for each in approaches),
         evaluations=sum(each.evaluations for each in approaches) + len(approaches),
     )
-    return _last_stage(_with_pairs(problem, pairs_at, best.poses), total, options, (), neutral=True)
+    return _last_stage(_with_pairs(problem, pairs_at, best.poses), total, options, neutral=True)
 
 
 def _neutral_energy(problem: JointProblem, options: JointOptions, share: float, reached: Approach) -> float:
@@ -124,40 +117,24 @@ def _approach(
     neutral: bool,
     pairs_at: PairsAt | None = None,
 ) -> Approach:
-    reached = Approach(start.copy(), 0, 0, 0)
+    poses, totals = start.copy(), np.zeros(3, dtype=np.int64)
     for part in [widenings] if pairs_at is None else [(widening,) for widening in widenings]:
-        chosen = _with_pairs(problem, pairs_at, reached.poses)
-        found = approach(chosen, reached.poses, np.array(part), neutral, *options.of_approach)
-        reached = reached.extended(*found)
-    return reached
+        chosen = _with_pairs(problem, pairs_at, poses)
+        totals += approach(chosen, poses, np.array(part), neutral, options.of_approach)
+    return Approach(poses, *totals.tolist())
 
 
-def _last_stage(
-    problem: JointProblem,
-    reached: Approach,
-    options: JointOptions,
-    widenings: tuple[float, ...],
-    neutral: bool,
-) -> JointMatch:
-    """The rest of an approach by `widenings`, and the last stage with the exact Hessian."""
+def _last_stage(problem: JointProblem, reached: Approach, options: JointOptions, neutral: bool) -> JointMatch:
+    """The last stage after an approach, with the exact Hessian."""
     poses, n = reached.poses, len(reached.poses)
     gradient, hessian = np.empty(3 * n), np.empty((3 * n, 3 * n))
-    value, last, converged, *approached = approach_and_finish(
-        problem,
-        poses,
-        np.array(widenings),
-        neutral,
-        options.of_approach,
-        options.max_iterations,
-        options.tolerance,
-        gradient,
-        hessian,
+    limits = gauge_of(options.fixed), options.max_iterations, options.tolerance, options.thorough
+    value, last, evaluations, converged = descend(
+        problem, poses, 1.0, True, neutral, 1, *limits, gradient, hessian
     )
-    reached = reached.extended(*approached)
     if neutral:
         # The derivatives of both energies are the same.
-        value = joint_energy(problem, poses).value
-        reached = reached.extended(0, 1, 0)
+        value, evaluations = joint_energy(problem, poses).value, evaluations + 1
     poses[:, 2] = wrap(poses[:, 2])
     return JointMatch(
         poses=poses,
@@ -165,8 +142,8 @@ def _last_stage(
         hessian=hessian,
         pairs=problem.pairs,
         energy=value,
-        iterations=reached.iterations,
-        evaluations=reached.evaluations,
+        iterations=reached.iterations + last,
+        evaluations=reached.evaluations + evaluations,
         last_iterations=last,
         unsettled=reached.unsettled,
         converged=converged,

@@ -11,65 +11,23 @@ from nscan_cli.matching.joint.gauge import gauge_fixed_step
 from nscan_cli.matching.joint.joint_energy import JointProblem, evaluate_joint
 from nscan_cli.poses import Array
 
-
-@kernel
-def approach_and_finish(
-    problem: JointProblem,
-    poses: Array,
-    widenings: Array,
-    neutral: bool,
-    of_approach: tuple[int, int, int, float, bool],
-    max_iterations: int,
-    tolerance: float,
-    gradient: Array,
-    hessian: Array,
-) -> tuple[float, int, bool, int, int, int]:
-    """The stages of the approach and the last one, from the poses (n, 3) in place.
-
-    Returns the value, the last stage's iterations, whether it converged, and the numbers of `approach` for
-    all stages. Writes gradient (3n,) and Hessian (3n, 3n). Other arguments are those of JointOptions.
-    """
-    stride, fixed, approach_iterations, near, thorough = of_approach
-    iterations, evaluations, unsettled = approach(
-        problem, poses, widenings, neutral, stride, fixed, approach_iterations, near, thorough
-    )
-    value, last, evaluated, converged = descend(
-        problem, poses, 1.0, True, neutral, 1, fixed, max_iterations, tolerance, thorough, gradient, hessian
-    )
-    return value, last, converged, iterations + last, evaluations + evaluated, unsettled
+OfApproach = tuple[int, int, int, float, bool]
+"""What `JointOptions.of_approach` returns."""
 
 
 @kernel
 def approach(
-    problem: JointProblem,
-    poses: Array,
-    widenings: Array,
-    neutral: bool,
-    stride: int,
-    fixed: int,
-    max_iterations: int,
-    near: float,
-    thorough: bool,
+    problem: JointProblem, poses: Array, widenings: Array, neutral: bool, of_approach: OfApproach
 ) -> tuple[int, int, int]:
     """An approach, from the poses (n, 3) in place: iterations, evaluations, stages that did not converge."""
+    stride, fixed, most, near, thorough = of_approach
     n = poses.shape[0]
     gradient, hessian = np.empty(3 * n), np.empty((3 * n, 3 * n))
     iterations = evaluations = unsettled = 0
     for widening in widenings:
         enough = near if widening < 1.0 else 0.5 * near
         _, steps, evaluated, converged = descend(
-            problem,
-            poses,
-            widening,
-            False,
-            neutral,
-            stride,
-            fixed,
-            max_iterations,
-            enough,
-            thorough,
-            gradient,
-            hessian,
+            problem, poses, widening, False, neutral, stride, fixed, most, enough, thorough, gradient, hessian
         )
         iterations += steps
         evaluations += evaluated

@@ -52,18 +52,6 @@ def _add_pair_energies(
     for pair in range(problem.pairs.shape[0]):
         i, j = problem.pairs[pair, 0], problem.pairs[pair, 1]
         relative_pose(poses[j], poses[i], u)
-        evaluate_energy(
-            scan_grid(scans, i),
-            scans.half,
-            scan_points(scans, j),
-            u[0],
-            u[1],
-            u[2],
-            1.0,
-            0.0,
-            share * scans.usual[i],
-            stride,
-            buffers.met,
-            buffers.out,
-        )
+        grid, points, baseline = scan_grid(scans, i), scan_points(scans, j), share * scans.usual[i]
+        evaluate_energy(grid, scans.half, points, u, 1.0, 0.0, baseline, stride, buffers.met, buffers.out)
         values[i, j] = stride * problem.scale * buffers.out[0]

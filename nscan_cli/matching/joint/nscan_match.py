@@ -18,8 +18,14 @@ from nscan_cli.matching.joint.outliers import ONLY_ONE_LEFT, TOO_FAR, ExcludedSc
 from nscan_cli.matching.joint.overlap import Overlaps
 from nscan_cli.matching.joint.scan_set import scan_set
 from nscan_cli.matching.joint.wall_fit import fit_to_walls
-from nscan_cli.matching.pairwise import CELL_BORDER, INDEFINITE, PairOptions, scan_ndt
-from nscan_cli.matching.uncertainty import Weakest, covariance_of, decrement, is_minimum, weakest_translation
+from nscan_cli.matching.pairwise import PairOptions, scan_ndt
+from nscan_cli.matching.uncertainty import (
+    Weakest,
+    covariance_of,
+    decrement,
+    weakest_translation,
+    why_no_minimum,
+)
 from nscan_cli.poses import Array
 
 NOT_CONVERGED = "did not converge within the steps allowed"
@@ -118,6 +124,7 @@ def _nscan(
     others = np.delete(np.arange(3 * len(kept)), np.arange(3 * held, 3 * held + 3))
     covariance = covariance_of(match.hessian[np.ix_(others, others)])
     gradient = match.gradient[others]
+    no_minimum = why_no_minimum(gradient, covariance, options.convergence)
     return NScanMatch(
         kept=tuple(kept),
         fixed=held,
@@ -129,7 +136,9 @@ def _nscan(
         pairs=match.pairs,
         overlap=shares.scans,
         weakest=tuple(weakest_translation(each) for each in information),
-        reason=_why_not_converged(match.converged, gradient, covariance, options),
+        reason=why_no_minimum(gradient, covariance, options.convergence)
+        if match.converged
+        else NOT_CONVERGED,
     )
 
 
@@ -151,13 +160,3 @@ def _diagonal_blocks(hessian: Array) -> Array:
     scan = np.arange(len(hessian) // 3)
     blocks: Array = hessian.reshape(len(scan), 3, len(scan), 3)[scan, :, scan, :]
     return blocks
-
-
-def _why_not_converged(
-    converged: bool, gradient: Array, covariance: Array | None, options: PairOptions
-) -> str | None:
-    if not converged:
-        return NOT_CONVERGED
-    if covariance is None:
-        return INDEFINITE
-    return None if is_minimum(gradient, covariance, options.convergence) else CELL_BORDER

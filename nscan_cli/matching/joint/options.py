@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 from nscan_cli.matching.correlative_search import SearchOptions
 from nscan_cli.matching.joint.gauge import gauge_of
@@ -40,8 +41,7 @@ class InitialisationOptions:
     """Stages of the match that refines a pose found by search, which is off by about 0.1 m."""
 
 
-@dataclass(frozen=True)
-class WallFitOptions:
+class WallFitOptions(NamedTuple):
     """Which points are walls, and how much a wall says about poses."""
 
     cell: float = 0.25

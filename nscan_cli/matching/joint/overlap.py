@@ -23,38 +23,19 @@ class Overlaps(NamedTuple):
     """(n,) of each scan's points, on those of at least one other scan."""
 
 
+@kernel
 def overlaps(scans: ScanSet, poses: Array, inlier_bound: float) -> Overlaps:
     """The overlaps of n scans at the poses (n, 3), of points within a Mahalanobis distance² of the bound."""
-    return Overlaps(*_overlaps(scans, poses, inlier_bound))
-
-
-@kernel
-def _overlaps(scans: ScanSet, poses: Array, inlier_bound: float) -> tuple[Array, Array]:
     n = poses.shape[0]
-    pairs, shares = np.zeros((n, n)), np.zeros(n)
+    pairs, shares, u = np.zeros((n, n)), np.zeros(n), np.empty(3)
     inliers = np.empty(most_points(scans), dtype=np.bool_)
-    _write_overlaps(scans, poses, inlier_bound, np.empty(3), inliers, pairs, shares)
-    return pairs, shares
-
-
-@leaf_kernel
-def _write_overlaps(
-    scans: ScanSet,
-    poses: Array,
-    inlier_bound: float,
-    u: Array,
-    inliers: NDArray[np.bool_],
-    pairs: Array,
-    shares: Array,
-) -> None:
-    """Write the fields of Overlaps; `u` (3,) and `inliers`, for the points of any scan, are buffers."""
-    n = poses.shape[0]
     for j in range(n):
         inliers[:] = False
         for i in range(n):
             if i != j:
                 pairs[i, j] = _pair_overlap(scans, poses, i, j, inlier_bound, u, inliers)
         shares[j] = inliers.sum() / max(scan_points(scans, j).shape[0], 1)
+    return Overlaps(pairs, shares)
 
 
 @kernel
@@ -79,7 +60,7 @@ def connectivity(
     scans: ScanSet, poses: Array, inlier_bound: float, least: float, scan: int
 ) -> tuple[NDArray[np.bool_], float]:
     """The scans (n,) connected to `scan` by overlap at the poses (n, 3), and the weakest link of all."""
-    pairs, _ = _overlaps(scans, poses, inlier_bound)
+    pairs = overlaps(scans, poses, inlier_bound).pairs
     return connected_to(pairs, least, scan), weakest_link(pairs)
 
 

@@ -92,25 +92,19 @@ def scan_points(scans: ScanSet, i: int) -> Array:
 @kernel
 def most_points(scans: ScanSet) -> int:
     """The greatest number of points of a scan."""
-    most, starts = 0, scans.starts
-    for i in range(starts.shape[1] - 1):
-        most = max(most, starts[3, i + 1] - starts[3, i])
-    return int(most)
+    return int(np.diff(scans.starts[3]).max())
 
 
 @kernel
 def _usual_s(scans: ScanSet) -> Array:
     """(n,) the mean s of each scan's points on its own Gaussians."""
-    means, out, buffers = (
-        np.empty(len(scans.usual)),
-        np.empty(ENERGY_NUMBERS),
-        association_buffers(most_points(scans), 1),
-    )
+    means, out, pose = np.empty(len(scans.usual)), np.empty(ENERGY_NUMBERS), np.zeros(3)
+    buffers = association_buffers(most_points(scans), 1)
     for i in range(len(means)):
         grid, points = scan_grid(scans, i), scan_points(scans, i)
-        evaluate_energy(grid, scans.half, points, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 1, buffers, out)
+        evaluate_energy(grid, scans.half, points, pose, 1.0, 0.0, 0.0, 1, buffers, out)
         energy = out[0]
-        evaluate_energy(grid, scans.half, points, 0.0, 0.0, 0.0, 1.0, 0.0, 1.0, 1, buffers, out)
+        evaluate_energy(grid, scans.half, points, pose, 1.0, 0.0, 1.0, 1, buffers, out)
         # With a baseline of 1 the energy grows by the number of points on Gaussians.
         means[i] = -energy / max(out[0] - energy, 1.0)
     return means

@@ -8,7 +8,6 @@ the walls, as in Z. Liu, F. Zhang, "BALM: Bundle Adjustment for Lidar Mapping", 
 
 from __future__ import annotations
 
-from dataclasses import astuple
 from typing import NamedTuple
 
 import numpy as np
@@ -21,27 +20,6 @@ from nscan_cli.matching.joint.options import WallFitOptions
 from nscan_cli.matching.joint.scan_set import ScanSet
 from nscan_cli.matching.small_matrices import multiply
 from nscan_cli.poses import Array, wrap
-
-
-class WallFitParameters(NamedTuple):
-    """WallFitOptions as the kernels take them."""
-
-    cell: float
-    levels: int
-    minimum: int
-    thickness: float
-    elongation: float
-    range_variance: float
-    wall_variance: float
-    prior_share: float
-    direction_noise: float
-    steps: int
-
-    @classmethod
-    def of(cls, options: WallFitOptions) -> WallFitParameters:
-        """The parameters of options."""
-        cell, levels, minimum, thickness, elongation, range_sigma, wall_sigma, *others = astuple(options)
-        return cls(cell, levels, minimum, thickness, elongation, range_sigma**2, wall_sigma**2, *others)
 
 
 class PointCloud(NamedTuple):
@@ -64,23 +42,26 @@ def fit_to_walls(
     the gauge free.
     """
     fitted = poses.copy()
-    _fit(scans, fitted, hessian, gauge_of(fixed), WallFitParameters.of(options))
+    variances = np.array([options.range_sigma**2, options.wall_sigma**2])
+    _fit(scans, fitted, hessian, gauge_of(fixed), variances, options)
     fitted[:, 2] = wrap(fitted[:, 2])
     return fitted
 
 
 @kernel
-def _fit(scans: ScanSet, poses: Array, hessian: Array, fixed: int, parameters: WallFitParameters) -> None:
+def _fit(
+    scans: ScanSet, poses: Array, hessian: Array, fixed: int, variances: Array, options: WallFitOptions
+) -> None:
     """Minimise Σ d² / σ² of points on walls + ½ Δᵗ (prior_share · H) Δ, from the poses (n, 3) in place."""
     start, step, gradient = poses.copy(), np.empty_like(poses), np.empty(poses.size)
-    for _ in range(parameters.steps):
+    for _ in range(options.steps):
         cloud = _point_cloud(scans, poses)
-        members, ends = common_walls(cloud, parameters)
-        information = parameters.prior_share * hessian
+        members, ends = common_walls(cloud, options)
+        information = options.prior_share * hessian
         multiply(information, (poses - start).ravel(), gradient)
         first = 0
         for end in ends:
-            _add_wall(cloud, members[first:end], parameters, gradient, information)
+            _add_wall(cloud, members[first:end], variances, options.direction_noise, gradient, information)
             first = end
         if not gauge_fixed_step(gradient, information, poses, 0.0, fixed, step):
             return
@@ -102,39 +83,33 @@ def _point_cloud(scans: ScanSet, poses: Array) -> PointCloud:
 
 
 @kernel
-def common_walls(
-    cloud: PointCloud, parameters: WallFitParameters
-) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def common_walls(cloud: PointCloud, options: WallFitOptions) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """The walls that more than one scan sees: their points, wall by wall, and the end of each among them.
 
     A cell holds a wall when the points seen from each side of it lie on a line. Otherwise its quarters are
     tested.
     """
     m = cloud.points.shape[0]
-    codes = _quadtree_codes(cloud.points, parameters.cell)
+    codes = _quadtree_codes(cloud.points, options.cell)
     order = np.argsort(codes)
     taken = np.zeros(m, dtype=np.bool_)
     members, ends = np.empty(m, dtype=np.int64), np.empty(m, dtype=np.int64)
     sides = np.empty(m, dtype=np.int64)
     count = walls = 0
-    for level in range(parameters.levels - 1, -1, -1):
+    for level in range(options.levels - 1, -1, -1):
         end = 0
         while end < m:
             first, cell = end, codes[order[end]] >> (2 * level)
             while end < m and codes[order[end]] >> (2 * level) == cell:
                 end += 1
-            if taken[first] or end - first < parameters.minimum:
+            if taken[first] or end - first < options.minimum:
                 continue
-            front = _split_by_side(cloud, order[first:end], sides)
-            back = end - first - front
-            if not (
-                _is_line(cloud, sides[:front], parameters)
-                and _is_line(cloud, sides[front : front + back], parameters)
-            ):
+            front, size = _split_by_side(cloud, order[first:end], sides), end - first
+            if not (_is_line(cloud, sides[:front], options) and _is_line(cloud, sides[front:size], options)):
                 continue
             taken[first:end] = True
-            for a, b in ((0, front), (front, front + back)):
-                if b - a >= parameters.minimum and (cloud.scans[sides[a:b]] != cloud.scans[sides[a]]).any():
+            for a, b in ((0, front), (front, size)):
+                if b - a >= options.minimum and (cloud.scans[sides[a:b]] != cloud.scans[sides[a]]).any():
                     assign(members[count : count + b - a], sides[a:b])
                     count += b - a
                     ends[walls] = count
@@ -171,13 +146,13 @@ def _moments(cloud: PointCloud, chosen: NDArray[np.int64]) -> tuple[float, float
 
 
 @kernel
-def _is_line(cloud: PointCloud, chosen: NDArray[np.int64], parameters: WallFitParameters) -> bool:
+def _is_line(cloud: PointCloud, chosen: NDArray[np.int64], options: WallFitOptions) -> bool:
     """Whether points lie on a line, or are too few for a wall."""
-    if chosen.shape[0] < parameters.minimum:
+    if chosen.shape[0] < options.minimum:
         return True
     _, _, xx, xy, yy = _moments(cloud, chosen)
     middle, radius = 0.5 * (xx + yy), np.hypot(0.5 * (xx - yy), xy)
-    thickness, elongation = parameters.thickness, parameters.elongation
+    thickness, elongation = options.thickness, options.elongation
     return bool(middle - radius <= min(thickness * thickness, (middle + radius) / elongation))
 
 
@@ -202,7 +177,8 @@ def _split_by_side(cloud: PointCloud, chosen: NDArray[np.int64], sides: NDArray[
 def _add_wall(
     cloud: PointCloud,
     chosen: NDArray[np.int64],
-    parameters: WallFitParameters,
+    variances: Array,
+    direction_noise: float,
     gradient: Array,
     hessian: Array,
 ) -> None:
@@ -212,6 +188,7 @@ def _add_wall(
     turn. With u the position along it from the weighted mean, these two directions are orthogonal, and their
     elimination subtracts (Σ wJ)(Σ wJ)ᵗ / Σ w and (Σ wuJ)(Σ wuJ)ᵗ / Σ wu² from Σ wJJᵗ. The variance of the
     line's angle is 1 / Σ wu²; by its noise Σ wJJᵗ claims that much information along the line.
+    `variances` (2,) are those of a range along its beam and of a wall from a straight line, m².
     """
     x, y, xx, xy, yy = _moments(cloud, chosen)
     along = 0.5 * np.arctan2(2 * xy, xx - yy)
@@ -221,7 +198,7 @@ def _add_wall(
     for at, k in enumerate(chosen):
         ax, ay = cloud.arms[k, 0], cloud.arms[k, 1]
         head_on = (ax * nx + ay * ny) ** 2 / (ax * ax + ay * ay + 1e-12)
-        weights[at] = 1.0 / (parameters.range_variance * head_on + parameters.wall_variance)
+        weights[at] = 1.0 / (variances[0] * head_on + variances[1])
         dx, dy = cloud.points[k, 0] - x, cloud.points[k, 1] - y
         along_line[at], distances[at] = dx * ny - dy * nx, dx * nx + dy * ny
     total = weights.sum()
@@ -230,7 +207,7 @@ def _add_wall(
     distances -= (weights * distances).sum() / total + along_line * (
         (weights * along_line * distances).sum() / spread
     )
-    angle_noise = parameters.direction_noise / spread
+    angle_noise = direction_noise / spread
     size = gradient.shape[0]
     shifts, turns, slides = np.zeros(size), np.zeros(size), np.zeros(size)
     across, by = np.empty(3), np.empty(3)
@@ -245,9 +222,8 @@ def _add_wall(
             turns[first + a] += weight * along_line[at] * across[a]
             slides[first + a] += weight * by[a]
             for b in range(3):
-                hessian[first + a, first + b] += weight * (
-                    across[a] * across[b] + angle_noise * by[a] * by[b]
-                )
+                held = across[a] * across[b] + angle_noise * by[a] * by[b]
+                hessian[first + a, first + b] += weight * held
     for a in range(size):
         if slides[a] == 0.0 and shifts[a] == 0.0:
             continue

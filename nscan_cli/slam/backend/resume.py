@@ -12,6 +12,7 @@ from typing import Any, get_args
 import numpy as np
 from numpy.typing import NDArray
 
+from nscan_cli.files.provenance import option_fields
 from nscan_cli.graph.model import Graph, Pairwise
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.matching.priors import odometry_prior
@@ -186,21 +187,21 @@ def _places(graph: Graph, options: SlamOptions) -> list[Place]:
 
 
 def _restored(default: Any, values: Any, place: str) -> Any:
-    """The dataclass `default` with the values of a JSON object, as far as it has such fields."""
+    """The options `default` with the values of a JSON object, as far as it has such fields."""
     if not isinstance(values, dict):
         raise ValueError(f"{place} is no object")
-    given: dict[str, Any] = {}
-    for field in dataclasses.fields(default):
-        if field.name not in values:
-            continue
-        inner = f"{place}.{field.name}"
-        given[field.name] = _like(getattr(default, field.name), values[field.name], inner)
-    return dataclasses.replace(default, **given)
+    fields = option_fields(default) or {}
+    given = {
+        name: _like(usual, values[name], f"{place}.{name}")
+        for name, usual in fields.items()
+        if name in values
+    }
+    return type(default)(**fields | given)
 
 
 def _like(usual: Any, value: Any, place: str) -> Any:
     """A value of the JSON as one of the kind that is usual there. Raises ValueError."""
-    if dataclasses.is_dataclass(usual):
+    if option_fields(usual) is not None:
         return _restored(usual, value, place)
     if isinstance(usual, tuple):
         if not isinstance(value, (list, tuple)) or not 0 < len(value) <= MOST_VALUES:

@@ -58,18 +58,6 @@ class VisitViews(NamedTuple):
     """(K, 2) direction of the first beam, and from one to the next, rad."""
 
 
-class _Comparison(NamedTuple):
-    """What is compared; see FreeSpaceOptions."""
-
-    radius: float
-    """Largest distance of two keyframes, m."""
-    recent: float
-    """Length of path up to which two keyframes are of the same visit, m."""
-    compared: int
-    tolerance: float
-    tolerance_per_metre: float
-
-
 def sound_share(within: float, options: FreeSpaceOptions) -> float:
     """The largest share that a sound map explains, where this share is looked through within visits."""
     allowed = options.within_factor * within + options.margin
@@ -96,11 +84,10 @@ def free_space_violations(
         log.ranges[rows],
         np.stack([log.angle_min[rows], log.angle_increment[rows]], axis=1),
     )
-    bounds = options.compared, options.tolerance, options.tolerance_per_metre
-    comparison = _Comparison(nscan.radius, nscan.visit_path, *bounds)
+    bounds = nscan.radius, nscan.visit_path
     parts = map_in_threads(
         threads,
-        lambda first: _compare_views(views, first, first + KEYFRAMES_PER_THREAD, comparison),
+        lambda first: _compare_views(views, first, first + KEYFRAMES_PER_THREAD, *bounds, options),
         range(0, len(rows), KEYFRAMES_PER_THREAD),
     )
     counts = np.concatenate(parts)
@@ -119,11 +106,14 @@ def free_space_violations(
 
 
 @kernel
-def _compare_views(views: VisitViews, first: int, end: int, comparison: _Comparison) -> NDArray[np.int64]:
+def _compare_views(
+    views: VisitViews, first: int, end: int, radius: float, recent: float, options: FreeSpaceOptions
+) -> NDArray[np.int64]:
     """What keyframes `first` to `end` and earlier ones see of each other: (k, 2, 2) numbers of points.
 
     The second axis is other visits, same visit; the third is points where the other saw them, points that it
-    looked through. The nearest keyframes of each kind are compared.
+    looked through. The nearest keyframes of each kind within `radius` (m) are compared. Those within `recent`
+    (m) of path are of the same visit.
     """
     poses, ends, end = views.poses, views.ends, min(end, len(views.paths))
     counts, pose = np.zeros((end - first, 2, 2), dtype=np.int64), np.empty(3)
@@ -135,26 +125,26 @@ def _compare_views(views: VisitViews, first: int, end: int, comparison: _Compari
         for within in range(2):
             n = 0
             for j in range(k):
-                is_recent = views.paths[k] - views.paths[j] <= comparison.recent
+                is_recent = views.paths[k] - views.paths[j] <= recent
                 if is_recent != (within == 1) or ends[j + 1] == ends[j]:
                     continue
                 distance = np.hypot(poses[j, 0] - poses[k, 0], poses[j, 1] - poses[k, 1])
-                if distance <= comparison.radius:
+                if distance <= radius:
                     near[n], distances[n] = j, distance
                     n += 1
             order = np.argsort(distances[:n], kind="mergesort")
-            for at in order[: comparison.compared]:
+            for at in order[: options.compared]:
                 j = near[at]
                 relative_pose(poses[k], poses[j], pose)
-                _count_violations(views, comparison, k, j, pose, counts[k - first, within])
+                _count_violations(views, options, k, j, pose, counts[k - first, within])
                 relative_pose(poses[j], poses[k], pose)
-                _count_violations(views, comparison, j, k, pose, counts[k - first, within])
+                _count_violations(views, options, j, k, pose, counts[k - first, within])
     return counts
 
 
 @leaf_kernel
 def _count_violations(
-    views: VisitViews, comparison: _Comparison, seen: int, by: int, pose: Array, counts: NDArray[np.int64]
+    views: VisitViews, options: FreeSpaceOptions, seen: int, by: int, pose: Array, counts: NDArray[np.int64]
 ) -> None:
     """Add to the counts (2,) the points of scan `seen` that scan `by` saw too, and those it looked through.
 
@@ -178,7 +168,7 @@ def _count_violations(
             if np.isfinite(ranges[b]):
                 shortest, longest = min(shortest, float(ranges[b])), max(longest, float(ranges[b]))
         distance = np.hypot(x, y)
-        tolerance = comparison.tolerance + comparison.tolerance_per_metre * distance
+        tolerance = options.tolerance + options.tolerance_per_metre * distance
         if distance < shortest - tolerance:
             counts[1] += 1
         elif distance <= longest + tolerance:

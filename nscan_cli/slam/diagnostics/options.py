@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 
-@dataclass(frozen=True)
-class FreeSpaceOptions:
+class FreeSpaceOptions(NamedTuple):
     """When one visit looks through too much of what another one saw."""
 
     keyframes: int = 40

@@ -16,7 +16,7 @@ from nscan_cli.matching.pose_kernels import relative_pose
 from nscan_cli.poses import Array, Indices
 from nscan_cli.slam.diagnostics.options import ViewMismatchOptions
 from nscan_cli.slam.frontend.options import ViewSimilarityOptions
-from nscan_cli.slam.frontend.view_similarity import ViewSimilarityParameters, nearest_ranges, share_alike
+from nscan_cli.slam.frontend.view_similarity import nearest_ranges, share_alike
 from nscan_cli.slam.keyframes.keyframe import Keyframe
 from nscan_cli.threads import map_in_threads
 
@@ -70,12 +70,11 @@ def view_mismatches(
         np.concatenate(points),
         np.cumsum([0, *map(len, points)]),
     )
-    settings = ViewSimilarityParameters.of(similarity)
     shares = np.concatenate(
         map_in_threads(
             threads,
             lambda first: _shares(
-                views, first, *log.batch_points(slice(first, first + SCANS_PER_THREAD), max_range), settings
+                views, first, *log.batch_points(slice(first, first + SCANS_PER_THREAD), max_range), similarity
             ),
             range(0, len(log), SCANS_PER_THREAD),
         )
@@ -96,14 +95,14 @@ def view_mismatches(
 
 @kernel
 def _shares(
-    views: KeyframeViews, first: int, points: Array, ends: Indices, settings: ViewSimilarityParameters
+    views: KeyframeViews, first: int, points: Array, ends: Indices, options: ViewSimilarityOptions
 ) -> Array:
     """(n,) the share of sectors in which scans from row `first` on see the same as the keyframe before them.
 
     Scan k of them has points[ends[k] : ends[k + 1]]; nan for keyframes, and where too few can be compared.
     """
     shares, pose = np.full(len(ends) - 1, np.nan), np.empty(3)
-    own, other = np.empty(settings.sectors), np.empty(settings.sectors)
+    own, other = np.empty(options.sectors), np.empty(options.sectors)
     for k in range(len(shares)):
         row = first + k
         at = np.searchsorted(views.rows, row, side="right") - 1
@@ -113,5 +112,5 @@ def _shares(
         nearest_ranges(views.points[views.ends[at] : views.ends[at + 1]], pose, other)
         pose[:] = 0.0
         nearest_ranges(points[ends[k] : ends[k + 1]], pose, own)
-        shares[k] = share_alike(own, other, settings)
+        shares[k] = share_alike(own, other, options)
     return shares

@@ -10,10 +10,10 @@ from nscan_cli.kernels.decorators import kernel
 from nscan_cli.matching.priors import Prior
 from nscan_cli.ndt.hash_grid import Grid
 from nscan_cli.poses import Array
+from nscan_cli.slam.frontend.options import TrackingParameters
 from nscan_cli.slam.frontend.scan_to_map import match_and_count
 from nscan_cli.slam.frontend.track_state import RESTARTS, TrackState
 from nscan_cli.slam.frontend.tracked_scans import TrackedScans
-from nscan_cli.slam.frontend.tracking_parameters import TrackingParameters
 
 
 @kernel

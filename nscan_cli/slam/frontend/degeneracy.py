@@ -22,9 +22,9 @@ from nscan_cli.ndt.association import begin_association
 from nscan_cli.ndt.energy import ENERGY_NUMBERS
 from nscan_cli.ndt.hash_grid import Grid
 from nscan_cli.poses import Array
+from nscan_cli.slam.frontend.options import TrackingParameters
 from nscan_cli.slam.frontend.scan_to_map import match_and_count
 from nscan_cli.slam.frontend.tracked_scans import TrackedScans
-from nscan_cli.slam.frontend.tracking_parameters import TrackingParameters
 
 
 @kernel
@@ -49,8 +49,14 @@ def keep_prediction(
     places, values = profile(grid, settings, points, prior, pose, along)
     best = np.argmin(values)
     if values[best] < found.values[k] - options.rematch_gain:
-        further = places[best] - ahead(pose, prior, along)
-        _match_from(grid, settings, points, prior, further, along, found, k)
+        further, trial, hessian = places[best] - ahead(pose, prior, along), pose.copy(), np.empty((3, 3))
+        trial[0] += further * along[0]
+        trial[1] += further * along[1]
+        value, inliers = match_and_count(grid, settings, points, prior, trial, hessian)
+        if value < found.values[k] - options.rematch_gain:
+            found.values[k], found.inliers[k] = value, inliers
+            assign(pose, trial)
+            assign_rows(found.hessians[k], hessian)
     off = ahead(pose, prior, along)
     untold = max(
         measured_variance(places, values, prior, options.profile_step) - options.trusted_sigma**2, 0.0
@@ -122,25 +128,3 @@ def entropy_power(values: Array, apart: float) -> float:
     weights /= weights.sum()
     entropy = np.log(apart) - (weights * np.log(np.maximum(weights, 1e-300))).sum()
     return float(np.exp(2 * entropy - 1) / (2 * np.pi))
-
-
-@kernel
-def _match_from(
-    grid: Grid,
-    settings: TrackingParameters,
-    points: Array,
-    prior: Prior,
-    further: float,
-    along: Array,
-    found: TrackedScans,
-    k: int,
-) -> None:
-    """Match scan k from a start `further` (m) along too; it stays there if its objective is clearly lower."""
-    pose, hessian = found.poses[k].copy(), np.empty((3, 3))
-    pose[0] += further * along[0]
-    pose[1] += further * along[1]
-    value, inliers = match_and_count(grid, settings, points, prior, pose, hessian)
-    if value < found.values[k] - settings.degeneracy.rematch_gain:
-        found.values[k], found.inliers[k] = value, inliers
-        assign(found.poses[k], pose)
-        assign_rows(found.hessians[k], hessian)

@@ -11,11 +11,10 @@ import numpy as np
 from nscan_cli.matching.priors import Prior
 from nscan_cli.ndt.transform import Ndt
 from nscan_cli.poses import Array
-from nscan_cli.slam.frontend.options import TrackingOptions
+from nscan_cli.slam.frontend.options import TrackingOptions, TrackingParameters
 from nscan_cli.slam.frontend.scan_batch import ScanBatch
 from nscan_cli.slam.frontend.scan_to_map import match_and_count
 from nscan_cli.slam.frontend.tracked_scans import TrackedScans
-from nscan_cli.slam.frontend.tracking_parameters import TrackingParameters
 
 
 def place_first(scans: ScanBatch, found: TrackedScans, options: TrackingOptions) -> Array:

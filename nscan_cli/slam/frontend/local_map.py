@@ -12,7 +12,7 @@ from nscan_cli.kernels.decorators import kernel
 from nscan_cli.ndt.grid_growth import change_points
 from nscan_cli.ndt.hash_grid import Grid
 from nscan_cli.poses import Array, transform
-from nscan_cli.slam.frontend.tracking_parameters import TrackingParameters
+from nscan_cli.slam.frontend.options import TrackingParameters
 
 NEWEST, OLDEST, ROWS = 0, 1, 2
 """Places in `LocalMap.counts`: the end of the scans that joined the map, the first of them that it still

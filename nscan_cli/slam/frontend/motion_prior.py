@@ -8,8 +8,8 @@ from nscan_cli.kernels.decorators import kernel
 from nscan_cli.matching.pose_kernels import composed_pose, relative_pose, wrapped
 from nscan_cli.matching.priors import Prior, motion_sigmas
 from nscan_cli.poses import Array
+from nscan_cli.slam.frontend.options import TrackingParameters
 from nscan_cli.slam.frontend.track_state import KNOWN, TrackState
-from nscan_cli.slam.frontend.tracking_parameters import TrackingParameters
 
 
 @kernel

@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import Any, NamedTuple
+
+import numpy as np
 
 from nscan_cli.matching.correlative_search import SearchOptions
 from nscan_cli.matching.priors import MotionModel
 from nscan_cli.ndt.options import GaussianOptions
+from nscan_cli.poses import Array
 
 
-@dataclass(frozen=True)
-class DegeneracyOptions:
+class DegeneracyOptions(NamedTuple):
     """When and how far a scan without odometry keeps to its prediction, in a direction it tells little of."""
 
     max_information_ratio: float = 0.12
@@ -97,6 +100,52 @@ class TrackingOptions:
     """Most scans that wait for it: a robot may stand for hours."""
 
 
+class TrackingParameters(NamedTuple):
+    """The fields of TrackingOptions that kernels use, and what follows from the log."""
+
+    half: float
+    """Side of a lattice cell of the map, m."""
+    visible_range: float
+    """Distance from where a scan was taken up to which it had whole cells in view, m."""
+    window: float
+    min_motion: float
+    widenings: Array
+    max_iterations: int
+    coarse_tolerance: float
+    tolerance: float
+    scale: float
+    inlier_bound: float
+    restart_inliers: float
+    inlier_margin: float
+    restart_angles: Array
+    """(rings, angles), with nan where a ring has fewer."""
+    far_restart_inliers: float
+    lost_inliers: float
+    odometry: MotionModel
+    constant_velocity: MotionModel
+    degeneracy_poses: int
+    degeneracy: DegeneracyOptions
+
+    @classmethod
+    def of(
+        cls, options: TrackingOptions, has_odometry: bool = False, range_limit: float = np.inf
+    ) -> TrackingParameters:
+        """Those for a log with or without odometry, whose laser has this range limit (m)."""
+        rings = options.restart_angles
+        angles = np.full((len(rings), max(map(len, rings), default=0)), np.nan)
+        for row, ring in zip(angles, rings, strict=True):
+            row[: len(ring)] = ring
+        values: dict[str, Any] = {name: getattr(options, name, None) for name in cls._fields}
+        values |= {
+            "half": 0.5 * options.gaussians.cell,
+            "visible_range": max(range_limit - options.gaussians.cell, 0.5 * range_limit),
+            "widenings": np.array(options.widenings),
+            "coarse_tolerance": options.coarse_tolerance if has_odometry else options.tolerance,
+            "restart_angles": angles,
+        }
+        return cls(**values)
+
+
 @dataclass(frozen=True)
 class OdometryCheckOptions:
     """Which steps of the odometry, or of the scans, are jumps that no robot drives."""
@@ -111,8 +160,7 @@ class OdometryCheckOptions:
     """A jump is longer than this, m and rad: a match finds less by itself."""
 
 
-@dataclass(frozen=True)
-class ViewSimilarityOptions:
+class ViewSimilarityOptions(NamedTuple):
     """When two scans from nearly the same place see the same."""
 
     sectors: int = 180

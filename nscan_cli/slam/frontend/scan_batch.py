@@ -7,7 +7,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from nscan_cli.kernels.decorators import kernel
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.poses import Array, Indices
 
@@ -42,7 +41,8 @@ class ScanBatch:
 
     def chosen(self, chosen: Indices) -> tuple[Array, Indices]:
         """A copy of the points (P, 2) of the scans with indices `chosen` (c,), and their `ends` (c + 1,)."""
-        return _copy_scans(self.points, self.ends, chosen)
+        points = np.concatenate([self.of(k) for k in chosen])
+        return points, np.append(0, np.cumsum(np.diff(self.ends)[chosen]))
 
     @classmethod
     def together(cls, parts: Sequence[ScanBatch]) -> ScanBatch:
@@ -73,15 +73,3 @@ def scan_batches(log: LaserLog, reach: float, odometry: Array | None, frozen: In
             ends = np.concatenate([[0], np.cumsum(np.where(is_frozen, 0, sizes))])
         yield ScanBatch(first, points, ends, None if odometry is None else odometry[first:end])
         first = end
-
-
-@kernel
-def _copy_scans(points: Array, ends: Indices, chosen: Indices) -> tuple[Array, Indices]:
-    """What ScanBatch.chosen returns."""
-    own = np.zeros(len(chosen) + 1, dtype=np.int64)
-    for c in range(len(chosen)):
-        own[c + 1] = own[c] + ends[chosen[c] + 1] - ends[chosen[c]]
-    copied = np.empty((own[-1], 2))
-    for c in range(len(chosen)):
-        copied[own[c] : own[c + 1]] = points[ends[chosen[c]] : ends[chosen[c] + 1]]
-    return copied, own

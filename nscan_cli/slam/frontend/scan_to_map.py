@@ -8,7 +8,7 @@ from nscan_cli.matching.priors import Prior
 from nscan_cli.ndt.association import begin_association, count_inliers, update_association
 from nscan_cli.ndt.hash_grid import Grid
 from nscan_cli.poses import Array
-from nscan_cli.slam.frontend.tracking_parameters import TrackingParameters
+from nscan_cli.slam.frontend.options import TrackingParameters
 
 
 @kernel
@@ -19,17 +19,9 @@ def match_and_count(
 
     Writes the Hessian (3, 3) of the objective.
     """
-    half, scale, widenings = settings.half, settings.scale, settings.widenings
     meeting = begin_association(points)
-    problem = PairProblem(grid, half, meeting, scale, prior)
-    value, _, _, _, _ = minimise_pairwise(
-        problem,
-        pose,
-        widenings,
-        settings.max_iterations,
-        settings.coarse_tolerance,
-        settings.tolerance,
-        hessian,
-    )
-    update_association(grid, half, meeting, pose[0], pose[1], pose[2])
+    problem = PairProblem(grid, settings.half, meeting, settings.scale, prior)
+    limits = settings.max_iterations, settings.coarse_tolerance, settings.tolerance
+    value, _, _, _, _ = minimise_pairwise(problem, pose, settings.widenings, *limits, hessian)
+    update_association(grid, settings.half, meeting, pose[0], pose[1], pose[2])
     return value, count_inliers(meeting, settings.inlier_bound) / max(points.shape[0], 1)

@@ -13,7 +13,7 @@ from nscan_cli.matching.priors import Prior
 from nscan_cli.ndt.transform import Ndt
 from nscan_cli.poses import Array
 from nscan_cli.slam.frontend.local_map import ROWS
-from nscan_cli.slam.frontend.options import TrackingOptions
+from nscan_cli.slam.frontend.options import TrackingOptions, TrackingParameters
 from nscan_cli.slam.frontend.scan_batch import ScanBatch
 from nscan_cli.slam.frontend.scan_to_map import match_and_count
 from nscan_cli.slam.frontend.track_state import RESTARTS, TrackState
@@ -23,7 +23,6 @@ from nscan_cli.slam.frontend.tracking_kernels import (
     settle,
     track_scans,
 )
-from nscan_cli.slam.frontend.tracking_parameters import TrackingParameters
 
 
 class Tracker:

@@ -16,10 +16,10 @@ from nscan_cli.slam.frontend.angle_restarts import match_from_other_angles, rest
 from nscan_cli.slam.frontend.degeneracy import keep_prediction
 from nscan_cli.slam.frontend.local_map import NEWEST, OLDEST, ROWS, insert_scan
 from nscan_cli.slam.frontend.motion_prior import predict
+from nscan_cli.slam.frontend.options import TrackingParameters
 from nscan_cli.slam.frontend.scan_to_map import match_and_count
 from nscan_cli.slam.frontend.track_state import KNOWN, TrackState
 from nscan_cli.slam.frontend.tracked_scans import TrackedScans
-from nscan_cli.slam.frontend.tracking_parameters import TrackingParameters
 from nscan_cli.slam.frontend.visible_points import visible_points
 
 

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import astuple
-from typing import NamedTuple
-
 import numpy as np
 
 from nscan_cli.kernels.decorators import kernel
@@ -12,30 +9,15 @@ from nscan_cli.poses import Array
 from nscan_cli.slam.frontend.options import ViewSimilarityOptions
 
 
-class ViewSimilarityParameters(NamedTuple):
-    """The fields of ViewSimilarityOptions, as kernels take them."""
-
-    sectors: int
-    min_sectors: int
-    tolerance: float
-    tolerance_per_metre: float
-
-    @classmethod
-    def of(cls, options: ViewSimilarityOptions) -> ViewSimilarityParameters:
-        """Those of the options."""
-        return cls(*astuple(options))
-
-
 def view_similarity(points: Array, others: Array, options: ViewSimilarityOptions) -> float | None:
     """The share of sectors in which two scans have the same range; None where too few can be compared.
 
     The points (m, 2) and (n, 2) are in one frame, that of one of the robot's poses.
     """
-    settings = ViewSimilarityParameters.of(options)
-    one, other = np.empty((2, settings.sectors))
+    one, other = np.empty((2, options.sectors))
     nearest_ranges(points, np.zeros(3), one)
     nearest_ranges(others, np.zeros(3), other)
-    share = share_alike(one, other, settings)
+    share = share_alike(one, other, options)
     return None if np.isnan(share) else float(share)
 
 
@@ -55,12 +37,12 @@ def nearest_ranges(points: Array, pose: Array, ranges: Array) -> None:
 
 
 @kernel
-def share_alike(one: Array, other: Array, settings: ViewSimilarityParameters) -> float:
+def share_alike(one: Array, other: Array, options: ViewSimilarityOptions) -> float:
     """The share of sectors in which two views (n,) have the same range; nan where too few can be compared."""
     both = same = 0
     for k in range(len(one)):
         if np.isfinite(one[k]) and np.isfinite(other[k]):
             both += 1
-            tolerance = settings.tolerance + settings.tolerance_per_metre * min(one[k], other[k])
+            tolerance = options.tolerance + options.tolerance_per_metre * min(one[k], other[k])
             same += abs(one[k] - other[k]) < tolerance
-    return same / both if both >= settings.min_sectors else np.nan
+    return same / both if both >= options.min_sectors else np.nan

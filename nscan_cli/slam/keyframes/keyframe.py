@@ -12,7 +12,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from nscan_cli.kernels.decorators import kernel
 from nscan_cli.ndt.hash_grid import WALL_END
 from nscan_cli.ndt.options import GaussianOptions
 from nscan_cli.ndt.transform import Ndt
@@ -81,13 +80,8 @@ def points_per_cell(keyframes: Iterable[Keyframe]) -> float:
     return points / cells if cells else 1.0
 
 
-@kernel
 def count_cells(points: Array, side: float) -> int:
     """Number of cells of one lattice that the points (m, 2) fall into."""
     cells = np.floor(points / side)
     # No laser sees so far that two cells would have the same number.
-    numbers = np.sort(cells[:, 0] * LATTICE_WIDTH + cells[:, 1])
-    count = 0
-    for k in range(len(numbers)):
-        count += k == 0 or numbers[k] != numbers[k - 1]
-    return count
+    return len(np.unique(cells[:, 0] * LATTICE_WIDTH + cells[:, 1]))

@@ -6,7 +6,7 @@ import pytest
 from nscan_cli.matching.joint.joint_energy import joint_energy
 from nscan_cli.matching.joint.joint_match import match_near_and_far
 from nscan_cli.matching.joint.options import JointOptions, WallFitOptions
-from nscan_cli.matching.joint.wall_fit import PointCloud, WallFitParameters, common_walls, fit_to_walls
+from nscan_cli.matching.joint.wall_fit import PointCloud, common_walls, fit_to_walls
 from nscan_cli.poses import compose
 from tests.matching.problems import OPTIONS, Problem, errors, near, office_problem, problem
 from tests.simulation.scenes import bare_corridor
@@ -14,7 +14,6 @@ from tests.simulation.scenes import bare_corridor
 ROWS = (2000, 2008, 2016, 2024, 2032)
 
 WALLS = WallFitOptions()
-PARAMETERS = WallFitParameters.of(WALLS)
 
 
 def fitted(scans: Problem, poses: np.ndarray, fixed: int | None = None) -> np.ndarray:
@@ -70,10 +69,10 @@ def test_along_a_bare_corridor_poses_stay_where_they_were(seed):
 def test_a_wall_seen_by_two_scans_is_one_and_a_bend_is_two():
     x = np.linspace(0.0, 3.9, 40)
     line = together(wall(x, 0 * x, (1, -2), 0), wall(x, 0 * x, (2, -2), 1))
-    members, ends = common_walls(line, PARAMETERS)
+    members, ends = common_walls(line, WALLS)
     assert (sorted(members), ends.tolist()) == (list(range(80)), [80])
     bend = np.where(x < 2, 0.0, 2 * (x - 2))
-    members, ends = common_walls(together(wall(x, bend, (1, -2), 0), wall(x, bend, (2, -2), 1)), PARAMETERS)
+    members, ends = common_walls(together(wall(x, bend, (1, -2), 0), wall(x, bend, (2, -2), 1)), WALLS)
     assert len(ends) > 1
     for first, end in zip([0, *ends[:-1]], ends, strict=True):
         part = x[members[first:end] % 40]
@@ -82,16 +81,16 @@ def test_a_wall_seen_by_two_scans_is_one_and_a_bend_is_two():
 
 def test_what_one_scan_sees_alone_is_no_common_wall():
     x = np.linspace(0.0, 3.9, 40)
-    assert len(common_walls(wall(x, 0 * x, (1, -2), 0), PARAMETERS)[1]) == 0
+    assert len(common_walls(wall(x, 0 * x, (1, -2), 0), WALLS)[1]) == 0
     few = np.linspace(0.0, 0.2, WALLS.minimum // 2 - 1)
     both = together(wall(few, 0 * few, (1, -2), 0), wall(few, 0 * few, (2, -2), 1))
-    assert len(common_walls(both, PARAMETERS)[1]) == 0
+    assert len(common_walls(both, WALLS)[1]) == 0
 
 
 def test_the_two_faces_of_a_wall_are_two_walls():
     x = np.linspace(0.0, 3.9, 40)
     faces = [wall(x, 0 * x + 0.1 * (y > 0), (1, y), scan) for scan, y in enumerate((-2, -2, 2, 2))]
-    members, ends = common_walls(together(*faces), PARAMETERS)
+    members, ends = common_walls(together(*faces), WALLS)
     assert len(ends) == 2
     assert {tuple(sorted(set(members[a:b] // 80))) for a, b in ((0, 80), (80, 160))} == {(0,), (1,)}
 

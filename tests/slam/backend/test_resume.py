@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import copy
-import dataclasses
 import functools
 
 import numpy as np
 import pytest
 
+from nscan_cli.files.provenance import as_parameters
 from nscan_cli.graph.io.json_graph import parse_graph, write_graph
 from nscan_cli.graph.model import Graph, Loop
 from nscan_cli.graph.optimise.whole_graph import optimise_graph
@@ -80,7 +80,7 @@ def test_the_same_graph_every_time():
 def test_the_parameters_are_those_of_the_graph():
     options = SlamOptions(nscan=NScanOptions(max_scans=5, widenings=(0.1, 1.0)), relations="nscan")
     graph = copy.deepcopy(saved())
-    graph.provenance["parameters"]["slam"] = dataclasses.asdict(options)
+    graph.provenance["parameters"]["slam"] = as_parameters(options)
     graph = parse_graph(write_graph(graph), "saved.json")
     assert options_of(graph) == options
     assert max(len(relation.nodes) for relation in refined(graph).nscan) == 5

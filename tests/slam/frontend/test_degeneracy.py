@@ -20,10 +20,9 @@ from nscan_cli.slam.frontend.degeneracy import (
     profile,
     weakest_direction,
 )
-from nscan_cli.slam.frontend.options import TrackingOptions
+from nscan_cli.slam.frontend.options import TrackingOptions, TrackingParameters
 from nscan_cli.slam.frontend.scan_to_map import match_and_count
 from nscan_cli.slam.frontend.tracked_scans import TrackedScans
-from nscan_cli.slam.frontend.tracking_parameters import TrackingParameters
 from tests.benchmarks.lasers import WAY, rms, turning
 from tests.logs.excerpts import truth_of
 from tests.ndt.wall_points import room
