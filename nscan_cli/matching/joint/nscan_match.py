@@ -136,9 +136,7 @@ def _nscan(
         pairs=match.pairs,
         overlap=shares.scans,
         weakest=tuple(weakest_translation(each) for each in information),
-        reason=why_no_minimum(gradient, covariance, options.convergence)
-        if match.converged
-        else NOT_CONVERGED,
+        reason=no_minimum if match.converged else NOT_CONVERGED,
     )
 
 

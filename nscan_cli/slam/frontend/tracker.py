@@ -18,11 +18,7 @@ from nscan_cli.slam.frontend.scan_batch import ScanBatch
 from nscan_cli.slam.frontend.scan_to_map import match_and_count
 from nscan_cli.slam.frontend.track_state import RESTARTS, TrackState
 from nscan_cli.slam.frontend.tracked_scans import TrackedScans
-from nscan_cli.slam.frontend.tracking_kernels import (
-    points_in_view,
-    settle,
-    track_scans,
-)
+from nscan_cli.slam.frontend.tracking_kernels import points_in_view, settle, track_scans
 
 
 class Tracker:
