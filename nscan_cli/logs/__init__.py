@@ -1,1 +1,1 @@
-"""FileBytes → scans: one reader a format, found from the content."""
+"""Laser logs: each form has a reader, found by the content of the file."""

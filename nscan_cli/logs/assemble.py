@@ -1,4 +1,4 @@
-"""The last step of every reader: raw scans and what was found about them become a LaserLog."""
+"""The last step of every reader: a LaserLog from the raw scans and what the reader found."""
 
 from __future__ import annotations
 
@@ -26,53 +26,52 @@ from nscan_cli.poses import Array
 
 @dataclass(frozen=True)
 class RawScans:
-    """The scans of one laser as the log has them, in file order: S scans of at most B beams."""
+    """The scans of one laser as in the log, in file order: S scans of at most B beams."""
 
     ranges: NDArray[np.float32]
-    """(S, B) m as written; nan beyond a scan's own beams."""
+    """(S, B) readings as written, m; nan for beams that a scan does not have."""
     angle_min: Array
-    """(S,) rad"""
+    """(S,) direction of the first beam, rad."""
     angle_increment: Array
-    """(S,) rad"""
+    """(S,) angle from beam to beam, rad."""
     stamps: list[str]
+    """S time stamps as written."""
     limits: tuple[float | Array, float | Array]
-    """m, of all scans or (S,) of each; a reading at or beyond one of them says nothing, or that nothing was
-    met."""
+    """Lower and upper limit of all scans, or (S,) of each, m. Readings at or beyond a limit are unusable."""
     limits_from: tuple[str, str] = ("none in this form of log", "assumed for this form of log")
-    """Where each limit is from."""
+    """Origin of each limit."""
     doubtful: Sequence[tuple[float, str]] = ()
-    """Upper limits (m) that need not be the laser's own, and where each is from."""
+    """Upper limits (m) that may not be the laser's own, and their origin."""
     angle_max: Array | None = None
-    """(S,) rad, the direction of the last beam as the log has it beside the step; nan where it has none."""
+    """(S,) direction of the last beam as written beside the step, rad; nan if a scan has none."""
     beams: NDArray[np.int64] | None = None
-    """(S,) how many beams each scan has; None: all have B."""
+    """(S,) number of beams of each scan; None if all have B."""
 
     def mirrored(self) -> RawScans:
-        """The same with beams that run the other way round."""
+        """The scans with all directions negated."""
         last = None if self.angle_max is None else -self.angle_max
         return replace(self, angle_min=-self.angle_min, angle_increment=-self.angle_increment, angle_max=last)
 
 
 @dataclass
 class Findings:
-    """What a reader notes on its way, for the report."""
+    """What a reader collects for the report."""
 
     skips: Skips
     records: dict[str, int] = field(default_factory=dict)
     warnings: list[str] = field(default_factory=list)
     used: dict[str, str] = field(default_factory=dict)
-    """Why this laser, odometry and mounting."""
+    """The reasons for laser, odometry and mounting, as in LogReport."""
     lasers: tuple[Device, ...] = ()
     laser_option: str = "--laser"
     odometries: tuple[Device, ...] = ()
     corrected: str = ""
-    """As LogReport has them."""
     frames: FrameNames = DEFAULT_FRAMES
 
 
 @dataclass(frozen=True)
 class RecordedMotion:
-    """What moves, in order of time: odometry (S, 3), true poses (T, 3) at truth_times (T,)."""
+    """Poses in order of time: odometry (S, 3), and true poses (T, 3) at truth_times (T,)."""
 
     odometry: Array | None
     truth_times: Array | None = None
@@ -80,14 +79,14 @@ class RecordedMotion:
 
 
 def empty_scan_table(scans: int, beams: int) -> NDArray[np.float32]:
-    """The readings (S, B) of a log before they are filled in, nan. Raises LimitExceededError for too many."""
+    """A table of readings (S, B), all nan. Raises LimitExceededError if it is too large."""
     problem = f"has {scans:,} scans of up to {beams:,} beams, {scans * beams:,} readings"
     READINGS.check(scans * beams, problem)
     return np.full((scans, beams), np.nan, dtype=np.float32)
 
 
 def scan_table(readings: Sequence[NDArray[Any]]) -> NDArray[np.float32]:
-    """Scans of different lengths as rows (S, B), nan beyond a scan's own beams. Raises LimitExceededError."""
+    """Scans of different lengths as rows (S, B), filled up with nan. Raises LimitExceededError."""
     rows = empty_scan_table(len(readings), max(map(len, readings), default=0))
     with np.errstate(over="ignore", invalid="ignore"):
         for row, values in zip(rows, readings, strict=True):
@@ -107,9 +106,9 @@ def laser_log(
     options: ReadingOptions,
     file: str,
 ) -> LaserLog:
-    """The log in order of time, cut to what was asked for, no-returns marked; `raw.ranges` is consumed.
+    """The selected scans in order of time, with no-returns marked. `raw.ranges` may be overwritten.
 
-    Raises WrongUsageError when the options leave no scan.
+    Raises WrongUsageError if the options select no scan.
     """
     numbers = selected_numbers(times.times, options, file)
     rows = times.rows[numbers]

@@ -1,4 +1,4 @@
-"""FileBytes that are compressed whole: how each kind is known, and unpacked piece by piece."""
+"""Files that are compressed as a whole: recognise the compression and decompress piece by piece."""
 
 from __future__ import annotations
 
@@ -8,21 +8,21 @@ from typing import Any, NamedTuple
 from nscan_cli.files.inputs import FileBytes
 from nscan_cli.files.limits import INPUT, LimitExceededError
 
-PIECE = 256
-"""FileBytes that are unpacked at once: what goes before damage stays, and no piece becomes large."""
+PIECE_BYTES = 256
+"""Bytes decompressed at once. A larger value loses more data before damage and needs more memory."""
 KEEPS_GROWING = "unpacks to more and more"
 
 
 class Compression(NamedTuple):
-    """A kind of compression of whole files."""
+    """A kind of compression."""
 
     name: str
     magic: bytes
-    """The first bytes of what is compressed so."""
+    """The first bytes of such a file."""
     new: Callable[[], Any]
-    """A decompressor, as in the standard library: decompress(bytes), eof, unused_data."""
+    """Makes a decompressor with the standard library's decompress(bytes), eof and unused_data."""
     command: str
-    """What unpacks such a file on the command line."""
+    """The command that decompresses such a file."""
 
 
 def _gzip() -> Any:
@@ -62,18 +62,18 @@ ZSTD = Compression("zstd", b"\x28\xb5\x2f\xfd", _zstd, "unzstd")
 LZ4 = Compression("lz4", b"\x04\x22\x4d\x18", _lz4, "unlz4")
 COMPRESSIONS = (GZIP, BZIP2, XZ, ZSTD, LZ4)
 SUFFIXES = (".gz", ".bz2", ".xz", ".zst", ".zstd", ".lz4")
-"""What names of compressed files end with."""
+"""Suffixes of the names of compressed files."""
 
 
 def compression_of(data: FileBytes) -> Compression | None:
-    """How the data are compressed; None when they are not."""
+    """The compression of the data; None if there is none."""
     return next((packing for packing in COMPRESSIONS if data[: len(packing.magic)] == packing.magic), None)
 
 
 def decompressed(stored: bytes, packing: Compression) -> tuple[bytes, str | None]:
-    """The content as far as it can be unpacked, and what is wrong with the rest; None when nothing is.
+    """The content as far as it can be decompressed, and the problem with the rest or None.
 
-    Compressed data may follow one another. Raises LimitExceededError when it is too much.
+    Several compressed streams may follow one another. Raises LimitExceededError if the content is too large.
     """
     content: list[bytes] = []
     size, at, most = 0, 0, INPUT.bytes
@@ -82,8 +82,8 @@ def decompressed(stored: bytes, packing: Compression) -> tuple[bytes, str | None
         try:
             member = packing.new()
             while at < len(stored) and not member.eof:
-                piece = member.decompress(stored[at : at + PIECE])
-                at = min(at + PIECE, len(stored)) - len(member.unused_data or b"")
+                piece = member.decompress(stored[at : at + PIECE_BYTES])
+                at = min(at + PIECE_BYTES, len(stored)) - len(member.unused_data or b"")
                 content.append(piece)
                 size += len(piece)
                 if size > most:

@@ -1,4 +1,4 @@
-"""What the scans of a log see: their field of view, and the shares of their beams that say nothing."""
+"""The field of view of the scans of a log, and the shares of beams without usable reading."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from nscan_cli.logs.laser_log import LaserLog
 
 
 def field_of_view(log: LaserLog) -> tuple[float, float, float]:
-    """First and last direction and step (rad) of the scan that sees the most with its own beams."""
+    """First direction, last direction and step (rad) of the scan with the widest field of view."""
     between = log.beam_counts() - 1
     row = int(np.argmax(np.abs(log.angle_increment) * between))
     first, step = float(log.angle_min[row]), float(log.angle_increment[row])
@@ -16,7 +16,7 @@ def field_of_view(log: LaserLog) -> tuple[float, float, float]:
 
 
 def beams_lost(log: LaserLog) -> tuple[float, float]:
-    """The shares of all scans' own beams that are without return, and that are unusable."""
+    """The shares of all beams without return, and of unusable beams."""
     total = int(log.beam_counts().sum())
     missing = log.ranges.size - total
     unusable = np.count_nonzero(np.isnan(log.ranges)) - missing

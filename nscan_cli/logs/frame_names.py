@@ -1,4 +1,4 @@
-"""The names of a log's coordinate frames, for results that have such frames too."""
+"""The names of the coordinate frames of a log, for results with such frames."""
 
 from __future__ import annotations
 
@@ -7,14 +7,14 @@ from dataclasses import dataclass, replace
 from nscan_cli.poses import Array
 
 MAP = "map"
-"""The frame of results."""
+"""The frame of the results."""
 
 
 @dataclass(frozen=True)
 class FrameNames:
-    """What a log calls its coordinate frames; where it has no names, those of ROS (REP 105).
+    """The names of the coordinate frames in a log, by default those of ROS (REP 105).
 
-    They are different from each other and from MAP, but for a laser in the robot's own frame.
+    All differ from each other and from MAP, except for a laser in the robot's own frame.
     """
 
     laser: str = "laser"
@@ -26,10 +26,10 @@ DEFAULT_FRAMES = FrameNames()
 
 
 def distinct_frame_names(laser: str, robot: str, odometry: str, mount: Array) -> FrameNames:
-    """The names that a recording has, empty where there is none; the usual ones where they would clash.
+    """The names of a recording, with defaults for empty ones; only defaults if names would coincide.
 
-    A laser in the robot's own frame is at its origin. With another mounting (3,), as the user may give it,
-    it gets a frame of its own.
+    A laser in the robot's own frame is at its origin. With another mounting (3,), which the user may give, it
+    gets a frame of its own.
     """
     names = FrameNames(
         laser or DEFAULT_FRAMES.laser, robot or DEFAULT_FRAMES.robot, odometry or DEFAULT_FRAMES.odometry

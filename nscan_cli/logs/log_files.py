@@ -1,4 +1,4 @@
-"""Which files a log consists of: one, the files of a folder, or those of a recording that was split."""
+"""The files of a log: one file, those of a folder, or the parts of a split recording."""
 
 from __future__ import annotations
 
@@ -26,13 +26,13 @@ from nscan_cli.logs.recordings.split_file_names import (
 )
 
 METADATA = "metadata.yaml"
-SQLITE = b"SQLite format 3\0"
+SQLITE_MAGIC = b"SQLite format 3\0"
 JOURNAL_SUFFIXES = ("-wal", "-journal")
-"""What is added to the name of a database for what has not been taken into it yet."""
+"""Suffixes of the files beside a database with changes that are not yet in it."""
 SHARED_MEMORY_SUFFIX = "-shm"
-"""The same for what processes share that have it open, which says nothing of its own."""
-LISTED = re.compile(r"^ *relative_file_paths:.*(\n *- .*)*", re.MULTILINE)
-"""The part of metadata.yaml that names the files."""
+"""Suffix of the memory shared by processes that have the database open. It holds no data."""
+FILE_LIST = re.compile(r"^ *relative_file_paths:.*(\n *- .*)*", re.MULTILINE)
+"""The part of metadata.yaml that lists the files."""
 
 
 @dataclass(frozen=True)
@@ -40,32 +40,32 @@ class Parts:
     """The files of one log."""
 
     title: str
-    """As messages call the log."""
+    """Name of the log in messages."""
     name: str
-    """As results call it: the same on every machine."""
+    """Name of the log in results, the same on every machine."""
     files: tuple[str, ...]
-    """Their paths."""
+    """Paths of the files."""
     warnings: tuple[str, ...] = ()
-    """What a user should know of the choice."""
+    """Notes for the user about the choice of files."""
     are_parts: bool = True
     """Whether metadata.yaml or their names say that they are parts of one recording."""
 
 
 def parts_of(paths: str | Sequence[str]) -> Parts:
-    """The files of the log that these paths name: a file, "-", a folder, or the files of one recording.
+    """The files of the log at these paths: a file, "-", a folder, or the files of one recording.
 
-    Raises InputMissingError when a folder holds none, WrongUsageError when the paths are of several.
+    Raises InputMissingError if a folder holds none, and WrongUsageError if the paths belong to several.
     """
-    named = [paths] if isinstance(paths, str) else _recorded(paths)
+    named = [paths] if isinstance(paths, str) else _without_journals(paths)
     if len(named) == 1:
         (path,) = named
         if os.path.isdir(path):
-            return _of_folder(path)
-        warnings = () if path == STANDARD_INPUT else _siblings(path)
+            return _parts_in_folder(path)
+        warnings = () if path == STANDARD_INPUT else _note_on_siblings(path)
         return Parts(label(path), base_name(path), (path,), warnings)
     if STANDARD_INPUT in named:
         raise WrongUsageError(
-            "standard input (-) can be no part of a recording; give all files by their paths"
+            "standard input (-) cannot be a part of a recording; give all files by their paths"
         )
     for path in named:
         if os.path.isdir(path):
@@ -81,15 +81,15 @@ def parts_of(paths: str | Sequence[str]) -> Parts:
     return Parts(title, name, tuple(part.file for part in parts), missing_parts(parts, first=None), agree)
 
 
-def _recorded(paths: Sequence[str]) -> list[str]:
-    """Those of several paths that name files of a recording: a shell's * names what goes with them too."""
+def _without_journals(paths: Sequence[str]) -> list[str]:
+    """The paths without metadata and journals, which a shell's * also names."""
     journals = {path + end for path in paths for end in (*JOURNAL_SUFFIXES, SHARED_MEMORY_SUFFIX)}
     kept = [path for path in paths if path not in journals and Path(path).name != METADATA]
     return kept or list(paths)
 
 
 def files_of(paths: str | Sequence[str]) -> list[str]:
-    """The paths of all files that are read for a log, with what stands beside databases; "-" is one too.
+    """The paths of all files that are read for a log, with the journals of databases; "-" is one too.
 
     Raises the errors of parts_of.
     """
@@ -97,19 +97,19 @@ def files_of(paths: str | Sequence[str]) -> list[str]:
 
 
 def journals_of(path: str) -> dict[str, str]:
-    """The paths of what has not been taken into the database at `path` yet, by what their names add.
+    """The journals of the database at `path`, as {suffix: path}; empty if it is no database.
 
-    None when it is no database. As SQLite does, it is looked for beside the file that a link leads to.
+    As in SQLite, they are beside the file that a link leads to.
     """
-    if path == STANDARD_INPUT or not first_bytes(path).startswith(SQLITE):
+    if path == STANDARD_INPUT or not first_bytes(path).startswith(SQLITE_MAGIC):
         return {}
     database = os.path.realpath(path) if os.path.islink(path) else path
     names = {end: database + end for end in JOURNAL_SUFFIXES}
     return {end: name for end, name in names.items() if os.path.isfile(name) and os.path.getsize(name)}
 
 
-def _of_folder(path: str) -> Parts:
-    """The recording in a folder: as its metadata.yaml says, else the only one that is there."""
+def _parts_in_folder(path: str) -> Parts:
+    """The recording in a folder: the one that its metadata.yaml lists, else the only one."""
     folder = Path(path)
     try:
         names = sorted(name for name in os.listdir(folder) if not name.startswith("."))
@@ -118,33 +118,33 @@ def _of_folder(path: str) -> Parts:
     there = [name for name in names if _is_recording(folder / name)]
     name = Path(os.path.abspath(path)).name
     warnings: list[str] = []
-    listed = _listed(folder, warnings) if METADATA in names else []
+    listed = _listed_files(folder, warnings) if METADATA in names else []
     known = {without_compression(one): one for one in there}
     found = [one if one in there else known.get(without_compression(one)) for one in listed]
     files = [one for one in found if one is not None]
     if listed and not files and there:
         warnings.append(
-            f"{METADATA} names other files than {shortened_list(there)}, which is there and is read"
+            f"{METADATA} lists other files than {shortened_list(there)}, which is in the folder and is read"
         )
     elif listed:
         gone = [one for one, other in zip(listed, found, strict=True) if other is None]
         if gone and files:
             warnings.append(
-                f"{shortened_list(gone)} is not there, which {METADATA} names: what it held is missing"
+                f"{shortened_list(gone)} is missing, though {METADATA} lists it: its scans are missing too"
             )
         twins = {without_compression(one) for one in files}
         more = [one for one in there if without_compression(one) not in twins]
         if more:
-            warnings.append(f"{shortened_list(more)} is not in {METADATA}, and is left out")
+            warnings.append(f"{shortened_list(more)} is not listed in {METADATA} and is not read")
     if not files:
-        files = _alone(path, there, names)
+        files = _only_recording(path, there, names)
         warnings += missing_parts(sorted_parts(files), first=0)
     ordered = tuple(str(folder / part.file) for part in sorted_parts(files))
     return Parts(path, name, ordered, tuple(warnings))
 
 
-def _alone(path: str, there: list[str], names: list[str]) -> list[str]:
-    """The files of the only recording among those of a folder."""
+def _only_recording(path: str, there: list[str], names: list[str]) -> list[str]:
+    """The files of the only recording in a folder. Raises InputMissingError and WrongUsageError."""
     if not there:
         held = [f"{name}/" if os.path.isdir(os.path.join(path, name)) else name for name in names]
         holds = f"it holds {shortened_list(held)}" if held else "it is empty"
@@ -161,13 +161,13 @@ def _alone(path: str, there: list[str], names: list[str]) -> list[str]:
     return [part.file for part in parts]
 
 
-def _siblings(path: str) -> tuple[str, ...]:
-    """What a user should know who has named one of several files of a recording."""
+def _note_on_siblings(path: str) -> tuple[str, ...]:
+    """A note for a user who has named one of several files of a recording."""
     if parse_name(path).number is None or not any(end in path for end in RECORDING_SUFFIXES):
         return ()
     file = Path(os.path.realpath(path))
     if (file.parent / METADATA).is_file():
-        listed = _listed(file.parent, [])
+        listed = _listed_files(file.parent, [])
         if len(listed) > 1 and file.name in listed:
             place, whole = listed.index(file.name) + 1, f"its folder {Path(path).parent}"
             return (f"it is file {place} of {len(listed)} of a recording: give {whole} to read all of it",)
@@ -185,25 +185,25 @@ def _siblings(path: str) -> tuple[str, ...]:
             f"{parts[-1].file}, to read all of it",)  # fmt: skip
 
 
-def _listed(folder: Path, warnings: list[str]) -> list[str]:
-    """The names of the files that metadata.yaml names; none, and a warning, when it cannot be read."""
+def _listed_files(folder: Path, warnings: list[str]) -> list[str]:
+    """The file names that metadata.yaml lists; none, with a warning, if it cannot be read."""
     from ruamel.yaml import YAML
 
     try:
-        # The rest, which may be long, is of no use.
-        text = LISTED.search(read_bytes(str(folder / METADATA), CONFIG).decode())
+        # The rest may be long and is not needed.
+        text = FILE_LIST.search(read_bytes(str(folder / METADATA), CONFIG).decode())
         document: Any = YAML(typ="safe", pure=True).load(text.group() if text else "")
-        # Only what is in the folder: some versions name it too.
+        # Some versions also write the folder.
         names = [PurePosixPath(str(name)).name for name in document["relative_file_paths"]]
     except Exception as error:
-        # Whatever a parser raises, and what a document of another shape leads to.
-        warnings.append(f"{METADATA} cannot be read, and is left out ({type(error).__name__})")
+        # Parsers raise various errors, and so does a document of another structure.
+        warnings.append(f"{METADATA} cannot be read and is ignored ({type(error).__name__})")
         return []
     return list(dict.fromkeys(name for name in names if name))
 
 
 def _is_recording(path: Path) -> bool:
-    """Whether a file is a recording, by its first bytes, or is called one."""
+    """Whether a file is a recording by its first bytes or by its name."""
     if not path.is_file():
         return False
     head = first_bytes(str(path))
@@ -212,7 +212,7 @@ def _is_recording(path: Path) -> bool:
 
 
 def first_bytes(path: str) -> bytes:
-    """The first bytes of a regular file; none when it is not there."""
+    """The first 16 bytes of a regular file; empty if it cannot be read."""
     try:
         if os.path.isfile(path):
             with open(path, "rb") as file:

@@ -1,4 +1,4 @@
-"""What a user may say about how a log is to be read; the command line fills it in."""
+"""The options for reading a log, set on the command line."""
 
 from __future__ import annotations
 
@@ -10,36 +10,43 @@ from nscan_cli.errors import WrongUsageError
 
 @dataclass(frozen=True)
 class ReadingOptions:
-    """What the user may say about how a log is to be read; None means: find it in the log."""
+    """The options for reading a log. None means that the value is taken from the log."""
 
     laser: str | None = None
     """Tag or device of the laser in a text log."""
     topic: str | None = None
     """Topic of the laser in a recording."""
     odom_topic: str | None = None
-    """Topic of the odometry, a frame that tf places in odom, or a device of a Player log."""
+    """Topic of the odometry, a frame whose pose in odom tf gives, or a device of a Player log."""
     mount: tuple[float, float, float] | None = None
-    """x, y (m), θ (rad)."""
+    """Pose of the laser on the robot: x, y (m), θ (rad)."""
     flip: bool = False
     """The laser is mounted upside down: the beams run clockwise."""
     min_range: float | None = None
+    """Lower range limit, m. A larger value drops more near readings."""
     max_range: float | None = None
+    """Upper range limit, m. Readings from there on are read as no return."""
     angle_min: float | None = None
-    """rad"""
+    """Direction of the first beam, rad."""
     angle_increment: float | None = None
-    """rad"""
+    """Angle from beam to beam, rad."""
     start: float | None = None
-    """Seconds after the first scan."""
+    """Time of the first scan to read after the log's first one, s."""
     end: float | None = None
+    """Time of the last scan to read after the log's first one, s."""
     every: int = 1
+    """Only every n-th of these scans is read."""
     odometry: bool = True
+    """Whether odometry is read."""
     strict: bool = False
+    """Whether a malformed record is an error. Otherwise it is skipped."""
     allow_corrected: bool = False
+    """Whether poses that a mapper has corrected may be read as odometry."""
     salvage: bool = False
-    """Use what is readable of a damaged or truncated file."""
+    """Whether the readable part of a damaged or truncated file is used."""
 
     def __post_init__(self) -> None:
-        """Refuse values that no log fits. Raises WrongUsageError."""
+        """Raises WrongUsageError for values that fit no log."""
         given = (self.min_range, self.max_range, self.angle_min, self.angle_increment, self.start, self.end)
         if not all(math.isfinite(value) for value in (*given, *(self.mount or ())) if value is not None):
             raise WrongUsageError("a reading option is not a finite number; give one that is")
@@ -51,11 +58,11 @@ class ReadingOptions:
             raise WrongUsageError("--start is after --end; no scan lies between")
 
     def refuse_topic(self, file: str, form: str, instead: str) -> None:
-        """For a log of `form` whose lasers are no topics. Raises WrongUsageError when one is asked for."""
+        """Raises WrongUsageError if --topic is given for a log of `form`, whose lasers are no topics."""
         self._refuse("--topic", self.topic, file, form, instead)
 
     def refuse_topics(self, file: str, form: str, instead: str) -> None:
-        """For a log of `form` without topics at all. Raises WrongUsageError when one is asked for."""
+        """Raises WrongUsageError if any topic is given for a log of `form`, which has none."""
         self.refuse_topic(file, form, instead)
         self._refuse("--odom-topic", self.odom_topic, file, form, instead)
 

@@ -153,7 +153,7 @@ def test_a_file_that_metadata_names_and_that_is_not_there(split):
     next(split.glob("my_bag_2.*")).unlink()
     log = read_log(str(split))
     assert log.report.warnings[0].startswith("my_bag_2.")
-    assert "is not there, which metadata.yaml names" in log.report.warnings[0]
+    assert "is missing, though metadata.yaml lists it" in log.report.warnings[0]
     assert 6 < len(log) < 12
 
 
@@ -168,7 +168,7 @@ def test_a_number_that_is_missing(split):
 
 def test_what_metadata_does_not_name_is_left_out(split, tmp_path):
     shutil.copy(next(split.glob("my_bag_0.*")), split / "copy_0.mcap")
-    check_with(read_log(str(split)), "copy_0.mcap is not in metadata.yaml, and is left out")
+    check_with(read_log(str(split)), "copy_0.mcap is not listed in metadata.yaml and is not read")
 
 
 @pytest.mark.parametrize(
@@ -179,7 +179,7 @@ def test_metadata_that_cannot_be_read(split, text):
     (split / "metadata.yaml").write_bytes(text)
     log = read_log(str(split))
     (warning,) = log.report.warnings
-    assert warning.startswith("metadata.yaml cannot be read, and is left out")
+    assert warning.startswith("metadata.yaml cannot be read and is ignored")
     assert len(log) == 12
 
 
@@ -191,8 +191,8 @@ def test_metadata_leads_to_no_file_outside_of_the_folder(split, tmp_path):
     )
     metadata.write_text(text)
     log = read_log(str(split))
-    assert "secret.mcap is not there" in log.report.warnings[0]
-    check_with(log, "what it held is missing")
+    assert "secret.mcap is missing" in log.report.warnings[0]
+    check_with(log, "its scans are missing too")
     # Some versions have named the folder too.
     metadata.write_text(text.replace("- my_bag_0", "- my_bag/my_bag_0").replace("- ../secret.mcap\n", ""))
     assert len(read_log(str(split))) == 12
@@ -202,7 +202,7 @@ def test_metadata_of_files_with_other_names(split):
     for path in split.glob("my_bag_*"):
         path.rename(split / path.name.replace("my_bag", "lab"))
     (warning,) = read_log(str(split)).report.warnings
-    assert warning.startswith("metadata.yaml names other files than lab_0.")
+    assert warning.startswith("metadata.yaml lists other files than lab_0.")
 
 
 def test_folders_without_a_recording(tmp_path):
@@ -272,7 +272,7 @@ def test_logs_that_are_no_files_of_one_recording(tmp_path):
     ):
         with pytest.raises(WrongUsageError, match=said):
             read_log([str(tmp_path / name) for name in names])
-    with pytest.raises(WrongUsageError, match=r"standard input \(-\) can be no part of a recording"):
+    with pytest.raises(WrongUsageError, match=r"standard input \(-\) cannot be a part of a recording"):
         read_log(["-", str(tmp_path / "a.mcap")])
     with pytest.raises(InputMissingError, match="no such file"):
         read_log([str(tmp_path / "a.mcap"), str(tmp_path / "gone.mcap")])

@@ -59,7 +59,7 @@ def read(data: bytes, file: str, source: Source, options: ReadingOptions) -> Las
     laser, findings.used["laser"] = choose_device("laser", options.laser, findings.lasers, file)
     if laser is None:
         raise InputDataError(file, "has no LASER-RANGE record", "give a log with laser scans")
-    raw = _raw_scans(records[laser], skips)
+    raw = _script_scans(records[laser], skips)
     if not raw.stamps:
         raise skips.nothing_read(f"{laser} record")
     times = order.by_time(raw.stamps)
@@ -95,7 +95,7 @@ def _records_by_tag(data: bytes, skips: Skips) -> ScriptRecords:
     return records
 
 
-def _raw_scans(laser_records: list[tuple[LineRecord, bytes]], skips: Skips) -> RawScans:
+def _script_scans(laser_records: list[tuple[LineRecord, bytes]], skips: Skips) -> RawScans:
     """The scans in m and rad; malformed records are skipped. Raises LimitExceededError."""
     records, views = [], {}
     for record, head in laser_records:
