@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from nscan_cli.errors import InputDataError
-from nscan_cli.evaluation.association import TOLERANCE, nearest_in_time
+from nscan_cli.evaluation.time_association import TOLERANCE, nearest_in_time
 from nscan_cli.files.encoding import without_byte_order_mark
 from nscan_cli.files.inputs import base_name, label, read_bytes
 from nscan_cli.files.limits import GRAPH

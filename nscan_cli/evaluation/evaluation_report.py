@@ -8,9 +8,9 @@ from dataclasses import dataclass
 from typing import Any
 
 from nscan_cli.evaluation.alignment import Alignment
-from nscan_cli.evaluation.association import TOLERANCE
 from nscan_cli.evaluation.reference_relations import ReferenceRelations, RelationErrors
 from nscan_cli.evaluation.statistics import Spread
+from nscan_cli.evaluation.time_association import TOLERANCE
 from nscan_cli.evaluation.trajectory_errors import RPE_DISTANCE, TrajectoryErrors
 from nscan_cli.files.counting import counted
 

@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 
 from nscan_cli.errors import InputDataError
 from nscan_cli.evaluation.alignment import Alignment, alignment
-from nscan_cli.evaluation.association import mutual_nearest, no_match
 from nscan_cli.evaluation.clock_lag import lag_without_overlap
 from nscan_cli.evaluation.statistics import Spread
+from nscan_cli.evaluation.time_association import mutual_nearest, no_match
 from nscan_cli.graph.io.tum import Trajectory
 from nscan_cli.poses import Array, compose, relative, wrap
 

@@ -23,7 +23,6 @@ FORMATS = {
     "pairwise": "matching/: pairwise matching; graph/relations/: the relation that it gives",
     "nscan": "cli/: the command; graph/relations/: the relation that it gives",
     "options": "the options of the package that it is in",
-    "association": "ndt/: of points with Gaussians; evaluation/: of poses by time",
 }
 """Stems of files that several packages have, and what they mean."""
 

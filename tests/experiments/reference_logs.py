@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
-from nscan_cli.evaluation.association import nearest_in_time
 from nscan_cli.evaluation.reference_relations import read_relations
+from nscan_cli.evaluation.time_association import nearest_in_time
 from nscan_cli.graph.model import Pairwise
 from nscan_cli.graph.optimise.chordal import chordal_start
 from nscan_cli.graph.optimise.graph_energy import GraphEnergy

@@ -4,7 +4,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from nscan_cli.evaluation.association import TOLERANCE, mutual_nearest, nearest_in_time
+from nscan_cli.evaluation.time_association import TOLERANCE, mutual_nearest, nearest_in_time
 
 # Multiples of 1/64 s: differences are exact, and many times are equal.
 times = st.lists(st.integers(0, 640).map(lambda k: k / 64), min_size=1, max_size=12).map(sorted).map(np.array)
