@@ -91,7 +91,7 @@ def command(
     check_plot(plot, None, [result, relations, reference])
     import json
 
-    from nscan_cli.evaluation.evaluation_report import as_document, as_text
+    from nscan_cli.evaluation.evaluation_report import as_document, evaluation_text
     from nscan_cli.evaluation.measured import measure
 
     measured = measure(result, relations, reference, worst or 0, reading, reference_topic)
@@ -106,7 +106,7 @@ def command(
     if as_json:
         print_result(json.dumps(as_document(evaluation), indent=2, allow_nan=False) + "\n")
     else:
-        print_result(as_text(evaluation))
+        print_result(evaluation_text(evaluation))
     if plot is not None:
         from nscan_cli.evaluation.error_picture import picture
 

@@ -100,6 +100,7 @@ def command(
     poses = whole.poses[nodes]
     grid = occupancy_grid(scans, rows, poses, resolution)
     if picture:
+        from nscan_cli.mapping.figures.canvas import figure_png
         from nscan_cli.mapping.figures.map_plots import Overlays, plot_over_map, plot_paper_figure
 
         if uncertainty and not whole.marginals:
@@ -109,7 +110,7 @@ def command(
             canvas = plot_paper_figure(scans, rows, poses, grid, whole, overlays)
         else:
             canvas = plot_over_map(grid, whole, overlays)
-        write_atomically(output, canvas.png())
+        write_atomically(output, figure_png(canvas.image()))
     else:
         from nscan_cli.mapping.map_server import map_image
 

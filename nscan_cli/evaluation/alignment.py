@@ -11,7 +11,7 @@ from typing import Literal
 
 import numpy as np
 
-from nscan_cli.poses import Array, compose, wrap
+from nscan_cli.poses import Array, compose
 
 LEAST_POSITION_ERROR = 0.02
 """m; error of positions that is always assumed, because markers are not placed more exactly."""
@@ -64,9 +64,3 @@ def circular_mean(angles: Array) -> tuple[float, float]:
     length = min(np.hypot(cos, sin), 1.0)
     spread = float(np.sqrt(-2 * np.log(length))) if length > 0 else np.inf
     return float(np.arctan2(sin, cos)), spread
-
-
-def spread_about(angles: Array) -> tuple[float, float]:
-    """The mean direction of angles (N,), and their standard deviation about it, rad."""
-    mean, _ = circular_mean(angles)
-    return mean, float(np.sqrt((wrap(angles - mean) ** 2).mean()))

@@ -14,7 +14,7 @@ from nscan_cli.evaluation.time_association import TOLERANCE
 from nscan_cli.evaluation.trajectory_errors import RPE_DISTANCE, TrajectoryErrors
 from nscan_cli.files.counting import counted
 
-UNITS = {"translation": "m", "rotation": "deg", "time": "s"}
+ERROR_UNITS = {"translation": "m", "rotation": "deg", "time": "s"}
 HEADINGS = ("mean", "sd", "median", "mean square", "rmse", "max")
 
 
@@ -44,7 +44,7 @@ class Evaluation:
         return figures
 
 
-def as_text(evaluation: Evaluation) -> str:
+def evaluation_text(evaluation: Evaluation) -> str:
     """The tables, with a final line feed."""
     blocks = [f"result     {evaluation.result}: {counted(evaluation.poses, 'pose')}"]
     if evaluation.relations:
@@ -87,7 +87,7 @@ def _alignment_note(alignment: Alignment) -> str:
 
 def as_document(evaluation: Evaluation) -> dict[str, Any]:
     """The evaluation as an object for JSON; lengths in m, angles in degrees."""
-    document: dict[str, Any] = {"result": evaluation.result, "poses": evaluation.poses, "units": UNITS}
+    document: dict[str, Any] = {"result": evaluation.result, "poses": evaluation.poses, "units": ERROR_UNITS}
     if evaluation.relations:
         relations, errors = evaluation.relations
         document["relations"] = {

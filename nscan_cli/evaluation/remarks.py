@@ -24,7 +24,7 @@ IMPROVEMENT = 3.0
 """Least ratio of the residuals of the positions without and with a remark."""
 UNIT_FACTORS = {1000.0: "millimetres", 100.0: "centimetres", 1 / 0.3048: "feet", 1 / 0.0254: "inches"}
 UNIT_TOLERANCE, SMALLEST_FACTOR = 0.03, 0.03
-SIGMAS = 5.0
+SIGNIFICANT_SIGMAS = 5.0
 """Standard deviations by which a lever arm or a rotation must differ from 0."""
 SMALLEST_TURN, SMALLEST_LEVER = math.radians(3.0), 0.05
 NO_SIDE = math.radians(170.0)
@@ -139,7 +139,9 @@ def _misfits(result: Trajectory, reference: Trajectory, errors: TrajectoryErrors
         left = fit(poses, truth)
     if left.apart < 2 * LARGEST_RESIDUAL * left.spread:
         turn, spread = heading_difference(poses, truth)
-        if abs(turn) > max(SMALLEST_TURN, SIGMAS * spread, SIGMAS * left.apart / left.spread):
+        if abs(turn) > max(
+            SMALLEST_TURN, SIGNIFICANT_SIGMAS * spread, SIGNIFICANT_SIGMAS * left.apart / left.spread
+        ):
             side = f", those of the reference to the {'left' if turn > 0 else 'right'}"
             yield (
                 f"the headings differ by {math.degrees(abs(turn)):.1f}° ± {math.degrees(spread):.1f}° "
@@ -179,7 +181,7 @@ def _lag_and_lever(clocks: Clocks, found: LeverArm | None, now: Fit) -> tuple[fl
 def _certain_lever_arm(poses: Array, truth: Array) -> LeverArm | None:
     """The lever arm; None where it is not certain."""
     found = lever_arm(poses, truth)
-    if found is None or np.hypot(*found.point) < max(SMALLEST_LEVER, SIGMAS * found.sigma):
+    if found is None or np.hypot(*found.point) < max(SMALLEST_LEVER, SIGNIFICANT_SIGMAS * found.sigma):
         return None
     if alignment(poses, truth).by == "positions":
         return found if found.apart * LEVER_IMPROVEMENT < fit(poses, truth).apart_scaled else None

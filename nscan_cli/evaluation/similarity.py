@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from nscan_cli.evaluation.alignment import alignment, spread_about
-from nscan_cli.poses import Array, compose
+from nscan_cli.evaluation.alignment import alignment, circular_mean
+from nscan_cli.poses import Array, compose, wrap
 
 
 @dataclass(frozen=True)
@@ -91,6 +91,7 @@ def lever_arm(poses: Array, truth: Array) -> LeverArm | None:
 
 
 def heading_difference(poses: Array, truth: Array) -> tuple[float, float]:
-    """The mean difference of the headings after alignment (rad, positive: truth is to the left), and ±."""
-    motion = alignment(poses, truth).motion
-    return spread_about(truth[:, 2] - poses[:, 2] - motion[2])
+    """Mean and standard deviation of the headings of truth minus those of the poses after alignment, rad."""
+    angles = truth[:, 2] - poses[:, 2] - alignment(poses, truth).motion[2]
+    mean, _ = circular_mean(angles)
+    return mean, float(np.sqrt((wrap(angles - mean) ** 2).mean()))

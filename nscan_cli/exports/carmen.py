@@ -48,7 +48,7 @@ def corrected_log(log: LaserLog, rows: NDArray[np.int64], poses: Array) -> bytes
     since = log.times - log.times[0]
     beams = _beam_texts(ranges, own, nothing)
     for k, row in enumerate(rows.tolist()):
-        triples = f"{_pose_text(lasers[k])} {_pose_text(poses[k])}"
+        triples = f"{_pose_fields(lasers[k])} {_pose_fields(poses[k])}"
         end = f"{log.stamps[row]} {OWN_HOST.decode()} {since[row]:.6f}\n"
         if plain:
             lines.append(f"FLASER {next(beams)} {triples} {end}")
@@ -91,17 +91,17 @@ def _param_lines(log: LaserLog, limit: np.float32, step: float) -> Iterator[str]
 def _beam_texts(ranges: NDArray[np.float32], own: NDArray[np.int64], nothing: np.float32) -> Iterator[str]:
     """The number of beams and the ranges of each scan, in the fewest digits that give the same value."""
     values, places = np.unique(ranges, return_inverse=True, equal_nan=True)
-    texts = np.array([_range_text(value, nothing) for value in values], dtype=object)
+    texts = np.array([_range_field(value, nothing) for value in values], dtype=object)
     for scan, beams in zip(places.reshape(ranges.shape), own.tolist(), strict=True):
         yield f"{beams} {' '.join(texts[scan[:beams]])}"
 
 
-def _range_text(value: np.float32, nothing: np.float32) -> str:
+def _range_field(value: np.float32, nothing: np.float32) -> str:
     if np.isnan(value):
         return "0"
     return str(nothing if np.isinf(value) else value)
 
 
-def _pose_text(pose: Array) -> str:
+def _pose_fields(pose: Array) -> str:
     x, y, angle = (np.round([pose[0], pose[1], wrap(pose[2])], 9) + 0.0).tolist()
     return f"{x:.9f} {y:.9f} {angle:.9f}"

@@ -67,18 +67,6 @@ class OccupancyGrid:
         """x, y (m) of the lower left corner of the cell (0, 0)."""
         self.options = options
 
-    @classmethod
-    def of_counts(
-        cls,
-        hits: NDArray[np.int32],
-        misses: NDArray[np.int32],
-        resolution: float,
-        origin: tuple[float, float],
-    ) -> OccupancyGrid:
-        """The grid with the given hits and misses (H, W)."""
-        height, width = hits.shape
-        return cls(_tiled(hits, misses), (height, width), resolution, origin)
-
     @property
     def hits(self) -> NDArray[np.int32]:
         """(H, W) the number of beams that end in the cell."""
@@ -123,18 +111,6 @@ class OccupancyGrid:
                 part = lines[:, column * TILE : (column + 1) * TILE]
                 part[:] = tile[: part.shape[0], : part.shape[1]]
         return whole
-
-
-def _tiled(hits: NDArray[np.int32], misses: NDArray[np.int32]) -> TileCounts:
-    """All tiles of the counts (H, W)."""
-    height, width = hits.shape
-    rows, columns = -(-height // TILE), -(-width // TILE)
-    padded = np.zeros((2, rows * TILE, columns * TILE), dtype=np.int32)
-    padded[:, :height, :width] = hits, misses
-    counts = padded.reshape(2, rows, TILE, columns, TILE).transpose(1, 3, 0, 2, 4).reshape(-1, 2, TILE, TILE)
-    return TileCounts(
-        np.arange(len(counts), dtype=np.int32).reshape(rows, columns), np.ascontiguousarray(counts)
-    )
 
 
 def occupancy_grid(

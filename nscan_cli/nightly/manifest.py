@@ -98,17 +98,17 @@ def bundled_manifests() -> dict[str, Path]:
 
 def _manifest_entry(file: str, number: int, table: dict[str, Any], folder: Path) -> ManifestEntry:
     place = f"{file}, log {number}"
-    name = table.get("name")
-    if not isinstance(name, str) or not LOG_NAME.fullmatch(name) or name.lower() in RESERVED_NAMES:
+    name: Any = table.get("name")
+    if not _is_name(name) or name.lower() in RESERVED_NAMES:
         remedy = "use letters, digits, '.', '_' and '-', as in intel"
         raise InputDataError(place, "has no name" if name is None else f"{name!r} is not a name", remedy)
     place += f" ({name})"
     for key, value in table.items():
         if key not in KEY_CHECKS:
             raise InputDataError(place, f"has an unknown key {key!r}", f"known: {', '.join(KEY_CHECKS)}")
-        problem = KEY_CHECKS[key](value)
-        if problem is not None:
-            raise InputDataError(place, f"{key} is {_abbreviated(value)}", f"give {problem}")
+        is_valid, wanted = KEY_CHECKS[key]
+        if not is_valid(value):
+            raise InputDataError(place, f"{key} is {_abbreviated(value)}", f"give {wanted}")
     if "relations" in table and "reference" in table:
         raise InputDataError(place, "has relations and reference", "remove one of them")
     for role in ROLES:
@@ -171,61 +171,43 @@ def _abbreviated(value: Any) -> str:
     return text if len(text) < 50 else f"{text[:47]}..."
 
 
-def _check_text(value: Any) -> str | None:
-    return None if isinstance(value, str) and value else "a text"
+def _is_number(value: Any) -> bool:
+    is_number = isinstance(value, (int, float)) and not isinstance(value, bool)
+    return is_number and value >= 0 and math.isfinite(value)
 
 
-def _check_number(value: Any) -> str | None:
-    good = isinstance(value, (int, float)) and not isinstance(value, bool) and value >= 0
-    return None if good and math.isfinite(value) else "a number that is not negative"
+def _is_name(value: Any) -> bool:
+    return isinstance(value, str) and LOG_NAME.fullmatch(value) is not None
 
 
-def _check_published(value: Any) -> str | None:
-    good = isinstance(value, dict) and all(_check_number(error) is None for error in value.values())
-    return None if good else 'errors in metres by method, as in { "RBPF" = 0.070 }'
-
-
-def _check_sha256(value: Any) -> str | None:
-    return (
-        None
-        if isinstance(value, str) and SHA256.fullmatch(value)
-        else "64 hexadecimal digits, in small letters"
-    )
-
-
-def _check_names(value: Any) -> str | None:
-    good = isinstance(value, list) and all(
-        isinstance(name, str) and LOG_NAME.fullmatch(name) for name in value
-    )
-    return None if good else 'names of files without their endings, as in ["intel-lab"]'
-
-
-def _check_bool(value: Any) -> str | None:
-    return None if isinstance(value, bool) else "true or false"
-
-
-def _check_table(value: Any) -> str | None:
-    return None if isinstance(value, dict) else "a table of options, as in { end = 60 }"
-
-
-KEY_CHECKS: dict[str, Callable[[Any], str | None]] = {
-    "name": _check_text,
-    "path": _check_text,
-    "also": _check_names,
-    "optional": _check_bool,
-    "about": _check_text,
-    "published_map": _check_text,
-    "relations": _check_text,
-    "reference": _check_text,
-    "max_translation": _check_number,
-    "max_rotation": _check_number,
-    "published": _check_published,
-    "parameters": _check_table,
-    "source": _check_text,
-    "sha256": _check_sha256,
-    "relations_source": _check_text,
-    "relations_sha256": _check_sha256,
-    "reference_source": _check_text,
-    "reference_sha256": _check_sha256,
+KeyCheck = tuple[Callable[[Any], bool], str]
+"""Whether a value is valid, and what it has to be."""
+TEXT: KeyCheck = (lambda value: isinstance(value, str) and value != "", "a text")
+BOUND: KeyCheck = (_is_number, "a number that is not negative")
+HASH: KeyCheck = (
+    lambda value: isinstance(value, str) and SHA256.fullmatch(value) is not None,
+    "64 hexadecimal digits, in small letters",
+)
+KEY_CHECKS: dict[str, KeyCheck] = {
+    "name": TEXT,
+    "path": TEXT,
+    "also": (
+        lambda value: isinstance(value, list) and all(map(_is_name, value)),
+        'names of files without their endings, as in ["intel-lab"]',
+    ),
+    "optional": (lambda value: isinstance(value, bool), "true or false"),
+    **dict.fromkeys(("about", "published_map", "relations", "reference"), TEXT),
+    **dict.fromkeys(("max_translation", "max_rotation"), BOUND),
+    "published": (
+        lambda value: isinstance(value, dict) and all(map(_is_number, value.values())),
+        'errors in metres by method, as in { "RBPF" = 0.070 }',
+    ),
+    "parameters": (lambda value: isinstance(value, dict), "a table of options, as in { end = 60 }"),
+    "source": TEXT,
+    "sha256": HASH,
+    "relations_source": TEXT,
+    "relations_sha256": HASH,
+    "reference_source": TEXT,
+    "reference_sha256": HASH,
 }
-"""The keys of a [[log]] table; each check returns None, or what the value has to be."""
+"""The keys of a [[log]] table."""

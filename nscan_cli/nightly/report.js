@@ -1,9 +1,9 @@
 "use strict";
-// Maps grow where they are tapped or by their buttons, and are dragged by the mouse; a finger scrolls them.
+// A tap, Ctrl + wheel or the buttons zoom a map; the mouse drags it, a finger scrolls it.
 for (const map of document.querySelectorAll(".map")) {
   const frame = map.querySelector(".frame"), sheet = map.querySelector(".sheet");
-  let zoom = 1, held = null, moved = false;
-  const grow = (to, x = frame.clientWidth / 2, y = frame.clientHeight / 2) => {
+  let zoom = 1, dragged = null, moved = false;
+  const zoomTo = (to, x = frame.clientWidth / 2, y = frame.clientHeight / 2) => {
     const was = zoom;
     zoom = Math.min(16, Math.max(1, to));
     const left = (frame.scrollLeft + x) * zoom / was - x, top = (frame.scrollTop + y) * zoom / was - y;
@@ -14,29 +14,29 @@ for (const map of document.querySelectorAll(".map")) {
   for (const button of map.querySelectorAll("button")) {
     button.addEventListener("click", () => {
       const factor = Number(button.dataset.zoom);
-      grow(factor ? zoom * factor : 1);
+      zoomTo(factor ? zoom * factor : 1);
     });
   }
   sheet.addEventListener("click", (event) => {
     const box = frame.getBoundingClientRect();
-    if (!moved && zoom === 1) grow(3, event.clientX - box.left, event.clientY - box.top);
+    if (!moved && zoom === 1) zoomTo(3, event.clientX - box.left, event.clientY - box.top);
   });
   frame.addEventListener("wheel", (event) => {
     if (!event.ctrlKey) return;
     event.preventDefault();
     const box = frame.getBoundingClientRect();
-    grow(zoom * Math.exp(-event.deltaY / 200), event.clientX - box.left, event.clientY - box.top);
+    zoomTo(zoom * Math.exp(-event.deltaY / 200), event.clientX - box.left, event.clientY - box.top);
   }, { passive: false });
   sheet.addEventListener("pointerdown", (event) => {
     moved = false;
-    if (event.pointerType === "mouse" && zoom > 1) held = event;
+    if (event.pointerType === "mouse" && zoom > 1) dragged = event;
   });
   addEventListener("pointermove", (event) => {
-    if (!held) return;
+    if (!dragged) return;
     moved = true;
-    frame.scrollBy(held.clientX - event.clientX, held.clientY - event.clientY);
-    held = event;
+    frame.scrollBy(dragged.clientX - event.clientX, dragged.clientY - event.clientY);
+    dragged = event;
   });
-  addEventListener("pointerup", () => { held = null; });
+  addEventListener("pointerup", () => { dragged = null; });
   sheet.addEventListener("dragstart", (event) => event.preventDefault());
 }

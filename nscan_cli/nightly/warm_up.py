@@ -1,7 +1,7 @@
 """Compile all kernels before the first log of a run, so that no log's time includes their compilation.
 
-A process started by `bootstrap.py` maps a simulated drive through a square corridor, with drifting odometry:
-it has keyframes, joint matches and loops. One side is bare, so that motion along it is weakly determined.
+A process started by `bootstrap.py` maps a simulated drive through a square corridor with drifting
+odometry. The drive has keyframes, joint matches and loops. One wall is bare, which leaves motion along it uncertain.
 """
 
 from __future__ import annotations
@@ -23,12 +23,12 @@ if TYPE_CHECKING:
 OUTER_WALL, INNER_WALL = 9.0, 6.0
 """Distance of the corridor's walls from its centre, m."""
 LAPS, SCAN_SPACING, BEAMS = 1.4, 0.3, 181
-"""Times round, m from scan to scan."""
+"""Number of laps, distance between scans (m), and number of beams."""
 LASER_RANGE, NO_RETURN, THREADS = 5.0, 81.91, 2
 ODOMETRY_DRIFT = 0.004
-"""rad, per step."""
+"""Error of the heading from scan to scan, rad."""
 COMPILED_FILE, LOCK_FILE = "all", ".compiling"
-"""Files of the cache folder. The first, with the machine in its name, exists once kernels are compiled."""
+"""Files of the cache folder. The first, with a build key in its name, exists once kernels are compiled."""
 
 
 def compile_kernels(environment: dict[str, str]) -> None:
@@ -66,7 +66,7 @@ def _compiled_file(folder: Path) -> Path:
 
 
 def main() -> None:
-    """Do everything that is done for a log, so that all kernels are compiled."""
+    """Map the simulated drive with and without odometry, so that all kernels are compiled."""
     import numpy as np
 
     from nscan_cli.kernels import decorators as compiled

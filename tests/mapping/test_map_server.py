@@ -8,6 +8,7 @@ from PIL import Image
 
 from nscan_cli.mapping.map_server import map_image, map_png, map_yaml
 from nscan_cli.mapping.occupancy import FREE, OCCUPIED, UNKNOWN, OccupancyGrid
+from tests.mapping.grids import grid_of_counts
 from tests.mapping.nav2 import load_map
 
 
@@ -15,7 +16,7 @@ from tests.mapping.nav2 import load_map
 def grid() -> OccupancyGrid:
     hits = np.array([[0, 3, 0], [0, 0, 9]], dtype=np.int32)
     misses = np.array([[4, 0, 0], [0, 2, 1]], dtype=np.int32)
-    return OccupancyGrid.of_counts(hits, misses, 0.05, (-1.2, 3.45))
+    return grid_of_counts(hits, misses, 0.05, (-1.2, 3.45))
 
 
 def test_nav2_loads_the_states_that_were_meant(grid, tmp_path):
@@ -42,7 +43,7 @@ def test_the_png_is_8_bit_gray_without_alpha_and_has_the_greatest_y_on_top(grid)
 
 
 def test_names_and_numbers_that_yaml_could_misread_are_safe(grid):
-    tiny = OccupancyGrid.of_counts(grid.hits, grid.misses, 0.001, (1e-5, -0.0))
+    tiny = grid_of_counts(grid.hits, grid.misses, 0.001, (1e-5, -0.0))
     text = map_yaml('a: "b" #ü.png', map_image(tiny)).decode()
     assert 'image: "a: \\"b\\" #ü.png"\n' in text
     assert "origin: [0.00001, 0.0, 0.0]\n" in text
@@ -50,6 +51,6 @@ def test_names_and_numbers_that_yaml_could_misread_are_safe(grid):
 
 
 def test_the_origin_has_no_rounding_noise(grid):
-    cells = OccupancyGrid.of_counts(grid.hits, grid.misses, 0.05, (-24 * 0.05, 3 * 0.05))
+    cells = grid_of_counts(grid.hits, grid.misses, 0.05, (-24 * 0.05, 3 * 0.05))
     assert math.isclose(cells.origin[1], 0.15)
     assert "origin: [-1.2, 0.15, 0.0]" in map_yaml("m.png", map_image(cells)).decode()

@@ -15,6 +15,7 @@ from nscan_cli.mapping.occupancy import (
     OccupancyGrid,
     occupancy_grid,
 )
+from tests.mapping.grids import grid_of_counts
 from tests.mapping.handmade_logs import half_circle, log_of
 
 ORIGIN = np.zeros((1, 3))
@@ -100,7 +101,7 @@ def test_beams_are_counted_one_by_one():
 def test_states_follow_the_shares():
     hits = np.array([[0, 0, 1, 1, 2, 2, 2]], dtype=np.int32)
     misses = np.array([[0, 5, 0, 1, 0, 6, 7]], dtype=np.int32)
-    states = OccupancyGrid.of_counts(hits, misses, 0.05, (0.0, 0.0)).states()
+    states = grid_of_counts(hits, misses, 0.05, (0.0, 0.0)).states()
     # 2 of 8 is a quarter and enough; 2 of 9 is less; a single hit is never enough.
     assert states.tolist() == [[UNKNOWN, FREE, UNKNOWN, FREE, OCCUPIED, OCCUPIED, FREE]]
 

@@ -9,9 +9,10 @@ from PIL import Image
 
 from nscan_cli.graph.model import Graph, Loop
 from nscan_cli.mapping.figures.map_plots import SOFT_GRAYS
-from nscan_cli.mapping.occupancy import FREE, OCCUPIED, UNKNOWN, OccupancyGrid
+from nscan_cli.mapping.occupancy import FREE, OCCUPIED, UNKNOWN
 from nscan_cli.nightly import map_preview as module
 from nscan_cli.nightly.map_preview import map_preview
+from tests.mapping.grids import grid_of_counts
 
 
 def graph_of(poses: list[tuple[float, float, float]]) -> Graph:
@@ -32,7 +33,7 @@ def grid():
     hits, misses = np.zeros((5, 4), dtype=np.int32), np.zeros((5, 4), dtype=np.int32)
     misses[:, :2] = 1
     hits[0, 0] = 5
-    return OccupancyGrid.of_counts(hits, misses, 0.5, (1.0, 2.0))
+    return grid_of_counts(hits, misses, 0.5, (1.0, 2.0))
 
 
 GRAPH = graph_of([(1.0, 2.0, 0), (2.0, 4.5, 0), (3.0, 2.0, 0)])

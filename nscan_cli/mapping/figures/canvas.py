@@ -244,10 +244,6 @@ class Canvas:
             picture.paste(enlarged.reduce(SUPERSAMPLING), (0, top))
         return picture
 
-    def png(self) -> bytes:
-        """The picture as a PNG file."""
-        return figure_png(self.image())
-
     def _ovals(self, outlines: Array, ring: Colour | None, inside: Colour) -> None:
         """Draws polygons (N, corners, 2) in pixels."""
 

@@ -8,6 +8,7 @@ from nscan_cli.mapping.figures.canvas import BLUE, GRAY, GREEN, PURPLE, SKY, VER
 from nscan_cli.mapping.figures.graph_edges import edges_by_kind
 from nscan_cli.mapping.figures.map_plots import Overlays, plot_over_map, plot_paper_figure
 from nscan_cli.mapping.occupancy import OccupancyGrid, occupancy_grid
+from tests.mapping.grids import grid_of_counts
 from tests.mapping.handmade_logs import half_circle
 
 PATH = np.array([[0.0, 0.0, 0.0], [4.0, 0.0, 0.0], [4.0, 4.0, 0.0], [0.0, 4.0, 0.0]])
@@ -25,7 +26,7 @@ def graph_of_a_square() -> Graph:
 
 def empty_map() -> OccupancyGrid:
     counts = np.zeros((120, 120), dtype=np.int32)
-    return OccupancyGrid.of_counts(counts, counts + 1, 0.05, (-1.0, -1.0))
+    return grid_of_counts(counts, counts + 1, 0.05, (-1.0, -1.0))
 
 
 def colour_at(canvas: Canvas, x: float, y: float) -> np.ndarray:
@@ -77,7 +78,7 @@ def test_walls_of_a_large_map_stay_when_cells_are_merged(monkeypatch):
     monkeypatch.setattr(map_plots, "MAX_PIXELS", 60)
     hits = np.zeros((121, 100), dtype=np.int32)
     hits[:, 50] = 9
-    grid = OccupancyGrid.of_counts(hits, np.ones_like(hits), 0.05, (0.0, 0.0))
+    grid = grid_of_counts(hits, np.ones_like(hits), 0.05, (0.0, 0.0))
     canvas = plot_over_map(grid, graph_of_a_square(), Overlays(uncertainty=False))
     # Three cells along a pixel: 41 rows for 121 cells, the column of cell 50 is the seventeenth.
     left, top, right, bottom = canvas.plot
