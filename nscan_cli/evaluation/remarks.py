@@ -139,9 +139,7 @@ def _misfits(result: Trajectory, reference: Trajectory, errors: TrajectoryErrors
         left = fit(poses, truth)
     if left.apart < 2 * LARGEST_RESIDUAL * left.spread:
         turn, spread = heading_difference(poses, truth)
-        if abs(turn) > max(
-            SMALLEST_TURN, SIGNIFICANT_SIGMAS * spread, SIGNIFICANT_SIGMAS * left.apart / left.spread
-        ):
+        if abs(turn) > max(SMALLEST_TURN, SIGNIFICANT_SIGMAS * max(spread, left.apart / left.spread)):
             side = f", those of the reference to the {'left' if turn > 0 else 'right'}"
             yield (
                 f"the headings differ by {math.degrees(abs(turn)):.1f}° ± {math.degrees(spread):.1f}° "

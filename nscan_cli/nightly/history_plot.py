@@ -9,7 +9,7 @@ from nscan_cli.nightly.regression_check import CheckResult, MeasuredErrors
 WIDTH, HEIGHT = 340, 96
 LEFT, RIGHT, TOP, BOTTOM = 50, 10, 8, 18
 MAX_RUNS = 40
-"""The last runs that are drawn at most."""
+"""Number of the last runs that are drawn."""
 
 
 def history_svg(check: CheckResult) -> str:
@@ -32,9 +32,9 @@ def history_svg(check: CheckResult) -> str:
     if bound is not None and known:
         marks.append(f'<line class="bound" x1="{LEFT}" x2="{WIDTH - RIGHT}" y1="{y(bound):.1f}" '
                      f'y2="{y(bound):.1f}"/>')  # fmt: skip
-        marks.append(_text_svg(LEFT - 6, y(bound) + 4, f"{bound:g}", "end"))
+        marks.append(_text_svg(LEFT - 6, y(bound) + 4, f"{bound:g}"))
     if known:
-        marks.append(_text_svg(LEFT - 6, y(0) + 4, "0 m", "end"))
+        marks.append(_text_svg(LEFT - 6, y(0) + 4, "0 m"))
     corners = [f"{x(at):.1f},{y(figure):.1f}" for at, figure in enumerate(figures) if figure is not None]
     marks.append(f'<polyline class="run" points="{" ".join(corners)}"/>')
     for at, (run, figure) in enumerate(zip(runs, figures, strict=True)):
@@ -48,9 +48,9 @@ def history_svg(check: CheckResult) -> str:
             marks.append(f'<circle class="dot" cx="{x(at):.1f}" cy="{y(figure):.1f}" r="{radius}">'
                          f"<title>{figure:.4f} m; {tool}</title></circle>")  # fmt: skip
     count = "one run so far" if len(check.runs) == 1 else f"{len(check.runs)} runs"
-    marks.append(_text_svg(WIDTH - RIGHT, HEIGHT - 3, count, "end"))
+    marks.append(_text_svg(WIDTH - RIGHT, HEIGHT - 3, count))
     return f'<svg viewBox="0 0 {WIDTH} {HEIGHT}" role="img" aria-label="Errors by run">{"".join(marks)}</svg>'
 
 
-def _text_svg(x: float, y: float, text: str, anchor: str) -> str:
-    return f'<text x="{x:.1f}" y="{y:.1f}" text-anchor="{anchor}">{text}</text>'
+def _text_svg(x: float, y: float, text: str) -> str:
+    return f'<text x="{x:.1f}" y="{y:.1f}" text-anchor="end">{text}</text>'

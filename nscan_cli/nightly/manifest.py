@@ -171,9 +171,9 @@ def _abbreviated(value: Any) -> str:
     return text if len(text) < 50 else f"{text[:47]}..."
 
 
-def _is_number(value: Any) -> bool:
-    is_number = isinstance(value, (int, float)) and not isinstance(value, bool)
-    return is_number and value >= 0 and math.isfinite(value)
+def _is_non_negative(value: Any) -> bool:
+    good = isinstance(value, (int, float)) and not isinstance(value, bool) and value >= 0
+    return good and math.isfinite(value)
 
 
 def _is_name(value: Any) -> bool:
@@ -183,7 +183,7 @@ def _is_name(value: Any) -> bool:
 KeyCheck = tuple[Callable[[Any], bool], str]
 """Whether a value is valid, and what it has to be."""
 TEXT: KeyCheck = (lambda value: isinstance(value, str) and value != "", "a text")
-BOUND: KeyCheck = (_is_number, "a number that is not negative")
+BOUND: KeyCheck = (_is_non_negative, "a number that is not negative")
 HASH: KeyCheck = (
     lambda value: isinstance(value, str) and SHA256.fullmatch(value) is not None,
     "64 hexadecimal digits, in small letters",
@@ -199,7 +199,7 @@ KEY_CHECKS: dict[str, KeyCheck] = {
     **dict.fromkeys(("about", "published_map", "relations", "reference"), TEXT),
     **dict.fromkeys(("max_translation", "max_rotation"), BOUND),
     "published": (
-        lambda value: isinstance(value, dict) and all(map(_is_number, value.values())),
+        lambda value: isinstance(value, dict) and all(map(_is_non_negative, value.values())),
         'errors in metres by method, as in { "RBPF" = 0.070 }',
     ),
     "parameters": (lambda value: isinstance(value, dict), "a table of options, as in { end = 60 }"),

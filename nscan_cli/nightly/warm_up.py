@@ -1,7 +1,7 @@
 """Compile all kernels before the first log of a run, so that no log's time includes their compilation.
 
 A process started by `bootstrap.py` maps a simulated drive through a square corridor with drifting
-odometry. The drive has keyframes, joint matches and loops. One wall is bare, which leaves motion along it uncertain.
+odometry. The drive has keyframes, joint matches and loops. One side is bare, so motion along it is uncertain.
 """
 
 from __future__ import annotations
