@@ -91,9 +91,10 @@ def command(
                 say(f"{name}: warning: {note}", quiet)
         if planned.to_do or planned.unreadable:
             from nscan_cli.cli.nightly_progress import night_progress
+            from nscan_cli.nightly.warm_up import TRACKING_KERNEL
 
             if scheduler is None:
-                announce_compiling("follow", quiet)
+                announce_compiling(TRACKING_KERNEL, quiet)
             names = [entry.name for entry, _key in planned.to_do]
             with night_progress(names, quiet) as lines:
                 run_plan(planned, folder, _engine(jobs, scheduler, timeout), lines)

@@ -27,6 +27,8 @@ LAPS, SCAN_SPACING, BEAMS = 1.4, 0.3, 181
 LASER_RANGE, NO_RETURN, THREADS = 5.0, 81.91, 2
 ODOMETRY_DRIFT = 0.004
 """Error of the heading from scan to scan, rad."""
+TRACKING_KERNEL = "track_scans"
+"""The kernel (slam/frontend/tracking_kernels.py) without whose machine code all kernels are compiled anew."""
 COMPILED_FILE, LOCK_FILE = "all", ".compiling"
 """Files of the cache folder. The first, with a build key in its name, exists once kernels are compiled."""
 
@@ -58,7 +60,7 @@ def cached_files() -> set[str]:
 
 def _is_compiled(folder: Path) -> bool:
     """Whether the kernels were compiled and not deleted since."""
-    return _compiled_file(folder).exists() and not machine_code.is_uncompiled("follow")
+    return _compiled_file(folder).exists() and not machine_code.is_uncompiled(TRACKING_KERNEL)
 
 
 def _compiled_file(folder: Path) -> Path:

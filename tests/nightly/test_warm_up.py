@@ -17,6 +17,7 @@ from nscan_cli.nightly.html_report import html_report
 from nscan_cli.nightly.manifest import ManifestEntry
 from nscan_cli.nightly.regression_check import check_log
 from nscan_cli.nightly.task import Task
+from nscan_cli.slam.frontend import tracking_kernels
 from tests.cli.room_logs import room_log
 
 
@@ -102,6 +103,10 @@ def test_a_time_with_compilation_in_it_is_none(cache, tmp_path, compiles):
 
     result = worker.map_and_evaluate(told, tmp_path / "outputs", report)
     assert (result["times"]["seconds"] is None) == compiles
+
+
+def test_the_tracking_kernel_is_there():
+    assert callable(getattr(tracking_kernels, warm_up.TRACKING_KERNEL))
 
 
 def test_what_is_not_timed_is_said(tmp_path, capsys):
