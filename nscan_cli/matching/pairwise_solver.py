@@ -50,7 +50,7 @@ def pairwise_objective(
     Writes the gradient (3,) and Hessian (3, 3) of the objective, and those of E into out (10,).
     """
     association = problem.association
-    update_association(problem.grid, problem.half, association, pose[0], pose[1], pose[2])
+    update_association(problem.grid, problem.half, association, pose)
     sum_association(association, widening, curvature, out)
     unpack_derivatives(out, problem.scale, gradient, hessian)
     value = problem.scale * out[0]

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from nscan_cli.kernels.decorators import kernel, leaf_kernel, numba_inline_kernel
+from nscan_cli.kernels.decorators import kernel, leaf_kernel
 from nscan_cli.ndt.gaussians import make_gaussian
 from nscan_cli.ndt.hash_grid import OUTDATED, Grid, facing_gaussian, find_row, pack_key
 from nscan_cli.poses import Array
@@ -37,12 +37,7 @@ def association_buffers(points: int, stride: int) -> AssociationBuffers:
 
 @leaf_kernel
 def associate_once(
-    grid: Grid,
-    half: float,
-    points: Array,
-    pose: Array,
-    stride: int,
-    buffers: AssociationBuffers,
+    grid: Grid, half: float, points: Array, pose: Array, stride: int, buffers: AssociationBuffers
 ) -> int:
     """Write the pairs of points (m, 2), moved by `pose` (3,), and Gaussians to `buffers.pairs`.
 
@@ -118,27 +113,23 @@ def begin_association(points: Array) -> Association:
 
 
 @leaf_kernel
-def update_association(
-    grid: Grid, half: float, association: Association, x: float, y: float, phi: float
-) -> None:
-    """Move the points to the pose (x, y, phi), and look up the Gaussians of points that change their cell.
+def update_association(grid: Grid, half: float, association: Association, pose: Array) -> None:
+    """Move the points to `pose` (3,), and look up the Gaussians of points that change their cell.
 
     Outdated Gaussians there are made again.
     """
     cells, cells_now = association.cells, association.cells_now
-    changed = _move_points(
-        association.points, x, y, np.cos(phi), np.sin(phi), half, association.moved, cells, cells_now
-    )
+    changed = _move_points(association, pose[0], pose[1], np.cos(pose[2]), np.sin(pose[2]), half)
     # After a short step mostly no point changes its cell.
     for k in range(cells.shape[1] if changed else 0):
         ix, iy = cells_now[0, k], cells_now[1, k]
         if ix != cells[0, k] or iy != cells[1, k]:
             cells[0, k], cells[1, k] = ix, iy
             row = find_row(grid, pack_key(int(ix), int(iy)))
-            if row >= 0:
-                _make_outdated(grid, row, half)
             for block in range(BLOCKS):
                 link = -1 if row < 0 else grid.links[row, block]
+                if link >= 0 and grid.gaussians[link, 2] == OUTDATED:
+                    make_gaussian(grid, link, half)
                 link = facing_gaussian(grid, link, association.moved[0, k], association.moved[1, k])
                 if link < 0:
                     association.gaussians[block, :, k] = 0.0
@@ -146,15 +137,6 @@ def update_association(
                 gaussian = grid.gaussians[link]
                 for number in range(GAUSSIAN_NUMBERS):
                     association.gaussians[block, number, k] = gaussian[number]
-
-
-@numba_inline_kernel
-def _make_outdated(grid: Grid, row: int, half: float) -> None:
-    """Make the outdated Gaussians of a lattice cell again."""
-    for block in range(BLOCKS):
-        link = grid.links[row, block]
-        if link >= 0 and grid.gaussians[link, 2] == OUTDATED:
-            make_gaussian(grid, link, half)
 
 
 @leaf_kernel
@@ -175,18 +157,9 @@ def count_inliers(association: Association, bound: float) -> int:
 
 
 @leaf_kernel
-def _move_points(
-    points: Array,
-    x: float,
-    y: float,
-    cos: float,
-    sin: float,
-    half: float,
-    moved: Array,
-    cells: Array,
-    cells_now: Array,
-) -> int:
+def _move_points(association: Association, x: float, y: float, cos: float, sin: float, half: float) -> int:
     """Write the moved points and their cells; the number of points that change their cell."""
+    points, cells, cells_now, moved, _ = association
     changed = 0
     for k in range(points.shape[1]):
         rx = cos * points[0, k] - sin * points[1, k]

@@ -90,7 +90,8 @@ def face_moments(grid: Grid, row: int, half: float) -> tuple[Moments, Moments]:
 
     NO_MOMENTS where there are too few points.
     """
-    cells = _cells_of_block(grid, grid.keys[row], row)
+    above, right = grid.keys[row] + 1, grid.keys[row] + 2 * HALF_KEY
+    cells = np.int32(row), find_row(grid, right), find_row(grid, above), find_row(grid, right + 1)
     minimum, has_faces = grid.settings[MINIMUM], grid.settings[FACES] > 0.0
     whole, normal = _block_sums(grid, cells, half)
     if whole[0] < minimum:
@@ -123,7 +124,7 @@ def _block_sums(grid: Grid, cells: Cells, half: float) -> tuple[Moments, tuple[f
                 xx += part[3] - part[1] * part[1] * per_point
                 xy += part[4] - part[1] * part[2] * per_point
                 yy += part[5] - part[2] * part[2] * per_point
-    return sums, _normal(_long_axis(xx, xy, yy))
+    return sums, _normal(long_axis_of((0.0, 0.0, 0.0, xx, xy, yy, 0.0, 0.0)))
 
 
 @leaf_kernel
@@ -156,17 +157,6 @@ def _face_sums(grid: Grid, cells: Cells, half: float, nx: float, ny: float) -> M
 
 
 @leaf_kernel
-def _cells_of_block(grid: Grid, key: int, row: int) -> Cells:
-    """The cells of the block whose lower left cell is `row`."""
-    return (
-        np.int32(row),
-        find_row(grid, key + 2 * HALF_KEY),
-        find_row(grid, key + 1),
-        find_row(grid, key + 2 * HALF_KEY + 1),
-    )
-
-
-@leaf_kernel
 def plus_cell(sums: Moments, part: Array, dx: float, dy: float) -> Moments:
     """The sums plus those of a part whose cell has its centre at (dx, dy) from the reference point."""
     n, sx, sy, sxx, sxy, syy, fx, fy = sums
@@ -196,12 +186,6 @@ def moments_of_sums(sums: Moments) -> Moments:
 def long_axis_of(moments: Moments) -> Direction:
     """The long axis of the covariance in the moments."""
     _, _, _, xx, xy, yy, _, _ = moments
-    return _long_axis(xx, xy, yy)
-
-
-@leaf_kernel
-def _long_axis(xx: float, xy: float, yy: float) -> Direction:
-    """The long axis of a covariance."""
     radius = eigenvalue_radius(xx, xy, yy)
     if radius > 0.0:
         return 0.5 * (xx - yy) / radius, xy / radius

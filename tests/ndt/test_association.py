@@ -34,7 +34,7 @@ def test_an_updated_association_equals_a_new_look_up(step, curvature):
     for n in range(40):
         # Every other time back where something is met.
         pose = start + (n % 2) * step * rng.uniform(-1, 1, 3)
-        update_association(ndt.grid, ndt.half, association, *pose)
+        update_association(ndt.grid, ndt.half, association, pose)
         sum_association(association, 0.3, curvature, kept)
         buffers = association_buffers(len(points), 1)
         evaluate_energy(ndt.grid, ndt.half, points, pose, 0.3, curvature, 0.0, 1, buffers, anew)
@@ -49,7 +49,7 @@ def test_inliers_of_an_association_are_those_of_a_new_look_up():
     for _ in range(20):
         pose = rng.uniform(-0.3, 0.3, 3)
         association = begin_association(points)
-        update_association(ndt.grid, ndt.half, association, *pose)
+        update_association(ndt.grid, ndt.half, association, pose)
         counts.add(count_inliers(association, 9.0))
         assert count_inliers(association, 9.0) / len(points) == inlier_share(
             ndt.grid, ndt.half, points, pose, 9.0
@@ -68,7 +68,7 @@ def test_outdated_gaussians_are_made_when_they_are_looked_up():
     for pose in np.random.default_rng(8).uniform(-0.3, 0.3, (10, 3)):
         for ndt, out in ((at_once, expected), (later, found)):
             association = begin_association(points)
-            update_association(ndt.grid, ndt.half, association, *pose)
+            update_association(ndt.grid, ndt.half, association, pose)
             sum_association(association, 1.0, 1.0, out)
         assert expected[0] < -1.0
         np.testing.assert_array_equal(found, expected)
@@ -81,7 +81,7 @@ def test_outdated_gaussians_are_made_when_they_are_looked_up():
 def test_no_points_have_no_gaussians():
     ndt, out = outside_in(1), np.empty(ENERGY_NUMBERS)
     association = begin_association(np.empty((0, 2)))
-    update_association(ndt.grid, ndt.half, association, 0.0, 0.0, 0.0)
+    update_association(ndt.grid, ndt.half, association, np.zeros(3))
     sum_association(association, 1.0, 1.0, out)
     assert (out == 0.0).all()
     assert count_inliers(association, 9.0) == 0
@@ -91,6 +91,6 @@ def test_poses_that_are_not_numbers_have_no_gaussians():
     ndt = outside_in(1)
     association, out = begin_association(room(1)), np.empty(ENERGY_NUMBERS)
     for x in (np.nan, np.inf, 1e300):
-        update_association(ndt.grid, ndt.half, association, x, 0.0, 0.0)
+        update_association(ndt.grid, ndt.half, association, np.array([x, 0.0, 0.0]))
         sum_association(association, 1.0, 0.0, out)
         assert not out[0] < -1e-300

@@ -142,7 +142,7 @@ def test_an_updated_association_has_the_right_face(points, pose):
     rng = np.random.default_rng(3)
     for _ in range(30):
         at = pose + rng.uniform(-0.1, 0.1, 3)
-        update_association(ndt.grid, ndt.half, association, *at)
+        update_association(ndt.grid, ndt.half, association, at)
         sum_association(association, 0.3, 0.0, kept)
         buffers = association_buffers(len(scan), 1)
         evaluate_energy(ndt.grid, ndt.half, scan, at, 0.3, 0.0, 0.0, 1, buffers, anew)

@@ -23,5 +23,5 @@ def match_and_count(
     problem = PairProblem(grid, settings.half, meeting, settings.scale, prior)
     limits = settings.max_iterations, settings.coarse_tolerance, settings.tolerance
     value, _, _, _, _ = minimise_pairwise(problem, pose, settings.widenings, *limits, hessian)
-    update_association(grid, settings.half, meeting, pose[0], pose[1], pose[2])
+    update_association(grid, settings.half, meeting, pose)
     return value, count_inliers(meeting, settings.inlier_bound) / max(points.shape[0], 1)

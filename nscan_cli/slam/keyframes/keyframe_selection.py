@@ -37,7 +37,7 @@ class Keyframes:
         begins |= not self.list
         before = found.poses[0] if begins else self.list[-1].tracked.pose
         bounds = self.distance, self.options.turn, self.options.slip_factor
-        new = _new_keyframes(found.poses, self._slips.find(found), int(begins), before, *bounds).tolist()
+        new = _new_keyframes(found.poses, self._slips.find(found), int(begins), before, bounds).tolist()
         first = 0
         for k in [0, *new] if begins else new:
             self.attach(scans, found, first, k)
@@ -76,19 +76,14 @@ class Keyframes:
 
 @kernel
 def _new_keyframes(
-    poses: Array,
-    slipped: NDArray[np.bool_],
-    first: int,
-    before: Array,
-    distance: float,
-    turn: float,
-    slip_factor: float,
+    poses: Array, slipped: NDArray[np.bool_], first: int, before: Array, bounds: tuple[float, float, float]
 ) -> Indices:
     """Which of the poses (n, 3), from the `first` on, become keyframes.
 
-    Each is the first beyond `distance` (m) or `turn` (rad) of the one before; the first of all, of `before`.
-    Where a scan may have slipped, both bounds are multiplied by `slip_factor`.
+    Each is the first beyond a distance (m) or turn (rad) of the one before; the first of all, of `before`.
+    These are the first two bounds. Where a scan may have slipped, both are multiplied by the third.
     """
+    distance, turn, slip_factor = bounds
     new, count, last = np.empty(len(poses), dtype=np.int64), 0, before
     for k in range(first, len(poses)):
         away = np.hypot(poses[k, 0] - last[0], poses[k, 1] - last[1])
