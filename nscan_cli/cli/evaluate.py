@@ -88,7 +88,7 @@ def command(
         raise WrongUsageError("--reference-topic needs a recording as the reference; give --reference, too")
     if [result, relations, reference].count("-") > 1:
         raise WrongUsageError("standard input (-) can be one input only; give the others by their path")
-    check_plot(plot, None, [result, relations, reference])
+    check_plot(plot, [result, relations, reference])
     import json
 
     from nscan_cli.evaluation.evaluation_report import as_document, evaluation_text

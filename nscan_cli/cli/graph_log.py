@@ -10,10 +10,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from nscan_cli.errors import InputDataError, InputMissingError
-from nscan_cli.files.counting import counted
 from nscan_cli.files.limits import DISTANCE
 from nscan_cli.files.provenance import is_made_from
-from nscan_cli.files.text import name_of_path, path_of_name
+from nscan_cli.files.text import counted, name_of_path, path_of_name
 from nscan_cli.logs.log_files import JOURNAL_SUFFIXES
 from nscan_cli.logs.reading_options import ReadingOptions
 
@@ -21,7 +20,7 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from nscan_cli.files.source import Source
+    from nscan_cli.files.provenance import Source
     from nscan_cli.graph.model import Graph
     from nscan_cli.logs.laser_log import LaserLog
 
@@ -82,7 +81,7 @@ def find_log(graph_file: str, graph: Graph) -> tuple[str, ...]:
         for inner in _folders(folder):
             # Recordings of equal names lie in folders of their own.
             paths = {inner / path_of_name(name): size for name, size in sizes.items()}
-            if all(_has_size(path, size) for path, size in paths.items()):
+            if all(path.is_file() and path.stat().st_size == size for path, size in paths.items()):
                 return tuple(map(str, paths))
     more = f" and {counted(len(sizes) - 1, 'more file')}" if len(sizes) > 1 else ""
     raise InputMissingError(
@@ -109,10 +108,6 @@ def _folders(folder: Path) -> list[Path]:
         return sorted(path for path in folder.iterdir() if path.is_dir())
     except OSError:
         return []
-
-
-def _has_size(path: Path, size: int) -> bool:
-    return path.is_file() and path.stat().st_size == size
 
 
 def _graph_inputs(graph: Graph) -> list[dict[str, Any]]:

@@ -6,14 +6,13 @@ import json
 import math
 from typing import TYPE_CHECKING, Any
 
-from nscan_cli.cli.laser_survey import laser_line, survey_of
+from nscan_cli.cli.laser_survey import laser_line, rate_of, survey_of
 from nscan_cli.cli.shared_options import common_options, reading_options
 from nscan_cli.cli.standard_streams import print_result
 from nscan_cli.cli.subcommand import log_argument, option, subcommand
 from nscan_cli.cli.summary import Row, summary_table
-from nscan_cli.files.counting import counted
 from nscan_cli.files.outputs import write_atomically
-from nscan_cli.files.text import json_bytes
+from nscan_cli.files.text import counted, json_bytes
 from nscan_cli.logs.reading_options import ReadingOptions
 
 if TYPE_CHECKING:
@@ -65,9 +64,7 @@ def facts_of(log: LaserLog) -> dict[str, Any]:
         "file": log.source.name,
         "sha256": log.source.sha256,
         "bytes": log.source.bytes,
-        "files": [
-            {"name": file.name, "sha256": file.sha256, "bytes": file.bytes} for file in log.source.files
-        ],
+        "files": [file.record for file in log.source.files],
         "format": log.format,
         "laser": log.laser,
         "scans": len(log),
@@ -81,7 +78,7 @@ def facts_of(log: LaserLog) -> dict[str, Any]:
         "angle_increments": increments,
         "start": log.stamps[0],
         "duration": round(duration, 6),
-        "rate": round(len(steps) / duration, 3) if duration > 0 else None,
+        "rate": rate_of(log),
         "longest_gap": round(float(steps.max()), 6) if len(steps) else None,
         "odometry": None if path is None else {"path": round(float(np.hypot(*path.T).sum()), 3)},
         "no_return": log.no_return,
@@ -150,25 +147,19 @@ def _of_laser(facts: dict[str, Any]) -> list[Row]:
 def _of_whole(facts: dict[str, Any]) -> list[Row]:
     odometry, used, backward = facts["odometry"], facts["used"], facts["backward_stamps"]
     path = [] if odometry is None else [f"a path of {odometry['path']:.1f} m"]
+    several = [
+        f"{one['name']} ({one['type']}): {counted(one['records'], 'record')}" for one in facts["odometries"]
+    ]
+    backwards = [] if backward is None else [counted(backward, "time stamp") if backward else "none"]
     skipped = None if facts["skipped"] is None else [_skipped_line(entry) for entry in facts["skipped"]]
     return [
-        ("odometry", [*path, used["odometry"], *_odometry_lines(facts["odometries"])]),
+        ("odometry", [*path, used["odometry"], *(several if len(several) > 1 else [])]),
         ("truth", [counted(facts["truth"], "pose") if facts["truth"] else "none"]),
         ("records", [f"{count} {tag}" for tag, count in facts["records"].items()]),
-        (
-            "out of order",
-            [] if backward is None else [counted(backward, "time stamp") if backward else "none"],
-        ),
+        ("out of order", backwards),
         ("skipped", [] if skipped is None else skipped or ["none"]),
         ("warnings", facts["warnings"] or ["none"]),
     ]
-
-
-def _odometry_lines(odometries: list[dict[str, Any]]) -> list[str]:
-    """A line for each odometry, if there are several."""
-    if len(odometries) < 2:
-        return []
-    return [f"{one['name']} ({one['type']}): {counted(one['records'], 'record')}" for one in odometries]
 
 
 def _mounting_line(x: float, y: float, degrees: float) -> str:

@@ -9,13 +9,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from nscan_cli.errors import InputDataError
+from nscan_cli.cli.nscan import INITIAL_WORDS, PRIOR_WORDS
+from nscan_cli.errors import InputDataError, WrongUsageError
 from nscan_cli.evaluation.time_association import TOLERANCE, nearest_in_time
 from nscan_cli.files.encoding import without_byte_order_mark
 from nscan_cli.files.inputs import base_name, label, read_bytes
 from nscan_cli.files.limits import GRAPH
-from nscan_cli.files.provenance import is_made_from
-from nscan_cli.files.source import Source
+from nscan_cli.files.provenance import Source, is_made_from
 from nscan_cli.graph.io.json_graph import parse_graph
 from nscan_cli.graph.io.tum import Trajectory, parse_tum
 from nscan_cli.graph.model import Graph, Pairwise
@@ -24,7 +24,7 @@ from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.matching.joint.joint_energy import Priors, no_priors
 from nscan_cli.matching.joint.nscan_match import PriorsAmong
 from nscan_cli.matching.priors import MotionModel, odometry_prior
-from nscan_cli.poses import Array
+from nscan_cli.poses import Array, relative
 
 LOG_REMEDY = "give the graph that was made from this log"
 
@@ -57,6 +57,29 @@ def read_pose_file(path: str, log: LaserLog) -> PoseFile:
     return PoseFile(graph, source, name)
 
 
+def initial_and_priors(
+    log: LaserLog, numbers: tuple[int, ...], initial: str, prior: str, model: MotionModel
+) -> tuple[Array, PriorsAmong, list[Source]]:
+    """The initial poses (n, 3), the priors, and the files that they come from."""
+    rows = [log.row(number) for number in numbers]
+    odometry = None if log.odometry is None else log.odometry[rows]
+    paths = [path for path, words in ((initial, INITIAL_WORDS), (prior, PRIOR_WORDS)) if path not in words]
+    files = {path: read_pose_file(path, log) for path in dict.fromkeys(paths)}
+    start = np.zeros((len(rows), 3))
+    if initial not in INITIAL_WORDS:
+        start = initial_poses(files[initial], log, rows)
+    elif initial == "odometry" and odometry is not None:
+        start = relative(odometry, odometry[0])
+    if prior not in PRIOR_WORDS:
+        graph = files[prior].content
+        if not isinstance(graph, Graph):
+            raise WrongUsageError(f"--prior {prior}: is a trajectory, which has no relations; give a graph")
+        priors = graph_priors(graph, numbers)
+    else:
+        priors = odometry_priors(odometry if prior == "odometry" else None, numbers, model)
+    return start, priors, [knowledge.source for knowledge in files.values()]
+
+
 def initial_poses(knowledge: PoseFile, log: LaserLog, rows: Sequence[int]) -> Array:
     """The poses (n, 3) of the scans in `rows`. Raises InputDataError if one has no pose."""
     content = knowledge.content
@@ -74,15 +97,12 @@ def initial_poses(knowledge: PoseFile, log: LaserLog, rows: Sequence[int]) -> Ar
     return content.poses[found]
 
 
-def no_priors_among(_kept: Sequence[int]) -> Priors:
-    """No priors for any scans."""
-    return no_priors()
-
-
-def odometry_priors(odometry: Array, numbers: Sequence[int], model: MotionModel) -> PriorsAmong:
-    """Priors from the odometry (n, 3) of the scans `numbers`, from each scan to the next in time."""
+def odometry_priors(odometry: Array | None, numbers: Sequence[int], model: MotionModel) -> PriorsAmong:
+    """Priors from the odometry (n, 3) of the scans `numbers`, from each scan to the next in time; or none."""
 
     def among(kept: Sequence[int]) -> Priors:
+        if odometry is None:
+            return no_priors()
         order = sorted(range(len(kept)), key=lambda at: numbers[kept[at]])
         pairs = list(itertools.pairwise(order))
         priors = [odometry_prior(odometry[kept[a]], odometry[kept[b]], model) for a, b in pairs]

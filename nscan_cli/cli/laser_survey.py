@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from nscan_cli.errors import InputDataError, NscanError
-from nscan_cli.files.counting import counted
+from nscan_cli.files.text import counted
 from nscan_cli.logs.reading_options import ReadingOptions
 
 if TYPE_CHECKING:

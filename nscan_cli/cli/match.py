@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import json
 import math
 from typing import TYPE_CHECKING, Any
 
@@ -21,6 +22,7 @@ from nscan_cli.logs.reading_options import ReadingOptions
 if TYPE_CHECKING:
     from nscan_cli.logs.laser_log import LaserLog
     from nscan_cli.matching.pairwise import PairMatch
+    from nscan_cli.matching.uncertainty import Weakest
     from nscan_cli.poses import Array
 
 MATCH_FORMAT = "nscan-match"
@@ -96,7 +98,7 @@ def command(
     check_writable(output)
     from nscan_cli.logs.log_files import files_of
 
-    check_plot(plot, output, files_of(log))
+    check_plot(plot, [output, *files_of(log)])
     from nscan_cli.logs.load import read_log
     from nscan_cli.matching.pairwise import PairOptions, match_pair, matched_points, scan_ndt
     from nscan_cli.matching.priors import MotionModel, odometry_prior
@@ -154,13 +156,31 @@ def _initial_pose(log: LaserLog, rows: tuple[int, int], initial: str) -> Array:
     return np.array(PoseType().convert(initial, None, None))
 
 
+def match_document(name: str, provenance: dict[str, Any], fields: dict[str, Any]) -> bytes:
+    """The JSON document of format `name`: one key a line in fixed order, no NaN, a final line feed."""
+    units = {"length": "m", "angle": "rad"}
+    head = {"format": name, "version": "1.0", "units": units, "provenance": provenance}
+    lines = [
+        f'"{key}":{json.dumps(value, separators=(",", ":"), allow_nan=False)}'
+        for key, value in {**head, **fields}.items()
+    ]
+    return ("{" + ",\n".join(lines) + "}\n").encode()
+
+
+def weakest_record(weakest: Weakest) -> dict[str, Any]:
+    """The JSON object of the direction that is known least."""
+    from nscan_cli.graph.io.json_fields import six_digits
+
+    sigma = None if weakest.sigma is None else six_digits(weakest.sigma)
+    return {"direction": six_digits(weakest.direction), "sigma": sigma}
+
+
 def _document(
     log: LaserLog, numbers: tuple[int, int], start: Array, match: PairMatch, parameters: dict[str, Any]
 ) -> bytes:
-    from nscan_cli.cli.match_document import document, weakest_record
     from nscan_cli.graph.io.json_fields import pose_rows, six_digits, triangle
 
-    return document(
+    return match_document(
         MATCH_FORMAT,
         provenance_of([log.source], parameters),
         {

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 from nscan_cli.cli.progress import say
-from nscan_cli.files.counting import counted
+from nscan_cli.files.text import counted
 from nscan_cli.nightly.manifest import ManifestEntry
 from nscan_cli.nightly.regression_check import MeasuredErrors
 from nscan_cli.nightly.run_history import RunRecord

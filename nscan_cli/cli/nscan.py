@@ -4,38 +4,66 @@ from __future__ import annotations
 
 import dataclasses
 import math
+import re
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from nscan_cli.cli.match import with_defaults
+from nscan_cli.cli.match import match_document, weakest_record, with_defaults
 from nscan_cli.cli.plot_option import check_plot, plot_option, write_plot
 from nscan_cli.cli.progress import Compiling, say
-from nscan_cli.cli.scan_spec import ScanSpecType
 from nscan_cli.cli.shared_options import common_options, reading_options
 from nscan_cli.cli.subcommand import PATH, log_argument, option, result_option, subcommand
 from nscan_cli.cli.summary import Row, match_outcome, summary_table
 from nscan_cli.errors import InputDataError, WrongUsageError
-from nscan_cli.files.counting import counted
 from nscan_cli.files.outputs import check_writable, write_atomically
 from nscan_cli.files.provenance import as_parameters, provenance_of
+from nscan_cli.files.text import counted
 from nscan_cli.logs.reading_options import ReadingOptions
 
 if TYPE_CHECKING:
-    from nscan_cli.files.source import Source
-    from nscan_cli.logs.laser_log import LaserLog
     from nscan_cli.matching.joint.index_set import IndexSetKind
-    from nscan_cli.matching.joint.nscan_match import NScanMatch, PriorsAmong
+    from nscan_cli.matching.joint.nscan_match import NScanMatch
     from nscan_cli.matching.joint.outliers import ExcludedScan
-    from nscan_cli.matching.priors import MotionModel
     from nscan_cli.matching.uncertainty import Weakest
-    from nscan_cli.poses import Array
 
 NSCAN_FORMAT = "nscan-joint-match"
 INITIAL_WORDS, PRIOR_WORDS = ("odometry", "identity"), ("odometry", "none")
 """Words in --initial and in --prior that are not files."""
 LISTED_SCANS = 6
 """Most scans with a weak direction that the summary lists; the result has all."""
+SPEC_PART = re.compile(r"(\d+)(?:-(\d+)(?::(\d+))?)?")
+MOST_SCANS = 500
+"""The Hessian grows with the square of the number of scans; a longer list is taken for a typing error."""
+
+
+class ScanSpecType(click.ParamType[Any]):
+    """Converts scan numbers and ranges, such as `10,12,14-20` or `100-190:10`, to a tuple of scan numbers."""
+
+    name = "SPEC"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        """Parse the scan numbers; another form, a single scan and a repeated scan are usage errors."""
+        scans: list[int] = []
+        for part in value.split(","):
+            match = SPEC_PART.fullmatch(part.strip())
+            if match is None:
+                self.fail(f"{part!r} is not of the form 10, 14-20 or 100-190:10", param, ctx)
+            first, last, step = int(match[1]), int(match[2] or match[1]), int(match[3] or 1)
+            if last < first:
+                self.fail(f"{part!r} runs backwards", param, ctx)
+            if step == 0:
+                self.fail(f"{part!r} has a step of 0", param, ctx)
+            chosen = range(first, last + 1, step)
+            if len(chosen) > MOST_SCANS - len(scans):
+                self.fail(f"{value!r} has more than {MOST_SCANS} scans", param, ctx)
+            scans += chosen
+        if len(scans) < 2:
+            self.fail(f"{value!r} has only one scan; give two or more", param, ctx)
+        if len(set(scans)) < len(scans):
+            twice = next(scan for at, scan in enumerate(scans) if scan in scans[:at])
+            self.fail(f"{value!r} has scan {twice} twice", param, ctx)
+        return tuple(scans)
 
 
 @subcommand(
@@ -94,8 +122,8 @@ def command(
     files = [path for path, words in ((initial, INITIAL_WORDS), (prior, PRIOR_WORDS)) if path not in words]
     from nscan_cli.logs.log_files import files_of
 
-    check_plot(plot, output, [*files_of(log), *files])
-    from nscan_cli.cli.match_document import document
+    check_plot(plot, [output, *files_of(log), *files])
+    from nscan_cli.cli.initial_and_priors import initial_and_priors
     from nscan_cli.files.inputs import base_name
     from nscan_cli.logs.load import read_log
     from nscan_cli.matching.joint.nscan_match import nscan_match
@@ -109,7 +137,7 @@ def command(
     initial, prior = with_defaults(scans, initial, prior, quiet)
     options, model = PairOptions(), MotionModel()
     joint = JointOptions(fixed=0 if gauge == "fixed" else None)
-    start, priors, sources = _initial_and_priors(scans, numbers, initial, prior, model)
+    start, priors, sources = initial_and_priors(scans, numbers, initial, prior, model)
     if prior not in PRIOR_WORDS and not len(priors(range(len(numbers))).pairs):
         say(f"warning: {prior} has no relation between these scans", quiet)
     points = [matched_points(scans, row, options) for row in rows]
@@ -132,7 +160,7 @@ def command(
         "odometry": as_parameters(model),
     }
     provenance = provenance_of([scans.source, *sources], parameters)
-    write_atomically(output, document(NSCAN_FORMAT, provenance, _fields(numbers, match, left_out)))
+    write_atomically(output, match_document(NSCAN_FORMAT, provenance, _fields(numbers, match, left_out)))
     if plot is not None:
         from nscan_cli.mapping.figures.match_plots import plot_nscan
 
@@ -140,45 +168,8 @@ def command(
     say(summary_table(_nscan_rows(numbers, match, left_out)), quiet)
 
 
-def _initial_and_priors(
-    log: LaserLog, numbers: tuple[int, ...], initial: str, prior: str, model: MotionModel
-) -> tuple[Array, PriorsAmong, list[Source]]:
-    """The initial poses (n, 3), the priors, and the files that they come from."""
-    import numpy as np
-
-    from nscan_cli.cli.initial_and_priors import (
-        graph_priors,
-        initial_poses,
-        no_priors_among,
-        odometry_priors,
-        read_pose_file,
-    )
-    from nscan_cli.graph.model import Graph
-    from nscan_cli.poses import relative
-
-    rows = [log.row(number) for number in numbers]
-    odometry = None if log.odometry is None else log.odometry[rows]
-    paths = [path for path, words in ((initial, INITIAL_WORDS), (prior, PRIOR_WORDS)) if path not in words]
-    files = {path: read_pose_file(path, log) for path in dict.fromkeys(paths)}
-    start = np.zeros((len(rows), 3))
-    priors: PriorsAmong = no_priors_among
-    if initial not in INITIAL_WORDS:
-        start = initial_poses(files[initial], log, rows)
-    elif initial == "odometry" and odometry is not None:
-        start = relative(odometry, odometry[0])
-    if prior not in PRIOR_WORDS:
-        graph = files[prior].content
-        if not isinstance(graph, Graph):
-            raise WrongUsageError(f"--prior {prior}: is a trajectory, which has no relations; give a graph")
-        priors = graph_priors(graph, numbers)
-    elif prior == "odometry" and odometry is not None:
-        priors = odometry_priors(odometry, numbers, model)
-    return start, priors, [knowledge.source for knowledge in files.values()]
-
-
 def _fields(numbers: tuple[int, ...], match: NScanMatch, left_out: list[ExcludedScan]) -> dict[str, Any]:
     """The fields of the result."""
-    from nscan_cli.cli.match_document import weakest_record
     from nscan_cli.graph.io.json_fields import six_digits, triangle
     from nscan_cli.graph.model import NScan
     from nscan_cli.graph.relations.registry import relation_record

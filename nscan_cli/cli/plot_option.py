@@ -37,22 +37,25 @@ def check_png(place: str, path: str) -> None:
         raise WrongUsageError(f"{place}: the name has no suffix; pictures are PNG: name it {name}")
 
 
-def check_plot(plot: str | None, output: str | None, inputs: Sequence[str | None]) -> None:
-    """Check that a picture can be written, and replaces no other file of the command.
+def check_second_output(name: str, path: str | None, others: Sequence[str | None]) -> None:
+    """Check that the output of the option `name` can be written, and replaces no other file of the command.
 
     Raises WrongUsageError and OutputError.
     """
-    if plot is None:
+    if path is None:
         return
-    if plot == "-":
-        raise WrongUsageError("--plot -: only the result can go to standard output; name a file")
-    file = os.path.realpath(plot)
-    if output not in (None, "-") and os.path.realpath(str(output)) == file:
-        raise WrongUsageError(f"--plot {plot}: the result has the same name; choose another")
-    if file in (os.path.realpath(path) for path in inputs if path and path != "-"):
-        raise WrongUsageError(f"--plot {plot}: is an input, and would be replaced; choose another name")
-    check_png(f"--plot {plot}", plot)
-    check_writable(plot)
+    if path == "-":
+        raise WrongUsageError(f"{name} -: only the result can go to standard output; name a file")
+    if os.path.realpath(path) in (os.path.realpath(other) for other in others if other and other != "-"):
+        raise WrongUsageError(f"{name} {path}: is another file of this command; choose another name")
+    check_writable(path)
+
+
+def check_plot(plot: str | None, others: Sequence[str | None]) -> None:
+    """Check the output --plot, and that its name is that of a PNG."""
+    check_second_output("--plot", plot, others)
+    if plot is not None:
+        check_png(f"--plot {plot}", plot)
 
 
 def write_plot(plot: str, picture: Image) -> None:

@@ -24,14 +24,12 @@ def say(message: str, quiet: bool = False) -> None:
 COMPILING = "compiling the kernels, once for this version on this machine"
 
 
-def announce_compiling(kernel: str, quiet: bool) -> bool:
-    """Print a message and return True if `kernel`, which other processes need, is not compiled yet."""
+def announce_compiling(kernel: str, quiet: bool) -> None:
+    """Print a message if `kernel`, which other processes need, is not compiled yet."""
     from nscan_cli.kernels.machine_code import is_uncompiled
 
-    compiling = is_uncompiled(kernel)
-    if compiling:
+    if is_uncompiled(kernel):
         say(f"{COMPILING}: a minute or two", quiet)
-    return compiling
 
 
 class Compiling:

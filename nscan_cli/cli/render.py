@@ -2,23 +2,20 @@
 
 from __future__ import annotations
 
-import os
-from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
 
 from nscan_cli.cli.graph_log import find_log, read_graph_log
-from nscan_cli.cli.plot_option import check_png
+from nscan_cli.cli.plot_option import check_png, check_second_output
 from nscan_cli.cli.progress import say
 from nscan_cli.cli.shared_options import common_options, reading_options
 from nscan_cli.cli.subcommand import PATH, argument, option, subcommand
 from nscan_cli.errors import WrongUsageError
-from nscan_cli.files.counting import counted
 from nscan_cli.files.inputs import base_name
 from nscan_cli.files.outputs import check_writable, is_device, write_atomically
-from nscan_cli.files.text import path_of_name, printable
+from nscan_cli.files.text import counted, path_of_name, printable
 from nscan_cli.logs.reading_options import ReadingOptions
 
 if TYPE_CHECKING:
@@ -86,7 +83,7 @@ def command(
         raise WrongUsageError("--yaml needs a map in a file; give -o MAP.png, or leave out --yaml")
     yaml = in_file and not picture if yaml is None else yaml
     check_map_outputs(output, yaml)
-    _check_mcap(mcap, [graph_file, *log, output, yaml_path(output) if yaml else None])
+    check_second_output("--mcap", mcap, [graph_file, *log, output, yaml_path(output) if yaml else None])
     if graph_file == "-" and "-" in log:
         raise WrongUsageError("standard input (-) can be one input only; give the other by its path")
     from nscan_cli.graph.io.json_graph import read_graph
@@ -95,7 +92,7 @@ def command(
 
     whole = read_graph(graph_file)
     log = log or find_log(graph_file, whole)
-    _check_mcap(mcap, files_of(log))
+    check_second_output("--mcap", mcap, files_of(log))
     scans, nodes, rows = read_graph_log(graph_file, whole, log, reading)
     poses = whole.poses[nodes]
     grid = occupancy_grid(scans, rows, poses, resolution)
@@ -121,10 +118,8 @@ def command(
         write_atomically(mcap, ros2_recording(scans, rows, nodes, whole, grid))
     if output != "-":
         low_x, low_y, high_x, high_y = grid.bounds
-        say(
-            f"{output}: {high_x - low_x:.1f} m × {high_y - low_y:.1f} m from {counted(len(rows), 'scan')}",
-            quiet,
-        )
+        size = f"{high_x - low_x:.1f} m × {high_y - low_y:.1f} m"
+        say(f"{output}: {size} from {counted(len(rows), 'scan')}", quiet)
 
 
 def check_map_outputs(output: str, yaml: bool) -> None:
@@ -159,14 +154,3 @@ def write_map(output: str, image: MapImage, yaml: bool, quiet: bool) -> None:
 def yaml_path(output: str) -> str:
     """The path of a map's YAML."""
     return str(Path(output).with_suffix(".yaml"))
-
-
-def _check_mcap(mcap: str | None, others: Sequence[str | None]) -> None:
-    """Check that a recording can be written, and replaces no other file of the command."""
-    if mcap is None:
-        return
-    if mcap == "-":
-        raise WrongUsageError("--mcap -: only the picture can go to standard output; name a file")
-    if os.path.realpath(mcap) in (os.path.realpath(path) for path in others if path and path != "-"):
-        raise WrongUsageError(f"--mcap {mcap}: is another file of this command; choose another name")
-    check_writable(mcap)

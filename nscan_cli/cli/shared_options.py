@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import functools
 import json
 import math
@@ -94,28 +95,12 @@ def reading_options(command: Command) -> Command:
 
     @functools.wraps(command)
     def wrapped(*args: Any, **kwargs: Any) -> Any:
-        def radians(degrees: float | None) -> float | None:
-            return None if degrees is None else math.radians(degrees)
-
-        reading = ReadingOptions(
-            laser=kwargs.pop("laser"),
-            topic=kwargs.pop("topic"),
-            odom_topic=kwargs.pop("odom_topic"),
-            mount=kwargs.pop("mount"),
-            flip=kwargs.pop("flip"),
-            min_range=kwargs.pop("min_range"),
-            max_range=kwargs.pop("max_range"),
-            angle_min=radians(kwargs.pop("angle_min")),
-            angle_increment=radians(kwargs.pop("angle_increment")),
-            start=kwargs.pop("start"),
-            end=kwargs.pop("end"),
-            every=kwargs.pop("every"),
-            odometry=not kwargs.pop("no_odometry"),
-            strict=kwargs.pop("strict"),
-            allow_corrected=kwargs.pop("allow_corrected"),
-            salvage=kwargs.pop("salvage"),
-        )
-        return command(*args, reading=reading, **kwargs)
+        kwargs["odometry"] = not kwargs.pop("no_odometry")
+        values = {each.name: kwargs.pop(each.name) for each in dataclasses.fields(ReadingOptions)}
+        for angle in ("angle_min", "angle_increment"):
+            if values[angle] is not None:
+                values[angle] = math.radians(values[angle])
+        return command(*args, reading=ReadingOptions(**values), **kwargs)
 
     return _with_options(wrapped, options)
 
@@ -200,22 +185,13 @@ def _as_toml(ctx: click.Context) -> str:
             continue
         if isinstance(param.type, PoseType):
             value = [value[0], value[1], math.degrees(value[2])]
-        lines.append(f"{param.long_name} = {_toml_value(value)}")
+        elif isinstance(value, str):
+            try:
+                value = os.fsencode(value).decode()
+            except UnicodeError as error:
+                problem = f"--dump-config: {value} is not UTF-8, which TOML needs; choose another name"
+                raise WrongUsageError(problem) from error
+        # JSON writes such values as TOML does, except that TOML escapes DEL.
+        text = json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
+        lines.append(f"{param.long_name} = {text}")
     return "\n".join(lines) + "\n"
-
-
-def _toml_value(value: Any) -> str:
-    if isinstance(value, bool):
-        return str(value).lower()
-    if isinstance(value, (int, float)):
-        return repr(value)
-    if isinstance(value, (tuple, list)):
-        return "[" + ", ".join(_toml_value(part) for part in value) + "]"
-    try:
-        text = os.fsencode(str(value)).decode()
-    except UnicodeError as error:
-        raise WrongUsageError(
-            f"--dump-config: {value} is not UTF-8, which TOML needs; choose another name"
-        ) from error
-    # JSON escapes the same characters as TOML, except DEL.
-    return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")

@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING
 from nscan_cli.cli.progress import Compiling, progress, say
 from nscan_cli.cli.summary import Row
 from nscan_cli.errors import InputDataError, InputMissingError, WrongUsageError
-from nscan_cli.files.counting import counted
 from nscan_cli.files.inputs import label
+from nscan_cli.files.text import counted
 from nscan_cli.logs.reading_options import ReadingOptions
 
 if TYPE_CHECKING:
@@ -72,10 +72,8 @@ def run_on_log(
         *_graph_rows(graph),
     ]
     if verbose:
-        starts, searches = (
-            counted(state.tracking_restarts, "start"),
-            counted(state.tracking_searches, "search"),
-        )
+        starts = counted(state.tracking_restarts, "start")
+        searches = counted(state.tracking_searches, "search")
         places = counted(len(state.places), "keyframe")
         summary += [
             ("tracking", [f"{starts} from other angles, {searches}"]),
@@ -90,16 +88,14 @@ def _graph_rows(graph: Graph) -> list[Row]:
 
     counts = Counts.of(graph)
     tried, refused = counts.accepted + counts.refused.total(), counts.refused.total()
+    loops = f"{tried} tried, {counts.accepted} accepted, {refused} refused"
     reasons: Counter[str] = Counter()
     for reason, count in counts.refused.items():
         reasons[without_numbers(reason)] += count
     return [
         ("keyframes", [f"{counts.keyframes}"]),
         ("relations", [f"{counts.pairwise} pairwise, {counts.nscan} nScan"]),
-        (
-            "loops",
-            [f"{tried} tried, {counts.accepted} accepted, {refused} refused" if tried else "none tried"],
-        ),
+        ("loops", [loops if tried else "none tried"]),
         ("refused", [f"{count}: {reason}" for reason, count in reasons.most_common()]),
         ("sigma", _sigma_lines(graph)),
     ]

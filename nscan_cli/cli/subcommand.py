@@ -44,15 +44,10 @@ class Option(click.Option):
         """The name of the option on the command line and in a TOML file, without its dashes."""
         return max(self.opts, key=len).lstrip("-")
 
-    @property
-    def is_shared(self) -> bool:
-        """Whether it has the same meaning in all commands."""
-        return self.long_name not in COMMAND_SPECIFIC
-
     def variables(self, ctx: click.Context) -> list[str]:
         """The environment variables that set it, the command's own first."""
         own = f"{VARIABLE_PREFIX}{_upper_case(ctx.command.name or '')}_{_upper_case(self.long_name)}"
-        return [own, self.envvar] if self.is_shared else [own]
+        return [own] if self.long_name in COMMAND_SPECIFIC else [own, self.envvar]
 
     def resolve_envvar_value(self, ctx: click.Context) -> str | None:
         """The value of the first of its variables that is set and not empty.

@@ -5,7 +5,7 @@ from __future__ import annotations
 import textwrap
 from collections.abc import Sequence
 
-from nscan_cli.files.counting import counted
+from nscan_cli.files.text import counted
 
 TERMINAL_WIDTH = 80
 Row = tuple[str, Sequence[str]]

@@ -12,7 +12,7 @@ from nscan_cli.evaluation.reference_relations import ReferenceRelations, Relatio
 from nscan_cli.evaluation.statistics import Spread
 from nscan_cli.evaluation.time_association import TOLERANCE
 from nscan_cli.evaluation.trajectory_errors import RPE_DISTANCE, TrajectoryErrors
-from nscan_cli.files.counting import counted
+from nscan_cli.files.text import counted
 
 ERROR_UNITS = {"translation": "m", "rotation": "deg", "time": "s"}
 HEADINGS = ("mean", "sd", "median", "mean square", "rmse", "max")

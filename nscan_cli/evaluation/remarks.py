@@ -16,7 +16,7 @@ from nscan_cli.evaluation.alignment import alignment
 from nscan_cli.evaluation.clock_lag import LARGEST_RESIDUAL, LEAST_MOTION, SMALLEST_LAG, Clocks
 from nscan_cli.evaluation.similarity import Fit, LeverArm, fit, heading_difference, lever_arm
 from nscan_cli.evaluation.trajectory_errors import TrajectoryErrors
-from nscan_cli.files.counting import counted
+from nscan_cli.files.text import counted
 from nscan_cli.graph.io.tum import Trajectory
 from nscan_cli.poses import Array, compose
 

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nscan_cli.errors import InputDataError
-from nscan_cli.files.counting import counted
+from nscan_cli.files.text import counted
 from nscan_cli.poses import Array
 
 TOLERANCE = 0.1

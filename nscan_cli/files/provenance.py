@@ -1,13 +1,37 @@
-"""The provenance in every result: tool, inputs and parameters."""
+"""The files that an input was read from, and the provenance in every result: tool, inputs, parameters."""
 
 from __future__ import annotations
 
 import dataclasses
 from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 from nscan_cli import __version__
-from nscan_cli.files.source import Source
+
+
+@dataclass(frozen=True)
+class Source:
+    """One file, or several that form one input: base name, SHA-256 of the stored bytes, size in bytes.
+
+    The SHA-256 of several files is inputs.common_hash of theirs.
+    """
+
+    name: str
+    sha256: str
+    bytes: int
+    parts: tuple[Source, ...] = ()
+    """The files, if there are several."""
+
+    @property
+    def record(self) -> dict[str, Any]:
+        """The input in documents."""
+        return {"name": self.name, "sha256": self.sha256, "bytes": self.bytes}
+
+    @property
+    def files(self) -> tuple[Source, ...]:
+        """All files."""
+        return self.parts or (self,)
 
 
 def option_fields(options: Any) -> dict[str, Any] | None:
@@ -27,11 +51,7 @@ def provenance_of(sources: Iterable[Source], parameters: dict[str, Any]) -> dict
     """The tool with version, the inputs with base name, SHA-256 and size, and all parameters (m, rad)."""
     return {
         "tool": {"name": "nscan-cli", "version": __version__},
-        "inputs": [
-            {"name": file.name, "sha256": file.sha256, "bytes": file.bytes}
-            for source in sources
-            for file in source.files
-        ],
+        "inputs": [file.record for source in sources for file in source.files],
         "parameters": parameters,
     }
 

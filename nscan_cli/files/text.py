@@ -1,4 +1,4 @@
-"""Text that can be written and printed in any encoding. Names of files can be bytes that are not UTF-8."""
+"""Text of messages, which can be printed in any encoding. Names of files can be bytes that are not UTF-8."""
 
 from __future__ import annotations
 
@@ -21,6 +21,13 @@ def printable(text: str) -> str:
         return text
     whole = LONE_SURROGATES.sub(lambda found: f"\\u{ord(found[0]):04x}", text)
     return whole.encode("utf-8", "surrogateescape").decode("utf-8", "backslashreplace")
+
+
+def counted(count: int, thing: str) -> str:
+    """The count and the name of the thing, in the plural unless the count is 1."""
+    if count == 1:
+        return f"1 {thing}"
+    return f"{count} {thing}{'es' if thing.endswith(('s', 'x', 'ch', 'sh')) else 's'}"
 
 
 def name_of_path(path: str) -> str:

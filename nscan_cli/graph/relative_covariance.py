@@ -32,8 +32,8 @@ class RelativePoses:
     def relation(self, a: int, b: int) -> Pairwise | None:
         """The pose of node b in the frame of node a, with its information from all relations of the graph.
 
-        A node that is no keyframe moves with the one that it is attached to, within ATTACHED. None when no
-        relations lead from one to the other, or they leave a direction open.
+        A node that is no keyframe moves with its keyframe, within ATTACHMENT_SIGMA. None when no relations
+        lead from one to the other, or they leave a direction open.
         """
         graph, nodes = self._graph, (a, b)
         anchors = [int(graph.anchors[node]) for node in nodes]

@@ -165,22 +165,19 @@ def load(file: Path, name: str) -> Callable[..., Any] | None:
 
 
 def _load_checked(file: Path, name: str) -> Callable[..., Any]:
-    head, check, code = file.read_bytes().split(b"\n", 2)
+    text, check, code = file.read_bytes().split(b"\n", 2)
     if int(check) != zlib.crc32(code):
         raise ValueError("damaged")
-    return _link_once(json.loads(head), check, code, name)
+    # It is linked once: a second copy would share symbols with the first.
+    head, linked = json.loads(text), runtime().linked
+    key = head["function"], check
+    if key not in linked:
+        linked[key] = _link(head, code, name)
+    return linked[key]
 
 
 class UnresolvedSymbolError(Exception):
     """Machine code needs a symbol that this process does not have."""
-
-
-def _link_once(head: dict[str, Any], check: bytes, code: bytes, name: str) -> Callable[..., Any]:
-    """The function of the code. It is linked once: a second copy would share symbols with the first."""
-    linked, key = runtime().linked, (head["function"], check)
-    if key not in linked:
-        linked[key] = _link(head, code, name)
-    return linked[key]
 
 
 def _link(head: dict[str, Any], code: bytes, name: str) -> Callable[..., Any]:

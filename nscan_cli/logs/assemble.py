@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nscan_cli.files.limits import READINGS
-from nscan_cli.files.source import Source
+from nscan_cli.files.provenance import Source
 from nscan_cli.logs.beam_angles import beam_directions
 from nscan_cli.logs.device_choice import Device
 from nscan_cli.logs.frame_names import DEFAULT_FRAMES, FrameNames

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from nscan_cli.files.counting import counted
+from nscan_cli.files.text import counted
 from nscan_cli.logs.laser_log import beam_counts
 from nscan_cli.logs.reading_options import ReadingOptions
 from nscan_cli.logs.wall_straightness import second_is_straighter

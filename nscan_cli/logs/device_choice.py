@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import Literal, NamedTuple
 
 from nscan_cli.errors import WrongUsageError
-from nscan_cli.files.counting import counted
+from nscan_cli.files.text import counted
 
 
 class Device(NamedTuple):

@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nscan_cli.errors import InputDataError, WrongUsageError
-from nscan_cli.files.counting import counted
-from nscan_cli.files.source import Source
+from nscan_cli.files.provenance import Source
+from nscan_cli.files.text import counted
 from nscan_cli.kernels.decorators import kernel
 from nscan_cli.logs.device_choice import Device
 from nscan_cli.logs.frame_names import DEFAULT_FRAMES, FrameNames

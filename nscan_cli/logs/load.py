@@ -15,7 +15,7 @@ from nscan_cli.errors import InputDataError, WrongUsageError
 from nscan_cli.files.encoding import without_byte_order_mark
 from nscan_cli.files.inputs import FileBytes, base_name, common_hash, label, memory_map, read_bytes, sha256_of
 from nscan_cli.files.limits import LimitExceededError
-from nscan_cli.files.source import Source
+from nscan_cli.files.provenance import Source
 from nscan_cli.logs.compression import compression_of, decompressed
 from nscan_cli.logs.formats import FORMS, Form, foreign_kind, readable_forms
 from nscan_cli.logs.laser_log import LaserLog

@@ -10,9 +10,9 @@ from pathlib import Path, PurePosixPath
 from typing import Any
 
 from nscan_cli.errors import InputMissingError, WrongUsageError
-from nscan_cli.files.counting import counted
 from nscan_cli.files.inputs import STANDARD_INPUT, base_name, label, read_bytes
 from nscan_cli.files.limits import CONFIG
+from nscan_cli.files.text import counted
 from nscan_cli.logs.formats import FORMS
 from nscan_cli.logs.recordings.split_file_names import (
     RECORDING_SUFFIXES,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from nscan_cli.files.counting import counted
+from nscan_cli.files.text import counted
 from nscan_cli.poses import Array, wrap
 
 

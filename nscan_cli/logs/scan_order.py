@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nscan_cli.errors import WrongUsageError
-from nscan_cli.files.counting import counted
 from nscan_cli.files.limits import TIME
+from nscan_cli.files.text import counted
 from nscan_cli.logs.reading_options import ReadingOptions
 from nscan_cli.poses import Array
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
-from nscan_cli.files.counting import counted
+from nscan_cli.files.text import counted
 from nscan_cli.nightly.manifest import ManifestEntry
 from nscan_cli.nightly.run_history import RunRecord
 

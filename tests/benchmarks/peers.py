@@ -12,7 +12,8 @@ from typing import Any
 
 import numpy as np
 
-from nscan_cli.graph.io.g2o import read_g2o, write_g2o
+from nscan_cli.graph.io.g2o import write_g2o
+from nscan_cli.graph.io.load_graph import load_graph
 from nscan_cli.graph.model import Graph
 from nscan_cli.graph.optimise.whole_graph import optimise_graph
 from nscan_cli.logs.load import read_log
@@ -66,7 +67,7 @@ def _graphs() -> Iterator[Timing]:
         for path in (ring, find_data("intel.g2o")):
             if path is None:
                 continue
-            graph = read_g2o(str(path))
+            graph = load_graph(str(path))
             name, ours = f"graph optimisation, {path.stem}", partial(_optimised, graph)
             yield Timing(f"{name}: nscan-cli", best_of(ours, 3))
             if importlib.util.find_spec("gtsam") is None:

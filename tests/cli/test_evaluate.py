@@ -204,8 +204,8 @@ def test_a_failed_check_has_a_plot_too(files: Path, capsys: pytest.CaptureFixtur
     [
         ("-", 2, "--plot -: only the result can go to standard output"),
         ("errors.jpg", 2, "pictures are PNG; name it like errors.png"),
-        ("result.tum", 2, "is an input, and would be replaced"),
-        ("./floor.relations", 2, "is an input, and would be replaced"),
+        ("result.tum", 2, "is another file of this command"),
+        ("./floor.relations", 2, "is another file of this command"),
         ("no/errors.png", 73, "the folder no does not exist"),
     ],
 )

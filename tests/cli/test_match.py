@@ -173,8 +173,8 @@ def test_a_match_that_failed_has_a_plot_too(tmp_path, capsys):
     [
         (["--plot", "-"], 2, "--plot -: only the result can go to standard output; name a file"),
         (["--plot", "match.pdf"], 2, "pictures are PNG; name it like match.png"),
-        (["-o", "match", "--plot", "./match"], 2, "the result has the same name"),
-        (["--plot", OFFICE_LOG], 2, "is an input, and would be replaced"),
+        (["-o", "match", "--plot", "./match"], 2, "--plot ./match: is another file of this command"),
+        (["--plot", OFFICE_LOG], 2, "is another file of this command"),
         (["--plot", "no/such.png"], 73, "the folder no does not exist"),
         (["--plot", "."], 73, "is a folder"),
     ],

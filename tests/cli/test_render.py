@@ -250,7 +250,7 @@ def test_the_mcap_has_map_path_graph_and_scans(room):
 @pytest.mark.parametrize(
     ("mcap", "code", "said"),
     [
-        ("-", 2, "--mcap -: only the picture can go to standard output"),
+        ("-", 2, "--mcap -: only the result can go to standard output"),
         ("missing/out.mcap", 73, "missing/out.mcap: the folder missing does not exist"),
         ("map.png", 2, "--mcap map.png: is another file of this command"),
         ("map.yaml", 2, "--mcap map.yaml: is another file of this command"),

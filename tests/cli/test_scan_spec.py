@@ -5,7 +5,7 @@ from __future__ import annotations
 import click
 import pytest
 
-from nscan_cli.cli.scan_spec import ScanSpecType
+from nscan_cli.cli.nscan import ScanSpecType
 
 
 @pytest.mark.parametrize(

@@ -18,9 +18,8 @@ import pytest
 from PIL import Image
 
 from nscan_cli.cli.main import run
-from nscan_cli.graph.io.g2o import read_g2o
 from nscan_cli.graph.io.json_graph import read_graph, write_graph
-from nscan_cli.graph.io.tum import read_tum
+from nscan_cli.graph.io.load_graph import load_graph
 from nscan_cli.logs.load import read_log
 from nscan_cli.logs.reading_options import ReadingOptions
 from nscan_cli.poses import relative
@@ -28,6 +27,7 @@ from tests.cli.documents import document_of
 from tests.cli.room_logs import ALL_OUTPUTS, room_log
 from tests.data import OFFICE_LOG
 from tests.graph.schema import validate
+from tests.graph.small_graph import read_tum
 
 SHORT = [OFFICE_LOG, "--end", "40"]
 """200 scans, 15 m."""
@@ -75,7 +75,7 @@ def test_trajectory_and_g2o_are_those_of_the_graph(everything):
     path = read_tum(str(everything / "path.tum"))
     assert list(path.stamps) == graph.stamps
     np.testing.assert_allclose(relative(path.poses, graph.poses), 0, atol=1e-8)
-    g2o = read_g2o(str(everything / "graph.g2o"))
+    g2o = load_graph(str(everything / "graph.g2o"))
     np.testing.assert_allclose(relative(g2o.poses, graph.poses[graph.keyframes]), 0, atol=1e-6)
 
 

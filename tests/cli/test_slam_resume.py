@@ -16,12 +16,11 @@ import pytest
 from nscan_cli.cli.main import run
 from nscan_cli.graph.io.g2o import write_g2o
 from nscan_cli.graph.io.json_graph import read_graph, write_graph
-from nscan_cli.graph.io.tum import read_tum
 from nscan_cli.logs.load import read_log
 from nscan_cli.logs.reading_options import ReadingOptions
 from nscan_cli.poses import relative
 from tests.data import OFFICE_LOG
-from tests.graph.small_graph import small_graph
+from tests.graph.small_graph import read_tum, small_graph
 
 
 @pytest.fixture(scope="module")

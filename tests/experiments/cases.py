@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from nscan_cli.cli.initial_and_priors import no_priors_among
 from nscan_cli.mapping.figures.match_plots import plot_nscan
 from nscan_cli.matching.joint.index_set import IndexSetKind
 from nscan_cli.matching.joint.joint_energy import JointProblem, all_pairs, no_priors
@@ -68,7 +67,13 @@ class Case:
         Raises RuntimeError when no two of the scans match.
         """
         match, left_out = nscan_match(
-            self.points, self.start, no_priors_among, fixed or 0, OPTIONS, JointOptions(fixed=fixed), pairs
+            self.points,
+            self.start,
+            lambda _kept: no_priors(),
+            fixed or 0,
+            OPTIONS,
+            JointOptions(fixed=fixed),
+            pairs,
         )
         if match is None:
             raise RuntimeError(f"{self.name}: no two of the scans match")

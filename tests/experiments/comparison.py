@@ -9,7 +9,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from nscan_cli.cli.initial_and_priors import no_priors_among
 from nscan_cli.graph.model import Graph, Pairwise
 from nscan_cli.graph.optimise.whole_graph import optimise_graph
 from nscan_cli.matching.joint.joint_energy import JointProblem, all_pairs, no_priors
@@ -89,7 +88,9 @@ def from_start(problem: Drawn) -> Array:
 
 def by_nscan(problem: Drawn) -> Array | None:
     """(c) What `nscan` gives; None when it leaves scans out."""
-    match, left_out = nscan_match(problem.points, problem.start, no_priors_among, 0, OPTIONS, JointOptions())
+    match, left_out = nscan_match(
+        problem.points, problem.start, lambda _kept: no_priors(), 0, OPTIONS, JointOptions()
+    )
     return None if match is None or left_out else match.poses
 
 

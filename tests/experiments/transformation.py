@@ -14,7 +14,7 @@ from typing import Protocol
 import numpy as np
 
 from nscan_cli.graph.model import Graph, NScan, Pairwise
-from nscan_cli.graph.optimise.graph_solver import Optimum, optimise_poses
+from nscan_cli.graph.optimise.graph_solver import Optimum, StopOptions, optimise_poses
 from nscan_cli.logs.load import read_log
 from nscan_cli.poses import Array, Indices, compose, relative
 from nscan_cli.slam.options import SlamOptions
@@ -134,7 +134,7 @@ def ways(problem: Problem) -> Iterator[tuple[str, str, Minimiser]]:
     yield (
         "follows c, as in the tool",
         "either",
-        functools.partial(optimise_poses, problem.chosen, tolerance=TOLERANCE),
+        functools.partial(optimise_poses, problem.chosen, stop=StopOptions(tolerance=TOLERANCE)),
     )
     yield "follows c, Gauss–Newton", "either", functools.partial(minimise, problem.chosen)
     for c_held, gauge in ((False, FREE), (True, C_HELD)):

@@ -10,8 +10,8 @@ from nscan_cli.errors import InputDataError
 from nscan_cli.evaluation.reference_relations import read_relations
 from nscan_cli.files.encoding import without_byte_order_mark
 from nscan_cli.graph.io.load_graph import load_graph
-from nscan_cli.graph.io.tum import read_tum
 from nscan_cli.logs.load import read_log
+from tests.graph.small_graph import read_tum
 from tests.logs.lines import flaser
 
 LOGS = {

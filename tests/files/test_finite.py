@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from nscan_cli.cli.match_document import document
+from nscan_cli.cli.match import match_document
 from nscan_cli.errors import WrongUsageError
 from nscan_cli.exports.carmen import corrected_log
 from nscan_cli.exports.mcap import ros2_recording
@@ -84,7 +84,7 @@ def test_the_rest_of_a_graph():
     with pytest.raises(ValueError, match="Out of range float"):
         write_graph(spoiled(provenance={"parameters": {"x": math.nan}}))
     with pytest.raises(ValueError, match="Out of range float"):
-        document("x", {}, {"energy": math.nan})
+        match_document("x", {}, {"energy": math.nan})
 
 
 @pytest.mark.parametrize("value", WRONG)

@@ -5,6 +5,9 @@ from __future__ import annotations
 import numpy as np
 from hypothesis import strategies as st
 
+from nscan_cli.files.inputs import label, read_text
+from nscan_cli.files.limits import GRAPH
+from nscan_cli.graph.io.tum import Trajectory, parse_tum
 from nscan_cli.graph.model import Graph, Loop, NScan, Pairwise
 
 
@@ -67,3 +70,8 @@ def graphs(draw: st.DrawFn, all_keyframes: bool = False) -> Graph:
             NScan(tuple(members), local, draw(matrices(3 * n)), draw(st.integers(0, n - 1)), "nscan")
         )
     return graph
+
+
+def read_tum(path: str) -> Trajectory:
+    """The trajectory of a TUM file."""
+    return parse_tum(read_text(path, GRAPH), label(path))

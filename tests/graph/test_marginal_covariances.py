@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from nscan_cli.graph.graph_information import component_information
-from nscan_cli.graph.io.g2o import read_g2o
+from nscan_cli.graph.io.load_graph import load_graph
 from nscan_cli.graph.marginal_covariances import marginal_covariances
 from nscan_cli.graph.model import Pairwise
 from nscan_cli.graph.optimise.whole_graph import components, optimise_graph
@@ -127,7 +127,7 @@ def test_keyframes_that_are_not_determined_are_left_out():
 @pytest.mark.logs
 @pytest.mark.parametrize("name", ["intel", "csail", "mit"])
 def test_real_graphs_are_determined_unless_the_first_keyframe_lets_them_turn(name: str):
-    graph = read_g2o(str(data_file(f"{name}.g2o")))
+    graph = load_graph(str(data_file(f"{name}.g2o")))
     optimise_graph(graph)
     marginals = marginal_covariances(graph)
     assert len(marginals) == len(graph)

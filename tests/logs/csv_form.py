@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from nscan_cli.errors import InputDataError
-from nscan_cli.files.source import Source
+from nscan_cli.files.provenance import Source
 from nscan_cli.logs.assemble import Findings, RawScans, RecordedMotion, laser_log, scan_table
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.logs.reading_options import ReadingOptions

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from nscan_cli.files.source import Source
+from nscan_cli.files.provenance import Source
 from nscan_cli.logs.laser_log import LaserLog, LogReport
 
 

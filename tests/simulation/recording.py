@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from nscan_cli.files.source import Source
+from nscan_cli.files.provenance import Source
 from nscan_cli.logs.laser_log import LaserLog, LogReport
 from nscan_cli.poses import Array, compose
 from tests.simulation.drive import Odometry, odometry

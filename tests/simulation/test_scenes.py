@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from nscan_cli.files.source import Source
+from nscan_cli.files.provenance import Source
 from nscan_cli.logs.reading_options import ReadingOptions
 from nscan_cli.logs.text import carmen
 from nscan_cli.poses import compose, transform, wrap

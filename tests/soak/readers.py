@@ -15,12 +15,14 @@ from nscan_cli.cli.main import cli
 from nscan_cli.errors import NscanError
 from nscan_cli.evaluation.load_trajectory import load_trajectory
 from nscan_cli.evaluation.reference_relations import read_relations
-from nscan_cli.graph.io.g2o import read_g2o, write_g2o
+from nscan_cli.graph.io.g2o import write_g2o
 from nscan_cli.graph.io.json_graph import parse_graph, read_graph, write_graph
-from nscan_cli.graph.io.tum import read_tum, write_tum
+from nscan_cli.graph.io.load_graph import load_graph
+from nscan_cli.graph.io.tum import write_tum
 from nscan_cli.logs.load import read_log
 from nscan_cli.logs.reading_options import ReadingOptions
 from nscan_cli.nightly.manifest import read_manifest
+from tests.graph.small_graph import read_tum
 
 PROMISED = (2, 3, 65, 66, 73)
 LONGEST = 10_000
@@ -73,10 +75,10 @@ def _same(one: bytes, other: bytes) -> bool:
 
 def g2o(path: str, chance: random.Random) -> None:
     """As for JSON."""
-    graph = read_g2o(path)
+    graph = load_graph(path)
     write_graph(graph)
     Path(path).write_bytes(write_g2o(graph))
-    read_g2o(path)
+    load_graph(path)
 
 
 def tum(path: str, chance: random.Random) -> None:

@@ -15,12 +15,12 @@ import time
 from collections import Counter
 from pathlib import Path
 
-from nscan_cli.graph.io.g2o import read_g2o
 from nscan_cli.graph.io.json_graph import read_graph
-from nscan_cli.graph.io.tum import read_tum
+from nscan_cli.graph.io.load_graph import load_graph
 from nscan_cli.logs.load import read_log
 from nscan_cli.logs.reading_options import ReadingOptions
 from tests.cli.room_logs import ALL_OUTPUTS, room_log
+from tests.graph.small_graph import read_tum
 from tests.soak.corpus import RELATION, samples
 from tests.soak.mutations import damaged
 
@@ -120,7 +120,7 @@ def _outcome(arguments: list[str], folder: Path) -> str:
 
 def _unreadable(folder: Path) -> str:
     """What is wrong with the files that a run has left; empty when all read back."""
-    readers = {"out.json": read_graph, "out.g2o": read_g2o, "out.tum": read_tum, "out.log": _log}
+    readers = {"out.json": read_graph, "out.g2o": load_graph, "out.tum": read_tum, "out.log": _log}
     for name, read in readers.items():
         if (folder / name).exists():
             try:

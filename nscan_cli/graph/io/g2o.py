@@ -15,10 +15,8 @@ from numpy.typing import NDArray
 
 from nscan_cli.errors import InputDataError
 from nscan_cli.files.finite import check_finite
-from nscan_cli.files.inputs import base_name, label, read_bytes
-from nscan_cli.files.limits import GRAPH
-from nscan_cli.files.provenance import provenance_of
-from nscan_cli.files.source import Source
+from nscan_cli.files.inputs import base_name, label
+from nscan_cli.files.provenance import Source, provenance_of
 from nscan_cli.graph.io.g2o_lines import G2O_REMEDY, G2oLines, key_text, keys, read_lines, rows
 from nscan_cli.graph.io.g2o_tags import losses
 from nscan_cli.graph.io.json_fields import LARGEST_INTEGER
@@ -29,8 +27,8 @@ from nscan_cli.graph.relations.semidefinite import IndefiniteError, semidefinite
 from nscan_cli.poses import Array, Indices, compose, inverse, rotated_information
 
 
-def read_g2o(path: str) -> Graph:
-    """The graph of a g2o file; "-" reads standard input.
+def parse_g2o(data: bytes, path: str) -> Graph:
+    """The graph in the bytes of a g2o file; errors and the provenance name the file `path`.
 
     The nodes are the vertices in order of their keys, all of them keyframes. A node's scan number is its
     vertex key, and its stamp is its row. Where a key is too large for a scan number, the scan numbers are
@@ -39,13 +37,8 @@ def read_g2o(path: str) -> Graph:
     smallest key, which is at the origin. FIX only chooses the frame, so it is checked and ignored; one vertex
     may be fixed. provenance["skipped"] counts the skipped lines by tag; g2o_tags.losses explains them.
 
-    Raises InputMissingError where the file cannot be read, InputDataError on a malformed line.
+    Raises InputDataError on a malformed line.
     """
-    return parse_g2o(read_bytes(path, GRAPH), path)
-
-
-def parse_g2o(data: bytes, path: str) -> Graph:
-    """The graph in the bytes of a g2o file, as read_g2o gives it."""
     name = label(path)
     lines = read_lines(data, name)
     if not lines.vertices and not lines.edge_lines:

@@ -28,6 +28,7 @@ from numpy.typing import NDArray
 from nscan_cli.errors import InputDataError
 from nscan_cli.files.encoding import BYTE_ORDER_MARK
 from nscan_cli.files.limits import DISTANCE, INFORMATION, RECORD_KINDS, Limit
+from nscan_cli.graph.io.pose_columns import UNIT_TOLERANCE
 from nscan_cli.poses import Array
 
 G2O_REMEDY = "mend or remove the line"
@@ -36,8 +37,6 @@ GTSAM_SYMBOL = re.compile("([A-Za-z])([0-9]{1,17})")
 """A key as GTSAM shows it, such as x12: the letter is the highest of the key's eight bytes."""
 PLANAR_TOLERANCE = 1e-6
 """Largest z (m), qx and qy of a planar pose: the rounding to six decimals."""
-LENGTH = 0.01
-"""Largest difference of a quaternion's length from 1."""
 
 
 class _NotPlanarError(ValueError):
@@ -49,8 +48,7 @@ class G2oLines:
     """The content of a file: V vertices and E edges as columns, and the other lines by tag."""
 
     vertices: dict[int, int] = field(default_factory=dict)
-    """Key → row."""
-    vertex_lines: array[int] = field(default_factory=lambda: array("q"))
+    """Key → line."""
     poses: array[float] = field(default_factory=lambda: array("d"))
     """3 V: x, y, θ."""
     edge_lines: array[int] = field(default_factory=lambda: array("q"))
@@ -83,7 +81,7 @@ def read_lines(data: bytes, name: str) -> G2oLines:
         except ValueError as error:
             raise InputDataError(name, str(error), G2O_REMEDY, line=number) from error
     for values, width, at, limit in (
-        (lines.poses, 3, lines.vertex_lines, DISTANCE),
+        (lines.poses, 3, list(lines.vertices.values()), DISTANCE),
         (lines.measurements, 3, lines.edge_lines, DISTANCE),
         (lines.information, 6, lines.edge_lines, INFORMATION),
     ):
@@ -121,8 +119,7 @@ def _read_line(lines: G2oLines, number: int, fields: list[str]) -> None:
         if key in lines.vertices:
             raise ValueError(f"vertex {key_text(key)} is there already")
         lines.poses.extend(pose([float(text) for text in fields[2:]]))
-        lines.vertices[key] = len(lines.vertex_lines)
-        lines.vertex_lines.append(number)
+        lines.vertices[key] = number
     elif tag in EDGE_TAGS:
         values, pose, information = EDGE_TAGS[tag]
         triangle = 6 if values == 3 else 21
@@ -178,23 +175,18 @@ def _check_limits(values: Array, lines: Sequence[int], limit: Limit, name: str) 
         raise InputDataError(name, problem, G2O_REMEDY, line=lines[first])
 
 
-def _unchanged(numbers: list[float]) -> list[float]:
-    return numbers
-
-
 def _in_the_plane(numbers: list[float]) -> list[float]:
     """x, y, θ of a pose x, y, z, qx, qy, qz, qw. Raises _NotPlanarError where it is not planar."""
     x, y, z, *quaternion = numbers
     if not all(map(math.isfinite, numbers)):
         raise ValueError("a number is not finite")
     length = math.hypot(*quaternion)
-    if not abs(length - 1.0) < LENGTH:
+    if not abs(length - 1.0) < UNIT_TOLERANCE:
         raise ValueError(f"the quaternion has the length {length:.3g} instead of 1")
     qx, qy, qz, qw = quaternion
     if max(abs(z), abs(qx), abs(qy)) > PLANAR_TOLERANCE:
         raise _NotPlanarError(f"the pose is not planar: z {z:.3g} m, qx {qx:.3g}, qy {qy:.3g}")
-    angle = 2.0 * math.atan2(qz, qw)
-    return [x, y, math.remainder(angle, 2.0 * math.pi)]
+    return [x, y, math.remainder(2.0 * math.atan2(qz, qw), 2.0 * math.pi)]
 
 
 def _from_toro(numbers: list[float]) -> list[float]:
@@ -215,14 +207,14 @@ def _from_quaternion(numbers: list[float]) -> list[float]:
 
 Conversion = Callable[[list[float]], list[float]]
 VERTEX_TAGS: dict[str, tuple[int, Conversion]] = {
-    "VERTEX_SE2": (4, _unchanged),
-    "VERTEX2": (4, _unchanged),
+    "VERTEX_SE2": (4, list),
+    "VERTEX2": (4, list),
     "VERTEX_SE3:QUAT": (8, _in_the_plane),
 }
 """Tag → the number of values, and the conversion of those after the key to x, y, θ."""
 EDGE_TAGS: dict[str, tuple[int, Conversion, Conversion]] = {
-    "EDGE_SE2": (3, _unchanged, _unchanged),
-    "EDGE2": (3, _unchanged, _from_toro),
+    "EDGE_SE2": (3, list, list),
+    "EDGE2": (3, list, _from_toro),
     "EDGE_SE3:QUAT": (7, _in_the_plane, _from_quaternion),
 }
 """Tag → the length of the measurement, its conversion to x, y, θ, and that of the information to 6

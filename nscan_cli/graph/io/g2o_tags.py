@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 
-from nscan_cli.files.counting import counted
+from nscan_cli.files.text import counted
 
 LANDMARKS = "XY|POINT|LANDMARK|LINE|SEGMENT|PLANE|BEARING"
 LOSSES = (
@@ -42,10 +42,9 @@ def losses(skipped: Mapping[str, int]) -> list[str]:
         kinds.setdefault(lost, []).append(counted(count, f"{name[:SHOWN_TAG_LENGTH]} line"))
     sentences = []
     for lost, lines in kinds.items():
-        more = (
-            [f"lines of {counted(len(lines) - NAMED_TAGS, 'other tag')}"] if len(lines) > NAMED_TAGS else []
-        )
-        *before, last = [*lines[:NAMED_TAGS], *more]
+        if len(lines) > NAMED_TAGS:
+            lines[NAMED_TAGS:] = [f"lines of {counted(len(lines) - NAMED_TAGS, 'other tag')}"]
+        *before, last = lines
         listed = f"{', '.join(before)} and {last}" if before else last
         sentences.append(f"{listed} skipped: {lost}")
     return sentences

@@ -127,19 +127,15 @@ class JsonRecord:
             raise error
         return np.array([_checked_numbers(value, 3, error, DISTANCE) for value in values])
 
-    def matrix(self, key: str, size: int) -> Array:
-        """The symmetric matrix (size, size) of an upper triangle."""
+    def information(self, key: str, size: int, fixed: int | None = None) -> Array:
+        """The positive semi-definite matrix (size, size) of an upper triangle.
+
+        Eigenvalues that rounding made negative are 0. The rows and columns of pose `fixed` are not checked.
+        """
         count = size * (size + 1) // 2
         numbers = f"{count} {_bounded(INFORMATION)}"
         error = self.wrong(key, f"the upper triangle of a {size} × {size} matrix: {numbers}")
-        return from_upper_triangle(_checked_numbers(self.get(key), count, error, INFORMATION), size)
-
-    def information(self, key: str, size: int, fixed: int | None = None) -> Array:
-        """A positive semi-definite matrix (size, size); eigenvalues that rounding made negative are 0.
-
-        The three rows and columns of pose `fixed` are not checked.
-        """
-        matrix = self.matrix(key, size)
+        matrix = from_upper_triangle(_checked_numbers(self.get(key), count, error, INFORMATION), size)
         block: Any = ...
         if fixed is not None:
             others = np.delete(np.arange(size), slice(3 * fixed, 3 * fixed + 3))

@@ -176,13 +176,9 @@ def _graph_of_document(document: JsonRecord) -> Graph:
     _relations(document, graph)
     keyframes = set(graph.keyframes.tolist())
     for record in document.records("loops"):
+        nodes = _loop_nodes(record, keyframes)
         graph.loops.append(
-            Loop(
-                _loop_nodes(record, keyframes),
-                record.flag("accepted"),
-                record.text("reason"),
-                record.number("score"),
-            )
+            Loop(nodes, record.flag("accepted"), record.text("reason"), record.number("score"))
         )
     for record in document.records("marginals"):
         node = record.integer("node")
@@ -214,10 +210,7 @@ def _nodes(document: JsonRecord) -> Graph:
     vertices: list[int] = []
     anchors: list[int] = []
     for node, record in enumerate(document.records("nodes")):
-        if record.integer("id") != node:
-            raise MalformedError(
-                record.place, f"'id' is {record.get('id')}, but ids count up from 0, here {node}"
-            )
+        _check_id(record, node)
         scans.append(record.integer("scan"))
         if node > 0 and scans[-1] <= scans[-2]:
             raise MalformedError(record.place, "'scan' is not greater than that of the node before")
@@ -275,13 +268,15 @@ def _node_anchor(record: JsonRecord, node: int) -> int:
 def _relations(document: JsonRecord, graph: Graph) -> None:
     keyframes = set(graph.keyframes.tolist())
     for number, record in enumerate(document.records("relations")):
-        if record.integer("id") != number:
-            raise MalformedError(
-                record.place, f"'id' is {record.get('id')}, but ids count up from 0, here {number}"
-            )
+        _check_id(record, number)
         relation = relation_of(record)
         _check_keyframes(record, relation.nodes, keyframes)
         graph.add(relation)
+
+
+def _check_id(record: JsonRecord, number: int) -> None:
+    if (found := record.integer("id")) != number:
+        raise MalformedError(record.place, f"'id' is {found}, but ids count up from 0, here {number}")
 
 
 def _loop_nodes(record: JsonRecord, keyframes: set[int]) -> tuple[int, int]:

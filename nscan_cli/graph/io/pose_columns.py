@@ -31,6 +31,8 @@ TIME_POWERS = (
     {"ms": 3, "us": 6, "µs": 6} | dict.fromkeys(SECOND_UNITS, 0) | dict.fromkeys(NANOSECOND_UNITS, 9)
 )
 """Unit of time → the power of ten of its count per second."""
+UNIT_TOLERANCE = 0.01
+"""Largest difference of a quaternion's length from 1, as rounding to a few digits makes it."""
 LATEST_SECONDS, POWER_STEP = 1e11, 1000
 """Later times are in ms, times POWER_STEP later in µs, and later still in ns."""
 

@@ -16,10 +16,10 @@ from numpy.typing import NDArray
 
 from nscan_cli.errors import InputDataError
 from nscan_cli.files.finite import check_finite
-from nscan_cli.files.inputs import label, read_text
-from nscan_cli.files.limits import DISTANCE, GRAPH, TIME
+from nscan_cli.files.limits import DISTANCE, TIME
 from nscan_cli.graph.io.pose_columns import (
     COMMENT_MARKS,
+    UNIT_TOLERANCE,
     PoseColumns,
     columns_by_content,
     columns_by_name,
@@ -31,8 +31,6 @@ from nscan_cli.graph.io.pose_columns import (
 from nscan_cli.poses import Array, wrap
 
 TUM_REMEDY = "TUM lines are 't x y z qx qy qz qw'"
-UNIT_TOLERANCE = 0.01
-"""Largest difference of a quaternion's length from 1, as rounding to a few digits makes it."""
 
 
 @dataclass(frozen=True)
@@ -86,17 +84,11 @@ def write_tum(stamps: Sequence[str], poses: Array) -> bytes:
     ).encode()
 
 
-def read_tum(path: str) -> Trajectory:
-    """The trajectory of a TUM file, sorted by time; "-" reads standard input.
-
-    Raises InputMissingError where the file cannot be read, InputDataError on a malformed line or where there
-    is no pose.
-    """
-    return parse_tum(read_text(path, GRAPH), label(path))
-
-
 def parse_tum(data: bytes, name: str) -> Trajectory:
-    """The trajectory of TUM text; errors name the file `name`. Raises InputDataError."""
+    """The trajectory of TUM text, sorted by time; errors name the file `name`.
+
+    Raises InputDataError on a malformed line or where there is no pose.
+    """
     stamps: list[str] = []
     values = array("d")
     columns: PoseColumns | None = None
@@ -112,11 +104,9 @@ def parse_tum(data: bytes, name: str) -> Trajectory:
         try:
             if not stamps:
                 columns = columns or columns_by_content(line)
-                power = (
-                    power_by_size(split_fields(line)[columns.time])
-                    if columns.power is None
-                    else columns.power
-                )
+                power = columns.power or 0
+                if columns.power is None:
+                    power = power_by_size(split_fields(line)[columns.time])
             assert columns is not None
             stamp, pose = _pose_of_line(split_fields(line), columns, power)
         except (ValueError, IndexError) as error:

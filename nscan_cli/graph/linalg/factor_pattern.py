@@ -89,14 +89,8 @@ def block_targets(edges: Indices, pattern: Pattern) -> Indices:
         transposed = row < column
         if transposed:
             row, column = column, row
-        low, high = pattern.starts[column], pattern.starts[column + 1] - 1
-        while low < high:
-            middle = (low + high) // 2
-            if pattern.rows[middle] < row:
-                low = middle + 1
-            else:
-                high = middle
-        targets[e] = 2 * low + transposed
+        start, end = pattern.starts[column], pattern.starts[column + 1]
+        targets[e] = 2 * (start + np.searchsorted(pattern.rows[start:end], row)) + transposed
     return targets
 
 

@@ -73,7 +73,8 @@ class GraphEnergy:
         columns = self._columns_at(poses) if self._not_linear else self.columns
         terms = np.zeros(len(columns.fixed))
         _evaluate_values(columns, poses, terms)
-        return _not_negative(terms)
+        # Values below 0 are rounding errors.
+        return np.maximum(terms, 0.0, out=terms)
 
     def evaluate(self, poses: Array, exact: bool) -> System:
         """Energy, gradient and Hessian (exact, or its Gauss–Newton part) at the poses (K, 3)."""
@@ -83,7 +84,7 @@ class GraphEnergy:
         gradient = np.zeros((len(poses), 3))
         blocks = np.zeros((len(self.pattern.rows), 3, 3))
         _evaluate(columns, poses, float(exact), self._targets, terms, gradient, blocks)
-        _not_negative(terms)
+        np.maximum(terms, 0.0, out=terms)
         return System(float(terms.sum()), terms, gradient[self.free], blocks)
 
     def _columns_at(self, poses: Array) -> TermColumns:
@@ -99,12 +100,6 @@ class GraphEnergy:
         return columns
 
 
-def _not_negative(terms: Array) -> Array:
-    """The terms (Q,), with values below 0, which are rounding errors, set to 0."""
-    np.maximum(terms, 0.0, out=terms)
-    return terms
-
-
 @kernel
 def _block_edges(columns: TermColumns, free_row: Indices) -> Indices:
     """The blocks of each term's lower triangle, as pairs of rows (E, 2); −1 is a fixed pose."""
@@ -112,17 +107,12 @@ def _block_edges(columns: TermColumns, free_row: Indices) -> Indices:
     edges = np.empty(((sizes * (sizes + 1)).sum() // 2, 2), dtype=np.int64)
     e = 0
     for k in range(columns.fixed.shape[0]):
-        e = _add_block_edges(columns.members[columns.starts[k] : columns.starts[k + 1]], free_row, edges, e)
+        members = columns.members[columns.starts[k] : columns.starts[k + 1]]
+        for i in range(members.shape[0]):
+            for j in range(i + 1):
+                edges[e, 0], edges[e, 1] = free_row[members[i]], free_row[members[j]]
+                e += 1
     return edges
-
-
-@kernel
-def _add_block_edges(members: Indices, free_row: Indices, edges: Indices, e: int) -> int:
-    for i in range(members.shape[0]):
-        for j in range(i + 1):
-            edges[e, 0], edges[e, 1] = free_row[members[i]], free_row[members[j]]
-            e += 1
-    return e
 
 
 @kernel
@@ -143,9 +133,8 @@ def _evaluate(
         members, m = columns.members[start:end], 3 * (end - start)
         if part.shape[0] != m:
             part, block = np.empty(m), np.empty((m, m))
-        hessian = columns.hessians[columns.hessian_starts[k] : columns.hessian_starts[k] + m * m].reshape(
-            m, m
-        )
+        begin = columns.hessian_starts[k]
+        hessian = columns.hessians[begin : begin + m * m].reshape(m, m)
         terms[k] = nscan_term(
             _poses_of(poses, members),
             columns.local[start:end],
@@ -169,9 +158,8 @@ def _evaluate_values(columns: TermColumns, poses: Array, terms: Array) -> None:
     for k in range(columns.fixed.shape[0]):
         start, end = columns.starts[k], columns.starts[k + 1]
         members, m = columns.members[start:end], 3 * (end - start)
-        hessian = columns.hessians[columns.hessian_starts[k] : columns.hessian_starts[k] + m * m].reshape(
-            m, m
-        )
+        begin = columns.hessian_starts[k]
+        hessian = columns.hessians[begin : begin + m * m].reshape(m, m)
         terms[k] = columns.weights[k] * nscan_value(
             _poses_of(poses, members), columns.local[start:end], hessian, columns.fixed[k]
         )

@@ -12,12 +12,24 @@ from nscan_cli.graph.optimise.graph_energy import GraphEnergy, System
 from nscan_cli.matching.damped_newton import GRAPH_STEPS, is_accepted, is_last, next_damping
 from nscan_cli.poses import Array, wrap
 
-EXACT_HESSIAN_STEP = 0.1
-"""m, rad: the exact Hessian is used after a shorter step. Near the minimum it takes fewer steps than the
-Gauss–Newton part; farther away it takes more, and often is not positive definite."""
-NEGLIGIBLE_GAIN = 1e-7
-"""Smallest relative decrease of 1 + energy. Where relations leave a direction undetermined, a step that gains
-less is the last: it moves less than a thousandth of a standard deviation."""
+
+@dataclass(frozen=True)
+class StopOptions:
+    """When an optimisation ends, and which Hessian its steps use."""
+
+    max_iterations: int = 100
+    """Most iterations. A larger number is slower where they do not converge."""
+    tolerance: float = 1e-6
+    """The optimisation ends with a step below this, m and rad. A larger one ends it earlier."""
+    exact_hessian_step: float = 0.1
+    """The exact Hessian is used after a shorter step, m and rad. Near the minimum it takes fewer steps than
+    the Gauss–Newton part; farther away it takes more, and often is not positive definite."""
+    negligible_gain: float = 1e-7
+    """Where relations leave a direction undetermined, a step that decreases 1 + energy by a smaller share is
+    the last: it moves less than a thousandth of a standard deviation. A larger share ends earlier."""
+
+
+DEFAULT_STOP = StopOptions()
 
 
 @dataclass(frozen=True)
@@ -31,10 +43,8 @@ class Optimum:
     """Whether the last step was within the tolerance without being damped."""
 
 
-def optimise_poses(
-    energy: GraphEnergy, poses: Array, max_iterations: int = 100, tolerance: float = 1e-6
-) -> Optimum:
-    """Minimise from the poses (K, 3) until a step moves no pose by more than `tolerance` (m, rad).
+def optimise_poses(energy: GraphEnergy, poses: Array, stop: StopOptions = DEFAULT_STOP) -> Optimum:
+    """Minimise from the poses (K, 3) until a step moves no pose by more than `stop.tolerance` (m, rad).
 
     Newton steps use the Gauss–Newton part of the Hessian while they are long, and the exact Hessian (25) once
     they are short and it is positive definite. They are damped, after Levenberg and Marquardt, where they
@@ -43,7 +53,7 @@ def optimise_poses(
     """
     here, exact, damping, is_open = energy.evaluate(poses, exact=False), False, GRAPH_STEPS.first, False
     iteration = 0
-    for iteration in range(1, max_iterations + 1):
+    for iteration in range(1, stop.max_iterations + 1):
         step = newton_step(energy.pattern, here, damping)
         if step is None and exact:
             here, exact = energy.evaluate(poses, exact=False), False
@@ -55,18 +65,19 @@ def optimise_poses(
             trial = poses.copy()
             trial[energy.free] += step
             length = float(np.abs(step).max(initial=0.0))
-            if is_last(length, tolerance, damping, GRAPH_STEPS):
+            if is_last(length, stop.tolerance, damping, GRAPH_STEPS):
                 value = float(energy.terms(trial).sum())
                 if is_accepted(here.value, value, GRAPH_STEPS):
                     return Optimum(_wrapped(trial), value, iteration, True)
                 return Optimum(_wrapped(poses), here.value, iteration, True)
-            there = energy.evaluate(trial, exact=length < EXACT_HESSIAN_STEP)
+            is_short = length < stop.exact_hessian_step
+            there = energy.evaluate(trial, is_short)
             accepted = is_accepted(here.value, there.value, GRAPH_STEPS)
             if accepted:
-                gains = here.value - there.value > NEGLIGIBLE_GAIN * (1 + here.value)
+                gains = here.value - there.value > stop.negligible_gain * (1 + here.value)
                 if is_open and damping <= GRAPH_STEPS.least_raised and not gains:
                     return Optimum(_wrapped(trial), there.value, iteration, True)
-                poses, here, exact = trial, there, length < EXACT_HESSIAN_STEP
+                poses, here, exact = trial, there, is_short
         damping = next_damping(damping, accepted, GRAPH_STEPS)
         if damping > GRAPH_STEPS.greatest:
             break

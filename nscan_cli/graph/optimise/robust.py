@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nscan_cli.graph.optimise.graph_energy import GraphEnergy
-from nscan_cli.graph.optimise.graph_solver import optimise_poses
+from nscan_cli.graph.optimise.graph_solver import StopOptions, optimise_poses
 from nscan_cli.poses import Array
 
 
@@ -78,10 +78,11 @@ def _graduated(
     if not 1.0 < width < np.inf:
         return None
     narrowing = max(options.narrowing, width ** (1 / options.max_widths))
+    stop = StopOptions(options.iterations, 1e-4)
     while width > 1.0:
         width = max(width / narrowing, 1.0)
         weights[doubted] = (width / (width + excess[doubted])) ** 2
-        poses = optimise_poses(energy.weighted(weights), poses, options.iterations, 1e-4).poses
+        poses = optimise_poses(energy.weighted(weights), poses, stop).poses
         excess = energy.terms(poses) / bounds
     return poses
 

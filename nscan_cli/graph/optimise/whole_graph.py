@@ -10,11 +10,12 @@ import numpy as np
 from nscan_cli.graph.model import Graph
 from nscan_cli.graph.optimise.chordal import chordal_start
 from nscan_cli.graph.optimise.graph_energy import GraphEnergy
-from nscan_cli.graph.optimise.graph_solver import Optimum, optimise_poses
+from nscan_cli.graph.optimise.graph_solver import Optimum, StopOptions, optimise_poses
 from nscan_cli.graph.optimise.robust import unfolded
 from nscan_cli.graph.relations.base import Relation
 from nscan_cli.poses import Array, Indices
 
+PATIENT_STOP = StopOptions(max_iterations=1000)
 TRIAL_ITERATIONS = 100
 """Iterations after which the starts are compared; only the better one continues."""
 MAX_UNFOLDINGS = 3
@@ -22,17 +23,6 @@ MAX_UNFOLDINGS = 3
 before."""
 SAME_ENERGY = 1e-6
 """Energies that differ by less, relative to 1 + energy, count as equal: then the given poses are kept."""
-
-
-@dataclass(frozen=True)
-class GraphOptimum:
-    """The energy Σ fᵗHf at the optimum, and how it was reached."""
-
-    energy: float
-    iterations: int
-    converged: bool
-    components: int
-    """The number of connected components; a keyframe without relations is one."""
 
 
 @dataclass(frozen=True)
@@ -50,49 +40,49 @@ class Component:
         return GraphEnergy(len(self.keyframes), self.relations, positions)
 
 
-def optimise_graph(graph: Graph, max_iterations: int = 1000, tolerance: float = 1e-6) -> GraphOptimum:
+def optimise_graph(graph: Graph, stop: StopOptions = PATIENT_STOP) -> Optimum:
     """Move the keyframes to the minimum of the graph's energy, and the attached nodes with them.
 
     The lowest minimum of several starts is kept. The first keyframe of each component stays. The graph's
-    marginals belong to the old poses and are removed.
+    marginals belong to the old poses and are removed. Returns the poses (N, 3) and the energy Σ fᵗHf.
     """
     total, iterations, converged = 0.0, 0, True
-    parts = components(graph)
     poses = graph.poses.copy()
-    for part in parts:
+    for part in components(graph):
         if len(part.keyframes) == 1:
             continue
-        lowest = _lowest_minimum(part.energy(len(graph)), poses[part.keyframes], max_iterations, tolerance)
+        lowest = _lowest_minimum(part.energy(len(graph)), poses[part.keyframes], stop)
         poses[part.keyframes] = lowest.poses
         total += lowest.energy
         iterations += lowest.iterations
         converged &= lowest.converged
     graph.move_keyframes(graph.keyframes, poses[graph.keyframes])
     graph.marginals = {}
-    return GraphOptimum(total, iterations, converged, len(parts))
+    return Optimum(graph.poses, total, iterations, converged)
 
 
-def _lowest_minimum(energy: GraphEnergy, given: Array, max_iterations: int, tolerance: float) -> Optimum:
+def _lowest_minimum(energy: GraphEnergy, given: Array, stop: StopOptions) -> Optimum:
     """The lowest minimum from the poses given (K, 3), the chordal start, and the unfolded best of both.
 
     The iterations are those of all starts together.
     """
+    trial = dataclasses.replace(stop, max_iterations=min(TRIAL_ITERATIONS, stop.max_iterations))
     iterations = 0
     best: Optimum | None = None
     for start in (given, chordal_start(energy, given)):
-        found = optimise_poses(energy, start, min(TRIAL_ITERATIONS, max_iterations), tolerance)
+        found = optimise_poses(energy, start, trial)
         iterations += found.iterations
         if best is None or _is_lower(found, best):
             best = found
     assert best is not None
     if not best.converged:
-        best = optimise_poses(energy, best.poses, max_iterations, tolerance)
+        best = optimise_poses(energy, best.poses, stop)
         iterations += best.iterations
     for _ in range(MAX_UNFOLDINGS):
         other_start = unfolded(energy, best.poses)
         if other_start is None:
             break
-        found = optimise_poses(energy, other_start, max_iterations, tolerance)
+        found = optimise_poses(energy, other_start, stop)
         iterations += found.iterations
         if not _is_lower(found, best):
             break

@@ -19,9 +19,9 @@ def pairwise_marginals(relation: Relation, poses: Array) -> list[Pairwise]:
     H_ii − H_ir H_rr⁺ H_ri over all other poses r (the inverse of its block of the covariance, where H has
     an inverse), turned from the relation's frame into that of pose c.
     A term that is not linear is taken at the global poses (n, 3).
-    Directions that the relation does not hold get next to no information, LEAST_SHARE of the greatest: with
-    none at all, readers that factorise after Cholesky (GTSAM) would make much out of rounding. The
-    Hessian's negative eigenvalues count as 0.
+    Directions that the relation does not hold get next to no information (LEAST_EIGENVALUE_SHARE): with none
+    at all, readers that factorise after Cholesky (GTSAM) would make much out of rounding. The Hessian's
+    negative eigenvalues count as 0.
     """
     term = relation.term()
     local, hessian, c, _ = term if term.at is None else term.at(poses)

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from nscan_cli.errors import InputDataError, WrongUsageError
-from nscan_cli.files.source import Source
+from nscan_cli.files.provenance import Source
 from nscan_cli.logs import scan_order as order
 from nscan_cli.logs.assemble import Findings, RawScans, RecordedMotion, laser_log, scan_table
 from nscan_cli.logs.frame_names import distinct_frame_names

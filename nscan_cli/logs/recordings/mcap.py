@@ -20,9 +20,9 @@ from mcap.exceptions import McapError
 from mcap.opcode import Opcode
 
 from nscan_cli.errors import InputDataError
-from nscan_cli.files.counting import counted
 from nscan_cli.files.inputs import FileBytes
 from nscan_cli.files.limits import INPUT, MB
+from nscan_cli.files.text import counted
 from nscan_cli.logs.recordings.container import DAMAGE_REMEDY, Channel, Recording
 from nscan_cli.logs.recordings.message_types import READ_TYPES, ros2_type_name
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from nscan_cli.errors import InputDataError, WrongUsageError
-from nscan_cli.files.counting import counted
+from nscan_cli.files.text import counted
 from nscan_cli.logs.recordings.container import Recording
 from nscan_cli.logs.recordings.decoded_messages import StampedTransform, decimal_seconds
 from nscan_cli.logs.recordings.message_types import REFERENCE_TYPES, TRANSFORM_TYPES

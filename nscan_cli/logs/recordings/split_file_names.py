@@ -8,8 +8,8 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from nscan_cli.files.counting import counted
 from nscan_cli.files.inputs import base_name
+from nscan_cli.files.text import counted
 from nscan_cli.logs.compression import SUFFIXES
 
 RECORDING_SUFFIXES = (".mcap", ".db3", ".bag")

@@ -16,7 +16,7 @@ from collections.abc import Iterator, Mapping
 from contextlib import closing
 
 from nscan_cli.errors import InputDataError, OutputError
-from nscan_cli.files.counting import counted
+from nscan_cli.files.text import counted
 
 WAL, JOURNAL = "-wal", "-journal"
 JOURNAL_END = b"\xd9\xd5\x05\xf9\x20\xa1\x63\xd7"

@@ -8,8 +8,8 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from nscan_cli.errors import InputDataError, WrongUsageError
-from nscan_cli.files.counting import counted
-from nscan_cli.files.source import Source
+from nscan_cli.files.provenance import Source
+from nscan_cli.files.text import counted
 from nscan_cli.logs import scan_order as order
 from nscan_cli.logs.assemble import Findings, RawScans, RecordedMotion, laser_log
 from nscan_cli.logs.device_choice import Device

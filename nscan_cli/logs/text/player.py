@@ -7,7 +7,7 @@ import re
 import numpy as np
 
 from nscan_cli.errors import InputDataError
-from nscan_cli.files.source import Source
+from nscan_cli.files.provenance import Source
 from nscan_cli.logs import scan_order as order
 from nscan_cli.logs.assemble import Findings, RecordedMotion, laser_log
 from nscan_cli.logs.device_choice import Device, choose_device

@@ -14,7 +14,7 @@ import numpy as np
 
 from nscan_cli.errors import InputDataError
 from nscan_cli.files.limits import RECORD_KINDS
-from nscan_cli.files.source import Source
+from nscan_cli.files.provenance import Source
 from nscan_cli.logs import scan_order as order
 from nscan_cli.logs.assemble import Findings, RawScans, RecordedMotion, laser_log, scan_table
 from nscan_cli.logs.device_choice import Device, choose_device

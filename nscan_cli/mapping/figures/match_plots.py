@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from nscan_cli.files.counting import counted
+from nscan_cli.files.text import counted
 from nscan_cli.mapping.figures.axes import LegendEntry, draw_title_and_legend
 from nscan_cli.mapping.figures.canvas import BLACK, BLUE, GRAY, PURPLE, VERMILLION, Bounds, Canvas, Colour
 from nscan_cli.mapping.figures.colormap import plasma

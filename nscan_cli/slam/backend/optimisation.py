@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from nscan_cli.graph.optimise import graph_solver
-from nscan_cli.slam.backend.options import StopOptions
+from nscan_cli.graph.optimise.graph_solver import StopOptions
 from nscan_cli.slam.backend.subgraph import Subgraph
 from nscan_cli.slam.state import SlamState
 
@@ -15,7 +15,7 @@ def optimise(state: SlamState, stop: StopOptions, part: Subgraph | None = None) 
     if len(state.poses) < 2:
         return
     energy = state.energies.of(state.route, part.relations, 0, part.free)
-    optimum = graph_solver.optimise_poses(energy, state.poses, stop.max_iterations, stop.tolerance)
+    optimum = graph_solver.optimise_poses(energy, state.poses, stop)
     state.route = state.route._replace(poses=optimum.poses)
 
 

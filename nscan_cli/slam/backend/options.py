@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
+from nscan_cli.graph.optimise.graph_solver import StopOptions
+
 
 @dataclass(frozen=True)
 class ScheduleOptions:
@@ -21,16 +23,6 @@ class ScheduleOptions:
     whole_new_share: float = 0.1
     """All keyframes are optimised when this share is new since they last were. A larger share is faster and
     less exact."""
-
-
-@dataclass(frozen=True)
-class StopOptions:
-    """When an optimisation ends."""
-
-    max_iterations: int = 100
-    """Most iterations. A larger number is slower where they do not converge."""
-    tolerance: float = 1e-6
-    """The optimisation ends with a step below this, m and rad. A larger one ends it earlier."""
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from nscan_cli.files.counting import counted
+from nscan_cli.files.text import counted
 from nscan_cli.graph.optimise.robust import chi2_by_three
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.poses import relative

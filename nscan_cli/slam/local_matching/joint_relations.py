@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from nscan_cli.files.counting import counted
+from nscan_cli.files.text import counted
 from nscan_cli.graph.model import Loop, NScan, Pairwise
 from nscan_cli.kernels.decorators import kernel
 from nscan_cli.matching.joint.ambiguity import with_ambiguity

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from nscan_cli.files.counting import counted
+from nscan_cli.files.text import counted
 from nscan_cli.graph.model import Pairwise
 from nscan_cli.matching.pairwise_solver import PairProblem, minimise_pairwise
 from nscan_cli.matching.priors import Prior

@@ -7,7 +7,8 @@ import pytest
 from hypothesis import given, settings
 
 from nscan_cli.errors import InputDataError
-from nscan_cli.graph.io.g2o import read_g2o, write_g2o
+from nscan_cli.graph.io.g2o import write_g2o
+from nscan_cli.graph.io.load_graph import load_graph
 from nscan_cli.graph.model import Graph, NScan, Pairwise
 from nscan_cli.graph.relations.pairwise_marginals import pairwise_marginals
 from nscan_cli.poses import compose, relative, rotated_information, wrap
@@ -60,7 +61,7 @@ def energy_of_g2o(text: str, poses: dict[int, np.ndarray]) -> float:
 def read(tmp_path: Path, text: str) -> Graph:
     path = tmp_path / "graph.g2o"
     path.write_text(text)
-    return read_g2o(str(path))
+    return load_graph(str(path))
 
 
 def test_vertices_become_keyframes_in_order_of_their_ids(tmp_path: Path):
@@ -88,7 +89,7 @@ def test_information_is_turned_from_the_frame_of_the_measurement(tmp_path: Path)
 )
 def test_the_energy_of_a_real_graph_is_that_of_g2o(name: str, nodes: int, edges: int):
     path = data_file(f"{name}.g2o")
-    graph = read_g2o(str(path))
+    graph = load_graph(str(path))
     assert (len(graph), len(graph.pairwise)) == (nodes, edges)
     poses = dict(zip(graph.scans.tolist(), graph.poses, strict=True))
     expected = energy_of_g2o(path.read_text(), poses)

@@ -13,21 +13,23 @@ from typing import Any
 import numpy as np
 import pytest
 
-from nscan_cli.graph.io.g2o import read_g2o, write_g2o
+from nscan_cli.graph.io.g2o import write_g2o
+from nscan_cli.graph.io.load_graph import load_graph
 from nscan_cli.graph.model import Graph
-from nscan_cli.graph.optimise.whole_graph import GraphOptimum, optimise_graph
+from nscan_cli.graph.optimise.graph_solver import Optimum, StopOptions
+from nscan_cli.graph.optimise.whole_graph import optimise_graph
 from tests.data import data_file
 from tests.graph.simulated_relations import disturbed, graph_of, mixed_ring
 
 gtsam = pytest.importorskip("gtsam", reason="gtsam is not installed: pip install nscan-cli[test]")
 
 
-def optimised_file(folder: Path, graph: Graph) -> tuple[GraphOptimum, Path]:
+def optimised_file(folder: Path, graph: Graph) -> tuple[Optimum, Path]:
     """The graph as g2o, read back and brought to its minimum by us; the file of that, and the minimum."""
     path = folder / "graph.g2o"
     path.write_bytes(write_g2o(graph))
-    graph = read_g2o(str(path))
-    optimum = optimise_graph(graph, tolerance=1e-9)
+    graph = load_graph(str(path))
+    optimum = optimise_graph(graph, StopOptions(1000, 1e-9))
     assert optimum.converged
     path.write_bytes(write_g2o(graph))
     return optimum, path
@@ -83,10 +85,10 @@ def simulated_graph() -> Graph:
     return graph
 
 
-def assert_gtsam_agrees(optimum: GraphOptimum, path: Path, gap: float, step: float) -> None:
+def assert_gtsam_agrees(optimum: Optimum, path: Path, gap: float, step: float) -> None:
     """`gap` is what GTSAM's own error may differ by, relatively; `step` (m) what it may move for that."""
     own, as_g2o, poses = read_by_gtsam(path)
-    graph = read_g2o(str(path))
+    graph = load_graph(str(path))
     assert (own.size(), poses.size()) == (len(graph.pairwise), len(graph))
     assert 2 * as_g2o.error(poses) == pytest.approx(optimum.energy, rel=1e-6)
     distance, turn = moved(as_g2o, poses)
@@ -105,7 +107,7 @@ def test_gtsam_reports_our_minimum_and_stays_there(tmp_path: Path):
 def test_a_worse_start_is_moved_to_our_minimum(tmp_path: Path):
     """What does not move has to be able to."""
     optimum, path = optimised_file(tmp_path, simulated_graph())
-    graph = read_g2o(str(path))
+    graph = load_graph(str(path))
     best = graph.poses
     graph.poses = disturbed(best, 0.02)
     path.write_bytes(write_g2o(graph))
@@ -141,5 +143,5 @@ def test_gtsam_reads_a_relation_that_leaves_a_direction_open(tmp_path: Path):
 
 @pytest.mark.logs
 def test_gtsam_agrees_on_a_real_graph(tmp_path: Path):
-    optimum, path = optimised_file(tmp_path, read_g2o(str(data_file("intel.g2o"))))
+    optimum, path = optimised_file(tmp_path, load_graph(str(data_file("intel.g2o"))))
     assert_gtsam_agrees(optimum, path, gap=1e-4, step=5e-3)

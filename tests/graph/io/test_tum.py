@@ -8,10 +8,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from nscan_cli.errors import InputDataError, InputMissingError
-from nscan_cli.graph.io.tum import parse_tum, read_tum, write_tum
+from nscan_cli.graph.io.tum import parse_tum, write_tum
 from nscan_cli.poses import wrap
 from tests.data import data_file
-from tests.graph.small_graph import poses
+from tests.graph.small_graph import poses, read_tum
 
 
 def test_a_trajectory_has_these_bytes():

@@ -7,8 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from nscan_cli.graph.io.tum import read_tum, write_tum
+from nscan_cli.graph.io.tum import write_tum
 from nscan_cli.poses import relative
+from tests.graph.small_graph import read_tum
 
 file_interface = pytest.importorskip(
     "evo.tools.file_interface", reason="evo is not installed: pip install nscan-cli[test]"

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from nscan_cli.graph.model import NScan, Pairwise
 from nscan_cli.graph.optimise.chordal import chordal_start
-from nscan_cli.graph.optimise.graph_solver import optimise_poses
+from nscan_cli.graph.optimise.graph_solver import StopOptions, optimise_poses
 from nscan_cli.poses import relative
 from tests.graph.simulated_relations import (
     energy_of,
@@ -43,7 +43,7 @@ def test_it_finds_the_minimum_where_the_given_poses_end_in_another(kind: str):
     wound = ring(60)
     wound[:, 2] = wound[0, 2] + 2 * (wound[:, 2] - wound[0, 2])
     wound[1:, :2] = wound[0, :2] + np.cumsum(np.stack([np.cos(wound[:-1, 2]), np.sin(wound[:-1, 2])], 1), 0)
-    assert optimise_poses(energy, wound, max_iterations=200).energy > 10 * best.energy
+    assert optimise_poses(energy, wound, StopOptions(200)).energy > 10 * best.energy
     found = optimise_poses(energy, chordal_start(energy, wound))
     assert found.energy == pytest.approx(best.energy, rel=1e-9)
     np.testing.assert_allclose(relative(found.poses, best.poses), 0, atol=1e-5)

@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from nscan_cli.graph.model import NScan, Pairwise
-from nscan_cli.graph.optimise.graph_solver import optimise_poses
+from nscan_cli.graph.optimise.graph_solver import StopOptions, optimise_poses
 from nscan_cli.poses import compose, relative, wrap
 from tests.graph.simulated_relations import disturbed, energy_of, mixed_ring
 
@@ -15,7 +15,9 @@ from tests.graph.simulated_relations import disturbed, energy_of, mixed_ring
 @given(st.integers(0, 2**32 - 1), st.integers(6, 30))
 def test_exact_relations_of_both_kinds_lead_back_to_the_truth(seed: int, count: int):
     truth, pairwise, nscan = mixed_ring(count, noise=0.0, seed=seed)
-    found = optimise_poses(energy_of(truth, pairwise, nscan), disturbed(truth, 0.5, seed), tolerance=1e-9)
+    found = optimise_poses(
+        energy_of(truth, pairwise, nscan), disturbed(truth, 0.5, seed), StopOptions(100, 1e-9)
+    )
     assert found.converged
     assert found.energy < 1e-12
     np.testing.assert_allclose(found.poses[:, :2], truth[:, :2], atol=1e-8)
@@ -37,7 +39,8 @@ def test_the_fixed_pose_stays_and_choosing_another_changes_the_frame_alone():
     truth, pairwise, nscan = mixed_ring(12, noise=1.0)
     start = disturbed(truth, 0.3)
     first, other = (
-        optimise_poses(energy_of(truth, pairwise, nscan, fixed), start, tolerance=1e-9) for fixed in (0, 7)
+        optimise_poses(energy_of(truth, pairwise, nscan, fixed), start, StopOptions(100, 1e-9))
+        for fixed in (0, 7)
     )
     np.testing.assert_array_equal(other.poses[7], start[7])
     assert other.energy == pytest.approx(first.energy, rel=1e-9)
@@ -45,26 +48,22 @@ def test_the_fixed_pose_stays_and_choosing_another_changes_the_frame_alone():
     np.testing.assert_allclose(moved, first.poses, atol=1e-6)
 
 
-def test_the_exact_hessian_ends_in_fewer_steps(monkeypatch: pytest.MonkeyPatch):
+def test_the_exact_hessian_ends_in_fewer_steps():
     # Relations that contradict each other leave large residuals; there Gauss–Newton only creeps.
     truth, pairwise, nscan = mixed_ring(30, noise=6.0)
     energy = energy_of(truth, pairwise, nscan)
     found = optimise_poses(energy, truth)
-    monkeypatch.setattr("nscan_cli.graph.optimise.graph_solver.EXACT_HESSIAN_STEP", 0.0)
-    slow = optimise_poses(energy, truth)
+    slow = optimise_poses(energy, truth, StopOptions(exact_hessian_step=0.0))
     assert found.converged
     assert found.energy == pytest.approx(slow.energy, rel=1e-6)
     assert found.iterations < slow.iterations
 
 
-def test_an_exact_hessian_that_is_not_positive_definite_is_left_for_the_part_that_is(
-    monkeypatch: pytest.MonkeyPatch,
-):
+def test_an_exact_hessian_that_is_not_positive_definite_is_left_for_the_part_that_is():
     truth, pairwise, nscan = mixed_ring(30, noise=1.0)
     energy, start = energy_of(truth, pairwise, nscan), disturbed(truth, 3.0)
     best = optimise_poses(energy, truth)
-    monkeypatch.setattr("nscan_cli.graph.optimise.graph_solver.EXACT_HESSIAN_STEP", np.inf)
-    found = optimise_poses(energy, start)
+    found = optimise_poses(energy, start, StopOptions(exact_hessian_step=np.inf))
     assert found.energy == pytest.approx(best.energy, rel=1e-9)
     assert found.iterations <= 15
 
@@ -111,6 +110,6 @@ def test_poses_without_relations_stay(count: int):
 
 def test_no_iterations_at_all_give_the_start_back():
     truth, pairwise, nscan = mixed_ring(6, noise=1.0)
-    found = optimise_poses(energy_of(truth, pairwise, nscan), truth, max_iterations=0)
+    found = optimise_poses(energy_of(truth, pairwise, nscan), truth, StopOptions(0))
     assert (found.iterations, found.converged) == (0, False)
     np.testing.assert_allclose(relative(found.poses, truth), 0, atol=1e-12)

@@ -13,6 +13,7 @@ from nscan_cli.graph.io.json_graph import parse_graph, write_graph
 from nscan_cli.graph.io.triangles import upper_triangle
 from nscan_cli.graph.model import Graph, NScan, Pairwise
 from nscan_cli.graph.optimise.graph_energy import GraphEnergy
+from nscan_cli.graph.optimise.graph_solver import StopOptions
 from nscan_cli.graph.optimise.whole_graph import optimise_graph
 from nscan_cli.graph.relations.semidefinite import IndefiniteError, as_information, semidefinite
 from nscan_cli.poses import Array, compose, inverse, relative, rotated_information
@@ -129,7 +130,7 @@ def test_no_energy_is_below_0(pairwise, joint, given_poses, seed):
             terms = energy.terms(poses)
             assert (terms >= 0).all()
             assert (energy.evaluate(poses, exact=True).terms >= 0).all()
-        assert optimise_graph(back, max_iterations=30).energy >= 0
+        assert optimise_graph(back, StopOptions(30)).energy >= 0
 
 
 def energy_of_graph(graph: Graph) -> GraphEnergy:

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from nscan_cli.graph.model import NScan, Pairwise
 from nscan_cli.graph.optimise.graph_energy import GraphEnergy
-from nscan_cli.graph.optimise.graph_solver import optimise_poses
+from nscan_cli.graph.optimise.graph_solver import StopOptions, optimise_poses
 from nscan_cli.graph.relations.base import Relation
 from nscan_cli.slam.backend.energy_cache import EnergyCache
 from nscan_cli.slam.backend.subgraph import (
@@ -101,7 +101,7 @@ def test_what_can_move_finds_its_minimum_and_the_others_stay(places):
     part = held_by_others(graph.route, [*graph.way, *graph.loops], chosen(12, *places))
     assert all({node // APART for node in relation.nodes} & {*places} for relation in part.relations)
     start = graph.route.poses + np.random.default_rng(1).normal(0, 0.05, (12, 3))
-    found = optimise_poses(graph.energy(part, 0), start, tolerance=1e-9)
+    found = optimise_poses(graph.energy(part, 0), start, StopOptions(tolerance=1e-9))
     moved = [place for place in places if place]
     others = np.delete(np.arange(12), moved)
     np.testing.assert_array_equal(found.poses[others], start[others])
