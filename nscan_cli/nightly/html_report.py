@@ -8,8 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from nscan_cli import __version__
-from nscan_cli.files.text import counted
-from nscan_cli.files.text import printable
+from nscan_cli.files.text import counted, printable
 from nscan_cli.nightly.history_plot import history_svg
 from nscan_cli.nightly.json_report import finish_time
 from nscan_cli.nightly.manifest import ManifestEntry
