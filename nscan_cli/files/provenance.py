@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, is_dataclass
 from typing import Any
 
 from nscan_cli import __version__
@@ -36,7 +35,7 @@ class Source:
 
 def option_fields(options: Any) -> dict[str, Any] | None:
     """The fields of options, which are a dataclass or a named tuple; None for any other value."""
-    if dataclasses.is_dataclass(options):
+    if is_dataclass(options):
         return vars(options)
     return options._asdict() if hasattr(options, "_asdict") else None
 
