@@ -10,7 +10,7 @@ from nscan_cli.files.limits import INPUT, LimitExceededError
 
 PIECE_BYTES = 256
 """Bytes decompressed at once. A larger value loses more data before damage and needs more memory."""
-KEEPS_GROWING = "unpacks to more and more"
+KEEPS_GROWING = "decompresses to too many bytes"
 
 
 class Compression(NamedTuple):

@@ -62,8 +62,10 @@ def read_log(
     """
     parts = parts_of(paths)
     if len(parts.files) > 1:
+        from nscan_cli.logs.recordings.laser_scans import log_from_recording
+
         recording, source = _merged_recording(parts, options.salvage)
-        log = _log_of_recording(recording, parts.title, source, options)
+        log = log_from_recording(recording, parts.title, source, options)
         _check_usable(log, even_unusable)
     else:
         (path,) = parts.files
@@ -119,9 +121,12 @@ def log_from(
     del stored
     with _limits_as_input_errors(name):
         if form.container:
+            # Text logs need no decoders of messages.
+            from nscan_cli.logs.recordings.laser_scans import log_from_recording
+
             recording = _messages(form, data, path, options.salvage, lost)
             del data
-            log = _log_of_recording(recording, name, source, options)
+            log = log_from_recording(recording, name, source, options)
         else:
             assert isinstance(data, bytes)
             reader: Reader = form.reader()
@@ -176,13 +181,6 @@ def _merged_recording(parts: Parts, salvage: bool) -> tuple[Recording, Source]:
         order = split_recordings.order_by_start(found)
         whole = split_recordings.merge_recordings([found[place] for place in order], parts.are_parts)
     return whole, _joint_source(parts.name, [file for place in order for file in sources[place]])
-
-
-def _log_of_recording(recording: Recording, name: str, source: Source, options: ReadingOptions) -> LaserLog:
-    """The scans of a recording. The decoders of messages are imported here, as text logs need none."""
-    from nscan_cli.logs.recordings.laser_scans import log_from_recording
-
-    return log_from_recording(recording, name, source, options)
 
 
 def _form(data: FileBytes, name: str) -> Form:

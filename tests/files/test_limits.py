@@ -91,7 +91,7 @@ def test_a_gzip_bomb_is_refused(tmp_path, monkeypatch, options):
     path = tmp_path / "bomb.log.gz"
     path.write_bytes(gzip.compress(bytes(5 * MB)))
     with pytest.raises(
-        InputDataError, match=r"bomb\.log\.gz: unpacks to more and more, more than the limit of 2 MB"
+        InputDataError, match=r"bomb\.log\.gz: decompresses to too many bytes, more than the limit of 2 MB"
     ):
         read_log(str(path), options)
 
@@ -119,7 +119,7 @@ def test_a_chunk_that_unpacks_to_too_much_is_refused(tmp_path, monkeypatch, comp
     set_limit(monkeypatch, limits.INPUT, 0.1)
     monkeypatch.setattr("nscan_cli.logs.load.read_bytes", lambda path: data)
     with pytest.raises(
-        InputDataError, match=r"chunk of \d+ MB, more than the limit of 0.1 MB|unpacks to more"
+        InputDataError, match=r"chunk of \d+ MB, more than the limit of 0.1 MB|decompresses to too many"
     ):
         read_log(str(path), SALVAGE)
 
@@ -132,7 +132,7 @@ def test_the_messages_of_bags_count(tmp_path, monkeypatch):
         assert len(read_log(str(path))) == 3
         set_limit(monkeypatch, limits.INPUT, 0.1)
         monkeypatch.setattr("nscan_cli.logs.load.read_bytes", lambda path, data=data: data)
-        with pytest.raises(InputDataError, match="unpacks to more and more"):
+        with pytest.raises(InputDataError, match="decompresses to too many bytes"):
             read_log(str(path), SALVAGE)
         monkeypatch.undo()
 
@@ -147,7 +147,7 @@ def test_a_scan_of_too_many_beams_is_skipped(tmp_path, count):
 
 def test_the_limit_of_beams_can_be_raised(tmp_path, monkeypatch):
     wide = flaser(1.0, (1.0,) * 20_000)
-    with pytest.raises(InputDataError, match="none of its 1 FLASER records can be read"):
+    with pytest.raises(InputDataError, match="no FLASER record can be read"):
         read(tmp_path, wide)
     set_limit(monkeypatch, limits.BEAMS, 20_000)
     assert read(tmp_path, wide).ranges.shape == (1, 20_000)
