@@ -45,7 +45,7 @@ class Counts:
 def slam_options(
     max_scans: int | None = None, relations: Relations | None = None, loops: bool = True
 ) -> SlamOptions:
-    """The parameters with what a user may choose; None means the default."""
+    """The options with what a user may set; None means the default."""
     nscan, whole = NScanOptions(loops=loops), SlamOptions()
     if max_scans is not None:
         nscan = dataclasses.replace(nscan, max_scans=max_scans)

@@ -14,13 +14,13 @@ from nscan_cli.slam.keyframes.route import Route
 
 
 class EnergyCache:
-    """Those of the keyframes of a route in a log of so many `scans`; terms of relations are kept."""
+    """Energies of the keyframes of a route in a log of `scans` scans. The terms of relations are kept."""
 
     def __init__(self, scans: int) -> None:
         self._scans, self._terms = scans, TermCache()
 
     def forget(self) -> None:
-        """Keep no terms any more: the relations that they are of have been replaced."""
+        """Drop all terms, once their relations have been replaced."""
         self._terms = TermCache()
 
     def of(
@@ -30,7 +30,7 @@ class EnergyCache:
         fixed: int = 0,
         free: NDArray[np.bool_] | None = None,
     ) -> GraphEnergy:
-        """That of all keyframes with keyframe `fixed` held, and those that are not `free` (K,), if given."""
+        """The energy of all keyframes. `fixed` is held, and so are those that are not `free` (K,)."""
         positions = np.full(self._scans, -1)
         positions[route.rows] = np.arange(len(route.rows))
         return GraphEnergy(len(route.rows), relations, positions, fixed, self._terms, free)

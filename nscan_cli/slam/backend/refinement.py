@@ -1,8 +1,8 @@
 """Step 6 of the loop: the matches of step 3 again, from the poses that all relations together have found.
 
-A match made on the way knew only what had been seen so far, and started from poses that later loops have
-corrected. From the final poses, and with the scans of all visits, some find a better place; the graph moves,
-and those about what has moved are matched again.
+A match made while the graph grew knew only earlier scans, and started from poses that later loops have
+corrected. From the final poses, and with the scans of all visits, some find a better place. The graph moves,
+and keyframes whose neighbours have moved are matched again.
 """
 
 from __future__ import annotations
@@ -55,7 +55,7 @@ class Refinement:
         wider: Mapping[int, float],
         threads: int = 1,
     ) -> None:
-        """Take the radius (m) about some centres that is `wider`: where large loops were closed."""
+        """`wider` has the radius (m) about the centres where large loops were closed."""
         self._route, self._options, self._match, self._threads = route, options, match, threads
         self._wider, self._covered = wider, Coverage()
         self._found: list[LocalMatch | None] = [None] * len(route.poses)
@@ -80,8 +80,8 @@ class Refinement:
                 chosen,
             )
             for (centre, near), nearby in zip(chosen.items(), found, strict=True):
-                self._covered.add(int(route.rows[centre]), route.rows[near.tried].tolist(), nearby)
-                self._starts[centre] = near.tried, poses[near.tried]
+                self._covered.add(int(route.rows[centre]), route.rows[near.members].tolist(), nearby)
+                self._starts[centre] = near.members, poses[near.members]
                 self._found[centre] = nearby
             waiting = {centre: near for centre, near in waiting.items() if centre not in chosen}
             matched += len(chosen)
@@ -90,7 +90,7 @@ class Refinement:
     def _uncovered(self, route: Route, waiting: Mapping[int, Neighbours]) -> dict[int, Neighbours]:
         """The centres to match next of those that wait, with the keyframes near each.
 
-        As if every match related all that it is tried with; where one does not, the next choice makes up.
+        Each match is assumed to relate all its keyframes. Where one does not, the next choice makes up.
         """
         chosen, covered = {}, Coverage(beneath=self._covered)
         for centre, near in waiting.items():

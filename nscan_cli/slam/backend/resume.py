@@ -1,6 +1,6 @@
-"""A saved graph refined again: steps 5 and 6 of the loop (paper, V), without tracking.
+"""A saved graph is refined again: steps 5 and 6 of the loop (paper, V), without tracking.
 
-The keyframes are laid out anew from the scans, with the poses of the graph where tracking had its own.
+The keyframes are made anew from the scans, at the poses of the graph.
 """
 
 from __future__ import annotations
@@ -29,10 +29,10 @@ from nscan_cli.slam.loop_closure.verification import AMBIGUOUS, ELSEWHERE, NO_MA
 from nscan_cli.slam.options import Relations, SlamOptions
 from nscan_cli.slam.state import SlamState
 
-LEAST_VALUE, LARGEST_VALUE, MOST_VALUES = 1e-9, 1e9, 10
-"""What a parameter can be, and how many values a list of them can have."""
-SEARCHED = (AMBIGUOUS, ELSEWHERE, NO_MATCH, NO_SECOND, SO_FAR_OFF)
-"""Verdicts of the search for large loops, which is not made again: they stay."""
+MIN_PARAMETER, MAX_PARAMETER, MAX_LIST_LENGTH = 1e-9, 1e9, 10
+"""Bounds of a parameter of a saved graph, and of the length of a list of them."""
+SEARCH_VERDICTS = (AMBIGUOUS, ELSEWHERE, NO_MATCH, NO_SECOND, SO_FAR_OFF)
+"""Verdicts of the search for large loops. They stay, as the search is not made again."""
 
 
 def can_refine(graph: Graph) -> bool:
@@ -49,20 +49,20 @@ def options_of(graph: Graph) -> SlamOptions:
 
     Raises ValueError naming a parameter that none can have been made with.
     """
-    options: SlamOptions = _restored(SlamOptions(), graph.provenance["parameters"]["slam"], "slam")
+    options: SlamOptions = _restored_options(SlamOptions(), graph.provenance["parameters"]["slam"], "slam")
     return options
 
 
 def resume(graph: Graph, log: LaserLog, rows: NDArray[np.int64], threads: int = 1) -> Graph:
-    """The graph after its loops are checked, and its matches made again from its poses.
+    """The graph after its loops are tested, and its matches made again from its poses.
 
     `rows` (N,) are the rows of the log with the scans of the nodes. `can_refine` has to hold.
     """
-    state = state_of_graph(graph, _scans(log, rows), options_of(graph), threads)
+    state = state_of_graph(graph, _log_of_rows(log, rows), options_of(graph), threads)
     reject_contradicting_loops(state)
     refine(state)
     refined = finish_graph(state)
-    refined.loops += [loop for loop in graph.loops if loop.reason in SEARCHED]
+    refined.loops += [loop for loop in graph.loops if loop.reason in SEARCH_VERDICTS]
     refined.provenance = graph.provenance
     return refined
 
@@ -71,7 +71,7 @@ def state_of_graph(graph: Graph, log: LaserLog, options: SlamOptions, threads: i
     """The state of the loop after its last optimisation, as a saved graph of all scans of `log` has it."""
     state, breaks = SlamState.of_log(log, options, threads), _breaks(graph, options)
     _add_keyframes(state, graph, breaks)
-    chain = _chain(graph, options)
+    chain = _chain_of_graph(graph, options)
     in_chain = {id(relation) for relation in chain}
     return dataclasses.replace(
         state,
@@ -82,12 +82,12 @@ def state_of_graph(graph: Graph, log: LaserLog, options: SlamOptions, threads: i
         matched_pairs=[pair for pair in graph.pairwise if id(pair) not in in_chain],
         nscan_relations=list(graph.nscan),
         other_relations=list(graph.others),
-        loops=[loop for loop in graph.loops if loop.reason not in SEARCHED],
-        places=_places(graph, options),
+        loops=[loop for loop in graph.loops if loop.reason not in SEARCH_VERDICTS],
+        places=_large_loop_places(graph, options),
     )
 
 
-def _scans(log: LaserLog, rows: NDArray[np.int64]) -> LaserLog:
+def _log_of_rows(log: LaserLog, rows: NDArray[np.int64]) -> LaserLog:
     """The log with the scans in some rows (N,) alone."""
     if np.array_equal(rows, np.arange(len(log))):
         return log
@@ -107,7 +107,7 @@ def _scans(log: LaserLog, rows: NDArray[np.int64]) -> LaserLog:
 def _add_keyframes(state: SlamState, graph: Graph, breaks: set[int]) -> None:
     """Add the graph's keyframes with their Gaussians, as tracking would have made them at its poses."""
     log, keyframes = state.log, state.keyframes
-    found = _as_tracked(graph, breaks, state.options)
+    found = _tracked_at_graph_poses(graph, breaks, state.options)
     for scans in scan_batches(log, state.options.tracking.max_range, state.odometry, state.frozen_scans):
         those = found.part(scans.first, scans.first + len(scans))
         for k, row in enumerate(range(scans.first, scans.first + len(scans))):
@@ -122,8 +122,8 @@ def _add_keyframes(state: SlamState, graph: Graph, breaks: set[int]) -> None:
     keyframes.end_segment()
 
 
-def _as_tracked(graph: Graph, breaks: set[int], options: SlamOptions) -> TrackedScans:
-    """The scans as if tracking had found them at the graph's poses, and knew nothing of how well."""
+def _tracked_at_graph_poses(graph: Graph, breaks: set[int], options: SlamOptions) -> TrackedScans:
+    """The scans as if tracking had found them at the graph's poses, without information."""
     found, step, path = TrackedScans.room(len(graph)), options.tracking.min_motion, 0.0
     found.poses[:], found.values[:], found.inliers[:] = graph.poses, 0.0, 1.0
     found.hessians[:], found.prior_covariances[:], found.odometry_sigmas[:] = 0.0, 0.0, 0.0
@@ -141,17 +141,17 @@ def _as_tracked(graph: Graph, breaks: set[int], options: SlamOptions) -> Tracked
 
 
 def _breaks(graph: Graph, options: SlamOptions) -> set[int]:
-    """The keyframes before which the track broke: not even the direction of the way there is known."""
+    """The keyframes before which the track broke: the relation to them says nothing of the turn."""
     least = (options.breaks.turn_sigma / 2) ** -2
     tracked = [pair for pair in graph.pairwise if pair.origin == "track"]
     return {pair.nodes[1] for pair in tracked if pair.information[2, 2] <= least}
 
 
-def _chain(graph: Graph, options: SlamOptions) -> list[Pairwise]:
+def _chain_of_graph(graph: Graph, options: SlamOptions) -> list[Pairwise]:
     """The relations from each keyframe to the next.
 
-    A graph of nScan relations alone has left out those that these hold together. In their place stands
-    what odometry would know of such a step.
+    A graph of nScan relations alone lacks those that nScan relations replace. In their place stands what
+    odometry would tell of such a step.
     """
     tracked: dict[tuple[int, int], Pairwise] = {}
     for pair in graph.pairwise:
@@ -164,8 +164,8 @@ def _chain(graph: Graph, options: SlamOptions) -> list[Pairwise]:
     return chain
 
 
-def _places(graph: Graph, options: SlamOptions) -> list[Place]:
-    """The large loops: those whose scans are further apart than a joint match reaches by itself."""
+def _large_loop_places(graph: Graph, options: SlamOptions) -> list[Place]:
+    """The large loops: those with scans farther apart than the radius of a joint match."""
     position = {int(node): k for k, node in enumerate(graph.keyframes)}
     loops: list[tuple[tuple[int, ...], int, LocalMatch]] = []
     for joint in graph.nscan:
@@ -186,33 +186,33 @@ def _places(graph: Graph, options: SlamOptions) -> list[Place]:
     return places
 
 
-def _restored(default: Any, values: Any, place: str) -> Any:
+def _restored_options(default: Any, values: Any, place: str) -> Any:
     """The options `default` with the values of a JSON object, as far as it has such fields."""
     if not isinstance(values, dict):
         raise ValueError(f"{place} is no object")
     fields = option_fields(default) or {}
     given = {
-        name: _like(usual, values[name], f"{place}.{name}")
+        name: _checked_value(usual, values[name], f"{place}.{name}")
         for name, usual in fields.items()
         if name in values
     }
     return type(default)(**fields | given)
 
 
-def _like(usual: Any, value: Any, place: str) -> Any:
-    """A value of the JSON as one of the kind that is usual there. Raises ValueError."""
+def _checked_value(usual: Any, value: Any, place: str) -> Any:
+    """A value of the JSON, if it is of the type of the usual one and within bounds. Raises ValueError."""
     if option_fields(usual) is not None:
-        return _restored(usual, value, place)
+        return _restored_options(usual, value, place)
     if isinstance(usual, tuple):
-        if not isinstance(value, (list, tuple)) or not 0 < len(value) <= MOST_VALUES:
+        if not isinstance(value, (list, tuple)) or not 0 < len(value) <= MAX_LIST_LENGTH:
             raise ValueError(f"{place} is no list of a few values")
-        return tuple(_like(usual[0], part, place) for part in value)
+        return tuple(_checked_value(usual[0], part, place) for part in value)
     if isinstance(usual, (bool, str)) or usual is None:
         if type(value) is type(usual) and (not isinstance(usual, str) or value in get_args(Relations)):
             return value
     elif type(value) in (int, float) and type(value) in (int, type(usual)):
         # Nothing that is measured by a parameter is below 0, and where 0 is none, it would divide.
-        least = 0 if isinstance(usual, int) or usual == 0 else LEAST_VALUE
-        if least <= value <= LARGEST_VALUE:
+        least = 0 if isinstance(usual, int) or usual == 0 else MIN_PARAMETER
+        if least <= value <= MAX_PARAMETER:
             return value
     raise ValueError(f"{place} is {str(value)[:40]!r}, which no graph is made with")

@@ -1,7 +1,7 @@
 """Step 5 while the graph grows (paper, V): when it is optimised, and how much of it.
 
-A small graph is always optimised as a whole. Of a large one it is mostly what lies near its new keyframes, so
-that time grows with the log and not faster.
+A small graph is always optimised as a whole, of a large one mostly the part near the new keyframes: the time
+grows in proportion to the log.
 """
 
 from __future__ import annotations
@@ -15,25 +15,25 @@ from nscan_cli.slam.keyframes.route import Route
 
 
 class OptimisationSchedule:
-    """What has come to the graph since it was optimised, and since it was as a whole."""
+    """How the graph has changed since it was optimised, and since it was as a whole."""
 
     def __init__(self, options: ScheduleOptions) -> None:
         self.options = options
         self._moved, self._optimised, self._whole = 0.0, 0, 0
 
     def matched(self, moved: float) -> None:
-        """A joint match has moved scans by so much in all, m."""
+        """Note that a match has moved a scan by this distance, m."""
         self._moved += moved
 
     def is_due(self, size: int) -> bool:
-        """Whether a graph of so many keyframes has changed by so much that it is optimised."""
+        """Whether a graph of `size` keyframes has changed enough to be optimised."""
         return (
             self._moved > self.options.min_motion
             and size - self._optimised >= self.options.min_new_share * size
         )
 
     def due(self, route: Route, relations: Sequence[Relation]) -> Subgraph:
-        """What is optimised then."""
+        """The part of the graph to optimise then."""
         size, options = len(route.poses), self.options
         if size <= options.max_keyframes or size - self._whole >= options.whole_new_share * size:
             return Subgraph(relations)
@@ -42,7 +42,7 @@ class OptimisationSchedule:
         )
 
     def optimised(self, size: int, part: Subgraph) -> None:
-        """A part of a graph of so many keyframes has been optimised."""
+        """Note that a part of a graph of `size` keyframes has been optimised."""
         self._moved, self._optimised = 0.0, size
         if part.free is None:
             self._whole = size

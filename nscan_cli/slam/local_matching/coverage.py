@@ -1,4 +1,4 @@
-"""Which keyframes have been matched with each other already, so that no match is made twice over."""
+"""Which keyframes have been matched with each other already, so that matches do not repeat each other."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from nscan_cli.slam.local_matching.options import NScanOptions
 
 
 class Coverage:
-    """Pairs of keyframes, by their nodes; those of the coverage `beneath` too, to which nothing is added."""
+    """Pairs of keyframes, by their nodes. Those of the coverage `beneath` count too; it is not changed."""
 
     def __init__(self, beneath: Coverage | None = None) -> None:
         self._partners: defaultdict[int, set[int]] = defaultdict(set)
@@ -32,7 +32,7 @@ class Coverage:
             if self._has_closed(beside):
                 return False
         return (
-            self.share(int(route.rows[centre]), route.rows[near.tried].tolist()) < options.max_covered_share
+            self.share(int(route.rows[centre]), route.rows[near.members].tolist()) < options.max_covered_share
         )
 
     def share(self, centre: int, others: Iterable[int]) -> float:
@@ -41,7 +41,7 @@ class Coverage:
         return 1.0 if not others else (len(others) - len(self._lacking(centre, others))) / len(others)
 
     def add(self, centre: int, others: Collection[int], nearby: LocalMatch | None) -> None:
-        """A match of `centre` with all others that was tried, and what it related."""
+        """Add a match of `centre` with others that was tried, and the relations that it gave."""
         self._partners[centre].update(others)
         for other in others:
             self._partners[other].add(centre)
@@ -53,9 +53,9 @@ class Coverage:
             self._closed.add(centre)
 
     def assume(self, route: Route, centre: int, near: Neighbours) -> None:
-        """A match of `centre` that is to be made, as if it related all that are near."""
-        self._relate(route.rows[near.tried].tolist())
-        if near.seen_before.any():
+        """Add a match of `centre` that is to be made, as if it related all neighbours."""
+        self._relate(route.rows[near.members].tolist())
+        if near.from_other_visit.any():
             self._closed.add(int(route.rows[centre]))
 
     def _relate(self, nodes: Collection[int]) -> None:

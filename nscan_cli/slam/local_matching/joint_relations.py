@@ -67,10 +67,12 @@ def match_neighbours(route: Route, centre: int, near: Neighbours, options: NScan
     Scans that do not hang together with the `centre` by overlaps are left out, and the others matched
     again. None when there are too few keyframes near.
     """
-    if len(near.tried) < options.min_scans:
+    if len(near.members) < options.min_scans:
         return None
     for widenings in options.attempts:
-        nearby, is_enough = _match_held(route, near.tried, near.seen_before, centre, widenings, options)
+        nearby, is_enough = _match_held(
+            route, near.members, near.from_other_visit, centre, widenings, options
+        )
         if is_enough and nearby.moved < options.max_last_stage_motion:
             break
     return nearby
@@ -98,7 +100,7 @@ def match_at(
     at any of the places, so that the lowest energy tells which place is right.
     """
     starts = [visit_moved(route, centre, place, options) for place in places]
-    near = [choose_neighbours(start, route.paths, centre, options).tried for start in starts]
+    near = [choose_neighbours(start, route.paths, centre, options).members for start in starts]
     members = np.unique(np.concatenate(near))
     visit = of_this_visit(route, centre, options)[members]
     scans, old = _laid_out(route.keyframes, members), int(np.argmin(visit))
@@ -114,7 +116,7 @@ def match_at(
 def _match_held(
     route: Route,
     tried: Indices,
-    seen_before: NDArray[np.bool_],
+    from_other_visit: NDArray[np.bool_],
     centre: int,
     widenings: tuple[float, ...],
     options: NScanOptions,
@@ -148,18 +150,18 @@ def _match_held(
             kept, start = kept[held], match.poses[held]
             continue
         if not match.converged:
-            loop = verdict(keyframes, tried, seen_before, centre, False, "did not converge", score)
+            loop = verdict(keyframes, tried, from_other_visit, centre, False, "did not converge", score)
             return LocalMatch((), None, loop, 0.0, False), False
-        closed = bool(seen_before[kept].any())
+        closed = bool(from_other_visit[kept].any())
         origin = "loop" if closed else "nscan"
         relation = _relation(route.rows[members], at, problem, match, origin, score, options)
         whole = len(kept) == len(tried)
         reason = "" if whole else f"{counted(len(tried) - len(kept), 'scan')} left out"
-        used, before = (members, seen_before[kept]) if closed else (tried, seen_before)
+        used, before = (members, from_other_visit[kept]) if closed else (tried, from_other_visit)
         loop = verdict(keyframes, used, before, centre, closed, reason, score)
         return LocalMatch((), relation, loop, moved_by(poses[members], match.poses, at), whole), all_began
     reason = f"only {len(kept)} of {len(tried)} scans hang together"
-    loop = verdict(keyframes, tried, seen_before, centre, False, reason, 0.0)
+    loop = verdict(keyframes, tried, from_other_visit, centre, False, reason, 0.0)
     return LocalMatch((), None, loop, 0.0, False), all_began
 
 
@@ -227,16 +229,16 @@ def _relation(
 def verdict(
     keyframes: Sequence[Keyframe],
     members: Indices,
-    seen_before: NDArray[np.bool_],
+    from_other_visit: NDArray[np.bool_],
     centre: int,
     accepted: bool,
     reason: str,
     score: float,
 ) -> Loop | None:
     """The verdict on the first keyframe of another visit, and the centre."""
-    if not seen_before.any():
+    if not from_other_visit.any():
         return None
-    first = members[np.argmax(seen_before)]
+    first = members[np.argmax(from_other_visit)]
     return Loop((keyframes[first].row, keyframes[centre].row), accepted, reason, score)
 
 

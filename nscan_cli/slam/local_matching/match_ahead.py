@@ -1,7 +1,7 @@
-"""Step 3 ahead of its turn: the next matches are made beside other work, as if the graph stayed as it is.
+"""Step 3 ahead of its turn: another thread makes the next matches, assuming that the graph does not move.
 
-At its turn a match counts if it is the very one that would be made then. So the graph is the same on any
-number of threads.
+At its turn a match counts only if its input is still the same. So the graph is the same with any number of
+threads.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ class MatchAhead:
         self._begun: dict[int, _Begun] = {}
 
     def open(self) -> None:
-        """From now on another thread, if there is one, has the time to make them: tracking is through."""
+        """Begin matches from now on, as tracking no longer needs the other thread."""
         self._pool = ThreadPoolExecutor(1) if self._threads > 1 else None
 
     def match(self, route: Route, centre: int, near: Neighbours) -> LocalMatch | None:

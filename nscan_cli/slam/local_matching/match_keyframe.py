@@ -21,7 +21,7 @@ def match_keyframe(
     # The newest keyframe may still collect scans.
     ahead.begin(route, len(state.keyframes) - 1, centre, neighbours, state.coverage)
     local_match = _verified(state, centre, ahead.match(route, centre, neighbours))
-    tried = route.rows[neighbours.tried].tolist()
+    tried = route.rows[neighbours.members].tolist()
     state.coverage.add(int(route.rows[centre]), tried, local_match)
     if local_match is not None:
         add_relations(state, local_match)

@@ -15,12 +15,12 @@ from nscan_cli.slam.local_matching.options import NScanOptions
 class Neighbours(NamedTuple):
     """The keyframes for a match."""
 
-    tried: Indices
-    """(n,), increasing."""
-    seen_before: NDArray[np.bool_]
-    """(n,) which are of another visit."""
+    members: Indices
+    """(n,) keyframes of the match, increasing."""
+    from_other_visit: NDArray[np.bool_]
+    """(n,) whether each is of another visit."""
     visits: int
-    """How often the path came by here before."""
+    """Number of earlier visits here."""
 
 
 def choose_neighbours(poses: Array, paths: Array, centre: int, options: NScanOptions) -> Neighbours:
@@ -47,7 +47,7 @@ def _choose(
     first_visits: int,
     most: int,
 ) -> tuple[Indices, NDArray[np.bool_], int]:
-    """What choose_nearby returns. Another visit is one more than `recent` (m) of path away from the last."""
+    """What choose_neighbours returns. Another visit is over `recent` (m) of path away from the last."""
     near, distances = np.empty(len(poses), dtype=np.int64), np.empty(len(poses))
     before, left_out = np.empty(len(poses), dtype=np.bool_), np.empty(len(poses), dtype=np.bool_)
     n = visits = others = 0

@@ -51,8 +51,8 @@ def match_neighbours_pairwise(
     is. None when no other keyframe is near.
     """
     keyframes = route.keyframes
-    others = near.tried != centre
-    tried, seen_before = near.tried[others], near.seen_before[others]
+    others = near.members != centre
+    tried, from_other_visit = near.members[others], near.from_other_visit[others]
     if len(tried) == 0:
         return None
     singles = [_match(route, int(other), centre, options) for other in tried]
@@ -60,17 +60,17 @@ def match_neighbours_pairwise(
     kept = overlaps >= options.min_overlap
     relations = tuple(
         _relation(keyframes[other], keyframes[centre], single, "loop" if seen else "track")
-        for other, seen, single, keep in zip(tried, seen_before, singles, kept, strict=True)
+        for other, seen, single, keep in zip(tried, from_other_visit, singles, kept, strict=True)
         if keep
     )
-    closed, whole = bool((kept & seen_before).any()), bool(kept.all())
+    closed, whole = bool((kept & from_other_visit).any()), bool(kept.all())
     if closed:
         reason = "" if whole else f"{counted(int((~kept).sum()), 'scan')} left out"
     else:
-        reason = f"too little overlap with {counted(int(seen_before.sum()), 'scan')} of another visit"
-    best = float(overlaps[seen_before].max(initial=0.0))
+        reason = f"too little overlap with {counted(int(from_other_visit.sum()), 'scan')} of another visit"
+    best = float(overlaps[from_other_visit].max(initial=0.0))
     used = kept if closed else np.ones(len(tried), dtype=bool)
-    loop = verdict(keyframes, tried[used], seen_before[used], centre, closed, reason, best)
+    loop = verdict(keyframes, tried[used], from_other_visit[used], centre, closed, reason, best)
     moved = max((single.moved for single, keep in zip(singles, kept, strict=True) if keep), default=0.0)
     return LocalMatch(relations, None, loop, moved, whole)
 

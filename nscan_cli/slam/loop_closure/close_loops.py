@@ -24,7 +24,7 @@ def close_loops(
     if not state.options.nscan.loops or (loop is not None and loop.reason == TOO_LITTLE):
         return
     is_refused = loop is not None and not loop.accepted
-    left_out = neighbours.tried[neighbours.seen_before & is_refused]
+    left_out = neighbours.members[neighbours.from_other_visit & is_refused]
     places = state.detector.close(state.route, centre, left_out, state.loop_relations)
     if not places:
         return

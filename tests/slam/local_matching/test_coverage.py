@@ -122,12 +122,12 @@ def test_what_is_assumed_counts_and_leaves_the_coverage_beneath_as_it_was():
     above, options = Coverage(beneath=covered), NScanOptions()
     near = choose_neighbours(route.poses, route.paths, 210, options)
     above.assume(route, 210, near)
-    assert above.share(10 * 210, (10 * near.tried).tolist()) == 1.0
+    assert above.share(10 * 210, (10 * near.members).tolist()) == 1.0
     assert not due(route, above, 212)
     assert due(route, covered, 212)
     over = Coverage(beneath=above)
     assert not due(route, over, 212)
-    assert over.share(10 * 210, (10 * near.tried).tolist()) == 1.0
+    assert over.share(10 * 210, (10 * near.members).tolist()) == 1.0
 
 
 def centres(run: Mapped) -> set[int]:

@@ -43,7 +43,7 @@ def test_of_other_visits_the_first_take_part():
 
     def visits_beside(centre: int, options: NScanOptions) -> set[int]:
         near = choose_neighbours(poses, paths, centre, options)
-        return set((near.tried[near.seen_before] // 11).tolist())
+        return set((near.members[near.from_other_visit] // 11).tolist())
 
     all_of_them = dataclasses.replace(OPTIONS, max_other_visits=99)
     assert visits_beside(60, all_of_them) == {2, 3, 4}
