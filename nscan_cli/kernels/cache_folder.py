@@ -115,16 +115,15 @@ def _candidates() -> Iterator[Path]:
 
 
 def _sources_hash() -> str:
-    """Hash of the package's path, and of the paths and bytes of all its files with kernels.
+    """Hash of the package's path, and of the paths and bytes of all its files with kernels or NamedTuples.
 
     The package's path is part of it because numba caches each copy of a file separately.
     """
     digest = hashlib.sha256(os.fsencode(PACKAGE) + b"\0")
     for path in sorted(PACKAGE.rglob("*.py")):
         text = path.read_bytes()
-        if (
-            path.relative_to(PACKAGE).as_posix() in COMPILER_SOURCES
-            or b"nscan_cli.kernels.decorators import" in text
-        ):
+        # Kernels take NamedTuples of options, which files without kernels define.
+        decides = b"nscan_cli.kernels.decorators import" in text or b"(NamedTuple)" in text
+        if decides or path.relative_to(PACKAGE).as_posix() in COMPILER_SOURCES:
             digest.update(f"{path.relative_to(PACKAGE)}\0{len(text)}\0".encode() + text)
     return digest.hexdigest()[:16]

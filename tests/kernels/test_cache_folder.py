@@ -90,7 +90,7 @@ def test_a_changed_kernel_file_changes_the_folder_and_no_other_file_does(places,
     with (package / "cli" / "main.py").open("a") as file:
         file.write("# changed\n")
     assert chosen() == before
-    for maker in ("mapping/ray_casting.py", "kernels/machine_code.py"):
+    for maker in ("mapping/ray_casting.py", "kernels/machine_code.py", "slam/frontend/options.py"):
         with (package / maker).open("a") as file:
             file.write("# changed\n")
         assert chosen() not in (None, before)
