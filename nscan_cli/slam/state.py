@@ -80,10 +80,8 @@ class SlamState:
             odometry, jumps = without_jumps(odometry, log.times, options.odometry_checks)
         seen = log.ranges[log.ranges < options.tracking.max_range]
         median_range = float(np.median(seen)) if len(seen) else 0.0
-        keyframes, chain = (
-            Keyframes(options.keyframes, options.nscan.gaussians, median_range),
-            list[Pairwise](),
-        )
+        keyframes = Keyframes(options.keyframes, options.nscan.gaussians, median_range)
+        chain: list[Pairwise] = []
         route = route_of(keyframes.list, chain, np.zeros((0, 3)))
         frozen = frozen_scans(log, odometry, options.odometry_checks)
         return cls(log, options, threads, odometry, jumps, frozen, keyframes, route, chain)

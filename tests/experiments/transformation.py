@@ -14,6 +14,7 @@ from typing import Protocol
 import numpy as np
 
 from nscan_cli.graph.model import Graph, NScan, Pairwise
+from nscan_cli.graph.optimise.graph_energy import GraphEnergy
 from nscan_cli.graph.optimise.graph_solver import Optimum, StopOptions, optimise_poses
 from nscan_cli.logs.load import read_log
 from nscan_cli.poses import Array, Indices, compose, relative
@@ -129,12 +130,17 @@ class Minimiser(Protocol):
     def __call__(self, poses: Array, /, *, max_iterations: int) -> Optimum: ...
 
 
+def _optimised(energy: GraphEnergy, poses: Array, /, *, max_iterations: int) -> Optimum:
+    """The tool's own optimisation."""
+    return optimise_poses(energy, poses, StopOptions(max_iterations, TOLERANCE))
+
+
 def ways(problem: Problem) -> Iterator[tuple[str, str, Minimiser]]:
     """The mapping, the gauge in the relations' Hessians, and the function that minimises."""
     yield (
         "follows c, as in the tool",
         "either",
-        functools.partial(optimise_poses, problem.chosen, stop=StopOptions(tolerance=TOLERANCE)),
+        functools.partial(_optimised, problem.chosen),
     )
     yield "follows c, Gauss–Newton", "either", functools.partial(minimise, problem.chosen)
     for c_held, gauge in ((False, FREE), (True, C_HELD)):

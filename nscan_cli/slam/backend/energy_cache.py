@@ -1,4 +1,4 @@
-"""The energy of a graph that grows (paper, V), or of some of its relations."""
+"""A cache of the terms of a growing graph's energy (paper, V)."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from nscan_cli.slam.keyframes.route import Route
 
 
 class EnergyCache:
-    """Energies of the keyframes of a route in a log of `scans` scans. The terms of relations are kept."""
+    """Energies of the keyframes of a route in a log of `scans` scans. The terms of relations are cached."""
 
     def __init__(self, scans: int) -> None:
         self._scans, self._terms = scans, TermCache()
@@ -30,7 +30,7 @@ class EnergyCache:
         fixed: int = 0,
         free: NDArray[np.bool_] | None = None,
     ) -> GraphEnergy:
-        """The energy of all keyframes. `fixed` is held, and so are those that are not `free` (K,)."""
+        """The energy of all keyframes. `fixed` is held, and so are the keyframes that are not `free` (K,)."""
         positions = np.full(self._scans, -1)
         positions[route.rows] = np.arange(len(route.rows))
         return GraphEnergy(len(route.rows), relations, positions, fixed, self._terms, free)

@@ -1,4 +1,4 @@
-"""Step 5 of the loop (paper, IV and V): the global poses of the keyframes from all relations."""
+"""Optimisation of the keyframes' global poses from all relations (paper, IV and V: step 5 of the loop)."""
 
 from __future__ import annotations
 

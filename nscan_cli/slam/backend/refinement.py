@@ -1,8 +1,8 @@
-"""Step 6 of the loop: the matches of step 3 again, from the poses that all relations together have found.
+"""Refinement: all local matches are made again from the optimised poses (step 6 of the loop).
 
-A match made while the graph grew knew only earlier scans, and started from poses that later loops have
-corrected. From the final poses, and with the scans of all visits, some find a better place. The graph moves,
-and keyframes whose neighbours have moved are matched again.
+A match that was made while the graph grew knew only earlier scans, and started from poses that later loops
+corrected. From the final poses, and with the scans of all visits, some matches find a better optimum. Then
+the graph moves, and keyframes whose neighbours have moved are matched again.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ from nscan_cli.threads import map_in_threads
 
 
 def refine(state: SlamState) -> None:
-    """Make the matches again, until they move nothing that was matched. Changes relations, loops, route."""
+    """Make the local matches again, until they move no member. Changes relations, loops, route."""
     options = state.options
     # The poses are right to centimetres: the last stage is all it takes.
     last = replace(options.nscan, widenings=options.nscan.widenings[-1:])
@@ -45,7 +45,7 @@ def refine(state: SlamState) -> None:
 
 
 class Refinement:
-    """The relations about all keyframes, each as of the poses that it was last matched from."""
+    """The relations about all keyframes, each from the poses of its last match."""
 
     def __init__(
         self,
@@ -88,9 +88,9 @@ class Refinement:
         return matched
 
     def _uncovered(self, route: Route, waiting: Mapping[int, Neighbours]) -> dict[int, Neighbours]:
-        """The centres to match next of those that wait, with the keyframes near each.
+        """The centres to match next among the waiting ones, with their neighbours.
 
-        Each match is assumed to relate all its keyframes. Where one does not, the next choice makes up.
+        Each match is assumed to relate all its members. If one does not, the next choice makes up for it.
         """
         chosen, covered = {}, Coverage(beneath=self._covered)
         for centre, near in waiting.items():
@@ -125,7 +125,7 @@ class Refinement:
 
 @kernel
 def _farthest_moved(before: Array, after: Array, centre: int) -> float:
-    """How far (m, rad) some pose (n, 3) moved in x, y or φ, seen from the one of the centre."""
+    """The largest motion (m, rad) of a pose (n, 3) in x, y or φ, as seen from the centre's pose."""
     farthest, was, now = 0.0, np.empty(3), np.empty(3)
     for k in range(len(before)):
         relative_pose(before[k], before[centre], was)

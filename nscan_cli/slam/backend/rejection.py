@@ -1,4 +1,4 @@
-"""Step 6 of the loop: loops that contradict the rest of the graph are taken back."""
+"""Rejection of loops that contradict the graph; graph/optimise/robust.py decides which do (step 6)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The poses of all scans from those of the keyframes: what the graph corrects, all scans in between share."""
+"""The final poses of all scans, which follow the correction of the keyframes on either side."""
 
 from __future__ import annotations
 
@@ -18,13 +18,14 @@ def between_keyframes(
     breaks: Sequence[int] = (),
     metres_per_radian: float = OptimisationOptions.metres_per_radian,
 ) -> Array:
-    """(S, 3) poses of all scans: as tracked (S, 3) from the keyframes (K,) on either side, blended.
+    """(S, 3) poses of all scans: tracked poses (S, 3) that are moved with the keyframes (K,) on either side,
+    blended.
 
-    `poses` (K, 3) are the keyframes' global poses. Seen from the keyframe before and from the one after,
-    a scan has two poses when the graph moved the two against each other. The closer one on the path
-    counts for more, so that the path bends and does not break at a keyframe. Over the `breaks` of the
-    track, which are keyframes, it does: the scans before belong to the keyframe before. A turn by 1 rad
-    counts as `metres_per_radian` (m) of path.
+    `poses` (K, 3) are the keyframes' global poses. If the graph moved two keyframes against each other, a
+    scan between them has two poses, one as seen from each. The nearer keyframe along the path has the larger
+    weight, so that the path bends smoothly. At the `breaks` of the track, which are keyframes, the path is
+    cut: the scans before belong to the keyframe before. A turn by 1 rad counts as `metres_per_radian` (m) of
+    path.
     """
     scans = np.arange(len(tracked))
     before = np.searchsorted(keyframes, scans, side="right") - 1

@@ -1,7 +1,7 @@
-"""Step 5 while the graph grows (paper, V): when it is optimised, and how much of it.
+"""The schedule of optimisation while the graph grows: when, and how much of the graph (paper, V: step 5).
 
-A small graph is always optimised as a whole, of a large one mostly the part near the new keyframes: the time
-grows in proportion to the log.
+A small graph is always optimised as a whole, a large one mostly near the new keyframes. So the time grows in
+proportion to the log.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from nscan_cli.slam.keyframes.route import Route
 
 
 class OptimisationSchedule:
-    """How the graph has changed since it was optimised, and since it was as a whole."""
+    """How much the graph has changed since it was optimised, in part and as a whole."""
 
     def __init__(self, options: ScheduleOptions) -> None:
         self.options = options

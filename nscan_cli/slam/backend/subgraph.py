@@ -1,7 +1,7 @@
 """Parts of a graph that is too large to be solved as a whole each time that it has grown (paper, V).
 
-New relations move what is near them. What lies far away is held meanwhile, or left out where it is asked how
-much is known: it could only tell more.
+New relations move what is near them. Keyframes far away are held meanwhile. For a question about uncertainty
+they are left out; they could only lower it.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ Chosen = NDArray[np.bool_]
 
 
 class Subgraph(NamedTuple):
-    """Keyframes that can move, and the relations that count."""
+    """The keyframes that can move, and the relations that count."""
 
     relations: Sequence[Relation]
     free: Chosen | None = None
@@ -30,7 +30,7 @@ class Subgraph(NamedTuple):
 
 
 def held_by_others(route: Route, relations: Sequence[Relation], free: Chosen) -> Subgraph:
-    """The `free` keyframes, with all relations that one of them has a part in."""
+    """The `free` keyframes, with all relations that contain one of them."""
     nodes = frozenset(route.rows[free].tolist())
     return Subgraph([relation for relation in relations if not nodes.isdisjoint(relation.nodes)], free)
 
@@ -38,7 +38,7 @@ def held_by_others(route: Route, relations: Sequence[Relation], free: Chosen) ->
 def without_others(
     route: Route, way: Sequence[Relation], loops: Sequence[Relation], wanted: Chosen
 ) -> Subgraph:
-    """The `wanted` keyframes with those that loops tie to them, and the relations among all these.
+    """The `wanted` keyframes, those that loops tie to them, and the relations among all these.
 
     `way[k]` leads from keyframe k to k + 1.
     """
@@ -50,7 +50,7 @@ def without_others(
 
 
 def nearest_keyframes(poses: Array, first: int, end: int, most: int) -> Chosen:
-    """Those of K poses (K, 3), so many at most, that lie nearest to any of those from `first` to `end`."""
+    """At most so many of K poses (K, 3), those nearest to any of those from `first` to `end`."""
     order = np.argsort(_distances(poses, first, end), kind="stable")
     chosen = np.zeros(len(poses), dtype=np.bool_)
     chosen[order[:most]] = True
@@ -59,7 +59,7 @@ def nearest_keyframes(poses: Array, first: int, end: int, most: int) -> Chosen:
 
 @kernel
 def _distances(poses: Array, first: int, end: int) -> Array:
-    """(K,) squared (m²), to the nearest of those from `first` to `end`."""
+    """(K,) squared distances (m²) to the nearest of those from `first` to `end`."""
     distances = np.full(len(poses), np.inf)
     for k in range(len(poses)):
         for other in range(first, end):

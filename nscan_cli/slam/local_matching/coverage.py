@@ -12,7 +12,8 @@ from nscan_cli.slam.local_matching.options import NScanOptions
 
 
 class Coverage:
-    """Pairs of keyframes, by their nodes. Those of the coverage `beneath` count too; it is not changed."""
+    """Pairs of keyframes that matches relate, by their nodes. Pairs of the coverage `beneath` count too; it
+    is not changed."""
 
     def __init__(self, beneath: Coverage | None = None) -> None:
         self._partners: defaultdict[int, set[int]] = defaultdict(set)
@@ -20,11 +21,12 @@ class Coverage:
         self._beneath = beneath
 
     def is_due(self, route: Route, centre: int, near: Neighbours, options: NScanOptions) -> bool:
-        """Whether a match about `centre` with the keyframes near would tell something new.
+        """Whether a match about `centre` with its neighbours would add new relations.
 
-        Not where other matches hold most of its pairs. Nor, from the third visit on, when a joint match that
-        closed a loop has a centre so near along the path that both would take in some of the same keyframes
-        of this visit: going round and round, the graph would become no better, and ever harder to solve.
+        It is not due where other matches hold most of its pairs. From the third visit on, it is not due
+        either if a joint match that closed a loop has a centre so near along the path that both would contain
+        the same keyframes of this visit. On repeated rounds such matches would not improve the graph, and
+        only make it harder to solve.
         """
         if near.visits > 1:
             half = options.max_scans // 2
@@ -36,12 +38,12 @@ class Coverage:
         )
 
     def share(self, centre: int, others: Iterable[int]) -> float:
-        """The share of the pairs of `centre` with each of the others that are there; 1 without any other."""
+        """The share of covered pairs among those of `centre` and each of the others; 1 without others."""
         others = {*others} - {centre}
         return 1.0 if not others else (len(others) - len(self._lacking(centre, others))) / len(others)
 
     def add(self, centre: int, others: Collection[int], nearby: LocalMatch | None) -> None:
-        """Add a match of `centre` with others that was tried, and the relations that it gave."""
+        """Add the pairs of a match about `centre` with its members, and the relations that the match gave."""
         self._partners[centre].update(others)
         for other in others:
             self._partners[other].add(centre)
@@ -53,7 +55,7 @@ class Coverage:
             self._closed.add(centre)
 
     def assume(self, route: Route, centre: int, near: Neighbours) -> None:
-        """Add a match of `centre` that is to be made, as if it related all neighbours."""
+        """Add the pairs of a match about `centre` that is still to be made, as if it related all members."""
         self._relate(route.rows[near.members].tolist())
         if near.from_other_visit.any():
             self._closed.add(int(route.rows[centre]))

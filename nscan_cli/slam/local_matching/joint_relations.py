@@ -1,4 +1,4 @@
-"""Step 3 of the loop (paper, V): the joint match of a keyframe with those near it, as one relation."""
+"""Joint matching of a keyframe with its neighbours, as one nScan relation (paper, V: step 3 of the loop)."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from nscan_cli.slam.local_matching.options import NScanOptions
 
 @dataclass(frozen=True)
 class LocalMatch:
-    """What the match of a keyframe with those near it gave: a joint one, or single ones."""
+    """The result of matching a keyframe with its neighbours, jointly or one by one."""
 
     pairwise: tuple[Pairwise, ...]
     """The relations of single matches."""
@@ -62,10 +62,10 @@ MatchNearby = Callable[[Route, int, Neighbours, NScanOptions], LocalMatch | None
 
 
 def match_neighbours(route: Route, centre: int, near: Neighbours, options: NScanOptions) -> LocalMatch | None:
-    """Match a keyframe jointly with those `near` it, with the relations of the chain among them as priors.
+    """Match a keyframe jointly with its neighbours. The relations of the chain among them are priors.
 
-    Scans that do not hang together with the `centre` by overlaps are left out, and the others matched
-    again. None when there are too few keyframes near.
+    Scans without enough overlap with the `centre`, directly or through others, are left out, and the rest are
+    matched again. None if too few keyframes are near.
     """
     if len(near.members) < options.min_scans:
         return None
@@ -79,13 +79,13 @@ def match_neighbours(route: Route, centre: int, near: Neighbours, options: NScan
 
 
 def of_this_visit(route: Route, centre: int, options: NScanOptions) -> NDArray[np.bool_]:
-    """(K,) whether the path came by not long before or after keyframe `centre`."""
+    """(K,) whether each keyframe belongs to the visit of keyframe `centre`, along the path."""
     this: NDArray[np.bool_] = np.abs(route.paths - route.paths[centre]) <= options.visit_path
     return this
 
 
 def visit_moved(route: Route, centre: int, place: Array, options: NScanOptions) -> Array:
-    """The poses (K, 3) with keyframe `centre` at a place (3,), and its visit moved with it as a whole."""
+    """The poses (K, 3) with keyframe `centre` at a place (3,), and its visit moved with it rigidly."""
     moved, visit = route.poses.copy(), of_this_visit(route, centre, options)
     moved[visit] = compose(place, relative(moved[visit], route.poses[centre]))
     return moved
@@ -94,10 +94,11 @@ def visit_moved(route: Route, centre: int, place: Array, options: NScanOptions) 
 def match_at(
     route: Route, centre: int, places: Sequence[Array], options: NScanOptions
 ) -> list[tuple[float, Array]]:
-    """Joint matches from several places (3,) of the centre: the energy of each, and where the centre is then.
+    """Joint matches that start with the centre at several places (3,): the energy of each, and the centre's
+    pose there.
 
-    This visit is moved to each place as a whole, others stay. All are of the same scans, those that are near
-    at any of the places, so that the lowest energy tells which place is right.
+    The visit of the centre is moved to each place rigidly; others stay. All matches have the same scans,
+    those that are near at any of the places, so that their energies can be compared.
     """
     starts = [visit_moved(route, centre, place, options) for place in places]
     near = [choose_neighbours(start, route.paths, centre, options).members for start in starts]
@@ -121,10 +122,10 @@ def _match_held(
     widenings: tuple[float, ...],
     options: NScanOptions,
 ) -> tuple[LocalMatch, bool]:
-    """Match jointly, leave out what does not hang together, and match again, until all does.
+    """Match jointly, leave out scans without enough overlap, and match again, until all scans hang together.
 
-    Returns as well whether other stages can hold no more together: it converged, and all scans took part at
-    first. What was left out after that hardly ever comes back.
+    Also returns whether further stages cannot add scans: the match converged, and all scans took part at
+    first. Scans that are left out later hardly ever come back.
     """
     keyframes, poses = route.keyframes, route.poses
     kept, start, scans = np.arange(len(tried)), poses[tried], _laid_out(keyframes, tried)
@@ -200,7 +201,7 @@ def _stages(widenings: tuple[float, ...], options: NScanOptions) -> JointOptions
 
 
 def scale_of(keyframes: Sequence[Keyframe], options: NScanOptions) -> float:
-    """What the energy of some keyframes' scans is multiplied with to be a negative log likelihood."""
+    """The factor that makes the energy of some keyframes' scans a negative log likelihood."""
     return options.scale_per_cell / points_per_cell(keyframes)
 
 
@@ -235,7 +236,7 @@ def verdict(
     reason: str,
     score: float,
 ) -> Loop | None:
-    """The verdict on the first keyframe of another visit, and the centre."""
+    """The verdict on the loop between the first keyframe of another visit and the centre."""
     if not from_other_visit.any():
         return None
     first = members[np.argmax(from_other_visit)]
@@ -244,7 +245,7 @@ def verdict(
 
 @kernel
 def moved_by(before: Array, after: Array, fixed: int) -> float:
-    """How far (m) some pose (n, 3) moved, seen from one of them."""
+    """The largest motion (m) of a pose (n, 3), as seen from one of the poses."""
     farthest, was, now = 0.0, np.empty(3), np.empty(3)
     for k in range(len(before)):
         relative_pose(before[k], before[fixed], was)

@@ -32,7 +32,8 @@ class _Begun(NamedTuple):
 
 
 class MatchAhead:
-    """The matches about the keyframes to come. To be used with `with`; none is begun until it is opened."""
+    """Matches about the next keyframes, made ahead in another thread. A context manager; none begins before
+    `open`."""
 
     def __init__(self, match: MatchNearby, options: NScanOptions, threads: int) -> None:
         self._match, self._options, self._threads = match, options, threads
@@ -40,11 +41,11 @@ class MatchAhead:
         self._begun: dict[int, _Begun] = {}
 
     def open(self) -> None:
-        """Begin matches from now on, as tracking no longer needs the other thread."""
+        """Begin matches from now on: tracking no longer needs the other thread."""
         self._pool = ThreadPoolExecutor(1) if self._threads > 1 else None
 
     def match(self, route: Route, centre: int, near: Neighbours) -> LocalMatch | None:
-        """The match of keyframe `centre` with those `near` it, whether it has been begun or not."""
+        """The match of keyframe `centre` with its neighbours, whether it has been begun or not."""
         begun = self._begun.pop(centre, None)
         # What waits still is as well made here.
         if begun is None or not np.array_equal(begun.route.poses, route.poses) or begun.match.cancel():
@@ -54,7 +55,7 @@ class MatchAhead:
         return begun.match.result()
 
     def _make_next(self) -> None:
-        """Make the first match that waits, in the time that another one takes."""
+        """Make the first match that waits, while another one is being made."""
         for keyframe, (route, near, match) in self._begun.items():
             if match.cancel():
                 made = completed_call(partial(self._match, route, keyframe, near, self._options))
@@ -69,10 +70,10 @@ class MatchAhead:
         near: Neighbours,
         covered: Coverage,
     ) -> None:
-        """Begin what comes after the match of keyframe `centre` with those `near`.
+        """Begin the matches that follow the one of keyframe `centre`.
 
-        So many keyframes of the route are `whole`; those that the graph does not have yet join it next. Every
-        match is taken to relate all that it is tried with.
+        The first `whole` keyframes of the route have all their scans; those that are not in the graph yet
+        join it next. Every match is assumed to relate all its members.
         """
         if self._pool is None:
             return
@@ -94,7 +95,7 @@ class MatchAhead:
                 self._begun[keyframe] = _Begun(longer, near, match)
 
     def _drop_outdated(self, route: Route, centre: int) -> None:
-        """Forget what is past, and what was begun before the graph moved."""
+        """Drop the matches of the past, and those that were begun before the graph moved."""
         for keyframe, begun in list(self._begun.items()):
             if keyframe < centre or not np.array_equal(begun.route.poses[: len(route.poses)], route.poses):
                 begun.match.cancel()

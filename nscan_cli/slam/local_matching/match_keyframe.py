@@ -1,4 +1,4 @@
-"""Step 3 of the loop (paper, V): a keyframe is matched, and its relations join the graph."""
+"""Matching of a keyframe and adding of its relations to the graph (paper, V: step 3 of the loop)."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def add_relations(state: SlamState, local_match: LocalMatch) -> None:
 
 
 def _verified(state: SlamState, centre: int, local_match: LocalMatch | None) -> LocalMatch | None:
-    """The match, or one without other visits and with the loop refused, if its place there is doubted."""
+    """The match. If its loop is doubted, a match without other visits, and the loop refused."""
     if local_match is None or local_match.loop is None:
         return local_match
     reason = state.detector.why_doubted(state.route, centre, local_match, state.loop_relations)

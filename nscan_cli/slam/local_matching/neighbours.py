@@ -1,4 +1,4 @@
-"""Step 3 of the loop (paper, V): which keyframes take part in the match of one."""
+"""The choice of the keyframes that are matched with a keyframe (paper, V: step 3 of the loop)."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from nscan_cli.slam.local_matching.options import NScanOptions
 
 
 class Neighbours(NamedTuple):
-    """The keyframes for a match."""
+    """The members of a match."""
 
     members: Indices
     """(n,) keyframes of the match, increasing."""
@@ -24,12 +24,12 @@ class Neighbours(NamedTuple):
 
 
 def choose_neighbours(poses: Array, paths: Array, centre: int, options: NScanOptions) -> Neighbours:
-    """The keyframes for a match about `centre`.
+    """Choose the members of a match about `centre`.
 
-    Poses (K, 3) are global ones, paths (K,) lengths of path. Of the keyframes within the radius, those
-    nearest are taken; half of the places are kept for other visits, further along the path or back,
-    unless the options leave these out. Of these the first take part: going round and round, what had other
-    corridors in view would else make room for what sees the same once more.
+    Poses (K, 3) are global, paths (K,) are lengths of path. The nearest keyframes within the radius are
+    taken. Half of the members are of other visits, unless the options leave these out. The first of the other
+    visits are preferred: on repeated rounds, scans from other corridors would else give way to scans that see
+    the same again.
     """
     first = options.max_other_visits if options.loops else 0
     return Neighbours(
@@ -47,7 +47,8 @@ def _choose(
     first_visits: int,
     most: int,
 ) -> tuple[Indices, NDArray[np.bool_], int]:
-    """What choose_neighbours returns. Another visit is over `recent` (m) of path away from the last."""
+    """The kernel of choose_neighbours. Keyframes more than `recent` (m) of path apart are of different
+    visits."""
     near, distances = np.empty(len(poses), dtype=np.int64), np.empty(len(poses))
     before, left_out = np.empty(len(poses), dtype=np.bool_), np.empty(len(poses), dtype=np.bool_)
     n = visits = others = 0

@@ -1,6 +1,6 @@
-"""Step 3 of the loop without joint matches: a keyframe matched with each of those near it alone.
+"""Pairwise matching of a keyframe with each of its neighbours (paper, V: step 3 of the loop).
 
-What nScan matching is compared with: the same scans are chosen, and the same energy of two of them is
+This is what nScan-Matching is compared with. The same scans are chosen, and the same energy of two scans is
 minimised, but each result is a pairwise relation of its own.
 """
 
@@ -45,10 +45,10 @@ class _Single:
 def match_neighbours_pairwise(
     route: Route, centre: int, near: Neighbours, options: NScanOptions
 ) -> LocalMatch | None:
-    """Match a keyframe with each of those near it, and keep the matches with overlap enough.
+    """Match a keyframe with each of its neighbours, and keep the matches with enough overlap.
 
-    Arguments as for match_neighbours. A loop is accepted when a match with some keyframe of another visit
-    is. None when no other keyframe is near.
+    Arguments as for match_neighbours. The loop is accepted if a match with a keyframe of another visit is
+    kept. None if no other keyframe is near.
     """
     keyframes = route.keyframes
     others = near.members != centre
@@ -76,7 +76,7 @@ def match_neighbours_pairwise(
 
 
 def _match(route: Route, other: int, centre: int, options: NScanOptions) -> _Single:
-    """The match of the centre with one other keyframe, from where the graph has them."""
+    """The match of the centre with one other keyframe, from their poses in the graph."""
     keyframes, poses = route.keyframes, route.poses
     reference, points = keyframes[other].ndt, keyframes[centre].points
     prior = _prior(route.chain, other, centre)
@@ -98,7 +98,8 @@ def _match(route: Route, other: int, centre: int, options: NScanOptions) -> _Sin
 
 
 def _prior(chain: Sequence[Pairwise], other: int, centre: int) -> Prior:
-    """What tracking says of the centre's pose in the other's frame; nothing unless one follows the other."""
+    """The prior of tracking on the centre's pose in the other's frame; no information unless one follows the
+    other."""
     if other == centre - 1:
         return Prior(chain[other].measurement, chain[other].information)
     if other == centre + 1:
@@ -110,7 +111,8 @@ def _prior(chain: Sequence[Pairwise], other: int, centre: int) -> Prior:
 
 
 def _overlap(other: Keyframe, centre: Keyframe, pose: Array, inlier_bound: float) -> float:
-    """As in matching.overlap, of two: `pose` (3,) is the centre's in the other's frame."""
+    """The overlap of two keyframes, as in matching.joint.overlap; `pose` (3,) is the centre's in the other's
+    frame."""
     ndt, own = other.ndt, centre.ndt
     on_other = inlier_share(ndt.grid, ndt.half, centre.points, pose, inlier_bound)
     on_centre = inlier_share(own.grid, own.half, other.points, inverse(pose), inlier_bound)

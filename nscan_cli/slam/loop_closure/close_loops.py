@@ -1,4 +1,4 @@
-"""Step 4 of the loop (paper, V): large loops are closed where a search finds an earlier visit."""
+"""Closing of large loops where a search finds an earlier visit (paper, V: step 4 of the loop)."""
 
 from __future__ import annotations
 

@@ -1,9 +1,9 @@
-"""Step 4 of the loop: large loops, where drift has carried the path away from a place seen before (paper, V).
+"""Detection of large loops, which drift has left open (paper, V: step 4 of the loop).
 
-A joint match needs a start within a metre. Where the graph knows less than that of how a keyframe lies to an
-older one that may be near, or a joint match has left out all scans of another visit, the place is searched.
-It counts when a second keyframe, searched by itself, agrees. A loop that a joint match has closed from such a
-start must stand the search too.
+A joint match needs a start within a metre. The place is searched where the graph knows less than that about
+how a keyframe lies to an older one, or where a joint match left out all scans of another visit. A place
+counts if a second keyframe, searched independently, agrees. The search also has to confirm a loop that a
+joint match closed from such a start.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ Loops = Callable[[], list[Relation]]
 
 
 class LoopDetector:
-    """The search for large loops, keyframe by keyframe; `energies` makes those of the graph."""
+    """The search for large loops, keyframe by keyframe. `energies` gives the energies of the graph."""
 
     def __init__(
         self, options: LoopClosureOptions, nscan: NScanOptions, match: MatchNearby, energies: EnergyCache
@@ -53,7 +53,7 @@ class LoopDetector:
         self._searched = -np.inf
 
     def extend(self, relation: Pairwise, length: float) -> None:
-        """Follow the chain by a relation over a way of `length` (m)."""
+        """Add a relation of the chain over a path of `length` (m)."""
         self.tracked_path.extend(relation, length)
 
     def close(
@@ -63,10 +63,10 @@ class LoopDetector:
         left_out: Indices,
         loops: Loops,
     ) -> list[Place]:
-        """The places of a keyframe, and of those before that agree with it, if they are enough, or none.
+        """The places of a keyframe and of earlier ones that agree with it. Empty if they are too few.
 
-        `left_out` (m,) are keyframes of another visit that the joint match about `centre` was tried with.
-        `loops` gives the relations that close loops so far.
+        `left_out` (m,) are keyframes of another visit that the joint match about `centre` left out. `loops`
+        gives the relations that close loops so far.
         """
         if route.paths[centre] - self._searched < self.options.search_interval:
             return []
@@ -102,9 +102,9 @@ class LoopDetector:
         nearby: LocalMatch,
         loops: Loops,
     ) -> str | None:
-        """Why the place is not sure that the joint match about `centre` has in an earlier visit, or None.
+        """Why the joint match about `centre` may be at a wrong place of an earlier visit, or None.
 
-        Arguments as for close. A match that began near enough, or closes no loop, is not doubted.
+        Arguments as for close. A match that started near enough, or closes no loop, is not doubted.
         """
         poses = route.poses
         tie = nearby.tie(int(route.rows[centre]))
@@ -137,7 +137,8 @@ class LoopDetector:
     ) -> RelativeSigma:
         """The uncertainty by the graph of the tracked path and all loops.
 
-        Of a large graph, the part nearest to the centre counts, and the paths to all that may be searched.
+        Of a large graph, only the part nearest to the centre counts, and the paths to all keyframes that may
+        be searched.
         """
         part = Subgraph([*self.tracked_path.relations, *loops()])
         if len(route.rows) > self.options.max_exact_keyframes:
@@ -150,7 +151,7 @@ class LoopDetector:
         return self._uncertainty.compute(energy, route.poses)
 
     def _farthest(self, sigma: RelativeSigma) -> Array:
-        """(K,) how far (m) keyframes are searched at most."""
+        """(K,) largest distance (m) at which each keyframe is searched."""
         return np.where(
             is_lost(sigma, self.options), self.options.max_distance_lost, self.options.max_distance
         )
@@ -160,14 +161,14 @@ class LoopDetector:
         return bool(self.options.sigmas * sigma.distance[keyframe] > self.options.match_reach)
 
     def refused(self) -> list[Loop]:
-        """The verdicts on what was not accepted."""
+        """The verdicts on places that were not accepted."""
         waiting = [(place.nearby.loop, reason) for place, reason in self._waiting]
         return self._refused + [
             replace(loop, accepted=False, reason=reason) for loop, reason in waiting if loop is not None
         ]
 
     def _near(self, route: Route, centre: int, sigma: RelativeSigma) -> Indices:
-        """The older keyframes that may be near, but may be too far off for a joint match."""
+        """The older keyframes that may be near and may be too far off for a joint match."""
         options, paths, away = self.options, route.paths, _distances_from(route, centre)
         bound = options.sigmas * sigma.distance
         may_be = away <= self.nscan.radius + np.minimum(bound, self._farthest(sigma))
@@ -181,7 +182,7 @@ class LoopDetector:
         near: Indices,
         sigma: RelativeSigma,
     ) -> Place | None:
-        """Search among the visit that most likely is near, or, when not even the direction is known, all."""
+        """Search among the visit that is most likely near. If not even the direction is known, search all."""
         away = _distances_from(route, centre)
         places, lost = [], is_lost(sigma, self.options)
         while len(near):
@@ -202,10 +203,10 @@ class LoopDetector:
         first: int,
         sigma: RelativeSigma,
     ) -> tuple[SearchOptions, Indices]:
-        """Where to search keyframe `centre` about an older one, the `first`, and among which (m,).
+        """Where to search keyframe `centre` about an older one, the `first`, and among which keyframes (m,).
 
-        These are what the graph knows well as seen from the first: the map that they make is in one piece.
-        `sigma` is that from the centre, for which it was computed last.
+        These are the keyframes that the graph knows well as seen from the first, so that their map is in one
+        piece. `sigma` is that from the centre, for which it was computed last.
         """
         options, paths, away = self.options, route.paths, _distances_from(route, centre)
         farthest = min(float(self._farthest(sigma)[first]), max(float(away.max()), options.max_distance))
@@ -219,11 +220,11 @@ class LoopDetector:
 
 
 def _distances_from(route: Route, centre: int) -> Array:
-    """(K,) how far keyframes lie from one of them, m."""
+    """(K,) distances of keyframes from one of them, m."""
     away: Array = np.hypot(*(route.poses[:, :2] - route.poses[centre, :2]).T)
     return away
 
 
 def _visit_overlap(place: Place) -> float:
-    """How well the scans of both visits hang together there."""
+    """The overlap of the scans of both visits in a match."""
     return 0.0 if place.nearby.loop is None else place.nearby.loop.score

@@ -1,6 +1,7 @@
 """An upper bound on the uncertainty of keyframes: that along the most certain path to each.
 
-All other relations of the graph can only lower it. It takes a hundredth of the time of the whole graph.
+All other relations of the graph can only lower it. The bound takes a hundredth of the time of the whole
+graph.
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ from nscan_cli.slam.keyframes.tracked_path import TrackedPath
 
 
 class Links(NamedTuple):
-    """E links between keyframes: what each says of one of them when the other is held."""
+    """E links between keyframes: the covariance that a relation gives one of them when the other is held."""
 
     held: Indices
     """(E,)"""
@@ -32,15 +33,15 @@ class Links(NamedTuple):
 
 
 class LinkCache:
-    """The links of a graph that grows. Those of its loops are kept, as long as new ones come after the
-    others; a loop is known by being the same object."""
+    """The links of a growing graph. Links of loops are kept as long as new loops come after the old ones; a
+    loop is recognised by its identity."""
 
     def __init__(self) -> None:
         self._loops: list[Relation] = []
         self._links = _concatenated([])
 
     def links(self, route: Route, way: TrackedPath, loops: Sequence[Relation]) -> Links:
-        """From each keyframe to the next along the way, and those of all loops."""
+        """The links of the chain, from each keyframe to the next, and those of all loops."""
         if len(loops) < len(self._loops) or not all(map(operator.is_, self._loops, loops)):
             self._loops, self._links = [], _concatenated([])
         new = [_links_of(loop, route.rows) for loop in loops[len(self._loops) :]]
@@ -51,13 +52,13 @@ class LinkCache:
 
 
 def _concatenated(parts: Sequence[Links]) -> Links:
-    """Links one after another."""
+    """Several Links as one."""
     none = Links(np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64), np.zeros((0, 3, 3)))
     return Links(*(np.concatenate(columns) for columns in zip(none, *parts, strict=True)))
 
 
 def _path_covariances(way: TrackedPath, poses: Array) -> Array:
-    """The covariances (len(way), 3, 3) of each keyframe's end of the way, in the global frame."""
+    """The covariances (len(way), 3, 3) of the end of each relation of the chain, in the global frame."""
     turned = np.zeros((len(way), 3, 3))
     cos, sin = np.cos(poses[: len(way), 2]), np.sin(poses[: len(way), 2])
     turned[:, 0, 0], turned[:, 0, 1], turned[:, 1, 0], turned[:, 1, 1] = cos, -sin, sin, cos
@@ -67,12 +68,12 @@ def _path_covariances(way: TrackedPath, poses: Array) -> Array:
 
 
 def _links_of(relation: Relation, rows: Indices) -> Links:
-    """From the pose that carries the mapping to each of the others; the same in all directions.
+    """Links from the pose that carries the mapping to each of the others, equal in all directions.
 
     The keyframes of the nodes are those in `rows` (K,).
 
-    A covariance is at most twice its diagonal. And a way that comes from one of the others and goes on to
-    another has the difference of two that depend on each other: at most twice the sum of their covariances.
+    A covariance is at most twice its diagonal. A path from one of the others to another contains the
+    difference of two dependent poses, at most twice the sum of their covariances.
     """
     term, nodes = relation.term(), np.searchsorted(rows, relation.nodes)
     others = np.delete(np.arange(len(nodes)), term.fixed)
@@ -92,7 +93,8 @@ def _links_of(relation: Relation, rows: Indices) -> Links:
 def most_certain_paths(links: Links, poses: Array, origin: int, lever_arm: float) -> tuple[Array, Indices]:
     """The most certain path from one pose to each of all (K, 3): covariances (K, 3, 3) along it, or inf.
 
-    And (K,) the pose before each on its path, −1 without any. Angles count at a distance of `lever_arm` (m).
+    Also returns (K,) the pose before each on its path, −1 without any. Angles count at a distance of
+    `lever_arm` (m).
 
     E. Dijkstra, "A note on two problems in connexion with graphs", 1959.
     """
@@ -121,7 +123,7 @@ def most_certain_paths(links: Links, poses: Array, origin: int, lever_arm: float
 
 @kernel
 def relations_on_paths(before: Indices, wanted: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Those wanted (K,) and all on the ways to them; `before` (K,) as of most_certain_paths."""
+    """The wanted keyframes (K,) and all on the paths to them; `before` (K,) as of most_certain_paths."""
     on = wanted.copy()
     for k in range(len(before)):
         here = k
@@ -133,7 +135,7 @@ def relations_on_paths(before: Indices, wanted: NDArray[np.bool_]) -> NDArray[np
 
 @kernel
 def _incident(links: Links, nodes: int) -> tuple[Indices, Indices]:
-    """The links at each node: where they begin (K + 1,), and they (2E,)."""
+    """The links at each node: where they begin (K + 1,), and their indices (2E,)."""
     count = links.held.shape[0]
     starts = np.zeros(nodes + 1, dtype=np.int64)
     for link in range(count):
@@ -151,7 +153,7 @@ def _incident(links: Links, nodes: int) -> tuple[Indices, Indices]:
 
 @kernel
 def _follow(links: Links, link: int, there: int, poses: Array, covariances: Array) -> None:
-    """C ← A C Aᵗ, A = [[1, 0, −d_y], [0, 1, d_x], [0, 0, 1]] over d; the link's own is at one end of it."""
+    """C ← A C Aᵗ plus the link's own covariance, A = [[1, 0, −d_y], [0, 1, d_x], [0, 0, 1]] over step d."""
     here = links.held[link] + links.other[link] - there
     moved = covariances[here].copy()
     if there == links.held[link]:

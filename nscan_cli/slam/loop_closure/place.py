@@ -12,7 +12,7 @@ from nscan_cli.slam.local_matching.joint_relations import LocalMatch
 
 @dataclass(frozen=True)
 class Place:
-    """A keyframe found at a place seen before."""
+    """A keyframe that was found at a place seen before."""
 
     old: int
     """A keyframe of the earlier visit."""
@@ -26,15 +26,16 @@ class Place:
     """The match of both visits."""
 
     def corrected(self, poses: Array, keyframe: int) -> Array:
-        """(3,) where a keyframe of this visit lies if the place is right, at the graph's poses (K, 3)."""
+        """(3,) pose of the centre if the place is right, at the graph's poses (K, 3)."""
         here = compose(poses[self.old], self.measured)
         return compose(here, relative(poses[keyframe], poses[self.centre]))
 
 
 def move_segment(route: Route, place: Place, breaks: Sequence[int]) -> Route:
-    """The route with the piece of the keyframe found moved there, if the track has broken since the place.
+    """The route with the segment of the found keyframe moved to the place, if the track has broken in
+    between.
 
-    `breaks` are rows of the log, increasing. The graph would find it too, but hardly from half a turn away.
+    `breaks` are rows of the log, increasing. Optimisation would hardly find it from half a turn away.
     """
     rows = route.rows.tolist()
     begins = [row for row in breaks if rows[place.old] < row <= rows[place.centre]]

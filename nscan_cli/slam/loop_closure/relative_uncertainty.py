@@ -1,4 +1,4 @@
-"""How far a keyframe may be from where the graph has it, seen from another one (paper, V: large loops)."""
+"""The uncertainty of a keyframe's pose as seen from another keyframe (paper, V: large loops)."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ class RelativeSigma(NamedTuple):
 
 
 class HeldPoseMarginals(NamedTuple):
-    """What a graph knows of its poses when one of them is held."""
+    """The marginals of a graph's poses when one of them is held."""
 
     held: int
     poses: Array
@@ -36,14 +36,14 @@ class HeldPoseMarginals(NamedTuple):
     """(K, 3, 3), 0 for the held one, inf for those that are not computed or that nothing holds."""
 
     def sigma(self) -> RelativeSigma:
-        """As seen from the held one."""
+        """Standard deviations as seen from the held pose."""
         return _sigma_of(self.covariances)
 
     def seen_from(self, other: int) -> RelativeSigma:
-        """As seen from another one, which is what would be known with that one held.
+        """Standard deviations as seen from another pose, as if that one were held.
 
-        With d from there to a pose and A = [[−1, 0, d_y], [0, −1, −d_x], [0, 0, −1]], a pose moves there by
-        its own motion plus A times that of the other.
+        With d from there to a pose and A = [[−1, 0, d_y], [0, −1, −d_x], [0, 0, −1]], a pose moves relative
+        to it by its own motion plus A times that of the other.
         """
         if other == self.held:
             return self.sigma()
@@ -92,15 +92,16 @@ def _sigma_of(covariances: Array) -> RelativeSigma:
 
 
 def _largest_eigenvalues(xx: Array, xy: Array, yy: Array) -> Array:
-    """The greater eigenvalues (K,) of covariances [[xx, xy], [xy, yy]]."""
+    """The largest eigenvalues (K,) of covariances [[xx, xy], [xy, yy]]."""
     return np.maximum(0.5 * (xx + yy) + np.hypot(0.5 * (xx - yy), xy), 0.0)
 
 
 class RelativeUncertainty:
-    """How uncertain all keyframes are as seen from one that moves on, without the whole graph each time.
+    """The uncertainty of all keyframes as seen from one that moves on, without solving the whole graph each
+    time.
 
-    Since the graph was last computed, the path is added as if only its own relations held it. That is never
-    too little, and costs next to nothing.
+    Since the last computation the path is added as if only its own relations held it. That never
+    underestimates, and costs next to nothing.
     """
 
     def __init__(self) -> None:
@@ -109,9 +110,9 @@ class RelativeUncertainty:
         self._marginals: HeldPoseMarginals | None = None
 
     def compute(self, energy: GraphEnergy, poses: Array) -> RelativeSigma:
-        """By the graph: (K,) from the keyframe at which its energy is fixed.
+        """By the graph: (K,) as seen from the keyframe at which its energy is fixed.
 
-        Where others are held too, theirs is the bound from that keyframe as it is.
+        If other keyframes are held too, theirs keep the bound from that keyframe.
         """
         self._marginals = held_pose_marginals(energy, poses)
         sigma = self._marginals.sigma()
@@ -126,7 +127,8 @@ class RelativeUncertainty:
         return self._marginals.seen_from(other)
 
     def tighten(self, origin: int, covariances: Array) -> RelativeSigma:
-        """Lower the last upper bound, of `origin`, by covariances (K, 3, 3), none of them too small."""
+        """Lower the last upper bound, of `origin`, by covariances (K, 3, 3), each of which is an upper bound
+        itself."""
         sigma = _sigma_of(covariances)
         distance = np.minimum(self._sigma.distance, sigma.distance)
         self._origin, self._sigma = (
@@ -152,10 +154,10 @@ class RelativeUncertainty:
 def _add_relation_variance(
     covariance: Array, measurement: Array, poses: Array, step: int, variances: Array
 ) -> None:
-    """Add to (K,) the greatest variances of positions up to `step`, seen from the end of its relation.
+    """Add to (K,) the largest variances of positions up to `step`, as seen from the end of its relation.
 
-    By what the relation is off: what lies v from its end, in its frame, moves by its shift and by its turn
-    times v turned by a right angle.
+    An error of the relation moves a point at v from its end, in its frame, by its shift, and by its turn
+    times v rotated by a right angle.
     """
     cos, sin = np.cos(poses[step, 2]), np.sin(poses[step, 2])
     for k in range(step + 1):

@@ -22,9 +22,10 @@ def search_input(
     window: SearchOptions,
     closing: LoopClosureOptions,
 ) -> tuple[Array, LikelihoodField] | None:
-    """The points (m, 2) around keyframe `centre`, in its frame, and the field of the `earlier` ones (m,).
+    """The points (m, 2) around keyframe `centre`, in its frame, and the likelihood field of the `earlier`
+    ones (m,).
 
-    None when one of them has no points.
+    None if one of them has no points.
     """
     keyframes, paths, poses = route.keyframes, route.paths, route.poses
     beside = np.flatnonzero(np.abs(paths - paths[centre]) <= closing.scan_path)
@@ -36,7 +37,7 @@ def search_input(
 
 
 def _cloud(keyframes: Sequence[Keyframe], chosen: NDArray[np.int64], poses: Array) -> Array:
-    """The points (m, 2) of the keyframes chosen (n,), at poses (n, 3)."""
+    """The points (m, 2) of the chosen keyframes (n,), at poses (n, 3)."""
     points = [keyframes[k].points for k in chosen.tolist()]
     cloud = np.concatenate([np.empty((0, 2)), *points])
     _transform_clouds(poses, np.array([len(each) for each in points], dtype=np.int64), cloud)
@@ -45,7 +46,7 @@ def _cloud(keyframes: Sequence[Keyframe], chosen: NDArray[np.int64], poses: Arra
 
 @kernel
 def _transform_clouds(poses: Array, counts: NDArray[np.int64], points: Array) -> None:
-    """Transform the points (m, 2), in place: so many (n,) by each of the poses (n, 3), eq. (1)."""
+    """Transform the points (m, 2) in place: the first sizes[0] by the first pose, and so on, eq. (1)."""
     end = 0
     for k in range(len(poses)):
         cos, sin = np.cos(poses[k, 2]), np.sin(poses[k, 2])

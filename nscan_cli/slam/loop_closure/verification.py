@@ -1,7 +1,7 @@
-"""Verification of loops: what a place that was found, or the loop of a joint match, has to stand.
+"""Verification of loops: tests for a place that a search found, and for the loop of a joint match.
 
-A place must stand alone: no other may fit nearly as well. The scans of both visits must match from there, and
-enough keyframes must find the same. A wrong loop is worse than a missed one.
+No other place may fit nearly as well, the scans of both visits must match from there, and enough keyframes
+must find the same place. A wrong loop is worse than a missed one.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ def verify_place(
     closing: LoopClosureOptions,
     nscan: NScanOptions,
 ) -> Place | Loop:
-    """The place `found` of keyframe `centre`, or why it is refused."""
+    """The place `found` of keyframe `centre` if it passes all tests, else the reason why it is refused."""
     keyframes, poses = route.keyframes, route.poses
     nodes = keyframes[int(earlier[0])].row, keyframes[centre].row
     rival = about.best(closing.rival_score * found.score, without=(found.pose, closing.rival_distance))
@@ -77,10 +77,9 @@ def why_match_doubted(
 ) -> str | None:
     """Why keyframe `centre` may lie elsewhere among the `earlier` ones (m,) than at `pose` (3,), or None.
 
-    A joint match ends at the optimum that is next. Along a corridor there is one at every door. Where the
-    search finds another place that fits about as well, a joint match from there, of the same scans, decides:
-    by the energy both ways, and exact to the centimetre, where the search has points in cells. Without
-    `nscan`, for single matches, the search has the last word.
+    A joint match ends at the nearest optimum; along a corridor there is one at every door. If the search
+    finds another place that fits about as well, a joint match from there, of the same scans, decides by the
+    energy of both, which is exact to the centimetre. Without `nscan`, for single matches, the search decides.
     """
     sought = search_input(route, centre, earlier, window, closing)
     if sought is None:
@@ -115,10 +114,10 @@ def places_agree(one: Place, other: Place, route: Route, options: LoopClosureOpt
 def why_too_few(
     agreeing: Sequence[Place], route: Route, sigma: RelativeSigma, options: LoopClosureOptions
 ) -> str | None:
-    """Why keyframes that agree on a place are too few, or None; `sigma` is that from the last of them.
+    """Why the keyframes that agree on a place are too few, or None; `sigma` is that from the last of them.
 
-    A place that is farther off than the path drifts is mostly one that looks alike, while the right one
-    has never been seen. What looks alike ends somewhere: scans far apart have to agree there.
+    A place farther off than the path drifts mostly only looks alike, while the right one has never been seen.
+    The likeness ends somewhere, so scans far apart have to agree there.
     """
     place, first = agreeing[-1], agreeing[0]
     lost = bool(is_lost(sigma, options)[place.old])
