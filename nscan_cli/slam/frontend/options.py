@@ -135,7 +135,7 @@ class TrackingParameters(NamedTuple):
         angles = np.full((len(rings), max(map(len, rings), default=0)), np.nan)
         for row, ring in zip(angles, rings, strict=True):
             row[: len(ring)] = ring
-        values: dict[str, Any] = {name: getattr(options, name, None) for name in cls._fields}
+        values: dict[str, Any] = {name: value for name, value in vars(options).items() if name in cls._fields}
         values |= {
             "half": 0.5 * options.gaussians.cell,
             "visible_range": max(range_limit - options.gaussians.cell, 0.5 * range_limit),
