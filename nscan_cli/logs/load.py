@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import os
 import re
+import traceback
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
@@ -130,7 +131,12 @@ def log_from(
         else:
             assert isinstance(data, bytes)
             reader: Reader = form.reader()
-            log = _with_warnings(reader.read(data, name, source, options), lost)
+            try:
+                log = _with_warnings(reader.read(data, name, source, options), lost)
+            except MemoryError as error:
+                # Python 3.11 can loop for ever at the end of a `with` block when no memory at all is left.
+                traceback.clear_frames(error.__traceback__)
+                raise
     _check_usable(log, even_unusable)
     return log
 
