@@ -50,6 +50,8 @@ class Database(Container, Protocol):
 
 
 DEFAULT_READING = ReadingOptions()
+RESERVED_MEMORY = 4 << 20
+"""Bytes that are freed when memory runs out, so that the error can be handled."""
 
 
 def read_log(
@@ -131,10 +133,12 @@ def log_from(
         else:
             assert isinstance(data, bytes)
             reader: Reader = form.reader()
+            # Python 3.11 can loop for ever at the end of a `with` block when no memory at all is left.
+            reserve = bytearray(RESERVED_MEMORY)
             try:
                 log = _with_warnings(reader.read(data, name, source, options), lost)
             except MemoryError as error:
-                # Python 3.11 can loop for ever at the end of a `with` block when no memory at all is left.
+                del reserve
                 traceback.clear_frames(error.__traceback__)
                 raise
     _check_usable(log, even_unusable)
