@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import gc
 import errno
 import gc
 import importlib
@@ -105,8 +104,6 @@ def run(arguments: list[str]) -> int:
     # Small matrices are slower with several threads, and last digits depend on the number of threads.
     for library in ("OPENBLAS", "MKL", "OMP"):
         os.environ.setdefault(f"{library}_NUM_THREADS", "1")
-    # Imports and logs make many objects and no cycles.
-    gc.set_threshold(100_000)
     try:
         if COMPLETION_VARIABLE in os.environ:
             from nscan_cli.cli.completion import add_completions
