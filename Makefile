@@ -4,7 +4,7 @@ VENV := .venv$(if $(filter-out python3,$(notdir $(PYTHON))),-$(notdir $(PYTHON))
 RUN := $(VENV)/bin
 READY := $(VENV)/.ready
 
-.PHONY: map test smoke lint samples figures pictures reference bench growth robustness lasers soak lowest lock clean
+.PHONY: map test smoke lint samples figures pictures reference bench growth robustness lasers consistency soak lowest lock clean
 
 map: $(READY)
 	mkdir -p out
@@ -44,6 +44,9 @@ growth: $(READY)
 
 robustness: $(READY)
 	$(RUN)/python -m tests.benchmarks.robustness docs/robustness.md
+
+consistency: $(READY)
+	$(RUN)/python -m tests.benchmarks.consistency docs/consistency.md
 
 lasers: $(READY)
 	$(RUN)/python -m tests.benchmarks.lasers docs/lasers.md

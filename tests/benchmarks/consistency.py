@@ -1,0 +1,164 @@
+"""Maps of the same drive that must be the same: `python -m tests.benchmarks.consistency OUT.md [LOG ...]`.
+
+Every recording in NSCAN_DATA is mapped with every scan, every second and every third one, mirrored, and
+backwards in time; with odometry and without. No truth is needed: the robot has driven the same. Compared is
+the distance that it came in windows of 6 s, at stamps that all of the runs have.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import os
+import sys
+from collections.abc import Sequence
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from nscan_cli.errors import NscanError
+from nscan_cli.logs.laser_log import LaserLog
+from nscan_cli.logs.load import read_log
+from nscan_cli.logs.reading_options import ReadingOptions
+from nscan_cli.poses import Array, relative
+from nscan_cli.slam.diagnostics.notices import notices
+from nscan_cli.slam.options import SlamOptions
+from nscan_cli.slam.pipeline import run_slam
+from nscan_cli.slam.state import SlamState
+from tests.data import REAL_LOGS
+from tests.experiments.output import table
+
+WINDOW = 6.0
+"""Length of a window, s."""
+NEAR, TURNED = 0.3, np.radians(15)
+"""Windows in which scans of the sparsest run are farther apart (m, rad) are left out: they may be lost."""
+RECORDINGS = ("*.log.gz", "*.mcap", "field/*.bag", "field/*.log", "field/*.db3", "field/rplidar-floor")
+
+
+@dataclass(frozen=True)
+class MappedPath:
+    """The path that one run found."""
+
+    times: Array
+    """(S,) s"""
+    poses: Array
+    """(S, 3)"""
+    breaks: int
+    told: bool
+    """Whether a notice says that something is wrong."""
+
+
+def mirrored(log: LaserLog) -> LaserLog:
+    """The log of the mirror image of the world: the x axes are the mirror."""
+    odometry = None if log.odometry is None else log.odometry * [1.0, -1.0, -1.0]
+    return dataclasses.replace(
+        log,
+        odometry=odometry,
+        mount=log.mount * [1.0, -1.0, -1.0],
+        angle_min=-log.angle_min,
+        angle_increment=-log.angle_increment,
+    )
+
+
+def backwards(log: LaserLog) -> LaserLog:
+    """The log read from its end to its beginning."""
+    order = np.arange(len(log) - 1, -1, -1)
+    return dataclasses.replace(
+        log,
+        numbers=log.numbers[order],
+        stamps=log.stamps[::-1],
+        times=(log.times[0] + log.times[-1] - log.times)[order],
+        ranges=log.ranges[order],
+        angle_min=log.angle_min[order],
+        angle_increment=log.angle_increment[order],
+        odometry=None if log.odometry is None else log.odometry[order],
+        beams=None if log.beams is None else log.beams[order],
+        mount=log.mount[order] if log.mount.ndim == 2 else log.mount,
+    )
+
+
+def mapped_path(path: str, every: int, change: str, odometry: bool) -> MappedPath | None:
+    """The path of a recording, changed in one way; None where there is nothing to map."""
+    try:
+        log = read_log(path, ReadingOptions(every=every))
+    except NscanError:
+        return None
+    if odometry and log.odometry is None:
+        return None
+    log = log if odometry else dataclasses.replace(log, odometry=None)
+    log = {"": lambda log: log, "mirrored": mirrored, "backwards": backwards}[change](log)
+    state = SlamState.of_log(log, SlamOptions())
+    graph = run_slam(state, lambda scans, keyframes: None)
+    times, poses = np.asarray(log.times), graph.poses
+    if change == "mirrored":
+        poses = poses * [1.0, -1.0, -1.0]
+    if change == "backwards":
+        times, poses = (log.times[0] + log.times[-1] - log.times)[::-1], poses[::-1]
+    return MappedPath(times, poses, len(state.breaks), bool(notices(state)))
+
+
+def differences(runs: Sequence[MappedPath]) -> tuple[float, float, float]:
+    """How far the distances over the windows differ, and where: 95 % quantile, greatest (m), its time (s).
+
+    The last of the runs is the sparsest one. nan where no window can be compared.
+    """
+    stamps = [np.round(run.times, 6) for run in runs]
+    common = stamps[0]
+    for each in stamps[1:]:
+        common = np.intersect1d(common, each)
+    paths = [run.poses[np.searchsorted(each, common)] for run, each in zip(runs, stamps, strict=True)]
+    steps = relative(runs[-1].poses[1:], runs[-1].poses[:-1])
+    apart = (np.hypot(steps[:, 0], steps[:, 1]) > NEAR) | (np.abs(steps[:, 2]) > TURNED)
+    gaps = runs[-1].times[1:][apart]
+    ends = np.searchsorted(common, common + WINDOW, side="right") - 1
+    whole = (common[ends] - common > 0.5 * WINDOW) & (
+        np.searchsorted(gaps, common[ends], side="right") == np.searchsorted(gaps, common, side="right")
+    )
+    if not whole.any():
+        return float("nan"), float("nan"), float("nan")
+    ways = np.array([np.linalg.norm(path[ends, :2] - path[:, :2], axis=1) for path in paths])
+    apart_by = np.where(whole, np.ptp(ways, axis=0), 0.0)
+    worst = int(apart_by.argmax())
+    at = float(common[worst] - common[0])
+    return float(np.quantile(apart_by[whole], 0.95)), float(apart_by[worst]), at
+
+
+def row(path: str, odometry: bool) -> list[str] | None:
+    """The line of one recording in the table."""
+    name = Path(path).name
+    runs = [mapped_path(path, every, "", odometry) for every in (1, 2, 3)]
+    first = runs[0]
+    if first is None or any(run is None for run in runs):
+        return None
+    found = [run for run in runs if run is not None]
+    cells = [name, "yes" if odometry else "no"]
+    changed = [mapped_path(path, 1, change, odometry) for change in ("mirrored", "backwards")]
+    for others in (found, *([first, run] for run in changed if run is not None)):
+        quantile, greatest, at = differences(others)
+        cells.append(f"{quantile:.3f} | {greatest:.3f} at {at:.0f} s")
+    cells.append(", ".join(str(run.breaks) for run in found))
+    cells.append("yes" if any(run.told for run in found) else "no")
+    return cells
+
+
+def main(out: str, names: Sequence[str]) -> None:
+    """Write the table as Markdown."""
+    folder = Path(os.environ.get("NSCAN_DATA", REAL_LOGS))
+    paths = sorted(str(path) for pattern in RECORDINGS for path in folder.glob(pattern))
+    paths = [path for path in paths if not names or Path(path).name in names]
+    jobs = [(path, odometry) for path in paths for odometry in (True, False)]
+    with ProcessPoolExecutor(2) as pool:
+        rows = [cells for cells in pool.map(row, *zip(*jobs, strict=True)) if cells is not None]
+    header = ["recording", "odometry"]
+    for way in ("every 1, 2, 3", "mirrored", "backwards"):
+        header += [f"{way}: 95 %, m", "greatest, m"]
+    lines = table((*header, "breaks", "told"), [" | ".join(cells).split(" | ") for cells in rows])
+    document = (__doc__ or "").replace(
+        "`python -m tests.benchmarks.consistency OUT.md [LOG ...]`", "`make consistency`"
+    )
+    Path(out).write_text(f"# Consistency\n\n{document}\n{lines}\n", encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main(sys.argv[1], sys.argv[2:])
