@@ -44,7 +44,7 @@ def match_from_other_angles(
     """
     pose, hessian = np.empty(3), np.empty((3, 3))
     for ring in range(settings.restart_angles.shape[0]):
-        if found.inliers[k] >= (settings.far_restart_inliers if ring > 0 else threshold):
+        if found.inliers[k] >= threshold - (settings.far_restart_margin if ring > 0 else 0.0):
             break
         counts[RESTARTS] += 1
         for angle in settings.restart_angles[ring]:

@@ -6,6 +6,7 @@ takes the best match all the same. The views of two scans from nearly the same p
 
 from __future__ import annotations
 
+from collections import deque
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -76,8 +77,12 @@ class SegmentTracker:
         """The last settled scan."""
         self._last_seeing: TrackedBatch | None = None
         """The last settled scan with points enough to compare views."""
+        self._usual: deque[float] = deque(maxlen=breaking.usual_scans)
+        """Shares of inliers of the last settled scans."""
         self._doubted: list[TrackedBatch] = []
         """Scans that may be the first of a new segment, one by one."""
+        self._unmatched: list[ScanBatch] = []
+        """The newest scans, which wait until the robot has moved: at most one batch."""
         self._waiting: list[TrackedBatch] | None = []
         """The first scans of a segment, until there are enough to place the first one; None from then on."""
 
@@ -93,8 +98,11 @@ class SegmentTracker:
 
     def follow(self, scans: ScanBatch) -> list[TrackedBatch]:
         """Track the next scans; returns those, in order, that are settled by it: not those still doubted."""
+        return self._follow(scans, may_wait=True)
+
+    def _follow(self, scans: ScanBatch, may_wait: bool) -> list[TrackedBatch]:
         settled: list[TrackedBatch] = []
-        ahead = self._track(scans)
+        ahead = self._track(scans, may_wait)
         while ahead:
             known = 0 if self._doubted else self._count_undoubted(ahead)
             if known == len(ahead):
@@ -108,12 +116,15 @@ class SegmentTracker:
             ahead = ahead.part(1, len(ahead))
             if self.tracker is not tracker and ahead:
                 # A new segment has begun: what was tracked ahead is tracked again, as a part of it.
-                ahead = self._track(ahead.scans)
+                ahead = self._track(ahead.scans, may_wait)
         return settled
 
     def finish(self) -> list[TrackedBatch]:
         """The last scans, which nothing settles any more. Nothing can be tracked after them."""
-        settled = self._settle_doubted() + self._place_first()
+        settled: list[TrackedBatch] = []
+        if self._unmatched:
+            settled += self._follow(self._unmatched.pop(), may_wait=False)
+        settled += self._settle_doubted() + self._place_first()
         self._restarts, self._searches = self.restarts, self.searches
         # The local map is large, and of no use any more.
         self.tracker = self._new_tracker()
@@ -122,9 +133,17 @@ class SegmentTracker:
     def _new_tracker(self) -> Tracker:
         return Tracker(self.options, self._has_odometry, self._range_limit)
 
-    def _track(self, scans: ScanBatch) -> TrackedBatch:
-        found = self.tracker.track(scans)
-        return TrackedBatch(scans, found if self._origin is None else self._from_origin(found, self._origin))
+    def _track(self, scans: ScanBatch, may_wait: bool) -> TrackedBatch:
+        """Track scans, and those after them or before them that waited; the last ones may wait now."""
+        unmatched = self._unmatched
+        together = sorted([scans, *unmatched], key=lambda batch: batch.first)
+        scans = ScanBatch.together(together) if unmatched else scans
+        found = self.tracker.track(scans, may_wait)
+        n = len(found.values)
+        self._unmatched = [scans.part(n, len(scans))] if n < len(scans) else []
+        if self._origin is not None:
+            found = self._from_origin(found, self._origin)
+        return TrackedBatch(scans.part(0, n), found)
 
     def _from_origin(self, found: TrackedScans, origin: Array) -> TrackedScans:
         """What was found in a later segment, in the frame of the first."""
@@ -181,6 +200,7 @@ class SegmentTracker:
     def _settle(self, batch: TrackedBatch) -> list[TrackedBatch]:
         """Settle scans; those that a segment begins with wait until the first can be placed."""
         self._last = batch.one(-1)
+        self._usual.extend(batch.tracked.inliers.tolist())
         seeing = np.flatnonzero(self._see_enough(batch))
         if len(seeing):
             self._last_seeing = batch.one(int(seeing[-1]))
@@ -217,11 +237,24 @@ class SegmentTracker:
             np.hypot(step[0], step[1]) > breaking.bridged_distance or abs(step[2]) > breaking.bridged_turn
         )
 
+    def _contradicts(self, scan: TrackedBatch) -> bool:
+        """Whether a scan contradicts the map, and is not just matched a little worse than all others.
+
+        Without odometry nothing else leads a tracker on that is lost.
+        """
+        usual, breaking = float(np.median(self._usual)), self.breaking
+        if not self._has_odometry and usual < self.options.lost_inliers:
+            return True
+        drop = usual - float(scan.tracked.inliers[0])
+        return usual >= breaking.min_usual_inliers and drop >= breaking.min_inlier_drop
+
     def _start_segment(self) -> list[TrackedBatch]:
         """Track the doubted scans anew, as a segment of their own; empty if they do not fit together.
 
         The track is broken, and the way there unknown, unless odometry bridges it.
         """
+        if not self._contradicts(self._doubted[0]):
+            return []
         kept = self.tracker, self._origin, self._path
         last, first = self._last, self._doubted[0]
         assert last is not None
@@ -232,7 +265,9 @@ class SegmentTracker:
         is_bridged = self._is_bridged(first)
         self._path = float(last.tracked.paths[0])
         self._path += float(np.hypot(*(guess - origin)[:2])) if is_bridged else self.breaking.path
-        segment = self._track(ScanBatch.together([scan.scans for scan in self._doubted]))
+        unmatched, self._unmatched = self._unmatched, []
+        segment = self._track(ScanBatch.together([scan.scans for scan in self._doubted]), may_wait=False)
+        self._unmatched = unmatched
         if np.median(segment.tracked.inliers[1:]) < self.breaking.poor_inliers:
             self.tracker, self._origin, self._path = kept
             return []

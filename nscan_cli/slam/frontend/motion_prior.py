@@ -6,7 +6,7 @@ import numpy as np
 
 from nscan_cli.kernels.decorators import kernel
 from nscan_cli.matching.pose_kernels import composed_pose, relative_pose, wrapped
-from nscan_cli.matching.priors import Prior, motion_sigmas
+from nscan_cli.matching.priors import MotionModel, Prior, motion_sigmas
 from nscan_cli.poses import Array
 from nscan_cli.slam.frontend.options import TrackingParameters
 from nscan_cli.slam.frontend.track_state import KNOWN, TrackState
@@ -20,7 +20,7 @@ def predict(track: TrackState, settings: TrackingParameters, odometry: Array, pr
     if np.isfinite(odometry[0]) and np.isfinite(track.odometry[0]):
         relative_pose(odometry, track.odometry, step)
         step[2] = wrapped(step[2])
-        along, about = motion_sigmas(step, settings.odometry)
+        along, about = motion_sigmas(step, settings.trusted_odometry)
     else:
         # Constant velocity: the mean of the last steps.
         relative_pose(last, track.poses[-known], step)
@@ -29,6 +29,33 @@ def predict(track: TrackState, settings: TrackingParameters, odometry: Array, pr
         along, about = motion_sigmas(step, settings.constant_velocity)
     composed_pose(last, step, prior.mean)
     prior.mean[2] = wrapped(prior.mean[2])
+    _inform(prior, along, about)
+
+
+@kernel
+def contradicts(prior: Prior, pose: Array, sigmas: float) -> bool:
+    """Whether a pose (3,) is more than `sigmas` standard deviations off its prior, in place or in angle."""
+    off = np.hypot(pose[0] - prior.mean[0], pose[1] - prior.mean[1])
+    turned = wrapped(pose[2] - prior.mean[2])
+    return bool(
+        off * off * prior.information[0, 0] > sigmas * sigmas
+        or turned * turned * prior.information[2, 2] > sigmas * sigmas
+    )
+
+
+@kernel
+def widen(prior: Prior, odometry: Array, last: Array, motion: MotionModel) -> None:
+    """Give a prior by odometry (3,) that of the `last` matched scan (3,) the deviations of another model."""
+    step = np.empty(3)
+    relative_pose(odometry, last, step)
+    step[2] = wrapped(step[2])
+    along, about = motion_sigmas(step, motion)
+    _inform(prior, along, about)
+
+
+@kernel
+def _inform(prior: Prior, along: float, about: float) -> None:
+    """Write the information for these standard deviations of position (m) and angle (rad)."""
     # The same variance along the path as across it: the information needs no rotation.
     prior.information[:, :] = 0.0
     prior.information[0, 0] = prior.information[1, 1] = along**-2

@@ -69,8 +69,9 @@ class TrackingOptions:
     """Difference of two shares of inliers that counts. A match from another angle must have more by this."""
     restart_angles: tuple[tuple[float, ...], ...] = ((0.1, 0.2), (0.4, 0.7), (1.0, 1.3))
     """Angles to start again from, to both sides, rad. A ring is tried when those before it did not help."""
-    far_restart_inliers: float = 0.5
-    """Rings after the first are tried with a smaller share of inliers only: outdoors most scans have few."""
+    far_restart_margin: float = 0.3
+    """Rings after the first are tried only if the share is too small by more than this: outdoors most scans
+    have few inliers."""
     lost_inliers: float = 0.3
     """With a smaller share of inliers a scan with odometry is searched among the last ones; without odometry
     `restart_inliers` decides. It is also the least score of a place that the search finds."""
@@ -78,8 +79,19 @@ class TrackingOptions:
     """The search for a lost scan, about its prediction."""
     lost_search_path: float = 5.0
     """Length of the path whose scans a lost scan is searched among, m."""
+    match_motion: float = 0.1
+    """With odometry a scan is matched when the robot has moved this far (m) or turned this much (rad) since
+    the last one that was. The scans between follow. Larger values drift less and see less."""
+    max_waiting: int = 100
+    """Most scans between two that are matched: a robot may stand for hours."""
+    trusted_odometry: MotionModel = field(default_factory=lambda: MotionModel(distance=0.02))
+    """Standard deviations of the odometry from one matched scan to the next, as a prior of the match."""
+    contradiction_sigmas: float = 2.0
+    """A match that is off that prior by more standard deviations is made again with the one of `odometry`."""
     odometry: MotionModel = field(default_factory=MotionModel)
-    """Standard deviations of a step of the odometry, as a prior of the match."""
+    """Standard deviations of the odometry where scans contradict it."""
+    between_sigma: float = 0.05
+    """Standard deviation of a scan between two matched ones from where odometry has it, m and rad."""
     constant_velocity: MotionModel = field(
         default_factory=lambda: MotionModel(distance=0.3, angle=0.3, distance_per_metre=0.3)
     )
@@ -119,9 +131,14 @@ class TrackingParameters(NamedTuple):
     inlier_margin: float
     restart_angles: Array
     """(rings, angles), with nan where a ring has fewer."""
-    far_restart_inliers: float
+    far_restart_margin: float
     lost_inliers: float
+    match_motion: float
+    max_waiting: int
+    trusted_odometry: MotionModel
+    contradiction_sigmas: float
     odometry: MotionModel
+    between_sigma: float
     constant_velocity: MotionModel
     degeneracy_poses: int
     degeneracy: DegeneracyOptions
@@ -185,6 +202,13 @@ class BreakOptions:
     max_doubted: int = 5
     """Scans that may follow a doubted one before the track breaks: someone may stand in the way. It does not
     break if one of them sees again what was seen before."""
+    usual_scans: int = 30
+    """Scans whose median share of inliers is the usual one. More scans follow changes more slowly."""
+    min_usual_inliers: float = 0.8
+    """The track breaks only where the usual share is at least this: elsewhere scans do not see clearly."""
+    min_inlier_drop: float = 0.37
+    """The first doubted scan has a share smaller than the usual one by at least this. A larger value breaks
+    less often: in sparse surroundings matches are poor now and then, and odometry goes on."""
     bridged_distance: float = 2.0
     """A new segment that begins farther away by odometry (m) is no break: other things are in view there, and
     odometry bridges the way."""

@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 from nscan_cli.poses import Array
 from nscan_cli.slam.frontend.local_map import LocalMap
 
-KNOWN, RESTARTS = 0, 1
-"""Places in `TrackState.counts`: the number of the last poses that are known, and how often matches were
-started from other angles."""
+KNOWN, RESTARTS, NEXT = 0, 1, 2
+"""Places in `TrackState.counts`: the number of the last poses that are known, how often matches were started
+from other angles, and the first scan of a batch whose pose is not known."""
 
 
 class TrackState(NamedTuple):
@@ -21,7 +21,7 @@ class TrackState(NamedTuple):
     poses: Array
     """(h, 3) of the last scans, the newest last."""
     odometry: Array
-    """(3,) of the last scan; nan where there is none."""
+    """(3,) of the last matched scan; nan where there is none."""
     inserted: Array
     """(3,) pose of the last scan that joined the map."""
     inliers: Array
@@ -29,12 +29,12 @@ class TrackState(NamedTuple):
     mean_square_deviation: Array
     """(1,) of scans from their predictions without odometry, m²."""
     counts: NDArray[np.int64]
-    """(2,) KNOWN and RESTARTS"""
+    """(3,) KNOWN, RESTARTS and NEXT"""
     map: LocalMap
 
     @classmethod
     def begin(cls, size: int, initial_sigma: float) -> TrackState:
         """The state before the first scan, with room for the last `size` poses; `initial_sigma` in m."""
         poses, odometry, inserted = np.zeros((size, 3)), np.full(3, np.nan), np.zeros(3)
-        deviation, counts = np.array([initial_sigma**2]), np.zeros(2, dtype=np.int64)
+        deviation, counts = np.array([initial_sigma**2]), np.zeros(3, dtype=np.int64)
         return cls(poses, odometry, inserted, np.zeros(1), deviation, counts, LocalMap.empty())

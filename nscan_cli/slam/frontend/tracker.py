@@ -16,9 +16,10 @@ from nscan_cli.slam.frontend.local_map import ROWS
 from nscan_cli.slam.frontend.options import TrackingOptions, TrackingParameters
 from nscan_cli.slam.frontend.scan_batch import ScanBatch
 from nscan_cli.slam.frontend.scan_to_map import match_and_count
-from nscan_cli.slam.frontend.track_state import RESTARTS, TrackState
+from nscan_cli.slam.frontend.track_state import NEXT, RESTARTS, TrackState
 from nscan_cli.slam.frontend.tracked_scans import TrackedScans
-from nscan_cli.slam.frontend.tracking_kernels import points_in_view, settle, track_scans
+from nscan_cli.slam.frontend.tracking_kernels import settle, track_scans
+from nscan_cli.slam.frontend.visible_points import points_in_view
 
 
 class Tracker:
@@ -44,25 +45,26 @@ class Tracker:
         """How often matches were started from other angles."""
         return int(self._track.counts[RESTARTS])
 
-    def track(self, scans: ScanBatch) -> TrackedScans:
-        """Track the next scans."""
+    def track(self, scans: ScanBatch, may_wait: bool = False) -> TrackedScans:
+        """Track the next scans. Of the last ones, which may wait for scans after them, nothing is found."""
         n, k = len(scans), 0
         points, ends = scans.points, scans.ends
         odometry = np.full((n, 3), np.nan) if scans.odometry is None else scans.odometry
         roomy = self._track.map.with_room(n, int(ends[-1] - ends[0]))
         self._track = self._track._replace(map=roomy)
         found = TrackedScans.room(n)
+        self._track.counts[NEXT] = 0
         while k < n:
             self.map.reserve(int(ends[k + 1] - ends[k]))
             self._track.map.counts[ROWS] = self.map.rows
             track, grid, settings, prior = self._track, self.map.grid, self._settings, self._prior
-            k = track_scans(track, grid, settings, points, ends, odometry, k, prior, found)
+            k = track_scans(track, grid, settings, points, ends, odometry, k, may_wait, prior, found)
             if k < n and np.isfinite(found.inliers[k]):
                 self._search(scans.of(k), found, k)
-                settle(track, grid, settings, scans.of(k), odometry[k], prior, found, k)
+                settle(track, grid, settings, points, ends, odometry, prior, found, k)
                 k += 1
             self.map.rows = int(self._track.map.counts[ROWS])
-        return found
+        return found.part(0, int(self._track.counts[NEXT]))
 
     def _search(self, points: Array, found: TrackedScans, k: int) -> None:
         """Match scan k from where a search among the last scans finds it too; keep the lower objective."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from nscan_cli.kernels.assign import assign
+from nscan_cli.kernels.assign import assign, assign_rows
 from nscan_cli.kernels.decorators import kernel
 from nscan_cli.matching.pose_kernels import relative_pose, wrapped
 from nscan_cli.matching.priors import Prior
@@ -13,21 +13,15 @@ from nscan_cli.ndt.grid_growth import CELLS_PER_POINT
 from nscan_cli.ndt.hash_grid import Grid
 from nscan_cli.poses import Array
 from nscan_cli.slam.frontend.angle_restarts import match_from_other_angles, restart_threshold
+from nscan_cli.slam.frontend.between_scans import match_between, waits_for_motion
 from nscan_cli.slam.frontend.degeneracy import keep_prediction
-from nscan_cli.slam.frontend.local_map import NEWEST, OLDEST, ROWS, insert_scan
-from nscan_cli.slam.frontend.motion_prior import predict
+from nscan_cli.slam.frontend.local_map import ROWS, insert_scan
+from nscan_cli.slam.frontend.motion_prior import contradicts, predict, widen
 from nscan_cli.slam.frontend.options import TrackingParameters
 from nscan_cli.slam.frontend.scan_to_map import match_and_count
-from nscan_cli.slam.frontend.track_state import KNOWN, TrackState
+from nscan_cli.slam.frontend.track_state import KNOWN, NEXT, TrackState
 from nscan_cli.slam.frontend.tracked_scans import TrackedScans
-from nscan_cli.slam.frontend.visible_points import visible_points
-
-
-@kernel
-def points_in_view(track: TrackState, settings: TrackingParameters, points: Array, pose: Array) -> Array:
-    """The points of a scan expected at `pose` (3,) that scans of the local map had in view too."""
-    placed = track.map.placed[track.map.counts[OLDEST] : track.map.counts[NEWEST]]
-    return visible_points(points, pose, placed, settings.visible_range)
+from nscan_cli.slam.frontend.visible_points import points_in_view
 
 
 @kernel
@@ -36,16 +30,19 @@ def settle(
     grid: Grid,
     settings: TrackingParameters,
     points: Array,
+    ends: NDArray[np.int64],
     odometry: Array,
     prior: Prior,
     found: TrackedScans,
     k: int,
 ) -> None:
-    """Take over the match of scan k into the state; the scan joins the map if the robot has moved.
+    """Take over the match of scan k into the state, then match the scans that wait for it.
 
-    Its pose, inliers and Hessian of the objective were written to `found`; the rest is written here.
+    The scan joins the map if the robot has moved. Its pose, inliers and Hessian of the objective were written
+    to `found`; the rest is written here. The arrays are those of `track_scans`.
     """
     counts, pose, step = track.counts, found.poses[k], np.empty(3)
+    before = track.poses[-1].copy(), track.odometry.copy()
     pose[2] = wrapped(pose[2])
     relative_pose(pose, track.inserted, step)
     distance = np.hypot(step[0], step[1])
@@ -55,16 +52,12 @@ def settle(
     if joins:
         track.map.path[0] += distance
         assign(track.inserted, pose)
-        insert_scan(track.map, grid, settings, points, pose)
-    for row in range(track.poses.shape[0] - 1):
-        assign(track.poses[row], track.poses[row + 1])
-    assign(track.poses[-1], pose)
+        insert_scan(track.map, grid, settings, points[ends[k] : ends[k + 1]], pose)
     found.odometry_sigmas[k] = 0.0
-    if np.isfinite(odometry[0]) and np.isfinite(track.odometry[0]):
+    if np.isfinite(odometry[k, 0]) and np.isfinite(track.odometry[0]):
         off = np.hypot(pose[0] - prior.mean[0], pose[1] - prior.mean[1])
         found.odometry_sigmas[k] = off * np.sqrt(prior.information[0, 0])
-    assign(track.odometry, odometry)
-    counts[KNOWN] = min(counts[KNOWN] + 1, track.poses.shape[0])
+    assign(track.odometry, odometry[k])
     track.inliers[0] = found.inliers[k]
     found.paths[k], found.in_map[k] = track.map.path[0], joins
     found.prior_covariances[k] = 0.0
@@ -73,6 +66,50 @@ def settle(
             found.hessians[k, a, b] -= prior.information[a, b]
         if prior.information[a, a] > 0.0:
             found.prior_covariances[k, a, a] = 1.0 / prior.information[a, a]
+    first = counts[NEXT]
+    if first < k:
+        match_between(track, grid, settings, points, ends, odometry, before, first, k, found)
+    for scan in range(first, k + 1):
+        for row in range(track.poses.shape[0] - 1):
+            assign(track.poses[row], track.poses[row + 1])
+        assign(track.poses[-1], found.poses[scan])
+    counts[KNOWN], counts[NEXT] = min(counts[KNOWN] + k + 1 - first, track.poses.shape[0]), k + 1
+
+
+@kernel
+def match_with_doubt(
+    track: TrackState,
+    grid: Grid,
+    settings: TrackingParameters,
+    points: Array,
+    odometry: Array,
+    prior: Prior,
+    threshold: float,
+    found: TrackedScans,
+    k: int,
+) -> None:
+    """Match scan k again with a wide prior if it contradicts odometry (3,) or has few inliers.
+
+    Also from other angles if there are fewer inliers than `threshold`. Unless the first match contradicts
+    odometry, the other one has to have clearly more inliers to take its place.
+    """
+    is_contradiction = contradicts(prior, found.poses[k], settings.contradiction_sigmas)
+    if not is_contradiction and found.inliers[k] >= threshold:
+        return
+    trusted, inliers, value = prior.information.copy(), found.inliers[k], found.values[k]
+    pose, hessian = found.poses[k].copy(), found.hessians[k].copy()
+    widen(prior, odometry, track.odometry, settings.odometry)
+    assign(found.poses[k], prior.mean)
+    found.values[k], found.inliers[k] = match_and_count(
+        grid, settings, points, prior, found.poses[k], found.hessians[k]
+    )
+    if found.inliers[k] < threshold:
+        match_from_other_angles(grid, settings, points, prior, threshold, track.counts, found, k)
+    if not is_contradiction and found.inliers[k] <= inliers + settings.inlier_margin:
+        found.values[k], found.inliers[k] = value, inliers
+        assign(found.poses[k], pose)
+        assign_rows(found.hessians[k], hessian)
+        assign_rows(prior.information, trusted)
 
 
 @kernel
@@ -84,13 +121,15 @@ def track_scans(
     ends: NDArray[np.int64],
     odometry: Array,
     first: int,
+    may_wait: bool,
     prior: Prior,
     found: TrackedScans,
 ) -> int:
     """Track scans from the `first` on; returns the next one, which is not settled.
 
-    Scan k has points[ends[k] : ends[k + 1]] and odometry[k], nan where there is none. The scan that is not
-    settled is lost: its inliers in `found` are too few. Or the grid has no room for it: its inliers are nan.
+    Scan k has points[ends[k] : ends[k + 1]] and odometry[k], nan where there is none. A scan waits until the
+    robot has moved; the last ones settle unless they `may_wait` for scans that are not here yet. A scan that
+    is not settled is lost: its inliers in `found` are too few. Or the grid has no room: its inliers are nan.
     """
     for k in range(first, ends.shape[0] - 1):
         scan = points[ends[k] : ends[k + 1]]
@@ -109,11 +148,18 @@ def track_scans(
                 grid, settings, in_view, prior, found.poses[k], found.hessians[k]
             )
             threshold = restart_threshold(track, settings)
-            if found.inliers[k] < threshold:
+            is_predicted = has_odometry and np.isfinite(track.odometry[0])
+            if is_predicted:
+                match_with_doubt(track, grid, settings, in_view, odometry[k], prior, threshold, found, k)
+            elif found.inliers[k] < threshold:
                 match_from_other_angles(grid, settings, in_view, prior, threshold, track.counts, found, k)
-                if found.inliers[k] < (settings.lost_inliers if has_odometry else settings.restart_inliers):
-                    return k
+            if waits_for_motion(track, settings, odometry, k, found.poses[k], may_wait):
+                continue
+            if found.inliers[k] < min(
+                threshold, settings.lost_inliers if has_odometry else settings.restart_inliers
+            ):
+                return k
             if track.counts[KNOWN] >= settings.degeneracy_poses and not has_odometry:
                 keep_prediction(grid, settings, in_view, prior, track.mean_square_deviation, found, k)
-        settle(track, grid, settings, scan, odometry[k], prior, found, k)
-    return len(ends) - 1
+        settle(track, grid, settings, points, ends, odometry, prior, found, k)
+    return int(ends.shape[0]) - 1

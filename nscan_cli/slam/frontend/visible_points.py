@@ -13,7 +13,9 @@ from numpy.typing import NDArray
 
 from nscan_cli.kernels.decorators import kernel
 from nscan_cli.poses import Array
-from nscan_cli.slam.frontend.options import TrackingOptions
+from nscan_cli.slam.frontend.local_map import NEWEST, OLDEST
+from nscan_cli.slam.frontend.options import TrackingOptions, TrackingParameters
+from nscan_cli.slam.frontend.track_state import TrackState
 
 
 def range_limit(ranges: NDArray[np.float32], options: TrackingOptions) -> float:
@@ -45,3 +47,10 @@ def visible_points(points: Array, pose: Array, placed: Array, far: float) -> Arr
             seen[n, 0], seen[n, 1] = points[k, 0], points[k, 1]
             n += 1
     return seen[:n]
+
+
+@kernel
+def points_in_view(track: TrackState, settings: TrackingParameters, points: Array, pose: Array) -> Array:
+    """The points of a scan expected at `pose` (3,) that scans of the local map had in view too."""
+    placed = track.map.placed[track.map.counts[OLDEST] : track.map.counts[NEWEST]]
+    return visible_points(points, pose, placed, settings.visible_range)

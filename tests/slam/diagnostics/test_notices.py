@@ -62,7 +62,7 @@ def test_a_map_that_a_glass_wall_has_made_6_m_too_short_is_told(seed):
     assert float(told[3]) >= 25
 
 
-@pytest.mark.parametrize("seed", [5, 6, 7, 8])
+@pytest.mark.parametrize("seed", [4, 5, 6, 7])
 def test_of_someone_who_walks_along_it_is_told_that_odometry_and_scans_disagree(seed):
     """On some drives tracking breaks before, or relations contradict each other behind."""
     log = ROUND["someone who walks along"](round_scene().record(seed).log()).log

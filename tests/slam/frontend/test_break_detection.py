@@ -3,16 +3,20 @@
 from __future__ import annotations
 
 import functools
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
+from nscan_cli.logs.load import read_log
+from nscan_cli.logs.reading_options import ReadingOptions
 from nscan_cli.slam.frontend.break_detection import SegmentTracker, TrackedBatch
 from nscan_cli.slam.frontend.options import BreakOptions, TrackingOptions
 from nscan_cli.slam.frontend.scan_batch import ScanBatch
+from tests.data import data_file
 from tests.logs.excerpts import excerpt
 from tests.slam.keyframe_drives import round_scene
-from tests.slam.mapped_logs import sensed_in
+from tests.slam.mapped_logs import mapped, sensed_in
 from tests.slam.trouble_cases import carried, standing
 
 
@@ -59,8 +63,27 @@ def test_when_all_is_tracked_the_map_goes_and_what_was_counted_stays():
 def test_of_a_robot_that_stands_few_scans_wait_for_it_to_drive():
     """They would be kept for hours: the first scan of a piece is placed by those of its first metres."""
     most = TrackingOptions().first_scan_max_count
-    log = standing(most + 200)
+    log = replace(standing(most + 200), odometry=None)
     follower, settled = SegmentTracker(TrackingOptions(), BreakOptions(), odometry=False), 0
     for first in range(0, len(log), 100):
         settled += sum(map(len, follower.follow(sensed_in(excerpt(log, slice(first, first + 100))))))
         assert settled == (0 if first + 100 < most else first + 100)
+
+
+@pytest.mark.parametrize("every", [1, 2, 3])
+def test_a_person_who_walks_about_a_standing_laser_breaks_no_track(every):
+    log = read_log(str(data_file("field/standing.bag")), ReadingOptions(every=every))
+    assert mapped(log).state.breaks == []
+
+
+def test_a_robot_that_was_carried_while_no_scans_were_recorded_breaks_the_track():
+    log = read_log(str(data_file("field/urg-carried.bag")))
+    assert mapped(log).state.breaks == [229]
+
+
+def test_matches_that_are_poor_throughout_break_no_track():
+    """Outdoors few points lie on Gaussians: a little fewer are no contradiction.."""
+    sparse = BreakOptions(min_usual_inliers=0.99)
+    follower = SegmentTracker(TrackingOptions(), sparse)
+    found = follower.follow(scans()) + follower.finish()
+    assert not any(batch.after_break for batch in found)

@@ -130,15 +130,14 @@ def test_the_first_scan_is_at_the_origin():
 
 
 def test_a_scan_joins_the_map_when_the_robot_has_moved():
-    """The sample moves 11 cm a step; at 2.5 cm a step every third scan is 5 cm beyond the last."""
+    """At 2.4 cm a step every fifth scan is matched 10 cm beyond the last, and the last one at the end."""
     truth = np.zeros((10, 3))
     truth[:, 0] = 0.024 * np.arange(10)
     points = [room(1) - pose[:2] for pose in truth]
     tracker = Tracker(TrackingOptions())
     found = tracker.track(sensed(points, truth))
-    assert found.in_map.tolist() == [k % 3 == 0 for k in range(10)]
-    assert found.paths[-1] == pytest.approx(0.216, abs=0.005)
-    assert found.paths[-2] == found.paths[-3] == found.paths[-4]
+    assert found.in_map.tolist() == [k in (0, 5, 9) for k in range(10)]
+    np.testing.assert_allclose(found.paths, truth[:, 0], atol=0.005)
 
 
 def window_map(found: list[TrackedScan], log: LaserLog, options: TrackingOptions) -> Ndt:
@@ -235,9 +234,9 @@ def test_scans_are_found_where_they_are_however_many_come_at_a_time(odometry):
         assert tracker.restarts > 0 or not odometry
 
 
-@pytest.mark.parametrize(("strange", "rings"), [(0.2, 1), (0.5, 3)])
+@pytest.mark.parametrize(("strange", "rings"), [(0.0, 1), (0.2, 3)])
 def test_far_angles_are_tried_when_most_points_of_a_scan_are_none_of_the_map(strange, rings):
-    """Leaves and people are no reason to doubt the angle by more than some degrees.
+    """Somewhat fewer inliers than before are no reason to doubt the angle by more than some degrees.
 
     Of the points of one scan alone 68 % lie on Gaussians of five points or more.
     """

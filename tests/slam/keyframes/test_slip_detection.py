@@ -87,7 +87,7 @@ def test_tracking_says_how_far_off_the_odometry_a_scan_lies():
     scans = sensed([room(1)] * 3, odometry)
     found = Tracker(TrackingOptions()).track(scans)
     assert found.odometry_sigmas[:2] == pytest.approx(0.0, abs=0.02)
-    moved = relative(found.poses[2], found.poses[1])
+    moved = relative(found.poses[2], found.poses[0])
     assert found.odometry_sigmas[2] == pytest.approx(np.hypot(moved[0] - 0.3, moved[1]) / 0.11)
     assert found.odometry_sigmas[2] > 2.5
     without = Tracker(TrackingOptions(), odometry=False).track(replace(scans, odometry=None))

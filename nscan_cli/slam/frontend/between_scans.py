@@ -1,0 +1,113 @@
+"""Step 1 with odometry: the scans between two that were matched, which are matched from both sides.
+
+Points of scans close together fall into the cells of the map in the same way. In a bare corridor this ripple
+is all that is left of the energy along it, and its minimum is where the last scan was. So a scan is matched
+when the robot has moved by `match_motion`. The scans before it follow, with a map that holds both ends.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nscan_cli.kernels.assign import assign
+from nscan_cli.kernels.decorators import kernel
+from nscan_cli.matching.pose_kernels import composed_pose, relative_pose, wrapped
+from nscan_cli.matching.priors import Prior
+from nscan_cli.ndt.hash_grid import Grid
+from nscan_cli.poses import Array
+from nscan_cli.slam.frontend.options import TrackingParameters
+from nscan_cli.slam.frontend.scan_to_map import match_and_count
+from nscan_cli.slam.frontend.track_state import NEXT, TrackState
+from nscan_cli.slam.frontend.tracked_scans import TrackedScans
+from nscan_cli.slam.frontend.visible_points import points_in_view
+
+LEAST_STEP = 1e-4
+"""Each step counts as this long at least, m and rad, so that no covariance of a step is zero."""
+
+
+@kernel
+def waits_for_motion(
+    track: TrackState, settings: TrackingParameters, odometry: Array, k: int, pose: Array, may_wait: bool
+) -> bool:
+    """Whether scan k is still close to the last matched scan, by odometry (n, 3) and its match, `pose` (3,).
+
+    A scan never waits without odometry, or for one without. The last one waits only if it `may_wait`.
+    """
+    has_next = k + 1 < odometry.shape[0]
+    if not (np.isfinite(odometry[k + 1, 0]) if has_next else may_wait):
+        return False
+    if k - track.counts[NEXT] + 1 >= settings.max_waiting:
+        return False
+    step = np.full(3, np.nan)
+    relative_pose(odometry[k], track.odometry, step)
+    if not _is_short(step, settings):
+        return False
+    relative_pose(pose, track.poses[-1], step)
+    return _is_short(step, settings)
+
+
+@kernel
+def _is_short(step: Array, settings: TrackingParameters) -> bool:
+    distance, turn = np.hypot(step[0], step[1]), abs(wrapped(step[2]))
+    return bool(distance < settings.match_motion and turn < settings.match_motion)
+
+
+@kernel
+def match_between(
+    track: TrackState,
+    grid: Grid,
+    settings: TrackingParameters,
+    points: Array,
+    ends: NDArray[np.int64],
+    odometry: Array,
+    before: tuple[Array, Array],
+    first: int,
+    last: int,
+    found: TrackedScans,
+) -> None:
+    """Match the scans from the `first` on, before the `last`, which is settled.
+
+    `before` has the pose (3,) of the matched scan before them and its odometry (3,). What odometry is off at
+    the last scan is shared out over the way; so is the covariance of the step.
+    """
+    pose_before, odometry_before = before
+    step, length = np.empty(3), 0.0
+    lengths = np.empty(last - first + 1)
+    for k in range(first, last + 1):
+        relative_pose(odometry[k], odometry[k - 1] if k > first else odometry_before, step)
+        length += np.hypot(step[0], step[1]) + abs(wrapped(step[2])) + LEAST_STEP
+        lengths[k - first] = length
+    relative_pose(odometry[last], odometry_before, step)
+    path = found.paths[last] - (np.hypot(step[0], step[1]) if found.in_map[last] else 0.0)
+    prior, missing = Prior(np.empty(3), np.zeros((3, 3))), np.empty(3)
+    composed_pose(pose_before, step, prior.mean)
+    for a in range(3):
+        missing[a] = found.poses[last, a] - prior.mean[a]
+        prior.information[a, a] = settings.between_sigma**-2
+    missing[2] = wrapped(missing[2])
+    shares = 0.0
+    for k in range(first, last):
+        share = lengths[k - first] / length
+        relative_pose(odometry[k], odometry_before, step)
+        composed_pose(pose_before, step, prior.mean)
+        for a in range(3):
+            prior.mean[a] += share * missing[a]
+        prior.mean[2] = wrapped(prior.mean[2])
+        in_view = points_in_view(track, settings, points[ends[k] : ends[k + 1]], prior.mean)
+        assign(found.poses[k], prior.mean)
+        found.values[k], found.inliers[k] = match_and_count(
+            grid, settings, in_view, prior, found.poses[k], found.hessians[k]
+        )
+        # The map holds the last scan: what differs from the scans before it is an inlier there.
+        found.inliers[k] = min(found.inliers[k], found.inliers[last])
+        found.poses[k, 2] = wrapped(found.poses[k, 2])
+        found.odometry_sigmas[k], found.in_map[k] = share * found.odometry_sigmas[last], False
+        found.paths[k] = path + share * (found.paths[last] - path)
+        found.prior_covariances[k] = 0.0
+        for a in range(3):
+            found.hessians[k, a, a] -= prior.information[a, a]
+            found.prior_covariances[k, a, a] = (share - shares) * found.prior_covariances[last, a, a]
+        shares = share
+    for a in range(3):
+        found.prior_covariances[last, a, a] *= 1.0 - shares
