@@ -136,7 +136,7 @@ def row(path: str, odometry: bool) -> list[str] | None:
     changed = [mapped_path(path, 1, change, odometry) for change in ("mirrored", "backwards")]
     for others in (found, *([first, run] for run in changed if run is not None)):
         quantile, greatest, at = differences(others)
-        cells.append(f"{quantile:.3f} | {greatest:.3f} at {at:.0f} s")
+        cells.append(f"{quantile:.3f} | {greatest:.3f} at {at:.0f} s" if np.isfinite(at) else "– | –")
     cells.append(", ".join(str(run.breaks) for run in found))
     cells.append("yes" if any(run.told for run in found) else "no")
     return cells
