@@ -29,6 +29,7 @@ from nscan_cli.slam.pipeline import run_slam
 from nscan_cli.slam.state import SlamState
 from tests.data import find_data
 from tests.experiments.output import table
+from tests.logs.excerpts import excerpt
 
 WANTED = {"intel": 0.014, "fr079": 0.0312, "mit-csail": 0.0262, "mit-killian": 0.0255, "fr-campus": 0.26}
 """m; fr-campus: ATE RMSE, the others: mean error of the relations."""
@@ -81,16 +82,7 @@ def disturbed(log: LaserLog, seed: int, dropped: int) -> LaserLog:
         for step in steps:
             poses.append(compose(poses[-1], step))
         odometry = np.array(poses)
-    return dataclasses.replace(
-        log,
-        numbers=log.numbers[dropped:],
-        stamps=log.stamps[dropped:],
-        times=log.times[dropped:],
-        ranges=log.ranges[dropped:],
-        angle_min=log.angle_min[dropped:],
-        angle_increment=log.angle_increment[dropped:],
-        odometry=odometry[dropped:],
-    )
+    return excerpt(dataclasses.replace(log, odometry=odometry), slice(dropped, None))
 
 
 def mapped(name: str, seed: int, dropped: int, relations: Relations) -> Graph:

@@ -30,7 +30,9 @@ def excerpt(log: LaserLog, rows: Rows) -> LaserLog:
         ranges=log.ranges[rows],
         angle_min=log.angle_min[rows],
         angle_increment=log.angle_increment[rows],
+        mount=log.mount[rows] if log.mount.ndim == 2 else log.mount,
         odometry=None if log.odometry is None else log.odometry[rows],
+        beams=None if log.beams is None else log.beams[rows],
         truth_times=None if log.truth is None else log.times[rows],
         truth=None if log.truth is None else truth_of(log)[rows],
     )

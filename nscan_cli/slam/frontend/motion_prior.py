@@ -13,14 +13,19 @@ from nscan_cli.slam.frontend.track_state import KNOWN, TrackState
 
 
 @kernel
-def predict(track: TrackState, settings: TrackingParameters, odometry: Array, prior: Prior) -> None:
-    """Write the prior on the next scan's pose, in the tracker's frame; its odometry (3,) may be nan."""
+def predict(
+    track: TrackState, settings: TrackingParameters, odometry: Array, motion: MotionModel, prior: Prior
+) -> None:
+    """Write the prior on the next scan's pose, in the tracker's frame; its odometry (3,) may be nan.
+
+    `motion` has the deviations of the odometry.
+    """
     known, last = track.counts[KNOWN], track.poses[-1]
     step = np.empty(3)
     if np.isfinite(odometry[0]) and np.isfinite(track.odometry[0]):
         relative_pose(odometry, track.odometry, step)
         step[2] = wrapped(step[2])
-        along, about = motion_sigmas(step, settings.trusted_odometry)
+        along, about = motion_sigmas(step, motion)
     else:
         # Constant velocity: the mean of the last steps.
         relative_pose(last, track.poses[-known], step)
@@ -29,7 +34,10 @@ def predict(track: TrackState, settings: TrackingParameters, odometry: Array, pr
         along, about = motion_sigmas(step, settings.constant_velocity)
     composed_pose(last, step, prior.mean)
     prior.mean[2] = wrapped(prior.mean[2])
-    _inform(prior, along, about)
+    # The same variance along the path as across it: the information needs no rotation.
+    prior.information[:, :] = 0.0
+    prior.information[0, 0] = prior.information[1, 1] = along**-2
+    prior.information[2, 2] = about**-2
 
 
 @kernel
@@ -41,22 +49,3 @@ def contradicts(prior: Prior, pose: Array, sigmas: float) -> bool:
         off * off * prior.information[0, 0] > sigmas * sigmas
         or turned * turned * prior.information[2, 2] > sigmas * sigmas
     )
-
-
-@kernel
-def widen(prior: Prior, odometry: Array, last: Array, motion: MotionModel) -> None:
-    """Give a prior by odometry (3,) that of the `last` matched scan (3,) the deviations of another model."""
-    step = np.empty(3)
-    relative_pose(odometry, last, step)
-    step[2] = wrapped(step[2])
-    along, about = motion_sigmas(step, motion)
-    _inform(prior, along, about)
-
-
-@kernel
-def _inform(prior: Prior, along: float, about: float) -> None:
-    """Write the information for these standard deviations of position (m) and angle (rad)."""
-    # The same variance along the path as across it: the information needs no rotation.
-    prior.information[:, :] = 0.0
-    prior.information[0, 0] = prior.information[1, 1] = along**-2
-    prior.information[2, 2] = about**-2

@@ -16,7 +16,7 @@ from nscan_cli.slam.frontend.angle_restarts import match_from_other_angles, rest
 from nscan_cli.slam.frontend.between_scans import match_between, waits_for_motion
 from nscan_cli.slam.frontend.degeneracy import keep_prediction
 from nscan_cli.slam.frontend.local_map import ROWS, insert_scan
-from nscan_cli.slam.frontend.motion_prior import contradicts, predict, widen
+from nscan_cli.slam.frontend.motion_prior import contradicts, predict
 from nscan_cli.slam.frontend.options import TrackingParameters
 from nscan_cli.slam.frontend.scan_to_map import match_and_count
 from nscan_cli.slam.frontend.track_state import KNOWN, NEXT, TrackState
@@ -98,7 +98,7 @@ def match_with_doubt(
         return
     trusted, inliers, value = prior.information.copy(), found.inliers[k], found.values[k]
     pose, hessian = found.poses[k].copy(), found.hessians[k].copy()
-    widen(prior, odometry, track.odometry, settings.odometry)
+    predict(track, settings, odometry, settings.odometry, prior)
     assign(found.poses[k], prior.mean)
     found.values[k], found.inliers[k] = match_and_count(
         grid, settings, points, prior, found.poses[k], found.hessians[k]
@@ -140,7 +140,7 @@ def track_scans(
             prior.mean[:], prior.information[:, :] = 0.0, 0.0
             found.values[k], found.poses[k], found.hessians[k], found.inliers[k] = 0.0, 0.0, 0.0, 1.0
         else:
-            predict(track, settings, odometry[k], prior)
+            predict(track, settings, odometry[k], settings.trusted_odometry, prior)
             has_odometry = np.isfinite(odometry[k, 0])
             in_view = points_in_view(track, settings, scan, prior.mean)
             assign(found.poses[k], prior.mean)
@@ -155,9 +155,7 @@ def track_scans(
                 match_from_other_angles(grid, settings, in_view, prior, threshold, track.counts, found, k)
             if waits_for_motion(track, settings, odometry, k, found.poses[k], may_wait):
                 continue
-            if found.inliers[k] < min(
-                threshold, settings.lost_inliers if has_odometry else settings.restart_inliers
-            ):
+            if found.inliers[k] < (settings.lost_inliers if has_odometry else settings.restart_inliers):
                 return k
             if track.counts[KNOWN] >= settings.degeneracy_poses and not has_odometry:
                 keep_prediction(grid, settings, in_view, prior, track.mean_square_deviation, found, k)

@@ -82,7 +82,7 @@ def test_a_robot_that_was_carried_while_no_scans_were_recorded_breaks_the_track(
 
 
 def test_matches_that_are_poor_throughout_break_no_track():
-    """Outdoors few points lie on Gaussians: a little fewer are no contradiction.."""
+    """Outdoors few points lie on Gaussians: a little fewer are no contradiction."""
     sparse = BreakOptions(min_usual_inliers=0.99)
     follower = SegmentTracker(TrackingOptions(), sparse)
     found = follower.follow(scans()) + follower.finish()

@@ -234,7 +234,7 @@ def test_scans_are_found_where_they_are_however_many_come_at_a_time(odometry):
         assert tracker.restarts > 0 or not odometry
 
 
-@pytest.mark.parametrize(("strange", "rings"), [(0.0, 1), (0.2, 3)])
+@pytest.mark.parametrize(("strange", "rings"), [(0.0, 1), (0.2, 3), (0.5, 3)])
 def test_far_angles_are_tried_when_most_points_of_a_scan_are_none_of_the_map(strange, rings):
     """Somewhat fewer inliers than before are no reason to doubt the angle by more than some degrees.
 
