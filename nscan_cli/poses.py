@@ -20,6 +20,12 @@ def wrap(angle: ArrayLike) -> Array:
     return a - 2 * np.pi * np.ceil((a - np.pi) / (2 * np.pi))
 
 
+def are_known(poses: ArrayLike) -> NDArray[np.bool_]:
+    """(…) which of the poses (…, 3) are known; the others are nan."""
+    known: NDArray[np.bool_] = ~np.isnan(np.asarray(poses, dtype=np.float64)[..., 0])
+    return known
+
+
 def transform(pose: ArrayLike, points: ArrayLike) -> Array:
     """Eq. (1): transform points (…, 2) from the pose's frame to the frame that the pose is given in."""
     p, x = np.asarray(pose, dtype=np.float64), np.asarray(points, dtype=np.float64)

@@ -80,7 +80,7 @@ def facts_of(log: LaserLog) -> dict[str, Any]:
         "duration": round(duration, 6),
         "rate": rate_of(log),
         "longest_gap": round(float(steps.max()), 6) if len(steps) else None,
-        "odometry": None if path is None else {"path": round(float(np.hypot(*path.T).sum()), 3)},
+        "odometry": None if path is None else {"path": round(float(np.nansum(np.hypot(*path.T))), 3)},
         "no_return": log.no_return,
         "beams_without_return": round(without_return, 6),
         "beams_unusable": round(unusable, 6),

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import json
 import math
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -106,7 +107,7 @@ def command(
     Compiling("half a minute", quiet)
     scans = read_log(log, reading)
     rows = scans.row(reference), scans.row(scan)
-    initial, prior = with_defaults(scans, initial, prior, quiet)
+    initial, prior = with_defaults(scans, rows, initial, prior, quiet)
     options, model = PairOptions(), MotionModel()
     start = _initial_pose(scans, rows, initial)
     known = None
@@ -128,18 +129,24 @@ def command(
     say(summary_table(_match_rows(reference, scan, match)), quiet)
 
 
-def with_defaults(log: LaserLog, initial: str | None, prior: str | None, quiet: bool) -> tuple[str, str]:
-    """`initial` and `prior`, with odometry as the default if the log has it.
+def with_defaults(
+    log: LaserLog, rows: Sequence[int], initial: str | None, prior: str | None, quiet: bool
+) -> tuple[str, str]:
+    """`initial` and `prior`, with odometry as the default if the scans in `rows` have it.
 
-    Raises WrongUsageError if odometry was requested and the log has none.
+    Raises WrongUsageError if odometry was requested and the log has none, or one of the scans.
     """
-    if log.odometry is not None:
+    from nscan_cli.poses import are_known
+
+    missing = [] if log.odometry is None else [row for row in rows if not are_known(log.odometry[row])]
+    if log.odometry is not None and not missing:
         return initial or "odometry", prior or "odometry"
+    where = f" at scan {log.numbers[missing[0]]}" if missing else ""
     for name, value, other in (("--initial", initial, "identity"), ("--prior", prior, "none")):
         if value == "odometry":
-            raise WrongUsageError(f"{log.source.name}: has no odometry; give {name} {other}")
+            raise WrongUsageError(f"{log.source.name}: has no odometry{where}; give {name} {other}")
     if initial is None or prior is None:
-        say(f"no odometry: initial {initial or 'identity'}, prior {prior or 'none'}", quiet)
+        say(f"no odometry{where}: initial {initial or 'identity'}, prior {prior or 'none'}", quiet)
     return initial or "identity", prior or "none"
 
 

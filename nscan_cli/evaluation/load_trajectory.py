@@ -5,6 +5,8 @@ from __future__ import annotations
 import os
 from dataclasses import replace
 
+import numpy as np
+
 from nscan_cli.errors import InputDataError, WrongUsageError
 from nscan_cli.files.inputs import FileBytes, label, read_bytes
 from nscan_cli.files.limits import GRAPH, MB, LimitExceededError
@@ -23,6 +25,7 @@ from nscan_cli.logs.load import (
 )
 from nscan_cli.logs.reading_options import ReadingOptions
 from nscan_cli.logs.recordings.pose_topics import poses_on_topic
+from nscan_cli.poses import are_known
 
 
 def load_trajectory(
@@ -46,7 +49,9 @@ def load_trajectory(
         raise InputDataError(
             label(path), "the log has no poses of the robot", "give a graph, a TUM file or another log"
         )
-    return Trajectory.in_order(loaded.times, loaded.odometry, loaded.stamps)
+    known = np.flatnonzero(are_known(loaded.odometry))
+    stamps = [loaded.stamps[row] for row in known.tolist()]
+    return Trajectory.in_order(loaded.times[known], loaded.odometry[known], stamps)
 
 
 def load_reference(

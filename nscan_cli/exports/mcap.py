@@ -34,7 +34,7 @@ from nscan_cli.graph.model import Graph
 from nscan_cli.logs.frame_names import MAP
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.mapping.occupancy import OccupancyGrid
-from nscan_cli.poses import compose, inverse
+from nscan_cli.poses import Array, are_known, compose, inverse
 
 TOPICS = {
     "/map": "nav_msgs/msg/OccupancyGrid",
@@ -62,7 +62,7 @@ def ros2_recording(
     first second of the log. Equal inputs give equal bytes. Raises NotFiniteError, and WrongUsageError when
     the stamps span 2³¹ s or more.
     """
-    check_finite("the poses of the recording", graph.poses, graph.odometry)
+    check_finite("the poses of the recording", graph.poses, graph.known_odometry)
     messages = MessageFactory()
     file = _File(messages)
     stamps = _nanoseconds(graph.stamps)
@@ -76,8 +76,8 @@ def ros2_recording(
         link = (names.robot, names.laser, log.mount)
         file.write("/tf_static", tf_message(messages, first, [link]), first)
     robots = graph.poses[nodes]
-    odometry = None if graph.odometry is None else graph.odometry[nodes]
-    corrections = None if odometry is None else compose(robots, inverse(odometry))
+    corrections = None if graph.odometry is None else _corrections(robots, graph.odometry[nodes])
+    odometry = None if corrections is None else compose(inverse(corrections), robots)
     for k, (row, time) in enumerate(zip(rows.tolist(), times, strict=True)):
         if odometry is None or corrections is None:
             links = [(MAP, names.robot, robots[k])]
@@ -86,6 +86,19 @@ def ros2_recording(
         file.write("/tf", tf_message(messages, time, links), time)
         file.write("/scan", scan_message(messages, log, row, time), time)
     return file.finished()
+
+
+def _corrections(robots: Array, odometry: Array) -> Array | None:
+    """(N, 3) poses of the odometry frame in the map, for poses of the robot by map and by odometry.
+
+    Where odometry is missing (nan), that of the scan before holds on: the robot has one parent frame
+    throughout. None if odometry is missing everywhere.
+    """
+    known = np.flatnonzero(are_known(odometry))
+    if not len(known):
+        return None
+    found = compose(robots[known], inverse(odometry[known]))
+    return found[np.maximum(np.searchsorted(known, np.arange(len(robots)), side="right") - 1, 0)]
 
 
 class _File:

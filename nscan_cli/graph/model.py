@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from nscan_cli.graph.relations.base import Relation
 from nscan_cli.graph.relations.nscan import NScan
 from nscan_cli.graph.relations.pairwise import Pairwise
-from nscan_cli.poses import Array, compose, relative
+from nscan_cli.poses import Array, are_known, compose, relative
 
 __all__ = ["Graph", "Loop", "NScan", "Pairwise"]
 
@@ -39,7 +39,7 @@ class Graph:
     poses: Array
     """(N, 3) global poses of the robot."""
     odometry: Array | None
-    """(N, 3) poses by odometry, or None."""
+    """(N, 3) poses by odometry, nan where it is missing; None where there is none at all."""
     anchors: NDArray[np.int64]
     """(N,) id of the keyframe that the node is attached to."""
     pairwise: list[Pairwise] = field(default_factory=list)
@@ -75,6 +75,11 @@ class Graph:
     def keyframes(self) -> NDArray[np.int64]:
         """The ids (K,) of the keyframes, increasing."""
         return np.flatnonzero(self.anchors == np.arange(len(self))).astype(np.int64)
+
+    @property
+    def known_odometry(self) -> Array | None:
+        """(n, 3) the odometry of the nodes that have it, or None."""
+        return None if self.odometry is None else self.odometry[are_known(self.odometry)]
 
     @property
     def times(self) -> Array:

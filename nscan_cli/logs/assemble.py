@@ -21,7 +21,7 @@ from nscan_cli.logs.range_limits import limits_in_force
 from nscan_cli.logs.reading_options import ReadingOptions
 from nscan_cli.logs.scan_order import ScanOrder, selected_numbers
 from nscan_cli.logs.skips import Skips
-from nscan_cli.poses import Array
+from nscan_cli.poses import Array, are_known
 
 
 @dataclass(frozen=True)
@@ -120,7 +120,7 @@ def laser_log(
     beams, limits = beam_counts(raw.ranges, raw.beams)[rows], limits.of(rows)
     lost = lost_readings(ranges, beams, limits, file)
     mark_no_returns(ranges, limits.low, limits.high)
-    odometry = motion.odometry
+    odometry = None if motion.odometry is None else motion.odometry[numbers]
     return LaserLog(
         source=source,
         format=form,
@@ -132,7 +132,7 @@ def laser_log(
         angle_min=angle_min[rows],
         angle_increment=angle_increment[rows],
         mount=mount,
-        odometry=None if odometry is None else odometry[numbers],
+        odometry=odometry if odometry is not None and are_known(odometry).any() else None,
         no_return=limits.no_return,
         range_limits=limits.whole,
         report=LogReport(

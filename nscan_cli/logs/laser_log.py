@@ -88,7 +88,7 @@ class LaserLog:
     mount: Array
     """(3,) pose of the laser in the robot's frame."""
     odometry: Array | None
-    """(S, 3) pose of the robot in the odometry frame, or None."""
+    """(S, 3) pose of the robot in the odometry frame, nan where it is missing; None without any odometry."""
     no_return: float | None
     """Smallest reading that means "no return", m; None if the log has none."""
     range_limits: tuple[float, float]

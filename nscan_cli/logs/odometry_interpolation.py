@@ -1,32 +1,94 @@
-"""Poses of the robot at the times of the scans, from poses at other times."""
+"""Poses of the robot at the times of the scans, from poses at other times; none where none are near."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
+from numpy.typing import NDArray
 
 from nscan_cli.files.text import counted
-from nscan_cli.poses import Array, wrap
+from nscan_cli.poses import Array, relative, wrap
+
+MOST_GAPS_NAMED = 5
+"""Gaps that the message about missing odometry names."""
 
 
-def interpolated_poses(times: Array, at: Array, poses: Array, name: str, warnings: list[str]) -> Array | None:
+@dataclass(frozen=True)
+class OdometryGapLimits:
+    """Where there is no odometry between two poses, because too much happens between them."""
+
+    periods: float = 10.0
+    """A gap is longer than this many median periods of the poses. A larger value interpolates over more."""
+    motion: float = 0.2
+    """The robot moves by more than this over a gap, m and rad. A robot that stands may send no pose: what is
+    interpolated then is right."""
+    beyond: float = 1.0
+    """Periods before the first and after the last pose during which that pose is used. A larger value lets
+    the robot stand longer where its odometry begins later or ends earlier than its scans."""
+
+
+def interpolated_poses(
+    times: Array,
+    at: Array,
+    poses: Array,
+    name: str,
+    warnings: list[str],
+    limits: OdometryGapLimits = OdometryGapLimits(),
+) -> Array | None:
     """Poses (S, 3) at `times` (S,), interpolated between `poses` (P, 3) at the sorted times `at` (P,).
 
-    Linear in x, y and the unwrapped angle. Before the first and after the last pose, that pose is used.
-    Returns None, with a warning, if no scan lies between them. `name` is what warnings call a pose.
+    Linear in x, y and the unwrapped angle; nan beyond the first and the last pose, and in gaps between poses.
+    Returns None, with a warning, if no scan has a pose. `name` is what warnings call a pose. Times in s.
     """
-    outside = int(np.sum((times < at[0]) | (times > at[-1])))
-    if outside == len(times):
+    if (times > at[-1]).all() or (times < at[0]).all():
         warnings.append(
             f"no scan lies between the first {name} ({at[0]:.3f} s) and the last ({at[-1]:.3f} s): the scans "
             f"go from {times[0]:.3f} s to {times[-1]:.3f} s; no odometry"
         )
         return None
-    if outside:
-        warnings.append(
-            f"{counted(outside, 'scan')} before the first {name} or after the last: that one's pose is used"
-        )
     angles = np.unwrap(poses[:, 2])
     columns = (poses[:, 0], poses[:, 1], angles)
     found = np.stack([np.interp(times, at, column) for column in columns], axis=-1)
     found[:, 2] = wrap(found[:, 2])
+    missing = _without_pose(times, at, poses, limits)
+    if missing.any():
+        found[missing] = np.nan
+        warnings.append(_missing_notice(missing, times, name))
     return found
+
+
+def _missing_notice(missing: NDArray[np.bool_], times: Array, name: str) -> str:
+    """The sentence that says at which scans (S,) odometry is missing; times (S,) in s."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], missing, [False]]).astype(np.int8)))
+    gaps = edges.reshape(-1, 2).tolist()
+    stretches = [_scans(first, end - 1) for first, end in gaps[:MOST_GAPS_NAMED]]
+    more = len(gaps) - MOST_GAPS_NAMED
+    rest = f" and in {counted(more, 'more gap')}" if more > 0 else ""
+    seconds = float(np.gradient(times)[missing].sum()) if len(times) > 1 else 0.0
+    return (
+        f"odometry is missing at {counted(int(missing.sum()), 'scan')} ({seconds:.1f} s): no {name} near "
+        f"{', '.join(stretches)}{rest}; steady motion takes its place there"
+    )
+
+
+def _scans(first: int, last: int) -> str:
+    """Some scans that follow each other, by their numbers."""
+    return f"scan {first}" if first == last else f"scans {first} to {last}"
+
+
+def _without_pose(times: Array, at: Array, poses: Array, limits: OdometryGapLimits) -> NDArray[np.bool_]:
+    """(S,) which of the `times` (S,) have no pose near enough, as interpolated_poses takes them."""
+    periods = np.diff(at)
+    usual = float(np.median(periods[periods > 0.0])) if (periods > 0.0).any() else 0.0
+    steps = np.abs(relative(poses[1:], poses[:-1]))
+    is_gap = (periods > limits.periods * usual) & (
+        np.maximum(np.hypot(steps[:, 0], steps[:, 1]), steps[:, 2]) > limits.motion
+    )
+    after = np.searchsorted(at, times, side="right")
+    between = np.clip(after - 1, 0, max(len(at) - 2, 0))
+    inside = (times > at[0]) & (times < at[-1])
+    missing: NDArray[np.bool_] = inside & np.isin(between, np.flatnonzero(is_gap)) & (times > at[between])
+    margin = limits.beyond * usual
+    missing |= (times < at[0] - margin) | (times > at[-1] + margin)
+    return missing

@@ -11,6 +11,8 @@ import pytest
 from PIL import Image
 
 from nscan_cli.cli.main import run
+from nscan_cli.cli.match import with_defaults
+from nscan_cli.errors import WrongUsageError
 from nscan_cli.graph.io.triangles import from_upper_triangle
 from nscan_cli.logs.load import read_log
 from nscan_cli.mapping.figures.canvas import BLUE, PURPLE, VERMILLION
@@ -18,6 +20,7 @@ from nscan_cli.poses import relative
 from tests.cli.documents import document_and_notices
 from tests.data import CORRIDOR_LOG, OFFICE_LOG, data_file
 from tests.logs.lines import flaser
+from tests.simulation.faults import odometry_missing
 
 KEYS = [
     "format", "version", "units", "provenance", "reference", "scan", "initial", "pose", "energy",
@@ -255,3 +258,12 @@ def test_a_stage_that_was_cut_off_is_told_though_the_match_has_converged(capsys)
     assert np.hypot(*off(document, OFFICE_LOG)[:2]) > 0.4
     assert (document["converged"], document["reason"], document["unsettled_stages"]) == (True, None, 1)
     assert said[-1].strip() == "1 stage before the last did not settle: the result is less certain"
+
+
+def test_scans_whose_odometry_is_missing_start_from_identity(capsys):
+    log = odometry_missing(read_log(OFFICE_LOG), [12])
+    assert with_defaults(log, (10, 11), None, None, quiet=False) == ("odometry", "odometry")
+    assert with_defaults(log, (10, 12), None, None, quiet=False) == ("identity", "none")
+    assert capsys.readouterr().err == "no odometry at scan 12: initial identity, prior none\n"
+    with pytest.raises(WrongUsageError, match="no odometry at scan 12; give --prior none"):
+        with_defaults(log, (10, 12), None, "odometry", quiet=False)

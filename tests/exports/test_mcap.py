@@ -166,6 +166,21 @@ def test_the_frames_lead_from_the_map_to_the_laser(run, topics):
         np.testing.assert_allclose(relative(laser, log.laser_pose(pose)), 0, atol=1e-9)
 
 
+def test_where_odometry_is_missing_the_correction_before_holds(run):
+    """The robot has one parent frame throughout, and is where the graph has it."""
+    odometry = run[0].odometry.copy()
+    odometry[[0, 3]] = np.nan
+    log = dataclasses.replace(run[0], odometry=odometry)
+    topics = read_back(ros2_recording(log, NODES, NODES, small_run_graph(log), grid_of(log)))
+    found = [frames_at(topics, k) for k in range(len(POSES))]
+    for k, after in ((0, 1), (3, 2)):
+        np.testing.assert_allclose(
+            relative(found[k]["map", "odom"], found[after]["map", "odom"]), 0, atol=1e-9
+        )
+        robot = compose(found[k]["map", "odom"], found[k]["odom", "base_link"])
+        np.testing.assert_allclose(relative(robot, POSES[k]), 0, atol=1e-9)
+
+
 def test_without_odometry_there_is_no_odom_frame(run):
     log = dataclasses.replace(run[0], odometry=None)
     graph = small_run_graph(log)

@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from nscan_cli.logs.odometry_interpolation import interpolated_poses
-from nscan_cli.poses import wrap
+from nscan_cli.poses import Array, wrap
 
 
 def test_linear_in_place_and_by_the_shorter_turn():
@@ -23,18 +23,55 @@ def test_linear_in_place_and_by_the_shorter_turn():
     assert warnings == []
 
 
-def test_outside_the_ends_hold_and_are_told():
+def at_every_tenth(poses: Array, times: list[float], warnings: list[str]) -> Array | None:
+    """Interpolated at `times` from poses every 0.1 s, except where they are nan."""
+    at = np.arange(len(poses)) / 10
+    kept = ~np.isnan(poses[:, 0])
+    return interpolated_poses(np.asarray(times), at[kept], poses[kept], "pose", warnings)
+
+
+def driven(poses: int, speed: float = 0.5) -> Array:
+    """A straight drive with so many poses, 0.1 s apart; speed in m/s."""
+    return np.stack([np.arange(poses) * speed / 10, np.zeros(poses), np.zeros(poses)], axis=1)
+
+
+def test_beyond_the_ends_it_is_missing_and_told():
+    """Within a period the nearest pose holds: a recorder rarely gets both topics at once."""
     warnings: list[str] = []
-    found = interpolated_poses(
-        np.array([0.0, 1.5, 9.0]),
-        np.array([1.0, 2.0]),
-        np.array([[1.0, 0, 0], [2, 0, 0]]),
-        "record",
-        warnings,
-    )
+    found = at_every_tenth(driven(21), [-1.0, -0.05, 1.0, 2.05, 3.0, 4.0], warnings)
     assert found is not None
-    np.testing.assert_allclose(found[:, 0], [1, 1.5, 2])
-    assert warnings == ["2 scans before the first record or after the last: that one's pose is used"]
+    np.testing.assert_allclose(found[:, 0], [np.nan, 0.0, 0.5, 1.0, np.nan, np.nan])
+    (warning,) = warnings
+    assert warning.startswith("odometry is missing at 3 scans (")
+    assert warning.endswith("no pose near scan 0, scans 4 to 5; steady motion takes its place there")
+
+
+def test_a_gap_in_which_the_robot_moved_is_no_straight_line():
+    poses, warnings = driven(100), list[str]()
+    poses[20:60] = np.nan
+    found = at_every_tenth(poses, [1.0, 1.9, 3.0, 5.9, 6.0], warnings)
+    assert found is not None
+    assert np.isnan(found[:, 0]).tolist() == [False, False, True, True, False]
+    assert len(warnings) == 1
+
+
+def test_a_short_gap_is_interpolated():
+    poses, warnings = driven(100), list[str]()
+    poses[20:27] = np.nan
+    found = at_every_tenth(poses, [2.5], warnings)
+    assert found is not None
+    np.testing.assert_allclose(found[0, 0], 1.25)
+    assert not warnings
+
+
+def test_a_robot_that_stands_need_not_say_so():
+    """Some drivers send poses only while the wheels turn."""
+    poses, warnings = driven(100, speed=0.0), list[str]()
+    poses[20:60] = np.nan
+    found = at_every_tenth(poses, [4.0], warnings)
+    assert found is not None
+    assert np.isfinite(found).all()
+    assert not warnings
 
 
 def test_none_inside_is_no_odometry():

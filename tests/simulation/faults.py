@@ -106,6 +106,13 @@ def odometry_reset(log: LaserLog, at: int) -> LaserLog:
     return replace(log, odometry=odometry)
 
 
+def odometry_missing(log: LaserLog, rows: Rows) -> LaserLog:
+    """The odometry says nothing at `rows`, as where a node had died or a topic was not recorded."""
+    odometry = _odometry(log).copy()
+    odometry[rows] = np.nan
+    return replace(log, odometry=odometry)
+
+
 def odometry_jump(log: LaserLog, at: int, jump: tuple[float, float, float]) -> LaserLog:
     """From row `at` on the odometry is off by a pose, in its own frame."""
     odometry = _odometry(log).copy()

@@ -25,6 +25,7 @@ from tests.slam.trouble_cases import ROUND, Case, errors, without_odometry
 MENDED = ("3 m without a return", "3 m of nan", "15 m without a return", "3 s of scans dropped",
           "10 s of scans dropped", "laser frozen for 3 m", "laser frozen for 8 m", "odometry reset to 0",
           "odometry jumps by 30 m and 2 rad", "odometry wrong in one scan", "odometry wraps round",
+          "odometry missing for 20 m", "odometry ends half-way",
           "clock set forward by 1 h", "clock set back by 1 h", "clock set back by 10 s",
           "people who pass")  # fmt: skip
 """As if it had not happened."""

@@ -89,6 +89,11 @@ def odometry_spike(log: LaserLog, at: float) -> Case:
     return Case(faults.odometry_spike(log, row, (300.0, 5.0, 2.0)), row, row + 1)
 
 
+def odometry_missing(log: LaserLog, since: float, until: float) -> Case:
+    a, b = at_metre(log, since), at_metre(log, until)
+    return Case(faults.odometry_missing(log, slice(a, b)), a, b)
+
+
 def odometry_wrapped(log: LaserLog, at: float) -> Case:
     """The limit is what the robot reaches after so many metres, 16.4 m in simulation: 15 bits of mm."""
     assert log.odometry is not None
@@ -157,6 +162,8 @@ ROUND: dict[str, Make] = {
     "odometry reset to 0": lambda log: odometry_reset(log, 50),
     "odometry jumps by 30 m and 2 rad": lambda log: odometry_jump(log, 50),
     "odometry wrong in one scan": lambda log: odometry_spike(log, 50),
+    "odometry missing for 20 m": lambda log: odometry_missing(log, 30, 50),
+    "odometry ends half-way": lambda log: odometry_missing(log, 40, 999),
     "odometry wraps round": lambda log: odometry_wrapped(log, 18),
     "clock set forward by 1 h": lambda log: clock_jump(log, 50, 3600.0),
     "clock set back by 1 h": lambda log: clock_jump(log, 50, -3600.0),

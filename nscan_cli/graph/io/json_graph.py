@@ -9,6 +9,7 @@ from __future__ import annotations
 import io
 import itertools
 import json
+import math
 import re
 from collections.abc import Iterable, Iterator
 from json.encoder import encode_basestring_ascii
@@ -38,6 +39,8 @@ POSES_AT_A_TIME = 1000
 """Poses that are converted to lists at a time; a larger value takes more memory."""
 VERTEX_KEY = re.compile("0|[1-9][0-9]{0,19}")
 """A g2o vertex key: an integer of 64 bits as text, which every JSON reader keeps exact."""
+NO_POSE = np.full(3, np.nan)
+"""The odometry of a node that has none."""
 RECORD_SEPARATOR = ",\n"
 """Between two records."""
 _compact = json.JSONEncoder(separators=(",", ":"), allow_nan=False, check_circular=False).encode
@@ -50,7 +53,7 @@ def write_graph(graph: Graph) -> bytes:
     Poses have 9 decimals, matrices 6 significant digits. Raises NotFiniteError, and ValueError for a number
     in the provenance that is not finite.
     """
-    check_finite("the poses of the graph", graph.poses, graph.odometry)
+    check_finite("the poses of the graph", graph.poses, graph.known_odometry)
     check_finite("the covariances of the graph", *graph.marginals.values())
     for relation in graph.relations:
         term = relation.term()
@@ -141,7 +144,7 @@ def _node_records(graph: Graph) -> Iterator[str]:
     each = zip(scans, named, graph.stamps, poses, odometry, anchors, strict=True)
     for node, (scan, vertex, stamp, (x, y, angle), sensed, anchor) in enumerate(each):
         pose = f'"pose":[{x!r},{y!r},{angle!r}]'
-        if sensed is not None:
+        if sensed is not None and not math.isnan(sensed[0]):
             pose += ',"odometry":[{!r},{!r},{!r}]'.format(*sensed)
         keyframe = '"keyframe":true' if anchor == node else f'"keyframe":false,"attached":{anchor}'
         stamped = f'{vertex}"stamp":{encode_basestring_ascii(stamp)}'
@@ -216,15 +219,12 @@ def _nodes(document: JsonRecord) -> Graph:
             raise MalformedError(record.place, "'scan' is not greater than that of the node before")
         stamps.append(_node_stamp(record))
         poses.append(record.pose("pose"))
-        if "odometry" in record:
-            odometry.append(record.pose("odometry"))
+        odometry.append(record.pose("odometry") if "odometry" in record else NO_POSE)
         if "vertex" in record:
             vertices.append(_node_vertex(record))
         anchors.append(_node_anchor(record, node))
     if not poses:
         raise MalformedError("nodes", "there are none")
-    if odometry and len(odometry) != len(poses):
-        raise MalformedError("nodes", f"{len(odometry)} of {len(poses)} have 'odometry'; all or none may")
     if vertices and len(set(vertices)) != len(poses):
         raise MalformedError("nodes", "'vertex' is not unique to each of them")
     for node, anchor in enumerate(anchors):
@@ -234,7 +234,7 @@ def _nodes(document: JsonRecord) -> Graph:
         scans=np.array(scans, dtype=np.int64),
         stamps=stamps,
         poses=np.array(poses),
-        odometry=np.array(odometry) if odometry else None,
+        odometry=None if all(sensed is NO_POSE for sensed in odometry) else np.array(odometry),
         anchors=np.array(anchors, dtype=np.int64),
         vertices=vertices or None,
     )

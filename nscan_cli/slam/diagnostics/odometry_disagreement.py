@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from nscan_cli.poses import Array, Indices
+from nscan_cli.poses import Array, Indices, are_known
 from nscan_cli.slam.diagnostics.options import OdometryDisagreementOptions
 
 
@@ -36,9 +36,14 @@ def odometry_disagreements(
 
     Odometry (S, 3) is that of all scans. Nothing is compared over the rows `breaks`, at which tracking broke.
     From end to end of a stretch is compared: the length of the path between depends on how many keyframes
-    there are where the robot turns.
+    there are where the robot turns. Nor is anything compared where odometry is missing (nan).
     """
-    pieces = np.searchsorted(np.asarray(breaks, dtype=np.int64), rows, side="right")
+    known = are_known(odometry)
+    rows, poses = rows[known[rows]], poses[known[rows]]
+    if not len(rows):
+        return []
+    begins = np.sort([*breaks, *(np.flatnonzero(known[1:] & ~known[:-1]) + 1)]).astype(np.int64)
+    pieces = np.searchsorted(begins, rows, side="right")
     tracks = np.stack([odometry[rows, :2], poses[:, :2]])
     steps = np.linalg.norm(np.diff(tracks, axis=1), axis=2).max(axis=0)
     along = np.cumsum(np.append(0.0, np.where(pieces[1:] > pieces[:-1], 0.0, steps)))

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nscan_cli.logs.laser_log import LaserLog
-from nscan_cli.poses import Array, compose, relative, transform
+from nscan_cli.poses import Array, are_known, compose, relative, transform
 from nscan_cli.slam.frontend.first_scan import place_first
 from nscan_cli.slam.frontend.options import BreakOptions, TrackingOptions
 from nscan_cli.slam.frontend.scan_batch import ScanBatch
@@ -260,7 +260,8 @@ class SegmentTracker:
         assert last is not None
         guess = origin = last.tracked.poses[0]
         if first.scans.odometry is not None and last.scans.odometry is not None:
-            guess = compose(origin, relative(first.scans.odometry[0], last.scans.odometry[0]))
+            step = relative(first.scans.odometry[0], last.scans.odometry[0])
+            guess = compose(origin, step) if are_known(step) else origin
         self.tracker, self._origin = self._new_tracker(), guess
         is_bridged = self._is_bridged(first)
         self._path = float(last.tracked.paths[0])

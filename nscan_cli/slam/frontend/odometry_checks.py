@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nscan_cli.logs.laser_log import LaserLog
-from nscan_cli.poses import Array, compose, relative
+from nscan_cli.poses import Array, are_known, compose, relative
 from nscan_cli.slam.frontend.options import OdometryCheckOptions
 
 SHORTEST_PERIOD = 1e-3
@@ -20,17 +20,20 @@ def without_jumps(
 ) -> tuple[Array, NDArray[np.int64]]:
     """Odometry (S, 3) without its jumps, and the rows (J,) to which it jumped; times (S,) in s.
 
+    Odometry is nan where it is missing; no step leads to such a row or from it.
+
     Where it is reset, wraps round or has a wrong value, the step before takes the place of the jump.
     """
     jumps = jumps_of(odometry, options, times)
     if not len(jumps):
         return odometry, jumps
     steps, mended = relative(odometry[1:], odometry[:-1]), odometry.copy()
-    jumped = np.isin(np.arange(1, len(odometry)), jumps)
+    jumped, known = np.isin(np.arange(1, len(odometry)), jumps), are_known(odometry)
     for row, jump in enumerate(jumped.tolist()):
         if jump:
-            steps[row] = steps[row - 1] if row else 0.0
-        mended[row + 1] = compose(mended[row], steps[row])
+            steps[row] = steps[row - 1] if row and known[row - 1] else 0.0
+        if known[row] and known[row + 1]:
+            mended[row + 1] = compose(mended[row], steps[row])
     return mended, jumps
 
 
