@@ -261,7 +261,7 @@ def test_a_stage_that_was_cut_off_is_told_though_the_match_has_converged(capsys)
 
 
 def test_scans_whose_odometry_is_missing_start_from_identity(capsys):
-    log = odometry_missing(read_log(OFFICE_LOG), [12])
+    log = odometry_missing(read_log(OFFICE_LOG), slice(12, 13))
     assert with_defaults(log, (10, 11), None, None, quiet=False) == ("odometry", "odometry")
     assert with_defaults(log, (10, 12), None, None, quiet=False) == ("identity", "none")
     assert capsys.readouterr().err == "no odometry at scan 12: initial identity, prior none\n"
