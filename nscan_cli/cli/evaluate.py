@@ -91,12 +91,12 @@ def command(
     check_plot(plot, [result, relations, reference])
     import json
 
+    from nscan_cli.evaluation.evaluate_result import evaluate_result
     from nscan_cli.evaluation.evaluation_report import as_document, evaluation_text
-    from nscan_cli.evaluation.measured import measure
 
-    measured = measure(result, relations, reference, worst or 0, reading, reference_topic)
-    evaluation = measured.evaluation
-    for notice in measured.notices:
+    evaluated = evaluate_result(result, relations, reference, worst or 0, reading, reference_topic)
+    evaluation = evaluated.evaluation
+    for notice in evaluated.notices:
         say(f"warning: {notice}", quiet)
     if evaluation.relations and evaluation.relations[1].too_far:
         table, errors = evaluation.relations
@@ -111,7 +111,7 @@ def command(
         from nscan_cli.evaluation.error_picture import picture
 
         drawn = DEFAULT_DRAWN if worst is None else worst
-        write_plot(plot, picture(evaluation, measured.trajectory, measured.reference, drawn))
+        write_plot(plot, picture(evaluation, evaluated.trajectory, evaluated.reference, drawn))
     _check_bounds(evaluation, max_translation, max_rotation)
 
 

@@ -130,7 +130,7 @@ def command(
     named = [*([] if from_file is None else [from_file]), *(files_of(log) if log else ())]
     outputs.check(named)
     from nscan_cli.memory import use_one_arena
-    from nscan_cli.slam.map_log import slam_options
+    from nscan_cli.slam.log_to_graph import slam_options
     from nscan_cli.threads import available_threads
 
     threads = threads or available_threads()

@@ -49,7 +49,7 @@ def run_on_log(
     from nscan_cli.kernels.decorators import load_runtime
     from nscan_cli.logs.load import read_log
     from nscan_cli.logs.log_files import files_of
-    from nscan_cli.slam.map_log import map_log
+    from nscan_cli.slam.log_to_graph import map_log
 
     load_runtime()
     compiling = Compiling("a minute or two", quiet)
@@ -84,18 +84,18 @@ def run_on_log(
 
 def _graph_rows(graph: Graph) -> list[Row]:
     """Counts of keyframes, relations and loops, reasons of refused loops, and standard deviations."""
-    from nscan_cli.slam.map_log import Counts
+    from nscan_cli.slam.log_to_graph import Counts
 
     counts = Counts.of(graph)
-    tried, refused = counts.accepted + counts.refused.total(), counts.refused.total()
-    loops = f"{tried} tried, {counts.accepted} accepted, {refused} refused"
+    candidates, refused = counts.accepted + counts.refused.total(), counts.refused.total()
+    loops = f"{candidates} tried, {counts.accepted} accepted, {refused} refused"
     reasons: Counter[str] = Counter()
     for reason, count in counts.refused.items():
         reasons[without_numbers(reason)] += count
     return [
         ("keyframes", [f"{counts.keyframes}"]),
         ("relations", [f"{counts.pairwise} pairwise, {counts.nscan} nScan"]),
-        ("loops", [loops if tried else "none tried"]),
+        ("loops", [loops if candidates else "none tried"]),
         ("refused", [f"{count}: {reason}" for reason, count in reasons.most_common()]),
         ("sigma", _sigma_lines(graph)),
     ]

@@ -14,10 +14,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nscan_cli.graph.linalg.block_cholesky import Factor, factorise
-from nscan_cli.graph.model import Graph, NScan, Pairwise
+from nscan_cli.graph.model import Graph
 from nscan_cli.graph.optimise.graph_energy import GraphEnergy
 from nscan_cli.graph.optimise.whole_graph import Component
 from nscan_cli.graph.relations.base import Relation
+from nscan_cli.graph.relations.registry import is_joint, is_pairwise
 from nscan_cli.poses import Array
 
 
@@ -38,13 +39,13 @@ def _each_pair_once(relations: Sequence[Relation]) -> Array:
     Pairwise relations are independent of each other. Joint matches take them as priors, so H contains their
     information. Relations of other types do not come from scans, and have weight 1.
     """
-    of_scans = [k for k, relation in enumerate(relations) if isinstance(relation, NScan | Pairwise)]
+    of_scans = [k for k, relation in enumerate(relations) if is_joint(relation) or is_pairwise(relation)]
     pairs = [_pair_keys(relations[k].nodes) for k in of_scans]
     sizes = [len(each) for each in pairs]
-    is_joint = np.repeat([isinstance(relations[k], NScan) for k in of_scans], sizes).astype(np.bool_)
+    joint = np.repeat([is_joint(relations[k]) for k in of_scans], sizes).astype(np.bool_)
     _, places = np.unique(np.concatenate([_pair_keys(()), *pairs]), return_inverse=True)
-    of_joint, of_any = np.bincount(places[is_joint], minlength=len(places)), np.bincount(places)
-    counts = np.where(is_joint, of_any[places], of_joint[places] + 1)
+    of_joint, of_any = np.bincount(places[joint], minlength=len(places)), np.bincount(places)
+    counts = np.where(joint, of_any[places], of_joint[places] + 1)
     owners = np.repeat(np.arange(len(sizes)), sizes)
     weights = np.ones(len(relations))
     weights[of_scans] = np.bincount(owners, 1.0 / counts, minlength=len(sizes)) / sizes

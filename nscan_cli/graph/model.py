@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from nscan_cli.graph.relations.base import Relation
 from nscan_cli.graph.relations.nscan import NScan
 from nscan_cli.graph.relations.pairwise import Pairwise
+from nscan_cli.graph.relations.registry import is_joint, is_pairwise
 from nscan_cli.poses import Array, are_known, compose, relative
 
 __all__ = ["Graph", "Loop", "NScan", "Pairwise"]
@@ -64,9 +65,9 @@ class Graph:
 
     def add(self, relation: Relation) -> None:
         """Append a relation to the list of its type."""
-        if isinstance(relation, Pairwise):
+        if is_pairwise(relation):
             self.pairwise.append(relation)
-        elif isinstance(relation, NScan):
+        elif is_joint(relation):
             self.nscan.append(relation)
         else:
             self.others.append(relation)

@@ -46,7 +46,7 @@ FORMS: tuple[Form, ...] = (
     ),
     Form("CARMEN text", "nscan_cli.logs.text.carmen"),
     Form("Player text", "nscan_cli.logs.text.player"),
-    Form(".script text", "nscan_cli.logs.text.script"),
+    Form(".script text", "nscan_cli.logs.text.script_format"),
 )
 """The forms in the order in which they are tried. A new form of log is a module and a line here."""
 

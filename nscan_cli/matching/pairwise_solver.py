@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from nscan_cli.kernels.assign import assign, assign_rows
+from nscan_cli.kernels.array_assignment import assign, assign_rows
 from nscan_cli.kernels.decorators import kernel, leaf_kernel
 from nscan_cli.matching.damped_newton import PAIRWISE_STEPS, is_accepted, is_last, next_damping
 from nscan_cli.matching.priors import Prior

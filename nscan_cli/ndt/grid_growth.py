@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from nscan_cli.kernels.assign import assign, assign_rows
+from nscan_cli.kernels.array_assignment import assign, assign_rows
 from nscan_cli.kernels.decorators import kernel, leaf_kernel
 from nscan_cli.ndt.gaussians import make_gaussian
 from nscan_cli.ndt.hash_grid import (

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from nscan_cli.kernels.assign import assign
+from nscan_cli.kernels.array_assignment import assign
 from nscan_cli.kernels.decorators import kernel
 from nscan_cli.ndt.grid_growth import add_points, change_points, make_all_gaussians, with_capacity
 from nscan_cli.ndt.hash_grid import (

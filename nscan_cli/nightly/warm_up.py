@@ -75,7 +75,7 @@ def main() -> None:
     from nscan_cli.logs.load import log_from
     from nscan_cli.logs.reading_options import ReadingOptions
     from nscan_cli.mapping.occupancy import occupancy_grid
-    from nscan_cli.slam.map_log import map_log, slam_options
+    from nscan_cli.slam.log_to_graph import map_log, slam_options
 
     compiled.load_runtime()
     drive = simulated_carmen_log()
@@ -122,9 +122,9 @@ def _simulated_poses() -> Array:
         turns = heading + np.radians(np.arange(15, 90, 15))
         x, y = cos * half + sin * half, sin * half - cos * half
         poses += [along, np.array([(x, y, turn) for turn in turns])]
-    way = np.concatenate(poses)
-    way[:, 2] = wrap(way[:, 2])
-    return way
+    drive = np.concatenate(poses)
+    drive[:, 2] = wrap(drive[:, 2])
+    return drive
 
 
 def _simulated_ranges(poses: Array, angles: Array) -> Array:

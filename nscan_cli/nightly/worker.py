@@ -59,7 +59,7 @@ def map_and_evaluate(
     from nscan_cli.mapping.occupancy import occupancy_grid
     from nscan_cli.nightly import warm_up
     from nscan_cli.nightly.map_preview import map_preview
-    from nscan_cli.slam.map_log import Counts, map_log, slam_options
+    from nscan_cli.slam.log_to_graph import Counts, map_log, slam_options
 
     if cache_folder() is None:
         warm_up.main()
@@ -105,13 +105,13 @@ def map_and_evaluate(
 
 def _evaluation(inputs: dict[str, str], graph_file: str) -> dict[str, Any] | None:
     """The document of `evaluate --json` for the graph; None without relations or a reference."""
+    from nscan_cli.evaluation.evaluate_result import evaluate_result
     from nscan_cli.evaluation.evaluation_report import as_document
-    from nscan_cli.evaluation.measured import measure
 
     relations, reference = inputs.get("relations"), inputs.get("reference")
     if relations is None and reference is None:
         return None
-    return as_document(measure(graph_file, relations, reference).evaluation)
+    return as_document(evaluate_result(graph_file, relations, reference).evaluation)
 
 
 def _progress_printer() -> Callable[[int, int, int], None]:

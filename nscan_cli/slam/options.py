@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Literal
 
-from nscan_cli.graph.optimise.robust import RobustOptions
+from nscan_cli.graph.optimise.graduated_nonconvexity import RobustOptions
 from nscan_cli.slam.backend.options import OptimisationOptions, RefinementOptions, ScheduleOptions
 from nscan_cli.slam.diagnostics.options import DiagnosticsOptions
 from nscan_cli.slam.frontend.options import BreakOptions, OdometryCheckOptions, TrackingOptions

@@ -13,9 +13,9 @@ from nscan_cli.slam.backend.rejection import reject_contradicting_loops
 from nscan_cli.slam.frontend.break_detection import SegmentTracker, TrackedBatch, tracker_of
 from nscan_cli.slam.frontend.scan_batch import ScanBatch, scan_batches
 from nscan_cli.slam.keyframes.growing_route import add_keyframes, extend_route
-from nscan_cli.slam.local_matching.match_ahead import MatchAhead
 from nscan_cli.slam.local_matching.match_keyframe import match_keyframe
 from nscan_cli.slam.local_matching.neighbours import choose_neighbours
+from nscan_cli.slam.local_matching.speculative_matching import SpeculativeMatching
 from nscan_cli.slam.loop_closure.close_loops import close_loops
 from nscan_cli.slam.state import SlamState
 from nscan_cli.threads import BackgroundCalls
@@ -31,7 +31,7 @@ def run_slam(state: SlamState, report: LoopProgress) -> Graph:
     """
     tracker, behind = tracker_of(state.log, state.options), state.options.nscan.centre_delay
     with (
-        MatchAhead(state.match, state.options.nscan, state.threads) as ahead,
+        SpeculativeMatching(state.match, state.options.nscan, state.threads) as ahead,
         BackgroundCalls(state.threads) as beside,
     ):
         for scans in scan_batches(
@@ -60,7 +60,7 @@ def track(tracker: SegmentTracker, scans: ScanBatch, is_last: bool) -> list[Trac
     return settled + tracker.finish() if is_last else settled
 
 
-def grow(state: SlamState, ahead: MatchAhead, size: int) -> None:
+def grow(state: SlamState, ahead: SpeculativeMatching, size: int) -> None:
     """Let the first `size` keyframes join the graph; relate those that have enough keyframes after them."""
     for keyframe in state.keyframes.list[len(state.poses) : size]:
         keyframe.make_ndt()
@@ -68,7 +68,7 @@ def grow(state: SlamState, ahead: MatchAhead, size: int) -> None:
         relate(state, ahead, len(state.poses) - 1 - state.options.nscan.centre_delay)
 
 
-def relate(state: SlamState, ahead: MatchAhead, centre: int) -> None:
+def relate(state: SlamState, ahead: SpeculativeMatching, centre: int) -> None:
     """Steps 3 to 5 for one keyframe, unless the matches of others cover it: match, close loops, optimise."""
     if centre < 0:
         return

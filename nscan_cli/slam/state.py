@@ -17,7 +17,7 @@ from nscan_cli.slam.frontend.odometry_checks import frozen_scans, without_jumps
 from nscan_cli.slam.keyframes.keyframe_selection import Keyframes
 from nscan_cli.slam.keyframes.route import Route, route_of
 from nscan_cli.slam.local_matching.coverage import Coverage
-from nscan_cli.slam.local_matching.joint_relations import MatchNearby, match_neighbours
+from nscan_cli.slam.local_matching.joint_relations import LocalMatcher, match_neighbours
 from nscan_cli.slam.local_matching.pairwise_relations import match_neighbours_pairwise
 from nscan_cli.slam.loop_closure.loop_detector import LoopDetector
 from nscan_cli.slam.loop_closure.place import Place
@@ -67,7 +67,7 @@ class SlamState:
     def __post_init__(self) -> None:
         options = self.options
         is_pairwise = options.relations == "pairwise"
-        self.match: MatchNearby = match_neighbours_pairwise if is_pairwise else match_neighbours
+        self.match: LocalMatcher = match_neighbours_pairwise if is_pairwise else match_neighbours
         self.energies, self.coverage = EnergyCache(len(self.log)), Coverage()
         self.detector = LoopDetector(options.loop_closure, options.nscan, self.match, self.energies)
         self.schedule = OptimisationSchedule(options.schedule)

@@ -13,7 +13,7 @@ from PIL import Image
 from nscan_cli.cli.main import run
 from nscan_cli.cli.match import with_defaults
 from nscan_cli.errors import WrongUsageError
-from nscan_cli.graph.io.triangles import from_upper_triangle
+from nscan_cli.graph.io.symmetric_matrices import from_upper_triangle
 from nscan_cli.logs.load import read_log
 from nscan_cli.mapping.figures.canvas import BLUE, PURPLE, VERMILLION
 from nscan_cli.poses import relative

@@ -11,7 +11,7 @@ import pytest
 from nscan_cli.cli.main import run
 from nscan_cli.graph.io.json_fields import JsonRecord
 from nscan_cli.graph.io.json_graph import write_graph
-from nscan_cli.graph.io.triangles import from_upper_triangle
+from nscan_cli.graph.io.symmetric_matrices import from_upper_triangle
 from nscan_cli.graph.io.tum import write_tum
 from nscan_cli.graph.model import Graph, NScan, Pairwise
 from nscan_cli.graph.relations.registry import relation_of

@@ -18,7 +18,7 @@ from nscan_cli.slam.keyframes.keyframe_selection import Keyframes
 from nscan_cli.slam.keyframes.options import KeyframeOptions
 from nscan_cli.slam.keyframes.route import Route, chain_relations, route_of
 from nscan_cli.slam.keyframes.tracked_path import TrackedPath
-from nscan_cli.slam.local_matching.joint_relations import LocalMatch, MatchNearby
+from nscan_cli.slam.local_matching.joint_relations import LocalMatch, LocalMatcher
 from nscan_cli.slam.local_matching.neighbours import choose_neighbours
 from nscan_cli.slam.local_matching.options import NScanOptions
 from nscan_cli.slam.loop_closure.loop_detector import LoopDetector
@@ -39,7 +39,7 @@ AROUND = np.array([0.0, -0.44, -0.22, 0.22, 0.44])
 BEHIND = NScanOptions().centre_delay
 
 
-def about(match: MatchNearby, route: Route, centre: int, options: NScanOptions) -> LocalMatch | None:
+def about(match: LocalMatcher, route: Route, centre: int, options: NScanOptions) -> LocalMatch | None:
     """The match of a keyframe with those near it."""
     near = choose_neighbours(route.poses, route.paths, centre, options)
     return match(route, centre, near, options)

@@ -22,7 +22,7 @@ from tests.logs.recordings.containers import repacked
 from tests.logs.recordings.messages import drive
 from tests.logs.test_radish_forms import FORMS as WITH_BEARINGS
 from tests.logs.text.test_player import V1, V2
-from tests.logs.text.test_script import LINES
+from tests.logs.text.test_script_format import LINES
 
 REAL_LINES = 60
 """Of the real logs, so many lines."""

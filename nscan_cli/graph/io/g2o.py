@@ -20,9 +20,10 @@ from nscan_cli.files.provenance import Source, provenance_of
 from nscan_cli.graph.io.g2o_lines import G2O_REMEDY, G2oLines, key_text, keys, read_lines, rows
 from nscan_cli.graph.io.g2o_tags import losses
 from nscan_cli.graph.io.json_fields import LARGEST_INTEGER
-from nscan_cli.graph.io.triangles import from_upper_triangle, upper_triangle
+from nscan_cli.graph.io.symmetric_matrices import from_upper_triangle, upper_triangle
 from nscan_cli.graph.model import Graph, Pairwise
 from nscan_cli.graph.relations.pairwise_marginals import pairwise_marginals
+from nscan_cli.graph.relations.registry import is_pairwise
 from nscan_cli.graph.relations.semidefinite import IndefiniteError, semidefinite
 from nscan_cli.poses import Array, Indices, compose, inverse, rotated_information
 
@@ -69,7 +70,7 @@ def write_g2o(graph: Graph) -> bytes:
     edges: list[Pairwise] = []
     for each in graph.relations:
         poses = graph.poses[list(each.nodes)]
-        edges += [each] if isinstance(each, Pairwise) else pairwise_marginals(each, poses)
+        edges += [each] if is_pairwise(each) else pairwise_marginals(each, poses)
     for relation in edges:
         z = relation.measurement
         information = upper_triangle(rotated_information(inverse(z), relation.information))
@@ -103,8 +104,8 @@ def _poses_along_edges(lines: G2oLines, name: str) -> dict[int, Array]:
                 queue.append(other)
     for line, (i, _) in zip(lines.edge_lines, ends, strict=True):
         if i not in poses:
-            way = f"from vertex {key_text(first)} to vertex {key_text(i)}"
-            problem = f"no VERTEX_SE2 lines, and no edges lead {way}"
+            ends_of_path = f"from vertex {key_text(first)} to vertex {key_text(i)}"
+            problem = f"no VERTEX_SE2 lines, and no edges lead {ends_of_path}"
             raise InputDataError(name, problem, "add the vertices or the missing edges", line=line)
     return poses
 

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from nscan_cli.files.limits import DISTANCE, INFORMATION, Limit
-from nscan_cli.graph.io.triangles import from_upper_triangle, upper_triangle
+from nscan_cli.graph.io.symmetric_matrices import from_upper_triangle, upper_triangle
 from nscan_cli.graph.relations.semidefinite import IndefiniteError, semidefinite
 from nscan_cli.poses import Array, wrap
 

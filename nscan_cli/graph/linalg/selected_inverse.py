@@ -10,7 +10,7 @@ import numpy as np
 
 from nscan_cli.graph.linalg.block_cholesky import Factor, panel_of, rows_of, subtract_products
 from nscan_cli.graph.linalg.factor_pattern import Pattern
-from nscan_cli.kernels.assign import assign_rows
+from nscan_cli.kernels.array_assignment import assign_rows
 from nscan_cli.kernels.decorators import kernel, leaf_kernel
 from nscan_cli.poses import Array, Indices
 

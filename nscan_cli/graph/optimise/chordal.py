@@ -13,7 +13,7 @@ from nscan_cli.graph.linalg.block_cholesky import factorise, solve
 from nscan_cli.graph.linalg.factor_pattern import block_targets
 from nscan_cli.graph.optimise.graph_energy import GraphEnergy
 from nscan_cli.graph.optimise.graph_solver import newton_step
-from nscan_cli.graph.optimise.term_columns import TermColumns
+from nscan_cli.graph.optimise.term_cache import TermColumns
 from nscan_cli.matching.damped_newton import GRAPH_STEPS
 from nscan_cli.poses import Array, Indices
 

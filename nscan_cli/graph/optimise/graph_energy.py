@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nscan_cli.graph.linalg.factor_pattern import block_targets, find_pattern
-from nscan_cli.graph.optimise.term_columns import TermCache, TermColumns
+from nscan_cli.graph.optimise.term_cache import TermCache, TermColumns
 from nscan_cli.graph.optimise.terms import nscan_term, nscan_value
 from nscan_cli.graph.relations.base import Relation
 from nscan_cli.kernels.decorators import kernel

@@ -9,9 +9,9 @@ import numpy as np
 
 from nscan_cli.graph.model import Graph
 from nscan_cli.graph.optimise.chordal import chordal_start
+from nscan_cli.graph.optimise.graduated_nonconvexity import unfolded
 from nscan_cli.graph.optimise.graph_energy import GraphEnergy
 from nscan_cli.graph.optimise.graph_solver import Optimum, StopOptions, optimise_poses
-from nscan_cli.graph.optimise.robust import unfolded
 from nscan_cli.graph.relations.base import Relation
 from nscan_cli.poses import Array, Indices
 

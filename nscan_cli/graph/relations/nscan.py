@@ -1,4 +1,7 @@
-"""The relation of n keyframes whose scans were matched jointly (paper, IV, eqs. (18) to (23))."""
+"""The relation of n keyframes whose scans were matched jointly (paper, IV, eqs. (18) to (23)).
+
+The relation is data. Eqs. (18) to (25) themselves are computed by `nscan_term` in graph/optimise/terms.py.
+"""
 
 from __future__ import annotations
 

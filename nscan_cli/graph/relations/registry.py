@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, TypeGuard
 
 from nscan_cli.graph.io.json_fields import JsonRecord, six_digits
 from nscan_cli.graph.relations.base import Relation
@@ -16,6 +16,21 @@ RELATION_TYPES: list[type[Relation]] = [
 """A new relation type takes one module and one line here."""
 
 ORIGINS = ("odometry", "track", "nscan", "loop")
+
+
+def is_pairwise(relation: Relation) -> TypeGuard[Pairwise]:
+    """Whether it is a measured relative pose of two keyframes."""
+    return isinstance(relation, Pairwise)
+
+
+def is_joint(relation: Relation) -> TypeGuard[NScan]:
+    """Whether it comes from a joint match, about pose c."""
+    return isinstance(relation, NScan)
+
+
+def centre_of(relation: Relation) -> int:
+    """The keyframe about which slam made the match of the relation."""
+    return relation.nodes[relation.fixed if is_joint(relation) else 1]
 
 
 def relation_record(relation: Relation, key: str = "nodes") -> dict[str, Any]:

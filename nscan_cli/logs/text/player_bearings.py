@@ -82,11 +82,11 @@ def has_degrees(poses: Array) -> bool:
         return False
     x, y = np.diff(poses[:, 0]), np.diff(poses[:, 1])
     far = np.hypot(x, y) > 0
-    way, headings = np.arctan2(y, x)[far], poses[:-1, 2][far]
+    directions, headings = np.arctan2(y, x)[far], poses[:-1, 2][far]
     # Twice the angle, because the robot may drive backwards.
     lengths = np.hypot(x, y)[far]
     in_degrees, in_rad = (
-        float(np.cos(2 * (way - angles)) @ lengths) for angles in (np.radians(headings), headings)
+        float(np.cos(2 * (directions - angles)) @ lengths) for angles in (np.radians(headings), headings)
     )
     return in_degrees > max(in_rad, 0.0)
 

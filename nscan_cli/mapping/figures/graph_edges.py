@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from nscan_cli.graph.model import Graph, NScan
+from nscan_cli.graph.model import Graph
 from nscan_cli.graph.relations.base import Relation
+from nscan_cli.graph.relations.registry import is_joint
 from nscan_cli.mapping.figures.canvas import GRAY, GREEN, VERMILLION
 
 REVISIT_DISTANCE = 20.0
@@ -33,6 +34,6 @@ def edges_by_kind(graph: Graph) -> dict[str, NDArray[np.int64]]:
         if far := [node for node in closing if abs(path[node] - path[centre]) > REVISIT_DISTANCE]:
             closing = far
         found["loop"].update((centre, node) for node in closing)
-        kind = "nScan" if isinstance(joint, NScan) else "pairwise"
+        kind = "nScan" if is_joint(joint) else "pairwise"
         found[kind].update((centre, node) for node in others if node not in closing)
     return {kind: np.array(sorted(pairs), dtype=np.int64).reshape(-1, 2) for kind, pairs in found.items()}

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from nscan_cli.kernels.assign import assign_rows
+from nscan_cli.kernels.array_assignment import assign_rows
 from nscan_cli.kernels.decorators import kernel
 from nscan_cli.matching.small_matrices import solve_definite
 from nscan_cli.poses import Array

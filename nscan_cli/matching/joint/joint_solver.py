@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from nscan_cli.kernels.assign import assign, assign_rows
+from nscan_cli.kernels.array_assignment import assign, assign_rows
 from nscan_cli.kernels.decorators import kernel
 from nscan_cli.matching.damped_newton import JOINT_STEPS, is_accepted, is_last, next_damping
 from nscan_cli.matching.joint.gauge import gauge_fixed_step

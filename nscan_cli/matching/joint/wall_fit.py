@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from nscan_cli.kernels.assign import assign
+from nscan_cli.kernels.array_assignment import assign
 from nscan_cli.kernels.decorators import kernel
 from nscan_cli.matching.joint.gauge import gauge_fixed_step, gauge_of
 from nscan_cli.matching.joint.options import WallFitOptions

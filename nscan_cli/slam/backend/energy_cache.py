@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nscan_cli.graph.optimise.graph_energy import GraphEnergy
-from nscan_cli.graph.optimise.term_columns import TermCache
+from nscan_cli.graph.optimise.term_cache import TermCache
 from nscan_cli.graph.relations.base import Relation
 from nscan_cli.slam.keyframes.route import Route
 

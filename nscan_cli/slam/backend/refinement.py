@@ -20,7 +20,7 @@ from nscan_cli.slam.backend.optimisation import optimise
 from nscan_cli.slam.backend.rejection import reject_contradicting_loops
 from nscan_cli.slam.keyframes.route import Route
 from nscan_cli.slam.local_matching.coverage import Coverage
-from nscan_cli.slam.local_matching.joint_relations import LocalMatch, MatchNearby
+from nscan_cli.slam.local_matching.joint_relations import LocalMatch, LocalMatcher
 from nscan_cli.slam.local_matching.neighbours import Neighbours, choose_neighbours
 from nscan_cli.slam.local_matching.options import NScanOptions
 from nscan_cli.slam.state import SlamState
@@ -51,7 +51,7 @@ class Refinement:
         self,
         route: Route,
         options: NScanOptions,
-        match: MatchNearby,
+        match: LocalMatcher,
         wider: Mapping[int, float],
         threads: int = 1,
     ) -> None:
@@ -79,10 +79,10 @@ class Refinement:
                 lambda centre: self._match(route, centre, chosen[centre], self._options_of(centre)),
                 chosen,
             )
-            for (centre, near), nearby in zip(chosen.items(), found, strict=True):
-                self._covered.add(int(route.rows[centre]), route.rows[near.members].tolist(), nearby)
+            for (centre, near), local_match in zip(chosen.items(), found, strict=True):
+                self._covered.add(int(route.rows[centre]), route.rows[near.members].tolist(), local_match)
                 self._starts[centre] = near.members, poses[near.members]
-                self._found[centre] = nearby
+                self._found[centre] = local_match
             waiting = {centre: near for centre, near in waiting.items() if centre not in chosen}
             matched += len(chosen)
         return matched
@@ -107,20 +107,20 @@ class Refinement:
 
     def relations(self) -> tuple[list[Pairwise], list[NScan]]:
         """The relations as they are now: of single matches, and of joint ones."""
-        found = [nearby for nearby in self._found if nearby is not None]
-        pairs = [relation for nearby in found for relation in nearby.pairwise]
-        return pairs, [nearby.nscan for nearby in found if nearby.nscan is not None]
+        found = [each for each in self._found if each is not None]
+        pairs = [relation for each in found for relation in each.pairwise]
+        return pairs, [each.nscan for each in found if each.nscan is not None]
 
     def loops(self) -> list[Loop]:
         """The verdicts on other visits that these relations come from."""
-        return [nearby.loop for nearby in self._found if nearby is not None and nearby.loop is not None]
+        return [each.loop for each in self._found if each is not None and each.loop is not None]
 
     def _has_moved(self, centre: int, poses: Array, moved: float) -> bool:
         start = self._starts[centre]
         if start is None:
             return True
-        tried, before = start
-        return bool(_farthest_moved(before, poses[tried], int(np.searchsorted(tried, centre))) > moved)
+        members, before = start
+        return bool(_farthest_moved(before, poses[members], int(np.searchsorted(members, centre))) > moved)
 
 
 @kernel

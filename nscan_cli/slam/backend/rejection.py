@@ -1,4 +1,4 @@
-"""Rejection of loops that contradict the graph; graph/optimise/robust.py decides which do (step 6)."""
+"""Step 6: rejection of loops that contradict the graph, as graph/optimise/graduated_nonconvexity.py finds."""
 
 from __future__ import annotations
 
@@ -6,8 +6,8 @@ import dataclasses
 
 import numpy as np
 
-from nscan_cli.graph.model import NScan
-from nscan_cli.graph.optimise.robust import contradicting
+from nscan_cli.graph.optimise.graduated_nonconvexity import contradicting
+from nscan_cli.graph.relations.registry import centre_of
 from nscan_cli.slam.backend.optimisation import optimise
 from nscan_cli.slam.state import SlamState
 
@@ -27,7 +27,7 @@ def reject_contradicting_loops(state: SlamState) -> None:
     state.matched_pairs = [pair for pair in state.matched_pairs if id(pair) not in gone]
     state.nscan_relations = [joint for joint in state.nscan_relations if id(joint) not in gone]
     state.other_relations = [other for other in state.other_relations if id(other) not in gone]
-    centres = {each.nodes[each.fixed] if isinstance(each, NScan) else each.nodes[1] for each in rejected}
+    centres = {centre_of(relation) for relation in rejected}
     state.loops = [
         dataclasses.replace(loop, accepted=False, reason=CONTRADICTS)
         if loop.accepted and loop.nodes[1] in centres

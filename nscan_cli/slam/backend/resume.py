@@ -175,14 +175,14 @@ def _large_loop_places(graph: Graph, options: SlamOptions) -> list[Place]:
         if pair.origin == "loop":
             loops.append((pair.nodes, pair.nodes[1], LocalMatch((pair,), None, None, 0.0, True)))
     places = []
-    for nodes, centre, nearby in loops:
+    for nodes, centre, local_match in loops:
         away = relative(graph.poses[list(nodes)], graph.poses[centre])
         distances = np.hypot(away[:, 0], away[:, 1])
         farthest = nodes[int(np.argmax(distances))]
         if distances.max() > options.nscan.radius:
             measured = relative(graph.poses[centre], graph.poses[farthest])
             radius = float(distances.max()) + options.refinement.min_motion
-            places.append(Place(position[farthest], position[centre], measured, radius, nearby))
+            places.append(Place(position[farthest], position[centre], measured, radius, local_match))
     return places
 
 

@@ -36,16 +36,16 @@ def held_by_others(route: Route, relations: Sequence[Relation], free: Chosen) ->
 
 
 def without_others(
-    route: Route, way: Sequence[Relation], loops: Sequence[Relation], wanted: Chosen
+    route: Route, chain: Sequence[Relation], loops: Sequence[Relation], wanted: Chosen
 ) -> Subgraph:
     """The `wanted` keyframes, those that loops tie to them, and the relations among all these.
 
-    `way[k]` leads from keyframe k to k + 1.
+    `chain[k]` leads from keyframe k to k + 1.
     """
     inner = frozenset(route.rows[wanted].tolist())
     nodes = inner.union(*(loop.nodes for loop in loops if not inner.isdisjoint(loop.nodes)))
     chosen = np.isin(route.rows, list(nodes))
-    steps = [way[k] for k in np.flatnonzero(chosen[:-1] & chosen[1:]).tolist()]
+    steps = [chain[k] for k in np.flatnonzero(chosen[:-1] & chosen[1:]).tolist()]
     return Subgraph([*steps, *(loop for loop in loops if nodes.issuperset(loop.nodes))], chosen)
 
 

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from nscan_cli.files.text import counted
-from nscan_cli.graph.optimise.robust import chi2_by_three
+from nscan_cli.graph.optimise.graduated_nonconvexity import chi2_by_three
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.poses import relative
 from nscan_cli.slam.diagnostics.free_space_violations import free_space_violations, sound_share

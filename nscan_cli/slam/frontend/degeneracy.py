@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from nscan_cli.kernels.assign import assign, assign_rows
+from nscan_cli.kernels.array_assignment import assign, assign_rows
 from nscan_cli.kernels.decorators import kernel, leaf_kernel
 from nscan_cli.matching.pairwise_solver import PairProblem, pairwise_objective
 from nscan_cli.matching.priors import Prior

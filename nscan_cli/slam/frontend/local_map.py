@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from nscan_cli.kernels.assign import assign, assign_rows
+from nscan_cli.kernels.array_assignment import assign, assign_rows
 from nscan_cli.kernels.decorators import kernel
 from nscan_cli.ndt.grid_growth import change_points
 from nscan_cli.ndt.hash_grid import Grid

@@ -42,16 +42,16 @@ class Coverage:
         others = {*others} - {centre}
         return 1.0 if not others else (len(others) - len(self._lacking(centre, others))) / len(others)
 
-    def add(self, centre: int, others: Collection[int], nearby: LocalMatch | None) -> None:
+    def add(self, centre: int, others: Collection[int], local_match: LocalMatch | None) -> None:
         """Add the pairs of a match about `centre` with its members, and the relations that the match gave."""
         self._partners[centre].update(others)
         for other in others:
             self._partners[other].add(centre)
-        if nearby is None:
+        if local_match is None:
             return
-        for relation in nearby.relations:
+        for relation in local_match.relations:
             self._relate(relation.nodes)
-        if nearby.nscan is not None and nearby.nscan.origin == "loop":
+        if local_match.nscan is not None and local_match.nscan.origin == "loop":
             self._closed.add(centre)
 
     def assume(self, route: Route, centre: int, near: Neighbours) -> None:

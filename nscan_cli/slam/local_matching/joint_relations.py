@@ -57,7 +57,7 @@ class LocalMatch:
         return old, relative(poses[nodes.index(centre)], poses[nodes.index(old)])
 
 
-MatchNearby = Callable[[Route, int, Neighbours, NScanOptions], LocalMatch | None]
+LocalMatcher = Callable[[Route, int, Neighbours, NScanOptions], LocalMatch | None]
 """Step 3, jointly or in pairs: match_neighbours tells the arguments."""
 
 
@@ -70,12 +70,12 @@ def match_neighbours(route: Route, centre: int, near: Neighbours, options: NScan
     if len(near.members) < options.min_scans:
         return None
     for widenings in options.attempts:
-        nearby, is_enough = _match_held(
+        local_match, is_enough = _match_held(
             route, near.members, near.from_other_visit, centre, widenings, options
         )
-        if is_enough and nearby.moved < options.max_last_stage_motion:
+        if is_enough and local_match.moved < options.max_last_stage_motion:
             break
-    return nearby
+    return local_match
 
 
 def of_this_visit(route: Route, centre: int, options: NScanOptions) -> NDArray[np.bool_]:
@@ -116,7 +116,7 @@ def match_at(
 
 def _match_held(
     route: Route,
-    tried: Indices,
+    members: Indices,
     from_other_visit: NDArray[np.bool_],
     centre: int,
     widenings: tuple[float, ...],
@@ -128,41 +128,41 @@ def _match_held(
     first. Scans that are left out later hardly ever come back.
     """
     keyframes, poses = route.keyframes, route.poses
-    kept, start, scans = np.arange(len(tried)), poses[tried], _laid_out(keyframes, tried)
+    kept, start, scans = np.arange(len(members)), poses[members], _laid_out(keyframes, members)
     if len(widenings) == 1:
         held = connected_at(
             scans,
             start,
             options.inlier_bound,
             options.start_overlap * options.min_overlap,
-            int(tried.searchsorted(centre)),
+            int(members.searchsorted(centre)),
         )
         kept, start = kept[held], start[held]
-    all_began = len(kept) == len(tried)
+    all_began = len(kept) == len(members)
     while len(kept) >= options.min_scans:
-        members = tried[kept]
-        if len(members) < len(scans.usual):
-            scans = _laid_out(keyframes, members)
-        problem = _problem(scans, members, route, options)
+        related = members[kept]
+        if len(related) < len(scans.usual):
+            scans = _laid_out(keyframes, related)
+        problem = _problem(scans, related, route, options)
         match = match_jointly(problem, start, _stages(widenings, options))
-        at = int(members.searchsorted(centre))
+        at = int(related.searchsorted(centre))
         held, score = connectivity(scans, match.poses, options.inlier_bound, options.min_overlap, at)
         if not held.all():
             kept, start = kept[held], match.poses[held]
             continue
         if not match.converged:
-            loop = verdict(keyframes, tried, from_other_visit, centre, False, "did not converge", score)
+            loop = verdict(keyframes, members, from_other_visit, centre, False, "did not converge", score)
             return LocalMatch((), None, loop, 0.0, False), False
         closed = bool(from_other_visit[kept].any())
         origin = "loop" if closed else "nscan"
-        relation = _relation(route.rows[members], at, problem, match, origin, score, options)
-        whole = len(kept) == len(tried)
-        reason = "" if whole else f"{counted(len(tried) - len(kept), 'scan')} left out"
-        used, before = (members, from_other_visit[kept]) if closed else (tried, from_other_visit)
+        relation = _relation(route.rows[related], at, problem, match, origin, score, options)
+        whole = len(kept) == len(members)
+        reason = "" if whole else f"{counted(len(members) - len(kept), 'scan')} left out"
+        used, before = (related, from_other_visit[kept]) if closed else (members, from_other_visit)
         loop = verdict(keyframes, used, before, centre, closed, reason, score)
-        return LocalMatch((), relation, loop, moved_by(poses[members], match.poses, at), whole), all_began
-    reason = f"only {len(kept)} of {len(tried)} scans hang together"
-    loop = verdict(keyframes, tried, from_other_visit, centre, False, reason, 0.0)
+        return LocalMatch((), relation, loop, moved_by(poses[related], match.poses, at), whole), all_began
+    reason = f"only {len(kept)} of {len(members)} scans hang together"
+    loop = verdict(keyframes, members, from_other_visit, centre, False, reason, 0.0)
     return LocalMatch((), None, loop, 0.0, False), all_began
 
 

@@ -5,13 +5,13 @@ from __future__ import annotations
 import dataclasses
 
 from nscan_cli.slam.local_matching.joint_relations import LocalMatch
-from nscan_cli.slam.local_matching.match_ahead import MatchAhead
 from nscan_cli.slam.local_matching.neighbours import Neighbours, choose_neighbours
+from nscan_cli.slam.local_matching.speculative_matching import SpeculativeMatching
 from nscan_cli.slam.state import SlamState
 
 
 def match_keyframe(
-    state: SlamState, ahead: MatchAhead, centre: int, neighbours: Neighbours
+    state: SlamState, ahead: SpeculativeMatching, centre: int, neighbours: Neighbours
 ) -> LocalMatch | None:
     """Match keyframe `centre` with its neighbours, without other visits if its loop is doubted.
 
@@ -21,8 +21,8 @@ def match_keyframe(
     # The newest keyframe may still collect scans.
     ahead.begin(route, len(state.keyframes) - 1, centre, neighbours, state.coverage)
     local_match = _verified(state, centre, ahead.match(route, centre, neighbours))
-    tried = route.rows[neighbours.members].tolist()
-    state.coverage.add(int(route.rows[centre]), tried, local_match)
+    members = route.rows[neighbours.members].tolist()
+    state.coverage.add(int(route.rows[centre]), members, local_match)
     if local_match is not None:
         add_relations(state, local_match)
     return local_match

@@ -51,16 +51,16 @@ def match_neighbours_pairwise(
     kept. None if no other keyframe is near.
     """
     keyframes = route.keyframes
-    others = near.members != centre
-    tried, from_other_visit = near.members[others], near.from_other_visit[others]
-    if len(tried) == 0:
+    is_other = near.members != centre
+    others, from_other_visit = near.members[is_other], near.from_other_visit[is_other]
+    if len(others) == 0:
         return None
-    singles = [_match(route, int(other), centre, options) for other in tried]
+    singles = [_match(route, int(other), centre, options) for other in others]
     overlaps = np.array([single.overlap for single in singles])
     kept = overlaps >= options.min_overlap
     relations = tuple(
         _relation(keyframes[other], keyframes[centre], single, "loop" if seen else "track")
-        for other, seen, single, keep in zip(tried, from_other_visit, singles, kept, strict=True)
+        for other, seen, single, keep in zip(others, from_other_visit, singles, kept, strict=True)
         if keep
     )
     closed, whole = bool((kept & from_other_visit).any()), bool(kept.all())
@@ -69,8 +69,8 @@ def match_neighbours_pairwise(
     else:
         reason = f"too little overlap with {counted(int(from_other_visit.sum()), 'scan')} of another visit"
     best = float(overlaps[from_other_visit].max(initial=0.0))
-    used = kept if closed else np.ones(len(tried), dtype=bool)
-    loop = verdict(keyframes, tried[used], from_other_visit[used], centre, closed, reason, best)
+    used = kept if closed else np.ones(len(others), dtype=bool)
+    loop = verdict(keyframes, others[used], from_other_visit[used], centre, closed, reason, best)
     moved = max((single.moved for single, keep in zip(singles, kept, strict=True) if keep), default=0.0)
     return LocalMatch(relations, None, loop, moved, whole)
 

@@ -30,6 +30,6 @@ def close_loops(
         return
     state.route = move_segment(state.route, places[-1], state.breaks)
     for place in places:
-        add_relations(state, place.nearby)
+        add_relations(state, place.local_match)
     state.places.extend(places)
     optimise(state, state.options.optimisation.after_large_loop)

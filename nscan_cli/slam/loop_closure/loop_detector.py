@@ -21,7 +21,7 @@ from nscan_cli.slam.backend.energy_cache import EnergyCache
 from nscan_cli.slam.backend.subgraph import Subgraph, nearest_keyframes, without_others
 from nscan_cli.slam.keyframes.route import Route
 from nscan_cli.slam.keyframes.tracked_path import TrackedPath
-from nscan_cli.slam.local_matching.joint_relations import LocalMatch, MatchNearby
+from nscan_cli.slam.local_matching.joint_relations import LocalMatch, LocalMatcher
 from nscan_cli.slam.local_matching.options import NScanOptions
 from nscan_cli.slam.loop_closure.most_certain_paths import LinkCache, most_certain_paths, relations_on_paths
 from nscan_cli.slam.loop_closure.options import LoopClosureOptions
@@ -43,7 +43,7 @@ class LoopDetector:
     """The search for large loops, keyframe by keyframe. `energies` gives the energies of the graph."""
 
     def __init__(
-        self, options: LoopClosureOptions, nscan: NScanOptions, match: MatchNearby, energies: EnergyCache
+        self, options: LoopClosureOptions, nscan: NScanOptions, match: LocalMatcher, energies: EnergyCache
     ) -> None:
         self.options, self.nscan, self.match, self.energies = options, nscan, match, energies
         self.tracked_path = TrackedPath(options.drift, options.drift_angle)
@@ -99,7 +99,7 @@ class LoopDetector:
         self,
         route: Route,
         centre: int,
-        nearby: LocalMatch,
+        local_match: LocalMatch,
         loops: Loops,
     ) -> str | None:
         """Why the joint match about `centre` may be at a wrong place of an earlier visit, or None.
@@ -107,7 +107,7 @@ class LoopDetector:
         Arguments as for close. A match that started near enough, or closes no loop, is not doubted.
         """
         poses = route.poses
-        tie = nearby.tie(int(route.rows[centre]))
+        tie = local_match.tie(int(route.rows[centre]))
         if tie is None:
             return None
         old = int(np.searchsorted(route.rows, tie[0]))
@@ -123,7 +123,7 @@ class LoopDetector:
             return LOST
         window, earlier = self._visit(route, centre, old, sigma)
         pose = compose(poses[old], tie[1])
-        joint = None if nearby.nscan is None else self.nscan
+        joint = None if local_match.nscan is None else self.nscan
         return why_match_doubted(route, centre, pose, earlier, window, self.options, joint)
 
     def _tightened(self, route: Route, centre: int, loops: Loops) -> tuple[RelativeSigma, Indices]:
@@ -162,7 +162,7 @@ class LoopDetector:
 
     def refused(self) -> list[Loop]:
         """The verdicts on places that were not accepted."""
-        waiting = [(place.nearby.loop, reason) for place, reason in self._waiting]
+        waiting = [(place.local_match.loop, reason) for place, reason in self._waiting]
         return self._refused + [
             replace(loop, accepted=False, reason=reason) for loop, reason in waiting if loop is not None
         ]
@@ -227,4 +227,4 @@ def _distances_from(route: Route, centre: int) -> Array:
 
 def _visit_overlap(place: Place) -> float:
     """The overlap of the scans of both visits in a match."""
-    return 0.0 if place.nearby.loop is None else place.nearby.loop.score
+    return 0.0 if place.local_match.loop is None else place.local_match.loop.score

@@ -40,15 +40,15 @@ class LinkCache:
         self._loops: list[Relation] = []
         self._links = _concatenated([])
 
-    def links(self, route: Route, way: TrackedPath, loops: Sequence[Relation]) -> Links:
+    def links(self, route: Route, path: TrackedPath, loops: Sequence[Relation]) -> Links:
         """The links of the chain, from each keyframe to the next, and those of all loops."""
         if len(loops) < len(self._loops) or not all(map(operator.is_, self._loops, loops)):
             self._loops, self._links = [], _concatenated([])
         new = [_links_of(loop, route.rows) for loop in loops[len(self._loops) :]]
         if new:
             self._loops, self._links = [*loops], _concatenated([self._links, *new])
-        steps = np.arange(len(way))
-        return _concatenated([Links(steps, steps + 1, _path_covariances(way, route.poses)), self._links])
+        steps = np.arange(len(path))
+        return _concatenated([Links(steps, steps + 1, _path_covariances(path, route.poses)), self._links])
 
 
 def _concatenated(parts: Sequence[Links]) -> Links:
@@ -57,13 +57,13 @@ def _concatenated(parts: Sequence[Links]) -> Links:
     return Links(*(np.concatenate(columns) for columns in zip(none, *parts, strict=True)))
 
 
-def _path_covariances(way: TrackedPath, poses: Array) -> Array:
-    """The covariances (len(way), 3, 3) of the end of each relation of the chain, in the global frame."""
-    turned = np.zeros((len(way), 3, 3))
-    cos, sin = np.cos(poses[: len(way), 2]), np.sin(poses[: len(way), 2])
+def _path_covariances(path: TrackedPath, poses: Array) -> Array:
+    """The covariances (len(path), 3, 3) of the end of each relation of the chain, in the global frame."""
+    turned = np.zeros((len(path), 3, 3))
+    cos, sin = np.cos(poses[: len(path), 2]), np.sin(poses[: len(path), 2])
     turned[:, 0, 0], turned[:, 0, 1], turned[:, 1, 0], turned[:, 1, 1] = cos, -sin, sin, cos
     turned[:, 2, 2] = 1.0
-    along: Array = turned @ way.covariances @ turned.transpose(0, 2, 1)
+    along: Array = turned @ path.covariances @ turned.transpose(0, 2, 1)
     return along
 
 

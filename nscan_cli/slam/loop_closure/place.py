@@ -22,7 +22,7 @@ class Place:
     """(3,) pose of the centre in the frame of the old."""
     radius: float
     """How near the centre (m) those of the earlier visit were taken from."""
-    nearby: LocalMatch
+    local_match: LocalMatch
     """The match of both visits."""
 
     def corrected(self, poses: Array, keyframe: int) -> Array:

@@ -9,11 +9,11 @@ from nscan_cli.graph.model import Loop
 from nscan_cli.matching.correlative_search import Search, SearchOptions
 from nscan_cli.poses import Indices
 from nscan_cli.slam.keyframes.route import Route
-from nscan_cli.slam.local_matching.joint_relations import MatchNearby
+from nscan_cli.slam.local_matching.joint_relations import LocalMatcher
 from nscan_cli.slam.local_matching.options import NScanOptions
 from nscan_cli.slam.loop_closure.options import LoopClosureOptions
 from nscan_cli.slam.loop_closure.place import Place
-from nscan_cli.slam.loop_closure.search_input import search_input
+from nscan_cli.slam.loop_closure.search_submaps import search_submaps
 from nscan_cli.slam.loop_closure.verification import verify_place
 
 
@@ -22,7 +22,7 @@ def find_place(
     centre: int,
     earlier: Indices,
     window: SearchOptions,
-    match: MatchNearby,
+    match: LocalMatcher,
     closing: LoopClosureOptions,
     nscan: NScanOptions,
 ) -> Place | Loop | None:
@@ -30,7 +30,7 @@ def find_place(
 
     None when nothing fits.
     """
-    sought = search_input(route, centre, earlier, window, closing)
+    sought = search_submaps(route, centre, earlier, window, closing)
     if sought is None:
         return None
     scan, field = sought

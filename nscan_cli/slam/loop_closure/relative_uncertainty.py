@@ -137,14 +137,14 @@ class RelativeUncertainty:
         )
         return self._sigma
 
-    def upper_bound(self, origin: int, way: TrackedPath, poses: Array) -> RelativeSigma:
+    def upper_bound(self, origin: int, path: TrackedPath, poses: Array) -> RelativeSigma:
         """An upper bound from `origin` for the keyframes before it. The origin never goes back."""
         known = len(self._sigma.distance)
         distance, angle = np.zeros(len(poses)), np.zeros(len(poses))
         distance[:known], angle[:known] = self._sigma.distance**2, self._sigma.angle**2
         for step in range(self._origin, origin):
-            covariance = way.covariances[step]
-            _add_relation_variance(covariance, way.relations[step].measurement, poses, step, distance)
+            covariance = path.covariances[step]
+            _add_relation_variance(covariance, path.relations[step].measurement, poses, step, distance)
             angle[: step + 1] += covariance[2, 2]
         self._origin, self._sigma = origin, RelativeSigma(np.sqrt(distance), np.sqrt(angle))
         return self._sigma

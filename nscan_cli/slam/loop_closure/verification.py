@@ -16,13 +16,13 @@ from nscan_cli.graph.model import Loop
 from nscan_cli.matching.correlative_search import FoundPose, Search, SearchOptions, search
 from nscan_cli.poses import Array, Indices, compose, relative, wrap
 from nscan_cli.slam.keyframes.route import Route
-from nscan_cli.slam.local_matching.joint_relations import MatchNearby, match_at, visit_moved
+from nscan_cli.slam.local_matching.joint_relations import LocalMatcher, match_at, visit_moved
 from nscan_cli.slam.local_matching.neighbours import choose_neighbours
 from nscan_cli.slam.local_matching.options import NScanOptions
 from nscan_cli.slam.loop_closure.options import LoopClosureOptions
 from nscan_cli.slam.loop_closure.place import Place
 from nscan_cli.slam.loop_closure.relative_uncertainty import RelativeSigma
-from nscan_cli.slam.loop_closure.search_input import search_input
+from nscan_cli.slam.loop_closure.search_submaps import search_submaps
 
 AMBIGUOUS = "another place fits as well"
 OUTDONE = "another place fits better"
@@ -40,7 +40,7 @@ def verify_place(
     earlier: Indices,
     about: Search,
     found: FoundPose,
-    match: MatchNearby,
+    match: LocalMatcher,
     closing: LoopClosureOptions,
     nscan: NScanOptions,
 ) -> Place | Loop:
@@ -55,15 +55,15 @@ def verify_place(
     radius = max(nscan.radius, float(away) + nscan.radius)
     wider = replace(nscan, radius=radius)
     near = choose_neighbours(moved, route.paths, centre, wider)
-    nearby = match(route._replace(poses=moved), centre, near, wider)
-    tie = None if nearby is None else nearby.tie(keyframes[centre].row)
-    if nearby is None or tie is None:
+    local_match = match(route._replace(poses=moved), centre, near, wider)
+    tie = None if local_match is None else local_match.tie(keyframes[centre].row)
+    if local_match is None or tie is None:
         return Loop(nodes, False, NO_MATCH, found.score)
     old = int(np.searchsorted(route.rows, tie[0]))
     off = compose(moved[old], tie[1]) - found.pose
     if np.hypot(off[0], off[1]) > closing.match_reach:
         return Loop(nodes, False, ELSEWHERE, found.score)
-    return Place(old, centre, tie[1], radius, nearby)
+    return Place(old, centre, tie[1], radius, local_match)
 
 
 def why_match_doubted(
@@ -81,7 +81,7 @@ def why_match_doubted(
     finds another place that fits about as well, a joint match from there, of the same scans, decides by the
     energy of both, which is exact to the centimetre. Without `nscan`, for single matches, the search decides.
     """
-    sought = search_input(route, centre, earlier, window, closing)
+    sought = search_submaps(route, centre, earlier, window, closing)
     if sought is None:
         return TOO_LITTLE
     scan, field = sought

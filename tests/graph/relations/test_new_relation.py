@@ -15,8 +15,8 @@ from nscan_cli.graph.io.json_fields import JsonRecord
 from nscan_cli.graph.io.json_graph import parse_graph, write_graph
 from nscan_cli.graph.marginal_covariances import marginal_covariances
 from nscan_cli.graph.model import Graph
+from nscan_cli.graph.optimise.graduated_nonconvexity import contradicting
 from nscan_cli.graph.optimise.graph_energy import GraphEnergy
-from nscan_cli.graph.optimise.robust import contradicting
 from nscan_cli.graph.optimise.whole_graph import components, optimise_graph
 from nscan_cli.graph.relations.base import Term
 from nscan_cli.graph.relations.registry import RELATION_TYPES

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from nscan_cli.graph.io.g2o import parse_g2o, write_g2o
 from nscan_cli.graph.io.json_fields import six_digits
 from nscan_cli.graph.io.json_graph import parse_graph, write_graph
-from nscan_cli.graph.io.triangles import upper_triangle
+from nscan_cli.graph.io.symmetric_matrices import upper_triangle
 from nscan_cli.graph.model import Graph, NScan, Pairwise
 from nscan_cli.graph.optimise.graph_energy import GraphEnergy
 from nscan_cli.graph.optimise.graph_solver import StopOptions

@@ -10,7 +10,7 @@ import pytest
 from nscan_cli.slam.backend.options import RefinementOptions
 from nscan_cli.slam.backend.refinement import Refinement
 from nscan_cli.slam.keyframes.route import Route
-from nscan_cli.slam.local_matching.joint_relations import LocalMatch, MatchNearby, match_neighbours
+from nscan_cli.slam.local_matching.joint_relations import LocalMatch, LocalMatcher, match_neighbours
 from nscan_cli.slam.local_matching.neighbours import Neighbours, choose_neighbours
 from nscan_cli.slam.local_matching.options import NScanOptions
 from nscan_cli.slam.local_matching.pairwise_relations import match_neighbours_pairwise
@@ -34,7 +34,7 @@ def unrefined() -> Mapped:
 class Recorded:
     """A match, and the centres and radii that it was made with."""
 
-    def __init__(self, match: MatchNearby) -> None:
+    def __init__(self, match: LocalMatcher) -> None:
         self.match = match
         self.made: list[tuple[int, float]] = []
 
@@ -51,7 +51,7 @@ class Recorded:
         return centres
 
 
-def refinement(match: MatchNearby, wider: dict[int, float] | None = None) -> Refinement:
+def refinement(match: LocalMatcher, wider: dict[int, float] | None = None) -> Refinement:
     state = unrefined().state
     return Refinement(state.route, state.options.nscan, match, wider or {})
 

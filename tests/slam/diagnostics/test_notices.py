@@ -14,7 +14,7 @@ from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.logs.load import read_log
 from nscan_cli.logs.reading_options import ReadingOptions
 from nscan_cli.slam.diagnostics.notices import notices
-from nscan_cli.slam.map_log import map_log
+from nscan_cli.slam.log_to_graph import map_log
 from nscan_cli.slam.options import SlamOptions
 from tests.data import data_file
 from tests.slam.keyframe_drives import round_scene

@@ -66,8 +66,8 @@ def test_a_slip_is_closed_by_two_keyframes_that_agree(slip):
         error = place.measured - relative(drive.truth[place.centre], drive.truth[place.old])
         assert np.abs(error[:2]).max() < 0.05
         assert abs(error[2]) < np.radians(0.5)
-        assert place.nearby.nscan is not None
-        assert place.nearby.nscan.origin == "loop"
+        assert place.local_match.nscan is not None
+        assert place.local_match.nscan.origin == "loop"
     assert closed_along(closing(NEVER), drive) == []
 
 
@@ -77,8 +77,8 @@ def test_one_keyframe_alone_closes_nothing():
     first = closed_along(closing(), drive)[0][1][0]
     alone = closing()
     assert closed_along(alone, drive, until=first.centre) == []
-    assert first.nearby.loop is not None
-    verdict = dataclasses.replace(first.nearby.loop, accepted=False, reason=NO_SECOND)
+    assert first.local_match.loop is not None
+    verdict = dataclasses.replace(first.local_match.loop, accepted=False, reason=NO_SECOND)
     assert alone.refused() == [verdict]
     assert verdict.nodes == (ROWS * first.old, ROWS * first.centre)
 
@@ -89,7 +89,7 @@ def test_what_is_accepted_is_not_refused_as_well():
     again = closing()
     closed_along(again, drive, until=centre)
     refused = {loop.nodes for loop in again.refused()}
-    assert not refused & {place.nearby.loop.nodes for place in places if place.nearby.loop}
+    assert not refused & {place.local_match.loop.nodes for place in places if place.local_match.loop}
 
 
 @pytest.mark.parametrize(
@@ -197,16 +197,16 @@ def test_who_is_lost_is_searched_for_in_all_that_was_seen_before():
 
 def doubted(off: tuple[float, float, float], options: LoopClosureOptions, origin: str = "loop") -> str | None:
     """What a joint match is told that puts the last but few keyframes of round_drive() off their place."""
-    drive, tried, centre = round_drive(), closing(options), 49
+    drive, detector, centre = round_drive(), closing(options), 49
     for k, relation in enumerate(drive.chain[:centre]):
-        tried.extend(relation, drive.keyframes[k + 1].tracked.path - drive.keyframes[k].tracked.path)
+        detector.extend(relation, drive.keyframes[k + 1].tracked.path - drive.keyframes[k].tracked.path)
     nodes = (ROWS * 3, ROWS * centre)
     measured = compose(relative(drive.truth[centre], drive.truth[3]), np.array(off))
-    nearby = LocalMatch(
+    local_match = LocalMatch(
         (Pairwise(nodes, measured, np.eye(3), origin),), None, Loop(nodes, True, "", 0.7), 0.0, True
     )
     known = route_of(drive.keyframes, drive.chain, drive.truth[: centre + 1])
-    return tried.why_doubted(known, centre, nearby, list)
+    return detector.why_doubted(known, centre, local_match, list)
 
 
 def test_a_loop_from_a_poor_start_must_stand_a_search():
@@ -226,12 +226,12 @@ def test_a_loop_from_a_poor_start_must_stand_a_search():
 )
 def test_of_doors_hardly_told_apart_a_joint_match_is_compared_with_another(match, reason):
     """The way has slipped by a door, which a search sees in a tenth of the points; single matches stay."""
-    doors, tried, centre = like_doors_drive(CABINETS).bent(15, (3.0, 0.0, 0.0)), closing(), 20
+    doors, detector, centre = like_doors_drive(CABINETS).bent(15, (3.0, 0.0, 0.0)), closing(), 20
     for k, relation in enumerate(doors.chain[: centre + 3]):
-        tried.extend(relation, doors.keyframes[k + 1].tracked.path - doors.keyframes[k].tracked.path)
+        detector.extend(relation, doors.keyframes[k + 1].tracked.path - doors.keyframes[k].tracked.path)
     known = route_of(doors.keyframes, doors.chain, doors.poses[: centre + 4])
-    nearby = about(match, known, centre, NSCAN)
-    assert nearby is not None
-    assert nearby.loop is not None
-    assert nearby.loop.accepted
-    assert tried.why_doubted(known, centre, nearby, list) == reason
+    local_match = about(match, known, centre, NSCAN)
+    assert local_match is not None
+    assert local_match.loop is not None
+    assert local_match.loop.accepted
+    assert detector.why_doubted(known, centre, local_match, list) == reason

@@ -146,10 +146,10 @@ def test_two_places_agree_within_half_a_metre(searches, second, agree):
     # Turned about the keyframe itself, so that its place is `second` off.
     about = (*(np.array(second[:2]) + here - turn @ here), second[2])
     searches({first: (1.0, 2.0, 0.0), then: about})
-    tried = closing()
-    found = closed_along(tried, bent())
+    detector = closing()
+    found = closed_along(detector, bent())
     assert [place.centre for _, places in found for place in places] == ([first, then] if agree else [])
-    assert len(tried.refused()) == (0 if agree else 2)
+    assert len(detector.refused()) == (0 if agree else 2)
 
 
 def test_a_third_that_agrees_with_the_first_leaves_the_second_alone(searches):
@@ -157,10 +157,10 @@ def test_a_third_that_agrees_with_the_first_leaves_the_second_alone(searches):
     closed_along(closing(), bent())
     one, two, three = [centre for centre, _, _ in made][-3:]
     searches({one: (1.0, 2.0, 0.0), two: (-1.0, 0.0, 0.0), three: (1.1, 2.0, 0.0)})
-    tried = closing()
-    found = closed_along(tried, bent())
+    detector = closing()
+    found = closed_along(detector, bent())
     assert [[place.centre for place in places] for _, places in found] == [[one, three]]
-    assert [(loop.nodes[1], loop.accepted, loop.reason) for loop in tried.refused()] == [
+    assert [(loop.nodes[1], loop.accepted, loop.reason) for loop in detector.refused()] == [
         (ROWS * two, False, NO_SECOND)
     ]
 

@@ -12,7 +12,7 @@ from nscan_cli.matching.correlative_search import SearchOptions
 from nscan_cli.poses import Array, compose, relative, wrap
 from nscan_cli.slam.keyframes.keyframe import Keyframe
 from nscan_cli.slam.keyframes.route import route_of
-from nscan_cli.slam.local_matching.joint_relations import LocalMatch, MatchNearby, match_neighbours
+from nscan_cli.slam.local_matching.joint_relations import LocalMatch, LocalMatcher, match_neighbours
 from nscan_cli.slam.local_matching.options import NScanOptions
 from nscan_cli.slam.local_matching.pairwise_relations import match_neighbours_pairwise
 from nscan_cli.slam.loop_closure.options import LoopClosureOptions
@@ -64,7 +64,7 @@ def found(
     off: tuple[float, float, float] = OFF,
     drive: Driven | None = None,
     centre: int = CENTRE,
-    match: MatchNearby = match_neighbours,
+    match: LocalMatcher = match_neighbours,
     window: SearchOptions = WINDOW,
     closing: LoopClosureOptions = CLOSING,
 ) -> Place | Loop | None:
@@ -92,11 +92,11 @@ def test_the_place_is_found_from_three_metres_away(off, match):
     error = off_truth(place, round_drive().truth)
     assert np.hypot(error[0], error[1]) < 0.05
     assert abs(error[2]) < np.radians(0.5)
-    nearby = place.nearby
-    assert nearby.loop is not None
-    assert nearby.loop.accepted
-    assert nearby.loop.nodes[1] == ROWS * CENTRE
-    nodes = {node // ROWS for relation in nearby.relations for node in relation.nodes}
+    local_match = place.local_match
+    assert local_match.loop is not None
+    assert local_match.loop.accepted
+    assert local_match.loop.nodes[1] == ROWS * CENTRE
+    nodes = {node // ROWS for relation in local_match.relations for node in relation.nodes}
     assert len(nodes & set(EARLIER.tolist())) >= 3
     assert len(nodes - set(EARLIER.tolist())) >= 3
 
@@ -105,9 +105,9 @@ def test_the_place_is_found_from_three_metres_away(off, match):
 def test_from_there_a_joint_match_alone_does_not_find_it(off):
     drive = round_drive()
     poses = moved(drive, CENTRE, off)
-    nearby = about(match_neighbours, route_of(drive.keyframes, drive.chain, poses), CENTRE, NSCAN)
-    assert nearby is not None
-    assert nearby.tie(ROWS * CENTRE) is None
+    local_match = about(match_neighbours, route_of(drive.keyframes, drive.chain, poses), CENTRE, NSCAN)
+    assert local_match is not None
+    assert local_match.tie(ROWS * CENTRE) is None
 
 
 def test_what_is_beyond_the_window_or_scores_too_little_is_not_found():
@@ -166,19 +166,19 @@ def test_scans_without_points_give_nothing():
 
 def matching(
     shift: tuple[float, float, float] | None,
-) -> tuple[MatchNearby, list[tuple[Array, NScanOptions]]]:
+) -> tuple[LocalMatcher, list[tuple[Array, NScanOptions]]]:
     """match_neighbours whose relation has the other visit shifted, or is none; and what it was given."""
     calls = []
 
     def match(visited, centre, near, options) -> LocalMatch | None:
         calls.append((visited.poses, options))
-        nearby = match_neighbours(visited, centre, near, options)
-        if shift is None or nearby is None or nearby.nscan is None:
+        local_match = match_neighbours(visited, centre, near, options)
+        if shift is None or local_match is None or local_match.nscan is None:
             return None
-        local = nearby.nscan.poses.copy()
-        early = np.array(nearby.nscan.nodes) < ROWS * len(EARLIER)
+        local = local_match.nscan.poses.copy()
+        early = np.array(local_match.nscan.nodes) < ROWS * len(EARLIER)
         local[early] = compose(np.array(shift), local[early])
-        return dataclasses.replace(nearby, nscan=dataclasses.replace(nearby.nscan, poses=local))
+        return dataclasses.replace(local_match, nscan=dataclasses.replace(local_match.nscan, poses=local))
 
     return match, calls
 

@@ -15,7 +15,7 @@ from nscan_cli.slam.keyframes.route import Route
 from nscan_cli.slam.loop_closure.options import LoopClosureOptions
 
 
-def search_input(
+def search_submaps(
     route: Route,
     centre: int,
     earlier: NDArray[np.int64],

@@ -13,7 +13,7 @@ from nscan_cli.graph.model import Graph, Loop
 from nscan_cli.logs.load import read_log
 from nscan_cli.logs.reading_options import ReadingOptions
 from nscan_cli.slam.frontend.scan_batch import SCANS_PER_BATCH
-from nscan_cli.slam.map_log import Counts, map_log, slam_options
+from nscan_cli.slam.log_to_graph import Counts, map_log, slam_options
 from nscan_cli.slam.options import SlamOptions
 from tests.data import CORRIDOR_LOG
 

@@ -14,9 +14,9 @@ from nscan_cli.slam.keyframes.keyframe import Keyframe
 from nscan_cli.slam.keyframes.route import Route, extended, route_of
 from nscan_cli.slam.local_matching.coverage import Coverage
 from nscan_cli.slam.local_matching.joint_relations import LocalMatch
-from nscan_cli.slam.local_matching.match_ahead import MATCHES_AHEAD, MatchAhead
 from nscan_cli.slam.local_matching.neighbours import Neighbours, choose_neighbours
 from nscan_cli.slam.local_matching.options import NScanOptions
+from nscan_cli.slam.local_matching.speculative_matching import MATCHES_AHEAD, SpeculativeMatching
 
 OPTIONS = NScanOptions(radius=2.5)
 """Two keyframes to both sides of one are near."""
@@ -56,17 +56,17 @@ class Matches:
         return LocalMatch((), None, None, float(centre), True)
 
 
-def begin(ahead: MatchAhead, route: Route) -> None:
+def begin(ahead: SpeculativeMatching, route: Route) -> None:
     """What comes after the match of keyframe 6 with its neighbours."""
     ahead.begin(route, SIZE, 6, NEAR, Coverage())
 
 
-def asked(ahead: MatchAhead, route: Route, centre: int) -> LocalMatch | None:
+def asked(ahead: SpeculativeMatching, route: Route, centre: int) -> LocalMatch | None:
     """The match about a keyframe at its turn."""
     return ahead.match(route, centre, choose_neighbours(route.poses, route.paths, centre, OPTIONS))
 
 
-def let_finish(ahead: MatchAhead) -> None:
+def let_finish(ahead: SpeculativeMatching) -> None:
     """The pool has one thread: what comes last is done after all that was begun."""
     assert ahead._pool is not None
     ahead._pool.submit(int).result()
@@ -75,7 +75,7 @@ def let_finish(ahead: MatchAhead) -> None:
 def test_what_is_due_next_is_begun_as_if_every_match_related_all():
     """Around 6 all pairs of 4 to 8 are: keyframe 7 misses one of its four (with 9), 8 two (9 and 10)."""
     matches, route = Matches(), straight(10)
-    with MatchAhead(matches, OPTIONS, 2) as ahead:
+    with SpeculativeMatching(matches, OPTIONS, 2) as ahead:
         ahead.open()
         begin(ahead, route)
         begin(ahead, route)
@@ -88,7 +88,7 @@ def test_what_is_due_next_is_begun_as_if_every_match_related_all():
 
 def test_a_match_counts_if_the_graph_lies_as_it_was_assumed():
     matches, route = Matches(), straight(10)
-    with MatchAhead(matches, OPTIONS, 2) as ahead:
+    with SpeculativeMatching(matches, OPTIONS, 2) as ahead:
         ahead.open()
         begin(ahead, route)
         let_finish(ahead)
@@ -106,7 +106,7 @@ def test_a_match_counts_if_the_graph_lies_as_it_was_assumed():
 
 def test_what_the_graph_has_left_behind_is_begun_anew():
     matches, route = Matches(), straight(10)
-    with MatchAhead(matches, OPTIONS, 2) as ahead:
+    with SpeculativeMatching(matches, OPTIONS, 2) as ahead:
         ahead.open()
         begin(ahead, route)
         route.poses[9, 1] = 0.5
@@ -119,7 +119,7 @@ def test_what_the_graph_has_left_behind_is_begun_anew():
 def test_with_one_thread_or_before_it_is_opened_none_is_begun():
     for threads in (1, 2):
         matches, route = Matches(), straight(10)
-        with MatchAhead(matches, OPTIONS, threads) as ahead:
+        with SpeculativeMatching(matches, OPTIONS, threads) as ahead:
             if threads == 1:
                 ahead.open()
             begin(ahead, route)
@@ -130,7 +130,7 @@ def test_with_one_thread_or_before_it_is_opened_none_is_begun():
 
 def test_in_the_end_what_was_begun_is_there_or_made_and_no_more_is_begun():
     matches, route = Matches(), straight(10)
-    with MatchAhead(matches, OPTIONS, 2) as ahead:
+    with SpeculativeMatching(matches, OPTIONS, 2) as ahead:
         ahead.open()
         begin(ahead, route)
     begin(ahead, route)
@@ -146,7 +146,7 @@ def test_an_error_is_raised_at_its_turn():
         raise ZeroDivisionError
 
     route = straight(10)
-    with MatchAhead(fail, OPTIONS, 2) as ahead:
+    with SpeculativeMatching(fail, OPTIONS, 2) as ahead:
         ahead.open()
         begin(ahead, route)
         with pytest.raises(ZeroDivisionError):
@@ -169,7 +169,7 @@ def test_who_waits_for_a_match_makes_the_next_one():
         return LocalMatch((), None, None, float(centre), True)
 
     route = straight(10)
-    with MatchAhead(match, OPTIONS, 2) as ahead:
+    with SpeculativeMatching(match, OPTIONS, 2) as ahead:
         ahead.open()
         begin(ahead, route)
         assert begun.wait(60)

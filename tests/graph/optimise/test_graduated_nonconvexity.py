@@ -9,8 +9,7 @@ import pytest
 from scipy.stats import chi2
 
 from nscan_cli.graph.model import NScan, Pairwise
-from nscan_cli.graph.optimise.graph_solver import optimise_poses
-from nscan_cli.graph.optimise.robust import (
+from nscan_cli.graph.optimise.graduated_nonconvexity import (
     UNFOLDING,
     RobustOptions,
     chi2_bounds,
@@ -18,6 +17,7 @@ from nscan_cli.graph.optimise.robust import (
     contradicting,
     unfolded,
 )
+from nscan_cli.graph.optimise.graph_solver import optimise_poses
 from nscan_cli.poses import relative
 from tests.graph.simulated_relations import (
     energy_of,

@@ -16,7 +16,7 @@ from nscan_cli.logs.reading_options import ReadingOptions
 
 
 @dataclass(frozen=True)
-class Measured:
+class EvaluatedResult:
     """An evaluation, and the trajectories that it was made from."""
 
     evaluation: Evaluation
@@ -26,14 +26,14 @@ class Measured:
     """Warnings from reading the files."""
 
 
-def measure(
+def evaluate_result(
     result: str,
     relations: str | None,
     reference: str | None,
     worst: int = 0,
     reading: ReadingOptions = DEFAULT_READING,
     reference_topic: str | None = None,
-) -> Measured:
+) -> EvaluatedResult:
     """The errors of the file `result`, and its `worst` relations.
 
     `reference_topic` is the topic of the poses when the reference is a recording.
@@ -53,4 +53,4 @@ def measure(
         on_reference = (base_name(reference), errors)
         found = tuple(remarks(trajectory, truth, errors))
     evaluation = Evaluation(base_name(result), len(trajectory), on_relations, on_reference, worst, found)
-    return Measured(evaluation, trajectory, truth, tuple(notices))
+    return EvaluatedResult(evaluation, trajectory, truth, tuple(notices))

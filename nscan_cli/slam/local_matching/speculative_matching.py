@@ -15,7 +15,7 @@ import numpy as np
 
 from nscan_cli.slam.keyframes.route import Route, extended
 from nscan_cli.slam.local_matching.coverage import Coverage
-from nscan_cli.slam.local_matching.joint_relations import LocalMatch, MatchNearby
+from nscan_cli.slam.local_matching.joint_relations import LocalMatch, LocalMatcher
 from nscan_cli.slam.local_matching.neighbours import Neighbours, choose_neighbours
 from nscan_cli.slam.local_matching.options import NScanOptions
 from nscan_cli.threads import completed_call
@@ -31,11 +31,11 @@ class _Begun(NamedTuple):
     match: Future[LocalMatch | None]
 
 
-class MatchAhead:
+class SpeculativeMatching:
     """Matches about the next keyframes, made ahead in another thread. A context manager; none begins before
     `open`."""
 
-    def __init__(self, match: MatchNearby, options: NScanOptions, threads: int) -> None:
+    def __init__(self, match: LocalMatcher, options: NScanOptions, threads: int) -> None:
         self._match, self._options, self._threads = match, options, threads
         self._pool: ThreadPoolExecutor | None = None
         self._begun: dict[int, _Begun] = {}
@@ -101,7 +101,7 @@ class MatchAhead:
                 begun.match.cancel()
                 del self._begun[keyframe]
 
-    def __enter__(self) -> MatchAhead:
+    def __enter__(self) -> SpeculativeMatching:
         return self
 
     def __exit__(

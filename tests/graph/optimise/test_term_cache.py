@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from nscan_cli.graph.optimise.graph_energy import GraphEnergy
-from nscan_cli.graph.optimise.term_columns import TermCache, TermColumns
+from nscan_cli.graph.optimise.term_cache import TermCache, TermColumns
 from nscan_cli.graph.optimise.whole_graph import optimise_graph
 from nscan_cli.graph.relations.base import Relation
 from tests.graph.simulated_relations import disturbed, graph_of, mixed_ring
