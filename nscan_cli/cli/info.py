@@ -95,7 +95,7 @@ def facts_of(log: LaserLog) -> dict[str, Any]:
         ],
         "backward_stamps": log.report.backward_stamps,
         "truth": 0 if log.truth is None else len(log.truth),
-        "warnings": list(log.report.warnings),
+        "warnings": [*log.report.warnings, *log.report.contradictions],
         "lasers": [],
         "odometries": [],
         "corrected": log.report.corrected or None,

@@ -80,6 +80,8 @@ def reading_options(command: Command) -> Command:
         read("--min-range", type=click.FloatRange(0), metavar="M", help="Drop shorter readings."),
         read("--max-range", type=click.FloatRange(0, min_open=True), metavar="M",
              help="Treat longer readings as no return."),
+        read("--range-scale", type=click.FloatRange(0, min_open=True), metavar="M",
+             help="Metres in a unit of the ranges, such as 0.001 for millimetres."),
         read("--angle-min", type=float, metavar="DEG", help="Direction of the first beam."),
         read("--angle-increment", type=float, metavar="DEG", help="Angle from beam to beam."),
         read("--start", type=float, metavar="T", help="Skip the first T seconds."),
@@ -91,6 +93,8 @@ def reading_options(command: Command) -> Command:
         read("--salvage", is_flag=True, help="Use the readable part of a damaged or cut-off file."),
         read("--allow-corrected", is_flag=True,
              help="Use poses that a mapper has already corrected as odometry."),
+        read("--as-recorded", is_flag=True,
+             help="Believe the log where its scans contradict it; correct nothing."),
     ]  # fmt: skip
 
     @functools.wraps(command)

@@ -65,7 +65,7 @@ def run_on_log(
                 bar.begin("optimising and refining", None)
 
         state, graph = map_log(scans, reading, options, threads, report)
-    for warning in graph.provenance["notices"]:
+    for warning in graph.provenance["notices"][len(scans.report.contradictions) :]:
         say(f"warning: {warning}", quiet)
     summary: list[Row] = [
         ("scans", [f"{len(scans)} in {float(scans.times[-1] - scans.times[0]):.1f} s"]),

@@ -17,7 +17,8 @@ from nscan_cli.logs.frame_names import DEFAULT_FRAMES, FrameNames
 from nscan_cli.logs.laser_defaults import mark_no_returns
 from nscan_cli.logs.laser_log import LaserLog, LogReport, beam_counts
 from nscan_cli.logs.lost_readings import lost_readings
-from nscan_cli.logs.range_limits import limits_in_force
+from nscan_cli.logs.range_limits import RangeLimits, limits_in_force
+from nscan_cli.logs.range_unit import scaled, wrong_unit
 from nscan_cli.logs.reading_options import ReadingOptions
 from nscan_cli.logs.scan_order import ScanOrder, selected_numbers
 from nscan_cli.logs.skips import Skips
@@ -113,7 +114,7 @@ def laser_log(
     numbers = selected_numbers(times.times, options, file)
     rows = times.rows[numbers]
     warnings = findings.warnings
-    limits = limits_in_force(raw, options, warnings)
+    raw, limits, contradictions = _in_metres(raw, options, warnings)
     angle_min, angle_increment = beam_directions(raw, options, warnings)
     findings.used |= {"range_min": limits.low_from, "range_max": limits.high_from}
     ranges = raw.ranges if np.array_equal(rows, np.arange(len(raw.stamps))) else raw.ranges[rows]
@@ -148,9 +149,27 @@ def laser_log(
             laser_option=findings.laser_option,
             odometries=findings.odometries,
             corrected=findings.corrected,
+            contradictions=tuple(contradictions),
         ),
         beams=None if (beams == ranges.shape[1]).all() else beams,
         truth_times=motion.truth_times,
         truth=motion.truth,
         frames=findings.frames,
     )
+
+
+def _in_metres(
+    raw: RawScans, options: ReadingOptions, warnings: list[str]
+) -> tuple[RawScans, RangeLimits, list[str]]:
+    """The scans in metres, their limits, and what is said if the scans contradict the unit of the log."""
+    if options.range_scale is not None:
+        raw = scaled(raw, options.range_scale)
+        return raw, limits_in_force(raw, options, warnings), []
+    said: list[str] = []
+    limits = limits_in_force(raw, options, said)
+    unit = None if options.as_recorded else wrong_unit(raw.ranges, limits)
+    if unit is None or not unit.is_certain:
+        warnings += said
+        return raw, limits, []
+    raw = scaled(raw, unit.scale)
+    return raw, limits_in_force(raw, options, warnings), [unit.correction]

@@ -50,10 +50,12 @@ class LogReport:
     """All odometries that --odom-topic can choose."""
     corrected: str = ""
     """The sign that the poses are the result of a mapper; empty if there is none."""
+    contradictions: tuple[str, ...] = ()
+    """Sentences for the user: what of the log the scans contradict, and what was corrected."""
 
     def notices(self) -> list[str]:
-        """The warnings, and one sentence for each reason of skipped records."""
-        return [*self.warnings] + [
+        """The warnings, the contradictions, and one sentence for each reason of skipped records."""
+        return [*self.warnings, *self.contradictions] + [
             f"{counted(count, 'record')} skipped: {reason}, first in {self.skipped_place} {first}"
             for reason, (count, first) in self.skipped.items()
         ]

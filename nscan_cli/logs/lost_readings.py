@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from typing import NamedTuple
 
 import numpy as np
@@ -10,20 +9,13 @@ from numpy.typing import NDArray
 
 from nscan_cli.errors import InputDataError
 from nscan_cli.logs.range_limits import RangeLimits
+from nscan_cli.logs.range_unit import wrong_unit
 from nscan_cli.poses import Array
 
 ROWS_AT_ONCE = 4096
 """Scans that are counted together, to save memory."""
 MAX_LOST_SHARE = 0.9
 """If a larger share of the readings is unusable, the user is told."""
-WRONG_UNITS = (("millimetres", 1000), ("centimetres", 100))
-"""Units that a log may have instead of metres, and their number in a metre."""
-MIN_MEDIAN, TYPICAL_MEDIAN, MAX_MEDIAN = 0.2, 3.0, 40.0
-"""Median reading of a log of a plausible unit, m."""
-REMOTE_MEDIAN = 100.0
-"""The median reading of no planar laser is larger, m."""
-SAMPLE_SIZE = 1 << 20
-"""Number of readings from which the unit is told."""
 
 
 class LostReadings(NamedTuple):
@@ -54,7 +46,8 @@ def lost_readings(
     found = zip(reasons, _counts(ranges, beams, limits).tolist(), strict=True)
     counts = {reason: count for reason, count in found if count}
     total, lost = int(beams.sum()), sum(counts.values())
-    unit, remedy = _wrong_unit(ranges, limits)
+    found_unit = wrong_unit(ranges, limits)
+    unit, remedy = ("", "") if found_unit is None else (f"; {found_unit.seems}", found_unit.remedy)
     if lost <= MAX_LOST_SHARE * total and not unit:
         told = f"{counts.get(crossed, 0):,} of {_readings(total)} are unusable: {crossed}"
         return LostReadings(counts, [told] if crossed in counts else [], None)
@@ -93,33 +86,6 @@ def _counts(ranges: NDArray[np.float32], beams: NDArray[np.int64], limits: Range
         # Beams that a scan with crossed limits does not have are no readings either.
         found[0] += crossed.sum() * ranges.shape[1] - beams[rows][crossed].sum()
     return found
-
-
-def _wrong_unit(ranges: NDArray[np.float32], limits: RangeLimits) -> tuple[str, str]:
-    """The unit that the readings seem to have and the remedy, as text; empty for metres or if no unit fits.
-
-    The unit is wrong if the median return is beyond the limits or implausibly large, and three quarters of
-    the returns would be within the limits in another unit.
-    """
-    some = ranges.reshape(-1)[:: -(-ranges.size // SAMPLE_SIZE)]
-    end = np.inf if limits.no_return is None else limits.no_return
-    some = some[(some > 0) & (some < end) & np.isfinite(some)]
-    if not some.size:
-        return "", ""
-    median, upper_quartile = (float(value) for value in np.quantile(some, (0.5, 0.75)))
-    highest = float(limits.high.max())
-    if median < min(highest, REMOTE_MEDIAN):
-        return "", ""
-    fitting = [
-        (abs(math.log(median / factor / TYPICAL_MEDIAN)), name, factor)
-        for name, factor in WRONG_UNITS
-        if MIN_MEDIAN <= median / factor <= MAX_MEDIAN and upper_quartile / factor < highest
-    ]
-    if not fitting:
-        return "", ""
-    _, name, factor = min(fitting)
-    seem = f"; half of the returns are beyond {median:,.0f}, which looks like {name}"
-    return seem, f"ranges must be in metres: divide them by {factor:,} and write the log again"
 
 
 def _readings(count: int) -> str:

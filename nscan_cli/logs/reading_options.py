@@ -26,6 +26,8 @@ class ReadingOptions:
     """Lower range limit, m. A larger value drops more near readings."""
     max_range: float | None = None
     """Upper range limit, m. Readings from there on are read as no return."""
+    range_scale: float | None = None
+    """Metres in a unit of the log's ranges. Range limits in the same unit are scaled too."""
     angle_min: float | None = None
     """Direction of the first beam, rad."""
     angle_increment: float | None = None
@@ -44,14 +46,19 @@ class ReadingOptions:
     """Whether poses that a mapper has corrected may be read as odometry."""
     salvage: bool = False
     """Whether the readable part of a damaged or truncated file is used."""
+    as_recorded: bool = False
+    """Whether the log is believed where its scans contradict it."""
 
     def __post_init__(self) -> None:
         """Raises WrongUsageError for values that fit no log."""
-        given = (self.min_range, self.max_range, self.angle_min, self.angle_increment, self.start, self.end)
+        given = (self.min_range, self.max_range, self.range_scale, self.angle_min, self.angle_increment,
+                 self.start, self.end)  # fmt: skip
         if not all(math.isfinite(value) for value in (*given, *(self.mount or ())) if value is not None):
             raise WrongUsageError("a reading option is not a finite number; give one that is")
         if self.max_range is not None and self.max_range <= (self.min_range or 0.0):
             raise WrongUsageError("--max-range leaves no beam; it has to be above 0 and --min-range")
+        if self.range_scale is not None and self.range_scale <= 0:
+            raise WrongUsageError("--range-scale has to be above 0")
         if self.angle_increment == 0:
             raise WrongUsageError("--angle-increment is 0; beams need different directions")
         if self.start is not None and self.end is not None and self.start > self.end:

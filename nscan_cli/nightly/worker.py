@@ -97,7 +97,7 @@ def map_and_evaluate(
         "pairwise": made.pairwise,
         "nscan": made.nscan,
         "loops": {"accepted": made.accepted, "refused": made.refused.total()},
-        "warnings": log.report.notices() + graph.provenance["notices"],
+        "warnings": log.report.notices() + graph.provenance["notices"][len(log.report.contradictions) :],
     }
     evaluation = _evaluation(task["inputs"], str(outputs / "graph.json"))
     return {"counts": counts, "evaluation": evaluation, "times": {"seconds": seconds}}

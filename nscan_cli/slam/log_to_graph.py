@@ -72,5 +72,6 @@ def map_log(
         "reading": dataclasses.asdict(reading),
         "slam": as_parameters(options),
     }
-    graph.provenance = {**provenance_of([log.source], parameters), "notices": notices(state)}
+    said = [*log.report.contradictions, *notices(state)]
+    graph.provenance = {**provenance_of([log.source], parameters), "notices": said}
     return state, graph

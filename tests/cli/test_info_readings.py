@@ -32,7 +32,7 @@ SAID = (
     [["slam", "-o", "graph.json"], ["match", "--reference", "0", "--scan", "1"], ["nscan", "--scans", "0-3"]],
 )
 def test_a_log_of_which_no_reading_counts_is_bad_data(millimetres, capsys, arguments):
-    assert run([arguments[0], millimetres, *arguments[1:]]) == 65
+    assert run([arguments[0], millimetres, "--as-recorded", *arguments[1:]]) == 65
     captured = capsys.readouterr()
     assert captured.out == ""
     assert captured.err.startswith(f"nscan-cli: {SAID}")
@@ -41,14 +41,20 @@ def test_a_log_of_which_no_reading_counts_is_bad_data(millimetres, capsys, argum
 
 
 def test_info_lists_it_and_then_refuses_it(millimetres, capsys):
-    assert run(["info", millimetres]) == 65
+    assert run(["info", millimetres, "--as-recorded"]) == 65
     captured = capsys.readouterr()
     assert "100.0% without return" in captured.out
     assert "7,200 beyond 12 m (range_max of the messages)" in captured.out
     assert captured.err.startswith(f"nscan-cli: {SAID}")
-    assert run(["info", "--json", millimetres]) == 65
+    assert run(["info", "--json", millimetres, "--as-recorded"]) == 65
     facts = json.loads(capsys.readouterr().out)
     assert facts["beams_lost"] == {"beyond 12 m (range_max of the messages)": 7200}
+
+
+def test_a_unit_that_is_put_right_is_among_the_warnings(millimetres, capsys):
+    assert run(["info", "--json", millimetres]) == 0
+    (warning,) = json.loads(capsys.readouterr().out)["warnings"]
+    assert "the ranges are multiplied by 0.001" in warning
 
 
 def test_the_source_of_each_limit(tmp_path, capsys):

@@ -9,13 +9,11 @@ import numpy as np
 import pytest
 
 from nscan_cli.errors import InputDataError
-from tests.logs import lines
-from tests.logs.noisy_room import carmen, readings, recording
+from tests.logs.noisy_room import readings, recording
 from tests.logs.recordings.messages import Scan
 
 ALL = 40 * 180
-MILLIMETRES = "looks like millimetres; ranges must be in metres: divide them by 1,000"
-CENTIMETRES = "looks like centimetres; ranges must be in metres: divide them by 100"
+MILLIMETRES = "looks like millimetres; ranges must be in metres: give --range-scale 0.001"
 
 
 def filled(value: float) -> np.ndarray:
@@ -31,9 +29,6 @@ def filled(value: float) -> np.ndarray:
         (filled(-1.0), {}, "7,200 are 0 or less;"),
         (filled(0.02), {}, "nearer than 0.05 m (range_min of the messages); if they are valid, set"),
         (filled(12.0), {}, "at a peak of readings without return); give a log"),
-        (1000 * readings(), {}, MILLIMETRES),
-        (1000 * readings(), {"range_max": 25.0}, MILLIMETRES),
-        (100 * readings(), {}, CENTIMETRES),
         (readings(), {"range_max": 0.5}, "0.5 m (range_max of the messages); if they are valid, set"),
         (readings(), {"range_min": 12.0, "range_max": 0.05},
          "in scans whose lower limit, 12 m (range_min of the messages), is not below the upper, 0.05 m "
@@ -56,21 +51,9 @@ def test_readings_of_several_kinds_are_counted_by_kind(read):
     ranges[:10], ranges[10:15], ranges[15, :3] = math.inf, 0.0, math.nan
     with pytest.raises(
         InputDataError, match="3 are not a number, 900 are 0 or less, 1,800 are infinite, 4,497"
-    ):
-        read(recording(ranges))
-
-
-@pytest.mark.parametrize(("factor", "unit"), [(1000, MILLIMETRES), (100, CENTIMETRES)])
-def test_a_text_log_in_another_unit(tmp_path, factor, unit):
-    with pytest.raises(InputDataError, match=r"beyond 80 m \(CARMEN's greatest range\)") as error:
-        lines.read(tmp_path, *carmen(factor * np.maximum(readings(), 1.0)))
-    assert unit in str(error.value)
-
-
-def test_a_limit_in_the_same_wrong_unit_hides_nothing(read):
-    (warning,) = read(recording(1000 * readings(), range_max=12000.0, range_min=50.0)).report.warnings
-    assert MILLIMETRES in warning
-    assert read(recording(1000 * readings(), range_max=9000.0)).report.warnings
+    ) as error:
+        read(recording(ranges), as_recorded=True)
+    assert MILLIMETRES in str(error.value)
 
 
 def test_options_that_leave_nothing_are_named(read):

@@ -162,6 +162,35 @@ def people(log: LaserLog, walkers: Array, speed: float = 1.2, radius: float = 0.
     return replace(log, ranges=ranges)
 
 
+def own_parts(
+    log: LaserLog, sectors: list[tuple[float, float, float]], noise: float = 0.01, seed: int = 1
+) -> LaserLog:
+    """Posts of the robot hide what is behind them: each from one bearing of the laser to another (rad), at
+    a distance (m), measured with so much noise (m)."""
+    ranges, rng = log.ranges.copy(), np.random.default_rng(seed)
+    beams = log.angle_min[:, None] + log.angle_increment[:, None] * np.arange(ranges.shape[1])
+    for first, last, distance in sectors:
+        hidden = (beams >= first) & (beams <= last)
+        ranges[hidden] = np.round(distance + noise * rng.standard_normal(int(hidden.sum())), 2)
+    return replace(log, ranges=ranges)
+
+
+def follower(log: LaserLog, distance: float, width: float = 0.5, seed: int = 1) -> LaserLog:
+    """Somebody walks behind the robot: a disc that sways by 0.1 m and 0.1 rad."""
+    ranges, rng = log.ranges.copy(), np.random.default_rng(seed)
+    sway = np.zeros(2)
+    for row in range(len(log)):
+        sway = 0.95 * sway + np.array([0.1, 0.1]) * np.sqrt(1 - 0.95**2) * rng.standard_normal(2)
+        beams = log.angle_min[row] + log.angle_increment[row] * np.arange(ranges.shape[1])
+        off = wrap(beams - (np.pi + sway[1] - log.mount[2]))
+        away = distance + width / 2 + sway[0]
+        across = away * np.sin(off)
+        hit = (np.abs(across) < width / 2) & (np.abs(off) < np.pi / 2)
+        near = away * np.cos(off) - np.sqrt(np.maximum((width / 2) ** 2 - across**2, 0.0))
+        ranges[row, hit] = np.fmin(ranges[row, hit], near[hit])
+    return replace(log, ranges=ranges)
+
+
 def _odometry(log: LaserLog) -> Array:
     assert log.odometry is not None
     return log.odometry

@@ -1,0 +1,104 @@
+"""The unit of the readings: metres, unless the scans say millimetres or centimetres, or an option does."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nscan_cli.logs.range_limits import LARGEST_RANGE, RangeLimits
+
+if TYPE_CHECKING:
+    from nscan_cli.logs.assemble import RawScans
+
+UNITS = (("millimetres", 0.001), ("centimetres", 0.01))
+"""Units that a log may have instead of metres, in metres."""
+MIN_MEDIAN, TYPICAL_MEDIAN, MAX_MEDIAN = 0.2, 3.0, 40.0
+"""Median reading of a log of a plausible unit, m."""
+REMOTE_MEDIAN = 100.0
+"""The median reading of no planar laser is larger, m. From here on metres are out of the question."""
+CERTAIN_FACTOR, UNLIKELY_FACTOR = 4.0, 6.0
+"""A unit is beyond doubt if the median is the typical one times or divided by at most the first, and with
+any other unit by more than the second. A larger first and a smaller second value correct more logs."""
+LIMITS_APART = 1.0
+"""Lower limits of lasers are less, and upper limits are more, m."""
+SAMPLE_SIZE = 1 << 20
+"""Number of readings from which the unit is told."""
+
+
+class WrongUnit(NamedTuple):
+    """The unit that the readings of a log seem to have in place of metres."""
+
+    name: str
+    scale: float
+    """m"""
+    median: float
+    """Of the readings as written."""
+    others: tuple[float, ...]
+    """Scales of the other units that the readings may have, m."""
+    is_certain: bool
+    """Whether it is beyond doubt."""
+
+    @property
+    def seems(self) -> str:
+        """What is wrong, as a part of a sentence."""
+        return f"half of the returns are beyond {self.median:,.0f}, which looks like {self.name}"
+
+    @property
+    def remedy(self) -> str:
+        """The option to give."""
+        scales = " or ".join(f"{scale:g}" for scale in (self.scale, *self.others))
+        return f"ranges must be in metres: give --range-scale {scales}"
+
+    @property
+    def correction(self) -> str:
+        """What is said if the unit is put right."""
+        return (
+            f"{self.seems}: the ranges are multiplied by {self.scale:g}; --as-recorded leaves them as they "
+            "are, --range-scale sets another factor"
+        )
+
+
+def wrong_unit(ranges: NDArray[np.float32], limits: RangeLimits) -> WrongUnit | None:
+    """The unit of readings (S, B) as written; None for metres, or if no unit fits.
+
+    The unit is wrong if the median return is beyond the limits or implausibly large, and three quarters of
+    the returns would be within the limits in another unit.
+    """
+    some = ranges.reshape(-1)[:: -(-ranges.size // SAMPLE_SIZE)]
+    end = np.inf if limits.no_return is None else limits.no_return
+    some = some[(some > 0) & (some < end) & np.isfinite(some)]
+    if not some.size:
+        return None
+    median, upper_quartile = (float(value) for value in np.quantile(some, (0.5, 0.75)))
+    highest = float(limits.high.max())
+    if median < min(highest, REMOTE_MEDIAN):
+        return None
+    fitting = sorted(
+        (abs(math.log(median * scale / TYPICAL_MEDIAN)), name, scale)
+        for name, scale in UNITS
+        if MIN_MEDIAN <= median * scale <= MAX_MEDIAN and upper_quartile * scale < highest
+    )
+    if not fitting:
+        return None
+    (off, name, scale), *others = fitting
+    near, far = math.log(CERTAIN_FACTOR), math.log(UNLIKELY_FACTOR)
+    is_certain = median >= REMOTE_MEDIAN and off <= near and all(other[0] > far for other in others)
+    return WrongUnit(name, scale, median, tuple(other[2] for other in others), is_certain)
+
+
+def scaled(raw: RawScans, scale: float) -> RawScans:
+    """The scans with ranges multiplied by `scale`; limits that were in the same unit are, too.
+
+    An upper limit was in another unit if the median return is beyond it. No limit may become one that no
+    laser has.
+    """
+    returns = raw.ranges[(raw.ranges > 0) & np.isfinite(raw.ranges)]
+    median = float(np.median(returns)) if returns.size else 0.0
+    low, high = (np.asarray(limit, dtype=np.float64) for limit in raw.limits)
+    shares_unit = (high < LARGEST_RANGE) & (high >= median) & (high * scale >= LIMITS_APART)
+    limits = np.where(low >= LIMITS_APART, low * scale, low), np.where(shares_unit, high * scale, high)
+    return replace(raw, ranges=raw.ranges * np.float32(scale), limits=limits)
