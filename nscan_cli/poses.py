@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
+Mask = NDArray[np.bool_]
 
 
 def wrap(angle: ArrayLike) -> Array:
@@ -20,9 +21,9 @@ def wrap(angle: ArrayLike) -> Array:
     return a - 2 * np.pi * np.ceil((a - np.pi) / (2 * np.pi))
 
 
-def are_known(poses: ArrayLike) -> NDArray[np.bool_]:
+def are_known(poses: ArrayLike) -> Mask:
     """(…) which of the poses (…, 3) are known; the others are nan."""
-    known: NDArray[np.bool_] = ~np.isnan(np.asarray(poses, dtype=np.float64)[..., 0])
+    known: Mask = ~np.isnan(np.asarray(poses, dtype=np.float64)[..., 0])
     return known
 
 

@@ -20,10 +20,12 @@ from nscan_cli.cli.subcommand import (
     Subcommand,
     section_of,
 )
-from nscan_cli.files.limits import ALL, Limit
+from nscan_cli.files import limits
+from nscan_cli.files.limits import Limit
 from nscan_cli.files.outputs import write_atomically
 from nscan_cli.logs.formats import readable_forms
 
+LIMITS = [each for each in vars(limits).values() if isinstance(each, Limit)]
 HEAD = """\
 # Reference
 
@@ -246,7 +248,7 @@ def _options(command: Subcommand, section: str) -> str:
 
 def _variables() -> Iterable[tuple[str, str]]:
     yield from _code_first(ENVIRONMENT.items())
-    for limit in ALL:
+    for limit in LIMITS:
         yield f"`{limit.variable}`", f"at most {_shown(limit)}; see [limits](limits.md)"
 
 

@@ -17,19 +17,17 @@ from nscan_cli.logs.log_files import JOURNAL_SUFFIXES
 from nscan_cli.logs.reading_options import ReadingOptions
 
 if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
-
     from nscan_cli.files.provenance import Source
     from nscan_cli.graph.model import Graph
     from nscan_cli.logs.laser_log import LaserLog
+    from nscan_cli.poses import Indices
 
 GRAPH_LOG_REMEDY = "give the log that the graph was made from"
 
 
 def read_graph_log(
     graph_file: str, graph: Graph, paths: Sequence[str], reading: ReadingOptions
-) -> tuple[LaserLog, NDArray[np.int64], NDArray[np.int64]]:
+) -> tuple[LaserLog, Indices, Indices]:
     """Read the graph's log at `paths`.
 
     Returns the log, the nodes (N,) whose scans `reading` includes, and their rows (N,) in the log.

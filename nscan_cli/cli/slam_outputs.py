@@ -15,13 +15,10 @@ from nscan_cli.files.limits import DISTANCE
 from nscan_cli.files.outputs import check_writable, write_atomically
 
 if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
-
     from nscan_cli.graph.model import Graph
     from nscan_cli.logs.laser_log import LaserLog
     from nscan_cli.mapping.map_server import MapImage
-    from nscan_cli.poses import Array
+    from nscan_cli.poses import Array, Indices
 
 
 @dataclass(frozen=True)
@@ -71,7 +68,7 @@ class SlamOutputs:
         self,
         graph: Graph,
         scans: LaserLog | None,
-        rows: NDArray[np.int64],
+        rows: Indices,
         inputs: Sequence[str],
         threads: int,
         quiet: bool,
@@ -123,7 +120,7 @@ class SlamOutputs:
         return os.fsencode(f"{targets}:{prerequisites}\n")
 
 
-def _draw_map(scans: LaserLog, rows: NDArray[np.int64], poses: Array, threads: int) -> MapImage:
+def _draw_map(scans: LaserLog, rows: Indices, poses: Array, threads: int) -> MapImage:
     """The picture of the map. Memory of earlier steps is released before."""
     from nscan_cli.mapping.map_server import map_image
     from nscan_cli.mapping.occupancy import occupancy_grid

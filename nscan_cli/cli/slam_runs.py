@@ -16,11 +16,9 @@ from nscan_cli.files.text import counted
 from nscan_cli.logs.reading_options import ReadingOptions
 
 if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
-
     from nscan_cli.graph.model import Graph
     from nscan_cli.logs.laser_log import LaserLog
+    from nscan_cli.poses import Indices
     from nscan_cli.slam.options import SlamOptions
 
 
@@ -31,7 +29,7 @@ class SlamRun:
     graph: Graph
     scans: LaserLog | None
     """The graph's log, if there is one."""
-    rows: NDArray[np.int64]
+    rows: Indices
     """(N,) the row of each node's scan in the log."""
     inputs: list[str]
     """The paths of all files that were read."""
@@ -170,7 +168,7 @@ def run_on_graph(
 
 def _graph_log(
     path: str, graph: Graph, log_files: Sequence[str] | None, needed: bool, quiet: bool
-) -> tuple[LaserLog, NDArray[np.int64], list[str]] | None:
+) -> tuple[LaserLog, Indices, list[str]] | None:
     """The log of a saved graph, the rows of its scans, and its files' paths; None without a log."""
     from nscan_cli.cli.graph_log import find_log, read_graph_log
     from nscan_cli.logs.log_files import files_of

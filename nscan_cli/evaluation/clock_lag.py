@@ -7,11 +7,10 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from nscan_cli.evaluation.similarity import fit
 from nscan_cli.graph.io.tum import Trajectory
-from nscan_cli.poses import Array, wrap
+from nscan_cli.poses import Array, Mask, wrap
 
 LARGEST_LAG, SMALLEST_LAG = 120.0, 0.05
 """s; range of the lags that are searched and reported."""
@@ -82,10 +81,10 @@ class Clocks:
         is_unique = not len(others) or at(lag) * COST_RATIO < float(others.min())
         return (lag, at(lag)) if is_unique else None
 
-    def _within(self, lag: float) -> NDArray[np.bool_]:
+    def _within(self, lag: float) -> Mask:
         """Which poses overlap the reference in time, with a lag (s)."""
         times = self.times + lag
-        inside: NDArray[np.bool_] = (times >= self.reference.times[0]) & (times <= self.reference.times[-1])
+        inside: Mask = (times >= self.reference.times[0]) & (times <= self.reference.times[-1])
         return inside
 
 

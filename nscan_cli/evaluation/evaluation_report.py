@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass, fields
 from typing import Any
 
 from nscan_cli.evaluation.alignment import Alignment
@@ -15,7 +15,6 @@ from nscan_cli.evaluation.trajectory_errors import RPE_DISTANCE, TrajectoryError
 from nscan_cli.files.text import counted
 
 ERROR_UNITS = {"translation": "m", "rotation": "deg", "time": "s"}
-HEADINGS = ("mean", "sd", "median", "mean square", "rmse", "max")
 
 
 @dataclass(frozen=True)
@@ -135,14 +134,15 @@ def _alignment_record(errors: TrajectoryErrors) -> dict[str, Any]:
 
 def _statistics_table(rows: Mapping[str, Spread | None]) -> str:
     """A table with a row for each spread."""
-    lines = [" " * 18 + "".join(f"{heading:>{_width(heading)}}" for heading in HEADINGS)]
+    headings = [field.name.replace("_", " ") for field in fields(Spread)]
+    lines = [" " * 18 + "".join(f"{heading:>{_width(heading)}}" for heading in headings)]
     for name, spread in rows.items():
         if spread is None:
             lines.append(f"{name:<18}  none: the matched path is too short")
             continue
         cells = (
             f"{_cell(heading, figure):>{_width(heading)}}"
-            for heading, figure in zip(HEADINGS, _statistics(spread), strict=True)
+            for heading, figure in zip(headings, asdict(spread).values(), strict=True)
         )
         lines.append(f"{name:<18}" + "".join(cells))
     return "\n".join(lines)
@@ -157,15 +157,8 @@ def _width(heading: str) -> int:
     return max(len(heading) + 1, 10)
 
 
-def _statistics(spread: Spread) -> tuple[float, ...]:
-    return spread.mean, spread.sd, spread.median, spread.mean_square, spread.rmse, spread.maximum
-
-
 def _statistics_record(spread: Spread | None) -> dict[str, float] | None:
-    if spread is None:
-        return None
-    names = (heading.replace(" ", "_") for heading in HEADINGS)
-    return {name: round(figure, 9) for name, figure in zip(names, _statistics(spread), strict=True)}
+    return None if spread is None else {name: round(value, 9) for name, value in asdict(spread).items()}
 
 
 def _worst_rows(evaluation: Evaluation) -> list[dict[str, Any]]:

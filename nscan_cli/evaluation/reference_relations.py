@@ -10,7 +10,6 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from nscan_cli.errors import InputDataError
 from nscan_cli.evaluation.statistics import Spread
@@ -19,7 +18,7 @@ from nscan_cli.files.inputs import base_name, label, read_text
 from nscan_cli.files.limits import DISTANCE, GRAPH, TIME
 from nscan_cli.graph.io.pose_columns import numbered_lines, split_fields
 from nscan_cli.graph.io.tum import Trajectory
-from nscan_cli.poses import Array, relative, wrap
+from nscan_cli.poses import Array, Indices, relative, wrap
 
 COLUMNS = 8
 RELATIONS_FORMAT = "relations are lines 't1 t2 x y z roll pitch yaw'"
@@ -41,7 +40,7 @@ class ReferenceRelations:
     """(R, 2) seconds."""
     poses: Array
     """(R, 3)"""
-    lines: NDArray[np.int64]
+    lines: Indices
     """(R,) line numbers in the file."""
 
     def __len__(self) -> int:
@@ -52,13 +51,13 @@ class ReferenceRelations:
 class RelationErrors:
     """The errors of a trajectory on the relations whose stamps it has."""
 
-    used: NDArray[np.int64]
+    used: Indices
     """(U,) rows of the relations that were used."""
     exact: int
     """How many of them found both stamps in the trajectory."""
     too_far: int
     """How many relations were left out, because no pose is within 0.1 s of a stamp."""
-    rows: NDArray[np.int64]
+    rows: Indices
     """(U, 2) rows of the trajectory."""
     translation: Array
     """(U,) m"""
@@ -75,7 +74,7 @@ class RelationErrors:
         """Statistics of the rotational error, degrees."""
         return Spread.of(self.rotation)
 
-    def worst(self, count: int) -> NDArray[np.int64]:
+    def worst(self, count: int) -> Indices:
         """Positions in `used` of the `count` largest translational errors, the largest first."""
         return np.argsort(-self.translation, kind="stable")[:count].astype(np.int64)
 

@@ -20,20 +20,19 @@ class Spread:
     median: float
     mean_square: float
     """In the unit squared."""
-    maximum: float
+    rmse: float
+    """Root of the mean square."""
+    max: float
 
     @classmethod
     def of(cls, errors: Array) -> Spread:
         """The statistics of errors (n,), n ≥ 1."""
+        mean_square = float((errors**2).mean())
         return cls(
             mean=float(errors.mean()),
             sd=float(errors.std(ddof=1)) if len(errors) > 1 else 0.0,
             median=float(np.median(errors)),
-            mean_square=float((errors**2).mean()),
-            maximum=float(errors.max()),
+            mean_square=mean_square,
+            rmse=math.sqrt(mean_square),
+            max=float(errors.max()),
         )
-
-    @property
-    def rmse(self) -> float:
-        """Root of the mean square."""
-        return math.sqrt(self.mean_square)

@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from nscan_cli.errors import InputDataError
 from nscan_cli.files.text import counted
-from nscan_cli.poses import Array
+from nscan_cli.poses import Array, Indices
 
 TOLERANCE = 0.1
 """s; largest distance in time of a match, as in Kümmerle's metric."""
 
 
-def nearest_in_time(times: Array, wanted: Array) -> NDArray[np.int64]:
+def nearest_in_time(times: Array, wanted: Array) -> Indices:
     """The rows (M,) of `times` (N,), not decreasing, nearest to `wanted` (M,); of two as near the earlier."""
     right = np.clip(np.searchsorted(times, wanted), 1, max(len(times) - 1, 1))
     left = right - 1
@@ -21,7 +20,7 @@ def nearest_in_time(times: Array, wanted: Array) -> NDArray[np.int64]:
     return np.where(wanted - times[left] <= times[right] - wanted, left, right).astype(np.int64)
 
 
-def mutual_nearest(times: Array, reference: Array) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def mutual_nearest(times: Array, reference: Array) -> tuple[Indices, Indices]:
     """Rows of `times` and of `reference`, pair by pair, that are each other's nearest within TOLERANCE.
 
     Each row occurs at most once. Both times must not decrease.

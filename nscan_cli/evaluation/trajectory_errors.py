@@ -8,7 +8,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from nscan_cli.errors import InputDataError
 from nscan_cli.evaluation.alignment import Alignment, alignment
@@ -16,7 +15,7 @@ from nscan_cli.evaluation.clock_lag import lag_without_overlap
 from nscan_cli.evaluation.statistics import Spread
 from nscan_cli.evaluation.time_association import mutual_nearest, no_match
 from nscan_cli.graph.io.tum import Trajectory
-from nscan_cli.poses import Array, compose, relative, wrap
+from nscan_cli.poses import Array, Indices, compose, relative, wrap
 
 RPE_DISTANCE = 1.0
 """Metres of path in the reference between the two poses of a relative error."""
@@ -32,9 +31,9 @@ class TrajectoryErrors:
     """Number of poses of the result without a match."""
     alignment: Alignment
     """Takes the result into the frame of the reference."""
-    rows: NDArray[np.int64]
+    rows: Indices
     """(matched,) rows of the result with a match."""
-    partners: NDArray[np.int64]
+    partners: Indices
     """(matched,) rows of the reference that match them."""
     translation: Array
     """(matched,) m, absolute, of the poses in `rows`."""

@@ -17,7 +17,7 @@ from nscan_cli.files.finite import check_finite
 from nscan_cli.logs.laser_defaults import CARMEN_MAX_RANGE, beam_angles
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.logs.text.corrected_poses import OWN_HOST
-from nscan_cli.poses import Array, wrap
+from nscan_cli.poses import Array, Indices, wrap
 
 HEADER = """\
 # CARMEN Logfile
@@ -27,7 +27,7 @@ ANGLE_TOLERANCE = 1e-6
 """rad; largest difference of beam directions that counts as none."""
 
 
-def corrected_log(log: LaserLog, rows: NDArray[np.int64], poses: Array) -> bytes:
+def corrected_log(log: LaserLog, rows: Indices, poses: Array) -> bytes:
     """The scans in `rows` (N,) of a log as CARMEN text, taken at the robot's `poses` (N, 3).
 
     The records are FLASER where the beams have the directions that CARMEN assumes for their number and
@@ -67,7 +67,7 @@ def _no_return_limit(log: LaserLog, greatest: float) -> np.float32:
     return np.float32(max(CARMEN_MAX_RANGE, math.floor(greatest) + 1.0))
 
 
-def _has_carmen_angles(first: Array, step: Array, beams: NDArray[np.int64]) -> bool:
+def _has_carmen_angles(first: Array, step: Array, beams: Indices) -> bool:
     """Whether all scans have the same number of beams, in the directions that CARMEN assumes for it."""
     if (beams != beams[0]).any():
         return False
@@ -88,7 +88,7 @@ def _param_lines(log: LaserLog, limit: np.float32, step: float) -> Iterator[str]
         yield f"PARAM {name} {value!s} 0 {OWN_HOST.decode()} 0\n"
 
 
-def _beam_texts(ranges: NDArray[np.float32], own: NDArray[np.int64], nothing: np.float32) -> Iterator[str]:
+def _beam_texts(ranges: NDArray[np.float32], own: Indices, nothing: np.float32) -> Iterator[str]:
     """The number of beams and the ranges of each scan, in the fewest digits that give the same value."""
     values, places = np.unique(ranges, return_inverse=True, equal_nan=True)
     texts = np.array([_range_field(value, nothing) for value in values], dtype=object)

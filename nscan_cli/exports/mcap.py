@@ -17,7 +17,6 @@ from decimal import Decimal
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from nscan_cli import __version__
 from nscan_cli.errors import WrongUsageError
@@ -34,7 +33,7 @@ from nscan_cli.graph.model import Graph
 from nscan_cli.logs.frame_names import MAP
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.mapping.occupancy import OccupancyGrid
-from nscan_cli.poses import Array, are_known, compose, inverse
+from nscan_cli.poses import Array, Indices, are_known, compose, inverse
 
 TOPICS = {
     "/map": "nav_msgs/msg/OccupancyGrid",
@@ -53,9 +52,7 @@ LAST_SECOND = 2**31
 """A stamp's seconds are 32 bits wide."""
 
 
-def ros2_recording(
-    log: LaserLog, rows: NDArray[np.int64], nodes: NDArray[np.int64], graph: Graph, grid: OccupancyGrid
-) -> bytes:
+def ros2_recording(log: LaserLog, rows: Indices, nodes: Indices, graph: Graph, grid: OccupancyGrid) -> bytes:
     """The MCAP of a graph and its map `grid`, with the scans in `rows` (N,) of the log at `nodes` (N,).
 
     Stamps are those of the log. Where ROS cannot hold one (before 0, from 2³¹ s on), all count from the

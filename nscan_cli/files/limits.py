@@ -93,4 +93,3 @@ TIME = Limit("TIME", 1e11, "s")
 """Largest absolute time stamp."""
 INFORMATION = Limit("INFORMATION", 1e30, "")
 """Largest absolute entry of an information, Hessian or covariance matrix."""
-ALL = (INPUT, UNPACKED, GRAPH, CONFIG, BEAMS, READINGS, MAP_CELLS, RECORD_KINDS, DISTANCE, TIME, INFORMATION)

@@ -11,7 +11,6 @@ import functools
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from nscan_cli.graph.linalg.block_cholesky import Factor, factorise
 from nscan_cli.graph.model import Graph
@@ -19,7 +18,7 @@ from nscan_cli.graph.optimise.graph_energy import GraphEnergy
 from nscan_cli.graph.optimise.whole_graph import Component
 from nscan_cli.graph.relations.base import Relation
 from nscan_cli.graph.relations.registry import is_joint, is_pairwise
-from nscan_cli.poses import Array
+from nscan_cli.poses import Array, Indices
 
 
 def component_information(graph: Graph, component: Component) -> tuple[GraphEnergy, Factor]:
@@ -52,14 +51,14 @@ def _each_pair_once(relations: Sequence[Relation]) -> Array:
     return weights
 
 
-def _pair_keys(nodes: Sequence[int]) -> NDArray[np.int64]:
+def _pair_keys(nodes: Sequence[int]) -> Indices:
     """(n (n − 1) / 2,) the pairs of n nodes, each packed into one integer."""
     ordered = np.sort(np.array(nodes, dtype=np.int64))
     a, b = _all_pairs(len(ordered))
-    pairs: NDArray[np.int64] = ordered[a] << 32 | ordered[b]
+    pairs: Indices = ordered[a] << 32 | ordered[b]
     return pairs
 
 
 @functools.cache
-def _all_pairs(n: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def _all_pairs(n: int) -> tuple[Indices, Indices]:
     return np.triu_indices(n, 1)

@@ -6,13 +6,12 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from nscan_cli.graph.relations.base import Relation
 from nscan_cli.graph.relations.nscan import NScan
 from nscan_cli.graph.relations.pairwise import Pairwise
 from nscan_cli.graph.relations.registry import is_joint, is_pairwise
-from nscan_cli.poses import Array, are_known, compose, relative
+from nscan_cli.poses import Array, Indices, are_known, compose, relative
 
 __all__ = ["Graph", "Loop", "NScan", "Pairwise"]
 
@@ -34,14 +33,14 @@ class Graph:
     A keyframe is its own anchor. Every other node moves rigidly with the keyframe that `anchors` names.
     """
 
-    scans: NDArray[np.int64]
+    scans: Indices
     """(N,) scan numbers."""
     stamps: list[str]
     poses: Array
     """(N, 3) global poses of the robot."""
     odometry: Array | None
     """(N, 3) poses by odometry, nan where it is missing; None where there is none at all."""
-    anchors: NDArray[np.int64]
+    anchors: Indices
     """(N,) id of the keyframe that the node is attached to."""
     pairwise: list[Pairwise] = field(default_factory=list)
     nscan: list[NScan] = field(default_factory=list)
@@ -73,7 +72,7 @@ class Graph:
             self.others.append(relation)
 
     @property
-    def keyframes(self) -> NDArray[np.int64]:
+    def keyframes(self) -> Indices:
         """The ids (K,) of the keyframes, increasing."""
         return np.flatnonzero(self.anchors == np.arange(len(self))).astype(np.int64)
 
@@ -87,7 +86,7 @@ class Graph:
         """(N,) the stamps in seconds."""
         return np.array([float(stamp) for stamp in self.stamps])
 
-    def move_keyframes(self, keyframes: NDArray[np.int64], poses: Array) -> None:
+    def move_keyframes(self, keyframes: Indices, poses: Array) -> None:
         """Set the poses (K, 3) of keyframes (K,), and move the nodes attached to them rigidly along."""
         moved = self.poses.copy()
         moved[keyframes] = poses

@@ -18,7 +18,7 @@ from nscan_cli.errors import WrongUsageError
 from nscan_cli.files.limits import MAP_CELLS
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.mapping.ray_casting import TILE, ScanRays, TileCounts, cast_rays, ray_bounds
-from nscan_cli.poses import Array
+from nscan_cli.poses import Array, Indices
 
 
 @dataclass(frozen=True)
@@ -115,7 +115,7 @@ class OccupancyGrid:
 
 def occupancy_grid(
     log: LaserLog,
-    rows: NDArray[np.int64],
+    rows: Indices,
     poses: Array,
     resolution: float = DEFAULT_CELL_SIZE,
     threads: int = 1,

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nscan_cli.kernels.decorators import kernel, leaf_kernel
-from nscan_cli.poses import Array
+from nscan_cli.poses import Array, Indices
 from nscan_cli.threads import map_in_threads
 
 TILE = 32
@@ -34,7 +34,7 @@ class TileCounts(NamedTuple):
 class ScanRays(NamedTuple):
     """The scans of a log whose beams are traced, and the poses of the laser."""
 
-    rows: NDArray[np.int64]
+    rows: Indices
     """(N,) rows of the log."""
     ranges: NDArray[np.float32]
     """(S, B) m"""
@@ -60,7 +60,7 @@ def cast_rays(
     The lower left corner of the grid is at (left, bottom) · resolution. No beam may leave the grid.
     """
 
-    def cast(some: NDArray[np.int64]) -> TileCounts:
+    def cast(some: Indices) -> TileCounts:
         index = np.full((-(-shape[0] // TILE), -(-shape[1] // TILE)), -1, dtype=np.int32)
         # The array has room for all tiles, but only the rows that are written take memory.
         tiles = TileCounts(index, np.zeros((index.size, 2, TILE, TILE), dtype=np.int32))

@@ -1,10 +1,10 @@
-"""SE(2) inside kernels: `nscan_cli.poses` for one pose at a time, without new arrays."""
+"""SE(2) inside kernels: `nscan_cli.poses` for one pose at a time, without new arrays; the motion of many."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from nscan_cli.kernels.decorators import leaf_kernel
+from nscan_cli.kernels.decorators import kernel, leaf_kernel
 from nscan_cli.poses import Array
 
 
@@ -28,3 +28,16 @@ def composed_pose(a: Array, b: Array, out: Array) -> None:
 def wrapped(angle: float) -> float:
     """The angle (rad) normalised to (−π, π]."""
     return float(angle - 2 * np.pi * np.ceil((angle - np.pi) / (2 * np.pi)))
+
+
+@kernel
+def largest_motion(before: Array, after: Array, fixed: int) -> tuple[float, float, float]:
+    """The largest motions of poses (n, 3) as seen from one of them: distance, shift in x or y, m; turn, rad."""
+    distance, shift, turn, was, now = 0.0, 0.0, 0.0, np.empty(3), np.empty(3)
+    for k in range(len(before)):
+        relative_pose(before[k], before[fixed], was)
+        relative_pose(after[k], after[fixed], now)
+        x, y = now[0] - was[0], now[1] - was[1]
+        distance, shift = max(distance, np.hypot(x, y)), max(shift, abs(x), abs(y))
+        turn = max(turn, abs(wrapped(now[2] - was[2])))
+    return distance, shift, turn

@@ -10,7 +10,6 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from nscan_cli.kernels.decorators import kernel, leaf_kernel, reduction_kernel
 from nscan_cli.ndt.association import (
@@ -22,7 +21,7 @@ from nscan_cli.ndt.association import (
 )
 from nscan_cli.ndt.hash_grid import Grid, facing_gaussian, find_row, pack_key
 from nscan_cli.ndt.transform import Ndt
-from nscan_cli.poses import Array
+from nscan_cli.poses import Array, Mask
 
 Vector = tuple[float, float]
 Symmetric = tuple[float, float, float]
@@ -158,9 +157,7 @@ def inlier_share(grid: Grid, half: float, points: Array, pose: Array, bound: flo
 
 
 @leaf_kernel
-def find_inliers(
-    grid: Grid, half: float, points: Array, pose: Array, bound: float, inliers: NDArray[np.bool_]
-) -> int:
+def find_inliers(grid: Grid, half: float, points: Array, pose: Array, bound: float, inliers: Mask) -> int:
     """Mark the points (m, 2) within a Mahalanobis distance² of `bound` of some Gaussian in `inliers` (m,).
 
     Returns their number. Other marks stay.

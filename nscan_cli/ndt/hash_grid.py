@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nscan_cli.kernels.decorators import kernel, leaf_kernel
-from nscan_cli.poses import Array
+from nscan_cli.poses import Array, Indices
 
 HALF_KEY = 1 << 30
 """Offset that makes lattice coordinates positive in a packed key."""
@@ -33,7 +33,7 @@ class Grid(NamedTuple):
 
     table: NDArray[np.int32]
     """(T,) open-addressing hash table of rows, −1 where empty; T is a power of two."""
-    keys: NDArray[np.int64]
+    keys: Indices
     """(R,) packed lattice coordinates."""
     links: NDArray[np.int32]
     """(R, 4) rows of the Gaussians of the four blocks that contain the lattice cell, or −1."""

@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from nscan_cli.kernels.array_assignment import assign
 from nscan_cli.kernels.decorators import kernel
@@ -21,7 +20,7 @@ from nscan_cli.ndt.hash_grid import (
     rehash,
     table_size,
 )
-from nscan_cli.poses import Array
+from nscan_cli.poses import Array, Indices
 
 INITIAL_CAPACITY = 512
 """Rows of a new NDT."""
@@ -29,7 +28,7 @@ INITIAL_CAPACITY = 512
 
 @kernel
 def _grid_of_scans(
-    points: Array, ends: NDArray[np.int64], poses: Array, half: float, capacity: int, settings: Array
+    points: Array, ends: Indices, poses: Array, half: float, capacity: int, settings: Array
 ) -> Grid:
     """The compact grid of n scans; see `Ndt.of_scans`."""
     grid, rows, touched = empty_grid(capacity, settings), 0, np.empty(points.shape[0], dtype=np.int32)
@@ -117,7 +116,7 @@ class Ndt:
     def of_scans(
         cls,
         points: Array,
-        ends: NDArray[np.int64],
+        ends: Indices,
         poses: Array,
         cell: float,
         minimum: int,

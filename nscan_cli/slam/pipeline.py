@@ -11,7 +11,7 @@ from nscan_cli.slam.backend.optimisation import optimise, optimise_if_due
 from nscan_cli.slam.backend.refinement import refine
 from nscan_cli.slam.backend.rejection import reject_contradicting_loops
 from nscan_cli.slam.frontend.break_detection import SegmentTracker, TrackedBatch, tracker_of
-from nscan_cli.slam.frontend.scan_batch import ScanBatch, scan_batches
+from nscan_cli.slam.frontend.scan_batch import ScanBatch
 from nscan_cli.slam.keyframes.growing_route import add_keyframes, extend_route
 from nscan_cli.slam.local_matching.match_keyframe import match_keyframe
 from nscan_cli.slam.local_matching.neighbours import choose_neighbours
@@ -34,9 +34,7 @@ def run_slam(state: SlamState, report: LoopProgress) -> Graph:
         SpeculativeMatching(state.match, state.options.nscan, state.threads) as ahead,
         BackgroundCalls(state.threads) as beside,
     ):
-        for scans in scan_batches(
-            state.log, state.options.tracking.max_range, state.odometry, state.frozen_scans
-        ):
+        for scans in state.scan_batches():
             for batch in track(tracker, scans, is_last=scans.first + len(scans) == len(state.log)):
                 if add_keyframes(state, batch):
                     # The newest keyframe still collects scans.

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -14,6 +15,7 @@ from nscan_cli.poses import Array, Indices
 from nscan_cli.slam.backend.energy_cache import EnergyCache
 from nscan_cli.slam.backend.schedule import OptimisationSchedule
 from nscan_cli.slam.frontend.odometry_checks import frozen_scans, without_jumps
+from nscan_cli.slam.frontend.scan_batch import ScanBatch, scan_batches
 from nscan_cli.slam.keyframes.keyframe_selection import Keyframes
 from nscan_cli.slam.keyframes.route import Route, route_of
 from nscan_cli.slam.local_matching.coverage import Coverage
@@ -85,6 +87,10 @@ class SlamState:
         route = route_of(keyframes.list, chain, np.zeros((0, 3)))
         frozen = frozen_scans(log, odometry, options.odometry_checks)
         return cls(log, options, threads, odometry, jumps, frozen, keyframes, route, chain)
+
+    def scan_batches(self) -> Iterator[ScanBatch]:
+        """The scans of the log as tracking takes them."""
+        return scan_batches(self.log, self.options.tracking.max_range, self.odometry, self.frozen_scans)
 
     @property
     def poses(self) -> Array:

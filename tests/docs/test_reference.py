@@ -15,11 +15,10 @@ from nscan_cli.cli import main
 from nscan_cli.cli.main import COMMANDS, cli, run
 from nscan_cli.cli.manual import EXAMPLES, EXIT_CODES
 from nscan_cli.cli.subcommand import Option, Subcommand
-from nscan_cli.files.limits import ALL
 from nscan_cli.nightly.manifest import KEY_CHECKS, read_manifest
 from tests.data import CORRIDOR_LOG, REPOSITORY
 from tests.docs.blocks import blocks
-from tests.reference import reference
+from tests.reference import LIMITS, reference
 
 PAGE = (REPOSITORY / "docs" / "reference.md").read_text()
 PARENT = click.Context(cli, info_name="nscan-cli")
@@ -53,7 +52,7 @@ def test_every_argument_and_option_is_there_and_told(name):
 
 
 def test_no_two_options_of_a_command_share_a_variable_with_each_other_or_a_limit():
-    limits = {limit.variable for limit in ALL}
+    limits = {limit.variable for limit in LIMITS}
     for name in COMMANDS:
         variables = [
             parameter.envvar for parameter in command(name).params if isinstance(parameter, click.Option)
@@ -94,7 +93,7 @@ def test_every_environment_variable_that_the_package_reads_is_told():
     for path in (REPOSITORY / "nscan_cli").rglob("*.py"):
         read |= set(re.findall(r"environ(?:ment)?(?:\.\w+\(|\[)\"(\w+)\"", path.read_text()))
     assert {"NUMBA_CACHE_DIR", "XDG_CACHE_HOME"} <= read
-    for variable in (*read, MARK_OF_CLICK, *(limit.variable for limit in ALL)):
+    for variable in (*read, MARK_OF_CLICK, *(limit.variable for limit in LIMITS)):
         assert variable in PAGE, variable
 
 

@@ -66,7 +66,7 @@ def test_the_figures_of_known_errors(tmp_path: Path):
         result, read(tmp_path, "".join(f"0 1 0 {error} 0 0 0 0\n" for error in (3, 1, 10, 2)))
     )
     spread = errors.translation_spread
-    assert (spread.mean, spread.median, spread.maximum, spread.mean_square) == (4, 2.5, 10, 28.5)
+    assert (spread.mean, spread.median, spread.max, spread.mean_square) == (4, 2.5, 10, 28.5)
     assert spread.sd == pytest.approx(np.sqrt(50 / 3))
     assert errors.worst(2).tolist() == [2, 0]
     assert errors.worst(9).tolist() == [2, 0, 3, 1]

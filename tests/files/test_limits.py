@@ -25,6 +25,7 @@ from tests.logs.forms import FORMS
 from tests.logs.lines import flaser, read
 from tests.logs.recordings.containers import repacked
 from tests.logs.recordings.messages import drive
+from tests.reference import LIMITS
 
 DOCS = REPOSITORY / "docs" / "limits.md"
 SALVAGE = ReadingOptions(salvage=True)
@@ -40,8 +41,8 @@ def test_the_docs_have_every_limit_with_its_default():
         for line in DOCS.read_text().splitlines()
         if line.startswith("| `NSCAN_CLI_MAX_") and (cells := line.strip("|").split("|"))
     }
-    assert rows.keys() == {limit.variable for limit in limits.ALL}
-    for limit in limits.ALL:
+    assert rows.keys() == {limit.variable for limit in LIMITS}
+    for limit in LIMITS:
         number = rows[limit.variable].removesuffix(limit.unit).strip().replace(",", "")
         assert float(number) == limit.default
 
@@ -64,7 +65,7 @@ def test_no_limit_is_an_option_of_a_command():
         command = cli.get_command(click.Context(cli), name)
         assert command is not None
         options |= {f"NSCAN_CLI_{param.name}".upper() for param in command.params}
-    assert not options & {limit.variable for limit in limits.ALL}
+    assert not options & {limit.variable for limit in LIMITS}
 
 
 def test_a_file_beyond_the_limit_is_not_read(tmp_path, monkeypatch):

@@ -12,7 +12,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from nscan_cli.errors import InputDataError
 from nscan_cli.files.finite import check_finite
@@ -28,7 +27,7 @@ from nscan_cli.graph.io.pose_columns import (
     power_by_size,
     split_fields,
 )
-from nscan_cli.poses import Array, wrap
+from nscan_cli.poses import Array, Indices, wrap
 
 TUM_REMEDY = "TUM lines are 't x y z qx qy qz qw'"
 
@@ -43,7 +42,7 @@ class Trajectory:
     """(N, 3)"""
     stamps: tuple[str, ...]
     """N times, as written in the source."""
-    rows: NDArray[np.int64] | None = None
+    rows: Indices | None = None
     """(N,) the row of each pose in the source; None: in the same order."""
     spatial: Array | None = None
     """(N, 4) z (m), and the direction upwards in the frame of the body."""

@@ -9,11 +9,10 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from nscan_cli.graph.linalg.factor_pattern import Pattern
 from nscan_cli.kernels.decorators import kernel, leaf_kernel, numba_inline_kernel, reduction_kernel
-from nscan_cli.poses import Array, Indices
+from nscan_cli.poses import Array, Indices, Mask
 
 LEAST_PIVOT = 1e-12
 """A pivot below this share of its diagonal entry counts as 0."""
@@ -30,7 +29,7 @@ class Factor(NamedTuple):
     pattern: Pattern
     panels: Array
     """The panels of all supernodes, end to end; entries above the diagonal are 0."""
-    loose: NDArray[np.bool_]
+    loose: Mask
     """(F, 3) by row: whether the pivot was not positive, so that the diagonal entry or more took its
     place."""
     diagonal: Array
@@ -55,7 +54,7 @@ def solve(factor: Factor, right: Array) -> Array:
     return x[place]
 
 
-def undetermined_nodes(factor: Factor, share: float = 1e-6) -> NDArray[np.bool_]:
+def undetermined_nodes(factor: Factor, share: float = 1e-6) -> Mask:
     """Which nodes (F,) take part in a direction that the matrix leaves undetermined.
 
     A pivot belongs to the direction v with Lᵗv = e, scaled so that vᵗAv is the pivot. Rounding alone makes
@@ -91,7 +90,7 @@ def rows_of(pattern: Pattern, supernode: int) -> Indices:
 
 
 @kernel
-def _factorise(pattern: Pattern, blocks: Array, diagonal: Array, loose: NDArray[np.bool_]) -> Array:
+def _factorise(pattern: Pattern, blocks: Array, diagonal: Array, loose: Mask) -> Array:
     """Left-looking factorisation: from each panel, the products of the earlier panels are subtracted."""
     supernodes, starts = pattern.supernodes, pattern.starts
     count, nodes = supernodes.shape[0] - 1, starts.shape[0] - 1
@@ -172,9 +171,7 @@ def _subtract_panel(
 
 
 @leaf_kernel
-def _factorise_panel(
-    panel: Array, rows: Indices, diagonal: Array, least: Array, loose: NDArray[np.bool_]
-) -> None:
+def _factorise_panel(panel: Array, rows: Indices, diagonal: Array, least: Array, loose: Mask) -> None:
     """Factorise a panel three columns at a time; pivots up to `least` are replaced."""
     height = panel.shape[1]
     for j in range(0, panel.shape[0], 3):

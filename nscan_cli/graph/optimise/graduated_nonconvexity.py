@@ -10,11 +10,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from nscan_cli.graph.optimise.graph_energy import GraphEnergy
 from nscan_cli.graph.optimise.graph_solver import StopOptions, optimise_poses
-from nscan_cli.poses import Array
+from nscan_cli.poses import Array, Mask
 
 
 @dataclass(frozen=True)
@@ -41,8 +40,8 @@ UNFOLDING = RobustOptions(tail_probability=0.05, bound_factor=1.0, narrowing=1.2
 
 
 def contradicting(
-    energy: GraphEnergy, poses: Array, doubted: NDArray[np.bool_], options: RobustOptions | None = None
-) -> NDArray[np.bool_]:
+    energy: GraphEnergy, poses: Array, doubted: Mask, options: RobustOptions | None = None
+) -> Mask:
     """Which of the doubted relations (R,) contradict the others; `poses` (K, 3) are at the energy's optimum.
 
     The relations are in the energy's order. None contradicts where all are within their bounds at the poses.
@@ -67,7 +66,7 @@ def unfolded(energy: GraphEnergy, poses: Array) -> Array | None:
 
 
 def _graduated(
-    energy: GraphEnergy, poses: Array, doubted: NDArray[np.bool_], bounds: Array, options: RobustOptions
+    energy: GraphEnergy, poses: Array, doubted: Mask, bounds: Array, options: RobustOptions
 ) -> Array | None:
     """The poses (K, 3) when the kernel of the doubted relations (R,) has narrowed to their bounds (R,).
 

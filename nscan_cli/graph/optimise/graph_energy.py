@@ -7,14 +7,13 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from nscan_cli.graph.linalg.factor_pattern import block_targets, find_pattern
 from nscan_cli.graph.optimise.term_cache import TermCache, TermColumns
 from nscan_cli.graph.optimise.terms import nscan_term, nscan_value
 from nscan_cli.graph.relations.base import Relation
 from nscan_cli.kernels.decorators import kernel
-from nscan_cli.poses import Array, Indices
+from nscan_cli.poses import Array, Indices, Mask
 
 
 class System(NamedTuple):
@@ -39,7 +38,7 @@ class GraphEnergy:
         positions: Indices,
         fixed: int = 0,
         terms: TermCache | None = None,
-        free: NDArray[np.bool_] | None = None,
+        free: Mask | None = None,
     ) -> None:
         """Take relations between node ids; `positions[id]` is a node's place among the `nodes` poses.
 

@@ -122,21 +122,12 @@ def _stamped_pose(message: Any, parent: str, child: str, at: Any, turned: Any) -
 
 def _protobuf_decoder(channel: Channel, file: str) -> Callable[[bytes], Any]:
     from google.protobuf.descriptor_pb2 import FileDescriptorSet
-    from google.protobuf.descriptor_pool import DescriptorPool
     from google.protobuf.message import DecodeError
-    from google.protobuf.message_factory import GetMessageClass
+    from google.protobuf.message_factory import GetMessages
 
     try:
-        pool = DescriptorPool()
-        waiting = {part.name: part for part in FileDescriptorSet.FromString(channel.schema).file}
-        while waiting:
-            ready = [name for name, part in waiting.items() if not waiting.keys() & set(part.dependency)]
-            if not ready:
-                raise TypeError("its files depend on each other")
-            for name in ready:
-                pool.Add(waiting.pop(name))
-        message_class = GetMessageClass(pool.FindMessageTypeByName(channel.type))
-    except (DecodeError, KeyError, TypeError) as error:
+        message_class = GetMessages(FileDescriptorSet.FromString(channel.schema).file)[channel.type]
+    except (DecodeError, KeyError, TypeError, ValueError, RecursionError) as error:
         problem = f"the definition of {channel.type} on {channel.topic} cannot be read"
         raise InputDataError(file, problem, "record it with its protobuf definition") from error
 

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from nscan_cli.mapping.figures.axes import TITLE_MARGINS, LegendEntry, draw_title_and_legend
 from nscan_cli.mapping.figures.canvas import BLACK, BLUE, VERMILLION, WHITE, Canvas
 from nscan_cli.mapping.figures.colormap import plasma
 from nscan_cli.mapping.figures.number_labels import LABEL_RADIUS, LABEL_TEXT_SIZE, draw_number_labels
 from nscan_cli.mapping.figures.panels import MIN_ASPECT, bounds_around, panel
-from nscan_cli.poses import Array
+from nscan_cli.poses import Array, Indices
 
 MAX_LISTED = 20
 """Largest number of relations that are numbered and listed beside the plot."""
@@ -25,9 +24,7 @@ MIN_COLOUR_RANGE = 1e-6
 """Least error with the last colour, m."""
 
 
-def plot_relations(
-    poses: Array, pairs: NDArray[np.int64], errors: Array, title: str, beside: bool = False
-) -> Canvas:
+def plot_relations(poses: Array, pairs: Indices, errors: Array, title: str, beside: bool = False) -> Canvas:
     """The worst relations as numbered lines over the trajectory `poses` (N, 3).
 
     `pairs` (W, 2) are rows of `poses`, `errors` (W, 2) the errors of the relations in m and degrees.
@@ -49,7 +46,7 @@ def plot_relations(
 
 def plot_against_reference(
     poses: Array,
-    rows: NDArray[np.int64],
+    rows: Indices,
     errors: Array,
     reference: Array,
     title: str,

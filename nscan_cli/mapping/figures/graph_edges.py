@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from nscan_cli.graph.model import Graph
 from nscan_cli.graph.relations.base import Relation
 from nscan_cli.graph.relations.registry import is_joint
 from nscan_cli.mapping.figures.canvas import GRAY, GREEN, VERMILLION
+from nscan_cli.poses import Indices
 
 REVISIT_DISTANCE = 20.0
 """Least path between scans of different visits, m; the same as in the joint matches of slam."""
@@ -16,7 +16,7 @@ EDGE_COLOURS = {"nScan": GREEN, "pairwise": GRAY, "loop": VERMILLION}
 """In the order of drawing, with loops on top."""
 
 
-def edges_by_kind(graph: Graph) -> dict[str, NDArray[np.int64]]:
+def edges_by_kind(graph: Graph) -> dict[str, Indices]:
     """The sorted pairs (E, 2) of joined nodes for each of EDGE_COLOURS.
 
     A joint relation joins its fixed scan with each of the others. If it closes a loop, its edges to other

@@ -25,7 +25,7 @@ from nscan_cli.mapping.figures.graph_edges import EDGE_COLOURS, edges_by_kind
 from nscan_cli.mapping.figures.panels import bounds_around
 from nscan_cli.mapping.map_server import gray_image
 from nscan_cli.mapping.occupancy import FREE, OCCUPIED, UNKNOWN, OccupancyGrid
-from nscan_cli.poses import Array, transform
+from nscan_cli.poses import Array, Indices, transform
 
 MIN_PIXELS, MAX_PIXELS = 1600, 3200
 """Limits of the longer side of a picture with overlays. The cells of a small map become squares of pixels.
@@ -62,7 +62,7 @@ def plot_over_map(grid: OccupancyGrid, graph: Graph, overlays: Overlays) -> Canv
 
 def plot_paper_figure(
     log: LaserLog,
-    rows: NDArray[np.int64],
+    rows: Indices,
     poses: Array,
     grid: OccupancyGrid,
     graph: Graph,
@@ -150,9 +150,7 @@ def _draw_uncertainty(canvas: Canvas, graph: Graph) -> list[LegendEntry]:
     return [draw_ellipses(canvas, graph.poses[keyframes, :2], covariances, PURPLE, MIN_ELLIPSE)]
 
 
-def _points_of_occupied_cells(
-    log: LaserLog, rows: NDArray[np.int64], poses: Array, grid: OccupancyGrid
-) -> Array:
+def _points_of_occupied_cells(log: LaserLog, rows: Indices, poses: Array, grid: OccupancyGrid) -> Array:
     """(M, 2) the end points of beams in occupied cells, m."""
     seen = list(log.points_by_scan())
     points = np.concatenate([transform(pose, seen[row]) for row, pose in zip(rows, poses, strict=True)])

@@ -7,7 +7,6 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from nscan_cli.files.text import counted
 from nscan_cli.mapping.figures.axes import LegendEntry, draw_title_and_legend
@@ -26,7 +25,7 @@ from nscan_cli.mapping.figures.symbols import draw_crosses, draw_robots
 from nscan_cli.matching.joint.nscan_match import NScanMatch
 from nscan_cli.matching.joint.outliers import ExcludedScan
 from nscan_cli.matching.pairwise import PairMatch
-from nscan_cli.poses import Array, transform
+from nscan_cli.poses import Array, Mask, transform
 
 if TYPE_CHECKING:
     from PIL.Image import Image
@@ -122,9 +121,9 @@ def plot_nscan(
     return stack_images([before.image(), after.image()])
 
 
-def _in_bounds(points: Array, bounds: Bounds) -> NDArray[np.bool_]:
+def _in_bounds(points: Array, bounds: Bounds) -> Mask:
     """(N,) whether each of the points (N, 2) lies within the bounds."""
-    inside: NDArray[np.bool_] = np.all((points >= bounds[:2]) & (points <= bounds[2:]), axis=1)
+    inside: Mask = np.all((points >= bounds[:2]) & (points <= bounds[2:]), axis=1)
     return inside
 
 
@@ -135,7 +134,7 @@ def scan_legend(names: Sequence[str]) -> list[LegendEntry]:
     return [("robot", colour, f"scan {name}") for colour, name in zip(plasma(len(names)), names, strict=True)]
 
 
-def excluded_legend(names: Sequence[str], near: NDArray[np.bool_]) -> list[LegendEntry]:
+def excluded_legend(names: Sequence[str], near: Mask) -> list[LegendEntry]:
     """Legend entries of the excluded scans; `near` (N,) tells which are in the picture."""
     entries: list[LegendEntry] = []
     for seen, colour, meaning in ((True, BLACK, "left out"), (False, GRAY, "left out, not in view")):

@@ -8,7 +8,6 @@ from __future__ import annotations
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from nscan_cli.kernels.decorators import leaf_kernel
 from nscan_cli.matching.joint.joint_energy import all_pairs
@@ -16,15 +15,13 @@ from nscan_cli.matching.joint.options import IndexSetOptions
 from nscan_cli.matching.joint.scan_set import ScanSet, scan_grid, scan_points
 from nscan_cli.matching.pose_kernels import relative_pose
 from nscan_cli.ndt.hash_grid import facing_gaussian, find_row, pack_key
-from nscan_cli.poses import Array
+from nscan_cli.poses import Array, Indices
 
 IndexSetKind = Literal["all", "visible", "overlap"]
 """How the index set is chosen; see index_set."""
 
 
-def index_set(
-    kind: IndexSetKind, options: IndexSetOptions, scans: ScanSet, poses: Array
-) -> NDArray[np.int64]:
+def index_set(kind: IndexSetKind, options: IndexSetOptions, scans: ScanSet, poses: Array) -> Indices:
     """The ordered pairs (m, 2) of n scans at the poses (n, 3) that are to be matched, sorted.
 
     `all`: every pair. `visible`: the position of one scan lies in the free space that the other saw.

@@ -9,7 +9,6 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from nscan_cli.kernels.decorators import kernel, leaf_kernel
 from nscan_cli.matching.joint.scan_set import ScanSet, most_points, scan_grid, scan_points
@@ -17,7 +16,7 @@ from nscan_cli.matching.pose_kernels import relative_pose
 from nscan_cli.matching.small_matrices import multiply
 from nscan_cli.ndt.association import AssociationBuffers, association_buffers
 from nscan_cli.ndt.energy import ENERGY_NUMBERS, Energy, evaluate_energy, unpack_derivatives
-from nscan_cli.poses import Array
+from nscan_cli.poses import Array, Indices
 
 NEUTRAL = 1.0
 """Share of the usual s with which overlap neither raises nor lowers the neutral energy of a perfect match."""
@@ -26,7 +25,7 @@ NEUTRAL = 1.0
 class Priors(NamedTuple):
     """Q priors (14), each on the pose of scan b in the frame of scan a."""
 
-    pairs: NDArray[np.int64]
+    pairs: Indices
     """(Q, 2) a and b."""
     means: Array
     """(Q, 3)"""
@@ -38,7 +37,7 @@ class JointProblem(NamedTuple):
     """The objective: scale · Σ over (i, j) ∈ J of E_ij, plus priors."""
 
     scans: ScanSet
-    pairs: NDArray[np.int64]
+    pairs: Indices
     """(m, 2) the index set J of ordered pairs (i, j)."""
     priors: Priors
     scale: float
@@ -64,7 +63,7 @@ def no_priors() -> Priors:
     return Priors(np.empty((0, 2), dtype=np.int64), np.empty((0, 3)), np.empty((0, 3, 3)))
 
 
-def all_pairs(n: int) -> NDArray[np.int64]:
+def all_pairs(n: int) -> Indices:
     """The index set J of all n (n − 1) ordered pairs, (n (n − 1), 2)."""
     return np.ascontiguousarray(np.argwhere(~np.eye(n, dtype=np.bool_)), dtype=np.int64)
 

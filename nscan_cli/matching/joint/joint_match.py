@@ -8,7 +8,6 @@ from functools import partial
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from nscan_cli.matching.joint.gauge import gauge_of
 from nscan_cli.matching.joint.joint_energy import NEUTRAL, JointProblem, joint_energy
@@ -17,9 +16,9 @@ from nscan_cli.matching.joint.neutral_energy import neutral_energy
 from nscan_cli.matching.joint.options import JointOptions
 from nscan_cli.matching.joint.overlap import overlaps, weakest_link
 from nscan_cli.matching.joint.weak_directions import replace_weak_directions
-from nscan_cli.poses import Array, wrap
+from nscan_cli.poses import Array, Indices, wrap
 
-PairsAt = Callable[[Array], NDArray[np.int64]]
+PairsAt = Callable[[Array], Indices]
 """The index set J (m, 2) at the poses (n, 3)."""
 
 
@@ -33,7 +32,7 @@ class JointMatch:
     """(3n,) of the objective at the poses."""
     hessian: Array
     """(3n, 3n) exact Hessian of the objective at the poses, the gauge still in it."""
-    pairs: NDArray[np.int64]
+    pairs: Indices
     """(m, 2) the index set J at the end."""
     energy: float
     """The objective's: scale · E with priors."""

@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 
 from nscan_cli.matching.joint.index_set import IndexSetKind, index_set
 from nscan_cli.matching.joint.initialisation import match_or_search
@@ -26,7 +25,7 @@ from nscan_cli.matching.uncertainty import (
     weakest_translation,
     why_no_minimum,
 )
-from nscan_cli.poses import Array
+from nscan_cli.poses import Array, Indices
 
 NOT_CONVERGED = "did not converge within the steps allowed"
 
@@ -52,7 +51,7 @@ class NScanMatch:
     """(3k − 3, 3k − 3) of the other scans' poses relative to the fixed one; None if H is singular there."""
     decrement: float | None
     """Length of the remaining Newton step in standard deviations; None without a covariance."""
-    pairs: NDArray[np.int64]
+    pairs: Indices
     """(m, 2) the index set J, indices among the kept."""
     overlap: Array
     """(k,) the share of each scan's points that lie on at least one other scan."""

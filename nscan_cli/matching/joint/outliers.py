@@ -6,12 +6,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from nscan_cli.matching.joint.joint_energy import Priors
 from nscan_cli.matching.joint.options import JointOptions
 from nscan_cli.matching.joint.overlap import Overlaps
-from nscan_cli.poses import Array, relative, relative_jacobians, wrap
+from nscan_cli.poses import Array, Indices, relative, relative_jacobians, wrap
 
 TOO_FAR = "starts too far from all others to overlap one"
 OVERLAPS_NONE = "overlaps none of the others"
@@ -48,7 +47,7 @@ def too_far(points: Sequence[Array], start: Array, error: float) -> list[int]:
 
 def outliers(
     shares: Overlaps,
-    pairs: NDArray[np.int64],
+    pairs: Indices,
     priors: Priors,
     poses: Array,
     information: Array,

@@ -5,13 +5,12 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from nscan_cli.kernels.decorators import kernel, leaf_kernel
 from nscan_cli.matching.joint.scan_set import ScanSet, most_points, scan_grid, scan_points
 from nscan_cli.matching.pose_kernels import relative_pose
 from nscan_cli.ndt.energy import find_inliers
-from nscan_cli.poses import Array
+from nscan_cli.poses import Array, Mask
 
 
 class Overlaps(NamedTuple):
@@ -39,7 +38,7 @@ def overlaps(scans: ScanSet, poses: Array, inlier_bound: float) -> Overlaps:
 
 
 @kernel
-def connected_to(pairs: Array, least: float, scan: int) -> NDArray[np.bool_]:
+def connected_to(pairs: Array, least: float, scan: int) -> Mask:
     """(n,) the scans that are connected to `scan` by overlaps (n, n) of at least `least`, either way."""
     n = pairs.shape[0]
     reached = np.zeros(n, dtype=np.bool_)
@@ -58,16 +57,14 @@ def connected_to(pairs: Array, least: float, scan: int) -> NDArray[np.bool_]:
 @kernel
 def connectivity(
     scans: ScanSet, poses: Array, inlier_bound: float, least: float, scan: int
-) -> tuple[NDArray[np.bool_], float]:
+) -> tuple[Mask, float]:
     """The scans (n,) connected to `scan` by overlap at the poses (n, 3), and the weakest link of all."""
     pairs = overlaps(scans, poses, inlier_bound).pairs
     return connected_to(pairs, least, scan), weakest_link(pairs)
 
 
 @kernel
-def connected_at(
-    scans: ScanSet, poses: Array, inlier_bound: float, least: float, scan: int
-) -> NDArray[np.bool_]:
+def connected_at(scans: ScanSet, poses: Array, inlier_bound: float, least: float, scan: int) -> Mask:
     """As `connected_to` at the poses (n, 3), where only the overlaps that are needed are counted."""
     n = poses.shape[0]
     reached = np.zeros(n, dtype=np.bool_)
@@ -89,7 +86,7 @@ def connected_at(
 
 @leaf_kernel
 def _pair_overlap(
-    scans: ScanSet, poses: Array, i: int, j: int, inlier_bound: float, u: Array, inliers: NDArray[np.bool_]
+    scans: ScanSet, poses: Array, i: int, j: int, inlier_bound: float, u: Array, inliers: Mask
 ) -> float:
     """The share of scan j's points on Gaussians of scan i; marks them in `inliers`. `u` (3,) is a buffer."""
     points = scan_points(scans, j)

@@ -6,14 +6,13 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from nscan_cli.kernels.decorators import kernel, numba_inline_kernel
 from nscan_cli.ndt.association import association_buffers
 from nscan_cli.ndt.energy import ENERGY_NUMBERS, evaluate_energy
 from nscan_cli.ndt.hash_grid import Grid
 from nscan_cli.ndt.transform import Ndt
-from nscan_cli.poses import Array
+from nscan_cli.poses import Array, Indices
 
 
 class ScanSet(NamedTuple):
@@ -23,7 +22,7 @@ class ScanSet(NamedTuple):
     """The concatenated arrays of all NDTs; row numbers count from the start of their own NDT."""
     points: Array
     """(Σ m, 2) the points of all scans, each in its own frame."""
-    starts: NDArray[np.int64]
+    starts: Indices
     """(4, n + 1) the first hash slot, row, Gaussian and point of each scan."""
     half: float
     """Side (m) of a lattice cell."""

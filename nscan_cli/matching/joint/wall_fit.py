@@ -11,7 +11,6 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from nscan_cli.kernels.array_assignment import assign
 from nscan_cli.kernels.decorators import kernel
@@ -19,7 +18,7 @@ from nscan_cli.matching.joint.gauge import gauge_fixed_step, gauge_of
 from nscan_cli.matching.joint.options import WallFitOptions
 from nscan_cli.matching.joint.scan_set import ScanSet
 from nscan_cli.matching.small_matrices import multiply
-from nscan_cli.poses import Array, wrap
+from nscan_cli.poses import Array, Indices, wrap
 
 
 class PointCloud(NamedTuple):
@@ -29,7 +28,7 @@ class PointCloud(NamedTuple):
     """(m, 2)"""
     arms: Array
     """(m, 2) the vector from the robot to each point."""
-    scans: NDArray[np.int64]
+    scans: Indices
     """(m,) the scan of each point."""
 
 
@@ -83,7 +82,7 @@ def _point_cloud(scans: ScanSet, poses: Array) -> PointCloud:
 
 
 @kernel
-def common_walls(cloud: PointCloud, options: WallFitOptions) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def common_walls(cloud: PointCloud, options: WallFitOptions) -> tuple[Indices, Indices]:
     """The walls that more than one scan sees: their points, wall by wall, and the end of each among them.
 
     A cell holds a wall when the points seen from each side of it lie on a line. Otherwise its quarters are
@@ -118,7 +117,7 @@ def common_walls(cloud: PointCloud, options: WallFitOptions) -> tuple[NDArray[np
 
 
 @kernel
-def _quadtree_codes(points: Array, cell: float) -> NDArray[np.int64]:
+def _quadtree_codes(points: Array, cell: float) -> Indices:
     """The Morton codes (m,) of the cells of points (m, 2): quarters of a larger cell follow each other."""
     codes = np.zeros(points.shape[0], dtype=np.int64)
     left, bottom = points[:, 0].min(), points[:, 1].min()
@@ -130,7 +129,7 @@ def _quadtree_codes(points: Array, cell: float) -> NDArray[np.int64]:
 
 
 @kernel
-def _moments(cloud: PointCloud, chosen: NDArray[np.int64]) -> tuple[float, float, float, float, float]:
+def _moments(cloud: PointCloud, chosen: Indices) -> tuple[float, float, float, float, float]:
     """Mean (x, y) and covariance (xx, xy, yy) of some points."""
     x = y = xx = xy = yy = 0.0
     for k in chosen:
@@ -146,7 +145,7 @@ def _moments(cloud: PointCloud, chosen: NDArray[np.int64]) -> tuple[float, float
 
 
 @kernel
-def _is_line(cloud: PointCloud, chosen: NDArray[np.int64], options: WallFitOptions) -> bool:
+def _is_line(cloud: PointCloud, chosen: Indices, options: WallFitOptions) -> bool:
     """Whether points lie on a line, or are too few for a wall."""
     if chosen.shape[0] < options.minimum:
         return True
@@ -157,7 +156,7 @@ def _is_line(cloud: PointCloud, chosen: NDArray[np.int64], options: WallFitOptio
 
 
 @kernel
-def _split_by_side(cloud: PointCloud, chosen: NDArray[np.int64], sides: NDArray[np.int64]) -> int:
+def _split_by_side(cloud: PointCloud, chosen: Indices, sides: Indices) -> int:
     """Write the points to `sides`, first those seen from one side of their line; the number of these."""
     _, _, xx, xy, yy = _moments(cloud, chosen)
     along = 0.5 * np.arctan2(2 * xy, xx - yy)
@@ -176,7 +175,7 @@ def _split_by_side(cloud: PointCloud, chosen: NDArray[np.int64], sides: NDArray[
 @kernel
 def _add_wall(
     cloud: PointCloud,
-    chosen: NDArray[np.int64],
+    chosen: Indices,
     variances: Array,
     direction_noise: float,
     gradient: Array,

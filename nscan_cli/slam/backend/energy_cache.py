@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from nscan_cli.graph.optimise.graph_energy import GraphEnergy
 from nscan_cli.graph.optimise.term_cache import TermCache
 from nscan_cli.graph.relations.base import Relation
+from nscan_cli.poses import Mask
 from nscan_cli.slam.keyframes.route import Route
 
 
@@ -28,7 +28,7 @@ class EnergyCache:
         route: Route,
         relations: Sequence[Relation],
         fixed: int = 0,
-        free: NDArray[np.bool_] | None = None,
+        free: Mask | None = None,
     ) -> GraphEnergy:
         """The energy of all keyframes. `fixed` is held, and so are the keyframes that are not `free` (K,)."""
         positions = np.full(self._scans, -1)

@@ -13,8 +13,7 @@ from dataclasses import replace
 import numpy as np
 
 from nscan_cli.graph.model import Loop, NScan, Pairwise
-from nscan_cli.kernels.decorators import kernel
-from nscan_cli.matching.pose_kernels import relative_pose, wrapped
+from nscan_cli.matching.pose_kernels import largest_motion
 from nscan_cli.poses import Array, Indices
 from nscan_cli.slam.backend.optimisation import optimise
 from nscan_cli.slam.backend.rejection import reject_contradicting_loops
@@ -120,16 +119,4 @@ class Refinement:
         if start is None:
             return True
         members, before = start
-        return bool(_farthest_moved(before, poses[members], int(np.searchsorted(members, centre))) > moved)
-
-
-@kernel
-def _farthest_moved(before: Array, after: Array, centre: int) -> float:
-    """The largest motion (m, rad) of a pose (n, 3) in x, y or φ, as seen from the centre's pose."""
-    farthest, was, now = 0.0, np.empty(3), np.empty(3)
-    for k in range(len(before)):
-        relative_pose(before[k], before[centre], was)
-        relative_pose(after[k], after[centre], now)
-        turned = abs(wrapped(now[2] - was[2]))
-        farthest = max(farthest, abs(now[0] - was[0]), abs(now[1] - was[1]), turned)
-    return farthest
+        return max(largest_motion(before, poses[members], int(np.searchsorted(members, centre)))[1:]) > moved

@@ -10,17 +10,15 @@ import itertools
 from typing import Any, get_args
 
 import numpy as np
-from numpy.typing import NDArray
 
 from nscan_cli.files.provenance import option_fields
 from nscan_cli.graph.model import Graph, Pairwise
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.matching.priors import odometry_prior
-from nscan_cli.poses import relative
+from nscan_cli.poses import Indices, relative
 from nscan_cli.slam.backend.finish import finish_graph
 from nscan_cli.slam.backend.refinement import refine
 from nscan_cli.slam.backend.rejection import reject_contradicting_loops
-from nscan_cli.slam.frontend.scan_batch import scan_batches
 from nscan_cli.slam.frontend.tracked_scans import TrackedScans
 from nscan_cli.slam.keyframes.route import route_of
 from nscan_cli.slam.local_matching.joint_relations import LocalMatch
@@ -53,7 +51,7 @@ def options_of(graph: Graph) -> SlamOptions:
     return options
 
 
-def resume(graph: Graph, log: LaserLog, rows: NDArray[np.int64], threads: int = 1) -> Graph:
+def resume(graph: Graph, log: LaserLog, rows: Indices, threads: int = 1) -> Graph:
     """The graph after its loops are tested, and its matches made again from its poses.
 
     `rows` (N,) are the rows of the log with the scans of the nodes. `can_refine` has to hold.
@@ -87,7 +85,7 @@ def state_of_graph(graph: Graph, log: LaserLog, options: SlamOptions, threads: i
     )
 
 
-def _log_of_rows(log: LaserLog, rows: NDArray[np.int64]) -> LaserLog:
+def _log_of_rows(log: LaserLog, rows: Indices) -> LaserLog:
     """The log with the scans in some rows (N,) alone."""
     if np.array_equal(rows, np.arange(len(log))):
         return log
@@ -106,9 +104,9 @@ def _log_of_rows(log: LaserLog, rows: NDArray[np.int64]) -> LaserLog:
 
 def _add_keyframes(state: SlamState, graph: Graph, breaks: set[int]) -> None:
     """Add the graph's keyframes with their Gaussians, as tracking would have made them at its poses."""
-    log, keyframes = state.log, state.keyframes
+    keyframes = state.keyframes
     found = _tracked_at_graph_poses(graph, breaks, state.options)
-    for scans in scan_batches(log, state.options.tracking.max_range, state.odometry, state.frozen_scans):
+    for scans in state.scan_batches():
         those = found.part(scans.first, scans.first + len(scans))
         for k, row in enumerate(range(scans.first, scans.first + len(scans))):
             if row in breaks:

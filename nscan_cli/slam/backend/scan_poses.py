@@ -5,15 +5,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
-from nscan_cli.poses import Array, compose, relative, wrap
+from nscan_cli.poses import Array, Indices, compose, relative, wrap
 from nscan_cli.slam.backend.options import OptimisationOptions
 
 
 def between_keyframes(
     tracked: Array,
-    keyframes: NDArray[np.int64],
+    keyframes: Indices,
     poses: Array,
     breaks: Sequence[int] = (),
     metres_per_radian: float = OptimisationOptions.metres_per_radian,

@@ -10,33 +10,29 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from nscan_cli.graph.relations.base import Relation
 from nscan_cli.kernels.decorators import kernel
-from nscan_cli.poses import Array
+from nscan_cli.poses import Array, Mask
 from nscan_cli.slam.keyframes.route import Route
-
-Chosen = NDArray[np.bool_]
-"""(K,) keyframes of a graph."""
 
 
 class Subgraph(NamedTuple):
     """The keyframes that can move, and the relations that count."""
 
     relations: Sequence[Relation]
-    free: Chosen | None = None
+    free: Mask | None = None
     """All, when None; the others are held where they are."""
 
 
-def held_by_others(route: Route, relations: Sequence[Relation], free: Chosen) -> Subgraph:
+def held_by_others(route: Route, relations: Sequence[Relation], free: Mask) -> Subgraph:
     """The `free` keyframes, with all relations that contain one of them."""
     nodes = frozenset(route.rows[free].tolist())
     return Subgraph([relation for relation in relations if not nodes.isdisjoint(relation.nodes)], free)
 
 
 def without_others(
-    route: Route, chain: Sequence[Relation], loops: Sequence[Relation], wanted: Chosen
+    route: Route, chain: Sequence[Relation], loops: Sequence[Relation], wanted: Mask
 ) -> Subgraph:
     """The `wanted` keyframes, those that loops tie to them, and the relations among all these.
 
@@ -49,7 +45,7 @@ def without_others(
     return Subgraph([*steps, *(loop for loop in loops if nodes.issuperset(loop.nodes))], chosen)
 
 
-def nearest_keyframes(poses: Array, first: int, end: int, most: int) -> Chosen:
+def nearest_keyframes(poses: Array, first: int, end: int, most: int) -> Mask:
     """At most so many of K poses (K, 3), those nearest to any of those from `first` to `end`."""
     order = np.argsort(_distances(poses, first, end), kind="stable")
     chosen = np.zeros(len(poses), dtype=np.bool_)

@@ -108,7 +108,7 @@ def free_space_violations(
 @kernel
 def _compare_views(
     views: VisitViews, first: int, end: int, radius: float, recent: float, options: FreeSpaceOptions
-) -> NDArray[np.int64]:
+) -> Indices:
     """What keyframes `first` to `end` and earlier ones see of each other: (k, 2, 2) numbers of points.
 
     The second axis is other visits, same visit; the third is points where the other saw them, points that it
@@ -144,7 +144,7 @@ def _compare_views(
 
 @leaf_kernel
 def _count_violations(
-    views: VisitViews, options: FreeSpaceOptions, seen: int, by: int, pose: Array, counts: NDArray[np.int64]
+    views: VisitViews, options: FreeSpaceOptions, seen: int, by: int, pose: Array, counts: Indices
 ) -> None:
     """Add to the counts (2,) the points of scan `seen` that scan `by` saw too, and those it looked through.
 

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from nscan_cli.kernels.decorators import kernel
 from nscan_cli.matching.pose_kernels import wrapped
 from nscan_cli.ndt.options import GaussianOptions
-from nscan_cli.poses import Array, Indices
+from nscan_cli.poses import Array, Indices, Mask
 from nscan_cli.slam.frontend.scan_batch import ScanBatch
 from nscan_cli.slam.frontend.tracked_scans import TrackedScan, TrackedScans
 from nscan_cli.slam.keyframes.keyframe import Keyframe, KeyframePoints, count_cells
@@ -76,7 +75,7 @@ class Keyframes:
 
 @kernel
 def _new_keyframes(
-    poses: Array, slipped: NDArray[np.bool_], first: int, before: Array, bounds: tuple[float, float, float]
+    poses: Array, slipped: Mask, first: int, before: Array, bounds: tuple[float, float, float]
 ) -> Indices:
     """Which of the poses (n, 3), from the `first` on, become keyframes.
 

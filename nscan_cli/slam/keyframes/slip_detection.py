@@ -8,8 +8,8 @@ wheels spin, and new things come into view.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from nscan_cli.poses import Mask
 from nscan_cli.slam.frontend.tracked_scans import TrackedScans
 from nscan_cli.slam.keyframes.options import KeyframeOptions
 
@@ -21,7 +21,7 @@ class SlipDetector:
         self._sigmas, self._drop = options.slip_sigmas, options.slip_inlier_drop
         self._usual, self._slipped = 0.0, False
 
-    def find(self, found: TrackedScans) -> NDArray[np.bool_]:
+    def find(self, found: TrackedScans) -> Mask:
         """(n,) which of the next scans may have slipped: all until the share of inliers is as before."""
         slipped = np.zeros(len(found.odometry_sigmas), dtype=np.bool_)
         if not self._slipped and not (found.odometry_sigmas > self._sigmas).any():

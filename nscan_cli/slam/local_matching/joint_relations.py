@@ -6,19 +6,17 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from nscan_cli.files.text import counted
 from nscan_cli.graph.model import Loop, NScan, Pairwise
-from nscan_cli.kernels.decorators import kernel
 from nscan_cli.matching.joint.ambiguity import with_ambiguity
 from nscan_cli.matching.joint.joint_energy import JointProblem, Priors, all_pairs, no_priors
 from nscan_cli.matching.joint.joint_match import JointMatch, match_jointly
 from nscan_cli.matching.joint.options import JointOptions
 from nscan_cli.matching.joint.overlap import connected_at, connectivity
 from nscan_cli.matching.joint.scan_set import ScanSet, scan_set
-from nscan_cli.matching.pose_kernels import relative_pose
-from nscan_cli.poses import Array, Indices, compose, relative
+from nscan_cli.matching.pose_kernels import largest_motion
+from nscan_cli.poses import Array, Indices, Mask, compose, relative
 from nscan_cli.slam.keyframes.keyframe import Keyframe, points_per_cell
 from nscan_cli.slam.keyframes.route import Route
 from nscan_cli.slam.local_matching.neighbours import Neighbours, choose_neighbours
@@ -78,9 +76,9 @@ def match_neighbours(route: Route, centre: int, near: Neighbours, options: NScan
     return local_match
 
 
-def of_this_visit(route: Route, centre: int, options: NScanOptions) -> NDArray[np.bool_]:
+def of_this_visit(route: Route, centre: int, options: NScanOptions) -> Mask:
     """(K,) whether each keyframe belongs to the visit of keyframe `centre`, along the path."""
-    this: NDArray[np.bool_] = np.abs(route.paths - route.paths[centre]) <= options.visit_path
+    this: Mask = np.abs(route.paths - route.paths[centre]) <= options.visit_path
     return this
 
 
@@ -117,7 +115,7 @@ def match_at(
 def _match_held(
     route: Route,
     members: Indices,
-    from_other_visit: NDArray[np.bool_],
+    from_other_visit: Mask,
     centre: int,
     widenings: tuple[float, ...],
     options: NScanOptions,
@@ -160,7 +158,9 @@ def _match_held(
         reason = "" if whole else f"{counted(len(members) - len(kept), 'scan')} left out"
         used, before = (related, from_other_visit[kept]) if closed else (members, from_other_visit)
         loop = verdict(keyframes, used, before, centre, closed, reason, score)
-        return LocalMatch((), relation, loop, moved_by(poses[related], match.poses, at), whole), all_began
+        return LocalMatch(
+            (), relation, loop, largest_motion(poses[related], match.poses, at)[0], whole
+        ), all_began
     reason = f"only {len(kept)} of {len(members)} scans hang together"
     loop = verdict(keyframes, members, from_other_visit, centre, False, reason, 0.0)
     return LocalMatch((), None, loop, 0.0, False), all_began
@@ -230,7 +230,7 @@ def _relation(
 def verdict(
     keyframes: Sequence[Keyframe],
     members: Indices,
-    from_other_visit: NDArray[np.bool_],
+    from_other_visit: Mask,
     centre: int,
     accepted: bool,
     reason: str,
@@ -241,14 +241,3 @@ def verdict(
         return None
     first = members[np.argmax(from_other_visit)]
     return Loop((keyframes[first].row, keyframes[centre].row), accepted, reason, score)
-
-
-@kernel
-def moved_by(before: Array, after: Array, fixed: int) -> float:
-    """The largest motion (m) of a pose (n, 3), as seen from one of the poses."""
-    farthest, was, now = 0.0, np.empty(3), np.empty(3)
-    for k in range(len(before)):
-        relative_pose(before[k], before[fixed], was)
-        relative_pose(after[k], after[fixed], now)
-        farthest = max(farthest, np.hypot(now[0] - was[0], now[1] - was[1]))
-    return farthest

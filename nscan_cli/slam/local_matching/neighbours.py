@@ -5,10 +5,9 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from nscan_cli.kernels.decorators import kernel
-from nscan_cli.poses import Array, Indices
+from nscan_cli.poses import Array, Indices, Mask
 from nscan_cli.slam.local_matching.options import NScanOptions
 
 
@@ -17,7 +16,7 @@ class Neighbours(NamedTuple):
 
     members: Indices
     """(n,) keyframes of the match, increasing."""
-    from_other_visit: NDArray[np.bool_]
+    from_other_visit: Mask
     """(n,) whether each is of another visit."""
     visits: int
     """Number of earlier visits here."""
@@ -46,7 +45,7 @@ def _choose(
     recent: float,
     first_visits: int,
     most: int,
-) -> tuple[Indices, NDArray[np.bool_], int]:
+) -> tuple[Indices, Mask, int]:
     """The kernel of choose_neighbours. Keyframes more than `recent` (m) of path apart are of different
     visits."""
     near, distances = np.empty(len(poses), dtype=np.int64), np.empty(len(poses))

@@ -14,13 +14,14 @@ import numpy as np
 from nscan_cli.files.text import counted
 from nscan_cli.graph.model import Pairwise
 from nscan_cli.matching.pairwise_solver import PairProblem, minimise_pairwise
+from nscan_cli.matching.pose_kernels import largest_motion
 from nscan_cli.matching.priors import Prior
 from nscan_cli.ndt.association import begin_association
 from nscan_cli.ndt.energy import energy, inlier_share
 from nscan_cli.poses import Array, inverse, relative, relative_jacobians, wrap
 from nscan_cli.slam.keyframes.keyframe import Keyframe
 from nscan_cli.slam.keyframes.route import Route
-from nscan_cli.slam.local_matching.joint_relations import LocalMatch, moved_by, scale_of, verdict
+from nscan_cli.slam.local_matching.joint_relations import LocalMatch, scale_of, verdict
 from nscan_cli.slam.local_matching.neighbours import Neighbours
 from nscan_cli.slam.local_matching.options import NScanOptions
 
@@ -89,7 +90,7 @@ def _match(route: Route, other: int, centre: int, options: NScanOptions) -> _Sin
             problem, pose, np.array(widenings), options.max_iterations, tolerance, tolerance, hessian
         )
         pose[2] = wrap(pose[2])
-        moved = moved_by(np.stack([origin, start]), np.stack([origin, pose]), 1)
+        moved = largest_motion(np.stack([origin, start]), np.stack([origin, pose]), 1)[0]
         overlap = _overlap(keyframes[other], keyframes[centre], pose, options.inlier_bound)
         if overlap >= options.min_overlap and moved < options.max_last_stage_motion:
             break

@@ -12,11 +12,10 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from nscan_cli.graph.relations.base import Relation
 from nscan_cli.kernels.decorators import kernel
-from nscan_cli.poses import Array, Indices
+from nscan_cli.poses import Array, Indices, Mask
 from nscan_cli.slam.keyframes.route import Route
 from nscan_cli.slam.keyframes.tracked_path import TrackedPath
 
@@ -122,7 +121,7 @@ def most_certain_paths(links: Links, poses: Array, origin: int, lever_arm: float
 
 
 @kernel
-def relations_on_paths(before: Indices, wanted: NDArray[np.bool_]) -> NDArray[np.bool_]:
+def relations_on_paths(before: Indices, wanted: Mask) -> Mask:
     """The wanted keyframes (K,) and all on the paths to them; `before` (K,) as of most_certain_paths."""
     on = wanted.copy()
     for k in range(len(before)):

@@ -5,11 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from nscan_cli.kernels.decorators import kernel
 from nscan_cli.matching.correlative_search import LikelihoodField, SearchOptions, likelihood_field
-from nscan_cli.poses import Array, relative
+from nscan_cli.poses import Array, Indices, relative
 from nscan_cli.slam.keyframes.keyframe import Keyframe
 from nscan_cli.slam.keyframes.route import Route
 from nscan_cli.slam.loop_closure.options import LoopClosureOptions
@@ -18,7 +17,7 @@ from nscan_cli.slam.loop_closure.options import LoopClosureOptions
 def search_submaps(
     route: Route,
     centre: int,
-    earlier: NDArray[np.int64],
+    earlier: Indices,
     window: SearchOptions,
     closing: LoopClosureOptions,
 ) -> tuple[Array, LikelihoodField] | None:
@@ -36,7 +35,7 @@ def search_submaps(
     return scan, likelihood_field(cloud, window)
 
 
-def _cloud(keyframes: Sequence[Keyframe], chosen: NDArray[np.int64], poses: Array) -> Array:
+def _cloud(keyframes: Sequence[Keyframe], chosen: Indices, poses: Array) -> Array:
     """The points (m, 2) of the chosen keyframes (n,), at poses (n, 3)."""
     points = [keyframes[k].points for k in chosen.tolist()]
     cloud = np.concatenate([np.empty((0, 2)), *points])
@@ -45,7 +44,7 @@ def _cloud(keyframes: Sequence[Keyframe], chosen: NDArray[np.int64], poses: Arra
 
 
 @kernel
-def _transform_clouds(poses: Array, counts: NDArray[np.int64], points: Array) -> None:
+def _transform_clouds(poses: Array, counts: Indices, points: Array) -> None:
     """Transform the points (m, 2) in place: the first sizes[0] by the first pose, and so on, eq. (1)."""
     end = 0
     for k in range(len(poses)):

@@ -10,11 +10,10 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from nscan_cli.graph.model import Loop
 from nscan_cli.matching.correlative_search import FoundPose, Search, SearchOptions, search
-from nscan_cli.poses import Array, Indices, compose, relative, wrap
+from nscan_cli.poses import Array, Indices, Mask, compose, relative, wrap
 from nscan_cli.slam.keyframes.route import Route
 from nscan_cli.slam.local_matching.joint_relations import LocalMatcher, match_at, visit_moved
 from nscan_cli.slam.local_matching.neighbours import choose_neighbours
@@ -70,7 +69,7 @@ def why_match_doubted(
     route: Route,
     centre: int,
     pose: Array,
-    earlier: NDArray[np.int64],
+    earlier: Indices,
     window: SearchOptions,
     closing: LoopClosureOptions,
     nscan: NScanOptions | None,
@@ -130,7 +129,7 @@ def why_too_few(
     return SO_FAR_OFF if surprises and share_scans else None
 
 
-def is_lost(sigma: RelativeSigma, options: LoopClosureOptions) -> NDArray[np.bool_]:
+def is_lost(sigma: RelativeSigma, options: LoopClosureOptions) -> Mask:
     """(K,) whether not even the direction to a keyframe is known: the track has broken since."""
-    lost: NDArray[np.bool_] = options.sigmas * sigma.angle >= np.pi
+    lost: Mask = options.sigmas * sigma.angle >= np.pi
     return lost

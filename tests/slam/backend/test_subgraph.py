@@ -14,9 +14,9 @@ from nscan_cli.graph.model import NScan, Pairwise
 from nscan_cli.graph.optimise.graph_energy import GraphEnergy
 from nscan_cli.graph.optimise.graph_solver import StopOptions, optimise_poses
 from nscan_cli.graph.relations.base import Relation
+from nscan_cli.poses import Mask
 from nscan_cli.slam.backend.energy_cache import EnergyCache
 from nscan_cli.slam.backend.subgraph import (
-    Chosen,
     Subgraph,
     held_by_others,
     nearest_keyframes,
@@ -50,7 +50,7 @@ class Walked(NamedTuple):
     def whole(self) -> Subgraph:
         return Subgraph([*self.way, *self.loops])
 
-    def led_to(self, origin: int, wanted: Chosen) -> Chosen:
+    def led_to(self, origin: int, wanted: Mask) -> Mask:
         """Those wanted, and what is on the surest ways to them."""
         way = exact_path([relation for relation in self.way if isinstance(relation, Pairwise)])
         links = LinkCache().links(self.route, way, self.loops)
@@ -78,7 +78,7 @@ def spread(relation: Pairwise | NScan) -> Relation:
     return dataclasses.replace(relation, nodes=(APART * first, APART * last))
 
 
-def chosen(size: int, *places: int) -> Chosen:
+def chosen(size: int, *places: int) -> Mask:
     return np.isin(np.arange(size), places)
 
 
