@@ -77,7 +77,7 @@ def test_the_rest_of_a_graph():
     scored = small_graph()
     scored.pairwise[0] = replace(scored.pairwise[0], score=math.inf)
     marginal = spoiled(marginals={2: np.full((3, 3), math.nan)})
-    odometry = spoiled(odometry=np.full((3, 3), math.nan))
+    odometry = spoiled(odometry=np.full((3, 3), math.inf))
     for graph in (hessian, scored, marginal, odometry):
         with pytest.raises(NotFiniteError):
             write_graph(graph)
