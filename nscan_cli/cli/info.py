@@ -7,6 +7,7 @@ import math
 from typing import TYPE_CHECKING, Any
 
 from nscan_cli.cli.laser_survey import laser_line, rate_of, survey_of
+from nscan_cli.cli.progress import Compiling
 from nscan_cli.cli.shared_options import common_options, reading_options
 from nscan_cli.cli.standard_streams import print_result
 from nscan_cli.cli.subcommand import log_argument, option, subcommand
@@ -38,6 +39,9 @@ def command(log: tuple[str, ...], as_json: bool, reading: ReadingOptions, **_com
     """
     survey = survey_of(log, reading)
     facts = survey.without_unchosen(facts_of(survey.log) | survey.facts(reading))
+    if survey.refused is None and not survey.choices:
+        Compiling("half a minute", bool(_common["quiet"]))
+        facts["warnings"] += _contradictions(survey.log, reading)
     if as_json:
         text = json.dumps(facts, ensure_ascii=False, allow_nan=False)
         write_atomically("-", json_bytes(f"{text}\n"))
@@ -45,6 +49,14 @@ def command(log: tuple[str, ...], as_json: bool, reading: ReadingOptions, **_com
         print_result(f"{facts_table(facts)}\n")
     if survey.refused is not None:
         raise survey.refused
+
+
+def _contradictions(log: LaserLog, reading: ReadingOptions) -> list[str]:
+    """What the scans of a log contradict of its file, as slam says it."""
+    from nscan_cli.calibration.file_check import checked_file
+    from nscan_cli.calibration.options import FileCheckOptions
+
+    return checked_file(log, reading, FileCheckOptions()).messages
 
 
 def facts_of(log: LaserLog) -> dict[str, Any]:

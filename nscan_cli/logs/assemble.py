@@ -95,6 +95,11 @@ def scan_table(readings: Sequence[NDArray[Any]]) -> NDArray[np.float32]:
     return rows
 
 
+def scaled_odometry(odometry: Array, options: ReadingOptions) -> Array:
+    """Odometry (S, 3) whose positions are in m."""
+    return odometry * (options.odometry_scale, options.odometry_scale, 1.0)
+
+
 def laser_log(
     source: Source,
     form: str,
@@ -121,7 +126,7 @@ def laser_log(
     beams, limits = beam_counts(raw.ranges, raw.beams)[rows], limits.of(rows)
     lost = lost_readings(ranges, beams, limits, file)
     mark_no_returns(ranges, limits.low, limits.high)
-    odometry = None if motion.odometry is None else motion.odometry[numbers]
+    odometry = None if motion.odometry is None else scaled_odometry(motion.odometry[numbers], options)
     return LaserLog(
         source=source,
         format=form,

@@ -40,6 +40,10 @@ class ReadingOptions:
     """Only every n-th of these scans is read."""
     odometry: bool = True
     """Whether odometry is read."""
+    odometry_scale: float = 1.0
+    """Factor of the positions by odometry: 0.001 for positions in millimetres."""
+    clock_offset: float = 0.0
+    """Time to add to the stamps of the odometry, s, so that they are in the clock of the scans."""
     strict: bool = False
     """Whether a malformed record is an error. Otherwise it is skipped."""
     allow_corrected: bool = False
@@ -47,12 +51,13 @@ class ReadingOptions:
     salvage: bool = False
     """Whether the readable part of a damaged or truncated file is used."""
     as_recorded: bool = False
-    """Whether the log is believed where its scans contradict it."""
+    """Whether the log is believed where its scans contradict it. Otherwise what is beyond doubt is put
+    right."""
 
     def __post_init__(self) -> None:
         """Raises WrongUsageError for values that fit no log."""
         given = (self.min_range, self.max_range, self.range_scale, self.angle_min, self.angle_increment,
-                 self.start, self.end)  # fmt: skip
+                 self.start, self.end, self.odometry_scale, self.clock_offset)  # fmt: skip
         if not all(math.isfinite(value) for value in (*given, *(self.mount or ())) if value is not None):
             raise WrongUsageError("a reading option is not a finite number; give one that is")
         if self.max_range is not None and self.max_range <= (self.min_range or 0.0):
@@ -61,6 +66,8 @@ class ReadingOptions:
             raise WrongUsageError("--range-scale has to be above 0")
         if self.angle_increment == 0:
             raise WrongUsageError("--angle-increment is 0; beams need different directions")
+        if self.odometry_scale <= 0:
+            raise WrongUsageError("--odometry-scale is not above 0; give the metres of one unit of odometry")
         if self.start is not None and self.end is not None and self.start > self.end:
             raise WrongUsageError("--start is after --end; no scan lies between")
 

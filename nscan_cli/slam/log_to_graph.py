@@ -8,6 +8,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
+from nscan_cli.calibration.file_check import checked_file
 from nscan_cli.files.provenance import as_parameters, provenance_of
 from nscan_cli.graph.model import Graph
 from nscan_cli.logs.laser_log import LaserLog
@@ -55,7 +56,12 @@ def slam_options(
 def map_log(
     log: LaserLog, reading: ReadingOptions, options: SlamOptions, threads: int, report: MappingProgress
 ) -> tuple[SlamState, Graph]:
-    """The state at the end of the loop, and the graph of a log that was read with `reading`."""
+    """The state at the end of the loop, and the graph of a log that was read with `reading`.
+
+    What the scans contradict of their file beyond doubt is put right first.
+    """
+    checked = checked_file(log, reading, options.file_check)
+    log = checked.log
     state = SlamState.of_log(log, options, threads)
     looked_at = accepted = 0
 
@@ -69,9 +75,9 @@ def map_log(
 
     graph = run_slam(state, tell)
     parameters: dict[str, Any] = {
-        "reading": dataclasses.asdict(reading),
+        "reading": dataclasses.asdict(checked.reading),
         "slam": as_parameters(options),
     }
-    said = [*log.report.contradictions, *notices(state)]
+    said = [*log.report.contradictions, *checked.messages, *notices(state)]
     graph.provenance = {**provenance_of([log.source], parameters), "notices": said}
     return state, graph

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Literal
 
+from nscan_cli.calibration.options import FileCheckOptions
 from nscan_cli.graph.optimise.graduated_nonconvexity import RobustOptions
 from nscan_cli.slam.backend.options import OptimisationOptions, RefinementOptions, ScheduleOptions
 from nscan_cli.slam.diagnostics.options import DiagnosticsOptions
@@ -21,6 +22,7 @@ Relations = Literal["pairwise", "nscan", "both"]
 class SlamOptions:
     """The options of all steps."""
 
+    file_check: FileCheckOptions = field(default_factory=FileCheckOptions)
     odometry_checks: OdometryCheckOptions = field(default_factory=OdometryCheckOptions)
     tracking: TrackingOptions = field(default_factory=TrackingOptions)
     breaks: BreakOptions = field(default_factory=BreakOptions)

@@ -60,12 +60,13 @@ def test_reading_options_are_in_metres_and_radians(calls):
         "--max-range", "30", "--angle-min", "-90", "--angle-increment", "0.5", "--start", "1",
         "--end", "20", "--every", "3", "--no-odometry", "--strict", "--allow-corrected",
         "--topic", "/scan", "--odom-topic", "/odom", "--salvage", "--range-scale", "0.001", "--as-recorded",
+        "--odometry-scale", "0.001", "--clock-offset", "-30",
     )["reading"]  # fmt: skip
     assert reading == ReadingOptions(
         laser="RLASER", mount=(0.1, -0.2, math.pi / 2), flip=True, min_range=0.2, max_range=30.0,
         angle_min=-math.pi / 2, angle_increment=math.radians(0.5), start=1.0, end=20.0, every=3,
         odometry=False, strict=True, allow_corrected=True, topic="/scan", odom_topic="/odom", salvage=True,
-        range_scale=0.001, as_recorded=True,
+        range_scale=0.001, as_recorded=True, odometry_scale=0.001, clock_offset=-30.0,
     )  # fmt: skip
 
 

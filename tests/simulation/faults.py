@@ -113,6 +113,43 @@ def odometry_missing(log: LaserLog, rows: Rows) -> LaserLog:
     return replace(log, odometry=odometry)
 
 
+def odometry_scaled(log: LaserLog, factor: float) -> LaserLog:
+    """The positions by odometry in another unit."""
+    return replace(log, odometry=_odometry(log) * (factor, factor, 1.0))
+
+
+def odometry_reversed(log: LaserLog) -> LaserLog:
+    """The odometry counts x the wrong way; its headings are right."""
+    return replace(log, odometry=_odometry(log) * (-1.0, 1.0, 1.0))
+
+
+def odometry_late(log: LaserLog, seconds: float) -> LaserLog:
+    """The clock of the odometry is ahead of the laser's by so much: it tells what was before."""
+    at, odometry = log.times + seconds, _odometry(log)
+    turned = np.unwrap(odometry[:, 2])
+    columns = [np.interp(log.times, at, column) for column in (*odometry[:, :2].T, turned)]
+    return replace(log, odometry=np.stack([*columns[:2], wrap(columns[2])], axis=1))
+
+
+def odometry_turning(log: LaserLog, factor: float) -> LaserLog:
+    """The odometry multiplies each turn."""
+    steps = relative(_odometry(log)[1:], _odometry(log)[:-1]) * (1.0, 1.0, factor)
+    poses = [_odometry(log)[0]]
+    for step in steps:
+        poses.append(compose(poses[-1], step))
+    return replace(log, odometry=np.array(poses))
+
+
+def mirrored(log: LaserLog) -> LaserLog:
+    """The readings of each scan in the wrong order."""
+    return replace(log, angle_min=-log.angle_min, angle_increment=-log.angle_increment)
+
+
+def mounted_otherwise(log: LaserLog, turn: float) -> LaserLog:
+    """The file says that the laser looks further to the left than it does, by a turn (rad)."""
+    return replace(log, mount=log.mount + np.array([0.0, 0.0, turn]))
+
+
 def odometry_jump(log: LaserLog, at: int, jump: tuple[float, float, float]) -> LaserLog:
     """From row `at` on the odometry is off by a pose, in its own frame."""
     odometry = _odometry(log).copy()

@@ -15,12 +15,12 @@ from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.logs.range_limits import LARGEST_RANGE
 from nscan_cli.logs.reading_options import ReadingOptions
 from nscan_cli.logs.recordings.container import Message, Recording
-from nscan_cli.logs.recordings.decoded_messages import ScanMessage, decimal_seconds
+from nscan_cli.logs.recordings.decoded_messages import S, ScanMessage, decimal_seconds
 from nscan_cli.logs.recordings.decoding import UNDECODABLE, scan_decoder
 from nscan_cli.logs.recordings.message_stamps import order_messages, valid_stamps
 from nscan_cli.logs.recordings.message_types import ODOMETRY_TYPES, SCAN_TYPES
 from nscan_cli.logs.recordings.mounting import laser_mounting
-from nscan_cli.logs.recordings.robot_motion import robot_odometry
+from nscan_cli.logs.recordings.robot_motion import ScanClock, robot_odometry
 from nscan_cli.logs.recordings.tf_tree import TransformTree
 from nscan_cli.logs.recordings.topics import devices, scan_topic
 from nscan_cli.logs.skips import Skips
@@ -52,7 +52,8 @@ def log_from_recording(recording: Recording, file: str, source: Source, options:
     times = order.by_time(raw.stamps)
     findings.warnings += times.warnings
     tree = TransformTree(recording, skips, file)
-    motion = robot_odometry(recording, tree, times, use_stamps, options, findings, file)
+    clock = ScanClock(times, use_stamps, _recording_delay(stamps, log_times))
+    motion = robot_odometry(recording, tree, clock, options, findings, file)
     mount, hanging, robot = laser_mounting(scans, motion.robot, tree, options, findings, file)
     findings.frames = distinct_frame_names(scans[0].frame, robot, motion.parent, mount)
     if hanging and not options.flip:
@@ -99,6 +100,12 @@ def _decoded_scans(
         raise InputDataError(file, f"no scan of {topic} can be read: {reason}",
                              "give a recording with whole messages")  # fmt: skip
     return scans, log_times
+
+
+def _recording_delay(stamps: Sequence[int | None], log_times: Sequence[int]) -> float:
+    """Median time from stamps (ns, None without one) to when the messages were recorded (ns), in s."""
+    delays = [recorded - at for at, recorded in zip(stamps, log_times, strict=True) if at is not None]
+    return float(np.median(delays)) / S
 
 
 def _scan_problem(scan: ScanMessage) -> str:

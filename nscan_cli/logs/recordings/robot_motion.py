@@ -28,6 +28,16 @@ from nscan_cli.logs.skips import Skips
 from nscan_cli.poses import Array
 
 
+class ScanClock(NamedTuple):
+    """The times of the scans of a recording, and whose clock they are in."""
+
+    times: ScanOrder
+    stamped: bool
+    """Whether they are the scans' stamps. Otherwise they are the times of recording."""
+    delay: float
+    """Median time from a scan's stamp to its recording, s; large where the two are in different clocks."""
+
+
 class RobotMotion(NamedTuple):
     """The odometry of a recording, at the times of the scans."""
 
@@ -42,16 +52,14 @@ class RobotMotion(NamedTuple):
 def robot_odometry(
     recording: Recording,
     tree: TransformTree,
-    times: ScanOrder,
-    use_stamps: bool,
+    clock: ScanClock,
     options: ReadingOptions,
     findings: Findings,
     file: str,
 ) -> RobotMotion:
     """The robot's motion from the topic that --odom-topic names, from the only one, or from tf.
 
-    `times` are those of the scans: stamps with `use_stamps`, else times of recording. Raises WrongUsageError
-    and OpenChoiceError when topics have to be chosen.
+    Raises WrongUsageError and OpenChoiceError when topics have to be chosen.
     """
     if not options.odometry:
         findings.used["odometry"] = "none: --no-odometry"
@@ -69,7 +77,7 @@ def robot_odometry(
         rows = by_frame.get(asked or "", []) or _odometry_in_tf(tree, file)
         source = f"tf from {rows[0][0].parent} to {rows[0][0].child}" if rows else ""
         why = "no topic has odometry" if asked is None else f"{asked} is asked for"
-    poses = _poses_at_scans(rows, source or "tf", times, use_stamps, findings)
+    poses = _poses_at_scans(rows, source or "tf", clock, options.clock_offset, findings)
     if poses is not None:
         findings.used["odometry"] = f"{source}, {why}, interpolated"
     elif rows:
@@ -120,25 +128,44 @@ def _transforms_from_odom(tree: TransformTree) -> dict[str, list[LoggedTransform
 
 
 def _poses_at_scans(
-    rows: Sequence[LoggedTransform], source: str, times: ScanOrder, use_stamps: bool, findings: Findings
+    rows: Sequence[LoggedTransform],
+    source: str,
+    clock: ScanClock,
+    offset: float,
+    findings: Findings,
 ) -> Array | None:
-    """Interpolated poses (S, 3) at the times of the scans; None without a valid pose."""
-    found, found_at = [], []
-    stamps = transform_times(rows) if use_stamps else [log_time for _, log_time in rows]
-    for number, ((transform, _), stamp) in enumerate(zip(rows, stamps, strict=True), 1):
+    """Interpolated poses (S, 3) at the times of the scans; None without a valid pose.
+
+    The `offset` (s) is added to the times of the poses.
+    """
+    found, found_at, delays = [], [], []
+    stamps = transform_times(rows) if clock.stamped else [log_time for _, log_time in rows]
+    for number, ((transform, log_time), stamp) in enumerate(zip(rows, stamps, strict=True), 1):
         angle = heading(transform.pose)
         if angle is None or stamp is None:
             findings.skips.add(f"{source}: {'not a pose' if angle is None else 'without a time'}", number)
             continue
         found.append((*transform.pose.translation[:2], angle))
         found_at.append(stamp / S)
+        delays.append((log_time - stamp) / S)
     if not found:
         return None
-    if times.nominal:
+    if clock.times.nominal:
         findings.warnings.append(f"the scans have no times that lead to {source}: no odometry")
         return None
-    seconds = np.array(found_at)
-    in_order = np.argsort(seconds, kind="stable")
-    return interpolated_poses(
-        times.times, seconds[in_order], np.array(found)[in_order], f"pose of {source}", findings.warnings
-    )
+    seconds, warnings = np.array(found_at) + offset, findings.warnings
+    order = np.argsort(seconds, kind="stable")
+    name, at = f"pose of {source}", clock.times.times
+    poses = interpolated_poses(at, seconds[order], np.array(found)[order], name, warnings)
+    apart = float(np.median(delays)) - clock.delay
+    if poses is None and clock.stamped and _overlap(at, seconds - offset + apart):
+        warnings.append(
+            f"{source} and the scans are stamped by two clocks: by their times of recording, "
+            f"--clock-offset {apart:.1f} leads from one to the other"
+        )
+    return poses
+
+
+def _overlap(times: Array, others: Array) -> bool:
+    """Whether there are times (s) between the first and the last of the others."""
+    return bool(((times >= others.min()) & (times <= others.max())).any())

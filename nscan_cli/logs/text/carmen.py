@@ -20,7 +20,7 @@ from nscan_cli.logs.skips import Skips
 from nscan_cli.logs.text import carmen_records
 from nscan_cli.logs.text.carmen_records import CarmenScans, TaggedLines
 from nscan_cli.logs.text.corrected_poses import sign_of_correction
-from nscan_cli.logs.text.odometry_records import odometry_of_records
+from nscan_cli.logs.text.odometry_records import odometry_of_records, odometry_of_scans
 from nscan_cli.poses import Array, relative, wrap
 
 LASERS = ("FLASER", "ROBOTLASER1", "ROBOTLASER0", "RAWLASER1", "RLASER", "ROBOTLASER2", "RAWLASER2",
@@ -249,7 +249,7 @@ def _odometry(
         values, stamps = carmen_records.carmen_poses(lines.get("ODOM", []), findings.skips, by_logger)
         recorded = order.by_time(stamps)
         name, origin = "ODOM record", "ODOM records, interpolated"
-        return odometry_of_records(times, recorded, values[recorded.rows], name, origin, findings)
+        return odometry_of_records(times, recorded, values[recorded.rows], name, origin, options, findings)
     if len(times.rows) > 1 and not scans.robot.any():
         findings.used["odometry"] = "none: all poses are zero"
         findings.warnings.append("all poses are zero: the log is read as one without odometry")
@@ -257,7 +257,7 @@ def _odometry(
     findings.used["odometry"] = f"the poses in {tag}"
     poses = scans.robot[times.rows]
     poses[:, 2] = wrap(poses[:, 2])
-    return poses
+    return odometry_of_scans(times, poses, options, findings)
 
 
 def _true_poses(

@@ -4,12 +4,32 @@ from __future__ import annotations
 
 from nscan_cli.logs.assemble import Findings
 from nscan_cli.logs.odometry_interpolation import interpolated_poses
+from nscan_cli.logs.reading_options import ReadingOptions
 from nscan_cli.logs.scan_order import ScanOrder
 from nscan_cli.poses import Array
 
 
+def odometry_of_scans(
+    scans: ScanOrder, poses: Array, options: ReadingOptions, findings: Findings
+) -> Array | None:
+    """Poses (S, 3) at the times of the scans from those (S, 3) in the records of the scans, or None.
+
+    They are at the same times, unless an option says that the odometry's clock is off.
+    """
+    if not options.clock_offset or scans.nominal:
+        return poses
+    at = scans.times + options.clock_offset
+    return interpolated_poses(scans.times, at, poses, "pose in a scan", findings.warnings)
+
+
 def odometry_of_records(
-    scans: ScanOrder, records: ScanOrder, poses: Array, name: str, origin: str, findings: Findings
+    scans: ScanOrder,
+    records: ScanOrder,
+    poses: Array,
+    name: str,
+    origin: str,
+    options: ReadingOptions,
+    findings: Findings,
 ) -> Array | None:
     """Poses (S, 3) at the times of the scans from poses (P, 3) of records in order of time, or None.
 
@@ -24,6 +44,7 @@ def odometry_of_records(
         used["odometry"] = "none: no time stamps"
         warnings.append(f"the time stamps do not relate the scans to a {name}: no odometry")
         return None
-    found = interpolated_poses(scans.times, records.times, poses, name, warnings)
+    at = records.times + options.clock_offset
+    found = interpolated_poses(scans.times, at, poses, name, warnings)
     used["odometry"] = "none: at other times" if found is None else origin
     return found

@@ -16,7 +16,7 @@ from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.logs.reading_options import ReadingOptions
 from nscan_cli.logs.skips import Skips
 from nscan_cli.logs.text import player_bearings, player_records
-from nscan_cli.logs.text.odometry_records import odometry_of_records
+from nscan_cli.logs.text.odometry_records import odometry_of_records, odometry_of_scans
 from nscan_cli.logs.text.player_records import DeviceLines, PlayerScans, Version
 from nscan_cli.poses import Array, wrap
 
@@ -138,7 +138,7 @@ def _odometry(
         poses = scans.robot[times.rows]
         poses[:, 2] = wrap(poses[:, 2])
         used["odometry"] = "the poses in the scans (1:2)"
-        return poses
+        return odometry_of_scans(times, poses, options, findings)
     device, why = choose_device("odometry", options.odom_topic, findings.odometries, file)
     found = [] if device is None else lines.get((device, ""), lines.get((device, "1:1"), []))
     values, stamps = player_records.device_poses(found, findings.skips)
@@ -148,4 +148,4 @@ def _odometry(
         poses[:, 2] = np.radians(poses[:, 2])
         origin += ", headings in degrees"
     name = f"record of {device or 'a position device'}"
-    return odometry_of_records(times, recorded, poses, name, origin, findings)
+    return odometry_of_records(times, recorded, poses, name, origin, options, findings)

@@ -139,4 +139,6 @@ def _odometry(
     recorded = order.by_time(stamps)
     poses = values[recorded.rows] * (METRES_PER_CM, METRES_PER_CM, 1.0)
     poses[:, 2] = wrap(np.radians(poses[:, 2]))
-    return odometry_of_records(times, recorded, poses, "POS record", "POS records, interpolated", findings)
+    return odometry_of_records(
+        times, recorded, poses, "POS record", "POS records, interpolated", options, findings
+    )

@@ -1,0 +1,70 @@
+"""How far the clock of the odometry is from that of the scans: the lag at which their turns agree best."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from nscan_cli.calibration.measured_steps import MeasuredSteps
+from nscan_cli.logs.laser_log import LaserLog
+from nscan_cli.poses import Array, are_known
+
+CAPPED = 0.1
+"""rad; turns that differ by more count as this much: they are slips, or matches that failed."""
+
+
+@dataclass(frozen=True)
+class ClockLag:
+    """The offset that makes turns by odometry agree best with those by scans."""
+
+    offset: float
+    """s to add to the stamps of the odometry."""
+    disagreement: float
+    """Sum of the differences of turns there, as a share of the sum of turns by scans; each is capped."""
+    as_stamped: float
+    """The same without an offset."""
+    elsewhere: float
+    """The median of the same over all offsets: what turns that have nothing in common give."""
+
+
+def clock_lag(
+    log: LaserLog, steps: MeasuredSteps, span: float, resolution: float, turn_sign: float = 1.0
+) -> ClockLag | None:
+    """The best offset within ±span (s), to about a tenth of `resolution` (s); None without turns.
+
+    `turn_sign` −1 compares with the turns of mirrored scans.
+    """
+    assert log.odometry is not None
+    known = are_known(log.odometry)
+    turns = turn_sign * steps.laser[:, 2]
+    whole = float(np.minimum(np.abs(turns), CAPPED).sum())
+    if known.sum() < 2 or whole == 0.0:
+        return None
+    at, headings = log.times[known], np.unwrap(log.odometry[known, 2])
+    begins, ends = log.times[steps.first], log.times[steps.last]
+    count = int(np.ceil(span / resolution))
+    offsets = resolution * np.arange(-count, count + 1)
+    off = np.array([_disagreement(at + by, headings, begins, ends, turns) for by in offsets]) / whole
+    best = int(np.argmin(off))
+    return ClockLag(
+        float(offsets[best] + resolution * _vertex(off, best)),
+        float(off[best]),
+        float(off[count]),
+        float(np.median(off)),
+    )
+
+
+def _disagreement(at: Array, headings: Array, begins: Array, ends: Array, turns: Array) -> float:
+    """The sum of capped differences (rad) of turns (n,) from those of headings (S,) at times `at` (S,)."""
+    told = np.interp(ends, at, headings) - np.interp(begins, at, headings)
+    return float(np.minimum(np.abs(told - turns), CAPPED).sum())
+
+
+def _vertex(values: Array, best: int) -> float:
+    """Where between its neighbours a parabola through the best of the values has its vertex, in samples."""
+    if not 0 < best < len(values) - 1:
+        return 0.0
+    before, at, after = values[best - 1 : best + 2].tolist()
+    bend = before - 2 * at + after
+    return 0.5 * (before - after) / bend if bend > 0.0 else 0.0

@@ -1,0 +1,99 @@
+"""Steps from scan to scan, all over a log, as its scans alone measure them: the evidence about its file."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from nscan_cli.calibration.options import StepOptions
+from nscan_cli.errors import InputDataError
+from nscan_cli.logs.laser_log import LaserLog
+from nscan_cli.matching.pairwise import PairMatch, match_pair, matched_points, scan_ndt
+from nscan_cli.poses import Array, Indices, relative
+
+
+@dataclass(frozen=True)
+class MeasuredSteps:
+    """n steps, each from one scan of a log to a later one."""
+
+    first: Indices
+    """(n,) row where the step begins."""
+    last: Indices
+    """(n,) row where it ends."""
+    laser: Array
+    """(n, 3) pose of the laser at the end, in the laser's frame at the beginning, m and rad."""
+    covariances: Array
+    """(n, 3, 3) of these poses."""
+
+    def __len__(self) -> int:
+        return len(self.first)
+
+    def odometry(self, poses: Array) -> Array:
+        """(n, 3) the same steps of the robot by odometry, of which `poses` (S, 3) are those of all scans."""
+        return relative(poses[self.last], poses[self.first])
+
+
+def measure_steps(log: LaserLog, options: StepOptions, count: int | None = None) -> MeasuredSteps:
+    """The steps of a log that its scans measure beyond doubt: `count` or `options.count` in each half of the
+    sample.
+
+    Every step is matched without odometry, as of one who knows nothing but the scans.
+    """
+    at_laser = replace(log, mount=np.zeros(3))
+    found: list[tuple[int, int, PairMatch]] = []
+    first, last = _sampled_steps(log, options, count or options.count)
+    for begin, end in zip(first.tolist(), last.tolist(), strict=True):
+        match = _measured(at_laser, begin, end, options)
+        if match is not None:
+            found.append((begin, end, match))
+    rows = np.array([(begin, end) for begin, end, _ in found], dtype=np.int64).reshape(-1, 2)
+    return MeasuredSteps(
+        rows[:, 0],
+        rows[:, 1],
+        np.array([match.pose for *_, match in found]).reshape(-1, 3),
+        np.array([match.covariance for *_, match in found]).reshape(-1, 3, 3),
+    )
+
+
+def _sampled_steps(log: LaserLog, options: StepOptions, count: int) -> tuple[Indices, Indices]:
+    """The rows (n,) where steps begin and end: spread over the log, and where odometry turns most."""
+    first = np.arange(len(log), dtype=np.int64)
+    last = np.maximum(np.searchsorted(log.times, log.times + options.duration), first + 1)
+    kept = last < len(log)
+    first, last = first[kept], last[kept]
+    kept = log.times[last] - log.times[first] <= options.max_duration
+    first, last = first[kept], last[kept]
+    if not len(first):
+        return first, last
+    chosen = [np.linspace(0, len(first) - 1, count).astype(np.int64)]
+    if log.odometry is not None:
+        turns = np.abs(relative(log.odometry[last], log.odometry[first])[:, 2])
+        turns = np.minimum(np.nan_to_num(turns), options.max_turn)
+        # Many more than are measured, so that these come from all over the log.
+        most = np.sort(np.argsort(-turns, kind="stable")[: options.turning_excess * count])
+        chosen.append(most[np.linspace(0, len(most) - 1, count).astype(np.int64)])
+    both = np.unique(np.concatenate(chosen))
+    return first[both], last[both]
+
+
+def _measured(log: LaserLog, begin: int, end: int, options: StepOptions) -> PairMatch | None:
+    """The pose of the scan in row `end` in the frame of that in row `begin`; None where it is in doubt."""
+    try:
+        reference, points = (_thinned_points(log, row, options) for row in (begin, end))
+    except InputDataError:
+        return None
+    gaussians = scan_ndt(reference, options.pair)
+    match = match_pair(gaussians, points, np.zeros(3), None, options.pair)
+    if not match.converged or match.covariance is None or match.overlap < options.min_overlap:
+        return None
+    aside = options.probe * np.array([np.cos(match.weakest.direction), np.sin(match.weakest.direction), 0.0])
+    again = match_pair(gaussians, points, match.pose + aside, None, options.pair)
+    apart = np.abs(relative(again.pose, match.pose)).max()
+    return match if apart <= options.agreement else None
+
+
+def _thinned_points(log: LaserLog, row: int, options: StepOptions) -> Array:
+    """The points (m, 2) of a scan, of so many beams as are matched. Raises InputDataError for too few."""
+    points = matched_points(log, row, options.pair)
+    return points[:: max(log.ranges.shape[1] // options.max_beams, 1)].copy()

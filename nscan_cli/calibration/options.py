@@ -1,0 +1,83 @@
+"""The parameters of the comparison of scans with what their file says."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from nscan_cli.matching.pairwise import PairOptions
+
+
+@dataclass(frozen=True)
+class StepOptions:
+    """Which steps from scan to scan are measured, and which measurements count."""
+
+    count: int = 30
+    """Steps that are spread evenly over the log, and as many more where odometry turns most. More steps tell
+    more and take longer."""
+    duration: float = 0.4
+    """Least time of a step, s. Over a longer one the robot moves more, until the scans are too far apart."""
+    max_duration: float = 2.0
+    """A longer step is not measured, s: scans are missing."""
+    max_turn: float = 0.4
+    """Of the steps that turn by more than this (rad), none is preferred to another: they may not match."""
+    turning_excess: int = 5
+    """Those where odometry turns most are chosen evenly among so many times as many. With a larger number
+    they come from more places, and turn less."""
+    min_overlap: float = 0.6
+    """Least share of a scan's points on the other scan."""
+    max_beams: int = 180
+    """Beams of a scan that are matched, evenly spread, are about so many. More tell more and take longer."""
+    probe: float = 0.2
+    """A step is measured again from a start this far away (m), in the direction in which it is least certain.
+    Along a corridor a match ends where it starts."""
+    agreement: float = 0.03
+    """Largest difference of the two measurements, m and rad. A larger one accepts less certain steps."""
+    pair: PairOptions = field(default_factory=PairOptions)
+
+
+@dataclass(frozen=True)
+class FileCheckOptions:
+    """When scans contradict what their file says of odometry, mounting and clocks.
+
+    With larger bounds a file is contradicted less often.
+    """
+
+    steps: StepOptions = field(default_factory=StepOptions)
+    min_steps: int = 12
+    """Least number of steps that a finding rests on: with motion, or with a turn."""
+    min_motion: float = 0.05
+    """A step by scans of this length (m) is one with motion, of this turn (rad) one with a turn."""
+    metres_per_radian: float = 0.3
+    """A turn of one radian counts as so much motion, m."""
+    still: float = 1e-3
+    """Odometry that stays this near to its first pose (m and rad) never moves."""
+    max_spread: float = 0.25
+    """A finding explains the steps if the median of what is left is at most this share of their motion."""
+    max_tail: float = 0.4
+    """The same for the upper quartile of what is left."""
+    min_mount_turn: float = 0.26
+    """The laser looks another way than the file says by more than this, rad."""
+    min_scale_factor: float = 1.5
+    """The scale of odometry is wrong by more than this factor."""
+    certain_scale_factor: float = 3.0
+    """A scale that is wrong by more than this factor is put right: no wheel slips so much."""
+    decimal_tolerance: float = 0.08
+    """A scale this near to a power of ten, as a share, is that: a file is in millimetres or centimetres."""
+    max_turn_error: float = 0.3
+    """Turns by odometry are wrong if they differ by more than this share from those by scans."""
+    min_clock_offset: float = 0.5
+    """A shorter offset of the clocks is not worth a warning, s: tracking hardly notices it."""
+    clock_span: float = 120.0
+    """Longest offset of the clocks that is looked for, s."""
+    clock_resolution: float = 0.1
+    """Distance of the offsets that are tried, s."""
+    clock_gain: float = 0.6
+    """At the offset of the clocks the turns have to disagree by less than this share of what they do without,
+    and of what they do anywhere."""
+    more_steps: int = 200
+    """Steps of each half of the sample where turns disagree, to find the offset of the clocks."""
+    excluded_spread: float = 0.4
+    """Odometry that no finding explains is not used where the median of what is left is at least this share
+    of the motion. It is 0.03 to 0.11 on real logs."""
+    min_steps_to_exclude: int = 30
+    """Least number of steps with motion for that."""

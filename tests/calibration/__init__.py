@@ -1,0 +1,1 @@
+"""Scans against their file."""

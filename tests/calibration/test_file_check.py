@@ -1,0 +1,144 @@
+"""What scans contradict of their file: what may be wrong is found, and nothing where all is right."""
+
+from __future__ import annotations
+
+import functools
+import re
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from nscan_cli.calibration.file_check import checked_file
+from nscan_cli.calibration.options import FileCheckOptions
+from nscan_cli.logs.laser_log import LaserLog
+from nscan_cli.logs.load import read_log
+from nscan_cli.logs.reading_options import ReadingOptions
+from tests.data import CORRIDOR_LOG, OFFICE_LOG, data_file
+from tests.simulation import faults
+from tests.simulation.scenes import bare_corridor
+from tests.slam.keyframe_drives import round_scene
+
+Fault = Callable[[LaserLog], LaserLog]
+REAL = ("intel", "fr079", "mit-csail", "mit-killian", "fr-campus", "fr-clinic")
+
+
+@functools.cache
+def drive() -> LaserLog:
+    return round_scene().record(5).log()
+
+
+@functools.cache
+def real_drive() -> LaserLog:
+    return read_log(str(data_file("mit-csail.log.gz")))
+
+
+def found(log: LaserLog, reading: ReadingOptions | None = None) -> list[str]:
+    return checked_file(log, reading or ReadingOptions(), FileCheckOptions()).messages
+
+
+LIKELY: dict[str, tuple[Fault, str]] = {
+    "mirrored": (faults.mirrored, "in the wrong order, and the map is mirrored.*try --flip"),
+    "looks to the left": (lambda log: faults.mounted_otherwise(log, -np.pi / 2), "90° further to the left"),
+    "looks back": (lambda log: faults.mounted_otherwise(log, np.pi), "try --mount 0.1,0,0, or --no-odometry"),
+    "looks askew": (lambda log: faults.mounted_otherwise(log, 0.6), "try --mount 0.1,0,0$"),
+    "half as long": (lambda log: faults.odometry_scaled(log, 0.5), r"try --odometry-scale (1\.9|2\.0|2)"),
+    "late by 30 s": (lambda log: faults.odometry_late(log, 30.0), r"ahead.*--clock-offset -(30\.0|29\.9)"),
+    "early by 2 s": (lambda log: faults.odometry_late(log, -2.0), r"behind.*--clock-offset (2\.0|1\.9|2\.1)"),
+    "turns by half": (
+        lambda log: faults.odometry_turning(log, 0.5),
+        r"turns are 0\.5\d? times.*--no-odometry",
+    ),
+}
+
+
+@pytest.mark.parametrize("name", LIKELY)
+def test_what_is_likely_is_said_with_its_cure_and_left_alone(name):
+    make, words = LIKELY[name]
+    log = make(drive())
+    checked = checked_file(log, ReadingOptions(), FileCheckOptions())
+    assert len(checked.messages) == 1
+    assert re.search(words, checked.messages[0])
+    assert checked.log is log
+    assert checked.reading == ReadingOptions()
+
+
+SCALES = (1000.0, 10.0, 0.1, 300.0)
+
+
+@pytest.mark.parametrize("scale", SCALES)
+def test_a_scale_beyond_doubt_is_put_right(scale):
+    log = faults.odometry_scaled(drive(), scale)
+    checked = checked_file(log, ReadingOptions(), FileCheckOptions())
+    recorded = drive().odometry
+    assert recorded is not None
+    assert checked.log.odometry is not None
+    assert checked.reading.odometry_scale * scale == pytest.approx(1.0, abs=0.02)
+    np.testing.assert_allclose(checked.log.odometry, recorded, rtol=0.02, atol=1e-6)
+    (message,) = checked.messages
+    assert f"as by --odometry-scale {checked.reading.odometry_scale:g}; --as-recorded" in message
+
+
+def frozen(log: LaserLog) -> LaserLog:
+    return faults.odometry_scaled(faults.odometry_turning(log, 0.0), 0.0)
+
+
+@pytest.mark.parametrize(
+    ("make", "words"),
+    [
+        (frozen, "odometry never moves, but in"),
+        (faults.odometry_reversed, "odometry counts x or y the wrong way"),
+    ],
+)
+def test_odometry_of_no_use_is_not_used(make, words):
+    checked = checked_file(make(drive()), ReadingOptions(), FileCheckOptions())
+    assert checked.log.odometry is None
+    assert not checked.reading.odometry
+    (message,) = checked.messages
+    assert message.startswith(words)
+
+
+@pytest.mark.parametrize("make", [frozen, faults.mirrored, lambda log: faults.odometry_scaled(log, 1000.0)])
+def test_as_recorded_believes_the_file(make):
+    log, reading = make(drive()), ReadingOptions(as_recorded=True)
+    checked = checked_file(log, reading, FileCheckOptions())
+    assert (checked.log, checked.reading, checked.messages) == (log, reading, [])
+
+
+@pytest.mark.parametrize("make", [case[0] for case in LIKELY.values()], ids=list(LIKELY))
+def test_a_real_log_tells_the_same(make):
+    """Its odometry turns by 1.14 of what the scans do, with a spread of a quarter."""
+    said = found(make(real_drive()))
+    assert len(said) <= 1
+    if "turns" not in str(said):
+        assert len(said) == 1
+
+
+@pytest.mark.parametrize("name", REAL)
+def test_nothing_is_contradicted_on_real_logs(name):
+    assert found(read_log(str(data_file(f"{name}.log.gz")))) == []
+
+
+@pytest.mark.parametrize(
+    "name",
+    ["urg-carried.bag", "urg-corridor-1.bag", "urg-corridor-2.bag", "player-2.1.2.log"],
+)
+def test_nothing_is_contradicted_on_logs_from_the_field(name):
+    assert found(read_log(str(data_file(f"field/{name}")))) == []
+
+
+def test_nothing_is_contradicted_on_samples():
+    assert found(read_log(OFFICE_LOG)) == []
+    assert found(read_log(CORRIDOR_LOG)) == []
+
+
+def test_a_bare_corridor_tells_nothing():
+    """Along it a match ends where it starts: no step is measured."""
+    log = bare_corridor().record(1).log()
+    assert found(faults.odometry_scaled(log, 1000.0)) == []
+    assert found(log) == []
+
+
+def test_a_robot_that_stands_contradicts_nothing():
+    log = faults.taken(drive(), np.zeros(100, dtype=np.int64))
+    assert found(log) == []
