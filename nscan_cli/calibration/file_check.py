@@ -8,10 +8,11 @@ from typing import Any
 
 import numpy as np
 
-from nscan_cli.calibration.clock_lag import ClockLag, clock_lag
 from nscan_cli.calibration.measured_steps import MeasuredSteps, measure_steps
+from nscan_cli.calibration.odometry_clock import ClockLag, clock_lag
 from nscan_cli.calibration.options import FileCheckOptions
 from nscan_cli.calibration.robot_fit import MIRRORED, MountFit, TurnFit, fit_mount, fit_turns
+from nscan_cli.files.text import counted
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.logs.reading_options import ReadingOptions
 from nscan_cli.poses import Array, are_known, relative, wrap
@@ -162,8 +163,8 @@ def _offset_of_clocks(log: LaserLog, steps: MeasuredSteps, options: FileCheckOpt
 
 
 def _frozen(evidence: _Evidence) -> Finding:
-    moving, count = evidence.moving, len(evidence.laser)
-    message = f"odometry never moves, but in {moving} of {count} steps the scans do: it is not used; {UNDONE}"
+    seen = f"{evidence.moving} of {counted(len(evidence.laser), 'step')}"
+    message = f"odometry never moves, but the scans do in {seen}: it is not used; {UNDONE}"
     return Finding(message, {"odometry": False})
 
 
@@ -180,15 +181,15 @@ def _mirrored(turns: TurnFit, reading: ReadingOptions) -> Finding:
     cure = "leave out --flip" if reading.flip else "try --flip"
     return Finding(
         "the readings are likely in the wrong order, and the map is mirrored: turns by odometry are "
-        f"{turns.ratio:.2f} times those by scans, in {turns.steps} steps; {cure}, or --no-odometry if "
-        "odometry turns the wrong way"
+        f"{turns.ratio:.2f} times those by scans, in {counted(turns.steps, 'step')}; {cure}, or "
+        "--no-odometry if odometry turns the wrong way"
     )
 
 
 def _wrong_turns(turns: TurnFit) -> Finding:
     return Finding(
         f"odometry likely turns wrongly: its turns are {turns.ratio:.2f} times those by scans, "
-        f"in {turns.steps} steps; try --no-odometry"
+        f"in {counted(turns.steps, 'step')}; try --no-odometry"
     )
 
 
@@ -210,7 +211,7 @@ def _of_positions(
 def _excluded(evidence: _Evidence) -> Finding:
     message = (
         "odometry contradicts the scans: no scale, mounting or clock explains its positions, "
-        f"in {evidence.moving} steps; it is not used; {UNDONE}"
+        f"in {counted(evidence.moving, 'step')}; it is not used; {UNDONE}"
     )
     return Finding(message, {"odometry": False})
 
@@ -218,7 +219,7 @@ def _excluded(evidence: _Evidence) -> Finding:
 def _reversed(evidence: _Evidence) -> Finding:
     message = (
         "odometry counts x or y the wrong way: with one of them reversed its positions agree with the scans, "
-        f"in {evidence.moving} steps; it is not used; {UNDONE}"
+        f"in {counted(evidence.moving, 'step')}; it is not used; {UNDONE}"
     )
     return Finding(message, {"odometry": False})
 
@@ -227,7 +228,7 @@ def _wrong_scale(fit: MountFit, reading: ReadingOptions, options: FileCheckOptio
     decimal = 10.0 ** round(math.log10(fit.scale))
     is_decimal = abs(fit.scale / decimal - 1.0) <= options.decimal_tolerance
     scale = reading.odometry_scale * (decimal if is_decimal else float(f"{fit.scale:.3g}"))
-    evidence = f"one metre by odometry is {fit.scale:.3g} m by scans, in {fit.steps} steps"
+    evidence = f"one metre by odometry is {fit.scale:.3g} m by scans, in {counted(fit.steps, 'step')}"
     if max(fit.scale, 1.0 / fit.scale) > options.certain_scale_factor:
         message = f"{evidence}: its positions are multiplied, as by --odometry-scale {scale:g}; {UNDONE}"
         return Finding(message, {"odometry_scale": scale})
@@ -244,7 +245,8 @@ def _wrong_mount(mount: Array, fit: MountFit, off: float) -> Finding:
     is_opposite = abs(off) > math.pi - 0.1
     opposite = ", or --no-odometry if it counts forward as backward" if is_opposite else ""
     side = "left" if off > 0 else "right"
+    cure = f"--mount {x},{y},{angle:g}{opposite}"
     return Finding(
         f"the laser likely looks {abs(math.degrees(off)):.0f}° further to the {side} than the file says: so "
-        f"steps by scans and by odometry agree, in {fit.steps} steps; try --mount {x},{y},{angle:g}{opposite}"
+        f"scans and odometry agree about {counted(fit.steps, 'step')}; try {cure}"
     )

@@ -86,7 +86,7 @@ def frozen(log: LaserLog) -> LaserLog:
 @pytest.mark.parametrize(
     ("make", "words"),
     [
-        (frozen, "odometry never moves, but in"),
+        (frozen, "odometry never moves, but the scans do in"),
         (faults.odometry_reversed, "odometry counts x or y the wrong way"),
     ],
 )

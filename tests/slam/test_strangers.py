@@ -6,6 +6,7 @@ import functools
 import re
 
 import numpy as np
+import pytest
 
 from nscan_cli.graph.io.tum import parse_tum
 from nscan_cli.graph.model import Graph
