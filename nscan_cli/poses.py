@@ -99,7 +99,7 @@ def relative_jacobians(a: ArrayLike, b: ArrayLike) -> tuple[Array, Array]:
 
 
 def rotated_information(pose: ArrayLike, information: Array) -> Array:
-    """Rotate information matrices (…, 3, 3) from the frame of `pose` to the frame that it is given in."""
+    """Rotate information or covariances (…, 3, 3) from the frame of `pose` to the one that it is given in."""
     angle = np.asarray(pose, dtype=np.float64)[..., 2]
     rotation = np.zeros((*angle.shape, 3, 3))
     rotation[..., 0, 0] = rotation[..., 1, 1] = np.cos(angle)

@@ -134,7 +134,7 @@ def command(
     Compiling("half a minute", quiet)
     scans = read_log(log, reading)
     rows = [scans.row(number) for number in numbers]
-    initial, prior = with_defaults(scans, [scans.row(number) for number in numbers], initial, prior, quiet)
+    initial, prior = with_defaults(scans, rows, initial, prior, quiet)
     options, model = PairOptions(), MotionModel()
     joint = JointOptions(fixed=0 if gauge == "fixed" else None)
     start, priors, sources = initial_and_priors(scans, numbers, initial, prior, model)

@@ -15,7 +15,7 @@ import numpy as np
 
 from nscan_cli.graph.relations.base import Relation
 from nscan_cli.kernels.decorators import kernel
-from nscan_cli.poses import Array, Indices, Mask
+from nscan_cli.poses import Array, Indices, Mask, rotated_information
 from nscan_cli.slam.keyframes.route import Route
 from nscan_cli.slam.keyframes.tracked_path import TrackedPath
 
@@ -47,23 +47,14 @@ class LinkCache:
         if new:
             self._loops, self._links = [*loops], _concatenated([self._links, *new])
         steps = np.arange(len(path))
-        return _concatenated([Links(steps, steps + 1, _path_covariances(path, route.poses)), self._links])
+        covariances = rotated_information(route.poses[steps], path.covariances)
+        return _concatenated([Links(steps, steps + 1, covariances), self._links])
 
 
 def _concatenated(parts: Sequence[Links]) -> Links:
     """Several Links as one."""
     none = Links(np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64), np.zeros((0, 3, 3)))
     return Links(*(np.concatenate(columns) for columns in zip(none, *parts, strict=True)))
-
-
-def _path_covariances(path: TrackedPath, poses: Array) -> Array:
-    """The covariances (len(path), 3, 3) of the end of each relation of the chain, in the global frame."""
-    turned = np.zeros((len(path), 3, 3))
-    cos, sin = np.cos(poses[: len(path), 2]), np.sin(poses[: len(path), 2])
-    turned[:, 0, 0], turned[:, 0, 1], turned[:, 1, 0], turned[:, 1, 1] = cos, -sin, sin, cos
-    turned[:, 2, 2] = 1.0
-    along: Array = turned @ path.covariances @ turned.transpose(0, 2, 1)
-    return along
 
 
 def _links_of(relation: Relation, rows: Indices) -> Links:
