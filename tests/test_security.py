@@ -71,7 +71,8 @@ def test_a_graph_leads_to_no_file_outside_of_its_folder(tmp_path, monkeypatch, n
 
 
 @pytest.mark.parametrize("reading", [5, {"mount": [1]}, {"mount": "x"}, {"min_range": "0"}, {"laser": 7},
-                                     {"flip": "no"}, {"max_range": True}, {"strict": None}])  # fmt: skip
+                                     {"flip": "no"}, {"max_range": True}, {"strict": None}, {"mask": [1]},
+                                     {"mask": [[1, "x"]]}])  # fmt: skip
 def test_reading_options_of_a_graph_are_checked(tmp_path, monkeypatch, capsys, reading):
     monkeypatch.chdir(tmp_path)
     Path("room.log").write_text(room_log(5))

@@ -142,14 +142,22 @@ def _options_of_slam(reading: ReadingOptions, graph_file: str, provenance: dict[
             if not _is_value_of(value, str(option.type)):
                 problem = f"provenance.parameters.reading: {option.name} is {str(value)[:40]!r}"
                 raise InputDataError(graph_file, problem, "correct it, or create the graph again")
-            kept[option.name] = tuple(value) if isinstance(value, list) else value
+            kept[option.name] = _as_tuples(value)
     return dataclasses.replace(reading, **kept)
+
+
+def _as_tuples(value: Any) -> Any:
+    """The value with tuples in place of lists."""
+    return tuple(_as_tuples(part) for part in value) if isinstance(value, list) else value
 
 
 def _is_value_of(value: Any, kind: str) -> bool:
     """Whether a value of the graph fits a field of ReadingOptions with this annotation."""
     if value is None:
         return "None" in kind
+    if isinstance(value, list) and kind.startswith("tuple[tuple"):
+        pairs = all(isinstance(part, list) and len(part) == 2 for part in value)
+        return pairs and all(_is_value_of(each, "float") for part in value for each in part)
     if isinstance(value, list):
         return (
             kind.startswith("tuple")

@@ -39,6 +39,22 @@ class PoseType(click.ParamType[Any]):
         return (x, y, math.radians(degrees))
 
 
+class MaskType(click.ParamType[Any]):
+    """FROM:TO,… in degrees on the command line, pairs of bearings in rad inside."""
+
+    name = "FROM:TO,..."
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        """Parse the sectors; a wrong form is a usage error."""
+        try:
+            sectors = [tuple(float(part) for part in sector.split(":")) for sector in value.split(",")]
+        except ValueError:
+            sectors = [()]
+        if not all(len(sector) == 2 and all(map(math.isfinite, sector)) for sector in sectors):
+            self.fail(f"{value!r} is not of the form FROM:TO,..., as in 130:150,-150:-130", param, ctx)
+        return tuple((math.radians(first), math.radians(last)) for first, last in sectors)
+
+
 def common_options(command: Command) -> Command:
     """Add -q, -v, --config and --dump-config; the command gets `quiet` and `verbose`."""
 
@@ -84,6 +100,7 @@ def reading_options(command: Command) -> Command:
              help="Metres in a unit of the ranges, such as 0.001 for millimetres."),
         read("--angle-min", type=float, metavar="DEG", help="Direction of the first beam."),
         read("--angle-increment", type=float, metavar="DEG", help="Angle from beam to beam."),
+        read("--mask", type=MaskType(), help="Drop beams between bearings (degrees, counter-clockwise)."),
         read("--start", type=float, metavar="T", help="Skip the first T seconds."),
         read("--end", type=float, metavar="T", help="Stop T seconds after the first scan."),
         read("--every", type=click.IntRange(1), default=1, show_default=True, metavar="N",
@@ -193,6 +210,8 @@ def _as_toml(ctx: click.Context) -> str:
             continue
         if isinstance(param.type, PoseType):
             value = [value[0], value[1], math.degrees(value[2])]
+        elif isinstance(param.type, MaskType):
+            value = [f"{math.degrees(first):.12g}:{math.degrees(last):.12g}" for first, last in value]
         elif isinstance(value, str):
             try:
                 value = os.fsencode(value).decode()

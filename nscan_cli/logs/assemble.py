@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from nscan_cli.files.limits import READINGS
 from nscan_cli.files.provenance import Source
 from nscan_cli.logs.beam_angles import beam_directions
+from nscan_cli.logs.beam_mask import mask_beams, masked_sectors
 from nscan_cli.logs.device_choice import Device
 from nscan_cli.logs.frame_names import DEFAULT_FRAMES, FrameNames
 from nscan_cli.logs.laser_defaults import mark_no_returns
@@ -20,6 +21,7 @@ from nscan_cli.logs.lost_readings import lost_readings
 from nscan_cli.logs.range_limits import RangeLimits, limits_in_force
 from nscan_cli.logs.range_unit import scaled, wrong_unit
 from nscan_cli.logs.reading_options import ReadingOptions
+from nscan_cli.logs.robot_parts import DEFAULT_ROBOT_PARTS, ScanTable
 from nscan_cli.logs.scan_order import ScanOrder, selected_numbers
 from nscan_cli.logs.skips import Skips
 from nscan_cli.poses import Array, are_known
@@ -122,10 +124,15 @@ def laser_log(
     raw, limits, contradictions = _in_metres(raw, options, warnings)
     angle_min, angle_increment = beam_directions(raw, options, warnings)
     findings.used |= {"range_min": limits.low_from, "range_max": limits.high_from}
+    table = ScanTable(raw.ranges, limits, angle_min, angle_increment, times.rows, times.times)
+    sectors, masked = masked_sectors(table, options, DEFAULT_ROBOT_PARTS)
     ranges = raw.ranges if np.array_equal(rows, np.arange(len(raw.stamps))) else raw.ranges[rows]
     beams, limits = beam_counts(raw.ranges, raw.beams)[rows], limits.of(rows)
     lost = lost_readings(ranges, beams, limits, file)
     mark_no_returns(ranges, limits.low, limits.high)
+    hidden = mask_beams(ranges, angle_min[rows], angle_increment[rows], sectors)
+    if hidden:
+        lost.counts["in masked sectors"] = hidden
     odometry = None if motion.odometry is None else scaled_odometry(motion.odometry[numbers], options)
     return LaserLog(
         source=source,
@@ -154,7 +161,7 @@ def laser_log(
             laser_option=findings.laser_option,
             odometries=findings.odometries,
             corrected=findings.corrected,
-            contradictions=tuple(contradictions),
+            contradictions=(*contradictions, *masked),
         ),
         beams=None if (beams == ranges.shape[1]).all() else beams,
         truth_times=motion.truth_times,

@@ -32,6 +32,9 @@ class ReadingOptions:
     """Direction of the first beam, rad."""
     angle_increment: float | None = None
     """Angle from beam to beam, rad."""
+    mask: tuple[tuple[float, float], ...] | None = None
+    """Sectors of beams that are not read: two bearings in the laser's frame each, from the first
+    counter-clockwise to the second, rad."""
     start: float | None = None
     """Time of the first scan to read after the log's first one, s."""
     end: float | None = None
@@ -68,6 +71,8 @@ class ReadingOptions:
             raise WrongUsageError("--angle-increment is 0; beams need different directions")
         if self.odometry_scale <= 0:
             raise WrongUsageError("--odometry-scale is not above 0; give the metres of one unit of odometry")
+        if not all(math.isfinite(bearing) for sector in self.mask or () for bearing in sector):
+            raise WrongUsageError("--mask has a bearing that is not a finite number")
         if self.start is not None and self.end is not None and self.start > self.end:
             raise WrongUsageError("--start is after --end; no scan lies between")
 

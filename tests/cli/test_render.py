@@ -187,6 +187,18 @@ def test_the_log_is_read_as_slam_has_read_it(room, capsys):
     assert origin["overridden"] - origin["plain"] == pytest.approx(2.0, abs=0.051)
 
 
+def test_the_mask_of_slam_holds(room):
+    """Without a beam the map is that of no scan."""
+    (room / "room.json").write_bytes(write_graph(graph_of(log_text())))
+    assert run(["render", "room.json", "-o", "all.png", "--no-yaml"]) == 0
+    graph = graph_of(log_text())
+    graph.provenance["parameters"] = {"reading": {"mask": [[0.5, -0.5]]}}
+    (room / "room.json").write_bytes(write_graph(graph))
+    assert run(["render", "room.json", "-o", "part.png", "--no-yaml"]) == 0
+    whole, part = (np.count_nonzero(picture(room / name) == 0) for name in ("all.png", "part.png"))
+    assert part < 0.8 * whole
+
+
 @pytest.mark.parametrize("options", [["--trajectory"], ["--graph"], ["--uncertainty"], ["--style", "paper"]])
 def test_pictures_in_colour_have_no_yaml(room, options):
     assert run(["render", "room.json", "-o", "map.png", *options]) == 0

@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import Any
 
 import click
+import numpy as np
 import pytest
 
 from nscan_cli.cli import main as frame
@@ -61,12 +62,14 @@ def test_reading_options_are_in_metres_and_radians(calls):
         "--end", "20", "--every", "3", "--no-odometry", "--strict", "--allow-corrected",
         "--topic", "/scan", "--odom-topic", "/odom", "--salvage", "--range-scale", "0.001", "--as-recorded",
         "--odometry-scale", "0.001", "--clock-offset", "-30",
+        "--mask", "130:150,-150:-130",
     )["reading"]  # fmt: skip
     assert reading == ReadingOptions(
         laser="RLASER", mount=(0.1, -0.2, math.pi / 2), flip=True, min_range=0.2, max_range=30.0,
         angle_min=-math.pi / 2, angle_increment=math.radians(0.5), start=1.0, end=20.0, every=3,
         odometry=False, strict=True, allow_corrected=True, topic="/scan", odom_topic="/odom", salvage=True,
         range_scale=0.001, as_recorded=True, odometry_scale=0.001, clock_offset=-30.0,
+        mask=((math.radians(130), math.radians(150)), (math.radians(-150), math.radians(-130))),
     )  # fmt: skip
 
 
@@ -158,6 +161,7 @@ def test_toml_values_of_every_kind(calls):
         ("mount = 3", "mount: '3' is not of the form X,Y,DEG"),
         ("mount = [1, 2]", "mount: '1,2' is not of the form X,Y,DEG"),
         ("mount = [1, 2, inf]", "mount: '1,2,inf' has a part that is not finite"),
+        ("mask = 3", "mask: '3' is not of the form FROM:TO,..., as in 130:150,-150:-130"),
         ("resolution = ", "not TOML"),
         ("\xff", "not TOML"),
     ],
@@ -181,6 +185,21 @@ def test_a_missing_config_is_a_missing_input(calls, capsys):
 def test_a_mount_of_the_wrong_form_is_wrong_usage(calls, wrong, capsys):
     assert run(["info", "some.log", "--mount", wrong]) == 2
     assert "--mount" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("wrong", ["1", "1:2:3", "a:b", "", "nan:1", "1:2,", "1,2"])
+def test_a_mask_of_the_wrong_form_is_wrong_usage(calls, wrong, capsys):
+    assert run(["info", "some.log", "--mask", wrong]) == 2
+    assert "--mask" in capsys.readouterr().err
+
+
+def test_a_dumped_mask_gives_the_same_beams_again(calls, capsys):
+    mask = called(calls, "--mask", "130.1:150,-150:-130")["reading"].mask
+    capsys.readouterr()
+    assert run(["info", "some.log", "--mask", "130.1:150,-150:-130", "--dump-config"]) == 0
+    dumped = capsys.readouterr().out
+    assert 'mask = ["130.1:150", "-150:-130"]' in dumped
+    np.testing.assert_allclose(called(calls, *config(dumped))["reading"].mask, mask, rtol=1e-12)
 
 
 def test_dumped_settings_give_the_same_call_again(calls, capsys):

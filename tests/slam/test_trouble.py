@@ -16,10 +16,14 @@ from nscan_cli.logs.reading_options import ReadingOptions
 from nscan_cli.poses import relative
 from nscan_cli.slam.diagnostics.notices import notices
 from nscan_cli.slam.frontend.options import BreakOptions
+from nscan_cli.slam.log_to_graph import map_log
+from nscan_cli.slam.options import SlamOptions
 from tests.data import data_file
+from tests.simulation import faults
+from tests.simulation.scenes import office
 from tests.slam import trouble_cases
 from tests.slam.keyframe_drives import round_scene
-from tests.slam.mapped_logs import Mapped, mapped
+from tests.slam.mapped_logs import Mapped, mapped, position_rmse
 from tests.slam.trouble_cases import ROUND, Case, errors, without_odometry
 
 MENDED = ("3 m without a return", "3 m of nan", "15 m without a return", "3 s of scans dropped",
@@ -148,6 +152,24 @@ def test_standing_still_makes_no_keyframes():
     graph = mapped(trouble_cases.standing(600)).graph
     assert graph.keyframes.tolist() == [0]
     assert np.abs(graph.poses[:, :2]).max() < 0.02
+
+
+def test_the_map_is_right_though_the_robot_has_itself_in_view(tmp_path):
+    """Without the check the posts hold the robot back; what it has found stands in the graph."""
+    scene = office()
+    recording = scene.record_at(scene.truth()[:900], seed=3)
+    seen = faults.own_parts(recording.log(), [(-1.05, -0.7, 0.3), (0.7, 1.05, 0.3)])
+    readings = np.where(np.isfinite(seen.ranges), seen.ranges, recording.readings)
+    path = tmp_path / "posts.log"
+    path.write_bytes(dataclasses.replace(recording, readings=readings).carmen())
+    options = ReadingOptions(odometry=False)
+    read = read_log(str(path), options)
+    _, graph = map_log(read, options, SlamOptions(), 1, lambda *done: None)
+    assert position_rmse(graph.poses, recording.truth) < 0.05
+    assert any("--mask -61:-40,40:61" in notice for notice in graph.provenance["notices"])
+    assert graph.provenance["parameters"]["robot_parts"]["max_range"] == 1.5
+    as_recorded = read_log(str(path), dataclasses.replace(options, as_recorded=True))
+    assert position_rmse(mapped(as_recorded).graph.poses, recording.truth) > 0.5
 
 
 def test_someone_in_the_way_for_half_a_second_breaks_nothing():

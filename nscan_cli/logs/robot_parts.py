@@ -1,0 +1,234 @@
+"""Beams that see the robot itself: its posts, its wheels, a cart behind it.
+
+Such a beam keeps its range whatever the robot does. So does one to a wall along which the robot drives, until
+it turns. Turns are taken from the scans alone, because odometry may be missing or wrong: the ranges of one
+scan, shifted by some beams, resemble those of a later one.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nscan_cli.logs.laser_defaults import mark_no_returns
+from nscan_cli.logs.range_limits import RangeLimits
+from nscan_cli.poses import Array
+
+
+@dataclass(frozen=True)
+class RobotPartsOptions:
+    """When a beam sees the robot itself."""
+
+    max_range: float = 1.5
+    """Range up to which parts of the robot are looked for, m. A larger value finds longer carts."""
+    relative_tolerance: float = 0.1
+    """Greatest deviation of a constant range from its median, as a share of that. A larger value finds looser
+    parts, and more walls of corners in which the robot turns."""
+    min_tolerance: float = 0.02
+    """This deviation is always allowed, m: noise. A larger value suits poorer lasers."""
+    max_tolerance: float = 0.05
+    """No larger deviation is allowed, m."""
+    min_share: float = 0.6
+    """Least share of all scans in which the range is constant. A smaller value finds what is added later."""
+    min_turning_share: float = 0.85
+    """Least share of scans in turns in which the range is constant. That of a wall at the side is for two
+    thirds of a turn in a corner, where another wall comes next. A smaller value finds parts that the laser
+    often misses."""
+    min_turn: float = np.radians(25.0)
+    """Turn between two scans that changes the range to any wall, rad. A larger value takes less for parts."""
+    max_turn: float = np.radians(60.0)
+    """Greatest turn between two scans that is looked for, rad."""
+    lags: tuple[float, ...] = (1.0, 3.0, 6.0)
+    """Times between the scans of a pair, s. Robots turn by `min_turn` meanwhile, and come a metre far."""
+    min_pairs: int = 10
+    """Least number of pairs of scans between which the robot has turned. A larger value finds fewer parts."""
+    max_mismatch: float = 0.5
+    """A turn counts if scans turned by it differ by at most this share of what they differ unturned. A larger
+    value finds more turns, and more that are none."""
+    max_hidden_share: float = 0.5
+    """Greatest share of beams of constant range that are left out when turns are looked for. A larger value
+    finds parts of the robot that hide more, and fewer in narrow corridors."""
+    step: float = np.radians(2.0)
+    """Steps in which turns are tried, rad. A smaller value takes longer."""
+    scans: int = 256
+    """Number of scans that are looked at for constant ranges. A larger value takes longer."""
+    pairs: int = 512
+    """Number of pairs for each lag that are looked at, if there are constant ranges. A larger value takes
+    longer."""
+    margin: float = np.radians(1.0)
+    """By so much sectors are larger than what was found, rad: at an edge a beam meets both. Gaps of twice
+    this are closed."""
+
+
+SCANS_OF_TURN = 4
+"""Scans from the first of a pair to the second whose ranges are compared."""
+DEFAULT_ROBOT_PARTS = RobotPartsOptions()
+"""Those of every log; the provenance of a graph has them."""
+
+
+class Sector(NamedTuple):
+    """Bearings in the laser's frame, from the first counter-clockwise to the last."""
+
+    first: float
+    """rad"""
+    last: float
+    """rad"""
+    range: float
+    """Median range in the sector, m."""
+
+
+class ScanTable(NamedTuple):
+    """The scans of a log in file order, as written."""
+
+    ranges: NDArray[np.float32]
+    """(S, B) m"""
+    limits: RangeLimits
+    angle_min: Array
+    """(S,) rad"""
+    angle_increment: Array
+    """(S,) rad"""
+    rows: NDArray[np.int64]
+    """(S,) positions of the scans in order of time."""
+    times: Array
+    """(S,) in order, s."""
+
+
+def robot_parts(table: ScanTable, options: RobotPartsOptions) -> list[Sector]:
+    """The sectors in which the robot itself is in view, by increasing bearing; none if it never turns."""
+    bearings = _bearings(table)
+    some = _at_bearings(table, _evenly(len(table.rows), options.scans), bearings)
+    constant, medians = _constant_beams(some, options)
+    if not constant.any():
+        return []
+    pairs = _turned_pairs(table, bearings, constant, options)
+    if len(pairs) < options.min_pairs:
+        return []
+    turning = np.unique(np.linspace(pairs[:, 0], pairs[:, 1], SCANS_OF_TURN).astype(np.int64))
+    ranges = _at_bearings(table, turning, bearings)
+    constant &= _kept(ranges, medians, options).mean(axis=0) >= options.min_turning_share
+    return _sectors(bearings, constant, medians, options.margin)
+
+
+def _evenly(size: int, most: int) -> NDArray[np.int64]:
+    """At most so many places, spread over `size`."""
+    return np.unique(np.linspace(0, size - 1, most).astype(np.int64))
+
+
+def _bearings(table: ScanTable) -> Array:
+    """(B,) increasing bearings of the beams of the scan with the finest step, rad."""
+    row = int(np.argmin(np.abs(table.angle_increment)))
+    found: Array = table.angle_min[row] + table.angle_increment[row] * np.arange(table.ranges.shape[1])
+    return found if table.angle_increment[row] > 0 else found[::-1]
+
+
+def _at_bearings(table: ScanTable, places: NDArray[np.int64], bearings: Array) -> NDArray[np.float32]:
+    """Ranges (n, B), in m, of the scans at `places` (n,) in order of time; inf or nan where there is none."""
+    rows = table.rows[places]
+    ranges = table.ranges[rows]
+    limits = table.limits.of(rows)
+    mark_no_returns(ranges, limits.low, limits.high)
+    beams = (bearings - table.angle_min[rows, None]) / table.angle_increment[rows, None]
+    nearest = np.rint(beams).astype(np.int64)
+    has = (nearest >= 0) & (nearest < ranges.shape[1])
+    found = np.take_along_axis(ranges, np.clip(nearest, 0, ranges.shape[1] - 1), axis=1)
+    found[~has] = np.nan
+    return found
+
+
+def _constant_beams(
+    ranges: NDArray[np.float32], options: RobotPartsOptions
+) -> tuple[NDArray[np.bool_], NDArray[np.float32]]:
+    """Which beams of scans (n, B) mostly have the same near range, and the median (B,) of that; else nan."""
+    near = (ranges < options.max_range).mean(axis=0) >= options.min_share
+    medians = np.full(ranges.shape[1], np.nan, dtype=np.float32)
+    for beam in np.flatnonzero(near):
+        some = ranges[:, beam]
+        medians[beam] = np.median(some[some < options.max_range])
+    constant = near.copy()
+    constant[near] = _kept(ranges[:, near], medians[near], options).mean(axis=0) >= options.min_share
+    return constant, medians
+
+
+def _kept(
+    ranges: NDArray[np.float32], medians: NDArray[np.float32], options: RobotPartsOptions
+) -> NDArray[np.bool_]:
+    """(n, B) whether the ranges of scans are the medians (B,), m."""
+    tolerance = np.clip(options.relative_tolerance * medians, options.min_tolerance, options.max_tolerance)
+    kept: NDArray[np.bool_] = np.abs(ranges - medians) <= tolerance
+    return kept
+
+
+def _turned_pairs(
+    table: ScanTable, bearings: Array, constant: NDArray[np.bool_], options: RobotPartsOptions
+) -> NDArray[np.int64]:
+    """Places (P, 2) of two scans each, between which the other beams show a turn of the robot."""
+    found = []
+    for lag in options.lags:
+        first = _evenly(len(table.times), options.pairs)
+        second = np.searchsorted(table.times, table.times[first] + lag)
+        inside = second < len(table.times)
+        pairs = np.stack([first[inside], second[inside]], axis=1)
+        turns = _turns(table, bearings, constant, pairs, options)
+        found.append(pairs[np.abs(turns) >= options.min_turn])
+    return np.concatenate(found)
+
+
+def _turns(
+    table: ScanTable,
+    bearings: Array,
+    constant: NDArray[np.bool_],
+    pairs: NDArray[np.int64],
+    options: RobotPartsOptions,
+) -> Array:
+    """(P,) turn between the scans of each pair, rad; 0 if no turn makes them alike."""
+    every = max(round(options.step / abs(bearings[1] - bearings[0])), 1) if len(bearings) > 1 else 1
+    step = every * abs(float(bearings[min(1, len(bearings) - 1)] - bearings[0]))
+    # Where most beams keep their range, along a corridor, these are of walls and show turns.
+    hidden = constant if constant.mean() <= options.max_hidden_share else np.zeros_like(constant)
+    sides = []
+    for places in pairs.T:
+        ranges = _at_bearings(table, places, bearings)
+        ranges[:, hidden] = np.nan
+        ranges[~(np.isfinite(ranges) & (ranges > 0))] = np.nan
+        sides.append(np.log(ranges[:, ::every]))
+    one, other = sides
+    most = min(int(options.max_turn / step) if step else 0, one.shape[1] - 1)
+    differences = np.full((2 * most + 1, len(pairs)), np.inf)
+    for shift in range(-most, most + 1):
+        a = one[:, max(shift, 0) : one.shape[1] + min(shift, 0)]
+        b = other[:, max(-shift, 0) : one.shape[1] + min(-shift, 0)]
+        apart = np.minimum(np.abs(a - b), 1.0)
+        there = np.isfinite(apart)
+        compared = there.sum(axis=1)
+        sums = np.where(there, apart, 0.0).sum(axis=1)
+        enough = compared >= max(one.shape[1] // 4, 1)
+        differences[shift + most, enough] = sums[enough] / compared[enough]
+    best = differences.argmin(axis=0)
+    least = differences[best, np.arange(len(pairs))]
+    alike = least <= options.max_mismatch * differences[most]
+    return np.where(alike & np.isfinite(least), (best - most) * step, 0.0)
+
+
+def _sectors(
+    bearings: Array, chosen: NDArray[np.bool_], medians: NDArray[np.float32], margin: float
+) -> list[Sector]:
+    """The chosen beams (B,) as sectors."""
+    found: list[Sector] = []
+    for beam in np.flatnonzero(chosen).tolist():
+        bearing = float(bearings[beam])
+        if found and bearing - margin <= found[-1].last + 1e-9:
+            found[-1] = found[-1]._replace(last=bearing + margin)
+        else:
+            found.append(Sector(bearing - margin, bearing + margin, 0.0))
+    return [
+        sector._replace(range=float(np.median(medians[chosen & _within(bearings, sector)])))
+        for sector in found
+    ]
+
+
+def _within(bearings: Array, sector: Sector) -> NDArray[np.bool_]:
+    inside: NDArray[np.bool_] = (bearings >= sector.first) & (bearings <= sector.last)
+    return inside
