@@ -70,6 +70,8 @@ class Findings:
     odometries: tuple[Device, ...] = ()
     corrected: str = ""
     frames: FrameNames = DEFAULT_FRAMES
+    contradictions: list[str] = field(default_factory=list)
+    """What the scans contradict, as in LogReport."""
 
 
 @dataclass(frozen=True)
@@ -161,7 +163,7 @@ def laser_log(
             laser_option=findings.laser_option,
             odometries=findings.odometries,
             corrected=findings.corrected,
-            contradictions=(*contradictions, *masked),
+            contradictions=(*findings.contradictions, *contradictions, *masked),
         ),
         beams=None if (beams == ranges.shape[1]).all() else beams,
         truth_times=motion.truth_times,

@@ -14,6 +14,7 @@ from nscan_cli.logs.frame_names import distinct_frame_names
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.logs.range_limits import LARGEST_RANGE
 from nscan_cli.logs.reading_options import ReadingOptions
+from nscan_cli.logs.recordings.alternating_lasers import first_of_two_lasers
 from nscan_cli.logs.recordings.container import Message, Recording
 from nscan_cli.logs.recordings.decoded_messages import S, ScanMessage, decimal_seconds
 from nscan_cli.logs.recordings.decoding import UNDECODABLE, scan_decoder
@@ -23,6 +24,7 @@ from nscan_cli.logs.recordings.mounting import laser_mounting
 from nscan_cli.logs.recordings.robot_motion import ScanClock, robot_odometry
 from nscan_cli.logs.recordings.tf_tree import TransformTree
 from nscan_cli.logs.recordings.topics import devices, scan_topic
+from nscan_cli.logs.recordings.turn_segments import TimedScan, joined_turns
 from nscan_cli.logs.skips import Skips
 from nscan_cli.logs.text.line_records import beams_problem
 from nscan_cli.poses import Array
@@ -48,6 +50,10 @@ def log_from_recording(recording: Recording, file: str, source: Source, options:
     if not use_stamps:
         findings.warnings.append("the scans' own time stamps are unusable: the times of recording are used")
         stamps = [*log_times]
+    if not options.as_recorded:
+        timed = [TimedScan(*one) for one in zip(scans, stamps, log_times, strict=True)]
+        timed = _of_one_laser(timed, findings)
+        scans, stamps, log_times = (list(column) for column in zip(*timed, strict=True))
     raw = _raw_scans(scans, [decimal_seconds(stamp) for stamp in stamps])
     times = order.by_time(raw.stamps)
     findings.warnings += times.warnings
@@ -71,6 +77,14 @@ def log_from_recording(recording: Recording, file: str, source: Source, options:
         options,
         file,
     )
+
+
+def _of_one_laser(timed: Sequence[TimedScan], findings: Findings) -> list[TimedScan]:
+    """The scans of one laser, each of a whole turn."""
+    turns, joined = joined_turns(timed)
+    scans, left_out = first_of_two_lasers(turns)
+    findings.contradictions += [said for said in (joined, left_out) if said]
+    return scans
 
 
 def _decoded_scans(

@@ -1,0 +1,113 @@
+"""Turns of a laser that come in several messages: they are put together to one scan a turn."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from nscan_cli.logs.recordings.decoded_messages import ScanMessage
+from nscan_cli.poses import Indices
+
+WHOLE_TURN = 2 * math.pi
+STEP_TOLERANCE = 0.5
+"""Segments continue one another to within this share of a step between beams."""
+MIN_CONTINUING_SHARE = 0.5
+"""Least share of messages that go on where the one before ends. A larger value joins fewer recordings."""
+MIN_GAP_RATIO = 2.0
+"""A turn begins after the longest pause if that is so many times the median one. Else it begins at the end
+of the field of view, or with the first message if there is no end."""
+
+
+class TimedScan(NamedTuple):
+    """A scan and its times."""
+
+    scan: ScanMessage
+    stamp: int | None
+    """ns; None if it was never set."""
+    log_time: int
+    """ns, when it was recorded."""
+
+
+def joined_turns(messages: Sequence[TimedScan]) -> tuple[list[TimedScan], str]:
+    """The scans with the segments of each turn put together, and what is said of it; as they are if none are.
+
+    A scan has the times of the segment in its middle. Beams of segments that are missing are nan.
+    """
+    scans = [message.scan for message in messages]
+    places, beams_a_turn = _places(scans)
+    if not len(places):
+        return list(messages), ""
+    first = _first_place(messages, places, beams_a_turn)
+    places = (places - first) % beams_a_turn
+    turns: list[list[int]] = []
+    for row, place in enumerate(places.tolist()):
+        if turns and place > places[turns[-1][-1]]:
+            turns[-1].append(row)
+        else:
+            turns.append([row])
+    beams = max(int(places[row]) + len(scans[row].ranges) for row in range(len(scans)))
+    begin = next(scans[turn[0]].angle_min for turn in turns if places[turn[0]] == places.min())
+    joined = [_joined([messages[row] for row in turn], places[turn], begin, beams) for turn in turns]
+    width = math.degrees(abs(scans[0].angle_increment) * len(scans[0].ranges))
+    several = max(map(len, turns))
+    said = (
+        f"a turn of the laser comes in {several} messages of {width:.0f}°: they are put together to one "
+        "scan; --as-recorded reads each as a scan"
+    )
+    return joined, said
+
+
+def _places(scans: Sequence[ScanMessage]) -> tuple[Indices, int]:
+    """Where in a turn, in beams from the first message's first, each message begins; and beams in a turn.
+
+    Empty unless messages mostly go on where the one before ends.
+    """
+    none, step = np.zeros(0, dtype=np.int64), scans[0].angle_increment
+    firsts = np.array([scan.angle_min for scan in scans])
+    sizes = np.array([len(scan.ranges) for scan in scans])
+    steps = np.array([scan.angle_increment for scan in scans])
+    if np.abs(steps / step - 1).max() > STEP_TOLERANCE / sizes.max() or sizes.max() < 2:
+        return none, 0
+    beams_a_turn = round(WHOLE_TURN / abs(step))
+    # One message of a whole turn goes on where it began itself.
+    if sizes.max() > beams_a_turn // 2 + 1 or len(scans) < 2:
+        return none, 0
+    offsets = (firsts - firsts[0]) / step
+    off = (
+        np.mod(offsets[1:] - offsets[:-1] - sizes[:-1] + beams_a_turn / 2, WHOLE_TURN / abs(step))
+        - beams_a_turn / 2
+    )
+    goes_on = np.abs(off) <= 1 + STEP_TOLERANCE
+    if goes_on.mean() < MIN_CONTINUING_SHARE:
+        return none, 0
+    return np.mod(np.rint(offsets).astype(np.int64), beams_a_turn), beams_a_turn
+
+
+def _first_place(messages: Sequence[TimedScan], places: Indices, beams_a_turn: int) -> int:
+    """The place at which turns begin: after a pause, at the end of the field of view, or anywhere."""
+    stamps = [message.log_time if message.stamp is None else message.stamp for message in messages]
+    pauses = np.diff(stamps)
+    known, rows = np.unique(places, return_index=True)
+    before = [pauses[places[1:] == place] for place in known]
+    usual = [float(np.median(some)) if len(some) else 0.0 for some in before]
+    longest = int(np.argmax(usual))
+    if usual[longest] > MIN_GAP_RATIO * float(np.median(usual)):
+        return int(known[longest])
+    if sum(len(messages[row].scan.ranges) for row in rows.tolist()) >= beams_a_turn:
+        return int(places[0])
+    firsts = np.array([message.scan.angle_min for message in messages])
+    return int(places[np.argmin(firsts * np.sign(messages[0].scan.angle_increment))])
+
+
+def _joined(turn: Sequence[TimedScan], places: Indices, begin: float, beams: int) -> TimedScan:
+    """One scan of the segments that begin at `places`, from the bearing `begin` (rad) on."""
+    ranges = np.full(beams, np.nan, dtype=np.float32)
+    for message, place in zip(turn, places.tolist(), strict=True):
+        ranges[place : place + len(message.scan.ranges)] = message.scan.ranges
+    middle = turn[len(turn) // 2]
+    end = begin + middle.scan.angle_increment * (beams - 1)
+    scan = middle.scan._replace(ranges=ranges, angle_min=begin, angle_max=end)
+    return middle._replace(scan=scan)
