@@ -12,6 +12,7 @@ from nscan_cli.calibration.measured_steps import MeasuredSteps, measure_steps
 from nscan_cli.calibration.odometry_clock import ClockLag, clock_lag
 from nscan_cli.calibration.options import FileCheckOptions
 from nscan_cli.calibration.robot_fit import MIRRORED, MountFit, TurnFit, fit_mount, fit_turns
+from nscan_cli.calibration.step_sampling import telling_steps
 from nscan_cli.files.text import counted
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.logs.reading_options import ReadingOptions
@@ -67,7 +68,7 @@ def find_contradictions(log: LaserLog, reading: ReadingOptions, options: FileChe
     """What the scans of a log contradict; empty without odometry, and where the scans tell too little."""
     if log.odometry is None:
         return []
-    evidence = _Evidence(log, measure_steps(log, options.steps), options)
+    evidence = _Evidence(log, measure_steps(log, telling_steps(log, options.steps), options.steps), options)
     if evidence.moving < options.min_steps:
         return []
     if _never_moves(log.odometry, options.still):
@@ -154,7 +155,8 @@ def _offset_of_clocks(log: LaserLog, steps: MeasuredSteps, options: FileCheckOpt
     first = clock_lag(log, steps, span, options.clock_resolution)
     if first is None or abs(first.offset) < options.min_clock_offset:
         return None
-    steps = measure_steps(log, options.steps, options.more_steps)
+    more = telling_steps(log, options.steps, options.more_steps)
+    steps = measure_steps(log, more, options.steps)
     lag = clock_lag(log, steps, span, options.clock_resolution)
     if lag is None or abs(lag.offset) < options.min_clock_offset:
         return None

@@ -34,47 +34,25 @@ class MeasuredSteps:
         return relative(poses[self.last], poses[self.first])
 
 
-def measure_steps(log: LaserLog, options: StepOptions, count: int | None = None) -> MeasuredSteps:
-    """The steps of a log that its scans measure beyond doubt: `count` or `options.count` in each half of the
-    sample.
+def measure_steps(log: LaserLog, rows: tuple[Indices, Indices], options: StepOptions) -> MeasuredSteps:
+    """Of the steps from the first rows (n,) to the last (n,), those that the scans measure beyond doubt.
 
     Every step is matched without odometry, as of one who knows nothing but the scans.
     """
     at_laser = replace(log, mount=np.zeros(3))
     found: list[tuple[int, int, PairMatch]] = []
-    first, last = _sampled_steps(log, options, count or options.count)
+    first, last = rows
     for begin, end in zip(first.tolist(), last.tolist(), strict=True):
         match = _measured(at_laser, begin, end, options)
         if match is not None:
             found.append((begin, end, match))
-    rows = np.array([(begin, end) for begin, end, _ in found], dtype=np.int64).reshape(-1, 2)
+    ends = np.array([(begin, end) for begin, end, _ in found], dtype=np.int64).reshape(-1, 2)
     return MeasuredSteps(
-        rows[:, 0],
-        rows[:, 1],
+        ends[:, 0],
+        ends[:, 1],
         np.array([match.pose for *_, match in found]).reshape(-1, 3),
         np.array([match.covariance for *_, match in found]).reshape(-1, 3, 3),
     )
-
-
-def _sampled_steps(log: LaserLog, options: StepOptions, count: int) -> tuple[Indices, Indices]:
-    """The rows (n,) where steps begin and end: spread over the log, and where odometry turns most."""
-    first = np.arange(len(log), dtype=np.int64)
-    last = np.maximum(np.searchsorted(log.times, log.times + options.duration), first + 1)
-    kept = last < len(log)
-    first, last = first[kept], last[kept]
-    kept = log.times[last] - log.times[first] <= options.max_duration
-    first, last = first[kept], last[kept]
-    if not len(first):
-        return first, last
-    chosen = [np.linspace(0, len(first) - 1, count).astype(np.int64)]
-    if log.odometry is not None:
-        turns = np.abs(relative(log.odometry[last], log.odometry[first])[:, 2])
-        turns = np.minimum(np.nan_to_num(turns), options.max_turn)
-        # Many more than are measured, so that these come from all over the log.
-        most = np.sort(np.argsort(-turns, kind="stable")[: options.turning_excess * count])
-        chosen.append(most[np.linspace(0, len(most) - 1, count).astype(np.int64)])
-    both = np.unique(np.concatenate(chosen))
-    return first[both], last[both]
 
 
 def _measured(log: LaserLog, begin: int, end: int, options: StepOptions) -> PairMatch | None:

@@ -14,6 +14,8 @@ class StepOptions:
     count: int = 30
     """Steps that are spread evenly over the log, and as many more where odometry turns most. More steps tell
     more and take longer."""
+    most: int = 1_500
+    """Most steps of a calibration. More tell more and take longer."""
     duration: float = 0.4
     """Least time of a step, s. Over a longer one the robot moves more, until the scans are too far apart."""
     max_duration: float = 2.0
@@ -81,3 +83,47 @@ class FileCheckOptions:
     of the motion. It is 0.03 to 0.11 on real logs."""
     min_steps_to_exclude: int = 30
     """Least number of steps with motion for that."""
+
+
+@dataclass(frozen=True)
+class CalibrationOptions:
+    """How a robot is calibrated from a drive."""
+
+    steps: StepOptions = field(default_factory=lambda: StepOptions(max_beams=1_000))
+    min_steps: int = 30
+    """Least number of steps with motion."""
+    min_turns: int = 12
+    """Least number of steps with a turn for what turns tell: the place of the laser, and the clocks."""
+    min_motion: float = 0.05
+    """A step by scans of this length (m) is one with motion, of this turn (rad) one with a turn."""
+    metres_per_radian: float = 0.3
+    """A turn of one radian counts as so much motion, m."""
+    clock_span: float = 120.0
+    """Longest offset of the clocks that is looked for, s."""
+    clock_resolution: float = 0.1
+    """Distance of the offsets that are tried, s, before the best is refined."""
+    clock_gain: float = 0.6
+    """At the offset of the clocks the turns have to disagree by less than this share of what they do
+    anywhere; otherwise it is open. The same holds for mirrored turns, against those that are not."""
+    max_turn_spread: float = 0.4
+    """Turns tell nothing where, in the median, they are off by more than this share of them: outdoors single
+    matches turn where the robot does not."""
+    clock_iterations: int = 5
+    """Gauss-Newton steps that refine it."""
+    angle_sigma: float = 0.005
+    """Standard deviation that is expected of a step's turn by odometry and scans, rad, without any turn: it
+    weighs the steps against each other."""
+    angle_sigma_per_radian: float = 0.1
+    """Increase of it for each radian turned."""
+    min_clock_offset: float = 0.5
+    """A shorter offset of the clocks is not passed on, s: tracking hardly notices it."""
+    min_sigmas: float = 3.0
+    """A value that is nearer to the file's, in standard deviations, is that of the file."""
+    max_place_sigma: float = 0.02
+    """A mounting with a larger standard deviation (m) is not passed on: the file's holds."""
+    max_angle_sigma: float = 0.01
+    """The same for its angle, rad."""
+    max_scale_sigma: float = 0.01
+    """The same for the scale of odometry, as a share."""
+    max_clock_sigma: float = 0.03
+    """The same for the offset of the clocks, s."""

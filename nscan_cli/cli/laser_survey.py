@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+from nscan_cli.cli.log_reader import ReadLog, log_reader
 from nscan_cli.errors import InputDataError, NscanError
 from nscan_cli.files.text import counted
 from nscan_cli.logs.reading_options import ReadingOptions
@@ -15,7 +16,6 @@ if TYPE_CHECKING:
     from nscan_cli.logs.laser_log import LaserLog
     from nscan_cli.logs.recordings.mounting import MountingError
 
-    Read = Callable[[ReadingOptions], LaserLog]
 
 ZERO_MOUNT = (0.0, 0.0, 0.0)
 LASER_INDEPENDENT = ("file", "sha256", "bytes", "files", "format", "odometry", "used", "records", "truth",
@@ -76,7 +76,7 @@ def survey_of(paths: Sequence[str], reading: ReadingOptions) -> Survey:
     from nscan_cli.logs.device_choice import OpenChoiceError
     from nscan_cli.logs.recordings.mounting import MountingError
 
-    read = _reader(paths)
+    read = log_reader(paths, even_unusable=True)
     options = dataclasses.replace(reading, allow_corrected=True)
     choices: dict[str, OpenChoiceError] = {}
     others: list[dict[str, Any]] = []
@@ -128,7 +128,7 @@ def laser_line(laser: dict[str, Any]) -> str:
 
 
 def _laser_facts(
-    laser: Device, option: str, chosen: LaserLog | None, read: Read, alone: ReadingOptions
+    laser: Device, option: str, chosen: LaserLog | None, read: ReadLog, alone: ReadingOptions
 ) -> dict[str, Any]:
     """The facts of a laser for `info --json`; the log is read again unless it is the `chosen` one."""
     from nscan_cli.logs.recordings.mounting import MountingError
@@ -151,14 +151,3 @@ def _laser_facts(
 
 def _device_facts(device: Device) -> dict[str, Any]:
     return {"name": device.name, "type": device.type, "records": device.records}
-
-
-def _reader(paths: Sequence[str]) -> Read:
-    """A function that reads the log with other options; standard input is read only once."""
-    from nscan_cli.files.inputs import STANDARD_INPUT, read_bytes
-    from nscan_cli.logs.load import log_from, read_log
-
-    if tuple(paths) != (STANDARD_INPUT,):
-        return lambda options: read_log(paths, options, even_unusable=True)
-    stored = read_bytes(STANDARD_INPUT)
-    return lambda options: log_from(stored, STANDARD_INPUT, options, even_unusable=True)

@@ -22,6 +22,7 @@ from nscan_cli.files.text import printable
 
 COMMANDS = {
     "info": "Show what a log contains, and what the other commands use of it.",
+    "calibrate": "Find how the laser is mounted and what odometry does, from the scans.",
     "match": "Match two scans of a log (NDT).",
     "nscan": "Match several scans of a log jointly (nScan-Matching).",
     "slam": "Build a pose graph and a map from a log.",

@@ -19,7 +19,7 @@ from nscan_cli.logs.reading_options import ReadingOptions
 if TYPE_CHECKING:
     from nscan_cli.slam.options import Relations
 
-MAPPING_OPTIONS = ("max_scans", "relations", "no_loops")
+MAPPING_OPTIONS = ("max_scans", "relations", "no_loops", "calibrate")
 """Options of mapping a log; they do not go with --from."""
 
 
@@ -74,6 +74,8 @@ MAPPING_OPTIONS = ("max_scans", "relations", "no_loops")
     help="Relations of neighbouring keyframes: pairwise matches, joint matches (nscan), or joint matches "
     "plus the chain of tracked relations (both).",
 )
+@option("--calibrate", is_flag=True,
+        help="First find and apply the mounting, and the scale and clock of odometry.")  # fmt: skip
 @option("--no-loops", is_flag=True, help="Do not close loops: drift remains.")
 @option(
     "--threads",
@@ -96,6 +98,7 @@ def command(
     from_file: str | None,
     max_scans: int,
     relations: Relations,
+    calibrate: bool,
     no_loops: bool,
     threads: int | None,
     depfile: str | None,
@@ -120,8 +123,8 @@ def command(
         raise WrongUsageError("standard input (-) can be one input only; give the other by its path")
     if from_file is not None and (reading != ReadingOptions() or _given(*MAPPING_OPTIONS)):
         raise WrongUsageError(
-            "slam: reading options, --max-scans, --relations and --no-loops cannot be combined with --from; "
-            "the graph keeps its own"
+            "slam: reading options, --max-scans, --relations, --calibrate and --no-loops cannot be combined "
+            "with --from; the graph keeps its own"
         )
     outputs = SlamOutputs(output, map_file, trajectory, g2o, carmen, depfile)
     from nscan_cli.cli.slam_runs import run_on_graph, run_on_log
@@ -138,7 +141,7 @@ def command(
     began = time.perf_counter()
     if from_file is None:
         options = slam_options(max_scans, relations, not no_loops)
-        run = run_on_log(log, reading, options, threads, quiet, verbose)
+        run = run_on_log(log, reading, options, calibrate, threads, quiet, verbose)
     else:
         run = run_on_graph(from_file, log or None, outputs.need_scans, threads, quiet)
         # The log that was found must not be replaced, either.

@@ -8,7 +8,9 @@ from collections import Counter
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
+from nscan_cli.cli.log_reader import log_reader
 from nscan_cli.cli.progress import Compiling, progress, say
+from nscan_cli.cli.robot_options import changed_flags
 from nscan_cli.cli.summary import Row
 from nscan_cli.errors import InputDataError, InputMissingError, WrongUsageError
 from nscan_cli.files.inputs import label
@@ -39,19 +41,28 @@ class SlamRun:
 
 
 def run_on_log(
-    log: Sequence[str], reading: ReadingOptions, options: SlamOptions, threads: int, quiet: bool, verbose: int
+    log: Sequence[str],
+    reading: ReadingOptions,
+    options: SlamOptions,
+    calibrated: bool,
+    threads: int,
+    quiet: bool,
+    verbose: int,
 ) -> SlamRun:
-    """Map a log."""
+    """Map a log, with its robot calibrated first if asked."""
     import numpy as np
 
     from nscan_cli.kernels.decorators import load_runtime
-    from nscan_cli.logs.load import read_log
     from nscan_cli.logs.log_files import files_of
     from nscan_cli.slam.log_to_graph import map_log
 
     load_runtime()
     compiling = Compiling("a minute or two", quiet)
-    scans = read_log(log, reading)
+    read = log_reader(log)
+    scans = read(reading)
+    if calibrated:
+        reading = _calibrated(scans, reading, quiet)
+        scans = read(reading)
     for warning in scans.report.notices():
         say(f"warning: {warning}", quiet)
     with progress("mapping", len(scans), quiet) as bar:
@@ -78,6 +89,22 @@ def run_on_log(
             ("large loops", [f"{places} found by search at a place seen before"]),
         ]
     return SlamRun(graph, scans, np.arange(len(scans)), files_of(log), summary, compiling.has_begun)
+
+
+def _calibrated(scans: LaserLog, reading: ReadingOptions, quiet: bool) -> ReadingOptions:
+    """The options that read the log as its calibration says, which are told; the same if it says nothing."""
+    from nscan_cli.calibration.calibrated_reading import calibrated_reading
+    from nscan_cli.calibration.options import CalibrationOptions
+    from nscan_cli.calibration.robot_calibration import calibrate
+
+    options = CalibrationOptions()
+    try:
+        found = calibrated_reading(calibrate(scans, reading, options), reading, options)
+    except InputDataError as error:
+        say(f"warning: not calibrated: {error}", quiet)
+        return reading
+    say(f"calibrated: {changed_flags(reading, found) or 'the file says what the scans say'}", quiet)
+    return found
 
 
 def _graph_rows(graph: Graph) -> list[Row]:

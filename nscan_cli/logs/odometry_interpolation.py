@@ -24,8 +24,8 @@ class OdometryGapLimits:
     """The robot moves by more than this over a gap, m and rad. A robot that stands may send no pose: what is
     interpolated then is right."""
     beyond: float = 1.0
-    """Periods before the first and after the last pose during which that pose is used. A larger value lets
-    the robot stand longer where its odometry begins later or ends earlier than its scans."""
+    """Periods from a pose, into a gap or beyond the first and the last, during which it is used. A larger
+    value lets the robot stand longer there."""
 
 
 def interpolated_poses(
@@ -38,7 +38,8 @@ def interpolated_poses(
 ) -> Array | None:
     """Poses (S, 3) at `times` (S,), interpolated between `poses` (P, 3) at the sorted times `at` (P,).
 
-    Linear in x, y and the unwrapped angle; nan beyond the first and the last pose, and in gaps between poses.
+    Linear in x, y and the unwrapped angle; nan far beyond the first and the last pose, and in gaps between
+    poses. Near a pose there, that one is used.
     Returns None, with a warning, if no scan has a pose. `name` is what warnings call a pose. Times in s.
     """
     if (times > at[-1]).all() or (times < at[0]).all():
@@ -51,7 +52,11 @@ def interpolated_poses(
     columns = (poses[:, 0], poses[:, 1], angles)
     found = np.stack([np.interp(times, at, column) for column in columns], axis=-1)
     found[:, 2] = wrap(found[:, 2])
-    missing = _without_pose(times, at, poses, limits)
+    in_gap, nearest = _in_gap(times, at, poses, limits), _nearest(times, at)
+    found[in_gap] = poses[nearest[in_gap]]
+    margin = limits.beyond * _usual_period(at)
+    missing = in_gap & (np.abs(times - at[nearest]) > margin)
+    missing |= (times < at[0] - margin) | (times > at[-1] + margin)
     if missing.any():
         found[missing] = np.nan
         warnings.append(_missing_notice(missing, times, name))
@@ -77,18 +82,28 @@ def _scans(first: int, last: int) -> str:
     return f"scan {first}" if first == last else f"scans {first} to {last}"
 
 
-def _without_pose(times: Array, at: Array, poses: Array, limits: OdometryGapLimits) -> NDArray[np.bool_]:
-    """(S,) which of the `times` (S,) have no pose near enough, as interpolated_poses takes them."""
+def _in_gap(times: Array, at: Array, poses: Array, limits: OdometryGapLimits) -> NDArray[np.bool_]:
+    """(S,) which of the `times` (S,) lie in a gap between two poses (P, 3) at times (P,)."""
     periods = np.diff(at)
-    usual = float(np.median(periods[periods > 0.0])) if (periods > 0.0).any() else 0.0
     steps = np.abs(relative(poses[1:], poses[:-1]))
-    is_gap = (periods > limits.periods * usual) & (
+    is_gap = (periods > limits.periods * _usual_period(at)) & (
         np.maximum(np.hypot(steps[:, 0], steps[:, 1]), steps[:, 2]) > limits.motion
     )
-    after = np.searchsorted(at, times, side="right")
-    between = np.clip(after - 1, 0, max(len(at) - 2, 0))
-    inside = (times > at[0]) & (times < at[-1])
-    missing: NDArray[np.bool_] = inside & np.isin(between, np.flatnonzero(is_gap)) & (times > at[between])
-    margin = limits.beyond * usual
-    missing |= (times < at[0] - margin) | (times > at[-1] + margin)
-    return missing
+    after = np.searchsorted(at, times)
+    found: NDArray[np.bool_] = (times > at[0]) & (times < at[-1]) & np.isin(after - 1, np.flatnonzero(is_gap))
+    return found
+
+
+def _nearest(times: Array, at: Array) -> NDArray[np.int64]:
+    """(S,) the pose that is nearest in time, of those at sorted times (P,)."""
+    after = np.clip(np.searchsorted(at, times), 1, max(len(at) - 1, 1))
+    before = after - 1
+    if len(at) == 1:
+        return np.zeros(len(times), dtype=np.int64)
+    return np.where(times - at[before] <= at[after] - times, before, after).astype(np.int64)
+
+
+def _usual_period(at: Array) -> float:
+    """The median time from a pose to the next, s; 0 without any."""
+    periods = np.diff(at)
+    return float(np.median(periods[periods > 0.0])) if (periods > 0.0).any() else 0.0

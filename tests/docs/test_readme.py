@@ -93,7 +93,7 @@ def shape(line: str) -> str:
 
 def test_the_readme_has_what_people_come_for():
     lines = [line for line, _shown in calls()]
-    for command in ("info", "slam", "render", "match", "nscan", "evaluate", "nightly"):
+    for command in ("info", "slam", "calibrate", "render", "match", "nscan", "evaluate", "nightly"):
         assert any(line.startswith(f"nscan-cli {command} ") for line in lines), command
     assert all(line.startswith(("nscan-cli ", *NOT_RUN)) for line in lines)
     assert blocks("README.md", "make")

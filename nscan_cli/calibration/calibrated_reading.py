@@ -1,0 +1,55 @@
+"""The reading options that a calibration leads to: what it tells surely and differently than the file."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from nscan_cli.calibration.options import CalibrationOptions
+from nscan_cli.calibration.robot_calibration import Calibration, Estimate
+from nscan_cli.logs.reading_options import ReadingOptions
+
+DECIMALS = 4
+"""Of lengths, angles, times and relative scales that are passed on: a tenth of what a drive tells."""
+
+
+def calibrated_reading(
+    calibration: Calibration, reading: ReadingOptions, options: CalibrationOptions
+) -> ReadingOptions:
+    """The options that read the same log as the calibration says; `reading` are those that it was read with.
+
+    A value that the drive leaves open, or that agrees with the file, stays as it is.
+    """
+    values = calibration.values
+    bounds = {
+        "mount_x": options.max_place_sigma,
+        "mount_y": options.max_place_sigma,
+        "mount_angle": options.max_angle_sigma,
+        "odometry_scale": options.max_scale_sigma * values["odometry_scale"].value,
+        "clock_offset": options.max_clock_sigma,
+    }
+    told = {name: _is_told(values[name], bound, options.min_sigmas) for name, bound in bounds.items()}
+    found = reading
+    if calibration.mirrored:
+        found = replace(found, flip=not reading.flip)
+    if told["mount_x"] or told["mount_y"] or told["mount_angle"]:
+        x, y, angle = (_passed_on(values[name], told[name]) for name in ("mount_x", "mount_y", "mount_angle"))
+        found = replace(found, mount=(x, y, angle))
+    if told["odometry_scale"]:
+        scale = values["odometry_scale"].value
+        found = replace(found, odometry_scale=float(f"{scale:.{DECIMALS}g}"))
+    clock = values["clock_offset"]
+    if told["clock_offset"] and abs(clock.value - reading.clock_offset) >= options.min_clock_offset:
+        found = replace(found, clock_offset=round(clock.value, DECIMALS))
+    return found
+
+
+def _is_told(estimate: Estimate, bound: float, sigmas: float) -> bool:
+    """Whether a value is known well enough, and not that of the file."""
+    assert estimate.recorded is not None
+    off = abs(estimate.value - estimate.recorded)
+    return estimate.sigma <= bound and off > sigmas * estimate.sigma
+
+
+def _passed_on(estimate: Estimate, is_told: bool) -> float:
+    assert estimate.recorded is not None
+    return round(estimate.value, DECIMALS) if is_told else estimate.recorded

@@ -1,0 +1,56 @@
+"""Which steps of a log are measured: a few that tell most, or one after another."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from nscan_cli.calibration.options import StepOptions
+from nscan_cli.logs.laser_log import LaserLog
+from nscan_cli.poses import Indices, relative
+
+
+def telling_steps(log: LaserLog, options: StepOptions, count: int | None = None) -> tuple[Indices, Indices]:
+    """The rows (n,) where steps begin and end: spread over the log, and where odometry turns most.
+
+    There are `count` of each, by default `options.count`.
+    """
+    count = count or options.count
+    first, last = _all_steps(log, options)
+    if not len(first):
+        return first, last
+    chosen = [np.linspace(0, len(first) - 1, count).astype(np.int64)]
+    if log.odometry is not None:
+        turns = np.abs(relative(log.odometry[last], log.odometry[first])[:, 2])
+        turns = np.minimum(np.nan_to_num(turns), options.max_turn)
+        # Many more than are measured, so that these come from all over the log.
+        most = np.sort(np.argsort(-turns, kind="stable")[: options.turning_excess * count])
+        chosen.append(most[np.linspace(0, len(most) - 1, count).astype(np.int64)])
+    both = np.unique(np.concatenate(chosen))
+    return first[both], last[both]
+
+
+def successive_steps(log: LaserLog, options: StepOptions) -> tuple[Indices, Indices]:
+    """The rows (n,) where steps begin and end that follow each other; of very many, `options.most` evenly.
+
+    No two of them overlap, so that their errors are independent.
+    """
+    first, last = _all_steps(log, options)
+    chosen, free = [], 0
+    for at, (begin, end) in enumerate(zip(first.tolist(), last.tolist(), strict=True)):
+        if begin >= free:
+            chosen.append(at)
+            free = end
+    kept = np.array(chosen, dtype=np.int64)
+    if len(kept) > options.most:
+        kept = kept[np.linspace(0, len(kept) - 1, options.most).astype(np.int64)]
+    return first[kept], last[kept]
+
+
+def _all_steps(log: LaserLog, options: StepOptions) -> tuple[Indices, Indices]:
+    """Each row that a step can begin at, and the first row that is far enough in time."""
+    first = np.arange(len(log), dtype=np.int64)
+    last = np.maximum(np.searchsorted(log.times, log.times + options.duration), first + 1)
+    kept = last < len(log)
+    first, last = first[kept], last[kept]
+    kept = log.times[last] - log.times[first] <= options.max_duration
+    return first[kept], last[kept]

@@ -1,0 +1,117 @@
+"""Robots calibrated from simulated drives: what comes out, and how far it is from the truth."""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+
+import numpy as np
+import pytest
+
+from nscan_cli.calibration.calibrated_reading import calibrated_reading
+from nscan_cli.calibration.options import CalibrationOptions
+from nscan_cli.calibration.robot_calibration import Calibration, calibrate
+from nscan_cli.errors import InputDataError
+from nscan_cli.logs.laser_log import LaserLog
+from nscan_cli.logs.load import read_log
+from nscan_cli.logs.reading_options import ReadingOptions
+from tests.data import OFFICE_LOG, data_file
+from tests.logs.excerpts import excerpt
+from tests.simulation import faults
+from tests.simulation.drive import Drive, Odometry
+from tests.simulation.laser import Laser
+from tests.simulation.scenes import bare_corridor, office
+
+OPTIONS = CalibrationOptions()
+MOUNTS = ((0.1, 0.0, 0.0), (-0.15, 0.2, 2.5))
+SCALE = 1.0 / Odometry().scale
+SEEDS = range(5)
+LATE = 0.3
+"""s"""
+
+
+def calibrated(log: LaserLog, reading: ReadingOptions | None = None) -> Calibration:
+    return calibrate(log, reading or ReadingOptions(), OPTIONS)
+
+
+@functools.cache
+def drive(mount: tuple[float, float, float], seed: int) -> LaserLog:
+    """60 m through the office, whose file says nothing of the mounting."""
+    scene = dataclasses.replace(office(), drive=Drive(period=0.1))
+    log = scene.record_at(scene.truth()[:1200], seed, Laser(mount=mount)).log()
+    return dataclasses.replace(log, mount=np.zeros(3))
+
+
+@pytest.mark.parametrize("mount", MOUNTS)
+def test_mounting_scale_and_clock_come_out(mount):
+    """Medians over the drives: within 1 cm, 0.3°, 0.5 % and 10 ms."""
+    off = []
+    for seed in SEEDS:
+        found = calibrated(faults.odometry_late(drive(mount, seed), LATE)).values
+        place = np.hypot(found["mount_x"].value - mount[0], found["mount_y"].value - mount[1])
+        turned = abs(np.degrees(found["mount_angle"].value - mount[2]))
+        scale = abs(found["odometry_scale"].value / SCALE - 1.0)
+        off.append((place, turned, scale, abs(found["clock_offset"].value + LATE)))
+    assert (np.median(off, axis=0) < (0.01, 0.3, 0.005, 0.01)).all(), np.median(off, axis=0)
+
+
+def test_errors_are_as_large_as_said():
+    """Mean squares of errors in standard deviations, of mounting, scale and clock."""
+    squares = []
+    for mount in MOUNTS:
+        for seed in SEEDS:
+            found = calibrated(drive(mount, seed)).values
+            true = dict(zip(("mount_x", "mount_y", "mount_angle"), mount, strict=True))
+            true |= {"odometry_scale": SCALE, "clock_offset": 0.0}
+            squares.append([((found[name].value - at) / found[name].sigma) ** 2 for name, at in true.items()])
+    assert 0.5 < np.mean(squares) < 2.0, np.mean(squares, axis=0)
+
+
+def test_a_mirrored_laser():
+    found = calibrated(faults.mirrored(drive(MOUNTS[0], 0)))
+    assert found.mirrored
+    assert found.values["mount_x"].value == pytest.approx(0.1, abs=0.01)
+    assert calibrated_reading(found, ReadingOptions(), OPTIONS).flip
+    assert not calibrated_reading(found, ReadingOptions(flip=True), OPTIONS).flip
+
+
+def test_what_the_file_says_rightly_stays():
+    log = read_log(OFFICE_LOG)
+    reading = calibrated_reading(calibrated(log), ReadingOptions(), OPTIONS)
+    assert reading == ReadingOptions(odometry_scale=reading.odometry_scale)
+    assert reading.odometry_scale == pytest.approx(SCALE, abs=0.003)
+
+
+def test_a_calibrated_robot_needs_no_more():
+    log = drive(MOUNTS[1], 1)
+    reading = calibrated_reading(calibrated(log), ReadingOptions(), OPTIONS)
+    assert reading.mount is not None
+    assert log.odometry is not None
+    scale = reading.odometry_scale
+    again = dataclasses.replace(log, mount=np.array(reading.mount), odometry=log.odometry * (scale, scale, 1))
+    assert calibrated_reading(calibrated(again, reading), reading, OPTIONS) == reading
+
+
+def test_a_drive_without_turns_leaves_the_place_open():
+    log = drive(MOUNTS[0], 0)
+    straight = np.abs(np.gradient(np.unwrap(log.truth[:, 2]))) < 0.003 if log.truth is not None else None
+    assert straight is not None
+    first = int(np.argmax(np.convolve(straight, np.ones(150), "valid")))
+    found = calibrated(excerpt(log, slice(first, first + 150)))
+    assert {"mount_x", "mount_y", "turn_ratio", "clock_offset"} <= set(found.open)
+    assert np.isfinite(found.values["odometry_scale"].sigma)
+    assert calibrated_reading(found, ReadingOptions(), OPTIONS).mount is None
+
+
+def test_too_little_is_an_error():
+    with pytest.raises(InputDataError, match=r"scans measure the motion of [0-9]+ steps? only"):
+        calibrated(bare_corridor().record(1).log())
+    with pytest.raises(InputDataError, match="has no odometry"):
+        calibrated(dataclasses.replace(drive(MOUNTS[0], 0), odometry=None))
+
+
+def test_intel():
+    """Its laser is 0.098 m ahead of where the log has it, by the turns of its tracked path."""
+    found = calibrated(read_log(str(data_file("intel.log.gz")))).values
+    assert found["mount_x"].value == pytest.approx(0.098, abs=0.02)
+    assert found["mount_y"].value == pytest.approx(0.0, abs=0.02)
