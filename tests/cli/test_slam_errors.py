@@ -89,7 +89,7 @@ def test_options_of_mapping_do_not_go_with_a_saved_graph(folder, capsys, options
     assert run(["slam", "--from", "saved.json", "-o", "out.json", *options]) == 2
     out, err = capsys.readouterr()
     assert (out, len(err.splitlines())) == ("", 1)
-    assert "--max-scans, --relations and --no-loops cannot be combined with --from" in err
+    assert "--max-scans, --relations, --calibrate and --no-loops cannot be combined with --from" in err
     assert not (folder / "out.json").exists()
 
 
