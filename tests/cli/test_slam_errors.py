@@ -82,7 +82,8 @@ def test_a_saved_graph_that_is_none(folder, capsys, content, code, said):
 
 
 @pytest.mark.parametrize(
-    "options", [["--max-scans", "4"], ["--relations", "both"], ["--no-loops"], ["--every", "2"]]
+    "options",
+    [["--max-scans", "4"], ["--relations", "both"], ["--no-loops"], ["--calibrate"], ["--every", "2"]],
 )
 def test_options_of_mapping_do_not_go_with_a_saved_graph(folder, capsys, options):
     (folder / "saved.json").write_bytes(write_graph(small_graph()))
