@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -16,17 +16,33 @@ if TYPE_CHECKING:
 
 UNITS = (("millimetres", 0.001), ("centimetres", 0.01))
 """Units that a log may have instead of metres, in metres."""
-MIN_MEDIAN, TYPICAL_MEDIAN, MAX_MEDIAN = 0.2, 3.0, 40.0
-"""Median reading of a log of a plausible unit, m."""
-REMOTE_MEDIAN = 100.0
-"""The median reading of no planar laser is larger, m. From here on metres are out of the question."""
-CERTAIN_FACTOR, UNLIKELY_FACTOR = 4.0, 6.0
-"""A unit is beyond doubt if the median is the typical one times or divided by at most the first, and with
-any other unit by more than the second. A larger first and a smaller second value correct more logs."""
 LIMITS_APART = 1.0
 """Lower limits of lasers are less, and upper limits are more, m."""
-SAMPLE_SIZE = 1 << 20
-"""Number of readings from which the unit is told."""
+
+
+@dataclass(frozen=True)
+class RangeUnitOptions:
+    """When the readings are not in metres."""
+
+    min_median: float = 0.2
+    """Least median reading of a plausible unit, m. A smaller value takes larger units for possible."""
+    max_median: float = 40.0
+    """Greatest median reading of a plausible unit, metres too, m. A larger value tells of fewer logs."""
+    remote_median: float = 100.0
+    """From here on metres are out of the question, m. A larger value corrects fewer logs."""
+    typical_median: float = 3.0
+    """Median reading that is expected, m."""
+    certain_factor: float = 4.0
+    """A unit is beyond doubt if the median is the typical one times or divided by at most this. A larger
+    value corrects more logs."""
+    unlikely_factor: float = 6.0
+    """And if the median in any other unit is the typical one times or divided by more than this. A smaller
+    value corrects more logs."""
+    sample: int = 1 << 20
+    """Number of readings from which the unit is told. A larger value takes longer."""
+
+
+DEFAULT_RANGE_UNIT = RangeUnitOptions()
 
 
 class WrongUnit(NamedTuple):
@@ -62,31 +78,33 @@ class WrongUnit(NamedTuple):
         )
 
 
-def wrong_unit(ranges: NDArray[np.float32], limits: RangeLimits) -> WrongUnit | None:
+def wrong_unit(
+    ranges: NDArray[np.float32], limits: RangeLimits, options: RangeUnitOptions = DEFAULT_RANGE_UNIT
+) -> WrongUnit | None:
     """The unit of readings (S, B) as written; None for metres, or if no unit fits.
 
     The unit is wrong if the median return is beyond the limits or implausibly large, and three quarters of
     the returns would be within the limits in another unit.
     """
-    some = ranges.reshape(-1)[:: -(-ranges.size // SAMPLE_SIZE)]
+    some = ranges.reshape(-1)[:: -(-ranges.size // options.sample)]
     end = np.inf if limits.no_return is None else limits.no_return
     some = some[(some > 0) & (some < end) & np.isfinite(some)]
     if not some.size:
         return None
     median, upper_quartile = (float(value) for value in np.quantile(some, (0.5, 0.75)))
     highest = float(limits.high.max())
-    if median < min(highest, REMOTE_MEDIAN):
+    if median < min(highest, options.max_median):
         return None
     fitting = sorted(
-        (abs(math.log(median * scale / TYPICAL_MEDIAN)), name, scale)
+        (abs(math.log(median * scale / options.typical_median)), name, scale)
         for name, scale in UNITS
-        if MIN_MEDIAN <= median * scale <= MAX_MEDIAN and upper_quartile * scale < highest
+        if options.min_median <= median * scale <= options.max_median and upper_quartile * scale < highest
     )
     if not fitting:
         return None
     (off, name, scale), *others = fitting
-    near, far = math.log(CERTAIN_FACTOR), math.log(UNLIKELY_FACTOR)
-    is_certain = median >= REMOTE_MEDIAN and off <= near and all(other[0] > far for other in others)
+    near, far = math.log(options.certain_factor), math.log(options.unlikely_factor)
+    is_certain = median >= options.remote_median and off <= near and all(other[0] > far for other in others)
     return WrongUnit(name, scale, median, tuple(other[2] for other in others), is_certain)
 
 

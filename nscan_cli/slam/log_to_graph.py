@@ -13,7 +13,7 @@ from nscan_cli.files.provenance import as_parameters, provenance_of
 from nscan_cli.graph.model import Graph
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.logs.reading_options import ReadingOptions
-from nscan_cli.logs.robot_parts import DEFAULT_ROBOT_PARTS
+from nscan_cli.logs.scan_checks import ScanCheckOptions
 from nscan_cli.slam.diagnostics.notices import notices
 from nscan_cli.slam.local_matching.options import NScanOptions
 from nscan_cli.slam.options import Relations, SlamOptions
@@ -77,7 +77,7 @@ def map_log(
     graph = run_slam(state, tell)
     parameters: dict[str, Any] = {
         "reading": dataclasses.asdict(checked.reading),
-        "robot_parts": as_parameters(DEFAULT_ROBOT_PARTS),
+        "scan_checks": as_parameters(ScanCheckOptions()),
         "slam": as_parameters(options),
     }
     said = [*log.report.contradictions, *checked.messages, *notices(state)]

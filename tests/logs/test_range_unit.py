@@ -63,6 +63,15 @@ def test_readings_of_the_open_are_told_and_not_put_right(read):
     assert np.isfinite(log.ranges).any()
 
 
+def test_centimetres_of_a_narrow_place_are_told(read):
+    """Half of the returns are beyond 80: 80 m cannot be excluded."""
+    log = read(recording(readings() * np.float32(80 / np.median(readings())), range_max=0.0))
+    assert log.report.contradictions == ()
+    assert (
+        "looks like centimetres; ranges must be in metres: give --range-scale 0.01" in log.report.warnings[0]
+    )
+
+
 @pytest.mark.parametrize("changes", [{}, {"range_max": 0.0}, {"range_max": 80.0}])
 def test_metres_are_left_alone(read, changes: dict[str, Any]):
     log = read(recording(readings(), **changes))

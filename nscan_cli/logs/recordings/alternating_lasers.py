@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,28 +12,39 @@ from nscan_cli.logs.recordings.decoded_messages import ScanMessage
 from nscan_cli.logs.recordings.turn_segments import TimedScan
 from nscan_cli.poses import Array
 
-COMPARED_SCANS = 128
-"""Number of scans that are compared with the next two. A larger value takes longer."""
-FEWEST_SCANS = 20
-"""Least number of scans of which something is said."""
-MIN_COMPARED = 10
-"""Least number of beams with a return in both of two scans that are compared."""
-LEAST_APART = 0.1
-"""Least difference between the scans of two lasers, as a share of the ranges."""
-MAX_LIKENESS_RATIO = 0.5
-"""Greatest ratio of the difference between a scan and the second next to that between it and the next, if the
-second next is of the same laser. A larger value finds more lasers."""
-MIN_ALTERNATING_SHARE = 0.9
-"""Least share of scans that are more like the second next than the next. A robot that drives leaves nearly
-none; a larger value finds fewer lasers."""
+
+@dataclass(frozen=True)
+class TwoLaserOptions:
+    """When the scans of a topic are those of two lasers."""
+
+    sample: int = 128
+    """Number of scans that are compared with the next two. A larger value takes longer."""
+    min_scans: int = 20
+    """Least number of scans of which something is said."""
+    min_compared: int = 10
+    """Least number of beams with a return in both of two scans that are compared."""
+    min_difference: float = 0.1
+    """Least difference between the scans of two lasers, as a share of the ranges. A smaller value finds more
+    lasers, and takes noise for them."""
+    max_ratio: float = 0.5
+    """Greatest ratio of the difference between a scan and the second next to that between it and the next, if
+    the second next is of the same laser. A larger value finds more lasers."""
+    min_share: float = 0.9
+    """Least share of scans for which this is so. A robot that drives leaves nearly none; a larger value finds
+    fewer lasers."""
 
 
-def first_of_two_lasers(messages: Sequence[TimedScan]) -> tuple[list[TimedScan], str]:
+DEFAULT_TWO_LASERS = TwoLaserOptions()
+
+
+def first_of_two_lasers(
+    messages: Sequence[TimedScan], options: TwoLaserOptions = DEFAULT_TWO_LASERS
+) -> tuple[list[TimedScan], str]:
     """The scans of the first laser alone, and what is said of it; all scans if there is one laser."""
     scans = [message.scan for message in messages]
-    if not _alternate(scans):
+    if not _alternate(scans, options):
         return list(messages), ""
-    is_first = _is_first(scans)
+    is_first = _is_first(scans, options)
     kept = [message for message, first in zip(messages, is_first.tolist(), strict=True) if first]
     said = (
         f"two lasers alternate in one frame, {scans[0].frame}: scans resemble the second next, not the next; "
@@ -42,22 +54,23 @@ def first_of_two_lasers(messages: Sequence[TimedScan]) -> tuple[list[TimedScan],
     return kept, said
 
 
-def _alternate(scans: Sequence[ScanMessage]) -> bool:
+def _alternate(scans: Sequence[ScanMessage], options: TwoLaserOptions) -> bool:
     """Whether scans resemble the second next, and not the next."""
-    if len(scans) < FEWEST_SCANS:
+    if len(scans) < options.min_scans:
         return False
-    rows = np.unique(np.linspace(0, len(scans) - 3, COMPARED_SCANS).astype(np.int64))
+    rows = np.unique(np.linspace(0, len(scans) - 3, options.sample).astype(np.int64))
     to_next, to_second = (
-        np.array([_difference(scans[row], scans[row + later]) for row in rows.tolist()]) for later in (1, 2)
+        np.array([_difference(scans[row], scans[row + later], options.min_compared) for row in rows.tolist()])
+        for later in (1, 2)
     )
     known = np.isfinite(to_next) & np.isfinite(to_second)
-    if not known.any() or float(np.median(to_next[known])) < LEAST_APART:
+    if not known.any() or float(np.median(to_next[known])) < options.min_difference:
         return False
-    alternates = to_second[known] <= MAX_LIKENESS_RATIO * to_next[known]
-    return bool(alternates.mean() >= MIN_ALTERNATING_SHARE)
+    alternates = to_second[known] <= options.max_ratio * to_next[known]
+    return bool(alternates.mean() >= options.min_share)
 
 
-def _is_first(scans: Sequence[ScanMessage]) -> NDArray[np.bool_]:
+def _is_first(scans: Sequence[ScanMessage], options: TwoLaserOptions) -> NDArray[np.bool_]:
     """(S,) whether each scan is of the laser of the first one.
 
     The lasers alternate, unless a scan is clearly more like the one before: then one of the other is missing.
@@ -67,20 +80,20 @@ def _is_first(scans: Sequence[ScanMessage]) -> NDArray[np.bool_]:
     latest: dict[bool, int] = {True: 0, False: 1}
     for row in range(2, len(scans)):
         before = bool(found[row - 1])
-        same = _difference(scans[row], scans[latest[before]])
-        other = _difference(scans[row], scans[latest[not before]])
-        found[row] = before if same < MAX_LIKENESS_RATIO * other else not before
+        same = _difference(scans[row], scans[latest[before]], options.min_compared)
+        other = _difference(scans[row], scans[latest[not before]], options.min_compared)
+        found[row] = before if same < options.max_ratio * other else not before
         latest[bool(found[row])] = row
     return found
 
 
-def _difference(one: ScanMessage, other: ScanMessage) -> float:
+def _difference(one: ScanMessage, other: ScanMessage, min_compared: int) -> float:
     """The median difference of the ranges of two scans, as a share; nan if too few compare."""
     if len(one.ranges) != len(other.ranges):
         return np.nan
     a, b = (np.asarray(scan.ranges, dtype=np.float64) for scan in (one, other))
     there = (a > 0) & (b > 0) & np.isfinite(a) & np.isfinite(b)
-    if np.count_nonzero(there) < MIN_COMPARED:
+    if np.count_nonzero(there) < min_compared:
         return np.nan
     apart: Array = np.abs(np.log(a[there] / b[there]))
     return float(np.median(apart))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -12,13 +13,23 @@ from nscan_cli.logs.recordings.decoded_messages import ScanMessage
 from nscan_cli.poses import Indices
 
 WHOLE_TURN = 2 * math.pi
-STEP_TOLERANCE = 0.5
-"""Segments continue one another to within this share of a step between beams."""
-MIN_CONTINUING_SHARE = 0.5
-"""Least share of messages that go on where the one before ends. A larger value joins fewer recordings."""
-MIN_GAP_RATIO = 2.0
-"""A turn begins after the longest pause if that is so many times the median one. Else it begins at the end
-of the field of view, or with the first message if there is no end."""
+
+
+@dataclass(frozen=True)
+class TurnSegmentOptions:
+    """When messages are segments of turns."""
+
+    step_tolerance: float = 0.5
+    """Segments go on where the one before ends, or one step later, to this share of a step. A larger value
+    joins more recordings."""
+    min_share: float = 0.5
+    """Least share of messages that go on where the one before ends. A larger value joins fewer recordings."""
+    min_gap_ratio: float = 2.0
+    """A turn begins after the longest pause if that is so many times the median one. Else it begins at the
+    end of the field of view, or with the first message if there is no end."""
+
+
+DEFAULT_TURN_SEGMENTS = TurnSegmentOptions()
 
 
 class TimedScan(NamedTuple):
@@ -31,16 +42,18 @@ class TimedScan(NamedTuple):
     """ns, when it was recorded."""
 
 
-def joined_turns(messages: Sequence[TimedScan]) -> tuple[list[TimedScan], str]:
+def joined_turns(
+    messages: Sequence[TimedScan], options: TurnSegmentOptions = DEFAULT_TURN_SEGMENTS
+) -> tuple[list[TimedScan], str]:
     """The scans with the segments of each turn put together, and what is said of it; as they are if none are.
 
     A scan has the times of the segment in its middle. Beams of segments that are missing are nan.
     """
     scans = [message.scan for message in messages]
-    places, beams_a_turn = _places(scans)
+    places, beams_a_turn = _places(scans, options)
     if not len(places):
         return list(messages), ""
-    first = _first_place(messages, places, beams_a_turn)
+    first = _first_place(messages, places, beams_a_turn, options.min_gap_ratio)
     places = (places - first) % beams_a_turn
     turns: list[list[int]] = []
     for row, place in enumerate(places.tolist()):
@@ -60,7 +73,7 @@ def joined_turns(messages: Sequence[TimedScan]) -> tuple[list[TimedScan], str]:
     return joined, said
 
 
-def _places(scans: Sequence[ScanMessage]) -> tuple[Indices, int]:
+def _places(scans: Sequence[ScanMessage], options: TurnSegmentOptions) -> tuple[Indices, int]:
     """Where in a turn, in beams from the first message's first, each message begins; and beams in a turn.
 
     Empty unless messages mostly go on where the one before ends.
@@ -69,7 +82,7 @@ def _places(scans: Sequence[ScanMessage]) -> tuple[Indices, int]:
     firsts = np.array([scan.angle_min for scan in scans])
     sizes = np.array([len(scan.ranges) for scan in scans])
     steps = np.array([scan.angle_increment for scan in scans])
-    if np.abs(steps / step - 1).max() > STEP_TOLERANCE / sizes.max() or sizes.max() < 2:
+    if np.abs(steps / step - 1).max() > options.step_tolerance / sizes.max() or sizes.max() < 2:
         return none, 0
     beams_a_turn = round(WHOLE_TURN / abs(step))
     # One message of a whole turn goes on where it began itself.
@@ -80,13 +93,15 @@ def _places(scans: Sequence[ScanMessage]) -> tuple[Indices, int]:
         np.mod(offsets[1:] - offsets[:-1] - sizes[:-1] + beams_a_turn / 2, WHOLE_TURN / abs(step))
         - beams_a_turn / 2
     )
-    goes_on = np.abs(off) <= 1 + STEP_TOLERANCE
-    if goes_on.mean() < MIN_CONTINUING_SHARE:
+    goes_on = np.abs(off) <= 1 + options.step_tolerance
+    if goes_on.mean() < options.min_share:
         return none, 0
     return np.mod(np.rint(offsets).astype(np.int64), beams_a_turn), beams_a_turn
 
 
-def _first_place(messages: Sequence[TimedScan], places: Indices, beams_a_turn: int) -> int:
+def _first_place(
+    messages: Sequence[TimedScan], places: Indices, beams_a_turn: int, min_gap_ratio: float
+) -> int:
     """The place at which turns begin: after a pause, at the end of the field of view, or anywhere."""
     stamps = [message.log_time if message.stamp is None else message.stamp for message in messages]
     pauses = np.diff(stamps)
@@ -94,7 +109,7 @@ def _first_place(messages: Sequence[TimedScan], places: Indices, beams_a_turn: i
     before = [pauses[places[1:] == place] for place in known]
     usual = [float(np.median(some)) if len(some) else 0.0 for some in before]
     longest = int(np.argmax(usual))
-    if usual[longest] > MIN_GAP_RATIO * float(np.median(usual)):
+    if usual[longest] > min_gap_ratio * float(np.median(usual)):
         return int(known[longest])
     if sum(len(messages[row].scan.ranges) for row in rows.tolist()) >= beams_a_turn:
         return int(places[0])

@@ -1,0 +1,20 @@
+"""What of a log its scans are checked against when it is read, and when it is corrected."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from nscan_cli.logs.range_unit import DEFAULT_RANGE_UNIT, RangeUnitOptions
+from nscan_cli.logs.recordings.alternating_lasers import DEFAULT_TWO_LASERS, TwoLaserOptions
+from nscan_cli.logs.recordings.turn_segments import DEFAULT_TURN_SEGMENTS, TurnSegmentOptions
+from nscan_cli.logs.robot_parts import DEFAULT_ROBOT_PARTS, RobotPartsOptions
+
+
+@dataclass(frozen=True)
+class ScanCheckOptions:
+    """The options of the checks that reading makes, as the provenance of a graph has them."""
+
+    range_unit: RangeUnitOptions = DEFAULT_RANGE_UNIT
+    turn_segments: TurnSegmentOptions = DEFAULT_TURN_SEGMENTS
+    two_lasers: TwoLaserOptions = DEFAULT_TWO_LASERS
+    robot_parts: RobotPartsOptions = DEFAULT_ROBOT_PARTS
