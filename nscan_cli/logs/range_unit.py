@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from nscan_cli.logs.range_limits import LARGEST_RANGE, RangeLimits
+from nscan_cli.logs.range_limits import LARGEST_RANGE, NEIGHBOURHOOD_FACTOR, RangeLimits
 
 if TYPE_CHECKING:
     from nscan_cli.logs.assemble import RawScans
@@ -87,8 +87,9 @@ def wrong_unit(
     the returns would be within the limits in another unit.
     """
     some = ranges.reshape(-1)[:: -(-ranges.size // options.sample)]
-    end = np.inf if limits.no_return is None else limits.no_return
-    some = some[(some > 0) & (some < end) & np.isfinite(some)]
+    some = some[(some > 0) & np.isfinite(some)]
+    if limits.no_return is not None and not _continue_beyond(some, limits.no_return):
+        some = some[some < limits.no_return]
     if not some.size:
         return None
     median, upper_quartile = (float(value) for value in np.quantile(some, (0.5, 0.75)))
@@ -106,6 +107,18 @@ def wrong_unit(
     near, far = math.log(options.certain_factor), math.log(options.unlikely_factor)
     is_certain = median >= options.remote_median and off <= near and all(other[0] > far for other in others)
     return WrongUnit(name, scale, median, tuple(other[2] for other in others), is_certain)
+
+
+def _continue_beyond(readings: NDArray[np.float32], no_return: float) -> bool:
+    """Whether most readings (N,) are far beyond the value that seems to mean "no return", and differ.
+
+    Among whole numbers, any looks like a peak.
+    """
+    beyond = readings[readings > NEIGHBOURHOOD_FACTOR * no_return]
+    if 2 * beyond.size <= readings.size:
+        return False
+    _, counts = np.unique(beyond, return_counts=True)
+    return bool(2 * counts.max() < beyond.size)
 
 
 def scaled(raw: RawScans, scale: float) -> RawScans:

@@ -49,6 +49,24 @@ def test_a_text_log_in_another_unit(tmp_path, factor, unit, scale):
     assert f"looks like {unit}: the ranges are multiplied by {scale:g}" in log.report.contradictions[0]
 
 
+def test_whole_numbers_hide_no_unit(read):
+    """Those of 80 look like a peak of readings without return at the limit."""
+    near = 0.4 * readings(200)
+    log = read(recording(np.round(100 * near), range_max=80.0))
+    np.testing.assert_allclose(log.ranges, near, atol=0.006)
+    assert "looks like centimetres: the ranges are multiplied by 0.01" in log.report.contradictions[0]
+
+
+def test_a_code_for_no_return_is_no_unit(read):
+    """Most beams say 1000, some the limit, and the others metres."""
+    ranges, rng = readings(), np.random.default_rng(4)
+    ranges[rng.random(ranges.shape) < 0.7] = 1000.0
+    ranges[rng.random(ranges.shape) < 0.1] = 12.0
+    log = read(recording(ranges))
+    assert log.report.contradictions == ()
+    assert np.isfinite(log.ranges).mean() > 0.2
+
+
 def test_two_units_that_fit_are_both_named(read):
     """Half of the returns are beyond 900: 9 m or 0.9 m."""
     ranges = readings() * np.float32(900 / np.median(readings()))
