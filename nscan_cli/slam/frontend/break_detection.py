@@ -15,12 +15,12 @@ from numpy.typing import NDArray
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.poses import Array, are_known, compose, relative, transform
 from nscan_cli.slam.frontend.first_scan import place_first
-from nscan_cli.slam.frontend.options import BreakOptions, TrackingOptions
+from nscan_cli.slam.frontend.options import BreakOptions, LaserView, TrackingOptions
 from nscan_cli.slam.frontend.scan_batch import ScanBatch
+from nscan_cli.slam.frontend.sector_of_view import laser_view
 from nscan_cli.slam.frontend.tracked_scans import TrackedScans
 from nscan_cli.slam.frontend.tracker import Tracker
 from nscan_cli.slam.frontend.view_similarity import view_similarity
-from nscan_cli.slam.frontend.visible_points import range_limit
 from nscan_cli.slam.options import SlamOptions
 
 
@@ -54,7 +54,7 @@ class TrackedBatch:
 class SegmentTracker:
     """Tracks the robot segment by segment. Poses of all segments are in one frame, as odometry guesses it.
 
-    `odometry` says whether the scans have any, `range_limit` (m) is that of the laser.
+    `odometry` says whether the scans have any, `laser` is what their laser has in view.
     """
 
     def __init__(
@@ -62,10 +62,10 @@ class SegmentTracker:
         options: TrackingOptions,
         breaking: BreakOptions,
         odometry: bool = True,
-        range_limit: float = np.inf,
+        laser: LaserView | None = None,
     ) -> None:
         self.options, self.breaking = options, breaking
-        self._has_odometry, self._range_limit = odometry, range_limit
+        self._has_odometry, self._laser = odometry, laser
         self.tracker = self._new_tracker()
         self._restarts = self._searches = 0
         """Those of the trackers of earlier segments."""
@@ -131,7 +131,7 @@ class SegmentTracker:
         return settled
 
     def _new_tracker(self) -> Tracker:
-        return Tracker(self.options, self._has_odometry, self._range_limit)
+        return Tracker(self.options, self._has_odometry, self._laser)
 
     def _track(self, scans: ScanBatch, may_wait: bool) -> TrackedBatch:
         """Track scans, and those after them or before them that waited; the last ones may wait now."""
@@ -285,5 +285,6 @@ class SegmentTracker:
 
 def tracker_of(log: LaserLog, options: SlamOptions) -> SegmentTracker:
     """The tracker for a log."""
-    limit = range_limit(log.ranges[log.ranges < options.tracking.max_range], options.tracking)
-    return SegmentTracker(options.tracking, options.breaks, log.odometry is not None, limit)
+    return SegmentTracker(
+        options.tracking, options.breaks, log.odometry is not None, laser_view(log, options.tracking)
+    )

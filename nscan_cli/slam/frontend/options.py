@@ -106,10 +106,32 @@ class TrackingOptions:
     range_limit_share: float = 0.01
     """The range limit ends walls if this share of the ranges is in the last cell before it. Lasers of 12 m
     and more have 0.001 to 0.004 there, those of 6 m and less 0.02 to 0.05."""
+    sector_margin: float = 0.1
+    """Points this near (m) to the border of what the laser had in view are not matched there: walls end. A
+    larger margin matches fewer points."""
+    sector_turn: float = 0.15
+    """A scan that is matched farther from its prediction than this (rad) is matched with all points first:
+    which of them lie in view is not known before."""
     first_scan_path: float = 5.0
     """Length of the path whose scans place the first scan of a track segment, m."""
     first_scan_max_count: int = 2_000
     """Most scans that wait for it: a robot may stand for hours."""
+
+
+class LaserView(NamedTuple):
+    """What a laser has in view."""
+
+    range_limit: float
+    """The range at which walls end, m; infinity if they do not."""
+    middle: Array
+    """(3,) pose of the laser on the robot, turned to the middle of its view."""
+    half_angle: float
+    """Half of its angle, rad; infinity if the laser sees all around."""
+
+    @classmethod
+    def all_around(cls, range_limit: float = np.inf) -> LaserView:
+        """That of a laser that sees all around, up to the range limit (m)."""
+        return cls(range_limit, np.zeros(3), np.inf)
 
 
 class TrackingParameters(NamedTuple):
@@ -119,6 +141,9 @@ class TrackingParameters(NamedTuple):
     """Side of a lattice cell of the map, m."""
     visible_range: float
     """Distance from where a scan was taken up to which it had whole cells in view, m."""
+    laser: LaserView
+    sector_margin: float
+    sector_turn: float
     window: float
     min_motion: float
     widenings: Array
@@ -145,17 +170,19 @@ class TrackingParameters(NamedTuple):
 
     @classmethod
     def of(
-        cls, options: TrackingOptions, has_odometry: bool = False, range_limit: float = np.inf
+        cls, options: TrackingOptions, has_odometry: bool = False, laser: LaserView | None = None
     ) -> TrackingParameters:
-        """Those for a log with or without odometry, whose laser has this range limit (m)."""
+        """Those for a log with or without odometry, whose laser has this view: all around by default."""
+        laser = laser or LaserView.all_around()
         rings = options.restart_angles
         angles = np.full((len(rings), max(map(len, rings), default=0)), np.nan)
         for row, ring in zip(angles, rings, strict=True):
             row[: len(ring)] = ring
         values: dict[str, Any] = {name: value for name, value in vars(options).items() if name in cls._fields}
         values |= {
+            "laser": laser,
             "half": 0.5 * options.gaussians.cell,
-            "visible_range": max(range_limit - options.gaussians.cell, 0.5 * range_limit),
+            "visible_range": max(laser.range_limit - options.gaussians.cell, 0.5 * laser.range_limit),
             "widenings": np.array(options.widenings),
             "coarse_tolerance": options.coarse_tolerance if has_odometry else options.tolerance,
             "restart_angles": angles,

@@ -13,7 +13,7 @@ from nscan_cli.matching.priors import Prior
 from nscan_cli.ndt.transform import Ndt
 from nscan_cli.poses import Array
 from nscan_cli.slam.frontend.local_map import ROWS
-from nscan_cli.slam.frontend.options import TrackingOptions, TrackingParameters
+from nscan_cli.slam.frontend.options import LaserView, TrackingOptions, TrackingParameters
 from nscan_cli.slam.frontend.scan_batch import ScanBatch
 from nscan_cli.slam.frontend.scan_to_map import match_and_count
 from nscan_cli.slam.frontend.track_state import NEXT, RESTARTS, TrackState
@@ -23,20 +23,22 @@ from nscan_cli.slam.frontend.visible_points import points_in_view
 
 
 class Tracker:
-    """Follows the robot from scan to scan. `odometry` says whether the scans have any; `range_limit` in m.
+    """Follows the robot from scan to scan. `odometry` says whether the scans have any, `laser` what is in view.
 
     Without odometry, the faces of a wall are not Gaussians of their own: exact ones hold the robot in place
     in corridors that come into view. And all stages converge, since the start of a match is a guess.
     """
 
-    def __init__(self, options: TrackingOptions, odometry: bool = True, range_limit: float = np.inf) -> None:
+    def __init__(
+        self, options: TrackingOptions, odometry: bool = True, laser: LaserView | None = None
+    ) -> None:
         self.options = options
         gaussians = options.gaussians
         self.map = Ndt.empty(
             gaussians.cell, gaussians.minimum, gaussians.floor, capacity=1 << 14, faces=odometry
         )
         self.searches = 0
-        self._settings = TrackingParameters.of(options, odometry, range_limit)
+        self._settings = TrackingParameters.of(options, odometry, laser)
         self._track = TrackState.begin(options.velocity_scans + 1, options.degeneracy.initial_sigma)
         self._prior = Prior(np.zeros(3), np.zeros((3, 3)))
 

@@ -19,6 +19,7 @@ from nscan_cli.slam.frontend.local_map import ROWS, insert_scan
 from nscan_cli.slam.frontend.motion_prior import contradicts, predict
 from nscan_cli.slam.frontend.options import TrackingParameters
 from nscan_cli.slam.frontend.scan_to_map import match_and_count
+from nscan_cli.slam.frontend.sector_of_view import match_again_in_sector, match_in_sector
 from nscan_cli.slam.frontend.track_state import KNOWN, NEXT, TrackState
 from nscan_cli.slam.frontend.tracked_scans import TrackedScans
 from nscan_cli.slam.frontend.visible_points import points_in_view
@@ -143,21 +144,20 @@ def track_scans(
             predict(track, settings, odometry[k], settings.trusted_odometry, prior)
             has_odometry = np.isfinite(odometry[k, 0])
             in_view = points_in_view(track, settings, scan, prior.mean)
-            assign(found.poses[k], prior.mean)
-            found.values[k], found.inliers[k] = match_and_count(
-                grid, settings, in_view, prior, found.poses[k], found.hessians[k]
-            )
             threshold = restart_threshold(track, settings)
+            matched = match_in_sector(track, grid, settings, in_view, prior, threshold, found, k)
             is_predicted = has_odometry and np.isfinite(track.odometry[0])
             if is_predicted:
-                match_with_doubt(track, grid, settings, in_view, odometry[k], prior, threshold, found, k)
+                match_with_doubt(track, grid, settings, matched, odometry[k], prior, threshold, found, k)
             elif found.inliers[k] < threshold:
-                match_from_other_angles(grid, settings, in_view, prior, threshold, track.counts, found, k)
+                match_from_other_angles(grid, settings, matched, prior, threshold, track.counts, found, k)
             if waits_for_motion(track, settings, odometry, k, found.poses[k], may_wait):
                 continue
             if found.inliers[k] < (settings.lost_inliers if has_odometry else settings.restart_inliers):
                 return k
+            if matched.shape[0] == in_view.shape[0]:
+                matched = match_again_in_sector(track, grid, settings, in_view, prior, found, k)
             if track.counts[KNOWN] >= settings.degeneracy_poses and not has_odometry:
-                keep_prediction(grid, settings, in_view, prior, track.mean_square_deviation, found, k)
+                keep_prediction(grid, settings, matched, prior, track.mean_square_deviation, found, k)
         settle(track, grid, settings, points, ends, odometry, prior, found, k)
     return int(ends.shape[0]) - 1

@@ -1,0 +1,138 @@
+"""Step 1: the points of a scan that lie in the sector in which scans of the local map looked.
+
+A laser that looks ahead sees new walls at its sides when the robot drives backwards or turns. The map's
+pieces of these walls end where its scans ended. They draw the new points to themselves, back to where the
+robot was: in a bare corridor a robot that drove backwards seemed to stand.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from nscan_cli.kernels.array_assignment import assign
+from nscan_cli.kernels.decorators import kernel
+from nscan_cli.logs.field_of_view import field_of_view
+from nscan_cli.logs.laser_log import LaserLog
+from nscan_cli.matching.pose_kernels import wrapped
+from nscan_cli.matching.priors import Prior
+from nscan_cli.ndt.hash_grid import Grid
+from nscan_cli.poses import Array, compose
+from nscan_cli.slam.frontend.local_map import NEWEST, OLDEST
+from nscan_cli.slam.frontend.options import LaserView, TrackingOptions, TrackingParameters
+from nscan_cli.slam.frontend.scan_to_map import match_and_count
+from nscan_cli.slam.frontend.track_state import TrackState
+from nscan_cli.slam.frontend.tracked_scans import TrackedScans
+from nscan_cli.slam.frontend.visible_points import range_limit
+
+WHOLE_TURN_BEAMS = 4
+"""A laser sees all around if no more than this many beams are missing to a whole turn."""
+
+
+def laser_view(log: LaserLog, options: TrackingOptions) -> LaserView:
+    """What the laser of a log has in view."""
+    limit = range_limit(log.ranges[log.ranges < options.max_range], options)
+    first, last, step = field_of_view(log)
+    half = 0.5 * abs(last - first)
+    if half > np.pi - 0.5 * WHOLE_TURN_BEAMS * abs(step):
+        return LaserView.all_around(limit)
+    return LaserView(limit, compose(log.mount, np.array([0.0, 0.0, 0.5 * (first + last)])), half)
+
+
+@kernel
+def points_in_sector(track: TrackState, settings: TrackingParameters, points: Array, pose: Array) -> Array:
+    """The points (m, 2) of a scan at `pose` (3,) that lie in the sector of a scan of the local map.
+
+    Points at its border do not count: the map's piece of their wall is cut there.
+    """
+    half, middle, margin = settings.laser.half_angle, settings.laser.middle, settings.sector_margin
+    if half >= np.pi:
+        return points
+    placed = track.map.placed[track.map.counts[OLDEST] : track.map.counts[NEWEST]]
+    # Where the laser was, and the normals of both borders, to the inside; the newest scan first.
+    sectors, known = np.empty((placed.shape[0], 6)), 0
+    cos, sin = np.cos(pose[2]), np.sin(pose[2])
+    seen, n = np.empty((points.shape[0], 2)), 0
+    for k in range(points.shape[0]):
+        x = pose[0] + cos * points[k, 0] - sin * points[k, 1]
+        y = pose[1] + sin * points[k, 0] + cos * points[k, 1]
+        for scan in range(placed.shape[0]):
+            sector = sectors[scan]
+            if scan == known:
+                _write_sector(placed[placed.shape[0] - 1 - scan], middle, half, sector)
+                known += 1
+            dx, dy = x - sector[0], y - sector[1]
+            is_left = dx * sector[2] + dy * sector[3] >= margin
+            is_right = dx * sector[4] + dy * sector[5] >= margin
+            if (is_left or is_right) if half > 0.5 * np.pi else (is_left and is_right):
+                seen[n, 0], seen[n, 1] = points[k, 0], points[k, 1]
+                n += 1
+                break
+    return seen[:n]
+
+
+@kernel
+def _write_sector(placed: Array, middle: Array, half: float, sector: Array) -> None:
+    cos, sin = np.cos(placed[2]), np.sin(placed[2])
+    right, left = placed[2] + middle[2] - half, placed[2] + middle[2] + half
+    sector[0] = placed[0] + cos * middle[0] - sin * middle[1]
+    sector[1] = placed[1] + sin * middle[0] + cos * middle[1]
+    sector[2], sector[3] = -np.sin(right), np.cos(right)
+    sector[4], sector[5] = np.sin(left), -np.cos(left)
+
+
+@kernel
+def match_in_sector(
+    track: TrackState,
+    grid: Grid,
+    settings: TrackingParameters,
+    points: Array,
+    prior: Prior,
+    threshold: float,
+    found: TrackedScans,
+    k: int,
+) -> Array:
+    """Match scan k from its prediction with those of its points (m, 2) that lie in the sector there.
+
+    If that has fewer inliers than `threshold`, or turns the scan far from the prediction, the prediction was
+    wrong, and with it the choice: all points are matched. Returns the points that were.
+    """
+    in_sector = points_in_sector(track, settings, points, prior.mean)
+    _match_from_prediction(grid, settings, in_sector, prior, found, k)
+    turned = abs(wrapped(found.poses[k, 2] - prior.mean[2]))
+    if in_sector.shape[0] == points.shape[0] or (
+        found.inliers[k] >= threshold and turned <= settings.sector_turn
+    ):
+        return in_sector
+    _match_from_prediction(grid, settings, points, prior, found, k)
+    return points
+
+
+@kernel
+def _match_from_prediction(
+    grid: Grid, settings: TrackingParameters, points: Array, prior: Prior, found: TrackedScans, k: int
+) -> None:
+    assign(found.poses[k], prior.mean)
+    found.values[k], found.inliers[k] = match_and_count(
+        grid, settings, points, prior, found.poses[k], found.hessians[k]
+    )
+
+
+@kernel
+def match_again_in_sector(
+    track: TrackState,
+    grid: Grid,
+    settings: TrackingParameters,
+    points: Array,
+    prior: Prior,
+    found: TrackedScans,
+    k: int,
+) -> Array:
+    """Match scan k from where all of its points (m, 2) were matched, with those in the sector there.
+
+    The share of inliers stays that of all. Returns the points that were matched.
+    """
+    in_sector = points_in_sector(track, settings, points, found.poses[k])
+    if in_sector.shape[0] == points.shape[0] or in_sector.shape[0] == 0:
+        return points
+    found.values[k], _ = match_and_count(grid, settings, in_sector, prior, found.poses[k], found.hessians[k])
+    return in_sector
