@@ -23,7 +23,7 @@ from nscan_cli.slam.frontend.visible_points import points_in_view
 
 
 class Tracker:
-    """Follows the robot from scan to scan. `odometry` says whether the scans have any, `laser` what is in view.
+    """Follows the robot from scan to scan. `odometry` says whether they have any, `laser` what is in view.
 
     Without odometry, the faces of a wall are not Gaussians of their own: exact ones hold the robot in place
     in corridors that come into view. And all stages converge, since the start of a match is a guess.

@@ -34,7 +34,7 @@ class LoopClosureOptions:
     """Least distance that is searched, m: a slip while all else is well known. A larger one is slower."""
     min_turn: float = 0.2
     """Least angle that is searched, rad. A larger one is slower."""
-    max_distance: float = 25.0
+    max_distance: float = 50.0
     """Largest distance that is searched, m. A larger one closes larger loops and is slower."""
     max_distance_lost: float = 100.0
     """Largest distance that is searched after the track has broken, m. A larger one is slower."""

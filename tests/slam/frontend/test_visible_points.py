@@ -40,6 +40,17 @@ def along(poses: Array, truth: Array) -> float:
     return float(((steps * true)[moves].sum(axis=1) / lengths[moves]).sum() / lengths[moves].sum())
 
 
+def tracked_poses(log: LaserLog) -> Array:
+    """(S, 3) where tracking has all scans of a log."""
+    tracker, options = tracker_of(log, SlamOptions()), SlamOptions().tracking
+    segments = [
+        each
+        for scans in scan_batches(log, options.max_range, log.odometry, np.zeros(0, dtype=np.int64))
+        for each in tracker.follow(scans)
+    ]
+    return np.concatenate([each.tracked.poses for each in segments + tracker.finish()])
+
+
 @settings(deadline=None)
 @given(st.integers(0, 2**32 - 1), st.floats(0.5, 8.0))
 def test_points_count_that_lie_within_view_of_a_scan(seed, far):
@@ -71,11 +82,4 @@ def test_corridors_are_as_long_as_they_are_with_a_laser_of_four_metres(odometry)
     """
     log, truth = short_drive()
     log = log if odometry else dataclasses.replace(log, odometry=None)
-    tracker, options = tracker_of(log, SlamOptions()), SlamOptions().tracking
-    segments = [
-        each
-        for scans in scan_batches(log, options.max_range, log.odometry, np.zeros(0, dtype=np.int64))
-        for each in tracker.follow(scans)
-    ]
-    tracked = [each.tracked.poses for each in segments + tracker.finish()]
-    assert abs(along(np.concatenate(tracked), truth) - 1) < (0.01 if odometry else 0.02)
+    assert abs(along(tracked_poses(log), truth) - 1) < (0.01 if odometry else 0.02)
