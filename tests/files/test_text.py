@@ -74,6 +74,10 @@ THINGS = re.compile(
     r" (scans|records|messages|iterations|evaluations|keyframes|poses|loops|pairs|steps|stamps)\b"
 )
 
+ALTERNATING = (
+    " scans of the laser that comes first are read, which may need --mount; give each laser its own topic and "
+    "frame; --as-recorded reads all as those of one laser"
+)
 NEVER_ONE = {
     ("cli/nightly_progress.py", " scans, "): "so many of so many",
     ("cli/nscan.py", " scans"): "a limit",
@@ -84,7 +88,9 @@ NEVER_ONE = {
     ("logs/text/carmen.py", " records"): "a tag",
     ("logs/text/carmen.py", " scans; --laser can be "): "a tag",
     ("logs/text/corrected_poses.py", " records"): "a tag",
+    ("logs/recordings/alternating_lasers.py", ALTERNATING): "two lasers alternate many times",
     ("logs/recordings/mcap.py", " messages on "): "so many of so many",
+    ("logs/recordings/turn_segments.py", " messages of "): "a turn in one message is whole",
     ("mapping/figures/match_plots.py", " scans, least overlap "): "of a joint match",
     ("slam/local_matching/joint_relations.py", " scans hang together"): "so many of so many",
 }

@@ -77,7 +77,7 @@ def test_of_someone_who_walks_along_it_is_told_too_where_tracking_breaks_before(
     log = ROUND["someone who walks along"](round_scene().record(8).log()).log
     said = notices(mapped(log).state)
     assert said[0].startswith("tracking broke at scan 28;")
-    assert "disagree about the distance driven: 8.9 m and 1.9 m from scan 28 to 68" in said[1]
+    assert "disagree about the distance driven: 9.3 m and 1.8 m from scan 28 to 70" in said[1]
 
 
 @pytest.mark.parametrize("trouble", ["none", "people who pass"])
