@@ -75,8 +75,8 @@ THINGS = re.compile(
 )
 
 ALTERNATING = (
-    " scans of the laser that comes first are read, which may need --mount; give each laser its own topic and "
-    "frame; --as-recorded reads all as those of one laser"
+    " scans of the laser that comes first are read, which may need --mount; give each laser its own topic "
+    "and frame; --as-recorded reads all as those of one laser"
 )
 NEVER_ONE = {
     ("cli/nightly_progress.py", " scans, "): "so many of so many",
