@@ -10,14 +10,13 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from nscan_cli.kernels.array_assignment import assign
 from nscan_cli.kernels.decorators import kernel
 from nscan_cli.matching.pose_kernels import composed_pose, relative_pose, wrapped
 from nscan_cli.matching.priors import Prior
 from nscan_cli.ndt.hash_grid import Grid
 from nscan_cli.poses import Array
 from nscan_cli.slam.frontend.options import TrackingParameters
-from nscan_cli.slam.frontend.scan_to_map import match_and_count
+from nscan_cli.slam.frontend.scan_to_map import match_from_prediction
 from nscan_cli.slam.frontend.track_state import NEXT, TrackState
 from nscan_cli.slam.frontend.tracked_scans import TrackedScans
 from nscan_cli.slam.frontend.visible_points import points_in_view
@@ -95,10 +94,7 @@ def match_between(
             prior.mean[a] += share * missing[a]
         prior.mean[2] = wrapped(prior.mean[2])
         in_view = points_in_view(track, settings, points[ends[k] : ends[k + 1]], prior.mean)
-        assign(found.poses[k], prior.mean)
-        found.values[k], found.inliers[k] = match_and_count(
-            grid, settings, in_view, prior, found.poses[k], found.hessians[k]
-        )
+        match_from_prediction(grid, settings, in_view, prior, found, k)
         # The map holds the last scan: what differs from the scans before it is an inlier there.
         found.inliers[k] = min(found.inliers[k], found.inliers[last])
         found.poses[k, 2] = wrapped(found.poses[k, 2])

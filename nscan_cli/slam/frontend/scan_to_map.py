@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from nscan_cli.kernels.array_assignment import assign
 from nscan_cli.kernels.decorators import kernel
 from nscan_cli.matching.pairwise_solver import PairProblem, minimise_pairwise
 from nscan_cli.matching.priors import Prior
@@ -9,6 +10,7 @@ from nscan_cli.ndt.association import begin_association, count_inliers, update_a
 from nscan_cli.ndt.hash_grid import Grid
 from nscan_cli.poses import Array
 from nscan_cli.slam.frontend.options import TrackingParameters
+from nscan_cli.slam.frontend.tracked_scans import TrackedScans
 
 
 @kernel
@@ -25,3 +27,14 @@ def match_and_count(
     value, _, _, _, _ = minimise_pairwise(problem, pose, settings.widenings, *limits, hessian)
     update_association(grid, settings.half, meeting, pose)
     return value, count_inliers(meeting, settings.inlier_bound) / max(points.shape[0], 1)
+
+
+@kernel
+def match_from_prediction(
+    grid: Grid, settings: TrackingParameters, points: Array, prior: Prior, found: TrackedScans, k: int
+) -> None:
+    """Match the points (m, 2) of scan k from its prediction; writes what match_and_count gives to `found`."""
+    assign(found.poses[k], prior.mean)
+    found.values[k], found.inliers[k] = match_and_count(
+        grid, settings, points, prior, found.poses[k], found.hessians[k]
+    )

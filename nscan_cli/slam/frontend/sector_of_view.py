@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from nscan_cli.kernels.array_assignment import assign
 from nscan_cli.kernels.decorators import kernel
 from nscan_cli.logs.field_of_view import field_of_view
 from nscan_cli.logs.laser_log import LaserLog
@@ -19,7 +18,7 @@ from nscan_cli.ndt.hash_grid import Grid
 from nscan_cli.poses import Array, compose
 from nscan_cli.slam.frontend.local_map import NEWEST, OLDEST
 from nscan_cli.slam.frontend.options import LaserView, TrackingOptions, TrackingParameters
-from nscan_cli.slam.frontend.scan_to_map import match_and_count
+from nscan_cli.slam.frontend.scan_to_map import match_and_count, match_from_prediction
 from nscan_cli.slam.frontend.track_state import TrackState
 from nscan_cli.slam.frontend.tracked_scans import TrackedScans
 from nscan_cli.slam.frontend.visible_points import range_limit
@@ -97,24 +96,14 @@ def match_in_sector(
     wrong, and with it the choice: all points are matched. Returns the points that were.
     """
     in_sector = points_in_sector(track, settings, points, prior.mean)
-    _match_from_prediction(grid, settings, in_sector, prior, found, k)
+    match_from_prediction(grid, settings, in_sector, prior, found, k)
     turned = abs(wrapped(found.poses[k, 2] - prior.mean[2]))
     if in_sector.shape[0] == points.shape[0] or (
         found.inliers[k] >= threshold and turned <= settings.sector_turn
     ):
         return in_sector
-    _match_from_prediction(grid, settings, points, prior, found, k)
+    match_from_prediction(grid, settings, points, prior, found, k)
     return points
-
-
-@kernel
-def _match_from_prediction(
-    grid: Grid, settings: TrackingParameters, points: Array, prior: Prior, found: TrackedScans, k: int
-) -> None:
-    assign(found.poses[k], prior.mean)
-    found.values[k], found.inliers[k] = match_and_count(
-        grid, settings, points, prior, found.poses[k], found.hessians[k]
-    )
 
 
 @kernel

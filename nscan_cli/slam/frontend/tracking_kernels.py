@@ -18,7 +18,7 @@ from nscan_cli.slam.frontend.degeneracy import keep_prediction
 from nscan_cli.slam.frontend.local_map import ROWS, insert_scan
 from nscan_cli.slam.frontend.motion_prior import contradicts, predict
 from nscan_cli.slam.frontend.options import TrackingParameters
-from nscan_cli.slam.frontend.scan_to_map import match_and_count
+from nscan_cli.slam.frontend.scan_to_map import match_from_prediction
 from nscan_cli.slam.frontend.sector_of_view import match_again_in_sector, match_in_sector
 from nscan_cli.slam.frontend.track_state import KNOWN, NEXT, TrackState
 from nscan_cli.slam.frontend.tracked_scans import TrackedScans
@@ -100,10 +100,7 @@ def match_with_doubt(
     trusted, inliers, value = prior.information.copy(), found.inliers[k], found.values[k]
     pose, hessian = found.poses[k].copy(), found.hessians[k].copy()
     predict(track, settings, odometry, settings.odometry, prior)
-    assign(found.poses[k], prior.mean)
-    found.values[k], found.inliers[k] = match_and_count(
-        grid, settings, points, prior, found.poses[k], found.hessians[k]
-    )
+    match_from_prediction(grid, settings, points, prior, found, k)
     if found.inliers[k] < threshold:
         match_from_other_angles(grid, settings, points, prior, threshold, track.counts, found, k)
     if not is_contradiction and found.inliers[k] <= inliers + settings.inlier_margin:
