@@ -14,6 +14,7 @@ from nscan_cli.calibration.options import FileCheckOptions
 from nscan_cli.calibration.robot_fit import MIRRORED, MountFit, TurnFit, fit_mount, fit_turns
 from nscan_cli.calibration.step_sampling import telling_steps
 from nscan_cli.files.text import counted
+from nscan_cli.logs.assemble import scaled_odometry
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.logs.reading_options import ReadingOptions
 from nscan_cli.poses import Array, are_known, relative, wrap
@@ -60,8 +61,7 @@ def _as_read(odometry: Array | None, reading: ReadingOptions, corrected: Reading
     """Odometry (S, 3) as other reading options give it."""
     if odometry is None or not corrected.odometry:
         return None
-    factor = corrected.odometry_scale / reading.odometry_scale
-    return odometry * (factor, factor, 1.0)
+    return scaled_odometry(odometry, corrected.odometry_scale / reading.odometry_scale)
 
 
 def find_contradictions(log: LaserLog, reading: ReadingOptions, options: FileCheckOptions) -> list[Finding]:
@@ -151,13 +151,12 @@ def _offset_of_clocks(log: LaserLog, steps: MeasuredSteps, options: FileCheckOpt
 
     Few steps agree at some offset by chance. So more are measured, unless these agree best without any.
     """
-    span = min(options.clock_span, 0.5 * float(log.times[-1] - log.times[0]))
-    first = clock_lag(log, steps, span, options.clock_resolution)
+    first = clock_lag(log, steps, options.clock_span, options.clock_resolution)
     if first is None or abs(first.offset) < options.min_clock_offset:
         return None
     more = telling_steps(log, options.steps, options.more_steps)
     steps = measure_steps(log, more, options.steps)
-    lag = clock_lag(log, steps, span, options.clock_resolution)
+    lag = clock_lag(log, steps, options.clock_span, options.clock_resolution)
     if lag is None or abs(lag.offset) < options.min_clock_offset:
         return None
     is_better = lag.disagreement < options.clock_gain * min(lag.as_stamped, lag.elsewhere)

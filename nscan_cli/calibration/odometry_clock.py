@@ -31,7 +31,9 @@ class ClockLag:
 def clock_lag(
     log: LaserLog, steps: MeasuredSteps, span: float, resolution: float, turn_sign: float = 1.0
 ) -> ClockLag | None:
-    """The best offset within ±span (s), to about a tenth of `resolution` (s); None without turns.
+    """The best offset, to about a tenth of `resolution` (s); None without turns.
+
+    It is looked for within ±span (s), and half of the log's length.
 
     `turn_sign` −1 compares with the turns of mirrored scans.
     """
@@ -43,6 +45,7 @@ def clock_lag(
         return None
     at, headings = log.times[known], np.unwrap(log.odometry[known, 2])
     begins, ends = log.times[steps.first], log.times[steps.last]
+    span = min(span, 0.5 * float(log.times[-1] - log.times[0]))
     count = int(np.ceil(span / resolution))
     offsets = resolution * np.arange(-count, count + 1)
     off = np.array([_disagreement(at + by, headings, begins, ends, turns) for by in offsets]) / whole

@@ -21,7 +21,7 @@ from nscan_cli.errors import InputDataError
 from nscan_cli.files.text import counted
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.logs.reading_options import ReadingOptions
-from nscan_cli.poses import Array, are_known, compose, relative, wrap
+from nscan_cli.poses import Array, are_known, relative, wrap
 
 
 @dataclass(frozen=True)
@@ -160,8 +160,8 @@ class _Drive:
         """The offset of the clocks to begin with, s, None if turns do not tell; whether they are mirrored."""
         if not self.turns_enough:
             return None, False
-        span = min(self.options.clock_span, 0.5 * float(self.log.times[-1] - self.log.times[0]))
-        resolution, gain = self.options.clock_resolution, self.options.clock_gain
+        options, gain = self.options, self.options.clock_gain
+        span, resolution = options.clock_span, options.clock_resolution
         lag, other = (clock_lag(self.log, self.steps, span, resolution, sign) for sign in (1.0, -1.0))
         assert lag is not None
         assert other is not None
@@ -209,20 +209,19 @@ class _Drive:
     ) -> dict[str, Estimate]:
         """Standard deviations of calibrated odometry: of a step's length per metre, of its turn per radian.
 
-        What the matches account for is taken out.
+        What the matches account for is taken out. Lengths are compared with those of the laser's steps: in
+        turns, its distance from the middle of the robot counts as noise.
         """
-        laser = self.laser * (MIRRORED if mirrored else 1.0)
+        turns = self.laser[:, 2] * (-1.0 if mirrored else 1.0)
         told = self.odometry(offset)
         far = self.length >= self.options.min_motion
         lengths = np.hypot(told[:, 0], told[:, 1]) * fit.scale
-        seen = np.array([fit.mount] * len(laser))
-        robot = relative(compose(seen, laser), seen)
-        along = (lengths - np.hypot(robot[:, 0], robot[:, 1]))[far]
-        about = (told[:, 2] - ratio * laser[:, 2] - veer * self.length)[self.turning]
+        along = (lengths - self.length)[far]
+        about = (told[:, 2] - ratio * turns - veer * self.length)[self.turning]
         by_match = np.sqrt(np.median(self.steps.covariances[:, [0, 2], [0, 2]], axis=0))
         return {
             "noise_distance": _noise(along, self.length[far], float(by_match[0])),
-            "noise_turn": _noise(about, np.abs(laser[self.turning, 2]), float(by_match[1])),
+            "noise_turn": _noise(about, np.abs(turns[self.turning]), float(by_match[1])),
         }
 
     def evidence(self, sampled: int) -> Evidence:

@@ -28,14 +28,10 @@ class TurnFit:
     """Turns by odometry as a multiple of those by scans."""
 
     ratio: float
-    sigma: float
-    """Standard deviation of the ratio."""
     spread: float
     """Median residual as a share of the median turn."""
     steps: int
     """Number of steps with a turn."""
-    residual: float
-    """Median residual, rad."""
 
 
 @dataclass(frozen=True)
@@ -53,8 +49,6 @@ class MountFit:
     tail: float
     """Upper quartile of the residuals as a share of the median motion."""
     steps: int
-    residual: float
-    """Median residual, m by scans."""
 
     @property
     def sigmas(self) -> Array:
@@ -69,11 +63,8 @@ def fit_turns(laser: Array, odometry: Array, min_turn: float) -> TurnFit | None:
         return None
     seen, told = laser[turning, 2], odometry[turning, 2]
     fit = robust_fit(seen[:, None, None], told[:, None])
-    residual = float(np.median(fit.residuals))
-    spread = residual / float(np.median(np.abs(seen)))
-    return TurnFit(
-        float(fit.values[0]), float(fit.covariance[0, 0] ** 0.5), spread, int(turning.sum()), residual
-    )
+    spread = float(np.median(fit.residuals)) / float(np.median(np.abs(seen)))
+    return TurnFit(float(fit.values[0]), spread, int(turning.sum()))
 
 
 def fit_mount(laser: Array, odometry: Array, metres_per_radian: float) -> MountFit | None:
@@ -103,7 +94,6 @@ def fit_mount(laser: Array, odometry: Array, metres_per_radian: float) -> MountF
         residual / usual,
         tail / usual,
         len(laser),
-        residual,
     )
 
 

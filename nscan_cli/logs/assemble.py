@@ -99,9 +99,9 @@ def scan_table(readings: Sequence[NDArray[Any]]) -> NDArray[np.float32]:
     return rows
 
 
-def scaled_odometry(odometry: Array, options: ReadingOptions) -> Array:
-    """Odometry (S, 3) whose positions are in m."""
-    return odometry * (options.odometry_scale, options.odometry_scale, 1.0)
+def scaled_odometry(odometry: Array, scale: float) -> Array:
+    """Odometry (S, 3) with its positions multiplied."""
+    return odometry * (scale, scale, 1.0)
 
 
 def laser_log(
@@ -135,7 +135,9 @@ def laser_log(
     hidden = mask_beams(ranges, angle_min[rows], angle_increment[rows], sectors)
     if hidden:
         lost.counts["in masked sectors"] = hidden
-    odometry = None if motion.odometry is None else scaled_odometry(motion.odometry[numbers], options)
+    odometry = motion.odometry
+    if odometry is not None:
+        odometry = scaled_odometry(odometry[numbers], options.odometry_scale)
     return LaserLog(
         source=source,
         format=form,
