@@ -61,8 +61,9 @@ def run_on_log(
     read = log_reader(log)
     scans = read(reading)
     if calibrated:
-        reading = _calibrated(scans, reading, quiet)
-        scans = read(reading)
+        recorded, reading = reading, _calibrated(scans, reading, quiet)
+        if reading != recorded:
+            scans = read(reading)
     for warning in scans.report.notices():
         say(f"warning: {warning}", quiet)
     with progress("mapping", len(scans), quiet) as bar:
