@@ -92,8 +92,8 @@ run.
 WRITTEN = (
     ("GRAPH.json", "`slam -o`", "the pose graph, described by the JSON Schema that it names; read by "
      "`render`, `evaluate`, `nscan`, `slam --from`"),
-    ("MAP.png, MAP.yaml", "`slam --map`, `render -o`", "8-bit gray (0 occupied, 205 unknown, 254 free), its "
-     "place and its scale, for map_server and Nav2"),
+    ("MAP.png or MAP.pgm, MAP.yaml", "`slam --map`, `render -o`", "8-bit gray (0 occupied, 205 unknown, 254 "
+     "free), its place and its scale, for map_server and Nav2"),
     ("OUT.tum", "`slam --trajectory`", "`t x y z qx qy qz qw`, the pose of every scan"),
     ("OUT.g2o", "`slam --g2o`", "`VERTEX_SE2`, `EDGE_SE2` and `FIX` for the keyframes"),
     ("OUT.log", "`slam --carmen`", "CARMEN text: the log with corrected poses"),

@@ -4,37 +4,21 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Sequence
-from pathlib import Path
 from typing import TYPE_CHECKING
 
+from nscan_cli.cli.picture_names import check_suffix
 from nscan_cli.cli.shared_options import Command
 from nscan_cli.cli.subcommand import PATH, option
 from nscan_cli.errors import WrongUsageError
-from nscan_cli.files.outputs import check_writable, is_device, write_atomically
+from nscan_cli.files.outputs import check_writable, write_atomically
 
 if TYPE_CHECKING:
     from PIL.Image import Image
-
-OTHER_SUFFIXES = (
-    ".bmp", ".eps", ".gif", ".jpeg", ".jpg", ".pdf", ".pgm", ".ppm", ".svg", ".tif", ".tiff", ".webp",
-)  # fmt: skip
 
 
 def plot_option(shows: str) -> Callable[[Command], Command]:
     """The option --plot; `shows` describes the picture."""
     return option("--plot", type=PATH, metavar="PICTURE.png", help=f"Draw {shows}, as a PNG.")
-
-
-def check_png(place: str, path: str) -> None:
-    """Raises WrongUsageError if the name of a picture has the suffix of another format, or none."""
-    named = Path(path)
-    if named.suffix.lower() in OTHER_SUFFIXES:
-        raise WrongUsageError(f"{place}: pictures are PNG; name it like {named.stem}.png")
-    # check_writable refuses a folder with its own message.
-    is_file = path != "-" and not is_device(path) and not os.path.isdir(path) and named.name
-    if is_file and not named.suffix:
-        name = named.with_name(f"{named.name.strip('.') or 'map'}.png")
-        raise WrongUsageError(f"{place}: the name has no suffix; pictures are PNG: name it {name}")
 
 
 def check_second_output(name: str, path: str | None, others: Sequence[str | None]) -> None:
@@ -55,7 +39,7 @@ def check_plot(plot: str | None, others: Sequence[str | None]) -> None:
     """Check the output --plot, and that its name is that of a PNG."""
     check_second_output("--plot", plot, others)
     if plot is not None:
-        check_png(f"--plot {plot}", plot)
+        check_suffix(f"--plot {plot}", plot)
 
 
 def write_plot(plot: str, picture: Image) -> None:

@@ -2,24 +2,19 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-from typing import TYPE_CHECKING
-
 import click
 
 from nscan_cli.cli.graph_log import find_log, read_graph_log
-from nscan_cli.cli.plot_option import check_png, check_second_output
+from nscan_cli.cli.map_output import check_map_outputs, resolution_option, write_map, yaml_path
+from nscan_cli.cli.picture_names import check_suffix
+from nscan_cli.cli.plot_option import check_second_output
 from nscan_cli.cli.progress import say
 from nscan_cli.cli.shared_options import common_options, reading_options
 from nscan_cli.cli.subcommand import PATH, argument, option, subcommand
 from nscan_cli.errors import WrongUsageError
-from nscan_cli.files.inputs import base_name
-from nscan_cli.files.outputs import check_writable, is_device, write_atomically
-from nscan_cli.files.text import counted, path_of_name, printable
+from nscan_cli.files.outputs import is_device, write_atomically
+from nscan_cli.files.text import counted
 from nscan_cli.logs.reading_options import ReadingOptions
-
-if TYPE_CHECKING:
-    from nscan_cli.mapping.map_server import MapImage
 
 
 @subcommand(
@@ -34,8 +29,7 @@ if TYPE_CHECKING:
           "current folder.")  # fmt: skip
 @option("-o", "--output", type=PATH, required=True, metavar="MAP.png",
         help="File for the picture; - is standard output.")  # fmt: skip
-@option("--resolution", type=click.FloatRange(0.001, 10), default=0.05, show_default=True, metavar="M",
-        help="Cell size. Smaller cells take more time and memory.")  # fmt: skip
+@resolution_option
 @option("--trajectory", is_flag=True, help="Draw the path.")
 @option("--graph", is_flag=True, help="Draw keyframes and relations.")
 @option("--uncertainty", is_flag=True, help="Draw the uncertainty of the keyframes' positions.")
@@ -68,9 +62,9 @@ def command(
 ) -> None:
     """Draw the occupancy map of a graph from the scans of its LOG.
 
-    LOG is read with the options of slam, unless an option here overrides them. The map is an 8-bit gray PNG
-    with a YAML for map_server and Nav2. With overlays or --style paper it is a colour picture, which robots
-    cannot load, and no YAML is written.
+    LOG is read with the options of slam, unless an option here overrides them. The map is an 8-bit gray PNG,
+    or a PGM if it is named MAP.pgm, with a YAML for map_server and Nav2. With overlays or --style paper it is
+    a colour picture, which robots cannot load, and no YAML is written.
 
     OUT.mcap is a recording of ROS 2 messages on the topics /map, /path, /graph, /scan, /tf and /tf_static.
     Poses of the result are in the frame map; the other frames are odom, base_link and laser, or as in LOG.
@@ -82,6 +76,8 @@ def command(
     if yaml and not in_file:
         raise WrongUsageError("--yaml needs a map in a file; give -o MAP.png, or leave out --yaml")
     yaml = in_file and not picture if yaml is None else yaml
+    if picture:
+        check_suffix(output, output)
     check_map_outputs(output, yaml)
     check_second_output("--mcap", mcap, [graph_file, *log, output, yaml_path(output) if yaml else None])
     if graph_file == "-" and "-" in log:
@@ -120,37 +116,3 @@ def command(
         low_x, low_y, high_x, high_y = grid.bounds
         size = f"{high_x - low_x:.1f} m × {high_y - low_y:.1f} m"
         say(f"{output}: {size} from {counted(len(rows), 'scan')}", quiet)
-
-
-def check_map_outputs(output: str, yaml: bool) -> None:
-    """Check that a map, and its YAML, can be written.
-
-    Raises WrongUsageError and OutputError.
-    """
-    check_png(output, output)
-    check_writable(output)
-    if yaml:
-        if yaml_path(output) == output:
-            raise WrongUsageError(f"{output}: the map would have the name of its YAML; name it like MAP.png")
-        check_writable(yaml_path(output))
-
-
-def write_map(output: str, image: MapImage, yaml: bool, quiet: bool) -> None:
-    """Write a map for map_server, then its YAML if `yaml`."""
-    name = base_name(output)
-    if yaml and path_of_name(name) != Path(output).name:
-        say(
-            f"warning: {printable(yaml_path(output))} names the map {name}, which no loader will find: "
-            "its real name is not UTF-8, which YAML needs",
-            quiet,
-        )
-    from nscan_cli.mapping.map_server import map_png, map_yaml
-
-    write_atomically(output, map_png(image))
-    if yaml:
-        write_atomically(yaml_path(output), map_yaml(name, image))
-
-
-def yaml_path(output: str) -> str:
-    """The path of a map's YAML."""
-    return str(Path(output).with_suffix(".yaml"))

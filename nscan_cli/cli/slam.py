@@ -2,18 +2,22 @@
 
 from __future__ import annotations
 
+import json
 import sys
 import time
 from typing import TYPE_CHECKING
 
 import click
 
+from nscan_cli.cli.map_output import resolution_option
 from nscan_cli.cli.progress import say
 from nscan_cli.cli.shared_options import common_options, reading_options
 from nscan_cli.cli.slam_outputs import SlamOutputs
+from nscan_cli.cli.slam_summary import facts_lines
 from nscan_cli.cli.subcommand import PATH, log_argument, option, subcommand
-from nscan_cli.cli.summary import summary_table
 from nscan_cli.errors import WrongUsageError
+from nscan_cli.files.outputs import write_atomically
+from nscan_cli.files.text import json_bytes
 from nscan_cli.logs.reading_options import ReadingOptions
 
 if TYPE_CHECKING:
@@ -30,6 +34,7 @@ MAPPING_OPTIONS = ("max_scans", "relations", "no_loops", "calibrate")
     ("nscan-cli slam my_bag/ -o my_bag.json", "a folder written by `ros2 bag record`"),
     ("nscan-cli slam robot.log.gz -o robot.json --depfile robot.d", "with a rule for make"),
     ("nscan-cli slam --from robot.json -o refined.json", "a saved graph, optimised and refined"),
+    ("nscan-cli slam robot.log.gz -o robot.json --json | jq .sigma.max", "one value, for a script"),
 )
 @log_argument(required=False)
 @option(
@@ -40,7 +45,10 @@ MAPPING_OPTIONS = ("max_scans", "relations", "no_loops", "calibrate")
     metavar="GRAPH.json",
     help="File for the graph. Default: standard output.",
 )
-@option("--map", "map_file", type=PATH, metavar="MAP.png", help="Also write the map, and MAP.yaml beside it.")
+@option(
+    "--map", "map_file", type=PATH, metavar="MAP.png", help="Also write the map (PNG or PGM), and MAP.yaml."
+)
+@resolution_option
 @option("--trajectory", type=PATH, metavar="OUT.tum", help="Also write the pose of every scan in TUM format.")
 @option(
     "--g2o",
@@ -86,12 +94,14 @@ MAPPING_OPTIONS = ("max_scans", "relations", "no_loops", "calibrate")
 @option(
     "--depfile", type=PATH, metavar="FILE", help="Also write the inputs of all outputs as a rule for make."
 )
+@option("--json", "as_json", is_flag=True, help="Print one JSON object (m, s, degrees).")
 @reading_options
 @common_options
 def command(
     log: tuple[str, ...],
     output: str,
     map_file: str | None,
+    resolution: float,
     trajectory: str | None,
     g2o: str | None,
     carmen: str | None,
@@ -102,6 +112,7 @@ def command(
     no_loops: bool,
     threads: int | None,
     depfile: str | None,
+    as_json: bool,
     reading: ReadingOptions,
     quiet: bool,
     verbose: int,
@@ -114,11 +125,17 @@ def command(
     With --from and without LOG, the log is looked for beside the graph, then in the current folder. It is
     read and matched with the options that the graph was made with. If the log is not found, the graph is
     optimised but not refined.
+
+    With --json the summary goes to standard output as JSON, and the graph to a file.
     """
     if not log and from_file is None:
         raise WrongUsageError("slam: give LOG, or --from GRAPH")
     if output == "-" and not _given("output") and sys.stdout is not None and sys.stdout.isatty():
         raise WrongUsageError("slam: the graph is long; give -o GRAPH.json, or -o - to see it here")
+    if output == "-" and as_json:
+        raise WrongUsageError("slam: --json prints the summary to standard output; give -o GRAPH.json, too")
+    if map_file is None and _given("resolution"):
+        raise WrongUsageError("slam: --resolution is that of the map; give --map MAP.png, too")
     if "-" in log and from_file == "-":
         raise WrongUsageError("standard input (-) can be one input only; give the other by its path")
     if from_file is not None and (reading != ReadingOptions() or _given(*MAPPING_OPTIONS)):
@@ -126,7 +143,7 @@ def command(
             "slam: reading options, --max-scans, --relations, --calibrate and --no-loops cannot be combined "
             "with --from; the graph keeps its own"
         )
-    outputs = SlamOutputs(output, map_file, trajectory, g2o, carmen, depfile)
+    outputs = SlamOutputs(output, map_file, resolution, trajectory, g2o, carmen, depfile)
     from nscan_cli.cli.slam_runs import run_on_graph, run_on_log
     from nscan_cli.logs.log_files import files_of
 
@@ -141,18 +158,21 @@ def command(
     began = time.perf_counter()
     if from_file is None:
         options = slam_options(max_scans, relations, not no_loops)
-        run = run_on_log(log, reading, options, calibrate, threads, quiet, verbose)
+        run = run_on_log(log, reading, options, calibrate, threads, quiet)
     else:
         run = run_on_graph(from_file, log or None, outputs.need_scans, threads, quiet)
         # The log that was found must not be replaced, either.
         outputs.check(run.inputs)
     outputs.write(run.graph, run.scans, run.rows, run.inputs, threads, quiet)
-    seconds = time.perf_counter() - began
-    took = [f"{seconds:.1f} s" + (", including the compilation of kernels" if run.compiled else "")]
-    if from_file is None and run.scans is not None and not run.compiled:
-        rate, span = len(run.scans) / seconds, float(run.scans.times[-1] - run.scans.times[0])
-        took = [f"{took[0]}, {rate:.0f} scans a second, {span / seconds:.0f} times real time"]
-    say(summary_table([*run.summary, ("time", took), ("written", [", ".join(outputs.files())])]), quiet)
+    facts = run.facts | {
+        "seconds": round(time.perf_counter() - began, 3),
+        "compiled": run.compiled,
+        "written": outputs.files(),
+    }
+    if as_json:
+        write_atomically("-", json_bytes(f"{json.dumps(facts, ensure_ascii=False, allow_nan=False)}\n"))
+    else:
+        say(facts_lines(facts, verbose > 0), quiet)
 
 
 def _given(*options: str) -> bool:

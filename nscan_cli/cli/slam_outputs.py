@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING
 
-from nscan_cli.cli.render import check_map_outputs, write_map, yaml_path
+from nscan_cli.cli.map_output import check_map_outputs, write_map, yaml_path
 from nscan_cli.errors import InputDataError, WrongUsageError
 from nscan_cli.files.inputs import label
 from nscan_cli.files.limits import DISTANCE
@@ -27,6 +27,8 @@ class SlamOutputs:
 
     graph: str
     map: str | None
+    resolution: float
+    """Size of a cell of the map, m."""
     trajectory: str | None
     g2o: str | None
     carmen: str | None
@@ -88,7 +90,9 @@ class SlamOutputs:
         image = None
         with short_switch_interval(threads):
             if scans is not None and self.map is not None:
-                image = in_background(threads, partial(_draw_map, scans, rows, graph.poses, threads))
+                image = in_background(
+                    threads, partial(_draw_map, scans, rows, graph.poses, self.resolution, threads)
+                )
             write_atomically(self.graph, write_graph(graph))
         if self.trajectory is not None:
             from nscan_cli.graph.io.tum import write_tum
@@ -120,12 +124,12 @@ class SlamOutputs:
         return os.fsencode(f"{targets}:{prerequisites}\n")
 
 
-def _draw_map(scans: LaserLog, rows: Indices, poses: Array, threads: int) -> MapImage:
+def _draw_map(scans: LaserLog, rows: Indices, poses: Array, resolution: float, threads: int) -> MapImage:
     """The picture of the map. Memory of earlier steps is released before."""
     from nscan_cli.mapping.map_server import map_image
     from nscan_cli.mapping.occupancy import occupancy_grid
     from nscan_cli.memory import trim_heap
 
-    grid = occupancy_grid(scans, rows, poses, threads=threads)
+    grid = occupancy_grid(scans, rows, poses, resolution, threads)
     trim_heap()
     return map_image(grid)

@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import dataclasses
-import re
-from collections import Counter
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from nscan_cli.cli.log_reader import log_reader
 from nscan_cli.cli.progress import Compiling, progress, say
 from nscan_cli.cli.robot_options import changed_flags
-from nscan_cli.cli.summary import Row
+from nscan_cli.cli.slam_summary import Facts, graph_facts
 from nscan_cli.errors import InputDataError, InputMissingError, WrongUsageError
 from nscan_cli.files.inputs import label
 from nscan_cli.files.text import counted
@@ -26,7 +24,7 @@ if TYPE_CHECKING:
 
 @dataclasses.dataclass(frozen=True)
 class SlamRun:
-    """The results of a run, and its summary."""
+    """The results of a run, and the facts of its summary."""
 
     graph: Graph
     scans: LaserLog | None
@@ -35,7 +33,7 @@ class SlamRun:
     """(N,) the row of each node's scan in the log."""
     inputs: list[str]
     """The paths of all files that were read."""
-    summary: list[Row]
+    facts: Facts
     compiled: bool = False
     """Whether kernels were compiled."""
 
@@ -47,7 +45,6 @@ def run_on_log(
     calibrated: bool,
     threads: int,
     quiet: bool,
-    verbose: int,
 ) -> SlamRun:
     """Map a log, with its robot calibrated first if asked."""
     import numpy as np
@@ -64,7 +61,8 @@ def run_on_log(
         recorded, reading = reading, _calibrated(scans, reading, quiet)
         if reading != recorded:
             scans = read(reading)
-    for warning in scans.report.notices():
+    warnings = scans.report.notices()
+    for warning in warnings:
         say(f"warning: {warning}", quiet)
     with progress("mapping", len(scans), quiet) as bar:
 
@@ -75,21 +73,19 @@ def run_on_log(
                 bar.begin("optimising and refining", None)
 
         state, graph = map_log(scans, reading, options, threads, report)
-    for warning in graph.provenance["notices"][len(scans.report.contradictions) :]:
+    later = graph.provenance["notices"][len(scans.report.contradictions) :]
+    for warning in later:
         say(f"warning: {warning}", quiet)
-    summary: list[Row] = [
-        ("scans", [f"{len(scans)} in {float(scans.times[-1] - scans.times[0]):.1f} s"]),
-        *_graph_rows(graph),
-    ]
-    if verbose:
-        starts = counted(state.tracking_restarts, "start")
-        searches = counted(state.tracking_searches, "search")
-        places = counted(len(state.places), "keyframe")
-        summary += [
-            ("tracking", [f"{starts} from other angles, {searches}"]),
-            ("large loops", [f"{places} found by search at a place seen before"]),
-        ]
-    return SlamRun(graph, scans, np.arange(len(scans)), files_of(log), summary, compiling.has_begun)
+    facts = graph_facts(graph) | {
+        "duration": float(scans.times[-1] - scans.times[0]),
+        "tracking": {
+            "restarts": state.tracking_restarts,
+            "searches": state.tracking_searches,
+            "places": len(state.places),
+        },
+        "warnings": [*warnings, *later],
+    }
+    return SlamRun(graph, scans, np.arange(len(scans)), files_of(log), facts, compiling.has_begun)
 
 
 def _calibrated(scans: LaserLog, reading: ReadingOptions, quiet: bool) -> ReadingOptions:
@@ -106,51 +102,6 @@ def _calibrated(scans: LaserLog, reading: ReadingOptions, quiet: bool) -> Readin
         return reading
     say(f"calibrated: {changed_flags(reading, found) or 'the file says what the scans say'}", quiet)
     return found
-
-
-def _graph_rows(graph: Graph) -> list[Row]:
-    """Counts of keyframes, relations and loops, reasons of refused loops, and standard deviations."""
-    from nscan_cli.slam.log_to_graph import Counts
-
-    counts = Counts.of(graph)
-    candidates, refused = counts.accepted + counts.refused.total(), counts.refused.total()
-    loops = f"{candidates} tried, {counts.accepted} accepted, {refused} refused"
-    reasons: Counter[str] = Counter()
-    for reason, count in counts.refused.items():
-        reasons[without_numbers(reason)] += count
-    return [
-        ("keyframes", [f"{counts.keyframes}"]),
-        ("relations", [f"{counts.pairwise} pairwise, {counts.nscan} nScan"]),
-        ("loops", [loops if candidates else "none tried"]),
-        ("refused", [f"{count}: {reason}" for reason, count in reasons.most_common()]),
-        ("sigma", _sigma_lines(graph)),
-    ]
-
-
-def _sigma_lines(graph: Graph) -> list[str]:
-    """Standard deviations of the keyframes' positions, each along its least certain direction."""
-    import numpy as np
-
-    first = int(graph.keyframes[0])
-    known = {keyframe: covariance for keyframe, covariance in graph.marginals.items() if keyframe != first}
-    unknown, lines = len(graph.keyframes) - 1 - len(known), []
-    if known:
-        positions = np.stack([covariance[:2, :2] for covariance in known.values()])
-        sigmas = np.sqrt(np.maximum(np.linalg.eigvalsh(positions)[:, 1], 0.0))
-        worst = graph.scans[list(known)[int(np.argmax(sigmas))]]
-        lines.append(
-            f"{np.median(sigmas):.2g} m in the median, {sigmas.max():.2g} m at scan {worst}, "
-            f"from scan {graph.scans[first]}"
-        )
-    if unknown:
-        lines.append(f"unknown for {counted(unknown, 'keyframe')}")
-    return lines
-
-
-def without_numbers(reason: str) -> str:
-    """The reason without its numbers of scans, so that equal reasons are counted together."""
-    reason = re.sub(r"\d+ of \d+ scans", "some of the scans", reason)
-    return re.sub(r"(all )?\d+ scans?\b", "some scans", reason)
 
 
 def run_on_graph(
@@ -172,7 +123,8 @@ def run_on_graph(
     before = graph.poses
     optimum = optimise_graph(graph)
     if not optimum.converged:
-        say(f"warning: {path}: the optimisation did not converge: its relations contradict each other", quiet)
+        notices.append(f"{path}: the optimisation did not converge: its relations contradict each other")
+        say(f"warning: {notices[-1]}", quiet)
     scans, rows, inputs = None, np.arange(0), [path]
     if read is None:
         graph.marginals = marginal_covariances(graph)
@@ -184,14 +136,16 @@ def run_on_graph(
         with progress("refining", None, quiet):
             graph = resume(graph, scans, rows, threads)
     moved = float(np.hypot(*(graph.poses - before)[:, :2].T).max())
-    refined = "" if read is None else ", then refined"
-    outcome = f"energy {optimum.energy:.6g} after {counted(optimum.iterations, 'iteration')}{refined}"
-    summary: list[Row] = [
-        *_graph_rows(graph),
-        ("optimised", [outcome]),
-        ("moved", [f"no pose by more than {moved:.3g} m"]),
-    ]
-    return SlamRun(graph, scans, rows, inputs, summary, compiling.has_begun)
+    facts = graph_facts(graph) | {
+        "optimised": {
+            "energy": optimum.energy,
+            "iterations": optimum.iterations,
+            "refined": read is not None,
+            "moved": moved,
+        },
+        "warnings": notices,
+    }
+    return SlamRun(graph, scans, rows, inputs, facts, compiling.has_begun)
 
 
 def _graph_log(

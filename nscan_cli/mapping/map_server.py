@@ -1,4 +1,4 @@
-"""The PNG and the YAML of a map that ROS's map_server and Nav2 load.
+"""The picture (PNG or PGM) and the YAML of a map that ROS's map_server and Nav2 load.
 
 Sources: ROS wiki, map_server; Nav2, nav2_map_server/src/map_io.cpp.
 """
@@ -61,6 +61,12 @@ def map_png(image: MapImage) -> bytes:
     from PIL import Image
 
     return png_bytes(Image.fromarray(image.cells))
+
+
+def map_pgm(image: MapImage) -> bytes:
+    """The map as map_server's PGM (Netpbm's P5), 8-bit gray. It is not compressed."""
+    height, width = image.cells.shape
+    return f"P5\n{width} {height}\n255\n".encode() + image.cells.tobytes()
 
 
 def map_yaml(image_name: str, image: MapImage) -> bytes:

@@ -217,7 +217,8 @@ def test_what_is_said(arguments, said, capsys):
 def test_a_picture_needs_a_name_that_says_so(arguments, capsys):
     assert run(arguments) == 2
     err = capsys.readouterr().err
-    assert err.endswith(": the name has no suffix; pictures are PNG: name it map.png\n")
+    formats = "maps are PNG or PGM" if arguments[0] in ("render", "slam") else "pictures are PNG"
+    assert err.endswith(f": the name has no suffix; {formats}: name it map.png\n")
     assert not list(Path().iterdir())
 
 

@@ -37,7 +37,7 @@ PNG = b"\x89PNG\r\n\x1a\n" + bytes(40)
         (["good.log", "--carmen", "out.json"], 2, "two outputs have the same name"),
         (["good.log", "--depfile", "none/out.d"], 73, "none/out.d: the folder none does not exist"),
         (["good.log", "--map", "out.yaml"], 2, "out.yaml: the map would have the name of its YAML"),
-        (["good.log", "--map", "out.JPG"], 2, "out.JPG: pictures are PNG; name it like out.png"),
+        (["good.log", "--map", "out.JPG"], 2, "out.JPG: maps are PNG or PGM; name it like out.png"),
         (["good.log", "--map", "-"], 2, "only the graph (-o) can go to standard output"),
         (["good.log", "--trajectory", "-"], 2, "only the graph (-o) can go to standard output"),
         (["good.log", "--config", "none.toml"], 66, "none.toml"),

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from nscan_cli.cli.main import run
-from nscan_cli.cli.slam_runs import without_numbers
+from nscan_cli.cli.slam_summary import without_numbers
 from nscan_cli.graph.io.json_graph import read_graph
 from tests.cli.test_slam import SHORT
 from tests.data import OFFICE_LOG
