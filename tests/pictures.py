@@ -1,6 +1,6 @@
-"""The pictures of README that show the tool at work: `python -m tests.pictures FOLDER`.
+"""The pictures of README and docs that show the tool at work: `python -m tests.pictures FOLDER`.
 
-Drawn by the commands that README shows. Those of the real logs are left as they are where NSCAN_DATA does not
+Drawn by the commands that the pages show. Those of the real logs are left as they are where NSCAN_DATA does not
 have them.
 """
 
