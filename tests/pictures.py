@@ -1,7 +1,7 @@
 """The pictures of README and docs that show the tool at work: `python -m tests.pictures FOLDER`.
 
-Drawn by the commands that the pages show. Those of the real logs are left as they are where NSCAN_DATA does not
-have them.
+Drawn by the commands that the pages show. Those of the real logs are left as they are where NSCAN_DATA does
+not have them.
 """
 
 from __future__ import annotations
