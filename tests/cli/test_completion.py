@@ -1,4 +1,4 @@
-"""Completion: what shells are told, and the lines of docs/reference.md at work in those that are installed."""
+"""Completion: what shells are told, and the lines of docs/reference.md in those that are installed."""
 
 from __future__ import annotations
 
