@@ -1,4 +1,4 @@
-"""What README.md and docs/ show is run, in a folder with the sample logs, and shows what they say but for numbers.
+"""What README.md and docs/ show is run with the sample logs, and shows what they say but for numbers.
 
 What stands for what: `sample_logs/` is a copy of that folder, with a manifest of its two smallest logs alone.
 `intel.log.gz` and `intel.clf`, a log that is not in the repository, are made of 70 s of the office log after
@@ -140,7 +140,8 @@ def shape(line: str) -> str:
 def test_the_readme_is_short_and_has_what_people_come_for():
     lines = [line for line, _shown in calls("README.md")]
     for begins in ("nscan-cli slam my_bag/", "ros2 run nav2_map_server map_server",
-                   "nscan-cli slam intel.clf", "nscan-cli evaluate", "nscan-cli nightly", "uv tool install", "pipx install"):  # fmt: skip
+                   "nscan-cli slam intel.clf", "nscan-cli evaluate", "nscan-cli nightly",
+                   "uv tool install", "pipx install"):  # fmt: skip
         assert any(line.startswith(begins) for line in lines), begins
     assert len((REPOSITORY / "README.md").read_text().splitlines()) < 200
 
