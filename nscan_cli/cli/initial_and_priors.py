@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -21,9 +20,10 @@ from nscan_cli.graph.io.tum import Trajectory, parse_tum
 from nscan_cli.graph.model import Graph, Pairwise
 from nscan_cli.graph.relative_covariance import RelativePoses
 from nscan_cli.logs.laser_log import LaserLog
-from nscan_cli.matching.joint.joint_energy import Priors, no_priors
+from nscan_cli.matching.joint.joint_energy import Priors
 from nscan_cli.matching.joint.nscan_match import PriorsAmong
-from nscan_cli.matching.priors import MotionModel, odometry_prior
+from nscan_cli.matching.joint.odometry_priors import odometry_priors, priors_of
+from nscan_cli.matching.priors import MotionModel
 from nscan_cli.poses import Array, relative
 
 LOG_REMEDY = "give the graph that was made from this log"
@@ -97,20 +97,6 @@ def initial_poses(knowledge: PoseFile, log: LaserLog, rows: Sequence[int]) -> Ar
     return content.poses[found]
 
 
-def odometry_priors(odometry: Array | None, numbers: Sequence[int], model: MotionModel) -> PriorsAmong:
-    """Priors from the odometry (n, 3) of the scans `numbers`, from each scan to the next in time; or none."""
-
-    def among(kept: Sequence[int]) -> Priors:
-        if odometry is None:
-            return no_priors()
-        order = sorted(range(len(kept)), key=lambda at: numbers[kept[at]])
-        pairs = list(itertools.pairwise(order))
-        priors = [odometry_prior(odometry[kept[a]], odometry[kept[b]], model) for a, b in pairs]
-        return _as_priors(pairs, [prior.mean for prior in priors], [prior.information for prior in priors])
-
-    return among
-
-
 def graph_priors(graph: Graph, numbers: Sequence[int]) -> PriorsAmong:
     """Priors for the scans `numbers` from a graph (paper, V, step 3).
 
@@ -124,7 +110,7 @@ def graph_priors(graph: Graph, numbers: Sequence[int]) -> PriorsAmong:
         places = {nodes[numbers[scan]]: at for at, scan in enumerate(kept) if numbers[scan] in nodes}
         found = [relation for relation in graph.pairwise if all(node in places for node in relation.nodes)]
         found += _connecting_relations(between, sorted(places), [relation.nodes for relation in found])
-        return _as_priors(
+        return priors_of(
             [(places[a], places[b]) for a, b in (relation.nodes for relation in found)],
             [relation.measurement for relation in found],
             [relation.information for relation in found],
@@ -156,9 +142,3 @@ def _connecting_relations(
                 join(earlier, node)
                 break
     return bridges
-
-
-def _as_priors(pairs: list[tuple[int, int]], means: list[Array], information: list[Array]) -> Priors:
-    if not pairs:
-        return no_priors()
-    return Priors(np.array(pairs, dtype=np.int64), np.array(means), np.array(information))

@@ -11,7 +11,7 @@ from nscan_cli.evaluation.remarks import remarks
 from nscan_cli.evaluation.trajectory_errors import trajectory_errors
 from nscan_cli.files.inputs import base_name, label
 from nscan_cli.graph.io.tum import Trajectory
-from nscan_cli.logs.load import DEFAULT_READING
+from nscan_cli.logs.laser_log import DEFAULT_READING
 from nscan_cli.logs.reading_options import ReadingOptions
 
 

@@ -13,9 +13,8 @@ from nscan_cli.files.limits import GRAPH, MB, LimitExceededError
 from nscan_cli.graph.io.json_graph import parse_graph
 from nscan_cli.graph.io.pose_columns import is_pose_table
 from nscan_cli.graph.io.tum import Trajectory, parse_tum
-from nscan_cli.logs.laser_log import LaserLog
+from nscan_cli.logs.laser_log import DEFAULT_READING, LaserLog
 from nscan_cli.logs.load import (
-    DEFAULT_READING,
     content_of,
     log_from,
     read_log,

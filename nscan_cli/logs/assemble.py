@@ -171,6 +171,7 @@ def laser_log(
         truth_times=motion.truth_times,
         truth=motion.truth,
         frames=findings.frames,
+        reading=options,
     )
 
 

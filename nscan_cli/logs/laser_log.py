@@ -16,8 +16,10 @@ from nscan_cli.files.text import counted
 from nscan_cli.kernels.decorators import kernel
 from nscan_cli.logs.device_choice import Device
 from nscan_cli.logs.frame_names import DEFAULT_FRAMES, FrameNames
+from nscan_cli.logs.reading_options import ReadingOptions
 from nscan_cli.poses import Array, Indices, compose
 
+DEFAULT_READING = ReadingOptions()
 SCANS_AT_ONCE = 256
 """Scans whose points are computed together."""
 
@@ -103,6 +105,8 @@ class LaserLog:
     truth: Array | None = None
     """(T, 3) true poses of the robot, or None."""
     frames: FrameNames = DEFAULT_FRAMES
+    reading: ReadingOptions = DEFAULT_READING
+    """The options that the log was read with."""
 
     def __len__(self) -> int:
         return len(self.stamps)

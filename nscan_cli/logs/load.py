@@ -19,7 +19,7 @@ from nscan_cli.files.limits import LimitExceededError
 from nscan_cli.files.provenance import Source
 from nscan_cli.logs.compression import compression_of, decompressed
 from nscan_cli.logs.formats import FORMS, Form, foreign_kind, readable_forms
-from nscan_cli.logs.laser_log import LaserLog
+from nscan_cli.logs.laser_log import DEFAULT_READING, LaserLog
 from nscan_cli.logs.log_files import Parts, first_bytes, journals_of, parts_of
 from nscan_cli.logs.reading_options import ReadingOptions
 from nscan_cli.logs.recordings import split_recordings
@@ -49,7 +49,6 @@ class Database(Container, Protocol):
         """The messages in the file and in its journals (log_files.journals_of). Raises the same errors."""
 
 
-DEFAULT_READING = ReadingOptions()
 RESERVED_MEMORY = 4 << 20
 """Bytes that are freed when memory runs out, so that the error can be handled."""
 

@@ -9,12 +9,12 @@ from typing import get_args
 
 import numpy as np
 
-from nscan_cli.cli.initial_and_priors import odometry_priors
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.logs.load import read_log
 from nscan_cli.matching.joint.index_set import IndexSetKind
 from nscan_cli.matching.joint.joint_energy import JointProblem, all_pairs, joint_energy, no_priors
 from nscan_cli.matching.joint.nscan_match import nscan_match
+from nscan_cli.matching.joint.odometry_priors import odometry_priors
 from nscan_cli.matching.joint.options import JointOptions
 from nscan_cli.matching.joint.scan_set import scan_set
 from nscan_cli.matching.pairwise import PairOptions, match_pair, matched_points, scan_ndt

@@ -10,7 +10,8 @@ import pytest
 
 from nscan_cli.graph.io.tum import parse_tum
 from nscan_cli.graph.model import Graph
-from nscan_cli.logs.load import DEFAULT_READING, read_log
+from nscan_cli.logs.laser_log import DEFAULT_READING
+from nscan_cli.logs.load import read_log
 from nscan_cli.logs.reading_options import ReadingOptions
 from nscan_cli.slam.log_to_graph import map_log
 from nscan_cli.slam.options import SlamOptions
