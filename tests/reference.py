@@ -94,6 +94,8 @@ WRITTEN = (
      "`render`, `evaluate`, `nscan`, `slam --from`"),
     ("MAP.png or MAP.pgm, MAP.yaml", "`slam --map`, `render -o`", "8-bit gray (0 occupied, 205 unknown, 254 "
      "free), its place and its scale, for map_server and Nav2"),
+    ("MAP.html", "`render -o`", "a page for browsers, complete in itself: the map to zoom and to measure in, "
+     "path by time, scans, graph, loops with reasons, uncertainty and notices"),
     ("OUT.tum", "`slam --trajectory`", "`t x y z qx qy qz qw`, the pose of every scan"),
     ("OUT.g2o", "`slam --g2o`", "`VERTEX_SE2`, `EDGE_SE2` and `FIX` for the keyframes"),
     ("OUT.log", "`slam --carmen`", "CARMEN text: the log with corrected poses"),
@@ -105,7 +107,7 @@ WRITTEN = (
      "`--style paper` is 20 cm long in print, its text of 10 points"),
     ("FILE", "`slam --depfile`", "`outputs: inputs` for `include` in a Makefile"),
     ("FOLDER", "`nightly -o`", "report.html, report.json, and for each log a folder with graph, trajectory, "
-     "map and history"),
+     "map, page and history"),
     ("~/.cache/nscan-cli", "all that match", "compiled kernels; can be deleted, but kernels that are "
      "compiled again can round differently"),
 )  # fmt: skip

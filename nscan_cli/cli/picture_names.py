@@ -11,8 +11,10 @@ from nscan_cli.files.outputs import is_device
 
 PICTURE_SUFFIXES = (".png",)
 MAP_SUFFIXES = (".png", ".pgm")
+PAGE_SUFFIXES = (".html", ".htm")
 OTHER_SUFFIXES = (
-    ".bmp", ".eps", ".gif", ".jpeg", ".jpg", ".pdf", ".pgm", ".ppm", ".svg", ".tif", ".tiff", ".webp",
+    ".bmp", ".eps", ".gif", ".htm", ".html", ".jpeg", ".jpg", ".pdf", ".pgm", ".ppm", ".svg", ".tif",
+    ".tiff", ".webp",
 )  # fmt: skip
 
 
@@ -31,6 +33,11 @@ def check_suffix(place: str, path: str, written: Sequence[str] = PICTURE_SUFFIXE
     if is_file and not named.suffix:
         name = named.with_name(f"{named.name.strip('.') or 'map'}.png")
         raise WrongUsageError(f"{place}: the name has no suffix; {what}: name it {name}")
+
+
+def is_page(path: str) -> bool:
+    """Whether the name of a map is that of a page for browsers."""
+    return Path(path).suffix.lower() in PAGE_SUFFIXES
 
 
 def _listed(suffixes: Sequence[str]) -> str:

@@ -6,13 +6,14 @@ import click
 
 from nscan_cli.cli.graph_log import find_log, read_graph_log
 from nscan_cli.cli.map_output import check_map_outputs, resolution_option, write_map, yaml_path
-from nscan_cli.cli.picture_names import check_suffix
+from nscan_cli.cli.picture_names import check_suffix, is_page
 from nscan_cli.cli.plot_option import check_second_output
 from nscan_cli.cli.progress import say
 from nscan_cli.cli.shared_options import common_options, reading_options
 from nscan_cli.cli.subcommand import PATH, argument, option, subcommand
 from nscan_cli.errors import WrongUsageError
-from nscan_cli.files.outputs import is_device, write_atomically
+from nscan_cli.files.inputs import base_name
+from nscan_cli.files.outputs import check_writable, is_device, write_atomically
 from nscan_cli.files.text import counted
 from nscan_cli.logs.reading_options import ReadingOptions
 
@@ -22,6 +23,7 @@ from nscan_cli.logs.reading_options import ReadingOptions
     ("nscan-cli render robot.json robot.log.gz -o robot.png", "a map for robots, robot.png and robot.yaml"),
     ("nscan-cli render robot.json -o figure.png --style paper", "a figure; the log is beside the graph"),
     ("nscan-cli render robot.json -o graph.png --trajectory --graph", "the path and the graph over the map"),
+    ("nscan-cli render robot.json -o robot.html", "a page to zoom, measure, and look at scans and loops"),
 )
 @argument("graph_file", metavar="GRAPH.json", type=PATH, tells="A result of slam; - is standard input.")
 @argument("log", nargs=-1, type=PATH,
@@ -66,19 +68,31 @@ def command(
     or a PGM if it is named MAP.pgm, with a YAML for map_server and Nav2. With overlays or --style paper it is
     a colour picture, which robots cannot load, and no YAML is written.
 
+    MAP.html is a page for any browser that needs no other file: the map to zoom and to measure in, the path
+    by time, scans, keyframes, relations, loops with the reasons of refused ones, uncertainty and notices.
+
     OUT.mcap is a recording of ROS 2 messages on the topics /map, /path, /graph, /scan, /tf and /tf_static.
     Poses of the result are in the frame map; the other frames are odom, base_link and laser, or as in LOG.
     """
     picture = trajectory or graph or uncertainty or style == "paper"
+    page = is_page(output)
+    if page and (picture or yaml):
+        raise WrongUsageError(
+            f"{output}: a page shows all of the graph; leave out overlays, --style and --yaml"
+        )
     if yaml and picture:
         raise WrongUsageError("--yaml is for plain maps, not for colour pictures; leave one of them out")
     in_file = output != "-" and not is_device(output)
     if yaml and not in_file:
         raise WrongUsageError("--yaml needs a map in a file; give -o MAP.png, or leave out --yaml")
-    yaml = in_file and not picture if yaml is None else yaml
-    if picture:
+    yaml = in_file and not picture and not page if yaml is None else yaml
+    if page:
+        check_writable(output)
+    elif picture:
         check_suffix(output, output)
-    check_map_outputs(output, yaml)
+        check_writable(output)
+    else:
+        check_map_outputs(output, yaml)
     check_second_output("--mcap", mcap, [graph_file, *log, output, yaml_path(output) if yaml else None])
     if graph_file == "-" and "-" in log:
         raise WrongUsageError("standard input (-) can be one input only; give the other by its path")
@@ -92,7 +106,12 @@ def command(
     scans, nodes, rows = read_graph_log(graph_file, whole, log, reading)
     poses = whole.poses[nodes]
     grid = occupancy_grid(scans, rows, poses, resolution)
-    if picture:
+    if page:
+        from nscan_cli.mapping.viewer.viewer_page import viewer_page
+
+        title = base_name(output).rpartition(".")[0]
+        write_atomically(output, viewer_page(title, grid, whole, scans, nodes, rows))
+    elif picture:
         from nscan_cli.mapping.figures.canvas import figure_png
         from nscan_cli.mapping.figures.map_plots import Overlays, plot_over_map, plot_paper_figure
 

@@ -17,7 +17,7 @@ from nscan_cli.nightly.manifest import ManifestEntry
 
 OUTSIDE_RESULTS = ("cli/", "nightly/", "exports/", "files/outputs.py")
 """Packages and modules whose code does not affect the results of a log."""
-MAKES_RESULTS = ("nightly/worker.py", "nightly/map_preview.py")
+MAKES_RESULTS = ("nightly/worker.py",)
 """Modules in OUTSIDE_RESULTS whose code affects the results nevertheless."""
 
 

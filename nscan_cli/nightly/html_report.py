@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import base64
-import re
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from nscan_cli import __version__
 from nscan_cli.files.text import counted, printable
+from nscan_cli.mapping.viewer.viewer_page import ViewerParts, viewer_parts
 from nscan_cli.nightly.history_plot import history_svg
 from nscan_cli.nightly.json_report import finish_time
 from nscan_cli.nightly.manifest import ManifestEntry
@@ -67,13 +66,13 @@ def html_report(title: str, checks: list[CheckResult], folder: Path) -> bytes:
         sections=[check for check in by_urgency if check not in never],
         never=never,
         style=Markup((beside / "report.css").read_text("utf-8")),
-        script=Markup((beside / "report.js").read_text("utf-8")),
+        viewer=ViewerParts(*map(Markup, viewer_parts())),
         counted=counted,
         error_change=_error_change,
         run_time=_run_time,
         real_time_factor=_real_time_factor,
         readable_time=_readable_time,
-        map_preview=lambda name: _map_preview(folder / name),
+        map_viewer=lambda name: _map_viewer(folder / name),
         has_history=_has_history,
         history=lambda check: Markup(history_svg(check)),
         bound_text=_bound_text,
@@ -108,18 +107,14 @@ def _readable_time(when: str) -> str:
     return when.replace("T", " ").replace("Z", " UTC")
 
 
-def _map_preview(results: Path) -> dict[str, str | Markup] | None:
-    """The preview of the map, its layers, and width divided by height; None if a file is missing."""
+def _map_viewer(results: Path) -> Markup | None:
+    """The viewer of the map; None if its file is missing."""
     from markupsafe import Markup
 
     try:
-        picture = base64.b64encode((results / "preview.png").read_bytes()).decode()
-        layers = (results / "preview.svg").read_text("utf-8")
+        return Markup((results / "viewer.html").read_text("utf-8"))
     except OSError:
         return None
-    size = re.search(r'viewBox="0 0 (\d+) (\d+)"', layers)
-    aspect = 1.0 if size is None else int(size[1]) / int(size[2])
-    return {"png": picture, "svg": Markup(layers), "aspect": f"{aspect:.4f}"}
 
 
 def _has_history(check: CheckResult) -> bool:

@@ -57,8 +57,8 @@ def map_and_evaluate(
     from nscan_cli.logs.load import read_log
     from nscan_cli.mapping.map_server import map_image, map_png, map_yaml
     from nscan_cli.mapping.occupancy import occupancy_grid
+    from nscan_cli.mapping.viewer.viewer_page import embedded_viewer, viewer_page
     from nscan_cli.nightly import warm_up
-    from nscan_cli.nightly.map_preview import map_preview
     from nscan_cli.slam.log_to_graph import Counts, map_log, slam_options
 
     if cache_folder() is None:
@@ -76,7 +76,8 @@ def map_and_evaluate(
         task["threads"],
         lambda done, keyframes, _accepted: report(done, len(log), keyframes),
     )
-    grid = occupancy_grid(log, np.arange(len(log)), graph.poses)
+    rows = np.arange(len(log))
+    grid = occupancy_grid(log, rows, graph.poses)
     (outputs / "graph.json").write_bytes(write_graph(graph))
     (outputs / "trajectory.tum").write_bytes(write_tum(graph.stamps, graph.poses))
     image = map_image(grid)
@@ -86,9 +87,10 @@ def map_and_evaluate(
     if "numba" in sys.modules and warm_up.cached_files() - kept:
         # Cached code is loaded without numba, so new files of the cache were compiled during this run.
         seconds = None
-    picture, overlay = map_preview(grid, graph)
-    (outputs / "preview.png").write_bytes(picture)
-    (outputs / "preview.svg").write_bytes(overlay)
+    (outputs / "map.html").write_bytes(
+        viewer_page(Path(task["inputs"]["log"]).name, grid, graph, log, rows, rows)
+    )
+    (outputs / "viewer.html").write_bytes(embedded_viewer(Path(task["inputs"]["log"]).name, grid, graph))
     made = Counts.of(graph)
     counts = {
         "scans": len(log),

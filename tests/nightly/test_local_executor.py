@@ -85,7 +85,7 @@ def test_a_process_that_is_killed_and_one_that_fails(fine, scratch, tmp_path):
     assert found["long"].result == {"reason": "its process was killed by signal 9"}
     assert found["empty"].result == {"reason": "log/empty.log: is empty; give a log with laser scans"}
     assert found["fine"].result["counts"]["scans"] == 12
-    outputs = {"graph.json", "map.png", "map.yaml", "preview.png", "preview.svg", "trajectory.tum"}
+    outputs = {"graph.json", "map.html", "map.png", "map.yaml", "trajectory.tum", "viewer.html"}
     assert set(found["fine"].files) == outputs
     assert list(scratch.iterdir()) == []
 

@@ -1,0 +1,1 @@
+"""The map as a page for browsers: to zoom, to measure, and to look at scans, loops and notices."""
