@@ -11,6 +11,7 @@ import json
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from nscan_cli.files.text import counted
 from nscan_cli.graph.model import Graph
@@ -54,7 +55,7 @@ def viewer_data(
         header["loops"] = [
             {"nodes": nodes, "accepted": True, "reason": "", "score": 0.0} for nodes in edges["loop"].tolist()
         ]
-    arrays: dict[str, Array] = {
+    arrays: dict[str, NDArray[Any]] = {
         "poses": graph.poses.astype("<f4"),
         "times": (times - times[0]).astype("<f4"),
         "numbers": graph.scans.astype("<i4"),
@@ -109,19 +110,20 @@ def _sigma(graph: Graph) -> Array:
     return table
 
 
-def _coded_ranges(ranges: Array) -> Array:
+def _coded_ranges(ranges: NDArray[np.float32]) -> NDArray[np.uint8]:
     """The ranges (M, B) as bytes: differences along the beams, low bytes first, then all high bytes.
 
     In units of RANGE_UNIT modulo 2¹⁶, with the sign in the lowest bit; 0 is no return.
     """
     units = np.where(np.isfinite(ranges), np.rint(ranges / RANGE_UNIT), 0.0)
-    steps = np.diff(np.where(units < 2**16, units, 0.0).astype(np.int32), axis=1, prepend=0)
+    whole: NDArray[np.int32] = np.where(units < 2**16, units, 0.0).astype(np.int32)
+    steps: NDArray[np.int32] = np.diff(whole, axis=1, prepend=np.int32(0))
     steps = (steps + 2**15) % 2**16 - 2**15
     coded = ((steps << 1) ^ (steps >> 31)).astype(np.uint16)
     return np.stack([coded & 0xFF, coded >> 8]).astype(np.uint8)
 
 
-def _packed(header: dict[str, Any], arrays: dict[str, Array]) -> bytes:
+def _packed(header: dict[str, Any], arrays: dict[str, NDArray[Any]]) -> bytes:
     """The block: header and arrays, compressed without a time stamp."""
     listed: list[tuple[str, str, int, int]] = []
     header = {**header, "arrays": listed}
