@@ -38,7 +38,7 @@ def calibrated_reading(
         scale = values["odometry_scale"].value
         found = replace(found, odometry_scale=float(f"{scale:.{DECIMALS}g}"))
     clock = values["clock_offset"]
-    if told["clock_offset"] and abs(clock.value - reading.clock_offset) >= options.min_clock_offset:
+    if told["clock_offset"] and abs(clock.value - reading.clock_offset) >= options.clock.min_offset:
         found = replace(found, clock_offset=round(clock.value, DECIMALS))
     return found
 

@@ -114,7 +114,7 @@ class _Evidence:
         odometry = steps.odometry(log.odometry)
         self._poses, self._known = log.odometry, are_known(odometry)
         laser, self.odometry = steps.laser[self._known], odometry[self._known]
-        self.laser, least = laser, options.min_motion
+        self.laser, least = laser, options.steps.min_motion
         self._is_moving = (np.hypot(laser[:, 0], laser[:, 1]) >= least) | (np.abs(laser[:, 2]) >= least)
 
     @property
@@ -123,17 +123,17 @@ class _Evidence:
         return int(self._is_moving.sum())
 
     def turns(self) -> TurnFit | None:
-        return fit_turns(self.laser, self.odometry, self.options.min_motion)
+        return fit_turns(self.laser, self.odometry, self.options.steps.min_motion)
 
     def fit(self, mirrored: bool) -> MountFit | None:
         """The mounting and the scale that explain the steps with motion."""
         laser = self.laser[self._is_moving] * (MIRRORED if mirrored else 1.0)
-        return fit_mount(laser, self.odometry[self._is_moving], self.options.metres_per_radian)
+        return fit_mount(laser, self.odometry[self._is_moving], self.options.steps.metres_per_radian)
 
     def fit_reversed(self) -> MountFit | None:
         """The fit with odometry that counts along one axis the other way."""
         odometry = self.steps.odometry(self._poses * REVERSED)[self._known][self._is_moving]
-        return fit_mount(self.laser[self._is_moving], odometry, self.options.metres_per_radian)
+        return fit_mount(self.laser[self._is_moving], odometry, self.options.steps.metres_per_radian)
 
 
 def _never_moves(odometry: Array, still: float) -> bool:
@@ -151,15 +151,15 @@ def _offset_of_clocks(log: LaserLog, steps: MeasuredSteps, options: FileCheckOpt
 
     Few steps agree at some offset by chance. So more are measured, unless these agree best without any.
     """
-    first = clock_lag(log, steps, options.clock_span, options.clock_resolution)
-    if first is None or abs(first.offset) < options.min_clock_offset:
+    first = clock_lag(log, steps, options.clock)
+    if first is None or abs(first.offset) < options.clock.min_offset:
         return None
     more = telling_steps(log, options.steps, options.more_steps)
     steps = measure_steps(log, more, options.steps)
-    lag = clock_lag(log, steps, options.clock_span, options.clock_resolution)
-    if lag is None or abs(lag.offset) < options.min_clock_offset:
+    lag = clock_lag(log, steps, options.clock)
+    if lag is None or abs(lag.offset) < options.clock.min_offset:
         return None
-    is_better = lag.disagreement < options.clock_gain * min(lag.as_stamped, lag.elsewhere)
+    is_better = lag.disagreement < options.clock.gain * min(lag.as_stamped, lag.elsewhere)
     return lag if is_better else None
 
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from nscan_cli.calibration.measured_steps import MeasuredSteps
+from nscan_cli.calibration.options import ClockOptions
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.poses import Array, are_known
 
@@ -29,11 +30,11 @@ class ClockLag:
 
 
 def clock_lag(
-    log: LaserLog, steps: MeasuredSteps, span: float, resolution: float, turn_sign: float = 1.0
+    log: LaserLog, steps: MeasuredSteps, options: ClockOptions, turn_sign: float = 1.0
 ) -> ClockLag | None:
-    """The best offset, to about a tenth of `resolution` (s); None without turns.
+    """The best offset, to about a tenth of the resolution; None without turns.
 
-    It is looked for within ±span (s), and half of the log's length.
+    It is looked for within half of the log's length.
 
     `turn_sign` −1 compares with the turns of mirrored scans.
     """
@@ -45,7 +46,8 @@ def clock_lag(
         return None
     at, headings = log.times[known], np.unwrap(log.odometry[known, 2])
     begins, ends = log.times[steps.first], log.times[steps.last]
-    span = min(span, 0.5 * float(log.times[-1] - log.times[0]))
+    resolution = options.resolution
+    span = min(options.span, 0.5 * float(log.times[-1] - log.times[0]))
     count = int(np.ceil(span / resolution))
     offsets = resolution * np.arange(-count, count + 1)
     off = np.array([_disagreement(at + by, headings, begins, ends, turns) for by in offsets]) / whole

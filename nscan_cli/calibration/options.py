@@ -34,7 +34,28 @@ class StepOptions:
     Along a corridor a match ends where it starts."""
     agreement: float = 0.03
     """Largest difference of the two measurements, m and rad. A larger one accepts less certain steps."""
+    min_motion: float = 0.05
+    """A step by scans of this length (m) is one with motion, of this turn (rad) one with a turn. With a
+    larger value fewer steps tell of it, each of them more."""
+    metres_per_radian: float = 0.3
+    """A turn of one radian counts as so much motion, m. With a larger value turns weigh more."""
     pair: PairOptions = field(default_factory=PairOptions)
+
+
+@dataclass(frozen=True)
+class ClockOptions:
+    """How the offset between the clocks of odometry and scans is looked for."""
+
+    span: float = 120.0
+    """Longest offset that is looked for, s. A longer one takes longer."""
+    resolution: float = 0.1
+    """Distance of the offsets that are tried, s. A finer one takes longer."""
+    gain: float = 0.6
+    """At the offset the turns have to disagree by less than this share of what they do without, and of what
+    they do anywhere. With a larger share an offset is found more often, also where there is none. The same
+    holds for mirrored turns, against those that are not."""
+    min_offset: float = 0.5
+    """A shorter offset is not worth a word, s: tracking hardly notices it."""
 
 
 @dataclass(frozen=True)
@@ -45,12 +66,9 @@ class FileCheckOptions:
     """
 
     steps: StepOptions = field(default_factory=StepOptions)
+    clock: ClockOptions = field(default_factory=ClockOptions)
     min_steps: int = 12
     """Least number of steps that a finding rests on: with motion, or with a turn."""
-    min_motion: float = 0.05
-    """A step by scans of this length (m) is one with motion, of this turn (rad) one with a turn."""
-    metres_per_radian: float = 0.3
-    """A turn of one radian counts as so much motion, m."""
     still: float = 1e-3
     """Odometry that stays this near to its first pose (m and rad) never moves."""
     max_spread: float = 0.25
@@ -67,15 +85,6 @@ class FileCheckOptions:
     """A scale this near to a power of ten, as a share, is that: a file is in millimetres or centimetres."""
     max_turn_error: float = 0.3
     """Turns by odometry are wrong if they differ by more than this share from those by scans."""
-    min_clock_offset: float = 0.5
-    """A shorter offset of the clocks is not worth a warning, s: tracking hardly notices it."""
-    clock_span: float = 120.0
-    """Longest offset of the clocks that is looked for, s."""
-    clock_resolution: float = 0.1
-    """Distance of the offsets that are tried, s."""
-    clock_gain: float = 0.6
-    """At the offset of the clocks the turns have to disagree by less than this share of what they do without,
-    and of what they do anywhere."""
     more_steps: int = 200
     """Steps of each half of the sample where turns disagree, to find the offset of the clocks."""
     excluded_spread: float = 0.4
@@ -90,21 +99,11 @@ class CalibrationOptions:
     """How a robot is calibrated from a drive."""
 
     steps: StepOptions = field(default_factory=lambda: StepOptions(max_beams=1_000))
+    clock: ClockOptions = field(default_factory=ClockOptions)
     min_steps: int = 30
     """Least number of steps with motion."""
     min_turns: int = 12
     """Least number of steps with a turn for what turns tell: the place of the laser, and the clocks."""
-    min_motion: float = 0.05
-    """A step by scans of this length (m) is one with motion, of this turn (rad) one with a turn."""
-    metres_per_radian: float = 0.3
-    """A turn of one radian counts as so much motion, m."""
-    clock_span: float = 120.0
-    """Longest offset of the clocks that is looked for, s."""
-    clock_resolution: float = 0.1
-    """Distance of the offsets that are tried, s, before the best is refined."""
-    clock_gain: float = 0.6
-    """At the offset of the clocks the turns have to disagree by less than this share of what they do
-    anywhere; otherwise it is open. The same holds for mirrored turns, against those that are not."""
     max_turn_spread: float = 0.4
     """Turns tell nothing where, in the median, they are off by more than this share of them: outdoors single
     matches turn where the robot does not."""
@@ -115,8 +114,6 @@ class CalibrationOptions:
     weighs the steps against each other."""
     angle_sigma_per_radian: float = 0.1
     """Increase of it for each radian turned."""
-    min_clock_offset: float = 0.5
-    """A shorter offset of the clocks is not passed on, s: tracking hardly notices it."""
     min_sigmas: float = 3.0
     """A value that is nearer to the file's, in standard deviations, is that of the file."""
     max_place_sigma: float = 0.02

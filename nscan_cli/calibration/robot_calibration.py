@@ -21,7 +21,7 @@ from nscan_cli.errors import InputDataError
 from nscan_cli.files.text import counted
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.logs.reading_options import ReadingOptions
-from nscan_cli.poses import Array, are_known, relative, wrap
+from nscan_cli.poses import Array, are_known, compose, inverse, relative, wrap
 
 
 @dataclass(frozen=True)
@@ -134,7 +134,7 @@ class _Drive:
         )  # fmt: skip
         self.laser = self.steps.laser
         self._begins, self._ends = log.times[self.steps.first], log.times[self.steps.last]
-        length, least = np.hypot(self.laser[:, 0], self.laser[:, 1]), options.min_motion
+        length, least = np.hypot(self.laser[:, 0], self.laser[:, 1]), options.steps.min_motion
         self.length, self.turning = length, np.abs(self.laser[:, 2]) >= least
         self.moving = (length >= least) | self.turning
 
@@ -160,9 +160,8 @@ class _Drive:
         """The offset of the clocks to begin with, s, None if turns do not tell; whether they are mirrored."""
         if not self.turns_enough:
             return None, False
-        options, gain = self.options, self.options.clock_gain
-        span, resolution = options.clock_span, options.clock_resolution
-        lag, other = (clock_lag(self.log, self.steps, span, resolution, sign) for sign in (1.0, -1.0))
+        options, gain = self.options.clock, self.options.clock.gain
+        lag, other = (clock_lag(self.log, self.steps, options, sign) for sign in (1.0, -1.0))
         assert lag is not None
         assert other is not None
         mirrored = other.disagreement < gain * lag.disagreement
@@ -188,7 +187,7 @@ class _Drive:
             fit = robust_fit(rows[:, None, :], (told / expected)[:, None])
             if lag is not None:
                 # Rates hold near their time only.
-                limit = self.options.clock_resolution
+                limit = self.options.clock.resolution
                 offset += float(np.clip(fit.values[2], -limit, limit))
         sigmas = np.sqrt(np.diag(fit.covariance))
         left = np.median((fit.residuals * expected)[self.turning[used]])
@@ -202,25 +201,26 @@ class _Drive:
 
     def mount_fit(self, offset: float, mirrored: bool) -> MountFit | None:
         laser = self.laser[self.moving] * (MIRRORED if mirrored else 1.0)
-        return fit_mount(laser, self.odometry(offset)[self.moving], self.options.metres_per_radian)
+        return fit_mount(laser, self.odometry(offset)[self.moving], self.options.steps.metres_per_radian)
 
     def noise(
         self, offset: float, fit: MountFit, ratio: float, veer: float, mirrored: bool
     ) -> dict[str, Estimate]:
         """Standard deviations of calibrated odometry: of a step's length per metre, of its turn per radian.
 
-        What the matches account for is taken out. Lengths are compared with those of the laser's steps: in
-        turns, its distance from the middle of the robot counts as noise.
+        What the matches account for is taken out. The laser's steps are compared as those of the robot that
+        carries it at the fitted mounting.
         """
-        turns = self.laser[:, 2] * (-1.0 if mirrored else 1.0)
-        told = self.odometry(offset)
-        far = self.length >= self.options.min_motion
-        lengths = np.hypot(told[:, 0], told[:, 1]) * fit.scale
-        along = (lengths - self.length)[far]
-        about = (told[:, 2] - ratio * turns - veer * self.length)[self.turning]
+        laser = self.laser * (MIRRORED if mirrored else 1.0)
+        robot = compose(compose(fit.mount, laser), inverse(fit.mount))
+        told, came = self.odometry(offset), np.hypot(robot[:, 0], robot[:, 1])
+        far = came >= self.options.steps.min_motion
+        along = (np.hypot(told[:, 0], told[:, 1]) * fit.scale - came)[far]
+        turns = laser[:, 2]
+        about = (told[:, 2] - ratio * turns - veer * came)[self.turning]
         by_match = np.sqrt(np.median(self.steps.covariances[:, [0, 2], [0, 2]], axis=0))
         return {
-            "noise_distance": _noise(along, self.length[far], float(by_match[0])),
+            "noise_distance": _noise(along, came[far], float(by_match[0])),
             "noise_turn": _noise(about, np.abs(turns[self.turning]), float(by_match[1])),
         }
 

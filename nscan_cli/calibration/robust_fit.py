@@ -14,6 +14,8 @@ TO_SIGMA = 1.4826
 """The standard deviation of a Gaussian in medians of its absolute value."""
 CAUCHY = 2.385
 """Residuals of so many standard deviations have half the weight: 95 % efficiency where all are Gaussian."""
+MOST_CONDITION = 1e12
+"""A system with a larger condition number leaves a value open."""
 LEAST_SIGMA = 1e-9
 """Residuals are at least so large, to divide by."""
 
@@ -50,11 +52,28 @@ def robust_fit(coefficients: Array, measured: Array) -> RobustFit:
             weights = 1.0 / np.maximum(residuals, sigma / CAUCHY)
         else:
             weights = 1.0 / (1.0 + (residuals / (CAUCHY * sigma)) ** 2)
-    # The weighted residuals estimate the variance, over the degrees of freedom that the weights leave.
-    used = d * float(weights.sum()) - m
-    variance = float((weights * residuals**2).sum()) / used if used > 0.0 else np.inf
-    information = np.einsum("n,nda,ndb->ab", weights, coefficients, coefficients)
-    covariance = np.full((m, m), np.inf)
-    if np.linalg.cond(information) < 1e12 and np.isfinite(variance):
-        covariance = variance * np.linalg.inv(information)
-    return RobustFit(values, covariance, residuals)
+    return RobustFit(
+        values, _covariance(coefficients, coefficients @ values - measured, CAUCHY * sigma), residuals
+    )
+
+
+def _covariance(coefficients: Array, off: Array, scale: float) -> Array:
+    """(m, m) of the values, from the residuals off (n, d) themselves: they may be larger along one row of an
+    equation than along another. `scale` (in their unit) is that of the loss; inf where a value is open.
+
+    The sandwich of the M-estimator: P. Huber, "Robust Statistics", 1981, 6.3 and 7.6.
+    """
+    n, d, m = coefficients.shape
+    weights = 1.0 / (1.0 + (off**2).sum(axis=1) / scale**2)
+    pulls = np.einsum("n,nda,nd->na", weights, coefficients, off)
+    along = np.einsum("nda,nd->na", coefficients, off)
+    bend = np.einsum("n,nda,ndb->ab", weights, coefficients, coefficients)
+    if n * d <= m or np.linalg.cond(bend) > MOST_CONDITION:
+        return np.full((m, m), np.inf)
+    # Where a residual is beyond the scale, the loss bends the other way.
+    bend -= np.einsum("n,na,nb->ab", 2.0 * (weights / scale) ** 2, along, along)
+    if np.linalg.eigvalsh(bend)[0] <= 0.0:
+        return np.full((m, m), np.inf)
+    inverse = np.linalg.inv(bend)
+    covariance: Array = n * d / (n * d - m) * (inverse @ (pulls.T @ pulls) @ inverse)
+    return covariance

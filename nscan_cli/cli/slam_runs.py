@@ -51,7 +51,7 @@ def run_on_log(
 
     from nscan_cli.kernels.decorators import load_runtime
     from nscan_cli.logs.log_files import files_of
-    from nscan_cli.slam.log_to_graph import map_log
+    from nscan_cli.slam.log_to_graph import map_log, notices_of_mapping
 
     load_runtime()
     compiling = Compiling("a minute or two", quiet)
@@ -73,7 +73,7 @@ def run_on_log(
                 bar.begin("optimising and refining", None)
 
         state, graph = map_log(scans, reading, options, threads, report)
-    later = graph.provenance["notices"][len(scans.report.contradictions) :]
+    later = notices_of_mapping(scans, graph)
     for warning in later:
         say(f"warning: {warning}", quiet)
     facts = graph_facts(graph) | {

@@ -59,7 +59,7 @@ def map_and_evaluate(
     from nscan_cli.mapping.occupancy import occupancy_grid
     from nscan_cli.mapping.viewer.viewer_page import embedded_viewer, viewer_page
     from nscan_cli.nightly import warm_up
-    from nscan_cli.slam.log_to_graph import Counts, map_log, slam_options
+    from nscan_cli.slam.log_to_graph import Counts, map_log, notices_of_mapping, slam_options
 
     if cache_folder() is None:
         warm_up.main()
@@ -99,7 +99,7 @@ def map_and_evaluate(
         "pairwise": made.pairwise,
         "nscan": made.nscan,
         "loops": {"accepted": made.accepted, "refused": made.refused.total()},
-        "warnings": log.report.notices() + graph.provenance["notices"][len(log.report.contradictions) :],
+        "warnings": log.report.notices() + notices_of_mapping(log, graph),
     }
     evaluation = _evaluation(task["inputs"], str(outputs / "graph.json"))
     return {"counts": counts, "evaluation": evaluation, "times": {"seconds": seconds}}

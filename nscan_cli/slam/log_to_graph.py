@@ -54,6 +54,12 @@ def slam_options(
     return dataclasses.replace(whole, nscan=nscan, relations=relations or whole.relations)
 
 
+def notices_of_mapping(log: LaserLog, graph: Graph) -> list[str]:
+    """What was found when the log was mapped, beyond what its reader found, which the graph has first."""
+    found: list[str] = graph.provenance["notices"]
+    return found[len(log.report.contradictions) :]
+
+
 def map_log(
     log: LaserLog, reading: ReadingOptions, options: SlamOptions, threads: int, report: MappingProgress
 ) -> tuple[SlamState, Graph]:
