@@ -17,6 +17,7 @@ from nscan_cli.files.text import counted
 from nscan_cli.logs.assemble import scaled_odometry
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.logs.reading_options import ReadingOptions
+from nscan_cli.logs.robot_path import robot_path
 from nscan_cli.poses import Array, are_known, relative, wrap
 
 ROUND_ANGLE, ROUND_WITHIN = 15.0, 3.0
@@ -52,16 +53,19 @@ def checked_file(log: LaserLog, reading: ReadingOptions, options: FileCheckOptio
     for finding in findings:
         if finding.corrected:
             corrected = replace(reading, **finding.corrected)
-            log = replace(log, odometry=_as_read(log.odometry, reading, corrected))
-            reading = corrected
+            log, reading = _as_read(log, reading, corrected), corrected
     return CheckedFile(log, reading, [finding.message for finding in findings])
 
 
-def _as_read(odometry: Array | None, reading: ReadingOptions, corrected: ReadingOptions) -> Array | None:
-    """Odometry (S, 3) as other reading options give it."""
+def _as_read(log: LaserLog, reading: ReadingOptions, corrected: ReadingOptions) -> LaserLog:
+    """The log with its odometry as other reading options give it."""
+    odometry, path = log.odometry, log.odometry_path
     if odometry is None or not corrected.odometry:
-        return None
-    return scaled_odometry(odometry, corrected.odometry_scale / reading.odometry_scale)
+        return replace(log, odometry=None, odometry_path=None)
+    scale = corrected.odometry_scale / reading.odometry_scale
+    if path is not None:
+        path = robot_path(path.times, scaled_odometry(path.poses, scale))
+    return replace(log, odometry=scaled_odometry(odometry, scale), odometry_path=path)
 
 
 def find_contradictions(log: LaserLog, reading: ReadingOptions, options: FileCheckOptions) -> list[Finding]:

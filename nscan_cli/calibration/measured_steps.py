@@ -39,7 +39,7 @@ def measure_steps(log: LaserLog, rows: tuple[Indices, Indices], options: StepOpt
 
     Every step is matched without odometry, as of one who knows nothing but the scans.
     """
-    at_laser = replace(log, mount=np.zeros(3))
+    at_laser = replace(log, mount=np.zeros(3), path=None)
     found: list[tuple[int, int, PairMatch]] = []
     first, last = rows
     for begin, end in zip(first.tolist(), last.tolist(), strict=True):

@@ -38,7 +38,7 @@ def command(log: tuple[str, ...], as_json: bool, reading: ReadingOptions, **_com
     has found, then fails with the same error.
     """
     survey = survey_of(log, reading)
-    facts = survey.without_unchosen(facts_of(survey.log) | survey.facts(reading))
+    facts = survey.without_unchosen(facts_of(survey.log, reading) | survey.facts(reading))
     if survey.refused is None and not survey.choices:
         Compiling("half a minute", bool(_common["quiet"]))
         facts["warnings"] += _contradictions(survey.log, reading)
@@ -59,7 +59,7 @@ def _contradictions(log: LaserLog, reading: ReadingOptions) -> list[str]:
     return checked_file(log, reading, FileCheckOptions()).messages
 
 
-def facts_of(log: LaserLog) -> dict[str, Any]:
+def facts_of(log: LaserLog, reading: ReadingOptions) -> dict[str, Any]:
     """The object that `info --json` prints, in m, s and degrees. Its keys are always the same."""
     import numpy as np
 
@@ -88,6 +88,7 @@ def facts_of(log: LaserLog) -> dict[str, Any]:
         "angle_max": round(last, 6),
         "angle_increment": round(step, 6),
         "angle_increments": increments,
+        "turn": _turn(log, reading.stamp),
         "start": log.stamps[0],
         "duration": round(duration, 6),
         "rate": rate_of(log),
@@ -147,6 +148,7 @@ def _of_laser(facts: dict[str, Any]) -> list[Row]:
                            f"{_interval(finest, coarsest, '°')} a beam"]),
         ("range limits", [f"{low:g} m to {high:g} m",
                           f"lower: {used['range_min']}", f"upper: {used['range_max']}"]),
+        ("turn", [_turn_line(facts["turn"]), used["turn"]] if "turn" in used else []),
         ("no return", ["no special value" if no_return is None else f"{no_return:g} m and above"]),
         ("beams lost", [f"{facts['beams_without_return']:.1%} without return, "
                         f"{facts['beams_unusable']:.1%} unusable",
@@ -172,6 +174,23 @@ def _of_whole(facts: dict[str, Any]) -> list[Row]:
         ("skipped", [] if skipped is None else skipped or ["none"]),
         ("warnings", facts["warnings"] or ["none"]),
     ]
+
+
+def _turn(log: LaserLog, stamp: str) -> dict[str, Any] | None:
+    """The usual time of a turn of the laser as --sweep takes it, s; None if all beams are seen at once."""
+    import numpy as np
+
+    if log.beam_times is None:
+        return None
+    turns = log.beam_times.step * 2 * np.pi / np.abs(log.angle_increment)
+    return {"seconds": round(float(np.median(turns)), 6), "stamp": stamp}
+
+
+def _turn_line(turn: dict[str, Any] | None) -> str:
+    if turn is None:
+        return "all beams of a scan are seen at once"
+    order = ", readings in the reverse order of time" if turn["seconds"] < 0 else ""
+    return f"a turn takes {abs(turn['seconds']):.3g} s, stamp at the {turn['stamp']} beam{order}"
 
 
 def _mounting_line(x: float, y: float, degrees: float) -> str:

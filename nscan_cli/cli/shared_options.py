@@ -17,7 +17,7 @@ from nscan_cli.errors import InputDataError, WrongUsageError
 from nscan_cli.files.inputs import read_toml
 from nscan_cli.files.outputs import write_atomically
 from nscan_cli.files.text import path_of_name
-from nscan_cli.logs.reading_options import ReadingOptions
+from nscan_cli.logs.reading_options import STAMPS, ReadingOptions
 
 Command = Callable[..., Any]
 NOT_PARAMETERS = ("config", "dump_config", "quiet", "verbose")
@@ -53,6 +53,24 @@ class MaskType(click.ParamType[Any]):
         if not all(len(sector) == 2 and all(map(math.isfinite, sector)) for sector in sectors):
             self.fail(f"{value!r} is not of the form FROM:TO,..., as in 130:150,-150:-130", param, ctx)
         return tuple((math.radians(first), math.radians(last)) for first, last in sectors)
+
+
+class SweepType(click.ParamType[Any]):
+    """SECONDS, auto or off on the command line; inside a number, None for auto, 0 for off."""
+
+    name = "SECONDS|auto|off"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        """Parse the time; a wrong form is a usage error."""
+        if value in ("auto", "off"):
+            return None if value == "auto" else 0.0
+        try:
+            seconds = float(value)
+        except ValueError:
+            seconds = math.nan
+        if not math.isfinite(seconds):
+            self.fail(f"{value!r} is neither a time in seconds nor auto or off", param, ctx)
+        return seconds
 
 
 def common_options(command: Command) -> Command:
@@ -101,6 +119,11 @@ def reading_options(command: Command) -> Command:
         read("--angle-min", type=float, metavar="DEG", help="Direction of the first beam."),
         read("--angle-increment", type=float, metavar="DEG", help="Angle from beam to beam."),
         read("--mask", type=MaskType(), help="Drop beams between bearings (degrees, counter-clockwise)."),
+        read("--sweep", type=SweepType(), default="auto", show_default=True,
+             help="Seconds of a whole turn of the laser, whose beams are seen one after another; negative if "
+             "the readings are in the reverse order of time. off: all at once. auto: as the log says."),
+        read("--stamp", type=click.Choice(STAMPS), default="first", show_default=True,
+             help="Beam of the turn at whose time a scan is stamped."),
         read("--start", type=float, metavar="T", help="Skip the first T seconds."),
         read("--end", type=float, metavar="T", help="Stop T seconds after the first scan."),
         read("--every", type=click.IntRange(1), default=1, show_default=True, metavar="N",

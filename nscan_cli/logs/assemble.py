@@ -22,8 +22,10 @@ from nscan_cli.logs.range_limits import RangeLimits, limits_in_force
 from nscan_cli.logs.range_unit import scaled, wrong_unit
 from nscan_cli.logs.reading_options import ReadingOptions
 from nscan_cli.logs.robot_parts import DEFAULT_ROBOT_PARTS, ScanTable
+from nscan_cli.logs.robot_path import RobotPath, robot_path
 from nscan_cli.logs.scan_order import ScanOrder, selected_numbers
 from nscan_cli.logs.skips import Skips
+from nscan_cli.logs.sweep import Sweep, SweepTimes, beam_times, sweep_of_file
 from nscan_cli.poses import Array, are_known
 
 
@@ -49,6 +51,8 @@ class RawScans:
     """(S,) direction of the last beam as written beside the step, rad; nan if a scan has none."""
     beams: NDArray[np.int64] | None = None
     """(S,) number of beams of each scan; None if all have B."""
+    sweep_times: SweepTimes | None = None
+    """The times of the beams as written; None if the log has none."""
 
     def mirrored(self) -> RawScans:
         """The scans with all directions negated."""
@@ -81,6 +85,8 @@ class RecordedMotion:
     odometry: Array | None
     truth_times: Array | None = None
     truth: Array | None = None
+    path: RobotPath | None = None
+    """Odometry at its own times; None if it has those of the scans."""
 
 
 def empty_scan_table(scans: int, beams: int) -> NDArray[np.float32]:
@@ -135,9 +141,15 @@ def laser_log(
     hidden = mask_beams(ranges, angle_min[rows], angle_increment[rows], sectors)
     if hidden:
         lost.counts["in masked sectors"] = hidden
-    odometry = motion.odometry
+    sweep = _sweep(raw, angle_increment, times, options)
+    if sweep.origin:
+        findings.used["turn"] = sweep.origin
+    swept = beam_times(sweep.turns[numbers], angle_increment[rows], beams, options.stamp)
+    odometry, path = motion.odometry, motion.path if swept is not None else None
     if odometry is not None:
         odometry = scaled_odometry(odometry[numbers], options.odometry_scale)
+    if path is not None:
+        path = robot_path(path.times, scaled_odometry(path.poses, options.odometry_scale))
     return LaserLog(
         source=source,
         format=form,
@@ -165,14 +177,25 @@ def laser_log(
             laser_option=findings.laser_option,
             odometries=findings.odometries,
             corrected=findings.corrected,
-            contradictions=(*findings.contradictions, *contradictions, *masked),
+            contradictions=(*findings.contradictions, *contradictions, *masked, *sweep.said),
         ),
         beams=None if (beams == ranges.shape[1]).all() else beams,
         truth_times=motion.truth_times,
         truth=motion.truth,
         frames=findings.frames,
         reading=options,
+        beam_times=swept,
+        odometry_path=path,
     )
+
+
+def _sweep(raw: RawScans, increments: Array, times: ScanOrder, options: ReadingOptions) -> Sweep:
+    """The times of the laser's turns (S,), in order of time; `increments` (S,) are in file order, rad."""
+    if options.sweep is not None:
+        return Sweep(np.full(len(times.times), options.sweep), "--sweep")
+    rows, beams = times.rows, beam_counts(raw.ranges, raw.beams)
+    told = None if raw.sweep_times is None else raw.sweep_times.of(rows)
+    return sweep_of_file(told, increments[rows], beams[rows], times.times, options.as_recorded)
 
 
 def _in_metres(

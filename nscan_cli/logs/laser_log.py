@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,10 +14,12 @@ from nscan_cli.errors import InputDataError, WrongUsageError
 from nscan_cli.files.provenance import Source
 from nscan_cli.files.text import counted
 from nscan_cli.kernels.decorators import kernel
+from nscan_cli.logs.beam_times import BeamTimes, swept_points
 from nscan_cli.logs.device_choice import Device
 from nscan_cli.logs.frame_names import DEFAULT_FRAMES, FrameNames
 from nscan_cli.logs.reading_options import ReadingOptions
-from nscan_cli.poses import Array, Indices, compose
+from nscan_cli.logs.robot_path import RobotPath, bent_path, poses_at, robot_path
+from nscan_cli.poses import Array, Indices, are_known, compose
 
 DEFAULT_READING = ReadingOptions()
 SCANS_AT_ONCE = 256
@@ -107,6 +109,13 @@ class LaserLog:
     frames: FrameNames = DEFAULT_FRAMES
     reading: ReadingOptions = DEFAULT_READING
     """The options that the log was read with."""
+    beam_times: BeamTimes | None = None
+    """The times of the beams of a laser that turns; None if each scan is seen at once."""
+    odometry_path: RobotPath | None = None
+    """The odometry at its own times, which tells more than the poses at the scans; None where it is not
+    kept: the laser sees at once, or there is none."""
+    path: RobotPath | None = None
+    """How the robot moves while the laser turns; None: as if it stood. See `moving_along`."""
 
     def __len__(self) -> int:
         return len(self.stamps)
@@ -156,7 +165,45 @@ class LaserLog:
             first, between = first[:1], between[:1]
         angles = first[:, None] + between[:, None] * np.arange(self.ranges.shape[1])
         turn = np.array([np.cos(self.mount[2]), np.sin(self.mount[2])])
+        if self.beam_times is not None and self.path is not None:
+            laser = np.concatenate([self.mount[:2], turn])
+            times, beams = self.times[rows], self.beam_times.of(rows)
+            directions = np.cos(angles), np.sin(angles)
+            return swept_points(self.ranges[rows], directions, laser, reach, times, beams, self.path)
         return _end_points(self.ranges[rows], np.cos(angles), np.sin(angles), self.mount, turn, reach)
+
+    def at_middle_of_turns(self) -> LaserLog:
+        """The log with each scan at the time of its middle beam, and the odometry there, if the laser turns.
+
+        How fast the robot moves then matters least for where a scan is: errors at its two ends cancel out.
+        """
+        if self.beam_times is None:
+            return self
+        middle = self.beam_times.first + 0.5 * (self.beam_counts() - 1) * self.beam_times.step
+        times, odometry, path = self.times + middle, self.odometry, self.odometry_path
+        if odometry is not None:
+            path = path or robot_path(self.times, odometry)
+            if path is not None:
+                odometry = np.where(are_known(odometry)[:, None], poses_at(path, times), np.nan)
+        beams = BeamTimes(self.beam_times.first - middle, self.beam_times.step)
+        return replace(self, times=times, odometry=odometry, odometry_path=path, beam_times=beams)
+
+    def moving_along(self, poses: Array | None, rows: Indices | None = None) -> LaserLog:
+        """The log with every beam seen from where the robot was, if the laser turns: `points` are corrected.
+
+        `poses` (N, 3) are the robot's in some rows (N,), increasing, or in all; None: as far as odometry
+        tells them. Between two of them it moves as odometry says, or else steadily.
+        """
+        if self.beam_times is None:
+            return self
+        if poses is None:
+            if self.odometry is None:
+                return replace(self, path=None)
+            return replace(self, path=self.odometry_path or robot_path(self.times, self.odometry))
+        times = self.times if rows is None else self.times[rows]
+        if self.odometry is None or self.odometry_path is None:
+            return replace(self, path=robot_path(times, poses))
+        return replace(self, path=bent_path(self.odometry_path, times, poses))
 
     def laser_pose(self, robot: Array) -> Array:
         """Poses (…, 3) of the laser for poses (…, 3) of the robot."""

@@ -7,6 +7,11 @@ from dataclasses import dataclass
 
 from nscan_cli.errors import WrongUsageError
 
+STAMPS = ("first", "middle", "last")
+"""The beams at whose time a scan may be stamped."""
+LONGEST_TURN = 2.0
+"""s; no laser that maps turns more slowly."""
+
 
 @dataclass(frozen=True)
 class ReadingOptions:
@@ -35,6 +40,11 @@ class ReadingOptions:
     mask: tuple[tuple[float, float], ...] | None = None
     """Sectors of beams that are not read: two bearings in the laser's frame each, from the first
     counter-clockwise to the second, rad."""
+    sweep: float | None = None
+    """Time that a whole turn of the laser takes, s: beams are seen one after another. Negative if the
+    readings are in the reverse order of time; 0: all are seen at once."""
+    stamp: str = "first"
+    """Beam at whose time a scan is stamped: first, middle or last of the scan."""
     start: float | None = None
     """Time of the first scan to read after the log's first one, s."""
     end: float | None = None
@@ -60,7 +70,7 @@ class ReadingOptions:
     def __post_init__(self) -> None:
         """Raises WrongUsageError for values that fit no log."""
         given = (self.min_range, self.max_range, self.range_scale, self.angle_min, self.angle_increment,
-                 self.start, self.end, self.odometry_scale, self.clock_offset)  # fmt: skip
+                 self.start, self.end, self.odometry_scale, self.clock_offset, self.sweep)  # fmt: skip
         if not all(math.isfinite(value) for value in (*given, *(self.mount or ())) if value is not None):
             raise WrongUsageError("a reading option is not a finite number; give one that is")
         if self.max_range is not None and self.max_range <= (self.min_range or 0.0):
@@ -69,6 +79,10 @@ class ReadingOptions:
             raise WrongUsageError("--range-scale has to be above 0")
         if self.angle_increment == 0:
             raise WrongUsageError("--angle-increment is 0; beams need different directions")
+        if self.sweep is not None and abs(self.sweep) > LONGEST_TURN:
+            raise WrongUsageError(f"--sweep is beyond {LONGEST_TURN:g} s; give the seconds of one turn")
+        if self.stamp not in STAMPS:
+            raise WrongUsageError(f"--stamp is {self.stamp!r}; give one of {', '.join(STAMPS)}")
         if self.odometry_scale <= 0:
             raise WrongUsageError("--odometry-scale is not above 0; give the metres of one unit of odometry")
         if not all(math.isfinite(bearing) for sector in self.mask or () for bearing in sector):

@@ -8,6 +8,7 @@ from nscan_cli.logs.range_unit import DEFAULT_RANGE_UNIT, RangeUnitOptions
 from nscan_cli.logs.recordings.alternating_lasers import DEFAULT_TWO_LASERS, TwoLaserOptions
 from nscan_cli.logs.recordings.turn_segments import DEFAULT_TURN_SEGMENTS, TurnSegmentOptions
 from nscan_cli.logs.robot_parts import DEFAULT_ROBOT_PARTS, RobotPartsOptions
+from nscan_cli.logs.sweep import DEFAULT_SWEEP, SweepOptions
 
 
 @dataclass(frozen=True)
@@ -18,3 +19,4 @@ class ScanCheckOptions:
     turn_segments: TurnSegmentOptions = DEFAULT_TURN_SEGMENTS
     two_lasers: TwoLaserOptions = DEFAULT_TWO_LASERS
     robot_parts: RobotPartsOptions = DEFAULT_ROBOT_PARTS
+    sweep: SweepOptions = DEFAULT_SWEEP

@@ -17,7 +17,14 @@ from numpy.typing import NDArray
 from nscan_cli.errors import WrongUsageError
 from nscan_cli.files.limits import MAP_CELLS
 from nscan_cli.logs.laser_log import LaserLog
-from nscan_cli.mapping.ray_casting import TILE, ScanRays, TileCounts, cast_rays, ray_bounds
+from nscan_cli.mapping.ray_casting import (
+    TILE,
+    ScanRays,
+    SweptRays,
+    TileCounts,
+    cast_rays,
+    ray_bounds,
+)
 from nscan_cli.poses import Array, Indices
 
 
@@ -131,7 +138,9 @@ def occupancy_grid(
     if len(rows) == 0:
         raise WrongUsageError(f"{log.source.name}: no scans for a map; choose some")
     lasers = np.ascontiguousarray(log.laser_pose(poses))
-    scans = ScanRays(np.asarray(rows, dtype=np.int64), log.ranges, log.angle_min, log.angle_increment, lasers)
+    swept = SweptRays.of(log.moving_along(poses, rows))
+    rows = np.asarray(rows, dtype=np.int64)
+    scans = ScanRays(rows, log.ranges, log.angle_min, log.angle_increment, lasers, swept)
     low_x, low_y, high_x, high_y = ray_bounds(scans, options.max_beam_length)
     # One more cell on each side: no beam reaches the border of the map, and rounding is harmless.
     left, bottom = math.floor(low_x / resolution) - 1, math.floor(low_y / resolution) - 1

@@ -10,7 +10,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from nscan_cli.kernels.decorators import kernel, leaf_kernel
+from nscan_cli.kernels.decorators import kernel, leaf_kernel, llvm_inline_kernel
+from nscan_cli.logs.beam_times import BeamTimes
+from nscan_cli.logs.laser_log import LaserLog
+from nscan_cli.logs.robot_path import RobotPath, interval_at, seen_from
 from nscan_cli.poses import Array, Indices
 from nscan_cli.threads import map_in_threads
 
@@ -31,6 +34,33 @@ class TileCounts(NamedTuple):
     """(T, 2, TILE, TILE) hits and misses of each numbered tile; further rows are 0."""
 
 
+class SweptRays(NamedTuple):
+    """The beams of a laser that turns: each begins where the laser was when it was measured."""
+
+    path: RobotPath
+    """That of the robot; without poses if all beams of a scan begin at one place."""
+    stamps: Array
+    """(S,) s"""
+    beams: BeamTimes
+    """Of the S scans."""
+    mount: Array
+    """(4,) pose of the laser on the robot: x, y, cosine and sine."""
+
+    @classmethod
+    def of(cls, log: LaserLog) -> SweptRays:
+        """Those of a log that moves along its path; of one without, each scan is seen at once."""
+        if log.beam_times is None or log.path is None:
+            return cls.at_once()
+        x, y, angle = log.mount
+        return cls(log.path, log.times, log.beam_times, np.array([x, y, np.cos(angle), np.sin(angle)]))
+
+    @classmethod
+    def at_once(cls) -> SweptRays:
+        """Those of a laser that sees all beams of a scan at once."""
+        none, poses = np.zeros(0), np.zeros((0, 3))
+        return cls(RobotPath(none, poses, poses), none, BeamTimes(none, none), np.zeros(4))
+
+
 class ScanRays(NamedTuple):
     """The scans of a log whose beams are traced, and the poses of the laser."""
 
@@ -44,6 +74,8 @@ class ScanRays(NamedTuple):
     """(S,) rad"""
     lasers: Array
     """(N, 3)"""
+    swept: SweptRays
+    """Where the laser was at each beam, if it turns."""
 
 
 def cast_rays(
@@ -78,7 +110,8 @@ def cast_rays(
 @kernel
 def ray_bounds(scans: ScanRays, max_length: float) -> tuple[float, float, float, float]:
     """The least x and y and the greatest x and y of the laser poses and the ends of the beams."""
-    rows, ranges, angle_min, angle_increment, lasers = scans
+    rows, ranges, angle_min, angle_increment, lasers, swept = scans
+    is_swept, at, j = len(swept.stamps) > 0, np.empty(4), 0
     low_x = high_x = lasers[0, 0]
     low_y = high_y = lasers[0, 1]
     for k in range(len(rows)):
@@ -90,10 +123,17 @@ def ray_bounds(scans: ScanRays, max_length: float) -> tuple[float, float, float,
             if not np.isfinite(ranges[row, beam]):
                 continue
             r = min(float(ranges[row, beam]), max_length)
+            if is_swept:
+                j = _place_laser(swept, row, beam, j, at)
+                x, y = at[0], at[1]
+                low_x, high_x = min(low_x, x), max(high_x, x)
+                low_y, high_y = min(low_y, y), max(high_y, y)
             # Most beams end inside the bounds whatever their direction is.
             if x - r > low_x and x + r < high_x and y - r > low_y and y + r < high_y:
                 continue
             angle = heading + angle_min[row] + beam * angle_increment[row]
+            if is_swept:
+                angle += np.arctan2(at[3], at[2]) - heading
             end_x, end_y = x + r * np.cos(angle), y + r * np.sin(angle)
             low_x, high_x = min(low_x, end_x), max(high_x, end_x)
             low_y, high_y = min(low_y, end_y), max(high_y, end_y)
@@ -105,7 +145,8 @@ def _cast_scans(
     scans: ScanRays, max_length: float, resolution: float, left: int, bottom: int, tiles: TileCounts
 ) -> None:
     """Adds the beams of all scans to the counts of the tiles."""
-    rows, ranges, angle_min, angle_increment, lasers = scans
+    rows, ranges, angle_min, angle_increment, lasers, swept = scans
+    is_swept, at, j = len(swept.stamps) > 0, np.empty(4), 0
     counts = tiles.counts.reshape(-1)
     used = 0
     for k in range(len(rows)):
@@ -117,12 +158,33 @@ def _cast_scans(
             if not np.isfinite(r):
                 continue
             angle = lasers[k, 2] + angle_min[row] + beam * angle_increment[row]
+            if is_swept:
+                j = _place_laser(swept, row, beam, j, at)
+                x, y = at[0] / resolution - left, at[1] / resolution - bottom
+                angle = np.arctan2(at[3], at[2]) + angle_min[row] + beam * angle_increment[row]
             length = min(r, max_length) / resolution
             end_x, end_y = x + length * np.cos(angle), y + length * np.sin(angle)
             used = _traverse(x, y, end_x, end_y, tiles.numbers, counts, used)
             if r <= max_length:
                 hit, used = _hit_index(tiles.numbers, int(end_y), int(end_x), used)
                 counts[np.uint64(hit)] += 1
+
+
+@llvm_inline_kernel
+def _place_laser(swept: SweptRays, row: int, beam: int, j: int, at: Array) -> int:
+    """Write the laser's pose at a beam to at (4,): x, y, cosine and sine of its heading.
+
+    Returns the place of that time in the path, looked for from place j on.
+    """
+    time = swept.stamps[row] + swept.beams.first[row] + beam * swept.beams.step[row]
+    j = interval_at(swept.path.times, time, j)
+    at[0], at[1], at[2], at[3] = 0.0, 0.0, 1.0, 0.0
+    seen_from(swept.path, at, time, j, at)
+    cos, sin, mount = at[2], at[3], swept.mount
+    at[0] += cos * mount[0] - sin * mount[1]
+    at[1] += sin * mount[0] + cos * mount[1]
+    at[2], at[3] = cos * mount[2] - sin * mount[3], sin * mount[2] + cos * mount[3]
+    return j
 
 
 @kernel

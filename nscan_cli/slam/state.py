@@ -80,6 +80,7 @@ class SlamState:
         odometry, jumps = log.odometry, np.zeros(0, dtype=np.int64)
         if odometry is not None:
             odometry, jumps = without_jumps(odometry, log.times, options.odometry_checks)
+        log = log.moving_along(None)
         seen = log.ranges[log.ranges < options.tracking.max_range]
         median_range = float(np.median(seen)) if len(seen) else 0.0
         keyframes = Keyframes(options.keyframes, options.nscan.gaussians, median_range)

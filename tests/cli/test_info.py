@@ -12,7 +12,7 @@ from tests.logs.lines import flaser
 KEYS = [
     "file", "sha256", "bytes", "files", "format", "laser", "scans", "first_scan", "last_scan", "beams",
     "fewest_beams",
-    "angle_min", "angle_max", "angle_increment", "angle_increments", "start", "duration", "rate",
+    "angle_min", "angle_max", "angle_increment", "angle_increments", "turn", "start", "duration", "rate",
     "longest_gap", "odometry", "no_return",
     "beams_without_return", "beams_unusable", "beams_lost", "mounting", "range_limits", "used", "records",
     "skipped", "backward_stamps", "truth", "warnings", "lasers", "odometries", "corrected",

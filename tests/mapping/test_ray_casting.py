@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from nscan_cli.mapping.ray_casting import ScanRays, ray_bounds
+from nscan_cli.mapping.ray_casting import ScanRays, SweptRays, ray_bounds
 
 REACH = 6.0
 
@@ -25,4 +25,5 @@ def test_the_extent_is_that_of_all_ends_and_lasers(seed, size):
     ends = lasers[:, None, :2] + lengths[..., None] * np.stack([np.cos(angles), np.sin(angles)], axis=-1)
     reached = np.concatenate([ends.reshape(-1, 2), lasers[:, :2]])
     corners = [*reached.min(axis=0), *reached.max(axis=0)]
-    assert ray_bounds(ScanRays(rows, ranges, first, step, lasers), REACH) == pytest.approx(corners, abs=1e-9)
+    scans = ScanRays(rows, ranges, first, step, lasers, SweptRays.at_once())
+    assert ray_bounds(scans, REACH) == pytest.approx(corners, abs=1e-9)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import math
 from typing import Any
 
 import numpy as np
@@ -10,17 +11,54 @@ from mcap.writer import Writer
 from rosbags.typesys import Stores, get_typestore
 
 from nscan_cli.poses import Array
+from tests.simulation.laser import Laser
 from tests.simulation.recording import START, Recording
+from tests.simulation.sweeping import SweptRecording
 
 S = 10**9
+Message = tuple[str, str, int, Any]
+"""Topic, type, time in ns, and the message."""
 FARTHEST = 80.0
 """m; what the simulated laser says to have no return is beyond."""
 
 
 def ros2_mcap(recording: Recording) -> bytes:
     """/scan, /odom and /tf_static of a ROS 2 robot, in chunks packed by zstd, with all checksums."""
-    types = get_typestore(Stores.ROS2_HUMBLE)
-    out = io.BytesIO()
+    messages = []
+    make = _Makers(get_typestore(Stores.ROS2_HUMBLE))
+    for k in range(len(recording.times)):
+        time = _nanoseconds(START, float(recording.times[k]))
+        messages.append(make.odometry_on(time, recording.odometry[k]))
+        messages.append(make.scan_on(time, recording.laser, recording.readings[k], 0.0, 0.2))
+    return _mcap(make, recording.laser, messages)
+
+
+def swept_mcap(
+    recording: SweptRecording, time_increment: float | None = None, scan_time: float | None = None
+) -> bytes:
+    """The same of a laser that turns, with odometry at its own times.
+
+    The times of the messages are the true ones unless they are given, s.
+    """
+    turning, laser = recording.turning, recording.laser
+    if time_increment is None:
+        time_increment = turning.turn * laser.angle_increment / (2 * np.pi)
+    scan_time = turning.period if scan_time is None else scan_time
+    make = _Makers(get_typestore(Stores.ROS2_HUMBLE))
+    messages = [
+        make.odometry_on(_nanoseconds(float(time)), pose)
+        for time, pose in zip(recording.odometry.times, recording.odometry.poses, strict=True)
+    ]
+    messages += [
+        make.scan_on(_nanoseconds(float(time)), laser, readings, time_increment, scan_time)
+        for time, readings in zip(recording.times, recording.readings, strict=True)
+    ]
+    return _mcap(make, laser, sorted(messages, key=lambda message: message[2]))
+
+
+def _mcap(make: _Makers, laser: Laser, messages: list[Message]) -> bytes:
+    """The messages, in the order in which they are recorded, behind the mounting of the laser."""
+    types, out = make.store, io.BytesIO()
     writer = Writer(out, chunk_size=1 << 16, enable_data_crcs=True)
     # No version: the bytes are to stay the same.
     writer.start(profile="ros2", library="nscan-cli sample")
@@ -33,14 +71,11 @@ def ros2_mcap(recording: Recording) -> bytes:
             channels[topic] = writer.register_channel(topic, "cdr", schema)
         writer.add_message(channels[topic], time, bytes(types.serialize_cdr(message, name)), time)
 
-    make = _Makers(types)
-    first = _nanoseconds(recording, 0)
-    mount = make.transform("base_link", "laser", first, np.array(recording.laser.mount))
+    first = messages[0][2]
+    mount = make.transform("base_link", "laser", first, np.array(laser.mount))
     write("/tf_static", "tf2_msgs/msg/TFMessage", first, make("tf2_msgs/msg/TFMessage", transforms=[mount]))
-    for k in range(len(recording.times)):
-        time = _nanoseconds(recording, k)
-        write("/odom", "nav_msgs/msg/Odometry", time, make.odometry(time, recording.odometry[k]))
-        write("/scan", "sensor_msgs/msg/LaserScan", time, make.scan(time, recording, k))
+    for topic, name, time, message in messages:
+        write(topic, name, time, message)
     writer.finish()  # type: ignore[no-untyped-call]
     return out.getvalue()
 
@@ -65,15 +100,17 @@ def player(recording: Recording) -> bytes:
     return ("\n".join(lines) + "\n").encode()
 
 
-def _nanoseconds(recording: Recording, k: int) -> int:
-    return round(START) * S + round(float(recording.times[k]) * S)
+def _nanoseconds(time: float, later: float = 0.0) -> int:
+    """A time and some seconds later in ns."""
+    whole = math.floor(time)
+    return whole * S + round((time - whole) * S) + round(later * S)
 
 
 class _Makers:
     """Messages by the names of their types."""
 
     def __init__(self, types: Any) -> None:
-        self.types = types.types
+        self.store, self.types = types, types.types
 
     def __call__(self, name: str, **fields: Any) -> Any:
         return self.types[name](**fields)
@@ -110,18 +147,27 @@ class _Makers:
             ),
         )
 
-    def scan(self, time: int, recording: Recording, k: int) -> Any:
-        laser = recording.laser
-        ranges = np.round(recording.readings[k], 2).astype(np.float32)
-        ranges[recording.readings[k] >= laser.no_return] = np.inf
+    def odometry_on(self, time: int, pose: Array) -> Message:
+        return "/odom", "nav_msgs/msg/Odometry", time, self.odometry(time, pose)
+
+    def scan_on(
+        self, time: int, laser: Laser, readings: Array, increment: float, scan_time: float
+    ) -> Message:
+        """A message on /scan, rounded to centimetres."""
+        scan = self.scan(time, laser, readings, increment, scan_time)
+        return "/scan", "sensor_msgs/msg/LaserScan", time, scan
+
+    def scan(self, time: int, laser: Laser, readings: Array, increment: float, scan_time: float) -> Any:
+        ranges = np.round(readings, 2).astype(np.float32)
+        ranges[readings >= laser.no_return] = np.inf
         return self(
             "sensor_msgs/msg/LaserScan",
             header=self.header(time, "laser"),
             angle_min=laser.angle_min,
             angle_max=laser.angle_min + (laser.beams - 1) * laser.angle_increment,
             angle_increment=laser.angle_increment,
-            time_increment=0.0,
-            scan_time=0.2,
+            time_increment=increment,
+            scan_time=scan_time,
             range_min=0.05,
             range_max=FARTHEST,
             ranges=ranges,

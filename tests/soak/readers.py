@@ -44,7 +44,7 @@ def log(path: str, chance: random.Random) -> None:
         start=chance.choice([None, None, 0.5]),
         flip=chance.random() < 0.1,
     )
-    facts = facts_of(read_log(path, options))
+    facts = facts_of(read_log(path, options), options)
     json.dumps(facts, allow_nan=False)
     facts_table(facts)
 

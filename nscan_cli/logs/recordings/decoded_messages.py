@@ -45,6 +45,10 @@ class ScanMessage(NamedTuple):
     """Of the laser in `frame`; None where the message has none."""
     angle_max: float = math.nan
     """rad; nan where the message does not have it beside the increment."""
+    time_increment: float = 0.0
+    """s from beam to beam; 0 where the message does not say."""
+    scan_time: float = 0.0
+    """s from scan to scan; 0 where the message does not say."""
 
 
 class StampedTransform(NamedTuple):

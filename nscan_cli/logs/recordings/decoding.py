@@ -150,6 +150,8 @@ def _ros_scan(message: Any) -> ScanMessage:
         ranges,
         None,
         message.angle_max,
+        message.time_increment,
+        message.scan_time,
     )
 
 

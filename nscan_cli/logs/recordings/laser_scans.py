@@ -26,6 +26,7 @@ from nscan_cli.logs.recordings.tf_tree import TransformTree
 from nscan_cli.logs.recordings.topics import devices, scan_topic
 from nscan_cli.logs.recordings.turn_segments import TimedScan, joined_turns
 from nscan_cli.logs.skips import Skips
+from nscan_cli.logs.sweep import SweepTimes
 from nscan_cli.logs.text.line_records import beams_problem
 from nscan_cli.poses import Array
 
@@ -72,7 +73,7 @@ def log_from_recording(recording: Recording, file: str, source: Source, options:
         raw,
         times,
         mount,
-        RecordedMotion(motion.poses),
+        RecordedMotion(motion.poses, path=motion.path),
         findings,
         options,
         file,
@@ -148,6 +149,10 @@ def _raw_scans(scans: Sequence[ScanMessage], stamps: list[str]) -> RawScans:
         (low_from, high_from),
         angle_max=np.array([scan.angle_max for scan in scans], dtype=np.float64),
         beams=np.array([len(scan.ranges) for scan in scans], dtype=np.int64),
+        sweep_times=SweepTimes(
+            np.array([scan.time_increment for scan in scans], dtype=np.float64),
+            np.array([scan.scan_time for scan in scans], dtype=np.float64),
+        ),
     )
 
 

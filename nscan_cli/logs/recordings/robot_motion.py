@@ -23,6 +23,7 @@ from nscan_cli.logs.recordings.tf_tree import (
     transform_times,
 )
 from nscan_cli.logs.recordings.topics import devices, find_topic, odometry_topic
+from nscan_cli.logs.robot_path import RobotPath, robot_path
 from nscan_cli.logs.scan_order import ScanOrder
 from nscan_cli.logs.skips import Skips
 from nscan_cli.poses import Array
@@ -43,6 +44,8 @@ class RobotMotion(NamedTuple):
 
     poses: Array | None
     """(S, 3) in order of time; None without odometry."""
+    path: RobotPath | None
+    """The odometry at its own times."""
     robot: str
     """The child frame of the odometry; empty where nothing names it."""
     parent: str
@@ -63,7 +66,7 @@ def robot_odometry(
     """
     if not options.odometry:
         findings.used["odometry"] = "none: --no-odometry"
-        return RobotMotion(None, _robot_frame(recording, tree, findings.skips, file), "")
+        return RobotMotion(None, None, _robot_frame(recording, tree, findings.skips, file), "")
     asked = options.odom_topic
     is_frame = (
         asked is not None and find_topic(asked, devices(recording, ODOMETRY_TYPES + TRANSFORM_TYPES)) is None
@@ -77,7 +80,7 @@ def robot_odometry(
         rows = by_frame.get(asked or "", []) or _odometry_in_tf(tree, file)
         source = f"tf from {rows[0][0].parent} to {rows[0][0].child}" if rows else ""
         why = "no topic has odometry" if asked is None else f"{asked} is asked for"
-    poses = _poses_at_scans(rows, source or "tf", clock, options.clock_offset, findings)
+    poses, path = _poses_at_scans(rows, source or "tf", clock, options.clock_offset, findings)
     if poses is not None:
         findings.used["odometry"] = f"{source}, {why}, interpolated"
     elif rows:
@@ -86,8 +89,8 @@ def robot_odometry(
         findings.used["odometry"] = "none in the recording"
         findings.warnings.append("no nav_msgs/Odometry, and no transform from odom: no odometry")
     if not rows:
-        return RobotMotion(poses, "", "")
-    return RobotMotion(poses, rows[0][0].child, rows[0][0].parent)
+        return RobotMotion(poses, path, "", "")
+    return RobotMotion(poses, path, rows[0][0].child, rows[0][0].parent)
 
 
 def _robot_frame(recording: Recording, tree: TransformTree, skips: Skips, file: str) -> str:
@@ -133,8 +136,8 @@ def _poses_at_scans(
     clock: ScanClock,
     offset: float,
     findings: Findings,
-) -> Array | None:
-    """Interpolated poses (S, 3) at the times of the scans; None without a valid pose.
+) -> tuple[Array | None, RobotPath | None]:
+    """Interpolated poses (S, 3) at the times of the scans, and the path; None without a valid pose.
 
     The `offset` (s) is added to the times of the poses.
     """
@@ -149,21 +152,22 @@ def _poses_at_scans(
         found_at.append(stamp / S)
         delays.append((log_time - stamp) / S)
     if not found:
-        return None
+        return None, None
     if clock.times.nominal:
         findings.warnings.append(f"the scans have no times that lead to {source}: no odometry")
-        return None
+        return None, None
     seconds, warnings = np.array(found_at) + offset, findings.warnings
     order = np.argsort(seconds, kind="stable")
     name, at = f"pose of {source}", clock.times.times
-    poses = interpolated_poses(at, seconds[order], np.array(found)[order], name, warnings)
+    seconds_in_order, in_order = seconds[order], np.array(found)[order]
+    poses = interpolated_poses(at, seconds_in_order, in_order, name, warnings)
     apart = float(np.median(delays)) - clock.delay
     if poses is None and clock.stamped and _overlap(at, seconds - offset + apart):
         warnings.append(
             f"{source} and the scans are stamped by two clocks: by their times of recording, "
             f"--clock-offset {apart:.1f} leads from one to the other"
         )
-    return poses
+    return poses, None if poses is None else robot_path(seconds_in_order, in_order)
 
 
 def _overlap(times: Array, others: Array) -> bool:

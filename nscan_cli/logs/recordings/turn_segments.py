@@ -124,5 +124,7 @@ def _joined(turn: Sequence[TimedScan], places: Indices, begin: float, beams: int
         ranges[place : place + len(message.scan.ranges)] = message.scan.ranges
     middle = turn[len(turn) // 2]
     end = begin + middle.scan.angle_increment * (beams - 1)
-    scan = middle.scan._replace(ranges=ranges, angle_min=begin, angle_max=end)
+    scan = middle.scan._replace(
+        ranges=ranges, angle_min=begin, angle_max=end, time_increment=0.0, scan_time=0.0
+    )
     return middle._replace(scan=scan)

@@ -1,0 +1,67 @@
+"""When the beams of a scan were measured, and where they end if the robot moved meanwhile."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nscan_cli.kernels.decorators import kernel
+from nscan_cli.logs.robot_path import RobotPath, interval_at, seen_from
+from nscan_cli.poses import Array, Indices
+
+
+class BeamTimes(NamedTuple):
+    """The times of the beams of S scans, from the stamp of each scan."""
+
+    first: Array
+    """(S,) of the first beam, s."""
+    step: Array
+    """(S,) from beam to beam, s; negative where the readings are in the reverse order of time."""
+
+    def of(self, rows: slice | Indices) -> BeamTimes:
+        """Those of some scans."""
+        return BeamTimes(self.first[rows], self.step[rows])
+
+
+@kernel
+def swept_points(
+    ranges: NDArray[np.float32],
+    directions: tuple[Array, Array],
+    laser: Array,
+    reach: float,
+    stamps: Array,
+    beams: BeamTimes,
+    path: RobotPath,
+) -> tuple[Array, Indices]:
+    """Points (m, 2) of ranges (R, B) in the robot's frame at the stamp, each from where the robot was.
+
+    `directions` are the cosines and the sines of the beams (1 or R, B). `laser` (4,) is its pose on the
+    robot: x, y, cosine and sine. Scan k, stamped at stamps[k] (s), has points[ends[k] : ends[k + 1]], with
+    ends (R + 1,). Points from `reach` (m) on are left out.
+    """
+    cos, sin = directions
+    points, ends = np.empty((ranges.size, 2)), np.zeros(ranges.shape[0] + 1, dtype=np.int64)
+    origin, start, moved = np.array([0.0, 0.0, 1.0, 0.0]), np.empty(4), np.empty(4)
+    m, j = 0, 0
+    for row in range(ranges.shape[0]):
+        angles = row if cos.shape[0] > 1 else 0
+        j = interval_at(path.times, stamps[row], j)
+        seen_from(path, origin, stamps[row], j, start)
+        for beam in range(ranges.shape[1]):
+            length = np.float64(ranges[row, beam])
+            if not np.isfinite(length):
+                continue
+            time = stamps[row] + beams.first[row] + beam * beams.step[row]
+            j = interval_at(path.times, time, j)
+            seen_from(path, start, time, j, moved)
+            along, left = length * cos[angles, beam], length * sin[angles, beam]
+            x = laser[2] * along - laser[3] * left + laser[0]
+            y = laser[3] * along + laser[2] * left + laser[1]
+            x, y = moved[2] * x - moved[3] * y + moved[0], moved[3] * x + moved[2] * y + moved[1]
+            if np.hypot(x, y) < reach:
+                points[m, 0], points[m, 1] = x, y
+                m += 1
+        ends[row + 1] = m
+    return points[:m], ends

@@ -1,0 +1,131 @@
+"""The robot's path as poses at increasing times, and where it is between two of them."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from nscan_cli.kernels.decorators import llvm_inline_kernel
+from nscan_cli.poses import Array, are_known, compose, relative, wrap
+
+STRAIGHT = 1e-9
+"""rad; a turn smaller than this is none: its arc is a straight line."""
+LONGEST_STEP = 1.0
+"""s; how the robot came from one pose to a later one is not known: it goes on as before."""
+FASTEST, FASTEST_TURN = 10.0, 15.0
+"""m/s, rad/s; no robot with a laser drives so. It was carried, or lost, and goes on as before."""
+
+
+class RobotPath(NamedTuple):
+    """Poses at P ≥ 2 times. From one to the next the robot moves steadily: along an arc, as wheels do."""
+
+    times: Array
+    """(P,) increasing, s."""
+    poses: Array
+    """(P, 3)"""
+    twists: Array
+    """(P, 3) velocities from each pose to the next in the frame of the first, m/s and rad/s. The last one
+    goes on as the one before."""
+
+
+def robot_path(times: Array, poses: Array) -> RobotPath | None:
+    """The path through poses (S, 3) at times (S,), s, that do not decrease; None with fewer than two.
+
+    Unknown poses are left out, and all but the first of those at one time.
+    """
+    known = np.flatnonzero(are_known(poses))
+    used = known[np.diff(times[known], prepend=-np.inf) > 0.0]
+    if len(used) < 2:
+        return None
+    at, through = np.ascontiguousarray(times[used]), np.ascontiguousarray(poses[used])
+    periods, twists = np.diff(at), np.empty((len(used), 3))
+    twists[:-1] = _velocities(relative(through[1:], through[:-1]), periods)
+    unknown = periods > LONGEST_STEP
+    unknown |= np.hypot(twists[:-1, 0], twists[:-1, 1]) > FASTEST
+    unknown |= np.abs(twists[:-1, 2]) > FASTEST_TURN
+    for row in np.flatnonzero(unknown).tolist():
+        twists[row] = twists[row - 1] if row else 0.0
+    twists[-1] = twists[-2]
+    return RobotPath(at, through, twists)
+
+
+def bent_path(path: RobotPath, times: Array, poses: Array) -> RobotPath | None:
+    """The path through poses (S, 3) at times (S,), s, with the motion between two of them as `path` has it.
+
+    What `path` is off between two poses is shared out over the time between them.
+    """
+    inside = (path.times > times[0]) & (path.times < times[-1])
+    at = path.times[inside]
+    after = np.searchsorted(times, at)
+    on_path = poses_at(path, times)
+    before = after - 1
+    between = path.poses[inside]
+    from_before = compose(poses[before], relative(between, on_path[before]))
+    from_after = compose(poses[after], relative(between, on_path[after]))
+    off = from_after - from_before
+    off[:, 2] = wrap(off[:, 2])
+    share = (at - times[before]) / (times[after] - times[before])
+    blended = from_before + share[:, None] * off
+    blended[:, 2] = wrap(blended[:, 2])
+    # Those of the scans come first where both are at one time.
+    order = np.argsort(np.concatenate([times, at]), kind="stable")
+    return robot_path(np.concatenate([times, at])[order], np.concatenate([poses, blended])[order])
+
+
+def poses_at(path: RobotPath, times: Array) -> Array:
+    """(n, 3) poses of a path at times (n,), s."""
+    rows = np.clip(np.searchsorted(path.times, times, side="right") - 1, 0, len(path.times) - 1)
+    twists, seconds = path.twists[rows], times - path.times[rows]
+    turns = twists[:, 2] * seconds
+    turning = np.abs(turns) > STRAIGHT
+    rates = np.where(turning, twists[:, 2], 1.0)
+    along = np.where(turning, np.sin(turns) / rates, seconds)
+    aside = np.where(turning, (1.0 - np.cos(turns)) / rates, 0.0)
+    x, y = twists[:, 0], twists[:, 1]
+    return compose(path.poses[rows], np.stack([along * x - aside * y, aside * x + along * y, turns], axis=1))
+
+
+def _velocities(steps: Array, periods: Array) -> Array:
+    """(n, 3) steady velocities that lead over steps (n, 3) in so many seconds (n,)."""
+    half = 0.5 * steps[:, 2]
+    # An arc turns its chord by half of its turn, and is longer by that angle over its sine.
+    turning = np.abs(half) > STRAIGHT
+    share = np.where(turning, half / np.tan(np.where(turning, half, 1.0)), 1.0)
+    x, y = steps[:, 0], steps[:, 1]
+    found: Array = np.stack([share * x + half * y, share * y - half * x, steps[:, 2]], axis=1)
+    return np.asarray(found / periods[:, None], dtype=np.float64)
+
+
+@llvm_inline_kernel
+def interval_at(times: Array, time: float, j: int) -> int:
+    """The place in increasing times (P,) of the last that is not after `time`, looked for from j on.
+
+    The first place if all are after it.
+    """
+    while j > 0 and times[j] > time:
+        j -= 1
+    while j + 1 < times.shape[0] and times[j + 1] <= time:
+        j += 1
+    return j
+
+
+@llvm_inline_kernel
+def seen_from(path: RobotPath, start: Array, time: float, j: int, out: Array) -> None:
+    """Write the robot's pose at a time (s), after place j of its path, as seen from `start`.
+
+    `start` (4,), in the frame of the path, and `out` (4,) are x, y (m), and the heading's cosine and sine.
+    """
+    seconds, rate = time - path.times[j], path.twists[j, 2]
+    turn = rate * seconds
+    cos, sin = np.cos(turn), np.sin(turn)
+    along, aside = seconds, 0.0
+    if abs(turn) > STRAIGHT:
+        along, aside = sin / rate, (1.0 - cos) / rate
+    x = along * path.twists[j, 0] - aside * path.twists[j, 1]
+    y = aside * path.twists[j, 0] + along * path.twists[j, 1]
+    c, s = np.cos(path.poses[j, 2]), np.sin(path.poses[j, 2])
+    dx, dy = path.poses[j, 0] + c * x - s * y - start[0], path.poses[j, 1] + s * x + c * y - start[1]
+    cos, sin = c * cos - s * sin, s * cos + c * sin
+    out[0], out[1] = start[2] * dx + start[3] * dy, start[2] * dy - start[3] * dx
+    out[2], out[3] = start[2] * cos + start[3] * sin, start[2] * sin - start[3] * cos

@@ -1,0 +1,135 @@
+"""How long a laser takes for its turn: what the file says, and what of it can be."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from nscan_cli.logs.beam_times import BeamTimes
+from nscan_cli.poses import Array, Indices
+
+BEFORE_STAMP = {"first": 0.0, "middle": 0.5, "last": 1.0}
+"""Share of the time from the first beam to the last that has passed at a stamp of each kind."""
+
+
+@dataclass(frozen=True)
+class SweepOptions:
+    """Which times of a turn can be."""
+
+    shortest: float = 1e-3
+    """A laser whose turn takes less sees at once, s. A larger value leaves more lasers uncorrected."""
+    fastest: float = 0.012
+    """No laser turns in less than this, s: those that are used turn up to 80 times a second. A larger value
+    believes fewer files."""
+    jitter: float = 1.1
+    """From the first beam to the last a scan may take so many periods of the scans: drivers measure their
+    times loosely. A larger value believes more files."""
+    varying: float = 2.0
+    """The time of a single scan is not used if it differs from the median by more than this factor. A larger
+    value follows lasers whose speed changes more, and more errors of drivers."""
+
+
+DEFAULT_SWEEP = SweepOptions()
+"""Those of every log; the provenance of a graph has them."""
+
+
+@dataclass(frozen=True)
+class SweepTimes:
+    """What the messages of S scans say, in file order."""
+
+    increment: Array
+    """(S,) time from beam to beam, s; 0 or nan where they do not say."""
+    scan_time: Array
+    """(S,) time from scan to scan, s; 0 or nan where they do not say."""
+
+    def of(self, rows: Indices) -> SweepTimes:
+        """Those of some scans."""
+        return SweepTimes(self.increment[rows], self.scan_time[rows])
+
+
+@dataclass(frozen=True)
+class Sweep:
+    """How long the turns of S scans take, in order of time."""
+
+    turns: Array
+    """(S,) s for 360°, negative where the readings are in the reverse order of time; 0: seen at once."""
+    origin: str
+    """Where that is from, for `info`; empty if the log has nothing about it."""
+    said: tuple[str, ...] = ()
+    """A sentence for the user if the file contradicts itself."""
+
+
+def sweep_of_file(
+    told: SweepTimes | None,
+    increments: Array,
+    beams: Indices,
+    times: Array,
+    as_recorded: bool = False,
+    options: SweepOptions = DEFAULT_SWEEP,
+) -> Sweep:
+    """The likeliest times of the turns, from what S scans say of them.
+
+    `increments` (S,) rad and `beams` (S,) are the angles between beams and their numbers, `times` (S,) those
+    of the scans, s; all are in order of time. A time from beam to beam cannot be if it makes a scan last
+    longer than the time to the next, or a turn shorter than lasers turn. It is not believed then, unless
+    `as_recorded`: the time between scans is used. A file that says nothing of its beams may be of a laser
+    that sees at once.
+    """
+    none = np.zeros(len(times))
+    if told is None:
+        return Sweep(none, "")
+    some = np.isfinite(told.increment) & (told.increment != 0.0)
+    if not some.any():
+        return Sweep(none, "")
+    usual = float(np.median(told.increment[some]))
+    per_beam = np.where(some, told.increment, usual)
+    ratio = per_beam / usual
+    per_beam[(ratio > options.varying) | (ratio < 1.0 / options.varying)] = usual
+    turns = per_beam * 2 * np.pi / np.abs(increments)
+    usual_turn = float(np.median(np.abs(turns)))
+    if usual_turn < options.shortest:
+        return Sweep(none, f"time_increment of the messages: a turn takes {usual_turn * 1e3:.2g} ms")
+    period = _period(times)
+    lasts = float(np.median(np.abs(per_beam) * np.maximum(beams - 1, 1)))
+    too_long = period > 0.0 and lasts > options.jitter * period
+    if as_recorded or (usual_turn >= options.fastest and not too_long):
+        return Sweep(turns, "time_increment of the messages")
+    scan_time = told.scan_time[np.isfinite(told.scan_time) & (told.scan_time > 0.0)]
+    likely = float(np.median(scan_time)) if len(scan_time) else period
+    origin = "scan_time" if len(scan_time) else "the time between scans"
+    if period > 0.0 and likely > options.jitter * period:
+        likely, origin = period, "the time between scans"
+    if likely < options.fastest:
+        return Sweep(none, "time_increment of the messages cannot be")
+    why = (
+        f"a scan would take {lasts:.3g} s, but the next comes after {period:.3g} s"
+        if too_long
+        else f"a turn would take {usual_turn:.2g} s, and no laser turns so fast"
+    )
+    said = (
+        f"time_increment of the messages is likely wrong: {why}; {origin} is used, a turn of {likely:.3g} s, "
+        "as by --sweep; --as-recorded uses it as it is"
+    )
+    return Sweep(np.full(len(times), np.copysign(likely, usual)), origin, (said,))
+
+
+def _period(times: Array) -> float:
+    """The usual time from scan to scan, s; 0 with fewer than two."""
+    periods = np.diff(times)
+    periods = periods[periods > 0.0]
+    return float(np.median(periods)) if len(periods) else 0.0
+
+
+def beam_times(turns: Array, increments: Array, beams: Indices, stamp: str) -> BeamTimes | None:
+    """The times of the beams of S scans; None if all are seen at once.
+
+    `turns` (S,) are the times of a turn, s, as in Sweep, `increments` (S,) the angles between beams, rad.
+    """
+    if not turns.any():
+        return None
+    step = turns * np.abs(increments) / (2 * np.pi)
+    lasts = step * np.maximum(beams - 1, 0)
+    # What the stamp is set by is the course of time, whatever the order of the readings.
+    began = np.where(step < 0.0, -lasts, 0.0)
+    return BeamTimes(began - BEFORE_STAMP[stamp] * np.abs(lasts), step)

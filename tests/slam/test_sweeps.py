@@ -1,0 +1,57 @@
+"""Lasers that turn while the robot drives are mapped as well as those that see at once."""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+
+import numpy as np
+
+from nscan_cli.evaluation.alignment import alignment
+from nscan_cli.mapping.occupancy import OCCUPIED, occupancy_grid
+from nscan_cli.poses import compose, wrap
+from tests.benchmarks.lasers import turning
+from tests.logs.excerpts import truth_of
+from tests.simulation.drive import Drive
+from tests.simulation.office import office_way, office_world
+from tests.simulation.sweeping import SweptRecording, Turning, fine_path, record_swept
+from tests.slam.mapped_logs import Mapped, mapped
+
+WAY_POINTS = 7
+"""Of the way through the office: out of the lobby, into a room and out again."""
+TURN_RATE = 2.8
+"""rad/s"""
+
+
+@functools.cache
+def recorded(turn: float) -> SweptRecording:
+    """A small robot with a laser of 5 Hz that turns on the spot quickly."""
+    path = fine_path(office_way()[:WAY_POINTS], Drive(speed=0.22, turn_rate=TURN_RATE))
+    return record_swept("office", office_world(), path, turning(360, 3.5, 0.01, 0.01), Turning(turn=turn), 1)
+
+
+def errors(found: Mapped) -> tuple[float, float]:
+    """Root mean square of the positions (m), and the largest error of a heading (degrees)."""
+    truth = truth_of(found.log)
+    off = compose(alignment(found.graph.poses, truth).motion, found.graph.poses) - truth
+    rms = float(np.sqrt((off[:, :2] ** 2).sum(axis=1).mean()))
+    return rms, float(np.degrees(np.abs(wrap(off[:, 2])).max()))
+
+
+def occupied_cells(found: Mapped) -> int:
+    rows = np.arange(len(found.log))
+    return int(np.count_nonzero(occupancy_grid(found.log, rows, found.graph.poses).states() == OCCUPIED))
+
+
+def test_a_drive_with_fast_turns_is_mapped_as_by_a_laser_that_sees_at_once():
+    at_once, swept = mapped(recorded(0.0).log()), mapped(recorded(0.2).log())
+    uncorrected = mapped(recorded(0.2).log(turn=0.0))
+    for error, other, bad, least in zip(
+        errors(swept), errors(at_once), errors(uncorrected), (0.005, 0.4), strict=True
+    ):
+        assert error <= max(1.5 * other, least)
+        assert bad > 3 * error
+    assert occupied_cells(swept) <= 1.05 * occupied_cells(at_once)
+    # Rays that begin at one place leave walls of two thicknesses, at the right poses too.
+    one_place = dataclasses.replace(swept, log=dataclasses.replace(swept.log, beam_times=None))
+    assert occupied_cells(one_place) > 1.1 * occupied_cells(at_once)
