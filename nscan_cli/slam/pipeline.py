@@ -10,6 +10,7 @@ from nscan_cli.slam.backend.finish import finish_graph
 from nscan_cli.slam.backend.optimisation import optimise, optimise_if_due
 from nscan_cli.slam.backend.refinement import refine
 from nscan_cli.slam.backend.rejection import reject_contradicting_loops
+from nscan_cli.slam.backend.swept_scans import correct_swept_scans
 from nscan_cli.slam.frontend.break_detection import SegmentTracker, TrackedBatch, tracker_of
 from nscan_cli.slam.frontend.scan_batch import ScanBatch
 from nscan_cli.slam.keyframes.growing_route import add_keyframes, extend_route
@@ -48,6 +49,7 @@ def run_slam(state: SlamState, report: LoopProgress) -> Graph:
         relate(state, ahead, centre)
     optimise(state, state.options.optimisation.final)
     reject_contradicting_loops(state)
+    correct_swept_scans(state)
     refine(state)
     return finish_graph(state)
 

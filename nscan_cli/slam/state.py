@@ -35,6 +35,9 @@ class SlamState:
     """
 
     log: LaserLog
+    """If the laser turns, each scan is at the time of its middle beam until the last optimisation."""
+    recorded: LaserLog
+    """The same log as it was read: each scan is at the time of its stamp."""
     options: SlamOptions
     threads: int
     odometry: Array | None
@@ -77,17 +80,17 @@ class SlamState:
     @classmethod
     def of_log(cls, log: LaserLog, options: SlamOptions, threads: int = 1) -> SlamState:
         """The state before the first scan of a log."""
+        recorded, log = log, log.at_middle_of_turns().moving_along(None)
         odometry, jumps = log.odometry, np.zeros(0, dtype=np.int64)
         if odometry is not None:
             odometry, jumps = without_jumps(odometry, log.times, options.odometry_checks)
-        log = log.moving_along(None)
         seen = log.ranges[log.ranges < options.tracking.max_range]
         median_range = float(np.median(seen)) if len(seen) else 0.0
         keyframes = Keyframes(options.keyframes, options.nscan.gaussians, median_range)
         chain: list[Pairwise] = []
         route = route_of(keyframes.list, chain, np.zeros((0, 3)))
         frozen = frozen_scans(log, odometry, options.odometry_checks)
-        return cls(log, options, threads, odometry, jumps, frozen, keyframes, route, chain)
+        return cls(log, recorded, options, threads, odometry, jumps, frozen, keyframes, route, chain)
 
     def scan_batches(self) -> Iterator[ScanBatch]:
         """The scans of the log as tracking takes them."""

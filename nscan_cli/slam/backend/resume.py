@@ -19,7 +19,7 @@ from nscan_cli.poses import Indices, relative
 from nscan_cli.slam.backend.finish import finish_graph
 from nscan_cli.slam.backend.refinement import refine
 from nscan_cli.slam.backend.rejection import reject_contradicting_loops
-from nscan_cli.slam.frontend.tracked_scans import TrackedScans
+from nscan_cli.slam.backend.swept_scans import add_keyframes_at, tracked_at
 from nscan_cli.slam.keyframes.route import route_of
 from nscan_cli.slam.local_matching.joint_relations import LocalMatch
 from nscan_cli.slam.loop_closure.place import Place
@@ -68,7 +68,9 @@ def resume(graph: Graph, log: LaserLog, rows: Indices, threads: int = 1) -> Grap
 def state_of_graph(graph: Graph, log: LaserLog, options: SlamOptions, threads: int = 1) -> SlamState:
     """The state of the loop after its last optimisation, as a saved graph of all scans of `log` has it."""
     state, breaks = SlamState.of_log(log, options, threads), _breaks(graph, options)
-    _add_keyframes(state, graph, breaks)
+    state.log = log.moving_along(graph.poses)
+    found = tracked_at(graph.poses, breaks, options)
+    add_keyframes_at(state, found, graph.anchors == np.arange(len(log)), breaks)
     chain = _chain_of_graph(graph, options)
     in_chain = {id(relation) for relation in chain}
     return dataclasses.replace(
@@ -99,43 +101,8 @@ def _log_of_rows(log: LaserLog, rows: Indices) -> LaserLog:
         angle_increment=log.angle_increment[rows],
         odometry=None if log.odometry is None else log.odometry[rows],
         beams=None if log.beams is None else log.beams[rows],
+        beam_times=None if log.beam_times is None else log.beam_times.of(rows),
     )
-
-
-def _add_keyframes(state: SlamState, graph: Graph, breaks: set[int]) -> None:
-    """Add the graph's keyframes with their Gaussians, as tracking would have made them at its poses."""
-    keyframes = state.keyframes
-    found = _tracked_at_graph_poses(graph, breaks, state.options)
-    for scans in state.scan_batches():
-        those = found.part(scans.first, scans.first + len(scans))
-        for k, row in enumerate(range(scans.first, scans.first + len(scans))):
-            if row in breaks:
-                keyframes.end_segment()
-            if graph.anchors[row] == row:
-                keyframes.add(row, scans.of(k), those.scan(k))
-                for whole in keyframes.list[-2:-1]:
-                    whole.make_ndt()
-            else:
-                keyframes.attach(scans, those, k, k + 1)
-    keyframes.end_segment()
-
-
-def _tracked_at_graph_poses(graph: Graph, breaks: set[int], options: SlamOptions) -> TrackedScans:
-    """The scans as if tracking had found them at the graph's poses, without information."""
-    found, step, path = TrackedScans.room(len(graph)), options.tracking.min_motion, 0.0
-    found.poses[:], found.values[:], found.inliers[:] = graph.poses, 0.0, 1.0
-    found.hessians[:], found.prior_covariances[:], found.odometry_sigmas[:] = 0.0, 0.0, 0.0
-    joined_at = graph.poses[0]
-    for row, pose in enumerate(graph.poses):
-        moved = relative(pose, joined_at)
-        distance = float(np.hypot(moved[0], moved[1]))
-        found.in_map[row] = row == 0 or distance > step or abs(moved[2]) > step
-        if found.in_map[row]:
-            path, joined_at = path + distance, pose
-        if row in breaks:
-            path += options.breaks.path
-        found.paths[row] = path
-    return found
 
 
 def _breaks(graph: Graph, options: SlamOptions) -> set[int]:

@@ -28,6 +28,12 @@ class Keyframes:
         self._since: list[KeyframePoints] = []
         self._prior_covariance = np.zeros((3, 3))
 
+    def without_any(self) -> Keyframes:
+        """None yet, to be selected in the same way."""
+        empty = Keyframes(self.options, self.gaussians)
+        empty.distance = self.distance
+        return empty
+
     def __len__(self) -> int:
         return len(self.list)
 

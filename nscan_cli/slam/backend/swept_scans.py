@@ -1,0 +1,94 @@
+"""Scans of a laser that turns, corrected once more: by the path of the robot after the last optimisation.
+
+Tracking knows the motion during a turn from odometry, or from the scans before alone. The final path has
+poses on both sides of each turn. The poses at the middle of the turns are held: how fast the robot moves
+meanwhile matters least there.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+
+from nscan_cli.graph.model import Pairwise
+from nscan_cli.logs.robot_path import poses_at
+from nscan_cli.poses import Array, Mask, compose, inverse, relative
+from nscan_cli.slam.backend.scan_poses import between_keyframes
+from nscan_cli.slam.frontend.tracked_scans import TrackedScans
+from nscan_cli.slam.keyframes.route import route_of
+from nscan_cli.slam.options import SlamOptions
+from nscan_cli.slam.state import SlamState
+
+
+def correct_swept_scans(state: SlamState) -> None:
+    """Bring all scans to the times of their stamps, with the points that the path of the robot gives.
+
+    Changes log, keyframes, chain, tracked and route, if the laser turns.
+    """
+    if state.log.beam_times is None:
+        return
+    rows, breaks = state.route.rows, set(state.breaks)
+    turn, tracked = state.options.optimisation.metres_per_radian, np.concatenate(state.tracked)
+    at_middle = between_keyframes(tracked, rows, state.poses, state.breaks, turn)
+    path, poses = state.log.moving_along(at_middle).path, at_middle
+    if path is not None:
+        poses = poses_at(path, state.recorded.times)
+    since_middle = relative(poses, at_middle)
+    before = state.keyframes.list
+    state.log = dataclasses.replace(state.recorded, path=path)
+    state.tracked = [poses]
+    state.chain = [
+        _between_moved(relation, since_middle[relation.nodes[0]], since_middle[relation.nodes[1]])
+        for relation in state.chain
+    ]
+    state.keyframes = state.keyframes.without_any()
+    is_keyframe = np.zeros(len(poses), dtype=np.bool_)
+    is_keyframe[rows] = True
+    add_keyframes_at(state, tracked_at(poses, breaks, state.options), is_keyframe, breaks)
+    for keyframe, known in zip(state.keyframes.list, before, strict=True):
+        keyframe.tracked = dataclasses.replace(known.tracked, pose=keyframe.tracked.pose)
+        keyframe.prior_covariance = known.prior_covariance
+    state.route = route_of(state.keyframes.list, state.chain, poses[rows])
+    state.energies.forget()
+
+
+def _between_moved(relation: Pairwise, first: Array, second: Array) -> Pairwise:
+    """A relation of two nodes after each has moved by a pose (3,), in its own frame."""
+    measurement = compose(inverse(first), compose(relation.measurement, second))
+    return dataclasses.replace(relation, measurement=measurement)
+
+
+def add_keyframes_at(state: SlamState, found: TrackedScans, is_keyframe: Mask, breaks: set[int]) -> None:
+    """Add keyframes with their Gaussians, from all scans (S,) where they were `found`."""
+    keyframes = state.keyframes
+    for scans in state.scan_batches():
+        those = found.part(scans.first, scans.first + len(scans))
+        for k, row in enumerate(range(scans.first, scans.first + len(scans))):
+            if row in breaks:
+                keyframes.end_segment()
+            if is_keyframe[row]:
+                keyframes.add(row, scans.of(k), those.scan(k))
+                for whole in keyframes.list[-2:-1]:
+                    whole.make_ndt()
+            else:
+                keyframes.attach(scans, those, k, k + 1)
+    keyframes.end_segment()
+
+
+def tracked_at(poses: Array, breaks: set[int], options: SlamOptions) -> TrackedScans:
+    """The scans as if tracking had found them at poses (S, 3), without information."""
+    found, step, path = TrackedScans.room(len(poses)), options.tracking.min_motion, 0.0
+    found.poses[:], found.values[:], found.inliers[:] = poses, 0.0, 1.0
+    found.hessians[:], found.prior_covariances[:], found.odometry_sigmas[:] = 0.0, 0.0, 0.0
+    joined_at = poses[0]
+    for row, pose in enumerate(poses):
+        moved = relative(pose, joined_at)
+        distance = float(np.hypot(moved[0], moved[1]))
+        found.in_map[row] = row == 0 or distance > step or abs(moved[2]) > step
+        if found.in_map[row]:
+            path, joined_at = path + distance, pose
+        if row in breaks:
+            path += options.breaks.path
+        found.paths[row] = path
+    return found
