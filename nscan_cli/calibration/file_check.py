@@ -176,8 +176,8 @@ def _frozen(evidence: _Evidence) -> Finding:
 def _two_clocks(lag: ClockLag, reading: ReadingOptions) -> Finding:
     side = "behind" if lag.offset > 0 else "ahead of"
     return Finding(
-        f"the clock of odometry is likely {abs(lag.offset):.1f} s {side} that of the scans: their turns "
-        f"differ by {lag.disagreement:.0%} there, and by {lag.as_stamped:.0%} as stamped; "
+        f"the clock of odometry is likely {abs(lag.offset):.1f} s {side} that of the scans: with this offset "
+        f"their turns differ by {lag.disagreement:.0%}, as stamped by {lag.as_stamped:.0%}; "
         f"try --clock-offset {reading.clock_offset + lag.offset:.1f}"
     )
 
@@ -252,6 +252,6 @@ def _wrong_mount(mount: Array, fit: MountFit, off: float) -> Finding:
     side = "left" if off > 0 else "right"
     cure = f"--mount {x},{y},{angle:g}{opposite}"
     return Finding(
-        f"the laser likely looks {abs(math.degrees(off)):.0f}° further to the {side} than the file says: so "
-        f"scans and odometry agree about {counted(fit.steps, 'step')}; try {cure}"
+        f"the laser likely looks {abs(math.degrees(off)):.0f}° further to the {side} than the file "
+        f"says; then scans and odometry agree about {counted(fit.steps, 'step')}; try {cure}"
     )

@@ -34,7 +34,7 @@ VALUE_UNITS = {
 
 @subcommand(
     "calibrate",
-    ("nscan-cli calibrate drive.mcap", "mounting, odometry and clocks by the scans"),
+    ("nscan-cli calibrate drive.mcap", "mounting, odometry and clocks from the scans"),
     ("nscan-cli calibrate drive.mcap -o robot.toml", "as options for --config of all commands"),
     ("nscan-cli calibrate drive.mcap --json", "for a program"),
 )
@@ -95,19 +95,20 @@ def _rows(calibration: Calibration, reading: ReadingOptions, calibrated: Reading
         ("mounting", [_line("x", values["mount_x"], "m"), _line("y", values["mount_y"], "m"),
                       _line("turned by", _degrees(values["mount_angle"]), "°")]),
         ("odometry", [_line("scale", values["odometry_scale"]),
-                      _line("turns by odometry, of those by scans", values["turn_ratio"]),
-                      _line("heading gained", _degrees(values["veer"]), "°/m")]),
-        ("noise", [_line("length of a step", noise, "m/m"), _line("turn of a step", turn_noise, "rad/rad")]),
-        ("clock", [_line("added to the stamps of odometry", values["clock_offset"], "s")]),
-        ("open", [", ".join(calibration.open) or "nothing"]),
-        ("options", [flags or "none: the file says what the scans say"]),
+                      _line("turns by odometry / turns by scans", values["turn_ratio"]),
+                      _line("heading drift", _degrees(values["veer"]), "°/m")]),
+        ("noise", [_line("per metre driven", noise, "m/m"),
+                   _line("per radian turned", turn_noise, "rad/rad")]),
+        ("clock", [_line("to add to odometry's stamps", values["clock_offset"], "s")]),
+        ("not found", [", ".join(calibration.open) or "nothing"]),
+        ("options", [flags or "none: the file agrees with the scans"]),
     ]  # fmt: skip
 
 
 def _line(what: str, estimate: Estimate, unit: str = "") -> str:
     """A value with as many decimals as its standard deviation tells."""
     if not math.isfinite(estimate.sigma):
-        return f"{what}: open"
+        return f"{what}: not found"
     decimals = max(1 - math.floor(math.log10(estimate.sigma)), 0) if estimate.sigma > 0 else 6
     shown = f"{round(estimate.value, decimals) + 0.0:.{decimals}f} ± {estimate.sigma:.{decimals}f}"
     recorded = "" if estimate.recorded is None else f" (file: {estimate.recorded:.4g})"

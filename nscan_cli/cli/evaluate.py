@@ -47,7 +47,7 @@ DEFAULT_DRAWN = 10
         "/tf:PARENT.CHILD for transforms.")  # fmt: skip
 @option("--worst", type=click.IntRange(0), metavar="N", help="List the N worst relations.")
 @option("--max-translation", type=click.FloatRange(0), metavar="M",
-        help="Exit with code 3 if the mean on relations, or the RMSE of the ATE, is larger.")  # fmt: skip
+        help="Exit with code 3 if the mean error (relations) or RMSE (ATE) is larger.")  # fmt: skip
 @option(
     "--max-rotation",
     type=click.FloatRange(0),

@@ -9,7 +9,7 @@ EXIT_CODES = {
     3: "done, but a requested check failed",
     65: "invalid input",
     66: "missing or unreadable input",
-    73: "an output that cannot be written",
+    73: "cannot write an output",
     130: "interrupted",
     141: "standard output was closed early",
 }

@@ -40,7 +40,7 @@ if TYPE_CHECKING:
         help="Run on a Dask cluster with this scheduler, tcp://HOST:PORT.")  # fmt: skip
 @option("--timeout", type=click.FloatRange(0, min_open=True), default=3600, show_default=True, metavar="S",
         help="Time limit for a log, seconds; a log that takes longer fails.")  # fmt: skip
-@option("--force", is_flag=True, help="Run logs that are up to date, too.")
+@option("--force", is_flag=True, help="Also run logs that are up to date.")
 @common_options
 def command(
     manifest: str,

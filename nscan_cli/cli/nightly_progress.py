@@ -86,5 +86,5 @@ def _outcome_line(night: RunRecord) -> str:
     errors, took, counts = MeasuredErrors.of(night), night["times"]["seconds"], night["counts"]
     measured = "" if errors is None else f"{errors.measure} {errors.metres:.4f} m, "
     if took is None:
-        return f"{measured}not timed: kernels were compiled meanwhile"
+        return f"{measured}not timed, because kernels were compiled"
     return f"{measured}{took:.1f} s, {counts['duration'] / max(took, 0.001):.0f} times real time"

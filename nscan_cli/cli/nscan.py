@@ -222,7 +222,7 @@ def _nscan_rows(numbers: tuple[int, ...], match: NScanMatch, left_out: list[Excl
         ("overlap", [f"{match.overlap.min():.0%} at least"]),
         ("match", match_outcome(match.reason, joint.iterations, joint.evaluations, joint.unsettled)),
         ("placed", [searched] if joint.searched else []),
-        ("held weakly", [*weak[:LISTED_SCANS], *more]),
+        ("weak", [*weak[:LISTED_SCANS], *more]),
         ("left out", [f"scan {numbers[out.scan]} {out.reason}" for out in left_out]),
     ]
 

@@ -115,7 +115,7 @@ def reading_options(command: Command) -> Command:
         read("--max-range", type=click.FloatRange(0, min_open=True), metavar="M",
              help="Treat longer readings as no return."),
         read("--range-scale", type=click.FloatRange(0, min_open=True), metavar="M",
-             help="Metres in a unit of the ranges, such as 0.001 for millimetres."),
+             help="Multiply the ranges: 0.001 for millimetres."),
         read("--angle-min", type=float, metavar="DEG", help="Direction of the first beam."),
         read("--angle-increment", type=float, metavar="DEG", help="Angle from beam to beam."),
         read("--mask", type=MaskType(), help="Drop beams between bearings (degrees, counter-clockwise)."),
@@ -138,7 +138,7 @@ def reading_options(command: Command) -> Command:
         read("--allow-corrected", is_flag=True,
              help="Use poses that a mapper has already corrected as odometry."),
         read("--as-recorded", is_flag=True,
-             help="Believe the log where its scans contradict it; correct nothing."),
+             help="Correct nothing, even if the scans contradict the log."),
     ]  # fmt: skip
 
     @functools.wraps(command)

@@ -64,7 +64,7 @@ MAPPING_OPTIONS = ("max_scans", "relations", "no_loops", "calibrate")
     "from_file",
     type=PATH,
     metavar="GRAPH",
-    help="Optimise a saved graph (JSON or g2o), and refine it with its LOG; nothing is tracked.",
+    help="Optimise a saved graph (JSON or g2o), and refine it with its LOG, without tracking.",
 )
 @option(
     "--max-scans",
@@ -83,7 +83,7 @@ MAPPING_OPTIONS = ("max_scans", "relations", "no_loops", "calibrate")
     "plus the chain of tracked relations (both).",
 )
 @option("--calibrate", is_flag=True,
-        help="First find and apply the mounting, and the scale and clock of odometry.")  # fmt: skip
+        help="First find and use the mounting, and the scale and clock of odometry.")  # fmt: skip
 @option("--no-loops", is_flag=True, help="Do not close loops: drift remains.")
 @option(
     "--threads",

@@ -79,7 +79,7 @@ def facts_lines(facts: Facts, verbose: bool) -> str:
         ("relations", [f"{facts['pairwise']} pairwise, {facts['nscan']} nScan"]),
         ("loops", [tried if loops["tried"] else "none tried"]),
         ("refused", [f"{count}: {reason}" for reason, count in loops["reasons"].items()]),
-        ("sigma", _sigma_lines(facts["sigma"])),
+        ("uncertainty", _sigma_lines(facts["sigma"])),
     ]
     if tracking is not None and verbose:
         starts, searches = counted(tracking["restarts"], "start"), counted(tracking["searches"], "search")
@@ -93,7 +93,7 @@ def facts_lines(facts: Facts, verbose: bool) -> str:
         iterations = counted(optimised["iterations"], "iteration")
         rows += [
             ("optimised", [f"energy {optimised['energy']:.6g} after {iterations}{refined}"]),
-            ("moved", [f"no pose by more than {optimised['moved']:.3g} m"]),
+            ("moved", [f"poses by at most {optimised['moved']:.3g} m"]),
         ]
     return summary_table([*rows, ("time", [_time(facts)]), ("written", [", ".join(facts["written"])])])
 
@@ -102,8 +102,8 @@ def _sigma_lines(sigma: Facts) -> list[str]:
     lines = []
     if sigma["median"] is not None:
         lines.append(
-            f"{sigma['median']:.2g} m in the median, {sigma['max']:.2g} m at scan {sigma['scan']}, "
-            f"from scan {sigma['from_scan']}"
+            f"median {sigma['median']:.2g} m, worst {sigma['max']:.2g} m (scan {sigma['scan']}), "
+            f"relative to scan {sigma['from_scan']}"
         )
     if sigma["unknown"]:
         lines.append(f"unknown for {counted(sigma['unknown'], 'keyframe')}")

@@ -30,7 +30,7 @@ def summary_table(rows: Sequence[Row], width: int | None = TERMINAL_WIDTH) -> st
 def match_outcome(reason: str | None, iterations: int, evaluations: int, unsettled: int) -> list[str]:
     """The outcome of a match: converged or why not, iterations, and stages that did not settle."""
     outcome = "converged" if reason is None else f"not converged ({reason})"
-    cut = f"{counted(unsettled, 'stage')} before the last did not settle: the result is less certain"
+    cut = f"{counted(unsettled, 'stage')} before the last did not converge: the result is less certain"
     return [
         f"{outcome}, {counted(iterations, 'iteration')}, {counted(evaluations, 'evaluation')}",
         *([cut] if unsettled else []),

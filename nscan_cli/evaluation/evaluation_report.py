@@ -52,7 +52,7 @@ def evaluation_text(evaluation: Evaluation) -> str:
         blocks.append(
             f"relations  {relations.name}: {len(errors.used)} of {len(relations)} used, "
             f"{errors.exact} at exact stamps,\n"
-            f"           {near} within {TOLERANCE} s; {errors.too_far} not used, with no pose so near\n\n"
+            f"           {near} within {TOLERANCE} s; {errors.too_far} not used, because no pose is near\n\n"
             + _statistics_table(
                 {"translation, m": errors.translation_spread, "rotation, deg": errors.rotation_spread}
             )
@@ -79,8 +79,8 @@ def _alignment_note(alignment: Alignment) -> str:
     if alignment.by == "positions":
         return ""
     return (
-        f"alignment  its angle is that of the headings: result and reference move by\n"
-        f"           {alignment.common:.3f} m together, which leaves it open\n"
+        f"alignment  the angle comes from the headings: result and reference move by only\n"
+        f"           {alignment.common:.3f} m together, which does not determine it\n"
     )
 
 

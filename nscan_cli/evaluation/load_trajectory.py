@@ -74,7 +74,7 @@ def load_reference(
         notices += [f"{name}: {warning}" for warning in recording.warnings]
         return Trajectory.in_space(*poses_on_topic(recording, topic, name, notices))
     if topic is not None:
-        raise WrongUsageError(f"{name}: is no recording, and has no topics; leave out --reference-topic")
+        raise WrongUsageError(f"{name}: is not a recording and has no topics; leave out --reference-topic")
     loaded = _trajectory_or_log(bytes(stored), path, options, notices)
     if isinstance(loaded, Trajectory):
         return loaded

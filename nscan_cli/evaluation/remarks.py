@@ -64,8 +64,8 @@ def _two_runs(trajectory: Trajectory) -> str:
         path, there = float(np.hypot(*np.diff(places[written], axis=0)[on].T).sum()), float(steps.sum())
         if backward and there > PATH_RATIO * path + REPEATED_DISTANCE:
             return (
-                f"time goes back {counted(backward, 'time')} in it, and in order of time its poses jump to "
-                f"and fro (a path of {there:.1f} m in place of {path:.1f} m)"
+                f"time goes back {counted(backward, 'time')} in it, and in order of time its poses jump back "
+                f"and forth (a path of {there:.1f} m instead of {path:.1f} m)"
             )
     same = np.diff(times) == 0
     firsts = places[np.append(True, ~same)]
@@ -96,7 +96,7 @@ def _out_of_plane_motion(trajectory: Trajectory, name: str) -> Iterator[str]:
     if lean > LARGEST_TILT_RANGE and tilt <= LARGEST_TILT_RANGE:
         yield (
             f"the {name} is tilted by {math.degrees(lean):.1f}° throughout: its frame is not that of a robot "
-            "on the floor, and its headings are those of another axis"
+            "on the floor, and its headings are about another axis"
         )
 
 
@@ -114,8 +114,8 @@ def _misfits(result: Trajectory, reference: Trajectory, errors: TrajectoryErrors
         and now.apart_mirrored < LARGEST_RESIDUAL * now.spread
     ):
         yield (
-            "the result is the mirror image of the reference: mirrored, it would be "
-            f"{now.apart_mirrored:.3g} m (RMS) off in place of {now.apart_scaled:.3g} m"
+            "the result is the mirror image of the reference: mirrored, its error is "
+            f"{now.apart_mirrored:.3g} m (RMS) instead of {now.apart_scaled:.3g} m"
         )
         return
     clocks = Clocks.of(result.times[errors.rows], poses, reference)
@@ -197,8 +197,8 @@ def _factor_text(factor: float) -> str:
     larger, which = (factor, "reference") if factor > 1 else (1 / factor, "result")
     for size, unit in UNIT_FACTORS.items():
         if abs(larger / size - 1) < UNIT_TOLERANCE:
-            return f"{size:.4g}: {unit}, the {which} seems to be in them"
-    return f"{larger:.3f}: the {which} is larger by it"
+            return f"{size:.4g}: the {which} seems to be in {unit}"
+    return f"{larger:.3f}: the {which} is larger by this factor"
 
 
 def _point_text(point: Array) -> str:

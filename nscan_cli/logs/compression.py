@@ -101,5 +101,5 @@ def decompressed(stored: bytes, packing: Compression) -> tuple[bytes, str | None
         return b"".join(content), f"the {packing.name} data {problem}"
     if at < len(stored):
         left = len(stored) - at
-        return b"".join(content), f"{left} bytes after the {packing.name} data are no such data"
+        return b"".join(content), f"{left} bytes after the {packing.name} data are something else"
     return b"".join(content), None

@@ -178,8 +178,8 @@ def _merged_recording(parts: Parts, salvage: bool) -> tuple[Recording, Source]:
             data, lost = _content(stored, path, salvage)
             form = _form(data, path)
             if not form.container:
-                problem = f"{path}: is {form.name}, no recording"
-                raise WrongUsageError(f"{problem}; several LOGs have to be the files of one recording")
+                problem = f"{path}: is {form.name}, not a recording"
+                raise WrongUsageError(f"{problem}; several LOGs must be the files of one recording")
             first = first or (path, form.name)
             if form.name != first[1]:
                 raise split_recordings.different_forms(first, (path, form.name))

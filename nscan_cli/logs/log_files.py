@@ -150,7 +150,7 @@ def _only_recording(path: str, there: list[str], names: list[str]) -> list[str]:
         holds = f"it holds {shortened_list(held)}" if held else "it is empty"
         raise InputMissingError(
             f"{path}: is a folder without a recording, {holds}; "
-            "name a log, or a folder that `ros2 bag record` has left"
+            "name a log, or a folder written by `ros2 bag record`"
         )
     plain = {without_compression(one): one for one in sorted(there, key=len, reverse=True)}
     parts = sorted_parts(plain.values())

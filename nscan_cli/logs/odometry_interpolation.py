@@ -73,7 +73,7 @@ def _missing_notice(missing: NDArray[np.bool_], times: Array, name: str) -> str:
     seconds = float(np.gradient(times)[missing].sum()) if len(times) > 1 else 0.0
     return (
         f"odometry is missing at {counted(int(missing.sum()), 'scan')} ({seconds:.1f} s): no {name} near "
-        f"{', '.join(stretches)}{rest}; steady motion takes its place there"
+        f"{', '.join(stretches)}{rest}; the robot is assumed to keep its velocity there"
     )
 
 

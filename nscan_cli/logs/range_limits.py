@@ -100,8 +100,8 @@ def _upper_limits(
         if share == 0.0:
             return np.minimum(high, limit), source
         warnings.append(
-            f"{source} is {limit:g} m, but {_percent(share)} of the returns lie beyond: it is no limit of "
-            f"the laser and is not used; --max-range {limit:g} would use it"
+            f"{source} is {limit:g} m, but {_percent(share)} of the returns lie beyond: it is not a limit "
+            f"of the laser and is not used; --max-range {limit:g} would use it"
         )
     if (high == high[0]).all():
         share = returns_beyond(raw.ranges, float(high[0]), end)

@@ -10,7 +10,7 @@ import numpy as np
 from nscan_cli.poses import Array
 
 INDEFINITE = "the Hessian is not positive definite"
-CELL_BORDER = "held at a cell border, where the energy jumps"
+CELL_BORDER = "stopped at a cell border, where the energy jumps"
 SINGULAR = 1e-10
 """An eigenvalue below this share of the greatest one is rounding, not information."""
 WEAK_SIGMA = 0.05

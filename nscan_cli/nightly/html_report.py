@@ -27,9 +27,9 @@ STATUS_SYMBOLS: dict[Status, str] = {"good": "✓", "worse": "!", "above": "✗"
 STATUS_WORDS: dict[Status, str] = {
     "good": "good",
     "worse": "worse",
-    "above": "above bound",
+    "above": "above its bound",
     "failed": "failed",
-    "absent": "not there",
+    "absent": "missing",
 }
 
 

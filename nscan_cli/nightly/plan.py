@@ -41,7 +41,7 @@ def make_plan(entries: list[ManifestEntry], folder: Path, force: bool) -> Plan:
             planned.absent.append(each)
             continue
         if not each.is_there:
-            reason = f"{each.inputs['log'].name} is not there"
+            reason = f"{each.inputs['log'].name} is missing"
             planned.unreadable.append((each, _with_sources(each, reason)))
             continue
         entry, lacking = _with_what_is_there(each) if each.optional else (each, [])
@@ -72,7 +72,7 @@ def _with_what_is_there(entry: ManifestEntry) -> tuple[ManifestEntry, list[str]]
     """An optional log without its missing references, and a note on each of them."""
     inputs = {role: path for role, path in entry.inputs.items() if path.exists()}
     lacking = [path for role, path in entry.inputs.items() if role not in inputs]
-    notes = [f"{path.name} is not there, so no errors are measured" for path in lacking]
+    notes = [f"{path.name} is missing, so no errors are measured" for path in lacking]
     return replace(entry, inputs=inputs), [_with_sources(entry, note) for note in notes]
 
 

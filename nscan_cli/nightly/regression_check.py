@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
-from nscan_cli.files.text import counted
 from nscan_cli.nightly.manifest import ManifestEntry
 from nscan_cli.nightly.run_history import RunRecord
 
@@ -13,8 +12,12 @@ Status = Literal["failed", "above", "worse", "good", "absent"]
 """What a check says of a log."""
 STATUS_ORDER: tuple[Status, ...] = ("failed", "above", "worse", "good", "absent")
 """The most urgent first."""
-ATTENTION: dict[Status, str] = {"failed": "failed", "above": "above bound", "worse": "worse than before"}
-"""The words for each status that needs attention."""
+ATTENTION: dict[Status, tuple[str, str]] = {
+    "failed": ("failed", "failed"),
+    "above": ("is above its bound", "are above their bound"),
+    "worse": ("is worse than before", "are worse than before"),
+}
+"""The words for each status that needs attention, for one log and for several."""
 
 MIN_RELATIVE_RISE = 0.05
 """An error is worse only if it has risen by more than this share of the previous error."""
@@ -98,7 +101,7 @@ def check_log(entry: ManifestEntry, runs: list[RunRecord], notes: list[str], abs
     last, previous = (done[-1] if done else None), (done[-2] if len(done) > 1 else None)
     status: Status
     if absent:
-        status, reasons = "absent", [f"{entry.inputs['log'].name} is not there"]
+        status, reasons = "absent", [f"{entry.inputs['log'].name} is missing"]
     else:
         status, reasons = _status_and_reasons(entry, runs, last, previous)
     if last is not None:
@@ -142,11 +145,13 @@ def headline(checks: list[CheckResult]) -> str:
     """The results of all logs in one line."""
     count = {status: sum(check.status == status for check in checks) for status in STATUS_ORDER}
     there = len(checks) - count["absent"]
-    parts = [f"{count[status]} {words}" for status, words in ATTENTION.items() if count[status]]
-    if count["failed"] or count["above"]:
-        return f"Not good: of {counted(there, 'log')}, {', '.join(parts)}"
+    parts = [
+        (count[status], words[count[status] > 1]) for status, words in ATTENTION.items() if count[status]
+    ]
     if parts:
-        return f"Within bounds, but of {counted(there, 'log')}, {parts[0]}"
+        (first, words), *others = parts
+        begin = f"{first} of {there} logs {words}" if there > 1 else f"The log {words}"
+        return ", ".join([begin, *(f"{number} {words}" for number, words in others)])
     within = sum(check.is_within_bounds for check in checks)
     if within == there:
         return "The log is good" if there == 1 else f"All {there} logs are good"

@@ -39,7 +39,7 @@ def test_relations_give_this_table(files: Path, capsys: pytest.CaptureFixture[st
         "result     result.tum: 4 poses\n"
         "\n"
         "relations  floor.relations: 2 of 3 used, 2 at exact stamps,\n"
-        "           0 within 0.1 s; 1 not used, with no pose so near\n"
+        "           0 within 0.1 s; 1 not used, because no pose is near\n"
         "\n"
         "                        mean        sd    median mean square      rmse       max\n"
         "translation, m        0.0500    0.0707    0.0500       0.005    0.0707    0.1000\n"

@@ -121,7 +121,7 @@ THERE = "/vicon/pose (PoseStamped, 5 messages)"
         ),
         (
             ["--reference", "truth.tum", "--reference-topic", "/a"],
-            "truth.tum: is no recording, and has no topics; leave out --reference-topic",
+            "truth.tum: is not a recording and has no topics; leave out --reference-topic",
         ),
         (
             ["--relations", "a.relations", "--reference-topic", "/a"],

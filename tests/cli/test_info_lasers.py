@@ -205,7 +205,7 @@ def test_a_laser_that_nods_is_listed_and_refused(tmp_path, capsys):
     assert (found["scans"], found["mounting"]) == (12, None)
     problem = "its laser nods, from 63.0° down to level: base_link → laser moves (tf base_link → laser)"
     assert found["used"]["mounting"] == f"refused: {problem}"
-    assert f"nods.mcap: {problem}; give --mount X,Y,DEG to take it as still" in said.err
+    assert f"nods.mcap: {problem}; give --mount X,Y,DEG to use a fixed mounting" in said.err
 
 
 @pytest.mark.parametrize(

@@ -257,7 +257,7 @@ def test_a_stage_that_was_cut_off_is_told_though_the_match_has_converged(capsys)
     document, said = matched(capsys, OFFICE_LOG, *arguments)
     assert np.hypot(*off(document, OFFICE_LOG)[:2]) > 0.4
     assert (document["converged"], document["reason"], document["unsettled_stages"]) == (True, None, 1)
-    assert said[-1].strip() == "1 stage before the last did not settle: the result is less certain"
+    assert said[-1].strip() == "1 stage before the last did not converge: the result is less certain"
 
 
 def test_scans_whose_odometry_is_missing_start_from_identity(capsys):

@@ -22,7 +22,7 @@ def test_scans_that_cannot_meet_the_others_are_named_and_left_out(tmp_path, caps
     document, said = matched(capsys, OFFICE_LOG, *arguments)
     assert document["relation"]["scans"] == [2000, 2016, 2024]
     assert document["relation"]["fixed"] == 2000
-    reason = "starts too far from all others to overlap one"
+    reason = "starts too far from all other scans to overlap any"
     assert document["left_out"] == [{"scan": 2008, "reason": reason, "overlap": 0, "chi2": None}]
     assert len(document["relation"]["hessian"]) == 45
     assert len(document["covariance"]) == 21
@@ -62,7 +62,7 @@ def test_a_weak_direction_is_named(capsys):
         assert abs(weakest["direction"]) < 0.1
     first, second = (f"σ {weakest['sigma']:.2g} m" for weakest in document["weakest"])
     weak = said[-2:]
-    assert weak[0].startswith("held weakly  scan 45 along ")
+    assert weak[0].startswith("weak  scan 45 along ")
     assert weak[0].endswith(f"({first})")
     assert weak[1].startswith("             scan 117 along ")
     assert weak[1].endswith(f"({second})")

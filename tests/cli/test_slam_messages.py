@@ -23,8 +23,10 @@ def test_the_summary(folder, capsys):
     refused = len(graph.loops) - accepted
     lines = [line for line in err.splitlines() if not line.startswith("compiling")]
     assert max(map(len, lines)) <= 80
-    said = {line[:11].strip(): line[11:] for line in lines if line[:11].strip()}
-    assert list(said) == ["scans", "keyframes", "relations", "loops", "refused", "sigma", "time", "written"]
+    said = {line[:13].strip(): line[13:] for line in lines if line[:13].strip()}
+    assert list(said) == [
+        "scans", "keyframes", "relations", "loops", "refused", "uncertainty", "time", "written"
+    ]  # fmt: skip
     assert said["scans"] == "252 in 502.0 s"
     assert said["keyframes"] == f"{len(graph.keyframes)}"
     assert said["relations"] == f"{len(graph.pairwise)} pairwise, {len(graph.nscan)} nScan"
@@ -36,7 +38,7 @@ def test_the_summary(folder, capsys):
     sigmas = [float(np.linalg.norm(graph.marginals[node][:2, :2], 2) ** 0.5) for node in others]
     worst = graph.scans[others[int(np.argmax(sigmas))]]
     of_half, most = f"{np.median(sigmas):.2g} m", f"{max(sigmas):.2g} m"
-    assert said["sigma"] == f"{of_half} in the median, {most} at scan {worst}, from scan 0"
+    assert said["uncertainty"] == f"median {of_half}, worst {most} (scan {worst}), relative to scan 0"
     rate = r"\d+ scans a second, \d+ times real time|including the compilation of kernels"
     assert re.fullmatch(rf"[\d.]+ s, ({rate})", said["time"])
     assert said["written"] == "graph.json"
@@ -97,7 +99,7 @@ def test_reasons_that_differ_by_a_number_are_counted_together():
     """In the graph each has its number; the summary has a line for all."""
     alike = {
         "some scans left out": ("1 scan left out", "1 scans left out", "12 scans left out"),
-        "only some of the scans hang together": ("only 1 of 9 scans hang together",),
+        "only some of the scans match each other": ("only 1 of 9 scans match each other",),
         "too little overlap with some scans of another visit": (
             "too little overlap with 1 scan of another visit",
             "too little overlap with 30 scans of another visit",

@@ -134,7 +134,7 @@ def test_logs_that_do_not_go_together_are_a_mistake(here, capsys):
     (here / "x.log").write_text("FLASER 1 1 0 0 0 0 0 0 1 h 1\n")
     for command in (["slam", "-o", "b.json"], ["info"]):
         assert run([*command, "my_bag/my_bag_0.mcap", "x.log"]) == 2
-        assert "x.log: is CARMEN text, no recording" in capsys.readouterr().err
+        assert "x.log: is CARMEN text, not a recording" in capsys.readouterr().err
     assert run(["info"]) == 2
     assert "Missing argument 'LOG" in capsys.readouterr().err
     assert run(["info", str(here)]) == 66

@@ -92,7 +92,7 @@ NEVER_ONE = {
     ("logs/recordings/mcap.py", " messages on "): "so many of so many",
     ("logs/recordings/turn_segments.py", " messages of "): "a turn in one message is whole",
     ("mapping/figures/match_plots.py", " scans, least overlap "): "of a joint match",
-    ("slam/local_matching/joint_relations.py", " scans hang together"): "so many of so many",
+    ("slam/local_matching/joint_relations.py", " scans match each other"): "so many of so many",
 }
 
 

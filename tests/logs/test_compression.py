@@ -90,7 +90,7 @@ def test_bytes_behind_the_data(pack, path):
     path.write_bytes(pack(TEXT) + bytes(100))
     assert len(read_log(str(path))) == 60
     path.write_bytes(pack(TEXT) + b"and more")
-    with pytest.raises(InputDataError, match=r"8 bytes after the .* data are no such data"):
+    with pytest.raises(InputDataError, match=r"8 bytes after the .* data are something else"):
         read_log(str(path))
     assert len(read_log(str(path), SALVAGE)) == 60
 

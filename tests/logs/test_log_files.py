@@ -264,7 +264,7 @@ def test_logs_that_are_no_files_of_one_recording(tmp_path):
     for names, said in (
         (
             ("a.mcap", "a.log"),
-            r"a\.log: is CARMEN text, no recording; several LOGs have to be the files of one",
+            r"a\.log: is CARMEN text, not a recording; several LOGs must be the files of one",
         ),
         (("a.mcap", "a.bag"), r"a\.mcap MCAP: they are not files of one recording"),
         (("a.mcap", "folder"), "folder: is a folder beside other LOGs"),

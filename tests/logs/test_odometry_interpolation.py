@@ -43,7 +43,9 @@ def test_beyond_the_ends_it_is_missing_and_told():
     np.testing.assert_allclose(found[:, 0], [np.nan, 0.0, 0.5, 1.0, np.nan, np.nan])
     (warning,) = warnings
     assert warning.startswith("odometry is missing at 3 scans (")
-    assert warning.endswith("no pose near scan 0, scans 4 to 5; steady motion takes its place there")
+    assert warning.endswith(
+        "no pose near scan 0, scans 4 to 5; the robot is assumed to keep its velocity there"
+    )
 
 
 def test_a_gap_in_which_the_robot_moved_is_no_straight_line():

@@ -172,7 +172,7 @@ def test_an_optional_log_is_mapped_without_what_is_not_there_to_measure_it(entry
     ((planned_entry, _key),) = planned.to_do
     assert planned_entry.inputs == {"log": tmp_path / "a.log"}
     assert planned.notes["a"] == [
-        "a.tum is not there, so no errors are measured; download from https://example.org/a.tum"
+        "a.tum is missing, so no errors are measured; download from https://example.org/a.tum"
     ]
     ((_, reason),) = make_plan([replace(optional, optional=False)], nights, False).unreadable
     assert "a.tum: no such file" in reason

@@ -80,10 +80,10 @@ def test_of_a_trajectory_the_rmse_counts():
     [
         ([judged(done(1), translation=2)], "The log is good"),
         ([judged(done(1), rotation=2)] * 3 + [judged(absent=True)], "All 3 logs are good"),
-        ([judged(done(1)), judged(done(1), done(2))], "Within bounds, but of 2 logs, 1 worse than before"),
+        ([judged(done(1)), judged(done(1), done(2))], "1 of 2 logs is worse than before"),
         ([judged(FAILED), judged(done(2), translation=1), judged(done(1), done(2)), judged(done(1))],
-         "Not good: of 4 logs, 1 failed, 1 above bound, 1 worse than before"),
-        ([judged(FAILED)], "Not good: of 1 log, 1 failed"),
+         "1 of 4 logs failed, 1 is above its bound, 1 is worse than before"),
+        ([judged(FAILED)], "The log failed"),
         ([judged(UNMEASURED, translation=2)], "The log is mapped; it has no bound"),
         ([judged(UNMEASURED), judged(done(1))],
          "All 2 logs are mapped, none has a bound"),

@@ -118,7 +118,7 @@ def test_what_is_not_timed_is_said(tmp_path, capsys):
     }  # fmt: skip
     entry = ManifestEntry("a", {"log": Path("a.log")})
     PlainProgress(False).finished(entry, night)
-    assert capsys.readouterr().err == "a: not timed: kernels were compiled meanwhile\n"
+    assert capsys.readouterr().err == "a: not timed, because kernels were compiled\n"
     text = html_report("small", [check_log(entry, [night], [], absent=False)], tmp_path).decode()
     assert '<span class="time">not timed: kernels were compiled during the run</span>' in text
     assert '<span class="time">2026-11-21 03:00:00 UTC; run again: the log has changed</span>' in text

@@ -77,7 +77,7 @@ def test_a_robot_that_was_carried_is_found_again_by_a_loop(name, odometry):
 def test_what_went_wrong_is_said_by_the_numbers_of_the_scans():
     made, found = case("carried by 5 m")
     state, numbers = copy.copy(found.state), made.log.numbers
-    broken = f"tracking broke at scan {numbers[made.before]}; the motion to there is unknown"
+    broken = f"tracking broke at scan {numbers[made.before]}; how the robot moved there is unknown"
     assert notices(state) == [broken]
     state.odometry_jumps, state.frozen_scans = np.arange(12), np.array([3, 7])
     several = ", ".join(str(number) for number in numbers[:10])
@@ -93,7 +93,8 @@ def test_without_odometry_a_jump_along_a_corridor_is_said():
     assert errors(made, found.graph.poses).whole > 5.0
     said = (
         f"the scans jump at scan {made.log.numbers[made.before]}, farther than the robot drives between "
-        "two scans: scans are missing, it was carried, or tracking slipped; how far it moved is unknown"
+        "two scans: scans are missing, the robot was carried, or tracking slipped; "
+        "how far it moved is unknown"
     )
     assert said in notices(found.state)
     assert notices(case("none", odometry=False)[1].state) == []

@@ -47,7 +47,7 @@ def first_of_two_lasers(
     is_first = _is_first(scans, options)
     kept = [message for message, first in zip(messages, is_first.tolist(), strict=True) if first]
     said = (
-        f"two lasers alternate in one frame, {scans[0].frame}: scans resemble the second next, not the next; "
+        f"two lasers alternate in one frame, {scans[0].frame}: a scan resembles the one after the next; "
         f"only the {len(kept)} scans of the laser that comes first are read, which may need --mount; "
         "give each laser its own topic and frame; --as-recorded reads all as those of one laser"
     )

@@ -45,7 +45,7 @@ def scan(message: Any) -> ScanMessage:
     # JSON has null for an invalid range; NumPy turns it into nan.
     ranges = np.array(message.ranges, dtype=np.float64)
     if ranges.ndim != 1:
-        raise ValueError("its ranges are no list of numbers")
+        raise ValueError("its ranges are not a list of numbers")
     first, last = float(message.start_angle), float(message.end_angle)
     step = (last - first) / max(len(ranges) - 1, 1)
     frame = normalised(message.frame_id)

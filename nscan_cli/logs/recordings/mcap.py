@@ -99,7 +99,7 @@ class _McapReader:
         try:
             end = self._read_data_section()
             if summary is not None and end != summary.start:
-                self._lost(end, "something stands between the data and the summary")
+                self._lost(end, "unknown bytes stand between the data and the summary")
         except DamagedMcapError as broken:
             self._lost(broken.at, f"{broken}; what follows is not readable")
             self._resume_at_chunks(broken.at, summary)

@@ -59,12 +59,12 @@ def laser_mounting(
         mount, hanging, tilt = planar_mount(composed(links)[0])
         if tilt > MountingLimits().tilt:
             problem = f"its laser is tilted by {math.degrees(tilt):.1f}° (tf {' → '.join(frames)})"
-            raise MountingError(file, problem, "give --mount X,Y,DEG to use its scans as if it were not")
+            raise MountingError(file, problem, "give --mount X,Y,DEG to use its scans as if it were level")
     elif moving.problem():
         raise _moving_laser(moving, links, frames, file)
     else:
         mount, hanging = moving.mount, moving.hangs
-        findings.used["mounting"] += f"; {_moving_links(links)}, {moving.extent()}: its mean is taken"
+        findings.used["mounting"] += f"; {_moving_links(links)}, {moving.extent()}: the mean is used"
     if hanging:
         findings.used["mounting"] += ", upside down"
     return mount, hanging, robot
@@ -83,7 +83,7 @@ def _laser_chain(
         if frames is not None:
             how = f"tf {' → '.join(frames)}"
             if robot and base != robot:
-                how += f", as if {base} were {robot}, from which no transforms lead"
+                how += f", with {base} for {robot}, which has no transforms"
             return chain_links(frames, tree.fixed, moving), frames, how
     if not robot and without_prefix(laser) in BASE_FRAMES:
         return [], [laser], ""
@@ -153,7 +153,7 @@ def _moving_laser(
     """The error that a laser moves on its robot so that no map can be made."""
     chain = f" (tf {' → '.join(frames)})" if len(frames) > 1 else ""
     problem = f"its laser {mount.problem()}: {_moving_links(links)}{chain}"
-    return MountingError(file, problem, "give --mount X,Y,DEG to take it as still")
+    return MountingError(file, problem, "give --mount X,Y,DEG to use a fixed mounting")
 
 
 def _moving_links(links: Sequence[ChainLink]) -> str:

@@ -84,7 +84,7 @@ def robot_odometry(
     if poses is not None:
         findings.used["odometry"] = f"{source}, {why}, interpolated"
     elif rows:
-        findings.used["odometry"] = f"none: {source} is of no use"
+        findings.used["odometry"] = f"none: {source} cannot be used"
     else:
         findings.used["odometry"] = "none in the recording"
         findings.warnings.append("no nav_msgs/Odometry, and no transform from odom: no odometry")
@@ -154,7 +154,7 @@ def _poses_at_scans(
     if not found:
         return None, None
     if clock.times.nominal:
-        findings.warnings.append(f"the scans have no times that lead to {source}: no odometry")
+        findings.warnings.append(f"the scans have no times to compare with {source}: no odometry")
         return None, None
     seconds, warnings = np.array(found_at) + offset, findings.warnings
     order = np.argsort(seconds, kind="stable")
@@ -164,8 +164,8 @@ def _poses_at_scans(
     apart = float(np.median(delays)) - clock.delay
     if poses is None and clock.stamped and _overlap(at, seconds - offset + apart):
         warnings.append(
-            f"{source} and the scans are stamped by two clocks: by their times of recording, "
-            f"--clock-offset {apart:.1f} leads from one to the other"
+            f"{source} and the scans are stamped by two clocks; from their times of recording, "
+            f"--clock-offset {apart:.1f} corrects it"
         )
     return poses, None if poses is None else robot_path(seconds_in_order, in_order)
 

@@ -36,7 +36,7 @@ from nscan_cli.logs.recordings.rosbag1_records import (
 
 CHUNK_COUNT = struct.Struct("<II")
 """A connection, and how many of its messages a chunk has."""
-WHOLE_READ = "its messages were found by walking through it"
+WHOLE_READ = "its messages were found by reading all of it"
 
 
 def read_recording(data: FileBytes, file: str, salvage: bool) -> Recording:
@@ -179,7 +179,7 @@ class _BagReader:
         """Damage: an error, or under --salvage a warning."""
         if not self.salvage:
             raise self._damaged(broken) from broken
-        self.recording.warnings.append(f"{_damage(broken)}: what is whole is used")
+        self.recording.warnings.append(f"{_damage(broken)}: the undamaged part is used")
 
     def _damaged(self, broken: DamagedBagError) -> InputDataError:
         return InputDataError(self.file, _damage(broken), DAMAGE_REMEDY)

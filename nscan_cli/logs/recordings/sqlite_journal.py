@@ -52,11 +52,11 @@ def recovered_database(
         except (sqlite3.Error, UnicodeDecodeError) as error:
             # The journal is damaged or of another database; the file alone may be sound.
             names = " and ".join(f"{file}{end}" for end in beside)
-            problem = f"does not go together with {names} ({' '.join(str(error).split())})"
+            problem = f"does not match {names} ({' '.join(str(error).split())})"
             if not salvage:
-                remedy = "move that away, or give --salvage, to use what the file has without it"
+                remedy = "remove that, or give --salvage, to use the file without it"
                 raise InputDataError(file, problem, remedy) from error
-            yield path, [f"{problem}: what that held is lost"]
+            yield path, [f"{problem}: its contents are lost"]
             return
         lost = _lost_pages(beside[WAL], applied) if WAL in beside else ""
         yield place, [f"{file}{WAL}: {lost}"] if lost else []
@@ -70,7 +70,7 @@ def _check_journal(path: str) -> None:
     with contextlib.suppress(FileNotFoundError), open(path + JOURNAL, "rb") as journal:
         journal.seek(-min(len(JOURNAL_END), os.path.getsize(path + JOURNAL)), os.SEEK_END)
         if journal.read() == JOURNAL_END:
-            raise sqlite3.DatabaseError("its journal leads to other files")
+            raise sqlite3.DatabaseError("its journal names other files")
 
 
 def apply_journals(path: str) -> int:
@@ -93,11 +93,11 @@ def _lost_pages(path: str, applied: int) -> str:
             return ""
         (page,) = struct.unpack_from(">I", head, 8)
         if applied == 0:
-            return "does not fit the file or is damaged: what it held is lost"
+            return "does not match the file or is damaged: its contents are lost"
         left = 0
         wal.seek(WAL_HEADER + applied * (FRAME_HEADER + page))
         while frame := wal.read(FRAME_HEADER):
             # Frames with other salts are older: the log was begun again over them.
             left += frame[FRAME_SALTS] == head[SALTS]
             wal.seek(page, os.SEEK_CUR)
-    return f"{counted(left, 'page')} at its end are not whole: what they held is lost" if left else ""
+    return f"{counted(left, 'page')} at its end are incomplete: their contents are lost" if left else ""

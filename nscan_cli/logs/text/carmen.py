@@ -119,7 +119,7 @@ def _chosen_laser(
     """The tag of the laser to use, and the reason. Raises InputDataError and WrongUsageError."""
     present = [tag for tag in LASERS if tag in lines]
     if not present:
-        found = ", ".join(lines) or "no record at all"
+        found = ", ".join(lines) or "no records"
         raise InputDataError(
             file, f"has no laser scans, only {found}", f"give a log with {LASERS[0]} records"
         )

@@ -42,7 +42,7 @@ def odometry_of_records(
         return None
     if scans.nominal or records.nominal:
         used["odometry"] = "none: no time stamps"
-        warnings.append(f"the time stamps do not relate the scans to a {name}: no odometry")
+        warnings.append(f"the time stamps do not match the scans with a {name}: no odometry")
         return None
     at = records.times + options.clock_offset
     found = interpolated_poses(scans.times, at, poses, name, warnings)

@@ -63,7 +63,7 @@ def read(data: bytes, file: str, source: Source, options: ReadingOptions) -> Las
     findings.lasers, findings.odometries = tuple(lasers), tuple(_devices(ODOMETRY_INTERFACES, lines))
     laser, findings.used["laser"] = choose_device("laser", options.laser, lasers, file)
     if laser is None:
-        found = ", ".join(findings.records) or "no record at all"
+        found = ", ".join(findings.records) or "no records"
         raise InputDataError(file, f"has no laser scans, only {found}", "give a log of a laser device")
     scans = player_records.player_scans(laser, lines, version, skips)
     if not scans.raw.stamps:

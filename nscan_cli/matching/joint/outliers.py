@@ -12,7 +12,7 @@ from nscan_cli.matching.joint.options import JointOptions
 from nscan_cli.matching.joint.overlap import Overlaps
 from nscan_cli.poses import Array, Indices, relative, relative_jacobians, wrap
 
-TOO_FAR = "starts too far from all others to overlap one"
+TOO_FAR = "starts too far from all other scans to overlap any"
 OVERLAPS_NONE = "overlaps none of the others"
 IN_NO_PAIR = "is in no pair of the index set"
 CONTRADICTS_PRIORS = "contradicts its priors"

@@ -24,7 +24,9 @@ def notices(state: SlamState) -> list[str]:
     """What went wrong, one sentence each."""
     log, found = state.log, []
     if state.breaks:
-        found.append(f"tracking broke at {_numbered(log, state.breaks)}; the motion to there is unknown")
+        found.append(
+            f"tracking broke at {_numbered(log, state.breaks)}; how the robot moved there is unknown"
+        )
     jumps = state.odometry_jumps.tolist()
     if jumps:
         found.append(f"the odometry jumps at {_numbered(log, jumps)}; each is replaced by the step before it")
@@ -72,15 +74,15 @@ def _scan_notices(state: SlamState) -> list[str]:
     same = repeated_scans(log, np.ones(max(len(log) - 1, 0), dtype=np.bool_)).tolist()
     if same:
         found.append(
-            f"the laser repeats itself at {_numbered(log, same)}: it is frozen, or the robot stands; "
-            "without odometry the robot is taken to stand"
+            f"the laser repeats itself at {_numbered(log, same)}: it is frozen, or the robot stands still; "
+            "without odometry the robot is assumed to stand still"
         )
     jumps_found = jumps_of(np.concatenate(state.tracked), state.options.odometry_checks)
     jumps = np.setdiff1d(jumps_found, state.breaks).tolist()
     if jumps:
         found.append(
             f"the scans jump at {_numbered(log, jumps)}, farther than the robot drives between two scans: "
-            "scans are missing, it was carried, or tracking slipped; how far it moved is unknown"
+            "scans are missing, the robot was carried, or tracking slipped; how far it moved is unknown"
         )
     return found
 
@@ -94,7 +96,7 @@ def _view_mismatches(state: SlamState) -> list[str]:
         return []
     first, last = state.log.numbers[[worst.first, worst.last]].tolist()
     return [
-        f"scans {first} to {last} see other things than the keyframes beside them: the same in only "
+        f"scans {first} to {last} do not see what the keyframes beside them see: they agree in only "
         f"{worst.share:.0%} of all directions; someone walks along, or tracking slipped"
     ]
 
@@ -112,7 +114,7 @@ def _contradictions(state: SlamState) -> list[str]:
     nodes = relations[int(np.argmax(chi2))].nodes
     return [
         f"relations contradict each other: their mean χ² is {mean:.1f}, that of loops {of_loops:.1f}, "
-        f"for 3 degrees of freedom; the map may be wrong, most of all at {_numbered(state.log, nodes)}"
+        f"for 3 degrees of freedom; the map may be wrong, most likely at {_numbered(state.log, nodes)}"
     ]
 
 
@@ -127,9 +129,9 @@ def _free_space_violations(state: SlamState) -> list[str]:
         return []
     first, last = state.log.numbers[[worst.first, worst.last]].tolist()
     return [
-        f"places do not look as they did before: from scan {first} to {last}, another visit looks through "
-        f"{worst.share:.1%} of what one visit saw, at most {most:.1%} in a sound map; the map is wrong there "
-        "or much has moved"
+        f"places look different on another visit: from scan {first} to {last}, its beams pass through "
+        f"{worst.share:.1%} of what the first visit saw (at most {most:.1%} in a sound map); the map is "
+        "wrong there, or much has moved"
     ]
 
 

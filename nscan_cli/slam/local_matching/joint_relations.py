@@ -30,7 +30,7 @@ class LocalMatch:
     pairwise: tuple[Pairwise, ...]
     """The relations of single matches."""
     nscan: NScan | None
-    """That of a joint match; None when too few scans hang together, or the match did not converge."""
+    """That of a joint match; None when too few scans match each other, or the match did not converge."""
     loop: Loop | None
     """The verdict on what another visit saw; None where nothing was."""
     moved: float
@@ -120,7 +120,7 @@ def _match_held(
     widenings: tuple[float, ...],
     options: NScanOptions,
 ) -> tuple[LocalMatch, bool]:
-    """Match jointly, leave out scans without enough overlap, and match again, until all scans hang together.
+    """Match jointly, leave out scans without enough overlap, and match again, until all match.
 
     Also returns whether further stages cannot add scans: the match converged, and all scans took part at
     first. Scans that are left out later hardly ever come back.
@@ -161,7 +161,7 @@ def _match_held(
         return LocalMatch(
             (), relation, loop, largest_motion(poses[related], match.poses, at)[0], whole
         ), all_began
-    reason = f"only {len(kept)} of {len(members)} scans hang together"
+    reason = f"only {len(kept)} of {len(members)} scans match each other"
     loop = verdict(keyframes, members, from_other_visit, centre, False, reason, 0.0)
     return LocalMatch((), None, loop, 0.0, False), all_began
 

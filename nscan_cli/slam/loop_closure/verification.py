@@ -25,12 +25,12 @@ from nscan_cli.slam.loop_closure.search_submaps import search_submaps
 
 AMBIGUOUS = "another place fits as well"
 OUTDONE = "another place fits better"
-TOO_LITTLE = "too little of an earlier visit is seen to tell the place"
+TOO_LITTLE = "too little of an earlier visit is in view to identify the place"
 NO_MATCH = "the scans of both visits do not match"
-ELSEWHERE = "the match leads away from the place found"
-NO_SECOND = "no second keyframe finds the same"
-SO_FAR_OFF = "too few keyframes find the same, farther off than the path drifts"
-LOST = "tracking has broken since: the place must be searched"
+ELSEWHERE = "the joint match moves away from the place found"
+NO_SECOND = "no second keyframe finds the same place"
+SO_FAR_OFF = "too few keyframes find the same place, which is farther off than the path drifts"
+LOST = "tracking broke since then: the place must be searched"
 
 
 def verify_place(

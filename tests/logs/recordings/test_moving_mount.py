@@ -67,7 +67,7 @@ def test_a_robot_that_rocks(form, static, read, tmp_path):
         "tf base_footprint → base_link → laser; base_footprint → base_link moves, so that it tilts by up to "
         "2.0° and rises by 0.0"
     )
-    assert log.report.used["mounting"].endswith(": its mean is taken")
+    assert log.report.used["mounting"].endswith(": the mean is used")
     assert log.report.warnings == ()
     assert log.frames.robot == "base_footprint"
 

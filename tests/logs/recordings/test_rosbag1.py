@@ -60,7 +60,7 @@ def test_a_bag_whose_last_chunk_was_never_closed(read, tmp_path):
         read(begun[:-30])
     log = read(begun[:-30], salvage=True)
     assert len(log) >= 11
-    assert "what is whole is used" in log.report.warnings[0]
+    assert "the undamaged part is used" in log.report.warnings[0]
 
 
 @pytest.mark.parametrize("longer", [4, 2224, 10**6, 2**32 - 10**6])
@@ -128,4 +128,4 @@ def test_a_damaged_chunk_of_a_bag(read, tmp_path):
         read(broken)
     log = read(broken, salvage=True)
     assert 0 < len(log) < 12
-    assert "what is whole is used" in log.report.warnings[0]
+    assert "the undamaged part is used" in log.report.warnings[0]

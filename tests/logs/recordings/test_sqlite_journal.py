@@ -100,7 +100,7 @@ def test_a_write_ahead_log_that_does_not_fit_is_told_of(bag, damage):
     log = read_log(str(bag))
     assert len(log) < 8
     assert any(
-        warning == f"{bag}-wal: does not fit the file or is damaged: what it held is lost"
+        warning == f"{bag}-wal: does not match the file or is damaged: its contents are lost"
         for warning in log.report.warnings
     )
 
@@ -116,7 +116,7 @@ def test_the_end_of_a_write_ahead_log_is_damaged(bag):
         log = read_log(str(bag))
         assert 6 < len(log) < 12
         (said,) = [warning for warning in log.report.warnings if "-wal: " in warning]
-        assert "at its end are not whole: what they held is lost" in said
+        assert "at its end are incomplete: their contents are lost" in said
         assert 0 < int(said.split("-wal: ")[1].split()[0]) < frames
 
 
@@ -138,7 +138,7 @@ def test_a_write_ahead_log_of_another_database(bag, tmp_path):
         database.executemany("INSERT INTO songs VALUES (?)", [("x" * 999,)] * 99)
         database.commit()
         shutil.copy(f"{other}-wal", wal_of(bag))
-    with pytest.raises(InputDataError, match=r"SQLite database, but no ROS 2 bag|does not go together with"):
+    with pytest.raises(InputDataError, match=r"SQLite database, but no ROS 2 bag|does not match"):
         read_log(str(bag))
 
 
@@ -155,7 +155,7 @@ def test_a_write_ahead_log_that_breaks_the_database(bag, monkeypatch):
         read_log(str(bag))
     log = read_log(str(bag), SALVAGE)
     assert len(log) < 8
-    assert "what that held is lost" in log.report.warnings[0]
+    assert "its contents are lost" in log.report.warnings[0]
 
 
 @pytest.fixture
@@ -188,6 +188,6 @@ def test_a_journal_removes_no_other_file(cut_off, tmp_path):
     name, magic = str(other).encode(), b"\xd9\xd5\x05\xf9\x20\xa1\x63\xd7"
     with Path(f"{cut_off}-journal").open("ab") as journal:
         journal.write(bytes(4) + name + len(name).to_bytes(4, "big") + sum(name).to_bytes(4, "big") + magic)
-    with pytest.raises(InputDataError, match=r"does not go together with .*its journal leads to other files"):
+    with pytest.raises(InputDataError, match=r"does not match .*its journal names other files"):
         read_log(str(cut_off))
     assert other.read_text() == "Dear all,"

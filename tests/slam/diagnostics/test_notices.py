@@ -92,7 +92,7 @@ def test_the_graph_keeps_what_was_told():
     _, graph = map_log(log, ReadingOptions(), SlamOptions(), 1, lambda *done: None)
     told = json.loads(write_graph(graph))["provenance"]["notices"]
     assert [re.sub(r"\d+", "n", notice) for notice in told] == [
-        "tracking broke at scan n; the motion to there is unknown"
+        "tracking broke at scan n; how the robot moved there is unknown"
     ]
 
 

@@ -68,7 +68,7 @@ def test_of_someone_who_walks_along_it_is_told(seed, odometry):
     """Also where tracking does not break and no place is seen again (without odometry, of drive 8)."""
     log = ROUND["someone who walks along"](round_scene().record(seed).log()).log
     log = log if odometry else dataclasses.replace(log, odometry=None)
-    assert "see other things than the keyframes beside them" in "\n".join(notices(mapped(log).state))
+    assert "do not see what the keyframes beside them see" in "\n".join(notices(mapped(log).state))
 
 
 def found_in(run) -> ViewMismatch | None:

@@ -170,7 +170,7 @@ def test_a_newest_scan_that_is_foreign_is_refused_with_a_reason():
     assert found.nscan is None
     assert found.loop is not None
     assert not found.loop.accepted
-    assert found.loop.reason == f"only 1 of {len(OLD) + len(NEW)} scans hang together"
+    assert found.loop.reason == f"only 1 of {len(OLD) + len(NEW)} scans match each other"
 
 
 def test_a_match_that_does_not_converge_is_refused_with_a_reason():
