@@ -100,7 +100,7 @@ def _rows(calibration: Calibration, reading: ReadingOptions, calibrated: Reading
         ("noise", [_line("per metre driven", noise, "m/m"),
                    _line("per radian turned", turn_noise, "rad/rad")]),
         ("clock", [_line("to add to odometry's stamps", values["clock_offset"], "s")]),
-        ("not found", [", ".join(calibration.open) or "nothing"]),
+        ("unknown", [", ".join(calibration.open) or "nothing"]),
         ("options", [flags or "none: the file agrees with the scans"]),
     ]  # fmt: skip
 
@@ -108,7 +108,7 @@ def _rows(calibration: Calibration, reading: ReadingOptions, calibrated: Reading
 def _line(what: str, estimate: Estimate, unit: str = "") -> str:
     """A value with as many decimals as its standard deviation tells."""
     if not math.isfinite(estimate.sigma):
-        return f"{what}: not found"
+        return f"{what}: unknown"
     decimals = max(1 - math.floor(math.log10(estimate.sigma)), 0) if estimate.sigma > 0 else 6
     shown = f"{round(estimate.value, decimals) + 0.0:.{decimals}f} ± {estimate.sigma:.{decimals}f}"
     recorded = "" if estimate.recorded is None else f" (file: {estimate.recorded:.4g})"

@@ -36,7 +36,7 @@ def test_a_table_for_people(capsys):
     assert run(["calibrate", CORRIDOR_LOG]) == 0
     shown = capsys.readouterr().out.splitlines()
     titles = [line.split()[0] for line in shown if not line.startswith(" ")]
-    assert titles == ["steps", "readings", "mounting", "odometry", "noise", "clock", "open", "options"]
+    assert titles == ["steps", "readings", "mounting", "odometry", "noise", "clock", "unknown", "options"]
     assert shown[-1] == "options   --odometry-scale 0.9865"
 
 

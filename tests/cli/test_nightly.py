@@ -103,7 +103,7 @@ def test_failures_have_their_reasons_and_code_3(manifest, first, tmp_path, capsy
     assert one.startswith("nscan-cli: one: log/one.log: is ")
     assert two.startswith("nscan-cli: two: RMSE of the ATE 0.")
     assert two.endswith(" m is above 0 m")
-    assert four == ("nscan-cli: four: four.log.gz is not there; download from https://example.org/four.log")
+    assert four == ("nscan-cli: four: four.log.gz is missing; download from https://example.org/four.log")
     assert last == f"nscan-cli: 2 of 4 logs failed, 1 is above its bound; see {folder}/report.html"
     document = report(folder)
     assert document["good"] is False
@@ -185,7 +185,7 @@ def test_where_no_log_of_ones_own_is_there_the_night_has_failed_and_the_report_s
     (tmp_path / "own.toml").write_text('[[log]]\nname = "a"\n[[log]]\nname = "b"\noptional = true')
     assert run(["nightly", str(tmp_path / "own.toml"), "-o", str(tmp_path / "nights"), "-q"]) == 3
     first, last = capsys.readouterr().err.splitlines()
-    assert first == "nscan-cli: a: a.log.gz is not there"
+    assert first == "nscan-cli: a: a.log.gz is missing"
     assert last == f"nscan-cli: The log failed; see {tmp_path}/nights/report.html"
     assert [log["status"] for log in report(tmp_path / "nights")["logs"]] == ["failed", "absent"]
 

@@ -62,7 +62,7 @@ def test_a_weak_direction_is_named(capsys):
         assert abs(weakest["direction"]) < 0.1
     first, second = (f"σ {weakest['sigma']:.2g} m" for weakest in document["weakest"])
     weak = said[-2:]
-    assert weak[0].startswith("weak  scan 45 along ")
+    assert weak[0].startswith("weak     scan 45 along ")
     assert weak[0].endswith(f"({first})")
-    assert weak[1].startswith("             scan 117 along ")
+    assert weak[1].startswith("         scan 117 along ")
     assert weak[1].endswith(f"({second})")

@@ -45,7 +45,7 @@ def test_with_its_log_a_graph_is_refined(folder, capsys):
     arguments = [part for pair in outputs.items() for part in pair]
     assert run(["slam", "--from", "graph.json", OFFICE_LOG, *arguments]) == 0
     said = capsys.readouterr().err
-    assert re.search(r"^optimised  energy .* iterations, then refined$", said, re.MULTILINE)
+    assert re.search(r"^optimised +energy .* iterations, then refined$", said, re.MULTILINE)
     assert re.search(r"^moved +poses by at most \S+ m$", said, re.MULTILINE)
     before, after = read_graph("graph.json"), read_graph("again.json")
     assert after.provenance == before.provenance
@@ -77,7 +77,7 @@ def test_without_its_log_a_graph_is_optimised_only(folder, capsys):
     assert run(["slam", "--from", "graph.json", "-o", "again.json", "--trajectory", "again.tum"]) == 0
     warning, *summary = capsys.readouterr().err.splitlines()
     assert warning.startswith("warning: optimised but not refined: graph.json: its log office.log.gz is")
-    assert any(line.startswith("optimised  energy ") for line in summary)
+    assert any(line.startswith("optimised    energy ") for line in summary)
     assert not any("refined" in line for line in summary)
     before, after = read_graph("graph.json"), read_graph("again.json")
     np.testing.assert_allclose(relative(after.poses, before.poses), 0, atol=1e-4)

@@ -81,7 +81,7 @@ ALTERNATING = (
 NEVER_ONE = {
     ("cli/nightly_progress.py", " scans, "): "so many of so many",
     ("cli/nscan.py", " scans"): "a limit",
-    ("cli/slam.py", " scans a second, "): "a rate",
+    ("cli/slam_summary.py", " scans a second, "): "a rate",
     ("evaluation/evaluation_report.py", " poses match within "): "a trajectory is aligned by several",
     ("graph/io/json_fields.py", " poses of three "): "of a joint relation",
     ("logs/assemble.py", " scans of up to "): "beyond a limit",

@@ -132,6 +132,6 @@ def test_a_failed_log_has_no_figures_in_the_overview_and_its_last_good_map_below
     errors = [re.findall(r'<td class="number">(0\.\d{4})</td>', row) for row in rows]
     assert [len(error) for error in errors] == [1, 1, 1, 0, 0]
     # What never was there has its few words at the end alone.
-    assert "One more log is not there" in pages["bad"]
+    assert "One more log is missing" in pages["bad"]
     assert pages["bad"].count("Below: the last run that did not fail.") == 1
     assert pages["bad"].count("data:image/png") == 4

@@ -159,7 +159,7 @@ def test_a_log_that_is_not_there_has_failed_unless_it_is_optional(nights, tmp_pa
     entry = ManifestEntry("b", {"log": tmp_path / "b.log"}, sources={"log": "https://example.org/b.log"})
     planned = make_plan([entry], nights, False)
     assert planned.absent == []
-    assert planned.unreadable == [(entry, "b.log is not there; download from https://example.org/b.log")]
+    assert planned.unreadable == [(entry, "b.log is missing; download from https://example.org/b.log")]
     planned = make_plan([replace(entry, optional=True)], nights, False)
     assert (planned.absent, planned.unreadable) == ([replace(entry, optional=True)], [])
 

@@ -56,8 +56,8 @@ def judged(
         (judged(done(0.03), done(0.02)), "good", []),
         (judged(done(0.02), done(0.03), translation=0.025), "above",
          ["mean on relations 0.0300 m is above 0.025 m"]),
-        (judged(absent=True), "absent", ["a.log is not there"]),
-        (judged(done(0.1), absent=True, translation=0.05), "absent", ["a.log is not there"]),
+        (judged(absent=True), "absent", ["a.log is missing"]),
+        (judged(done(0.1), absent=True, translation=0.05), "absent", ["a.log is missing"]),
     ],
 )  # fmt: skip
 def test_the_verdict(found, status, reasons):

@@ -56,8 +56,8 @@ TOLD = {
     "scans are missing before": "scans are missing",
     "disagree": "odometry and scans disagree",
     "contradict": "relations contradict each other",
-    "other things": "scans see other things",
-    "looks through": "places do not look as before",
+    "do not see what": "scans see other things",
+    "pass through": "places look different",
     "the scans jump": "the scans jump",
     "it is frozen, or": "the laser hangs, or the robot stands",
 }

@@ -78,7 +78,7 @@ def missing_parts(parts: Sequence[RecordingFile], first: int | None) -> tuple[st
     missing = [str(number) for number in range(low, min(max(numbers), low + 10_000)) if number not in numbers]
     if not missing:
         return ()
-    return (f"its part number {shortened_list(missing)} is missing",)
+    return (f"parts are missing: number {shortened_list(missing)}",)
 
 
 def shortened_list(names: Sequence[str]) -> str:

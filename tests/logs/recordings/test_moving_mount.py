@@ -177,7 +177,7 @@ def test_a_base_that_tf_has_by_its_other_name(read):
     log = read(written)
     np.testing.assert_allclose(log.mount, (0.3, 0.1, math.pi / 2), atol=1e-9)
     assert log.report.used["mounting"] == (
-        "tf base_link → laser, as if base_link were base_footprint, from which no transforms lead"
+        "tf base_link → laser, with base_link for base_footprint, which has no transforms"
     )
     other = [one for one in written if not isinstance(one.content, Odom)]
     other += [Written("/odom", START, Odom(START, 0, 0, 0, "camera"))]

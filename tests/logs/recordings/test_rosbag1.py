@@ -28,8 +28,10 @@ def index_of(data: bytes) -> int:
     return int.from_bytes(data[at : at + 8], "little")
 
 
-NO_INDEX = "the bag has no index, since its recorder did not close it: its messages were found by walking"
-WRONG_INDEX = "the index of the bag is wrong: its messages were found by walking"
+NO_INDEX = (
+    "the bag has no index, since its recorder did not close it: its messages were found by reading all of it"
+)
+WRONG_INDEX = "the index of the bag is wrong: its messages were found by reading all of it"
 
 
 def check_walked(log, said: str) -> None:

@@ -149,9 +149,7 @@ def test_a_write_ahead_log_that_breaks_the_database(bag, monkeypatch):
         raise sqlite3.DatabaseError("malformed")
 
     monkeypatch.setattr(sqlite_journal, "apply_journals", broken)
-    with pytest.raises(
-        InputDataError, match=r"lab\.db3-wal \(malformed\); move that away, or give --salvage"
-    ):
+    with pytest.raises(InputDataError, match=r"lab\.db3-wal \(malformed\); remove that, or give --salvage"):
         read_log(str(bag))
     log = read_log(str(bag), SALVAGE)
     assert len(log) < 8
