@@ -1,4 +1,4 @@
-"""docs/reference.md, made from the commands themselves: python -m tests.reference docs/reference.md"""
+"""docs/reference.md and man/, made from the commands: python -m tests.reference docs/reference.md"""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ import click
 from nscan_cli.cli.main import COMMANDS, cli
 from nscan_cli.cli.manual import ENVIRONMENT, EXAMPLES, EXIT_CODES
 from nscan_cli.cli.subcommand import (
+    ADVANCED,
     ARGUMENTS,
     COMMON,
     CONTEXT,
@@ -24,6 +25,10 @@ from nscan_cli.files import limits
 from nscan_cli.files.limits import Limit
 from nscan_cli.files.outputs import write_atomically
 from nscan_cli.logs.formats import readable_forms
+from tests.data import REPOSITORY
+from tests.man_pages import man_pages
+
+MAN = REPOSITORY / "man"
 
 LIMITS = [each for each in vars(limits).values() if isinstance(each, Limit)]
 HEAD = """\
@@ -164,9 +169,9 @@ def reference() -> str:
     context = click.Context(cli, info_name="nscan-cli")
     commands = {name: _command(context, name) for name in COMMANDS}
     first = commands["info"]
-    titles = ["All commands", *(f"nscan-cli {name}" for name in COMMANDS), READING, COMMON, "Exit codes",
-              "Environment", "Settings in a file", "Manifest", "Files", "Results of match and nscan",
-              "Completion"]  # fmt: skip
+    titles = ["All commands", *(f"nscan-cli {name}" for name in COMMANDS), READING, ADVANCED, COMMON,
+              "Exit codes", "Environment", "Settings in a file", "Manifest", "Files",
+              "Results of match and nscan", "Completion"]  # fmt: skip
     parts = [
         HEAD,
         "".join(f"- [{title}](#{title.lower().replace(' ', '-')})\n" for title in titles),
@@ -174,6 +179,7 @@ def reference() -> str:
         _examples(EXAMPLES),
         *(_chapter(context, command) for command in commands.values()),
         f"## {READING}\n\nOptions of the commands that read a log.\n\n" + _options(first, READING),
+        f"## {ADVANCED}\n\nReading a log: options that are seldom needed.\n\n" + _options(first, ADVANCED),
         f"## {COMMON}\n\n" + _options(first, COMMON),
         "## Exit codes\n\n" + _table(("code", "meaning"), ((str(c), m) for c, m in EXIT_CODES.items())),
         "## Environment\n\n" + _table(("variable", "what it does"), _variables()),
@@ -204,7 +210,7 @@ def _chapter(parent: click.Context, command: Subcommand) -> str:
     assert command.help is not None
     shared = [
         f"[{title}](#{title.lower().replace(' ', '-')})"
-        for title in (READING, COMMON)
+        for title in (READING, ADVANCED, COMMON)
         if command.records(context, title)
     ]
     parts = [
@@ -216,7 +222,7 @@ def _chapter(parent: click.Context, command: Subcommand) -> str:
             (_code_first(command.records(context, ARGUMENTS))),
         ),
         _options(command, OWN),
-        f"And the options of {' and '.join(shared)}.\n",
+        f"And the options of {', '.join(shared)}.\n",
         _examples(command.examples),
     ]
     return "\n".join(parts)
@@ -272,3 +278,5 @@ def _table(head: tuple[str, ...], rows: Iterable[tuple[str, ...]]) -> str:
 
 if __name__ == "__main__":
     write_atomically(sys.argv[1], reference().encode())
+    for name, page in man_pages().items():
+        write_atomically(str(MAN / name), page.encode())

@@ -24,12 +24,16 @@ COMMANDS = {
     "info": "Show what a log contains, and what the other commands use of it.",
     "calibrate": "Find how the laser is mounted and what odometry does, from the scans.",
     "match": "Match two scans of a log (NDT).",
-    "nscan": "Match several scans of a log jointly (nScan-Matching).",
+    "nscan": "Match several scans of a log jointly (nScan-Matching). Also called match-jointly.",
     "slam": "Build a pose graph and a map from a log.",
     "render": "Draw the map of a pose graph.",
     "evaluate": "Compare a result with reference relations or a reference trajectory.",
     "nightly": "Map and evaluate many logs, and report what has changed.",
+    "schema": "Print the JSON Schema of the graph file.",
+    "warm-up": "Compile all numerical code now, so that no later run has to.",
 }
+ALIASES = {"match-jointly": "nscan"}
+"""Other names of commands, which explain themselves."""
 INTERRUPTED, CLOSED_EARLY, INTERNAL_ERROR = 130, 141, 1
 COMPLETION_VARIABLE = "_NSCAN_CLI_COMPLETE"
 """The variable by which a shell asks for completions."""
@@ -47,10 +51,11 @@ class LazyGroup(click.Group):
         return list(COMMANDS)
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
-        """The object `command` of the module `nscan_cli.cli.NAME`."""
-        if cmd_name not in COMMANDS:
+        """The object `command` of the module `nscan_cli.cli.NAME`, also by an alias."""
+        name = ALIASES.get(cmd_name, cmd_name)
+        if name not in COMMANDS:
             return None
-        module = importlib.import_module(f"nscan_cli.cli.{cmd_name}")
+        module = importlib.import_module(f"nscan_cli.cli.{name.replace('-', '_')}")
         command: click.Command = module.command
         return command
 

@@ -12,7 +12,7 @@ from typing import Any
 
 import click
 
-from nscan_cli.cli.subcommand import COMMAND_SPECIFIC, COMMON, READING, Option, option
+from nscan_cli.cli.subcommand import ADVANCED, COMMAND_SPECIFIC, COMMON, READING, Option, option
 from nscan_cli.errors import InputDataError, WrongUsageError
 from nscan_cli.files.inputs import read_toml
 from nscan_cli.files.outputs import write_atomically
@@ -104,41 +104,50 @@ def _with_options(command: Command, options: Sequence[Callable[[Command], Comman
 
 def reading_options(command: Command) -> Command:
     """Add the options of reading a log; the command gets them as `reading`, a ReadingOptions."""
-    read = functools.partial(option, section=READING)
+    read, rare = (functools.partial(option, section=section) for section in (READING, ADVANCED))
     options = [
-        read("--laser", metavar="TAG", help="Laser to use of a text log, such as FLASER or laser:0."),
-        read("--topic", metavar="TOPIC", help="Laser topic to use of an MCAP or bag, such as /scan."),
-        read("--odom-topic", metavar="TOPIC", help="Odometry topic to use, such as /odom or /tf."),
-        read("--mount", type=PoseType(), help="Pose of the laser on the robot (m, degrees)."),
+        read("--laser", metavar="TAG",
+             help="Laser to use of a text log, such as FLASER or laser:0. Default: the only one."),
+        read("--topic", metavar="TOPIC",
+             help="Laser topic to use of an MCAP or bag, such as /scan. Default: the only one."),
+        read("--odom-topic", metavar="TOPIC",
+             help="Odometry topic to use, such as /odom or /tf. Default: the only one, or tf."),
+        read("--mount", type=PoseType(),
+             help="Pose of the laser on the robot (m, degrees). Default: that in the log."),
         read("--flip", is_flag=True, help="The laser is mounted upside down."),
-        read("--min-range", type=click.FloatRange(0), metavar="M", help="Drop shorter readings."),
+        read("--min-range", type=click.FloatRange(0), metavar="M",
+             help="Drop shorter readings. Default: the limit in the log."),
         read("--max-range", type=click.FloatRange(0, min_open=True), metavar="M",
-             help="Treat longer readings as no return."),
-        read("--range-scale", type=click.FloatRange(0, min_open=True), metavar="M",
-             help="Multiply the ranges: 0.001 for millimetres."),
-        read("--angle-min", type=float, metavar="DEG", help="Direction of the first beam."),
-        read("--angle-increment", type=float, metavar="DEG", help="Angle from beam to beam."),
-        read("--mask", type=MaskType(), help="Drop beams between bearings (degrees, counter-clockwise)."),
-        read("--sweep", type=SweepType(), default="auto", show_default=True,
-             help="Seconds of a whole turn of the laser, whose beams are seen one after another; negative if "
-             "the readings are in the reverse order of time. off: all at once. auto: as the log says."),
-        read("--stamp", type=click.Choice(STAMPS), default="first", show_default=True,
-             help="Beam of the turn at whose time a scan is stamped."),
-        read("--start", type=float, metavar="T", help="Skip the first T seconds."),
-        read("--end", type=float, metavar="T", help="Stop T seconds after the first scan."),
+             help="Treat longer readings as no return. Default: the limit in the log."),
+        read("--start", type=float, metavar="T", help="Skip the first T seconds. Default: 0."),
+        read("--end", type=float, metavar="T",
+             help="Stop T seconds after the first scan. Default: at the last scan."),
         read("--every", type=click.IntRange(1), default=1, show_default=True, metavar="N",
              help="Use every Nth scan."),
         read("--no-odometry", is_flag=True, help="Ignore odometry."),
-        read("--odometry-scale", type=click.FloatRange(0, min_open=True), default=1.0, show_default=True,
+        rare("--range-scale", type=click.FloatRange(0, min_open=True), metavar="F",
+             help="Multiply the ranges: 0.001 for millimetres. Default: 1, or what the ranges show."),
+        rare("--angle-min", type=float, metavar="DEG",
+             help="Direction of the first beam. Default: that in the log."),
+        rare("--angle-increment", type=float, metavar="DEG",
+             help="Angle from beam to beam. Default: that in the log."),
+        rare("--mask", type=MaskType(),
+             help="Drop beams between bearings (degrees, counter-clockwise). Default: those that see "
+             "the robot."),
+        rare("--sweep", type=SweepType(), default="auto", show_default=True,
+             help="Seconds of a full turn of the laser, so that each beam has its own time; negative if the "
+             "readings are in the reverse order of time. off: all at once. auto: as the log says."),
+        rare("--stamp", type=click.Choice(STAMPS), default="first", show_default=True,
+             help="Beam of the turn at whose time a scan is stamped."),
+        rare("--odometry-scale", type=click.FloatRange(0, min_open=True), default=1.0, show_default=True,
              metavar="F", help="Multiply the positions of odometry: 0.001 for millimetres."),
-        read("--clock-offset", type=float, default=0.0, show_default=True, metavar="SECONDS",
+        rare("--clock-offset", type=float, default=0.0, show_default=True, metavar="SECONDS",
              help="Add this to the time stamps of odometry."),
-        read("--strict", is_flag=True, help="Treat a malformed record as an error, not as a warning."),
-        read("--salvage", is_flag=True, help="Use the readable part of a damaged or cut-off file."),
-        read("--allow-corrected", is_flag=True,
+        rare("--strict", is_flag=True, help="Treat a malformed record as an error, not as a warning."),
+        rare("--salvage", is_flag=True, help="Use the readable part of a damaged or cut-off file."),
+        rare("--allow-corrected", is_flag=True,
              help="Use poses that a mapper has already corrected as odometry."),
-        read("--as-recorded", is_flag=True,
-             help="Correct nothing, even if the scans contradict the log."),
+        rare("--as-recorded", is_flag=True, help="Correct nothing, even if the scans contradict the log."),
     ]  # fmt: skip
 
     @functools.wraps(command)

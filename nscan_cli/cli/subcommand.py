@@ -18,8 +18,10 @@ from nscan_cli.logs.formats import readable_forms
 CONTEXT: dict[str, Any] = {"help_option_names": ["-h", "--help"]}
 # All commands share the prefix, so a shell or a Makefile can set an option for all of them at once.
 VARIABLE_PREFIX = "NSCAN_CLI_"
-ARGUMENTS, OWN, READING, COMMON = "Arguments", "Options", "Reading the log", "For all commands"
-SECTIONS = (ARGUMENTS, OWN, READING, COMMON)
+ARGUMENTS, OWN, READING, ADVANCED, COMMON = (
+    "Arguments", "Options", "Reading the log", "Advanced", "For all commands"
+)  # fmt: skip
+SECTIONS = (ARGUMENTS, OWN, READING, ADVANCED, COMMON)
 """The sections of the help, in order."""
 COMMAND_SPECIFIC = {"initial", "output", "plot", "prior", "reference", "relations", "trajectory"}
 """Long names of options with another meaning in each command. A variable without the command's name does not

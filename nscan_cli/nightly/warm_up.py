@@ -13,6 +13,7 @@ import subprocess
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from nscan_cli.errors import InputDataError
 from nscan_cli.kernels import machine_code
 from nscan_cli.kernels.cache_folder import cache_folder
 from nscan_cli.nightly import bootstrap
@@ -67,10 +68,19 @@ def _compiled_file(folder: Path) -> Path:
     return folder / f"{COMPILED_FILE}-{machine_code.build_key()}"
 
 
+def compile_here(folder: Path) -> None:
+    """Compile the kernels that the cache folder lacks, in this process, for `nscan-cli warm-up`."""
+    main()
+    _compiled_file(folder).touch()
+
+
 def main() -> None:
-    """Map the simulated drive with and without odometry, so that all kernels are compiled."""
+    """Map the simulated drive with and without odometry, match and calibrate, so that all is compiled."""
     import numpy as np
 
+    from nscan_cli.api import match, nscan
+    from nscan_cli.calibration.options import CalibrationOptions
+    from nscan_cli.calibration.robot_calibration import calibrate
     from nscan_cli.kernels import decorators as compiled
     from nscan_cli.logs.load import log_from
     from nscan_cli.logs.reading_options import ReadingOptions
@@ -83,6 +93,12 @@ def main() -> None:
         log = log_from(drive, "warm-up.log", reading)
         _, graph = map_log(log, reading, slam_options(None, None, True), THREADS, lambda *_progress: None)
         occupancy_grid(log, np.arange(len(log)), graph.poses, threads=THREADS)
+    log = log_from(drive, "warm-up.log")
+    match(log, 0, 2)
+    nscan(log, [0, 2, 4])
+    # A drive of one lap may leave the robot open, but its kernels are compiled by then.
+    with contextlib.suppress(InputDataError):
+        calibrate(log, log.reading, CalibrationOptions())
 
 
 def simulated_carmen_log() -> bytes:

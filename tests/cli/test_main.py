@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import importlib
+import json
 import os
 import signal
 import subprocess
@@ -12,6 +13,7 @@ import pytest
 from nscan_cli import __version__
 from nscan_cli.cli import main as frame
 from nscan_cli.cli.main import COMMANDS, run
+from nscan_cli.graph.io.json_graph import SCHEMA
 
 SHOW_MODULES = (
     "import sys; from nscan_cli.cli.main import run; codes = [run(a.split()) for a in sys.argv[1:]]; "
@@ -52,7 +54,7 @@ def test_the_command_has_the_garbage_collection_look_through_new_objects_only():
 
 def test_every_command_is_there_under_its_name():
     for name in COMMANDS:
-        assert importlib.import_module(f"nscan_cli.cli.{name}").command.name == name
+        assert importlib.import_module(f"nscan_cli.cli.{name.replace('-', '_')}").command.name == name
 
 
 def test_help_and_version_import_nothing_heavy():
@@ -196,3 +198,20 @@ def test_a_standard_output_without_room_is_code_73():
         _out, err = process.communicate(timeout=20)
     assert process.returncode == 73
     assert err == b"nscan-cli: standard output: cannot be written: No space left on device\n"
+
+
+def test_an_alias_is_its_command(capsys):
+    for alias, name in frame.ALIASES.items():
+        assert run([alias, "--help"]) == 0
+        told = capsys.readouterr().out
+        assert run([name, "--help"]) == 0
+        assert told.replace(f"nscan-cli {alias} ", f"nscan-cli {name} ") == capsys.readouterr().out
+        assert alias in COMMANDS[name]
+
+
+def test_the_schema_is_the_one_that_graphs_name(tmp_path, capsys):
+    assert run(["schema"]) == 0
+    printed = capsys.readouterr().out
+    assert json.loads(printed)["$id"] == SCHEMA
+    assert run(["schema", "-o", str(tmp_path / "schema.json")]) == 0
+    assert (tmp_path / "schema.json").read_text() == printed

@@ -5,6 +5,8 @@ from __future__ import annotations
 import json
 import re
 import shlex
+import shutil
+import subprocess
 from pathlib import Path
 
 import click
@@ -18,7 +20,8 @@ from nscan_cli.cli.subcommand import Option, Subcommand
 from nscan_cli.nightly.manifest import KEY_CHECKS, read_manifest
 from tests.data import CORRIDOR_LOG, REPOSITORY
 from tests.docs.blocks import blocks
-from tests.reference import LIMITS, reference
+from tests.man_pages import man_pages
+from tests.reference import LIMITS, MAN, reference
 
 PAGE = (REPOSITORY / "docs" / "reference.md").read_text()
 PARENT = click.Context(cli, info_name="nscan-cli")
@@ -33,6 +36,19 @@ def command(name: str) -> Subcommand:
 
 def test_the_page_is_what_the_commands_say_now():
     assert reference() == PAGE, "run: python -m tests.reference docs/reference.md"
+    assert {path.name: path.read_text() for path in MAN.iterdir()} == man_pages(), "run the same"
+
+
+@pytest.mark.skipif(shutil.which("groff") is None, reason="no groff")
+def test_the_man_pages_are_set_without_a_warning():
+    for path in MAN.iterdir():
+        told = subprocess.run(
+            ["groff", "-man", "-ww", "-Kutf8", "-Tutf8", "-z", str(path)],
+            capture_output=True,
+            text=True,
+            check=True,
+        )
+        assert told.stderr == "", path.name
 
 
 @pytest.mark.parametrize("name", COMMANDS)
@@ -128,7 +144,8 @@ def test_the_help_fits_80_columns_but_for_lines_to_copy(name, capsys, monkeypatc
 def test_the_help_has_sections_in_order(capsys):
     assert run(["slam", "--help"]) == 0
     titles = [line for line in capsys.readouterr().out.splitlines() if re.fullmatch(r"\w.*:", line)]
-    assert titles == ["Arguments:", "Options:", "Reading the log:", "For all commands:", "Examples:"]
+    assert titles == ["Arguments:", "Options:", "Reading the log:", "Advanced:", "For all commands:",
+                      "Examples:"]  # fmt: skip
 
 
 def test_every_key_of_a_match_is_told_and_no_other(tmp_path, monkeypatch):

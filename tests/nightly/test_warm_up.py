@@ -9,8 +9,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from nscan_cli.cli.main import run
 from nscan_cli.cli.nightly_progress import PlainProgress
-from nscan_cli.kernels import machine_code
+from nscan_cli.kernels import cache_folder, machine_code
 from nscan_cli.logs.load import log_from
 from nscan_cli.nightly import bootstrap, local_executor, warm_up, worker
 from nscan_cli.nightly.html_report import html_report
@@ -50,6 +51,20 @@ def test_once_on_each_machine(cache, calls, monkeypatch):
     monkeypatch.setattr(machine_code, "build_key", lambda: "another")
     warm_up.compile_kernels({})
     assert len(calls) == 3
+
+
+def test_the_command_compiles_here_and_nightly_has_nothing_left_to_do(cache, calls, monkeypatch, capsys):
+    made: list[str] = []
+    monkeypatch.setattr(warm_up, "main", lambda: made.append("all"))
+    monkeypatch.setattr(cache_folder, "cache_folder", lambda: cache)
+    assert run(["warm-up"]) == 0
+    assert made == ["all"]
+    assert capsys.readouterr().err == f"nothing to compile: {cache}\n"
+    warm_up.compile_kernels({})
+    assert calls == []
+    monkeypatch.setattr(cache_folder, "cache_folder", lambda: None)
+    assert run(["warm-up"]) == 73
+    assert "set NUMBA_CACHE_DIR to one that is" in capsys.readouterr().err
 
 
 def test_where_nothing_can_be_kept_nothing_is_done(calls, monkeypatch):

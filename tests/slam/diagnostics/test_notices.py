@@ -38,7 +38,8 @@ def simulated() -> LaserLog:
         (
             "laser frozen for 8 m",
             False,
-            r"repeats itself at scans 187, .* it is frozen, or the robot stands still; .*\nplaces look different",
+            r"repeats itself at scans 187, .* it is frozen, or the robot stands still; .*\n"
+            r"places look different",
         ),
     ],
 )
