@@ -27,6 +27,8 @@ ARGUMENTS = {
     "evaluate": ["a.json"],
     "nightly": ["a.toml", "-o", "nights"],
 }
+LOG: dict[str, list[str]] = {"schema": [], "warm-up": []}
+"""The commands that take no LOG nor anything else."""
 JARGON = re.compile(r"valid|range|Sentinel|[<>]=|\bx[<>]|type|Traceback|internal", re.IGNORECASE)
 
 
@@ -70,7 +72,7 @@ def test_no_two_options_have_the_same_variable():
 def test_such_an_option_is_set_by_its_commands_variable_and_table_alone(
     name, key, value, monkeypatch, capsys
 ):
-    arguments = [name, *ARGUMENTS.get(name, ["a.log"]), "--dump-config"]
+    arguments = [name, *ARGUMENTS.get(name, LOG.get(name, ["a.log"])), "--dump-config"]
     if name == "match":
         arguments = [name, "a.log", "--scan", "1", "--dump-config"]
     shared, own = f"NSCAN_CLI_{key.upper()}", f"NSCAN_CLI_{name.upper()}_{key.upper()}"
@@ -107,10 +109,10 @@ def test_one_file_has_settings_for_all_commands(capsys):
     )
     found = {}
     for name in COMMANDS:
-        assert run([name, "a.log", "--config", "all.toml", "--dump-config"]) == 0
+        assert run([name, *LOG.get(name, ["a.log"]), "--config", "all.toml", "--dump-config"]) == 0
         found[name] = capsys.readouterr().out
     assert [name for name in COMMANDS if "every = 2" in found[name]] == [
-        name for name in COMMANDS if name != "nightly"
+        name for name in COMMANDS if name not in ("nightly", *LOG)
     ]
     assert "resolution = 0.1" in found["render"]
     assert "max-scans = 7" in found["slam"]
@@ -120,7 +122,7 @@ def test_one_file_has_settings_for_all_commands(capsys):
     assert "reference" not in found["evaluate"]
     Path("all.toml").write_text("evry = 2\n")
     for name in COMMANDS:
-        assert run([name, *ARGUMENTS.get(name, ["a.log"]), "--config", "all.toml"]) == 65
+        assert run([name, *ARGUMENTS.get(name, LOG.get(name, ["a.log"])), "--config", "all.toml"]) == 65
         assert f"all.toml: {name} has no option 'evry'; known: " in capsys.readouterr().err
 
 
@@ -161,7 +163,7 @@ def assert_plain(err: str, place: str) -> None:
 
 @pytest.mark.parametrize(("name", "option", "value"), VALUED)
 def test_a_wrong_value_of_any_option_is_told_in_a_plain_line(name, option, value, monkeypatch, capsys):
-    arguments = [name, *ARGUMENTS.get(name, ["a.log"])]
+    arguments = [name, *ARGUMENTS.get(name, LOG.get(name, ["a.log"]))]
     assert run([*arguments, f"--{option.long_name}", value]) == 2
     assert_plain(capsys.readouterr().err, f"{name}: --{option.long_name}: ")
     Path("all.toml").write_text(f"[{name}]\n{option.long_name} = {value!r}\n")
@@ -180,7 +182,7 @@ def test_a_wrong_value_of_any_option_is_told_in_a_plain_line(name, option, value
 def test_so_is_a_flag_that_is_set_to_neither_true_nor_false(name, option, monkeypatch, capsys):
     variable = option.variables(click.Context(click.Command(name)))[0]
     monkeypatch.setenv(variable, "perhaps")
-    assert run([name, *ARGUMENTS.get(name, ["a.log"])]) == 2
+    assert run([name, *ARGUMENTS.get(name, LOG.get(name, ["a.log"]))]) == 2
     err = capsys.readouterr().err
     assert f"{name}: {variable} in the environment: 'perhaps' is neither true nor false; see" in err
     assert err.count("\n") == 1

@@ -176,7 +176,7 @@ def test_all_command_lines_of_a_page_do_what_it_shows(page, folder, tmp_path, mo
         missing = [each for each in missing if not NOT_EVERYWHERE.search(each)]
         assert missing == [], f"{line} said {said}"
     for line, _shown in calls(page):
-        for name in re.findall(r" -o ([\w.]+)| --(?:map|plot) ([\w.]+)", line):
+        for name in re.findall(r" -o ([\w.-]+\w)| --(?:map|plot) ([\w.]+)", line):
             assert os.path.exists("".join(name)) or line.startswith(MEASURED_ONCE), line
 
 
