@@ -191,7 +191,7 @@ def _read_config(ctx: click.Context, _param: click.Parameter, value: str | None)
     for key, entry in settings.items():
         if key not in options:
             raise InputDataError(
-                value, f"{name} has no option {key!r}", f"known: {', '.join(sorted(options))}"
+                value, f"{name} has no option {key!r}", f"known: {', '.join(sorted(options)) or 'none'}"
             )
         try:
             options[key].type_cast_value(ctx, _as_argument(entry))
