@@ -77,10 +77,10 @@ def test_a_path_that_repeats_itself_tells_no_lag():
 
 
 @pytest.mark.parametrize(("factor", "words"), [
-    (1000.0, "factor 1000: millimetres, the reference seems to be in them"),
-    (0.01, "factor 100: centimetres, the result seems to be in them"),
-    (1 / 0.3048, "factor 3.281: feet, the reference seems to be in them"),
-    (1.2, "factor 1.200: the reference is larger by it"),
+    (1000.0, "factor 1000: the reference seems to be in millimetres"),
+    (0.01, "factor 100: the result seems to be in centimetres"),
+    (1 / 0.3048, "factor 3.281: the reference seems to be in feet"),
+    (1.2, "factor 1.200: the reference is larger by this factor"),
 ])  # fmt: skip
 def test_another_unit(factor: float, words: str):
     assert said(scaled(factor)) == [words]
@@ -106,7 +106,7 @@ def test_all_of_it_at_once_keeps_its_figures():
     path = compose(compose(PLACE, compose(drive(), [0.3, 0.0, 0.0])), [0, 0, np.pi / 2])
     clock, factor, turned, point = said(later(3.0, path * [1000, 1000, 1]), trajectory(drive()))
     assert clock.startswith("stamps off by 3.00 s")
-    assert factor.startswith("factor 1000: millimetres")
+    assert factor.startswith("factor 1000: the reference seems to be in millimetres")
     assert turned.startswith("the headings differ by 90.0° ± ")
     assert "0.30 m ahead of" in point
 
@@ -123,7 +123,7 @@ def test_what_a_lag_and_a_lever_arm_explain_alike_is_said_to_be_either():
 
 def test_a_mirrored_result():
     (sentence,) = said(trajectory(TRUTH * [1, -1, -1]))
-    assert sentence.startswith("the result is the mirror image of the reference: mirrored, it would be 0.0")
+    assert sentence.startswith("the result is the mirror image of the reference: mirrored, its error is 0.0")
 
 
 @pytest.mark.parametrize(("spatial", "words"), [
