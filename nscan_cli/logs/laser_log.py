@@ -172,6 +172,17 @@ class LaserLog:
             return swept_points(self.ranges[rows], directions, laser, reach, times, beams, self.path)
         return _end_points(self.ranges[rows], np.cos(angles), np.sin(angles), self.mount, turn, reach)
 
+    def point_times(self, rows: slice, reach: float) -> Array:
+        """(m,) the times of the points of batch_points from the stamps of their scans, s."""
+        scans, beams = np.nonzero(np.isfinite(self.ranges[rows]))
+        points, _ = self.batch_points(rows, math.inf)
+        near = np.hypot(points[:, 0], points[:, 1]) < reach
+        if self.beam_times is None:
+            return np.zeros(int(near.sum()))
+        times = self.beam_times.of(rows)
+        found: Array = (times.first[scans] + times.step[scans] * beams)[near]
+        return found
+
     def at_middle_of_turns(self) -> LaserLog:
         """The log with each scan at the time of its middle beam, and the odometry there, if the laser turns.
 

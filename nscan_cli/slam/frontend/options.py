@@ -82,6 +82,10 @@ class TrackingOptions:
     match_motion: float = 0.1
     """With odometry a scan is matched when the robot has moved this far (m) or turned this much (rad) since
     the last one that was. The scans between follow. Larger values drift less and see less."""
+    sweep_step_change: float = 0.01
+    """Without odometry a scan of a laser that turns is corrected and matched again if its step differs by
+    more than this (m, rad) from the one that it was corrected by. Larger values take less time, and blur the
+    map where the robot begins to turn."""
     max_waiting: int = 100
     """Most scans between two that are matched: a robot may stand for hours."""
     trusted_odometry: MotionModel = field(default_factory=lambda: MotionModel(distance=0.02))
@@ -159,6 +163,7 @@ class TrackingParameters(NamedTuple):
     far_restart_margin: float
     lost_inliers: float
     match_motion: float
+    sweep_step_change: float
     max_waiting: int
     trusted_odometry: MotionModel
     contradiction_sigmas: float

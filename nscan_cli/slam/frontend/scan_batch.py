@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.poses import Array, Indices
 
+NONE = np.zeros(0)
+SHORTEST_PERIOD = 1e-3
+"""s"""
 SCANS_PER_BATCH = 128
 """Scans that are tracked together, before the keyframes among them are chosen."""
 
@@ -26,6 +29,9 @@ class ScanBatch:
     """(n + 1,) scan k has points[ends[k] : ends[k + 1]]."""
     odometry: Array | None
     """(n, 3) poses of the robot, or None."""
+    shares: Array = field(default_factory=lambda: NONE)
+    """(P,) times of the points from the middle of the laser's turn, in periods of the scans, where tracking
+    is to correct them; else empty."""
 
     def __len__(self) -> int:
         return len(self.ends) - 1
@@ -37,7 +43,7 @@ class ScanBatch:
     def part(self, first: int, end: int) -> ScanBatch:
         """The scans from the `first` on, before the `end`."""
         odometry = None if self.odometry is None else self.odometry[first:end]
-        return ScanBatch(self.first + first, self.points, self.ends[first : end + 1], odometry)
+        return ScanBatch(self.first + first, self.points, self.ends[first : end + 1], odometry, self.shares)
 
     def chosen(self, chosen: Indices) -> tuple[Array, Indices]:
         """A copy of the points (P, 2) of the scans with indices `chosen` (c,), and their `ends` (c + 1,)."""
@@ -49,12 +55,14 @@ class ScanBatch:
         """The scans of several batches, each of which begins where the one before ends."""
         scans = [part.chosen(np.arange(len(part))) for part in parts]
         sizes = np.concatenate([np.diff(ends) for _, ends in scans])
+        shares = [part.shares[part.ends[0] : part.ends[-1]] for part in parts]
         odometry = [part.odometry for part in parts if part.odometry is not None]
         return cls(
             parts[0].first,
             np.concatenate([points for points, _ in scans]),
             np.concatenate([[0], np.cumsum(sizes)]),
             np.concatenate(odometry) if odometry else None,
+            np.concatenate(shares),
         )
 
 
@@ -63,13 +71,17 @@ def scan_batches(log: LaserLog, reach: float, odometry: Array | None, frozen: In
 
     Scans in the `frozen` rows (H,) have no points.
     """
-    first = 0
+    # Along a path they are corrected already.
+    is_corrected = log.beam_times is not None and log.path is None and len(log) > 1
+    period, first = max(float(np.median(np.diff(log.times))), SHORTEST_PERIOD) if is_corrected else 1.0, 0
     for points, ends in log.point_batches(SCANS_PER_BATCH, reach):
         end = first + len(ends) - 1
+        shares = log.point_times(slice(first, end), reach) / period if is_corrected else NONE
         is_frozen = np.isin(np.arange(first, end), frozen)
         if is_frozen.any():
             sizes = np.diff(ends)
-            points = points[np.repeat(~is_frozen, sizes)]
+            kept = np.repeat(~is_frozen, sizes)
+            points, shares = points[kept], shares[kept] if is_corrected else NONE
             ends = np.concatenate([[0], np.cumsum(np.where(is_frozen, 0, sizes))])
-        yield ScanBatch(first, points, ends, None if odometry is None else odometry[first:end])
+        yield ScanBatch(first, points, ends, None if odometry is None else odometry[first:end], shares)
         first = end

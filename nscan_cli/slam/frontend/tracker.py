@@ -60,7 +60,9 @@ class Tracker:
             self.map.reserve(int(ends[k + 1] - ends[k]))
             self._track.map.counts[ROWS] = self.map.rows
             track, grid, settings, prior = self._track, self.map.grid, self._settings, self._prior
-            k = track_scans(track, grid, settings, points, ends, odometry, k, may_wait, prior, found)
+            k = track_scans(
+                track, grid, settings, points, ends, scans.shares, odometry, k, may_wait, prior, found
+            )
             if k < n and np.isfinite(found.inliers[k]):
                 self._search(scans.of(k), found, k)
                 settle(track, grid, settings, points, ends, odometry, prior, found, k)

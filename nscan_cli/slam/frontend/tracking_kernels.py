@@ -20,6 +20,7 @@ from nscan_cli.slam.frontend.motion_prior import contradicts, predict
 from nscan_cli.slam.frontend.options import TrackingParameters
 from nscan_cli.slam.frontend.scan_to_map import match_from_prediction
 from nscan_cli.slam.frontend.sector_of_view import match_again_in_sector, match_in_sector
+from nscan_cli.slam.frontend.sweep_correction import correct_by_last_step, correct_by_match
 from nscan_cli.slam.frontend.track_state import KNOWN, NEXT, TrackState
 from nscan_cli.slam.frontend.tracked_scans import TrackedScans
 from nscan_cli.slam.frontend.visible_points import points_in_view
@@ -117,6 +118,7 @@ def track_scans(
     settings: TrackingParameters,
     points: Array,
     ends: NDArray[np.int64],
+    shares: Array,
     odometry: Array,
     first: int,
     may_wait: bool,
@@ -125,10 +127,13 @@ def track_scans(
 ) -> int:
     """Track scans from the `first` on; returns the next one, which is not settled.
 
-    Scan k has points[ends[k] : ends[k + 1]] and odometry[k], nan where there is none. A scan waits until the
-    robot has moved; the last ones settle unless they `may_wait` for scans that are not here yet. A scan that
-    is not settled is lost: its inliers in `found` are too few. Or the grid has no room: its inliers are nan.
+    Scan k has points[ends[k] : ends[k + 1]] and odometry[k], nan where there is none. Points are corrected in
+    place by their `shares` (P,), see sweep_correction; these are empty if there is nothing to correct. A
+    scan waits until the robot has moved; the last ones settle unless they `may_wait` for scans that are not
+    here yet. A scan that is not settled is lost: its inliers in `found` are too few. Or the grid has no room:
+    its inliers are nan.
     """
+    step = np.empty(3)
     for k in range(first, ends.shape[0] - 1):
         scan = points[ends[k] : ends[k + 1]]
         if track.map.counts[ROWS] + CELLS_PER_POINT * scan.shape[0] > grid.keys.shape[0]:
@@ -140,9 +145,16 @@ def track_scans(
         else:
             predict(track, settings, odometry[k], settings.trusted_odometry, prior)
             has_odometry = np.isfinite(odometry[k, 0])
+            if shares.shape[0] > 0:
+                correct_by_last_step(track, scan, shares[ends[k] : ends[k + 1]], step)
             in_view = points_in_view(track, settings, scan, prior.mean)
             threshold = restart_threshold(track, settings)
             matched = match_in_sector(track, grid, settings, in_view, prior, threshold, found, k)
+            if shares.shape[0] > 0 and correct_by_match(
+                track, settings, scan, shares[ends[k] : ends[k + 1]], step, found.poses[k]
+            ):
+                in_view = points_in_view(track, settings, scan, prior.mean)
+                matched = match_in_sector(track, grid, settings, in_view, prior, threshold, found, k)
             is_predicted = has_odometry and np.isfinite(track.odometry[0])
             if is_predicted:
                 match_with_doubt(track, grid, settings, matched, odometry[k], prior, threshold, found, k)
