@@ -13,6 +13,7 @@ from nscan_cli.calibration.odometry_clock import ClockLag, clock_lag
 from nscan_cli.calibration.options import FileCheckOptions
 from nscan_cli.calibration.robot_fit import MIRRORED, MountFit, TurnFit, fit_mount, fit_turns
 from nscan_cli.calibration.step_sampling import telling_steps
+from nscan_cli.calibration.sweep_check import checked_sweep
 from nscan_cli.files.text import counted
 from nscan_cli.logs.assemble import scaled_odometry
 from nscan_cli.logs.laser_log import LaserLog
@@ -49,12 +50,13 @@ class CheckedFile:
 
 def checked_file(log: LaserLog, reading: ReadingOptions, options: FileCheckOptions) -> CheckedFile:
     """Check a log that was read with these options, and put right what is beyond doubt."""
+    log, reading, said = checked_sweep(log, reading, options)
     findings = [] if reading.as_recorded else find_contradictions(log, reading, options)
     for finding in findings:
         if finding.corrected:
             corrected = replace(reading, **finding.corrected)
             log, reading = _as_read(log, reading, corrected), corrected
-    return CheckedFile(log, reading, [finding.message for finding in findings])
+    return CheckedFile(log, reading, said + [finding.message for finding in findings])
 
 
 def _as_read(log: LaserLog, reading: ReadingOptions, corrected: ReadingOptions) -> LaserLog:

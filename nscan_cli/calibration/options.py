@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
+import numpy as np
+
 from nscan_cli.matching.pairwise import PairOptions
 
 
@@ -43,6 +45,40 @@ class StepOptions:
 
 
 @dataclass(frozen=True)
+class SweepCheckOptions:
+    """How the time of a laser's turn is taken from its scans."""
+
+    scans: int = 120
+    """Scans, evenly spread, whose motion is measured. More find more turns of the robot, and take longer."""
+    min_scans: int = 30
+    """Least number of scans of a log that is asked. A larger value believes short logs."""
+    pairs: int = 24
+    """Most pairs of scans that are compared, those where the robot turns fastest. More tell more and take
+    longer."""
+    shifts: tuple[int, ...] = (-2, 2, -4, 4, -7, 7)
+    """Scans from the first of a pair to the second: the robot has to move otherwise there, and to see the
+    same."""
+    longest_step: float = 0.4
+    """Longest time from a scan to the next, s, over which motion is measured."""
+    max_apart: float = 0.6
+    """Scans of a pair are turned against each other by less than this, rad. A larger value finds more pairs,
+    of which some do not match."""
+    min_winding: float = np.radians(2.5)
+    """Least turn of the robot during a turn of the laser, and least difference of two such turns, rad. A
+    larger value tells more of each pair, and finds fewer."""
+    min_view: float = np.radians(190.0)
+    """Least field of view of a laser that is thought to turn though its file does not say so, rad. With a
+    smaller value lasers that look ahead are asked too, which takes time."""
+    shortest: float = 0.012
+    """Shortest time from scan to scan of such a laser, s. A smaller value asks more lasers."""
+    longest: float = 0.5
+    """Longest time from scan to scan of such a laser, s. A larger value asks more lasers."""
+    sigmas: float = 3.0
+    """By so many standard deviations another time than the file's has to make scans sharper to be believed. A
+    larger value believes the file more often."""
+
+
+@dataclass(frozen=True)
 class ClockOptions:
     """How the offset between the clocks of odometry and scans is looked for."""
 
@@ -67,6 +103,7 @@ class FileCheckOptions:
 
     steps: StepOptions = field(default_factory=StepOptions)
     clock: ClockOptions = field(default_factory=ClockOptions)
+    sweep: SweepCheckOptions = field(default_factory=SweepCheckOptions)
     min_steps: int = 12
     """Least number of steps that a finding rests on: with motion, or with a turn."""
     still: float = 1e-3

@@ -145,7 +145,7 @@ def laser_log(
     if sweep.origin:
         findings.used["turn"] = sweep.origin
     swept = beam_times(sweep.turns[numbers], angle_increment[rows], beams, options.stamp)
-    odometry, path = motion.odometry, motion.path if swept is not None else None
+    odometry, path = motion.odometry, motion.path
     if odometry is not None:
         odometry = scaled_odometry(odometry[numbers], options.odometry_scale)
     if path is not None:

@@ -112,8 +112,8 @@ class LaserLog:
     beam_times: BeamTimes | None = None
     """The times of the beams of a laser that turns; None if each scan is seen at once."""
     odometry_path: RobotPath | None = None
-    """The odometry at its own times, which tells more than the poses at the scans; None where it is not
-    kept: the laser sees at once, or there is none."""
+    """The odometry at its own times, which tells more than the poses at the scans; None where it has no
+    others, or there is none."""
     path: RobotPath | None = None
     """How the robot moves while the laser turns; None: as if it stood. See `moving_along`."""
 

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from nscan_cli.kernels.decorators import llvm_inline_kernel
+from nscan_cli.kernels.decorators import kernel, llvm_inline_kernel
 from nscan_cli.poses import Array, are_known, compose, relative, wrap
 
 STRAIGHT = 1e-9
@@ -129,3 +129,25 @@ def seen_from(path: RobotPath, start: Array, time: float, j: int, out: Array) ->
     cos, sin = c * cos - s * sin, s * cos + c * sin
     out[0], out[1] = start[2] * dx + start[3] * dy, start[2] * dy - start[3] * dx
     out[2], out[3] = start[2] * cos + start[3] * sin, start[2] * sin - start[3] * cos
+
+
+@kernel
+def move_along_arc(points: Array, shares: Array, step: Array, back: bool) -> None:
+    """Move points (m, 2) along their shares (m,) of the arc of a step (3,), or back."""
+    # The velocity at the middle: an arc turns its chord by half of its turn.
+    half, rate = 0.5 * step[2], step[2]
+    cotangent = half / np.tan(half) if abs(half) > STRAIGHT else 1.0
+    ahead, left = cotangent * step[0] + half * step[1], cotangent * step[1] - half * step[0]
+    for k in range(points.shape[0]):
+        turn = rate * shares[k]
+        cos, sin = np.cos(turn), np.sin(turn)
+        along, aside = shares[k], 0.0
+        if abs(turn) > STRAIGHT:
+            along, aside = sin / rate, (1.0 - cos) / rate
+        x, y = along * ahead - aside * left, aside * ahead + along * left
+        if back:
+            dx, dy = points[k, 0] - x, points[k, 1] - y
+            points[k, 0], points[k, 1] = cos * dx + sin * dy, cos * dy - sin * dx
+        else:
+            dx, dy = points[k, 0], points[k, 1]
+            points[k, 0], points[k, 1] = cos * dx - sin * dy + x, sin * dx + cos * dy + y

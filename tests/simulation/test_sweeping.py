@@ -77,7 +77,6 @@ def test_the_recording_says_it_all(turning, said):
 def test_the_options_say_otherwise():
     data = swept_mcap(recorded(Turning()), time_increment=0.0)
     assert log_from(data, "room.mcap").beam_times is None
-    assert log_from(data, "room.mcap").odometry_path is None
     swept = log_from(data, "room.mcap", ReadingOptions(sweep=0.2, every=2)).beam_times
     assert swept is not None
     np.testing.assert_allclose(swept.step, 0.2 / 90)

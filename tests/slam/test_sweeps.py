@@ -55,3 +55,15 @@ def test_a_drive_with_fast_turns_is_mapped_as_by_a_laser_that_sees_at_once():
     # Rays that begin at one place leave walls of two thicknesses, at the right poses too.
     one_place = dataclasses.replace(swept, log=dataclasses.replace(swept.log, beam_times=None))
     assert occupied_cells(one_place) > 1.1 * occupied_cells(at_once)
+
+
+def test_without_odometry_the_last_step_stands_for_it():
+    """A turn that begins within a turn of the laser is seen by no pose: there headings are off for a scan."""
+    found = [
+        errors(mapped(dataclasses.replace(log, odometry=None, odometry_path=None)))
+        for log in (recorded(0.0).log(), recorded(0.2).log(), recorded(0.2).log(turn=0.0))
+    ]
+    at_once, swept, uncorrected = found
+    assert swept[0] <= 2 * at_once[0]
+    assert uncorrected[0] > 2 * swept[0]
+    assert uncorrected[1] > 1.8 * swept[1]

@@ -9,10 +9,9 @@ import numpy as np
 
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.poses import Array, Indices
+from nscan_cli.slam.frontend.odometry_checks import SHORTEST_PERIOD
 
 NONE = np.zeros(0)
-SHORTEST_PERIOD = 1e-3
-"""s"""
 SCANS_PER_BATCH = 128
 """Scans that are tracked together, before the keyframes among them are chosen."""
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from nscan_cli.kernels.decorators import kernel
-from nscan_cli.logs.robot_path import STRAIGHT
+from nscan_cli.logs.robot_path import move_along_arc
 from nscan_cli.matching.pose_kernels import relative_pose, wrapped
 from nscan_cli.poses import Array
 from nscan_cli.slam.frontend.options import TrackingParameters
@@ -27,7 +27,7 @@ def correct_by_last_step(track: TrackState, points: Array, shares: Array, step: 
     if track.counts[KNOWN] > 1:
         relative_pose(track.poses[-1], track.poses[-2], step)
         step[2] = wrapped(step[2])
-    _move(points, shares, step, False)
+    move_along_arc(points, shares, step, False)
 
 
 @kernel
@@ -44,29 +44,7 @@ def correct_by_match(
     bound = settings.sweep_step_change
     differs = np.hypot(found[0] - step[0], found[1] - step[1]) > bound or abs(found[2] - step[2]) > bound
     if differs:
-        _move(points, shares, step, True)
-        _move(points, shares, found, False)
+        move_along_arc(points, shares, step, True)
+        move_along_arc(points, shares, found, False)
     shares[:] = 0.0
     return bool(differs)
-
-
-@kernel
-def _move(points: Array, shares: Array, step: Array, back: bool) -> None:
-    """Move points (m, 2) along their shares (m,) of the arc of a step (3,), or back."""
-    # The velocity at the middle: an arc turns its chord by half of its turn.
-    half, rate = 0.5 * step[2], step[2]
-    cotangent = half / np.tan(half) if abs(half) > STRAIGHT else 1.0
-    ahead, left = cotangent * step[0] + half * step[1], cotangent * step[1] - half * step[0]
-    for k in range(points.shape[0]):
-        turn = rate * shares[k]
-        cos, sin = np.cos(turn), np.sin(turn)
-        along, aside = shares[k], 0.0
-        if abs(turn) > STRAIGHT:
-            along, aside = sin / rate, (1.0 - cos) / rate
-        x, y = along * ahead - aside * left, aside * ahead + along * left
-        if back:
-            dx, dy = points[k, 0] - x, points[k, 1] - y
-            points[k, 0], points[k, 1] = cos * dx + sin * dy, cos * dy - sin * dx
-        else:
-            dx, dy = points[k, 0], points[k, 1]
-            points[k, 0], points[k, 1] = cos * dx - sin * dy + x, sin * dx + cos * dy + y
