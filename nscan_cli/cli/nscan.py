@@ -108,7 +108,7 @@ def command(
     quiet: bool,
     **_verbosity: int,
 ) -> None:
-    """Match several scans of LOG jointly (nScan-Matching).
+    """Match several scans of LOG jointly (nScan-Matching). Also called match-jointly.
 
     The result is an nScan relation: local poses and their Hessian, gauge included, with the covariance
     relative to one scan. Scans that overlap no other scan, or contradict their priors, are left out and
