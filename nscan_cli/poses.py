@@ -14,6 +14,9 @@ Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 Mask = NDArray[np.bool_]
 
+MIRRORED = np.array([1.0, -1.0, -1.0])
+"""Factors of a pose that is seen in a mirror along the x axis."""
+
 
 def wrap(angle: ArrayLike) -> Array:
     """The angle (rad) normalised to (−π, π]."""

@@ -11,7 +11,7 @@ import numpy as np
 from nscan_cli.calibration.measured_steps import MeasuredSteps, measure_steps
 from nscan_cli.calibration.odometry_clock import ClockLag, clock_lag
 from nscan_cli.calibration.options import FileCheckOptions
-from nscan_cli.calibration.robot_fit import MIRRORED, MountFit, TurnFit, fit_mount, fit_turns
+from nscan_cli.calibration.robot_fit import MountFit, TurnFit, fit_mount, fit_turns
 from nscan_cli.calibration.step_sampling import telling_steps
 from nscan_cli.calibration.sweep_check import checked_sweep
 from nscan_cli.files.text import counted
@@ -19,7 +19,7 @@ from nscan_cli.logs.assemble import scaled_odometry
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.logs.reading_options import ReadingOptions
 from nscan_cli.logs.robot_path import robot_path
-from nscan_cli.poses import Array, are_known, relative, wrap
+from nscan_cli.poses import MIRRORED, Array, are_known, relative, wrap
 
 ROUND_ANGLE, ROUND_WITHIN = 15.0, 3.0
 """Degrees: lasers are mounted at round angles; a measured one this near to one is that."""

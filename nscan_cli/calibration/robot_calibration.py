@@ -14,14 +14,14 @@ import numpy as np
 from nscan_cli.calibration.measured_steps import MeasuredSteps, measure_steps
 from nscan_cli.calibration.odometry_clock import clock_lag
 from nscan_cli.calibration.options import CalibrationOptions
-from nscan_cli.calibration.robot_fit import MIRRORED, MountFit, fit_mount
+from nscan_cli.calibration.robot_fit import MountFit, fit_mount
 from nscan_cli.calibration.robust_fit import TO_SIGMA, robust_fit
 from nscan_cli.calibration.step_sampling import successive_steps
 from nscan_cli.errors import InputDataError
 from nscan_cli.files.text import counted
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.logs.reading_options import ReadingOptions
-from nscan_cli.poses import Array, are_known, compose, inverse, relative, wrap
+from nscan_cli.poses import MIRRORED, Array, are_known, compose, inverse, relative, wrap
 
 
 @dataclass(frozen=True)

@@ -19,9 +19,6 @@ import numpy as np
 from nscan_cli.calibration.robust_fit import RobustFit, robust_fit
 from nscan_cli.poses import Array
 
-MIRRORED = np.array([1.0, -1.0, -1.0])
-"""Factors of a pose that is seen in a mirror along the x axis."""
-
 
 @dataclass(frozen=True)
 class TurnFit:

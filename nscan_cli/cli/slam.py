@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import sys
 import time
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -15,7 +15,8 @@ from nscan_cli.cli.shared_options import common_options, reading_options
 from nscan_cli.cli.slam_outputs import SlamOutputs
 from nscan_cli.cli.slam_summary import facts_lines
 from nscan_cli.cli.subcommand import PATH, log_argument, option, subcommand
-from nscan_cli.errors import WrongUsageError
+from nscan_cli.errors import CheckFailedError, WrongUsageError
+from nscan_cli.files.inputs import label
 from nscan_cli.files.outputs import write_atomically
 from nscan_cli.files.text import json_bytes
 from nscan_cli.logs.reading_options import ReadingOptions
@@ -23,7 +24,7 @@ from nscan_cli.logs.reading_options import ReadingOptions
 if TYPE_CHECKING:
     from nscan_cli.slam.options import Relations
 
-MAPPING_OPTIONS = ("max_scans", "relations", "no_loops", "calibrate")
+MAPPING_OPTIONS = ("max_scans", "relations", "no_loops", "calibrate", "verify", "verify_bound")
 """Options of mapping a log; they do not go with --from."""
 
 
@@ -35,6 +36,7 @@ MAPPING_OPTIONS = ("max_scans", "relations", "no_loops", "calibrate")
     ("nscan-cli slam robot.log.gz -o robot.json --depfile robot.d", "with a rule for make"),
     ("nscan-cli slam --from robot.json -o refined.json", "a saved graph, optimised and refined"),
     ("nscan-cli slam robot.log.gz -o robot.json --json | jq .sigma.max", "one value, for a script"),
+    ("nscan-cli slam robot.log.gz -o robot.json --verify-bound 0.3", "as a test: exit code 3 if it fails"),
 )
 @log_argument(required=False)
 @option(
@@ -85,6 +87,10 @@ MAPPING_OPTIONS = ("max_scans", "relations", "no_loops", "calibrate")
 @option("--calibrate", is_flag=True,
         help="First find and use the mounting, and the scale and clock of odometry.")  # fmt: skip
 @option("--no-loops", is_flag=True, help="Do not close loops: drift remains.")
+@option("--verify", is_flag=True,
+        help="Map the drive again in ways that must give the same map; print the differences.")  # fmt: skip
+@option("--verify-bound", type=click.FloatRange(0, min_open=True), metavar="M",
+        help="Like --verify; exit with code 3 if a difference is larger.")  # fmt: skip
 @option(
     "--threads",
     type=click.IntRange(1),
@@ -110,6 +116,8 @@ def command(
     relations: Relations,
     calibrate: bool,
     no_loops: bool,
+    verify: bool,
+    verify_bound: float | None,
     threads: int | None,
     depfile: str | None,
     as_json: bool,
@@ -140,8 +148,8 @@ def command(
         raise WrongUsageError("standard input (-) can be one input only; give the other by its path")
     if from_file is not None and (reading != ReadingOptions() or _given(*MAPPING_OPTIONS)):
         raise WrongUsageError(
-            "slam: reading options, --max-scans, --relations, --calibrate and --no-loops cannot be combined "
-            "with --from; the graph keeps its own"
+            "slam: reading options, --max-scans, --relations, --calibrate, --no-loops and --verify cannot be "
+            "combined with --from; the graph keeps its own"
         )
     outputs = SlamOutputs(output, map_file, resolution, trajectory, g2o, carmen, depfile)
     from nscan_cli.cli.slam_runs import run_on_graph, run_on_log
@@ -150,6 +158,7 @@ def command(
     named = [*([] if from_file is None else [from_file]), *(files_of(log) if log else ())]
     outputs.check(named)
     from nscan_cli.memory import use_one_arena
+    from nscan_cli.slam.consistency.options import VerificationOptions
     from nscan_cli.slam.log_to_graph import slam_options
     from nscan_cli.threads import available_threads
 
@@ -158,7 +167,8 @@ def command(
     began = time.perf_counter()
     if from_file is None:
         options = slam_options(max_scans, relations, not no_loops)
-        run = run_on_log(log, reading, options, calibrate, threads, quiet)
+        repeated = VerificationOptions(bound=verify_bound) if verify or verify_bound is not None else None
+        run = run_on_log(log, reading, options, calibrate, repeated, threads, quiet)
     else:
         run = run_on_graph(from_file, log or None, outputs.need_scans, threads, quiet)
         # The log that was found must not be replaced, either.
@@ -173,6 +183,17 @@ def command(
         write_atomically("-", json_bytes(f"{json.dumps(facts, ensure_ascii=False, allow_nan=False)}\n"))
     else:
         say(facts_lines(facts, verbose > 0), quiet)
+    _check_bound(run.inputs[0], facts["verification"])
+
+
+def _check_bound(name: str, verification: dict[str, Any] | None) -> None:
+    """Raises CheckFailedError if maps of the same drive differ by more than --verify-bound."""
+    if verification is None or verification["bound"] is None:
+        return
+    greatest, bound = verification["greatest"], verification["bound"]
+    if greatest is None or greatest > bound:
+        said = "no maps could be compared" if greatest is None else f"maps differ by {greatest:.3f} m"
+        raise CheckFailedError(f"{label(name)}: {said}, and --verify-bound is {bound:g} m")
 
 
 def _given(*options: str) -> bool:

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from nscan_cli.graph.model import Graph
     from nscan_cli.logs.laser_log import LaserLog
     from nscan_cli.poses import Indices
+    from nscan_cli.slam.consistency.options import VerificationOptions
     from nscan_cli.slam.options import SlamOptions
 
 
@@ -43,14 +44,16 @@ def run_on_log(
     reading: ReadingOptions,
     options: SlamOptions,
     calibrated: bool,
+    verification: VerificationOptions | None,
     threads: int,
     quiet: bool,
 ) -> SlamRun:
-    """Map a log, with its robot calibrated first if asked."""
+    """Map a log, with its robot calibrated first, and its drive mapped again, if asked."""
     import numpy as np
 
     from nscan_cli.kernels.decorators import load_runtime
     from nscan_cli.logs.log_files import files_of
+    from nscan_cli.slam.consistency.map_verification import add_verification
     from nscan_cli.slam.log_to_graph import map_log, notices_of_mapping
 
     load_runtime()
@@ -73,6 +76,9 @@ def run_on_log(
                 bar.begin("optimising and refining", None)
 
         state, graph = map_log(scans, reading, options, threads, report)
+    if verification is not None:
+        with progress("mapping again", None, quiet):
+            add_verification(state, graph, verification, threads)
     later = notices_of_mapping(scans, graph)
     for warning in later:
         say(f"warning: {warning}", quiet)
@@ -83,6 +89,7 @@ def run_on_log(
             "searches": state.tracking_searches,
             "places": len(state.places),
         },
+        "verification": graph.provenance.get("verification"),
         "warnings": [*warnings, *later],
     }
     return SlamRun(graph, scans, np.arange(len(scans)), files_of(log), facts, compiling.has_begun)

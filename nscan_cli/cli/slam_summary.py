@@ -38,6 +38,7 @@ def graph_facts(graph: Graph) -> Facts:
         "sigma": _sigma(graph),
         "tracking": None,
         "optimised": None,
+        "verification": None,
         "warnings": [],
     }
 
@@ -95,6 +96,8 @@ def facts_lines(facts: Facts, verbose: bool) -> str:
             ("optimised", [f"energy {optimised['energy']:.6g} after {iterations}{refined}"]),
             ("moved", [f"poses by at most {optimised['moved']:.3g} m"]),
         ]
+    if facts["verification"] is not None:
+        rows += [("mapped again", verification_lines(facts["verification"]))]
     return summary_table([*rows, ("time", [_time(facts)]), ("written", [", ".join(facts["written"])])])
 
 
@@ -107,6 +110,26 @@ def _sigma_lines(sigma: Facts) -> list[str]:
         )
     if sigma["unknown"]:
         lines.append(f"unknown for {counted(sigma['unknown'], 'keyframe')}")
+    return lines
+
+
+def verification_lines(verification: Facts) -> list[str]:
+    """Each run that had to give the same map, and where it differs most."""
+    lines = []
+    for repeat in verification["repeats"]:
+        found = repeat["differences"]
+        if not found:
+            lines.append(f"{repeat['change']}: no way could be compared")
+            continue
+        worst = max(found, key=lambda each: each["max"])
+        sizes = ", ".join(f"{each['max']:.3f}" for each in found)
+        ways = ", ".join(f"{each['way']:g}" for each in found)
+        sigma = "unknown" if worst["sigma"] is None else f"{worst['sigma']:.3f} m"
+        told = "" if repeat["counts"] else "; it says itself that it is wrong"
+        lines.append(
+            f"{repeat['change']}: at most {sizes} m apart over {ways} m, most from scan {worst['first']} to "
+            f"{worst['last']} (sigma {sigma}){told}"
+        )
     return lines
 
 

@@ -11,6 +11,8 @@ from nscan_cli.errors import InputDataError, WrongUsageError
 from nscan_cli.logs.reading_options import ReadingOptions
 
 RELATION_CHOICES = ("pairwise", "nscan", "both")
+MAPPING_PARAMETERS = {"max-scans": int, "relations": str, "no-loops": bool, "verify-bound": float}
+"""Options of mapping, each with the type of its value in TOML."""
 DEGREE_OPTIONS = ("angle-min", "angle-increment")
 """Options that are in degrees in a manifest, and in rad here."""
 
@@ -21,7 +23,7 @@ class LogParameters:
 
     reading: ReadingOptions = field(default_factory=ReadingOptions)
     mapping: dict[str, Any] = field(default_factory=dict)
-    """Those of max-scans, relations and no-loops that the manifest gives."""
+    """Those of MAPPING_PARAMETERS that the manifest gives."""
 
     def as_table(self) -> dict[str, Any]:
         """The parameters as a table of a manifest, without those that have their defaults."""
@@ -41,7 +43,7 @@ class LogParameters:
 
 def parameters_from(place: str, table: dict[str, Any]) -> LogParameters:
     """The parameters from a table of a manifest; messages begin with `place`. Raises InputDataError."""
-    known = _reading_options() | {"max-scans": int, "relations": str, "no-loops": bool}
+    known = _reading_options() | MAPPING_PARAMETERS
     reading: dict[str, Any] = {}
     mapping: dict[str, Any] = {}
     for key, value in table.items():
@@ -53,7 +55,7 @@ def parameters_from(place: str, table: dict[str, Any]) -> LogParameters:
             value = float(value)
         if not _is_a(value, wanted):
             raise _parameter_error(place, key, value, TYPE_WORDS[wanted])
-        if key in ("max-scans", "relations", "no-loops"):
+        if key in MAPPING_PARAMETERS:
             mapping[key] = value
         elif key == "mount":
             reading["mount"] = _mount_pose(place, value)
@@ -63,6 +65,8 @@ def parameters_from(place: str, table: dict[str, Any]) -> LogParameters:
             reading[key.replace("-", "_")] = math.radians(value) if key in DEGREE_OPTIONS else value
     if mapping.get("max-scans", 3) < 3:
         raise _parameter_error(place, "max-scans", mapping["max-scans"], "3 or more")
+    if mapping.get("verify-bound", 1.0) <= 0:
+        raise _parameter_error(place, "verify-bound", mapping["verify-bound"], "a number above 0")
     if mapping.get("relations", "both") not in RELATION_CHOICES:
         raise _parameter_error(
             place, "relations", mapping["relations"], f"one of {', '.join(RELATION_CHOICES)}"

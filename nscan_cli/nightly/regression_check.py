@@ -114,10 +114,10 @@ def _status_and_reasons(
 ) -> tuple[Status, list[str]]:
     if runs[-1]["outcome"] != "done":
         return "failed", [runs[-1]["reason"]]
-    errors = MeasuredErrors.of(last)
+    errors, above = MeasuredErrors.of(last), _above_verify_bound(last)
     if errors is None:
-        return "good", []
-    above = [
+        return ("above" if above else "good"), above
+    above += [
         f"{errors.measure} {figure:.4f} {unit} is above {bound:g} {unit}"
         for figure, bound, unit in (
             (errors.metres, entry.max_translation, "m"),
@@ -139,6 +139,17 @@ def _status_and_reasons(
         if new - old > max(least, MIN_RELATIVE_RISE * old)
     ]
     return ("worse" if worse else "good"), worse
+
+
+def _above_verify_bound(last: RunRecord | None) -> list[str]:
+    """Why the maps of the same drive differ too much, if the manifest asked for them."""
+    verification: dict[str, Any] | None = (last or {}).get("counts", {}).get("verification")
+    if verification is None:
+        return []
+    greatest, bound = verification["greatest"], verification["bound"]
+    if greatest is None:
+        return ["mapped again, no way could be compared"]
+    return [f"mapped again, maps differ by {greatest:.4f} m, above {bound:g} m"] if greatest > bound else []
 
 
 def headline(checks: list[CheckResult]) -> str:

@@ -59,6 +59,8 @@ def map_and_evaluate(
     from nscan_cli.mapping.occupancy import occupancy_grid
     from nscan_cli.mapping.viewer.viewer_page import embedded_viewer, viewer_page
     from nscan_cli.nightly import warm_up
+    from nscan_cli.slam.consistency.map_verification import add_verification
+    from nscan_cli.slam.consistency.options import VerificationOptions
     from nscan_cli.slam.log_to_graph import Counts, map_log, notices_of_mapping, slam_options
 
     if cache_folder() is None:
@@ -69,7 +71,7 @@ def map_and_evaluate(
         mapping.get("max-scans"), mapping.get("relations"), not mapping.get("no-loops", False)
     )
     log = read_log(task["inputs"]["log"], reading)
-    _, graph = map_log(
+    state, graph = map_log(
         log,
         reading,
         options,
@@ -77,6 +79,9 @@ def map_and_evaluate(
         lambda done, keyframes, _accepted: report(done, len(log), keyframes),
     )
     rows = np.arange(len(log))
+    bound = mapping.get("verify-bound")
+    if bound is not None:
+        add_verification(state, graph, VerificationOptions(bound=bound), task["threads"])
     grid = occupancy_grid(log, rows, graph.poses)
     (outputs / "graph.json").write_bytes(write_graph(graph))
     (outputs / "trajectory.tum").write_bytes(write_tum(graph.stamps, graph.poses))
@@ -101,6 +106,8 @@ def map_and_evaluate(
         "loops": {"accepted": made.accepted, "refused": made.refused.total()},
         "warnings": log.report.notices() + notices_of_mapping(log, graph),
     }
+    if bound is not None:
+        counts["verification"] = {"greatest": graph.provenance["verification"]["greatest"], "bound": bound}
     evaluation = _evaluation(task["inputs"], str(outputs / "graph.json"))
     return {"counts": counts, "evaluation": evaluation, "times": {"seconds": seconds}}
 

@@ -21,7 +21,8 @@ from nscan_cli.errors import NscanError
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.logs.load import read_log
 from nscan_cli.logs.reading_options import ReadingOptions
-from nscan_cli.poses import Array, relative
+from nscan_cli.poses import MIRRORED, Array, relative
+from nscan_cli.slam.consistency.repeated_maps import mirrored
 from nscan_cli.slam.diagnostics.notices import notices
 from nscan_cli.slam.options import SlamOptions
 from nscan_cli.slam.pipeline import run_slam
@@ -50,18 +51,6 @@ class MappedPath:
     """Whether a notice says that something is wrong."""
 
 
-def mirrored(log: LaserLog) -> LaserLog:
-    """The log of the mirror image of the world: the x axes are the mirror."""
-    odometry = None if log.odometry is None else log.odometry * [1.0, -1.0, -1.0]
-    return dataclasses.replace(
-        log,
-        odometry=odometry,
-        mount=log.mount * [1.0, -1.0, -1.0],
-        angle_min=-log.angle_min,
-        angle_increment=-log.angle_increment,
-    )
-
-
 def backwards(log: LaserLog) -> LaserLog:
     """The log read from its end to its beginning."""
     times = (log.times[0] + log.times[-1] - log.times)[::-1]
@@ -82,7 +71,7 @@ def mapped_path(path: str, every: int, change: str, odometry: bool) -> MappedPat
     graph = run_slam(state, lambda scans, keyframes: None)
     times, poses = np.asarray(log.times), graph.poses
     if change == "mirrored":
-        poses = poses * [1.0, -1.0, -1.0]
+        poses = poses * MIRRORED
     if change == "backwards":
         times, poses = (log.times[0] + log.times[-1] - log.times)[::-1], poses[::-1]
     return MappedPath(times, poses, len(state.breaks), bool(notices(state)))

@@ -83,14 +83,21 @@ def test_a_saved_graph_that_is_none(folder, capsys, content, code, said):
 
 @pytest.mark.parametrize(
     "options",
-    [["--max-scans", "4"], ["--relations", "both"], ["--no-loops"], ["--calibrate"], ["--every", "2"]],
+    [
+        ["--max-scans", "4"],
+        ["--relations", "both"],
+        ["--no-loops"],
+        ["--calibrate"],
+        ["--verify"],
+        ["--every", "2"],
+    ],
 )
 def test_options_of_mapping_do_not_go_with_a_saved_graph(folder, capsys, options):
     (folder / "saved.json").write_bytes(write_graph(small_graph()))
     assert run(["slam", "--from", "saved.json", "-o", "out.json", *options]) == 2
     out, err = capsys.readouterr()
     assert (out, len(err.splitlines())) == ("", 1)
-    assert "--max-scans, --relations, --calibrate and --no-loops cannot be combined with --from" in err
+    assert "--relations, --calibrate, --no-loops and --verify cannot be combined with --from" in err
     assert not (folder / "out.json").exists()
 
 

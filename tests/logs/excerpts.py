@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-import numpy as np
-from numpy.typing import NDArray
-
+from nscan_cli.logs import log_excerpt
 from nscan_cli.logs.laser_log import LaserLog
+from nscan_cli.logs.log_excerpt import Rows
 from nscan_cli.poses import Array
 
-Rows = slice | NDArray[np.int64]
+__all__ = ["Rows", "excerpt", "truth_of"]
 
 
 def truth_of(log: LaserLog) -> Array:
@@ -21,18 +20,9 @@ def truth_of(log: LaserLog) -> Array:
 
 
 def excerpt(log: LaserLog, rows: Rows) -> LaserLog:
-    """The scans in `rows` alone, in that order, with the numbers that they have in the whole log."""
+    """The scans in `rows` alone, in that order, with their true poses."""
     return replace(
-        log,
-        numbers=log.numbers[rows],
-        stamps=tuple(np.array(log.stamps)[rows].tolist()),
-        times=log.times[rows],
-        ranges=log.ranges[rows],
-        angle_min=log.angle_min[rows],
-        angle_increment=log.angle_increment[rows],
-        mount=log.mount[rows] if log.mount.ndim == 2 else log.mount,
-        odometry=None if log.odometry is None else log.odometry[rows],
-        beams=None if log.beams is None else log.beams[rows],
+        log_excerpt.excerpt(log, rows),
         truth_times=None if log.truth is None else log.times[rows],
         truth=None if log.truth is None else truth_of(log)[rows],
     )

@@ -69,6 +69,21 @@ def test_a_log_without_anything_to_measure_against_is_good_when_it_is_done():
     assert judged(UNMEASURED).status == "good"
 
 
+@pytest.mark.parametrize(
+    ("greatest", "status", "reasons"),
+    [
+        (0.2, "good", []),
+        (0.4, "above", ["mapped again, maps differ by 0.4000 m, above 0.3 m"]),
+        (None, "above", ["mapped again, no way could be compared"]),
+    ],
+)
+def test_maps_of_the_same_drive_have_to_be_the_same(greatest, status, reasons):
+    for run in (done(0.02), UNMEASURED):
+        counts = {"warnings": [], "verification": {"greatest": greatest, "bound": 0.3}}
+        found = judged({**run, "counts": counts})
+        assert (found.status, found.reasons) == (status, reasons)
+
+
 def test_of_a_trajectory_the_rmse_counts():
     ate = {"translation": {**figures(0.1), "rmse": 0.3}, "rotation": figures(1.0)}
     found = judged({**done(0), "evaluation": {"reference": {"ate": ate}}}, translation=0.2)

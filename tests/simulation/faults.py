@@ -113,6 +113,16 @@ def odometry_missing(log: LaserLog, rows: Rows) -> LaserLog:
     return replace(log, odometry=odometry)
 
 
+def odometry_held(log: LaserLog, rows: Rows, catches_up: bool) -> LaserLog:
+    """The odometry does not move in `rows`; then it jumps to where it would be, or it has lost the way."""
+    some, odometry = np.arange(len(log))[rows], _odometry(log).copy()
+    first, last = int(some[0]), int(some[-1])
+    if not catches_up:
+        odometry[last + 1 :] = compose(odometry[first], relative(odometry[last + 1 :], odometry[last]))
+    odometry[some] = odometry[first]
+    return replace(log, odometry=odometry)
+
+
 def odometry_scaled(log: LaserLog, factor: float) -> LaserLog:
     """The positions by odometry in another unit."""
     return replace(log, odometry=_odometry(log) * (factor, factor, 1.0))
@@ -121,6 +131,12 @@ def odometry_scaled(log: LaserLog, factor: float) -> LaserLog:
 def odometry_reversed(log: LaserLog) -> LaserLog:
     """The odometry counts x the wrong way; its headings are right."""
     return replace(log, odometry=_odometry(log) * (-1.0, 1.0, 1.0))
+
+
+def odometry_behind(log: LaserLog) -> LaserLog:
+    """The odometry counts forward as backward, in every step; its turns are right."""
+    steps = relative(_odometry(log)[1:], _odometry(log)[:-1]) * (-1.0, -1.0, 1.0)
+    return replace(log, odometry=_summed(_odometry(log)[0], steps))
 
 
 def odometry_late(log: LaserLog, seconds: float) -> LaserLog:
@@ -134,10 +150,7 @@ def odometry_late(log: LaserLog, seconds: float) -> LaserLog:
 def odometry_turning(log: LaserLog, factor: float) -> LaserLog:
     """The odometry multiplies each turn."""
     steps = relative(_odometry(log)[1:], _odometry(log)[:-1]) * (1.0, 1.0, factor)
-    poses = [_odometry(log)[0]]
-    for step in steps:
-        poses.append(compose(poses[-1], step))
-    return replace(log, odometry=np.array(poses))
+    return replace(log, odometry=_summed(_odometry(log)[0], steps))
 
 
 def mirrored(log: LaserLog) -> LaserLog:
@@ -226,6 +239,54 @@ def follower(log: LaserLog, distance: float, width: float = 0.5, seed: int = 1) 
         near = away * np.cos(off) - np.sqrt(np.maximum((width / 2) ** 2 - across**2, 0.0))
         ranges[row, hit] = np.fmin(ranges[row, hit], near[hit])
     return replace(log, ranges=ranges)
+
+
+def cart(log: LaserLog, hitch: float = 0.35, length: float = 0.5, width: float = 0.5) -> LaserLog:
+    """The robot pulls a cart: a box on a bar of 0.15 m whose hinge is `hitch` (m) behind the robot's middle.
+
+    The box is `length` m long and `width` m wide; it turns into the way of the hinge, on wheels at its end.
+    """
+    ranges, truth = log.ranges.copy(), truth_of(log)
+    hinges = compose(truth, np.array([-hitch, 0.0, 0.0]))
+    heading, bar = float(truth[0, 2]), 0.15
+    corners = np.array([(-bar, -0.5), (-bar, 0.5), (-bar - length, 0.5), (-bar - length, -0.5)]) * (
+        1.0,
+        width,
+    )
+    for row in range(len(log)):
+        if row:
+            step = hinges[row, :2] - hinges[row - 1, :2]
+            across = float(step[1] * np.cos(heading) - step[0] * np.sin(heading))
+            heading += across / (bar + length)
+        box = transform(np.array([*hinges[row, :2], heading]), corners)
+        laser = log.laser_pose(truth[row])
+        seen = transform(relative(np.zeros(3), laser), box)
+        beams = log.angle_min[row] + log.angle_increment[row] * np.arange(ranges.shape[1])
+        ranges[row] = np.fmin(ranges[row], _to_outline(beams, seen))
+    return replace(log, ranges=ranges)
+
+
+def _to_outline(beams: Array, corners: Array) -> Array:
+    """(B,) distance (m) along bearings (B,) to a polygon (n, 2); inf where it is not met."""
+    directions = np.stack([np.cos(beams), np.sin(beams)], axis=-1)
+    nearest = np.full(len(beams), np.inf)
+    for begin, end in zip(corners, np.roll(corners, -1, axis=0), strict=True):
+        side = end - begin
+        turn = directions[:, 0] * side[1] - directions[:, 1] * side[0]
+        with np.errstate(divide="ignore", invalid="ignore"):
+            away = (begin[0] * side[1] - begin[1] * side[0]) / turn
+            along = (begin[0] * directions[:, 1] - begin[1] * directions[:, 0]) / turn
+        met = (away > 0.0) & (along >= 0.0) & (along <= 1.0)
+        nearest = np.where(met & (away < nearest), away, nearest)
+    return nearest
+
+
+def _summed(first: Array, steps: Array) -> Array:
+    """(n + 1, 3) the poses to which steps (n, 3) lead from the first."""
+    poses = [first]
+    for step in steps:
+        poses.append(compose(poses[-1], step))
+    return np.array(poses)
 
 
 def _odometry(log: LaserLog) -> Array:

@@ -14,6 +14,7 @@ import numpy as np
 from nscan_cli.files.provenance import option_fields
 from nscan_cli.graph.model import Graph, Pairwise
 from nscan_cli.logs.laser_log import LaserLog
+from nscan_cli.logs.log_excerpt import excerpt
 from nscan_cli.matching.priors import odometry_prior
 from nscan_cli.poses import Indices, relative
 from nscan_cli.slam.backend.finish import finish_graph
@@ -91,18 +92,7 @@ def _log_of_rows(log: LaserLog, rows: Indices) -> LaserLog:
     """The log with the scans in some rows (N,) alone."""
     if np.array_equal(rows, np.arange(len(log))):
         return log
-    return dataclasses.replace(
-        log,
-        numbers=log.numbers[rows],
-        stamps=tuple(log.stamps[row] for row in rows.tolist()),
-        times=log.times[rows],
-        ranges=log.ranges[rows],
-        angle_min=log.angle_min[rows],
-        angle_increment=log.angle_increment[rows],
-        odometry=None if log.odometry is None else log.odometry[rows],
-        beams=None if log.beams is None else log.beams[rows],
-        beam_times=None if log.beam_times is None else log.beam_times.of(rows),
-    )
+    return excerpt(log, rows)
 
 
 def _breaks(graph: Graph, options: SlamOptions) -> set[int]:

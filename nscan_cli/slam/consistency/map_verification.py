@@ -1,0 +1,129 @@
+"""How far a map can be trusted without any truth: its drive mapped again in ways that must give the same."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from nscan_cli.files.provenance import as_parameters
+from nscan_cli.graph.model import Graph
+from nscan_cli.graph.relative_covariance import RelativePoses
+from nscan_cli.poses import Indices
+from nscan_cli.slam.consistency.options import VerificationOptions
+from nscan_cli.slam.consistency.path_differences import PathDifference, path_differences
+from nscan_cli.slam.consistency.repeated_maps import WITHOUT_ODOMETRY, MappedPath, repeats
+from nscan_cli.slam.state import SlamState
+from nscan_cli.threads import map_in_threads
+
+
+@dataclass(frozen=True)
+class Repeat:
+    """One run that had to give the same map."""
+
+    name: str
+    path: MappedPath
+    differences: list[PathDifference]
+
+    @property
+    def counts(self) -> bool:
+        """Whether a difference says something of the map.
+
+        Without odometry a map may be wrong where the first is right; then it mostly says so itself.
+        """
+        return self.name != WITHOUT_ODOMETRY or not self.path.notices
+
+
+@dataclass(frozen=True)
+class Verification:
+    """What mapping a drive again says of its map."""
+
+    repeats: list[Repeat]
+    options: VerificationOptions
+
+    @property
+    def worst(self) -> tuple[str, PathDifference] | None:
+        """The greatest difference of the runs that count, and its run; None where nothing is compared."""
+        found = [(run.name, each) for run in self.repeats if run.counts for each in run.differences]
+        return max(found, key=lambda named: named[1].max, default=None)
+
+    def as_document(self, numbers: Indices) -> dict[str, Any]:
+        """For JSON, in m; `numbers` (S,) are those of the log's scans."""
+        return {
+            "greatest": None if self.worst is None else self.worst[1].max,
+            "bound": self.options.bound,
+            "repeats": [
+                {
+                    "change": run.name,
+                    "counts": run.counts,
+                    "breaks": len(run.path.breaks),
+                    "notices": list(run.path.notices),
+                    "differences": [_in_scans(each, numbers) for each in run.differences],
+                }
+                for run in self.repeats
+            ],
+        }
+
+    def notice(self, numbers: Indices) -> str | None:
+        """A sentence where maps differ by more than those of a sound map do; None if they do not."""
+        if self.worst is None or self.worst[1].max <= self.options.max_difference:
+            return None
+        name, worst = self.worst
+        said = "unknown" if worst.sigma is None else f"{worst.sigma:.2g} m"
+        return (
+            f"mapped again ({name}), the map differs by {worst.max:.2f} m over {worst.way:g} m, from scan "
+            f"{numbers[worst.first]} to {numbers[worst.last]}, where sigma is {said}: one of the two is wrong"
+        )
+
+
+def verify(state: SlamState, graph: Graph, options: VerificationOptions, threads: int) -> Verification:
+    """Map the drive of a finished run again, and compare."""
+    log, slam = state.recorded, state.options
+    path = MappedPath(np.arange(len(log)), graph.poses, np.array(state.breaks, dtype=np.int64), ())
+    runs = repeats(log)
+    paths = map_in_threads(threads, lambda run: run(log, slam), runs.values())
+    found = [path_differences(path, again, options) for again in paths]
+    sigmas = _RelativeSigmas(graph, [each for some in found for each in some])
+    return Verification(
+        [
+            Repeat(name, again, [replace(each, sigma=sigmas.of(each)) for each in some])
+            for name, again, some in zip(runs, paths, found, strict=True)
+        ],
+        options,
+    )
+
+
+def add_verification(state: SlamState, graph: Graph, options: VerificationOptions, threads: int) -> None:
+    """Map the drive again; the graph's provenance gets the differences, and a notice if they are large."""
+    found, numbers, provenance = verify(state, graph, options, threads), state.log.numbers, graph.provenance
+    provenance["parameters"]["verification"] = as_parameters(options)
+    provenance["verification"] = found.as_document(numbers)
+    notice = found.notice(numbers)
+    if notice is not None:
+        provenance["notices"].append(notice)
+
+
+def _in_scans(difference: PathDifference, numbers: Indices) -> dict[str, Any]:
+    scans = {"first": int(numbers[difference.first]), "last": int(numbers[difference.last])}
+    return asdict(difference) | scans
+
+
+class _RelativeSigmas:
+    """What a graph says of the relative positions of the ends of some ways."""
+
+    def __init__(self, graph: Graph, differences: list[PathDifference]) -> None:
+        self._anchors = graph.anchors
+        rows = [row for each in differences for row in (each.first, each.last)]
+        self._relations = RelativePoses(graph, np.unique(graph.anchors[rows]).tolist())
+
+    def of(self, difference: PathDifference) -> float | None:
+        """Standard deviation (m) along the least certain direction, of the keyframes at its ends."""
+        a, b = self._anchors[[difference.first, difference.last]].tolist()
+        if a == b:
+            return 0.0
+        relation = self._relations.relation(a, b)
+        if relation is None:
+            return None
+        covariance = np.linalg.inv(relation.information)[:2, :2]
+        return float(np.sqrt(max(np.linalg.eigvalsh(covariance)[-1], 0.0)))

@@ -1,0 +1,76 @@
+"""A drive mapped again, from a log that is changed in a way that must not change the map."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from nscan_cli.logs.laser_log import LaserLog
+from nscan_cli.logs.log_excerpt import excerpt
+from nscan_cli.logs.robot_path import robot_path
+from nscan_cli.poses import MIRRORED, Array, Indices
+from nscan_cli.slam.diagnostics.notices import notices
+from nscan_cli.slam.options import SlamOptions
+from nscan_cli.slam.pipeline import run_slam
+from nscan_cli.slam.state import SlamState
+
+
+@dataclass(frozen=True)
+class MappedPath:
+    """The path that one run found."""
+
+    rows: Indices
+    """(n,) rows of its scans in the log of the first run, increasing."""
+    poses: Array
+    """(n, 3)"""
+    breaks: Indices
+    """Rows before which its track broke."""
+    notices: tuple[str, ...]
+    """What it says of itself."""
+
+
+def mirrored(log: LaserLog) -> LaserLog:
+    """The log of the mirror image of the world: the x axes are the mirror."""
+    path = log.odometry_path
+    return replace(
+        log,
+        odometry=None if log.odometry is None else log.odometry * MIRRORED,
+        odometry_path=None if path is None else robot_path(path.times, path.poses * MIRRORED),
+        mount=log.mount * MIRRORED,
+        angle_min=-log.angle_min,
+        angle_increment=-log.angle_increment,
+    )
+
+
+def path_of(log: LaserLog, options: SlamOptions, rows: Indices | None = None) -> MappedPath:
+    """Map a log, or its scans in `rows` (n,) alone."""
+    rows = np.arange(len(log)) if rows is None else rows
+    state = SlamState.of_log(log if len(rows) == len(log) else excerpt(log, rows), options)
+    graph = run_slam(state, lambda *_counts: None)
+    breaks = rows[np.array(state.breaks, dtype=np.int64)]
+    return MappedPath(rows, graph.poses, breaks, tuple(notices(state)))
+
+
+def path_of_mirrored(log: LaserLog, options: SlamOptions) -> MappedPath:
+    """Map the mirror image, and mirror the path back."""
+    found = path_of(mirrored(log), options)
+    return replace(found, poses=found.poses * MIRRORED)
+
+
+def repeats(log: LaserLog) -> dict[str, Callable[[LaserLog, SlamOptions], MappedPath]]:
+    """What to call the runs that have to give the same path, and how each is done."""
+    runs: dict[str, Callable[[LaserLog, SlamOptions], MappedPath]] = {
+        "every second scan": lambda log, options: path_of(log, options, np.arange(0, len(log), 2)),
+        "the other scans": lambda log, options: path_of(log, options, np.arange(1, len(log), 2)),
+        "mirrored": path_of_mirrored,
+    }
+    if log.odometry is not None:
+        runs[WITHOUT_ODOMETRY] = lambda log, options: path_of(
+            replace(log, odometry=None, odometry_path=None), options
+        )
+    return runs
+
+
+WITHOUT_ODOMETRY = "without odometry"
