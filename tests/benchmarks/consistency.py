@@ -18,6 +18,7 @@ from pathlib import Path
 import numpy as np
 
 from nscan_cli.errors import NscanError
+from nscan_cli.logs.beam_times import BeamTimes
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.logs.load import read_log
 from nscan_cli.logs.reading_options import ReadingOptions
@@ -54,7 +55,11 @@ class MappedPath:
 def backwards(log: LaserLog) -> LaserLog:
     """The log read from its end to its beginning."""
     times = (log.times[0] + log.times[-1] - log.times)[::-1]
-    return dataclasses.replace(excerpt(log, slice(None, None, -1)), times=times)
+    found = dataclasses.replace(excerpt(log, slice(None, None, -1)), times=times, odometry_path=None)
+    beams = found.beam_times
+    if beams is None:
+        return found
+    return dataclasses.replace(found, beam_times=BeamTimes(-beams.first, -beams.step))
 
 
 def mapped_path(path: str, every: int, change: str, odometry: bool) -> MappedPath | None:
