@@ -101,15 +101,15 @@ WRITTEN = (
      "free), its place and its scale, for map_server and Nav2"),
     ("MAP.html", "`render -o`", "a page for browsers, complete in itself: the map to zoom and to measure in, "
      "path by time, scans, graph, loops with reasons, uncertainty and notices"),
-    ("OUT.tum", "`slam --trajectory`", "`t x y z qx qy qz qw`, the pose of every scan"),
+    ("OUT.tum", "`slam --trajectory`, `render --poses`", "`t x y z qx qy qz qw`, the pose of every scan"),
     ("OUT.g2o", "`slam --g2o`", "`VERTEX_SE2`, `EDGE_SE2` and `FIX` for the keyframes"),
     ("OUT.log", "`slam --carmen`", "CARMEN text: the log with corrected poses"),
     ("OUT.mcap", "`render --mcap`", "a ROS 2 recording: `/map`, `/path`, `/graph`, `/scan`, "
      "`/tf`, `/tf_static`"),
     ("RESULT.json", "`match`, `nscan`", "poses, Hessian and covariance; matrices as upper "
      "triangles, row by row"),
-    ("PICTURE.png", "`--plot`, `render` for people", "a picture in colour, of 300 dots an inch: the plot of "
-     "`--style paper` is 20 cm long in print, its text of 10 points"),
+    ("PICTURE.png", "`--plot`, `--removed`, `render` for people", "a picture in colour, of 300 dots an inch: the "
+     "plot of `--style paper` is 20 cm long in print, its text of 10 points"),
     ("FILE", "`slam --depfile`", "`outputs: inputs` for `include` in a Makefile"),
     ("FOLDER", "`nightly -o`", "report.html, report.json, and for each log a folder with graph, trajectory, "
      "map, page and history"),

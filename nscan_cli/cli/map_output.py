@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -41,8 +42,8 @@ def check_map_outputs(output: str, yaml: bool) -> None:
         check_writable(yaml_path(output))
 
 
-def write_map(output: str, image: MapImage, yaml: bool, quiet: bool) -> None:
-    """Write a map for map_server, as PGM if its name says so, then its YAML if `yaml`."""
+def write_map(output: str, image: MapImage, yaml: bool, quiet: bool, comments: Sequence[str] = ()) -> None:
+    """Write a map for map_server, as PGM if its name says so, then its YAML with `comments` if `yaml`."""
     name = base_name(output)
     if yaml and path_of_name(name) != Path(output).name:
         say(
@@ -55,7 +56,7 @@ def write_map(output: str, image: MapImage, yaml: bool, quiet: bool) -> None:
     as_pgm = Path(output).suffix.lower() == ".pgm"
     write_atomically(output, map_pgm(image) if as_pgm else map_png(image))
     if yaml:
-        write_atomically(yaml_path(output), map_yaml(name, image))
+        write_atomically(yaml_path(output), map_yaml(name, image, comments))
 
 
 def yaml_path(output: str) -> str:

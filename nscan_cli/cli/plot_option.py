@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from nscan_cli.cli.picture_names import check_suffix
@@ -33,6 +33,14 @@ def check_second_output(name: str, path: str | None, others: Sequence[str | None
     if os.path.realpath(path) in (os.path.realpath(other) for other in others if other and other != "-"):
         raise WrongUsageError(f"{name} {path}: is another file of this command; choose another name")
     check_writable(path)
+
+
+def check_second_outputs(outputs: Mapping[str, str | None], others: Sequence[str | None]) -> None:
+    """Check the outputs of several options, by their names; none may replace another either."""
+    taken = list(others)
+    for name, path in outputs.items():
+        check_second_output(name, path, taken)
+        taken.append(path)
 
 
 def check_plot(plot: str | None, others: Sequence[str | None]) -> None:

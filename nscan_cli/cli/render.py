@@ -2,19 +2,22 @@
 
 from __future__ import annotations
 
+import json
+
 import click
 
 from nscan_cli.cli.graph_log import find_log, read_graph_log
 from nscan_cli.cli.map_output import check_map_outputs, resolution_option, write_map, yaml_path
+from nscan_cli.cli.map_shape import MapShape, shape_options, shaped_map
 from nscan_cli.cli.picture_names import check_suffix, is_page
-from nscan_cli.cli.plot_option import check_second_output
+from nscan_cli.cli.plot_option import check_second_outputs
 from nscan_cli.cli.progress import say
 from nscan_cli.cli.shared_options import common_options, reading_options
 from nscan_cli.cli.subcommand import PATH, argument, option, subcommand
 from nscan_cli.errors import WrongUsageError
 from nscan_cli.files.inputs import base_name
 from nscan_cli.files.outputs import check_writable, is_device, write_atomically
-from nscan_cli.files.text import counted
+from nscan_cli.files.text import counted, json_bytes
 from nscan_cli.logs.reading_options import ReadingOptions
 
 
@@ -23,6 +26,7 @@ from nscan_cli.logs.reading_options import ReadingOptions
     ("nscan-cli render robot.json robot.log.gz -o robot.png", "a map for robots, robot.png and robot.yaml"),
     ("nscan-cli render robot.json -o figure.png --style paper", "a figure; the log is beside the graph"),
     ("nscan-cli render robot.json -o graph.png --trajectory --graph", "the path and the graph over the map"),
+    ("nscan-cli render robot.json -o robot.png --align --clean --crop auto", "a map to hand over"),
     ("nscan-cli render robot.json -o robot.html", "a page to zoom, measure, and look at scans and loops"),
 )
 @argument("graph_file", metavar="GRAPH.json", type=PATH, tells="A result of slam; - is standard input.")
@@ -45,6 +49,10 @@ from nscan_cli.logs.reading_options import ReadingOptions
     metavar="OUT.mcap",
     help="Also write map, path, graph and scans for Foxglove and RViz.",
 )
+@option("--poses", type=PATH, metavar="OUT.tum",
+        help="Also write the poses in the frame of the map, in TUM format.")  # fmt: skip
+@option("--json", "as_json", is_flag=True, help="Print one JSON object (m, s, degrees).")
+@shape_options
 @reading_options
 @common_options
 def command(
@@ -58,6 +66,9 @@ def command(
     style: str,
     yaml: bool | None,
     mcap: str | None,
+    poses: str | None,
+    as_json: bool,
+    shape: MapShape,
     reading: ReadingOptions,
     quiet: bool,
     **_verbosity: int,
@@ -70,6 +81,10 @@ def command(
 
     MAP.html is a page for any browser that needs no other file: the map to zoom and to measure in, the path
     by time, scans, keyframes, relations, loops with the reasons of refused ones, uncertainty and notices.
+
+    --align turns path and graph along with the map, in all that is written; the YAML says by how much.
+    --clean makes space unknown that was seen through glass only. What stood where most visits looked through
+    becomes free. The map is cleaned before it is cropped.
 
     OUT.mcap is a recording of ROS 2 messages on the topics /map, /path, /graph, /scan, /tf and /tf_static.
     Poses of the result are in the frame map; the other frames are odom, base_link and laser, or as in LOG.
@@ -93,19 +108,23 @@ def command(
         check_writable(output)
     else:
         check_map_outputs(output, yaml)
-    check_second_output("--mcap", mcap, [graph_file, *log, output, yaml_path(output) if yaml else None])
+    seconds = {"--mcap": mcap, "--poses": poses, "--removed": shape.removed}
+    check_second_outputs(seconds, [graph_file, *log, output, yaml_path(output) if yaml else None])
+    if shape.removed is not None:
+        check_suffix(f"--removed {shape.removed}", shape.removed)
+    if as_json and output == "-":
+        raise WrongUsageError("--json prints to standard output; give -o MAP.png, too")
     if graph_file == "-" and "-" in log:
         raise WrongUsageError("standard input (-) can be one input only; give the other by its path")
     from nscan_cli.graph.io.json_graph import read_graph
     from nscan_cli.logs.log_files import files_of
-    from nscan_cli.mapping.occupancy import occupancy_grid
 
     whole = read_graph(graph_file)
     log = log or find_log(graph_file, whole)
-    check_second_output("--mcap", mcap, files_of(log))
+    check_second_outputs(seconds, files_of(log))
     scans, nodes, rows = read_graph_log(graph_file, whole, log, reading)
-    poses = whole.poses[nodes]
-    grid = occupancy_grid(scans, rows, poses, resolution)
+    shaped = shaped_map(shape, whole, scans, nodes, rows, resolution)
+    grid, whole = shaped.grid, shaped.graph
     if page:
         from nscan_cli.mapping.viewer.viewer_page import viewer_page
 
@@ -119,19 +138,26 @@ def command(
             say(f"warning: {graph_file} has no covariances, so no uncertainty is drawn", quiet)
         overlays = Overlays(trajectory, graph, uncertainty)
         if style == "paper":
-            canvas = plot_paper_figure(scans, rows, poses, grid, whole, overlays)
+            canvas = plot_paper_figure(scans, rows, whole.poses[nodes], grid, whole, overlays)
         else:
             canvas = plot_over_map(grid, whole, overlays)
         write_atomically(output, figure_png(canvas.image()))
     else:
         from nscan_cli.mapping.map_server import map_image
 
-        write_map(output, map_image(grid), yaml, quiet)
+        write_map(output, map_image(grid), yaml, quiet, shaped.comments())
     if mcap is not None:
         from nscan_cli.exports.mcap import ros2_recording
 
         write_atomically(mcap, ros2_recording(scans, rows, nodes, whole, grid))
-    if output != "-":
+    if poses is not None:
+        from nscan_cli.graph.io.tum import write_tum
+
+        write_atomically(poses, write_tum(whole.stamps, whole.poses))
+    if as_json:
+        facts = json.dumps(shaped.facts(output, len(rows)), ensure_ascii=False, allow_nan=False)
+        write_atomically("-", json_bytes(f"{facts}\n"))
+    elif output != "-":
         low_x, low_y, high_x, high_y = grid.bounds
         size = f"{high_x - low_x:.1f} m × {high_y - low_y:.1f} m"
         say(f"{output}: {size} from {counted(len(rows), 'scan')}", quiet)

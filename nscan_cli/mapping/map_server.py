@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import io
 import json
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -69,7 +70,7 @@ def map_pgm(image: MapImage) -> bytes:
     return f"P5\n{width} {height}\n255\n".encode() + image.cells.tobytes()
 
 
-def map_yaml(image_name: str, image: MapImage) -> bytes:
+def map_yaml(image_name: str, image: MapImage, comments: Sequence[str] = ()) -> bytes:
     """The YAML of the map; `image_name` is the path of the image, relative to the folder of the YAML.
 
     The yaw of the origin is 0, because consumers ignore it.
@@ -83,7 +84,7 @@ def map_yaml(image_name: str, image: MapImage) -> bytes:
         f"origin: [{x}, {y}, 0.0]\n"
         "negate: 0\n"
         f"occupied_thresh: {OCCUPIED_THRESH}\n"
-        f"free_thresh: {FREE_THRESH}\n"
+        f"free_thresh: {FREE_THRESH}\n" + "".join(f"# {comment}\n" for comment in comments)
     ).encode()
 
 

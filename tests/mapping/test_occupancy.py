@@ -7,6 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from nscan_cli.errors import WrongUsageError
+from nscan_cli.mapping.counted_grid import grid_of_counts
 from nscan_cli.mapping.occupancy import (
     DEFAULT_OCCUPANCY,
     FREE,
@@ -15,7 +16,6 @@ from nscan_cli.mapping.occupancy import (
     OccupancyGrid,
     occupancy_grid,
 )
-from tests.mapping.grids import grid_of_counts
 from tests.mapping.handmade_logs import half_circle, log_of
 
 ORIGIN = np.zeros((1, 3))

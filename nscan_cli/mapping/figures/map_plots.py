@@ -54,7 +54,7 @@ class Overlays:
 
 def plot_over_map(grid: OccupancyGrid, graph: Graph, overlays: Overlays) -> Canvas:
     """The map in soft grays with coloured overlays; a scale bar and a legend below."""
-    background, cells_per_pixel = _background_image(grid)
+    background, cells_per_pixel = background_image(grid)
     canvas = Canvas(grid.bounds, 1 / (cells_per_pixel * grid.resolution), background, SCALE_BAR_MARGINS)
     draw_scale_bar(canvas, _draw_overlays(canvas, graph, overlays))
     return canvas
@@ -110,7 +110,7 @@ def _draw_overlays(canvas: Canvas, graph: Graph, overlays: Overlays) -> list[Leg
     return entries
 
 
-def _background_image(grid: OccupancyGrid) -> tuple[NDArray[np.uint8], float]:
+def background_image(grid: OccupancyGrid) -> tuple[NDArray[np.uint8], float]:
     """The map in soft grays (h, w), and the number of cells along the side of a pixel."""
     cells = gray_image(grid, SOFT_GRAYS)
     longest = max(cells.shape)

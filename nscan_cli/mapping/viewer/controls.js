@@ -31,7 +31,7 @@ function hasLayer(data, layer) {
     loops: data.loops.some((loop) => loop.accepted),
     refused: data.loops.some((loop) => !loop.accepted),
     relations: data.nscan.length + data.pairwise.length > 0,
-    uncertainty: data.sigma.some(Number.isFinite),
+    uncertainty: data.sigma.some((value, k) => k % 3 === 0 && value > 0),
     scan: data.scanNodes.length > 0,
     notices: data.notices.some((notice) => notice.places.length),
   }[layer] ?? true;

@@ -1,0 +1,94 @@
+"""A map without what robots cannot use: space seen through glass, single specks, and people who went.
+
+Each changes the counts of cells, so that all that is made of the map agrees.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from nscan_cli.logs.laser_log import LaserLog
+from nscan_cli.mapping.counted_grid import grid_of_counts
+from nscan_cli.mapping.occupancy import FREE, OCCUPIED, OccupancyGrid
+from nscan_cli.mapping.visits import visit_counts
+from nscan_cli.poses import Array, Indices, Mask
+
+
+@dataclass(frozen=True)
+class CleaningOptions:
+    """Decide what is removed."""
+
+    visit_length: float = 20.0
+    """Path of one visit, m. Whoever stands at a place during a shorter one is seen in one visit only."""
+    min_looks: int = 2
+    """Least beams of a visit through a cell that has looked through it. More spare what stray beams pass."""
+    looks_per_hit: float = 2.0
+    """Visits that look through a cell for each visit that hits it, from which on what stood there has gone.
+    With less, doors that were open half of the time go as well."""
+    visits_of_post: int = 2
+    """Visits that have hit a single cell that stays: a post, or the leg of a table. More remove railings."""
+
+
+class Removed(NamedTuple):
+    """What was removed: cells (H, W) that are different from before."""
+
+    gone: Mask
+    """Hit by few visits, and looked through by others: people, and what was carried away."""
+    specks: Mask
+    """Occupied cells without an occupied cell beside them, seen by one visit only."""
+    unconnected: Mask
+    """Free, and not connected to where the robot was; and occupied, without free space beside."""
+
+    def counts(self) -> dict[str, int]:
+        """Name → cells."""
+        return {name: int(mask.sum()) for name, mask in zip(self._fields, self, strict=True)}
+
+
+def cleaned_map(
+    grid: OccupancyGrid, log: LaserLog, rows: Indices, poses: Array, options: CleaningOptions | None = None
+) -> tuple[OccupancyGrid, Removed]:
+    """The grid of the scans in `rows` (N,) at `poses` without what is to be removed, and what that was."""
+    from scipy import ndimage
+
+    options = options or CleaningOptions()
+    hits, misses, states = grid.hits, grid.misses, grid.states()
+    visits = visit_counts(grid, log, rows, poses, options.visit_length, options.min_looks)
+    occupied = states == OCCUPIED
+    gone = occupied & (visits.through > 0) & (visits.through >= options.looks_per_hit * visits.hit)
+    occupied &= ~gone
+    around = np.ones((3, 3), dtype=np.int8)
+    alone = ndimage.convolve(occupied.astype(np.int8), around, mode="constant") == 1
+    specks = occupied & alone & (visits.hit < options.visits_of_post)
+    occupied &= ~specks
+    hits[gone | specks] = 0
+    free = ((states == FREE) | gone | specks) & (misses > 0)
+    reached = _connected(free, _cells_of(grid, poses))
+    walls, count = ndimage.label(occupied, around)
+    seen = np.zeros(count + 1, dtype=np.bool_)
+    seen[np.unique(walls[ndimage.binary_dilation(reached, around)])] = True
+    unconnected = (free & ~reached) | (occupied & ~seen[walls])
+    hits[unconnected] = misses[unconnected] = 0
+    cleaned = grid_of_counts(hits, misses, grid.resolution, grid.origin, grid.options)
+    return cleaned, Removed(gone & ~unconnected, specks & ~unconnected, unconnected)
+
+
+def _cells_of(grid: OccupancyGrid, poses: Array) -> tuple[Indices, Indices]:
+    """The rows and the columns of the cells in which the poses (N, 3) lie."""
+    columns, lines = np.floor((poses[:, :2] - np.array(grid.origin)) / grid.resolution).astype(np.int64).T
+    return lines, columns
+
+
+def _connected(free: Mask, start: tuple[Indices, Indices]) -> Mask:
+    """The free cells from which others lead to a cell of the start, across sides of cells."""
+    from scipy import ndimage
+
+    space = free.copy()
+    space[start] = True
+    labels, count = ndimage.label(space)
+    reached = np.zeros(count + 1, dtype=np.bool_)
+    reached[np.unique(labels[start])] = True
+    connected: Mask = reached[labels] & free
+    return connected
