@@ -108,8 +108,8 @@ WRITTEN = (
      "`/tf`, `/tf_static`"),
     ("RESULT.json", "`match`, `nscan`", "poses, Hessian and covariance; matrices as upper "
      "triangles, row by row"),
-    ("PICTURE.png", "`--plot`, `--removed`, `render` for people", "a picture in colour, of 300 dots an inch: the "
-     "plot of `--style paper` is 20 cm long in print, its text of 10 points"),
+    ("PICTURE.png", "`--plot`, `--removed`, `render` for people", "a picture in colour, of 300 dots an "
+     "inch: the plot of `--style paper` is 20 cm long in print, its text of 10 points"),
     ("FILE", "`slam --depfile`", "`outputs: inputs` for `include` in a Makefile"),
     ("FOLDER", "`nightly -o`", "report.html, report.json, and for each log a folder with graph, trajectory, "
      "map, page and history"),

@@ -39,11 +39,26 @@ def visit_counts(
         of_visit = numbers == number
         part = occupancy_grid(log, rows[of_visit], poses[of_visit], grid.resolution, options=grid.options)
         hit, misses = part.hits > 0, part.misses
-        left, bottom = (
-            round((there - here) / grid.resolution)
-            for there, here in zip(part.origin, grid.origin, strict=True)
-        )
-        place = slice(bottom, bottom + part.shape[0]), slice(left, left + part.shape[1])
-        found.hit[place] += hit
-        found.through[place] += (misses >= min_looks) & ~ndimage.binary_dilation(hit, around)
+        looked = (misses >= min_looks) & ~ndimage.binary_dilation(hit, around)
+        whole, own = _common_cells(grid, part)
+        found.hit[whole] += hit[own]
+        found.through[whole] += looked[own]
     return found
+
+
+_Cells = tuple[slice, slice]
+"""Rows and columns."""
+
+
+def _common_cells(grid: OccupancyGrid, part: OccupancyGrid) -> tuple[_Cells, _Cells]:
+    """The cells of a grid that a part of its map has as well, and the same as cells of the part.
+
+    The part may reach beyond: at its first and last scan, the path that a turning laser is moved along ends.
+    """
+    whole, own = [], []
+    for axis in (0, 1):
+        offset = round((part.origin[1 - axis] - grid.origin[1 - axis]) / grid.resolution)
+        first, last = max(0, offset), min(grid.shape[axis], offset + part.shape[axis])
+        whole.append(slice(first, last))
+        own.append(slice(first - offset, last - offset))
+    return (whole[0], whole[1]), (own[0], own[1])
