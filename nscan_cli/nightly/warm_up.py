@@ -75,7 +75,7 @@ def compile_here(folder: Path) -> None:
 
 
 def main() -> None:
-    """Map the simulated drive with and without odometry, match and calibrate, so that all is compiled."""
+    """Map the simulated drive with and without odometry and as a turning laser, match and calibrate."""
     import numpy as np
 
     from nscan_cli.api import match, nscan
@@ -89,13 +89,15 @@ def main() -> None:
 
     compiled.load_runtime()
     drive = simulated_carmen_log()
-    for reading in (ReadingOptions(), ReadingOptions(end=20.0, odometry=False)):
+    short = ReadingOptions(end=20.0, odometry=False), ReadingOptions(end=20.0, sweep=0.2)
+    for reading in (ReadingOptions(), *short):
         log = log_from(drive, "warm-up.log", reading)
         _, graph = map_log(log, reading, slam_options(None, None, True), THREADS, lambda *_progress: None)
         occupancy_grid(log, np.arange(len(log)), graph.poses, threads=THREADS)
     log = log_from(drive, "warm-up.log")
     match(log, 0, 2)
-    nscan(log, [0, 2, 4])
+    # From so far off, the scans are placed by search.
+    nscan(log, [0, 4, 8, 12], np.array([(0, 0, 0), (1.4, -1.4, 0.5), (-1.4, 1.2, -0.5), (0, 1.4, 0.5)]))
     # A drive of one lap may leave the robot open, but its kernels are compiled by then.
     with contextlib.suppress(InputDataError):
         calibrate(log, log.reading, CalibrationOptions())
