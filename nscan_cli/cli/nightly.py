@@ -77,7 +77,7 @@ def command(
                 _say_absent(entry, quiet)
         first = entries[0].inputs["log"]
         raise InputMissingError(
-            f"{manifest}: none of its logs was found, such as {first}; give --data FOLDER"
+            f"{manifest}: none of its logs was found, such as {first}; put logs there, or give --data FOLDER"
         )
     with locked_folder(output) as folder:
         planned = make_plan(entries, folder, force)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from nscan_cli import __version__
 from nscan_cli.files.text import counted, printable
-from nscan_cli.mapping.viewer.viewer_page import ViewerParts, viewer_parts
+from nscan_cli.mapping.viewer.viewer_parts import ViewerParts, viewer_parts
 from nscan_cli.nightly.history_plot import history_svg
 from nscan_cli.nightly.json_report import finish_time
 from nscan_cli.nightly.manifest import ManifestEntry
@@ -52,6 +52,7 @@ def html_report(title: str, checks: list[CheckResult], folder: Path) -> bytes:
     by_urgency = sorted(checks, key=lambda check: STATUS_ORDER.index(check.status))
     status = by_urgency[0].status if checks else "good"
     never = [check for check in checks if check.status == "absent" and check.last is None]
+    parts = viewer_parts()
     page = environment.get_template("report.html").render(
         title=title,
         headline=headline(checks),
@@ -66,7 +67,7 @@ def html_report(title: str, checks: list[CheckResult], folder: Path) -> bytes:
         sections=[check for check in by_urgency if check not in never],
         never=never,
         style=Markup((beside / "report.css").read_text("utf-8")),
-        viewer=ViewerParts(*map(Markup, viewer_parts())),
+        viewer=ViewerParts(Markup(parts.style), Markup(parts.script)),
         counted=counted,
         error_change=_error_change,
         run_time=_run_time,

@@ -157,7 +157,7 @@ def test_force(manifest, first, tmp_path, capsys):
     [
         (["none.toml", "-o", "out"], 66, "none.toml: no such file; check the path"),
         (["bad.toml", "-o", "out"], 65, "bad.toml, log 1 (a): has an unknown key 'pth'; known: name, path,"),
-        (["empty.toml", "-o", "out"], 66, "empty.toml: none of its logs was found, such as a.log.gz; give"),
+        (["empty.toml", "-o", "out"], 66, "empty.toml: none of its logs was found, such as a.log.gz; put"),
         (["kuemmerle", "-o", "out"], 2, "nightly: kuemmerle has no logs of its own; give their folder with"),
         (["kuemmerle", "-o", "out", "--data", "nowhere"], 66, "--data nowhere: is not a folder; give"),
         (["fine.toml", "-o", "no/out"], 73, "no/out: the folder no does not exist; create it first"),

@@ -5,7 +5,6 @@ from __future__ import annotations
 import base64
 import html
 from pathlib import Path
-from typing import NamedTuple
 
 from nscan_cli import __version__
 from nscan_cli.files.text import printable
@@ -14,28 +13,13 @@ from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.mapping.occupancy import OccupancyGrid
 from nscan_cli.mapping.viewer.map_picture import map_picture
 from nscan_cli.mapping.viewer.viewer_data import viewer_data
+from nscan_cli.mapping.viewer.viewer_parts import viewer_parts
 from nscan_cli.poses import Indices
 
 MAX_PIXELS = 4096
 """Longest side of the picture of the map in a page of its own."""
 EMBEDDED_PIXELS = 1400
 """Longest side of the picture in a page with many maps: sharp on a screen, and some tens of kilobytes."""
-SCRIPTS = ("unpack.js", "camera.js", "layers.js", "controls.js", "viewer.js")
-
-
-class ViewerParts(NamedTuple):
-    """What a page needs once, however many viewers it has."""
-
-    style: str
-    script: str
-
-
-def viewer_parts() -> ViewerParts:
-    """The style sheet and the script."""
-    beside = Path(__file__).parent
-    scripts = "\n".join((beside / name).read_text("utf-8") for name in SCRIPTS)
-    style = (beside / "viewer.css").read_text("utf-8")
-    return ViewerParts(style, f'"use strict";\n(() => {{\n{scripts}}})();')
 
 
 def viewer_page(
