@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from nscan_cli.calibration.held_odometry import checked_held
 from nscan_cli.calibration.measured_steps import MeasuredSteps, measure_steps
 from nscan_cli.calibration.odometry_clock import ClockLag, clock_lag
 from nscan_cli.calibration.options import FileCheckOptions
@@ -51,7 +52,13 @@ class CheckedFile:
 def checked_file(log: LaserLog, reading: ReadingOptions, options: FileCheckOptions) -> CheckedFile:
     """Check a log that was read with these options, and put right what is beyond doubt."""
     log, reading, said = checked_sweep(log, reading, options)
-    findings = [] if reading.as_recorded else find_contradictions(log, reading, options)
+    if reading.as_recorded:
+        return CheckedFile(log, reading, said)
+    findings = find_contradictions(log, reading, options)
+    if not findings:
+        # A clock that is behind makes odometry begin late, as if it stood.
+        log, messages = checked_held(log, options.held, options.steps)
+        return CheckedFile(log, reading, said + messages)
     for finding in findings:
         if finding.corrected:
             corrected = replace(reading, **finding.corrected)

@@ -95,6 +95,28 @@ class ClockOptions:
 
 
 @dataclass(frozen=True)
+class HeldOdometryOptions:
+    """When odometry stands for a part of the log though the robot moves."""
+
+    still: float = 1e-6
+    """Odometry stands from one scan to the next if no coordinate changes by more, m and rad."""
+    min_duration: float = 3.0
+    """Shortest time that it has to stand, s. A shorter one finds more, and takes longer."""
+    changed_range: float = 0.1
+    """A range that differs by more (m) at both ends of that time has changed."""
+    min_changed_share: float = 0.2
+    """Least share of ranges that have changed. A smaller one finds robots in bare corridors, too; more is
+    measured where robots stand."""
+    steps: int = 7
+    """Steps that are measured, spread over that time. More tell more and take longer."""
+    min_measured: int = 3
+    """Least number of them that the scans measure."""
+    min_moving_share: float = 0.7
+    """Least share of these with motion. A larger one finds less, and never people who pass a robot that
+    stands."""
+
+
+@dataclass(frozen=True)
 class FileCheckOptions:
     """When scans contradict what their file says of odometry, mounting and clocks.
 
@@ -104,6 +126,7 @@ class FileCheckOptions:
     steps: StepOptions = field(default_factory=StepOptions)
     clock: ClockOptions = field(default_factory=ClockOptions)
     sweep: SweepCheckOptions = field(default_factory=SweepCheckOptions)
+    held: HeldOdometryOptions = field(default_factory=HeldOdometryOptions)
     min_steps: int = 12
     """Least number of steps that a finding rests on: with motion, or with a turn."""
     still: float = 1e-3

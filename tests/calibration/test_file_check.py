@@ -14,6 +14,7 @@ from nscan_cli.calibration.options import FileCheckOptions
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.logs.load import read_log
 from nscan_cli.logs.reading_options import ReadingOptions
+from nscan_cli.poses import are_known
 from tests.data import CORRIDOR_LOG, OFFICE_LOG, data_file
 from tests.simulation import faults
 from tests.simulation.scenes import bare_corridor
@@ -96,6 +97,21 @@ def test_odometry_of_no_use_is_not_used(make, words):
     assert not checked.reading.odometry
     (message,) = checked.messages
     assert message.startswith(words)
+
+
+@pytest.mark.parametrize("catches_up", [True, False])
+@pytest.mark.parametrize("log", [drive, real_drive])
+def test_odometry_that_stands_for_a_part_is_missing_there(log, catches_up):
+    whole = log()
+    rows = slice(len(whole) // 3, len(whole) // 2)
+    held = faults.odometry_held(whole, rows, catches_up)
+    checked = checked_file(held, ReadingOptions(), FileCheckOptions())
+    assert checked.messages[0].startswith("odometry stands still while the scans move, from scan ")
+    assert checked.log.odometry is not None
+    unknown = np.flatnonzero(~are_known(checked.log.odometry))
+    assert abs(len(unknown) - (rows.stop - rows.start)) < 25
+    assert checked.reading == ReadingOptions()
+    assert found(held, ReadingOptions(as_recorded=True)) == []
 
 
 @pytest.mark.parametrize("make", [frozen, faults.mirrored, lambda log: faults.odometry_scaled(log, 1000.0)])

@@ -1,0 +1,79 @@
+"""Stretches in which odometry stands while the scans move: a node hangs, or an encoder has failed."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from nscan_cli.calibration.measured_steps import measure_steps
+from nscan_cli.calibration.options import HeldOdometryOptions, StepOptions
+from nscan_cli.files.text import counted
+from nscan_cli.logs.laser_log import LaserLog
+from nscan_cli.logs.robot_path import robot_path
+from nscan_cli.poses import relative
+
+MOST_NAMED = 5
+"""Stretches that a message names."""
+
+
+def checked_held(
+    log: LaserLog, options: HeldOdometryOptions, steps: StepOptions
+) -> tuple[LaserLog, list[str]]:
+    """The log without its odometry where that stands and the scans move, and what is said of it."""
+    held = held_stretches(log, options, steps)
+    if not held:
+        return log, []
+    some = ", ".join(f"{log.numbers[first]} to {log.numbers[last]}" for first, last in held[:MOST_NAMED])
+    more = f" and {counted(len(held) - MOST_NAMED, 'more stretch')}" if len(held) > MOST_NAMED else ""
+    message = (
+        f"odometry stands still while the scans move, from scan {some}{more}: it is not used there, and "
+        "steady motion takes its place; --as-recorded uses it as it is"
+    )
+    return without_held(log, held), [message]
+
+
+def held_stretches(log: LaserLog, options: HeldOdometryOptions, steps: StepOptions) -> list[tuple[int, int]]:
+    """First and last row of each stretch over which the scans move and odometry does not."""
+    if log.odometry is None or len(log) < 2:
+        return []
+    moves = np.abs(relative(log.odometry[1:], log.odometry[:-1])).max(axis=1)
+    # An unknown pose neither stands nor moves: it ends a stretch.
+    stands = np.concatenate([[False], moves <= options.still, [False]])
+    begins = np.flatnonzero(~stands[:-1] & stands[1:])
+    ends = np.flatnonzero(stands[:-1] & ~stands[1:])
+    long = log.times[ends] - log.times[begins] >= options.min_duration
+    stretches = zip(begins[long].tolist(), ends[long].tolist(), strict=True)
+    return [(first, last) for first, last in stretches if _scans_move(log, first, last, options, steps)]
+
+
+def without_held(log: LaserLog, stretches: list[tuple[int, int]]) -> LaserLog:
+    """The log without its odometry after the beginning of each stretch, up to its end."""
+    assert log.odometry is not None
+    odometry = log.odometry.copy()
+    for first, last in stretches:
+        odometry[first + 1 : last + 1] = np.nan
+    # What was recorded between the scans stands still as well.
+    path = None if log.odometry_path is None else robot_path(log.times, odometry)
+    return replace(log, odometry=odometry, odometry_path=path)
+
+
+def _scans_move(
+    log: LaserLog, first: int, last: int, options: HeldOdometryOptions, steps: StepOptions
+) -> bool:
+    """Whether most of some steps, spread over a stretch, are of a robot that moves."""
+    # To look at two scans costs next to nothing, and mostly the robot stands.
+    both = log.ranges[[first, last]]
+    apart = np.abs(np.diff(both[:, np.isfinite(both).all(axis=0)], axis=0))
+    if not apart.size or float((apart > options.changed_range).mean()) < options.min_changed_share:
+        return False
+    ends = np.searchsorted(log.times, log.times[first : last + 1] + steps.duration)
+    within = np.flatnonzero(ends <= last)
+    if not len(within):
+        return False
+    some = within[np.unique(np.linspace(0, len(within) - 1, options.steps).astype(np.int64))]
+    laser = measure_steps(log, (first + some, ends[some]), steps).laser
+    if len(laser) < options.min_measured:
+        return False
+    size = np.maximum(np.hypot(laser[:, 0], laser[:, 1]), np.abs(laser[:, 2]))
+    return float((size >= steps.min_motion).mean()) >= options.min_moving_share
