@@ -50,6 +50,8 @@ class SweepCheckOptions:
 
     scans: int = 120
     """Scans, evenly spread, whose motion is measured. More find more turns of the robot, and take longer."""
+    scans_apart: int = 5
+    """No more than one in so many scans is measured. A larger value takes less time in short logs."""
     min_scans: int = 30
     """Least number of scans of a log that is asked. A larger value believes short logs."""
     pairs: int = 24
@@ -73,6 +75,17 @@ class SweepCheckOptions:
     """Shortest time from scan to scan of such a laser, s. A smaller value asks more lasers."""
     longest: float = 0.5
     """Longest time from scan to scan of such a laser, s. A larger value asks more lasers."""
+    longest_delay: float = 0.4
+    """Longest delay of odometry that is looked for, s. A larger value takes longer."""
+    delay_step: float = 0.01
+    """Distance of the delays that are tried, s. A smaller value takes longer."""
+    least_delay: float = 0.03
+    """A shorter delay of odometry is none, s. A larger value leaves the file as it is more often."""
+    delay_gain: float = 0.75
+    """With the delay the turns have to disagree by no more than this share of what they do without. A larger
+    value finds delays more often, also where there is none."""
+    min_delay_turns: int = 15
+    """Least number of scans in turns that a delay rests on."""
     sigmas: float = 3.0
     """By so many standard deviations another time than the file's has to make scans sharper to be believed. A
     larger value believes the file more often."""

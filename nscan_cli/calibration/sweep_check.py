@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from nscan_cli.calibration.calibrated_reading import DECIMALS
+from nscan_cli.calibration.odometry_delay import odometry_delay, with_delay
 from nscan_cli.calibration.options import FileCheckOptions
 from nscan_cli.calibration.sweep_evidence import SweepEvidence, sweep_evidence
 from nscan_cli.logs.field_of_view import field_of_view
@@ -31,15 +32,18 @@ def checked_sweep(
     if turn == 0.0:
         return log, reading, []
     evidence = sweep_evidence(log, (0.0, turn, -turn), options.steps, options.sweep)
-    sharpest = evidence.sharpest
+    sharpest, said = evidence.sharpest, list[str]()
     certainty = evidence.sigmas(sharpest, told)
-    if sharpest == told or certainty < options.sweep.sigmas:
-        return log, reading, []
-    corrected = replace(reading, sweep=round(sharpest, DECIMALS) + 0.0)
-    increments, beams = log.angle_increment, log.beam_counts()
-    times = beam_times(np.full(len(log), corrected.sweep), increments, beams, reading.stamp)
-    said = _said(evidence, told, sharpest, certainty)
-    return replace(log, beam_times=times), corrected, [said]
+    if sharpest != told and certainty >= options.sweep.sigmas:
+        reading = replace(reading, sweep=round(sharpest, DECIMALS) + 0.0)
+        turns = np.full(len(log), reading.sweep)
+        times = beam_times(turns, log.angle_increment, log.beam_counts(), reading.stamp)
+        said.append(_said(evidence, told, sharpest, certainty))
+        log = replace(log, beam_times=times)
+    delay = odometry_delay(log, evidence, options.sweep)
+    if delay:
+        log, reading = with_delay(log, delay), replace(reading, clock_offset=reading.clock_offset + delay)
+    return log, reading, said
 
 
 def _turn_of(log: LaserLog) -> float:

@@ -30,6 +30,10 @@ class SweepEvidence:
     """(T,) the times that were tried, s; negative: readings in the reverse order of time."""
     energies: Array
     """(P, T) energy of each of P pairs matched with each time, per point; smaller is sharper."""
+    rows: Indices
+    """(n,) rows of scans whose motion was measured, by the scans before and after."""
+    twists: Array
+    """(n, 3) that motion of the laser, m/s and rad/s."""
 
     def sigmas(self, better: float, worse: float) -> float:
         """By how many standard deviations one of the times fits better than another; 0 with too few pairs."""
@@ -61,14 +65,17 @@ def sweep_evidence(
         pair = [twists[one], twists[other]]
         way = np.mean(pair, axis=0) * float(log.times[other] - log.times[one])
         energies.append([_energy(both, pair, way, turn, steps) for turn in turns])
-    return SweepEvidence(np.array(turns), np.array(energies).reshape(-1, len(turns)))
+    rows = np.array(sorted(twists), dtype=np.int64)
+    motion = np.array([twists[row] for row in rows.tolist()]).reshape(-1, 3)
+    return SweepEvidence(np.array(turns), np.array(energies).reshape(-1, len(turns)), rows, motion)
 
 
 def _pairs(
     log: LaserLog, turn: float, steps: StepOptions, options: SweepCheckOptions
 ) -> tuple[Indices, Indices, dict[int, Array]]:
     """Rows (P,) of two scans each between which the motion has changed, and the twists at these rows."""
-    centres = np.unique(np.linspace(1, max(len(log) - 2, 1), options.scans).astype(np.int64))
+    count = min(options.scans, len(log) // options.scans_apart)
+    centres = np.unique(np.linspace(1, max(len(log) - 2, 1), count).astype(np.int64))
     twists = _twists(log, centres, steps, options)
     rates = {row: abs(float(twist[2])) for row, twist in twists.items()}
     turning = [row for row in rates if rates[row] * turn > options.min_winding]

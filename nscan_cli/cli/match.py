@@ -105,7 +105,7 @@ def command(
     from nscan_cli.matching.priors import MotionModel, odometry_prior
 
     Compiling("half a minute", quiet)
-    scans = read_log(log, reading)
+    scans = read_log(log, reading).moving_along(None)
     rows = scans.row(reference), scans.row(scan)
     initial, prior = with_defaults(scans, rows, initial, prior, quiet)
     options, model = PairOptions(), MotionModel()

@@ -132,7 +132,7 @@ def command(
     from nscan_cli.matching.priors import MotionModel
 
     Compiling("half a minute", quiet)
-    scans = read_log(log, reading)
+    scans = read_log(log, reading).moving_along(None)
     rows = [scans.row(number) for number in numbers]
     initial, prior = with_defaults(scans, rows, initial, prior, quiet)
     options, model = PairOptions(), MotionModel()

@@ -79,6 +79,8 @@ def run_on_log(
     if verification is not None:
         with progress("mapping again", None, quiet):
             add_verification(state, graph, verification, threads)
+    # As the check of the file has corrected it.
+    scans = state.recorded
     later = notices_of_mapping(scans, graph)
     for warning in later:
         say(f"warning: {warning}", quiet)

@@ -18,7 +18,7 @@ from nscan_cli.logs.beam_times import BeamTimes, swept_points
 from nscan_cli.logs.device_choice import Device
 from nscan_cli.logs.frame_names import DEFAULT_FRAMES, FrameNames
 from nscan_cli.logs.reading_options import ReadingOptions
-from nscan_cli.logs.robot_path import RobotPath, bent_path, poses_at, robot_path
+from nscan_cli.logs.robot_path import RobotPath, likelier_path, poses_at, robot_path
 from nscan_cli.poses import Array, Indices, are_known, compose
 
 DEFAULT_READING = ReadingOptions()
@@ -203,7 +203,7 @@ class LaserLog:
         """The log with every beam seen from where the robot was, if the laser turns: `points` are corrected.
 
         `poses` (N, 3) are the robot's in some rows (N,), increasing, or in all; None: as far as odometry
-        tells them. Between two of them it moves as odometry says, or else steadily.
+        tells them. Between two of them it moves as odometry says, or steadily if that is likelier.
         """
         if self.beam_times is None:
             return self
@@ -214,7 +214,7 @@ class LaserLog:
         times = self.times if rows is None else self.times[rows]
         if self.odometry is None or self.odometry_path is None:
             return replace(self, path=robot_path(times, poses))
-        return replace(self, path=bent_path(self.odometry_path, times, poses))
+        return replace(self, path=likelier_path(self.odometry_path, times, poses))
 
     def laser_pose(self, robot: Array) -> Array:
         """Poses (…, 3) of the laser for poses (…, 3) of the robot."""

@@ -13,6 +13,10 @@ STRAIGHT = 1e-9
 """rad; a turn smaller than this is none: its arc is a straight line."""
 LONGEST_STEP = 1.0
 """s; how the robot came from one pose to a later one is not known: it goes on as before."""
+LEAST_POSES = 10
+"""With fewer nothing is said of what leads from one to the next."""
+METRES_PER_RADIAN = 1.0
+"""An error of a heading counts as one of a place of so many metres: what a beam of that length is off by."""
 FASTEST, FASTEST_TURN = 10.0, 15.0
 """m/s, rad/s; no robot with a laser drives so. It was carried, or lost, and goes on as before."""
 
@@ -71,6 +75,26 @@ def bent_path(path: RobotPath, times: Array, poses: Array) -> RobotPath | None:
     # Those of the scans come first where both are at one time.
     order = np.argsort(np.concatenate([times, at]), kind="stable")
     return robot_path(np.concatenate([times, at])[order], np.concatenate([poses, blended])[order])
+
+
+def likelier_path(path: RobotPath, times: Array, poses: Array) -> RobotPath | None:
+    """The path through poses (S, 3) at times (S,), s: bent, with the motion of `path` between two of them, or
+    steady there if that tells better where every second pose is from those beside it.
+
+    Odometry whose clock or wheels are off leads astray between two poses.
+    """
+    steady, bent = robot_path(times, poses), bent_path(path, times, poses)
+    if len(times) < LEAST_POSES or steady is None or bent is None:
+        return bent
+    some, others = slice(None, None, 2), slice(1, None, 2)
+    errors = []
+    for each in (robot_path(times[some], poses[some]), bent_path(path, times[some], poses[some])):
+        if each is None:
+            return bent
+        off = relative(poses_at(each, times[others]), poses[others])
+        away = np.hypot(off[:, 0], off[:, 1]) + METRES_PER_RADIAN * np.abs(off[:, 2])
+        errors.append(float(away.mean()))
+    return steady if errors[0] < errors[1] else bent
 
 
 def poses_at(path: RobotPath, times: Array) -> Array:

@@ -78,10 +78,11 @@ def map_and_evaluate(
         task["threads"],
         lambda done, keyframes, _accepted: report(done, len(log), keyframes),
     )
-    rows = np.arange(len(log))
     bound = mapping.get("verify-bound")
     if bound is not None:
         add_verification(state, graph, VerificationOptions(bound=bound), task["threads"])
+    # As the check of the file has corrected it.
+    log, rows = state.recorded, np.arange(len(log))
     grid = occupancy_grid(log, rows, graph.poses)
     (outputs / "graph.json").write_bytes(write_graph(graph))
     (outputs / "trajectory.tum").write_bytes(write_tum(graph.stamps, graph.poses))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import functools
 
 import numpy as np
@@ -11,23 +12,29 @@ from nscan_cli.calibration.file_check import CheckedFile, checked_file
 from nscan_cli.calibration.options import FileCheckOptions
 from nscan_cli.logs.load import log_from, read_log
 from nscan_cli.logs.reading_options import ReadingOptions
+from nscan_cli.logs.robot_path import poses_at, robot_path
+from nscan_cli.poses import relative
 from tests.benchmarks.lasers import turning
 from tests.data import data_file
 from tests.simulation.drive import Drive
 from tests.simulation.office import office_way, office_world
 from tests.simulation.other_forms import swept_mcap
-from tests.simulation.sweeping import Turning, fine_path, record_swept
+from tests.simulation.sweeping import SweptRecording, Turning, fine_path, record_swept
 
 PERIOD, BEAMS = 0.2, 360
 
 
 @functools.cache
-def recording(turn: float, rate: float = 2.8, told: float | None = None) -> bytes:
-    """A drive through the office with turns at a rate (rad/s); the file says that a turn takes `told` s."""
+def driven(turn: float, rate: float) -> SweptRecording:
+    """A drive through the office with turns at a rate (rad/s); a turn of the laser takes `turn` s."""
     path = fine_path(office_way()[:12], Drive(speed=0.22, turn_rate=rate))
     laser = turning(BEAMS, 3.5, 0.01, 0.01)
-    drive = record_swept("office", office_world(), path, laser, Turning(PERIOD, turn), 1)
-    return swept_mcap(drive, time_increment=None if told is None else told / BEAMS)
+    return record_swept("office", office_world(), path, laser, Turning(PERIOD, turn), 1)
+
+
+def recording(turn: float, rate: float = 2.8, told: float | None = None) -> bytes:
+    """Such a drive as a file that says that a turn of the laser takes `told` s."""
+    return swept_mcap(driven(turn, rate), time_increment=None if told is None else told / BEAMS)
 
 
 def checked(data: bytes, reading: ReadingOptions | None = None) -> CheckedFile:
@@ -67,6 +74,20 @@ def test_what_the_user_says_is_not_asked(reading):
     assert found.reading == reading
     assert found.log.beam_times is not None
     np.testing.assert_allclose(found.log.beam_times.step, -PERIOD / BEAMS, rtol=1e-4)
+
+
+@pytest.mark.parametrize("late", [0.14, -0.1, 0.0])
+def test_odometry_is_moved_to_where_its_turns_are_those_of_the_scans(late):
+    """Turns of the laser are corrected by odometry, which has to be that of their time."""
+    drive = driven(PERIOD, 0.5)
+    path = robot_path(drive.odometry.times - late, drive.odometry.poses)
+    assert path is not None
+    found = checked(swept_mcap(dataclasses.replace(drive, odometry=path)))
+    assert found.reading.clock_offset == pytest.approx(late, abs=0.03 if late else 0)
+    assert found.messages == []
+    assert found.log.odometry is not None
+    off = relative(found.log.odometry, poses_at(drive.odometry, found.log.times))
+    assert np.nanmax(np.abs(off[:, 2])) < np.radians(1.6)
 
 
 @pytest.mark.parametrize(("name", "used"), [

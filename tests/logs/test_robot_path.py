@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from nscan_cli.logs.robot_path import RobotPath, bent_path, poses_at, robot_path
+from nscan_cli.logs.robot_path import RobotPath, bent_path, likelier_path, poses_at, robot_path
 from nscan_cli.poses import Array, compose
 
 RATE, RADIUS = 1.5, 0.4
@@ -74,3 +74,17 @@ def test_a_bent_path_leads_through_the_poses_and_moves_like_the_first_between_th
     sparse = bent_path(path_of(fine, odometry), scans[::2], poses[::2])
     assert sparse is not None
     assert_same(poses_at(sparse, fine), truth, atol=0.01)
+
+
+def test_motion_that_does_not_fit_the_poses_is_not_used():
+    """Odometry that knows when the robot stopped is used; with another clock, steady motion is likelier."""
+    fine = np.arange(0, 8.01, 0.05)
+    driven = np.where(fine % 1.0 < 0.5, fine % 1.0, 0.5) + 0.5 * np.floor(fine)
+    odometry, scans = path_of(fine, on_circle(driven)), np.arange(0, 8.01, 0.2)
+    poses = on_circle(np.interp(scans, fine, driven))
+    good = likelier_path(odometry, scans, poses)
+    assert good is not None
+    assert len(good.times) > len(scans)
+    late = likelier_path(path_of(fine + 0.5, odometry.poses), scans, poses)
+    assert late is not None
+    np.testing.assert_array_equal(late.times, scans)

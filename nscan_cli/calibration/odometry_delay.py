@@ -1,0 +1,60 @@
+"""How late odometry is against the scans of a laser that turns: by so much its motion would be put wrongly.
+
+Tracking hardly notices a tenth of a second. But beams that were measured while the robot began to turn would
+be corrected as if it stood, and the other way round.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from nscan_cli.calibration.options import SweepCheckOptions
+from nscan_cli.calibration.sweep_evidence import SweepEvidence
+from nscan_cli.logs.laser_log import LaserLog
+from nscan_cli.logs.robot_path import poses_at, robot_path
+from nscan_cli.poses import are_known
+
+
+def odometry_delay(log: LaserLog, evidence: SweepEvidence, options: SweepCheckOptions) -> float:
+    """Seconds to add to the stamps of odometry, so that its turns fit best to those by scans; 0 in doubt."""
+    path, times = log.odometry_path, log.times
+    if log.odometry is None or path is None or log.beam_times is None:
+        return 0.0
+    rows = evidence.rows
+    turned = evidence.twists[:, 2] * (times[rows + 1] - times[rows - 1])
+    if np.count_nonzero(np.abs(turned) > options.min_winding) < options.min_delay_turns:
+        return 0.0
+    # What a scan tells is where the robot is at its middle beam.
+    middle = log.beam_times.first + 0.5 * (log.beam_counts() - 1) * log.beam_times.step
+    begin, end = (times + middle)[rows - 1], (times + middle)[rows + 1]
+    heading = np.unwrap(path.poses[:, 2])
+
+    def disagreement(delay: float) -> float:
+        by_odometry = np.interp(end - delay, path.times, heading) - np.interp(
+            begin - delay, path.times, heading
+        )
+        return float(np.abs(turned - by_odometry).mean())
+
+    count = round(options.longest_delay / options.delay_step)
+    delays = options.delay_step * np.arange(-count, count + 1)
+    found = [disagreement(delay) for delay in delays.tolist()]
+    best = int(np.argmin(found))
+    # At an end of the range the best one may lie beyond.
+    if best in (0, 2 * count) or found[best] > options.delay_gain * found[count]:
+        return 0.0
+    delay = round(float(delays[best]), 3)
+    return delay if abs(delay) >= options.least_delay else 0.0
+
+
+def with_delay(log: LaserLog, delay: float) -> LaserLog:
+    """The log with so many seconds added to the stamps of its odometry."""
+    path, odometry = log.odometry_path, log.odometry
+    if path is None or odometry is None:
+        return log
+    path = robot_path(path.times + delay, path.poses)
+    if path is None:
+        return log
+    odometry = np.where(are_known(odometry)[:, None], poses_at(path, log.times), np.nan)
+    return replace(log, odometry=odometry, odometry_path=path)
