@@ -6,12 +6,13 @@ import json
 
 import click
 
-from nscan_cli.cli.graph_log import find_log, read_graph_log
+from nscan_cli.cli.map_comparison import draw_comparison
 from nscan_cli.cli.map_output import check_map_outputs, resolution_option, write_map, yaml_path
 from nscan_cli.cli.map_shape import MapShape, shape_options, shaped_map
 from nscan_cli.cli.picture_names import check_suffix, is_page
-from nscan_cli.cli.plot_option import check_second_outputs
+from nscan_cli.cli.plot_option import check_second_output, check_second_outputs
 from nscan_cli.cli.progress import say
+from nscan_cli.cli.result_over_log import load_result, log_of, over_log
 from nscan_cli.cli.shared_options import common_options, reading_options
 from nscan_cli.cli.subcommand import PATH, argument, option, subcommand
 from nscan_cli.errors import WrongUsageError
@@ -27,9 +28,15 @@ from nscan_cli.logs.reading_options import ReadingOptions
     ("nscan-cli render robot.json -o figure.png --style paper", "a figure; the log is beside the graph"),
     ("nscan-cli render robot.json -o graph.png --trajectory --graph", "the path and the graph over the map"),
     ("nscan-cli render robot.json -o robot.png --align --clean --crop auto", "a map to hand over"),
+    (
+        "nscan-cli render robot.json other.tum robot.log.gz -o both.png --compare",
+        "another mapper's result, too",
+    ),
     ("nscan-cli render robot.json -o robot.html", "a page to zoom, measure, and look at scans and loops"),
 )
-@argument("graph_file", metavar="GRAPH.json", type=PATH, tells="A result of slam; - is standard input.")
+@argument("graph_file", metavar="GRAPH.json", type=PATH,
+          tells="A result of slam; - is standard input. With LOG it may be that of another mapper: a "
+          "trajectory in TUM format, or a g2o file whose vertices are numbers of scans.")  # fmt: skip
 @argument("log", nargs=-1, type=PATH,
           tells="The log that the graph was made from. Default: looked for beside the graph, then in the "
           "current folder.")  # fmt: skip
@@ -39,6 +46,8 @@ from nscan_cli.logs.reading_options import ReadingOptions
 @option("--trajectory", is_flag=True, help="Draw the path.")
 @option("--graph", is_flag=True, help="Draw keyframes and relations.")
 @option("--uncertainty", is_flag=True, help="Draw the uncertainty of the keyframes' positions.")
+@option("--compare", is_flag=True,
+        help="Draw two results over each other; the second one stands before LOG.")  # fmt: skip
 @option("--style", type=click.Choice(["map_server", "paper"]), default="map_server", show_default=True,
         help="A map for robots (map_server), or points and path on white with axes (paper).")  # fmt: skip
 @option("--yaml/--no-yaml", default=None,
@@ -63,6 +72,7 @@ def command(
     trajectory: bool,
     graph: bool,
     uncertainty: bool,
+    compare: bool,
     style: str,
     yaml: bool | None,
     mcap: str | None,
@@ -86,10 +96,14 @@ def command(
     --clean makes space unknown that was seen through glass only. What stood where most visits looked through
     becomes free. The map is cleaned before it is cropped.
 
+    With --compare, the second result is moved rigidly so that it fits the first best. Walls of both are dark,
+    walls of one alone in its colour.
+
     OUT.mcap is a recording of ROS 2 messages on the topics /map, /path, /graph, /scan, /tf and /tf_static.
     Poses of the result are in the frame map; the other frames are odom, base_link and laser, or as in LOG.
     """
-    picture = trajectory or graph or uncertainty or style == "paper"
+    overlaid = trajectory or graph or uncertainty or style == "paper"
+    picture = overlaid or compare
     page = is_page(output)
     if page and (picture or yaml):
         raise WrongUsageError(
@@ -108,6 +122,8 @@ def command(
         check_writable(output)
     else:
         check_map_outputs(output, yaml)
+    if in_file:
+        check_second_output("-o", output, [graph_file, *log])
     seconds = {"--mcap": mcap, "--poses": poses, "--removed": shape.removed}
     check_second_outputs(seconds, [graph_file, *log, output, yaml_path(output) if yaml else None])
     if shape.removed is not None:
@@ -116,13 +132,24 @@ def command(
         raise WrongUsageError("--json prints to standard output; give -o MAP.png, too")
     if graph_file == "-" and "-" in log:
         raise WrongUsageError("standard input (-) can be one input only; give the other by its path")
-    from nscan_cli.graph.io.json_graph import read_graph
     from nscan_cli.logs.log_files import files_of
 
-    whole = read_graph(graph_file)
-    log = log or find_log(graph_file, whole)
+    if compare:
+        plain = shape == MapShape(False, False, None, None) and not any(seconds.values())
+        if overlaid or page or yaml or as_json or not plain:
+            raise WrongUsageError(
+                "--compare draws one picture of both results; only --resolution goes with it"
+            )
+        if not log:
+            raise WrongUsageError("--compare needs two results: render A.json B.tum LOG --compare")
+        draw_comparison((graph_file, log[0]), log[1:], output, resolution, reading, quiet)
+        return
+    result = load_result(graph_file)
+    log = log_of(graph_file, result, log)
     check_second_outputs(seconds, files_of(log))
-    scans, nodes, rows = read_graph_log(graph_file, whole, log, reading)
+    whole, scans, nodes, rows, notice = over_log(graph_file, result, log, reading)
+    if notice is not None:
+        say(f"warning: {notice}", quiet)
     shaped = shaped_map(shape, whole, scans, nodes, rows, resolution)
     grid, whole = shaped.grid, shaped.graph
     if page:

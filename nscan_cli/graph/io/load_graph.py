@@ -17,7 +17,11 @@ def load_graph(path: str, notices: list[str] | None = None) -> Graph:
     Notices of skipped lines are added to `notices`. Raises InputMissingError where the file cannot be read,
     InputDataError where it is not a graph.
     """
-    data = read_bytes(path, GRAPH)
+    return graph_from(read_bytes(path, GRAPH), path, notices)
+
+
+def graph_from(data: bytes, path: str, notices: list[str] | None = None) -> Graph:
+    """The graph in the bytes that `path` has, as load_graph reads it."""
     text = without_byte_order_mark(data, label(path))
     if text.lstrip()[:1] == b"{":
         return parse_graph(text, label(path))
