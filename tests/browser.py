@@ -57,7 +57,8 @@ class Page:
         self.call("Emulation.setEmulatedMedia", features=[scheme])
         self.call("Page.navigate", url=file.as_uri())
         self.run(
-            "new Promise((done) => { const look = () => document.readyState === 'complete' && "
+            "new Promise((done, fail) => { setTimeout(() => fail('no viewer is shown'), 60000); "
+            "const look = () => document.readyState === 'complete' && "
             "[...document.querySelectorAll('.viewer')].every((each) => each.matches('.live:has(.key)')) "
             "? done() : setTimeout(look, 20); look(); })"
         )

@@ -75,6 +75,8 @@ def viewer_data(
             "beamAngles": np.stack([log.angle_min, log.angle_increment], axis=1)[rows].astype("<f4"),
             "ranges": _coded_ranges(log.ranges[rows]),
         }
+        if log.beam_times is not None:
+            arrays["beamTimes"] = np.stack(log.beam_times, axis=1)[rows].astype("<f4")
     else:
         arrays["scanNodes"] = np.zeros(0, dtype="<i4")
     return _packed(header, arrays)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import base64
+import dataclasses
 import io
 import re
 from collections.abc import Iterator
@@ -12,10 +14,12 @@ import pytest
 from PIL import Image
 
 from nscan_cli.graph.model import Graph, Loop
+from nscan_cli.logs.beam_times import BeamTimes
 from nscan_cli.mapping.occupancy import occupancy_grid
 from nscan_cli.mapping.viewer.viewer_page import viewer_page
 from tests.browser import CHROMIUM, Page, browser_page
 from tests.mapping.handmade_logs import half_circle
+from tests.mapping.viewer.unpack import block_of
 
 pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="Chromium is not installed")
 WIDTHS = (390, 1280)
@@ -202,3 +206,27 @@ def test_print_is_one_light_page_without_controls(browser, file):
     browser.call("Emulation.setEmulatedMedia", media="")
     assert pixels.mean() > 200
     assert browser.run("document.querySelector('.tools').offsetHeight") > 0
+
+
+def test_beams_of_a_turning_laser_begin_where_it_was(browser, tmp_path):
+    """The robot turns by 90° in a second and drives 1 m; the last of 181 beams is half a second late."""
+    log = half_circle(np.full((2, 181), RADIUS))
+    log = dataclasses.replace(log, beam_times=BeamTimes(np.zeros(2), np.full(2, 0.5 / 180)))
+    poses = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, np.pi / 2]])
+    rows = np.arange(2)
+    graph = Graph(rows, ["0.0", "1.0"], poses, None, np.zeros(2, dtype=np.int64))
+    page = viewer_page("turning", occupancy_grid(log, rows, poses), graph, log, rows, rows)
+    shared = "(window.points = scanPoints, window.read = unpack, show(element))"
+    (tmp_path / "map.html").write_text(page.decode().replace("  show(element).catch", f"  {shared}.catch"))
+    browser.open(tmp_path / "map.html", 1280, 800)
+    text = base64.b64encode(block_of(page.decode())).decode()
+    points = browser.run(
+        f"(async () => {{ const element = document.createElement('div'); "
+        f"element.innerHTML = '<script>{text}</script>'; return points(await read(element), 0); }})()"
+    )
+    ends = np.array(points).reshape(-1, 2)
+    share = 0.5 * np.arange(181) / 180
+    angles = share * np.pi / 2 + np.radians(np.arange(-90, 91))
+    assert ends == pytest.approx(
+        np.column_stack([share + RADIUS * np.cos(angles), RADIUS * np.sin(angles)]), abs=1e-3
+    )

@@ -1,9 +1,12 @@
 from __future__ import annotations
 
+import dataclasses
+
 import numpy as np
 import pytest
 
 from nscan_cli.graph.model import Graph, Loop, Pairwise
+from nscan_cli.logs.beam_times import BeamTimes
 from nscan_cli.mapping.viewer import viewer_data as module
 from nscan_cli.mapping.viewer.viewer_data import viewer_data
 from tests.mapping.handmade_logs import half_circle
@@ -86,3 +89,12 @@ def test_the_same_bytes_every_time():
     nodes = np.arange(3)
     scans = (half_circle(RANGES), nodes, nodes)
     assert viewer_data(graph(), BOUNDS, scans) == viewer_data(graph(), BOUNDS, scans)
+
+
+def test_a_turning_laser_has_the_times_of_its_beams():
+    nodes = np.arange(3)
+    times = BeamTimes(np.array([0.0, -0.05, 0.01]), np.full(3, 0.0005))
+    log = dataclasses.replace(half_circle(RANGES), beam_times=times)
+    data = unpack(viewer_data(graph(), BOUNDS, (log, nodes, nodes)))
+    assert data["beamTimes"].reshape(-1, 2) == pytest.approx(np.column_stack(times))
+    assert "beamTimes" not in unpack(viewer_data(graph(), BOUNDS, (half_circle(RANGES), nodes, nodes)))
