@@ -4,7 +4,7 @@ VENV := .venv$(if $(filter-out python3,$(notdir $(PYTHON))),-$(notdir $(PYTHON))
 RUN := $(VENV)/bin
 READY := $(VENV)/.ready
 
-.PHONY: map test smoke lint samples figures pictures reference bench growth robustness lasers consistency soak lowest lock clean
+.PHONY: map test smoke lint samples figures pictures reference bench growth robustness lasers consistency strangers soak lowest lock clean
 
 map: $(READY)
 	mkdir -p out
@@ -50,6 +50,9 @@ consistency: $(READY)
 
 lasers: $(READY)
 	$(RUN)/python -m tests.benchmarks.lasers docs/lasers.md
+
+strangers: $(READY)
+	$(RUN)/python -m tests.benchmarks.strangers docs/strangers.md
 
 soak: $(READY)
 	mkdir -p out

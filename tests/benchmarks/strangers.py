@@ -1,0 +1,164 @@
+"""Files that say something wrong, mapped: `python -m tests.benchmarks.strangers OUT.md [WORD ...]`.
+
+Each is mapped by default, with the options that the messages say to try, and with --as-recorded. With words,
+only cases are run whose drive or fault contains one of them.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import subprocess
+import sys
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+from tests.benchmarks.stranger_cases import Case, siblings, strangers
+from tests.data import REAL_LOGS
+from tests.experiments.output import table
+
+FACTOR, MORE = 1.5, 0.002
+"""A map is right up to so many times the error of the untouched drive, or so much (m) more."""
+CURES = re.compile(r"(?:try|leave out) (--[a-z-]+(?: -?\d[^\s;]*[^\s;,])?)|(--clock-offset \S+) corrects")
+"""The options that a message says to try, as they are pasted."""
+
+
+@dataclass(frozen=True)
+class Run:
+    """One run of `slam`."""
+
+    error: float | None
+    """m: RMSE of positions, or mean error on the relations; None if it failed."""
+    said: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What came of a case."""
+
+    case: Case
+    default: Run
+    cure: str
+    cured: Run | None
+    """With the options of the message; None if it has none."""
+    recorded: Run
+
+
+def outcome(case: Case) -> Outcome:
+    """Map a file in three ways."""
+    with TemporaryDirectory() as folder:
+        log, reference = case.files(Path(folder))
+        slam = [str(log), "-o", str(Path(folder, "graph.json"))]
+        default = _run(slam, reference)
+        cure = next((first or second for said in default.said for first, second in CURES.findall(said)), "")
+        cured = _run([*slam, *cure.split()], reference) if cure else None
+        return Outcome(case, default, cure, cured, _run([*slam, "--as-recorded"], reference))
+
+
+def _run(slam: Sequence[str], reference: Sequence[str]) -> Run:
+    path = str(Path(slam[2]).with_name("path.tum"))
+    done = _nscan_cli("slam", *slam, "--trajectory", path, "--json", "--threads", "1")
+    if done.returncode:
+        return Run(None, (done.stderr.strip().splitlines()[-1],))
+    said = tuple(json.loads(done.stdout)["warnings"])
+    found = json.loads(_nscan_cli("evaluate", path, *reference, "--json").stdout)
+    if "--reference" in reference:
+        return Run(found["reference"]["ate"]["translation"]["rmse"], said)
+    return Run(found["relations"]["translation"]["mean"], said)
+
+
+def _nscan_cli(*arguments: str) -> subprocess.CompletedProcess[str]:
+    command = [sys.executable, "-m", "nscan_cli", *arguments]
+    return subprocess.run(command, capture_output=True, text=True, check=False)
+
+
+def verdict(outcome: Outcome, untouched: float) -> str:
+    """How a stranger fares."""
+    bound = max(FACTOR * untouched, untouched + MORE)
+    told = any(re.search(outcome.case.cause, said) for said in outcome.default.said)
+    if _within(outcome.default, bound):
+        return "right" if told or not outcome.case.cause else "right, not told"
+    if told:
+        return "told, right with the option" if _within(outcome.cured, bound) else "told"
+    return "**another cause is told**" if outcome.default.said else "**wrong and silent**"
+
+
+def _within(run: Run | None, bound: float) -> bool:
+    return run is not None and run.error is not None and run.error <= bound
+
+
+def document(outcomes: Sequence[Outcome]) -> str:
+    """The table as Markdown."""
+    untouched = {each.case.drive: each.default.error for each in outcomes if not each.case.fault}
+    rows = []
+    for each in outcomes:
+        own = untouched.get(each.case.drive) if each.case.untouched is None else each.case.untouched
+        rows.append((
+            each.case.drive,
+            each.case.fault or "nothing",
+            "–" if own is None else f"{own:.4f}",
+            _metres(each.recorded),
+            _metres(each.default),
+            f"{_metres(each.cured)} `{each.cure}`" if each.cure else "–",
+            "–" if own is None else verdict(each, own),
+            _shortened(each),
+        ))  # fmt: skip
+    header = (
+        "drive",
+        "what is wrong",
+        "untouched",
+        "as recorded",
+        "by default",
+        "as the message says",
+        "verdict",
+        "what is said",
+    )
+    parts = [
+        "# Files of strangers",
+        "Written by `make strangers`: files that say something wrong, after reports of their owners, "
+        "and the same faults put into a simulated drive and real logs "
+        "(`tests/benchmarks/stranger_cases.py`). Errors in m: of simulated drives the root mean square error "
+        "of positions (ATE), of real logs the mean error on their relations. A map is right if its error is "
+        f"at most {FACTOR:g} times that of "
+        f"the untouched drive, or {1000 * MORE:g} mm more. "
+        '"As recorded" is with `--as-recorded`: the file is believed. "As the message says" is with the '
+        "first option that a message says to try.",
+        table(header, rows),
+    ]
+    return "\n\n".join(parts) + "\n"
+
+
+def _metres(run: Run | None) -> str:
+    return "–" if run is None else "fails" if run.error is None else f"{run.error:.4f}"
+
+
+def _shortened(outcome: Outcome) -> str:
+    """The first words of each message, the one that tells the cause first."""
+    cause = outcome.case.cause
+    said = sorted(outcome.default.said, key=lambda text: not (cause and re.search(cause, text)))
+    return "; ".join(text.split(":")[0][:90].replace("|", "/") for text in said[:2]) or "–"
+
+
+def main(out: str, words: Sequence[str]) -> None:
+    """Map all files, two at a time; write the document."""
+    data = Path(os.environ.get("NSCAN_DATA", REAL_LOGS))
+    with ThreadPoolExecutor(2) as pool:
+        cases = [*strangers(data), *siblings(data)]
+        cases = [
+            case for case in cases if not words or any(word in f"{case.drive} {case.fault}" for word in words)
+        ]
+        outcomes = []
+        for each in pool.map(outcome, cases):
+            outcomes.append(each)
+            runs = _metres(each.default), each.cure, _metres(each.cured)
+            print(each.case.drive, each.case.fault, *runs, *each.default.said, sep=" | ", flush=True)
+            # What is done is kept if it is stopped.
+            Path(out).write_text(document(outcomes), encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main(sys.argv[1], sys.argv[2:])
