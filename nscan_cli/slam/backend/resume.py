@@ -165,9 +165,11 @@ def _checked_value(usual: Any, value: Any, place: str) -> Any:
     if isinstance(usual, (bool, str)) or usual is None:
         if type(value) is type(usual) and (not isinstance(usual, str) or value in get_args(Relations)):
             return value
-    elif type(value) in (int, float) and type(value) in (int, type(usual)):
-        # Nothing that is measured by a parameter is below 0, and where 0 is none, it would divide.
+    elif type(value) is int or (type(value) is float and isinstance(usual, float)):
+        # Nothing that is measured by a parameter is below 0, and where 0 is none, it would divide. Only
+        # what counts from a middle has both signs.
         least = 0 if isinstance(usual, int) or usual == 0 else MIN_PARAMETER
+        least = -MAX_PARAMETER if usual < 0 else least
         if least <= value <= MAX_PARAMETER:
             return value
     raise ValueError(f"{place} is {str(value)[:40]!r}, which no graph is made with")
