@@ -15,6 +15,7 @@ from nscan_cli.poses import Array, Indices
 from nscan_cli.slam.backend.energy_cache import EnergyCache
 from nscan_cli.slam.backend.schedule import OptimisationSchedule
 from nscan_cli.slam.frontend.odometry_checks import frozen_scans, without_jumps
+from nscan_cli.slam.frontend.odometry_stalls import without_stalls
 from nscan_cli.slam.frontend.scan_batch import ScanBatch, scan_batches
 from nscan_cli.slam.keyframes.keyframe_selection import Keyframes
 from nscan_cli.slam.keyframes.route import Route, route_of
@@ -53,6 +54,8 @@ class SlamState:
     """Relations of tracking: `chain[k]` leads from keyframe k to k + 1. The route holds the same list."""
     tracked: list[Array] = field(default_factory=list)
     """(n, 3) poses of the scans as tracking found them, batch by batch."""
+    told_sigmas: list[Array] = field(default_factory=list)
+    """(n,) to what standard deviation (m) each scan told its place (TrackedScans), batch by batch."""
     breaks: list[int] = field(default_factory=list)
     """Rows of the keyframes before which the track broke, increasing."""
     matched_pairs: list[Pairwise] = field(default_factory=list)
@@ -83,6 +86,7 @@ class SlamState:
         recorded, log = log, log.at_middle_of_turns().moving_along(None)
         odometry, jumps = log.odometry, np.zeros(0, dtype=np.int64)
         if odometry is not None:
+            odometry, _ = without_stalls(odometry, log.times, options.odometry_checks.stalls)
             odometry, jumps = without_jumps(odometry, log.times, options.odometry_checks)
         seen = log.ranges[log.ranges < options.tracking.max_range]
         median_range = float(np.median(seen)) if len(seen) else 0.0

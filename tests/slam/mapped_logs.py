@@ -102,7 +102,7 @@ def found_of(*scans: TrackedScan) -> TrackedScans:
     """The same as columns; the objective's value is nobody's."""
     names = ("pose", "hessian", "prior_covariance", "inliers", "path", "in_map", "odometry_sigmas")
     columns = ([getattr(scan, name) for scan in scans] for name in names)
-    return TrackedScans(np.full(len(scans), np.nan), *map(np.array, columns))
+    return TrackedScans(np.full(len(scans), np.nan), *map(np.array, columns), np.zeros(len(scans)))
 
 
 def poses_of(found: list[TrackedScan]) -> Array:

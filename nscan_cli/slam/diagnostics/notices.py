@@ -12,6 +12,7 @@ from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.poses import relative
 from nscan_cli.slam.diagnostics.free_space_violations import free_space_violations, sound_share
 from nscan_cli.slam.diagnostics.odometry_disagreement import odometry_disagreements
+from nscan_cli.slam.diagnostics.untold_way import untold_ways
 from nscan_cli.slam.diagnostics.view_mismatch import view_mismatches
 from nscan_cli.slam.frontend.odometry_checks import jumps_of, repeated_scans
 from nscan_cli.slam.state import SlamState
@@ -84,7 +85,26 @@ def _scan_notices(state: SlamState) -> list[str]:
             f"the scans jump at {_numbered(log, jumps)}, farther than the robot drives between two scans: "
             "scans are missing, the robot was carried, or tracking slipped; how far it moved is unknown"
         )
-    return found
+    return found + _untold_ways(state)
+
+
+def _untold_ways(state: SlamState) -> list[str]:
+    """Without odometry: where steady motion alone says how far the robot went."""
+    log, poses, sigmas = state.log, np.concatenate(state.tracked), state.told_sigmas
+    if not sigmas:
+        return []
+    ways = untold_ways(poses, np.concatenate(sigmas), state.options.diagnostics.untold_way)
+    if not ways:
+        return []
+    some = "; ".join(
+        f"{way.path:.1f} m from scan {log.numbers[way.first]} to {log.numbers[way.last]}"
+        for way in ways[:MOST_NAMED]
+    )
+    more = "" if len(ways) <= MOST_NAMED else f"; and {counted(len(ways) - MOST_NAMED, 'more stretch')}"
+    return [
+        f"the walls do not show how far the robot went: {some}{more}; "
+        "without odometry steady motion is assumed there, and the length is a guess"
+    ]
 
 
 def _view_mismatches(state: SlamState) -> list[str]:

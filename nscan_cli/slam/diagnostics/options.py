@@ -55,12 +55,26 @@ class ViewMismatchOptions:
 
 
 @dataclass(frozen=True)
+class UntoldWayOptions:
+    """When a way without odometry is held by steady motion alone, since its walls look alike all along."""
+
+    sigma: float = 0.15
+    """Standard deviation (m) beyond which a scan does not tell its place along the walls."""
+    path: float = 2.0
+    """Least length of such a way that is named, m. It is 2.5 m and more in bare corridors, at most 0.7 m in
+    offices and outdoors."""
+    scans_between: int = 2
+    """Most scans in succession within it that seem to tell more."""
+
+
+@dataclass(frozen=True)
 class DiagnosticsOptions:
     """From where on the notices of a graph warn."""
 
     free_space: FreeSpaceOptions = field(default_factory=FreeSpaceOptions)
     odometry: OdometryDisagreementOptions = field(default_factory=OdometryDisagreementOptions)
     view: ViewMismatchOptions = field(default_factory=ViewMismatchOptions)
+    untold_way: UntoldWayOptions = field(default_factory=UntoldWayOptions)
     gap_periods: float = 3.0
     """Scans are missing when the next one comes later than this multiple of the median period."""
     max_mean_chi2: float = 3.0

@@ -21,10 +21,13 @@ def restart_threshold(track: TrackState, settings: TrackingParameters) -> float:
     """The share of inliers below which the next scan is matched from other angles too.
 
     A match that is off sideways can have four fifths, but fewer than the scan before. Without odometry that
-    comparison is left out: there, more than the angle is a guess.
+    counts only where the scan before saw clearly: outdoors most scans have few.
     """
-    before = track.inliers[0] if np.isfinite(track.odometry[0]) else 0.0
-    return max(settings.restart_inliers, float(before) - settings.inlier_margin)
+    before = float(track.inliers[0])
+    if np.isfinite(track.odometry[0]):
+        return max(settings.restart_inliers, before - settings.inlier_margin)
+    is_clear = before > settings.clear_inliers
+    return max(settings.restart_inliers, before - settings.clear_inlier_drop if is_clear else 0.0)
 
 
 @kernel

@@ -40,6 +40,7 @@ def keep_prediction(
     """Move scan k, which was matched, back to its prediction as far as it does not tell its position.
 
     `points` (m, 2) are its own. `mean_square_deviation` (1,) of scans from their predictions (m²) is updated.
+    Writes `told_sigmas` of `found`.
     """
     options, pose, along = settings.degeneracy, found.poses[k], np.empty(2)
     if weakest_direction(found.hessians[k], along) > options.max_information_ratio:
@@ -58,9 +59,9 @@ def keep_prediction(
             assign(pose, trial)
             assign_rows(found.hessians[k], hessian)
     off = ahead(pose, prior, along)
-    untold = max(
-        measured_variance(places, values, prior, options.profile_step) - options.trusted_sigma**2, 0.0
-    )
+    told = measured_variance(places, values, prior, options.profile_step)
+    found.told_sigmas[k] = np.sqrt(told)
+    untold = max(told - options.trusted_sigma**2, 0.0)
     if untold == 0.0:
         mean_square_deviation[0] += options.smoothing * (off * off - mean_square_deviation[0])
     allowed = max(options.min_deviation**2, options.deviation_factor**2 * mean_square_deviation[0])

@@ -67,6 +67,10 @@ class TrackingOptions:
     0.7. With odometry it starts again, too, if the scan before had more by `inlier_margin`."""
     inlier_margin: float = 0.05
     """Difference of two shares of inliers that counts. A match from another angle must have more by this."""
+    clear_inliers: float = 0.9
+    """A scan with a larger share of inliers sees clearly."""
+    clear_inlier_drop: float = 0.1
+    """Without odometry, a match starts again if it has fewer inliers by this than a clear scan before it."""
     restart_angles: tuple[tuple[float, ...], ...] = ((0.1, 0.2), (0.4, 0.7), (1.0, 1.3))
     """Angles to start again from, to both sides, rad. A ring is tried when those before it did not help."""
     far_restart_margin: float = 0.3
@@ -158,6 +162,8 @@ class TrackingParameters(NamedTuple):
     inlier_bound: float
     restart_inliers: float
     inlier_margin: float
+    clear_inliers: float
+    clear_inlier_drop: float
     restart_angles: Array
     """(rings, angles), with nan where a ring has fewer."""
     far_restart_margin: float
@@ -195,6 +201,19 @@ class TrackingParameters(NamedTuple):
         return cls(**values)
 
 
+class OdometryStallOptions(NamedTuple):
+    """When odometry stood still while the robot drove on, and made up for it in one step."""
+
+    min_steps: int = 2
+    """Least number of steps in which it stands. With a smaller number odometry that comes less often than the
+    scans would be a stall."""
+    min_motion: float = 0.1
+    """Least length of the step that makes up for it, m + rad: less does not mislead a match."""
+    factor: float = 2.0
+    """The step that makes up for it is faster than the steps before and after by this factor, but over the
+    whole time the robot is not: a larger factor evens out fewer stalls."""
+
+
 @dataclass(frozen=True)
 class OdometryCheckOptions:
     """Which steps of the odometry, or of the scans, are jumps that no robot drives."""
@@ -207,6 +226,7 @@ class OdometryCheckOptions:
     """A jump is longer than the usual longest step times this."""
     min_jump: float = 1.0
     """A jump is longer than this, m and rad: a match finds less by itself."""
+    stalls: OdometryStallOptions = field(default_factory=OdometryStallOptions)
 
 
 class ViewSimilarityOptions(NamedTuple):

@@ -51,6 +51,9 @@ class TrackedScans(NamedTuple):
     """(n,)"""
     odometry_sigmas: Array
     """(n,)"""
+    told_sigmas: Array
+    """(n,) standard deviation to which a scan without odometry tells its place in its weakest direction, m;
+    0 where the others tell as much."""
 
     @classmethod
     def room(cls, n: int) -> TrackedScans:
@@ -58,7 +61,8 @@ class TrackedScans(NamedTuple):
         values, inliers, paths, sigmas = np.empty((4, n))
         hessians, covariances = np.empty((2, n, 3, 3))
         in_map = np.empty(n, dtype=np.bool_)
-        return cls(values, np.empty((n, 3)), hessians, covariances, inliers, paths, in_map, sigmas)
+        poses, told = np.empty((n, 3)), np.zeros(n)
+        return cls(values, poses, hessians, covariances, inliers, paths, in_map, sigmas, told)
 
     @classmethod
     def together(cls, parts: Iterable[TrackedScans]) -> TrackedScans:

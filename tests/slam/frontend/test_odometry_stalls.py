@@ -1,0 +1,99 @@
+"""Odometry that stands still for some scans and makes up for it in one step."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from nscan_cli.logs.laser_log import LaserLog
+from nscan_cli.logs.load import read_log
+from nscan_cli.poses import Array, compose, relative
+from nscan_cli.slam.frontend.odometry_stalls import without_stalls
+from nscan_cli.slam.frontend.options import OdometryCheckOptions
+from tests.data import data_file
+from tests.logs.excerpts import truth_of
+from tests.simulation.faults import taken
+from tests.slam.frontend.test_tracker import SOUTH, end_off
+from tests.slam.mapped_logs import mapped, office_log
+
+STALLS = OdometryCheckOptions().stalls
+PERIOD = 0.2
+"""s"""
+
+
+def driven(steps: Array) -> tuple[Array, Array]:
+    """Poses (S, 3) of a robot that makes these steps (S − 1, 3), and the times of them."""
+    poses = [np.zeros(3)]
+    for step in steps:
+        poses.append(compose(poses[-1], step))
+    return np.array(poses), PERIOD * np.arange(len(poses))
+
+
+def held(odometry: Array, row: int, count: int) -> Array:
+    """Odometry (S, 3) that still says the pose of a row in the `count` rows after it."""
+    stalled = odometry.copy()
+    stalled[row + 1 : row + count + 1] = odometry[row]
+    return stalled
+
+
+@settings(deadline=None)
+@given(st.integers(2, 8), st.integers(2, 12), st.floats(0.05, 0.3), st.floats(-0.3, 0.3))
+def test_what_steady_motion_would_have_said_takes_the_place_of_a_stall(count, row, step, turn):
+    poses, times = driven(np.tile([step, 0.0, turn], (24, 1)))
+    evened, ends = without_stalls(held(poses, row, count), times, STALLS)
+    np.testing.assert_array_equal(ends, [row + count + 1])
+    known = np.setdiff1d(np.arange(25), np.arange(row + 1, row + count + 1))
+    np.testing.assert_array_equal(evened[known], poses[known])
+    # The chord in place of the arc: no pose is farther off than the arc is from its chord, 1/8 κ s².
+    length = step * (count + 1)
+    assert np.hypot(*(evened - poses)[:, :2].T).max() < 1e-9 + length * abs(turn) * (count + 1) / 4
+    np.testing.assert_allclose(np.unwrap(evened[:, 2]), np.unwrap(poses[:, 2]), atol=1e-9)
+
+
+@settings(deadline=None)
+@given(st.lists(st.floats(0.0, 0.3), min_size=4, max_size=30), st.integers(0, 6))
+def test_a_robot_that_stops_and_starts_again_has_no_stall(speeds, rest):
+    """It takes a step or more to get to its speed again."""
+    half = sorted(speeds)
+    steps = np.zeros((2 * len(half) + rest, 3))
+    steps[:, 0] = [*half[::-1], *np.zeros(rest), *half]
+    poses, times = driven(steps)
+    evened, ends = without_stalls(poses, times, STALLS)
+    assert len(ends) == 0
+    np.testing.assert_array_equal(evened, poses)
+
+
+def test_a_jump_after_a_rest_is_no_stall():
+    """No robot goes as far in the time."""
+    steps = np.tile([0.1, 0.0, 0.0], (12, 1))
+    steps[4:7], steps[7] = 0.0, [5.0, 0.0, 0.0]
+    poses, times = driven(steps)
+    assert len(without_stalls(poses, times, STALLS)[1]) == 0
+
+
+def stalled_corridor() -> LaserLog:
+    """22 m of corridor at 0.3 m a scan, with odometry that stands for four scans, twice."""
+    log = taken(office_log(), np.arange(SOUTH.start, SOUTH.stop, 3))
+    assert log.odometry is not None
+    return dataclasses.replace(log, odometry=held(held(log.odometry, 20, 4), 40, 4))
+
+
+def test_tracking_goes_on_over_a_stall():
+    """Along a corridor a scan fits where it stands, and then where it jumps to: 0.75 m off and more."""
+    log = stalled_corridor()
+    track = np.concatenate(mapped(log).state.tracked)
+    steps = relative(relative(track[1:], track[:-1]), relative(truth_of(log)[1:], truth_of(log)[:-1]))
+    assert np.abs(steps[:, :2]).max() < 0.05
+    assert np.abs(end_off(track, truth_of(log)))[:2].max() < 0.05
+
+
+@pytest.mark.parametrize("every", [1, 2, 3])
+def test_a_stall_of_mit_csail_breaks_nothing(every):
+    """Its odometry stands for 0.8 s of a fast turn; every second scan alone was a break there."""
+    log = read_log(str(data_file("mit-csail.log.gz")))
+    part = taken(log, np.arange(240, 420, every))
+    assert mapped(part).state.breaks == []
