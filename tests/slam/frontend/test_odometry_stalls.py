@@ -30,7 +30,8 @@ def driven(steps: Array) -> tuple[Array, Array]:
     poses = [np.zeros(3)]
     for step in steps:
         poses.append(compose(poses[-1], step))
-    return np.array(poses), PERIOD * np.arange(len(poses))
+    times: Array = PERIOD * np.arange(len(poses))
+    return np.array(poses), times
 
 
 def held(odometry: Array, row: int, count: int) -> Array:
