@@ -13,7 +13,7 @@ from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.logs.robot_path import robot_path
 from nscan_cli.poses import relative
 
-MOST_NAMED = 5
+MOST_STRETCHES_NAMED = 5
 """Stretches that a message names."""
 
 
@@ -24,8 +24,14 @@ def checked_held(
     held = held_stretches(log, options, steps)
     if not held:
         return log, []
-    some = ", ".join(f"{log.numbers[first]} to {log.numbers[last]}" for first, last in held[:MOST_NAMED])
-    more = f" and {counted(len(held) - MOST_NAMED, 'more stretch')}" if len(held) > MOST_NAMED else ""
+    some = ", ".join(
+        f"{log.numbers[first]} to {log.numbers[last]}" for first, last in held[:MOST_STRETCHES_NAMED]
+    )
+    more = (
+        f" and {counted(len(held) - MOST_STRETCHES_NAMED, 'more stretch')}"
+        if len(held) > MOST_STRETCHES_NAMED
+        else ""
+    )
     message = (
         f"odometry stands still while the scans move, from scan {some}{more}: it is not used there, and "
         "steady motion takes its place; --as-recorded uses it as it is"

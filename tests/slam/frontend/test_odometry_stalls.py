@@ -30,7 +30,7 @@ def driven(steps: Array) -> tuple[Array, Array]:
     poses = [np.zeros(3)]
     for step in steps:
         poses.append(compose(poses[-1], step))
-    times: Array = PERIOD * np.arange(len(poses))
+    times = np.linspace(0.0, PERIOD * (len(poses) - 1), len(poses))
     return np.array(poses), times
 
 
