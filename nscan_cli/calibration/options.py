@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
-
-import numpy as np
 
 from nscan_cli.matching.pairwise import PairOptions
 
@@ -65,10 +64,10 @@ class SweepCheckOptions:
     max_apart: float = 0.6
     """Scans of a pair are turned against each other by less than this, rad. A larger value finds more pairs,
     of which some do not match."""
-    min_winding: float = np.radians(2.5)
+    min_winding: float = math.radians(2.5)
     """Least turn of the robot during a turn of the laser, and least difference of two such turns, rad. A
     larger value tells more of each pair, and finds fewer."""
-    min_view: float = np.radians(190.0)
+    min_view: float = math.radians(190.0)
     """Least field of view of a laser that is thought to turn though its file does not say so, rad. With a
     smaller value lasers that look ahead are asked too, which takes time."""
     shortest: float = 0.012

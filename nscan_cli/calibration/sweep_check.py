@@ -10,6 +10,7 @@ from nscan_cli.calibration.calibrated_reading import DECIMALS
 from nscan_cli.calibration.odometry_delay import odometry_delay, with_delay
 from nscan_cli.calibration.options import FileCheckOptions
 from nscan_cli.calibration.sweep_evidence import SweepEvidence, sweep_evidence
+from nscan_cli.files.text import counted
 from nscan_cli.logs.field_of_view import field_of_view
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.logs.reading_options import ReadingOptions
@@ -62,7 +63,8 @@ def _likely_turn(log: LaserLog, options: FileCheckOptions) -> float:
 
 
 def _said(evidence: SweepEvidence, told: float, sharpest: float, certainty: float) -> str:
-    pairs = f"{len(evidence.energies)} pairs of scans fit so by {certainty:.1f} standard deviations better"
+    compared = counted(len(evidence.energies), "pair")
+    pairs = f"{compared} of scans fit better so, by {certainty:.1f} standard deviations"
     flag, order = f"{sharpest:.3g}", ", readings in the reverse order" if sharpest < 0.0 else ""
     if sharpest == 0.0:
         what, flag = "the laser sees all beams at once, though the file has times of beams", "off"

@@ -36,7 +36,7 @@ MAPPING_OPTIONS = ("max_scans", "relations", "no_loops", "calibrate", "verify", 
     ("nscan-cli slam robot.log.gz -o robot.json --depfile robot.d", "with a rule for make"),
     ("nscan-cli slam --from robot.json -o refined.json", "a saved graph, optimised and refined"),
     ("nscan-cli slam robot.log.gz -o robot.json --json | jq .sigma.max", "one value, for a script"),
-    ("nscan-cli slam robot.log.gz -o robot.json --verify-bound 0.3", "as a test: exit code 3 if it fails"),
+    ("nscan-cli slam robot.log.gz -o robot.json --verify-bound 0.5", "as a test: exit code 3 if it fails"),
 )
 @log_argument(required=False)
 @option(

@@ -100,7 +100,8 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
         shutil.copy(CORRIDOR_LOG, place / name)
     for name in ("robot.mcap", "drive.mcap"):
         shutil.copy(SAMPLE_LOGS / "corridor_and_room.mcap", place / name)
-    (place / "truth.tum").write_text(true_trajectory(CORRIDOR_LOG))
+    for name in ("truth.tum", "other.tum"):
+        (place / name).write_text(true_trajectory(CORRIDOR_LOG))
     (place / "logs").mkdir()
     for name in ("intel.log.gz", "intel.relations"):
         shutil.copy(place / name, place / "logs")

@@ -91,7 +91,7 @@ def test_what_is_likely_is_cured_by_the_option_in_the_message(name, reference, c
 def test_two_clocks_are_told_apart():
     log = read_log(str(data_file("strangers/two-clocks.mcap")))
     assert log.odometry is None
-    (cure,) = re.findall(r"--clock-offset (\S+) leads", " ".join(log.report.warnings))
+    (cure,) = re.findall(r"--clock-offset (\S+) corrects", " ".join(log.report.warnings))
     log = read_log(str(data_file("strangers/two-clocks.mcap")), ReadingOptions(clock_offset=float(cure)))
     assert log.odometry is not None
     assert log.report.warnings == ()
