@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 
@@ -56,14 +56,13 @@ def _odometry_notices(state: SlamState) -> list[str]:
         route.rows, route.poses, odometry, state.breaks, state.options.diagnostics.odometry
     )
     if apart:
-        some = "; ".join(
+        named = _stretches(
             f"{each.by_odometry:.1f} m and {each.by_scans:.1f} m from scan {log.numbers[each.first]} "
             f"to {log.numbers[each.last]}"
-            for each in apart[:MOST_NAMED]
+            for each in apart
         )
-        more = "" if len(apart) <= MOST_NAMED else f"; and {counted(len(apart) - MOST_NAMED, 'more stretch')}"
         found.append(
-            f"odometry and scans disagree about the distance driven: {some}{more}; "
+            f"odometry and scans disagree about the distance driven: {named}; "
             "odometry is wrong there, or tracking slipped"
         )
     return found
@@ -96,13 +95,11 @@ def _untold_ways(state: SlamState) -> list[str]:
     ways = untold_ways(poses, np.concatenate(sigmas), state.options.diagnostics.untold_way)
     if not ways:
         return []
-    some = "; ".join(
-        f"{way.path:.1f} m from scan {log.numbers[way.first]} to {log.numbers[way.last]}"
-        for way in ways[:MOST_NAMED]
+    named = _stretches(
+        f"{way.path:.1f} m from scan {log.numbers[way.first]} to {log.numbers[way.last]}" for way in ways
     )
-    more = "" if len(ways) <= MOST_NAMED else f"; and {counted(len(ways) - MOST_NAMED, 'more stretch')}"
     return [
-        f"the walls do not show how far the robot went: {some}{more}; "
+        f"the walls do not show how far the robot went: {named}; "
         "without odometry steady motion is assumed there, and the length is a guess"
     ]
 
@@ -153,6 +150,13 @@ def _free_space_violations(state: SlamState) -> list[str]:
         f"{worst.share:.1%} of what the first visit saw (at most {most:.1%} in a sound map); the map is "
         "wrong there, or much has moved"
     ]
+
+
+def _stretches(each: Iterable[str]) -> str:
+    """Stretches of the path, the first of many."""
+    named = list(each)
+    more = [f"and {counted(len(named) - MOST_NAMED, 'more stretch')}"] if len(named) > MOST_NAMED else []
+    return "; ".join(named[:MOST_NAMED] + more)
 
 
 def _numbered(log: LaserLog, rows: Sequence[int]) -> str:
