@@ -10,9 +10,9 @@ import numpy as np
 
 from nscan_cli.calibration.held_odometry import checked_held
 from nscan_cli.calibration.measured_steps import MeasuredSteps, measure_steps
+from nscan_cli.calibration.mount_fit import MountFit, TurnFit, fit_mount, fit_turns
 from nscan_cli.calibration.odometry_clock import ClockLag, clock_lag
 from nscan_cli.calibration.options import FileCheckOptions
-from nscan_cli.calibration.robot_fit import MountFit, TurnFit, fit_mount, fit_turns
 from nscan_cli.calibration.step_sampling import telling_steps
 from nscan_cli.calibration.sweep_check import checked_sweep
 from nscan_cli.files.text import counted

@@ -1,6 +1,6 @@
 """What an ordinary drive says about the robot: mounting, odometry and clocks, each with a standard deviation.
 
-The mounting and the scale follow in closed form from the steps (robot_fit.py). The lag of the clocks, the
+The mounting and the scale follow in closed form from the steps (mount_fit.py). The lag of the clocks, the
 ratio of the turns and the heading that is gained per metre are fitted to the turns, the lag by Gauss-Newton
 steps. Both fits are robust against slips.
 """
@@ -12,9 +12,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from nscan_cli.calibration.measured_steps import MeasuredSteps, measure_steps
+from nscan_cli.calibration.mount_fit import MountFit, fit_mount
 from nscan_cli.calibration.odometry_clock import clock_lag
 from nscan_cli.calibration.options import CalibrationOptions
-from nscan_cli.calibration.robot_fit import MountFit, fit_mount
 from nscan_cli.calibration.robust_fit import TO_SIGMA, robust_fit
 from nscan_cli.calibration.step_sampling import successive_steps
 from nscan_cli.errors import InputDataError

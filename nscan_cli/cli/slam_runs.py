@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from nscan_cli.cli.log_reader import log_reader
 from nscan_cli.cli.progress import Compiling, progress, say
-from nscan_cli.cli.robot_options import changed_flags
+from nscan_cli.cli.robot_toml import changed_flags
 from nscan_cli.cli.slam_summary import Facts, graph_facts
 from nscan_cli.errors import InputDataError, InputMissingError, WrongUsageError
 from nscan_cli.files.inputs import label

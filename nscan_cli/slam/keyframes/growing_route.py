@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from nscan_cli.slam.frontend.break_detection import TrackedBatch
+from nscan_cli.slam.frontend.tracked_batch import TrackedBatch
 from nscan_cli.slam.keyframes.keyframe import Keyframe
 from nscan_cli.slam.keyframes.route import chain_relations, extended, route_of
 from nscan_cli.slam.state import SlamState

@@ -9,9 +9,10 @@ import pytest
 
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.poses import Array, relative
-from nscan_cli.slam.frontend.break_detection import SegmentTracker, TrackedBatch
 from nscan_cli.slam.frontend.first_scan import place_first
 from nscan_cli.slam.frontend.options import BreakOptions, TrackingOptions
+from nscan_cli.slam.frontend.segment_tracker import SegmentTracker
+from nscan_cli.slam.frontend.tracked_batch import TrackedBatch
 from tests.logs.excerpts import excerpt, truth_of
 from tests.simulation.scenes import office
 from tests.slam.keyframe_drives import round_scene

@@ -10,9 +10,10 @@ import pytest
 
 from nscan_cli.logs.load import read_log
 from nscan_cli.logs.reading_options import ReadingOptions
-from nscan_cli.slam.frontend.break_detection import SegmentTracker, TrackedBatch
 from nscan_cli.slam.frontend.options import BreakOptions, TrackingOptions
 from nscan_cli.slam.frontend.scan_batch import ScanBatch
+from nscan_cli.slam.frontend.segment_tracker import SegmentTracker
+from nscan_cli.slam.frontend.tracked_batch import TrackedBatch
 from tests.data import data_file
 from tests.logs.excerpts import excerpt
 from tests.slam.keyframe_drives import round_scene

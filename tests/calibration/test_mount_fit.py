@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from nscan_cli.calibration.robot_fit import fit_mount, fit_turns
+from nscan_cli.calibration.mount_fit import fit_mount, fit_turns
 from nscan_cli.poses import Array, compose, relative
 
 MOUNT = np.array([0.21, -0.05, 1.3])
