@@ -11,19 +11,23 @@ from dataclasses import replace
 import numpy as np
 
 from nscan_cli.calibration.options import SweepCheckOptions
-from nscan_cli.calibration.sweep_evidence import SweepEvidence
+from nscan_cli.calibration.scan_motion import ScanMotion
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.logs.robot_path import poses_at, robot_path
 from nscan_cli.poses import are_known
 
 
-def odometry_delay(log: LaserLog, evidence: SweepEvidence, options: SweepCheckOptions) -> float:
+def odometry_delay(log: LaserLog, motion: ScanMotion, options: SweepCheckOptions) -> float:
     """Seconds to add to the stamps of odometry, so that its turns fit best to those by scans; 0 in doubt."""
     path, times = log.odometry_path, log.times
     if log.odometry is None or path is None or log.beam_times is None:
         return 0.0
-    rows = evidence.rows
-    turned = evidence.twists[:, 2] * (times[rows + 1] - times[rows - 1])
+    twists = {row: motion.twist(row) for row in _turning(motion, options)}
+    measured = {row: twist for row, twist in twists.items() if twist is not None}
+    if len(measured) < options.min_delay_turns:
+        return 0.0
+    rows = np.array(list(measured))
+    turned = np.array(list(measured.values()))[:, 2] * (times[rows + 1] - times[rows - 1])
     if np.count_nonzero(np.abs(turned) > options.min_winding) < options.min_delay_turns:
         return 0.0
     # What a scan tells is where the robot is at its middle beam.
@@ -46,6 +50,15 @@ def odometry_delay(log: LaserLog, evidence: SweepEvidence, options: SweepCheckOp
         return 0.0
     delay = round(float(delays[best]), 3)
     return delay if abs(delay) >= options.least_delay else 0.0
+
+
+def _turning(motion: ScanMotion, options: SweepCheckOptions) -> list[int]:
+    """Rows of scans in turns, evenly among them."""
+    rows = motion.spread_rows(options)
+    turned = np.abs(motion.rates(rows)) * (motion.log.times[rows + 1] - motion.log.times[rows - 1])
+    rows = rows[turned > options.min_winding]
+    used: list[int] = rows[:: max(-(-len(rows) // options.max_delay_turns), 1)].tolist()
+    return used
 
 
 def with_delay(log: LaserLog, delay: float) -> LaserLog:

@@ -47,15 +47,20 @@ class StepOptions:
 class SweepCheckOptions:
     """How the time of a laser's turn is taken from its scans."""
 
-    scans: int = 120
-    """Scans, evenly spread, whose motion is measured. More find more turns of the robot, and take longer."""
-    scans_apart: int = 5
+    scans: int = 240
+    """Scans, evenly spread, among which turns are looked for. More find more, and take longer."""
+    scans_apart: int = 2
     """No more than one in so many scans is measured. A larger value takes less time in short logs."""
     min_scans: int = 30
     """Least number of scans of a log that is asked. A larger value believes short logs."""
     pairs: int = 24
     """Most pairs of scans that are compared, those where the robot turns fastest. More tell more and take
     longer."""
+    least_pairs: int = 5
+    """No fewer pairs say that the file is right. More take longer where it is."""
+    settled_sigmas: float = 1.5
+    """No more pairs are compared once the file's time makes scans sharper than the others by so many standard
+    deviations. A larger value takes longer."""
     shifts: tuple[int, ...] = (-2, 2, -4, 4, -7, 7)
     """Scans from the first of a pair to the second: the robot has to move otherwise there, and to see the
     same."""
@@ -85,6 +90,8 @@ class SweepCheckOptions:
     value finds delays more often, also where there is none."""
     min_delay_turns: int = 15
     """Least number of scans in turns that a delay rests on."""
+    max_delay_turns: int = 40
+    """Most of them. More tell more and take longer."""
     sigmas: float = 3.0
     """By so many standard deviations another time than the file's has to make scans sharper to be believed. A
     larger value believes the file more often."""

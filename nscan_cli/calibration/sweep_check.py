@@ -9,6 +9,7 @@ import numpy as np
 from nscan_cli.calibration.calibrated_reading import DECIMALS
 from nscan_cli.calibration.odometry_delay import odometry_delay, with_delay
 from nscan_cli.calibration.options import FileCheckOptions
+from nscan_cli.calibration.scan_motion import ScanMotion
 from nscan_cli.calibration.sweep_evidence import SweepEvidence, sweep_evidence
 from nscan_cli.files.text import counted
 from nscan_cli.logs.field_of_view import field_of_view
@@ -32,7 +33,8 @@ def checked_sweep(
     turn = _likely_turn(log, options) if told == 0.0 else told
     if turn == 0.0:
         return log, reading, []
-    evidence = sweep_evidence(log, (0.0, turn, -turn), options.steps, options.sweep)
+    motion = ScanMotion.of_log(log, options.steps, options.sweep)
+    evidence = sweep_evidence(motion, (0.0, turn, -turn), told, options.sweep)
     sharpest, said = evidence.sharpest, list[str]()
     certainty = evidence.sigmas(sharpest, told)
     if sharpest != told and certainty >= options.sweep.sigmas:
@@ -41,9 +43,10 @@ def checked_sweep(
         times = beam_times(turns, log.angle_increment, log.beam_counts(), reading.stamp)
         said.append(_said(evidence, told, sharpest, certainty))
         log = replace(log, beam_times=times)
-    delay = odometry_delay(log, evidence, options.sweep)
+    delay = odometry_delay(log, motion, options.sweep)
     if delay:
         log, reading = with_delay(log, delay), replace(reading, clock_offset=reading.clock_offset + delay)
+        said.append(_said_late(delay, reading.clock_offset))
     return log, reading, said
 
 
@@ -73,3 +76,12 @@ def _said(evidence: SweepEvidence, told: float, sharpest: float, certainty: floa
     else:
         what = "the readings are in the reverse order of time"
     return f"{what}: {pairs}; they are read so, as by --sweep {flag}; --as-recorded believes the file"
+
+
+def _said_late(delay: float, offset: float) -> str:
+    side = "early" if delay > 0.0 else "late"
+    return (
+        f"odometry is stamped {abs(delay):.2g} s too {side}, as its turns are against those of the scans; "
+        f"it is moved, as by --clock-offset {offset:.2g}, since beams are corrected by it; "
+        "--as-recorded believes the file"
+    )

@@ -6,17 +6,14 @@ that stands is not. Two scans that were taken while the robot moved differently 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from nscan_cli.calibration.options import StepOptions, SweepCheckOptions
-from nscan_cli.errors import InputDataError
-from nscan_cli.logs.laser_log import LaserLog
-from nscan_cli.logs.robot_path import move_along_arc
-from nscan_cli.matching.pairwise import PairMatch, match_pair, matched_points, scan_ndt
-from nscan_cli.poses import Array, Indices
+from nscan_cli.calibration.options import SweepCheckOptions
+from nscan_cli.calibration.scan_motion import ScanMotion
+from nscan_cli.poses import Array
 
 LEAST_PAIRS = 5
 """With fewer their spread says little of their mean."""
@@ -30,10 +27,6 @@ class SweepEvidence:
     """(T,) the times that were tried, s; negative: readings in the reverse order of time."""
     energies: Array
     """(P, T) energy of each of P pairs matched with each time, per point; smaller is sharper."""
-    rows: Indices
-    """(n,) rows of scans whose motion was measured, by the scans before and after."""
-    twists: Array
-    """(n, 3) that motion of the laser, m/s and rad/s."""
 
     def sigmas(self, better: float, worse: float) -> float:
         """By how many standard deviations one of the times fits better than another; 0 with too few pairs."""
@@ -51,95 +44,39 @@ class SweepEvidence:
 
 
 def sweep_evidence(
-    log: LaserLog, turns: Sequence[float], steps: StepOptions, options: SweepCheckOptions
+    motion: ScanMotion, turns: Sequence[float], told: float, options: SweepCheckOptions
 ) -> SweepEvidence:
-    """What the scans of a log say of some times of a turn, s, without its odometry and times of beams."""
-    at_laser = replace(log, mount=np.zeros(3), path=None)
-    first, second, twists = _pairs(at_laser, max(abs(turn) for turn in turns), steps, options)
-    energies = []
-    for one, other in zip(first.tolist(), second.tolist(), strict=True):
-        try:
-            both = [_points_and_places(at_laser, row, steps) for row in (one, other)]
-        except InputDataError:
-            continue
-        pair = [twists[one], twists[other]]
-        way = np.mean(pair, axis=0) * float(log.times[other] - log.times[one])
-        energies.append([_energy(both, pair, way, turn, steps) for turn in turns])
-    rows = np.array(sorted(twists), dtype=np.int64)
-    motion = np.array([twists[row] for row in rows.tolist()]).reshape(-1, 3)
-    return SweepEvidence(np.array(turns), np.array(energies).reshape(-1, len(turns)), rows, motion)
+    """What the scans of a log say of some times of a turn, s, without its odometry and times of beams.
 
-
-def _pairs(
-    log: LaserLog, turn: float, steps: StepOptions, options: SweepCheckOptions
-) -> tuple[Indices, Indices, dict[int, Array]]:
-    """Rows (P,) of two scans each between which the motion has changed, and the twists at these rows."""
-    count = min(options.scans, len(log) // options.scans_apart)
-    centres = np.unique(np.linspace(1, max(len(log) - 2, 1), count).astype(np.int64))
-    twists = _twists(log, centres, steps, options)
-    rates = {row: abs(float(twist[2])) for row, twist in twists.items()}
-    turning = [row for row in rates if rates[row] * turn > options.min_winding]
-    fast = sorted(turning, key=lambda row: -rates[row])
-    partners = [row + shift for row in fast for shift in options.shifts if 1 <= row + shift <= len(log) - 2]
-    twists |= _twists(log, np.unique(np.array(partners, dtype=np.int64)), steps, options)
-    found = [
-        (row, row + shift)
-        for row in fast
-        for shift in options.shifts
-        if row + shift in twists
-        and abs(float(twists[row + shift][2] - twists[row][2])) * turn > options.min_winding
-        and abs(float(twists[row + shift][2] + twists[row][2]))
-        * 0.5
-        * abs(float(log.times[row + shift] - log.times[row]))
-        <= options.max_apart
-    ]
-    pairs = np.array(found[: options.pairs], dtype=np.int64).reshape(-1, 2)
-    return pairs[:, 0], pairs[:, 1], twists
-
-
-def _twists(log: LaserLog, rows: Indices, steps: StepOptions, options: SweepCheckOptions) -> dict[int, Array]:
-    """Row → velocity (3,) of the laser there, m/s and rad/s, by the scans on both sides of it."""
-    found = {}
-    for row in rows.tolist():
-        velocities: list[Array] = []
-        for begin in (row - 1, row):
-            seconds = float(log.times[begin + 1] - log.times[begin])
-            # A step is about as long as the one before it.
-            start = velocities[-1] * seconds if velocities else np.zeros(3)
-            match = _matched(log, begin, start, steps) if 0.0 < seconds <= options.longest_step else None
-            if match is None or not match.converged or match.overlap < steps.min_overlap:
+    No more pairs are compared where `told`, one of those times, fits better than the others.
+    """
+    evidence = SweepEvidence(np.array(turns), np.empty((0, len(turns))))
+    for one, other in _pairs(motion, max(abs(turn) for turn in turns), options):
+        energies = motion.energies(one, other, turns)
+        if energies is not None:
+            evidence = replace(evidence, energies=np.vstack([evidence.energies, energies]))
+            if _is_settled(evidence, told, options) or len(evidence.energies) == options.pairs:
                 break
-            velocities.append(match.pose / seconds)
-        else:
-            found[row] = np.mean(velocities, axis=0)
-    return found
+    return evidence
 
 
-def _matched(log: LaserLog, begin: int, start: Array, steps: StepOptions) -> PairMatch | None:
-    """The scan after that in row `begin`, matched with it from `start` (3,); None with too few points."""
-    try:
-        (reference, _), (points, _) = (_points_and_places(log, begin + by, steps) for by in (0, 1))
-    except InputDataError:
-        return None
-    return match_pair(scan_ndt(reference, steps.pair), points, start, None, steps.pair)
+def _is_settled(evidence: SweepEvidence, told: float, options: SweepCheckOptions) -> bool:
+    """Whether the time that the file tells fits better than the others already."""
+    others = [turn for turn in evidence.turns.tolist() if turn != told]
+    enough = len(evidence.energies) >= options.least_pairs
+    return enough and all(evidence.sigmas(told, turn) >= options.settled_sigmas for turn in others)
 
 
-def _points_and_places(log: LaserLog, row: int, steps: StepOptions) -> tuple[Array, Array]:
-    """Points (m, 2) of a scan, and where in a turn (m,) each was measured, in turns from the middle beam."""
-    ranges = log.ranges[row]
-    points = matched_points(log, row, steps.pair)
-    beams = np.flatnonzero(np.isfinite(ranges) & (ranges <= steps.pair.reach))
-    places = (beams - 0.5 * (len(log.readings(row)) - 1)) * abs(log.angle_increment[row]) / (2 * np.pi)
-    every = max(len(ranges) // steps.max_beams, 1)
-    return points[::every].copy(), places[::every].copy()
-
-
-def _energy(
-    both: Sequence[tuple[Array, Array]], twists: Sequence[Array], way: Array, turn: float, steps: StepOptions
-) -> float:
-    """The energy of two scans about a way (3,) apart, per point, if the turn of the laser takes so long."""
-    one, other = (points.copy() for points, _ in both)
-    for points, (_, places), twist in zip((one, other), both, twists, strict=True):
-        move_along_arc(points, places * turn, twist, False)
-    match = match_pair(scan_ndt(one, steps.pair), other, way, None, steps.pair)
-    return match.energy / len(other)
+def _pairs(motion: ScanMotion, turn: float, options: SweepCheckOptions) -> Iterator[tuple[int, int]]:
+    """Rows of two scans each between which the motion has changed; no scan is first again before all were."""
+    fast, shifts = motion.turning_rows(turn, options), np.array(options.shifts)
+    for begin in range(len(shifts)):
+        # Each scan begins with another shift, and comes to all of them.
+        others = fast + shifts[(begin + np.arange(len(fast))) % len(shifts)]
+        inside = (others >= 1) & (others <= len(motion.log) - 2)
+        found = np.stack([fast[inside], others[inside]], axis=1)
+        rates = motion.rates(found.ravel()).reshape(-1, 2)
+        seconds = np.abs(np.diff(motion.log.times[found], axis=1)[:, 0])
+        used = np.abs(rates[:, 1] - rates[:, 0]) * turn > options.min_winding
+        used &= 0.5 * np.abs(rates.sum(axis=1)) * seconds <= options.max_apart
+        yield from found[used].tolist()

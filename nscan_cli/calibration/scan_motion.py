@@ -1,0 +1,119 @@
+"""How the laser moves while it takes a scan, by the scans before and after it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from nscan_cli.calibration.options import StepOptions, SweepCheckOptions
+from nscan_cli.calibration.scan_turns import scan_turns
+from nscan_cli.errors import InputDataError
+from nscan_cli.logs.laser_log import LaserLog
+from nscan_cli.logs.robot_path import move_along_arc
+from nscan_cli.matching.pairwise import PairEnd, matched_points, scan_ndt, settle_pair
+from nscan_cli.poses import Array, Indices
+
+
+@dataclass(frozen=True)
+class ScanMotion:
+    """The scans of a log as its laser sees them, without odometry, and what was measured of their motion."""
+
+    log: LaserLog
+    """The laser is the robot, and every scan seen at once."""
+    steps: StepOptions
+    longest_step: float
+    """Longest time from a scan to the next, s, over which motion is measured."""
+    _points: dict[int, tuple[Array, Array] | None] = field(default_factory=dict)
+    _twists: dict[int, Array | None] = field(default_factory=dict)
+
+    @staticmethod
+    def of_log(log: LaserLog, steps: StepOptions, options: SweepCheckOptions) -> ScanMotion:
+        """Of a log of a robot, of which nothing was measured yet."""
+        return ScanMotion(replace(log, mount=np.zeros(3), path=None), steps, options.longest_step)
+
+    def rates(self, rows: Indices) -> Array:
+        """(n,) rad/s; about how fast the laser turns at rows (n,) with a scan on both sides; 0 at a gap."""
+        times = self.log.times
+        seconds = times[rows + 1] - times[rows - 1]
+        is_measured = (seconds > 0.0) & (seconds <= 2 * self.longest_step)
+        rates = np.zeros(len(rows))
+        if is_measured.any():
+            those = rows[is_measured]
+            rates[is_measured] = scan_turns(self.log, those - 1, those + 1) / seconds[is_measured]
+        return rates
+
+    def spread_rows(self, options: SweepCheckOptions) -> Indices:
+        """Rows (n,) of scans that are spread over the log, with a scan on both sides."""
+        count = min(options.scans, len(self.log) // options.scans_apart)
+        return np.unique(np.linspace(1, max(len(self.log) - 2, 1), count).astype(np.int64))
+
+    def turning_rows(self, turn: float, options: SweepCheckOptions) -> Indices:
+        """Rows (n,) of scans in turns that count if the laser turns for so long (s), the fastest first."""
+        rows = self.spread_rows(options)
+        rates = np.abs(self.rates(rows))
+        order = np.argsort(-rates, kind="stable")
+        fastest: Indices = rows[order[rates[order] * turn > options.min_winding]]
+        return fastest[: options.pairs]
+
+    def twist(self, row: int) -> Array | None:
+        """(3,) velocity of the laser at a row, m/s and rad/s, by the scans on both sides; None in doubt."""
+        if row not in self._twists:
+            self._twists[row] = self._measured(row)
+        return self._twists[row]
+
+    def _measured(self, row: int) -> Array | None:
+        velocities: list[Array] = []
+        for begin in (row - 1, row):
+            seconds = float(self.log.times[begin + 1] - self.log.times[begin])
+            reference, scan = self._scan(begin), self._scan(begin + 1)
+            if not 0.0 < seconds <= self.longest_step or reference is None or scan is None:
+                return None
+            # A step is about as long as the one before it.
+            start = velocities[-1] * seconds if velocities else np.zeros(3)
+            end = self._matched(reference[0], scan[0], start)
+            if not end.converged or end.overlap < self.steps.min_overlap:
+                return None
+            velocities.append(end.pose / seconds)
+        mean: Array = np.mean(velocities, axis=0)
+        return mean
+
+    def energies(self, one: int, other: int, turns: Sequence[float]) -> Array | None:
+        """(T,) energy of two scans, per point, if a turn of the laser takes so long (T,); None in doubt."""
+        scans, twists = [self._scan(row) for row in (one, other)], [self.twist(row) for row in (one, other)]
+        (first, second), (before, after) = scans, twists
+        if first is None or second is None or before is None or after is None:
+            return None
+        way = 0.5 * (before + after) * float(self.log.times[other] - self.log.times[one])
+        found = np.empty(len(turns))
+        for k, turn in enumerate(turns):
+            moved = first[0].copy(), second[0].copy()
+            for points, places, twist in zip(moved, (first[1], second[1]), (before, after), strict=True):
+                move_along_arc(points, places * turn, twist, False)
+            found[k] = self._matched(*moved, way).energy / len(moved[1])
+        return found
+
+    def _matched(self, reference: Array, points: Array, start: Array) -> PairEnd:
+        return settle_pair(scan_ndt(reference, self.steps.pair), points, start, self.steps.pair)
+
+    def _scan(self, row: int) -> tuple[Array, Array] | None:
+        """Points (m, 2) of a scan, and where in a turn (m,) each was measured, in turns from the middle beam.
+
+        None with too few points.
+        """
+        if row not in self._points:
+            try:
+                self._points[row] = self._thinned(row)
+            except InputDataError:
+                self._points[row] = None
+        return self._points[row]
+
+    def _thinned(self, row: int) -> tuple[Array, Array]:
+        ranges, pair = self.log.ranges[row], self.steps.pair
+        points = matched_points(self.log, row, pair)
+        beams = np.flatnonzero(np.isfinite(ranges) & (ranges <= pair.reach))
+        increment = abs(self.log.angle_increment[row])
+        places = (beams - 0.5 * (len(self.log.readings(row)) - 1)) * increment / (2 * np.pi)
+        every = max(len(ranges) // self.steps.max_beams, 1)
+        return points[::every].copy(), places[::every].copy()
