@@ -40,7 +40,10 @@ def checked_held(
 
 
 def held_stretches(log: LaserLog, options: HeldOdometryOptions, steps: StepOptions) -> list[tuple[int, int]]:
-    """First and last row of each stretch over which the scans move and odometry does not."""
+    """First and last row of each stretch over which the scans move and odometry does not.
+
+    Odometry that never moves has none: it is of no use anywhere.
+    """
     if log.odometry is None or len(log) < 2:
         return []
     moves = np.abs(relative(log.odometry[1:], log.odometry[:-1])).max(axis=1)
@@ -49,6 +52,7 @@ def held_stretches(log: LaserLog, options: HeldOdometryOptions, steps: StepOptio
     begins = np.flatnonzero(~stands[:-1] & stands[1:])
     ends = np.flatnonzero(stands[:-1] & ~stands[1:])
     long = log.times[ends] - log.times[begins] >= options.min_duration
+    long &= (begins > 0) | (ends < len(log) - 1)
     stretches = zip(begins[long].tolist(), ends[long].tolist(), strict=True)
     return [(first, last) for first, last in stretches if _scans_move(log, first, last, options, steps)]
 

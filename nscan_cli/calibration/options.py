@@ -154,8 +154,14 @@ class FileCheckOptions:
     """A finding explains the steps if the median of what is left is at most this share of their motion."""
     max_tail: float = 0.4
     """The same for the upper quartile of what is left."""
-    min_mount_turn: float = 0.26
-    """The laser looks another way than the file says by more than this, rad."""
+    min_mount_turn: float = 0.1
+    """The laser looks another way than the file says by more than this, rad. It is 0.04 at most on real
+    logs."""
+    min_mount_move: float = 0.15
+    """The laser is elsewhere than the file says by more than this along an axis, m. It is 0.1 at most on
+    real logs, and a clock that is late looks like some centimetres."""
+    mount_sigmas: float = 5.0
+    """And by more than so many standard deviations of what the steps say."""
     min_scale_factor: float = 1.5
     """The scale of odometry is wrong by more than this factor."""
     certain_scale_factor: float = 3.0
@@ -169,6 +175,9 @@ class FileCheckOptions:
     excluded_spread: float = 0.4
     """Odometry that no finding explains is not used where the median of what is left is at least this share
     of the motion. It is 0.03 to 0.11 on real logs."""
+    excluded_turn_spread: float = 1.0
+    """Odometry is not used where the median of what is left of its turns is at least this multiple of the
+    turns by scans. It is 0.004 to 0.4 on real logs."""
     min_steps_to_exclude: int = 30
     """Least number of steps with motion for that."""
 

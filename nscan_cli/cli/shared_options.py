@@ -139,8 +139,9 @@ def reading_options(command: Command) -> Command:
              "readings are in the reverse order of time. off: all at once. auto: as the log says."),
         rare("--stamp", type=click.Choice(STAMPS), default="first", show_default=True,
              help="Beam of the turn at whose time a scan is stamped."),
-        rare("--odometry-scale", type=click.FloatRange(0, min_open=True), default=1.0, show_default=True,
-             metavar="F", help="Multiply the positions of odometry: 0.001 for millimetres."),
+        rare("--odometry-scale", type=float, default=1.0, show_default=True, metavar="F",
+             help="Multiply the positions of odometry: 0.001 for millimetres, -1 for forward counted as "
+             "backward."),
         rare("--clock-offset", type=float, default=0.0, show_default=True, metavar="SECONDS",
              help="Add this to the time stamps of odometry."),
         rare("--strict", is_flag=True, help="Treat a malformed record as an error, not as a warning."),

@@ -83,8 +83,8 @@ class ReadingOptions:
             raise WrongUsageError(f"--sweep is beyond {LONGEST_TURN:g} s; give the seconds of one turn")
         if self.stamp not in STAMPS:
             raise WrongUsageError(f"--stamp is {self.stamp!r}; give one of {', '.join(STAMPS)}")
-        if self.odometry_scale <= 0:
-            raise WrongUsageError("--odometry-scale is not above 0; give the metres of one unit of odometry")
+        if self.odometry_scale == 0:
+            raise WrongUsageError("--odometry-scale is 0; give the metres of one unit of odometry")
         if not all(math.isfinite(bearing) for sector in self.mask or () for bearing in sector):
             raise WrongUsageError("--mask has a bearing that is not a finite number")
         if self.start is not None and self.end is not None and self.start > self.end:

@@ -54,9 +54,15 @@ def outcome(case: Case) -> Outcome:
         log, reference = case.files(Path(folder))
         slam = [str(log), "-o", str(Path(folder, "graph.json"))]
         default = _run(slam, reference)
-        cure = next((first or second for said in default.said for first, second in CURES.findall(said)), "")
+        cure = " ".join(_cures(default.said))
         cured = _run([*slam, *cure.split()], reference) if cure else None
         return Outcome(case, default, cure, cured, _run([*slam, "--as-recorded"], reference))
+
+
+def _cures(said: Sequence[str]) -> list[str]:
+    """The first option of each message that says to try one."""
+    found = [CURES.search(message) for message in said]
+    return [cure.group(1) or cure.group(2) for cure in found if cure]
 
 
 def _run(slam: Sequence[str], reference: Sequence[str]) -> Run:
@@ -126,7 +132,7 @@ def document(outcomes: Sequence[Outcome]) -> str:
         f"at most {FACTOR:g} times that of "
         f"the untouched drive, or {1000 * MORE:g} mm more. "
         '"As recorded" is with `--as-recorded`: the file is believed. "As the message says" is with the '
-        "first option that a message says to try.",
+        "first option that each message says to try.",
         table(header, rows),
     ]
     return "\n\n".join(parts) + "\n"

@@ -5,6 +5,7 @@ from __future__ import annotations
 import functools
 import re
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -14,7 +15,7 @@ from nscan_cli.calibration.options import FileCheckOptions
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.logs.load import read_log
 from nscan_cli.logs.reading_options import ReadingOptions
-from nscan_cli.poses import are_known
+from nscan_cli.poses import are_known, compose
 from tests.data import CORRIDOR_LOG, OFFICE_LOG, data_file
 from tests.simulation import faults
 from tests.simulation.scenes import bare_corridor
@@ -41,14 +42,26 @@ def found(log: LaserLog, reading: ReadingOptions | None = None) -> list[str]:
 LIKELY: dict[str, tuple[Fault, str]] = {
     "mirrored": (faults.mirrored, "in the wrong order, and the map is mirrored.*try --flip"),
     "looks to the left": (lambda log: faults.mounted_otherwise(log, -np.pi / 2), "90° further to the left"),
-    "looks back": (lambda log: faults.mounted_otherwise(log, np.pi), "try --mount 0.1,0,0, or --no-odometry"),
+    "looks back": (
+        lambda log: faults.mounted_otherwise(log, np.pi),
+        "180° further.*try --mount 0.1,0,0, or --odometry-scale -1 if",
+    ),
+    "drives backwards": (faults.odometry_behind, "forward as backward.*try --odometry-scale -1$"),
+    "is elsewhere": (
+        lambda log: replace(log, mount=log.mount + np.array([0.3, -0.2, 0.0])),
+        r"by -0\.(29|30|31) m ahead and \+0\.(19|20|21) m to the left.*try --mount 0.(09|1|11),-?0",
+    ),
+    "turns the wrong way": (
+        lambda log: faults.odometry_turning(log, -1.0),
+        "try --flip; if left and right are as they should be in the map, odometry turns the wrong way",
+    ),
     "looks askew": (lambda log: faults.mounted_otherwise(log, 0.6), "try --mount 0.1,0,0$"),
     "half as long": (lambda log: faults.odometry_scaled(log, 0.5), r"try --odometry-scale (1\.9|2\.0|2)"),
     "late by 30 s": (lambda log: faults.odometry_late(log, 30.0), r"ahead.*--clock-offset -(30\.0|29\.9)"),
     "early by 2 s": (lambda log: faults.odometry_late(log, -2.0), r"behind.*--clock-offset (2\.0|1\.9|2\.1)"),
     "turns by half": (
         lambda log: faults.odometry_turning(log, 0.5),
-        r"turns are 0\.5\d? times.*--no-odometry",
+        r"turns by odometry are 0\.5\d? times.*--no-odometry",
     ),
 }
 
@@ -84,11 +97,22 @@ def frozen(log: LaserLog) -> LaserLog:
     return faults.odometry_scaled(faults.odometry_turning(log, 0.0), 0.0)
 
 
+def headings_reversed(log: LaserLog) -> LaserLog:
+    assert log.odometry is not None
+    return replace(log, odometry=log.odometry * (1.0, 1.0, -1.0))
+
+
 @pytest.mark.parametrize(
     ("make", "words"),
     [
         (frozen, "odometry never moves, but the scans do in"),
         (faults.odometry_reversed, "odometry counts x or y the wrong way"),
+        (headings_reversed, "odometry counts headings the wrong way"),
+        (lambda log: faults.odometry_scaled(log, 0.0), "the position by odometry never moves"),
+        (
+            lambda log: faults.odometry_turning(log, 180.0 / np.pi),
+            "odometry contradicts the scans: no scale and no clock explains its turns",
+        ),
     ],
 )
 def test_odometry_of_no_use_is_not_used(make, words):
@@ -97,6 +121,36 @@ def test_odometry_of_no_use_is_not_used(make, words):
     assert not checked.reading.odometry
     (message,) = checked.messages
     assert message.startswith(words)
+
+
+def aside(log: LaserLog) -> LaserLog:
+    """The drive with its laser 0.3 m to the left of where it was: odometry is that of the moved middle."""
+    assert log.odometry is not None
+    moved = np.array([0.0, -0.3, 0.0])
+    return replace(log, odometry=compose(log.odometry, moved), mount=log.mount - moved)
+
+
+def test_a_laser_aside_tells_mirrored_readings_from_odometry_that_turns_the_wrong_way():
+    (mirrored,) = found(faults.mirrored(aside(drive())))
+    assert re.search("in the wrong order, and the map is mirrored: .*; try --flip$", mirrored)
+    log = aside(drive())
+    assert log.odometry is not None
+    (turning,) = found(replace(log, odometry=log.odometry * (1.0, -1.0, -1.0)))
+    assert re.search("odometry likely turns the wrong way: .*; try --no-odometry$", turning)
+
+
+def test_a_late_clock_of_a_mirrored_drive_is_found():
+    late, mirrored = found(faults.mirrored(faults.odometry_late(drive(), 3.0)))
+    assert "try --clock-offset -3.0" in late
+    assert "in the wrong order" in mirrored
+
+
+def test_where_odometry_stands_it_says_nothing_of_the_mounting_elsewhere():
+    rows = slice(len(drive()) // 3, len(drive()) // 2)
+    held = faults.odometry_held(faults.mounted_otherwise(drive(), -np.pi / 2), rows, True)
+    stands, looks = found(held)
+    assert stands.startswith("odometry stands still")
+    assert "90° further to the left" in looks
 
 
 @pytest.mark.parametrize("catches_up", [True, False])

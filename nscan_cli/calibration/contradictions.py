@@ -1,0 +1,149 @@
+"""What a file says of odometry, mounting and clocks, against the steps that its scans measure."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from nscan_cli.calibration import findings
+from nscan_cli.calibration.findings import OPPOSITE_WITHIN, Finding
+from nscan_cli.calibration.measured_steps import MeasuredSteps, measure_steps
+from nscan_cli.calibration.odometry_clock import ClockLag, clock_lag
+from nscan_cli.calibration.options import FileCheckOptions
+from nscan_cli.calibration.mount_fit import MountFit, TurnFit
+from nscan_cli.calibration.step_evidence import StepEvidence, explains, is_excluded, is_nearer, turns_agree
+from nscan_cli.calibration.step_sampling import telling_steps
+from nscan_cli.logs.laser_log import LaserLog
+from nscan_cli.logs.reading_options import ReadingOptions
+from nscan_cli.poses import MIRRORED, Array, Mask, are_known, relative, wrap
+
+BACKWARDS = np.array([-1.0, -1.0, 1.0])
+"""Factors of a mounting: of a robot that counts forward as backward the laser seems to be there, turned."""
+ONE_AXIS_REVERSED = np.array([-1.0, 1.0, 1.0])
+"""Factors of poses: with x and y it is the same, seen from behind; so it is with the sign of headings."""
+
+
+def find_contradictions(log: LaserLog, reading: ReadingOptions, options: FileCheckOptions) -> list[Finding]:
+    """What the scans of a log contradict; empty without odometry, and where the scans tell too little."""
+    if log.odometry is None:
+        return []
+    steps = measure_steps(log, telling_steps(log, options.steps), options.steps)
+    evidence = StepEvidence(log.odometry, steps, options)
+    if evidence.moving < options.min_steps:
+        return []
+    is_still = _is_still(log.odometry, options.still)
+    if is_still[:2].all():
+        return [findings.frozen(evidence, "odometry" if is_still[2] else "the position by odometry")]
+    turns = evidence.turns()
+    if turns is not None and not turns_agree(turns, options):
+        found = _of_clocks(log, evidence.steps, reading, options)
+        if found:
+            return found
+    fit, mirrored = evidence.fit(), evidence.fit(mirrored=True)
+    unusable = _unusable(evidence, turns, fit, mirrored, options)
+    if unusable is not None:
+        return [unusable]
+    if turns is not None and turns.ratio < 0.0 and _are_told(turns, options):
+        if turns_agree(turns, options) and mirrored is not None and explains(mirrored, options):
+            return _of_opposite_turns(log, turns, mirrored, reading, options)
+        return [findings.wrong_turns(turns), *_of_positions(log.mount, fit, reading, options)]
+    found = []
+    if turns is not None and _are_told(turns, options) and not turns_agree(turns, options):
+        found.append(findings.wrong_turns(turns))
+    return found + _of_positions(log.mount, fit, reading, options)
+
+
+def _is_still(odometry: Array, still: float) -> Mask:
+    """(3,) which of the robot's coordinates never change, seen from its first pose."""
+    known = odometry[are_known(odometry)]
+    moves = np.abs(relative(known, known[0])).max(axis=0)
+    never: Mask = moves < still
+    return never
+
+
+def _are_told(turns: TurnFit, options: FileCheckOptions) -> bool:
+    """Whether turns by odometry are a multiple of those by scans."""
+    return turns.steps >= options.min_steps and turns.spread <= options.max_spread
+
+
+def _unusable(
+    evidence: StepEvidence,
+    turns: TurnFit | None,
+    fit: MountFit | None,
+    mirrored: MountFit | None,
+    options: FileCheckOptions,
+) -> Finding | None:
+    """Why odometry cannot be used at all; None if it can."""
+    is_explained = explains(fit, options) or explains(mirrored, options)
+    if not is_explained and explains(evidence.fit_with_signs(ONE_AXIS_REVERSED), options):
+        is_heading = turns is not None and turns.ratio < 0.0
+        return findings.wrong_signs(evidence, "headings" if is_heading else "x or y")
+    if is_excluded(fit, options) and is_excluded(mirrored, options):
+        return findings.excluded(evidence)
+    if turns is not None and turns.steps >= options.min_steps and turns.spread > options.excluded_turn_spread:
+        return findings.excluded_turns(turns)
+    return None
+
+
+def _of_clocks(
+    log: LaserLog, steps: MeasuredSteps, reading: ReadingOptions, options: FileCheckOptions
+) -> list[Finding]:
+    """What turns say of the odometry's clock: the offset that explains why they disagree, if there is one.
+
+    Few steps agree at some offset by chance. So more are measured, unless these agree best without any. The
+    turns of mirrored scans are looked for too.
+    """
+    tries = [(sign, clock_lag(log, steps, options.clock, sign)) for sign in (1.0, -1.0)]
+    signs = [sign for sign, lag in tries if lag and abs(lag.offset) >= options.clock.min_offset]
+    if not signs:
+        return []
+    steps = measure_steps(log, telling_steps(log, options.steps, options.more_steps), options.steps)
+    lags = [(sign, clock_lag(log, steps, options.clock, sign)) for sign in signs]
+    told = [(lag.disagreement, sign, lag) for sign, lag in lags if lag and _is_offset(lag, options)]
+    if not told:
+        return []
+    _, sign, lag = min(told)
+    if sign > 0.0:
+        return [findings.two_clocks(lag, reading)]
+    evidence = "turns by odometry, at that offset, are those by scans the other way round"
+    return [findings.two_clocks(lag, reading), findings.mirrored(evidence, reading, False)]
+
+
+def _is_offset(lag: ClockLag, options: FileCheckOptions) -> bool:
+    is_better = lag.disagreement < options.clock.gain * min(lag.as_stamped, lag.elsewhere)
+    return is_better and abs(lag.offset) >= options.clock.min_offset
+
+
+def _of_opposite_turns(
+    log: LaserLog, turns: TurnFit, fit: MountFit, reading: ReadingOptions, options: FileCheckOptions
+) -> list[Finding]:
+    """Readings in the wrong order, or odometry that turns the wrong way; `fit` is that of mirrored scans.
+
+    One is the mirror image of the other, but for where the laser is on the robot: if it is aside, the file
+    has it on the right side in one case alone.
+    """
+    as_told, other = log.mount, log.mount * MIRRORED
+    # Small steps aside, which may be of either sign, would pass for a place farther ahead or behind.
+    options = replace(options, min_mount_move=np.inf)
+    if is_nearer(fit, other, as_told, options.mount_sigmas):
+        return [findings.wrong_turns(turns), *_of_positions(other, fit, reading, options)]
+    is_certain = is_nearer(fit, as_told, other, options.mount_sigmas)
+    mirrored = findings.mirrored(findings.turns_of(turns), reading, is_certain)
+    return [mirrored, *_of_positions(log.mount, fit, reading, options)]
+
+
+def _of_positions(
+    mount: Array, fit: MountFit | None, reading: ReadingOptions, options: FileCheckOptions
+) -> list[Finding]:
+    """What the positions by odometry say of its scale and of the mounting, which the file has at (3,)."""
+    if fit is None or not explains(fit, options):
+        return []
+    found = []
+    if findings.is_wrong_scale(fit, options):
+        found.append(findings.wrong_scale(fit, reading, options))
+    is_opposite = abs(float(wrap(fit.mount[2] - mount[2]))) > np.pi - OPPOSITE_WITHIN
+    if is_opposite and is_nearer(fit, mount * BACKWARDS, mount, options.mount_sigmas):
+        return [*found, findings.backwards(fit, reading)]
+    mounting = findings.wrong_mounting(mount, fit, reading, options)
+    return found if mounting is None else [*found, mounting]

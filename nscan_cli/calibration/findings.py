@@ -1,0 +1,180 @@
+"""What scans contradict of their file, in sentences: the evidence, and what was done or what to do."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from nscan_cli.calibration.odometry_clock import ClockLag
+from nscan_cli.calibration.options import FileCheckOptions
+from nscan_cli.calibration.mount_fit import MountFit, TurnFit
+from nscan_cli.calibration.step_evidence import StepEvidence
+from nscan_cli.files.text import counted
+from nscan_cli.logs.reading_options import ReadingOptions
+from nscan_cli.poses import Array, wrap
+
+ROUND_ANGLE, ROUND_WITHIN = 15.0, 3.0
+"""Degrees: lasers are mounted at round angles; a measured one this near to one is that."""
+OPPOSITE_WITHIN = 0.1
+"""rad; a laser that seems to look back to within this may be one of a robot that seems to drive backwards."""
+MOST_WRONG_RANGES = 10.0
+"""Ranges that are wrong by a larger factor are not of a room, which a reader notices."""
+UNDONE = "--as-recorded uses it as it is"
+
+
+@dataclass(frozen=True)
+class Finding:
+    """Something that the file says and its scans contradict."""
+
+    message: str
+    """For the user: the evidence, and what was done or what to do."""
+    corrected: dict[str, Any] = field(default_factory=dict)
+    """Reading options that put it right, where it is beyond doubt."""
+    is_of_clocks: bool = False
+    """Whether odometry and scans are compared at wrong times before it is put right."""
+
+
+def frozen(evidence: StepEvidence, what: str) -> Finding:
+    """Odometry, or the part of it that `what` names, never moves."""
+    seen = f"{evidence.moving} of {counted(len(evidence.laser), 'step')}"
+    return _unused(f"{what} never moves, but the scans do in {seen}")
+
+
+def excluded(evidence: StepEvidence) -> Finding:
+    """Nothing explains the positions."""
+    return _unused(
+        "odometry contradicts the scans: no scale, mounting or clock explains its positions, "
+        f"in {counted(evidence.moving, 'step')}"
+    )
+
+
+def excluded_turns(turns: TurnFit) -> Finding:
+    """Nothing explains the turns."""
+    return _unused(
+        "odometry contradicts the scans: no scale and no clock explains its turns, "
+        f"in {counted(turns.steps, 'step')} (headings in degrees, or a wheel that is not counted?)"
+    )
+
+
+def wrong_signs(evidence: StepEvidence, what: str) -> Finding:
+    """With the sign of `what` changed the odometry agrees."""
+    return _unused(
+        f"odometry counts {what} the wrong way: with the other sign its positions agree with the "
+        f"scans, in {counted(evidence.moving, 'step')}"
+    )
+
+
+def _unused(evidence: str) -> Finding:
+    return Finding(f"{evidence}; it is not used; {UNDONE}", {"odometry": False})
+
+
+def two_clocks(lag: ClockLag, reading: ReadingOptions) -> Finding:
+    """Odometry is stamped by another clock."""
+    side = "behind" if lag.offset > 0 else "ahead of"
+    return Finding(
+        f"the clock of odometry is likely {abs(lag.offset):.1f} s {side} that of the scans: with this offset "
+        f"their turns differ by {lag.disagreement:.0%}, as stamped by {lag.as_stamped:.0%}; "
+        f"try --clock-offset {reading.clock_offset + lag.offset:.1f}",
+        is_of_clocks=True,
+    )
+
+
+def mirrored(evidence: str, reading: ReadingOptions, is_certain: bool) -> Finding:
+    """Scans turn the other way than odometry. `is_certain`: the mounting tells that the readings are wrong.
+
+    Without that, scans and odometry are the mirror image of what they are if the other one is wrong.
+    """
+    cure = "leave out --flip" if reading.flip else "try --flip"
+    other = (
+        ""
+        if is_certain
+        else (
+            "; if left and right are as they should be in the map, odometry turns the wrong way instead, and "
+            "the map is right, also with --no-odometry"
+        )
+    )
+    return Finding(
+        f"the readings are likely in the wrong order, and the map is mirrored: {evidence}; {cure}{other}"
+    )
+
+
+def turns_of(turns: TurnFit) -> str:
+    """What turns are, as evidence."""
+    return f"turns by odometry are {turns.ratio:.2f} times those by scans, in {counted(turns.steps, 'step')}"
+
+
+def wrong_turns(turns: TurnFit) -> Finding:
+    """Odometry turns too much, too little or the wrong way."""
+    what = "the wrong way" if turns.ratio < 0.0 else "wrongly"
+    return Finding(f"odometry likely turns {what}: {turns_of(turns)}; try --no-odometry")
+
+
+def is_wrong_scale(fit: MountFit, options: FileCheckOptions) -> bool:
+    """Whether odometry and scans count lengths in different units."""
+    return max(fit.scale, 1.0 / fit.scale) > options.min_scale_factor
+
+
+def wrong_scale(fit: MountFit, reading: ReadingOptions, options: FileCheckOptions) -> Finding:
+    """Odometry counts in another unit than the ranges, beyond doubt or likely."""
+    decimal = 10.0 ** round(math.log10(fit.scale))
+    is_decimal = abs(fit.scale / decimal - 1.0) <= options.decimal_tolerance
+    scale = reading.odometry_scale * (decimal if is_decimal else float(f"{fit.scale:.3g}"))
+    evidence = f"one metre by odometry is {fit.scale:.3g} m by scans, in {counted(fit.steps, 'step')}"
+    ranges = f"{(reading.range_scale or 1.0) / fit.scale:.3g}"
+    is_either = not is_decimal and max(fit.scale, 1.0 / fit.scale) <= MOST_WRONG_RANGES
+    other = f"; if the ranges are wrong instead, --range-scale {ranges}" if is_either else ""
+    if max(fit.scale, 1.0 / fit.scale) > options.certain_scale_factor:
+        message = (
+            f"{evidence}: its positions are multiplied, as by --odometry-scale {scale:g}{other}; {UNDONE}"
+        )
+        return Finding(message, {"odometry_scale": scale})
+    return Finding(
+        f"the scale of odometry is likely wrong: {evidence}; try --odometry-scale {scale:g}{other}"
+    )
+
+
+def wrong_mounting(
+    mount: Array, fit: MountFit, reading: ReadingOptions, options: FileCheckOptions
+) -> Finding | None:
+    """The laser is elsewhere than in the file, at `mount` (3,), or looks elsewhere; None if it does not."""
+    off, sigmas = fit.mount - mount, options.mount_sigmas
+    turn = float(wrap(off[2]))
+    is_turned = abs(turn) > max(options.min_mount_turn, sigmas * float(fit.sigmas[3]))
+    is_moved = bool((np.abs(off[:2]) > np.maximum(options.min_mount_move, sigmas * fit.sigmas[1:3])).any())
+    # Lengths tell nothing as long as it is open whose metre is wrong.
+    is_moved &= not is_wrong_scale(fit, options)
+    if not is_turned and not is_moved:
+        return None
+    place = np.round(fit.mount[:2], 2) + 0.0 if is_moved else mount[:2]
+    x, y = (f"{part:g}" for part in place.tolist())
+    angle = _round_angle(math.degrees(fit.mount[2] if is_turned else mount[2]), is_turned)
+    agree = f"then scans and odometry agree about {counted(fit.steps, 'step')}"
+    cure = f"try --mount {x},{y},{angle}"
+    if not is_turned:
+        along = f"{off[0]:+.2f} m ahead and {off[1]:+.2f} m to the left"
+        what = f"the laser is likely elsewhere on the robot than the file says, by {along}"
+        return Finding(f"{what}; {agree}; {cure}")
+    side, degrees = "left" if turn > 0 else "right", abs(math.degrees(turn))
+    if abs(turn) > math.pi - OPPOSITE_WITHIN:
+        cure += f", or --odometry-scale {-reading.odometry_scale:g} if odometry counts forward as backward"
+    what = f"the laser likely looks {degrees:.0f}° further to the {side} than the file says"
+    return Finding(f"{what}; {agree}; {cure}")
+
+
+def backwards(fit: MountFit, reading: ReadingOptions) -> Finding:
+    """Odometry counts forward as backward: then the laser is where the file has it."""
+    return Finding(
+        "odometry likely counts forward as backward: then the laser is where the file says, and scans and "
+        f"odometry agree about {counted(fit.steps, 'step')}; try --odometry-scale {-reading.odometry_scale:g}"
+    )
+
+
+def _round_angle(degrees: float, is_measured: bool) -> str:
+    if is_measured:
+        rounded = ROUND_ANGLE * round(degrees / ROUND_ANGLE)
+        degrees = rounded if abs(rounded - degrees) <= ROUND_WITHIN else round(degrees)
+    # −180° and 180° are one direction.
+    return f"{math.degrees(float(wrap(math.radians(degrees)))):g}"

@@ -1,0 +1,72 @@
+"""The steps of a log by scans and by odometry: what mounting, scale and signs explain them."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from nscan_cli.calibration.measured_steps import MeasuredSteps
+from nscan_cli.calibration.options import FileCheckOptions
+from nscan_cli.calibration.mount_fit import MountFit, TurnFit, fit_mount, fit_turns
+from nscan_cli.poses import MIRRORED, Array, are_known
+
+
+class StepEvidence:
+    """The steps by scans and by odometry, of those that have both."""
+
+    def __init__(self, odometry: Array, steps: MeasuredSteps, options: FileCheckOptions) -> None:
+        """`odometry` (S, 3) are the poses of all scans."""
+        by_odometry = steps.odometry(odometry)
+        self.steps, self.options, self.poses = steps, options, odometry
+        self._known = are_known(by_odometry)
+        laser, self.odometry = steps.laser[self._known], by_odometry[self._known]
+        self.laser, least = laser, options.steps.min_motion
+        self._is_moving = (np.hypot(laser[:, 0], laser[:, 1]) >= least) | (np.abs(laser[:, 2]) >= least)
+
+    @property
+    def moving(self) -> int:
+        """The number of steps with motion by scans."""
+        return int(self._is_moving.sum())
+
+    def turns(self) -> TurnFit | None:
+        """Turns by odometry as a multiple of those by scans; None for few."""
+        return fit_turns(self.laser, self.odometry, self.options.steps.min_motion)
+
+    def fit(self, mirrored: bool = False) -> MountFit | None:
+        """The mounting and the scale that explain the steps with motion, of scans or of mirrored scans."""
+        laser = self.laser[self._is_moving] * (MIRRORED if mirrored else 1.0)
+        return fit_mount(laser, self.odometry[self._is_moving], self.options.steps.metres_per_radian)
+
+    def fit_with_signs(self, signs: Array) -> MountFit | None:
+        """The fit of odometry whose coordinates are multiplied by signs (3,)."""
+        odometry = self.steps.odometry(self.poses * signs)[self._known][self._is_moving]
+        return fit_mount(self.laser[self._is_moving], odometry, self.options.steps.metres_per_radian)
+
+
+def explains(fit: MountFit | None, options: FileCheckOptions) -> bool:
+    """Whether a mounting and a scale explain the positions."""
+    return fit is not None and fit.spread <= options.max_spread and fit.tail <= options.max_tail
+
+
+def is_excluded(fit: MountFit | None, options: FileCheckOptions) -> bool:
+    """Whether no mounting and no scale comes near to explaining the positions."""
+    return (
+        fit is not None and fit.steps >= options.min_steps_to_exclude and fit.spread > options.excluded_spread
+    )
+
+
+def turns_agree(turns: TurnFit, options: FileCheckOptions) -> bool:
+    """Whether turns by odometry and by scans are of the same size; they may be opposite."""
+    return turns.spread <= options.max_spread and abs(abs(turns.ratio) - 1.0) <= options.max_turn_error
+
+
+def is_nearer(fit: MountFit, one: Array, other: Array, sigmas: float) -> bool:
+    """Whether a fit is nearer to one mounting (3,) than to another, by so many standard deviations.
+
+    Their places alone are compared.
+    """
+    apart = float(np.hypot(*(one - other)[:2]))
+    if apart == 0.0:
+        return False
+    away, from_other = (float(np.hypot(*(fit.mount - mount)[:2])) for mount in (one, other))
+    # From the line half-way between both.
+    return from_other**2 - away**2 > 2.0 * apart * sigmas * float(fit.sigmas[1:3].max())
