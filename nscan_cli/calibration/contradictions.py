@@ -9,9 +9,9 @@ import numpy as np
 from nscan_cli.calibration import findings
 from nscan_cli.calibration.findings import OPPOSITE_WITHIN, Finding
 from nscan_cli.calibration.measured_steps import MeasuredSteps, measure_steps
+from nscan_cli.calibration.mount_fit import MountFit, TurnFit
 from nscan_cli.calibration.odometry_clock import ClockLag, clock_lag
 from nscan_cli.calibration.options import FileCheckOptions
-from nscan_cli.calibration.mount_fit import MountFit, TurnFit
 from nscan_cli.calibration.step_evidence import StepEvidence, explains, is_excluded, is_nearer, turns_agree
 from nscan_cli.calibration.step_sampling import telling_steps
 from nscan_cli.logs.laser_log import LaserLog
@@ -107,7 +107,7 @@ def _of_clocks(
     if sign > 0.0:
         return [findings.two_clocks(lag, reading)]
     evidence = "turns by odometry, at that offset, are those by scans the other way round"
-    return [findings.two_clocks(lag, reading), findings.mirrored(evidence, reading, False)]
+    return [findings.two_clocks(lag, reading), findings.opposite_turns(evidence, reading, False)]
 
 
 def _is_offset(lag: ClockLag, options: FileCheckOptions) -> bool:
@@ -129,7 +129,7 @@ def _of_opposite_turns(
     if is_nearer(fit, other, as_told, options.mount_sigmas):
         return [findings.wrong_turns(turns), *_of_positions(other, fit, reading, options)]
     is_certain = is_nearer(fit, as_told, other, options.mount_sigmas)
-    mirrored = findings.mirrored(findings.turns_of(turns), reading, is_certain)
+    mirrored = findings.opposite_turns(findings.turns_of(turns), reading, is_certain)
     return [mirrored, *_of_positions(log.mount, fit, reading, options)]
 
 

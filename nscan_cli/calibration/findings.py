@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
+from nscan_cli.calibration.mount_fit import MountFit, TurnFit
 from nscan_cli.calibration.odometry_clock import ClockLag
 from nscan_cli.calibration.options import FileCheckOptions
-from nscan_cli.calibration.mount_fit import MountFit, TurnFit
 from nscan_cli.calibration.step_evidence import StepEvidence
 from nscan_cli.files.text import counted
 from nscan_cli.logs.reading_options import ReadingOptions
@@ -82,7 +82,7 @@ def two_clocks(lag: ClockLag, reading: ReadingOptions) -> Finding:
     )
 
 
-def mirrored(evidence: str, reading: ReadingOptions, is_certain: bool) -> Finding:
+def opposite_turns(evidence: str, reading: ReadingOptions, is_certain: bool) -> Finding:
     """Scans turn the other way than odometry. `is_certain`: the mounting tells that the readings are wrong.
 
     Without that, scans and odometry are the mirror image of what they are if the other one is wrong.

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from nscan_cli.calibration.measured_steps import MeasuredSteps
-from nscan_cli.calibration.options import FileCheckOptions
 from nscan_cli.calibration.mount_fit import MountFit, TurnFit, fit_mount, fit_turns
+from nscan_cli.calibration.options import FileCheckOptions
 from nscan_cli.poses import MIRRORED, Array, are_known
 
 
