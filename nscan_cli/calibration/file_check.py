@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
+from nscan_cli.calibration.companions import checked_companion
 from nscan_cli.calibration.contradictions import find_contradictions
 from nscan_cli.calibration.held_odometry import checked_held
 from nscan_cli.calibration.options import FileCheckOptions
@@ -39,7 +40,12 @@ def checked_file(log: LaserLog, reading: ReadingOptions, options: FileCheckOptio
         if finding.corrected:
             corrected = replace(reading, **finding.corrected)
             log, reading = _as_read(log, reading, corrected), corrected
-    return CheckedFile(log, reading, said + held + [finding.message for finding in findings])
+    said += held + [finding.message for finding in findings]
+    if any(not finding.corrected for finding in findings):
+        # Where the robot has been is in doubt.
+        return CheckedFile(log, reading, said)
+    log, reading, along = checked_companion(log, reading, options.companion)
+    return CheckedFile(log, reading, said + along)
 
 
 def _as_read(log: LaserLog, reading: ReadingOptions, corrected: ReadingOptions) -> LaserLog:

@@ -177,6 +177,7 @@ def laser_log(
             laser_option=findings.laser_option,
             odometries=findings.odometries,
             corrected=findings.corrected,
+            masked=tuple(sectors),
             contradictions=(*findings.contradictions, *contradictions, *masked, *sweep.said),
         ),
         beams=None if (beams == ranges.shape[1]).all() else beams,

@@ -14,6 +14,7 @@ from nscan_cli.errors import InputDataError, WrongUsageError
 from nscan_cli.files.provenance import Source
 from nscan_cli.files.text import counted
 from nscan_cli.kernels.decorators import kernel
+from nscan_cli.logs.beam_mask import Bearings
 from nscan_cli.logs.beam_times import BeamTimes, swept_points
 from nscan_cli.logs.device_choice import Device
 from nscan_cli.logs.frame_names import DEFAULT_FRAMES, FrameNames
@@ -54,6 +55,8 @@ class LogReport:
     """All odometries that --odom-topic can choose."""
     corrected: str = ""
     """The sign that the poses are the result of a mapper; empty if there is none."""
+    masked: tuple[Bearings, ...] = ()
+    """Sectors whose beams are not read, rad."""
     contradictions: tuple[str, ...] = ()
     """Sentences for the user: what of the log the scans contradict, and what was corrected."""
 

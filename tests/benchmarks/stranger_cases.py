@@ -184,8 +184,9 @@ FAULTS: tuple[tuple[str, Fault, str], ...] = (
     ("two posts of 10°", _posts((40.0, 50.0, 0.3), (-50.0, -40.0, 0.3)), "see the robot itself"),
     ("two posts of 20°", _posts((35.0, 55.0, 0.3), (-55.0, -35.0, 0.3)), "see the robot itself"),
     ("a wheel of 15° at 0.15 m", _posts((70.0, 85.0, 0.15)), "see the robot itself"),
-    ("someone follows at 0.6 m", lambda log: faults.follower(log, 0.6), ""),
-    ("cart on a hinge", faults.cart, "see the robot itself|moves along|walks along"),
+    ("someone follows at 0.6 m", lambda log: faults.follower(log, 0.6), "goes along with the robot"),
+    ("someone follows at 0.4 m", lambda log: faults.follower(log, 0.4), "goes along with the robot"),
+    ("cart on a hinge", faults.cart, "goes along with the robot"),
 )  # fmt: skip
 """Name, fault, and what tells its cause."""
 FAULTS_OF_REAL_LOGS = ("", "two posts of 20°", "odometry × 1000", "odometry frozen for a third")

@@ -6,6 +6,7 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 
+from nscan_cli.calibration.companions import find_companion, mask_text
 from nscan_cli.files.text import counted
 from nscan_cli.graph.optimise.graduated_nonconvexity import chi2_by_three
 from nscan_cli.logs.laser_log import LaserLog
@@ -35,7 +36,13 @@ def notices(state: SlamState) -> list[str]:
     if frozen:
         found.append(f"the laser repeats itself at {_numbered(log, frozen)}; these scans are not matched")
     found += _scan_notices(state) if state.odometry is None else _odometry_notices(state)
-    return found + _view_mismatches(state) + _contradictions(state) + _free_space_violations(state)
+    return (
+        found
+        + _companions(state)
+        + _view_mismatches(state)
+        + _contradictions(state)
+        + _free_space_violations(state)
+    )
 
 
 def _odometry_notices(state: SlamState) -> list[str]:
@@ -102,6 +109,15 @@ def _untold_ways(state: SlamState) -> list[str]:
         f"the walls do not show how far the robot went: {named}; "
         "without odometry steady motion is assumed there, and the length is a guess"
     ]
+
+
+def _companions(state: SlamState) -> list[str]:
+    """Whether something goes along with the robot that the check of the file could not see."""
+    poses, options = np.concatenate(state.tracked), state.options.file_check.companion
+    found = find_companion(state.log, poses, options)
+    if found is None:
+        return []
+    return [f"{found.seen}; try --mask {mask_text(found.mask(state.log.report.masked))}"]
 
 
 def _view_mismatches(state: SlamState) -> list[str]:

@@ -1,0 +1,142 @@
+"""What goes along with the robot without being a part of it: a cart on a hinge, someone who follows or leads.
+
+Its ranges vary, so it is no part of the robot, and it is nothing of the map, which it seems to hold still.
+But it is where the robot itself was a moment ago, or will be in a moment: no wall is there.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from nscan_cli.calibration.options import CompanionOptions
+from nscan_cli.logs.beam_mask import Bearings, mask_beams, sectors_text
+from nscan_cli.logs.laser_log import LaserLog
+from nscan_cli.logs.reading_options import ReadingOptions
+from nscan_cli.poses import Array, Indices, Mask, are_known, compose, transform
+
+BIN = np.radians(2.0)
+"""rad; sectors consist of bins of this width."""
+
+
+@dataclass(frozen=True)
+class Companion:
+    """Something that goes along."""
+
+    share: float
+    """Of the scans that were looked at, those in which it is on the robot's path."""
+    sectors: list[Bearings]
+    """In which it is seen, in the laser's frame, rad."""
+
+    @property
+    def seen(self) -> str:
+        """What was found, for a message."""
+        return (
+            f"something goes along with the robot: in {self.share:.0%} of the scans it is where the robot "
+            "itself has just been or is about to be, as a cart or someone who follows"
+        )
+
+    def mask(self, others: tuple[Bearings, ...]) -> tuple[Bearings, ...]:
+        """Its sectors and others, as they are read without."""
+        return (*others, *self.sectors)
+
+
+def mask_text(sectors: tuple[Bearings, ...]) -> str:
+    """Sectors (rad) as --mask takes them."""
+    return sectors_text([(float(np.degrees(first)), float(np.degrees(last))) for first, last in sectors])
+
+
+def checked_companion(
+    log: LaserLog, reading: ReadingOptions, options: CompanionOptions
+) -> tuple[LaserLog, ReadingOptions, list[str]]:
+    """The log without the beams that see what goes along by its odometry, how it is read, what is said."""
+    found = None if log.odometry is None else find_companion(log, log.odometry, options)
+    if found is None:
+        return log, reading, []
+    ranges = log.ranges.copy()
+    mask_beams(ranges, log.angle_min, log.angle_increment, found.sectors)
+    mask = found.mask(log.report.masked)
+    said = f"{found.seen}; its beams are left out, as by --mask {mask_text(mask)}; --as-recorded uses them"
+    return replace(log, ranges=ranges), replace(reading, mask=mask), [said]
+
+
+def find_companion(log: LaserLog, poses: Array, options: CompanionOptions) -> Companion | None:
+    """What goes along in a log whose robot moves through poses (S, 3), nan where unknown; None if nothing."""
+    rows = np.flatnonzero(are_known(poses))
+    steps = np.hypot(*np.diff(poses[rows, :2], axis=0).T)
+    # Who jumps is not followed over the jump.
+    along = np.append(0.0, np.cumsum(np.where(steps > options.longest_step, options.farthest, steps)))
+    if along[-1] < options.min_way:
+        return None
+    at = np.arange(0.0, along[-1], options.path_step)
+    path = np.stack([np.interp(at, along, column) for column in poses[rows, :2].T], axis=1)
+    # Evenly by the way: a robot that stands tells nothing.
+    some = np.unique(np.searchsorted(along, np.linspace(0.0, along[-1], options.scans)))
+    found, looked_at = [], 0
+    for k in some.tolist():
+        apart = np.abs(at - along[k])
+        about = path[(apart > options.nearest) & (apart < options.farthest)]
+        seen = _seen(log, int(rows[k]), poses[rows[k]], about, options)
+        looked_at += seen is not None
+        if seen is not None and len(seen):
+            found.append(seen)
+    share = len(found) / max(looked_at, 1)
+    return None if share < options.min_share else Companion(share, _sectors(found, options))
+
+
+def _seen(log: LaserLog, row: int, pose: Array, path: Array, options: CompanionOptions) -> Indices | None:
+    """The bins of bearings in which a scan at a pose (3,) sees something on the path (n, 2) about it.
+
+    None if there is no path at some distance from the robot.
+    """
+    path = path[np.hypot(*(path - pose[:2]).T) > options.clearance]
+    if not len(path):
+        return None
+    every = max(log.ranges.shape[1] // options.max_beams, 1)
+    ranges = log.readings(row)[::every]
+    bearings = log.angle_min[row] + every * log.angle_increment[row] * np.arange(len(ranges))
+    is_near = np.isfinite(ranges) & (ranges < options.max_range)
+    ranges, bearings = ranges[is_near].astype(np.float64), bearings[is_near]
+    ends = np.stack([ranges * np.cos(bearings), ranges * np.sin(bearings)], axis=1)
+    places = transform(compose(pose, log.mount), ends)
+    is_on_path = _is_on_path(places, path, options.radius)
+    if np.count_nonzero(is_on_path) < options.min_beams:
+        return np.zeros(0, dtype=np.int64)
+    # The rest of it is joined to that and not far away.
+    middle = places[is_on_path].mean(axis=0)
+    is_joined = np.hypot(*np.diff(places, axis=0).T) < options.max_gap
+    groups = np.append(0, np.cumsum(~is_joined))
+    is_of_it = np.isin(groups, groups[is_on_path]) & (np.hypot(*(places - middle).T) < options.max_size)
+    return np.unique(np.floor(np.mod(bearings[is_of_it], 2 * np.pi) / BIN).astype(np.int64))
+
+
+def _is_on_path(places: Array, path: Array, radius: float) -> Mask:
+    """(m,) which of the places (m, 2) are within a radius (m) of the path (n, 2)."""
+    if not len(places):
+        return np.zeros(0, dtype=np.bool_)
+    squares = ((places[:, None] - path[None]) ** 2).sum(axis=2)
+    near: Mask = squares.min(axis=1) < radius**2
+    return near
+
+
+def _sectors(seen: list[Indices], options: CompanionOptions) -> list[Bearings]:
+    """The sectors of bins that are seen in more than a few of the scans, and a bin to each side."""
+    size = round(2 * np.pi / BIN)
+    counts = np.bincount(np.concatenate(seen), minlength=size)[:size]
+    # No more than half of all: the rest is what the map is made from.
+    often = counts > max(options.min_sector_share * len(seen), int(np.sort(counts)[size // 2]))
+    chosen = often | np.roll(often, 1) | np.roll(often, -1)
+    begins = np.flatnonzero(chosen & ~np.roll(chosen, 1))
+    ends = np.flatnonzero(chosen & ~np.roll(chosen, -1)) + 1
+    # The last sector may go on beyond 0.
+    if len(ends) and ends[0] <= begins[0]:
+        ends = np.roll(ends, -1)
+    return [
+        (_bearing(begin), _bearing(end)) for begin, end in zip(begins.tolist(), ends.tolist(), strict=True)
+    ]
+
+
+def _bearing(bin_edge: int) -> float:
+    """The bearing of an edge between two bins, from −π to π, rad."""
+    return float(np.mod(bin_edge * BIN + np.pi, 2 * np.pi) - np.pi)
