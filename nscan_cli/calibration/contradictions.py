@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from nscan_cli.calibration import findings
-from nscan_cli.calibration.findings import OPPOSITE_WITHIN, Finding
+from nscan_cli.calibration.findings import Finding
 from nscan_cli.calibration.measured_steps import MeasuredSteps, measure_steps
 from nscan_cli.calibration.mount_fit import MountFit, TurnFit
 from nscan_cli.calibration.odometry_clock import ClockLag, clock_lag
@@ -18,6 +18,8 @@ from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.logs.reading_options import ReadingOptions
 from nscan_cli.poses import MIRRORED, Array, Mask, are_known, relative, wrap
 
+OPPOSITE_WITHIN = 0.1
+"""rad; a laser that seems to look back to within this may be one of a robot that seems to drive backwards."""
 BACKWARDS = np.array([-1.0, -1.0, 1.0])
 """Factors of a mounting: of a robot that counts forward as backward the laser seems to be there, turned."""
 ONE_AXIS_REVERSED = np.array([-1.0, 1.0, 1.0])
@@ -46,12 +48,12 @@ def find_contradictions(log: LaserLog, reading: ReadingOptions, options: FileChe
         return [unusable]
     if turns is not None and turns.ratio < 0.0 and _are_told(turns, options):
         if turns_agree(turns, options) and mirrored is not None and explains(mirrored, options):
-            return _of_opposite_turns(log, turns, mirrored, reading, options)
-        return [findings.wrong_turns(turns), *_of_positions(log.mount, fit, reading, options)]
+            return _of_opposite_turns(log.mount, turns, mirrored, evidence, reading, options)
+        return [findings.wrong_turns(turns), *_of_positions(log.mount, fit, evidence, reading, options)]
     found = []
     if turns is not None and _are_told(turns, options) and not turns_agree(turns, options):
         found.append(findings.wrong_turns(turns))
-    return found + _of_positions(log.mount, fit, reading, options)
+    return found + _of_positions(log.mount, fit, evidence, reading, options)
 
 
 def _is_still(odometry: Array, still: float) -> Mask:
@@ -116,25 +118,34 @@ def _is_offset(lag: ClockLag, options: FileCheckOptions) -> bool:
 
 
 def _of_opposite_turns(
-    log: LaserLog, turns: TurnFit, fit: MountFit, reading: ReadingOptions, options: FileCheckOptions
+    mount: Array,
+    turns: TurnFit,
+    fit: MountFit,
+    evidence: StepEvidence,
+    reading: ReadingOptions,
+    options: FileCheckOptions,
 ) -> list[Finding]:
     """Readings in the wrong order, or odometry that turns the wrong way; `fit` is that of mirrored scans.
 
     One is the mirror image of the other, but for where the laser is on the robot: if it is aside, the file
     has it on the right side in one case alone.
     """
-    as_told, other = log.mount, log.mount * MIRRORED
+    other = mount * MIRRORED
     # Small steps aside, which may be of either sign, would pass for a place farther ahead or behind.
     options = replace(options, min_mount_move=np.inf)
-    if is_nearer(fit, other, as_told, options.mount_sigmas):
-        return [findings.wrong_turns(turns), *_of_positions(other, fit, reading, options)]
-    is_certain = is_nearer(fit, as_told, other, options.mount_sigmas)
+    if is_nearer(fit, other, mount, options.mount_sigmas):
+        return [findings.wrong_turns(turns), *_of_positions(other, fit, evidence, reading, options)]
+    is_certain = is_nearer(fit, mount, other, options.mount_sigmas)
     mirrored = findings.opposite_turns(findings.turns_of(turns), reading, is_certain)
-    return [mirrored, *_of_positions(log.mount, fit, reading, options)]
+    return [mirrored, *_of_positions(mount, fit, evidence, reading, options)]
 
 
 def _of_positions(
-    mount: Array, fit: MountFit | None, reading: ReadingOptions, options: FileCheckOptions
+    mount: Array,
+    fit: MountFit | None,
+    evidence: StepEvidence,
+    reading: ReadingOptions,
+    options: FileCheckOptions,
 ) -> list[Finding]:
     """What the positions by odometry say of its scale and of the mounting, which the file has at (3,)."""
     if fit is None or not explains(fit, options):
@@ -142,8 +153,25 @@ def _of_positions(
     found = []
     if findings.is_wrong_scale(fit, options):
         found.append(findings.wrong_scale(fit, reading, options))
-    is_opposite = abs(float(wrap(fit.mount[2] - mount[2]))) > np.pi - OPPOSITE_WITHIN
-    if is_opposite and is_nearer(fit, mount * BACKWARDS, mount, options.mount_sigmas):
-        return [*found, findings.backwards(fit, reading)]
-    mounting = findings.wrong_mounting(mount, fit, reading, options)
+    if abs(float(wrap(fit.mount[2] - mount[2]))) > np.pi - OPPOSITE_WITHIN:
+        return [*found, _opposite(mount, fit, evidence, reading, options)]
+    mounting = findings.wrong_mounting(mount, fit, options)
     return found if mounting is None else [*found, mounting]
+
+
+def _opposite(
+    mount: Array, fit: MountFit, evidence: StepEvidence, reading: ReadingOptions, options: FileCheckOptions
+) -> Finding:
+    """A laser that looks back, or odometry that counts forward as backward.
+
+    The place of the laser tells, if it is ahead of the robot's middle or behind; else that robots mostly
+    drive forward.
+    """
+    sigmas, forward = options.mount_sigmas, evidence.forward_share
+    is_backward = is_nearer(fit, mount * BACKWARDS, mount, sigmas)
+    if is_backward or is_nearer(fit, mount, mount * BACKWARDS, sigmas):
+        why = "the laser is where the file says"
+    else:
+        is_backward = forward < 0.5
+        why = f"{forward:.0%} of the steps by odometry go forward"
+    return findings.opposite(mount, fit, why, is_backward, reading)

@@ -18,8 +18,6 @@ from nscan_cli.poses import Array, wrap
 
 ROUND_ANGLE, ROUND_WITHIN = 15.0, 3.0
 """Degrees: lasers are mounted at round angles; a measured one this near to one is that."""
-OPPOSITE_WITHIN = 0.1
-"""rad; a laser that seems to look back to within this may be one of a robot that seems to drive backwards."""
 MOST_WRONG_RANGES = 10.0
 """Ranges that are wrong by a larger factor are not of a room, which a reader notices."""
 UNDONE = "--as-recorded uses it as it is"
@@ -136,9 +134,7 @@ def wrong_scale(fit: MountFit, reading: ReadingOptions, options: FileCheckOption
     )
 
 
-def wrong_mounting(
-    mount: Array, fit: MountFit, reading: ReadingOptions, options: FileCheckOptions
-) -> Finding | None:
+def wrong_mounting(mount: Array, fit: MountFit, options: FileCheckOptions) -> Finding | None:
     """The laser is elsewhere than in the file, at `mount` (3,), or looks elsewhere; None if it does not."""
     off, sigmas = fit.mount - mount, options.mount_sigmas
     turn = float(wrap(off[2]))
@@ -158,18 +154,28 @@ def wrong_mounting(
         what = f"the laser is likely elsewhere on the robot than the file says, by {along}"
         return Finding(f"{what}; {agree}; {cure}")
     side, degrees = "left" if turn > 0 else "right", abs(math.degrees(turn))
-    if abs(turn) > math.pi - OPPOSITE_WITHIN:
-        cure += f", or --odometry-scale {-reading.odometry_scale:g} if odometry counts forward as backward"
     what = f"the laser likely looks {degrees:.0f}° further to the {side} than the file says"
     return Finding(f"{what}; {agree}; {cure}")
 
 
-def backwards(fit: MountFit, reading: ReadingOptions) -> Finding:
-    """Odometry counts forward as backward: then the laser is where the file has it."""
-    return Finding(
-        "odometry likely counts forward as backward: then the laser is where the file says, and scans and "
-        f"odometry agree about {counted(fit.steps, 'step')}; try --odometry-scale {-reading.odometry_scale:g}"
-    )
+def opposite(
+    mount: Array, fit: MountFit, evidence: str, is_odometry: bool, reading: ReadingOptions
+) -> Finding:
+    """Odometry counts forward as backward, or the laser looks back; `evidence` says why it is the one.
+
+    The file has the laser at `mount` (3,).
+    """
+    angle = _round_angle(math.degrees(fit.mount[2]), is_measured=True)
+    by_mount = f"--mount {mount[0]:g},{mount[1]:g},{angle}"
+    by_scale = f"--odometry-scale {-reading.odometry_scale:g}"
+    if is_odometry:
+        what, other = "odometry likely counts forward as backward", "the laser looks back"
+        cures = by_scale, by_mount
+    else:
+        what = "the laser likely looks 180° further to the left than the file says"
+        other, cures = "odometry counts forward as backward", (by_mount, by_scale)
+    agree = f"then scans and odometry agree about {counted(fit.steps, 'step')}, and {evidence}"
+    return Finding(f"{what}; {agree}; try {cures[0]}, or {cures[1]} if {other}")
 
 
 def _round_angle(degrees: float, is_measured: bool) -> str:

@@ -27,6 +27,11 @@ class StepEvidence:
         """The number of steps with motion by scans."""
         return int(self._is_moving.sum())
 
+    @property
+    def forward_share(self) -> float:
+        """The share of the steps with motion that go forward by odometry."""
+        return float((self.odometry[self._is_moving, 0] > 0.0).mean())
+
     def turns(self) -> TurnFit | None:
         """Turns by odometry as a multiple of those by scans; None for few."""
         return fit_turns(self.laser, self.odometry, self.options.steps.min_motion)

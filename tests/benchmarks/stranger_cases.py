@@ -176,7 +176,7 @@ FAULTS: tuple[tuple[str, Fault, str], ...] = (
     ("readings reversed", faults.mirrored, "in the wrong order"),
     ("looks 90° left", _looking(-90.0), "90° further to the left"),
     ("looks 90° right", _looking(90.0), "(90|89|91)° further to the right"),
-    ("looks back", _looking(180.0), "1(80|79|78)° further"),
+    ("looks back", _looking(180.0), "looks 180° further"),
     ("looks 30° left", _looking(-30.0), "(29|30|31)° further to the left"),
     ("odometry 30 s late", lambda log: faults.odometry_late(log, 30.0), "clock of odometry"),
     ("odometry 3 s early", lambda log: faults.odometry_late(log, -3.0), "clock of odometry"),

@@ -46,7 +46,10 @@ LIKELY: dict[str, tuple[Fault, str]] = {
         lambda log: faults.mounted_otherwise(log, np.pi),
         "180° further.*try --mount 0.1,0,0, or --odometry-scale -1 if",
     ),
-    "drives backwards": (faults.odometry_behind, "forward as backward.*try --odometry-scale -1$"),
+    "drives backwards": (
+        faults.odometry_behind,
+        "forward as backward;.*where the file says; try --odometry-scale -1, or --mount 0.1,0,180 if",
+    ),
     "is elsewhere": (
         lambda log: replace(log, mount=log.mount + np.array([0.3, -0.2, 0.0])),
         r"by -0\.(29|30|31) m ahead and \+0\.(19|20|21) m to the left.*try --mount 0.(09|1|11),-?0",
@@ -121,6 +124,19 @@ def test_odometry_of_no_use_is_not_used(make, words):
     assert not checked.reading.odometry
     (message,) = checked.messages
     assert message.startswith(words)
+
+
+def central(log: LaserLog) -> LaserLog:
+    """The drive with its laser in the middle of the robot."""
+    assert log.odometry is not None
+    return replace(log, odometry=compose(log.odometry, log.mount), mount=np.zeros(3))
+
+
+def test_a_robot_with_its_laser_in_the_middle_mostly_drives_forward():
+    (looks,) = found(faults.mounted_otherwise(central(drive()), np.pi))
+    assert re.search(r"180° further.*100% of the steps by odometry go forward; try --mount 0,0,-?0", looks)
+    (counts,) = found(faults.odometry_behind(central(drive())))
+    assert re.search("forward as backward;.* 0% of the steps.*; try --odometry-scale -1, or --mount", counts)
 
 
 def aside(log: LaserLog) -> LaserLog:
