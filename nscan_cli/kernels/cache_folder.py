@@ -24,7 +24,12 @@ from nscan_cli import __version__
 from nscan_cli.files.outputs import TEMPORARY_PREFIX, write_once
 
 PACKAGE = Path(__file__).parents[1]
-COMPILER_SOURCES = {"kernels/cache_folder.py", "kernels/decorators.py", "kernels/machine_code.py"}
+COMPILER_SOURCES = {
+    "kernels/cache_folder.py",
+    "kernels/decorators.py",
+    "kernels/machine_code.py",
+    "kernels/whole_kernels.py",
+}
 """Files of the package that decide how machine code is compiled and cached."""
 FOLDER_NAME = re.compile(r"\d[\w.+]*-[0-9a-f]{16}")
 """The name of a cache folder: a version and a hash."""

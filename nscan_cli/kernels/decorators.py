@@ -1,7 +1,4 @@
-"""`kernel`, the decorator of compiled functions: it loads cached machine code, or has numba compile it.
-
-numba's own cache is used beside it, so that a function that two kernels call is compiled once.
-"""
+"""`kernel`, the decorator of compiled functions: it loads cached machine code, or has numba compile it."""
 
 from __future__ import annotations
 
@@ -17,6 +14,7 @@ import numpy as np
 
 from nscan_cli.kernels import machine_code
 from nscan_cli.kernels.cache_folder import cache_folder
+from nscan_cli.kernels.whole_kernels import compile_whole
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 
@@ -104,7 +102,6 @@ class Kernel:
         """Compiled functions by the types of the arguments (`_type_key`)."""
         self.by_fingerprint: dict[object, Callable[..., Any]] = {}
         """The same functions by the fingerprints of the arguments, which are faster to take."""
-        self._dispatcher: Any = None
 
     def __call__(self, *arguments: Any) -> Any:
         """What the function returns."""
@@ -131,44 +128,46 @@ class Kernel:
         loaded = machine_code.load(file, self.py_func.__name__)
         if loaded is None:
             _announce_compile()
-            jitted = self._njit(arguments)
-            (compiled,) = jitted.overloads.values()
             # Another process may have saved its code first.
-            loaded = machine_code.save(file, self.py_func.__name__, compiled) or jitted
-        return cast(Callable[..., Any], loaded)
+            loaded = machine_code.save(file, self.py_func.__name__, lambda: self._compile(arguments))
+        return cast(Callable[..., Any], loaded or self.dispatcher)
 
-    @property
+    def _compile(self, arguments: tuple[Any, ...]) -> Any:
+        """numba's CompileResult for arguments of these types."""
+        types = tuple(map(_import_numba().typeof, arguments))
+        return compile_whole(self.py_func, types, self._options)
+
+    @functools.cached_property
     def dispatcher(self) -> Any:
-        """numba's dispatcher of the function, with numba's own cache. Kernels that call this one use it."""
-        with COMPILE_LOCK:
-            if self._dispatcher is None:
-                self._dispatcher = self._njit()
-                _tolerate_broken_cache(getattr(self._dispatcher, "_cache", None))
-        return self._dispatcher
-
-    def _njit(self, arguments: tuple[Any, ...] | None = None) -> Any:
-        """A dispatcher that compiles at its first call; given arguments, now and for their types only."""
+        """numba's dispatcher of the function with numba's own cache, for where no machine code is cached."""
         numba = _import_numba()
         config: Any = numba.config
-        folder = cache_folder() if arguments is None else None
-        signature = None if arguments is None else [tuple(map(numba.typeof, arguments))]
+        folder = cache_folder()
         # numba reads its cache folder when it decorates. It is restored for other users of numba.
         own = "" if folder is None else str(folder / machine_code.vector_library())
         configured, config.CACHE_DIR = config.CACHE_DIR, own
         try:
-            return numba.njit(signature, cache=folder is not None, **self._options)(self.py_func)
+            dispatcher = numba.njit(cache=folder is not None, **self._options)(self.py_func)
         finally:
             config.CACHE_DIR = configured
+        _tolerate_broken_cache(getattr(dispatcher, "_cache", None))
+        return dispatcher
+
+    @functools.cached_property
+    def _called(self) -> Any:
+        """numba's dispatcher of the function in kernels that call it. Python cannot call this one."""
+        wrappers = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+        return _import_numba().njit(**wrappers, **self._options)(self.py_func)
 
     @property
     def _numba_type_(self) -> Any:
         """The numba type of this kernel in one that calls it."""
-        return self.dispatcher._numba_type_
+        return self._called._numba_type_
 
     @property
     def targetoptions(self) -> Any:
         """The options in which numba looks for `inline`."""
-        return self.dispatcher.targetoptions
+        return self._called.targetoptions
 
 
 def _import_numba() -> Any:

@@ -29,6 +29,7 @@ import numpy as np
 
 from nscan_cli.files.outputs import write_once
 from nscan_cli.kernels.cache_folder import cache_folder
+from nscan_cli.kernels.whole_kernels import link_and_optimise
 
 HARMLESS_VARIABLES = {"NUMBA_CACHE_DIR", "NUMBA_NUM_THREADS", "NUMBA_DISABLE_INTEL_SVML"}
 """Settings of numba that do not change machine code."""
@@ -98,23 +99,27 @@ def _short_hash(value: object) -> str:
     return hashlib.sha256(repr(value).encode()).hexdigest()[:16]
 
 
-def save(file: Path, name: str, compiled: Any) -> Callable[..., Any] | None:
-    """Write a CompileResult of numba to the file, unless it exists or there is no room.
+def save(file: Path, name: str, compile_kernel: Callable[[], Any]) -> Callable[..., Any] | None:
+    """Compile a kernel and write it to the file, unless that exists or there is no room.
 
-    Returns the function in the file, or None if there is none. The file that is written first counts for all
-    processes: a kernel that is compiled twice can round differently, since its machine code also depends on
-    the order in which kernels are compiled.
+    Returns the function, or None if its code can be linked in a process of numba only. The file that is
+    written first counts for all processes: a kernel that is compiled twice can round differently, since its
+    machine code also depends on the order in which kernels are compiled.
 
     The file has a line of JSON with the names that the code defines and needs, a line with the CRC-32 of the
     code, and the code.
     """
     try:
-        head, code = object_code(compiled)
+        head, code = object_code(compile_kernel())
         if UNRESOLVED.intersection(head["needs"]):
             raise UnresolvedSymbolError
-        write_once(file, b"%s\n%d\n%s" % (json.dumps(head).encode(), zlib.crc32(code), code))
-        return _load_checked(file, name)
-    except (OSError, MemoryError):
+        data = b"%s\n%d\n%s" % (json.dumps(head).encode(), zlib.crc32(code), code)
+        # Where there is no room, every process compiles.
+        with contextlib.suppress(OSError):
+            write_once(file, data)
+            data = file.read_bytes()
+        return _load_checked(data, name)
+    except MemoryError:
         return None
     except Exception:
         # An unknown numba can raise anything, and its code can call what only numba has. From the next
@@ -127,17 +132,18 @@ def save(file: Path, name: str, compiled: Any) -> Callable[..., Any] | None:
 
 def object_code(compiled: Any) -> tuple[dict[str, Any], bytes]:
     """The header of a compiled kernel's file, and its machine code."""
-    import llvmlite.binding as llvm
-
-    (_name, _kind, (code, bitcode)), description, *_rest, environments = compiled._reduce()
-    module = llvm.parse_bitcode(bitcode)
+    module, code = link_and_optimise(compiled)
     declared = [each.name for each in (*module.functions, *module.global_variables) if each.is_declaration]
+    description, own = compiled.fndesc, compiled.environment
+    environments = {each.env_name: each for each in compiled._find_referenced_environments()}
     return {
         "function": description.llvm_cpython_wrapper_name,
         "needs": sorted(name for name in declared if not name.startswith("llvm.")),
         "environment": description.env_name,
-        "constants": {each.env_name: [_dtype_text(value) for value in each.consts] for each in environments}
-        | {description.env_name: [_dtype_text(value) for value in compiled.environment.consts]},
+        "constants": {
+            name: [_dtype_text(value) for value in each.consts]
+            for name, each in (environments | {description.env_name: own}).items()
+        },
     }, code
 
 
@@ -154,7 +160,7 @@ def load(file: Path, name: str) -> Callable[..., Any] | None:
     A file that is damaged or needs missing symbols is removed.
     """
     try:
-        return _load_checked(file, name)
+        return _load_checked(file.read_bytes(), name)
     except (FileNotFoundError, MemoryError):
         return None
     except Exception:
@@ -164,8 +170,8 @@ def load(file: Path, name: str) -> Callable[..., Any] | None:
         return None
 
 
-def _load_checked(file: Path, name: str) -> Callable[..., Any]:
-    text, check, code = file.read_bytes().split(b"\n", 2)
+def _load_checked(data: bytes, name: str) -> Callable[..., Any]:
+    text, check, code = data.split(b"\n", 2)
     if int(check) != zlib.crc32(code):
         raise ValueError("damaged")
     # It is linked once: a second copy would share symbols with the first.

@@ -59,3 +59,25 @@ def test_numba_takes_no_vector_library_here(tmp_path):
     told = "import os; print(os.environ['NUMBA_DISABLE_INTEL_SVML']); raise SystemExit"
     (tmp_path / "numba" / "__init__.py").write_text(told)
     assert process(tmp_path, "from some_kernels import add; add(1, 2)") == b"1\n"
+
+
+FOREIGN = """
+import json
+import numba
+import numpy as np
+from some_kernels import Pair, scaled
+
+scaled(Pair(np.ones((2, 3)), 2.0))
+
+@numba.njit
+def own(n):
+    return np.empty(n, dtype=np.float32), np.zeros(n).sum()
+
+print(json.dumps(len(own(3)[0])))
+"""
+
+
+def test_functions_of_others_can_call_what_was_compiled_for_a_kernel(tmp_path):
+    """numba keeps the functions that make arrays: those of a kernel have no machine code."""
+    (tmp_path / "some_kernels.py").write_text(KERNELS)
+    assert process(tmp_path, FOREIGN) == b"3\n"
