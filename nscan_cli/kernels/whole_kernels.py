@@ -17,8 +17,9 @@ def compile_whole(function: Callable[..., Any], types: tuple[Any, ...], options:
     """The CompileResult of a function for arguments of these numba types. It has no machine code yet."""
     import numba
 
+    njit: Any = numba.njit
     with _modules_alone():
-        (compiled,) = numba.njit([types], no_cfunc_wrapper=True, **options)(function).overloads.values()
+        (compiled,) = njit([types], no_cfunc_wrapper=True, **options)(function).overloads.values()
     return compiled
 
 
@@ -49,9 +50,11 @@ def _modules_alone() -> Iterator[None]:
 @functools.cache
 def _code_generator() -> Any:
     """A code generator of numba that generates no machine code."""
-    from numba.core.codegen import JITCodeLibrary, JITCPUCodegen
+    import numba.core.codegen
 
-    class ModuleLibrary(JITCodeLibrary):  # type: ignore[misc]
+    numba_code: Any = numba.core.codegen
+
+    class ModuleLibrary(numba_code.JITCodeLibrary):  # type: ignore[misc]
         """The LLVM module of one function, and the libraries of those that it calls."""
 
         def finalize(self) -> None:
@@ -87,16 +90,18 @@ def _code_generator() -> Any:
             self._optimize_final_module()
             self._final_module.verify()
 
-        def _get_module_for_linking(self) -> Any:
-            """For functions that are not of this package and call this one of numba's."""
-            if self._shared_module is None:
-                whole = type(self)(self._codegen, self.name)
-                whole._linking_libraries = [self]
-                whole.link_called()
-                self._shared_module = whole._final_module
-            return self._shared_module
+        @functools.cached_property
+        def _linked_module(self) -> Any:
+            whole = type(self)(self._codegen, self.name)
+            whole._linking_libraries = [self]
+            whole.link_called()
+            return whole._final_module
 
-    class ModuleGenerator(JITCPUCodegen):  # type: ignore[misc]
+        def _get_module_for_linking(self) -> Any:
+            """The module for functions of others, which may call this one of numba's."""
+            return self._linked_module
+
+    class ModuleGenerator(numba_code.JITCPUCodegen):  # type: ignore[misc]
         """Makes libraries without machine code."""
 
         _library_class = ModuleLibrary
