@@ -143,7 +143,8 @@ def _of_laser(facts: dict[str, Any]) -> list[Row]:
     return [
         ("scans", [f"{facts['scans']}, numbered {facts['first_scan']} to {facts['last_scan']}{rate}"]),
         ("duration", [f"{facts['duration']:.1f} s from {facts['start']}"]),
-        ("beams", [_interval(facts["fewest_beams"], facts["beams"])]),
+        ("beams", [_interval(facts["fewest_beams"], facts["beams"]),
+                   *([used["beams"]] if "beams" in used else [])]),
         ("field of view", [f"{facts['angle_min']:g}° to {facts['angle_max']:g}°, "
                            f"{_interval(finest, coarsest, '°')} a beam"]),
         ("range limits", [f"{low:g} m to {high:g} m",

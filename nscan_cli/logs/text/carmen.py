@@ -20,6 +20,7 @@ from nscan_cli.logs.skips import Skips
 from nscan_cli.logs.text import carmen_records
 from nscan_cli.logs.text.carmen_records import CarmenScans, TaggedLines
 from nscan_cli.logs.text.corrected_poses import sign_of_correction
+from nscan_cli.logs.text.interlaced_scans import between_the_others
 from nscan_cli.logs.text.odometry_records import odometry_of_records, odometry_of_scans
 from nscan_cli.poses import Array, relative, wrap
 
@@ -81,7 +82,7 @@ def read(data: bytes, file: str, source: Source, options: ReadingOptions) -> Las
     params = _params(lines)
     times, by_logger = _scan_order(lines[tag], scans, warnings)
     mount, used["mounting"] = _carmen_mount(tag, scans, params, options, warnings)
-    angle_min, angle_increment, angle_max = _angles(scans)
+    angle_min, angle_increment, angle_max = _angles(scans, used)
     farthest, doubtful = _max_range(tag, scans, params)
     raw = RawScans(
         scans.ranges,
@@ -202,8 +203,11 @@ def _pose_text(pose: Array) -> str:
     return f"{pose[0]:g} m, {pose[1]:g} m, {np.degrees(pose[2]):g}°"
 
 
-def _angles(scans: CarmenScans) -> tuple[Array, Array, Array]:
-    """First direction, step and last direction (S,) of each scan, rad; nan for an unknown last one."""
+def _angles(scans: CarmenScans, used: dict[str, str]) -> tuple[Array, Array, Array]:
+    """First direction, step and last direction (S,) of each scan, rad; nan for an unknown last one.
+
+    Says in `used` if scans are interlaced.
+    """
     counts, which = np.unique(scans.beams, return_inverse=True)
     angles = np.array([beam_angles(beams) for beams in counts.tolist()])[which]
     last = np.full(len(angles), np.nan)
@@ -211,6 +215,15 @@ def _angles(scans: CarmenScans) -> tuple[Array, Array, Array]:
         known = scans.head[:, 3] != 0
         angles[known] = scans.head[known][:, (1, 3)]
         last[known] = scans.head[known][:, (1, 2)].sum(axis=1)
+    between = between_the_others(scans.beams, *angles.T)
+    if between.any():
+        half = 0.5 * angles[between, 1]
+        angles[between, 0] += half
+        last[between] += half
+        used["beams"] = (
+            f"{between.sum()} of {len(between)} scans have {scans.beams[between][0]} readings, "
+            f"which lie between those of the others: they begin {np.degrees(half[0]):g}° later"
+        )
     return angles[:, 0], angles[:, 1], last
 
 

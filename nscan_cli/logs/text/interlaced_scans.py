@@ -1,0 +1,33 @@
+"""Interlaced scans: a SICK LMS sends, in turn, scans whose beams lie between those of the scans before.
+
+A log then has scans of 181 and of 180 readings a degree apart. The head of the record has the same first
+direction for both, but the 180 beams lie between the 181: they begin half a step later. Read as recorded,
+every other scan is turned by half a degree, and scan matching follows it.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from nscan_cli.poses import Array, Indices, Mask
+
+MIN_BEAMS = 90
+"""Least number of readings of the longer scans: shorter scans are parts."""
+MIN_SHARE = 0.05
+"""Least share of the log that both kinds of scans have: a single short scan is a damaged one."""
+SAME = 1e-3
+"""Largest difference of directions and steps that are the same, as a share of the step: they are printed."""
+
+
+def between_the_others(beams: Indices, first: Array, step: Array) -> Mask:
+    """(S,) which scans have their beams between those of the others.
+
+    `beams` (S,) are the numbers of readings, `first` and `step` (S,) the first direction and the step that the
+    log says, rad.
+    """
+    most = int(beams.max(initial=0))
+    short, whole = beams == most - 1, beams == most
+    if most < MIN_BEAMS or min(short.mean(), whole.mean()) < MIN_SHARE or not (short | whole).all():
+        return np.zeros(len(beams), dtype=np.bool_)
+    same = (np.ptp(first) <= SAME * abs(step[0])) & (np.ptp(step) <= SAME * abs(step[0]))
+    return short & same
