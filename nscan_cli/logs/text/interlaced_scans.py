@@ -22,8 +22,8 @@ SAME = 1e-3
 def between_the_others(beams: Indices, first: Array, step: Array) -> Mask:
     """(S,) which scans have their beams between those of the others.
 
-    `beams` (S,) are the numbers of readings, `first` and `step` (S,) the first direction and the step that the
-    log says, rad.
+    `beams` (S,) are the numbers of readings, `first` and `step` (S,) the first direction and the step that
+    the log says, rad.
     """
     most = int(beams.max(initial=0))
     short, whole = beams == most - 1, beams == most
