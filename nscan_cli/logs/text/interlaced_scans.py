@@ -29,5 +29,5 @@ def between_the_others(beams: Indices, first: Array, step: Array) -> Mask:
     short, whole = beams == most - 1, beams == most
     if most < MIN_BEAMS or min(short.mean(), whole.mean()) < MIN_SHARE or not (short | whole).all():
         return np.zeros(len(beams), dtype=np.bool_)
-    same = (np.ptp(first) <= SAME * abs(step[0])) & (np.ptp(step) <= SAME * abs(step[0]))
-    return short & same
+    is_same = max(np.ptp(first), np.ptp(step)) <= SAME * abs(step[0])
+    return short if is_same else np.zeros(len(beams), dtype=np.bool_)
