@@ -131,9 +131,11 @@ def scan_ndt(points: Array, options: PairOptions) -> Ndt:
     )
 
 
-def settle_pair(reference: Ndt, points: Array, start: Array, options: PairOptions) -> PairEnd:
+def settle_pair(
+    reference: Ndt, points: Array, start: Array, options: PairOptions, prior: Prior | None = None
+) -> PairEnd:
     """Match points (m, 2) of a scan as `match_pair` does; quick, for what asks for no uncertainty."""
-    prior = Prior(np.zeros(3), np.zeros((3, 3)))
+    prior = prior or Prior(np.zeros(3), np.zeros((3, 3)))
     problem = PairProblem(reference.grid, reference.half, begin_association(points), options.scale, prior)
     pose, tolerance = start.copy(), options.tolerance
     _, energy, _, _, converged = minimise_pairwise(

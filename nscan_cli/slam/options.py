@@ -7,7 +7,12 @@ from typing import Literal
 
 from nscan_cli.calibration.options import FileCheckOptions
 from nscan_cli.graph.optimise.graduated_nonconvexity import RobustOptions
-from nscan_cli.slam.backend.options import OptimisationOptions, RefinementOptions, ScheduleOptions
+from nscan_cli.slam.backend.options import (
+    OptimisationOptions,
+    RefinementOptions,
+    ScheduleOptions,
+    UnevenMotionOptions,
+)
 from nscan_cli.slam.diagnostics.options import DiagnosticsOptions
 from nscan_cli.slam.frontend.options import BreakOptions, OdometryCheckOptions, TrackingOptions
 from nscan_cli.slam.keyframes.options import KeyframeOptions
@@ -32,6 +37,7 @@ class SlamOptions:
     schedule: ScheduleOptions = field(default_factory=ScheduleOptions)
     optimisation: OptimisationOptions = field(default_factory=OptimisationOptions)
     rejection: RobustOptions = field(default_factory=RobustOptions)
+    uneven_motion: UnevenMotionOptions = field(default_factory=UnevenMotionOptions)
     refinement: RefinementOptions = field(default_factory=RefinementOptions)
     diagnostics: DiagnosticsOptions = field(default_factory=DiagnosticsOptions)
     relations: Relations = "both"

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from nscan_cli.graph.optimise.graph_solver import StopOptions
+from nscan_cli.matching.pairwise import PairOptions
 
 
 @dataclass(frozen=True)
@@ -35,6 +36,34 @@ class OptimisationOptions:
     metres_per_radian: float = 0.3
     """Length of path that counts as much as a turn by 1 rad where scans between keyframes share what the
     graph corrects, m. A larger one puts more of the correction into turns."""
+
+
+@dataclass(frozen=True)
+class UnevenMotionOptions:
+    """Where the path of a robot without odometry is matched more finely, if its laser turns."""
+
+    min_change: float = 0.04
+    """The motion is uneven if it differs by more from one turn of the laser to the next, m and rad. A larger
+    value takes less time, and leaves the poses between two turns less certain."""
+    longest_step: float = 2.5
+    """Over a longer time, in the usual times from scan to scan, how the robot moved is not known."""
+    scans: int = 6
+    """Scans before and after, each, that those in uneven motion are matched with."""
+    longest_run: int = 8
+    """Most scans in uneven motion that are matched with the same others."""
+    iterations: int = 8
+    """How often they are matched at most, each time corrected by the path as it was found before."""
+    settled: float = 0.003
+    """A pose that moves by less, m and rad, is not matched again. A smaller value takes longer."""
+    sigma: float = 0.05
+    """Standard deviation of the place from the path before, m: no match slides along walls."""
+    turn_sigma: float = 0.1
+    """The same of the heading, rad."""
+    min_overlap: float = 0.6
+    """Least share of points that lie on what the others see. With a larger value more poses stay."""
+    max_beams: int = 300
+    """Beams of a scan that are matched, evenly spread, are about so many. More tell more and take longer."""
+    pair: PairOptions = field(default_factory=lambda: PairOptions(widenings=(0.3, 1.0), tolerance=1e-4))
 
 
 @dataclass(frozen=True)

@@ -1,8 +1,8 @@
 """Scans of a laser that turns, corrected once more: by the path of the robot after the last optimisation.
 
 Tracking knows the motion during a turn from odometry, or from the scans before alone. The final path has
-poses on both sides of each turn. The poses at the middle of the turns are held: how fast the robot moves
-meanwhile matters least there.
+poses on both sides of each turn, and, without odometry, more of them where the motion is uneven. The poses at
+the middle of the turns are held: how fast the robot moves meanwhile matters least there.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ from nscan_cli.graph.model import Pairwise
 from nscan_cli.logs.robot_path import poses_at
 from nscan_cli.poses import Array, Mask, compose, inverse, relative
 from nscan_cli.slam.backend.scan_poses import between_keyframes
+from nscan_cli.slam.backend.uneven_motion import path_of_turns
 from nscan_cli.slam.frontend.tracked_scans import TrackedScans
 from nscan_cli.slam.keyframes.route import route_of
 from nscan_cli.slam.options import SlamOptions
@@ -31,7 +32,11 @@ def correct_swept_scans(state: SlamState) -> None:
     rows, breaks = state.route.rows, set(state.breaks)
     turn, tracked = state.options.optimisation.metres_per_radian, np.concatenate(state.tracked)
     at_middle = between_keyframes(tracked, rows, state.poses, state.breaks, turn)
-    path, poses = state.log.moving_along(at_middle).path, at_middle
+    poses = at_middle
+    if state.log.odometry is None:
+        path = path_of_turns(state.log, at_middle, state.breaks, state.options)
+    else:
+        path = state.log.moving_along(at_middle).path
     if path is not None:
         poses = poses_at(path, state.recorded.times)
     since_middle = relative(poses, at_middle)

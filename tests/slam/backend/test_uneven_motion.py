@@ -1,0 +1,65 @@
+"""The path between the middles of the turns of a laser."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+
+from nscan_cli.logs.laser_log import LaserLog
+from nscan_cli.logs.robot_path import RobotPath, poses_at, robot_path
+from nscan_cli.poses import Array, wrap
+from nscan_cli.slam.backend.uneven_motion import path_of_turns
+from nscan_cli.slam.options import SlamOptions
+from tests.benchmarks.lasers import turning
+from tests.simulation.drive import Drive
+from tests.simulation.office import office_way, office_world
+from tests.simulation.sweeping import Turning, fine_path, record_swept
+
+WAY_POINTS = 7
+RATE = 2.8
+"""rad/s"""
+
+
+def drive() -> tuple[LaserLog, RobotPath]:
+    """A robot that begins its turns from one moment to the next; the scans are at the middles of turns."""
+    path = fine_path(office_way()[:WAY_POINTS], Drive(speed=0.22, turn_rate=RATE))
+    log = record_swept("office", office_world(), path, turning(360, 3.5, 0.01, 0.01), Turning(), 1).log()
+    return dataclasses.replace(log, odometry=None, odometry_path=None).at_middle_of_turns(), path
+
+
+def heading_errors(path: RobotPath | None, times: Array, true: RobotPath) -> Array:
+    """Degrees."""
+    assert path is not None
+    off: Array = np.degrees(np.abs(wrap(poses_at(path, times)[:, 2] - poses_at(true, times)[:, 2])))
+    return off
+
+
+def test_headings_between_the_middles_are_found_where_a_turn_begins():
+    log, true = drive()
+    middles = poses_at(true, log.times)
+    between = 0.5 * (log.times[1:] + log.times[:-1])
+    steady = heading_errors(robot_path(log.times, middles), between, true)
+    finer = heading_errors(path_of_turns(log, middles, [], SlamOptions()), between, true)
+    assert steady.max() > 4.0
+    assert finer.max() < 2.0
+    assert np.median(finer) < 0.1
+
+
+def test_middles_that_are_off_there_are_matched_anew():
+    log, true = drive()
+    middles = poses_at(true, log.times)
+    turn = int(np.argmax(np.abs(np.diff(middles[:, 2])) > 0.1)) + 1
+    middles[turn, 2] += 0.1
+    found = heading_errors(path_of_turns(log, middles, [], SlamOptions()), log.times, true)
+    assert found[turn] < 2.0
+
+
+def test_scans_without_points_and_breaks_leave_the_path_as_it_is():
+    log, true = drive()
+    middles, ranges = poses_at(true, log.times), np.full_like(log.ranges, np.inf)
+    blind = dataclasses.replace(log, ranges=ranges)
+    for each, breaks in ((blind, []), (log, list(range(1, len(log))))):
+        path = path_of_turns(each, middles, breaks, SlamOptions())
+        assert path is not None
+        np.testing.assert_allclose(poses_at(path, log.times)[:, :2], middles[:, :2], atol=1e-9)
