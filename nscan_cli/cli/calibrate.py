@@ -7,7 +7,7 @@ import json
 import math
 from typing import TYPE_CHECKING, Any
 
-from nscan_cli.cli.progress import Compiling
+from nscan_cli.cli.compilation import Compiling
 from nscan_cli.cli.robot_toml import changed_flags, robot_table, robot_toml
 from nscan_cli.cli.shared_options import common_options, reading_options
 from nscan_cli.cli.standard_streams import print_result

@@ -6,8 +6,8 @@ import json
 import math
 from typing import TYPE_CHECKING, Any
 
+from nscan_cli.cli.compilation import Compiling
 from nscan_cli.cli.laser_survey import laser_line, rate_of, survey_of
-from nscan_cli.cli.progress import Compiling
 from nscan_cli.cli.shared_options import common_options, reading_options
 from nscan_cli.cli.standard_streams import print_result
 from nscan_cli.cli.subcommand import log_argument, option, subcommand

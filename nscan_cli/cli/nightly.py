@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 
 import click
 
-from nscan_cli.cli.progress import announce_compiling, say
+from nscan_cli.cli.compilation import announce_compiling
+from nscan_cli.cli.progress import say
 from nscan_cli.cli.shared_options import common_options
 from nscan_cli.cli.subcommand import PATH, argument, option, subcommand
 from nscan_cli.errors import CheckFailedError, InputMissingError

@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from nscan_cli.cli.compilation import Compiling
 from nscan_cli.cli.match import match_document, weakest_record, with_defaults
 from nscan_cli.cli.plot_option import check_plot, plot_option, write_plot
-from nscan_cli.cli.progress import Compiling, say
+from nscan_cli.cli.progress import say
 from nscan_cli.cli.shared_options import common_options, reading_options
 from nscan_cli.cli.subcommand import PATH, log_argument, option, result_option, subcommand
 from nscan_cli.cli.summary import Row, match_outcome, summary_table

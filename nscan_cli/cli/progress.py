@@ -7,8 +7,6 @@ import sys
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
-import click
-
 from nscan_cli.files.text import printable
 
 if TYPE_CHECKING:
@@ -19,38 +17,6 @@ def say(message: str, quiet: bool = False) -> None:
     """Print a message, unless `quiet`."""
     if not quiet:
         print(printable(message), file=sys.stderr)
-
-
-COMPILING = "compiling the kernels, once for this version on this machine"
-
-
-def announce_compiling(kernel: str, quiet: bool) -> None:
-    """Print a message if `kernel`, which other processes need, is not compiled yet."""
-    from nscan_cli.kernels.machine_code import is_uncompiled
-
-    if is_uncompiled(kernel):
-        say(f"{COMPILING}: a minute or two", quiet)
-
-
-class Compiling:
-    """Prints a message when this process begins to compile kernels, and records that it did.
-
-    `takes` is the usual time in words.
-    """
-
-    def __init__(self, takes: str, quiet: bool) -> None:
-        from nscan_cli.kernels.decorators import on_first_compile
-
-        self.has_begun = False
-        self._takes, self._quiet = takes, quiet
-        on_first_compile(self._begin)
-        context = click.get_current_context(silent=True)
-        if context is not None:
-            context.call_on_close(lambda: on_first_compile(None))
-
-    def _begin(self) -> None:
-        self.has_begun = True
-        say(f"{COMPILING}: {self._takes}", self._quiet)
 
 
 class Bar:

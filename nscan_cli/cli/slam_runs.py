@@ -6,8 +6,9 @@ import dataclasses
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
+from nscan_cli.cli.compilation import Compiling
 from nscan_cli.cli.log_reader import log_reader
-from nscan_cli.cli.progress import Compiling, progress, say
+from nscan_cli.cli.progress import progress, say
 from nscan_cli.cli.robot_toml import changed_flags
 from nscan_cli.cli.slam_summary import Facts, graph_facts
 from nscan_cli.errors import InputDataError, InputMissingError, WrongUsageError
@@ -56,8 +57,9 @@ def run_on_log(
     from nscan_cli.slam.consistency.map_verification import add_verification
     from nscan_cli.slam.log_to_graph import map_log, notices_of_mapping
 
+    compiling = Compiling("half a minute to a minute", quiet)
+    compiling.beforehand_for_slam(threads)
     load_runtime()
-    compiling = Compiling("a minute or two", quiet)
     read = log_reader(log)
     scans = read(reading)
     if calibrated:
@@ -123,7 +125,7 @@ def run_on_graph(
     from nscan_cli.graph.marginal_covariances import marginal_covariances
     from nscan_cli.graph.optimise.whole_graph import optimise_graph
 
-    compiling = Compiling("a minute or two", quiet)
+    compiling = Compiling("half a minute", quiet)
     notices: list[str] = []
     graph = load_graph(path, notices)
     for notice in notices:

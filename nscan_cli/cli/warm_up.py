@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import time
 
-from nscan_cli.cli.progress import Compiling, say
+from nscan_cli.cli.compilation import Compiling
+from nscan_cli.cli.progress import say
 from nscan_cli.cli.shared_options import common_options
 from nscan_cli.cli.subcommand import subcommand
 from nscan_cli.errors import OutputError
@@ -23,13 +24,12 @@ def command(quiet: bool, **_verbosity: int) -> None:
     version of nscan-cli, Python and the processor only.
     """
     from nscan_cli.kernels.cache_folder import cache_folder
-    from nscan_cli.nightly.warm_up import compile_here
 
     folder = cache_folder()
     if folder is None:
         raise OutputError("no folder for compiled code is writable; set NUMBA_CACHE_DIR to one that is")
     began = time.perf_counter()
-    compiling = Compiling("a minute or two", quiet)
-    compile_here(folder)
+    compiling = Compiling("half a minute to a minute", quiet)
+    compiling.all(folder)
     took = f"compiled in {time.perf_counter() - began:.0f} s" if compiling.has_begun else "nothing to compile"
     say(f"{took}: {folder}", quiet)

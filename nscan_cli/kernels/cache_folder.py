@@ -36,7 +36,7 @@ FOLDER_NAME = re.compile(r"\d[\w.+]*-[0-9a-f]{16}")
 OWNER_FILE = ".package"
 """A file with the path of the package that the folder belongs to. Its time is that of the last use."""
 CACHE_FILES = re.compile(
-    rf"{re.escape(OWNER_FILE)}|{re.escape(TEMPORARY_PREFIX)}.*|.*\.(code|left|nbc|nbi)(\.tmp\..*)?"
+    rf"{re.escape(OWNER_FILE)}|{re.escape(TEMPORARY_PREFIX)}.*|.*\.(code|left|lock|nbc|nbi)(\.tmp\..*)?"
 )
 """Names of the files that nscan-cli and numba write into the folder."""
 DAY = 86400.0

@@ -14,6 +14,7 @@ import numpy as np
 
 from nscan_cli.kernels import machine_code
 from nscan_cli.kernels.cache_folder import cache_folder
+from nscan_cli.kernels.compile_lock import compile_lock
 from nscan_cli.kernels.whole_kernels import compile_whole
 
 Function = TypeVar("Function", bound=Callable[..., Any])
@@ -127,9 +128,12 @@ class Kernel:
             return cast(Callable[..., Any], self.dispatcher)
         loaded = machine_code.load(file, self.py_func.__name__)
         if loaded is None:
-            _announce_compile()
-            # Another process may have saved its code first.
-            loaded = machine_code.save(file, self.py_func.__name__, lambda: self._compile(arguments))
+            with compile_lock(file):
+                # Another process may have compiled it meanwhile.
+                loaded = machine_code.load(file, self.py_func.__name__)
+                if loaded is None:
+                    _announce_compile()
+                    loaded = machine_code.save(file, self.py_func.__name__, lambda: self._compile(arguments))
         return cast(Callable[..., Any], loaded or self.dispatcher)
 
     def _compile(self, arguments: tuple[Any, ...]) -> Any:

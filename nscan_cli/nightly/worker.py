@@ -58,13 +58,14 @@ def map_and_evaluate(
     from nscan_cli.mapping.map_server import map_image, map_png, map_yaml
     from nscan_cli.mapping.occupancy import occupancy_grid
     from nscan_cli.mapping.viewer.viewer_page import embedded_viewer, viewer_page
-    from nscan_cli.nightly import warm_up
+    from nscan_cli.nightly import kernel_exercises, warm_up
     from nscan_cli.slam.consistency.map_verification import add_verification
     from nscan_cli.slam.consistency.options import VerificationOptions
     from nscan_cli.slam.log_to_graph import Counts, map_log, notices_of_mapping, slam_options
 
     if cache_folder() is None:
-        warm_up.main()
+        for share in kernel_exercises.FOR_ALL:
+            kernel_exercises.main(*share)
     kept, began = warm_up.cached_files(), time.perf_counter()
     reading, mapping = reading_options_from(task["reading"]), task["mapping"]
     options = slam_options(

@@ -28,7 +28,7 @@ def subtract(a, b):
 COMMAND = """
 import sys
 import click
-from nscan_cli.cli.progress import Compiling
+from nscan_cli.cli.compilation import Compiling
 import some_kernels
 
 @click.command()

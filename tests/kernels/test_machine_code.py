@@ -162,7 +162,7 @@ def test_all_processes_run_what_was_kept_first(tmp_path, monkeypatch):
     (kept,) = tmp_path.glob(f"*{machine_code.SUFFIX}")
     first = kept.read_bytes()
     # Looked for the first time, it is not there yet.
-    loads: list[Callable[..., Any]] = [machine_code.load] * 3 + [lambda *_: None]
+    loads: list[Callable[..., Any]] = [machine_code.load] * 4 + [lambda *_: None] * 2
     monkeypatch.setattr(machine_code, "load", lambda *call: loads.pop()(*call))
     assert made(2.0)(0.0) == 1.0
     assert [path.read_bytes() for path in tmp_path.iterdir()] == [first]

@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import importlib
+import os
 import subprocess
+import sys
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +16,14 @@ from nscan_cli.cli.main import run
 from nscan_cli.cli.nightly_progress import PlainProgress
 from nscan_cli.kernels import cache_folder, machine_code
 from nscan_cli.logs.load import log_from
-from nscan_cli.nightly import bootstrap, local_executor, warm_up, worker
+from nscan_cli.nightly import (
+    bootstrap,
+    kernel_exercises,
+    local_executor,
+    simulated_drive,
+    warm_up,
+    worker,
+)
 from nscan_cli.nightly.html_report import html_report
 from nscan_cli.nightly.manifest import ManifestEntry
 from nscan_cli.nightly.regression_check import check_log
@@ -34,31 +44,41 @@ def cache(tmp_path, monkeypatch):
 def calls(monkeypatch):
     """The calls of processes, which end at once."""
     made: list[list[str]] = []
-    monkeypatch.setattr(subprocess, "run", lambda call, **_how: made.append(call))
+
+    start = subprocess.Popen
+
+    def begun(call: list[str], **_how: object) -> subprocess.Popen[bytes]:
+        made.append(call)
+        return start([b"true"])
+
+    monkeypatch.setattr(subprocess, "Popen", begun)
     return made
 
 
 def test_once_on_each_machine(cache, calls, monkeypatch):
     warm_up.compile_kernels({})
     warm_up.compile_kernels({})
-    assert calls == [bootstrap.worker_command("warm_up")]
+    assert calls == [
+        bootstrap.worker_command("kernel_exercises", "track", "others"),
+        bootstrap.worker_command("kernel_exercises", "refine"),
+    ]
     # Somebody has cleared the folder.
     with monkeypatch.context() as patch:
         patch.setattr(machine_code, "is_uncompiled", lambda _name: True)
         warm_up.compile_kernels({})
-    assert len(calls) == 2
+    assert len(calls) == 4
     # Another processor, or another numba.
     monkeypatch.setattr(machine_code, "build_key", lambda: "another")
     warm_up.compile_kernels({})
-    assert len(calls) == 3
+    assert len(calls) == 6
 
 
-def test_the_command_compiles_here_and_nightly_has_nothing_left_to_do(cache, calls, monkeypatch, capsys):
+def test_the_command_compiles_all_and_leaves_nothing_to_nightly(cache, calls, monkeypatch, capsys):
     made: list[str] = []
-    monkeypatch.setattr(warm_up, "main", lambda: made.append("all"))
+    monkeypatch.setattr(kernel_exercises, "main", lambda *parts: made.extend(parts))
     monkeypatch.setattr(cache_folder, "cache_folder", lambda: cache)
     assert run(["warm-up"]) == 0
-    assert made == ["all"]
+    assert made == ["track", "others", "refine"]
     assert capsys.readouterr().err == f"nothing to compile: {cache}\n"
     warm_up.compile_kernels({})
     assert calls == []
@@ -92,10 +112,10 @@ def test_before_the_first_log_begins(cache, monkeypatch, tmp_path):
 
 
 def test_the_drive_has_what_a_night_can_have():
-    log = log_from(warm_up.simulated_carmen_log(), "warm-up.log")
-    assert (len(log), log.ranges.shape[1]) == (330, warm_up.BEAMS)
+    log = log_from(simulated_drive.simulated_carmen_log(), "warm-up.log")
+    assert (len(log), log.ranges.shape[1]) == (330, simulated_drive.BEAMS)
     assert log.report.skipped == {}
-    assert log.no_return == pytest.approx(warm_up.NO_RETURN)
+    assert log.no_return == pytest.approx(simulated_drive.NO_RETURN)
     assert np.isfinite(log.ranges).mean() > 0.5
     # Text that is parsed by a kernel; a way that comes back to where it was.
     assert log.source.bytes > 1 << 17
@@ -137,3 +157,40 @@ def test_what_is_not_timed_is_said(tmp_path, capsys):
     text = html_report("small", [check_log(entry, [night], [], absent=False)], tmp_path).decode()
     assert '<span class="time">not timed: kernels were compiled during the run</span>' in text
     assert '<span class="time">2026-11-21 03:00:00 UTC; run again: the log has changed</span>' in text
+
+
+def test_what_a_process_compiles_is_told(tmp_path, monkeypatch):
+    """How many kernels are done, and which are in work; nothing says so when all processes have ended."""
+    monkeypatch.setattr(warm_up, "LOOK_INTERVAL", 0.01)
+    (tmp_path / "a.old-1.code").touch()
+    work = "import pathlib, time; (pathlib.Path.cwd() / 'a.new-1.lock').touch(); time.sleep(0.5)"
+    command = [sys.executable, "-c", f"import os; os.chdir({str(tmp_path)!r}); {work}"]
+    monkeypatch.setattr(bootstrap, "worker_command", lambda *_call: command)
+    told = []
+
+    def report(done: int, names: Sequence[str]) -> None:
+        told.append((done, list(names)))
+        (tmp_path / f"a.b{len(told)}-1.code").touch()
+
+    warm_up.compile_side_by_side(tmp_path, (("track",), ("refine",)), os.environ, report)
+    assert [done for done, _ in told] == list(range(len(told)))
+    assert told[-1][1] == ["new"]
+
+
+def test_an_interrupt_ends_the_processes(tmp_path, monkeypatch):
+    monkeypatch.setattr(bootstrap, "worker_command", lambda *_call: ["sleep", "60"])
+    begun = []
+    start = warm_up._started
+
+    def begin(share: Sequence[str], environment: Mapping[str, str]) -> subprocess.Popen[bytes]:
+        begun.append(start(share, environment))
+        return begun[-1]
+
+    monkeypatch.setattr(warm_up, "_started", begin)
+
+    def interrupted(*_progress: object) -> None:
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        warm_up.compile_side_by_side(tmp_path, (("track",), ("refine",)), os.environ, interrupted)
+    assert [process.returncode for process in begun] == [-9, -9]

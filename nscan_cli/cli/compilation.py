@@ -1,0 +1,77 @@
+"""Commands that compile kernels: what they say, and the bar of processes that compile side by side."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from nscan_cli.cli.progress import progress, say
+
+if TYPE_CHECKING:
+    from nscan_cli.nightly.warm_up import CompileProgress
+
+COMPILING = "compiling the kernels, once for this version on this machine"
+SLAM_KERNELS, ALL_KERNELS = 52, 80
+"""About how many kernels `slam` compiles, and `warm-up`: for the bar alone."""
+
+
+def announce_compiling(kernel: str, quiet: bool) -> None:
+    """Print a message if `kernel`, which other processes need, is not compiled yet."""
+    from nscan_cli.kernels.machine_code import is_uncompiled
+
+    if is_uncompiled(kernel):
+        say(f"{COMPILING}: half a minute to a minute", quiet)
+
+
+class Compiling:
+    """Prints a message when this process begins to compile kernels, and records that it did.
+
+    `takes` is the usual time in words.
+    """
+
+    def __init__(self, takes: str, quiet: bool) -> None:
+        from nscan_cli.kernels.decorators import on_first_compile
+
+        self.has_begun = False
+        self._takes, self._quiet = takes, quiet
+        on_first_compile(self._begin)
+        context = click.get_current_context(silent=True)
+        if context is not None:
+            context.call_on_close(lambda: on_first_compile(None))
+
+    def _begin(self) -> None:
+        if not self.has_begun:
+            self.has_begun = True
+            say(f"{COMPILING}: {self._takes}", self._quiet)
+
+    def beforehand_for_slam(self, threads: int) -> None:
+        """Compile what `slam` needs in two processes, if nothing is compiled yet and there may be threads."""
+        from nscan_cli.kernels.cache_folder import cache_folder
+        from nscan_cli.nightly import kernel_exercises, warm_up
+
+        folder = cache_folder()
+        if folder is None or threads < 2 or not warm_up.is_cold():
+            return
+        self._begin()
+        with self._bar(SLAM_KERNELS) as report:
+            warm_up.compile_side_by_side(folder, kernel_exercises.FOR_SLAM, os.environ, report)
+
+    def all(self, folder: Path) -> None:
+        """Compile all kernels that the cache folder lacks, in two processes if it has none."""
+        from nscan_cli.nightly import warm_up
+
+        if warm_up.is_cold():
+            self._begin()
+        with self._bar(ALL_KERNELS) as report:
+            warm_up.compile_all(folder, report)
+
+    @contextlib.contextmanager
+    def _bar(self, kernels: int) -> Iterator[CompileProgress]:
+        """A bar for about this many kernels: which are compiled now, and how many are left."""
+        with progress("compiling", kernels, self._quiet) as bar:
+            yield lambda done, names: bar.advance(min(done, kernels), ", ".join(names))

@@ -1,0 +1,114 @@
+"""Runs that need all kernels, so that they compile them, in parts for processes side by side.
+
+A kernel that two parts need is compiled in one of them (kernels/compile_lock.py). So a part begins with what
+the other comes to last.
+"""
+
+from __future__ import annotations
+
+import contextlib
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from nscan_cli.graph.model import Graph
+
+THREADS, SCANS_PER_KEYFRAME = 2, 5
+FOR_SLAM = (("track",), ("refine",))
+"""The parts with the kernels that `slam` needs for most logs, for two processes that take about as long."""
+FOR_ALL = (("track", "others"), ("refine",))
+"""The parts with all kernels."""
+
+
+def main(*parts: str) -> None:
+    """Run some parts. A process started by `bootstrap.py` does so."""
+    from nscan_cli.kernels.decorators import load_runtime
+
+    load_runtime()
+    for part in parts:
+        {"track": _track, "refine": _refine, "others": _others}[part]()
+
+
+def _track() -> None:
+    """Map the drive from its first scan to the last."""
+    from nscan_cli.logs.load import log_from
+    from nscan_cli.logs.reading_options import ReadingOptions
+    from nscan_cli.nightly.simulated_drive import simulated_carmen_log
+    from nscan_cli.slam.log_to_graph import map_log, slam_options
+
+    log = log_from(simulated_carmen_log(), "warm-up.log")
+    map_log(log, ReadingOptions(), slam_options(), THREADS, lambda *_progress: None)
+
+
+def _refine() -> None:
+    """Optimise the graph of the drive, draw its map, match its keyframes jointly, and then map the drive."""
+    import numpy as np
+
+    from nscan_cli.graph.marginal_covariances import marginal_covariances
+    from nscan_cli.graph.optimise.whole_graph import optimise_graph
+    from nscan_cli.logs.load import log_from
+    from nscan_cli.mapping.occupancy import occupancy_grid
+    from nscan_cli.nightly.simulated_drive import simulated_carmen_log
+    from nscan_cli.slam.backend.resume import resume
+
+    graph = _drive_graph()
+    optimise_graph(graph)
+    marginal_covariances(graph)
+    log = log_from(simulated_carmen_log(), "warm-up.log")
+    rows = np.arange(len(log))
+    occupancy_grid(log, rows, graph.poses, threads=THREADS)
+    resume(graph, log, rows, THREADS)
+    _track()
+
+
+def _drive_graph() -> Graph:
+    """A graph of the drive with a keyframe every 1.5 m and a relation of each type."""
+    import numpy as np
+
+    from nscan_cli.files.provenance import as_parameters
+    from nscan_cli.graph.model import Graph, NScan, Pairwise
+    from nscan_cli.nightly.simulated_drive import simulated_poses
+    from nscan_cli.poses import relative
+    from nscan_cli.slam.log_to_graph import slam_options
+
+    poses = simulated_poses()
+    rows = np.arange(len(poses))
+    anchors = rows - rows % SCANS_PER_KEYFRAME
+    graph = Graph(rows, [f"{row}.0" for row in rows], poses, None, anchors)
+    graph.provenance["parameters"] = {"slam": as_parameters(slam_options())}
+    keyframes = graph.keyframes
+    for first, second in zip(keyframes[:-1].tolist(), keyframes[1:].tolist(), strict=True):
+        step = relative(poses[second], poses[first])
+        graph.add(Pairwise((first, second), step, 1e4 * np.eye(3), "track", 1.0))
+    first, second, third = keyframes[:3].tolist()
+    around = relative(poses[[first, second, third]], poses[second])
+    graph.add(NScan((first, second, third), around, 1e4 * np.eye(9), 1, "nscan", 1.0))
+    return graph
+
+
+def _others() -> None:
+    """What `slam` needs for a few logs only, and what other commands need."""
+    import numpy as np
+
+    from nscan_cli.api import match, nscan
+    from nscan_cli.calibration.options import CalibrationOptions
+    from nscan_cli.calibration.robot_calibration import calibrate
+    from nscan_cli.errors import InputDataError
+    from nscan_cli.logs.load import log_from
+    from nscan_cli.logs.reading_options import ReadingOptions
+    from nscan_cli.mapping.occupancy import occupancy_grid
+    from nscan_cli.nightly.simulated_drive import simulated_carmen_log
+    from nscan_cli.slam.log_to_graph import map_log, slam_options
+
+    drive = simulated_carmen_log()
+    log = log_from(drive, "warm-up.log")
+    match(log, 0, 2)
+    # From so far off, the scans are placed by search.
+    nscan(log, [0, 4, 8, 12], np.array([(0, 0, 0), (1.4, -1.4, 0.5), (-1.4, 1.2, -0.5), (0, 1.4, 0.5)]))
+    # A drive of one lap may leave the robot open, but its kernels are compiled by then.
+    with contextlib.suppress(InputDataError):
+        calibrate(log, log.reading, CalibrationOptions())
+    # Without odometry, and as a turning laser.
+    for reading in (ReadingOptions(end=20.0, odometry=False), ReadingOptions(end=20.0, sweep=0.2)):
+        log = log_from(drive, "warm-up.log", reading)
+        _, graph = map_log(log, reading, slam_options(), THREADS, lambda *_progress: None)
+        occupancy_grid(log, np.arange(len(log)), graph.poses, threads=THREADS)
