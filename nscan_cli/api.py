@@ -52,6 +52,7 @@ def match(
     from nscan_cli.matching.pairwise import PairOptions, match_pair, matched_points, scan_ndt
     from nscan_cli.matching.priors import MotionModel, odometry_prior
 
+    log = log.moving_along(None)
     options, rows = PairOptions(), [log.row(reference), log.row(scan)]
     known = _known_odometry(log, rows)
     prior = None if known is None else odometry_prior(known[0], known[1], MotionModel())
@@ -78,6 +79,7 @@ def nscan(
     from nscan_cli.matching.priors import MotionModel
     from nscan_cli.poses import relative
 
+    log = log.moving_along(None)
     options, rows = PairOptions(), [log.row(number) for number in scans]
     known = _known_odometry(log, rows)
     start = np.zeros((len(rows), 3)) if known is None else relative(known, known[0])

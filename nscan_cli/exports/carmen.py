@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from nscan_cli.files.finite import check_finite
 from nscan_cli.logs.laser_defaults import CARMEN_MAX_RANGE, beam_angles
 from nscan_cli.logs.laser_log import LaserLog
+from nscan_cli.logs.seen_at_once import seen_at_once
 from nscan_cli.logs.text.corrected_poses import OWN_HOST
 from nscan_cli.poses import Array, Indices, wrap
 
@@ -33,9 +34,11 @@ def corrected_log(log: LaserLog, rows: Indices, poses: Array) -> bytes:
     The records are FLASER where the beams have the directions that CARMEN assumes for their number and
     end within CARMEN's largest range, else ROBOTLASER1, which states both. A beam without return gets the
     least range that means so in the log (PARAM robot_front_laser_max), an invalid one 0. Ranges keep all
-    digits and poses 9 decimals, so that reading gives the same values. Raises NotFiniteError.
+    digits and poses 9 decimals, so that reading gives the same values. A laser that turns
+    is written as if it saw at once: the records have no times of beams. Raises NotFiniteError.
     """
     check_finite("the corrected poses", poses)
+    log = seen_at_once(log.moving_along(poses, rows))
     ranges = log.ranges[rows]
     greatest = ranges[np.isfinite(ranges)].max(initial=np.float32(0.0))
     limit = _no_return_limit(log, float(greatest))

@@ -32,6 +32,7 @@ from nscan_cli.files.finite import check_finite
 from nscan_cli.graph.model import Graph
 from nscan_cli.logs.frame_names import MAP
 from nscan_cli.logs.laser_log import LaserLog
+from nscan_cli.logs.seen_at_once import seen_at_once
 from nscan_cli.mapping.occupancy import OccupancyGrid
 from nscan_cli.poses import Array, Indices, are_known, compose, inverse
 
@@ -56,8 +57,8 @@ def ros2_recording(log: LaserLog, rows: Indices, nodes: Indices, graph: Graph, g
     """The MCAP of a graph and its map `grid`, with the scans in `rows` (N,) of the log at `nodes` (N,).
 
     Stamps are those of the log. Where ROS cannot hold one (before 0, from 2³¹ s on), all count from the
-    first second of the log. Equal inputs give equal bytes. Raises NotFiniteError, and WrongUsageError when
-    the stamps span 2³¹ s or more.
+    first second of the log. A laser that turns is written as if it saw at once. Equal inputs give equal
+    bytes. Raises NotFiniteError, and WrongUsageError when the stamps span 2³¹ s or more.
     """
     check_finite("the poses of the recording", graph.poses, graph.known_odometry)
     messages = MessageFactory()
@@ -73,6 +74,7 @@ def ros2_recording(log: LaserLog, rows: Indices, nodes: Indices, graph: Graph, g
         link = (names.robot, names.laser, log.mount)
         file.write("/tf_static", tf_message(messages, first, [link]), first)
     robots = graph.poses[nodes]
+    log = seen_at_once(log.moving_along(robots, rows))
     corrections = None if graph.odometry is None else _corrections(robots, graph.odometry[nodes])
     odometry = None if corrections is None else compose(inverse(corrections), robots)
     for k, (row, time) in enumerate(zip(rows.tolist(), times, strict=True)):

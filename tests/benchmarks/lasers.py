@@ -35,8 +35,8 @@ from tests.simulation.sweeping import Turning, fine_path, record_swept
 
 BUILDINGS = (1, 2, 3, 4, 5, 6)
 """Seeds: no two have the same rooms."""
-PLACES = 3
-"""Hard places of each kind."""
+FEW = 3
+"""Buildings of lasers that turn, and hard places of each kind."""
 WAY = [(0, 0), (2, 0), (2, 2), (0, 2), (0, 1), (1, 1), (1, 0), (0, 0), (0, 1), (2, 1), (2, 0), (1, 0), (1, 2)]
 """Crossings of corridors, 300 m of way; the robot comes back to most corridors, also from their other end."""
 RIGHT = 0.3
@@ -236,11 +236,11 @@ def _row(kind: str, outcomes: list[Outcome]) -> tuple[str, ...]:
 
 def drives(buildings: Sequence[int]) -> list[tuple[Kind, int, str]]:
     """All that are mapped."""
-    ordinary = [
-        (kind, seed, odometry) for kind in KINDS + TURNING for odometry in (GOOD, NONE) for seed in buildings
-    ]
-    return ordinary + [
-        (kind, seed, odometry) for kind in HARD for odometry in ODOMETRY for seed in buildings[:PLACES]
+    few = buildings[:FEW]
+    return [
+        *((kind, seed, odometry) for kind in KINDS for odometry in (GOOD, NONE) for seed in buildings),
+        *((kind, seed, odometry) for kind in TURNING for odometry in (GOOD, NONE) for seed in few),
+        *((kind, seed, odometry) for kind in HARD for odometry in ODOMETRY for seed in few),
     ]
 
 

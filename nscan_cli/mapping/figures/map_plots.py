@@ -152,7 +152,7 @@ def _draw_uncertainty(canvas: Canvas, graph: Graph) -> list[LegendEntry]:
 
 def _points_of_occupied_cells(log: LaserLog, rows: Indices, poses: Array, grid: OccupancyGrid) -> Array:
     """(M, 2) the end points of beams in occupied cells, m."""
-    seen = list(log.points_by_scan())
+    seen = list(log.moving_along(poses, rows).points_by_scan())
     points = np.concatenate([transform(pose, seen[row]) for row, pose in zip(rows, poses, strict=True)])
     columns, lines = np.floor((points - np.array(grid.origin)) / grid.resolution).astype(np.int64).T
     height, width = grid.shape

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from nscan_cli.kernels.decorators import kernel, leaf_kernel
 from nscan_cli.logs.laser_log import LaserLog
+from nscan_cli.logs.seen_at_once import ranges_at_once
 from nscan_cli.matching.pose_kernels import relative_pose
 from nscan_cli.poses import Array, Indices, inverse, transform
 from nscan_cli.slam.diagnostics.options import FreeSpaceOptions
@@ -81,7 +82,7 @@ def free_space_violations(
         route.paths,
         np.concatenate(points),
         np.cumsum([0, *map(len, points)]),
-        log.ranges[rows],
+        ranges_at_once(log, rows),
         np.stack([log.angle_min[rows], log.angle_increment[rows]], axis=1),
     )
     bounds = nscan.radius, nscan.visit_path
