@@ -17,9 +17,9 @@ REAL_LOGS = REPOSITORY.parent / "shared" / "data"
 
 
 def find_data(name: str) -> Path | None:
-    """The real log or graph `name` in the folder NSCAN_DATA; None where it is absent."""
+    """The real log (a file or a folder) or graph `name` in the folder NSCAN_DATA; None where it is absent."""
     path = Path(os.environ.get("NSCAN_DATA", REAL_LOGS)) / name
-    return path if path.is_file() else None
+    return path if path.exists() else None
 
 
 def data_file(name: str) -> Path:

@@ -25,8 +25,9 @@ PAIR_WIDTH = 1600
 def main(folder: str) -> None:
     """Draw all pictures that can be drawn into an existing folder."""
     with tempfile.TemporaryDirectory() as scratch:
-        for name, picture in {**_of_the_sample(Path(scratch)), **_of_real_logs(Path(scratch))}.items():
-            width = PAIR_WIDTH if name.endswith("-loops") else None
+        drawn = _of_the_sample(Path(scratch)), _of_real_logs(Path(scratch)), _of_turning_lasers(Path(scratch))
+        for name, picture in {name: each for some in drawn for name, each in some.items()}.items():
+            width = PAIR_WIDTH if name.endswith(("-loops", "-turn")) else None
             (Path(folder) / f"{name}.png").write_bytes(small_png(picture, width))
             print(f"{name}.png")
 
@@ -67,6 +68,19 @@ def _of_real_logs(scratch: Path) -> dict[str, Image]:
             _run("nscan", log, "--scans", "3000-3090:10", "-o", scratch / "nscan.json", "--plot", plot)
             pictures["nscan"] = _opened(plot)
     return pictures
+
+
+def _of_turning_lasers(scratch: Path) -> dict[str, Image]:
+    """Each as if the laser saw at once, and with every beam from where the robot was."""
+    found = {
+        name: find_data(f"field/{name}{ending}")
+        for name, ending in (("rplidar-floor", ""), ("rplidar-hallway", ".bag"))
+    }
+    return {
+        f"{name}-turn": _beside(_map(log, scratch, "--sweep", "off"), _map(log, scratch))
+        for name, log in found.items()
+        if log is not None
+    }
 
 
 def _map(log: Path, scratch: Path, *options: str) -> Image:

@@ -10,6 +10,7 @@ import pytest
 from nscan_cli.exports.carmen import corrected_log
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.logs.load import log_from
+from nscan_cli.logs.reading_options import ReadingOptions
 from nscan_cli.logs.robot_path import poses_at
 from nscan_cli.logs.seen_at_once import ranges_at_once, seen_at_once
 from nscan_cli.poses import Array, transform
@@ -51,7 +52,7 @@ def test_points_are_on_the_walls(laser, turn):
     uncorrected = off_the_walls(dataclasses.replace(log, path=None), poses_at(PATH, log.times))
     # Half a beam beside where the point is.
     assert np.quantile(off, 0.95) < 0.03
-    assert np.quantile(uncorrected, 0.95) > 0.15
+    assert np.quantile(uncorrected, 0.95) > 0.1
 
 
 def test_a_laser_that_sees_at_once_keeps_its_ranges():
@@ -70,4 +71,5 @@ def test_a_carmen_log_has_them():
     log = drive(Laser(360, -np.pi, np.radians(1), 12.0), 0.2)
     poses = poses_at(PATH, log.times)
     text = corrected_log(dataclasses.replace(log, path=None), np.arange(len(log)), poses)
-    assert np.quantile(off_the_walls(log_from(text, "room.log"), poses), 0.9) < 0.05
+    read = log_from(text, "room.log", ReadingOptions(odometry=False))
+    assert np.quantile(off_the_walls(read, poses), 0.9) < 0.05

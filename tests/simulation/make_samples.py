@@ -6,10 +6,23 @@ import gzip
 import sys
 from pathlib import Path
 
-from tests.simulation.other_forms import player, ros2_mcap
-from tests.simulation.scenes import corridor_and_room, office
+import numpy as np
 
-SEEDS = {"office": 1, "corridor_and_room": 3}
+from tests.simulation.drive import Drive
+from tests.simulation.laser import Laser
+from tests.simulation.office import office_way, office_world
+from tests.simulation.other_forms import player, ros2_mcap, swept_mcap
+from tests.simulation.scenes import corridor_and_room, office
+from tests.simulation.sweeping import SweptRecording, Turning, fine_path, record_swept
+
+SEEDS = {"office": 1, "corridor_and_room": 3, "turning_laser": 1}
+
+
+def turning_laser() -> SweptRecording:
+    """A small robot that turns quickly, and its laser five times a second, in a part of the office."""
+    laser = Laser(180, -np.pi, np.radians(2), 8.0, noise=0.01, resolution=0.001, dropout=0.01)
+    path = fine_path(office_way()[:7], Drive(speed=0.5, turn_rate=2.8))
+    return record_swept("turning_laser", office_world(), path, laser, Turning(), SEEDS["turning_laser"])
 
 
 def samples() -> dict[str, bytes]:
@@ -20,6 +33,7 @@ def samples() -> dict[str, bytes]:
         "corridor_and_room.log": small.carmen(),
         "corridor_and_room.player.log": player(small),
         "corridor_and_room.mcap": ros2_mcap(small),
+        "turning_laser.mcap": swept_mcap(turning_laser()),
     }
 
 

@@ -40,11 +40,13 @@ def test_written_twice_the_bytes_are_the_same(tmp_path, monkeypatch, made):
         "corridor_and_room.mcap",
         "corridor_and_room.player.log.gz",
         "office.log.gz",
+        "turning_laser.mcap",
     ]
 
 
-def test_the_recording_holds_the_messages_that_are_made_again(made):
-    committed = (SAMPLE_LOGS / "corridor_and_room.mcap").read_bytes()
+@pytest.mark.parametrize("name", ["corridor_and_room.mcap", "turning_laser.mcap"])
+def test_the_recording_holds_the_messages_that_are_made_again(made, name):
+    committed = (SAMPLE_LOGS / name).read_bytes()
     assert len(committed) < 150_000
 
     def messages(data: bytes) -> list[tuple[str, str, int, bytes]]:
@@ -55,7 +57,7 @@ def test_the_recording_holds_the_messages_that_are_made_again(made):
             for schema, channel, message in reader.iter_messages(log_time_order=False)
         ]
 
-    assert messages(committed) == messages(made["corridor_and_room.mcap"])
+    assert messages(committed) == messages(made[name])
 
 
 @pytest.mark.parametrize("name", ["corridor_and_room.player.log.gz", "corridor_and_room.mcap"])

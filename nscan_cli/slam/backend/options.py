@@ -61,6 +61,8 @@ class UnevenMotionOptions:
     """The same of the heading, rad."""
     min_overlap: float = 0.6
     """Least share of points that lie on what the others see. With a larger value more poses stay."""
+    min_points: int = 50
+    """A turn of the laser with fewer points leaves its pose. With a smaller number blind lasers move it."""
     max_beams: int = 300
     """Beams of a scan that are matched, evenly spread, are about so many. More tell more and take longer."""
     pair: PairOptions = field(default_factory=lambda: PairOptions(widenings=(0.3, 1.0), tolerance=1e-4))

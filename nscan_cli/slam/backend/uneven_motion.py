@@ -181,8 +181,11 @@ class _Run:
     def _settle(self, reference: Ndt, place: int) -> float:
         """Move the pose of one of the times to where its points fit best near it; by how much, m and rad."""
         uneven, start = self._options.uneven_motion, self.poses[place].copy()
+        points = self._points_at(place)
+        if len(points) < uneven.min_points:
+            return 0.0
         information = np.diag([uneven.sigma**-2, uneven.sigma**-2, uneven.turn_sigma**-2])
-        end = settle_pair(reference, self._points_at(place), start, uneven.pair, Prior(start, information))
+        end = settle_pair(reference, points, start, uneven.pair, Prior(start, information))
         off = end.pose - start
         off[2] = wrap(off[2])
         near = np.hypot(off[0], off[1]) < 3 * uneven.sigma and abs(off[2]) < 3 * uneven.turn_sigma
