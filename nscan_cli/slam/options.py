@@ -12,6 +12,7 @@ from nscan_cli.slam.backend.options import (
     RefinementOptions,
     ScheduleOptions,
     UnevenMotionOptions,
+    UntoldSigmaOptions,
 )
 from nscan_cli.slam.diagnostics.options import DiagnosticsOptions
 from nscan_cli.slam.frontend.options import BreakOptions, OdometryCheckOptions, TrackingOptions
@@ -39,6 +40,7 @@ class SlamOptions:
     rejection: RobustOptions = field(default_factory=RobustOptions)
     uneven_motion: UnevenMotionOptions = field(default_factory=UnevenMotionOptions)
     refinement: RefinementOptions = field(default_factory=RefinementOptions)
+    untold_sigmas: UntoldSigmaOptions = field(default_factory=UntoldSigmaOptions)
     diagnostics: DiagnosticsOptions = field(default_factory=DiagnosticsOptions)
     relations: Relations = "both"
     """both: the chain of pairwise relations from tracking, and nScan relations of joint matches. nscan: of

@@ -7,6 +7,7 @@ import numpy as np
 from nscan_cli.graph.marginal_covariances import marginal_covariances
 from nscan_cli.graph.model import Graph
 from nscan_cli.slam.backend.scan_poses import between_keyframes
+from nscan_cli.slam.backend.untold_sigmas import relations_as_told
 from nscan_cli.slam.state import SlamState
 
 
@@ -16,14 +17,15 @@ def finish_graph(state: SlamState) -> Graph:
     log, rows = state.log, state.route.rows
     anchors = rows[np.searchsorted(rows, np.arange(len(log)), side="right") - 1]
     turn = state.options.optimisation.metres_per_radian
+    pairwise, nscan = relations_as_told(state)
     graph = Graph(
         scans=log.numbers,
         stamps=list(log.stamps),
         poses=between_keyframes(np.concatenate(state.tracked), rows, state.poses, state.breaks, turn),
         odometry=log.odometry,
         anchors=anchors,
-        pairwise=state.pairwise_relations,
-        nscan=state.nscan_relations,
+        pairwise=pairwise,
+        nscan=nscan,
         others=state.other_relations,
         loops=state.loops + state.detector.refused(),
     )

@@ -76,3 +76,17 @@ class RefinementOptions:
     """Most sweeps over all keyframes. A larger number is slower."""
     min_motion: float = 0.02
     """A match is made again if a scan has moved by more since, m and rad. A larger one makes fewer again."""
+
+
+@dataclass(frozen=True)
+class UntoldSigmaOptions:
+    """How certain the length of a way is that no scan tells, see diagnostics.untold_way."""
+
+    speed_share: float = 0.5
+    """Standard deviation of the robot's speed there, as a share of its usual one: it may stand, or hurry. A
+    larger share makes such ways less certain."""
+    least_speed: float = 0.05
+    """A slower robot stands, m/s. A larger value makes the usual speed that of fast drives."""
+    most_steps: int = 3
+    """Nodes of a relation that are more keyframes apart are of different visits, and measured. A larger value
+    makes more relations less certain."""

@@ -38,6 +38,7 @@ def notices(state: SlamState) -> list[str]:
     found += _scan_notices(state) if state.odometry is None else _odometry_notices(state)
     return (
         found
+        + _untold_ways(state)
         + _companions(state)
         + _view_mismatches(state)
         + _contradictions(state)
@@ -91,7 +92,7 @@ def _scan_notices(state: SlamState) -> list[str]:
             f"the scans jump at {_numbered(log, jumps)}, farther than the robot drives between two scans: "
             "scans are missing, the robot was carried, or tracking slipped; how far it moved is unknown"
         )
-    return found + _untold_ways(state)
+    return found
 
 
 def _untold_ways(state: SlamState) -> list[str]:

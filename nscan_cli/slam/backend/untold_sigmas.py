@@ -1,0 +1,117 @@
+"""Relations along ways that no scan tells: their length is a guess, and so it is as uncertain as that.
+
+Without odometry tracking keeps to steady motion along bare walls. The Hessian of a match there knows the
+ripple of its energy alone. So the relations of such a way get variance along it, of a random walk whose end
+has the variance of the whole guess. All repeat the same guess; marginals count each pair of scans once.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from nscan_cli.graph.model import NScan, Pairwise
+from nscan_cli.poses import Array, Indices, Mask
+from nscan_cli.slam.backend.options import UntoldSigmaOptions
+from nscan_cli.slam.diagnostics.untold_way import UntoldWay, untold_ways
+from nscan_cli.slam.state import SlamState
+
+Between = list[tuple[int, int]]
+"""Of each two successive nodes of a relation: the first and the last step from keyframe to keyframe."""
+
+
+def relations_as_told(state: SlamState) -> tuple[list[Pairwise], list[NScan]]:
+    """The pairwise and the nScan relations of a finished loop, as certain as scans tell the way."""
+    pairwise, nscan, options = state.pairwise_relations, state.nscan_relations, state.options.untold_sigmas
+    told, path = state.told_sigmas, np.concatenate(state.tracked)
+    sigmas = np.concatenate(told) if told else np.zeros(len(path))
+    ways = untold_ways(path, sigmas, state.options.diagnostics.untold_way)
+    if not ways:
+        return pairwise, nscan
+    times, is_told = state.log.times, sigmas <= state.options.diagnostics.untold_way.sigma
+    speed = _usual_speed(path, times, is_told, options)
+    variances = untold_variances(state.route.rows, times, speed, ways, options)
+    return with_untold_variances(pairwise, nscan, state.route.rows, variances, options.most_steps)
+
+
+def _usual_speed(path: Array, times: Array, is_told: Mask, options: UntoldSigmaOptions) -> float:
+    """The median speed (m/s) along a path (S, 3) of a robot that moves, where scans or odometry tell it."""
+    speeds = np.hypot(*np.diff(path[:, :2], axis=0).T) / np.maximum(np.diff(times), 1e-3)
+    moves = speeds > options.least_speed
+    told = moves & is_told[1:]
+    chosen = told if told.any() else moves
+    return float(np.median(speeds[chosen])) if chosen.any() else 0.0
+
+
+def untold_variances(
+    rows: Indices, times: Array, speed: float, ways: Sequence[UntoldWay], options: UntoldSigmaOptions
+) -> Array:
+    """The variance (K − 1,) in m² of the guess from each of the keyframes in rows (K,) to the next.
+
+    `times` (S,) are those of all scans, s; `speed` is that at which the robot usually drives, m/s.
+    """
+    variances = np.zeros(max(len(rows) - 1, 0))
+    at = times[rows]
+    for way in ways:
+        begin, end = times[max(way.first - 1, 0)], times[way.last]
+        whole = options.speed_share * speed * float(end - begin)
+        within = np.clip(at[1:], begin, end) - np.clip(at[:-1], begin, end)
+        variances += whole**2 * within / max(float(end - begin), 1e-9)
+    return variances
+
+
+def with_untold_variances(
+    pairwise: Sequence[Pairwise], nscan: Sequence[NScan], rows: Indices, variances: Array, most_steps: int
+) -> tuple[list[Pairwise], list[NScan]]:
+    """The relations among keyframes in rows (K,), less certain along ways that no scan tells.
+
+    `variances` (K − 1,) are those from each keyframe to the next, m². Relations over more than `most_steps`
+    keyframes are of another visit: they measure, and stay.
+    """
+    known = [_widened_pair(pair, _steps(pair, rows, most_steps), variances) for pair in pairwise]
+    return known, [_widened_joint(joint, _steps(joint, rows, most_steps), variances) for joint in nscan]
+
+
+def _steps(relation: Pairwise | NScan, rows: Indices, most_steps: int) -> Between:
+    """The steps of the chain between successive nodes of a relation; an empty range where it is a loop."""
+    at = np.sort(np.searchsorted(rows, np.array(relation.nodes))).tolist()
+    return [(a, b if b - a <= most_steps else a) for a, b in itertools.pairwise(at)]
+
+
+def _widened_pair(pair: Pairwise, steps: Between, variances: Array) -> Pairwise:
+    ((first, last),) = steps
+    variance = float(variances[first:last].sum())
+    if variance == 0.0:
+        return pair
+    along = np.append(_direction(pair.measurement[:2], pair.measurement[2]), 0.0)
+    return replace(pair, information=_less_certain(pair.information, along, variance))
+
+
+def _widened_joint(joint: NScan, steps: Between, variances: Array) -> NScan:
+    order = np.argsort(joint.nodes)
+    poses, hessian = joint.poses[order], joint.hessian
+    for after, (first, last) in enumerate(steps, start=1):
+        variance = float(variances[first:last].sum())
+        if variance == 0.0:
+            continue
+        motion = np.zeros((len(order), 3))
+        # The scans behind the step move along it together.
+        motion[order[after:], :2] = _direction(poses[after, :2] - poses[after - 1, :2], poses[after, 2])
+        hessian = _less_certain(hessian, motion.ravel(), variance)
+    return joint if hessian is joint.hessian else replace(joint, hessian=hessian)
+
+
+def _direction(step: Array, heading: float) -> Array:
+    """The unit vector (2,) along a step (2,), or along a heading (rad) if it is of no length."""
+    length = float(np.hypot(*step))
+    return step / length if length > 1e-3 else np.array([np.cos(heading), np.sin(heading)])
+
+
+def _less_certain(information: Array, motion: Array, variance: float) -> Array:
+    """Information (n, n) with a variance added along a motion (n,): Sherman and Morrison's formula."""
+    row = information @ motion
+    less: Array = information - np.outer(row, row) * (variance / (1.0 + variance * float(motion @ row)))
+    return less

@@ -1,0 +1,85 @@
+"""Where no scan tells the way, relations are as uncertain as the guess of its length, and no others."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from nscan_cli.graph.io.tum import parse_tum
+from nscan_cli.graph.marginal_covariances import marginal_covariances
+from nscan_cli.graph.model import Graph, NScan, Pairwise
+from nscan_cli.logs.load import read_log
+from nscan_cli.poses import Array, relative
+from nscan_cli.slam.backend.options import UntoldSigmaOptions
+from nscan_cli.slam.backend.untold_sigmas import untold_variances, with_untold_variances
+from nscan_cli.slam.diagnostics.notices import notices
+from nscan_cli.slam.diagnostics.untold_way import UntoldWay
+from tests.data import data_file
+from tests.slam.mapped_logs import mapped
+
+SIZE = 7
+SURE = 1e6
+"""Information (1/m², 1/rad²) of each relation along each coordinate."""
+
+
+def chain() -> list[Pairwise]:
+    step = np.array([2.0, 0.0, 0.0])
+    return [Pairwise((k, k + 1), step, SURE * np.eye(3), "track") for k in range(SIZE - 1)]
+
+
+def joint(nodes: tuple[int, ...]) -> NScan:
+    """All pairs of nodes along the x axis hold each other as the chain does."""
+    n = len(nodes)
+    laplacian = SURE * (n * np.eye(n) - np.ones((n, n)))
+    poses = np.array([(2.0 * node, 0.0, 0.0) for node in nodes])
+    hessian: Array = np.kron(laplacian, np.eye(3)).astype(np.float64)
+    return NScan(nodes, poses, hessian, 0, "nscan")
+
+
+def end_sigmas(pairwise: list[Pairwise], nscan: list[NScan]) -> Array:
+    """(3,) of the last node."""
+    ids = np.arange(SIZE)
+    poses = np.array([(2.0 * k, 0.0, 0.0) for k in range(SIZE)])
+    graph = Graph(ids, [f"{k}.0" for k in range(SIZE)], poses, None, ids, pairwise, nscan)
+    return np.sqrt(np.diag(marginal_covariances(graph)[SIZE - 1]))
+
+
+@pytest.mark.parametrize("joints", [[], [(0, 1, 2, 3), (2, 3, 4, 5), (3, 4, 5, 6)]])
+def test_all_relations_together_have_the_variance_of_the_guess(joints):
+    rows, times = np.arange(SIZE), np.arange(float(SIZE))
+    way = UntoldWay(2, 5, 6.0)
+    variances = untold_variances(rows, times, 2.0, [way], UntoldSigmaOptions(speed_share=0.5))
+    # Four seconds at 2 m/s, and half of that speed.
+    np.testing.assert_allclose(variances, [0.0, 4.0, 4.0, 4.0, 4.0, 0.0])
+    nscan = [joint(nodes) for nodes in joints]
+    x, y, _ = end_sigmas(*with_untold_variances(chain(), nscan, rows, variances, 3))
+    assert x == pytest.approx(4.0, rel=0.3)
+    assert y < 0.02
+
+
+def test_other_relations_and_other_visits_stay():
+    rows, variances = np.arange(SIZE), np.array([0.0, 0.0, 9.0, 0.0, 0.0, 0.0])
+    loop = Pairwise((1, 6), np.array([10.0, 0.0, 0.0]), SURE * np.eye(3), "loop")
+    known, _ = with_untold_variances([*chain(), loop], [], rows, variances, 3)
+    changed = [k for k, (old, new) in enumerate(zip([*chain(), loop], known, strict=True)) if old is not new]
+    assert len(known) == SIZE
+    assert [known[k].nodes for k in changed if known[k].information[0, 0] < SURE] == [(2, 3)]
+    assert known[2].information[0, 0] == pytest.approx(1.0 / 9.0, rel=1e-3)
+    assert known[2].information[1, 1] == pytest.approx(SURE)
+
+
+def test_sigma_grows_where_odometry_ends_in_a_bare_corridor():
+    """At the end the path is 6.5 m short and more; sigma was 0.86 m."""
+    name = "strangers/corridor-odometry-ends.mcap"
+    found = mapped(read_log(str(data_file(name))))
+    truth = parse_tum(data_file("strangers/corridor.tum").read_bytes(), "corridor.tum").poses
+    poses, last = found.graph.poses, int(found.graph.keyframes[-1])
+    off = relative(poses[last], poses[0]) - relative(truth[last], truth[0])
+    error = float(np.hypot(*off[:2]))
+    sigma = np.sqrt(np.linalg.eigvalsh(found.graph.marginals[last][:2, :2])[-1])
+    assert error > 3.0
+    assert 0.5 * error < sigma < 3.0 * error
+    # Before its odometry ends it is as certain as ever.
+    early = next(k for k in found.graph.keyframes.tolist() if k > 100)
+    assert np.sqrt(np.linalg.eigvalsh(found.graph.marginals[early][:2, :2])[-1]) < 0.6
+    assert any("the walls do not show how far the robot went" in said for said in notices(found.state))
