@@ -80,7 +80,10 @@ class Verification:
 def verify(state: SlamState, graph: Graph, options: VerificationOptions, threads: int) -> Verification:
     """Map the drive of a finished run again, and compare."""
     log, slam = state.recorded, state.options
-    path = MappedPath(np.arange(len(log)), graph.poses, np.array(state.breaks, dtype=np.int64), ())
+    rows, breaks = np.arange(len(log)), np.array(state.breaks, dtype=np.int64)
+    # A map without odometry is no better told than its repeats.
+    untold = np.concatenate(state.told_sigmas) > slam.diagnostics.untold_way.sigma
+    path = MappedPath(rows, graph.poses, breaks, (), rows if log.odometry is None else rows[untold])
     runs = repeats(log)
     paths = map_in_threads(threads, lambda run: run(log, slam), runs.values())
     found = [path_differences(path, again, options) for again in paths]

@@ -37,14 +37,15 @@ def path_differences(
     """Over each length the differences of a path and of its repeat, which has some of its scans.
 
     Compared are the relative positions of the last scan of a way, seen from the first. A length is left out
-    where no way is that long without a break or a gap.
+    where no way is that long without a break, a gap, or scans of the repeat alone that do not tell their
+    places.
     """
     at = np.searchsorted(path.rows, repeat.rows)
     one, other = path.poses[at], repeat.poses
     if len(one) < 2:
         return []
     along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(one[:, :2], axis=0).T))])
-    apart = np.cumsum(np.concatenate([[False], _is_apart(one, repeat, path.breaks, options)]))
+    apart = np.cumsum(np.concatenate([[False], _is_apart(one, path, repeat, options)]))
     found = []
     for way in options.ways:
         last = np.searchsorted(along, along + way)
@@ -55,11 +56,13 @@ def path_differences(
     return found
 
 
-def _is_apart(poses: Array, repeat: MappedPath, breaks: Indices, options: VerificationOptions) -> Mask:
+def _is_apart(poses: Array, path: MappedPath, repeat: MappedPath, options: VerificationOptions) -> Mask:
     """(n - 1,) whether a step from scan to scan is too far to say that the repeat must follow, or breaks."""
     steps = relative(poses[1:], poses[:-1])
     far = (np.hypot(steps[:, 0], steps[:, 1]) > options.max_step) | (np.abs(steps[:, 2]) > options.max_turn)
-    broken = np.searchsorted(repeat.rows, np.union1d(breaks, repeat.breaks)) - 1
+    # What the repeat alone guesses says nothing of the path.
+    guessed = np.setdiff1d(repeat.untold, path.untold)
+    broken = np.searchsorted(repeat.rows, np.union1d(np.union1d(path.breaks, repeat.breaks), guessed)) - 1
     far[np.clip(broken, 0, len(far) - 1)] = True
     return far
 

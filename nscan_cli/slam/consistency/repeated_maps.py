@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -29,6 +29,8 @@ class MappedPath:
     """Rows before which its track broke."""
     notices: tuple[str, ...]
     """What it says of itself."""
+    untold: Indices = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
+    """Rows of scans along bare walls, without odometry, that do not tell their places."""
 
 
 def mirrored(log: LaserLog) -> LaserLog:
@@ -50,13 +52,19 @@ def path_of(log: LaserLog, options: SlamOptions, rows: Indices | None = None) ->
     state = SlamState.of_log(log if len(rows) == len(log) else excerpt(log, rows), options)
     graph = run_slam(state, lambda *_counts: None)
     breaks = rows[np.array(state.breaks, dtype=np.int64)]
-    return MappedPath(rows, graph.poses, breaks, tuple(notices(state)))
+    untold = np.concatenate(state.told_sigmas) > options.diagnostics.untold_way.sigma
+    return MappedPath(rows, graph.poses, breaks, tuple(notices(state)), rows[untold])
 
 
 def path_of_mirrored(log: LaserLog, options: SlamOptions) -> MappedPath:
     """Map the mirror image, and mirror the path back."""
     found = path_of(mirrored(log), options)
     return replace(found, poses=found.poses * MIRRORED)
+
+
+def path_without_odometry(log: LaserLog, options: SlamOptions) -> MappedPath:
+    """Map a log by its scans alone."""
+    return path_of(replace(log, odometry=None, odometry_path=None), options)
 
 
 def repeats(log: LaserLog) -> dict[str, Callable[[LaserLog, SlamOptions], MappedPath]]:
@@ -67,9 +75,7 @@ def repeats(log: LaserLog) -> dict[str, Callable[[LaserLog, SlamOptions], Mapped
         "mirrored": path_of_mirrored,
     }
     if log.odometry is not None:
-        runs[WITHOUT_ODOMETRY] = lambda log, options: path_of(
-            replace(log, odometry=None, odometry_path=None), options
-        )
+        runs[WITHOUT_ODOMETRY] = path_without_odometry
     return runs
 
 
