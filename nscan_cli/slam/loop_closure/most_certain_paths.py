@@ -14,6 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from nscan_cli.graph.relations.base import Relation
+from nscan_cli.kernels.array_assignment import assign_rows
 from nscan_cli.kernels.decorators import kernel
 from nscan_cli.poses import Array, Indices, Mask, rotated_information
 from nscan_cli.slam.keyframes.route import Route
@@ -157,4 +158,4 @@ def _follow(links: Links, link: int, there: int, poses: Array, covariances: Arra
         moved[a, 1] += dx * moved[a, 2]
     if there == links.other[link]:
         moved += links.covariances[link]
-    covariances[there] = moved
+    assign_rows(covariances[there], moved)
