@@ -27,7 +27,7 @@ def main(folder: str) -> None:
     with tempfile.TemporaryDirectory() as scratch:
         drawn = _of_the_sample(Path(scratch)), _of_real_logs(Path(scratch)), _of_turning_lasers(Path(scratch))
         for name, picture in {name: each for some in drawn for name, each in some.items()}.items():
-            width = PAIR_WIDTH if name.endswith(("-loops", "-turn")) else None
+            width = PAIR_WIDTH if name.endswith(("-loops", "-turn", "-clean")) else None
             (Path(folder) / f"{name}.png").write_bytes(small_png(picture, width))
             print(f"{name}.png")
 
@@ -61,6 +61,8 @@ def _of_real_logs(scratch: Path) -> dict[str, Image]:
         closed = _map(log, scratch)
         if name != "fr-campus":
             pictures[name] = closed
+        if name == "intel":
+            pictures["intel-clean"] = _cleaned(log, scratch)
         if name != "intel":
             pictures[f"{name}-loops"] = _beside(_map(log, scratch, "--no-loops"), closed)
         else:
@@ -88,6 +90,14 @@ def _map(log: Path, scratch: Path, *options: str) -> Image:
     _run("slam", log, "-o", graph, *options)
     _run("render", graph, log, "-o", drawn, "--style", "paper", "--trajectory")
     return _opened(drawn)
+
+
+def _cleaned(log: Path, scratch: Path) -> Image:
+    """The map of the graph that `_map` has made, and what --clean leaves of it."""
+    graph, plain, clean = scratch / "map.json", scratch / "plain.png", scratch / "clean.png"
+    _run("render", graph, log, "-o", plain, "--align", "--crop", "auto")
+    _run("render", graph, log, "-o", clean, "--align", "--crop", "auto", "--clean")
+    return _beside(_opened(plain), _opened(clean))
 
 
 def _beside(left: Image, right: Image) -> Image:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from nscan_cli.cli.progress import say
-from nscan_cli.cli.result_over_log import load_result, log_of, over_log
+from nscan_cli.cli.result_over_log import load_result, log_of, number_by_order, over_log
 from nscan_cli.errors import InputDataError, WrongUsageError
 from nscan_cli.files.inputs import base_name, label
 from nscan_cli.files.outputs import write_atomically
@@ -28,10 +28,11 @@ def draw_comparison(
 
     loaded = [load_result(path) for path in results]
     log = log or log_of(results[0], loaded[0], log)
+    notices = [number_by_order(results[k], loaded[k], results[1 - k], loaded[1 - k]) for k in range(2)]
     first, second = (
         over_log(path, result, log, reading) for path, result in zip(results, loaded, strict=True)
     )
-    for notice in filter(None, (first.notice, second.notice)):
+    for notice in filter(None, (*notices, first.notice, second.notice)):
         say(f"warning: {notice}", quiet)
     _, one, two = np.intersect1d(first.rows, second.rows, return_indices=True)
     if len(one) == 0:

@@ -29,6 +29,10 @@ class BoxType(click.ParamType[Any]):
 
     name = f"X0,Y0,X1,Y1|{AUTO}"
 
+    def get_metavar(self, param: click.Parameter, ctx: click.Context | None = None) -> str:
+        """The form in help, where click would write all of it in capitals."""
+        return self.name
+
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
         """Parse the four numbers; a wrong form is a usage error."""
         if value == AUTO:

@@ -66,6 +66,36 @@ def log_of(path: str, result: Graph | Trajectory, log: tuple[str, ...]) -> tuple
     raise InputMissingError(f"{path}: a trajectory does not name its log; give its path as LOG")
 
 
+def number_by_order(
+    path: str, result: Graph | Trajectory, other_path: str, other: Graph | Trajectory
+) -> str | None:
+    """Give the vertices of a g2o file that count from 0 the scans of the other graph's keyframes, in order.
+
+    Returns a notice that says so; None for other results, and where the numbers can be those of scans. Raises
+    InputDataError if there are not as many keyframes.
+    """
+    import numpy as np
+
+    from nscan_cli.graph.model import Graph
+
+    if not (isinstance(result, Graph) and isinstance(other, Graph)) or result.provenance.get("format") != G2O:
+        return None
+    count, keyframes = np.arange(len(result)), other.scans[other.keyframes]
+    if not np.array_equal(result.scans, count) or len(count) >= len(other) or keyframes[-1] < len(count):
+        return None
+    if len(keyframes) != len(count):
+        problem = (
+            f"its vertices count from 0 to {len(count) - 1}: they are neither the {len(other)} scans of "
+            f"{other_path} nor its {len(keyframes)} keyframes"
+        )
+        raise InputDataError(label(path), problem, "give the trajectory in TUM format")
+    result.scans = keyframes
+    result.provenance = {"inputs": []}
+    return (
+        f"{label(path)}: its vertices are taken as the {len(keyframes)} keyframes of {other_path}, in order"
+    )
+
+
 def over_log(
     path: str, result: Graph | Trajectory, log: tuple[str, ...], reading: ReadingOptions
 ) -> ResultOverLog:

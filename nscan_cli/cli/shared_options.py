@@ -60,6 +60,10 @@ class SweepType(click.ParamType[Any]):
 
     name = "SECONDS|auto|off"
 
+    def get_metavar(self, param: click.Parameter, ctx: click.Context | None = None) -> str:
+        """The form in help, where click would write all of it in capitals."""
+        return self.name
+
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
         """Parse the time; a wrong form is a usage error."""
         if value in ("auto", "off"):
