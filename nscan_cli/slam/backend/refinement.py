@@ -7,7 +7,7 @@ the graph moves, and keyframes whose neighbours have moved are matched again.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -22,18 +22,23 @@ from nscan_cli.slam.local_matching.coverage import Coverage
 from nscan_cli.slam.local_matching.joint_relations import LocalMatch, LocalMatcher
 from nscan_cli.slam.local_matching.neighbours import Neighbours, choose_neighbours
 from nscan_cli.slam.local_matching.options import NScanOptions
+from nscan_cli.slam.loop_closure.close_loops import close_loops_left_open
+from nscan_cli.slam.loop_closure.place import Place
 from nscan_cli.slam.state import SlamState
 from nscan_cli.threads import map_in_threads
 
 
-def refine(state: SlamState) -> None:
-    """Make the local matches again, until they move no member. Changes relations, loops, route."""
+def refine(state: SlamState, search: bool = True) -> None:
+    """Make the local matches again, until they move no member. Changes relations, loops, places, route.
+
+    After the first sweep, keyframes that no loop relates to an earlier visit nearby are searched, unless
+    `search` is off.
+    """
     options = state.options
     # The poses are right to centimetres: the last stage is all it takes.
     last = replace(options.nscan, widenings=options.nscan.widenings[-1:])
-    wider = {place.centre: place.radius for place in state.places}
-    refinement = Refinement(state.route, last, state.match, wider, state.threads)
-    for _ in range(options.refinement.max_sweeps):
+    refinement = Refinement(state.route, last, state.match, state.places, state.threads)
+    for sweep in range(options.refinement.max_sweeps):
         if not refinement.sweep(state.poses, options.refinement.min_motion):
             break
         state.matched_pairs, state.nscan_relations = refinement.relations()
@@ -41,6 +46,8 @@ def refine(state: SlamState) -> None:
         state.loops = refinement.loops()
         optimise(state, options.optimisation.final)
         reject_contradicting_loops(state)
+        if sweep == 0 and search and options.nscan.loops:
+            refinement.match_at(close_loops_left_open(state))
 
 
 class Refinement:
@@ -51,14 +58,21 @@ class Refinement:
         route: Route,
         options: NScanOptions,
         match: LocalMatcher,
-        wider: Mapping[int, float],
+        places: Sequence[Place],
         threads: int = 1,
     ) -> None:
-        """`wider` has the radius (m) about the centres where large loops were closed."""
+        """At the `places` where a search closed loops, matches are made as there."""
         self._route, self._options, self._match, self._threads = route, options, match, threads
-        self._wider, self._covered = wider, Coverage()
+        self._covered, self._wider = Coverage(), dict[int, NScanOptions]()
         self._found: list[LocalMatch | None] = [None] * len(route.poses)
         self._starts: list[tuple[Indices, Array] | None] = [None] * len(route.poses)
+        self.match_at(places)
+
+    def match_at(self, places: Sequence[Place]) -> None:
+        """Let the next sweep match about the centres of these places, as a search matched there."""
+        for place in places:
+            self._wider[place.centre] = replace(place.options, widenings=self._options.widenings)
+            self._starts[place.centre] = None
 
     def sweep(self, poses: Array, moved: float) -> int:
         """Match again about the keyframes whose neighbours have moved by more than `moved` (m, rad).
@@ -100,9 +114,7 @@ class Refinement:
         return chosen
 
     def _options_of(self, centre: int) -> NScanOptions:
-        if centre not in self._wider:
-            return self._options
-        return replace(self._options, radius=self._wider[centre])
+        return self._wider.get(centre, self._options)
 
     def relations(self) -> tuple[list[Pairwise], list[NScan]]:
         """The relations as they are now: of single matches, and of joint ones."""

@@ -24,7 +24,14 @@ from nscan_cli.slam.backend.swept_scans import add_keyframes_at, tracked_at
 from nscan_cli.slam.keyframes.route import route_of
 from nscan_cli.slam.local_matching.joint_relations import LocalMatch
 from nscan_cli.slam.loop_closure.place import Place
-from nscan_cli.slam.loop_closure.verification import AMBIGUOUS, ELSEWHERE, NO_MATCH, NO_SECOND, SO_FAR_OFF
+from nscan_cli.slam.loop_closure.verification import (
+    AMBIGUOUS,
+    ELSEWHERE,
+    NO_MATCH,
+    NO_SECOND,
+    SO_FAR_OFF,
+    stretches,
+)
 from nscan_cli.slam.options import Relations, SlamOptions
 from nscan_cli.slam.state import SlamState
 
@@ -59,7 +66,7 @@ def resume(graph: Graph, log: LaserLog, rows: Indices, threads: int = 1) -> Grap
     """
     state = state_of_graph(graph, _log_of_rows(log, rows), options_of(graph), threads)
     reject_contradicting_loops(state)
-    refine(state)
+    refine(state, search=False)
     refined = finish_graph(state)
     refined.loops += [loop for loop in graph.loops if loop.reason in SEARCH_VERDICTS]
     refined.provenance = graph.provenance
@@ -137,7 +144,10 @@ def _large_loop_places(graph: Graph, options: SlamOptions) -> list[Place]:
         if distances.max() > options.nscan.radius:
             measured = relative(graph.poses[centre], graph.poses[farthest])
             radius = float(distances.max()) + options.refinement.min_motion
-            places.append(Place(position[farthest], position[centre], measured, radius, local_match))
+            matched = dataclasses.replace(options.nscan, radius=radius)
+            if len(nodes) > options.nscan.max_scans:
+                matched = dataclasses.replace(stretches(matched, options.loop_closure), radius=radius)
+            places.append(Place(position[farthest], position[centre], measured, matched, local_match))
     return places
 
 

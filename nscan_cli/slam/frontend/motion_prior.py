@@ -8,8 +8,12 @@ from nscan_cli.kernels.decorators import kernel
 from nscan_cli.matching.pose_kernels import composed_pose, relative_pose, wrapped
 from nscan_cli.matching.priors import MotionModel, Prior, motion_sigmas
 from nscan_cli.poses import Array
+from nscan_cli.slam.frontend.odometry_noise import learned_shares
 from nscan_cli.slam.frontend.options import TrackingParameters
 from nscan_cli.slam.frontend.track_state import KNOWN, TrackState
+
+TURN_ARM = 1.0
+"""A turn by one radian counts as this length of way, m."""
 
 
 @kernel
@@ -32,6 +36,28 @@ def predict(
         step[2] = wrapped(step[2])
         step /= max(known - 1, 1)
         along, about = motion_sigmas(step, settings.constant_velocity)
+    _write(prior, last, step, along, about)
+
+
+@kernel
+def predict_by_trusted_odometry(
+    track: TrackState, settings: TrackingParameters, odometry: Array, prior: Prior
+) -> None:
+    """As `predict`, with the deviations of trusted odometry, narrowed by what was learned of it."""
+    predict(track, settings, odometry, settings.trusted_odometry, prior)
+    if np.isfinite(odometry[0]) and np.isfinite(track.odometry[0]):
+        step = np.empty(3)
+        relative_pose(odometry, track.odometry, step)
+        length = max(np.hypot(step[0], step[1]), settings.match_motion) + abs(wrapped(step[2])) * TURN_ARM
+        along, about = prior.information[0, 0] ** -0.5, prior.information[2, 2] ** -0.5
+        shares = learned_shares(track.odometry_noise, settings.odometry_noise, length, along, about)
+        prior.information[0, 0] = prior.information[1, 1] = (along * shares[0]) ** -2
+        prior.information[2, 2] = (about * shares[1]) ** -2
+
+
+@kernel
+def _write(prior: Prior, last: Array, step: Array, along: float, about: float) -> None:
+    """Write the prior on the pose (3,) after a step (3,) from the last, with deviations in m and rad."""
     composed_pose(last, step, prior.mean)
     prior.mean[2] = wrapped(prior.mean[2])
     # The same variance along the path as across it: the information needs no rotation.

@@ -11,6 +11,7 @@ from nscan_cli.matching.correlative_search import SearchOptions
 from nscan_cli.matching.priors import MotionModel
 from nscan_cli.ndt.options import GaussianOptions
 from nscan_cli.poses import Array
+from nscan_cli.slam.frontend.odometry_noise import OdometryNoiseOptions
 
 
 class DegeneracyOptions(NamedTuple):
@@ -94,6 +95,8 @@ class TrackingOptions:
     """Most scans between two that are matched: a robot may stand for hours."""
     trusted_odometry: MotionModel = field(default_factory=lambda: MotionModel(distance=0.02))
     """Standard deviations of the odometry from one matched scan to the next, as a prior of the match."""
+    odometry_noise: OdometryNoiseOptions = field(default_factory=OdometryNoiseOptions)
+    """How these are narrowed by what is learned of the odometry."""
     contradiction_sigmas: float = 2.0
     """A match that is off that prior by more standard deviations is made again with the one of `odometry`."""
     odometry: MotionModel = field(default_factory=MotionModel)
@@ -172,6 +175,7 @@ class TrackingParameters(NamedTuple):
     sweep_step_change: float
     max_waiting: int
     trusted_odometry: MotionModel
+    odometry_noise: OdometryNoiseOptions
     contradiction_sigmas: float
     odometry: MotionModel
     between_sigma: float

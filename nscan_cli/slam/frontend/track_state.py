@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from nscan_cli.poses import Array
 from nscan_cli.slam.frontend.local_map import LocalMap
+from nscan_cli.slam.frontend.odometry_noise import OdometryNoise
 
 KNOWN, RESTARTS, NEXT = 0, 1, 2
 """Places in `TrackState.counts`: the number of the last poses that are known, how often matches were started
@@ -28,6 +29,7 @@ class TrackState(NamedTuple):
     """(1,) share of inliers of the last scan."""
     mean_square_deviation: Array
     """(1,) of scans from their predictions without odometry, m²."""
+    odometry_noise: OdometryNoise
     counts: NDArray[np.int64]
     """(3,) KNOWN, RESTARTS and NEXT"""
     map: LocalMap
@@ -37,4 +39,5 @@ class TrackState(NamedTuple):
         """The state before the first scan, with room for the last `size` poses; `initial_sigma` in m."""
         poses, odometry, inserted = np.zeros((size, 3)), np.full(3, np.nan), np.zeros(3)
         deviation, counts = np.array([initial_sigma**2]), np.zeros(3, dtype=np.int64)
-        return cls(poses, odometry, inserted, np.zeros(1), deviation, counts, LocalMap.empty())
+        noise, empty = OdometryNoise.begin(), LocalMap.empty()
+        return cls(poses, odometry, inserted, np.zeros(1), deviation, noise, counts, empty)

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from nscan_cli.kernels.array_assignment import assign, assign_rows
 from nscan_cli.kernels.decorators import kernel
 from nscan_cli.matching.pose_kernels import relative_pose, wrapped
-from nscan_cli.matching.priors import Prior
+from nscan_cli.matching.priors import Prior, motion_sigmas
 from nscan_cli.ndt.grid_growth import CELLS_PER_POINT
 from nscan_cli.ndt.hash_grid import Grid
 from nscan_cli.poses import Array
@@ -16,7 +16,8 @@ from nscan_cli.slam.frontend.angle_restarts import match_from_other_angles, rest
 from nscan_cli.slam.frontend.between_scans import match_between, waits_for_motion
 from nscan_cli.slam.frontend.degeneracy import keep_prediction
 from nscan_cli.slam.frontend.local_map import ROWS, insert_scan
-from nscan_cli.slam.frontend.motion_prior import contradicts, predict
+from nscan_cli.slam.frontend.motion_prior import contradicts, predict, predict_by_trusted_odometry
+from nscan_cli.slam.frontend.odometry_noise import learn_noise
 from nscan_cli.slam.frontend.options import TrackingParameters
 from nscan_cli.slam.frontend.scan_to_map import match_from_prediction
 from nscan_cli.slam.frontend.sector_of_view import match_again_in_sector, match_in_sector
@@ -55,10 +56,12 @@ def settle(
         track.map.path[0] += distance
         assign(track.inserted, pose)
         insert_scan(track.map, grid, settings, points[ends[k] : ends[k + 1]], pose)
-    found.odometry_sigmas[k] = 0.0
+    found.odometry_sigmas[k], length, along = 0.0, np.nan, np.inf
     if np.isfinite(odometry[k, 0]) and np.isfinite(track.odometry[0]):
+        relative_pose(odometry[k], track.odometry, step)
+        length, along = np.hypot(step[0], step[1]), motion_sigmas(step, settings.trusted_odometry)[0]
         off = np.hypot(pose[0] - prior.mean[0], pose[1] - prior.mean[1])
-        found.odometry_sigmas[k] = off * np.sqrt(prior.information[0, 0])
+        found.odometry_sigmas[k] = off / max(along, prior.information[0, 0] ** -0.5)
     assign(track.odometry, odometry[k])
     track.inliers[0] = found.inliers[k]
     found.paths[k], found.in_map[k] = track.map.path[0], joins
@@ -68,6 +71,9 @@ def settle(
             found.hessians[k, a, b] -= prior.information[a, b]
         if prior.information[a, a] > 0.0:
             found.prior_covariances[k, a, a] = 1.0 / prior.information[a, a]
+    learn_noise(
+        track.odometry_noise, settings.odometry_noise, pose, odometry[k], length, found.hessians[k], along**-2
+    )
     first = counts[NEXT]
     if first < k:
         match_between(track, grid, settings, points, ends, odometry, before, first, k, found)
@@ -143,7 +149,7 @@ def track_scans(
             prior.mean[:], prior.information[:, :] = 0.0, 0.0
             found.values[k], found.poses[k], found.hessians[k], found.inliers[k] = 0.0, 0.0, 0.0, 1.0
         else:
-            predict(track, settings, odometry[k], settings.trusted_odometry, prior)
+            predict_by_trusted_odometry(track, settings, odometry[k], prior)
             has_odometry = np.isfinite(odometry[k, 0])
             if shares.shape[0] > 0:
                 correct_by_last_step(track, scan, shares[ends[k] : ends[k + 1]], step)

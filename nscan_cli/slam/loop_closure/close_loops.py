@@ -2,13 +2,30 @@
 
 from __future__ import annotations
 
+from nscan_cli.poses import Indices
 from nscan_cli.slam.backend.optimisation import optimise
 from nscan_cli.slam.local_matching.joint_relations import LocalMatch
 from nscan_cli.slam.local_matching.match_keyframe import add_relations
-from nscan_cli.slam.local_matching.neighbours import Neighbours
-from nscan_cli.slam.loop_closure.place import move_segment
+from nscan_cli.slam.local_matching.neighbours import Neighbours, choose_neighbours
+from nscan_cli.slam.loop_closure.place import Place, move_segment
 from nscan_cli.slam.loop_closure.verification import TOO_LITTLE
 from nscan_cli.slam.state import SlamState
+
+
+def close_loops_left_open(state: SlamState) -> list[Place]:
+    """Search once more where no loop relates a keyframe to an earlier visit nearby; returns the places found.
+
+    The graph is optimised: such a place may have been too far off while it grew, or not yet seen by a second
+    keyframe. Changes what `close_loops` changes.
+    """
+    closed, known = {row for relation in state.loop_relations() for row in relation.nodes}, len(state.places)
+    state.detector.begin_again()
+    for centre, row in enumerate(state.route.rows.tolist()):
+        near = choose_neighbours(state.poses, state.route.paths, centre, state.options.nscan)
+        earlier = near.members[near.from_other_visit & (near.members < centre)]
+        if row not in closed and len(earlier):
+            _search(state, centre, earlier)
+    return state.places[known:]
 
 
 def close_loops(
@@ -25,6 +42,10 @@ def close_loops(
         return
     is_refused = loop is not None and not loop.accepted
     left_out = neighbours.members[neighbours.from_other_visit & is_refused]
+    _search(state, centre, left_out)
+
+
+def _search(state: SlamState, centre: int, left_out: Indices) -> None:
     places = state.detector.close(state.route, centre, left_out, state.loop_relations)
     if not places:
         return

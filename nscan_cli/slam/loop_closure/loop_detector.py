@@ -52,6 +52,11 @@ class LoopDetector:
         self._uncertainty, self._links = RelativeUncertainty(), LinkCache()
         self._searched = -np.inf
 
+    def begin_again(self) -> None:
+        """Forget where the path was searched last: the keyframes come anew."""
+        self._searched, self._waiting = -np.inf, []
+        self._uncertainty = RelativeUncertainty()
+
     def extend(self, relation: Pairwise, length: float) -> None:
         """Add a relation of the chain over a path of `length` (m)."""
         self.tracked_path.extend(relation, length)

@@ -56,6 +56,14 @@ class LoopClosureOptions:
     """Largest difference between the places that two keyframes find, rad. A larger one accepts more."""
     agreement_path: float = 30.0
     """Largest length of path between keyframes that agree, m. A larger one accepts more."""
+    stretch_radius: float = 10.0
+    """Where single scans of both visits see too little of the same, those within so much more of the centre
+    are matched together, m. A larger radius sees more of both visits and takes longer."""
+    stretch_scans: int = 20
+    """Most keyframes of such a match, half of them of other visits. More take longer."""
+    stretch_overlap: float = 0.55
+    """Least share of inliers, of one scan on another, that ties two scans of such a match. A larger share
+    refuses more."""
     min_agreeing: int = 2
     """Number of keyframes that have to find the same place. A larger number accepts less."""
     min_agreeing_doubtful: int = 3

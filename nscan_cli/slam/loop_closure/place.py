@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from nscan_cli.poses import Array, compose, relative
 from nscan_cli.slam.keyframes.route import Route
 from nscan_cli.slam.local_matching.joint_relations import LocalMatch
+from nscan_cli.slam.local_matching.options import NScanOptions
 
 
 @dataclass(frozen=True)
@@ -20,8 +21,8 @@ class Place:
     """The keyframe that was found."""
     measured: Array
     """(3,) pose of the centre in the frame of the old."""
-    radius: float
-    """How near the centre (m) those of the earlier visit were taken from."""
+    options: NScanOptions
+    """How both visits were matched: those that see little of the same, in stretches of the path."""
     local_match: LocalMatch
     """The match of both visits."""
 

@@ -53,16 +53,33 @@ def verify_place(
     away = np.hypot(*(poses[earlier, :2] - found.pose[:2]).T).min()
     radius = max(nscan.radius, float(away) + nscan.radius)
     wider = replace(nscan, radius=radius)
-    near = choose_neighbours(moved, route.paths, centre, wider)
-    local_match = match(route._replace(poses=moved), centre, near, wider)
-    tie = None if local_match is None else local_match.tie(keyframes[centre].row)
+    for options in (wider, stretches(wider, closing)):
+        near = choose_neighbours(moved, route.paths, centre, options)
+        local_match = match(route._replace(poses=moved), centre, near, options)
+        tie = None if local_match is None else local_match.tie(keyframes[centre].row)
+        if tie is not None:
+            break
     if local_match is None or tie is None:
         return Loop(nodes, False, NO_MATCH, found.score)
     old = int(np.searchsorted(route.rows, tie[0]))
     off = compose(moved[old], tie[1]) - found.pose
     if np.hypot(off[0], off[1]) > closing.match_reach:
         return Loop(nodes, False, ELSEWHERE, found.score)
-    return Place(old, centre, tie[1], radius, local_match)
+    return Place(old, centre, tie[1], options, local_match)
+
+
+def stretches(options: NScanOptions, closing: LoopClosureOptions) -> NScanOptions:
+    """The options with which stretches of the path are matched in place of single scans.
+
+    Where a laser looks ahead alone, scans of visits from opposite directions see little of the same. Those of
+    a stretch that hang together by the scans of their own visit see enough.
+    """
+    return replace(
+        options,
+        radius=options.radius + closing.stretch_radius,
+        max_scans=closing.stretch_scans,
+        min_overlap=closing.stretch_overlap,
+    )
 
 
 def why_match_doubted(

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import dataclasses
 import functools
+from collections.abc import Sequence
 
 import numpy as np
 import pytest
@@ -14,6 +16,7 @@ from nscan_cli.slam.local_matching.joint_relations import LocalMatch, LocalMatch
 from nscan_cli.slam.local_matching.neighbours import Neighbours, choose_neighbours
 from nscan_cli.slam.local_matching.options import NScanOptions
 from nscan_cli.slam.local_matching.pairwise_relations import match_neighbours_pairwise
+from nscan_cli.slam.loop_closure.place import Place
 from nscan_cli.slam.options import Relations, SlamOptions
 from tests.logs.excerpts import excerpt
 from tests.slam.mapped_logs import Mapped, mapped, mapped_office, office_log
@@ -51,9 +54,9 @@ class Recorded:
         return centres
 
 
-def refinement(match: LocalMatcher, wider: dict[int, float] | None = None) -> Refinement:
+def refinement(match: LocalMatcher, places: Sequence[Place] = ()) -> Refinement:
     state = unrefined().state
-    return Refinement(state.route, state.options.nscan, match, wider or {})
+    return Refinement(state.route, state.options.nscan, match, places)
 
 
 def near(centre: int) -> list[int]:
@@ -110,7 +113,9 @@ def test_about_a_closed_loop_a_match_is_made_whatever_others_cover_and_reaches_f
     state, recorded = unrefined().state, Recorded(match_neighbours)
     refinement(recorded).sweep(state.poses, MOVED)
     covered = sorted(set(range(len(state.keyframes))) - set(recorded.centres()))[5]
-    found = refinement(recorded, {covered: 6.5})
+    wider = dataclasses.replace(state.options.nscan, radius=6.5)
+    place = Place(0, covered, np.zeros(3), wider, LocalMatch((), None, None, 0.0, True))
+    found = refinement(recorded, [place])
     found.sweep(state.poses, MOVED)
     radii = dict(recorded.made)
     assert radii.pop(covered) == 6.5

@@ -37,7 +37,7 @@ class Searches(list[tuple[int, Array, SearchOptions]]):
         old = int(earlier[0])
         measured = relative(compose(np.array(self.corrections[centre]), poses[centre]), poses[old])
         loop = Loop((keyframes[old].row, keyframes[centre].row), True, "", 0.9)
-        return Place(old, centre, measured, 5.0, LocalMatch((), None, loop, 0.0, True))
+        return Place(old, centre, measured, NScanOptions(), LocalMatch((), None, loop, 0.0, True))
 
 
 @pytest.fixture

@@ -192,6 +192,24 @@ def test_a_place_that_no_match_confirms_is_refused():
     assert isinstance(found(match=matching((0.0, 0.0, 0.0))[0]), Place)
 
 
+def test_what_single_scans_do_not_confirm_stretches_of_both_visits_may():
+    match, calls = matching((0.0, 0.0, 0.0))
+
+    def match_stretches(visited, centre, near, options) -> LocalMatch | None:
+        found = match(visited, centre, near, options)
+        return found if options.min_overlap < NSCAN.min_overlap else None
+
+    place = found(match=match_stretches)
+    assert isinstance(place, Place)
+    single, stretches = (options for _, options in calls)
+    assert place.options == stretches
+    assert stretches.radius == single.radius + CLOSING.stretch_radius
+    assert stretches.max_scans == CLOSING.stretch_scans
+    joint = place.local_match.nscan
+    assert joint is not None
+    assert len(joint.nodes) > NSCAN.max_scans
+
+
 @pytest.mark.parametrize(("far", "reason"), [(0.6, None), (1.4, ELSEWHERE)])
 def test_a_match_that_leads_away_is_refused(far, reason):
     """By more than a metre, as a joint match from a good start never does."""
@@ -216,14 +234,14 @@ def test_both_visits_are_matched_from_the_place_found():
         relative(poses[visit], poses[CENTRE]), relative(before[visit], before[CENTRE]), atol=1e-9
     )
     away = np.hypot(*(poses[EARLIER, :2] - poses[CENTRE, :2]).T).min()
-    assert options == dataclasses.replace(NSCAN, radius=place.radius)
-    assert place.radius == pytest.approx(away + NSCAN.radius)
+    assert options == place.options == dataclasses.replace(NSCAN, radius=options.radius)
+    assert options.radius == pytest.approx(away + NSCAN.radius)
 
 
 def test_corrected_moves_the_visit_rigidly_to_its_place():
     """Golden: the centre, 90° to the left of (1, 2, 0), is 1 m ahead; keyframe 2 is 3 m ahead of that."""
     poses = np.array([[1.0, 2, 0], [7, 7, 0], [10, 7, 0]])
-    place = Place(0, 1, np.array([1.0, 0, np.pi / 2]), 5.0, LocalMatch((), None, None, 0.0, True))
+    place = Place(0, 1, np.array([1.0, 0, np.pi / 2]), NSCAN, LocalMatch((), None, None, 0.0, True))
     np.testing.assert_allclose(place.corrected(poses, 1), [2, 2, np.pi / 2], atol=1e-12)
     np.testing.assert_allclose(place.corrected(poses, 2), [2, 5, np.pi / 2], atol=1e-12)
 

@@ -1,0 +1,114 @@
+"""Step 1 with odometry: how good the odometry of this robot is, learned while it is tracked.
+
+Odometry differs from robot to robot by a factor of ten. Over each piece of the path along which all scans
+tell their place, the way by scans is compared with the way by odometry. The difference is the noise of both,
+so that it bounds that of the odometry. A prior as narrow as that keeps good odometry where scans tell little.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from nscan_cli.kernels.array_assignment import assign
+from nscan_cli.kernels.decorators import kernel
+from nscan_cli.matching.pose_kernels import relative_pose, wrapped
+from nscan_cli.poses import Array
+
+SAMPLES, PATH, TELLING = 0, 1, 2
+"""Places in `OdometryNoise.counts`: the pieces of the path that were compared, the length (m) of the present
+one, and whether all its scans told their place."""
+
+
+class OdometryNoiseOptions(NamedTuple):
+    """How the noise of the odometry is learned."""
+
+    window: float = 4.0
+    """Length of the pieces of the path, m. With longer ones wrong scales weigh more against chance."""
+    smoothing: float = 0.1
+    """Least weight of a new piece in the mean square. A larger weight follows changes faster."""
+    min_pieces: int = 4
+    """Nothing is learned from fewer pieces."""
+    factor: float = 2.0
+    """A prior has the standard deviation learned times this. A larger factor trusts the odometry less."""
+    min_share: float = 0.1
+    """Least share of the standard deviation of `trusted_odometry` that a prior keeps."""
+
+
+class OdometryNoise(NamedTuple):
+    """What is learned, which the kernels change."""
+
+    pose: Array
+    """(3,) where the present piece of the path begins."""
+    odometry: Array
+    """(3,) the odometry there; nan before the first piece."""
+    variances: Array
+    """(2,) mean square difference of both ways: of a coordinate, m² a metre; of the angle, rad² a metre."""
+    counts: Array
+    """(3,) SAMPLES, PATH and TELLING."""
+
+    @classmethod
+    def begin(cls) -> OdometryNoise:
+        """Nothing is known."""
+        return cls(np.zeros(3), np.full(3, np.nan), np.zeros(2), np.zeros(3))
+
+
+@kernel
+def learn_noise(
+    noise: OdometryNoise,
+    options: OdometryNoiseOptions,
+    pose: Array,
+    odometry: Array,
+    length: float,
+    hessian: Array,
+    least_information: float,
+) -> None:
+    """Take in a matched scan: its pose (3,), odometry (3,), and the `length` (m) of the step to it,
+    nan without odometry.
+
+    It tells its place if its Hessian (3, 3), without the prior, has at least this information (1/m²) in each
+    direction.
+    """
+    counts, way, by_odometry = noise.counts, np.empty(3), np.empty(3)
+    if not np.isfinite(length):
+        noise.odometry[0] = np.nan
+    counts[PATH] += length
+    if _weakest_information(hessian) < least_information:
+        counts[TELLING] = 0.0
+    if np.isfinite(noise.odometry[0]) and counts[PATH] < options.window:
+        return
+    if np.isfinite(noise.odometry[0]) and counts[TELLING] > 0.0:
+        relative_pose(pose, noise.pose, way)
+        relative_pose(odometry, noise.odometry, by_odometry)
+        off, turned = way - by_odometry, wrapped(way[2] - by_odometry[2])
+        counts[SAMPLES] += 1.0
+        weight = max(1.0 / counts[SAMPLES], options.smoothing)
+        square = 0.5 * (off[0] * off[0] + off[1] * off[1])
+        noise.variances[0] += weight * (square / counts[PATH] - noise.variances[0])
+        noise.variances[1] += weight * (turned * turned / counts[PATH] - noise.variances[1])
+    assign(noise.pose, pose)
+    assign(noise.odometry, odometry)
+    counts[PATH], counts[TELLING] = 0.0, 1.0
+
+
+@kernel
+def learned_shares(
+    noise: OdometryNoise, options: OdometryNoiseOptions, length: float, along: float, about: float
+) -> tuple[float, float]:
+    """The shares of the deviations `along` (m) and `about` (rad) that a step of this length (m) has."""
+    if noise.counts[SAMPLES] < options.min_pieces:
+        return 1.0, 1.0
+    distance = options.factor * np.sqrt(noise.variances[0] * length) / along
+    angle = options.factor * np.sqrt(noise.variances[1] * length) / about
+    return min(max(distance, options.min_share), 1.0), min(max(angle, options.min_share), 1.0)
+
+
+@kernel
+def _weakest_information(hessian: Array) -> float:
+    """The information (1/m²) of a Hessian (3, 3) in its weakest direction, its angle free."""
+    turn = max(hessian[2, 2], 1e-9)
+    xx = hessian[0, 0] - hessian[0, 2] * hessian[0, 2] / turn
+    xy = hessian[0, 1] - hessian[0, 2] * hessian[1, 2] / turn
+    yy = hessian[1, 1] - hessian[1, 2] * hessian[1, 2] / turn
+    return float(0.5 * (xx + yy) - np.hypot(0.5 * (xx - yy), xy))
