@@ -45,6 +45,8 @@ class SlamState:
     """(S, 3) odometry without its jumps; None without odometry."""
     odometry_jumps: Indices
     """(J,) rows to which the odometry jumped."""
+    odometry_stalls: Indices
+    """(J,) rows where the odometry moved on after it had stood while the robot drove."""
     frozen_scans: Indices
     """(H,) rows of scans that a laser repeated while the robot moved."""
     keyframes: Keyframes
@@ -84,9 +86,10 @@ class SlamState:
     def of_log(cls, log: LaserLog, options: SlamOptions, threads: int = 1) -> SlamState:
         """The state before the first scan of a log."""
         recorded, log = log, log.at_middle_of_turns().moving_along(None)
-        odometry, jumps = log.odometry, np.zeros(0, dtype=np.int64)
+        odometry = log.odometry
+        jumps = stalls = np.zeros(0, dtype=np.int64)
         if odometry is not None:
-            odometry, _ = without_stalls(odometry, log.times, options.odometry_checks.stalls)
+            odometry, stalls = without_stalls(odometry, log.times, options.odometry_checks.stalls)
             odometry, jumps = without_jumps(odometry, log.times, options.odometry_checks)
         seen = log.ranges[log.ranges < options.tracking.max_range]
         median_range = float(np.median(seen)) if len(seen) else 0.0
@@ -94,7 +97,7 @@ class SlamState:
         chain: list[Pairwise] = []
         route = route_of(keyframes.list, chain, np.zeros((0, 3)))
         frozen = frozen_scans(log, odometry, options.odometry_checks)
-        return cls(log, recorded, options, threads, odometry, jumps, frozen, keyframes, route, chain)
+        return cls(log, recorded, options, threads, odometry, jumps, stalls, frozen, keyframes, route, chain)
 
     def scan_batches(self) -> Iterator[ScanBatch]:
         """The scans of the log as tracking takes them."""

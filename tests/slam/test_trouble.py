@@ -80,9 +80,12 @@ def test_what_went_wrong_is_said_by_the_numbers_of_the_scans():
     broken = f"tracking broke at scan {numbers[made.before]}; how the robot moved there is unknown"
     assert notices(state) == [broken]
     state.odometry_jumps, state.frozen_scans = np.arange(12), np.array([3, 7])
+    state.odometry_stalls = np.array([5])
     several = ", ".join(str(number) for number in numbers[:10])
     assert notices(state)[1:] == [
         f"the odometry jumps at scans {several} and 2 more; each is replaced by the step before it",
+        f"the odometry stands still and catches up at scan {numbers[5]}; "
+        "that way is shared out over the scans before",
         f"the laser repeats itself at scans {numbers[3]}, {numbers[7]}; these scans are not matched",
     ]
 

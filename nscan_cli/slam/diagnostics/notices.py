@@ -32,6 +32,12 @@ def notices(state: SlamState) -> list[str]:
     jumps = state.odometry_jumps.tolist()
     if jumps:
         found.append(f"the odometry jumps at {_numbered(log, jumps)}; each is replaced by the step before it")
+    stalls = state.odometry_stalls.tolist()
+    if stalls:
+        found.append(
+            f"the odometry stands still and catches up at {_numbered(log, stalls)}; "
+            "that way is shared out over the scans before"
+        )
     frozen = state.frozen_scans.tolist()
     if frozen:
         found.append(f"the laser repeats itself at {_numbered(log, frozen)}; these scans are not matched")

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from nscan_cli.poses import Indices
 from nscan_cli.slam.backend.optimisation import optimise
 from nscan_cli.slam.local_matching.joint_relations import LocalMatch
@@ -13,17 +15,21 @@ from nscan_cli.slam.state import SlamState
 
 
 def close_loops_left_open(state: SlamState) -> list[Place]:
-    """Search once more where no loop relates a keyframe to an earlier visit nearby; returns the places found.
+    """Search once more where no loop relates the path to an earlier visit nearby; returns the places found.
 
     The graph is optimised: such a place may have been too far off while it grew, or not yet seen by a second
     keyframe. Changes what `close_loops` changes.
     """
-    closed, known = {row for relation in state.loop_relations() for row in relation.nodes}, len(state.places)
+    route, known = state.route, len(state.places)
+    related = [row for relation in state.loop_relations() for row in relation.nodes]
+    closed = np.isin(route.rows, related)
+    # A keyframe between two that are related lies well.
+    closed[1:-1] |= closed[:-2] & closed[2:]
     state.detector.begin_again()
-    for centre, row in enumerate(state.route.rows.tolist()):
-        near = choose_neighbours(state.poses, state.route.paths, centre, state.options.nscan)
+    for centre in np.flatnonzero(~closed).tolist():
+        near = choose_neighbours(state.poses, route.paths, centre, state.options.nscan)
         earlier = near.members[near.from_other_visit & (near.members < centre)]
-        if row not in closed and len(earlier):
+        if len(earlier):
             _search(state, centre, earlier)
     return state.places[known:]
 
