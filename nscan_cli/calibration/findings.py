@@ -140,8 +140,8 @@ def wrong_mounting(mount: Array, fit: MountFit, options: FileCheckOptions) -> Fi
     turn = float(wrap(off[2]))
     is_turned = abs(turn) > max(options.min_mount_turn, sigmas * float(fit.sigmas[3]))
     is_moved = bool((np.abs(off[:2]) > np.maximum(options.min_mount_move, sigmas * fit.sigmas[1:3])).any())
-    # Lengths tell nothing as long as it is open whose metre is wrong.
-    is_moved &= not is_wrong_scale(fit, options)
+    # Lengths tell nothing as long as it is open whose metre is wrong, nor do a few steps.
+    is_moved &= fit.steps >= options.min_steps_to_exclude and not is_wrong_scale(fit, options)
     if not is_turned and not is_moved:
         return None
     place = np.round(fit.mount[:2], 2) + 0.0 if is_moved else mount[:2]

@@ -85,14 +85,14 @@ def number_by_order(
         return None
     if len(keyframes) != len(count):
         problem = (
-            f"its vertices count from 0 to {len(count) - 1}: they are neither the {len(other)} scans of "
-            f"{other_path} nor its {len(keyframes)} keyframes"
+            f"its vertices count from 0 to {len(count) - 1}: they are neither the scans of {other_path} "
+            f"({len(other)}) nor its keyframes ({len(keyframes)})"
         )
         raise InputDataError(label(path), problem, "give the trajectory in TUM format")
     result.scans = keyframes
     result.provenance = {"inputs": []}
     return (
-        f"{label(path)}: its vertices are taken as the {len(keyframes)} keyframes of {other_path}, in order"
+        f"{label(path)}: its vertices are taken as the keyframes of {other_path} ({len(keyframes)}), in order"
     )
 
 

@@ -25,7 +25,7 @@ def test_short_scans_begin_half_a_step_later(tmp_path: Path) -> None:
     first = np.degrees(log.angle_min)
     assert first[::2] == pytest.approx(-90, abs=0.01)
     assert first[1::2] == pytest.approx(-89.5, abs=0.01)
-    assert "10 of 20 scans have 180 readings" in log.report.used["beams"]
+    assert "10 scans of 20 have 180 readings" in log.report.used["beams"]
 
 
 @pytest.mark.parametrize("beams", [[180] * 40, [181] * 39 + [180], [181, 179] * 20, [181, 180, 90] * 20])
