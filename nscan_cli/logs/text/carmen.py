@@ -221,8 +221,8 @@ def _angles(scans: CarmenScans, used: dict[str, str]) -> tuple[Array, Array, Arr
         angles[between, 0] += half
         last[between] += half
         used["beams"] = (
-            f"{counted(int(between.sum()), 'scan')} of {len(between)} have {scans.beams[between][0]} readings "
-            f"that lie between those of the others: they begin {np.degrees(half[0]):g}° later"
+            f"{counted(int(between.sum()), 'scan')} of {len(between)} have {scans.beams[between][0]} readings"
+            f" that lie between those of the others: they begin {np.degrees(half[0]):g}° later"
         )
     return angles[:, 0], angles[:, 1], last
 
