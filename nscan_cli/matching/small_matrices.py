@@ -33,6 +33,16 @@ def inverted(matrix: Array) -> Array:
 
 
 @leaf_kernel
+def information_of_place(hessian: Array) -> tuple[float, float, float]:
+    """The information (1/m²) of x, of both, and of y in the Hessian (3, 3) of a pose whose angle is free."""
+    turn = max(hessian[2, 2], 1e-9)
+    xx = hessian[0, 0] - hessian[0, 2] * hessian[0, 2] / turn
+    xy = hessian[0, 1] - hessian[0, 2] * hessian[1, 2] / turn
+    yy = hessian[1, 1] - hessian[1, 2] * hessian[1, 2] / turn
+    return xx, xy, yy
+
+
+@leaf_kernel
 def solve_definite(matrix: Array, right: Array, out: Array) -> bool:
     """Solve a symmetric positive definite system (m, m) by Cholesky; False when it is not definite.
 

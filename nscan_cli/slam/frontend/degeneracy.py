@@ -18,6 +18,7 @@ from nscan_cli.kernels.array_assignment import assign, assign_rows
 from nscan_cli.kernels.decorators import kernel, leaf_kernel
 from nscan_cli.matching.pairwise_solver import PairProblem, pairwise_objective
 from nscan_cli.matching.priors import Prior
+from nscan_cli.matching.small_matrices import information_of_place
 from nscan_cli.ndt.association import begin_association
 from nscan_cli.ndt.energy import ENERGY_NUMBERS
 from nscan_cli.ndt.hash_grid import Grid
@@ -82,10 +83,7 @@ def weakest_direction(hessian: Array, along: Array) -> float:
 
     Returns the ratio of that information to the one across.
     """
-    turn = max(hessian[2, 2], 1e-9)
-    xx = hessian[0, 0] - hessian[0, 2] * hessian[0, 2] / turn
-    xy = hessian[0, 1] - hessian[0, 2] * hessian[1, 2] / turn
-    yy = hessian[1, 1] - hessian[1, 2] * hessian[1, 2] / turn
+    xx, xy, yy = information_of_place(hessian)
     middle, radius = 0.5 * (xx + yy), np.hypot(0.5 * (xx - yy), xy)
     angle = 0.5 * (np.arctan2(2 * xy, xx - yy) + np.pi)
     along[0], along[1] = np.cos(angle), np.sin(angle)

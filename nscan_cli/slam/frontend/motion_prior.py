@@ -12,9 +12,6 @@ from nscan_cli.slam.frontend.odometry_noise import learned_shares
 from nscan_cli.slam.frontend.options import TrackingParameters
 from nscan_cli.slam.frontend.track_state import KNOWN, TrackState
 
-TURN_ARM = 1.0
-"""A turn by one radian counts as this length of way, m."""
-
 
 @kernel
 def predict(
@@ -36,7 +33,12 @@ def predict(
         step[2] = wrapped(step[2])
         step /= max(known - 1, 1)
         along, about = motion_sigmas(step, settings.constant_velocity)
-    _write(prior, last, step, along, about)
+    composed_pose(last, step, prior.mean)
+    prior.mean[2] = wrapped(prior.mean[2])
+    # The same variance along the path as across it: the information needs no rotation.
+    prior.information[:, :] = 0.0
+    prior.information[0, 0] = prior.information[1, 1] = along**-2
+    prior.information[2, 2] = about**-2
 
 
 @kernel
@@ -46,24 +48,14 @@ def predict_by_trusted_odometry(
     """As `predict`, with the deviations of trusted odometry, narrowed by what was learned of it."""
     predict(track, settings, odometry, settings.trusted_odometry, prior)
     if np.isfinite(odometry[0]) and np.isfinite(track.odometry[0]):
-        step = np.empty(3)
+        step, options = np.empty(3), settings.odometry_noise
         relative_pose(odometry, track.odometry, step)
-        length = max(np.hypot(step[0], step[1]), settings.match_motion) + abs(wrapped(step[2])) * TURN_ARM
+        length = max(np.hypot(step[0], step[1]), settings.match_motion)
+        length += abs(wrapped(step[2])) * options.turn_arm
         along, about = prior.information[0, 0] ** -0.5, prior.information[2, 2] ** -0.5
-        shares = learned_shares(track.odometry_noise, settings.odometry_noise, length, along, about)
+        shares = learned_shares(track.odometry_noise, options, length, along, about)
         prior.information[0, 0] = prior.information[1, 1] = (along * shares[0]) ** -2
         prior.information[2, 2] = (about * shares[1]) ** -2
-
-
-@kernel
-def _write(prior: Prior, last: Array, step: Array, along: float, about: float) -> None:
-    """Write the prior on the pose (3,) after a step (3,) from the last, with deviations in m and rad."""
-    composed_pose(last, step, prior.mean)
-    prior.mean[2] = wrapped(prior.mean[2])
-    # The same variance along the path as across it: the information needs no rotation.
-    prior.information[:, :] = 0.0
-    prior.information[0, 0] = prior.information[1, 1] = along**-2
-    prior.information[2, 2] = about**-2
 
 
 @kernel

@@ -14,6 +14,7 @@ import numpy as np
 from nscan_cli.kernels.array_assignment import assign
 from nscan_cli.kernels.decorators import kernel
 from nscan_cli.matching.pose_kernels import relative_pose, wrapped
+from nscan_cli.matching.small_matrices import information_of_place
 from nscan_cli.poses import Array
 
 SAMPLES, PATH, TELLING = 0, 1, 2
@@ -32,6 +33,8 @@ class OdometryNoiseOptions(NamedTuple):
     """Nothing is learned from fewer pieces."""
     factor: float = 2.0
     """A prior has the standard deviation learned times this. A larger factor trusts the odometry less."""
+    turn_arm: float = 1.0
+    """A turn by one radian counts as this length of way, m. A longer one widens the prior of turns."""
     min_share: float = 0.1
     """Least share of the standard deviation of `trusted_odometry` that a prior keeps."""
 
@@ -107,8 +110,5 @@ def learned_shares(
 @kernel
 def _weakest_information(hessian: Array) -> float:
     """The information (1/m²) of a Hessian (3, 3) in its weakest direction, its angle free."""
-    turn = max(hessian[2, 2], 1e-9)
-    xx = hessian[0, 0] - hessian[0, 2] * hessian[0, 2] / turn
-    xy = hessian[0, 1] - hessian[0, 2] * hessian[1, 2] / turn
-    yy = hessian[1, 1] - hessian[1, 2] * hessian[1, 2] / turn
+    xx, xy, yy = information_of_place(hessian)
     return float(0.5 * (xx + yy) - np.hypot(0.5 * (xx - yy), xy))

@@ -187,9 +187,9 @@ class SegmentTracker:
         The track is broken, and the way there unknown, unless odometry bridges it.
         """
         usual = float(np.median(self._usual))
-        lost = not self._has_odometry and usual < self.options.lost_inliers
-        if not (lost or contradicts_map(self._doubted[0], usual, self.breaking)):
-            # Nothing but the scans leads a tracker on that is lost without odometry.
+        # Without odometry nothing but the scans leads a tracker on that is lost.
+        is_lost = not self._has_odometry and usual < self.options.lost_inliers
+        if not (is_lost or contradicts_map(self._doubted[0], usual, self.breaking)):
             return []
         kept = self.tracker, self._origin, self._path
         last, first = self._last, self._doubted[0]

@@ -53,9 +53,9 @@ class LoopDetector:
         self._searched = -np.inf
 
     def begin_again(self) -> None:
-        """Forget where the path was searched last: the keyframes come anew."""
-        self._searched, self._waiting = -np.inf, []
-        self._uncertainty = RelativeUncertainty()
+        """Let the keyframes come anew. Verdicts stay; places that wait for a second keyframe are refused."""
+        self._refused, self._waiting = self.refused(), []
+        self._searched, self._uncertainty = -np.inf, RelativeUncertainty()
 
     def extend(self, relation: Pairwise, length: float) -> None:
         """Add a relation of the chain over a path of `length` (m)."""
