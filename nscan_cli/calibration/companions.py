@@ -75,8 +75,8 @@ def find_companion(log: LaserLog, poses: Array, options: CompanionOptions) -> Co
     some = np.unique(np.searchsorted(along, np.linspace(0.0, along[-1], options.scans)))
     found, looked_at = [], 0
     for k in some.tolist():
-        apart = np.abs(at - along[k])
-        about = path[(apart > options.nearest) & (apart < options.farthest)]
+        begin, end = np.searchsorted(at, along[k] + options.farthest * np.array([-1.0, 1.0]))
+        about = path[begin:end][np.abs(at[begin:end] - along[k]) > options.nearest]
         seen = _seen(log, int(rows[k]), poses[rows[k]], about, options)
         looked_at += seen is not None
         if seen is not None and len(seen):
@@ -90,9 +90,12 @@ def _seen(log: LaserLog, row: int, pose: Array, path: Array, options: CompanionO
 
     None if there is no path at some distance from the robot.
     """
-    path = path[np.hypot(*(path - pose[:2]).T) > options.clearance]
-    if not len(path):
+    away = np.hypot(*(path - pose[:2]).T)
+    if not (away > options.clearance).any():
         return None
+    # No reading that is looked at ends near the rest of it.
+    farthest = options.max_range + float(np.hypot(*log.mount[:2])) + options.radius
+    path = path[(away > options.clearance) & (away < farthest)]
     every = max(log.ranges.shape[1] // options.max_beams, 1)
     ranges = log.readings(row)[::every]
     bearings = log.angle_min[row] + every * log.angle_increment[row] * np.arange(len(ranges))
@@ -113,10 +116,8 @@ def _seen(log: LaserLog, row: int, pose: Array, path: Array, options: CompanionO
 
 def _is_on_path(places: Array, path: Array, radius: float) -> Mask:
     """(m,) which of the places (m, 2) are within a radius (m) of the path (n, 2)."""
-    if not len(places):
-        return np.zeros(0, dtype=np.bool_)
-    squares = ((places[:, None] - path[None]) ** 2).sum(axis=2)
-    near: Mask = squares.min(axis=1) < radius**2
+    squares = (places[:, :1] - path[:, 0]) ** 2 + (places[:, 1:] - path[:, 1]) ** 2
+    near: Mask = np.any(squares < radius**2, axis=1)
     return near
 
 

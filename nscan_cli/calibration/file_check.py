@@ -13,6 +13,7 @@ from nscan_cli.logs.assemble import scaled_odometry
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.logs.reading_options import ReadingOptions
 from nscan_cli.logs.robot_path import robot_path
+from nscan_cli.poses import are_known
 
 
 @dataclass(frozen=True)
@@ -23,6 +24,8 @@ class CheckedFile:
     reading: ReadingOptions
     """The options that read the log as it is now."""
     messages: list[str]
+    followed: bool = False
+    """Whether what goes along with the robot was looked for at all scans, by their odometry."""
 
 
 def checked_file(log: LaserLog, reading: ReadingOptions, options: FileCheckOptions) -> CheckedFile:
@@ -44,8 +47,9 @@ def checked_file(log: LaserLog, reading: ReadingOptions, options: FileCheckOptio
     if any(not finding.corrected for finding in findings):
         # Where the robot has been is in doubt.
         return CheckedFile(log, reading, said)
+    is_followed = log.odometry is not None and bool(are_known(log.odometry).all())
     log, reading, along = checked_companion(log, reading, options.companion)
-    return CheckedFile(log, reading, said + along)
+    return CheckedFile(log, reading, said + along, is_followed)
 
 
 def _as_read(log: LaserLog, reading: ReadingOptions, corrected: ReadingOptions) -> LaserLog:

@@ -9,7 +9,7 @@ import numpy as np
 from nscan_cli.calibration.options import StepOptions
 from nscan_cli.errors import InputDataError
 from nscan_cli.logs.laser_log import LaserLog
-from nscan_cli.matching.pairwise import PairMatch, match_pair, matched_points, scan_ndt
+from nscan_cli.matching.pairwise import PairMatch, match_pair, matched_points, scan_ndt, settle_pair
 from nscan_cli.poses import Array, Indices, relative
 
 
@@ -66,7 +66,7 @@ def _measured(log: LaserLog, begin: int, end: int, options: StepOptions) -> Pair
     if not match.converged or match.covariance is None or match.overlap < options.min_overlap:
         return None
     aside = options.probe * np.array([np.cos(match.weakest.direction), np.sin(match.weakest.direction), 0.0])
-    again = match_pair(gaussians, points, match.pose + aside, None, options.pair)
+    again = settle_pair(gaussians, points, match.pose + aside, options.pair)
     apart = np.abs(relative(again.pose, match.pose)).max()
     return match if apart <= options.agreement else None
 

@@ -86,6 +86,6 @@ def map_log(
         "scan_checks": as_parameters(ScanCheckOptions()),
         "slam": as_parameters(options),
     }
-    said = [*log.report.contradictions, *checked.messages, *notices(state)]
+    said = [*log.report.contradictions, *checked.messages, *notices(state, checked.followed)]
     graph.provenance = {**provenance_of([log.source], parameters), "notices": said}
     return state, graph

@@ -78,6 +78,16 @@ def test_without_odometry_the_option_is_named():
     assert "; try --mask 1" in said
 
 
+def test_it_is_looked_for_once():
+    """Before the log is mapped where odometry tells the path and is not in doubt, else afterwards."""
+    log, options = drive(), FileCheckOptions()
+    assert checked_file(log, ReadingOptions(), options).followed
+    without = faults.odometry_missing(log, slice(100, 110))
+    for other in (without, faults.mirrored(log), replace(log, odometry=None, odometry_path=None)):
+        assert not checked_file(other, ReadingOptions(), options).followed
+    assert not checked_file(log, ReadingOptions(as_recorded=True), options).followed
+
+
 def test_sectors_that_are_left_out_already_stay_so():
     masked = faults.cart(drive())
     report = replace(masked.report, masked=((0.5, 0.6),))

@@ -22,8 +22,11 @@ MOST_NAMED = 10
 """Scans or stretches that a notice names."""
 
 
-def notices(state: SlamState) -> list[str]:
-    """What went wrong, one sentence each."""
+def notices(state: SlamState, followed: bool = False) -> list[str]:
+    """What went wrong, one sentence each.
+
+    `followed`: whether what goes along with the robot was looked for before the log was mapped.
+    """
     log, found = state.log, []
     if state.breaks:
         found.append(
@@ -45,7 +48,7 @@ def notices(state: SlamState) -> list[str]:
     return (
         found
         + _untold_ways(state)
-        + _companions(state)
+        + ([] if followed else _companions(state))
         + _view_mismatches(state)
         + _contradictions(state)
         + _free_space_violations(state)
