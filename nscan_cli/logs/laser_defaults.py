@@ -56,7 +56,7 @@ def no_return_value(ranges: NDArray[np.float32]) -> float | None:
         return _single_value(usable, largest)
     least = int(values[top & (counts >= 0.01 * sharpest)].min()) / 100 - 0.005
     lower = usable[usable < least]
-    if np.unique(lower).size < MIN_DISTINCT_READINGS:
+    if not _are_many_values(lower):
         return None
     return _rounded(usable[usable >= least].min())
 
@@ -70,7 +70,15 @@ def _single_value(usable: NDArray[np.float32], largest: float) -> float | None:
     )
     if stands_out is None or 10 * np.count_nonzero(usable > value) > count:
         return None
-    return _rounded(value) if np.unique(usable[usable < value]).size >= MIN_DISTINCT_READINGS else None
+    return _rounded(value) if _are_many_values(usable[usable < value]) else None
+
+
+def _are_many_values(readings: NDArray[np.float32]) -> bool:
+    """Whether readings (N,) have enough distinct values; mostly the first of them tell."""
+    return any(
+        np.unique(some).size >= MIN_DISTINCT_READINGS
+        for some in (readings[: 100 * MIN_DISTINCT_READINGS], readings)
+    )
 
 
 def _rounded(value: np.float32) -> float:
