@@ -10,8 +10,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from nscan_cli.calibration.options import SweepCheckOptions
 from nscan_cli.calibration.scan_motion import ScanMotion
+from nscan_cli.calibration.sweep_options import SweepCheckOptions
+from nscan_cli.calibration.turn_of_file import usual_turn
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.logs.robot_path import poses_at, robot_path
 from nscan_cli.poses import are_known
@@ -22,12 +23,9 @@ def odometry_delay(log: LaserLog, motion: ScanMotion, options: SweepCheckOptions
     path, times = log.odometry_path, log.times
     if log.odometry is None or path is None or log.beam_times is None:
         return 0.0
-    twists = {row: motion.twist(row) for row in _turning(motion, options)}
-    measured = {row: twist for row, twist in twists.items() if twist is not None}
-    if len(measured) < options.min_delay_turns:
-        return 0.0
-    rows = np.array(list(measured))
-    turned = np.array(list(measured.values()))[:, 2] * (times[rows + 1] - times[rows - 1])
+    found = {row: motion.turned(row, usual_turn(log)) for row in _turning(motion, options)}
+    measured = {row: turned for row, turned in found.items() if turned is not None}
+    rows, turned = np.array(list(measured)), np.array(list(measured.values()))
     if np.count_nonzero(np.abs(turned) > options.min_winding) < options.min_delay_turns:
         return 0.0
     # What a scan tells is where the robot is at its middle beam.
@@ -43,12 +41,14 @@ def odometry_delay(log: LaserLog, motion: ScanMotion, options: SweepCheckOptions
 
     count = round(options.longest_delay / options.delay_step)
     delays = options.delay_step * np.arange(-count, count + 1)
-    found = [disagreement(delay) for delay in delays.tolist()]
-    best = int(np.argmin(found))
+    off = np.array([disagreement(delay) for delay in delays.tolist()])
+    best = int(np.argmin(off))
+    near = slice(max(best - options.delays_fitted, 0), best + options.delays_fitted + 1)
     # At an end of the range the best one may lie beyond.
-    if best in (0, 2 * count) or found[best] > options.delay_gain * found[count]:
+    if best in (0, 2 * count) or off[best] > options.delay_gain * off[count]:
         return 0.0
-    delay = round(float(delays[best]), 3)
+    bend, slope, _ = np.polyfit(delays[near] - delays[best], off[near], 2).tolist()
+    delay = round(float(delays[best]) - (slope / (2 * bend) if bend > 0.0 else 0.0), 3)
     return delay if abs(delay) >= options.least_delay else 0.0
 
 

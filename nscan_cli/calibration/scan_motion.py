@@ -7,8 +7,9 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from nscan_cli.calibration.options import StepOptions, SweepCheckOptions
+from nscan_cli.calibration.options import StepOptions
 from nscan_cli.calibration.scan_turns import scan_turns
+from nscan_cli.calibration.sweep_options import SweepCheckOptions, SweepTimeOptions
 from nscan_cli.errors import InputDataError
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.logs.robot_path import move_along_arc
@@ -26,7 +27,7 @@ class ScanMotion:
     longest_step: float
     """Longest time from a scan to the next, s, over which motion is measured."""
     _points: dict[int, tuple[Array, Array] | None] = field(default_factory=dict)
-    _twists: dict[int, Array | None] = field(default_factory=dict)
+    _twists: dict[int, tuple[Array, Array] | None] = field(default_factory=dict)
 
     @staticmethod
     def of_log(log: LaserLog, steps: StepOptions, options: SweepCheckOptions) -> ScanMotion:
@@ -59,11 +60,28 @@ class ScanMotion:
 
     def twist(self, row: int) -> Array | None:
         """(3,) velocity of the laser at a row, m/s and rad/s, by the scans on both sides; None in doubt."""
+        both = self._on_both_sides(row)
+        if both is None:
+            return None
+        mean: Array = np.mean(both, axis=0)
+        return mean
+
+    def is_steady(self, row: int, options: SweepTimeOptions) -> bool:
+        """Whether the laser turns before and after a row at nearly the same rate."""
+        both = self._on_both_sides(row)
+        if both is None:
+            return False
+        before, after = both[0][2], both[1][2]
+        most = max(abs(before), abs(after), options.slow)
+        return bool(abs(after - before) <= options.max_change * most)
+
+    def _on_both_sides(self, row: int) -> tuple[Array, Array] | None:
+        """The velocities (3,) from the scan before, and to the next one; None in doubt."""
         if row not in self._twists:
             self._twists[row] = self._measured(row)
         return self._twists[row]
 
-    def _measured(self, row: int) -> Array | None:
+    def _measured(self, row: int) -> tuple[Array, Array] | None:
         velocities: list[Array] = []
         for begin in (row - 1, row):
             seconds = float(self.log.times[begin + 1] - self.log.times[begin])
@@ -76,22 +94,45 @@ class ScanMotion:
             if not end.converged or end.overlap < self.steps.min_overlap:
                 return None
             velocities.append(end.pose / seconds)
-        mean: Array = np.mean(velocities, axis=0)
-        return mean
+        return velocities[0], velocities[1]
+
+    def corrected(self, row: int, turn: float) -> Array | None:
+        """Points (m, 2) of a scan from where the laser is at its middle beam, if its turn takes so long (s).
+
+        None in doubt.
+        """
+        scan, twist = self._scan(row), self.twist(row) if 0 < row < len(self.log) - 1 else None
+        if scan is None or twist is None:
+            return None
+        points = scan[0].copy()
+        move_along_arc(points, scan[1] * turn, twist, False)
+        return points
+
+    def turned(self, row: int, turn: float) -> float | None:
+        """rad; how far the laser turns from the scan before a row to the one after it, by corrected scans.
+
+        None in doubt.
+        """
+        before, at, after = (self.corrected(each, turn) for each in (row - 1, row, row + 1))
+        twist = self.twist(row)
+        if before is None or at is None or after is None or twist is None:
+            return None
+        seconds = np.diff(self.log.times[row - 1 : row + 2]).tolist()
+        ends = self._matched(before, at, twist * seconds[0]), self._matched(at, after, twist * seconds[1])
+        return float(sum(end.pose[2] for end in ends)) if all(end.converged for end in ends) else None
 
     def energies(self, one: int, other: int, turns: Sequence[float]) -> Array | None:
         """(T,) energy of two scans, per point, if a turn of the laser takes so long (T,); None in doubt."""
-        scans, twists = [self._scan(row) for row in (one, other)], [self.twist(row) for row in (one, other)]
-        (first, second), (before, after) = scans, twists
-        if first is None or second is None or before is None or after is None:
+        before, after = self.twist(one), self.twist(other)
+        if before is None or after is None:
             return None
         way = 0.5 * (before + after) * float(self.log.times[other] - self.log.times[one])
         found = np.empty(len(turns))
         for k, turn in enumerate(turns):
-            moved = first[0].copy(), second[0].copy()
-            for points, places, twist in zip(moved, (first[1], second[1]), (before, after), strict=True):
-                move_along_arc(points, places * turn, twist, False)
-            found[k] = self._matched(*moved, way).energy / len(moved[1])
+            first, second = self.corrected(one, turn), self.corrected(other, turn)
+            if first is None or second is None:
+                return None
+            found[k] = self._matched(first, second, way).energy / len(second)
         return found
 
     def _matched(self, reference: Array, points: Array, start: Array) -> PairEnd:

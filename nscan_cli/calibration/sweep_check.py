@@ -11,11 +11,14 @@ from nscan_cli.calibration.odometry_delay import odometry_delay, with_delay
 from nscan_cli.calibration.options import FileCheckOptions
 from nscan_cli.calibration.scan_motion import ScanMotion
 from nscan_cli.calibration.sweep_evidence import SweepEvidence, sweep_evidence
+from nscan_cli.calibration.sweep_time import sweep_time
+from nscan_cli.calibration.turn_of_file import stamp_place, sweep_turns, usual_turn
 from nscan_cli.files.text import counted
 from nscan_cli.logs.field_of_view import field_of_view
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.logs.reading_options import ReadingOptions
 from nscan_cli.logs.sweep import beam_times
+from nscan_cli.poses import Array
 
 
 def checked_sweep(
@@ -24,40 +27,64 @@ def checked_sweep(
     """The log with the times of beams that its scans tell, the options that read it so, and what is said.
 
     A time that the file tells may be of readings in the reverse order, or of a laser that sees at once. A
-    file that tells none may be of a laser that turns once from scan to scan. Where the scans do not say so
-    beyond doubt, all stays as it is.
+    file that tells none may be of a laser that turns from scan to scan, or for a part of that time. Where the
+    scans do not say so beyond doubt, all stays as it is.
     """
     if reading.as_recorded or reading.sweep is not None or len(log) < options.sweep.min_scans:
         return log, reading, []
-    told = _turn_of(log)
-    turn = _likely_turn(log, options) if told == 0.0 else told
-    if turn == 0.0:
+    told = usual_turn(log)
+    longest = abs(told) or _longest_turn(log, options)
+    if longest == 0.0:
         return log, reading, []
-    motion = ScanMotion.of_log(log, options.steps, options.sweep)
-    evidence = sweep_evidence(motion, (0.0, turn, -turn), told, options.sweep)
-    sharpest, said = evidence.sharpest, list[str]()
+    motion, said = ScanMotion.of_log(log, options.steps, options.sweep), list[str]()
+    tried = (0.0, longest, -longest) if told else (0.0, longest, -longest, 0.5 * longest, -0.5 * longest)
+    evidence = sweep_evidence(motion, tried, told, options.sweep)
+    sharpest = evidence.sharpest
     certainty = evidence.sigmas(sharpest, told)
     if sharpest != told and certainty >= options.sweep.sigmas:
-        reading = replace(reading, sweep=round(sharpest, DECIMALS) + 0.0)
-        turns = np.full(len(log), reading.sweep)
-        times = beam_times(turns, log.angle_increment, log.beam_counts(), reading.stamp)
-        said.append(_said(evidence, told, sharpest, certainty))
-        log = replace(log, beam_times=times)
+        turn = sharpest if told else _measured_turn(log, float(np.copysign(longest, sharpest)), options)
+        reading = replace(reading, sweep=round(turn, DECIMALS) + 0.0)
+        log = _turning(log, np.full(len(log), reading.sweep), reading.stamp)
+        said.append(_said(evidence, told, turn, certainty))
     delay = odometry_delay(log, motion, options.sweep)
     if delay:
-        log, reading = with_delay(log, delay), replace(reading, clock_offset=reading.clock_offset + delay)
-        said.append(_said_late(delay, reading.clock_offset))
+        log, reading, late = _without_delay(log, reading, delay, options)
+        said.append(late)
     return log, reading, said
 
 
-def _turn_of(log: LaserLog) -> float:
-    """The usual time of a turn as the file has it, s; 0 if it has none."""
-    if log.beam_times is None:
-        return 0.0
-    return float(np.median(log.beam_times.step * 2 * np.pi / np.abs(log.angle_increment)))
+def _measured_turn(log: LaserLog, whole: float, options: FileCheckOptions) -> float:
+    """The time of a turn by the scans, s, of a laser that turns; in doubt all of that from scan to scan."""
+    steps = replace(options.steps, max_beams=options.sweep.time.max_beams)
+    found = sweep_time(ScanMotion.of_log(log, steps, options.sweep), abs(whole), options.sweep)
+    return found.believed(whole, abs(whole), options.sweep.sigmas) or whole
 
 
-def _likely_turn(log: LaserLog, options: FileCheckOptions) -> float:
+def _turning(log: LaserLog, turns: Array, stamp: str) -> LaserLog:
+    """The log of a laser whose turns take so long (S,), s, with its scans stamped at that beam."""
+    return replace(log, beam_times=beam_times(turns, log.angle_increment, log.beam_counts(), stamp))
+
+
+def _without_delay(
+    log: LaserLog, reading: ReadingOptions, delay: float, options: FileCheckOptions
+) -> tuple[LaserLog, ReadingOptions, str]:
+    """The log whose odometry, stamped so much (s) too early, is where the scans have it; and what is said.
+
+    Scans that are stamped at their middle or last beam look like that.
+    """
+    place = None if reading.clock_offset else stamp_place(log, reading.stamp, delay, options.sweep)
+    if place is None:
+        reading = replace(reading, clock_offset=reading.clock_offset + delay)
+        return with_delay(log, delay), reading, _said_late(delay, reading.clock_offset)
+    said = (
+        f"scans are stamped at their {place} beam: as if at the {reading.stamp} one, they turn "
+        f"{abs(delay):.2g} s {'later' if delay > 0.0 else 'earlier'} than odometry; they are read so, as by "
+        f"--stamp {place}; --as-recorded believes the file"
+    )
+    return _turning(log, sweep_turns(log), place), replace(reading, stamp=place), said
+
+
+def _longest_turn(log: LaserLog, options: FileCheckOptions) -> float:
     """The time from scan to scan, s, if the laser looks around as those do that turn; else 0."""
     first, last, _ = field_of_view(log)
     period = float(np.median(np.diff(log.times)))
@@ -65,14 +92,14 @@ def _likely_turn(log: LaserLog, options: FileCheckOptions) -> float:
     return period if is_wide and options.sweep.shortest <= period <= options.sweep.longest else 0.0
 
 
-def _said(evidence: SweepEvidence, told: float, sharpest: float, certainty: float) -> str:
+def _said(evidence: SweepEvidence, told: float, turn: float, certainty: float) -> str:
     compared = counted(len(evidence.energies), "pair")
     pairs = f"{compared} of scans fit better so, by {certainty:.1f} standard deviations"
-    flag, order = f"{sharpest:.3g}", ", readings in the reverse order" if sharpest < 0.0 else ""
-    if sharpest == 0.0:
+    flag, order = f"{turn:.3g}", ", readings in the reverse order" if turn < 0.0 else ""
+    if turn == 0.0:
         what, flag = "the laser sees all beams at once, though the file has times of beams", "off"
     elif told == 0.0:
-        what = f"the laser turns for {abs(sharpest):.3g} s{order}, though the file has no times of beams"
+        what = f"the laser turns for {abs(turn):.3g} s{order}, though the file has no times of beams"
     else:
         what = "the readings are in the reverse order of time"
     return f"{what}: {pairs}; they are read so, as by --sweep {flag}; --as-recorded believes the file"

@@ -11,12 +11,15 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from nscan_cli.calibration.options import SweepCheckOptions
+from nscan_cli.calibration.robust_fit import TO_SIGMA
 from nscan_cli.calibration.scan_motion import ScanMotion
+from nscan_cli.calibration.sweep_options import SweepCheckOptions
 from nscan_cli.poses import Array
 
 LEAST_PAIRS = 5
 """With fewer their spread says little of their mean."""
+FARTHEST = 3.0
+"""Standard deviations from the median. What is farther from it counts as if it were there: matches slip."""
 
 
 @dataclass(frozen=True)
@@ -31,16 +34,27 @@ class SweepEvidence:
     def sigmas(self, better: float, worse: float) -> float:
         """By how many standard deviations one of the times fits better than another; 0 with too few pairs."""
         places = [int(np.argmin(np.abs(self.turns - turn))) for turn in (better, worse)]
-        gains = self.energies[:, places[1]] - self.energies[:, places[0]]
-        if len(gains) < LEAST_PAIRS:
+        if len(self.energies) < LEAST_PAIRS:
             return 0.0
+        gains = clipped(self.energies[:, places[1]] - self.energies[:, places[0]])
         spread = float(gains.std(ddof=1)) / np.sqrt(len(gains))
         return float(gains.mean()) / max(float(spread), 1e-12)
 
     @property
     def sharpest(self) -> float:
         """The time with the least energy of all pairs, s."""
-        return float(self.turns[int(np.argmin(self.energies.sum(axis=0)))])
+        if not len(self.energies):
+            return float(self.turns[0])
+        gains = clipped(self.energies - self.energies[:, :1])
+        return float(self.turns[int(np.argmin(gains.mean(axis=0)))])
+
+
+def clipped(values: Array) -> Array:
+    """Columns (P, ...) without what is farther than `FARTHEST` from their medians."""
+    middle = np.median(values, axis=0)
+    most = FARTHEST * TO_SIGMA * np.median(np.abs(values - middle), axis=0)
+    found: Array = np.clip(values, middle - most, middle + most)
+    return found
 
 
 def sweep_evidence(
@@ -51,7 +65,7 @@ def sweep_evidence(
     No more pairs are compared where `told`, one of those times, fits better than the others.
     """
     evidence = SweepEvidence(np.array(turns), np.empty((0, len(turns))))
-    for one, other in _pairs(motion, max(abs(turn) for turn in turns), options):
+    for one, other in turning_pairs(motion, max(abs(turn) for turn in turns), options):
         energies = motion.energies(one, other, turns)
         if energies is not None:
             evidence = replace(evidence, energies=np.vstack([evidence.energies, energies]))
@@ -67,7 +81,7 @@ def _is_settled(evidence: SweepEvidence, told: float, options: SweepCheckOptions
     return enough and all(evidence.sigmas(told, turn) >= options.settled_sigmas for turn in others)
 
 
-def _pairs(motion: ScanMotion, turn: float, options: SweepCheckOptions) -> Iterator[tuple[int, int]]:
+def turning_pairs(motion: ScanMotion, turn: float, options: SweepCheckOptions) -> Iterator[tuple[int, int]]:
     """Rows of two scans each between which the motion has changed; no scan is first again before all were."""
     fast, shifts = motion.turning_rows(turn, options), np.array(options.shifts)
     for begin in range(len(shifts)):

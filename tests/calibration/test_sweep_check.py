@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import functools
+import itertools
 
 import numpy as np
 import pytest
@@ -25,11 +26,11 @@ PERIOD, BEAMS = 0.2, 360
 
 
 @functools.cache
-def driven(turn: float, rate: float) -> SweptRecording:
+def driven(turn: float, rate: float, stamp: str = "first", seed: int = 1) -> SweptRecording:
     """A drive through the office with turns at a rate (rad/s); a turn of the laser takes `turn` s."""
     path = fine_path(office_way()[:12], Drive(speed=0.22, turn_rate=rate))
     laser = turning(BEAMS, 3.5, 0.01, 0.01)
-    return record_swept("office", office_world(), path, laser, Turning(PERIOD, turn), 1)
+    return record_swept("office", office_world(), path, laser, Turning(PERIOD, turn, stamp), seed)
 
 
 def recording(turn: float, rate: float = 2.8, told: float | None = None) -> bytes:
@@ -65,6 +66,30 @@ def test_the_scans_say_whether_and_how_the_laser_turns(turn, rate, told, used, s
         np.testing.assert_allclose(found.log.beam_times.step, used / BEAMS, rtol=1e-4)
     else:
         assert found.log.beam_times is None
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_a_pair_of_scans_that_slipped_does_not_hide_a_laser_that_turns(seed):
+    found = checked(swept_mcap(driven(PERIOD, 1.5, seed=seed), time_increment=0.0))
+    assert found.reading.sweep == pytest.approx(PERIOD)
+
+
+def test_a_laser_may_turn_for_a_part_of_the_time_from_scan_to_scan():
+    found = checked(recording(0.5 * PERIOD, 0.5, 0.0)).reading.sweep
+    assert found == pytest.approx(0.5 * PERIOD, rel=0.05)
+
+
+@pytest.mark.parametrize(("rate", "stamp"), list(itertools.product((0.5, 1.5, 2.8), ("middle", "last"))))
+def test_scans_that_are_stamped_at_another_beam_are_read_so(rate, stamp):
+    """Their turns are later than those of odometry by half a turn of the laser, or by a whole one."""
+    found = checked(swept_mcap(driven(PERIOD, rate, stamp)))
+    assert found.reading == ReadingOptions(stamp=stamp)
+    (message,) = found.messages
+    assert message.startswith(f"scans are stamped at their {stamp} beam")
+    right = log_from(swept_mcap(driven(PERIOD, rate, stamp)), "office.mcap", ReadingOptions(stamp=stamp))
+    assert found.log.beam_times is not None
+    assert right.beam_times is not None
+    np.testing.assert_allclose(found.log.beam_times.first, right.beam_times.first)
 
 
 @pytest.mark.parametrize("reading", [ReadingOptions(as_recorded=True), ReadingOptions(sweep=-PERIOD)])

@@ -1,0 +1,101 @@
+"""How long a turn of the laser takes, by its scans: a value with its standard deviation.
+
+Pairs of scans that were taken while the robot turned differently are matched with many times of a turn. Their
+energies have a minimum at the true one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from nscan_cli.calibration.scan_motion import ScanMotion
+from nscan_cli.calibration.sweep_evidence import LEAST_PAIRS, turning_pairs
+from nscan_cli.calibration.sweep_options import SweepCheckOptions, SweepTimeOptions
+from nscan_cli.poses import Array
+
+
+@dataclass(frozen=True)
+class SweepTime:
+    """The time of a turn that makes scans sharpest."""
+
+    turn: float
+    """s; negative if the readings are in the reverse order of time, nearly 0 if all are seen at once."""
+    sigma: float
+    """Standard deviation, s; inf where the robot hardly turns, or the scans do not tell."""
+    pairs: int
+    """Pairs of scans that it rests on."""
+
+    def believed(self, told: float, period: float, sigmas: float) -> float:
+        """The time to use if the file tells one, 0 for none, and scans follow each other in a period, all s.
+
+        It is the file's unless the scans contradict it by so many standard deviations. No turn takes longer
+        than the time from scan to scan, or than the file says.
+        """
+        longest = max(period, abs(told))
+        value, bound = float(np.clip(self.turn, -longest, longest)), sigmas * self.sigma
+        for known in (told, -told, 0.0, np.copysign(period, value)):
+            if abs(value - known) <= bound:
+                return known
+        return value
+
+
+def sweep_time(motion: ScanMotion, longest: float, options: SweepCheckOptions) -> SweepTime:
+    """The time of a turn of the laser of a log, of about `longest` (s) at most, in both directions.
+
+    The standard deviation is that of the jackknife over the pairs (B. Efron, "The Jackknife, the Bootstrap
+    and Other Resampling Plans", 1982), with what uneven turns add.
+    """
+    time = options.time
+    count = round(time.reach / time.step)
+    turns = time.step * longest * np.arange(-count, count + 1, dtype=np.float64)
+    energies = _energies(motion, longest, turns, options)
+    pairs = len(energies)
+    if pairs < LEAST_PAIRS:
+        return SweepTime(0.0, np.inf, pairs)
+    turn = _sharpest(turns, energies, time)
+    if abs(turn) >= turns[-2]:
+        # Beyond what was tried.
+        return SweepTime(0.0, np.inf, pairs)
+    without_one = np.array([
+        _sharpest(turns, np.delete(energies, pair, axis=0), time) for pair in range(pairs)
+    ])  # fmt: skip
+    sigma = np.sqrt((pairs - 1) * without_one.var())
+    return SweepTime(turn, float(np.hypot(sigma, time.unsteadiness * turn)), pairs)
+
+
+def _energies(motion: ScanMotion, longest: float, turns: Array, options: SweepCheckOptions) -> Array:
+    """(P, T) energies of P pairs for times of a turn (T,), of scans in steady turns if there are enough."""
+    time = options.time
+    steady, uneven = list[Array](), list[Array]()
+    for one, other in _pairs(motion, longest, options):
+        is_steady = motion.is_steady(one, time) and motion.is_steady(other, time)
+        if not is_steady and len(uneven) == time.pairs:
+            continue
+        energies = motion.energies(one, other, turns.tolist())
+        if energies is not None:
+            (steady if is_steady else uneven).append(energies)
+        if len(steady) == time.pairs:
+            break
+    if len(steady) < time.min_steady:
+        steady += uneven[: time.pairs - len(steady)]
+    return np.array(steady).reshape(-1, len(turns))
+
+
+def _pairs(motion: ScanMotion, longest: float, options: SweepCheckOptions) -> Iterator[tuple[int, int]]:
+    more = replace(options, scans=options.time.scans, pairs=options.time.most_rows)
+    return turning_pairs(motion, longest, more)
+
+
+def _sharpest(turns: Array, energies: Array, options: SweepTimeOptions) -> float:
+    """The time with the least energy (P, T) of all pairs, by a parabola through the times (T,) beside it."""
+    above = energies - energies.min(axis=1, keepdims=True)
+    most = options.cap * float(np.median(above.max(axis=1)))
+    means: Array = np.minimum(above, most).mean(axis=0)
+    best, step = int(np.argmin(means)), float(turns[1] - turns[0])
+    near = slice(max(best - options.fitted, 0), best + options.fitted + 1)
+    bend, slope, _ = np.polyfit(turns[near] - turns[best], means[near], 2).tolist()
+    off = -slope / (2 * bend) if bend > 0.0 else 0.0
+    return float(turns[best] + np.clip(off, -step, step))

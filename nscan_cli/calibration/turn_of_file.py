@@ -1,0 +1,43 @@
+"""The turn of the laser as a log is read: how long it takes, and at which beam its scans are stamped."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from nscan_cli.calibration.sweep_options import SweepCheckOptions
+from nscan_cli.logs.laser_log import LaserLog
+from nscan_cli.logs.sweep import BEFORE_STAMP
+from nscan_cli.poses import Array
+
+
+def sweep_turns(log: LaserLog) -> Array:
+    """(S,) the times of the turns, s, negative where the readings are in the reverse order; 0: at once."""
+    if log.beam_times is None:
+        return np.zeros(len(log))
+    found: Array = log.beam_times.step * 2 * np.pi / np.abs(log.angle_increment)
+    return found
+
+
+def usual_turn(log: LaserLog) -> float:
+    """The usual time of a turn, s; 0 if the file has none."""
+    return float(np.median(sweep_turns(log)))
+
+
+def stamp_place(log: LaserLog, stamp: str, delay: float, options: SweepCheckOptions) -> str | None:
+    """The beam that scans are stamped at if odometry, read as if they were at `stamp`, is `delay` (s) early.
+
+    None if no beam explains that, or the laser sees at once.
+    """
+    lasts = scan_time(log)
+    left = {
+        place: abs(delay - (share - BEFORE_STAMP[stamp]) * lasts) for place, share in BEFORE_STAMP.items()
+    }
+    place = min(left, key=lambda each: left[each])
+    return place if left[place] < options.stamp_tolerance * 0.5 * lasts else None
+
+
+def scan_time(log: LaserLog) -> float:
+    """The usual time from the first beam of a scan to the last, s; 0 if all are seen at once."""
+    if log.beam_times is None:
+        return 0.0
+    return float(np.median(np.abs(log.beam_times.step) * np.maximum(log.beam_counts() - 1, 0)))
