@@ -15,7 +15,7 @@ import numpy as np
 from nscan_cli.kernels import machine_code
 from nscan_cli.kernels.cache_folder import cache_folder
 from nscan_cli.kernels.compile_lock import compile_lock
-from nscan_cli.kernels.whole_kernels import compile_whole
+from nscan_cli.kernels.whole_kernels import compile_whole, dispatcher_for_kernels
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 
@@ -139,7 +139,7 @@ class Kernel:
     def _compile(self, arguments: tuple[Any, ...]) -> Any:
         """numba's CompileResult for arguments of these types."""
         types = tuple(map(_import_numba().typeof, arguments))
-        return compile_whole(self.py_func, types, self._options)
+        return compile_whole(self._called, types)
 
     @functools.cached_property
     def dispatcher(self) -> Any:
@@ -160,8 +160,8 @@ class Kernel:
     @functools.cached_property
     def _called(self) -> Any:
         """numba's dispatcher of the function in kernels that call it. Python cannot call this one."""
-        wrappers = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
-        return _import_numba().njit(**wrappers, **self._options)(self.py_func)
+        _import_numba()
+        return dispatcher_for_kernels(self.py_func, self._options)
 
     @property
     def _numba_type_(self) -> Any:
