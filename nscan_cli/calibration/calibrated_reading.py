@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from nscan_cli.calibration.estimate import Estimate
 from nscan_cli.calibration.options import CalibrationOptions
-from nscan_cli.calibration.robot_calibration import Calibration, Estimate
+from nscan_cli.calibration.robot_calibration import Calibration
 from nscan_cli.logs.reading_options import ReadingOptions
 
 DECIMALS = 4

@@ -17,7 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from nscan_cli.calibration.robust_fit import RobustFit, robust_fit
-from nscan_cli.poses import Array
+from nscan_cli.poses import Array, Indices
 
 
 @dataclass(frozen=True)
@@ -64,9 +64,12 @@ def fit_turns(laser: Array, odometry: Array, min_turn: float) -> TurnFit | None:
     return TurnFit(float(fit.values[0]), spread, int(turning.sum()))
 
 
-def fit_mount(laser: Array, odometry: Array, metres_per_radian: float) -> MountFit | None:
+def fit_mount(
+    laser: Array, odometry: Array, metres_per_radian: float, groups: Indices | None = None
+) -> MountFit | None:
     """The fit for steps (n, 3) of laser and robot; None where there is no motion to fit.
 
+    `groups` (g,) are the first of steps that follow each other: two have a scan in common, and its error.
     A step's motion is its length, and `metres_per_radian` times its turn.
     """
     if len(laser) < 3:
@@ -77,7 +80,7 @@ def fit_mount(laser: Array, odometry: Array, metres_per_radian: float) -> MountF
     rows[:, 1, :2] = np.stack([laser[:, 1], laser[:, 0]], axis=1)
     rows[:, 0, 2:] = np.stack([1.0 - c, s], axis=1)
     rows[:, 1, 2:] = np.stack([-s, 1.0 - c], axis=1)
-    fit = robust_fit(rows, odometry[:, :2])
+    fit = robust_fit(rows, odometry[:, :2], groups)
     size = float(np.hypot(fit.values[0], fit.values[1]))
     if size <= 0.0:
         return None

@@ -16,7 +16,10 @@ class StepOptions:
     """Steps that are spread evenly over the log, and as many more where odometry turns most. More steps tell
     more and take longer."""
     most: int = 1_500
-    """Most steps of a calibration. More tell more and take longer."""
+    """Most steps of a calibration, about. More tell more and take longer."""
+    chain: int = 12
+    """Steps that follow each other whose turns are added up to be compared with those by odometry. Of more,
+    stamps that are off matter less, and one match that fails spoils more."""
     duration: float = 0.4
     """Least time of a step, s. Over a longer one the robot moves more, until the scans are too far apart."""
     max_duration: float = 2.0
@@ -201,3 +204,6 @@ class CalibrationOptions:
     """The same for the scale of odometry, as a share."""
     max_clock_sigma: float = 0.03
     """The same for the offset of the clocks, s."""
+    max_sideways: float = 0.05
+    """Odometry is that of two wheels if its steps go to the side by no more than this share, in the median.
+    It is 0.001 to 0.013 on real logs."""

@@ -1,8 +1,8 @@
 """What an ordinary drive says about the robot: mounting, odometry and clocks, each with a standard deviation.
 
-The mounting and the scale follow in closed form from the steps (mount_fit.py). The lag of the clocks, the
-ratio of the turns and the heading that is gained per metre are fitted to the turns, the lag by Gauss-Newton
-steps. Both fits are robust against slips.
+The mounting and the scale follow in closed form from the steps (mount_fit.py), the lag of the clocks from
+their turns by Gauss-Newton steps, the ratio of the turns and the heading that is gained per metre from the
+turns of chains of steps. All fits are robust against slips.
 """
 
 from __future__ import annotations
@@ -11,32 +11,28 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from nscan_cli.calibration.estimate import Estimate, estimate, left_open
 from nscan_cli.calibration.measured_steps import MeasuredSteps, measure_steps
 from nscan_cli.calibration.mount_fit import MountFit, fit_mount
 from nscan_cli.calibration.odometry_clock import clock_lag
 from nscan_cli.calibration.options import CalibrationOptions
 from nscan_cli.calibration.robust_fit import TO_SIGMA, robust_fit
+from nscan_cli.calibration.step_chains import chains
 from nscan_cli.calibration.step_sampling import successive_steps
+from nscan_cli.calibration.wheels import sideways_share, wheels
 from nscan_cli.errors import InputDataError
 from nscan_cli.files.text import counted
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.logs.reading_options import ReadingOptions
 from nscan_cli.poses import MIRRORED, Array, are_known, compose, inverse, relative, wrap
 
-
-@dataclass(frozen=True)
-class Estimate:
-    """A value by the scans."""
-
-    value: float
-    sigma: float
-    """Standard deviation; inf where the drive leaves the value open."""
-    recorded: float | None = None
-    """The value that the file, or an option, says; None if they say nothing."""
-
-
-NO_TURNS = Estimate(1.0, np.inf, 1.0), Estimate(0.0, np.inf, 0.0), Estimate(0.0, np.inf, 0.0)
-"""Ratio of the turns, heading gained per metre and offset of the clocks, where turns do not tell."""
+HARDLY_TURNS = "the robot hardly turns"
+TURNS_DIFFER = "turns by odometry and by scans have too little in common"
+NO_OFFSET = "turns agree at no offset of the clocks better than at others"
+FEW_STEPS = "too few steps go far enough"
+STEPS_ALIKE = "all steps are alike"
+TOGETHER = 3
+"""Steps that follow each other whose errors have to do with each other: they have scans in common."""
 
 
 @dataclass(frozen=True)
@@ -62,14 +58,14 @@ class Calibration:
     """Whether the readings are in the wrong order."""
     values: dict[str, Estimate]
     """mount_x, mount_y, mount_angle; odometry_scale, turn_ratio (turns by odometry as a multiple of those by
-    scans), veer (heading that odometry gains per metre); clock_offset; noise_distance (per metre) and
-    noise_turn (per radian) of steps by odometry."""
+    scans), veer (heading that odometry gains per metre); wheel_difference and track_width (wheels.py);
+    clock_offset; noise_distance (per metre) and noise_turn (per radian) of steps by odometry."""
     evidence: Evidence
 
     @property
     def open(self) -> list[str]:
         """The values that the drive leaves open."""
-        return [name for name, estimate in self.values.items() if not np.isfinite(estimate.sigma)]
+        return [name for name, value in self.values.items() if value.is_open]
 
 
 def calibrate(log: LaserLog, reading: ReadingOptions, options: CalibrationOptions) -> Calibration:
@@ -86,18 +82,21 @@ def calibrate(log: LaserLog, reading: ReadingOptions, options: CalibrationOption
         measured = counted(int(drive.moving.sum()), "step")
         problem = f"its scans measure the motion of {measured} only, of {len(rows[0])}"
         raise InputDataError(log.source.name, problem, "give a longer drive, along more than bare walls")
-    lag, mirrored = drive.clock()
-    ratio, veer, offset = drive.turn_fit(lag, mirrored)
+    offset, mirrored, why_open = drive.clock()
     fit, scale = drive.mount_fit(offset.value, mirrored), reading.odometry_scale
     if fit is None:
         raise InputDataError(log.source.name, "its odometry never moves", "give a log whose odometry does")
+    ratio, veer = drive.turn_fit(offset.value, fit.scale, mirrored, why_open)
+    by_scale = estimate(scale * fit.scale, scale * float(fit.sigmas[0]), scale, STEPS_ALIKE)
+    sideways = sideways_share(drive.odometry(offset.value)[drive.moving])
     return Calibration(
         mirrored,
         {
-            **_mounting(fit, log.mount, np.isfinite(ratio.sigma)),
-            "odometry_scale": Estimate(scale * fit.scale, scale * float(fit.sigmas[0]), scale),
+            **_mounting(fit, log.mount, why_open),
+            "odometry_scale": by_scale,
             "turn_ratio": ratio,
             "veer": veer,
+            **wheels(by_scale, ratio, veer, sideways, options.max_sideways),
             "clock_offset": replace(
                 offset, value=reading.clock_offset + offset.value, recorded=reading.clock_offset
             ),
@@ -107,14 +106,16 @@ def calibrate(log: LaserLog, reading: ReadingOptions, options: CalibrationOption
     )
 
 
-def _mounting(fit: MountFit, mount: Array, turns_agree: bool) -> dict[str, Estimate]:
-    _, x, y, angle = fit.sigmas.tolist()
-    x, y = (x, y) if turns_agree else (np.inf, np.inf)
+def _mounting(fit: MountFit, mount: Array, why_open: str) -> dict[str, Estimate]:
+    """`why_open`: why the place stays open, empty if it does not."""
+    _, *sigmas, angle = fit.sigmas.tolist()
+    x, y = (np.inf, np.inf) if why_open else sigmas
+    why_open = why_open or STEPS_ALIKE
     turned = float(mount[2] + wrap(fit.mount[2] - mount[2]))
     return {
-        "mount_x": Estimate(float(fit.mount[0]), x, float(mount[0])),
-        "mount_y": Estimate(float(fit.mount[1]), y, float(mount[1])),
-        "mount_angle": Estimate(turned, angle, float(mount[2])),
+        "mount_x": estimate(float(fit.mount[0]), x, float(mount[0]), why_open),
+        "mount_y": estimate(float(fit.mount[1]), y, float(mount[1]), why_open),
+        "mount_angle": estimate(turned, angle, float(mount[2]), STEPS_ALIKE),
     }
 
 
@@ -156,23 +157,25 @@ class _Drive:
         after, before = (np.interp(times + side, self._at, self._poses[:, 2]) for side in (half, -half))
         return (after - before) / (2 * half)
 
-    def clock(self) -> tuple[float | None, bool]:
-        """The offset of the clocks to begin with, s, None if turns do not tell; whether they are mirrored."""
+    def clock(self) -> tuple[Estimate, bool, str]:
+        """The offset of the clocks, s; whether readings are mirrored; why turns do not tell, or nothing."""
         if not self.turns_enough:
-            return None, False
+            return left_open(0.0, 0.0, HARDLY_TURNS), False, HARDLY_TURNS
         options, gain = self.options.clock, self.options.clock.gain
         lag, other = (clock_lag(self.log, self.steps, options, sign) for sign in (1.0, -1.0))
         assert lag is not None
         assert other is not None
         mirrored = other.disagreement < gain * lag.disagreement
         best = other if mirrored else lag
-        return (best.offset if best.disagreement < gain * best.elsewhere else None), mirrored
+        is_told = best.disagreement < gain * best.elsewhere
+        offset, left = self._clock_fit(best.offset if is_told else 0.0, mirrored)
+        if left > self.options.max_turn_spread:
+            return left_open(0.0, 0.0, TURNS_DIFFER), mirrored, TURNS_DIFFER
+        return offset if is_told else left_open(0.0, 0.0, NO_OFFSET), mirrored, ""
 
-    def turn_fit(self, lag: float | None, mirrored: bool) -> tuple[Estimate, Estimate, Estimate]:
-        """Ratio of the turns, heading gained per metre (rad/m), and offset of the clocks (s), near `lag`."""
-        if not self.turns_enough:
-            return NO_TURNS
-        used, offset = self.moving, lag or 0.0
+    def _clock_fit(self, offset: float, mirrored: bool) -> tuple[Estimate, float]:
+        """The offset of the clocks, s, near another, and what is then left of turns, as a share of them."""
+        used = self.moving
         turns = self.laser[used, 2] * (-1.0 if mirrored else 1.0)
         # Of a drive that is mostly straight, the turns would else be outliers.
         expected = self.options.angle_sigma + self.options.angle_sigma_per_radian * np.abs(turns)
@@ -182,26 +185,41 @@ class _Drive:
             by_lag = self._turn_rates(self._ends[used] - offset) - self._turn_rates(
                 self._begins[used] - offset
             )
-            columns = [turns, self.length[used], *([] if lag is None else [by_lag])]
-            rows = np.stack(columns, axis=1) / expected[:, None]
+            rows = np.stack([turns, self.length[used], by_lag], axis=1) / expected[:, None]
             fit = robust_fit(rows[:, None, :], (told / expected)[:, None])
-            if lag is not None:
-                # Rates hold near their time only.
-                limit = self.options.clock.resolution
-                offset += float(np.clip(fit.values[2], -limit, limit))
-        sigmas = np.sqrt(np.diag(fit.covariance))
+            # Rates hold near their time only.
+            limit = self.options.clock.resolution
+            offset += float(np.clip(fit.values[2], -limit, limit))
         left = np.median((fit.residuals * expected)[self.turning[used]])
-        if left > self.options.max_turn_spread * np.median(np.abs(turns[self.turning[used]])):
-            return NO_TURNS
-        return (
-            Estimate(float(fit.values[0]), float(sigmas[0]), 1.0),
-            Estimate(float(fit.values[1]), float(sigmas[1]), 0.0),
-            Estimate(offset, np.inf if lag is None else float(sigmas[2]), 0.0),
-        )
+        sigma = float(np.sqrt(fit.covariance[2, 2]))
+        return Estimate(offset, sigma, 0.0), float(left / np.median(np.abs(turns[self.turning[used]])))
+
+    def turn_fit(
+        self, offset: float, scale: float, mirrored: bool, why_open: str
+    ) -> tuple[Estimate, Estimate]:
+        """Ratio of the turns, and heading gained per metre (rad/m), by chains of steps.
+
+        `why_open`: why turns do not tell, empty if they do.
+        """
+        if why_open:
+            return left_open(1.0, 1.0, why_open), left_open(0.0, 0.0, why_open)
+        begins = chains(self.steps, self.options.steps.chain)
+        told = self.odometry(offset)
+        columns = self.laser[:, 2] * (-1.0 if mirrored else 1.0), _forward(told, scale), told[:, 2]
+        turned, driven, by_odometry = (np.add.reduceat(column, begins) for column in columns)
+        # Errors of steps add up as in a random walk.
+        expected = np.sqrt(np.diff(np.append(begins, len(told))))
+        rows = np.stack([turned, driven], axis=1) / expected[:, None]
+        fit = robust_fit(rows[:, None, :], (by_odometry / expected)[:, None])
+        ratio, veer = fit.values.tolist()
+        sigmas = np.sqrt(np.diag(fit.covariance)).tolist()
+        return estimate(ratio, sigmas[0], 1.0, FEW_STEPS), estimate(veer, sigmas[1], 0.0, FEW_STEPS)
 
     def mount_fit(self, offset: float, mirrored: bool) -> MountFit | None:
-        laser = self.laser[self.moving] * (MIRRORED if mirrored else 1.0)
-        return fit_mount(laser, self.odometry(offset)[self.moving], self.options.steps.metres_per_radian)
+        laser, told = self.laser[self.moving] * (MIRRORED if mirrored else 1.0), self.odometry(offset)
+        group = np.searchsorted(chains(self.steps, TOGETHER), np.flatnonzero(self.moving), side="right")
+        groups = np.flatnonzero(np.diff(group, prepend=0))
+        return fit_mount(laser, told[self.moving], self.options.steps.metres_per_radian, groups)
 
     def noise(
         self, offset: float, fit: MountFit, ratio: float, veer: float, mirrored: bool
@@ -217,7 +235,7 @@ class _Drive:
         far = came >= self.options.steps.min_motion
         along = (np.hypot(told[:, 0], told[:, 1]) * fit.scale - came)[far]
         turns = laser[:, 2]
-        about = (told[:, 2] - ratio * turns - veer * came)[self.turning]
+        about = (told[:, 2] - ratio * turns - veer * _forward(told, fit.scale))[self.turning]
         by_match = np.sqrt(np.median(self.steps.covariances[:, [0, 2], [0, 2]], axis=0))
         return {
             "noise_distance": _noise(along, came[far], float(by_match[0])),
@@ -234,10 +252,15 @@ class _Drive:
         )
 
 
+def _forward(odometry: Array, scale: float) -> Array:
+    """(n,) way of steps (n, 3) by odometry, m by scans; negative where the robot drives backwards."""
+    return scale * np.copysign(np.hypot(odometry[:, 0], odometry[:, 1]), odometry[:, 0])
+
+
 def _noise(residuals: Array, motion: Array, by_match: float) -> Estimate:
     """The standard deviation of residuals (n,) per unit of motion (n,), without that of the matches."""
     if len(residuals) < 3:
-        return Estimate(0.0, np.inf)
+        return left_open(0.0, None, FEW_STEPS)
     sigma = TO_SIGMA * float(np.median(np.abs(residuals - np.median(residuals))))
     own = np.sqrt(max(sigma**2 - by_match**2, 0.0)) / float(np.median(motion))
     return Estimate(own, sigma / float(np.median(motion)) / np.sqrt(2 * len(residuals)))

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from nscan_cli.poses import Array
+from nscan_cli.poses import Array, Indices
 
 SWEEPS, FIRST_SWEEPS = 30, 10
 """Sweeps of reweighting, and how many of them minimise the sum of absolute values: it has one minimum."""
@@ -16,6 +16,8 @@ CAUCHY = 2.385
 """Residuals of so many standard deviations have half the weight: 95 % efficiency where all are Gaussian."""
 MOST_CONDITION = 1e12
 """A system with a larger condition number leaves a value open."""
+MOST_LEVERAGE = 0.99
+"""Of the share of a residual that its own equation takes away: one alone may take it all."""
 LEAST_SIGMA = 1e-9
 """Residuals are at least so large, to divide by."""
 
@@ -31,8 +33,11 @@ class RobustFit(NamedTuple):
     """(n,) length of each equation's residual."""
 
 
-def robust_fit(coefficients: Array, measured: Array) -> RobustFit:
+def robust_fit(coefficients: Array, measured: Array, groups: Indices | None = None) -> RobustFit:
     """Minimise the residuals of coefficients (n, d, m) · values − measured (n, d), by Cauchy's loss.
+
+    `groups` (g,) are the rows where groups of equations begin whose errors have to do with each other.
+    Without them all are independent.
 
     Iteratively reweighted least squares (P. Huber, "Robust Statistics", 1981), from the solution of least
     absolute values. An equation is a block of d rows, and gets one weight.
@@ -52,28 +57,33 @@ def robust_fit(coefficients: Array, measured: Array) -> RobustFit:
             weights = 1.0 / np.maximum(residuals, sigma / CAUCHY)
         else:
             weights = 1.0 / (1.0 + (residuals / (CAUCHY * sigma)) ** 2)
-    return RobustFit(
-        values, _covariance(coefficients, coefficients @ values - measured, CAUCHY * sigma), residuals
-    )
+    off = coefficients @ values - measured
+    return RobustFit(values, _covariance(coefficients, off, CAUCHY * sigma, groups), residuals)
 
 
-def _covariance(coefficients: Array, off: Array, scale: float) -> Array:
+def _covariance(coefficients: Array, off: Array, scale: float, groups: Indices | None) -> Array:
     """(m, m) of the values, from the residuals off (n, d) themselves: they may be larger along one row of an
     equation than along another. `scale` (in their unit) is that of the loss; inf where a value is open.
 
-    The sandwich of the M-estimator: P. Huber, "Robust Statistics", 1981, 6.3 and 7.6.
+    The sandwich of the M-estimator: P. Huber, "Robust Statistics", 1981, 6.3 and 7.6. An equation that moves
+    the fit has a smaller residual by it, which is made up for: J. MacKinnon, H. White, "Some
+    Heteroskedasticity-Consistent Covariance Matrix Estimators", 1985 (their HC3).
     """
     n, d, m = coefficients.shape
     weights = 1.0 / (1.0 + (off**2).sum(axis=1) / scale**2)
-    pulls = np.einsum("n,nda,nd->na", weights, coefficients, off)
     along = np.einsum("nda,nd->na", coefficients, off)
     bend = np.einsum("n,nda,ndb->ab", weights, coefficients, coefficients)
     if n * d <= m or np.linalg.cond(bend) > MOST_CONDITION:
         return np.full((m, m), np.inf)
+    hats = np.einsum("n,nda,ab,neb->nde", weights, coefficients, np.linalg.inv(bend), coefficients)
+    others = np.linalg.solve(np.eye(d) - MOST_LEVERAGE * hats, off[:, :, None])[:, :, 0]
+    pulls = np.einsum("n,nda,nd->na", weights, coefficients, others)
+    if groups is not None:
+        pulls = np.add.reduceat(pulls, groups)
     # Where a residual is beyond the scale, the loss bends the other way.
     bend -= np.einsum("n,na,nb->ab", 2.0 * (weights / scale) ** 2, along, along)
     if np.linalg.eigvalsh(bend)[0] <= 0.0:
         return np.full((m, m), np.inf)
     inverse = np.linalg.inv(bend)
-    covariance: Array = n * d / (n * d - m) * (inverse @ (pulls.T @ pulls) @ inverse)
+    covariance: Array = inverse @ (pulls.T @ pulls) @ inverse
     return covariance

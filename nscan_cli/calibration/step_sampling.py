@@ -30,9 +30,10 @@ def telling_steps(log: LaserLog, options: StepOptions, count: int | None = None)
 
 
 def successive_steps(log: LaserLog, options: StepOptions) -> tuple[Indices, Indices]:
-    """The rows (n,) where steps begin and end that follow each other; of very many, `options.most` evenly.
+    """The rows (n,) where steps begin and end that follow each other; of very many, about `options.most`.
 
-    No two of them overlap, so that their errors are independent.
+    No two of them overlap, so that their errors are independent. Those of very many are chains of
+    `options.chain` that are spread evenly.
     """
     first, last = _all_steps(log, options)
     chosen, free = [], 0
@@ -42,7 +43,8 @@ def successive_steps(log: LaserLog, options: StepOptions) -> tuple[Indices, Indi
             free = end
     kept = np.array(chosen, dtype=np.int64)
     if len(kept) > options.most:
-        kept = kept[np.linspace(0, len(kept) - 1, options.most).astype(np.int64)]
+        begins = np.linspace(0, len(kept) - options.chain, options.most // options.chain).astype(np.int64)
+        kept = kept[np.unique(begins[:, None] + np.arange(options.chain))]
     return first[kept], last[kept]
 
 

@@ -18,7 +18,8 @@ from nscan_cli.files.text import counted, json_bytes
 from nscan_cli.logs.reading_options import ReadingOptions
 
 if TYPE_CHECKING:
-    from nscan_cli.calibration.robot_calibration import Calibration, Estimate
+    from nscan_cli.calibration.estimate import Estimate
+    from nscan_cli.calibration.robot_calibration import Calibration
 
 ANGLE_VALUES = ("mount_angle", "veer")
 """Values in rad, or rad/m, that are printed in degrees."""
@@ -27,6 +28,7 @@ VALUE_UNITS = {
     "mount_y": "m",
     "mount_angle": "degrees",
     "veer": "degrees/m",
+    "wheel_difference": "1/m",
     "clock_offset": "s",
 }
 """The other values have none."""
@@ -97,12 +99,23 @@ def _rows(calibration: Calibration, reading: ReadingOptions, calibrated: Reading
         ("odometry", [_line("scale", values["odometry_scale"]),
                       _line("turns by odometry / turns by scans", values["turn_ratio"]),
                       _line("heading drift", _degrees(values["veer"]), "°/m")]),
+        ("wheels", [_line("right larger than left by", _percent(values["wheel_difference"]),
+                          "% per metre of track width"),
+                    _line("track width / that of odometry", values["track_width"])]),
         ("noise", [_line("per metre driven", noise, "m/m"),
                    _line("per radian turned", turn_noise, "rad/rad")]),
         ("clock", [_line("to add to odometry's stamps", values["clock_offset"], "s")]),
-        ("unknown", [", ".join(calibration.open) or "nothing"]),
+        ("unknown", _unknown(calibration) or ["nothing"]),
         ("options", [flags or "none: the file agrees with the scans"]),
     ]  # fmt: skip
+
+
+def _unknown(calibration: Calibration) -> list[str]:
+    """The values that the drive leaves open, and why, one line for each reason."""
+    by_reason: dict[str, list[str]] = {}
+    for name in calibration.open:
+        by_reason.setdefault(calibration.values[name].why_open, []).append(name)
+    return [f"{', '.join(names)}: {why}" for why, names in by_reason.items()]
 
 
 def _line(what: str, estimate: Estimate, unit: str = "") -> str:
@@ -122,6 +135,13 @@ def _degrees(estimate: Estimate) -> Estimate:
     return dataclasses.replace(estimate, value=value, sigma=sigma, recorded=recorded)
 
 
+def _percent(estimate: Estimate) -> Estimate:
+    """A share in percent; what the file says of it is nothing."""
+    return dataclasses.replace(
+        estimate, value=100.0 * estimate.value, sigma=100.0 * estimate.sigma, recorded=None
+    )
+
+
 def _facts(calibration: Calibration, calibrated: ReadingOptions) -> dict[str, Any]:
     """The object that `calibrate --json` prints, in m, s and degrees. Its keys are always the same."""
     evidence, values = calibration.evidence, {}
@@ -132,6 +152,7 @@ def _facts(calibration: Calibration, calibrated: ReadingOptions) -> dict[str, An
             "sigma": _rounded(shown.sigma) if math.isfinite(shown.sigma) else None,
             "recorded": None if shown.recorded is None else _rounded(shown.recorded),
             "unit": VALUE_UNITS.get(name),
+            "why_open": estimate.why_open or None,
         }
     return {
         "steps": {

@@ -10,12 +10,14 @@ import numpy as np
 import pytest
 
 from nscan_cli.calibration.calibrated_reading import calibrated_reading
+from nscan_cli.calibration.estimate import Estimate
 from nscan_cli.calibration.options import CalibrationOptions
-from nscan_cli.calibration.robot_calibration import Calibration, Estimate, calibrate
+from nscan_cli.calibration.robot_calibration import Calibration, calibrate
 from nscan_cli.errors import InputDataError
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.logs.load import read_log
 from nscan_cli.logs.reading_options import ReadingOptions
+from nscan_cli.poses import compose, relative
 from tests.data import OFFICE_LOG, data_file
 from tests.logs.excerpts import excerpt
 from tests.simulation import faults
@@ -30,6 +32,10 @@ MOUNTS = ((0.0, 0.0, 0.0), (-0.3, 0.2, 2.5))
 ROBOTS = tuple(itertools.product(LASERS, MOUNTS))
 SCALE = 1.0 / Odometry().scale
 SEEDS = range(5)
+DRIVES = [(*robot, len(SEEDS) * at + seed) for at, robot in enumerate(ROBOTS) for seed in SEEDS]
+"""Each with noise of its own."""
+TRACK = 0.4
+"""m"""
 LATE = 0.3
 """s"""
 
@@ -52,11 +58,11 @@ def found(laser: Laser, mount: tuple[float, float, float], seed: int) -> dict[st
     return calibrated(faults.odometry_late(drive(laser, mount, seed), LATE)).values
 
 
-@pytest.mark.parametrize(("laser", "mount"), ROBOTS)
-def test_mounting_scale_and_clock_come_out(laser, mount):
+@pytest.mark.parametrize("robot", ROBOTS)
+def test_mounting_scale_and_clock_come_out(robot):
     """Medians over the drives: within 1 cm, 0.3°, 0.5 % and 10 ms."""
     off = []
-    for seed in SEEDS:
+    for laser, mount, seed in (drive for drive in DRIVES if drive[:2] == robot):
         values = found(laser, mount, seed)
         place = np.hypot(values["mount_x"].value - mount[0], values["mount_y"].value - mount[1])
         turned = abs(np.degrees(values["mount_angle"].value - mount[2]))
@@ -71,14 +77,53 @@ def test_errors_are_as_large_as_said():
     Those of three values of 20 drives have a standard deviation of 0.2 where they are as large as said.
     """
     squares = []
-    for (laser, mount), seed in itertools.product(ROBOTS, SEEDS):
+    for laser, mount, seed in DRIVES:
         values = found(laser, mount, seed)
         true = dict(zip(("mount_x", "mount_y", "mount_angle"), mount, strict=True))
         true |= {"odometry_scale": SCALE, "clock_offset": -LATE, "veer": Odometry().veer, "turn_ratio": 1.0}
+        true |= {"wheel_difference": -Odometry().veer, "track_width": SCALE}
         squares.append([((values[name].value - at) / values[name].sigma) ** 2 for name, at in true.items()])
     of_values = np.mean(squares, axis=0)
     for mean in (of_values.mean(), of_values[:3].mean(), of_values[3:].mean()):
         assert 0.5 < mean < 2.0, of_values
+
+
+def unequal_wheels(log: LaserLog, left: float, wider: float) -> LaserLog:
+    """The left wheel is so many times as large, and the track so many times as wide, as odometry has it."""
+    poses = log.odometry
+    assert poses is not None
+    steps = relative(poses[1:], poses[:-1])
+    told_right, told_left = (
+        steps[:, 0] + TRACK / 2 * steps[:, 2],
+        (steps[:, 0] - TRACK / 2 * steps[:, 2]) / left,
+    )
+    steps[:, 0], steps[:, 2] = (told_right + told_left) / 2, (told_right - told_left) / (TRACK / wider)
+    told = [poses[0]]
+    for step in steps:
+        told.append(compose(told[-1], step))
+    return dataclasses.replace(log, odometry=np.array(told))
+
+
+def test_wheels_come_out():
+    """The left one is 4 % smaller than odometry takes it for, and the track 5 % wider."""
+    off = []
+    for one in DRIVES[::3]:
+        values = calibrated(unequal_wheels(drive(*one), 0.96, 1.05)).values
+        true = {"odometry_scale": 0.98 * SCALE, "track_width": 1.05 * SCALE}
+        true |= {"wheel_difference": 0.04 / (0.98 * SCALE) / TRACK - Odometry().veer}
+        off.append([(values[name].value - at) / values[name].sigma for name, at in true.items()])
+        assert values["wheel_difference"].sigma < 0.005
+        assert values["track_width"].sigma < 0.01
+    assert 0.3 < np.mean(np.square(off)) < 2.0, off
+
+
+def test_a_robot_that_goes_sideways_has_no_two_wheels():
+    log = drive(*ROBOTS[0], 0)
+    assert log.odometry is not None
+    turned = dataclasses.replace(log, odometry=log.odometry + np.array([0.0, 0.0, 0.3]))
+    values = calibrated(turned).values
+    assert values["track_width"].why_open == "odometry goes sideways: it is not of two wheels"
+    assert not values["turn_ratio"].is_open
 
 
 def test_the_noise_is_that_of_the_robots_steps():
@@ -123,6 +168,8 @@ def test_a_drive_without_turns_leaves_the_place_open():
     straight_on = calibrated(excerpt(log, slice(first, first + 150)))
     assert {"mount_x", "mount_y", "turn_ratio", "clock_offset"} <= set(straight_on.open)
     assert np.isfinite(straight_on.values["odometry_scale"].sigma)
+    why = {value.why_open for value in straight_on.values.values() if value.is_open}
+    assert why <= {"the robot hardly turns", "too few steps go far enough"}
     assert calibrated_reading(straight_on, ReadingOptions(), OPTIONS).mount is None
 
 

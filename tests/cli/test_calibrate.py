@@ -13,8 +13,8 @@ from nscan_cli.graph.io.json_graph import read_graph
 from tests.data import CORRIDOR_LOG, data_file
 
 VALUES = [
-    "mount_x", "mount_y", "mount_angle", "odometry_scale", "turn_ratio", "veer", "clock_offset",
-    "noise_distance", "noise_turn",
+    "mount_x", "mount_y", "mount_angle", "odometry_scale", "turn_ratio", "veer", "wheel_difference",
+    "track_width", "clock_offset", "noise_distance", "noise_turn",
 ]  # fmt: skip
 
 
@@ -36,7 +36,17 @@ def test_a_table_for_people(capsys):
     assert run(["calibrate", CORRIDOR_LOG]) == 0
     shown = capsys.readouterr().out.splitlines()
     titles = [line.split()[0] for line in shown if not line.startswith(" ")]
-    assert titles == ["steps", "readings", "mounting", "odometry", "noise", "clock", "unknown", "options"]
+    assert titles == [
+        "steps",
+        "readings",
+        "mounting",
+        "odometry",
+        "wheels",
+        "noise",
+        "clock",
+        "unknown",
+        "options",
+    ]
     assert shown[-1] == "options   --odometry-scale 0.9865"
 
 
