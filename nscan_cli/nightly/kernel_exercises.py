@@ -1,7 +1,7 @@
 """Runs that need all kernels, so that they compile them, in parts for processes side by side.
 
-A kernel that two parts need is compiled in one of them (kernels/compile_lock.py). So a part begins with what
-the other comes to last.
+A kernel that two parts need is compiled in one of them (kernels/compile_lock.py). So each part needs first
+what the other comes to last, and neither waits long.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ def _track() -> None:
 
 
 def _refine() -> None:
-    """Optimise the graph of the drive, draw its map, match its keyframes jointly, and then map the drive."""
+    """Optimise the graph of the drive, draw its map, match its keyframes jointly, and close its loops."""
     import numpy as np
 
     from nscan_cli.graph.marginal_covariances import marginal_covariances
@@ -48,7 +48,12 @@ def _refine() -> None:
     from nscan_cli.logs.load import log_from
     from nscan_cli.mapping.occupancy import occupancy_grid
     from nscan_cli.nightly.simulated_drive import simulated_carmen_log
-    from nscan_cli.slam.backend.resume import resume
+    from nscan_cli.slam.backend.finish import finish_graph
+    from nscan_cli.slam.backend.refinement import refine
+    from nscan_cli.slam.backend.rejection import reject_contradicting_loops
+    from nscan_cli.slam.backend.resume import state_of_graph
+    from nscan_cli.slam.diagnostics.notices import notices
+    from nscan_cli.slam.log_to_graph import slam_options
 
     graph = _drive_graph()
     optimise_graph(graph)
@@ -56,8 +61,13 @@ def _refine() -> None:
     log = log_from(simulated_carmen_log(), "warm-up.log")
     rows = np.arange(len(log))
     occupancy_grid(log, rows, graph.poses, threads=THREADS)
-    resume(graph, log, rows, THREADS)
-    _track()
+    state = state_of_graph(graph, log, slam_options(), THREADS)
+    for relation, length in zip(state.chain, np.diff(state.route.paths).tolist(), strict=True):
+        state.detector.extend(relation, length)
+    reject_contradicting_loops(state)
+    refine(state)
+    finish_graph(state)
+    notices(state)
 
 
 def _drive_graph() -> Graph:
