@@ -30,8 +30,7 @@ def find_contradictions(log: LaserLog, reading: ReadingOptions, options: FileChe
     """What the scans of a log contradict; empty without odometry, and where the scans tell too little."""
     if log.odometry is None:
         return []
-    steps = measure_steps(log, telling_steps(log, options.steps), options.steps)
-    evidence = StepEvidence(log.odometry, steps, options)
+    evidence = _evidence(log, log.odometry, options)
     if evidence.moving < options.min_steps:
         return []
     is_still = _is_still(log.odometry, options.still)
@@ -54,6 +53,17 @@ def find_contradictions(log: LaserLog, reading: ReadingOptions, options: FileChe
     if turns is not None and _are_told(turns, options) and not turns_agree(turns, options):
         found.append(findings.wrong_turns(turns))
     return found + _of_positions(log.mount, fit, evidence, reading, options)
+
+
+def _evidence(log: LaserLog, odometry: Array, options: FileCheckOptions) -> StepEvidence:
+    """The steps of a sample, which is larger where scans tell few of them, as outdoors."""
+    count, most = options.steps.count, min(int(0.5 * options.max_share * len(log)), options.more_steps)
+    while True:
+        steps = measure_steps(log, telling_steps(log, options.steps, count), options.steps)
+        evidence = StepEvidence(odometry, steps, options)
+        if evidence.tells_enough or count >= most:
+            return evidence
+        count = min(2 * count, most)
 
 
 def _is_still(odometry: Array, still: float) -> Mask:

@@ -81,9 +81,12 @@ def _scans_move(
     within = np.flatnonzero(ends <= last)
     if not len(within):
         return False
-    some = within[np.unique(np.linspace(0, len(within) - 1, options.steps).astype(np.int64))]
-    laser = measure_steps(log, (first + some, ends[some]), steps).laser
-    if len(laser) < options.min_measured:
+    for count in (options.steps, options.more_steps):
+        some = within[np.unique(np.linspace(0, len(within) - 1, count).astype(np.int64))]
+        laser = measure_steps(log, (first + some, ends[some]), steps).laser
+        if len(laser) >= options.min_measured:
+            break
+    else:
         return False
     size = np.maximum(np.hypot(laser[:, 0], laser[:, 1]), np.abs(laser[:, 2]))
     return float((size >= steps.min_motion).mean()) >= options.min_moving_share

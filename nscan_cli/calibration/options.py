@@ -77,6 +77,8 @@ class HeldOdometryOptions:
     measured where robots stand."""
     steps: int = 7
     """Steps that are measured, spread over that time. More tell more and take longer."""
+    more_steps: int = 28
+    """Steps that are measured where the scans tell too few of these, as outdoors."""
     min_measured: int = 3
     """Least number of them that the scans measure."""
     min_moving_share: float = 0.7
@@ -163,7 +165,11 @@ class FileCheckOptions:
     max_turn_error: float = 0.3
     """Turns by odometry are wrong if they differ by more than this share from those by scans."""
     more_steps: int = 200
-    """Steps of each half of the sample where turns disagree, to find the offset of the clocks."""
+    """Steps of each half of the sample where turns disagree, to find the offset of the clocks. No more where
+    a smaller sample tells too little."""
+    max_share: float = 0.04
+    """Most steps of a sample that is enlarged because it tells too little, as a share of the scans. A larger
+    value finds more where scans tell little, as outdoors, and takes longer."""
     excluded_spread: float = 0.4
     """Odometry that no finding explains is not used where the median of what is left is at least this share
     of the motion. It is 0.03 to 0.11 on real logs."""

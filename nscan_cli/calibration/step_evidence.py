@@ -32,6 +32,13 @@ class StepEvidence:
         """The share of the steps with motion that go forward by odometry."""
         return float((self.odometry[self._is_moving, 0] > 0.0).mean())
 
+    @property
+    def tells_enough(self) -> bool:
+        """Whether there is nothing that more steps would tell."""
+        turns = self.turns()
+        is_turned = turns is not None and turns.steps >= self.options.min_steps
+        return is_turned and self.moving >= self.options.min_steps_to_exclude
+
     def turns(self) -> TurnFit | None:
         """Turns by odometry as a multiple of those by scans; None for few."""
         return fit_turns(self.laser, self.odometry, self.options.steps.min_motion)

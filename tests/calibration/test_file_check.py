@@ -205,6 +205,26 @@ def test_nothing_is_contradicted_on_real_logs(name):
     assert found(read_log(str(data_file(f"{name}.log.gz")))) == []
 
 
+OUTDOORS: dict[str, tuple[Fault, str]] = {
+    "mirrored": (faults.mirrored, "in the wrong order.* try --flip"),
+    "looks 90° left": (lambda log: faults.mounted_otherwise(log, -np.pi / 2), "90° further to the left"),
+    "millimetres": (lambda log: faults.odometry_scaled(log, 1000.0), "as by --odometry-scale 0.001"),
+    "x": (faults.odometry_reversed, "counts x or y the wrong way"),
+    "held": (
+        lambda log: faults.odometry_held(log, slice(3000, 5000), True),
+        "stands still while the scans move",
+    ),
+}
+
+
+@pytest.mark.parametrize("fault", OUTDOORS)
+def test_outdoors_where_scans_tell_few_steps_more_are_measured(fault):
+    """Of 59 steps of this log, scans measure nine."""
+    make, words = OUTDOORS[fault]
+    said = found(make(read_log(str(data_file("fr-clinic.log.gz")))))
+    assert re.search(words, " ".join(said))
+
+
 def test_nothing_is_contradicted_on_a_log_from_the_field():
     assert found(read_log(str(data_file("field/player-2.1.2.log")))) == []
 
