@@ -112,7 +112,8 @@ def wrong_turns(turns: TurnFit) -> Finding:
 
 def is_wrong_scale(fit: MountFit, options: FileCheckOptions) -> bool:
     """Whether odometry and scans count lengths in different units."""
-    return max(fit.scale, 1.0 / fit.scale) > options.min_scale_factor
+    off, sigma = abs(math.log(fit.scale)), float(fit.sigmas[0]) / fit.scale
+    return off > max(math.log(options.min_scale_factor), options.mount_sigmas * sigma)
 
 
 def wrong_scale(fit: MountFit, reading: ReadingOptions, options: FileCheckOptions) -> Finding:

@@ -156,8 +156,9 @@ class FileCheckOptions:
     real logs, and a clock that is late looks like some centimetres."""
     mount_sigmas: float = 5.0
     """And by more than so many standard deviations of what the steps say."""
-    min_scale_factor: float = 1.5
-    """The scale of odometry is wrong by more than this factor."""
+    min_scale_factor: float = 1.2
+    """The scale of odometry is wrong by more than this factor, and by more than `mount_sigmas`. It is 1.11 at
+    most on real logs."""
     certain_scale_factor: float = 3.0
     """A scale that is wrong by more than this factor is put right: no wheel slips so much."""
     decimal_tolerance: float = 0.08

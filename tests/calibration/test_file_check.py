@@ -60,6 +60,7 @@ LIKELY: dict[str, tuple[Fault, str]] = {
     ),
     "looks askew": (lambda log: faults.mounted_otherwise(log, 0.6), "try --mount 0.1,0,0$"),
     "half as long": (lambda log: faults.odometry_scaled(log, 0.5), r"try --odometry-scale (1\.9|2\.0|2)"),
+    "a third too long": (lambda log: faults.odometry_scaled(log, 1.33), r"try --odometry-scale 0\.7"),
     "late by 30 s": (lambda log: faults.odometry_late(log, 30.0), r"ahead.*--clock-offset -(30\.0|29\.9)"),
     "early by 2 s": (lambda log: faults.odometry_late(log, -2.0), r"behind.*--clock-offset (2\.0|1\.9|2\.1)"),
     "turns by half": (
@@ -209,6 +210,7 @@ OUTDOORS: dict[str, tuple[Fault, str]] = {
     "mirrored": (faults.mirrored, "in the wrong order.* try --flip"),
     "looks 90° left": (lambda log: faults.mounted_otherwise(log, -np.pi / 2), "90° further to the left"),
     "millimetres": (lambda log: faults.odometry_scaled(log, 1000.0), "as by --odometry-scale 0.001"),
+    "a third too long": (lambda log: faults.odometry_scaled(log, 1.33), r"try --odometry-scale 0\.7"),
     "x": (faults.odometry_reversed, "counts x or y the wrong way"),
     "held": (
         lambda log: faults.odometry_held(log, slice(3000, 5000), True),
