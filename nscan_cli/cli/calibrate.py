@@ -8,6 +8,7 @@ import math
 from typing import TYPE_CHECKING, Any
 
 from nscan_cli.cli.compilation import Compiling
+from nscan_cli.cli.log_reader import log_reader
 from nscan_cli.cli.robot_toml import changed_flags, robot_table, robot_toml
 from nscan_cli.cli.shared_options import common_options, reading_options
 from nscan_cli.cli.standard_streams import print_result
@@ -18,8 +19,11 @@ from nscan_cli.files.text import counted, json_bytes
 from nscan_cli.logs.reading_options import ReadingOptions
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+
     from nscan_cli.calibration.estimate import Estimate
     from nscan_cli.calibration.robot_calibration import Calibration
+    from nscan_cli.logs.laser_log import LaserLog
 
 ANGLE_VALUES = ("mount_angle", "veer")
 """Values in rad, or rad/m, that are printed in degrees."""
@@ -58,29 +62,82 @@ def command(
 
     Steps from scan to scan, matched without odometry, are compared with the same steps by odometry. Every
     value has its standard deviation, and what the file says beside it. A drive has to have turns, and more in
-    view than bare walls. What it leaves open is listed.
+    view than bare walls. What it leaves open is listed. Of several lasers in a recording each is calibrated,
+    unless --topic chooses one.
     """
     if output is not None:
         check_writable(output)
-    from nscan_cli.calibration.calibrated_reading import calibrated_reading
-    from nscan_cli.calibration.options import CalibrationOptions
-    from nscan_cli.calibration.robot_calibration import calibrate
     from nscan_cli.kernels.decorators import load_runtime
-    from nscan_cli.logs.load import read_log
 
     load_runtime()
     Compiling("half a minute", quiet)
-    options, scans = CalibrationOptions(), read_log(log, reading)
-    calibration = calibrate(scans, reading, options)
-    calibrated = calibrated_reading(calibration, reading, options)
+    found = [
+        _Calibrated.of(scans, own_reading) for own_reading, scans in _lasers(log, reading, output is None)
+    ]
     if as_json:
-        facts = _facts(calibration, calibrated) | {"file": scans.source.name, "sha256": scans.source.sha256}
+        lasers = [one.facts() for one in found]
+        facts = lasers[0] if len(lasers) == 1 else {"lasers": lasers}
         text = json.dumps(facts, ensure_ascii=False, allow_nan=False)
         write_atomically("-", json_bytes(f"{text}\n"))
     else:
-        print_result(f"{summary_table(_rows(calibration, reading, calibrated))}\n")
+        tables = [summary_table(one.rows(with_name=len(found) > 1)) for one in found]
+        print_result("\n\n".join(tables) + "\n")
     if output is not None:
-        write_atomically(output, robot_toml(calibrated).encode())
+        write_atomically(output, robot_toml(found[0].calibrated).encode())
+
+
+def _lasers(
+    paths: Sequence[str], reading: ReadingOptions, is_each: bool
+) -> Iterator[tuple[ReadingOptions, LaserLog]]:
+    """The log of each laser, with the options that read it. Raises OpenChoiceError unless `is_each`."""
+    from nscan_cli.logs.device_choice import OpenChoiceError
+
+    read = log_reader(paths)
+    try:
+        yield reading, read(reading)
+    except OpenChoiceError as choice:
+        if choice.what != "laser" or not is_each:
+            raise
+        for one in choice.devices:
+            chosen: dict[str, Any] = {choice.chooses: one.name}
+            own = dataclasses.replace(reading, **chosen)
+            yield own, read(own)
+
+
+@dataclasses.dataclass(frozen=True)
+class _Calibrated:
+    """A laser and what its scans say."""
+
+    scans: LaserLog
+    reading: ReadingOptions
+    """The options that the log was read with."""
+    calibration: Calibration
+    calibrated: ReadingOptions
+    """The options that it is to be read with."""
+
+    @classmethod
+    def of(cls, scans: LaserLog, reading: ReadingOptions) -> _Calibrated:
+        from nscan_cli.calibration.calibrated_reading import calibrated_reading
+        from nscan_cli.calibration.options import CalibrationOptions
+        from nscan_cli.calibration.robot_calibration import calibrate
+
+        options = CalibrationOptions()
+        calibration = calibrate(scans, reading, options)
+        return cls(scans, reading, calibration, calibrated_reading(calibration, reading, options))
+
+    def rows(self, with_name: bool) -> list[Row]:
+        """The table for people."""
+        name: list[Row] = [("laser", [self.scans.laser])] if with_name else []
+        return name + _rows(self.calibration, self.reading, self.calibrated)
+
+    def facts(self) -> dict[str, Any]:
+        """The object that `calibrate --json` prints of one laser."""
+        source = self.scans.source
+        return _facts(self.calibration, self.calibrated) | {
+            "laser": self.scans.laser,
+            "file": source.name,
+            "sha256": source.sha256,
+        }
 
 
 def _rows(calibration: Calibration, reading: ReadingOptions, calibrated: ReadingOptions) -> list[Row]:
@@ -143,7 +200,7 @@ def _percent(estimate: Estimate) -> Estimate:
 
 
 def _facts(calibration: Calibration, calibrated: ReadingOptions) -> dict[str, Any]:
-    """The object that `calibrate --json` prints, in m, s and degrees. Its keys are always the same."""
+    """What the scans say, in m, s and degrees. The keys are always the same."""
     evidence, values = calibration.evidence, {}
     for name, estimate in calibration.values.items():
         shown = _degrees(estimate) if name in ANGLE_VALUES else estimate

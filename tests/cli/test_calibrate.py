@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 import tomllib
 
@@ -11,6 +12,11 @@ import pytest
 from nscan_cli.cli.main import run
 from nscan_cli.graph.io.json_graph import read_graph
 from tests.data import CORRIDOR_LOG, data_file
+from tests.logs.recordings.messages import START, Odom, S, Scan, Tf, Written, turned
+from tests.logs.recordings.ros import ros2
+from tests.simulation.drive import Drive
+from tests.simulation.laser import Laser
+from tests.simulation.scenes import office
 
 VALUES = [
     "mount_x", "mount_y", "mount_angle", "odometry_scale", "turn_ratio", "veer", "wheel_difference",
@@ -21,7 +27,7 @@ VALUES = [
 def test_json(capsys):
     assert run(["calibrate", CORRIDOR_LOG, "--json"]) == 0
     facts = json.loads(capsys.readouterr().out)
-    assert list(facts) == ["steps", "mirrored", "values", "open", "options", "file", "sha256"]
+    assert list(facts) == ["steps", "mirrored", "values", "open", "options", "laser", "file", "sha256"]
     assert list(facts["values"]) == VALUES
     mounted = facts["values"]["mount_x"]
     assert mounted["recorded"] == 0.1
@@ -70,6 +76,52 @@ def test_slam_calibrates_first(tmp_path, capsys):
     reading = read_graph(str(graph)).provenance["parameters"]["reading"]
     assert reading["flip"] is True
     np.testing.assert_allclose(reading["mount"], [0.1, 0, -0.0171], atol=0.003)
+
+
+REAR = (-0.2, 0.1, 3.0)
+"""Where the rear laser is, m and rad; the recording has it straight back, 5 cm off."""
+
+
+@pytest.fixture(scope="module")
+def two_lasers(tmp_path_factory) -> str:
+    """A drive with a laser in front and one behind, each with its frame and topic; the second 50 ms later."""
+    scene = dataclasses.replace(office(), drive=Drive(period=0.05))
+    truth, laser = scene.truth()[:1600], Laser(360, -np.pi, np.radians(1.0), 12.0, no_return=13.0)
+    front = scene.record_at(truth[::2], 3, dataclasses.replace(laser, mount=(0.2, 0.0, 0.0))).log()
+    rear = scene.record_at(truth[1::2], 4, dataclasses.replace(laser, mount=REAR)).log()
+    links = ("front", (0.2, 0.0, 0.0), 0.0), ("rear", (-0.25, 0.1, 0.0), np.pi)
+    frames = tuple(Tf(START, "base_link", name, place, turned(turn)) for name, place, turn in links)
+    written = [Written("/tf_static", START, frames)]
+    for name, log, begin in (("front", front, START), ("rear", rear, START + S // 20)):
+        for row, time in enumerate(range(begin, begin + len(log) * S // 10, S // 10)):
+            scan = Scan(time, log.ranges[row], name, -np.pi, np.radians(1.0), 0.05, 12.0)
+            written.append(Written(f"/{name}", time, scan))
+            if name == "front":
+                assert log.odometry is not None
+                written.append(Written("/odom", time, Odom(time, *log.odometry[row].tolist())))
+    path = tmp_path_factory.mktemp("two") / "two.mcap"
+    path.write_bytes(ros2(sorted(written, key=lambda one: one.log_time)))
+    return str(path)
+
+
+def test_each_of_two_lasers_is_calibrated(two_lasers, capsys):
+    assert run(["calibrate", two_lasers, "--json"]) == 0
+    front, rear = json.loads(capsys.readouterr().out)["lasers"]
+    assert (front["laser"], rear["laser"]) == ("/front", "/rear")
+    for found, mount in ((front, (0.2, 0.0, 0.0)), (rear, REAR)):
+        values = {name: found["values"][f"mount_{name}"]["value"] for name in ("x", "y", "angle")}
+        np.testing.assert_allclose([values["x"], values["y"]], mount[:2], atol=0.01)
+        assert abs(values["angle"] - np.degrees(mount[2])) < 0.3
+    assert run(["calibrate", two_lasers]) == 0
+    assert "laser     /rear" in capsys.readouterr().out
+
+
+def test_options_are_written_for_one_laser(two_lasers, tmp_path, capsys):
+    robot = tmp_path / "robot.toml"
+    assert run(["calibrate", two_lasers, "-o", str(robot)]) == 2
+    assert "choose one by --topic" in capsys.readouterr().err
+    assert run(["calibrate", two_lasers, "--topic", "/rear", "-o", str(robot)]) == 0
+    assert tomllib.loads(robot.read_text())["topic"] == "/rear"
 
 
 @pytest.mark.parametrize("command", ["calibrate", "slam"])
