@@ -105,9 +105,12 @@ def _others() -> None:
     from nscan_cli.errors import InputDataError
     from nscan_cli.logs.load import log_from
     from nscan_cli.logs.reading_options import ReadingOptions
+    from nscan_cli.logs.robot_path import move_along_arc
     from nscan_cli.mapping.occupancy import occupancy_grid
     from nscan_cli.nightly.simulated_drive import simulated_carmen_log
+    from nscan_cli.slam.backend.subgraph import nearest_keyframes
     from nscan_cli.slam.log_to_graph import map_log, slam_options
+    from nscan_cli.slam.loop_closure.most_certain_paths import relations_on_paths
 
     drive = simulated_carmen_log()
     log = log_from(drive, "warm-up.log")
@@ -122,3 +125,6 @@ def _others() -> None:
         log = log_from(drive, "warm-up.log", reading)
         _, graph = map_log(log, reading, slam_options(), THREADS, lambda *_progress: None)
         occupancy_grid(log, np.arange(len(log)), graph.poses, threads=THREADS)
+    # For the check of a turn that a file may tell wrongly, and for graphs of more than 500 keyframes.
+    move_along_arc(np.zeros((1, 2)), np.zeros(1), np.zeros(3), False)
+    relations_on_paths(np.zeros(1, dtype=np.int64), nearest_keyframes(np.zeros((1, 3)), 0, 1, 1))

@@ -103,9 +103,9 @@ def test_of_a_trajectory_the_rmse_counts():
         ([judged(UNMEASURED), judged(done(1))],
          "All 2 logs are mapped, none has a bound"),
         ([judged(UNMEASURED), judged(done(1)), judged(done(1), translation=2)],
-         "All 3 logs are mapped, 1 within its bound, 2 without"),
+         "All 3 logs are mapped, 1 within its bound, 2 without a bound"),
         ([judged(UNMEASURED)] + [judged(done(1), translation=2)] * 2,
-         "All 3 logs are mapped, 2 within their bounds, 1 without"),
+         "All 3 logs are mapped, 2 within their bounds, 1 without a bound"),
     ],
 )  # fmt: skip
 def test_the_headline(verdicts, line):

@@ -38,7 +38,8 @@ class Factor(NamedTuple):
 
 def factorise(pattern: Pattern, blocks: Array) -> Factor:
     """The factor of the matrix whose lower triangle is in blocks (B, 3, 3), which stay unchanged."""
-    diagonal = np.ascontiguousarray(np.diagonal(blocks[pattern.starts[:-1]], axis1=1, axis2=2))
+    # Of one block it would be a view that cannot be written, and code of its own.
+    diagonal = np.diagonal(blocks[pattern.starts[:-1]], axis1=1, axis2=2).copy()
     loose = np.zeros((len(pattern.place), 3), dtype=np.bool_)
     return Factor(pattern, _factorise(pattern, blocks, diagonal, loose), loose, diagonal)
 
