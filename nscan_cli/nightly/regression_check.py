@@ -168,5 +168,7 @@ def headline(checks: list[CheckResult]) -> str:
         return "The log is good" if there == 1 else f"All {there} logs are good"
     if there == 1:
         return "The log is mapped; it has no bound"
-    of_them = f"{within} within {'its bound' if within == 1 else 'their bounds'}, {there - within} without a bound"
+    of_them = (
+        f"{within} within {'its bound' if within == 1 else 'their bounds'}, {there - within} without a bound"
+    )
     return f"All {there} logs are mapped, {of_them if within else 'none has a bound'}"
