@@ -12,6 +12,9 @@ class VerificationOptions:
     ways: tuple[float, ...] = (1.0, 5.0, 20.0)
     """Lengths of the path over which relative positions are compared, m. Over longer ones small errors of
     heading count more."""
+    least_move: float = 0.1
+    """The way counts in pieces of at least this length, m. A smaller value counts the noise of a robot that
+    stands as a way."""
     max_step: float = 0.3
     """A way is left out on which a repeated map has two scans farther apart, m: with every second scan it may
     be lost there. With a larger value more is compared."""

@@ -44,7 +44,7 @@ def path_differences(
     one, other = path.poses[at], repeat.poses
     if len(one) < 2:
         return []
-    along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(one[:, :2], axis=0).T))])
+    along = _way(one[:, :2], options.least_move)
     apart = np.cumsum(np.concatenate([[False], _is_apart(one, path, repeat, options)]))
     found = []
     for way in options.ways:
@@ -54,6 +54,20 @@ def path_differences(
         if len(first):
             found.append(_difference(way, repeat.rows, one, other, first, last[first]))
     return found
+
+
+def _way(places: Array, least: float) -> Array:
+    """(n,) the way to each of places (n, 2), m, in straight pieces of at least a length.
+
+    A robot that stands seems to tremble by some millimetres from scan to scan, which add up.
+    """
+    corners = [0]
+    for row in range(1, len(places)):
+        if np.hypot(*(places[row] - places[corners[-1]])) >= least:
+            corners.append(row)
+    pieces = np.hypot(*np.diff(places[corners], axis=0).T)
+    way: Array = np.interp(np.arange(len(places)), corners, np.append(0.0, np.cumsum(pieces)))
+    return way
 
 
 def _is_apart(poses: Array, path: MappedPath, repeat: MappedPath, options: VerificationOptions) -> Mask:

@@ -66,3 +66,12 @@ def test_what_the_repeat_alone_guesses_says_nothing():
     # A map that guesses there as well may be wrong.
     guess = replace(path(straight()), untold=np.array([57, 58, 59, 60, 61]))
     assert path_differences(guess, repeat, OPTIONS)[0].max == pytest.approx(0.4)
+
+
+def test_a_robot_that_stands_goes_no_way():
+    """It trembles by 5 mm, 7 m in all; and the repeat has somebody who passes move it by 0.4 m."""
+    stands = np.zeros((1000, 3))
+    stands[:, :2] = 0.005 * np.random.default_rng(1).standard_normal((1000, 2))
+    moved = stands.copy()
+    moved[500:600, 0] += 0.4
+    assert path_differences(path(stands), path(moved), OPTIONS) == []
