@@ -77,9 +77,9 @@ def _without_delay(
         reading = replace(reading, clock_offset=reading.clock_offset + delay)
         return with_delay(log, delay), reading, _said_late(delay, reading.clock_offset)
     said = (
-        f"scans are stamped at their {place} beam: as if at the {reading.stamp} one, they turn "
-        f"{abs(delay):.2g} s {'later' if delay > 0.0 else 'earlier'} than odometry; they are read so, as by "
-        f"--stamp {place}; --as-recorded believes the file"
+        f"scans are stamped at their {place} beam: if it were the {reading.stamp} one, they would turn "
+        f"{abs(delay):.2g} s {'later' if delay > 0.0 else 'earlier'} than odometry; they are read that way, "
+        f"as with --stamp {place}; --as-recorded believes the file"
     )
     return _turning(log, sweep_turns(log), place), replace(reading, stamp=place), said
 
@@ -94,7 +94,7 @@ def _longest_turn(log: LaserLog, options: FileCheckOptions) -> float:
 
 def _said(evidence: SweepEvidence, told: float, turn: float, certainty: float) -> str:
     compared = counted(len(evidence.energies), "pair")
-    pairs = f"{compared} of scans fit better so, by {certainty:.1f} standard deviations"
+    pairs = f"{compared} of scans match better that way, by {certainty:.1f} standard deviations"
     flag, order = f"{turn:.3g}", ", readings in the reverse order" if turn < 0.0 else ""
     if turn == 0.0:
         what, flag = "the laser sees all beams at once, though the file has times of beams", "off"
@@ -102,13 +102,13 @@ def _said(evidence: SweepEvidence, told: float, turn: float, certainty: float) -
         what = f"the laser turns for {abs(turn):.3g} s{order}, though the file has no times of beams"
     else:
         what = "the readings are in the reverse order of time"
-    return f"{what}: {pairs}; they are read so, as by --sweep {flag}; --as-recorded believes the file"
+    return f"{what}: {pairs}; they are read that way, as with --sweep {flag}; --as-recorded believes the file"
 
 
 def _said_late(delay: float, offset: float) -> str:
     side = "early" if delay > 0.0 else "late"
     return (
-        f"odometry is stamped {abs(delay):.2g} s too {side}, as its turns are against those of the scans; "
-        f"it is moved, as by --clock-offset {offset:.2g}, since beams are corrected by it; "
+        f"odometry is stamped {abs(delay):.2g} s too {side}, by the turns of the scans; its stamps are "
+        f"moved, as with --clock-offset {offset:.2g}, because beams are corrected by odometry; "
         "--as-recorded believes the file"
     )

@@ -29,10 +29,6 @@ class BoxType(click.ParamType[Any]):
 
     name = f"X0,Y0,X1,Y1|{AUTO}"
 
-    def get_metavar(self, param: click.Parameter, ctx: click.Context | None = None) -> str:
-        """The form in help, where click would write all of it in capitals."""
-        return self.name
-
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
         """Parse the four numbers; a wrong form is a usage error."""
         if value == AUTO:
@@ -98,9 +94,10 @@ def shape_options(command: Command) -> Command:
     """Add --align, --crop, --clean and --removed; the command gets them as `shape`, a MapShape."""
     options = [
         option("--align", is_flag=True, help="Turn the map so that most walls lie along its axes."),
-        option("--crop", type=BoxType(), help="Cut the map to a rectangle (m), or to what is mapped (auto)."),
+        option("--crop", type=BoxType(), metavar=BoxType.name,
+               help="Cut the map to a rectangle (m), or to what is mapped (auto)."),
         option("--clean", is_flag=True,
-               help="Remove free space that the path does not lead to, single specks, and people who went."),
+               help="Remove free space that the path does not reach, single specks, and people who passed."),
         option("--removed", type=PATH, metavar="PICTURE.png", help="Draw what --clean removes, as a PNG."),
     ]  # fmt: skip
 

@@ -93,8 +93,8 @@ def command(
     by time, scans, keyframes, relations, loops with the reasons of refused ones, uncertainty and notices.
 
     --align turns path and graph along with the map, in all that is written; the YAML says by how much.
-    --clean makes space unknown that was seen through glass only. What stood where most visits looked through
-    becomes free. The map is cleaned before it is cropped.
+    --clean makes unknown what was only seen through glass, and frees the places of people who passed and of
+    things that most visits did not see. The map is cleaned before it is cropped.
 
     With --compare, the second result is moved rigidly so that it fits the first best. Walls of both are dark,
     walls of one alone in its colour.

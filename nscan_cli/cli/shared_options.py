@@ -60,10 +60,6 @@ class SweepType(click.ParamType[Any]):
 
     name = "SECONDS|auto|off"
 
-    def get_metavar(self, param: click.Parameter, ctx: click.Context | None = None) -> str:
-        """The form in help, where click would write all of it in capitals."""
-        return self.name
-
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
         """Parse the time; a wrong form is a usage error."""
         if value in ("auto", "off"):
@@ -138,7 +134,7 @@ def reading_options(command: Command) -> Command:
         rare("--mask", type=MaskType(),
              help="Drop beams between bearings (degrees, counter-clockwise). Default: those that see "
              "the robot."),
-        rare("--sweep", type=SweepType(), default="auto", show_default=True,
+        rare("--sweep", type=SweepType(), metavar=SweepType.name, default="auto", show_default=True,
              help="Seconds of a full turn of the laser, so that each beam has its own time; negative if the "
              "readings are in the reverse order of time. off: all at once. auto: as the log says."),
         rare("--stamp", type=click.Choice(STAMPS), default="first", show_default=True,

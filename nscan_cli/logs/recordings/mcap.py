@@ -118,7 +118,7 @@ class _McapReader:
         if self.recording.warnings:
             self.recording.checksums = "some do not fit, or cannot be checked"
         else:
-            self.recording.checksums = "they fit" if self.checked else "none over the messages"
+            self.recording.checksums = "they fit" if self.checked else "the file has none of its messages"
 
     def _lost(self, at: int | None, problem: str) -> None:
         """Damage: an error, or under --salvage a warning."""

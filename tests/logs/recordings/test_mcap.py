@@ -24,7 +24,9 @@ def test_every_container_gives_the_same(whole, read):
         log = read(data)
         check_drive(log)
         unchecked = name in ("not chunked", "no checksums")
-        assert log.report.used["checksums"] == ("none over the messages" if unchecked else "they fit"), name
+        assert log.report.used["checksums"] == (
+            "the file has none of its messages" if unchecked else "they fit"
+        ), name
 
 
 def chunk_starts(data: bytes) -> list[int]:
