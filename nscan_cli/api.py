@@ -49,8 +49,8 @@ def match(
     """
     import numpy as np
 
+    from nscan_cli.matching.motion_model import MotionModel, odometry_prior
     from nscan_cli.matching.pairwise import PairOptions, match_pair, matched_points, scan_ndt
-    from nscan_cli.matching.priors import MotionModel, odometry_prior
 
     log = log.moving_along(None)
     options, rows = PairOptions(), [log.row(reference), log.row(scan)]
@@ -73,10 +73,10 @@ def nscan(
     import numpy as np
 
     from nscan_cli.matching.joint.nscan_match import nscan_match
-    from nscan_cli.matching.joint.odometry_priors import odometry_priors
+    from nscan_cli.matching.joint.odometry_chain import odometry_priors
     from nscan_cli.matching.joint.options import JointOptions
+    from nscan_cli.matching.motion_model import MotionModel
     from nscan_cli.matching.pairwise import PairOptions, matched_points
-    from nscan_cli.matching.priors import MotionModel
     from nscan_cli.poses import relative
 
     log = log.moving_along(None)

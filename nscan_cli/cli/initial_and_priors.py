@@ -22,8 +22,8 @@ from nscan_cli.graph.relative_covariance import RelativePoses
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.matching.joint.joint_energy import Priors
 from nscan_cli.matching.joint.nscan_match import PriorsAmong
-from nscan_cli.matching.joint.odometry_priors import odometry_priors, priors_of
-from nscan_cli.matching.priors import MotionModel
+from nscan_cli.matching.joint.odometry_chain import odometry_priors, priors_of
+from nscan_cli.matching.motion_model import MotionModel
 from nscan_cli.poses import Array, relative
 
 LOG_REMEDY = "give the graph that was made from this log"

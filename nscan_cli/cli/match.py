@@ -102,8 +102,8 @@ def command(
 
     check_plot(plot, [output, *files_of(log)])
     from nscan_cli.logs.load import read_log
+    from nscan_cli.matching.motion_model import MotionModel, odometry_prior
     from nscan_cli.matching.pairwise import PairOptions, match_pair, matched_points, scan_ndt
-    from nscan_cli.matching.priors import MotionModel, odometry_prior
 
     Compiling("half a minute", quiet)
     scans = read_log(log, reading).moving_along(None)

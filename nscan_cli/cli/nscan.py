@@ -129,8 +129,8 @@ def command(
     from nscan_cli.logs.load import read_log
     from nscan_cli.matching.joint.nscan_match import nscan_match
     from nscan_cli.matching.joint.options import JointOptions
+    from nscan_cli.matching.motion_model import MotionModel
     from nscan_cli.matching.pairwise import PairOptions, matched_points
-    from nscan_cli.matching.priors import MotionModel
 
     Compiling("half a minute", quiet)
     scans = read_log(log, reading).moving_along(None)

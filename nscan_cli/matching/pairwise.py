@@ -9,8 +9,8 @@ import numpy as np
 
 from nscan_cli.errors import InputDataError
 from nscan_cli.logs.laser_log import LaserLog
+from nscan_cli.matching.motion_model import Prior
 from nscan_cli.matching.pairwise_solver import PairProblem, minimise_pairwise, pairwise_objective
-from nscan_cli.matching.priors import Prior
 from nscan_cli.matching.uncertainty import (
     ConvergenceOptions,
     Weakest,

@@ -13,7 +13,7 @@ import numpy as np
 from nscan_cli.kernels.array_assignment import assign, assign_rows
 from nscan_cli.kernels.decorators import kernel, leaf_kernel
 from nscan_cli.matching.damped_newton import PAIRWISE_STEPS, is_accepted, is_last, next_damping
-from nscan_cli.matching.priors import Prior
+from nscan_cli.matching.motion_model import Prior
 from nscan_cli.matching.small_matrices import solve_definite
 from nscan_cli.ndt.association import Association, update_association
 from nscan_cli.ndt.energy import ENERGY_NUMBERS, sum_association, unpack_derivatives

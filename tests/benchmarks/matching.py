@@ -14,11 +14,11 @@ from nscan_cli.logs.load import read_log
 from nscan_cli.matching.joint.index_set import IndexSetKind
 from nscan_cli.matching.joint.joint_energy import JointProblem, all_pairs, joint_energy, no_priors
 from nscan_cli.matching.joint.nscan_match import nscan_match
-from nscan_cli.matching.joint.odometry_priors import odometry_priors
+from nscan_cli.matching.joint.odometry_chain import odometry_priors
 from nscan_cli.matching.joint.options import JointOptions
 from nscan_cli.matching.joint.scan_set import scan_set
+from nscan_cli.matching.motion_model import MotionModel
 from nscan_cli.matching.pairwise import PairOptions, match_pair, matched_points, scan_ndt
-from nscan_cli.matching.priors import MotionModel
 from nscan_cli.poses import Array, relative
 from tests.benchmarks.clock import Timing, median_of
 from tests.data import OFFICE_LOG, find_data

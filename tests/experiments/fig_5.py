@@ -7,8 +7,8 @@ import functools
 import numpy as np
 from numpy.typing import NDArray
 
+from nscan_cli.matching.motion_model import MotionModel, odometry_prior
 from nscan_cli.matching.pairwise import match_pair, matched_points, scan_ndt
-from nscan_cli.matching.priors import MotionModel, odometry_prior
 from nscan_cli.poses import Array, compose
 from tests.experiments.cases import HEADER, Case, Outcome, office_case, paper_row, real_case, run
 from tests.experiments.reference_logs import ReferenceLog, reference_log

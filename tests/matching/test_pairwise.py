@@ -7,6 +7,7 @@ import pytest
 
 from nscan_cli.errors import InputDataError
 from nscan_cli.logs.load import read_log
+from nscan_cli.matching.motion_model import Prior
 from nscan_cli.matching.pairwise import (
     NO_OVERLAP,
     STEP_LIMIT,
@@ -15,7 +16,6 @@ from nscan_cli.matching.pairwise import (
     matched_points,
     scan_ndt,
 )
-from nscan_cli.matching.priors import Prior
 from nscan_cli.matching.uncertainty import CELL_BORDER
 from nscan_cli.ndt.energy import energy
 from nscan_cli.poses import Array, relative, wrap

@@ -3,8 +3,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from nscan_cli.matching.motion_model import Prior
 from nscan_cli.matching.pairwise_solver import PairProblem, minimise_pairwise, pairwise_objective
-from nscan_cli.matching.priors import Prior
 from nscan_cli.ndt.association import begin_association
 from nscan_cli.ndt.energy import ENERGY_NUMBERS
 from nscan_cli.ndt.transform import Ndt

@@ -17,9 +17,9 @@ from nscan_cli.matching.joint.joint_match import JointMatch, PairsAt, match_near
 from nscan_cli.matching.joint.neutral_energy import neutral_energy, pair_energies
 from nscan_cli.matching.joint.options import InitialisationOptions, JointOptions
 from nscan_cli.matching.joint.overlap import Overlaps, overlaps, weakest_link
+from nscan_cli.matching.motion_model import Prior
 from nscan_cli.matching.pairwise import PairOptions
 from nscan_cli.matching.pairwise_solver import PairProblem, minimise_pairwise
-from nscan_cli.matching.priors import Prior
 from nscan_cli.ndt.association import begin_association
 from nscan_cli.ndt.transform import Ndt
 from nscan_cli.poses import Array, compose, relative, transform

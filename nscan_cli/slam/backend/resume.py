@@ -15,7 +15,7 @@ from nscan_cli.files.provenance import option_fields
 from nscan_cli.graph.model import Graph, Pairwise
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.logs.log_excerpt import excerpt
-from nscan_cli.matching.priors import odometry_prior
+from nscan_cli.matching.motion_model import odometry_prior
 from nscan_cli.poses import Indices, relative
 from nscan_cli.slam.backend.finish import finish_graph
 from nscan_cli.slam.backend.refinement import refine

@@ -16,8 +16,8 @@ import numpy as np
 
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.logs.robot_path import LONGEST_STEP, RobotPath, move_along_arc, poses_at, robot_path
+from nscan_cli.matching.motion_model import Prior
 from nscan_cli.matching.pairwise import settle_pair
-from nscan_cli.matching.priors import Prior
 from nscan_cli.ndt.hash_grid import WALL_DIRECTION
 from nscan_cli.ndt.transform import Ndt
 from nscan_cli.poses import Array, Indices, Mask, relative, wrap

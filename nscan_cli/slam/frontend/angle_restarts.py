@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from nscan_cli.kernels.array_assignment import assign, assign_rows
 from nscan_cli.kernels.decorators import kernel
-from nscan_cli.matching.priors import Prior
+from nscan_cli.matching.motion_model import Prior
 from nscan_cli.ndt.hash_grid import Grid
 from nscan_cli.poses import Array
 from nscan_cli.slam.frontend.options import TrackingParameters

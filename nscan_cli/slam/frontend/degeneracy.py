@@ -16,8 +16,8 @@ import numpy as np
 
 from nscan_cli.kernels.array_assignment import assign, assign_rows
 from nscan_cli.kernels.decorators import kernel, leaf_kernel
+from nscan_cli.matching.motion_model import Prior
 from nscan_cli.matching.pairwise_solver import PairProblem, pairwise_objective
-from nscan_cli.matching.priors import Prior
 from nscan_cli.matching.small_matrices import information_of_place
 from nscan_cli.ndt.association import begin_association
 from nscan_cli.ndt.energy import ENERGY_NUMBERS

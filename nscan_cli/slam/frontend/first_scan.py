@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from nscan_cli.matching.priors import Prior
+from nscan_cli.matching.motion_model import Prior
 from nscan_cli.ndt.transform import Ndt
 from nscan_cli.poses import Array
 from nscan_cli.slam.frontend.options import TrackingOptions, TrackingParameters

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from nscan_cli.kernels.array_assignment import assign
 from nscan_cli.kernels.decorators import kernel
+from nscan_cli.matching.motion_model import Prior
 from nscan_cli.matching.pairwise_solver import PairProblem, minimise_pairwise
-from nscan_cli.matching.priors import Prior
 from nscan_cli.ndt.association import begin_association, count_inliers, update_association
 from nscan_cli.ndt.hash_grid import Grid
 from nscan_cli.poses import Array

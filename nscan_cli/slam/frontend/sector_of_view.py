@@ -12,8 +12,8 @@ import numpy as np
 from nscan_cli.kernels.decorators import kernel
 from nscan_cli.logs.field_of_view import field_of_view
 from nscan_cli.logs.laser_log import LaserLog
+from nscan_cli.matching.motion_model import Prior
 from nscan_cli.matching.pose_kernels import wrapped
-from nscan_cli.matching.priors import Prior
 from nscan_cli.ndt.hash_grid import Grid
 from nscan_cli.poses import Array, compose
 from nscan_cli.slam.frontend.local_map import NEWEST, OLDEST

@@ -7,8 +7,8 @@ from numpy.typing import NDArray
 
 from nscan_cli.kernels.array_assignment import assign, assign_rows
 from nscan_cli.kernels.decorators import kernel
+from nscan_cli.matching.motion_model import Prior, motion_sigmas
 from nscan_cli.matching.pose_kernels import relative_pose, wrapped
-from nscan_cli.matching.priors import Prior, motion_sigmas
 from nscan_cli.ndt.grid_growth import CELLS_PER_POINT
 from nscan_cli.ndt.hash_grid import Grid
 from nscan_cli.poses import Array
@@ -16,9 +16,9 @@ from nscan_cli.slam.frontend.angle_restarts import match_from_other_angles, rest
 from nscan_cli.slam.frontend.between_scans import match_between, waits_for_motion
 from nscan_cli.slam.frontend.degeneracy import keep_prediction
 from nscan_cli.slam.frontend.local_map import ROWS, insert_scan
-from nscan_cli.slam.frontend.motion_prior import contradicts, predict, predict_by_trusted_odometry
 from nscan_cli.slam.frontend.odometry_noise import learn_noise
 from nscan_cli.slam.frontend.options import TrackingParameters
+from nscan_cli.slam.frontend.prediction import contradicts, predict, predict_by_trusted_odometry
 from nscan_cli.slam.frontend.scan_to_map import match_from_prediction
 from nscan_cli.slam.frontend.sector_of_view import match_again_in_sector, match_in_sector
 from nscan_cli.slam.frontend.sweep_correction import correct_by_last_step, correct_by_match

@@ -13,9 +13,9 @@ import numpy as np
 
 from nscan_cli.files.text import counted
 from nscan_cli.graph.model import Pairwise
+from nscan_cli.matching.motion_model import Prior
 from nscan_cli.matching.pairwise_solver import PairProblem, minimise_pairwise
 from nscan_cli.matching.pose_kernels import largest_motion
-from nscan_cli.matching.priors import Prior
 from nscan_cli.ndt.association import begin_association
 from nscan_cli.ndt.energy import energy, inlier_share
 from nscan_cli.poses import Array, inverse, relative, relative_jacobians, wrap

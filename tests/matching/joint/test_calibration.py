@@ -12,8 +12,8 @@ from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.matching.joint.joint_energy import Priors
 from nscan_cli.matching.joint.nscan_match import NScanMatch, nscan_match
 from nscan_cli.matching.joint.options import JointOptions
+from nscan_cli.matching.motion_model import MotionModel, odometry_prior
 from nscan_cli.matching.pairwise import PairOptions, matched_points
-from nscan_cli.matching.priors import MotionModel, odometry_prior
 from nscan_cli.poses import Array, compose, relative, wrap
 from tests.matching.problems import office_truth
 from tests.simulation.scenes import bare_corridor, office

@@ -127,7 +127,7 @@ def test_a_global_motion_changes_nothing(five):
     np.testing.assert_allclose(part @ null, 0, atol=1e-9 * np.abs(part).max())
 
 
-def test_priors_compare_angles_across_the_jump():
+def test_motion_model_compare_angles_across_the_jump():
     """Poses at ±179°: their difference is 2°, and a prior of 2° is met."""
     poses = np.array([[0.0, 0.0, np.radians(179)], [0.0, 0.0, np.radians(-179)]])
     prior = Priors(np.array([[0, 1]]), np.array([[0.0, 0.0, np.radians(2)]]), np.eye(3)[None])

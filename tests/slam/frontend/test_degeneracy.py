@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from nscan_cli.logs.laser_log import LaserLog
-from nscan_cli.matching.priors import Prior
+from nscan_cli.matching.motion_model import Prior
 from nscan_cli.ndt.energy import energy
 from nscan_cli.ndt.transform import Ndt
 from nscan_cli.poses import Array, wrap

@@ -3,7 +3,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from nscan_cli.matching.priors import MotionModel, odometry_prior
+from nscan_cli.matching.motion_model import MotionModel, odometry_prior
 from nscan_cli.poses import compose
 
 

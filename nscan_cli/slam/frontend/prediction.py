@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from nscan_cli.kernels.decorators import kernel
+from nscan_cli.matching.motion_model import MotionModel, Prior, motion_sigmas
 from nscan_cli.matching.pose_kernels import composed_pose, relative_pose, wrapped
-from nscan_cli.matching.priors import MotionModel, Prior, motion_sigmas
 from nscan_cli.poses import Array
 from nscan_cli.slam.frontend.odometry_noise import learned_shares
 from nscan_cli.slam.frontend.options import TrackingParameters

@@ -9,7 +9,7 @@ import numpy as np
 
 from nscan_cli.matching.joint.joint_energy import Priors, no_priors
 from nscan_cli.matching.joint.nscan_match import PriorsAmong
-from nscan_cli.matching.priors import MotionModel, odometry_prior
+from nscan_cli.matching.motion_model import MotionModel, odometry_prior
 from nscan_cli.poses import Array
 
 

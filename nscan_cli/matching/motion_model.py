@@ -1,4 +1,4 @@
-"""Priors on relative poses from odometry (paper, III-E, eq. (14))."""
+"""The motion model of odometry, and the prior on a step that follows from it (paper, III-E, eq. (14))."""
 
 from __future__ import annotations
 
