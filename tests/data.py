@@ -12,6 +12,7 @@ SAMPLE_LOGS = REPOSITORY / "sample_logs"
 PACKAGE = REPOSITORY / "nscan_cli"
 OFFICE_LOG = str(SAMPLE_LOGS / "office.log.gz")
 CORRIDOR_LOG = str(SAMPLE_LOGS / "corridor_and_room.log.gz")
+TURNING_LOG = str(SAMPLE_LOGS / "turning_laser.mcap")
 REAL_LOGS = REPOSITORY.parent / "shared" / "data"
 """The folder of the real logs unless NSCAN_DATA names another."""
 

@@ -38,8 +38,14 @@ def calibrated_reading(
     if told["odometry_scale"]:
         scale = values["odometry_scale"].value
         found = replace(found, odometry_scale=float(f"{scale:.{DECIMALS}g}"))
+    if calibration.sweep != values["sweep_time"].recorded:
+        found = replace(found, sweep=round(calibration.sweep, DECIMALS) + 0.0)
+    if calibration.stamp not in (None, reading.stamp):
+        return replace(found, stamp=calibration.stamp)
     clock = values["clock_offset"]
-    if told["clock_offset"] and abs(clock.value - reading.clock_offset) >= options.clock.min_offset:
+    # Beams of a laser that turns are corrected by odometry, which has to be that of their time.
+    least = options.sweep.least_delay if calibration.sweep else options.clock.min_offset
+    if told["clock_offset"] and abs(clock.value - reading.clock_offset) >= least:
         found = replace(found, clock_offset=round(clock.value, DECIMALS))
     return found
 

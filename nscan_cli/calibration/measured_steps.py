@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -34,16 +35,26 @@ class MeasuredSteps:
         return relative(poses[self.last], poses[self.first])
 
 
-def measure_steps(log: LaserLog, rows: tuple[Indices, Indices], options: StepOptions) -> MeasuredSteps:
+def measure_steps(
+    log: LaserLog,
+    rows: tuple[Indices, Indices],
+    options: StepOptions,
+    corrected: Callable[[int], Array | None] | None = None,
+) -> MeasuredSteps:
     """Of the steps from the first rows (n,) to the last (n,), those that the scans measure beyond doubt.
 
-    Every step is matched without odometry, as of one who knows nothing but the scans.
+    Every step is matched without odometry, as of one who knows nothing but the scans. `corrected` gives the
+    points (m, 2) of a row in the laser's frame if the laser turns; None: as if it saw all at once.
     """
     at_laser = replace(log, mount=np.zeros(3), path=None)
     found: list[tuple[int, int, PairMatch]] = []
     first, last = rows
     for begin, end in zip(first.tolist(), last.tolist(), strict=True):
-        match = _measured(at_laser, begin, end, options)
+        before, after = (
+            _thinned_points(at_laser, row, options) if corrected is None else corrected(row)
+            for row in (begin, end)
+        )
+        match = _measured(before, after, options)
         if match is not None:
             found.append((begin, end, match))
     ends = np.array([(begin, end) for begin, end, _ in found], dtype=np.int64).reshape(-1, 2)
@@ -55,11 +66,9 @@ def measure_steps(log: LaserLog, rows: tuple[Indices, Indices], options: StepOpt
     )
 
 
-def _measured(log: LaserLog, begin: int, end: int, options: StepOptions) -> PairMatch | None:
-    """The pose of the scan in row `end` in the frame of that in row `begin`; None where it is in doubt."""
-    try:
-        reference, points = (_thinned_points(log, row, options) for row in (begin, end))
-    except InputDataError:
+def _measured(reference: Array | None, points: Array | None, options: StepOptions) -> PairMatch | None:
+    """The pose of a scan's points (m, 2) in the frame of the reference (n, 2); None where it is in doubt."""
+    if reference is None or points is None:
         return None
     gaussians = scan_ndt(reference, options.pair)
     match = match_pair(gaussians, points, np.zeros(3), None, options.pair)
@@ -71,7 +80,10 @@ def _measured(log: LaserLog, begin: int, end: int, options: StepOptions) -> Pair
     return match if apart <= options.agreement else None
 
 
-def _thinned_points(log: LaserLog, row: int, options: StepOptions) -> Array:
-    """The points (m, 2) of a scan, of so many beams as are matched. Raises InputDataError for too few."""
-    points = matched_points(log, row, options.pair)
+def _thinned_points(log: LaserLog, row: int, options: StepOptions) -> Array | None:
+    """The points (m, 2) of a scan, of so many beams as are matched; None for too few."""
+    try:
+        points = matched_points(log, row, options.pair)
+    except InputDataError:
+        return None
     return points[:: max(log.ranges.shape[1] // options.max_beams, 1)].copy()

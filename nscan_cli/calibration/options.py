@@ -187,6 +187,7 @@ class CalibrationOptions:
 
     steps: StepOptions = field(default_factory=lambda: StepOptions(max_beams=1_000))
     clock: ClockOptions = field(default_factory=ClockOptions)
+    sweep: SweepCheckOptions = field(default_factory=SweepCheckOptions)
     min_steps: int = 30
     """Least number of steps with motion."""
     min_turns: int = 12
@@ -211,6 +212,8 @@ class CalibrationOptions:
     """The same for the scale of odometry, as a share."""
     max_clock_sigma: float = 0.03
     """The same for the offset of the clocks, s."""
+    max_sweep_sigma: float = 0.1
+    """The same for the time of the laser's turn, as a share."""
     max_sideways: float = 0.05
     """Odometry is that of two wheels if its steps go to the side by no more than this share, in the median.
     It is 0.001 to 0.013 on real logs."""

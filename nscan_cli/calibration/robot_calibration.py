@@ -1,4 +1,4 @@
-"""What an ordinary drive says about the robot: mounting, odometry and clocks, each with a standard deviation.
+"""What an ordinary drive says about the robot: laser, odometry and clocks, each with a standard deviation.
 
 The mounting and the scale follow in closed form from the steps (mount_fit.py), the lag of the clocks from
 their turns by Gauss-Newton steps, the ratio of the turns and the heading that is gained per metre from the
@@ -19,6 +19,7 @@ from nscan_cli.calibration.options import CalibrationOptions
 from nscan_cli.calibration.robust_fit import TO_SIGMA, robust_fit
 from nscan_cli.calibration.step_chains import chains
 from nscan_cli.calibration.step_sampling import successive_steps
+from nscan_cli.calibration.sweep_calibration import calibrated_sweep
 from nscan_cli.calibration.wheels import sideways_share, wheels
 from nscan_cli.errors import InputDataError
 from nscan_cli.files.text import counted
@@ -48,6 +49,8 @@ class Evidence:
     """m, of the measured steps."""
     turned: float
     """rad, of the measured steps."""
+    pairs: int
+    """Pairs of scans that the time of the laser's turn rests on."""
 
 
 @dataclass(frozen=True)
@@ -57,10 +60,15 @@ class Calibration:
     mirrored: bool
     """Whether the readings are in the wrong order."""
     values: dict[str, Estimate]
-    """mount_x, mount_y, mount_angle; odometry_scale, turn_ratio (turns by odometry as a multiple of those by
-    scans), veer (heading that odometry gains per metre); wheel_difference and track_width (wheels.py);
-    clock_offset; noise_distance (per metre) and noise_turn (per radian) of steps by odometry."""
+    """sweep_time; mount_x, mount_y, mount_angle; odometry_scale, turn_ratio (turns by odometry as a multiple
+    of those by scans), veer (heading that odometry gains per metre); wheel_difference and track_width
+    (wheels.py); clock_offset; noise_distance (per metre) and noise_turn (per radian) of steps by odometry."""
     evidence: Evidence
+    sweep: float
+    """The time of the laser's turn that the steps were measured with, s; negative if the readings are in the
+    reverse order of time, 0 if all are seen at once."""
+    stamp: str | None
+    """Beam at whose time scans are stamped: first, middle or last; None where nothing tells it."""
 
     @property
     def open(self) -> list[str]:
@@ -75,8 +83,11 @@ def calibrate(log: LaserLog, reading: ReadingOptions, options: CalibrationOption
     """
     if log.odometry is None:
         raise InputDataError(log.source.name, "has no odometry to calibrate", "give a log that has it")
+    turn = calibrated_sweep(log, options)
+    # What a scan tells is where the robot is at its middle beam.
+    log = turn.log.at_middle_of_turns()
     rows = successive_steps(log, options.steps)
-    steps = measure_steps(log, rows, options.steps)
+    steps = measure_steps(log, rows, options.steps, turn.corrected if turn.seconds else None)
     drive = _Drive(log, steps, options)
     if drive.moving.sum() < options.min_steps:
         measured = counted(int(drive.moving.sum()), "step")
@@ -92,6 +103,7 @@ def calibrate(log: LaserLog, reading: ReadingOptions, options: CalibrationOption
     return Calibration(
         mirrored,
         {
+            "sweep_time": turn.estimate,
             **_mounting(fit, log.mount, why_open),
             "odometry_scale": by_scale,
             "turn_ratio": ratio,
@@ -102,7 +114,9 @@ def calibrate(log: LaserLog, reading: ReadingOptions, options: CalibrationOption
             ),
             **drive.noise(offset.value, fit, ratio.value, veer.value, mirrored),
         },
-        drive.evidence(len(rows[0])),
+        drive.evidence(len(rows[0]), turn.pairs),
+        turn.seconds,
+        turn.stamp(reading.stamp, offset),
     )
 
 
@@ -242,13 +256,14 @@ class _Drive:
             "noise_turn": _noise(about, np.abs(turns[self.turning]), float(by_match[1])),
         }
 
-    def evidence(self, sampled: int) -> Evidence:
+    def evidence(self, sampled: int, pairs: int) -> Evidence:
         return Evidence(
             sampled,
             len(self.laser),
             int(self.turning.sum()),
             float(self.length.sum()),
             float(np.abs(self.laser[:, 2]).sum()),
+            pairs,
         )
 
 

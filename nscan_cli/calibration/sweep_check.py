@@ -12,13 +12,11 @@ from nscan_cli.calibration.options import FileCheckOptions
 from nscan_cli.calibration.scan_motion import ScanMotion
 from nscan_cli.calibration.sweep_evidence import SweepEvidence, sweep_evidence
 from nscan_cli.calibration.sweep_time import sweep_time
-from nscan_cli.calibration.turn_of_file import stamp_place, sweep_turns, usual_turn
+from nscan_cli.calibration.turn_of_file import stamp_place, sweep_turns, usual_turn, with_turns
 from nscan_cli.files.text import counted
 from nscan_cli.logs.field_of_view import field_of_view
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.logs.reading_options import ReadingOptions
-from nscan_cli.logs.sweep import beam_times
-from nscan_cli.poses import Array
 
 
 def checked_sweep(
@@ -44,7 +42,7 @@ def checked_sweep(
     if sharpest != told and certainty >= options.sweep.sigmas:
         turn = sharpest if told else _measured_turn(log, float(np.copysign(longest, sharpest)), options)
         reading = replace(reading, sweep=round(turn, DECIMALS) + 0.0)
-        log = _turning(log, np.full(len(log), reading.sweep), reading.stamp)
+        log = with_turns(log, np.full(len(log), reading.sweep), reading.stamp)
         said.append(_said(evidence, told, turn, certainty))
     delay = odometry_delay(log, motion, options.sweep)
     if delay:
@@ -58,11 +56,6 @@ def _measured_turn(log: LaserLog, whole: float, options: FileCheckOptions) -> fl
     steps = replace(options.steps, max_beams=options.sweep.time.max_beams)
     found = sweep_time(ScanMotion.of_log(log, steps, options.sweep), abs(whole), options.sweep)
     return found.believed(whole, abs(whole), options.sweep.sigmas) or whole
-
-
-def _turning(log: LaserLog, turns: Array, stamp: str) -> LaserLog:
-    """The log of a laser whose turns take so long (S,), s, with its scans stamped at that beam."""
-    return replace(log, beam_times=beam_times(turns, log.angle_increment, log.beam_counts(), stamp))
 
 
 def _without_delay(
@@ -81,7 +74,7 @@ def _without_delay(
         f"{abs(delay):.2g} s {'later' if delay > 0.0 else 'earlier'} than odometry; they are read that way, "
         f"as with --stamp {place}; --as-recorded believes the file"
     )
-    return _turning(log, sweep_turns(log), place), replace(reading, stamp=place), said
+    return with_turns(log, sweep_turns(log), place), replace(reading, stamp=place), said
 
 
 def _longest_turn(log: LaserLog, options: FileCheckOptions) -> float:

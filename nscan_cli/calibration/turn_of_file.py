@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from nscan_cli.calibration.sweep_options import SweepCheckOptions
 from nscan_cli.logs.laser_log import LaserLog
-from nscan_cli.logs.sweep import BEFORE_STAMP
+from nscan_cli.logs.sweep import BEFORE_STAMP, beam_times
 from nscan_cli.poses import Array
 
 
@@ -16,6 +18,11 @@ def sweep_turns(log: LaserLog) -> Array:
         return np.zeros(len(log))
     found: Array = log.beam_times.step * 2 * np.pi / np.abs(log.angle_increment)
     return found
+
+
+def with_turns(log: LaserLog, turns: Array, stamp: str) -> LaserLog:
+    """The log of a laser whose turns take so long (S,), s, with its scans stamped at that beam."""
+    return replace(log, beam_times=beam_times(turns, log.angle_increment, log.beam_counts(), stamp))
 
 
 def usual_turn(log: LaserLog) -> float:
@@ -28,7 +35,7 @@ def stamp_place(log: LaserLog, stamp: str, delay: float, options: SweepCheckOpti
 
     None if no beam explains that, or the laser sees at once.
     """
-    lasts = scan_time(log)
+    lasts = first_to_last(log)
     left = {
         place: abs(delay - (share - BEFORE_STAMP[stamp]) * lasts) for place, share in BEFORE_STAMP.items()
     }
@@ -36,7 +43,7 @@ def stamp_place(log: LaserLog, stamp: str, delay: float, options: SweepCheckOpti
     return place if left[place] < options.stamp_tolerance * 0.5 * lasts else None
 
 
-def scan_time(log: LaserLog) -> float:
+def first_to_last(log: LaserLog) -> float:
     """The usual time from the first beam of a scan to the last, s; 0 if all are seen at once."""
     if log.beam_times is None:
         return 0.0

@@ -34,13 +34,14 @@ VALUE_UNITS = {
     "veer": "degrees/m",
     "wheel_difference": "1/m",
     "clock_offset": "s",
+    "sweep_time": "s",
 }
 """The other values have none."""
 
 
 @subcommand(
     "calibrate",
-    ("nscan-cli calibrate drive.mcap", "mounting, odometry and clocks from the scans"),
+    ("nscan-cli calibrate drive.mcap", "laser, odometry and clocks from the scans"),
     ("nscan-cli calibrate drive.mcap -o robot.toml", "as options for --config of all commands"),
     ("nscan-cli calibrate drive.mcap --json", "for a program"),
 )
@@ -58,7 +59,7 @@ def command(
     quiet: bool,
     **_verbosity: int,
 ) -> None:
-    """Find from an ordinary drive how the laser is mounted, and what odometry and clocks do.
+    """Find from an ordinary drive how the laser is mounted and turns, and what odometry and clocks do.
 
     Steps from scan to scan, matched without odometry, are compared with the same steps by odometry. Every
     value has its standard deviation, and what the file says beside it. A drive has to have turns, and more in
@@ -151,6 +152,7 @@ def _rows(calibration: Calibration, reading: ReadingOptions, calibrated: Reading
     return [
         ("steps", [f"{measured}; {evidence.distance:.1f} m and {evidence.turned:.1f} rad"]),
         ("readings", [order]),
+        ("sweep", _sweep_lines(calibration)),
         ("mounting", [_line("x", values["mount_x"], "m"), _line("y", values["mount_y"], "m"),
                       _line("turned by", _degrees(values["mount_angle"]), "°")]),
         ("odometry", [_line("scale", values["odometry_scale"]),
@@ -165,6 +167,17 @@ def _rows(calibration: Calibration, reading: ReadingOptions, calibrated: Reading
         ("unknown", _unknown(calibration) or ["nothing"]),
         ("options", [flags or "none: the file agrees with the scans"]),
     ]  # fmt: skip
+
+
+def _sweep_lines(calibration: Calibration) -> list[str]:
+    """How long the laser turns, by how many pairs of scans, and at which beam its scans are stamped."""
+    turn, pairs = calibration.values["sweep_time"], calibration.evidence.pairs
+    lines = [f"{_line('a turn takes', turn, 's')}, {counted(pairs, 'pair')} of scans"]
+    if calibration.sweep and calibration.stamp:
+        lines.append(f"stamp at the {calibration.stamp} beam")
+    elif calibration.sweep:
+        lines.append("stamp at a beam that cannot be told from the clock of odometry")
+    return lines
 
 
 def _unknown(calibration: Calibration) -> list[str]:
@@ -220,6 +233,7 @@ def _facts(calibration: Calibration, calibrated: ReadingOptions) -> dict[str, An
             "turned": _rounded(math.degrees(evidence.turned)),
         },
         "mirrored": calibration.mirrored,
+        "sweep": {"pairs": evidence.pairs, "used": _rounded(calibration.sweep), "stamp": calibration.stamp},
         "values": values,
         "open": calibration.open,
         "options": robot_table(calibrated),

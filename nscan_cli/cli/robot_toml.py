@@ -7,7 +7,9 @@ from typing import Any
 
 from nscan_cli.logs.reading_options import ReadingOptions
 
-ROBOT_OPTIONS = ("laser", "topic", "odom-topic", "flip", "mount", "odometry-scale", "clock-offset")
+ROBOT_OPTIONS = (
+    "laser", "topic", "odom-topic", "flip", "mount", "sweep", "stamp", "odometry-scale", "clock-offset",
+)  # fmt: skip
 """Their long names."""
 
 

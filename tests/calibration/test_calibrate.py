@@ -17,13 +17,17 @@ from nscan_cli.errors import InputDataError
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.logs.load import read_log
 from nscan_cli.logs.reading_options import ReadingOptions
+from nscan_cli.logs.robot_path import robot_path
 from nscan_cli.poses import compose, relative
+from tests.benchmarks.lasers import turning
 from tests.data import OFFICE_LOG, data_file
 from tests.logs.excerpts import excerpt
 from tests.simulation import faults
 from tests.simulation.drive import Drive, Odometry
 from tests.simulation.laser import Laser
+from tests.simulation.office import office_way, office_world
 from tests.simulation.scenes import bare_corridor, office
+from tests.simulation.sweeping import SweptRecording, Turning, fine_path, record_swept
 
 OPTIONS = CalibrationOptions()
 LASERS = (Laser(), Laser(360, -np.pi, np.radians(1.0), 12.0, no_return=13.0))
@@ -185,3 +189,52 @@ def test_intel():
     values = calibrated(read_log(str(data_file("intel.log.gz")))).values
     assert values["mount_x"].value == pytest.approx(0.098, abs=0.02)
     assert values["mount_y"].value == pytest.approx(0.0, abs=0.02)
+
+
+@functools.cache
+def swept(turn: float, stamp: str = "first") -> SweptRecording:
+    """A drive whose laser takes `turn` s for a turn; odometry is right."""
+    path = fine_path(office_way()[:12], Drive(speed=0.22, turn_rate=1.5))
+    return record_swept(
+        "office", office_world(), path, turning(360, 3.5, 0.01, 0.01), Turning(0.2, turn, stamp), 1
+    )
+
+
+def test_the_steps_of_a_laser_that_turns_are_those_of_one_that_sees_at_once():
+    """As the scans are, they would be late by half a turn, and the wheels would seem to slip."""
+    at_once, turning_laser = (calibrated(swept(turn).log()) for turn in (0.0, 0.2))
+    assert at_once.stamp is None
+    assert turning_laser.stamp == "first"
+    assert turning_laser.sweep == 0.2
+    values = turning_laser.values
+    assert values["clock_offset"].value == pytest.approx(0.0, abs=0.02)
+    assert values["clock_offset"].sigma < 0.01
+    assert values["noise_turn"].value < 1.5 * at_once.values["noise_turn"].value
+    assert values["mount_y"].value == pytest.approx(0.0, abs=3 * values["mount_y"].sigma)
+    assert values["mount_x"].value == pytest.approx(0.1, abs=0.01)
+    assert values["sweep_time"].value == pytest.approx(0.2, abs=3 * values["sweep_time"].sigma)
+
+
+@pytest.mark.parametrize("told", [0.0, -0.2, 0.2])
+def test_a_turn_that_the_file_has_wrongly(told):
+    reading = calibrated_reading(calibrated(swept(0.2).log(turn=told)), ReadingOptions(), OPTIONS)
+    assert reading.sweep == (None if told == 0.2 else pytest.approx(0.2, abs=0.01))
+
+
+@pytest.mark.parametrize("stamp", ["middle", "last"])
+def test_a_stamp_that_is_not_at_the_first_beam(stamp):
+    found = calibrated(swept(0.2, stamp).log(stamp="first"))
+    assert found.stamp == stamp
+    reading = calibrated_reading(found, ReadingOptions(), OPTIONS)
+    assert (reading.stamp, reading.clock_offset) == (stamp, 0.0)
+
+
+def test_the_clock_of_a_laser_that_turns():
+    """A third of a second is no beam of the scan; it is passed on, since beams are corrected by odometry."""
+    drive = swept(0.2)
+    path = robot_path(drive.odometry.times - 0.3, drive.odometry.poses)
+    assert path is not None
+    found = calibrated(dataclasses.replace(drive, odometry=path).log())
+    assert found.stamp is None
+    assert found.values["clock_offset"].value == pytest.approx(0.3, abs=0.02)
+    assert calibrated_reading(found, ReadingOptions(), OPTIONS).clock_offset == pytest.approx(0.3, abs=0.02)

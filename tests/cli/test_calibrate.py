@@ -11,7 +11,7 @@ import pytest
 
 from nscan_cli.cli.main import run
 from nscan_cli.graph.io.json_graph import read_graph
-from tests.data import CORRIDOR_LOG, data_file
+from tests.data import CORRIDOR_LOG, TURNING_LOG, data_file
 from tests.logs.recordings.messages import START, Odom, S, Scan, Tf, Written, turned
 from tests.logs.recordings.ros import ros2
 from tests.simulation.drive import Drive
@@ -19,15 +19,25 @@ from tests.simulation.laser import Laser
 from tests.simulation.scenes import office
 
 VALUES = [
-    "mount_x", "mount_y", "mount_angle", "odometry_scale", "turn_ratio", "veer", "wheel_difference",
-    "track_width", "clock_offset", "noise_distance", "noise_turn",
+    "sweep_time", "mount_x", "mount_y", "mount_angle", "odometry_scale", "turn_ratio", "veer",
+    "wheel_difference", "track_width", "clock_offset", "noise_distance", "noise_turn",
 ]  # fmt: skip
 
 
 def test_json(capsys):
     assert run(["calibrate", CORRIDOR_LOG, "--json"]) == 0
     facts = json.loads(capsys.readouterr().out)
-    assert list(facts) == ["steps", "mirrored", "values", "open", "options", "laser", "file", "sha256"]
+    assert list(facts) == [
+        "steps",
+        "mirrored",
+        "sweep",
+        "values",
+        "open",
+        "options",
+        "laser",
+        "file",
+        "sha256",
+    ]
     assert list(facts["values"]) == VALUES
     mounted = facts["values"]["mount_x"]
     assert mounted["recorded"] == 0.1
@@ -45,6 +55,7 @@ def test_a_table_for_people(capsys):
     assert titles == [
         "steps",
         "readings",
+        "sweep",
         "mounting",
         "odometry",
         "wheels",
@@ -54,6 +65,23 @@ def test_a_table_for_people(capsys):
         "options",
     ]
     assert shown[-1] == "options   --odometry-scale 0.9865"
+
+
+def test_the_turn_of_the_laser(tmp_path, capsys):
+    assert run(["calibrate", TURNING_LOG, "--json"]) == 0
+    facts = json.loads(capsys.readouterr().out)
+    turn = facts["values"]["sweep_time"]
+    assert turn["recorded"] == 0.2
+    assert abs(turn["value"] - 0.2) < 3 * turn["sigma"] < 0.03
+    assert facts["sweep"]["used"] == 0.2
+    assert facts["sweep"]["stamp"] is None, "the drive is too short for it"
+    assert facts["sweep"]["pairs"] >= 30
+    robot = tmp_path / "robot.toml"
+    assert run(["calibrate", TURNING_LOG, "--sweep", "-0.2", "-o", str(robot)]) == 0
+    shown = capsys.readouterr().out
+    assert "(file: -0.2)" in shown
+    assert "stamp at a beam that cannot be told from the clock of odometry" in shown
+    assert tomllib.loads(robot.read_text())["sweep"] == 0.2
 
 
 def test_the_file_is_a_config_of_every_command(tmp_path, capsys):
