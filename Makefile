@@ -64,7 +64,7 @@ lowest:
 	$(PYTHON) -m venv out/lowest
 	out/lowest/bin/python -m pip install --quiet --disable-pip-version-check -r requirements-lowest.txt \
 	  pytest hypothesis jsonschema foxglove-schemas-protobuf mcap-protobuf-support mcap-ros1-support mcap-ros2-support
-	PYTHONPATH=. out/lowest/bin/python -m pytest tests --ignore tests/soak --ignore tests/nightly \
+	PYTHONPATH=$(CURDIR) out/lowest/bin/python -m pytest tests --ignore tests/soak --ignore tests/nightly \
 	  --ignore tests/slam --ignore tests/experiments --ignore tests/simulation
 
 lock: $(READY)
