@@ -185,6 +185,16 @@ def test_odometry_that_stands_for_a_part_is_missing_there(log, catches_up):
     assert found(held, ReadingOptions(as_recorded=True)) == []
 
 
+def test_positions_without_headings_are_not_used():
+    """Some drivers write positions only."""
+    log = real_drive()
+    assert log.odometry is not None
+    (said,) = found(replace(log, odometry=log.odometry * (1.0, 1.0, 0.0)))
+    assert said.startswith(
+        "odometry contradicts the scans: no scale, mounting or clock explains its positions"
+    )
+
+
 @pytest.mark.parametrize("make", [frozen, faults.mirrored, lambda log: faults.odometry_scaled(log, 1000.0)])
 def test_as_recorded_believes_the_file(make):
     log, reading = make(drive()), ReadingOptions(as_recorded=True)
