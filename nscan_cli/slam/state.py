@@ -101,7 +101,7 @@ class SlamState:
 
     def scan_batches(self) -> Iterator[ScanBatch]:
         """The scans of the log as tracking takes them."""
-        return scan_batches(self.log, self.options.tracking.max_range, self.odometry, self.frozen_scans)
+        return scan_batches(self.log, self.options.tracking, self.odometry, self.frozen_scans)
 
     @property
     def poses(self) -> Array:

@@ -159,7 +159,7 @@ def test_standing_still_makes_no_keyframes():
 
 
 def test_the_map_is_right_though_the_robot_has_itself_in_view(tmp_path):
-    """Without the check the posts hold the robot back; what it has found stands in the graph."""
+    """What the check has found stands in the graph. Without it the posts are a few points near the robot."""
     scene = office()
     recording = scene.record_at(scene.truth()[:900], seed=3)
     seen = faults.own_parts(recording.log(), [(-1.05, -0.7, 0.3), (0.7, 1.05, 0.3)])
@@ -173,7 +173,7 @@ def test_the_map_is_right_though_the_robot_has_itself_in_view(tmp_path):
     assert any("--mask -61:-40,40:61" in notice for notice in graph.provenance["notices"])
     assert graph.provenance["parameters"]["scan_checks"]["robot_parts"]["max_range"] == 1.5
     as_recorded = read_log(str(path), dataclasses.replace(options, as_recorded=True))
-    assert position_rmse(mapped(as_recorded).graph.poses, recording.truth) > 0.5
+    assert position_rmse(mapped(as_recorded).graph.poses, recording.truth) < 0.05
 
 
 def test_someone_in_the_way_for_half_a_second_breaks_nothing():

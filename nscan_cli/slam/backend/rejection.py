@@ -9,6 +9,7 @@ import numpy as np
 from nscan_cli.graph.optimise.graduated_nonconvexity import contradicting
 from nscan_cli.graph.relations.registry import centre_of
 from nscan_cli.slam.backend.optimisation import optimise
+from nscan_cli.slam.backend.untold_sigmas import told_relations
 from nscan_cli.slam.state import SlamState
 
 CONTRADICTS = "contradicts the rest of the graph"
@@ -17,7 +18,7 @@ CONTRADICTS = "contradicts the rest of the graph"
 def reject_contradicting_loops(state: SlamState) -> None:
     """Remove the relations of loops that contradict the others. Changes relations, loops, route."""
     relations = state.relations
-    energy = state.energies.of(state.route, relations)
+    energy = state.energies.of(state.route, told_relations(state))
     closes_loop = np.array([relation.origin == "loop" for relation in relations], dtype=np.bool_)
     wrong = contradicting(energy, state.poses, closes_loop, state.options.rejection)
     if not wrong.any():

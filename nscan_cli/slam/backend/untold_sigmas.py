@@ -14,6 +14,7 @@ from dataclasses import replace
 import numpy as np
 
 from nscan_cli.graph.model import NScan, Pairwise
+from nscan_cli.graph.relations.base import Relation
 from nscan_cli.poses import Array, Indices, Mask
 from nscan_cli.slam.backend.options import UntoldSigmaOptions
 from nscan_cli.slam.diagnostics.untold_way import UntoldWay, untold_ways
@@ -24,17 +25,26 @@ Between = list[tuple[int, int]]
 
 
 def relations_as_told(state: SlamState) -> tuple[list[Pairwise], list[NScan]]:
-    """The pairwise and the nScan relations of a finished loop, as certain as scans tell the way."""
+    """The pairwise and the nScan relations, as certain as scans tell the way."""
     pairwise, nscan, options = state.pairwise_relations, state.nscan_relations, state.options.untold_sigmas
-    told, path = state.told_sigmas, np.concatenate(state.tracked)
-    sigmas = np.concatenate(told) if told else np.zeros(len(path))
+    if not state.told_sigmas:
+        return pairwise, nscan
+    # Scans after the last keyframe may be tracked by another thread at this moment.
+    end = int(state.route.rows[-1]) + 1
+    path, sigmas = np.concatenate(list(state.tracked))[:end], np.concatenate(list(state.told_sigmas))[:end]
     ways = untold_ways(path, sigmas, state.options.diagnostics.untold_way)
     if not ways:
         return pairwise, nscan
-    times, is_told = state.log.times, sigmas <= state.options.diagnostics.untold_way.sigma
+    times, is_told = state.log.times[:end], sigmas <= state.options.diagnostics.untold_way.sigma
     speed = _usual_speed(path, times, is_told, options)
     variances = untold_variances(state.route.rows, times, speed, ways, options)
     return with_untold_variances(pairwise, nscan, state.route.rows, variances, options.most_steps)
+
+
+def told_relations(state: SlamState) -> list[Relation]:
+    """All relations, in the order of the graph, as certain as scans tell the way."""
+    pairwise, nscan = relations_as_told(state)
+    return [*pairwise, *nscan, *state.other_relations]
 
 
 def _usual_speed(path: Array, times: Array, is_told: Mask, options: UntoldSigmaOptions) -> float:

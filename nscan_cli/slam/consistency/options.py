@@ -20,6 +20,9 @@ class VerificationOptions:
     be lost there. With a larger value more is compared."""
     max_turn: float = 0.26
     """The same for their turn, rad."""
+    start: float = 0.3
+    """Without odometry a robot that begins in a bare corridor seems to stand at first. Nothing counts before
+    the repeated map has it this far from where it began, m."""
     max_difference: float = 0.3
     """A larger difference of two maps is a warning, m. It is below 0.2 m on sound logs."""
     bound: float | None = None

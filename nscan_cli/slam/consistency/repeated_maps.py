@@ -31,6 +31,13 @@ class MappedPath:
     """What it says of itself."""
     untold: Indices = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
     """Rows of scans along bare walls, without odometry, that do not tell their places."""
+    has_odometry: bool = True
+
+    def standing_rows(self, distance: float) -> Indices:
+        """The first rows, without odometry, up to where the robot is this far (m) from where it began."""
+        gone = np.hypot(*(self.poses[:, :2] - self.poses[0, :2]).T) > distance
+        first = int(np.argmax(gone)) if gone.any() else len(gone)
+        return self.rows[: 0 if self.has_odometry else first]
 
 
 def mirrored(log: LaserLog) -> LaserLog:
@@ -53,7 +60,8 @@ def path_of(log: LaserLog, options: SlamOptions, rows: Indices | None = None) ->
     graph = run_slam(state, lambda *_counts: None)
     breaks = rows[np.array(state.breaks, dtype=np.int64)]
     untold = np.concatenate(state.told_sigmas) > options.diagnostics.untold_way.sigma
-    return MappedPath(rows, graph.poses, breaks, tuple(notices(state)), rows[untold])
+    has_odometry = log.odometry is not None
+    return MappedPath(rows, graph.poses, breaks, tuple(notices(state)), rows[untold], has_odometry)
 
 
 def path_of_mirrored(log: LaserLog, options: SlamOptions) -> MappedPath:

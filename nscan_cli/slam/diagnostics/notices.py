@@ -11,6 +11,7 @@ from nscan_cli.files.text import counted
 from nscan_cli.graph.optimise.graduated_nonconvexity import chi2_by_three
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.poses import relative
+from nscan_cli.slam.backend.untold_sigmas import told_relations
 from nscan_cli.slam.diagnostics.free_space_violations import free_space_violations, sound_share
 from nscan_cli.slam.diagnostics.odometry_disagreement import odometry_disagreements
 from nscan_cli.slam.diagnostics.untold_way import untold_ways
@@ -146,7 +147,7 @@ def _view_mismatches(state: SlamState) -> list[str]:
 
 def _contradictions(state: SlamState) -> list[str]:
     """Whether the relations of the graph agree as well as their information says."""
-    relations, options = state.relations, state.options.diagnostics
+    relations, options = told_relations(state), state.options.diagnostics
     if not relations:
         return []
     chi2 = chi2_by_three(state.energies.of(state.route, relations), state.poses)

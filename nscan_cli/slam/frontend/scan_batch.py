@@ -10,6 +10,8 @@ import numpy as np
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.poses import Array, Indices
 from nscan_cli.slam.frontend.odometry_checks import SHORTEST_PERIOD
+from nscan_cli.slam.frontend.options import TrackingOptions
+from nscan_cli.slam.frontend.point_spacing import spaced_points
 
 NONE = np.zeros(0)
 SCANS_PER_BATCH = 128
@@ -65,22 +67,24 @@ class ScanBatch:
         )
 
 
-def scan_batches(log: LaserLog, reach: float, odometry: Array | None, frozen: Indices) -> Iterator[ScanBatch]:
-    """The scans of a log, batch by batch: their points within `reach` (m), and the odometry (S, 3), if any.
+def scan_batches(
+    log: LaserLog, options: TrackingOptions, odometry: Array | None, frozen: Indices
+) -> Iterator[ScanBatch]:
+    """The scans of a log, batch by batch: the points that are matched, and the odometry (S, 3), if any.
 
     Scans in the `frozen` rows (H,) have no points.
     """
     # Along a path they are corrected already.
     is_corrected = log.beam_times is not None and log.path is None and len(log) > 1
     period, first = max(float(np.median(np.diff(log.times))), SHORTEST_PERIOD) if is_corrected else 1.0, 0
+    reach = options.max_range
     for points, ends in log.point_batches(SCANS_PER_BATCH, reach):
         end = first + len(ends) - 1
         shares = log.point_times(slice(first, end), reach) / period if is_corrected else NONE
-        is_frozen = np.isin(np.arange(first, end), frozen)
-        if is_frozen.any():
-            sizes = np.diff(ends)
-            kept = np.repeat(~is_frozen, sizes)
+        kept = spaced_points(points, ends, options.point_spacing)
+        kept &= np.repeat(~np.isin(np.arange(first, end), frozen), np.diff(ends))
+        if not kept.all():
             points, shares = points[kept], shares[kept] if is_corrected else NONE
-            ends = np.concatenate([[0], np.cumsum(np.where(is_frozen, 0, sizes))])
+            ends = np.concatenate([[0], np.cumsum(kept)])[ends]
         yield ScanBatch(first, points, ends, None if odometry is None else odometry[first:end], shares)
         first = end

@@ -13,7 +13,7 @@ class LoopClosureOptions:
 
     drift: float = 0.05
     """Standard deviation of tracking slips, m/√m. A larger one searches more often and farther."""
-    drift_angle: float = 0.002
+    drift_angle: float = 0.003
     """Standard deviation of tracking slips, rad/√m. A larger one searches more often and farther."""
     lever_arm: float = 20.0
     """Distance at which angles count when paths are compared by their uncertainty, m. With a larger one,

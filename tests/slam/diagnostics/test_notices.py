@@ -18,7 +18,7 @@ from nscan_cli.slam.log_to_graph import map_log
 from nscan_cli.slam.options import SlamOptions
 from tests.data import data_file
 from tests.slam.keyframe_drives import round_scene
-from tests.slam.mapped_logs import mapped
+from tests.slam.mapped_logs import mapped, position_rmse
 from tests.slam.trouble_cases import ROUND, without_odometry
 
 
@@ -50,33 +50,28 @@ def test_trouble_that_the_graph_hides_is_told(trouble, odometry, told):
 
 
 @pytest.mark.parametrize("seed", [5, 6, 7, 8])
-def test_a_map_that_a_glass_wall_has_made_6_m_too_short_is_told(seed):
-    """Tracking stands still beside the glass, and in the other corridor the visits match, 6 m off."""
-    drive = round_scene().record(seed).log()
-    made = without_odometry(ROUND["glass wall, seen within 17° of head-on"](drive))
-    said = "\n".join(notices(mapped(made.log).state))
-    told = re.search(r"another visit: from scan (\d+) to (\d+), its beams pass through ([\d.]+)%", said)
+def test_a_way_beside_glass_is_told_to_be_a_guess(seed):
+    """The map is right; the robot has driven steadily."""
+    recording = round_scene().record(seed)
+    made = without_odometry(ROUND["glass wall, seen within 17° of head-on"](recording.log()))
+    run = mapped(made.log)
+    assert position_rmse(run.graph.poses, recording.truth) < 0.1
+    (said,) = notices(run.state)
+    told = re.match(
+        r"the walls do not show how far the robot went: ([\d.]+) m from scan (\d+) to (\d+)", said
+    )
     assert told is not None
-    assert 270 <= int(told[1]) < int(told[2])
-    assert float(told[3]) >= 25
+    assert 3 < float(told[1]) < 7
+    assert 150 < int(told[2]) < int(told[3]) < 200
 
 
-@pytest.mark.parametrize("seed", [4, 5, 6, 7])
-def test_of_someone_who_walks_along_it_is_told_that_odometry_and_scans_disagree(seed):
-    """On some drives tracking breaks before, or relations contradict each other behind."""
-    log = ROUND["someone who walks along"](round_scene().record(seed).log()).log
-    ways = r"disagree about the distance driven: 1\d\.\d m and \d\.\d m from scan (\d+) to (\d+)"
-    told = re.search(ways, "\n".join(notices(mapped(log).state)))
-    assert told is not None
-    assert int(told[1]) < 40
-    assert int(told[2]) > 60
-
-
-def test_of_someone_who_walks_along_it_is_told_too_where_tracking_breaks_before():
-    log = ROUND["someone who walks along"](round_scene().record(8).log()).log
-    said = notices(mapped(log).state)
-    assert said[0].startswith("tracking broke at scan 28;")
-    assert "disagree about the distance driven: 9.3 m and 1.8 m from scan 28 to 70" in said[1]
+@pytest.mark.parametrize("seed", range(4, 9))
+def test_someone_who_walks_along_does_not_hold_the_robot(seed):
+    """Half of all beams end on someone near the robot; they are a few points of many."""
+    recording = round_scene().record(seed)
+    run = mapped(ROUND["someone who walks along"](recording.log()).log)
+    assert position_rmse(run.graph.poses, recording.truth) < 0.01
+    assert all("look different" in said for said in notices(run.state))
 
 
 @pytest.mark.parametrize("trouble", ["none", "people who pass"])
@@ -107,5 +102,6 @@ def test_odometry_without_sign_in_a_real_log_is_told():
     assert log.odometry is not None
     ahead = np.linalg.norm(log.odometry[int(last), :2] - log.odometry[int(first), :2])
     assert by_odometry == pytest.approx(ahead, rel=0.02)
-    assert by_odometry - by_scans == pytest.approx(3.9, abs=0.5)
+    # The last 0.8 m of the 3 m back are driven twice.
+    assert 3.4 < by_odometry - by_scans < 6.0
     assert first <= 1375 <= 1431 <= last

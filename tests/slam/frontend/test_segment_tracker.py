@@ -77,9 +77,16 @@ def test_a_person_who_walks_about_a_standing_laser_breaks_no_track(every):
     assert mapped(log).state.breaks == []
 
 
-def test_a_robot_that_was_carried_while_no_scans_were_recorded_breaks_the_track():
-    log = read_log(str(data_file("field/urg-carried.bag")))
-    assert mapped(log).state.breaks == [229]
+@pytest.mark.parametrize(
+    ("name", "first", "last", "way"), [("carried", 225, 300, 4.3), ("corridor-2", 165, 222, 5.5)]
+)
+@pytest.mark.parametrize("odometry", [True, False])
+def test_a_robot_that_someone_carries_is_tracked_by_what_it_sees(name, first, last, way, odometry):
+    """Half of its beams end on whoever holds it. Odometry stands still, or is missing."""
+    run = mapped(read_log(str(data_file(f"field/urg-{name}.bag")), ReadingOptions(odometry=odometry)))
+    assert run.state.breaks == []
+    carried_by = run.graph.poses[last] - run.graph.poses[first]
+    assert np.hypot(*carried_by[:2]) == pytest.approx(way, abs=0.4)
 
 
 def test_matches_that_are_poor_throughout_break_no_track():

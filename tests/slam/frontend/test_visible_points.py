@@ -40,12 +40,12 @@ def along(poses: Array, truth: Array) -> float:
     return float(((steps * true)[moves].sum(axis=1) / lengths[moves]).sum() / lengths[moves].sum())
 
 
-def tracked_poses(log: LaserLog) -> Array:
+def tracked_poses(log: LaserLog, options: TrackingOptions = TRACKING) -> Array:
     """(S, 3) where tracking has all scans of a log."""
-    tracker, options = tracker_of(log, SlamOptions()), SlamOptions().tracking
+    tracker = tracker_of(log, SlamOptions(tracking=options))
     segments = [
         each
-        for scans in scan_batches(log, options.max_range, log.odometry, np.zeros(0, dtype=np.int64))
+        for scans in scan_batches(log, options, log.odometry, np.zeros(0, dtype=np.int64))
         for each in tracker.follow(scans)
     ]
     return np.concatenate([each.tracked.poses for each in segments + tracker.finish()])
