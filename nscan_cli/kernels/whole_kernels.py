@@ -47,7 +47,7 @@ def compile_whole(dispatcher: Any, types: tuple[Any, ...]) -> Any:
 
     options, target = dispatcher.targetoptions, cast(Any, cpu_target.target_context)
     with _modules_alone(), _without_full_collections():
-        dispatcher.compile(types)
+        dispatcher.get_call_template(types, {})
         called = dispatcher.overloads[types]
         context = target.subtarget(enable_nrt=options.get("_nrt", True))
         library = context.codegen().create_library(called.library.name)
