@@ -13,7 +13,7 @@ class LoopClosureOptions:
 
     drift: float = 0.05
     """Standard deviation of tracking slips, m/√m. A larger one searches more often and farther."""
-    drift_angle: float = 0.003
+    drift_angle: float = 0.002
     """Standard deviation of tracking slips, rad/√m. A larger one searches more often and farther."""
     lever_arm: float = 20.0
     """Distance at which angles count when paths are compared by their uncertainty, m. With a larger one,
@@ -32,7 +32,7 @@ class LoopClosureOptions:
     search: SearchOptions = field(default_factory=lambda: SearchOptions(beams=180))
     min_distance: float = 4.0
     """Least distance that is searched, m: a slip while all else is well known. A larger one is slower."""
-    min_turn: float = 0.2
+    min_turn: float = 0.3
     """Least angle that is searched, rad. A larger one is slower."""
     max_distance: float = 50.0
     """Largest distance that is searched, m. A larger one closes larger loops and is slower."""
