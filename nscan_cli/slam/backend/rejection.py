@@ -18,6 +18,7 @@ CONTRADICTS = "contradicts the rest of the graph"
 def reject_contradicting_loops(state: SlamState) -> None:
     """Remove the relations of loops that contradict the others. Changes relations, loops, route."""
     relations = state.relations
+    # These are in the same order.
     energy = state.energies.of(state.route, told_relations(state))
     closes_loop = np.array([relation.origin == "loop" for relation in relations], dtype=np.bool_)
     wrong = contradicting(energy, state.poses, closes_loop, state.options.rejection)

@@ -32,6 +32,7 @@ class MappedPath:
     untold: Indices = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
     """Rows of scans along bare walls, without odometry, that do not tell their places."""
     has_odometry: bool = True
+    """Whether its log had any."""
 
     def standing_rows(self, distance: float) -> Indices:
         """The first rows, without odometry, up to where the robot is this far (m) from where it began."""
