@@ -1,9 +1,10 @@
 """Maps of the same drive that must be the same: `python -m tests.benchmarks.consistency OUT.md [LOG ...]`.
 
 Every recording in NSCAN_DATA is mapped with every scan, every second and every third one, mirrored, and
-backwards in time; with odometry and without. Each is read as `slam` reads it: what its scans contradict in
-the file, such as the direction in which a laser turns, is put right first. No truth is needed: the robot has
-driven the same. Compared is the distance that it came in windows of 6 s, at stamps that all of the runs have.
+backwards in time; with odometry and without. Faults of the file that its scans show, such as a wrong
+direction of the laser's turn, are corrected first, as in `slam`. No truth is needed, because the drive is
+the same. The table has how much the distances that the robot came in windows of 6 s differ between the
+runs, at stamps that all of them have.
 """
 
 from __future__ import annotations

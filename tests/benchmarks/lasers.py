@@ -175,25 +175,25 @@ def rms(poses: Array, truth: Array) -> float:
 def document(outcomes: list[Outcome], buildings: Sequence[int]) -> str:
     """The tables as Markdown."""
     first = (
-        f"Written by `make lasers`: simulated drives of 300 m through the corridors of {len(buildings)} "
-        f"buildings (`tests/simulation/building.py`), {len(KINDS)} kinds of lasers and robots. "
+        f"Written by `make lasers`. Simulated drives of 300 m through the corridors of {len(buildings)} "
+        f"buildings (`tests/simulation/building.py`), with {len(KINDS)} kinds of lasers and robots. "
         "Corridors are 2.2 m wide, with a pier or a door every few metres: hard for a laser that sees no "
-        "farther than that. Root mean square errors of the positions, over all scans, after the best rigid "
-        f"alignment. A map is wrong when that is above {RIGHT} m; it is told when `slam` says anything of "
-        "it. A loop is false when it is 0.5 m or 5° off. Ranges have noise of 1.5 cm where nothing else is "
-        "said, of 1 to 3 cm with the lasers that turn and those of 270° and 240°. Odometry is 1 % too long, "
-        "veers by 0.05° a metre, and has noise."
+        "farther than that. Errors are root mean square errors of all positions, after the best rigid "
+        f"alignment. A map is wrong if its error is above {RIGHT} m. It is told if `slam` warns of "
+        "anything. A loop is false if it is 0.5 m or 5° off. Ranges have a noise of 1.5 cm unless stated "
+        "otherwise, and of 1 to 3 cm with the lasers that turn and those of 270° and 240°. Odometry is 1 % "
+        "too long, veers by 0.05° a metre, and has noise."
     )
     swept = (
-        "The same buildings; each beam is seen from where the robot is then. Odometry has its own times, 20 "
-        "a second. The robot begins and ends its turns from one moment to the next."
+        "The same buildings; each beam is seen from where the robot is at its time. Odometry has its own "
+        "stamps, 20 a second. The robot starts and stops turning at once."
     )
     hard = (
-        "Places of `tests/simulation/places.py`: corridors whose walls have the frames of doors alone, 4 cm "
-        "deep; a hall of like aisles between racks; grounds with four buildings, trees, hedges and parked "
-        "cars, where ways are driven in both directions, about a third of the beams do not return, and the "
-        "laser looks down by a few degrees at times, on a wall that is none. Poor odometry is 10 % too long, "
-        "veers by 5° a metre, and has more noise."
+        "Places of `tests/simulation/places.py`. Bare corridors: their walls have only door frames, 4 cm "
+        "deep. Warehouse: a hall of like aisles between racks. Grounds: four buildings, trees, hedges and "
+        "parked cars; ways are driven in both directions, about a third of the beams do not return, and at "
+        "times the laser looks down by a few degrees and sees the ground as a wall. Poor odometry is 10 % "
+        "too long, veers by 5° a metre, and has more noise."
     )
     names = {GOOD: "With odometry", "poor": "With poor odometry", NONE: "Without odometry"}
     parts = ["# Lasers", first]

@@ -163,11 +163,11 @@ def document(outcomes: list[Outcome]) -> str:
             ]  # fmt: skip
     parts = [
         "# Robustness",
-        "Written by `make robustness`: every log with noise on its odometry (Gaussian, anew for each of "
-        f"{SEEDS} seeds: {OF_STEP:.0%} of a step's length and {OF_TURN:.0%} of its turn, and 1 cm and 0.3° a "
-        f"step), and with its first {', '.join(map(str, DROPPED[1:-1]))} or {DROPPED[-1]} scans left out. "
-        "Errors are means (medians) on the log's relations in m, of fr-campus the RMSE (median) of the ATE; "
-        "wanted: "
+        "Written by `make robustness`. Every log is mapped with noise on its odometry (Gaussian, anew for "
+        f"each of {SEEDS} seeds: {OF_STEP:.0%} of a step's length and {OF_TURN:.0%} of its turn, and 1 cm "
+        f"and 0.3° a step), and without its first {', '.join(map(str, DROPPED[1:-1]))} or {DROPPED[-1]} "
+        "scans. Errors are means (medians) on the log's relations in m; for fr-campus the RMSE (median) of "
+        "the ATE. Wanted are: "
         + ", ".join(f"{log} {wanted}" for log, wanted in WANTED.items())
         + ". A loop is false when it was accepted and lies 0.5 m or 5° off the map of the undisturbed log.",
         table(header, rows),

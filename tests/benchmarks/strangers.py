@@ -127,14 +127,13 @@ def document(outcomes: Sequence[Outcome]) -> str:
     )
     parts = [
         "# Files of strangers",
-        "Written by `make strangers`: files that say something wrong, after reports of their owners, "
+        "Written by `make strangers`. Files that say something wrong, made after reports of their owners, "
         "and the same faults put into a simulated drive and real logs "
-        "(`tests/benchmarks/stranger_cases.py`). Errors in m: of simulated drives the root mean square error "
-        "of positions (ATE), of real logs the mean error on their relations. A map is right if its error is "
-        f"at most {FACTOR:g} times that of "
-        f"the untouched drive, or {1000 * MORE:g} mm more. "
-        '"As recorded" is with `--as-recorded`: the file is believed. "As the message says" is with the '
-        "first option that each message says to try.",
+        "(`tests/benchmarks/stranger_cases.py`). Errors are in m: for simulated drives the root mean "
+        "square error of positions (ATE), for real logs the mean error on their relations. A map is right "
+        f"if its error is at most {FACTOR:g} times that of the untouched drive, or at most {1000 * MORE:g} "
+        'mm larger. "As recorded" is with `--as-recorded`: the file is believed. "As the message says" '
+        "is with the first option that each message names.",
         table(header, rows),
     ]
     return "\n\n".join(parts) + "\n"
@@ -148,7 +147,12 @@ def _shortened(outcome: Outcome) -> str:
     """The first words of each message, the one that tells the cause first."""
     cause = outcome.case.cause
     said = sorted(outcome.default.said, key=lambda text: not (cause and re.search(cause, text)))
-    return "; ".join(text.split(":")[0][:90].replace("|", "/") for text in said[:2]) or "–"
+    return "; ".join(_clipped(text.split(":")[0].replace("|", "/")) for text in said[:2]) or "–"
+
+
+def _clipped(text: str, most: int = 90) -> str:
+    """A text of at most so many characters, cut between words."""
+    return text if len(text) <= most else text[:most].rsplit(" ", 1)[0].rstrip(" ,;") + " …"
 
 
 def main(out: str, words: Sequence[str]) -> None:

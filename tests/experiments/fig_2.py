@@ -133,13 +133,13 @@ def report() -> Report:
     """Pictures and table."""
     return Report(
         "Fig. 2: three shapes, any two of which are ambiguous",
-        "Each of the three shapes has a wall and three strokes. Two shapes have strokes at one height in "
-        "common, where one of them has two, so that two shifts along the wall match equally well. Of the "
-        "shifts that the pairs allow, only one goes together: where the three lines cross in the image of "
-        "the joint energy. The curves show the energies over the shift along the wall, everything else "
-        "where it was drawn, and for all three the lowest energy over all shifts of shape 3. The table "
-        f"has the minima that {len(STARTS)} starts for a pair and {len(STARTS) ** 2} for all three end "
-        "in, with all poses free but the first. The Hessian shows nothing of it: every minimum is sharp.",
+        "Each of the three shapes has a wall and three strokes. Any two shapes have strokes of one height "
+        "in common, of which one shape has two; so two shifts along the wall match equally well. Only one "
+        "combination of these shifts fits all three shapes: where the three lines cross in the image of "
+        "the joint energy. The curves show the energies over the shift along the wall, with everything "
+        "else as drawn; for all three, it is the lowest energy over all shifts of shape 3. The table has "
+        f"the minima from {len(STARTS)} starts for a pair and {len(STARTS) ** 2} for all three, with all "
+        "poses free but the first. The Hessian does not show the ambiguity: every minimum is sharp.",
         {"fig_2": _picture()},
         ("matched", "lowest energy", "second lowest", "difference", "least eigenvalue at the lowest"),
         [_row(which) for which in (*PAIRS, (0, 1, 2))],

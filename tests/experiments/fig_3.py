@@ -159,14 +159,14 @@ def report() -> Report:
     free = _told(free_eigenvalues())
     return Report(
         "Fig. 3: a robot enters a room (1), turns there (2), and leaves (3)",
-        "Scans 1 and 2 share the walls of the corridor only, scans 1 and 3 only the far wall of the room: "
-        "either pair leaves one direction open, and the little that is known there comes from the cells of "
-        "the NDT. Scans 2 and 3 both see the corner beside the door, and all three together leave nothing "
-        "open. The eigenvalues (1/m² and 1/rad², mixed) are those of the Hessian at the joint minimum with "
-        "the first scan held, the standard deviations those along the weakest direction of each position "
-        "(its angle is that in the frame of the first scan), and the error is that of a match of these "
-        f"scans alone from poses up to {OFF} m and {OFF_ANGLE} rad off, with the median over {DRAWS} draws "
-        "of noise and start in brackets. The curves show the lowest energy when a scan is held at a shift "
+        "Scans 1 and 2 share only the walls of the corridor, scans 1 and 3 only the far wall of the room. "
+        "Either pair leaves one direction open; the little information there comes from the cells of the "
+        "NDT. Scans 2 and 3 both see the corner beside the door, and all three together leave nothing "
+        "open. The eigenvalues (1/m² and 1/rad², mixed) are those of the Hessian at the joint minimum, "
+        "with the first scan held. The standard deviations are those along the weakest direction of each "
+        "position, with its angle in the frame of the first scan. The error is that of a match of these "
+        f"scans alone, from poses up to {OFF} m and {OFF_ANGLE} rad off; in brackets is the median over "
+        f"{DRAWS} draws of noise and start. The curves show the lowest energy with a scan held at a shift "
         "from its joint pose: scan 2 along the corridor, scan 3 across it.",
         {"fig_3": _picture()},
         ("scans", "eigenvalues", "greatest σ of the others' positions", "error of their own match"),

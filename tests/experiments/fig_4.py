@@ -44,14 +44,14 @@ def report() -> Report:
     names = ("fig_4_office", "fig_4_intel")
     return Report(
         "Fig. 4: ten scans from odometry",
-        "Ten scans start where the odometry says they were taken, and are matched at once, with no prior "
-        "and the gauge free. The errors are the greatest of all scans, seen from the first, against the "
-        "simulated truth or, on intel, against poses that the reference relations of Kümmerle et al. 2009 "
-        "give by least squares. Iterations and evaluations are those of all stages of both approaches that "
-        "`nscan` makes from a start, with the iterations of the last stage in brackets; an evaluation is "
-        "one of the joint energy with gradient and Hessian. The good start is drawn up to "
-        f"{GOOD} m and {GOOD_ANGLE} rad off the truth, and matched in the same way. These are "
-        "examples that succeed; how many of many do is told below, with the two gauges.",
+        "Ten scans start where the odometry has them, and are matched at once, without a prior and with a "
+        "free gauge. The errors are the largest of all scans, relative to the first: against the simulated "
+        "truth or, on intel, against poses by least squares from the reference relations of Kümmerle et "
+        "al. 2009. Iterations and evaluations count all stages of both attempts that `nscan` makes from a "
+        "start; in brackets are the iterations of the last stage. An evaluation is one of the joint energy "
+        f"with gradient and Hessian. The good start is drawn up to {GOOD} m and {GOOD_ANGLE} rad off the "
+        "truth, and matched in the same way. These examples succeed; the section on the two gauges tells "
+        "how many do.",
         {name: outcome.picture() for name, outcome in zip(names, done, strict=False)},
         HEADER,
         [*(outcome.row() for outcome in done), paper_row(10, 30, 267)],

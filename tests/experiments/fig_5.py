@@ -60,9 +60,9 @@ def report() -> Report:
     names = ("fig_5_office", "fig_5_intel")
     return Report(
         "Fig. 5: six scans closing a loop",
-        "Three scans from where a loop begins, three from where it ends. The start has the drift of a whole "
-        "round in it: in the office that of the odometry, on intel that of scans 1 m apart that were "
-        "matched in pairs, each with the one before. They are matched at once, as for Fig. 4.",
+        "Three scans are from where a loop begins, three from where it ends. The start has the drift of a "
+        "whole round: in the office that of the odometry, on intel that of scans 1 m apart, each matched "
+        "in a pair with the one before. They are matched at once, as for Fig. 4.",
         {name: outcome.picture() for name, outcome in zip(names, done, strict=False)},
         HEADER,
         [*(outcome.row() for outcome in done), paper_row(6, 30, 174)],

@@ -82,12 +82,11 @@ def report() -> Report:
     sets = {"simulated office": office_set(), "intel": intel_set()}
     return Report(
         "III-D: the gauge free, or the first scan fixed",
-        f"{PROBLEMS} problems of {SCANS} scans in each set, spread over the whole drive, 1.3 m apart in the "
-        "office and 0.7 m on intel, matched from where the odometry says, as for Fig. 4; those that fail "
-        "count in the means as the others do. A problem succeeds when "
-        f"all its scans end within {SUCCESS} m of where they were taken, seen from the first. "
-        'The paper saw "a better convergence behavior" of the free gauge, "not dramatically but clearly '
-        'observable". The good start is that of Fig. 4.',
+        f"Each set has {PROBLEMS} problems of {SCANS} scans, spread over the whole drive, 1.3 m apart in "
+        "the office and 0.7 m on intel. They start from the odometry, as for Fig. 4. The means include the "
+        f"problems that fail. A problem succeeds if all its scans end within {SUCCESS} m of where they were "
+        'taken, relative to the first. The paper saw "a better convergence behavior" of the free gauge, '
+        '"not dramatically but clearly observable". The good start is that of Fig. 4.',
         {},
         (
             "set",

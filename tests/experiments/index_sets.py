@@ -17,11 +17,12 @@ def report() -> Report:
     sets = {"simulated office": office_cases(), "intel": intel_cases()}
     return Report(
         "III-B: which pairs are matched",
-        "The problems of the gauges again, with three index sets: `all` pairs; those where the position of "
-        "one scan lies in the free space that the other saw (`visible`); those where enough of one scan's "
-        "points fall into cells where the other has a Gaussian (`overlap`, the default). The set is chosen "
-        "from the poses before each stage. `make bench` tells the times. From poor starts `visible` solves "
-        f"fewer, and it loses the pair that ties the scans of Fig. 3. A problem succeeds within {SUCCESS} m.",
+        "The problems of the gauges again, with three index sets. `all`: all pairs. `visible`: the "
+        "position of one scan lies in the free space that the other saw. `overlap` (the default): enough "
+        "of one scan's points fall into cells where the other has a Gaussian. The set is chosen from the "
+        "poses before each stage. `make bench` has the times. From poor starts `visible` solves fewer "
+        "problems, and it loses the pair that ties the scans of Fig. 3. A problem succeeds within "
+        f"{SUCCESS} m.",
         {},
         ("set", "pairs", "number of them (median)", "iterations (mean)", "succeeded"),
         [

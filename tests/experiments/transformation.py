@@ -39,25 +39,24 @@ FURTHER = 1000
 """Iterations at most, once, of those that need many."""
 
 TEXT = (
-    "The graphs that `slam` makes of three logs, minimised again from other poses: the odometry of the "
-    "keyframes; the chain of their pairwise relations, as it is and with noise of "
-    f"{CHAIN_NOISE[0]:g} m and {CHAIN_NOISE[2]:g} rad in every relation, drawn twice; and `{NEAR}`, the "
-    f"minimum with noise of {NEAR_NOISE:g} m and {NEAR_NOISE / 10:g} rad in every pose. The chosen mapping "
-    "follows pose c. The others are held in each iteration and found again for the next: that of pose c, "
-    "the mean of those of single scans, and the optimal one, which makes fᵗHf least. Damping and the end "
-    "are the same for all, a step that moves no pose by more than 1e-6 (m, rad); all steps are "
-    "Gauss–Newton's but the last ones of the tool. A cell has the iterations, and in brackets the energy "
-    f"that is left, always with the chosen mapping. `not in {MAX_ITERATIONS}` is the most that was allowed; "
-    "with fewer, no step lowered the energy any more.\n\n"
-    'With the optimal mapping the paper saw "significantly more iterations", and with simpler ones more '
-    "still. So it is when H is that with pose c held, as III-D recalculates it (which H the paper took "
-    "here it does not say): H then ties the scans to where the held mapping puts them, they follow each "
-    "other slowly, and what pulls at pose c itself is lost, so that they do not end in the minimum. From "
-    f"`{NEAR}` in the office, within {FURTHER} iterations, {{further}}. With the gauge free, as graphs keep "
-    "H, the mapping of c and the mean one take at most two iterations more than the chosen one, and end "
-    "within 0.01 % of its energy; the optimal one is hardly determined, since a turn of all local poses "
-    "costs nothing to first order, and leads elsewhere. From the odometry of intel, up to 60 m off, none "
-    "gets to the minimum."
+    "The graphs that `slam` makes of three logs are minimised again from other poses: the odometry of the "
+    "keyframes; the chain of their pairwise relations, as it is, and twice with noise of "
+    f"{CHAIN_NOISE[0]:g} m and {CHAIN_NOISE[2]:g} rad in every relation; and `{NEAR}`, the minimum with "
+    f"noise of {NEAR_NOISE:g} m and {NEAR_NOISE / 10:g} rad in every pose. The tool's mapping follows pose "
+    "c. The others are held during an iteration and found again for the next: the mapping of pose c, the "
+    "mean of those of single scans, and the optimal one, which minimises fᵗHf. Damping and the stopping "
+    "rule are the same for all: a step that moves no pose by more than 1e-6 (m, rad). All steps are "
+    "Gauss–Newton steps, except the last ones of the tool. A cell has the iterations, and in brackets the "
+    f"energy that is left, always with the tool's mapping. `not in {MAX_ITERATIONS}` means that the limit "
+    "was reached; with a smaller number, no step lowered the energy any more.\n\nWith the optimal mapping "
+    'the paper saw "significantly more iterations", and more still with simpler ones. We see this if H '
+    "is that with pose c held, as III-D recalculates it; the paper does not say which H it used here. Such "
+    "an H ties the scans to where the held mapping puts them. They follow each other slowly, the forces on "
+    f"pose c itself are lost, and they do not end in the minimum. From `{NEAR}` in the office, within "
+    f"{FURTHER} iterations, {{further}}. Graphs keep H with a free gauge. Then the mapping of c and the "
+    "mean one take at most two iterations more than the tool's, and end within 0.01 % of its energy. The "
+    "optimal one is hardly determined, since a turn of all local poses costs nothing to first order, and "
+    "leads elsewhere. From the odometry of intel, up to 60 m off, none reaches the minimum."
 )
 
 
