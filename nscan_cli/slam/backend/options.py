@@ -40,32 +40,50 @@ class OptimisationOptions:
 
 @dataclass(frozen=True)
 class UnevenMotionOptions:
-    """Where the path of a robot without odometry is matched more finely, if its laser turns."""
+    """Where the path of a robot is matched more finely, if its laser turns."""
 
-    min_change: float = 0.04
-    """The motion is uneven if it differs by more from one turn of the laser to the next, m and rad. A larger
-    value takes less time, and leaves the poses between two turns less certain."""
+    odometry_periods: float = 0.4
+    """Odometry with poses at most so far apart, in the times from scan to scan, tells the motion within a
+    turn. A larger value believes coarser odometry."""
+    min_change: float = 0.05
+    """The motion is uneven if it differs by more from one turn of the laser to the next, m. A larger value
+    takes less time, and leaves the poses between two turns less certain."""
+    min_turn_change: float = 0.02
+    """The same of the heading, rad."""
     longest_step: float = 2.5
     """Over a longer time, in the usual times from scan to scan, how the robot moved is not known."""
     scans: int = 6
     """Scans before and after, each, that those in uneven motion are matched with."""
     longest_run: int = 8
     """Most scans in uneven motion that are matched with the same others."""
+    parts: int = 4
+    """Parts of steady motion from the middle of one turn to the next. With more the moment when a turn of
+    the robot begins is told more exactly, and it takes longer."""
+    groups: int = 2
+    """Groups of beams in each of these, which are matched from where the robot was in their middle. More
+    take longer."""
+    speed_change: float = 0.05
+    """Usual change of the speed from one part to the next, m/s. Larger ones are seldom; with a larger value
+    the path is rougher where the beams tell little."""
+    turn_change: float = 0.1
+    """The same of the rate of the turn, rad/s."""
     iterations: int = 8
-    """How often they are matched at most, each time corrected by the path as it was found before."""
-    settled: float = 0.003
-    """A pose that moves by less, m and rad, is not matched again. A smaller value takes longer."""
+    """Most steps for each widening."""
     sigma: float = 0.05
-    """Standard deviation of the place from the path before, m: no match slides along walls."""
+    """Standard deviation of the places at the middles of the turns before, m: no match slides along walls."""
     turn_sigma: float = 0.1
-    """The same of the heading, rad."""
-    min_overlap: float = 0.6
-    """Least share of points that lie on what the others see. With a larger value more poses stay."""
+    """The same of the headings, rad."""
+    min_gain: float = 1.0
+    """The path stays where the beams fit better by less than so many nats for each part. A larger value
+    leaves more of it to odometry, or as steady."""
     min_points: int = 50
-    """A turn of the laser with fewer points leaves its pose. With a smaller number blind lasers move it."""
+    """With fewer points in a turn of the laser, on average, the path stays. With a smaller number blind
+    lasers move it."""
     max_beams: int = 300
     """Beams of a scan that are matched, evenly spread, are about so many. More tell more and take longer."""
-    pair: PairOptions = field(default_factory=lambda: PairOptions(widenings=(0.3, 1.0), tolerance=1e-4))
+    pair: PairOptions = field(
+        default_factory=lambda: PairOptions(widenings=(0.3, 1.0), scale=0.3, tolerance=3e-4)
+    )
 
 
 @dataclass(frozen=True)

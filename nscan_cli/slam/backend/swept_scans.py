@@ -1,8 +1,7 @@
 """Scans of a laser that turns, corrected once more: by the path of the robot after the last optimisation.
 
 Tracking knows the motion during a turn from odometry, or from the scans before alone. The final path has
-poses on both sides of each turn, and, without odometry, more of them where the motion is uneven. The poses at
-the middle of the turns are held: how fast the robot moves meanwhile matters least there.
+poses on both sides of each turn, and more of them where the motion is uneven and odometry does not tell it.
 """
 
 from __future__ import annotations
@@ -32,13 +31,8 @@ def correct_swept_scans(state: SlamState) -> None:
     rows, breaks = state.route.rows, set(state.breaks)
     turn, tracked = state.options.optimisation.metres_per_radian, np.concatenate(state.tracked)
     at_middle = between_keyframes(tracked, rows, state.poses, state.breaks, turn)
-    poses = at_middle
-    if state.log.odometry is None:
-        path = path_of_turns(state.log, at_middle, state.breaks, state.options)
-    else:
-        path = state.log.moving_along(at_middle).path
-    if path is not None:
-        poses = poses_at(path, state.recorded.times)
+    path = path_of_turns(state.log, at_middle, state.breaks, state.options)
+    poses = at_middle if path is None else poses_at(path, state.recorded.times)
     since_middle = relative(poses, at_middle)
     before = state.keyframes.list
     state.log = dataclasses.replace(state.recorded, path=path)

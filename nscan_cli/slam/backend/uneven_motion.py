@@ -1,10 +1,9 @@
 """Where the motion changes from one turn of the laser to the next: the path between the middles of two turns.
 
-Without odometry, the poses at the middles of the turns are all that is known of the path. Where the robot
-begins to turn between two of them, a steady motion from one to the next is off by some degrees there. But the
-beams between two middles, the second half of one turn and the first half of the next, are as many as those of
-a turn: they tell where the robot is halfway. Both are matched with the scans about them, each with its points
-corrected by the path as it is known so far.
+The poses at the middles of the turns are known, but where the robot begins to turn between two of them, a
+steady motion from one to the next is off by some degrees there; so is odometry that has a pose a turn. The
+beams tell more: each part of a turn is matched with the scans before and after. All parts of a run of such
+scans are matched at once, with the path between them, as a change of motion moves the points of all of them.
 """
 
 from __future__ import annotations
@@ -14,14 +13,15 @@ from dataclasses import replace
 
 import numpy as np
 
+from nscan_cli.graph.optimise.graph_solver import newton_step
 from nscan_cli.logs.laser_log import LaserLog
-from nscan_cli.logs.robot_path import LONGEST_STEP, RobotPath, move_along_arc, poses_at, robot_path
-from nscan_cli.matching.motion_model import Prior
-from nscan_cli.matching.pairwise import settle_pair
+from nscan_cli.logs.robot_path import LONGEST_STEP, RobotPath, poses_at, robot_path
+from nscan_cli.matching.damped_newton import PAIRWISE_STEPS, is_accepted, is_last, next_damping
 from nscan_cli.ndt.hash_grid import WALL_DIRECTION
 from nscan_cli.ndt.transform import Ndt
-from nscan_cli.poses import Array, Indices, Mask, relative, wrap
+from nscan_cli.poses import Array, Mask, relative, wrap
 from nscan_cli.slam.backend.options import UnevenMotionOptions
+from nscan_cli.slam.backend.turn_energy import FIT, TimedPoints, TurnEnergy
 from nscan_cli.slam.options import SlamOptions
 
 
@@ -30,33 +30,57 @@ def path_of_turns(
 ) -> RobotPath | None:
     """The path through poses (S, 3) at the middles of the turns, matched more finely where motion is uneven.
 
-    The scans of `log` are stamped at the middles; the track broke before those in rows `breaks`. None of
-    fewer than two scans.
+    The scans of `log` are stamped at the middles; the track broke before those in rows `breaks`. Where
+    odometry tells the motion within a turn, it is believed. None of fewer than two scans.
     """
-    uneven = options.uneven_motion
-    poses, halfway, times = poses.copy(), list[Array](), list[float]()
-    for first, last in _runs(_is_uneven(log.times, poses, breaks, uneven), uneven.longest_run):
-        run = _Run(log, poses, (first, last), options)
-        run.match(uneven.iterations)
-        poses[first - 1 : last + 1] = run.middles
-        times += run.times[run.is_halfway].tolist()
-        halfway.append(run.poses[run.is_halfway])
-    all_times = np.concatenate([log.times, times])
+    path, uneven = log.moving_along(poses).path, options.uneven_motion
+    if path is None or _is_fine(log, uneven):
+        return path
+    poses, times, found = poses.copy(), [log.times], list[Array]()
+    outside = ~np.isin(path.times, log.times)
+    known = _known_steps(log.times, breaks, uneven)
+    for first, last in _runs(_is_uneven(log.times, poses, known, uneven), uneven.longest_run):
+        # A scan more on each side: at the ends of what is matched nothing tells the motion beyond.
+        before, after = first > 1 and known[first - 2], last < len(known) and known[last]
+        around = first - 1 - int(before), last + int(after)
+        run = _Run(log, poses, path, (first - 1, last), around, options)
+        if run.match():
+            poses[run.rows] = run.knots[run.is_middle]
+            times.append(run.times[~run.is_middle])
+            found.append(run.knots[~run.is_middle])
+            outside &= (path.times < run.times[0]) | (path.times > run.times[-1])
+    all_times = np.concatenate([*times, path.times[outside]])
     order = np.argsort(all_times, kind="stable")
-    return robot_path(all_times[order], np.concatenate([poses, *halfway])[order])
+    return robot_path(all_times[order], np.concatenate([poses, *found, path.poses[outside]])[order])
 
 
-def _is_uneven(times: Array, poses: Array, breaks: Sequence[int], options: UnevenMotionOptions) -> Mask:
-    """(S,) whether the motion from the scan before differs from that before it, or from the next one."""
+def _is_fine(log: LaserLog, options: UnevenMotionOptions) -> bool:
+    """Whether odometry has several poses in the time from one scan to the next."""
+    if log.odometry is None or log.odometry_path is None or len(log) < 2:
+        return False
+    period = float(np.median(np.diff(log.times)))
+    return float(np.median(np.diff(log.odometry_path.times))) < options.odometry_periods * period
+
+
+def _known_steps(times: Array, breaks: Sequence[int], options: UnevenMotionOptions) -> Mask:
+    """(S − 1,) whether it is known how the robot came from each scan to the next."""
     seconds = np.diff(times)
     usual = float(np.median(seconds)) if len(seconds) else 0.0
-    steps = relative(poses[1:], poses[:-1])
-    known = (seconds > 0.0) & (seconds < min(LONGEST_STEP, options.longest_step * usual))
+    known: Mask = (seconds > 0.0) & (seconds < min(LONGEST_STEP, options.longest_step * usual))
     known[np.array(breaks, dtype=np.int64) - 1] = False
-    steps = steps * (usual / np.where(known, seconds, 1.0))[:, None]
+    return known
+
+
+def _is_uneven(times: Array, poses: Array, known: Mask, options: UnevenMotionOptions) -> Mask:
+    """(S,) whether the motion from the scan before differs from that before it, or from the next one.
+
+    `known` (S − 1,) are the steps that are.
+    """
+    seconds = np.where(known, np.diff(times), 1.0)
+    steps = relative(poses[1:], poses[:-1]) * (np.median(seconds) / seconds)[:, None]
     change = np.abs(np.diff(steps, axis=0))
-    change = np.maximum(np.hypot(change[:, 0], change[:, 1]), change[:, 2])
-    changes = (change > options.min_change) & known[1:] & known[:-1]
+    moves = np.hypot(change[:, 0], change[:, 1]) > options.min_change
+    changes = (moves | (change[:, 2] > options.min_turn_change)) & known[1:] & known[:-1]
     is_uneven = np.zeros(len(times), dtype=np.bool_)
     is_uneven[1:-1] |= changes
     is_uneven[2:] |= changes
@@ -75,121 +99,98 @@ def _runs(marks: Mask, longest: int) -> Iterator[tuple[int, int]]:
 class _Run:
     """Scans in uneven motion, and those about them that they are matched with."""
 
-    def __init__(self, log: LaserLog, poses: Array, rows: tuple[int, int], options: SlamOptions) -> None:
-        """Those of the first to the last of `rows`; `poses` (S, 3) are those of all scans."""
-        self._log, self._options, (self._first, self._last) = log, options, rows
-        apart, halfway = options.uneven_motion.scans, np.arange(self._first, self._last + 1)
-        self._begin, end = max(self._first - 1 - apart, 0), min(self._last + 1 + apart, len(log))
-        self._count = end - self._begin
-        between = 0.5 * (log.times[halfway - 1] + log.times[halfway])
-        times = np.concatenate([log.times[self._begin : end], between])
-        self._order = np.argsort(times, kind="stable")
-        self.times = times[self._order]
-        """(n,) of the poses of the path that is looked for, s."""
-        self.is_halfway = self._order >= self._count
-        """(n,) whether they are between the middles of two turns."""
-        known = robot_path(log.times[self._begin : end], poses[self._begin : end])
-        assert known is not None
-        self.poses = poses_at(known, self.times)
-        """(n, 3)"""
-        self._standing, self._seen = replace(log, path=None), dict[int, tuple[Array, Array]]()
-        self._others = np.concatenate(
-            [np.arange(self._begin, self._first - 1), np.arange(self._last + 1, end)]
-        )
+    def __init__(
+        self,
+        log: LaserLog,
+        poses: Array,
+        path: RobotPath,
+        rows: tuple[int, int],
+        around: tuple[int, int],
+        options: SlamOptions,
+    ) -> None:
+        """Find the path between the first and last of `rows`, by matching those from the first to the last
+        `around` them. `poses` (S, 3) are those of all scans, `path` is theirs before any run was matched."""
+        self._log, self._options, self._around = log, options, around
+        uneven, parts, (first, last) = options.uneven_motion, options.uneven_motion.parts, around
+        self.rows = slice(rows[0], rows[1] + 1)
+        middles = log.times[first : last + 1]
+        between = middles[:-1, None] + np.arange(parts) / parts * np.diff(middles)[:, None]
+        self._times = np.append(between.ravel(), middles[-1])
+        self._knots = poses_at(path, self._times)
+        self._knots[::parts] = poses[first : last + 1]
+        self._knots[:, 2] = np.unwrap(self._knots[:, 2])
+        near = np.arange(max(first - uneven.scans, 0), min(last + 1 + uneven.scans, len(log)))
+        self._others = near[(near < first) | (near > last)]
+        self._moving = replace(log, path=robot_path(log.times[near], poses[near]))
+        self._inside = slice(parts * (rows[0] - first), parts * (rows[1] - first) + 1)
 
     @property
-    def middles(self) -> Array:
-        """The poses (m, 3) at the middles of the turns from that before the first row to that of the last."""
-        found: Array = self.poses[self._places(np.arange(self._first - 1, self._last + 1))]
+    def times(self) -> Array:
+        """(n,) of the knots of the path that is found, s."""
+        return self._times[self._inside]
+
+    @property
+    def knots(self) -> Array:
+        """(n, 3)"""
+        found = self._knots[self._inside].copy()
+        found[:, 2] = wrap(found[:, 2])
         return found
 
-    def _places(self, rows: Indices) -> Indices:
-        """(n,) the places of the middles of the turns in rows (n,) among the times."""
-        places: Indices = np.argsort(self._order)[rows - self._begin]
-        return places
+    @property
+    def is_middle(self) -> Mask:
+        """(n,) whether they are at the middles of turns."""
+        middles: Mask = np.arange(len(self.times)) % self._options.uneven_motion.parts == 0
+        return middles
 
-    def match(self, iterations: int) -> None:
-        """Match all poses of the run one after another, each with the path that those before have led to."""
-        if len(self._others) < self._options.uneven_motion.scans:
-            return
-        reference, uneven = self._reference(), self._options.uneven_motion
-        first, last = self._places(np.array([self._first - 1, self._last])).tolist()
-        moved = np.zeros(len(self.times))
-        moved[first : last + 1] = np.inf
-        for _ in range(iterations):
-            before = moved.copy()
-            moved[:] = 0.0
-            for place in range(first, last + 1):
-                # A pose whose neighbours stay fits as before.
-                if max(before[max(place - 1, 0) : place + 2].max(), moved[place - 1]) > uneven.settled:
-                    moved[place] = self._settle(reference, place)
-            if moved.max() <= uneven.settled:
-                break
+    def match(self) -> bool:
+        """Find the path on which the beams fit best; whether they tell it."""
+        uneven, start = self._options.uneven_motion, self._knots
+        seen, turns = self._seen(), len(start) / uneven.parts
+        if len(self._others) < uneven.scans or len(seen.points) < uneven.min_points * turns:
+            return False
+        energy = TurnEnergy(self._reference(), seen, self._times, start, uneven)
+        for widening in uneven.pair.widenings:
+            self._knots = _least(energy, self._knots, widening, uneven)
+        off = np.abs(self._knots - start)[:: uneven.parts]
+        near = (off < 3 * np.array([uneven.sigma, uneven.sigma, uneven.turn_sigma])).all()
+        fits = [energy.evaluate(knots, 1.0).terms[FIT] for knots in (start, self._knots)]
+        return bool(near) and fits[0] - fits[1] > uneven.min_gain * (len(start) - 1)
 
     def _reference(self) -> Ndt:
         """The Gaussians of the scans on both sides."""
         gaussians, reach = self._options.nscan.gaussians, self._options.tracking.max_range
-        moving = replace(self._log, path=robot_path(self.times, self.poses))
-        points = [moving.batch_points(slice(row, row + 1), reach)[0] for row in self._others.tolist()]
+        points = [self._moving.batch_points(slice(row, row + 1), reach)[0] for row in self._others.tolist()]
         ends = np.cumsum([0, *(len(each) for each in points)])
-        poses = self.poses[self._places(self._others)]
+        assert self._moving.path is not None
+        poses = poses_at(self._moving.path, self._log.times[self._others])
         return Ndt.of_scans(
             np.concatenate(points), ends, poses, gaussians.cell, gaussians.minimum, gaussians.floor,
             neighbourhood=WALL_DIRECTION,
         )  # fmt: skip
 
-    def _points_at(self, place: int) -> Array:
-        """The points (m, 2) of the turn of the laser about one of the times, seen from the pose there."""
-        if place not in self._seen:
-            self._seen[place] = self._seen_about(place)
-        points, seconds = self._seen[place]
-        found = []
-        for other, side in ((place - 1, seconds <= 0.0), (place + 1, seconds > 0.0)):
-            # At an end of the path the motion goes on.
-            begin = other if 0 <= other < len(self.times) else 2 * place - other
-            period = float(self.times[place] - self.times[begin])
-            moved, shares = points[side], seconds[side] / period
-            if period != 0.0:
-                step = relative(self.poses[place], self.poses[begin])
-                move_along_arc(moved, shares, step, False)
-            found.append(moved)
-        return np.concatenate(found)
+    def _seen(self) -> TimedPoints:
+        """The points of the scans in the time of the path, in order of time."""
+        rows, reach = slice(self._around[0], self._around[1] + 1), self._options.tracking.max_range
+        standing, every = replace(self._log, path=None), self._options.uneven_motion.max_beams
+        points, ends = standing.batch_points(rows, reach)
+        times = standing.point_times(rows, reach) + np.repeat(self._log.times[rows], np.diff(ends))
+        order = np.argsort(times, kind="stable")[:: max(self._log.ranges.shape[1] // every, 1)]
+        order = order[(times[order] >= self._times[0]) & (times[order] < self._times[-1])]
+        return TimedPoints(points[order], times[order])
 
-    def _seen_about(self, place: int) -> tuple[Array, Array]:
-        """Points (m, 2) of the turn about one of the times, as if the robot stood, and times (m,) from it."""
-        number, reach = int(self._order[place]), self._options.tracking.max_range
-        row = self._begin + number if number < self._count else self._first + number - self._count
-        points, seconds = [], []
-        every = max(self._log.ranges.shape[1] // self._options.uneven_motion.max_beams, 1)
-        for each in (row,) if number < self._count else (row - 1, row):
-            one = slice(each, each + 1)
-            since = self._log.times[each] - self.times[place]
-            points.append(self._standing.batch_points(one, reach)[0][::every])
-            seconds.append(self._standing.point_times(one, reach)[::every] + since)
-        if number < self._count:
-            return points[0], seconds[0]
-        # The second half of the turn before, and the first half of the next.
-        halves = (
-            seconds[0] > self._log.times[row - 1] - self.times[place],
-            seconds[1] < self._log.times[row] - self.times[place],
-        )
-        return (
-            np.concatenate([each[half] for each, half in zip(points, halves, strict=True)]),
-            np.concatenate([each[half] for each, half in zip(seconds, halves, strict=True)]),
-        )
 
-    def _settle(self, reference: Ndt, place: int) -> float:
-        """Move the pose of one of the times to where its points fit best near it; by how much, m and rad."""
-        uneven, start = self._options.uneven_motion, self.poses[place].copy()
-        points = self._points_at(place)
-        if len(points) < uneven.min_points:
-            return 0.0
-        information = np.diag([uneven.sigma**-2, uneven.sigma**-2, uneven.turn_sigma**-2])
-        end = settle_pair(reference, points, start, uneven.pair, Prior(start, information))
-        off = end.pose - start
-        off[2] = wrap(off[2])
-        near = np.hypot(off[0], off[1]) < 3 * uneven.sigma and abs(off[2]) < 3 * uneven.turn_sigma
-        if end.overlap < uneven.min_overlap or not near:
-            return 0.0
-        self.poses[place] = end.pose
-        return float(np.abs(off).max())
+def _least(energy: TurnEnergy, knots: Array, widening: float, options: UnevenMotionOptions) -> Array:
+    """The knots (K, 3) of least energy, from `knots` (K, 3) on."""
+    here, damping = energy.evaluate(knots, widening), PAIRWISE_STEPS.first
+    for _ in range(options.iterations):
+        step = newton_step(energy.pattern, here, damping)
+        accepted = False
+        if step is not None:
+            there = energy.evaluate(knots + step, widening)
+            accepted = is_accepted(here.value, there.value, PAIRWISE_STEPS)
+            if accepted:
+                knots, here = knots + step, there
+            if is_last(float(np.abs(step).max()), options.pair.tolerance, damping, PAIRWISE_STEPS):
+                break
+        damping = next_damping(damping, accepted, PAIRWISE_STEPS)
+    return knots

@@ -42,7 +42,7 @@ def test_headings_between_the_middles_are_found_where_a_turn_begins():
     steady = heading_errors(robot_path(log.times, middles), between, true)
     finer = heading_errors(path_of_turns(log, middles, [], SlamOptions()), between, true)
     assert steady.max() > 4.0
-    assert finer.max() < 2.0
+    assert finer.max() < 0.5
     assert np.median(finer) < 0.1
 
 
@@ -52,7 +52,7 @@ def test_middles_that_are_off_there_are_matched_anew():
     turn = int(np.argmax(np.abs(np.diff(middles[:, 2])) > 0.1)) + 1
     middles[turn, 2] += 0.1
     found = heading_errors(path_of_turns(log, middles, [], SlamOptions()), log.times, true)
-    assert found[turn] < 2.0
+    assert found[turn] < 0.2
 
 
 def test_scans_without_points_and_breaks_leave_the_path_as_it_is():
@@ -63,3 +63,35 @@ def test_scans_without_points_and_breaks_leave_the_path_as_it_is():
         path = path_of_turns(each, middles, breaks, SlamOptions())
         assert path is not None
         np.testing.assert_allclose(poses_at(path, log.times)[:, :2], middles[:, :2], atol=1e-9)
+
+
+def with_odometry(log: LaserLog, true: RobotPath, period: float) -> LaserLog:
+    """The log with true odometry a pose in so many seconds."""
+    times = np.arange(true.times[0], true.times[-1], period)
+    odometry = robot_path(times, poses_at(true, times))
+    return dataclasses.replace(log, odometry=poses_at(true, log.times), odometry_path=odometry)
+
+
+def test_odometry_is_believed_unless_it_has_hardly_a_pose_a_turn():
+    log, true = drive()
+    middles = poses_at(true, log.times)
+    between = 0.5 * (log.times[1:] + log.times[:-1])
+    for period, is_kept in ((0.05, True), (0.2, False)):
+        with_poses = with_odometry(log, true, period)
+        told = with_poses.moving_along(middles).path
+        path = path_of_turns(with_poses, middles, [], SlamOptions())
+        assert path is not None
+        assert told is not None
+        assert np.array_equal(path.times, told.times) == is_kept
+        assert heading_errors(path, between, true).max() < 1.0
+        assert is_kept or heading_errors(told, between, true).max() > 2.0
+
+
+def test_the_path_stays_where_the_beams_fit_hardly_better():
+    log, true = drive()
+    middles = poses_at(true, log.times)
+    options = SlamOptions()
+    uneven = dataclasses.replace(options.uneven_motion, min_gain=1e3)
+    path = path_of_turns(log, middles, [], dataclasses.replace(options, uneven_motion=uneven))
+    assert path is not None
+    np.testing.assert_array_equal(path.times, log.times)

@@ -1,0 +1,211 @@
+"""The energy of a path along which a laser turns: how well its beams fit, and how steadily the robot moves.
+
+The path is made of parts of steady motion from one knot to the next. The beams of a part are matched in
+groups, each group from where the robot was in its middle; its derivatives are shared out to the knots on both
+sides (the energy of pairwise matches, [19]). A change of motion from part to part costs as much as in
+Cauchy's distribution: mostly there is hardly any, but where a robot begins to turn there is a large one.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from nscan_cli.graph.linalg.factor_pattern import Pattern
+from nscan_cli.graph.optimise.graph_energy import System
+from nscan_cli.kernels.decorators import kernel, leaf_kernel
+from nscan_cli.ndt.association import association_buffers
+from nscan_cli.ndt.energy import ENERGY_NUMBERS, evaluate_energy
+from nscan_cli.ndt.hash_grid import Grid
+from nscan_cli.ndt.transform import Ndt
+from nscan_cli.poses import Array, Indices
+from nscan_cli.slam.backend.options import UnevenMotionOptions
+
+FIT, MOVED, CHANGES = 0, 1, 2
+"""Terms of the energy: how the points fit, how far known poses have moved, and the changes of motion."""
+
+
+class TimedPoints(NamedTuple):
+    """Points that a laser saw one after another."""
+
+    points: Array
+    """(m, 2) as the robot saw them, each from where it was."""
+    times: Array
+    """(m,) s; increasing."""
+
+
+class TurnProblem(NamedTuple):
+    """What the energy of K knots depends on."""
+
+    grid: Grid
+    half: float
+    """Side (m) of a lattice cell of the grid that the points are matched with."""
+    points: Array
+    """(m, 2) in order of time."""
+    shares: Array
+    """(m,) of the part that has passed when they were seen."""
+    ends: Indices
+    """(G + 1,) where the points of each group begin."""
+    groups: int
+    """Groups in a part."""
+    seconds: Array
+    """(K − 1,) what the parts take."""
+    start: Array
+    """(K, 3) where the knots were before."""
+    parts: int
+    """One knot in so many is a pose that was known before."""
+    scale: float
+    """Factor that makes a negative log likelihood of the energy of the points."""
+    sigmas: Array
+    """(4,) those of the place (m) and heading (rad) of known poses, and the usual changes of speed (m/s) and
+    rate of turn (rad/s)."""
+
+
+class TurnEnergy:
+    """Evaluates the energy of K ≥ 3 knots (x, y, φ), with φ that does not jump by 2π."""
+
+    def __init__(
+        self, reference: Ndt, seen: TimedPoints, times: Array, start: Array, options: UnevenMotionOptions
+    ) -> None:
+        """Match points `seen` from the first to the last of `times` (K,), s, with a reference.
+
+        Of the knots `start` (K, 3) one in `options.parts` is a pose that is known.
+        """
+        seconds, groups = np.diff(times), options.groups
+        part = np.searchsorted(times, seen.times, side="right") - 1
+        shares = (seen.times - times[part]) / seconds[part]
+        group = groups * part + np.minimum((groups * shares).astype(np.int64), groups - 1)
+        ends = np.searchsorted(group, np.arange(groups * len(seconds) + 1))
+        sigmas = np.array([options.sigma, options.turn_sigma, options.speed_change, options.turn_change])
+        self.pattern = _band_pattern(len(times))
+        self._problem = TurnProblem(
+            reference.grid, reference.half, seen.points, shares, ends, groups, seconds, start, options.parts,
+            options.pair.scale, sigmas,
+        )  # fmt: skip
+
+    def evaluate(self, knots: Array, widening: float) -> System:
+        """Energy, its terms, gradient and the semi-definite part of the Hessian at knots (K, 3)."""
+        terms, gradient = np.zeros(3), np.zeros((len(knots), 3))
+        hessian = np.zeros((len(self.pattern.rows), 3, 3))
+        _evaluate(self._problem, knots, widening, self.pattern.starts, terms, gradient, hessian)
+        return System(float(terms.sum()), terms, gradient, hessian)
+
+
+def _band_pattern(nodes: int) -> Pattern:
+    """The pattern of the factor where each of at least 3 nodes has blocks with the next two, in order."""
+    columns = np.arange(nodes)
+    heights = np.minimum(3, nodes - columns)
+    starts = np.concatenate([[0], np.cumsum(heights)])
+    rows = np.arange(starts[-1]) - np.repeat(starts[:-1] - columns, heights)
+    return Pattern(columns, starts, rows, np.arange(nodes + 1), 9 * starts)
+
+
+@kernel
+def _evaluate(
+    problem: TurnProblem,
+    knots: Array,
+    widening: float,
+    starts: Indices,
+    terms: Array,
+    gradient: Array,
+    hessian: Array,
+) -> None:
+    """Add the terms (3,), gradient (K, 3) and the blocks (B, 3, 3) of the Hessian, as the pattern has them.
+
+    `starts` (K + 1,) are those of its columns.
+    """
+    moved, buffers = np.empty_like(problem.points), association_buffers(problem.points.shape[0], 1)
+    pose, step, out, block = np.empty(3), np.empty(3), np.empty(ENERGY_NUMBERS), np.empty((3, 3))
+    for group in range(problem.ends.shape[0] - 1):
+        part, number = group // problem.groups, group % problem.groups
+        begin, end = problem.ends[group], problem.ends[group + 1]
+        after = (number + 0.5) / problem.groups
+        before = 1.0 - after
+        for a in range(3):
+            step[a] = knots[part + 1, a] - knots[part, a]
+            pose[a] = knots[part, a] + after * step[a]
+        for k in range(begin, end):
+            _seen_from_group(problem.points[k], problem.shares[k] - after, step, pose[2], moved[k])
+        evaluate_energy(
+            problem.grid, problem.half, moved[begin:end], pose, widening, 0.0, 0.0, 1, buffers, out
+        )
+        terms[FIT] += problem.scale * out[0]
+        first, second = starts[part], starts[part + 1]
+        at = 4
+        for a in range(3):
+            gradient[part, a] += before * problem.scale * out[1 + a]
+            gradient[part + 1, a] += after * problem.scale * out[1 + a]
+            for b in range(a, 3):
+                block[a, b] = block[b, a] = problem.scale * out[at]
+                at += 1
+        for a in range(3):
+            for b in range(3):
+                hessian[first, a, b] += before * before * block[a, b]
+                hessian[first + 1, a, b] += before * after * block[a, b]
+                hessian[second, a, b] += after * after * block[a, b]
+    for k in range(0, knots.shape[0], problem.parts):
+        for a in range(3):
+            information = problem.sigmas[a // 2] ** -2
+            off = knots[k, a] - problem.start[k, a]
+            terms[MOVED] += 0.5 * information * off * off
+            gradient[k, a] += information * off
+            hessian[starts[k], a, a] += information
+    for k in range(1, knots.shape[0] - 1):
+        terms[CHANGES] += _add_change(problem, knots, k, starts, gradient, hessian)
+
+
+@leaf_kernel
+def _seen_from_group(point: Array, share: float, step: Array, heading: float, out: Array) -> None:
+    """Write a point (2,), seen `share` of the step (3,) of its part after the pose of its group, from there.
+
+    Within a part the chord is as good as the arc.
+    """
+    cos, sin = np.cos(heading), np.sin(heading)
+    dx, dy, turn = share * step[0], share * step[1], share * step[2]
+    c, s = np.cos(turn), np.sin(turn)
+    out[0] = c * point[0] - s * point[1] + cos * dx + sin * dy
+    out[1] = s * point[0] + c * point[1] + cos * dy - sin * dx
+
+
+@leaf_kernel
+def _add_change(
+    problem: TurnProblem, knots: Array, k: int, starts: Indices, gradient: Array, hessian: Array
+) -> float:
+    """Add what the change of the velocity at knot k costs; returns that."""
+    before, after = 1.0 / problem.seconds[k - 1], 1.0 / problem.seconds[k]
+    # Going on steadily, the robot's velocity turns with it.
+    turn = 0.5 * (knots[k + 1, 2] - knots[k - 1, 2])
+    cos, sin = np.cos(turn), np.sin(turn)
+    vx, vy = before * (knots[k, 0] - knots[k - 1, 0]), before * (knots[k, 1] - knots[k - 1, 1])
+    x = after * (knots[k + 1, 0] - knots[k, 0]) - cos * vx + sin * vy
+    y = after * (knots[k + 1, 1] - knots[k, 1]) - sin * vx - cos * vy
+    phi = after * (knots[k + 1, 2] - knots[k, 2]) - before * (knots[k, 2] - knots[k - 1, 2])
+    speed, rate = problem.sigmas[2] ** -2, problem.sigmas[3] ** -2
+    moves, turns = speed * (x * x + y * y), rate * phi * phi
+    # The weights of Cauchy's distribution, as in iterated least squares.
+    w, wt = speed / (1.0 + moves), rate / (1.0 + turns)
+    # Derivatives by the three knots: before R, −before R − after, after, with R the rotation by `turn`.
+    rx, ry = cos * x + sin * y, cos * y - sin * x
+    for a in range(3):
+        weight = w if a < 2 else wt
+        ahead = (x, y, phi)[a] * weight
+        turned = (rx, ry, phi)[a] * weight
+        gradient[k - 1, a] += before * turned
+        gradient[k, a] -= before * turned + after * ahead
+        gradient[k + 1, a] += after * ahead
+        for b in range(3):
+            diagonal = weight if a == b else 0.0
+            if a == 2 or b == 2:
+                rotated = both = diagonal
+                both *= 2.0
+            else:
+                rotated = weight * (cos if a == b else (-sin if a < b else sin))
+                both = 2.0 * cos * weight if a == b else 0.0
+            hessian[starts[k - 1], a, b] += before * before * diagonal
+            hessian[starts[k], a, b] += (before * before + after * after) * diagonal + before * after * both
+            hessian[starts[k + 1], a, b] += after * after * diagonal
+            hessian[starts[k - 1] + 1, a, b] -= before * before * diagonal + before * after * rotated
+            hessian[starts[k] + 1, a, b] -= after * after * diagonal + before * after * rotated
+            hessian[starts[k - 1] + 2, a, b] += before * after * rotated
+    return float(0.5 * (np.log1p(moves) + np.log1p(turns)))
