@@ -90,8 +90,8 @@ def opposite_turns(evidence: str, reading: ReadingOptions, is_certain: bool) -> 
         ""
         if is_certain
         else (
-            "; if left and right are as they should be in the map, odometry turns the wrong way instead, and "
-            "the map is right, also with --no-odometry"
+            "; if left and right are correct in the map, odometry turns the wrong way instead, and the map "
+            "is right, also with --no-odometry"
         )
     )
     return Finding(

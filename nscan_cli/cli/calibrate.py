@@ -59,12 +59,12 @@ def command(
     quiet: bool,
     **_verbosity: int,
 ) -> None:
-    """Find from an ordinary drive how the laser is mounted and turns, and what odometry and clocks do.
+    """Find from an ordinary drive how the laser is mounted and turns, and the errors of odometry and clocks.
 
-    Steps from scan to scan, matched without odometry, are compared with the same steps by odometry. Every
-    value has its standard deviation, and what the file says beside it. A drive has to have turns, and more in
-    view than bare walls. What it leaves open is listed. Of several lasers in a recording each is calibrated,
-    unless --topic chooses one.
+    Steps from scan to scan, matched without odometry, are compared with the same steps by odometry. Each
+    value stands with its standard deviation and the value in the file. The drive needs turns, and more in
+    view than bare walls. Values that it does not determine are listed. If a recording has several lasers,
+    each is calibrated, unless --topic chooses one.
     """
     if output is not None:
         check_writable(output)

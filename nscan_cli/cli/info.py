@@ -32,10 +32,10 @@ if TYPE_CHECKING:
 def command(log: tuple[str, ...], as_json: bool, reading: ReadingOptions, **_common: Any) -> None:
     """Show what LOG contains, and what the other commands use of it.
 
-    This is the scans, the laser and its mounting, odometry, the value for no return, and skipped records with
-    reasons. The reading options have the same effect as in the other commands. If the other commands need an
-    option to choose a laser or odometry, all choices are listed. If they refuse the log, info prints what it
-    has found, then fails with the same error.
+    It prints the scans, the laser and its mounting, odometry, the value for no return, and skipped records
+    with reasons. The reading options have the same effect as in the other commands. If the other commands
+    need an option to choose a laser or odometry, all choices are listed. If they refuse the log, info prints
+    what it has found, then fails with the same error.
     """
     survey = survey_of(log, reading)
     facts = survey.without_unchosen(facts_of(survey.log, reading) | survey.facts(reading))

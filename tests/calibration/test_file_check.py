@@ -56,7 +56,7 @@ LIKELY: dict[str, tuple[Fault, str]] = {
     ),
     "turns the wrong way": (
         lambda log: faults.odometry_turning(log, -1.0),
-        "try --flip; if left and right are as they should be in the map, odometry turns the wrong way",
+        "try --flip; if left and right are correct in the map, odometry turns the wrong way",
     ),
     "looks askew": (lambda log: faults.mounted_otherwise(log, 0.6), "try --mount 0.1,0,0$"),
     "half as long": (lambda log: faults.odometry_scaled(log, 0.5), r"try --odometry-scale (1\.9|2\.0|2)"),

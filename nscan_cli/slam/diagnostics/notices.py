@@ -40,7 +40,7 @@ def notices(state: SlamState, followed: bool = False) -> list[str]:
     if stalls:
         found.append(
             f"the odometry stands still and catches up at {_numbered(log, stalls)}; "
-            "that way is shared out over the scans before"
+            "the step there is shared out over the scans before it"
         )
     frozen = state.frozen_scans.tolist()
     if frozen:
@@ -173,7 +173,7 @@ def _free_space_violations(state: SlamState) -> list[str]:
         return []
     first, last = state.log.numbers[[worst.first, worst.last]].tolist()
     return [
-        f"places look different on another visit: from scan {first} to {last}, its beams pass through "
+        f"places look different on another visit: from scan {first} to {last}, beams pass through "
         f"{worst.share:.1%} of what the first visit saw (at most {most:.1%} in a sound map); the map is "
         "wrong there, or much has moved"
     ]
