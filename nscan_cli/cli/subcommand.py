@@ -147,6 +147,9 @@ class Subcommand(click.Command):
                 with formatter.section(title):
                     formatter.write_dl(records)
 
+    def format_arguments(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        """Write nothing: `format_options` writes the arguments. click 8.5.0 would write them twice."""
+
     def records(self, ctx: click.Context, title: str) -> list[tuple[str, str]]:
         """The parameters of a section: each one's name in the help, and its help text."""
         found = (

@@ -55,9 +55,9 @@ def slam_options(
 
 
 def notices_of_mapping(log: LaserLog, graph: Graph) -> list[str]:
-    """What was found when the log was mapped, beyond what its reader found, which the graph has first."""
+    """The notices of mapping. The graph's notices begin with those of reading the log."""
     found: list[str] = graph.provenance["notices"]
-    return found[len(log.report.contradictions) :]
+    return found[len(log.report.notices()) :]
 
 
 def map_log(
@@ -86,6 +86,6 @@ def map_log(
         "scan_checks": as_parameters(ScanCheckOptions()),
         "slam": as_parameters(options),
     }
-    said = [*log.report.contradictions, *checked.messages, *notices(state, checked.followed)]
+    said = [*log.report.notices(), *checked.messages, *notices(state, checked.followed)]
     graph.provenance = {**provenance_of([log.source], parameters), "notices": said}
     return state, graph

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.kernels.kernels_kept import environment
+from tests.kernels.kernels_kept import environment, write_module
 
 KERNELS = """
 from nscan_cli.kernels.decorators import kernel, leaf_kernel
@@ -46,7 +46,7 @@ TOLD = "compiling the kernels, once for this version on this machine: long\n"
 
 def told(folder: Path, settings: dict[str, str], *names: str, quiet: bool = False) -> tuple[str, bool]:
     """What a new process says that calls these kernels, and whether it knows that it has compiled."""
-    (folder / "some_kernels.py").write_text(KERNELS)
+    write_module(folder, KERNELS)
     code = COMMAND.replace("NAMES", repr(names))
     done = subprocess.run(
         [sys.executable, "-c", code, *(["-q"] if quiet else [])],

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import gzip
+import json
 import re
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -42,6 +45,16 @@ def test_the_summary(folder, capsys):
     rate = r"\d+ scans a second, \d+ times real time|including the compilation of kernels"
     assert re.fullmatch(rf"[\d.]+ s, ({rate})", said["time"])
     assert said["written"] == "graph.json"
+
+
+def test_the_graph_keeps_all_that_is_warned_of(folder, capsys):
+    """Also what reading has found: here a record that is skipped."""
+    text = gzip.decompress(Path(OFFICE_LOG).read_bytes()).splitlines()[:60]
+    Path("short.log").write_bytes(b"\n".join([*text, b"FLASER 180 broken"]) + b"\n")
+    assert run(["slam", "short.log", "-o", "graph.json", "--json"]) == 0
+    warnings = json.loads(capsys.readouterr().out)["warnings"]
+    assert any(warning.startswith("1 record skipped") for warning in warnings)
+    assert read_graph("graph.json").provenance["notices"] == warnings
 
 
 def test_more_is_said_when_asked_and_nothing_with_q(folder, capsys):

@@ -95,6 +95,13 @@ def environment(folder: Path) -> dict[str, str]:
     return kept | places
 
 
+def write_module(folder: Path, text: str) -> None:
+    """Write some_kernels.py unless it is there: older numba compiles again if a file is newer."""
+    file = folder / "some_kernels.py"
+    if not file.exists() or file.read_text() != text:
+        file.write_text(text)
+
+
 def process(folder: Path, code: str, **settings: str) -> bytes:
     """What a new process prints that has this environment."""
     done = subprocess.run(
@@ -106,7 +113,7 @@ def process(folder: Path, code: str, **settings: str) -> bytes:
 
 def report(folder: Path, begin: str = "", **settings: str) -> list[Any]:
     """What a new process says of kernels that it compiles or loads, with all that is kept in the folder."""
-    (folder / "some_kernels.py").write_text(KERNELS)
+    write_module(folder, KERNELS)
     answer: list[Any] = json.loads(process(folder, begin + REPORT, **settings))
     return answer
 
