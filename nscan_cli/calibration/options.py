@@ -13,36 +13,41 @@ class StepOptions:
     """Which steps from scan to scan are measured, and which measurements count."""
 
     count: int = 30
-    """Steps that are spread evenly over the log, and as many more where odometry turns most. More steps tell
-    more and take longer."""
+    """Steps spread evenly over the log; as many again are measured where odometry turns most. More tell more
+    and take longer."""
     most: int = 1_500
-    """Most steps of a calibration, about. More tell more and take longer."""
+    """Largest number of steps of a calibration, about. More tell more and take longer."""
     chain: int = 12
-    """Steps that follow each other whose turns are added up to be compared with those by odometry. Of more,
-    stamps that are off matter less, and one match that fails spoils more."""
+    """Number of successive steps whose turns are summed and compared with odometry. Over longer chains errors
+    of stamps matter less, and one failed match spoils more."""
     duration: float = 0.4
-    """Least time of a step, s. Over a longer one the robot moves more, until the scans are too far apart."""
+    """Least duration of a step, s. In a longer step the robot moves more; if it is too long, the scans no
+    longer overlap."""
     max_duration: float = 2.0
-    """A longer step is not measured, s: scans are missing."""
+    """Longest step that is measured, s: in a longer one scans are missing. A larger value measures across
+    longer gaps."""
     max_turn: float = 0.4
-    """Of the steps that turn by more than this (rad), none is preferred to another: they may not match."""
+    """Steps that turn by more than this (rad) are not preferred to each other: they may not match. A larger
+    value prefers larger turns."""
     turning_excess: int = 5
-    """Those where odometry turns most are chosen evenly among so many times as many. With a larger number
-    they come from more places, and turn less."""
+    """The steps with a turn are chosen evenly from this multiple of their number, those where odometry turns
+    most. With a larger value they come from more places, and turn less."""
     min_overlap: float = 0.6
-    """Least share of a scan's points on the other scan."""
+    """Least share of a scan's points that lie on the other scan. A larger share accepts fewer steps."""
     max_beams: int = 180
-    """Beams of a scan that are matched, evenly spread, are about so many. More tell more and take longer."""
+    """Approximate number of beams of a scan that are matched, evenly spread. More tell more and take
+    longer."""
     probe: float = 0.2
-    """A step is measured again from a start this far away (m), in the direction in which it is least certain.
-    Along a corridor a match ends where it starts."""
+    """Each step is matched a second time from a start this far off (m), in its least certain direction: along
+    a corridor a match ends where it starts. A larger value accepts fewer steps."""
     agreement: float = 0.03
-    """Largest difference of the two measurements, m and rad. A larger one accepts less certain steps."""
+    """Largest difference of the two matches of a step, m and rad. A larger value accepts less certain
+    steps."""
     min_motion: float = 0.05
-    """A step by scans of this length (m) is one with motion, of this turn (rad) one with a turn. With a
-    larger value fewer steps tell of it, each of them more."""
+    """A step has motion if the scans say at least this length (m), and a turn if they say at least this angle
+    (rad). With a larger value fewer steps count, and each tells more."""
     metres_per_radian: float = 0.3
-    """A turn of one radian counts as so much motion, m. With a larger value turns weigh more."""
+    """Motion that a turn of one radian counts as, m. With a larger value turns weigh more."""
     pair: PairOptions = field(default_factory=PairOptions)
 
 
@@ -51,15 +56,16 @@ class ClockOptions:
     """How the offset between the clocks of odometry and scans is looked for."""
 
     span: float = 120.0
-    """Longest offset that is looked for, s. A longer one takes longer."""
+    """Largest clock offset that is tried, s. A larger value takes longer."""
     resolution: float = 0.1
-    """Distance of the offsets that are tried, s. A finer one takes longer."""
+    """Interval between the offsets that are tried, s. A smaller value takes longer."""
     gain: float = 0.6
-    """At the offset the turns have to disagree by less than this share of what they do without, and of what
-    they do anywhere. With a larger share an offset is found more often, also where there is none. The same
-    holds for mirrored turns, against those that are not."""
+    """An offset is found if the turns disagree by less than this share of their disagreement without it, and
+    of that anywhere else. With a larger share an offset is found more often, also where there is none.
+    Mirrored turns are found in the same way."""
     min_offset: float = 0.5
-    """A shorter offset is not worth a word, s: tracking hardly notices it."""
+    """Smallest offset that a warning names, s: tracking hardly notices a smaller one. A larger value warns
+    less."""
 
 
 @dataclass(frozen=True)
@@ -67,23 +73,25 @@ class HeldOdometryOptions:
     """When odometry stands for a part of the log though the robot moves."""
 
     still: float = 1e-6
-    """Odometry stands from one scan to the next if no coordinate changes by more, m and rad."""
+    """Odometry stands between two scans if no coordinate changes by more, m and rad. A larger value counts
+    slow motion as standing."""
     min_duration: float = 3.0
-    """Shortest time that it has to stand, s. A shorter one finds more, and takes longer."""
+    """Shortest time that odometry has to stand, s. A smaller value finds more, and takes longer."""
     changed_range: float = 0.1
-    """A range that differs by more (m) at both ends of that time has changed."""
+    """A range has changed if it differs by more than this at both ends of that time, m. A larger value finds
+    less."""
     min_changed_share: float = 0.2
-    """Least share of ranges that have changed. A smaller one finds robots in bare corridors, too; more is
-    measured where robots stand."""
+    """Least share of ranges that have changed. A smaller value also finds robots in bare corridors; more
+    steps are then measured where robots stand."""
     steps: int = 7
-    """Steps that are measured, spread over that time. More tell more and take longer."""
+    """Number of steps that are measured, spread over that time. More tell more and take longer."""
     more_steps: int = 28
-    """Steps that are measured where the scans tell too few of these, as outdoors."""
+    """Number of steps where the scans tell too few of these, as outdoors. More tell more and take longer."""
     min_measured: int = 3
-    """Least number of them that the scans measure."""
+    """Least number of steps that the scans measure. A larger value finds less."""
     min_moving_share: float = 0.7
-    """Least share of these with motion. A larger one finds less, and never people who pass a robot that
-    stands."""
+    """Least share of the measured steps with motion. A larger value finds less; a small one takes people who
+    pass a standing robot for motion."""
 
 
 @dataclass(frozen=True)
@@ -94,37 +102,42 @@ class CompanionOptions:
     """
 
     scans: int = 100
-    """Scans that are looked at, evenly spread over the way. More take longer."""
+    """Number of scans that are checked, evenly spread over the path. More take longer."""
     max_beams: int = 180
-    """Beams of a scan that are looked at, evenly spread, are about so many. More take longer."""
+    """Approximate number of beams of a scan that are checked, evenly spread. More take longer."""
     min_way: float = 5.0
-    """Least way of a drive, m. A larger one believes short logs."""
+    """Shortest path of a drive that is checked, m. A larger value skips longer logs."""
     longest_step: float = 1.0
-    """Longest step from scan to scan of one way, m. Beyond it the robot was carried or lost."""
+    """Longest step between two scans of one path, m: beyond it the robot was carried or lost. A larger value
+    joins more of such parts."""
     nearest: float = 0.25
-    """The path is looked at from so far before and behind it, m. A larger value misses what is near."""
+    """Readings are compared with the path from this distance on, before and behind the robot, m. A larger
+    value misses what is near."""
     farthest: float = 4.0
-    """And up to so far, m. A larger value finds more, also where odometry has drifted into a wall."""
+    """And up to this distance along the path, m. A larger value finds more, also where drift of odometry has
+    put a wall onto the path."""
     path_step: float = 0.05
-    """Distance of the points of the path, m. A smaller value takes longer."""
+    """Distance between the points of the path that are compared, m. A smaller value takes longer."""
     clearance: float = 0.2
-    """Points of the path that are nearer to the robot are not looked at, m: it is there now."""
+    """Points of the path nearer to the robot than this are not compared, m: the robot is there now. A larger
+    value misses what is near."""
     max_range: float = 1.5
-    """Longest reading that is looked at, m. A larger value finds who follows farther away, and does less
+    """Longest reading that is compared, m. A larger value finds who follows farther away, where he does less
     harm."""
     radius: float = 0.12
     """A reading is on the path within this distance of it, m: half the width of a small robot. A larger value
     takes walls beside the path for something that goes along."""
     min_beams: int = 2
-    """Least number of such readings of a scan."""
+    """Least number of readings of a scan on the path. A larger value finds less."""
     min_share: float = 0.3
-    """Least share of scans with them. A smaller value finds who goes along for a part of the way."""
+    """Least share of scans with such readings. A smaller value finds who goes along for a part of the way."""
     max_gap: float = 0.2
-    """Readings next to each other are of one thing within this distance, m."""
+    """Largest distance between neighbouring readings of one thing, m. A larger value leaves out more."""
     max_size: float = 0.5
-    """Greatest distance of its readings from the middle of those on the path, m. A larger one hides more."""
+    """Largest distance of its readings from the middle of those on the path, m. A larger value leaves out
+    more."""
     min_sector_share: float = 0.07
-    """Bearings at which it is seen in more than this share of these scans are left out. A larger value leaves
+    """Bearings are left out if it is seen there in more than this share of these scans. A larger value leaves
     out less."""
 
 
@@ -141,44 +154,49 @@ class FileCheckOptions:
     held: HeldOdometryOptions = field(default_factory=HeldOdometryOptions)
     companion: CompanionOptions = field(default_factory=CompanionOptions)
     min_steps: int = 12
-    """Least number of steps that a finding rests on: with motion, or with a turn."""
+    """Least number of steps with motion, or with a turn, that a finding rests on. A larger value finds
+    less."""
     still: float = 1e-3
-    """Odometry that stays this near to its first pose (m and rad) never moves."""
+    """Odometry never moves if it stays this near to its first pose, m and rad. A larger value counts small
+    motions as none."""
     max_spread: float = 0.25
-    """A finding explains the steps if the median of what is left is at most this share of their motion."""
+    """A finding explains the steps if the median residual is at most this share of their motion. A larger
+    value accepts poorer explanations."""
     max_tail: float = 0.4
-    """The same for the upper quartile of what is left."""
+    """The same for the upper quartile of the residuals."""
     min_mount_turn: float = 0.1
-    """The laser looks another way than the file says by more than this, rad. It is 0.04 at most on real
-    logs."""
+    """Least error of the laser's direction in the file that a warning names, rad. It is 0.04 at most on real
+    logs. A larger value warns less."""
     min_mount_move: float = 0.15
-    """The laser is elsewhere than the file says by more than this along an axis, m. It is 0.1 at most on
-    real logs, and a clock that is late looks like some centimetres."""
+    """Least error of the laser's place in the file, along an axis, that a warning names, m. It is 0.1 at most
+    on real logs; a late clock looks like some centimetres. A larger value warns less."""
     mount_sigmas: float = 5.0
-    """And by more than so many standard deviations of what the steps say."""
+    """Such an error must also exceed this number of its standard deviations. A larger value warns less."""
     min_scale_factor: float = 1.2
-    """The scale of odometry is wrong by more than this factor, and by more than `mount_sigmas`. It is 1.11 at
-    most on real logs."""
+    """Least factor by which the scale of odometry is wrong, beside `mount_sigmas`. It is 1.11 at most on real
+    logs. A larger value warns less."""
     certain_scale_factor: float = 3.0
-    """A scale that is wrong by more than this factor is put right: no wheel slips so much."""
+    """A scale that is wrong by more than this factor is corrected: no wheel slips so much. A larger value
+    corrects less."""
     decimal_tolerance: float = 0.08
-    """A scale this near to a power of ten, as a share, is that: a file is in millimetres or centimetres."""
+    """A scale this near to a power of ten (relative) is that power: the file is in millimetres or
+    centimetres. A larger value rounds more scales."""
     max_turn_error: float = 0.3
-    """Turns by odometry are wrong if they differ by more than this share from those by scans."""
+    """Largest relative difference of the turns by odometry and by scans. A larger value warns less."""
     more_steps: int = 200
-    """Steps of each half of the sample where turns disagree, to find the offset of the clocks. No more where
-    a smaller sample tells too little."""
+    """Number of steps of each half of the sample if turns disagree, to find the offset of the clocks; also
+    the limit where scans tell little. More take longer."""
     max_share: float = 0.04
-    """Most steps of a sample that is enlarged because it tells too little, as a share of the scans. A larger
-    value finds more where scans tell little, as outdoors, and takes longer."""
+    """Largest sample where scans tell little, as outdoors, as a share of the scans. A larger value finds more
+    there, and takes longer."""
     excluded_spread: float = 0.4
-    """Odometry that no finding explains is not used where the median of what is left is at least this share
-    of the motion. It is 0.03 to 0.11 on real logs."""
+    """Odometry that no finding explains is not used if the median residual is at least this share of the
+    motion. It is 0.03 to 0.11 on real logs. A larger value uses poorer odometry."""
     excluded_turn_spread: float = 1.0
-    """Odometry is not used where the median of what is left of its turns is at least this multiple of the
-    turns by scans. It is 0.004 to 0.4 on real logs."""
+    """Odometry is not used if the median residual of its turns is at least this multiple of the turns by
+    scans. It is 0.004 to 0.4 on real logs. A larger value uses poorer odometry."""
     min_steps_to_exclude: int = 30
-    """Least number of steps with motion for that."""
+    """Least number of steps with motion for that. A larger value excludes less."""
 
 
 @dataclass(frozen=True)
@@ -189,23 +207,27 @@ class CalibrationOptions:
     clock: ClockOptions = field(default_factory=ClockOptions)
     sweep: SweepCheckOptions = field(default_factory=SweepCheckOptions)
     min_steps: int = 30
-    """Least number of steps with motion."""
+    """Least number of steps with motion. A larger value leaves more drives uncalibrated."""
     min_turns: int = 12
-    """Least number of steps with a turn for what turns tell: the place of the laser, and the clocks."""
+    """Least number of steps with a turn for what turns tell: the place of the laser, and the clocks. A larger
+    value leaves these open more often."""
     max_turn_spread: float = 0.4
-    """Turns tell nothing where, in the median, they are off by more than this share of them: outdoors single
-    matches turn where the robot does not."""
+    """Turns tell nothing if their median residual is more than this share of them: outdoors single matches
+    turn where the robot does not. A larger value believes poorer turns."""
     clock_iterations: int = 5
-    """Gauss-Newton steps that refine it."""
+    """Gauss–Newton steps that refine the clock offset. More are more exact and take longer."""
     angle_sigma: float = 0.005
-    """Standard deviation that is expected of a step's turn by odometry and scans, rad, without any turn: it
-    weighs the steps against each other."""
+    """Expected standard deviation of a step's turn between odometry and scans without any turn, rad: it
+    weighs the steps against each other. A larger value weighs them more alike."""
     angle_sigma_per_radian: float = 0.1
-    """Increase of it for each radian turned."""
+    """Growth of that standard deviation with the turn, rad/rad. With a larger value large turns weigh
+    less."""
     min_sigmas: float = 3.0
-    """A value that is nearer to the file's, in standard deviations, is that of the file."""
+    """A value differs from the file's if it is off by more than this number of standard deviations. A larger
+    value keeps the file's more often."""
     max_place_sigma: float = 0.02
-    """A mounting with a larger standard deviation (m) is not passed on: the file's holds."""
+    """A mounting with a larger standard deviation is not applied, m. A larger value applies less certain
+    ones."""
     max_angle_sigma: float = 0.01
     """The same for its angle, rad."""
     max_scale_sigma: float = 0.01

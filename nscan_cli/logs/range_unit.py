@@ -27,17 +27,18 @@ class RangeUnitOptions:
     min_median: float = 0.2
     """Least median reading of a plausible unit, m. A smaller value takes larger units for possible."""
     max_median: float = 40.0
-    """Greatest median reading of a plausible unit, metres too, m. A larger value tells of fewer logs."""
+    """Largest median reading of a plausible unit, m; it bounds metres too. A larger value warns of fewer
+    logs."""
     remote_median: float = 100.0
-    """From here on metres are out of the question, m. A larger value corrects fewer logs."""
+    """From this median reading on, the unit cannot be metres, m. A larger value corrects fewer logs."""
     typical_median: float = 3.0
     """Median reading that is expected, m."""
     certain_factor: float = 4.0
-    """A unit is beyond doubt if the median is the typical one times or divided by at most this. A larger
-    value corrects more logs."""
+    """A unit is certain if the median is within this factor of the typical one. A larger value corrects more
+    logs."""
     unlikely_factor: float = 6.0
-    """And if the median in any other unit is the typical one times or divided by more than this. A smaller
-    value corrects more logs."""
+    """And if the median in every other unit is off the typical one by more than this factor. A smaller value
+    corrects more logs."""
     sample: int = 1 << 20
     """Number of readings from which the unit is told. A larger value takes longer."""
 

@@ -28,39 +28,41 @@ class RobotPartsOptions:
     """Greatest deviation of a constant range from its median, as a share of that. A larger value finds looser
     parts, and more walls of corners in which the robot turns."""
     min_tolerance: float = 0.02
-    """This deviation is always allowed, m: noise. A larger value suits poorer lasers."""
+    """Deviation that is always allowed, for noise, m. A larger value suits poorer lasers."""
     max_tolerance: float = 0.05
-    """No larger deviation is allowed, m."""
+    """Largest deviation that is allowed, m. A larger value finds looser parts."""
     min_share: float = 0.6
     """Least share of all scans in which the range is constant. A smaller value finds what is added later."""
     min_turning_share: float = 0.85
-    """Least share of scans in turns in which the range is constant. That of a wall at the side is for two
-    thirds of a turn in a corner, where another wall comes next. A smaller value finds parts that the laser
-    often misses."""
+    """Least share of scans in turns in which the range is constant. For a wall at the side it is two thirds
+    in a turn at a corner, where another wall comes next. A smaller value finds parts that the laser often
+    misses."""
     min_turn: float = np.radians(25.0)
-    """Turn between two scans that changes the range to any wall, rad. A larger value takes less for parts."""
+    """Least turn between two scans, rad: it changes the range to any wall. A larger value takes less for
+    parts."""
     max_turn: float = np.radians(60.0)
-    """Greatest turn between two scans that is looked for, rad."""
+    """Largest turn between two scans that is looked for, rad. A larger value takes longer."""
     lags: tuple[float, ...] = (1.0, 3.0, 6.0)
-    """Times between the scans of a pair, s. Robots turn by `min_turn` meanwhile, and come a metre far."""
+    """Times between the scans of a pair, s, in which robots turn by `min_turn` and come a metre far. More
+    take longer."""
     min_pairs: int = 10
     """Least number of pairs of scans between which the robot has turned. A larger value finds fewer parts."""
     max_mismatch: float = 0.5
-    """A turn counts if scans turned by it differ by at most this share of what they differ unturned. A larger
-    value finds more turns, and more that are none."""
+    """A turn counts if the scans differ, once turned by it, by at most this share of their difference before.
+    A larger value finds more turns, also false ones."""
     max_hidden_share: float = 0.5
     """Greatest share of beams of constant range that are left out when turns are looked for. A larger value
     finds parts of the robot that hide more, and fewer in narrow corridors."""
     step: float = np.radians(2.0)
-    """Steps in which turns are tried, rad. A smaller value takes longer."""
+    """Interval between the turns that are tried, rad. A smaller value takes longer."""
     scans: int = 256
     """Number of scans that are looked at for constant ranges. A larger value takes longer."""
     pairs: int = 512
     """Number of pairs for each lag that are looked at, if there are constant ranges. A larger value takes
     longer."""
     margin: float = np.radians(1.0)
-    """By so much sectors are larger than what was found, rad: at an edge a beam meets both. Gaps of twice
-    this are closed."""
+    """Sectors are widened by this on each side, rad: a beam at an edge meets both. Gaps of twice this are
+    closed. A larger value leaves out more."""
 
 
 SCANS_OF_TURN = 4

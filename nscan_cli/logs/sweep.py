@@ -18,13 +18,14 @@ class SweepOptions:
     """Which times of a turn can be."""
 
     shortest: float = 1e-3
-    """A laser whose turn takes less sees at once, s. A larger value leaves more lasers uncorrected."""
+    """A laser whose turn takes less time than this sees at once, s. A larger value leaves more lasers
+    uncorrected."""
     fastest: float = 0.012
-    """No laser turns in less than this, s: those that are used turn up to 80 times a second. A larger value
+    """No laser turns in less time than this, s: those in use turn up to 80 times a second. A larger value
     believes fewer files."""
     jitter: float = 1.1
-    """From the first beam to the last a scan may take so many periods of the scans: drivers measure their
-    times loosely. A larger value believes more files."""
+    """Largest time from the first beam to the last, in periods of the scans: drivers measure it loosely. A
+    larger value believes more files."""
     varying: float = 2.0
     """The time of a single scan is not used if it differs from the median by more than this factor. A larger
     value follows lasers whose speed changes more, and more errors of drivers."""

@@ -34,8 +34,8 @@ class OptimisationOptions:
     after_large_loop: StopOptions = field(default_factory=lambda: StopOptions(100, 1e-4))
     final: StopOptions = field(default_factory=StopOptions)
     metres_per_radian: float = 0.3
-    """Length of path that counts as much as a turn by 1 rad where scans between keyframes share what the
-    graph corrects, m. A larger one puts more of the correction into turns."""
+    """A turn by 1 rad counts as this length of path where the scans between keyframes share a correction of
+    the graph, m. A larger value puts more of the correction into turns."""
 
 
 @dataclass(frozen=True)

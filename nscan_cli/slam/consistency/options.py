@@ -13,17 +13,18 @@ class VerificationOptions:
     """Lengths of the path over which relative positions are compared, m. Over longer ones small errors of
     heading count more."""
     least_move: float = 0.1
-    """The way counts in pieces of at least this length, m. A smaller value counts the noise of a robot that
-    stands as a way."""
+    """The way is measured in pieces of at least this length, m. A smaller value counts the noise of a
+    standing robot as way."""
     max_step: float = 0.3
-    """A way is left out on which a repeated map has two scans farther apart, m: with every second scan it may
-    be lost there. With a larger value more is compared."""
+    """A way is left out if a repeated map has two successive scans on it that are farther apart, m: with
+    every second scan it may be lost there. A larger value compares more."""
     max_turn: float = 0.26
-    """The same for their turn, rad."""
+    """The same for the turn between them, rad."""
     start: float = 0.3
-    """Without odometry a robot that begins in a bare corridor seems to stand at first. Nothing counts before
-    the repeated map has it this far from where it began, m."""
+    """Without odometry a robot that begins in a bare corridor seems to stand at first. The comparison begins
+    where the repeated map is this far from its start, m. A larger value compares less."""
     max_difference: float = 0.3
-    """A larger difference of two maps is a warning, m. It is below 0.2 m on sound logs."""
+    """Largest difference of two maps without a warning, m. It is below 0.2 m on sound logs. A larger value
+    warns less."""
     bound: float | None = None
-    """A larger difference is a failure, m; None: none is."""
+    """Largest difference without a failure, m; None: no difference is one. A larger value fails less."""

@@ -10,26 +10,29 @@ class FreeSpaceOptions(NamedTuple):
     """When one visit looks through too much of what another one saw."""
 
     keyframes: int = 40
-    """Keyframes that are judged together. What differs in a sound map is seen from few: the worst ten of
-    fr-campus look through 24 % of what was there before, the worst forty 8 %."""
+    """Number of keyframes that are judged together. In a sound map few keyframes see a change: the worst ten
+    of fr-campus look through 24 % of what was there before, the worst forty 8 %. A larger number warns
+    less."""
     min_keyframes: int = 3
-    """Least number of keyframes at places seen before; with fewer nothing is said."""
+    """Least number of keyframes at places seen before. A larger number judges fewer maps."""
     min_points: int = 50
-    """Least number of compared points of a keyframe that counts."""
+    """Least number of compared points of a keyframe that counts. A larger number counts fewer keyframes."""
     compared: int = 8
-    """Keyframes that each is compared with: the nearest of other visits, and as many of its own."""
+    """Number of other keyframes that each is compared with: the nearest of other visits, and as many of its
+    own. More take longer."""
     tolerance: float = 0.2
-    """A point this much (m) nearer than the shortest of four neighbouring beams is looked through."""
+    """A point is looked through if it is nearer by this than the shortest of four neighbouring beams, m. A
+    larger value warns less."""
     tolerance_per_metre: float = 0.02
-    """Growth of the tolerance with the range, m/m."""
+    """Growth of the tolerance with the range, m/m. A larger value warns less."""
     within_factor: float = 2.5
-    """A sound map has at most this multiple of the share that is looked through within visits. It is 0.5 to
-    1.6 in real buildings, and 4 to 300 in simulated maps that are metres wrong."""
+    """A sound map looks through at most this multiple of the share within visits. It is 0.5 to 1.6 in real
+    buildings, and 4 to 300 in simulated maps that are metres wrong. A larger value warns less."""
     margin: float = 0.01
-    """Share that is added to that bound."""
+    """Share that is added to that bound. A larger value warns less."""
     max_share: float = 0.15
-    """Largest share in any sound map. It is 0.08 in mit-killian and fr-campus, and 0.26 and more in maps of
-    these that are metres wrong."""
+    """Upper limit of that bound. The share is 0.08 in mit-killian and fr-campus, and 0.26 and more in maps of
+    these that are metres wrong. A larger value warns less."""
 
 
 @dataclass(frozen=True)
@@ -37,10 +40,10 @@ class OdometryDisagreementOptions:
     """When odometry and scans disagree about the distance that the robot came."""
 
     path: float = 5.0
-    """Length of path over which both distances are compared, m. Over less, noise counts too much."""
+    """Length of path over which both distances are compared, m. Over a smaller one noise counts too much."""
     max_share: float = 0.4
-    """They disagree if the distances differ by more than this share of the path. Sound odometry is off by
-    little more than half of it, with disturbed steps too."""
+    """Largest difference of the distances, as a share of the path. For sound odometry it is little more than
+    half of this, with disturbed steps too. A larger value warns less."""
 
 
 @dataclass(frozen=True)
@@ -48,10 +51,11 @@ class ViewMismatchOptions:
     """When scans see other things than the keyframe before them."""
 
     scans: int = 10
-    """Scans that are judged together: someone who comes close hides the view for a moment."""
+    """Number of scans that are judged together: someone who comes close hides the view for a moment. A larger
+    number warns less."""
     min_similarity: float = 0.28
     """Least mean share of sectors with the same view. It is 0.53 or more in four real buildings, 0.29
-    outdoors, and 0.02 to 0.27 where someone walks along."""
+    outdoors, and 0.02 to 0.27 where someone walks along. A larger value warns more."""
 
 
 @dataclass(frozen=True)
@@ -59,12 +63,14 @@ class UntoldWayOptions:
     """When a way without odometry is held by steady motion alone, since its walls look alike all along."""
 
     sigma: float = 0.15
-    """Standard deviation (m) beyond which a scan does not tell its place along the walls."""
+    """Standard deviation beyond which a scan does not tell its place along the walls, m. A larger value warns
+    less."""
     path: float = 2.0
-    """Least length of such a way that is named, m. It is 2.5 m and more in bare corridors, at most 0.7 m in
-    offices and outdoors."""
+    """Least length of such a way that a warning names, m. It is 2.5 m and more in bare corridors, at most 0.7
+    m in offices and outdoors. A larger value warns less."""
     scans_between: int = 2
-    """Most scans in succession within it that seem to tell more."""
+    """Largest number of successive scans within it that seem to tell their place. A larger number joins more
+    ways."""
 
 
 @dataclass(frozen=True)
@@ -76,8 +82,10 @@ class DiagnosticsOptions:
     view: ViewMismatchOptions = field(default_factory=ViewMismatchOptions)
     untold_way: UntoldWayOptions = field(default_factory=UntoldWayOptions)
     gap_periods: float = 3.0
-    """Scans are missing when the next one comes later than this multiple of the median period."""
+    """Scans are missing if the next one comes later than this multiple of the median period. A larger value
+    warns less."""
     max_mean_chi2: float = 3.0
-    """Largest mean χ² of all relations, with three degrees of freedom. It is below 1 on sound logs."""
+    """Largest mean χ² of all relations, with three degrees of freedom. It is below 1 on sound logs. A larger
+    value warns less."""
     max_mean_loop_chi2: float = 6.0
-    """Largest mean χ² of loops: they join what has drifted."""
+    """Largest mean χ² of loops, which join what has drifted. A larger value warns less."""

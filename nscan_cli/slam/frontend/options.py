@@ -18,24 +18,29 @@ class DegeneracyOptions(NamedTuple):
     """When and how far a scan without odometry keeps to its prediction, in a direction it tells little of."""
 
     max_information_ratio: float = 0.12
-    """A direction with less than this share of the information across it is checked. A larger ratio checks
-    more scans."""
+    """A direction is checked if it has less than this share of the information across it. A larger value
+    checks more scans."""
     profile_sigmas: float = 2.5
-    """Half length of the line on which the objective is sampled, in standard deviations of the prediction."""
+    """Half length of the line on which the objective is sampled, in standard deviations of the prediction. A
+    larger value takes longer."""
     profile_step: float = 0.03
-    """Distance of the samples, m. No wall's Gaussian is narrower; a larger step is faster and coarser."""
+    """Distance between the samples, m. No wall's Gaussian is narrower. A larger value is faster and
+    coarser."""
     rematch_gain: float = 3.0
-    """The scan is matched from the best sample too if the objective is lower there by more than this."""
+    """The scan is also matched from the best sample if the objective is lower there by more than this. A
+    larger value is faster."""
     trusted_sigma: float = 0.04
-    """A scan that tells its place on the line to this standard deviation (m) stays where it was matched."""
+    """A scan that tells its place on the line to this standard deviation stays where it was matched, m. A
+    larger value trusts matches more than predictions."""
     initial_sigma: float = 0.05
-    """Root mean square deviation of scans from their predictions before any was seen, m."""
+    """Root mean square deviation of scans from their predictions before any is known, m. A larger value
+    trusts the first matches more."""
     smoothing: float = 0.02
     """Weight of a new scan in that mean square. A larger weight follows changes of the motion faster."""
     deviation_factor: float = 3.5
     """Multiple of that deviation that is allowed. A larger factor trusts matches more than predictions."""
     min_deviation: float = 0.03
-    """Least deviation that is allowed, m."""
+    """Least deviation that is allowed, m. A larger value trusts matches more."""
 
 
 @dataclass(frozen=True)
@@ -44,7 +49,7 @@ class TrackingOptions:
 
     gaussians: GaussianOptions = field(default_factory=lambda: GaussianOptions(floor=0.03))
     max_range: float = 40.0
-    """Longest beam that is matched, m."""
+    """Longest beam that is matched, m. A larger value sees more and takes longer."""
     point_spacing: float = 0.03
     """Least distance between neighbouring points of a scan, m. A larger one is faster, and blurs small
     things; with none a wall beside the robot outweighs all the rest."""
@@ -54,39 +59,42 @@ class TrackingOptions:
     """A scan joins the local map when the robot has moved farther (m) or turned more (rad) than this since
     the last one that joined. A larger value makes the map sparser."""
     widenings: tuple[float, ...] = (0.05, 0.3, 1.0)
-    """Stages of a match, wide to narrow: the exponent of the energy is weighed by each."""
+    """Stages of a match: factors of the exponent of the energy. Smaller ones lead from farther off."""
     max_iterations: int = 20
-    """Most Newton steps of a stage."""
+    """Largest number of Newton steps of a stage. A larger number lets slow matches converge."""
     coarse_tolerance: float = 5e-3
-    """With odometry, a stage before the last ends with a step shorter than this, m and rad."""
+    """With odometry, earlier stages end with a step below this, m and rad. A larger one ends them earlier."""
     tolerance: float = 1e-4
-    """The last stage ends with a step shorter than this, m and rad; without odometry all stages do."""
+    """The last stage ends with a step shorter than this, m and rad; without odometry all stages do. A larger
+    value ends them earlier."""
     scale: float = 0.1
     """Weight of the energy against the prior. It is small, since four Gaussians see each point and
     neighbouring points hit the same wall. A larger weight trusts the odometry less."""
     inlier_bound: float = 9.0
-    """Largest squared Mahalanobis distance of an inlier from a Gaussian."""
+    """Largest squared Mahalanobis distance of an inlier. A larger value counts more points."""
     restart_inliers: float = 0.8
     """With a smaller share of inliers a match starts again from other angles: one that is off by 12° can have
-    0.7. With odometry it starts again, too, if the scan before had more by `inlier_margin`."""
+    0.7. With odometry it also starts again if the scan before had more by `inlier_margin`. A larger value
+    restarts more."""
     inlier_margin: float = 0.05
-    """Difference of two shares of inliers that counts. A match from another angle must have more by this."""
+    """Difference of two shares of inliers that counts. A larger value keeps first matches more often."""
     clear_inliers: float = 0.9
-    """A scan with a larger share of inliers sees clearly."""
+    """A scan with a larger share of inliers sees clearly. A larger value restarts less."""
     clear_inlier_drop: float = 0.1
-    """Without odometry, a match starts again if it has fewer inliers by this than a clear scan before it."""
+    """Without odometry, a match that has fewer inliers by this than a clear scan before it starts again."""
     restart_angles: tuple[tuple[float, ...], ...] = ((0.1, 0.2), (0.4, 0.7), (1.0, 1.3))
-    """Angles to start again from, to both sides, rad. A ring is tried when those before it did not help."""
+    """Rings of angles to start again from, to both sides, rad: each if the one before did not help."""
     far_restart_margin: float = 0.3
     """Rings after the first are tried only if the share is too small by more than this: outdoors most scans
-    have few inliers."""
+    have few inliers. A larger value is faster."""
     lost_inliers: float = 0.3
     """With a smaller share of inliers a scan with odometry is searched among the last ones; without odometry
-    `restart_inliers` decides. It is also the least score of a place that the search finds."""
+    `restart_inliers` decides. It is also the least score of a place that the search finds. A larger value
+    searches more and accepts less."""
     lost_search: SearchOptions = field(default_factory=lambda: SearchOptions(distance=1.5, turn=1.5))
-    """The search for a lost scan, about its prediction."""
+    """The search for a lost scan, around its prediction."""
     lost_search_path: float = 5.0
-    """Length of the path whose scans a lost scan is searched among, m."""
+    """Length of the path among whose scans a lost scan is searched, m. A larger value takes longer."""
     match_motion: float = 0.1
     """With odometry a scan is matched when the robot has moved this far (m) or turned this much (rad) since
     the last one that was. The scans between follow. Larger values drift less and see less."""
@@ -95,28 +103,30 @@ class TrackingOptions:
     more than this (m, rad) from the one that it was corrected by. Larger values take less time, and blur the
     map where the robot begins to turn."""
     max_waiting: int = 100
-    """Most scans between two that are matched: a robot may stand for hours."""
+    """Most scans between two that are matched: a robot may stand for hours. More take more memory."""
     trusted_odometry: MotionModel = field(default_factory=lambda: MotionModel(distance=0.02))
     """Standard deviations of the odometry from one matched scan to the next, as a prior of the match."""
     odometry_noise: OdometryNoiseOptions = field(default_factory=OdometryNoiseOptions)
-    """How these are narrowed by what is learned of the odometry."""
+    """How these standard deviations shrink as the odometry proves good."""
     contradiction_sigmas: float = 2.0
-    """A match that is off that prior by more standard deviations is made again with the one of `odometry`."""
+    """A match that is off that prior by more standard deviations is repeated with the prior of `odometry`. A
+    larger value trusts the odometry more."""
     odometry: MotionModel = field(default_factory=MotionModel)
     """Standard deviations of the odometry where scans contradict it."""
     between_sigma: float = 0.05
-    """Standard deviation of a scan between two matched ones from where odometry has it, m and rad."""
+    """Standard deviation of a scan between two matched ones from its place by odometry, m and rad. A larger
+    value trusts the odometry less."""
     constant_velocity: MotionModel = field(
         default_factory=lambda: MotionModel(distance=0.3, angle=0.3, distance_per_metre=0.3)
     )
     """Standard deviations of a step without odometry, predicted by constant velocity."""
     velocity_scans: int = 5
-    """Steps whose mean is the velocity. More steps even out jitter of stamps, fewer follow turns faster."""
+    """Number of steps whose mean is the velocity. More even out jitter of stamps, and follow turns later."""
     degeneracy_poses: int = 3
-    """Poses that have to be known before `degeneracy` is checked: fewer make no velocity."""
+    """Number of known poses from which on `degeneracy` is checked: fewer give no velocity."""
     degeneracy: DegeneracyOptions = field(default_factory=DegeneracyOptions)
     range_limit_outliers: float = 0.001
-    """Share of the ranges that may exceed the laser's range limit: some are echoes."""
+    """Share of ranges that may exceed the range limit, as echoes. A larger one gives a shorter limit."""
     range_limit_share: float = 0.01
     """The range limit ends walls if this share of the ranges is in the last cell before it. Lasers of 12 m
     and more have 0.001 to 0.004 there, those of 6 m and less 0.02 to 0.05."""
@@ -124,12 +134,14 @@ class TrackingOptions:
     """Points this near (m) to the border of what the laser had in view are not matched there: walls end. A
     larger margin matches fewer points."""
     sector_turn: float = 0.15
-    """A scan that is matched farther from its prediction than this (rad) is matched with all points first:
-    which of them lie in view is not known before."""
+    """A scan that is matched farther from its prediction than this (rad) is first matched with all points:
+    which of them lie in view is not known before. A larger value does so less often."""
     first_scan_path: float = 5.0
-    """Length of the path whose scans place the first scan of a track segment, m."""
+    """Length of the path whose scans place the first scan of a track segment, m. A larger value is more exact
+    and takes longer."""
     first_scan_max_count: int = 2_000
-    """Most scans that wait for it: a robot may stand for hours."""
+    """Largest number of scans that wait for that: a robot may stand for hours. A larger number takes more
+    memory."""
 
 
 class LaserView(NamedTuple):
@@ -212,13 +224,14 @@ class OdometryStallOptions(NamedTuple):
     """When odometry stood still while the robot drove on, and made up for it in one step."""
 
     min_steps: int = 2
-    """Least number of steps in which it stands. With a smaller number odometry that comes less often than the
-    scans would be a stall."""
+    """Least number of steps in which odometry stands. With a smaller number, odometry slower than the scans
+    would count as a stall."""
     min_motion: float = 0.1
-    """Least length of the step that makes up for it, m + rad: less does not mislead a match."""
+    """Least length of the step that catches up, m + rad: a smaller one does not mislead a match. A larger
+    value evens out fewer stalls."""
     factor: float = 2.0
-    """The step that makes up for it is faster than the steps before and after by this factor, but over the
-    whole time the robot is not: a larger factor evens out fewer stalls."""
+    """The step that catches up is faster than those before and after it by this factor; averaged over the
+    stall, the robot is not. A larger value evens out fewer stalls."""
 
 
 @dataclass(frozen=True)
@@ -226,13 +239,14 @@ class OdometryCheckOptions:
     """Which steps of the odometry, or of the scans, are jumps that no robot drives."""
 
     min_motion: float = 1e-3
-    """Least step (m, rad) that counts as motion."""
+    """Least step that counts as motion, m and rad. A larger value ignores slow drives."""
     step_quantile: float = 0.99
-    """Quantile of the log's steps that is the usual longest one."""
+    """Quantile of the log's steps that is the usual longest step. A larger value finds fewer jumps."""
     jump_factor: float = 5.0
-    """A jump is longer than the usual longest step times this."""
+    """A jump is longer than this multiple of the usual longest step. A larger value finds fewer jumps."""
     min_jump: float = 1.0
-    """A jump is longer than this, m and rad: a match finds less by itself."""
+    """A jump is longer than this, m and rad: a match corrects a smaller one by itself. A larger value finds
+    fewer jumps."""
     stalls: OdometryStallOptions = field(default_factory=OdometryStallOptions)
 
 
@@ -240,13 +254,14 @@ class ViewSimilarityOptions(NamedTuple):
     """When two scans from nearly the same place see the same."""
 
     sectors: int = 180
-    """Sectors of the view; in each the nearest point of both scans is compared."""
+    """Number of sectors of the view; in each, the nearest points of both scans are compared. More are finer
+    and have fewer points."""
     min_sectors: int = 10
-    """Least number of sectors in which both scans have points; with fewer nothing is said."""
+    """Least number of sectors in which both scans have points. A larger number compares fewer scans."""
     tolerance: float = 0.2
-    """Difference of two ranges that are the same, m."""
+    """Largest difference of two equal ranges, m. A larger value takes more views for the same."""
     tolerance_per_metre: float = 0.1
-    """Growth of the tolerance with the shorter range, m/m."""
+    """Growth of the tolerance with the shorter range, m/m. A larger value takes more views for the same."""
 
 
 @dataclass(frozen=True)
@@ -254,28 +269,31 @@ class BreakOptions:
     """When the track is broken: the robot was carried, and a new segment of the track begins."""
 
     poor_inliers: float = 0.7
-    """A match with a smaller share of inliers is poor: the view is compared with that of the scan before."""
+    """A match with a smaller share of inliers is poor: its view is compared with that of the scan before. A
+    larger value compares more."""
     view: ViewSimilarityOptions = field(default_factory=ViewSimilarityOptions)
     min_similarity: float = 0.7
-    """A poor match is doubted if the two views are the same in a smaller share of sectors."""
+    """A poor match is doubted if the two views are the same in a smaller share of sectors. A larger value
+    breaks more often."""
     max_doubted: int = 5
-    """Scans that may follow a doubted one before the track breaks: someone may stand in the way. It does not
-    break if one of them sees again what was seen before."""
+    """Number of scans that may follow a doubted one before the track breaks: someone may stand in the way. It
+    does not break if one of them sees again what was seen before. A larger number breaks less often."""
     usual_scans: int = 30
-    """Scans whose median share of inliers is the usual one. More scans follow changes more slowly."""
+    """Number of scans whose median share of inliers is the usual one. More follow changes more slowly."""
     min_usual_inliers: float = 0.8
-    """The track breaks only where the usual share is at least this: elsewhere scans do not see clearly."""
+    """The track breaks only if the usual share is at least this: with a smaller one scans do not see clearly.
+    A larger value breaks less often."""
     min_inlier_drop: float = 0.37
-    """The first doubted scan has a share smaller than the usual one by at least this. A larger value breaks
-    less often: in sparse surroundings matches are poor now and then, and odometry goes on."""
+    """The first doubted scan has a share of inliers lower than the usual one by at least this. A larger value
+    breaks less often: in sparse surroundings matches are poor now and then, and odometry goes on."""
     bridged_distance: float = 2.0
-    """A new segment that begins farther away by odometry (m) is no break: other things are in view there, and
-    odometry bridges the way."""
+    """A segment that begins farther away by odometry is no break, m: other things are in view there, and
+    odometry bridges the way. A larger value breaks more often."""
     bridged_turn: float = 1.0
     """The same bound for a turn, rad."""
     path: float = 40.0
-    """Length of path that a break counts as, m: what lies before it is another visit."""
+    """Length of path that a break counts as, m: the keyframes before it are of another visit."""
     distance_sigma: float = 100.0
-    """Standard deviation of the way over a break, m."""
+    """Standard deviation of the relation over a break, m. A larger value searches farther."""
     turn_sigma: float = 1.8
-    """Standard deviation of the turn over a break, rad: all are as likely."""
+    """Standard deviation of the turn over a break, rad: all angles are about equally likely."""
