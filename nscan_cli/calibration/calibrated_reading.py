@@ -1,4 +1,4 @@
-"""The reading options that a calibration leads to: what it tells surely and differently than the file."""
+"""The reading options that follow from a calibration: values that are certain and differ from the file."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ DECIMALS = 4
 def calibrated_reading(
     calibration: Calibration, reading: ReadingOptions, options: CalibrationOptions
 ) -> ReadingOptions:
-    """The options that read the same log as the calibration says; `reading` are those that it was read with.
+    """The options that read the log as calibrated; `reading` are those that it was read with.
 
-    A value that the drive leaves open, or that agrees with the file, stays as it is.
+    A value that the drive leaves open, or that agrees with the file, does not change.
     """
     values = calibration.values
     bounds = {

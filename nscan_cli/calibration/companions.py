@@ -1,7 +1,7 @@
 """What goes along with the robot without being a part of it: a cart on a hinge, someone who follows or leads.
 
-Its ranges vary, so it is no part of the robot, and it is nothing of the map, which it seems to hold still.
-But it is where the robot itself was a moment ago, or will be in a moment: no wall is there.
+Its ranges vary, so it is no part of the robot. It is no part of the map either, which it seems to hold still.
+But it is where the robot itself was a moment ago or will be in a moment, and no wall is there.
 """
 
 from __future__ import annotations
@@ -86,9 +86,9 @@ def find_companion(log: LaserLog, poses: Array, options: CompanionOptions) -> Co
 
 
 def _seen(log: LaserLog, row: int, pose: Array, path: Array, options: CompanionOptions) -> Indices | None:
-    """The bins of bearings in which a scan at a pose (3,) sees something on the path (n, 2) about it.
+    """The bins of bearings in which a scan at a pose (3,) sees something on the path (n, 2) around it.
 
-    None if there is no path at some distance from the robot.
+    None if no point of the path is far enough from the robot.
     """
     away = np.hypot(*(path - pose[:2]).T)
     if not (away > options.clearance).any():

@@ -1,4 +1,4 @@
-"""What a file says of odometry, mounting and clocks, against the steps that its scans measure."""
+"""What the file says of odometry, mounting and clocks, compared with the steps that its scans measure."""
 
 from __future__ import annotations
 
@@ -101,10 +101,10 @@ def _unusable(
 def _of_clocks(
     log: LaserLog, steps: MeasuredSteps, reading: ReadingOptions, options: FileCheckOptions
 ) -> list[Finding]:
-    """What turns say of the odometry's clock: the offset that explains why they disagree, if there is one.
+    """Findings of the odometry's clock: the offset that explains why turns disagree, if there is one.
 
-    Few steps agree at some offset by chance. So more are measured, unless these agree best without any. The
-    turns of mirrored scans are looked for too.
+    Few steps can agree at some offset by chance. So if an offset is likely, more steps are measured. Turns of
+    mirrored scans are compared, too.
     """
     tries = [(sign, clock_lag(log, steps, options.clock, sign)) for sign in (1.0, -1.0)]
     signs = [sign for sign, lag in tries if lag and abs(lag.offset) >= options.clock.min_offset]
@@ -137,8 +137,8 @@ def _of_opposite_turns(
 ) -> list[Finding]:
     """Readings in the wrong order, or odometry that turns the wrong way; `fit` is that of mirrored scans.
 
-    One is the mirror image of the other, but for where the laser is on the robot: if it is aside, the file
-    has it on the right side in one case alone.
+    The two are mirror images, except for the place of the laser on the robot: if it is beside the middle, its
+    side in the file is right in only one of the two cases.
     """
     other = mount * MIRRORED
     # Small steps aside, which may be of either sign, would pass for a place farther ahead or behind.
@@ -174,8 +174,8 @@ def _opposite(
 ) -> Finding:
     """A laser that looks back, or odometry that counts forward as backward.
 
-    The place of the laser tells, if it is ahead of the robot's middle or behind; else that robots mostly
-    drive forward.
+    The place of the laser decides, if it is ahead of the robot's middle or behind it. Otherwise the robot is
+    assumed to drive mostly forward.
     """
     sigmas, forward = options.mount_sigmas, evidence.forward_share
     is_backward = is_nearer(fit, mount * BACKWARDS, mount, sigmas)

@@ -1,4 +1,4 @@
-"""A value that scans tell, with its standard deviation, or why they do not tell it."""
+"""A value that the scans determine, with its standard deviation, or the reason why they leave it open."""
 
 from __future__ import annotations
 

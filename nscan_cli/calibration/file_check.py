@@ -1,4 +1,4 @@
-"""Scans against their file: what it says of odometry, mounting and clocks that they contradict."""
+"""The check of the file: its odometry, mounting and clocks against the scans."""
 
 from __future__ import annotations
 

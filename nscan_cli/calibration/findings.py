@@ -1,4 +1,4 @@
-"""What scans contradict of their file, in sentences: the evidence, and what was done or what to do."""
+"""What the scans contradict of their file, as sentences: the evidence, and what was or should be done."""
 
 from __future__ import annotations
 
@@ -81,9 +81,9 @@ def two_clocks(lag: ClockLag, reading: ReadingOptions) -> Finding:
 
 
 def opposite_turns(evidence: str, reading: ReadingOptions, is_certain: bool) -> Finding:
-    """Scans turn the other way than odometry. `is_certain`: the mounting tells that the readings are wrong.
+    """Scans turn the other way than odometry. `is_certain`: the mounting shows that the readings are wrong.
 
-    Without that, scans and odometry are the mirror image of what they are if the other one is wrong.
+    If not certain, odometry may be wrong instead: scans and odometry are then mirror images of each other.
     """
     cure = "leave out --flip" if reading.flip else "try --flip"
     other = (
@@ -162,9 +162,9 @@ def wrong_mounting(mount: Array, fit: MountFit, options: FileCheckOptions) -> Fi
 def opposite(
     mount: Array, fit: MountFit, evidence: str, is_odometry: bool, reading: ReadingOptions
 ) -> Finding:
-    """Odometry counts forward as backward, or the laser looks back; `evidence` says why it is the one.
+    """Odometry counts forward as backward, or the laser looks back; `evidence` says why it is this one.
 
-    The file has the laser at `mount` (3,).
+    `mount` (3,) is the mounting in the file.
     """
     angle = _round_angle(math.degrees(fit.mount[2]), is_measured=True)
     by_mount = f"--mount {mount[0]:g},{mount[1]:g},{angle}"

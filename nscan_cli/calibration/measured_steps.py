@@ -1,4 +1,4 @@
-"""Steps from scan to scan, all over a log, as its scans alone measure them: the evidence about its file."""
+"""Steps from scan to scan all over a log, measured by the scans alone: the evidence about its file."""
 
 from __future__ import annotations
 
@@ -43,8 +43,8 @@ def measure_steps(
 ) -> MeasuredSteps:
     """Of the steps from the first rows (n,) to the last (n,), those that the scans measure beyond doubt.
 
-    Every step is matched without odometry, as of one who knows nothing but the scans. `corrected` gives the
-    points (m, 2) of a row in the laser's frame if the laser turns; None: as if it saw all at once.
+    Every step is matched without odometry, so that the result is independent of it. `corrected` gives the
+    points (m, 2) of a row in the laser's frame if the laser turns; None: as if it saw all beams at once.
     """
     at_laser = replace(log, mount=np.zeros(3), path=None)
     found: list[tuple[int, int, PairMatch]] = []

@@ -1,4 +1,4 @@
-"""How far the clock of the odometry is from that of the scans: the lag at which their turns agree best."""
+"""The offset of odometry's clock from that of the scans: the lag at which their turns agree best."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
-"""How late odometry is against the scans of a laser that turns: by so much its motion would be put wrongly.
+"""How late the odometry is against the scans of a laser that turns.
 
-Tracking hardly notices a tenth of a second. But beams that were measured while the robot began to turn would
-be corrected as if it stood, and the other way round.
+Tracking hardly notices a delay of a tenth of a second. But beams that were measured while the robot began to
+turn would be corrected as if it stood, and the other way round.
 """
 
 from __future__ import annotations

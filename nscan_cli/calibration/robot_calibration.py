@@ -240,8 +240,8 @@ class _Drive:
     ) -> dict[str, Estimate]:
         """Standard deviations of calibrated odometry: of a step's length per metre, of its turn per radian.
 
-        What the matches account for is taken out. The laser's steps are compared as those of the robot that
-        carries it at the fitted mounting.
+        The part that the matches account for is subtracted. The laser's steps are first turned into steps of
+        the robot, by the fitted mounting.
         """
         laser = self.laser * (MIRRORED if mirrored else 1.0)
         robot = compose(compose(fit.mount, laser), inverse(fit.mount))

@@ -36,8 +36,8 @@ class RobustFit(NamedTuple):
 def robust_fit(coefficients: Array, measured: Array, groups: Indices | None = None) -> RobustFit:
     """Minimise the residuals of coefficients (n, d, m) · values − measured (n, d), by Cauchy's loss.
 
-    `groups` (g,) are the rows where groups of equations begin whose errors have to do with each other.
-    Without them all are independent.
+    `groups` (g,) are the first rows of groups of equations with dependent errors; without them all are
+    independent.
 
     Iteratively reweighted least squares (P. Huber, "Robust Statistics", 1981), from the solution of least
     absolute values. An equation is a block of d rows, and gets one weight.

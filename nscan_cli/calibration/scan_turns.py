@@ -1,8 +1,8 @@
-"""Roughly how far the robot turns from scan to scan, by their ranges alone: where a closer look is worth it.
+"""Rough turns of the robot from scan to scan, by the ranges alone: they show where a closer look is worth it.
 
-What a laser that turns by an angle sees moves by that angle the other way. It is looked for among whole cells
-of directions, and refined by a parabola. A metre driven meanwhile hardly matters: the ranges of most
-directions change by less than a turn changes them.
+If a laser turns by an angle, what it sees moves by that angle the other way. The shift is found in whole
+cells of directions, and refined by a parabola. A metre driven meanwhile hardly matters: it changes the ranges
+of most directions less than a turn does.
 """
 
 from __future__ import annotations

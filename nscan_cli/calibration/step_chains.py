@@ -1,7 +1,7 @@
-"""Measured steps that follow each other, added up: over a longer time the stamps matter less.
+"""Successive measured steps, added up: over a longer time, errors of the stamps matter less.
 
-Where odometry or scans are stamped now too late and now too early, the turn of a short step is compared with
-that of another time, and is as little like it as the turns of two times are: the ratio comes out too small.
+If stamps are now too late and now too early, the turn of a short step is compared with odometry of another
+time. The two then agree less, and the fitted ratio comes out too small.
 """
 
 from __future__ import annotations

@@ -30,10 +30,10 @@ def telling_steps(log: LaserLog, options: StepOptions, count: int | None = None)
 
 
 def successive_steps(log: LaserLog, options: StepOptions) -> tuple[Indices, Indices]:
-    """The rows (n,) where steps begin and end that follow each other; of very many, about `options.most`.
+    """The rows (n,) where successive steps begin and end; of very many, about `options.most`.
 
-    No two of them overlap, so that their errors are independent. Those of very many are chains of
-    `options.chain` that are spread evenly.
+    No two steps overlap, so their errors are independent. In a long log, chains of `options.chain` steps are
+    spread evenly.
     """
     first, last = _all_steps(log, options)
     chosen, free = [], 0

@@ -1,4 +1,4 @@
-"""The turn of the laser as its file has it, against the scans: its direction, and whether it turns."""
+"""The check of the laser's turn in the file against the scans: its direction, and whether the laser turns."""
 
 from __future__ import annotations
 
@@ -22,11 +22,11 @@ from nscan_cli.logs.reading_options import ReadingOptions
 def checked_sweep(
     log: LaserLog, reading: ReadingOptions, options: FileCheckOptions
 ) -> tuple[LaserLog, ReadingOptions, list[str]]:
-    """The log with the times of beams that its scans tell, the options that read it so, and what is said.
+    """The log with the times of beams that its scans show, the options that read it so, and what is said.
 
-    A time that the file tells may be of readings in the reverse order, or of a laser that sees at once. A
-    file that tells none may be of a laser that turns from scan to scan, or for a part of that time. Where the
-    scans do not say so beyond doubt, all stays as it is.
+    The file may have times for readings in the reverse order, or for a laser that sees at once. It may have
+    none though the laser turns, for the whole time from scan to scan or for a part of it. If the scans do not
+    show this beyond doubt, nothing changes.
     """
     if reading.as_recorded or reading.sweep is not None or len(log) < options.sweep.min_scans:
         return log, reading, []

@@ -1,7 +1,7 @@
-"""How long a laser turns, as its scans tell: they fit best if every beam is seen from where the robot was.
+"""How long a laser turns, by its scans: they fit best if every beam is seen from where the robot was.
 
-A scan of a robot that turns is wound up or unwound by its motion during the turn of the laser; one of a robot
-that stands is not. Two scans that were taken while the robot moved differently fit best with the true time.
+If the robot turns during a turn of the laser, the scan is stretched or compressed by its motion; if it
+stands, the scan is not. So two scans that were taken during different motions fit best with the true time.
 """
 
 from __future__ import annotations

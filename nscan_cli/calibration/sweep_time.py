@@ -1,6 +1,6 @@
 """How long a turn of the laser takes, by its scans: a value with its standard deviation.
 
-Pairs of scans that were taken while the robot turned differently are matched with many times of a turn. Their
+Pairs of scans that were taken while the robot turned differently are matched with many assumed times. Their
 energies have a minimum at the true one.
 """
 
@@ -31,8 +31,8 @@ class SweepTime:
     def believed(self, told: float, period: float, sigmas: float) -> float:
         """The time to use if the file tells one, 0 for none, and scans follow each other in a period, all s.
 
-        It is the file's unless the scans contradict it by so many standard deviations. No turn takes longer
-        than the time from scan to scan, or than the file says.
+        It is the file's time, unless the scans contradict it by enough standard deviations. No turn takes
+        longer than the time from scan to scan, or than the file says.
         """
         longest = max(period, abs(told))
         value, bound = float(np.clip(self.turn, -longest, longest)), sigmas * self.sigma

@@ -1,4 +1,4 @@
-"""What of a log its scans are checked against when it is read, and when it is corrected."""
+"""The checks of a log against its own scans while it is read, which correct it."""
 
 from __future__ import annotations
 

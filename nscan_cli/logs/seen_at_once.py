@@ -1,4 +1,4 @@
-"""Scans of a laser that turns, as one that sees at once would have taken them."""
+"""Scans of a turning laser, converted to what a laser that sees at once would have measured."""
 
 from __future__ import annotations
 

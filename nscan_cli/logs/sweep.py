@@ -1,4 +1,4 @@
-"""How long a laser takes for its turn: what the file says, and what of it can be."""
+"""How long a laser takes for its turn by its file, and which such times are plausible."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A log mapped: the whole loop (paper, V), and a graph that says what it was made from."""
+"""A log is mapped: the whole loop (paper, V), and a graph that says what it was made from."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Two lasers whose scans alternate on one topic with one frame: the scans of the first are told apart."""
+"""Two lasers whose scans alternate on one topic with one frame: how those of the first are recognised."""
 
 from __future__ import annotations
 

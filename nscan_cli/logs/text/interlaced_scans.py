@@ -1,8 +1,8 @@
-"""Interlaced scans: a SICK LMS sends, in turn, scans whose beams lie between those of the scans before.
+"""Interlaced scans: the beams of every other scan of a SICK LMS lie between those of the scan before.
 
-A log then has scans of 181 and of 180 readings a degree apart. The head of the record has the same first
-direction for both, but the 180 beams lie between the 181: they begin half a step later. Read as recorded,
-every other scan is turned by half a degree, and scan matching follows it.
+Such a log has scans of 181 and of 180 readings, a degree apart. The record gives the same first direction for
+both, but the 180 beams lie between the 181: they begin half a step later. Read as recorded, every other scan
+would be turned by half a degree, and scan matching would follow it.
 """
 
 from __future__ import annotations

@@ -112,8 +112,8 @@ def _breaks(graph: Graph, options: SlamOptions) -> set[int]:
 def _chain_of_graph(graph: Graph, options: SlamOptions) -> list[Pairwise]:
     """The relations from each keyframe to the next.
 
-    A graph of nScan relations alone lacks those that nScan relations replace. In their place stands what
-    odometry would tell of such a step.
+    A graph of nScan relations alone lacks those that nScan relations replace. They are replaced by what
+    odometry would say of such a step.
     """
     tracked: dict[tuple[int, int], Pairwise] = {}
     for pair in graph.pairwise:

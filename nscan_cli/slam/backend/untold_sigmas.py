@@ -1,8 +1,9 @@
-"""Relations along ways that no scan tells: their length is a guess, and so it is as uncertain as that.
+"""Relations along ways that the scans do not measure: their length is a guess, and gets its uncertainty.
 
-Without odometry tracking keeps to steady motion along bare walls. The Hessian of a match there knows the
-ripple of its energy alone. So the relations of such a way get variance along it, of a random walk whose end
-has the variance of the whole guess. All repeat the same guess; marginals count each pair of scans once.
+Without odometry tracking assumes steady motion along bare walls. The Hessian of a match there describes only
+the ripple of its energy. So the relations of such a way get variance along it: that of a random walk, whose
+end has the variance of the whole guess. All relations there repeat the same guess, and marginals count each
+pair of scans once.
 """
 
 from __future__ import annotations

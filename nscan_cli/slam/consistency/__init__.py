@@ -1,1 +1,1 @@
-"""Maps of the same drive that have to be the same: how far a result can be trusted without any truth."""
+"""Repeated maps of one drive that must agree: how far a result can be trusted without ground truth."""

@@ -1,4 +1,4 @@
-"""How far a map can be trusted without any truth: its drive mapped again in ways that must give the same."""
+"""How far a map can be trusted without ground truth: its drive is mapped again, and the maps must agree."""
 
 from __future__ import annotations
 

@@ -1,1 +1,1 @@
-"""What a finished map tells of itself that a user should know."""
+"""What a finished map shows about itself that a user should know."""

@@ -1,8 +1,8 @@
 """Where odometry and scans disagree about how far the robot came.
 
-Tracking trusts the scans: wheels spin, and some count the way back as one ahead. But along a bare corridor,
-behind glass, or beside somebody who walks along, scans show less motion than there was, and only the odometry
-knows.
+Tracking trusts the scans, because wheels spin, and some odometry counts backward as forward. But along a bare
+corridor, behind glass, or beside someone who walks along, scans show less motion than there was, and only the
+odometry knows.
 """
 
 from __future__ import annotations

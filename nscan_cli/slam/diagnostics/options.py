@@ -1,4 +1,4 @@
-"""The parameters of the diagnostics: from where on a user is warned. None changes a graph."""
+"""The parameters of the diagnostics: when a user is warned. None changes a graph."""
 
 from __future__ import annotations
 

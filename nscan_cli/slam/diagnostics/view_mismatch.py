@@ -1,7 +1,7 @@
 """Scans that see other things than the keyframe beside which tracking has them.
 
 Someone who walks along with the robot seems to stand still. Tracking can hold on to him while the corridor
-goes by: the robot seems to stand, too, and half of its beams meet other things every second.
+passes by. Then the robot seems to stand, too, and half of its beams meet other things every second.
 """
 
 from __future__ import annotations

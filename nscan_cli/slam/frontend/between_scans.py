@@ -67,8 +67,8 @@ def match_between(
 ) -> None:
     """Match the scans from the `first` on, before the `last`, which is settled.
 
-    `before` has the pose (3,) of the matched scan before them and its odometry (3,). What odometry is off at
-    the last scan is shared out over the way; so is the covariance of the step.
+    `before` has the pose (3,) of the matched scan before them and its odometry (3,). The error of odometry at
+    the last scan is distributed over the way; so is the covariance of the step.
     """
     pose_before, odometry_before = before
     step, length = np.empty(3), 0.0

@@ -1,13 +1,13 @@
-"""Step 1 without odometry: a scan keeps to its prediction in a direction that it tells little of.
+"""Step 1 without odometry: a scan keeps to its prediction in a direction of which it tells little.
 
-The walls of a corridor look alike all along. What is left of the energy in that direction is a ripple of
-some centimetres, from how points fall into cells. A match ends in its nearest minimum, mostly a little
-behind; so the velocity falls, and the robot seems to stop while its corridor goes by. The Hessian gives no
-warning: it knows the ripple alone.
+The walls of a corridor look alike all along. The energy in that direction has only a ripple of some
+centimetres, from how points fall into cells. A match ends in its nearest minimum, mostly a little behind. So
+the velocity falls, and the robot seems to stop while its corridor goes by. The Hessian gives no warning,
+because it describes the ripple.
 
-How well the position is known shows in the objective over all that constant velocity allows. Where it is
-flat, the scan stays at its prediction, as in a Kalman filter: the less the scan tells, the more so, and the
-steadier the robot goes where scans do tell.
+How well the position is known shows in the objective over all positions that constant velocity allows. Where
+it is flat, the scan stays at its prediction, as in a Kalman filter: the closer, the less the scan tells, and
+the steadier the robot moves where scans do tell.
 """
 
 from __future__ import annotations

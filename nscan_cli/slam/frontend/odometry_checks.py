@@ -1,4 +1,4 @@
-"""What of a log is not trusted: steps of the odometry that no robot drives, and scans of a frozen laser."""
+"""What is not trusted in a log: odometry steps that no robot could drive, and scans of a frozen laser."""
 
 from __future__ import annotations
 

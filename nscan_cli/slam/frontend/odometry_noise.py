@@ -1,8 +1,9 @@
-"""Step 1 with odometry: how good the odometry of this robot is, learned while it is tracked.
+"""Step 1 with odometry: how good the odometry of this robot is, learned during tracking.
 
 Odometry differs from robot to robot by a factor of ten. Over each piece of the path along which all scans
-tell their place, the way by scans is compared with the way by odometry. The difference is the noise of both,
-so that it bounds that of the odometry. A prior as narrow as that keeps good odometry where scans tell little.
+tell their place, the distance by scans is compared with that by odometry. The difference has the noise of
+both, so it is an upper bound on that of odometry. A prior as narrow as this bound keeps good odometry where
+scans tell little.
 """
 
 from __future__ import annotations

@@ -1,9 +1,9 @@
-"""Step 1: points of a scan that are closer together than they need to be are left out.
+"""Step 1: points of a scan that are closer together than needed are left out.
 
 A laser hits a wall beside the robot with hundreds of beams within half a metre, and one a few metres off with
-a dozen. As many points as that in one place outweigh all the rest, and the map has them where the robot was:
-in a bare corridor they hold the robot. A robot that drove backwards 0.2 m beside a wall lost two thirds of
-its way with odometry.
+a dozen. So many points in one place outweigh all the rest. The map has them where the robot was, so in a bare
+corridor they hold the robot back. A robot that drove backwards 0.2 m beside a wall lost two thirds of its way
+with odometry.
 """
 
 from __future__ import annotations

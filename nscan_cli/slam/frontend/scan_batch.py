@@ -1,4 +1,4 @@
-"""Scans as tracking takes them: some that follow each other in the log, with their points laid end to end."""
+"""Scans as tracking takes them: some successive scans of the log, with all points in one array."""
 
 from __future__ import annotations
 

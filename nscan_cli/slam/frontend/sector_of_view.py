@@ -1,8 +1,8 @@
 """Step 1: the points of a scan that lie in the sector in which scans of the local map looked.
 
-A laser that looks ahead sees new walls at its sides when the robot drives backwards or turns. The map's
-pieces of these walls end where its scans ended. They draw the new points to themselves, back to where the
-robot was: in a bare corridor a robot that drove backwards seemed to stand.
+A laser that looks ahead sees new walls at its sides when the robot drives backwards or turns. In the map
+these walls end where its scans ended. These ends attract the new points, back to where the robot was: in a
+bare corridor a robot that drove backwards seemed to stand.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """Step 1 with its breaks: where the track breaks, a new segment of it begins.
 
-What a break is stands in `break_detection`. Scans that may be the first after one are doubted for a while:
-they are tracked as part of the segment, and once more as a segment of their own.
+`break_detection` defines a break. Scans that may be the first after one are doubted for a while: they are
+tracked as part of the segment, and also as a segment of their own.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
-"""Step 1 without odometry: a scan of a laser that turns is seen from where the robot was, by its last steps.
+"""Step 1 without odometry: the beams of a turning laser are corrected by the robot's last step.
 
-The poses are those at the middle of the turns. From one to the next the robot makes a step. During the turn
-it goes on so, half a step before the middle and half a step after it.
+Poses are those at the middle of each turn. During a turn the robot is assumed to go on as in the step between
+the last two: half a step before the middle, and half a step after it.
 """
 
 from __future__ import annotations

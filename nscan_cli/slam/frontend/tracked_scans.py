@@ -1,4 +1,4 @@
-"""What tracking finds of scans (paper, V): of many as columns, which its kernels fill, or of one."""
+"""What tracking finds of a scan (paper, V), and of many as columns, which its kernels fill."""
 
 from __future__ import annotations
 

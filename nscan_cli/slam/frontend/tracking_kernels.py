@@ -98,8 +98,8 @@ def match_with_doubt(
 ) -> None:
     """Match scan k again with a wide prior if it contradicts odometry (3,) or has few inliers.
 
-    Also from other angles if there are fewer inliers than `threshold`. Unless the first match contradicts
-    odometry, the other one has to have clearly more inliers to take its place.
+    With fewer inliers than `threshold` it is also matched from other angles. Unless the first match
+    contradicts odometry, another one must have clearly more inliers to replace it.
     """
     is_contradiction = contradicts(prior, found.poses[k], settings.contradiction_sigmas)
     if not is_contradiction and found.inliers[k] >= threshold:

@@ -1,9 +1,9 @@
-"""Step 1: the points of a scan that scans of the local map had in view too.
+"""Step 1: the points of a scan that scans of the local map had in view, too.
 
-To a laser that sees a few metres, a wall ends at the range limit. The map has a piece of the wall there, in
-a cell that the next scan sees more of. Its points are drawn to the middle of that piece, back to where the
-robot was, by 1 mm a step. In a corridor little holds against it: with a laser of 4 m the robot lost 1.3 % of
-its way with odometry, and 4 to 10 % without.
+For a laser that sees a few metres, a wall ends at the range limit. In the map the last cell has only a piece
+of the wall, and the next scan sees more of it. Its points are drawn to the middle of that piece, back to
+where the robot was, by 1 mm a step. In a corridor little holds against it: with a laser of 4 m the robot lost
+1.3 % of its way with odometry, and 4 to 10 % without.
 """
 
 from __future__ import annotations

@@ -15,10 +15,10 @@ from nscan_cli.slam.state import SlamState
 
 
 def close_loops_left_open(state: SlamState) -> list[Place]:
-    """Search once more where no loop relates the path to an earlier visit nearby; returns the places found.
+    """Search once more where no loop ties the path to an earlier visit nearby; returns the places found.
 
-    The graph is optimised: such a place may have been too far off while it grew, or not yet seen by a second
-    keyframe. Changes what `close_loops` changes.
+    It is called once the graph is optimised. While the graph grew, such a place may have been too far off, or
+    not yet seen by a second keyframe. Changes what `close_loops` changes.
     """
     route, known = state.route, len(state.places)
     related = [row for relation in state.loop_relations() for row in relation.nodes]

@@ -1,9 +1,9 @@
-"""Detection of large loops, which drift has left open (paper, V: step 4 of the loop).
+"""Detection of large loops that drift has left open (paper, V: step 4 of the loop).
 
-A joint match needs a start within a metre. The place is searched where the graph knows less than that about
-how a keyframe lies to an older one, or where a joint match left out all scans of another visit. A place
-counts if a second keyframe, searched independently, agrees. The search also has to confirm a loop that a
-joint match closed from such a start.
+A joint match needs a start within a metre. A place is searched where the graph knows less than that about a
+keyframe relative to an older one, or where a joint match left out all scans of another visit. A place counts
+if a second keyframe, searched independently, agrees. A loop that a joint match closed from such a start needs
+the same confirmation by the search.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """An upper bound on the uncertainty of keyframes: that along the most certain path to each.
 
-All other relations of the graph can only lower it. The bound takes a hundredth of the time of the whole
-graph.
+All other relations of the graph can only lower the uncertainty. The bound takes a hundredth of the time of
+the whole graph.
 """
 
 from __future__ import annotations

@@ -71,8 +71,8 @@ def verify_place(
 def stretches(options: NScanOptions, closing: LoopClosureOptions) -> NScanOptions:
     """The options with which stretches of the path are matched in place of single scans.
 
-    Where a laser looks ahead alone, scans of visits from opposite directions see little of the same. Those of
-    a stretch that hang together by the scans of their own visit see enough.
+    If a laser looks only ahead, scans of visits in opposite directions see little of the same. A stretch,
+    whose scans hang together by their own visit, sees enough.
     """
     return replace(
         options,
@@ -133,7 +133,7 @@ def why_too_few(
     """Why the keyframes that agree on a place are too few, or None; `sigma` is that from the last of them.
 
     A place farther off than the path drifts mostly only looks alike, while the right one has never been seen.
-    The likeness ends somewhere, so scans far apart have to agree there.
+    Places that look alike do so over a short distance only, so scans far apart must agree there.
     """
     place, first = agreeing[-1], agreeing[0]
     lost = bool(is_lost(sigma, options)[place.old])
