@@ -23,8 +23,8 @@ def seen_at_once(log: LaserLog) -> LaserLog:
 def ranges_at_once(log: LaserLog, rows: Indices) -> NDArray[np.float32]:
     """(N, B) the ranges (m) of the scans in rows (N,) from where the laser is at their stamps.
 
-    A corrected point is given to the beam that points to it most nearly. Beams that none is given to have no
-    return where they had none, and are unusable else: where the robot turns with its laser, fewer are seen.
+    Each corrected point goes to the beam that points to it most nearly. A beam without a point has no return
+    if it had none, else it is unusable: where the robot turns with its laser, fewer beams are left.
     """
     if log.beam_times is None or log.path is None:
         return log.ranges[rows]

@@ -72,10 +72,10 @@ def sweep_of_file(
     """The likeliest times of the turns, from what S scans say of them.
 
     `increments` (S,) rad and `beams` (S,) are the angles between beams and their numbers, `times` (S,) those
-    of the scans, s; all are in order of time. A time from beam to beam cannot be if it makes a scan last
-    longer than the time to the next, or a turn shorter than lasers turn. It is not believed then, unless
-    `as_recorded`: the time between scans is used. A file that says nothing of its beams may be of a laser
-    that sees at once.
+    of the scans, s; all are in order of time. A time from beam to beam is implausible if the scan would last
+    longer than the time to the next, or the turn would be faster than any laser. It is then replaced by the
+    time between scans, unless `as_recorded`. A file without times of beams may be of a laser that sees at
+    once.
     """
     none = np.zeros(len(times))
     if told is None:

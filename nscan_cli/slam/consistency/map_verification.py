@@ -28,9 +28,9 @@ class Repeat:
 
     @property
     def counts(self) -> bool:
-        """Whether a difference says something of the map.
+        """Whether a difference says something about the map.
 
-        Without odometry a map may be wrong where the first is right; then it mostly says so itself.
+        A repeat without odometry can be wrong where the map is right. Mostly it warns then.
         """
         return self.name != WITHOUT_ODOMETRY or not self.path.notices
 

@@ -34,11 +34,11 @@ class PathDifference:
 def path_differences(
     path: MappedPath, repeat: MappedPath, options: VerificationOptions
 ) -> list[PathDifference]:
-    """Over each length the differences of a path and of its repeat, which has some of its scans.
+    """The differences of a path and of its repeat, which has some of its scans, over each length.
 
-    Compared are the relative positions of the last scan of a way, seen from the first. A length is left out
-    where no way is that long without a break, a gap, or scans of the repeat alone that do not tell their
-    places.
+    The relative poses of the first and the last scan of a way are compared. A length is left out if no way is
+    that long without a break, without a gap, and without scans of which the repeat alone does not tell the
+    place.
     """
     at = np.searchsorted(path.rows, repeat.rows)
     one, other = path.poses[at], repeat.poses

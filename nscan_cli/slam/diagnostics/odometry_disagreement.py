@@ -34,9 +34,9 @@ def odometry_disagreements(
 ) -> list[OdometryDisagreement]:
     """The stretches over which they disagree, of K keyframes in rows (K,), at poses (K, 3).
 
-    Odometry (S, 3) is that of all scans. Nothing is compared over the rows `breaks`, at which tracking broke.
-    From end to end of a stretch is compared: the length of the path between depends on how many keyframes
-    there are where the robot turns. Nor is anything compared where odometry is missing (nan).
+    Odometry (S, 3) is that of all scans. Nothing is compared across the rows `breaks`, at which tracking
+    broke, nor where odometry is missing (nan). The distance between both ends of a stretch is compared,
+    because the length of the path between them depends on how many keyframes there are in turns.
     """
     known = are_known(odometry)
     rows, poses = rows[known[rows]], poses[known[rows]]
