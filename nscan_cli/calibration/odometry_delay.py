@@ -13,24 +13,47 @@ import numpy as np
 from nscan_cli.calibration.scan_motion import ScanMotion
 from nscan_cli.calibration.sweep_options import SweepCheckOptions
 from nscan_cli.calibration.turn_of_file import usual_turn
+from nscan_cli.logs.beam_times import BeamTimes
 from nscan_cli.logs.laser_log import LaserLog
-from nscan_cli.logs.robot_path import poses_at, robot_path
-from nscan_cli.poses import are_known
+from nscan_cli.logs.robot_path import RobotPath, poses_at, robot_path
+from nscan_cli.poses import Array, Indices, are_known
 
 
 def odometry_delay(log: LaserLog, motion: ScanMotion, options: SweepCheckOptions) -> float:
-    """Seconds to add to the stamps of odometry, so that its turns fit best to those by scans; 0 in doubt."""
-    path, times = log.odometry_path, log.times
+    """Seconds to add to the stamps of odometry, so that its turns fit best to those by scans; 0 in doubt.
+
+    Only half of the scans in turns are matched if these fit hardly better with any delay.
+    """
+    path, measured = log.odometry_path, dict[int, float]()
     if log.odometry is None or path is None or log.beam_times is None:
         return 0.0
-    found = {row: motion.turned(row, usual_turn(log)) for row in _turning(motion, options)}
-    measured = {row: turned for row, turned in found.items() if turned is not None}
-    rows, turned = np.array(list(measured)), np.array(list(measured.values()))
-    if np.count_nonzero(np.abs(turned) > options.min_winding) < options.min_delay_turns:
-        return 0.0
+    rows, turn, delay = _turning(motion, options), usual_turn(log), 0.0
+    for part in (rows[::2], rows[1::2]):
+        found = {row: motion.turned(row, turn) for row in part}
+        measured.update({row: turned for row, turned in found.items() if turned is not None})
+        turns = np.array(list(measured.values()))
+        if np.count_nonzero(np.abs(turns) > options.min_winding) >= options.min_delay_turns:
+            delay, gain = _best_delay(log, path, log.beam_times, np.array(list(measured)), turns, options)
+            if gain > options.no_delay_gain:
+                return 0.0
+    return delay
+
+
+def _best_delay(
+    log: LaserLog,
+    path: RobotPath,
+    beams: BeamTimes,
+    rows: Indices,
+    turned: Array,
+    options: SweepCheckOptions,
+) -> tuple[float, float]:
+    """The delay (s) with which odometry disagrees least with the turns (n,) at rows (n,), 0 in doubt.
+
+    And by what share of what it does without it disagrees then.
+    """
     # What a scan tells is where the robot is at its middle beam.
-    middle = log.beam_times.first + 0.5 * (log.beam_counts() - 1) * log.beam_times.step
-    begin, end = (times + middle)[rows - 1], (times + middle)[rows + 1]
+    middle = beams.first + 0.5 * (log.beam_counts() - 1) * beams.step
+    begin, end = (log.times + middle)[rows - 1], (log.times + middle)[rows + 1]
     heading = np.unwrap(path.poses[:, 2])
 
     def disagreement(delay: float) -> float:
@@ -43,13 +66,14 @@ def odometry_delay(log: LaserLog, motion: ScanMotion, options: SweepCheckOptions
     delays = options.delay_step * np.arange(-count, count + 1)
     off = np.array([disagreement(delay) for delay in delays.tolist()])
     best = int(np.argmin(off))
+    gain = float(off[best] / off[count]) if off[count] > 0.0 else 1.0
     near = slice(max(best - options.delays_fitted, 0), best + options.delays_fitted + 1)
     # At an end of the range the best one may lie beyond.
-    if best in (0, 2 * count) or off[best] > options.delay_gain * off[count]:
-        return 0.0
+    if best in (0, 2 * count) or gain > options.delay_gain:
+        return 0.0, gain
     bend, slope, _ = np.polyfit(delays[near] - delays[best], off[near], 2).tolist()
     delay = round(float(delays[best]) - (slope / (2 * bend) if bend > 0.0 else 0.0), 3)
-    return delay if abs(delay) >= options.least_delay else 0.0
+    return (delay if abs(delay) >= options.least_delay else 0.0), gain
 
 
 def _turning(motion: ScanMotion, options: SweepCheckOptions) -> list[int]:

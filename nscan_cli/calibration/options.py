@@ -48,7 +48,7 @@ class StepOptions:
     (rad). With a larger value fewer steps count, and each tells more."""
     metres_per_radian: float = 0.3
     """Motion that a turn of one radian counts as, m. With a larger value turns weigh more."""
-    pair: PairOptions = field(default_factory=PairOptions)
+    pair: PairOptions = field(default_factory=lambda: PairOptions(tolerance=1e-4, coarse_tolerance=3e-3))
 
 
 @dataclass(frozen=True)

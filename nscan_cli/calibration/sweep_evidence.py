@@ -62,23 +62,38 @@ def sweep_evidence(
 ) -> SweepEvidence:
     """What the scans of a log say of some times of a turn, s, without its odometry and times of beams.
 
-    No more pairs are compared where `told`, one of those times, fits better than the others.
+    No more pairs are compared where `told`, one of those times, fits better than the others, or another far
+    better than it. Times that fit clearly worse than it are left out.
     """
     evidence = SweepEvidence(np.array(turns), np.empty((0, len(turns))))
     for one, other in turning_pairs(motion, max(abs(turn) for turn in turns), options):
-        energies = motion.energies(one, other, turns)
+        energies = motion.energies(one, other, evidence.turns.tolist())
         if energies is not None:
             evidence = replace(evidence, energies=np.vstack([evidence.energies, energies]))
             if _is_settled(evidence, told, options) or len(evidence.energies) == options.pairs:
                 break
+            evidence = _without_worse(evidence, told, options)
     return evidence
 
 
 def _is_settled(evidence: SweepEvidence, told: float, options: SweepCheckOptions) -> bool:
-    """Whether the time that the file tells fits better than the others already."""
-    others = [turn for turn in evidence.turns.tolist() if turn != told]
-    enough = len(evidence.energies) >= options.least_pairs
-    return enough and all(evidence.sigmas(told, turn) >= options.settled_sigmas for turn in others)
+    """Whether the time that the file tells fits better than the others already, or far worse than another."""
+    pairs, best = len(evidence.energies), evidence.sharpest
+    if best == told:
+        least = options.settled_sigmas if pairs >= options.least_pairs else np.inf
+    elif pairs >= options.least_decisive and evidence.sigmas(best, told) >= options.decided_sigmas:
+        least = options.settled_sigmas
+    else:
+        return False
+    return all(evidence.sigmas(best, turn) >= least for turn in evidence.turns.tolist() if turn != best)
+
+
+def _without_worse(evidence: SweepEvidence, told: float, options: SweepCheckOptions) -> SweepEvidence:
+    """The evidence without the times that fit clearly worse than the one that the file tells."""
+    if len(evidence.energies) < options.least_decisive:
+        return evidence
+    kept = [evidence.sigmas(told, turn) < options.dropped_sigmas for turn in evidence.turns.tolist()]
+    return SweepEvidence(evidence.turns[kept], evidence.energies[:, kept])
 
 
 def turning_pairs(motion: ScanMotion, turn: float, options: SweepCheckOptions) -> Iterator[tuple[int, int]]:

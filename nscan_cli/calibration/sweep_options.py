@@ -67,6 +67,13 @@ class SweepCheckOptions:
     settled_sigmas: float = 1.5
     """The comparison ends once the file's time makes scans sharper than the others by this number of standard
     deviations. A larger value takes longer."""
+    decided_sigmas: float = 6.0
+    """Nor once another time makes scans sharper than the file's by so many. A larger value takes longer."""
+    dropped_sigmas: float = 2.0
+    """A time that fits worse than the file's by so many is not tried on more pairs. A larger value takes
+    longer."""
+    least_decisive: int = 10
+    """Least pairs for the last two. More take longer."""
     shifts: tuple[int, ...] = (-2, 2, -4, 4, -7, 7)
     """Scans from the first of a pair to the second: the robot must move differently there and see the same.
     More shifts find more pairs and take longer."""
@@ -99,6 +106,9 @@ class SweepCheckOptions:
     delay_gain: float = 0.75
     """A delay is found if the turns disagree by at most this share of their disagreement without it. A larger
     value finds delays more often, also where there is none."""
+    no_delay_gain: float = 0.9
+    """No more turns are measured where half of them disagree by more than this share with any delay. A larger
+    value takes longer."""
     stamp_tolerance: float = 0.25
     """A delay of odometry is due to scans stamped at another beam if that explains it to within this share of
     the time between two such beams. A larger value blames the stamps more often, and the clock of odometry

@@ -53,6 +53,9 @@ class PairOptions:
     """Most iterations in each stage."""
     tolerance: float = 1e-5
     """A stage has converged when a step moves the pose by less, m and rad."""
+    coarse_tolerance: float = 1e-5
+    """The same of the stages before the last. With a larger one a match is quicker, and its last stage begins
+    farther from where it ends."""
     inlier_bound: float = 9.0
     """Squared Mahalanobis distance from a Gaussian within which a point lies on it."""
     least_overlap: float = 0.1
@@ -137,14 +140,14 @@ def settle_pair(
     """Match points (m, 2) of a scan as `match_pair` does; quick, for what asks for no uncertainty."""
     prior = prior or Prior(np.zeros(3), np.zeros((3, 3)))
     problem = PairProblem(reference.grid, reference.half, begin_association(points), options.scale, prior)
-    pose, tolerance = start.copy(), options.tolerance
+    pose = start.copy()
     _, energy, _, _, converged = minimise_pairwise(
         problem,
         pose,
         np.array(options.widenings),
         options.max_iterations,
-        tolerance,
-        tolerance,
+        options.coarse_tolerance,
+        options.tolerance,
         np.empty((3, 3)),
     )
     pose[2] = wrap(pose[2])
@@ -165,10 +168,10 @@ def match_pair(
     pose, hessian, gradient, out = start.copy(), np.empty((3, 3)), np.empty(3), np.empty(ENERGY_NUMBERS)
     iterations, evaluations, last, converged = 0, 1, 0, [True]
     # One stage a call: whether the match has converged depends on the last stage alone.
-    limits = options.max_iterations, options.tolerance, options.tolerance
-    for widening in options.widenings:
+    tolerances = [options.coarse_tolerance] * (len(options.widenings) - 1) + [options.tolerance]
+    for widening, enough in zip(options.widenings, tolerances, strict=True):
         _, _, last, evaluated, ended = minimise_pairwise(
-            problem, pose, np.array([widening]), *limits, hessian
+            problem, pose, np.array([widening]), options.max_iterations, enough, enough, hessian
         )
         iterations += last
         evaluations += evaluated
