@@ -82,7 +82,9 @@ class UnevenMotionOptions:
     max_beams: int = 300
     """Beams of a scan that are matched, evenly spread, are about so many. More tell more and take longer."""
     pair: PairOptions = field(
-        default_factory=lambda: PairOptions(widenings=(0.3, 1.0), scale=0.3, tolerance=3e-4)
+        default_factory=lambda: PairOptions(
+            widenings=(0.3, 1.0), scale=0.3, tolerance=5e-4, coarse_tolerance=3e-3
+        )
     )
 
 

@@ -120,7 +120,7 @@ class _Run:
         self._knots[::parts] = poses[first : last + 1]
         self._knots[:, 2] = np.unwrap(self._knots[:, 2])
         near = np.arange(max(first - uneven.scans, 0), min(last + 1 + uneven.scans, len(log)))
-        self._others = near[(near < first) | (near > last)]
+        self._near, self._is_other = near, (near < first) | (near > last)
         self._moving = replace(log, path=robot_path(log.times[near], poses[near]))
         self._inside = slice(parts * (rows[0] - first), parts * (rows[1] - first) + 1)
 
@@ -146,7 +146,7 @@ class _Run:
         """Find the path on which the beams fit best; whether they tell it."""
         uneven, start = self._options.uneven_motion, self._knots
         seen, turns = self._seen(), len(start) / uneven.parts
-        if len(self._others) < uneven.scans or len(seen.points) < uneven.min_points * turns:
+        if self._is_other.sum() < uneven.scans or len(seen.points) < uneven.min_points * turns:
             return False
         energy = TurnEnergy(self._reference(), seen, self._times, start, uneven)
         for widening in uneven.pair.widenings:
@@ -159,12 +159,14 @@ class _Run:
     def _reference(self) -> Ndt:
         """The Gaussians of the scans on both sides."""
         gaussians, reach = self._options.nscan.gaussians, self._options.tracking.max_range
-        points = [self._moving.batch_points(slice(row, row + 1), reach)[0] for row in self._others.tolist()]
-        ends = np.cumsum([0, *(len(each) for each in points)])
+        near, others = self._near, self._is_other
+        points, ends = self._moving.batch_points(slice(int(near[0]), int(near[-1]) + 1), reach)
+        sizes = np.diff(ends)
         assert self._moving.path is not None
-        poses = poses_at(self._moving.path, self._log.times[self._others])
+        poses = poses_at(self._moving.path, self._log.times[near[others]])
+        ends = np.append(0, np.cumsum(sizes[others]))
         return Ndt.of_scans(
-            np.concatenate(points), ends, poses, gaussians.cell, gaussians.minimum, gaussians.floor,
+            points[np.repeat(others, sizes)], ends, poses, gaussians.cell, gaussians.minimum, gaussians.floor,
             neighbourhood=WALL_DIRECTION,
         )  # fmt: skip
 
@@ -181,6 +183,7 @@ class _Run:
 
 def _least(energy: TurnEnergy, knots: Array, widening: float, options: UnevenMotionOptions) -> Array:
     """The knots (K, 3) of least energy, from `knots` (K, 3) on."""
+    tolerance = options.pair.tolerance if widening == 1.0 else options.pair.coarse_tolerance
     here, damping = energy.evaluate(knots, widening), PAIRWISE_STEPS.first
     for _ in range(options.iterations):
         step = newton_step(energy.pattern, here, damping)
@@ -190,7 +193,7 @@ def _least(energy: TurnEnergy, knots: Array, widening: float, options: UnevenMot
             accepted = is_accepted(here.value, there.value, PAIRWISE_STEPS)
             if accepted:
                 knots, here = knots + step, there
-            if is_last(float(np.abs(step).max()), options.pair.tolerance, damping, PAIRWISE_STEPS):
+            if is_last(float(np.abs(step).max()), tolerance, damping, PAIRWISE_STEPS):
                 break
         damping = next_damping(damping, accepted, PAIRWISE_STEPS)
     return knots
