@@ -6,7 +6,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from nscan_cli.kernels.decorators import kernel
+from nscan_cli.kernels.decorators import kernel, leaf_kernel
+from nscan_cli.matching.pose_kernels import wrapped
 from nscan_cli.poses import Array, relative
 
 
@@ -17,6 +18,16 @@ class Prior(NamedTuple):
     """(3,) z"""
     information: Array
     """(3, 3) P"""
+
+
+@leaf_kernel
+def prior_value(prior: Prior, pose: Array) -> float:
+    """The prior's part of the objective at a pose (3,), eq. (14)."""
+    mean, information = prior
+    x, y, turn = pose[0] - mean[0], pose[1] - mean[1], wrapped(pose[2] - mean[2])
+    square = x * x * information[0, 0] + y * y * information[1, 1] + turn * turn * information[2, 2]
+    across = x * y * information[0, 1] + x * turn * information[0, 2] + y * turn * information[1, 2]
+    return float(0.5 * square + across)
 
 
 class MotionModel(NamedTuple):

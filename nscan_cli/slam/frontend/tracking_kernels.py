@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from nscan_cli.kernels.array_assignment import assign, assign_rows
 from nscan_cli.kernels.decorators import kernel
-from nscan_cli.matching.motion_model import Prior, motion_sigmas
+from nscan_cli.matching.motion_model import Prior, motion_sigmas, prior_value
 from nscan_cli.matching.pose_kernels import relative_pose, wrapped
 from nscan_cli.ndt.grid_growth import CELLS_PER_POINT
 from nscan_cli.ndt.hash_grid import Grid
@@ -98,19 +98,22 @@ def match_with_doubt(
 ) -> None:
     """Match scan k again with a wide prior if it contradicts odometry (3,) or has few inliers.
 
-    With fewer inliers than `threshold` it is also matched from other angles. Unless the first match
-    contradicts odometry, another one must have clearly more inliers to replace it.
+    With fewer inliers than `threshold` it is also matched from other angles. Another match replaces the first
+    one if it has clearly more inliers; if the first one contradicts odometry, a lower energy is enough.
     """
     is_contradiction = contradicts(prior, found.poses[k], settings.contradiction_sigmas)
     if not is_contradiction and found.inliers[k] >= threshold:
         return
     trusted, inliers, value = prior.information.copy(), found.inliers[k], found.values[k]
+    energy = value - prior_value(prior, found.poses[k])
     pose, hessian = found.poses[k].copy(), found.hessians[k].copy()
     predict(track, settings, odometry, settings.odometry, prior)
     match_from_prediction(grid, settings, points, prior, found, k)
     if found.inliers[k] < threshold:
         match_from_other_angles(grid, settings, points, prior, threshold, track.counts, found, k)
-    if not is_contradiction and found.inliers[k] <= inliers + settings.inlier_margin:
+    has_more = found.inliers[k] > inliers + settings.inlier_margin
+    fits_better = found.values[k] - prior_value(prior, found.poses[k]) < energy
+    if not (has_more or (is_contradiction and fits_better)):
         found.values[k], found.inliers[k] = value, inliers
         assign(found.poses[k], pose)
         assign_rows(found.hessians[k], hessian)

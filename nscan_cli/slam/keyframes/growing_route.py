@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from nscan_cli.poses import relative
 from nscan_cli.slam.frontend.tracked_batch import TrackedBatch
 from nscan_cli.slam.keyframes.keyframe import Keyframe
 from nscan_cli.slam.keyframes.route import chain_relations, extended, route_of
@@ -33,5 +34,9 @@ def extend_route(state: SlamState, keyframe: Keyframe) -> None:
     if not size:
         state.route = route_of(state.keyframes.list, state.chain, np.zeros((1, 3)))
         return
-    state.detector.extend(state.chain[size - 1], keyframe.tracked.path - float(state.route.paths[-1]))
+    relation, length = state.chain[size - 1], keyframe.tracked.path - float(state.route.paths[-1])
+    odometry = None
+    if state.odometry is not None:
+        odometry = relative(state.odometry[relation.nodes[1]], state.odometry[relation.nodes[0]])
+    state.detector.extend(relation, length, odometry)
     state.route = extended(state.route, size + 1)

@@ -29,9 +29,13 @@ class TrackedPath:
         """(len, 3, 3) of the relations' measurements."""
         return self._covariances[: len(self.relations)]
 
-    def extend(self, relation: Pairwise, length: float) -> None:
-        """Add the next relation, over a path of this `length` (m)."""
-        slips = self._variances[0] * length, self._variances[1] * length, self._variances[2] * length
+    def extend(self, relation: Pairwise, length: float, slip: tuple[float, float] = (0.0, 0.0)) -> None:
+        """Add the next relation, over a path of this `length` (m).
+
+        By `slip` it may have slipped besides: variances of a coordinate (m²) and of its angle (rad²).
+        """
+        along = self._variances[0] * length + slip[0]
+        slips = along, along, self._variances[2] * length + slip[1]
         covariance, information = _with_slips(relation.information, slips)
         end = len(self.relations)
         if end == len(self._covariances):

@@ -28,6 +28,7 @@ from nscan_cli.slam.loop_closure.options import LoopClosureOptions
 from nscan_cli.slam.loop_closure.place import Place
 from nscan_cli.slam.loop_closure.place_search import find_place
 from nscan_cli.slam.loop_closure.relative_uncertainty import RelativeSigma, RelativeUncertainty
+from nscan_cli.slam.loop_closure.slip_evidence import SlipEvidence
 from nscan_cli.slam.loop_closure.verification import (
     LOST,
     is_lost,
@@ -47,6 +48,7 @@ class LoopDetector:
     ) -> None:
         self.options, self.nscan, self.match, self.energies = options, nscan, match, energies
         self.tracked_path = TrackedPath(options.drift, options.drift_angle)
+        self._slips = SlipEvidence(options.disagreement, options.min_compared_steps)
         self._refused: list[Loop] = []
         self._waiting: list[tuple[Place, str]] = []
         self._uncertainty, self._links = RelativeUncertainty(), LinkCache()
@@ -57,9 +59,12 @@ class LoopDetector:
         self._refused, self._waiting = self.refused(), []
         self._searched, self._uncertainty = -np.inf, RelativeUncertainty()
 
-    def extend(self, relation: Pairwise, length: float) -> None:
-        """Add a relation of the chain over a path of `length` (m)."""
-        self.tracked_path.extend(relation, length)
+    def extend(self, relation: Pairwise, length: float, odometry: Array | None = None) -> None:
+        """Add a relation of the chain over a path of `length` (m); `odometry` (3,) is it by odometry."""
+        slip = (0.0, 0.0)
+        if odometry is not None:
+            slip = self._slips.variances(relation.measurement, odometry, length)
+        self.tracked_path.extend(relation, length, slip)
 
     def close(
         self,

@@ -15,6 +15,11 @@ class LoopClosureOptions:
     """Standard deviation of tracking slips, m/√m. A larger one searches more often and farther."""
     drift_angle: float = 0.002
     """Standard deviation of tracking slips, rad/√m. A larger one searches more often and farther."""
+    disagreement: float = 4.0
+    """Tracking may have slipped where it differs from odometry by more than the usual difference times this.
+    A larger number searches less far after such a step."""
+    min_compared_steps: int = 20
+    """Steps from keyframe to keyframe after which the usual difference is known."""
     lever_arm: float = 20.0
     """Distance at which angles count when paths are compared by their uncertainty, m. With a larger one,
     paths with certain angles are preferred."""
@@ -44,8 +49,9 @@ class LoopClosureOptions:
     earlier_radius: float = 15.0
     """Largest distance of keyframes of the earlier visit from where the place may be, m. A larger one
     compares with more of that visit."""
-    min_score: float = 0.55
-    """Least share of points that fit at a place. A larger share refuses more."""
+    min_score: float = 0.42
+    """Least share of points that fit at a place. A larger share refuses more. A laser that looks ahead sees
+    half of what it saw from the opposite direction."""
     rival_score: float = 0.88
     """A place is ambiguous if another one scores this share of its score. A larger share refuses less."""
     rival_distance: float = 1.5

@@ -1,0 +1,47 @@
+"""Where tracking may have slipped, as odometry tells (paper, V: large loops)."""
+
+from __future__ import annotations
+
+from collections import deque
+
+import numpy as np
+
+from nscan_cli.poses import Array, relative, wrap
+
+REMEMBERED = 1000
+"""Steps whose median difference is the usual one: enough that more change nothing."""
+
+
+class SlipEvidence:
+    """Compares tracking with odometry from keyframe to keyframe.
+
+    Where both agreed so far and now differ by far more, one of them has slipped, and nothing tells which. So
+    the path may be off by any part of the difference.
+    """
+
+    def __init__(self, disagreement: float, min_steps: int) -> None:
+        """They disagree where they differ by more than `disagreement` times the usual difference.
+
+        The usual one is known after `min_steps` steps.
+        """
+        self._disagreement, self._min_steps = disagreement, min_steps
+        self._squares: deque[tuple[float, float]] = deque(maxlen=REMEMBERED)
+        """Square differences a metre of path: of a coordinate, m²/m, and of the angle, rad²/m."""
+
+    def variances(self, step: Array, odometry: Array, length: float) -> tuple[float, float]:
+        """By how much a step (3,) may have slipped: variances of a coordinate (m²) and of its angle (rad²).
+
+        `odometry` is that step (3,) by odometry, nan where there is none, and `length` that of its path (m).
+        0 where both agree. If all places between both are as likely, the variance about one end is a third of
+        the square.
+        """
+        if not (np.isfinite(odometry).all() and length > 0.0):
+            return 0.0, 0.0
+        off = relative(step, odometry)
+        squares = np.array([0.5 * (off[0] ** 2 + off[1] ** 2), wrap(off[2]) ** 2])
+        self._squares.append(tuple((squares / length).tolist()))
+        if len(self._squares) < self._min_steps:
+            return 0.0, 0.0
+        usual = np.median(np.array(self._squares), axis=0) * length
+        place, angle = np.where(squares > self._disagreement**2 * usual, squares / 3, 0.0).tolist()
+        return place, angle

@@ -1,0 +1,57 @@
+"""Where tracking may have slipped, as odometry tells."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from nscan_cli.poses import Array, compose
+from nscan_cli.slam.loop_closure.options import LoopClosureOptions
+from nscan_cli.slam.loop_closure.slip_evidence import SlipEvidence
+
+STEP = np.array([1.5, 0.1, 0.2])
+NONE = np.full(3, np.nan)
+OPTIONS = LoopClosureOptions()
+
+
+def evidence(noise: float, steps: int = 200) -> SlipEvidence:
+    """After some steps of 1.5 m whose coordinates and angle differ by `noise` (m and rad)."""
+    found, rng = SlipEvidence(OPTIONS.disagreement, OPTIONS.min_compared_steps), np.random.default_rng(1)
+    for _ in range(steps):
+        found.variances(STEP, odometry(rng.normal(0.0, noise, 3)), 1.5)
+    return found
+
+
+def odometry(off: Array) -> Array:
+    """What odometry says of STEP where tracking differs from it by `off` (3,)."""
+    by_odometry: Array = compose(STEP, -np.asarray(off))
+    return by_odometry
+
+
+def test_a_step_far_off_the_odometry_may_be_anywhere_between_both():
+    """Golden: a uniform distribution over 0.6 m has 0.6² / 3 about its end, half of it for each coordinate."""
+    place, angle = evidence(0.01).variances(STEP, odometry(np.array([0.6, 0.0, 0.0])), 1.5)
+    assert place == pytest.approx(0.5 * 0.6**2 / 3)
+    assert angle == 0.0
+    place, angle = evidence(0.01).variances(STEP, odometry(np.array([0.0, 0.0, 0.3])), 1.5)
+    assert angle == pytest.approx(0.3**2 / 3)
+
+
+def test_a_usual_difference_is_no_slip():
+    """Bad odometry differs from tracking at every step, and tells nothing of it."""
+    good, bad = evidence(0.01), evidence(0.2)
+    off = np.array([0.15, 0.15, 0.15])
+    assert min(good.variances(STEP, odometry(off), 1.5)) > 0.0
+    assert bad.variances(STEP, odometry(off), 1.5) == (0.0, 0.0)
+
+
+def test_nothing_is_told_before_the_usual_difference_is_known_or_without_odometry():
+    early, off = evidence(0.01, steps=OPTIONS.min_compared_steps - 2), np.array([0.6, 0.0, 0.0])
+    assert early.variances(STEP, odometry(off), 1.5) == (0.0, 0.0)
+    assert evidence(0.01).variances(STEP, NONE, 1.5) == (0.0, 0.0)
+    assert evidence(0.01).variances(STEP, odometry(off), 0.0) == (0.0, 0.0)
+
+
+def test_turns_are_compared_across_the_jump_of_the_angle():
+    near = np.array([0.0, 0.0, 2 * np.pi])
+    assert evidence(0.01).variances(STEP, STEP + near, 1.5) == (0.0, 0.0)
