@@ -29,7 +29,7 @@ def odometry(off: Array) -> Array:
 
 
 def test_a_step_far_off_the_odometry_may_be_anywhere_between_both():
-    """Golden: a uniform distribution over 0.6 m has 0.6² / 3 about its end, half of it for each coordinate."""
+    """Golden: a uniform distribution over 0.6 m has 0.6² / 3 about its end; each coordinate has half."""
     place, angle = evidence(0.01).variances(STEP, odometry(np.array([0.6, 0.0, 0.0])), 1.5)
     assert place == pytest.approx(0.5 * 0.6**2 / 3)
     assert angle == 0.0
