@@ -49,7 +49,7 @@ class LoopClosureOptions:
     earlier_radius: float = 15.0
     """Largest distance of keyframes of the earlier visit from where the place may be, m. A larger one
     compares with more of that visit."""
-    min_score: float = 0.42
+    min_score: float = 0.45
     """Least share of points that fit at a place. A larger share refuses more. A laser that looks ahead sees
     half of what it saw from the opposite direction."""
     rival_score: float = 0.88
