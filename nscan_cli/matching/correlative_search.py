@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from nscan_cli.kernels.decorators import kernel
 from nscan_cli.poses import Array
 
-FIELD_LEVELS = 4
+FIELD_LEVELS = 5
 """Levels of a field. This and the next three are the layout of its arrays, compiled into the kernels."""
 PAD = 1 << (FIELD_LEVELS - 1)
 """Cells on a side of a square of the coarsest level."""

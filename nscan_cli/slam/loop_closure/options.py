@@ -49,9 +49,12 @@ class LoopClosureOptions:
     earlier_radius: float = 15.0
     """Largest distance of keyframes of the earlier visit from where the place may be, m. A larger one
     compares with more of that visit."""
-    min_score: float = 0.45
-    """Least share of points that fit at a place. A larger share refuses more. A laser that looks ahead sees
-    half of what it saw from the opposite direction."""
+    min_score: float = 0.55
+    """Least share of points that fit at a place. A larger share refuses more."""
+    min_score_far: float = 0.45
+    """The same share where the path may be off by more than `min_distance`. It is smaller, since only such a
+    loop corrects the path there, and a laser that looks ahead sees half of what it saw from the opposite
+    direction."""
     rival_score: float = 0.88
     """A place is ambiguous if another one scores this share of its score. A larger share refuses less."""
     rival_distance: float = 1.5

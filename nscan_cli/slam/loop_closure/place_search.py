@@ -35,7 +35,8 @@ def find_place(
         return None
     scan, field = sought
     about = Search(field, scan, route.poses[centre], window)
-    found = about.best(closing.min_score)
+    is_far = window.distance > closing.min_distance
+    found = about.best(closing.min_score_far if is_far else closing.min_score)
     return (
         None if found is None else verify_place(route, centre, earlier, about, found, match, closing, nscan)
     )

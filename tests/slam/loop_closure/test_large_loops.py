@@ -20,7 +20,7 @@ from tests.slam.mapped_logs import Mapped, mapped, position_rmse
 
 ALONG, ACROSS, ASLANT = (2.5, 0.0, 0.0), (0.0, 2.5, 0.0), (-2.5, 1.0, 0.05)
 ASIDE = (1.0, 2.0, -0.05)
-NEVER = LoopClosureOptions(min_score=1.1)
+NEVER = LoopClosureOptions(min_score=1.1, min_score_far=1.1)
 """No scan fits better than entirely."""
 
 

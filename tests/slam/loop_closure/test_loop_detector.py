@@ -41,7 +41,7 @@ SLIPS = pytest.mark.parametrize(
 SLIPPED = 34
 """The relation of round_drive() that is bent, 51 m from the start."""
 ACROSS = (0.0, 2.5, 0.0)
-NEVER = LoopClosureOptions(min_score=1.1)
+NEVER = LoopClosureOptions(min_score=1.1, min_score_far=1.1)
 """No scan fits better than entirely."""
 
 

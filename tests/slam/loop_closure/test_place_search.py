@@ -113,11 +113,23 @@ def test_from_there_a_joint_match_alone_does_not_find_it(off):
 def test_what_is_beyond_the_window_or_scores_too_little_is_not_found():
     assert found(window=dataclasses.replace(WINDOW, distance=1.0)) is None
     assert (
-        found(window=dataclasses.replace(WINDOW, turn=0.05), closing=LoopClosureOptions(min_score=0.8))
+        found(
+            window=dataclasses.replace(WINDOW, turn=0.05),
+            closing=LoopClosureOptions(min_score=0.8),
+        )
         is None
     )
     assert isinstance(found(), Place)
     assert found(closing=LoopClosureOptions(min_score=1.01)) is None
+
+
+def test_a_place_farther_off_needs_a_smaller_score():
+    """Only such a loop corrects the path there."""
+    never_near = LoopClosureOptions(min_score=1.01)
+    farther = dataclasses.replace(WINDOW, distance=never_near.min_distance + 1.0)
+    assert found(closing=never_near) is None
+    assert isinstance(found(window=farther, closing=never_near), Place)
+    assert found(window=farther, closing=LoopClosureOptions(min_score_far=1.01)) is None
 
 
 @pytest.mark.parametrize("off", [(2.0, 0.0, 0.0), (0.3, 0.2, 0.05), (-1.4, -0.1, 0.0)])
