@@ -186,8 +186,10 @@ def _turns(
     options: RobotPartsOptions,
 ) -> Array:
     """(P,) turn between the scans of each pair, rad; 0 if no turn makes them alike."""
-    every = max(round(options.step / abs(bearings[1] - bearings[0])), 1) if len(bearings) > 1 else 1
-    step = every * abs(float(bearings[min(1, len(bearings) - 1)] - bearings[0]))
+    apart = abs(float(bearings[min(1, len(bearings) - 1)] - bearings[0]))
+    # A damaged file may have beams in one direction.
+    every = max(round(min(options.step / apart, len(bearings))), 1) if apart > 0.0 else 1
+    step = every * apart
     # Where most beams keep their range, along a corridor, these are of walls and show turns.
     hidden = constant if constant.mean() <= options.max_hidden_share else np.zeros_like(constant)
     sides = []

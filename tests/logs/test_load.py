@@ -11,7 +11,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 
 from nscan_cli.errors import InputDataError, InputMissingError, NscanError, WrongUsageError
@@ -146,6 +146,7 @@ TOKENS = st.sampled_from(
 
 @FUZZ
 @given(st.lists(st.tuples(st.integers(0, 2**16), TOKENS, st.booleans()), min_size=1, max_size=12))
+@example([(0, "FLASER", True), (0, "FLASER", True), (0, "FLASER", True), (43, "1e-300", False)])
 def test_mutated_lines(tmp_path, changes):
     lines = [
         "PARAM robot_frontlaser_offset 0.1 nohost 0",
