@@ -125,6 +125,14 @@ class TrackingOptions:
     degeneracy_poses: int = 3
     """Number of known poses from which on `degeneracy` is checked: fewer give no velocity."""
     degeneracy: DegeneracyOptions = field(default_factory=DegeneracyOptions)
+    standstill_share: float = 0.5
+    """Without odometry, scans that tell little are tracked from behind, too, if the robot goes less far there
+    than this share of its way at the highest speed after them. A larger share takes more time."""
+    standstill_lag: float = 0.2
+    """Nothing is done about a shorter way that is missing, m. A larger value keeps more scans as they are."""
+    standstill_scans: int = 512
+    """Most first scans of a log that wait for one that tells its place. A larger number takes more time and
+    memory where a log begins in a bare corridor."""
     range_limit_outliers: float = 0.001
     """Share of ranges that may exceed the range limit, as echoes. A larger one gives a shorter limit."""
     range_limit_share: float = 0.01

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -45,6 +45,17 @@ class ScanBatch:
         """The scans from the `first` on, before the `end`."""
         odometry = None if self.odometry is None else self.odometry[first:end]
         return ScanBatch(self.first + first, self.points, self.ends[first : end + 1], odometry, self.shares)
+
+    def copied(self) -> ScanBatch:
+        """The same scans, with points and shares of their own."""
+        return replace(self, points=self.points.copy(), shares=self.shares.copy())
+
+    def backwards(self) -> ScanBatch:
+        """The scans from the last to the first, without odometry, as if time went backwards."""
+        order = np.arange(len(self))[::-1]
+        points, ends = self.chosen(order)
+        shares = np.concatenate([self.shares[self.ends[k] : self.ends[k + 1]] for k in order])
+        return ScanBatch(self.first, points, ends, None, -shares)
 
     def chosen(self, chosen: Indices) -> tuple[Array, Indices]:
         """A copy of the points (P, 2) of the scans with indices `chosen` (c,), and their `ends` (c + 1,)."""

@@ -6,6 +6,7 @@ tracked as part of the segment, and also as a segment of their own.
 
 from __future__ import annotations
 
+import copy
 from collections import deque
 from dataclasses import replace
 
@@ -21,6 +22,7 @@ from nscan_cli.slam.frontend.break_detection import (
     sees_the_same,
 )
 from nscan_cli.slam.frontend.first_scan import place_first
+from nscan_cli.slam.frontend.motion_from_behind import motion_from_behind, untold_stretches
 from nscan_cli.slam.frontend.options import BreakOptions, LaserView, TrackingOptions
 from nscan_cli.slam.frontend.scan_batch import ScanBatch
 from nscan_cli.slam.frontend.sector_of_view import laser_view
@@ -117,12 +119,33 @@ class SegmentTracker:
         unmatched = self._unmatched
         together = sorted([scans, *unmatched], key=lambda batch: batch.first)
         scans = ScanBatch.together(together) if unmatched else scans
-        found = self.tracker.track(scans, may_wait)
+        if self._has_odometry:
+            found = self.tracker.track(scans, may_wait)
+        else:
+            scans, found = self._track_both_ways(scans, may_wait)
         n = len(found.values)
         self._unmatched = [scans.part(n, len(scans))] if n < len(scans) else []
         if self._origin is not None:
             found = self._from_origin(found, self._origin)
         return TrackedBatch(scans.part(0, n), found)
+
+    def _track_both_ways(self, scans: ScanBatch, may_wait: bool) -> tuple[ScanBatch, TrackedScans]:
+        """Track scans without odometry, guided by their track from behind where they fit better so.
+
+        The first scans of a log may wait until some tell their place. Returns the scans as corrected.
+        """
+        again, guided, before = scans.copied(), scans.copied(), copy.deepcopy(self.tracker)
+        found = self.tracker.track(scans)
+        waits = may_wait and self._last is None and len(scans) < self.options.standstill_scans
+        if waits and (0, len(scans)) in untold_stretches(found, self.options):
+            self.tracker = before
+            return guided, found.part(0, 0)
+        motion = motion_from_behind(again, found, self._new_tracker(), self.options)
+        if motion is None:
+            return scans, found
+        before.searches += self.tracker.searches
+        self.tracker = before
+        return guided, self.tracker.track(replace(guided, odometry=motion))
 
     def _from_origin(self, found: TrackedScans, origin: Array) -> TrackedScans:
         """What was found in a later segment, in the frame of the first."""

@@ -1,0 +1,74 @@
+"""Step 1 without odometry: scans that fit badly or tell little are tracked from behind, too.
+
+Few beams hit a wall far ahead, too few for a Gaussian. So a robot that drives off, or drives as its log
+begins, seems to stand until the wall is near. From behind, the wall is near first, and its Gaussians hold the
+scans before.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from nscan_cli.poses import Array, Mask
+from nscan_cli.slam.frontend.options import TrackingOptions
+from nscan_cli.slam.frontend.scan_batch import ScanBatch
+from nscan_cli.slam.frontend.tracked_scans import TrackedScans
+from nscan_cli.slam.frontend.tracker import Tracker
+
+
+def motion_from_behind(
+    scans: ScanBatch, found: TrackedScans, tracker: Tracker, options: TrackingOptions
+) -> Array | None:
+    """Poses (n, 3) of scans as `tracker`, a new one, finds them from the last to the first.
+
+    nan except for stretches where the robot, as it was `found`, seems to stand, and where from behind all
+    scans tell a longer way and fit clearly better. None if there are no such. The points are corrected in
+    place.
+    """
+    untold = untold_stretches(found, options)
+    stretches = [each for each in untold if _seems_to_stand(found.poses, *each, options)]
+    if not stretches:
+        return None
+    behind = tracker.track(scans.backwards())
+    tells, inliers = _in_runs_that_tell(behind, options)[::-1], behind.inliers[::-1]
+    poses, guide = behind.poses[::-1], np.full((len(scans), 3), np.nan)
+    for first, end in stretches:
+        fits_better = inliers[first:end].mean() > found.inliers[first:end].mean() + options.inlier_margin
+        went_farther = _way(poses, first, end) - _way(found.poses, first, end) > options.standstill_lag
+        if fits_better and went_farther and tells[first:end].all():
+            # The step to the first of them, and the one from the last.
+            whole = slice(max(first - 1, 0), end + 1)
+            guide[whole] = poses[whole]
+    return guide if np.isfinite(guide).any() else None
+
+
+def untold_stretches(found: TrackedScans, options: TrackingOptions) -> list[tuple[int, int]]:
+    """The stretches (first, end) of scans that fit badly or do not tell their place."""
+    # The first scan of a log has nothing to be matched with, and tells.
+    told = np.concatenate([[True], _in_runs_that_tell(found, options), [True]])
+    return [(first, end) for first, end in np.flatnonzero(np.diff(told)).reshape(-1, 2).tolist()]
+
+
+def _seems_to_stand(poses: Array, first: int, end: int, options: TrackingOptions) -> bool:
+    """Whether the robot is far behind where it had come at the highest speed after a stretch."""
+    run = options.velocity_scans
+    starts = range(end, len(poses) - run)
+    fastest = max((_way(poses, at + 1, at + run + 1) / run for at in starts), default=0.0)
+    expected, way = fastest * (end - first), _way(poses, first, end)
+    return way < options.standstill_share * expected and expected - way > options.standstill_lag
+
+
+def _way(poses: Array, first: int, end: int) -> float:
+    """Distance (m) from the scan before a stretch to its last."""
+    return float(np.hypot(*(poses[end - 1] - poses[max(first - 1, 0)])[:2]))
+
+
+def _in_runs_that_tell(found: TrackedScans, options: TrackingOptions) -> Mask:
+    """Of each scan (n,), whether it is one of `velocity_scans` in a row that fit and tell their place."""
+    tells, run = found.inliers >= options.restart_inliers, options.velocity_scans
+    tells &= found.told_sigmas <= options.degeneracy.trusted_sigma
+    in_run = np.zeros(len(tells), dtype=np.bool_)
+    for first in range(len(tells) - run + 1):
+        if tells[first : first + run].all():
+            in_run[first : first + run] = True
+    return in_run

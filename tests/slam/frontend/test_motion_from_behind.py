@@ -1,0 +1,60 @@
+"""Scans without odometry that are tracked from behind, since the robot seemed to stand."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from nscan_cli.logs.laser_log import LaserLog
+from nscan_cli.logs.load import log_from
+from nscan_cli.logs.reading_options import ReadingOptions
+from nscan_cli.poses import Array
+from nscan_cli.slam.consistency.repeated_maps import mirrored
+from tests.simulation.scenes import corridor_and_room
+from tests.slam.mapped_logs import mapped
+
+HALT = 60
+"""Scans"""
+SCANS_IN_CORRIDOR = 40
+
+
+def drive_with_halt(at: int, seed: int, every: int) -> tuple[LaserLog, Array]:
+    """Down a corridor towards the far wall of a room, with a halt at a scan; the log, and its true poses."""
+    truth = corridor_and_room().truth()
+    truth = np.concatenate([truth[:at], np.repeat(truth[at : at + 1], HALT, axis=0), truth[at:]])
+    recording = corridor_and_room().record_at(truth, seed)
+    log = log_from(recording.carmen(), "halt.log", ReadingOptions(every=every, odometry=False))
+    return dataclasses.replace(log, truth=None), truth[::every][: len(log)]
+
+
+def way(poses: Array, scans: int) -> float:
+    """Distance (m) from the first pose."""
+    return float(np.hypot(*(poses[scans] - poses[0])[:2]))
+
+
+@pytest.mark.parametrize("every", [1, 3])
+@pytest.mark.parametrize(("at", "seed"), [(1, 2), (1, 3), (15, 3), (30, 1), (45, 1), (45, 2)])
+def test_a_robot_that_drives_towards_a_far_wall_does_not_seem_to_stand(at, seed, every):
+    """Up to 7 m were lost before, mostly without a word."""
+    log, truth = drive_with_halt(at, seed, every)
+    scans = (at + HALT + SCANS_IN_CORRIDOR) // every
+    assert way(mapped(log).graph.poses, scans) == pytest.approx(way(truth, scans), abs=0.02)
+
+
+@pytest.mark.parametrize("seed", [2, 3, 6])
+def test_so_in_the_mirror_image(seed):
+    log, truth = drive_with_halt(0, seed, 1)
+    scans = HALT + SCANS_IN_CORRIDOR
+    assert way(mapped(mirrored(log)).graph.poses, scans) == pytest.approx(way(truth, scans), abs=0.02)
+
+
+def test_the_sample_is_mapped_without_odometry_as_with_it():
+    """Four metres of its corridor were missing."""
+    rows = slice(0, 60)
+    alone, guided = (
+        mapped(log_from(corridor_and_room().record(3).carmen(), "sample.log", ReadingOptions(odometry=given)))
+        for given in (False, True)
+    )
+    np.testing.assert_allclose(alone.graph.poses[rows], guided.graph.poses[rows], atol=0.03)
