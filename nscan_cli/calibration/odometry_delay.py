@@ -32,9 +32,12 @@ def odometry_delay(log: LaserLog, motion: ScanMotion, options: SweepCheckOptions
         found = {row: motion.turned(row, turn) for row in part}
         measured.update({row: turned for row, turned in found.items() if turned is not None})
         turns = np.array(list(measured.values()))
-        if np.count_nonzero(np.abs(turns) > options.min_winding) >= options.min_delay_turns:
+        count = np.count_nonzero(np.abs(turns) > options.min_winding)
+        if count >= options.few_delay_turns:
             delay, gain = _best_delay(log, path, log.beam_times, np.array(list(measured)), turns, options)
-            if gain > options.no_delay_gain:
+            if count < options.min_delay_turns and gain > options.few_delay_gain:
+                delay = 0.0
+            elif gain > options.no_delay_gain:
                 return 0.0
     return delay
 

@@ -115,6 +115,11 @@ class SweepCheckOptions:
     less."""
     min_delay_turns: int = 15
     """Least number of scans in turns that a delay rests on. A larger value finds less."""
+    few_delay_turns: int = 8
+    """So many are enough where the delay is clear. A larger value finds less in short drives."""
+    few_delay_gain: float = 0.4
+    """It is clear if turns disagree by at most this share of their disagreement without it. A larger value
+    finds more in short drives, also where there is none."""
     max_delay_turns: int = 40
     """Largest number of them. More tell more and take longer."""
     sigmas: float = 3.0

@@ -39,6 +39,8 @@ class RangeUnitOptions:
     unlikely_factor: float = 6.0
     """And if the median in every other unit is off the typical one by more than this factor. A smaller value
     corrects more logs."""
+    min_returns: int = 50
+    """Least number of returns that make a unit certain. A larger value corrects fewer logs."""
     sample: int = 1 << 20
     """Number of readings from which the unit is told. A larger value takes longer."""
 
@@ -110,7 +112,8 @@ def wrong_unit(
         return None
     (off, name, scale), *others = fitting
     near, far = math.log(options.certain_factor), math.log(options.unlikely_factor)
-    is_certain = median >= options.remote_median and off <= near and all(other[0] > far for other in others)
+    is_certain = median >= options.remote_median and some.size >= options.min_returns
+    is_certain &= off <= near and all(other[0] > far for other in others)
     return WrongUnit(name, scale, median, tuple(other[2] for other in others), is_certain)
 
 

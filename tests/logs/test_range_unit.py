@@ -108,3 +108,10 @@ def test_the_recording_of_a_stranger():
     assert log.range_limits == pytest.approx((0.05, 12.0))
     assert 2.0 < float(np.median(log.ranges)) < 3.5
     assert len(log.report.contradictions) == 1
+
+
+@pytest.mark.parametrize(("beams", "corrections"), [(40, 0), (60, 1)])
+def test_a_few_returns_do_not_prove_a_unit(read, beams, corrections):
+    """Those at 300 may be 3 m in centimetres, or a hill."""
+    ranges = np.full((1, beams), 300.0, dtype=np.float32)
+    assert len(read(recording(ranges, range_max=0.0)).report.contradictions) == corrections
