@@ -21,21 +21,23 @@ def motion_from_behind(
 ) -> Array | None:
     """Poses (n, 3) of scans as `tracker`, a new one, finds them from the last to the first.
 
-    nan except for stretches where the robot, as it was `found`, seems to stand, and where from behind all
-    scans tell a longer way and fit clearly better. None if there are no such. The points are corrected in
-    place.
+    nan except for stretches where the robot, as it was `found`, seems to stand, and where scans from behind
+    fit clearly better, with a longer way. None if there are no such. The points are corrected in place.
     """
     untold = untold_stretches(found, options)
     stretches = [each for each in untold if _seems_to_stand(found.poses, *each, options)]
     if not stretches:
         return None
-    behind = tracker.track(scans.backwards())
-    tells, inliers = _in_runs_that_tell(behind, options)[::-1], behind.inliers[::-1]
-    poses, guide = behind.poses[::-1], np.full((len(scans), 3), np.nan)
+    # Where scans tell the motion, it leads from behind, too.
+    known = found.poses.copy()
+    for first, end in untold:
+        known[first:end] = np.nan
+    behind = tracker.track(scans.backwards(known))
+    inliers, poses, guide = behind.inliers[::-1], behind.poses[::-1], np.full((len(scans), 3), np.nan)
     for first, end in stretches:
-        fits_better = inliers[first:end].mean() > found.inliers[first:end].mean() + options.inlier_margin
-        went_farther = _way(poses, first, end) - _way(found.poses, first, end) > options.standstill_lag
-        if fits_better and went_farther and tells[first:end].all():
+        before, now = found.inliers[first:end].mean(), inliers[first:end].mean()
+        fits_better = now >= max(before + options.standstill_gain, options.restart_inliers)
+        if fits_better and _way(poses, first, end) - _way(found.poses, first, end) > options.standstill_lag:
             # The step to the first of them, and the one from the last.
             whole = slice(max(first - 1, 0), end + 1)
             guide[whole] = poses[whole]
@@ -50,10 +52,13 @@ def untold_stretches(found: TrackedScans, options: TrackingOptions) -> list[tupl
 
 
 def _seems_to_stand(poses: Array, first: int, end: int, options: TrackingOptions) -> bool:
-    """Whether the robot is far behind where it had come at the highest speed after a stretch."""
+    """Whether in a stretch the robot falls far behind where it had come at the highest speed after it.
+
+    A stretch of all scans may be one of a short log, with the highest speed in it.
+    """
     run = options.velocity_scans
-    starts = range(end, len(poses) - run)
-    fastest = max((_way(poses, at + 1, at + run + 1) / run for at in starts), default=0.0)
+    starts = range(1 if (first, end) == (0, len(poses)) else end + 1, len(poses) - run + 1)
+    fastest = max((_way(poses, at, at + run) / run for at in starts), default=0.0)
     expected, way = fastest * (end - first), _way(poses, first, end)
     return way < options.standstill_share * expected and expected - way > options.standstill_lag
 

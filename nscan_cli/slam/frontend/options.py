@@ -130,7 +130,10 @@ class TrackingOptions:
     than this share of its way at the highest speed after them. A larger share takes more time."""
     standstill_lag: float = 0.2
     """Nothing is done about a shorter way that is missing, m. A larger value keeps more scans as they are."""
-    standstill_scans: int = 512
+    standstill_gain: float = 0.03
+    """From behind these scans must have a share of inliers that is larger by this. A larger value keeps more
+    scans as they are."""
+    standstill_scans: int = 1024
     """Most first scans of a log that wait for one that tells its place. A larger number takes more time and
     memory where a log begins in a bare corridor."""
     range_limit_outliers: float = 0.001

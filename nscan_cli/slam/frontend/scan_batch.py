@@ -50,12 +50,12 @@ class ScanBatch:
         """The same scans, with points and shares of their own."""
         return replace(self, points=self.points.copy(), shares=self.shares.copy())
 
-    def backwards(self) -> ScanBatch:
-        """The scans from the last to the first, without odometry, as if time went backwards."""
+    def backwards(self, poses: Array) -> ScanBatch:
+        """The scans from the last to the first, as if time went backwards, with poses (n, 3) as odometry."""
         order = np.arange(len(self))[::-1]
         points, ends = self.chosen(order)
         shares = np.concatenate([self.shares[self.ends[k] : self.ends[k + 1]] for k in order])
-        return ScanBatch(self.first, points, ends, None, -shares)
+        return ScanBatch(self.first, points, ends, poses[::-1], -shares)
 
     def chosen(self, chosen: Indices) -> tuple[Array, Indices]:
         """A copy of the points (P, 2) of the scans with indices `chosen` (c,), and their `ends` (c + 1,)."""

@@ -12,7 +12,10 @@ from nscan_cli.logs.load import log_from
 from nscan_cli.logs.reading_options import ReadingOptions
 from nscan_cli.poses import Array
 from nscan_cli.slam.consistency.repeated_maps import mirrored
-from tests.simulation.scenes import corridor_and_room
+from tests.simulation.drive import Drive
+from tests.simulation.laser import Laser
+from tests.simulation.scenes import Scene, corridor_and_room
+from tests.simulation.world import Builder
 from tests.slam.mapped_logs import mapped
 
 HALT = 60
@@ -58,3 +61,35 @@ def test_the_sample_is_mapped_without_odometry_as_with_it():
         for given in (False, True)
     )
     np.testing.assert_allclose(alone.graph.poses[rows], guided.graph.poses[rows], atol=0.03)
+
+
+def tee() -> Scene:
+    """A bare corridor of 25 m, and a wall across its end."""
+    plan = Builder()
+    plan.line(-25.0, -1.0, 0.0, -1.0)
+    plan.line(-25.0, 1.0, 0.0, 1.0)
+    plan.line(-25.0, -1.0, -25.0, 1.0)
+    for y in (-8.0, 8.0):
+        plan.line(0.0, np.sign(y), 0.0, y)
+        plan.line(0.0, y, 2.0, y)
+    plan.line(2.0, -8.0, 2.0, 8.0)
+    return Scene("tee", plan.world(), np.array([(-18.0, 0.0), (1.0, 0.0), (1.0, 6.0)]))
+
+
+LASERS = {
+    "180 beams": Laser(),
+    "91 beams": Laser(91, -np.pi / 2, np.radians(2), 20.0),
+    "541 beams over 270°": Laser(541, -np.radians(135), np.radians(0.5), 20.0),
+    "5 cm of noise": Laser(noise=0.05),
+}
+
+
+@pytest.mark.parametrize("speed", [0.55, 1.2])
+@pytest.mark.parametrize("laser", list(LASERS))
+def test_a_bare_corridor_to_a_wall_far_ahead(laser, speed):
+    """From 5 to 17 m of 19 were lost."""
+    drive = Drive(speed=speed, period=0.1 if speed > 1.0 else 0.2)
+    recording = dataclasses.replace(tee(), laser=LASERS[laser], drive=drive).record(5)
+    log = dataclasses.replace(recording.log(), odometry=None)
+    scans = int(np.argmax(recording.truth[:, 0] > -1.0))
+    assert way(mapped(log).graph.poses, scans) == pytest.approx(way(recording.truth, scans), abs=0.05)
