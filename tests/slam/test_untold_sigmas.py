@@ -47,9 +47,9 @@ def end_sigmas(pairwise: list[Pairwise], nscan: list[NScan]) -> Array:
 @pytest.mark.parametrize("joints", [[], [(0, 1, 2, 3), (2, 3, 4, 5), (3, 4, 5, 6)]])
 def test_all_relations_together_have_the_variance_of_the_guess(joints):
     rows, times = np.arange(SIZE), np.arange(float(SIZE))
-    way = UntoldWay(2, 5, 6.0)
-    variances = untold_variances(rows, times, 2.0, [way], UntoldSigmaOptions(speed_share=0.5))
-    # Four seconds at 2 m/s, and half of that speed.
+    way = UntoldWay(2, 5, 6.0, possible=8.0)
+    variances = untold_variances(rows, times, [way], UntoldSigmaOptions(speed_share=0.5))
+    # Half of 8 m, over four steps.
     np.testing.assert_allclose(variances, [0.0, 4.0, 4.0, 4.0, 4.0, 0.0])
     nscan = [joint(nodes) for nodes in joints]
     x, y, _ = end_sigmas(*with_untold_variances(chain(), nscan, rows, variances, 3))

@@ -105,8 +105,6 @@ class UntoldSigmaOptions:
     speed_share: float = 0.5
     """Standard deviation of the robot's speed there, as a share of its usual one: it may stand, or hurry. A
     larger share makes such ways less certain."""
-    least_speed: float = 0.05
-    """A slower robot stands, m/s. A larger value makes the usual speed that of fast drives."""
     most_steps: int = 3
     """Nodes of a relation that are more keyframes apart are of different visits, and measured. A larger value
     makes more relations less certain."""

@@ -16,7 +16,7 @@ import numpy as np
 
 from nscan_cli.graph.model import NScan, Pairwise
 from nscan_cli.graph.relations.base import Relation
-from nscan_cli.poses import Array, Indices, Mask
+from nscan_cli.poses import Array, Indices
 from nscan_cli.slam.backend.options import UntoldSigmaOptions
 from nscan_cli.slam.diagnostics.untold_way import UntoldWay, untold_ways
 from nscan_cli.slam.state import SlamState
@@ -33,12 +33,12 @@ def relations_as_told(state: SlamState) -> tuple[list[Pairwise], list[NScan]]:
     # Scans after the last keyframe may be tracked by another thread at this moment.
     end = int(state.route.rows[-1]) + 1
     path, sigmas = np.concatenate(list(state.tracked))[:end], np.concatenate(list(state.told_sigmas))[:end]
-    ways = untold_ways(path, sigmas, state.options.diagnostics.untold_way)
+    times, untold = state.log.times[:end], state.options.diagnostics.untold_way
+    # A robot that seems to stand mostly does.
+    ways = [way for way in untold_ways(path, times, sigmas, untold) if way.is_long(untold)]
     if not ways:
         return pairwise, nscan
-    times, is_told = state.log.times[:end], sigmas <= state.options.diagnostics.untold_way.sigma
-    speed = _usual_speed(path, times, is_told, options)
-    variances = untold_variances(state.route.rows, times, speed, ways, options)
+    variances = untold_variances(state.route.rows, times, ways, options)
     return with_untold_variances(pairwise, nscan, state.route.rows, variances, options.most_steps)
 
 
@@ -48,27 +48,18 @@ def told_relations(state: SlamState) -> list[Relation]:
     return [*pairwise, *nscan, *state.other_relations]
 
 
-def _usual_speed(path: Array, times: Array, is_told: Mask, options: UntoldSigmaOptions) -> float:
-    """The median speed (m/s) along a path (S, 3) of a robot that moves, where scans or odometry tell it."""
-    speeds = np.hypot(*np.diff(path[:, :2], axis=0).T) / np.maximum(np.diff(times), 1e-3)
-    moves = speeds > options.least_speed
-    told = moves & is_told[1:]
-    chosen = told if told.any() else moves
-    return float(np.median(speeds[chosen])) if chosen.any() else 0.0
-
-
 def untold_variances(
-    rows: Indices, times: Array, speed: float, ways: Sequence[UntoldWay], options: UntoldSigmaOptions
+    rows: Indices, times: Array, ways: Sequence[UntoldWay], options: UntoldSigmaOptions
 ) -> Array:
     """The variance (K − 1,) in m² of the guess from each of the keyframes in rows (K,) to the next.
 
-    `times` (S,) are those of all scans, s; `speed` is that at which the robot usually drives, m/s.
+    `times` (S,) are those of all scans, s.
     """
     variances = np.zeros(max(len(rows) - 1, 0))
     at = times[rows]
     for way in ways:
         begin, end = times[max(way.first - 1, 0)], times[way.last]
-        whole = options.speed_share * speed * float(end - begin)
+        whole = options.speed_share * way.possible
         within = np.clip(at[1:], begin, end) - np.clip(at[:-1], begin, end)
         variances += whole**2 * within / max(float(end - begin), 1e-9)
     return variances

@@ -110,11 +110,14 @@ def _untold_ways(state: SlamState) -> list[str]:
     log, poses, sigmas = state.log, np.concatenate(state.tracked), state.told_sigmas
     if not sigmas:
         return []
-    ways = untold_ways(poses, np.concatenate(sigmas), state.options.diagnostics.untold_way)
+    options = state.options.diagnostics.untold_way
+    ways = untold_ways(poses, log.times, np.concatenate(sigmas), options)
     if not ways:
         return []
     named = _stretches(
-        f"{way.path:.1f} m from scan {log.numbers[way.first]} to {log.numbers[way.last]}" for way in ways
+        f"{way.path:.1f} m from scan {log.numbers[way.first]} to {log.numbers[way.last]}"
+        + ("" if way.is_long(options) else f" (at its usual speed {way.possible:.1f} m)")
+        for way in ways
     )
     return [
         f"the walls do not show how far the robot went: {named}; "

@@ -66,11 +66,13 @@ class UntoldWayOptions:
     """Standard deviation beyond which a scan does not tell its place along the walls, m. A larger value warns
     less."""
     path: float = 2.0
-    """Least length of such a way that a warning names, m. It is 2.5 m and more in bare corridors, at most 0.7
-    m in offices and outdoors. A larger value warns less."""
+    """Least length of such a way that a warning names, m, as mapped or at the robot's usual speed. As mapped
+    it is 2.5 m and more in bare corridors, at most 0.7 m elsewhere. A larger value warns less."""
     scans_between: int = 2
     """Largest number of successive scans within it that seem to tell their place. A larger number joins more
     ways."""
+    least_speed: float = 0.05
+    """A slower robot stands, m/s. A larger value makes the usual speed that of fast drives."""
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from nscan_cli.poses import Array
+from nscan_cli.poses import Array, Mask
 from nscan_cli.slam.diagnostics.options import UntoldWayOptions
 
 
@@ -23,15 +23,39 @@ class UntoldWay(NamedTuple):
     """Row of its last scan."""
     path: float
     """Its length as mapped, m."""
+    possible: float
+    """Its length at the speed that the robot usually drives at, m: it may only seem to stand."""
+
+    def is_long(self, options: UntoldWayOptions) -> bool:
+        """Whether it is long as mapped."""
+        return self.path >= options.path
 
 
-def untold_ways(poses: Array, told_sigmas: Array, options: UntoldWayOptions) -> list[UntoldWay]:
-    """The stretches among scans at poses (S, 3) that tell their places to `told_sigmas` (S,) in m."""
+def untold_ways(poses: Array, times: Array, told_sigmas: Array, options: UntoldWayOptions) -> list[UntoldWay]:
+    """The stretches that are or may be long, among scans at poses (S, 3) and times (S,) in s.
+
+    The scans tell their places to `told_sigmas` (S,) in m.
+    """
     rows = np.flatnonzero(told_sigmas > options.sigma)
     if not len(rows):
         return []
     steps = np.append(0.0, np.hypot(*np.diff(poses[:, :2], axis=0).T))
     along = np.cumsum(steps)
     pieces = np.split(rows, np.flatnonzero(np.diff(rows) > options.scans_between + 1) + 1)
-    ways = [UntoldWay(int(p[0]), int(p[-1]), float(along[p[-1]] - along[max(p[0] - 1, 0)])) for p in pieces]
-    return [way for way in ways if way.path >= options.path]
+    speed, ways = usual_speed(poses, times, told_sigmas <= options.sigma, options), []
+    for piece in pieces:
+        begin, last = max(int(piece[0]) - 1, 0), int(piece[-1])
+        possible = speed * float(times[last] - times[begin])
+        way = UntoldWay(int(piece[0]), last, float(along[last] - along[begin]), possible)
+        if max(way.path, way.possible) >= options.path:
+            ways.append(way)
+    return ways
+
+
+def usual_speed(poses: Array, times: Array, is_told: Mask, options: UntoldWayOptions) -> float:
+    """The median speed (m/s) along a path (S, 3) of a robot that moves, where scans or odometry tell it."""
+    speeds = np.hypot(*np.diff(poses[:, :2], axis=0).T) / np.maximum(np.diff(times), 1e-3)
+    moves = speeds > options.least_speed
+    told = moves & is_told[1:]
+    chosen = told if told.any() else moves
+    return float(np.median(speeds[chosen])) if chosen.any() else 0.0

@@ -34,7 +34,7 @@ def test_a_way_is_named_that_is_long_enough(first, count, between):
     sigmas[first : last + 1] = 0.3
     middle = first + count // 2
     sigmas[middle : middle + between] = 0.01
-    ways = untold_ways(poses, sigmas, OPTIONS)
+    ways = untold_ways(poses, np.arange(80.0), sigmas, OPTIONS)
     if between <= OPTIONS.scans_between:
         long_enough = STEP * (count + 1) >= OPTIONS.path - 1e-9
         assert len(ways) == (1 if long_enough else 0) or abs(STEP * (count + 1) - OPTIONS.path) < 1e-6
@@ -42,6 +42,19 @@ def test_a_way_is_named_that_is_long_enough(first, count, between):
             assert (way.first, way.last) == (first, last)
             assert way.path == pytest.approx(STEP * (count + 1))
     assert all(way.path >= OPTIONS.path for way in ways)
+
+
+def test_a_way_is_named_where_the_robot_only_seems_to_stand():
+    """It drives at 0.5 m/s, and seems to stand for six seconds in which no scan tells its place."""
+    steps, sigmas = np.full(120, 0.05), np.zeros(120)
+    steps[20:80], sigmas[20:80] = 0.0, 0.3
+    poses = np.zeros((120, 3))
+    poses[:, 0] = np.cumsum(steps)
+    (way,) = untold_ways(poses, 0.1 * np.arange(120.0), sigmas, OPTIONS)
+    assert (way.first, way.last) == (20, 79)
+    assert way.path == pytest.approx(0.0)
+    assert way.possible == pytest.approx(3.0)
+    assert not way.is_long(OPTIONS)
 
 
 @pytest.mark.parametrize("seed", [4, 5])

@@ -87,7 +87,7 @@ LASERS = {
 @pytest.mark.parametrize("speed", [0.55, 1.2])
 @pytest.mark.parametrize("laser", list(LASERS))
 def test_a_bare_corridor_to_a_wall_far_ahead(laser, speed):
-    """From 5 to 17 m of 19 were lost."""
+    """Up to 17 m of 17 were lost."""
     drive = Drive(speed=speed, period=0.1 if speed > 1.0 else 0.2)
     recording = dataclasses.replace(tee(), laser=LASERS[laser], drive=drive).record(5)
     log = dataclasses.replace(recording.log(), odometry=None)
