@@ -15,7 +15,8 @@ from nscan_cli.slam.backend.options import (
     UntoldSigmaOptions,
 )
 from nscan_cli.slam.diagnostics.options import DiagnosticsOptions
-from nscan_cli.slam.frontend.options import BreakOptions, OdometryCheckOptions, TrackingOptions
+from nscan_cli.slam.frontend.odometry_checks import OdometryCheckOptions
+from nscan_cli.slam.frontend.options import BreakOptions, TrackingOptions
 from nscan_cli.slam.keyframes.options import KeyframeOptions
 from nscan_cli.slam.local_matching.options import NScanOptions
 from nscan_cli.slam.loop_closure.options import LoopClosureOptions

@@ -12,6 +12,7 @@ import numpy as np
 
 from nscan_cli.poses import Array, Mask
 from nscan_cli.slam.diagnostics.options import UntoldWayOptions
+from nscan_cli.slam.frontend.odometry_checks import SHORTEST_PERIOD
 
 
 class UntoldWay(NamedTuple):
@@ -42,7 +43,7 @@ def untold_ways(poses: Array, times: Array, told_sigmas: Array, options: UntoldW
     steps = np.append(0.0, np.hypot(*np.diff(poses[:, :2], axis=0).T))
     along = np.cumsum(steps)
     pieces = np.split(rows, np.flatnonzero(np.diff(rows) > options.scans_between + 1) + 1)
-    speed, ways = usual_speed(poses, times, told_sigmas <= options.sigma, options), []
+    speed, ways = _usual_speed(poses, times, told_sigmas <= options.sigma, options), []
     for piece in pieces:
         begin, last = max(int(piece[0]) - 1, 0), int(piece[-1])
         possible = speed * float(times[last] - times[begin])
@@ -52,9 +53,9 @@ def untold_ways(poses: Array, times: Array, told_sigmas: Array, options: UntoldW
     return ways
 
 
-def usual_speed(poses: Array, times: Array, is_told: Mask, options: UntoldWayOptions) -> float:
+def _usual_speed(poses: Array, times: Array, is_told: Mask, options: UntoldWayOptions) -> float:
     """The median speed (m/s) along a path (S, 3) of a robot that moves, where scans or odometry tell it."""
-    speeds = np.hypot(*np.diff(poses[:, :2], axis=0).T) / np.maximum(np.diff(times), 1e-3)
+    speeds = np.hypot(*np.diff(poses[:, :2], axis=0).T) / np.maximum(np.diff(times), SHORTEST_PERIOD)
     moves = speeds > options.least_speed
     told = moves & is_told[1:]
     chosen = told if told.any() else moves

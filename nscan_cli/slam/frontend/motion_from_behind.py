@@ -22,7 +22,7 @@ def motion_from_behind(
     """Poses (n, 3) of scans as `tracker`, a new one, finds them from the last to the first.
 
     nan except for stretches where the robot, as it was `found`, seems to stand, and where scans from behind
-    fit clearly better, with a longer way. None if there are no such. The points are corrected in place.
+    fit clearly better, with a longer way. None if there are no such. The scans stay as they are.
     """
     untold = untold_stretches(found, options)
     stretches = [each for each in untold if _seems_to_stand(found.poses, *each, options)]

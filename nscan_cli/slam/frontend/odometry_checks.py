@@ -2,17 +2,35 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass, field
+
 import numpy as np
 from numpy.typing import NDArray
 
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.poses import Array, are_known, compose, relative
-from nscan_cli.slam.frontend.options import OdometryCheckOptions
+from nscan_cli.slam.frontend.odometry_stalls import OdometryStallOptions
 
 SHORTEST_PERIOD = 1e-3
 """s; a median period is at least this, to divide by."""
 BEAM_STRIDE = 16
 """Every beam in this many is compared first; these tell nearly all scans apart."""
+
+
+@dataclass(frozen=True)
+class OdometryCheckOptions:
+    """Which steps of the odometry, or of the scans, are jumps that no robot drives."""
+
+    min_motion: float = 1e-3
+    """Least step that counts as motion, m and rad. A larger value ignores slow drives."""
+    step_quantile: float = 0.99
+    """Quantile of the log's steps that is the usual longest step. A larger value finds fewer jumps."""
+    jump_factor: float = 5.0
+    """A jump is longer than this multiple of the usual longest step. A larger value finds fewer jumps."""
+    min_jump: float = 1.0
+    """A jump is longer than this, m and rad: a match corrects a smaller one by itself. A larger value finds
+    fewer jumps."""
+    stalls: OdometryStallOptions = field(default_factory=OdometryStallOptions)
 
 
 def without_jumps(

@@ -6,10 +6,25 @@ between is not known, and steady motion is the best guess.
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from nscan_cli.poses import Array, Indices, compose, relative
-from nscan_cli.slam.frontend.options import OdometryStallOptions
+
+
+class OdometryStallOptions(NamedTuple):
+    """When odometry stood still while the robot drove on, and made up for it in one step."""
+
+    min_steps: int = 2
+    """Least number of steps in which odometry stands. With a smaller number, odometry slower than the scans
+    would count as a stall."""
+    min_motion: float = 0.1
+    """Least length of the step that catches up, m + rad: a smaller one does not mislead a match. A larger
+    value evens out fewer stalls."""
+    factor: float = 2.0
+    """The step that catches up is faster than those before and after it by this factor; averaged over the
+    stall, the robot is not. A larger value evens out fewer stalls."""
 
 
 def without_stalls(odometry: Array, times: Array, options: OdometryStallOptions) -> tuple[Array, Indices]:

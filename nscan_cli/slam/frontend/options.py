@@ -231,36 +231,6 @@ class TrackingParameters(NamedTuple):
         return cls(**values)
 
 
-class OdometryStallOptions(NamedTuple):
-    """When odometry stood still while the robot drove on, and made up for it in one step."""
-
-    min_steps: int = 2
-    """Least number of steps in which odometry stands. With a smaller number, odometry slower than the scans
-    would count as a stall."""
-    min_motion: float = 0.1
-    """Least length of the step that catches up, m + rad: a smaller one does not mislead a match. A larger
-    value evens out fewer stalls."""
-    factor: float = 2.0
-    """The step that catches up is faster than those before and after it by this factor; averaged over the
-    stall, the robot is not. A larger value evens out fewer stalls."""
-
-
-@dataclass(frozen=True)
-class OdometryCheckOptions:
-    """Which steps of the odometry, or of the scans, are jumps that no robot drives."""
-
-    min_motion: float = 1e-3
-    """Least step that counts as motion, m and rad. A larger value ignores slow drives."""
-    step_quantile: float = 0.99
-    """Quantile of the log's steps that is the usual longest step. A larger value finds fewer jumps."""
-    jump_factor: float = 5.0
-    """A jump is longer than this multiple of the usual longest step. A larger value finds fewer jumps."""
-    min_jump: float = 1.0
-    """A jump is longer than this, m and rad: a match corrects a smaller one by itself. A larger value finds
-    fewer jumps."""
-    stalls: OdometryStallOptions = field(default_factory=OdometryStallOptions)
-
-
 class ViewSimilarityOptions(NamedTuple):
     """When two scans from nearly the same place see the same."""
 

@@ -51,7 +51,10 @@ class ScanBatch:
         return replace(self, points=self.points.copy(), shares=self.shares.copy())
 
     def backwards(self, poses: Array) -> ScanBatch:
-        """The scans from the last to the first, as if time went backwards, with poses (n, 3) as odometry."""
+        """A copy of the scans from the last to the first, as if time went backwards.
+
+        Its odometry are the poses (n, 3) of the scans, in their own order.
+        """
         order = np.arange(len(self))[::-1]
         points, ends = self.chosen(order)
         shares = np.concatenate([self.shares[self.ends[k] : self.ends[k + 1]] for k in order])

@@ -134,18 +134,17 @@ class SegmentTracker:
 
         The first scans of a log may wait until some tell their place. Returns the scans as corrected.
         """
-        again, guided, before = scans.copied(), scans.copied(), copy.deepcopy(self.tracker)
+        fresh, before = scans.copied(), copy.deepcopy(self.tracker)
         found = self.tracker.track(scans)
         waits = may_wait and self._last is None and len(scans) < self.options.standstill_scans
         if waits and (0, len(scans)) in untold_stretches(found, self.options):
             self.tracker = before
-            return guided, found.part(0, 0)
-        motion = motion_from_behind(again, found, self._new_tracker(), self.options)
+            return fresh, found.part(0, 0)
+        motion = motion_from_behind(fresh, found, self._new_tracker(), self.options)
         if motion is None:
             return scans, found
-        before.searches += self.tracker.searches
         self.tracker = before
-        return guided, self.tracker.track(replace(guided, odometry=motion))
+        return fresh, self.tracker.track(replace(fresh, odometry=motion))
 
     def _from_origin(self, found: TrackedScans, origin: Array) -> TrackedScans:
         """What was found in a later segment, in the frame of the first."""

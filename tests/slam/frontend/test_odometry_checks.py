@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from nscan_cli.poses import Array, relative
-from nscan_cli.slam.frontend.odometry_checks import frozen_scans, without_jumps
-from nscan_cli.slam.frontend.options import OdometryCheckOptions
+from nscan_cli.slam.frontend.odometry_checks import OdometryCheckOptions, frozen_scans, without_jumps
 from tests.simulation import faults
 from tests.slam.keyframe_drives import round_scene
 

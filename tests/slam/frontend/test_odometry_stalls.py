@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.logs.load import read_log
 from nscan_cli.poses import Array, compose, relative
+from nscan_cli.slam.frontend.odometry_checks import OdometryCheckOptions
 from nscan_cli.slam.frontend.odometry_stalls import without_stalls
-from nscan_cli.slam.frontend.options import OdometryCheckOptions
 from tests.data import data_file
 from tests.logs.excerpts import truth_of
 from tests.simulation.faults import taken
