@@ -13,6 +13,7 @@ from nscan_cli.files.limits import READINGS
 from nscan_cli.files.provenance import Source
 from nscan_cli.logs.beam_angles import beam_directions
 from nscan_cli.logs.beam_mask import mask_beams, masked_sectors
+from nscan_cli.logs.beam_spacing import checked_by_walls
 from nscan_cli.logs.device_choice import Device
 from nscan_cli.logs.frame_names import DEFAULT_FRAMES, FrameNames
 from nscan_cli.logs.laser_defaults import mark_no_returns
@@ -53,6 +54,8 @@ class RawScans:
     """(S,) number of beams of each scan; None if all have B."""
     sweep_times: SweepTimes | None = None
     """The times of the beams as written; None if the log has none."""
+    angles_assumed: bool = False
+    """Whether the directions are a convention of the form of log, and not written in it."""
 
     def mirrored(self) -> RawScans:
         """The scans with all directions negated."""
@@ -130,7 +133,8 @@ def laser_log(
     rows = times.rows[numbers]
     warnings = findings.warnings
     raw, limits, contradictions = _in_metres(raw, options, warnings)
-    angle_min, angle_increment = beam_directions(raw, options, warnings)
+    written = beam_directions(raw, options, warnings)
+    (angle_min, angle_increment), bent = checked_by_walls(raw, written, limits, options)
     findings.used |= {"range_min": limits.low_from, "range_max": limits.high_from}
     table = ScanTable(raw.ranges, limits, angle_min, angle_increment, times.rows, times.times)
     sectors, masked = masked_sectors(table, options, DEFAULT_ROBOT_PARTS)
@@ -178,7 +182,7 @@ def laser_log(
             odometries=findings.odometries,
             corrected=findings.corrected,
             masked=tuple(sectors),
-            contradictions=(*findings.contradictions, *contradictions, *masked, *sweep.said),
+            contradictions=(*findings.contradictions, *contradictions, *bent, *masked, *sweep.said),
         ),
         beams=None if (beams == ranges.shape[1]).all() else beams,
         truth_times=motion.truth_times,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,8 +23,17 @@ MAX_SCANS_TESTED = 200
 """Number of scans whose walls are tested. A larger value takes longer."""
 
 
-def beam_directions(raw: RawScans, options: ReadingOptions, warnings: list[str]) -> tuple[Array, Array]:
-    """First direction and step (S,) of each scan, rad, from the options, else from the log."""
+class BeamDirections(NamedTuple):
+    """Where the beams of each scan point."""
+
+    first: Array
+    """(S,) direction of the first beam, rad"""
+    step: Array
+    """(S,) angle from beam to beam, rad"""
+
+
+def beam_directions(raw: RawScans, options: ReadingOptions, warnings: list[str]) -> BeamDirections:
+    """The directions of the beams from the options, else from the log."""
     size = len(raw.stamps)
     first, step = raw.angle_min, raw.angle_increment
     if options.angle_increment is not None:
@@ -33,7 +42,7 @@ def beam_directions(raw: RawScans, options: ReadingOptions, warnings: list[str])
         step = _steps(raw, warnings)
     if options.angle_min is not None:
         first = np.full(size, options.angle_min)
-    return (-first, -step) if options.flip else (first, step)
+    return BeamDirections(-first, -step) if options.flip else BeamDirections(first, step)
 
 
 def _steps(raw: RawScans, warnings: list[str]) -> Array:

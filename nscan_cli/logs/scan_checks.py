@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from nscan_cli.logs.beam_spacing import DEFAULT_BEAM_SPACING, BeamSpacingOptions
 from nscan_cli.logs.range_unit import DEFAULT_RANGE_UNIT, RangeUnitOptions
 from nscan_cli.logs.recordings.alternating_lasers import DEFAULT_TWO_LASERS, TwoLaserOptions
 from nscan_cli.logs.recordings.turn_segments import DEFAULT_TURN_SEGMENTS, TurnSegmentOptions
@@ -16,6 +17,7 @@ class ScanCheckOptions:
     """The options of the checks that reading makes, as the provenance of a graph has them."""
 
     range_unit: RangeUnitOptions = DEFAULT_RANGE_UNIT
+    beam_spacing: BeamSpacingOptions = DEFAULT_BEAM_SPACING
     turn_segments: TurnSegmentOptions = DEFAULT_TURN_SEGMENTS
     two_lasers: TwoLaserOptions = DEFAULT_TWO_LASERS
     robot_parts: RobotPartsOptions = DEFAULT_ROBOT_PARTS

@@ -20,6 +20,7 @@ from nscan_cli.graph.io.tum import parse_tum, write_tum
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.logs.load import read_log
 from nscan_cli.logs.text.corrected_poses import OWN_HOST
+from nscan_cli.poses import Array
 from tests.logs.excerpts import truth_of
 from tests.simulation import faults
 from tests.simulation.laser import Laser
@@ -27,6 +28,8 @@ from tests.simulation.scenes import office
 
 Fault = Callable[[LaserLog], LaserLog]
 SIMULATED = "office, simulated"
+WIDE = "office, 541 beams over 270°"
+WIDE_LASER = Laser(541, np.radians(-135.0), np.radians(0.5), 20.0, no_return=81.0, mount=(0.2, 0.0, 0.0))
 ROUND_LASER = Laser(360, -np.pi, np.radians(1.0), 12.0, no_return=13.0, mount=(0.2, 0.0, 0.0))
 
 
@@ -71,6 +74,11 @@ def siblings(data: Path) -> Iterator[Case]:
         for fault, make, cause in FAULTS:
             if drive == SIMULATED or fault in FAULTS_OF_REAL_LOGS:
                 yield Case(drive, fault, cause, partial(_sibling, data, drive, make))
+    for fault, form, cause in (
+        ("", _with_angles, ""),
+        ("FLASER, which has no angles", _without_angles, "541 beams over 270°"),
+    ):
+        yield Case(WIDE, fault, cause, partial(_wide, form))
     recording = data / "mit-csail.ros2.mcap"
     if recording.exists():
         for fault, first, last in (
@@ -82,16 +90,49 @@ def siblings(data: Path) -> Iterator[Case]:
 
 def _sibling(data: Path, drive: str, fault: Fault, folder: Path) -> tuple[Path, list[str]]:
     """A drive with a fault, as a file whose poses are its odometry."""
-    log = fault(_simulated() if drive == SIMULATED else _real(data / f"{drive}.log.gz"))
-    assert log.odometry is not None
-    path, truth = folder / "sibling.log", folder / "truth.tum"
-    written = corrected_log(log, np.arange(len(log)), log.odometry)
-    # By its host alone a reader would know that the poses may be no odometry.
-    path.write_bytes(written.replace(OWN_HOST, b"robot"))
+    log = fault(_simulated(ROUND_LASER) if drive == SIMULATED else _real(data / f"{drive}.log.gz"))
+    path = folder / "sibling.log"
+    path.write_bytes(_with_angles(log))
     if drive != SIMULATED:
         return path, ["--relations", str(data / f"{drive}.relations")]
+    return path, _reference(log, folder)
+
+
+def _wide(form: Callable[[LaserLog], bytes], folder: Path) -> tuple[Path, list[str]]:
+    """The drive with a laser that CARMEN's older records have no angles for."""
+    log, path = _simulated(WIDE_LASER), folder / "wide.log"
+    path.write_bytes(form(log))
+    return path, _reference(log, folder)
+
+
+def _reference(log: LaserLog, folder: Path) -> list[str]:
+    """The arguments of `evaluate` for the true poses, which are written to the folder."""
+    truth = folder / "truth.tum"
     truth.write_bytes(write_tum(log.stamps, truth_of(log)))
-    return path, ["--reference", str(truth)]
+    return ["--reference", str(truth)]
+
+
+def _with_angles(log: LaserLog) -> bytes:
+    """A log as CARMEN's newer records, whose poses are its odometry."""
+    assert log.odometry is not None
+    # By its host alone a reader would know that the poses may be no odometry.
+    return corrected_log(log, np.arange(len(log)), log.odometry).replace(OWN_HOST, b"robot")
+
+
+def _without_angles(log: LaserLog) -> bytes:
+    """A log as CARMEN's older records, which have readings and poses alone."""
+    assert log.odometry is not None
+    readings = np.where(np.isfinite(log.ranges), log.ranges, WIDE_LASER.no_return)
+    poses = zip(log.laser_pose(log.odometry), log.odometry, strict=True)
+    lines = [
+        f"FLASER {len(scan)} {_text(scan)} {_text(laser)} {_text(robot)} {time:.6f} robot {time:.6f}\n"
+        for scan, (laser, robot), time in zip(readings, poses, log.times, strict=True)
+    ]
+    return "".join(lines).encode()
+
+
+def _text(values: Array) -> str:
+    return " ".join(f"{value:.6f}" for value in values)
 
 
 def _with_gap(recording: Path, first: float, last: float, folder: Path) -> tuple[Path, list[str]]:
@@ -106,9 +147,9 @@ def _real(path: Path) -> LaserLog:
 
 
 @functools.cache
-def _simulated() -> LaserLog:
+def _simulated(laser: Laser) -> LaserLog:
     scene = office()
-    return scene.record_at(scene.truth()[:600], 7, ROUND_LASER).log()
+    return scene.record_at(scene.truth()[:600], 7, laser).log()
 
 
 def _without_odometry(recording: bytes, first: float, last: float) -> bytes:
@@ -174,6 +215,8 @@ FAULTS: tuple[tuple[str, Fault, str], ...] = (
         "odometry (does not move|never moves|stands still)",
     ),
     ("readings reversed", faults.mirrored, "in the wrong order"),
+    ("beams closer by a third", lambda log: faults.beams_apart(log, 2 / 3), "1° from beam to beam"),
+    ("beams wider by a half", lambda log: faults.beams_apart(log, 1.5), "1° from beam to beam"),
     ("looks 90° left", _looking(-90.0), "90° further to the left"),
     ("looks 90° right", _looking(90.0), "(90|89|91)° further to the right"),
     ("looks back", _looking(180.0), "looks 180° further"),

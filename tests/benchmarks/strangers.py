@@ -23,9 +23,8 @@ from tests.experiments.output import table
 
 FACTOR, MORE = 1.5, 0.002
 """A map is right up to so many times the error of the untouched drive, or so much (m) more."""
-CURES = re.compile(
-    r"(?:try|leave out) (--[a-z-]+(?: -?\d[^\s;,]*(?:,[^\s;,]+)*)?)|(--clock-offset \S+) corrects"
-)
+OPTION = r"--[a-z-]+(?: -?\d[^\s;,]*(?:,[^\s;,]+)*)?"
+CURES = re.compile(rf"(?:try|leave out) ({OPTION}(?: {OPTION})*)|(--clock-offset \S+) corrects")
 """The options that a message says to try, as they are pasted."""
 
 

@@ -158,6 +158,13 @@ def mirrored(log: LaserLog) -> LaserLog:
     return replace(log, angle_min=-log.angle_min, angle_increment=-log.angle_increment)
 
 
+def beams_apart(log: LaserLog, factor: float) -> LaserLog:
+    """The file says that beams are so many times as far apart as they are, about the same middle."""
+    middle = log.angle_min + 0.5 * log.angle_increment * (log.beam_counts() - 1)
+    step = factor * log.angle_increment
+    return replace(log, angle_min=middle - 0.5 * step * (log.beam_counts() - 1), angle_increment=step)
+
+
 def mounted_otherwise(log: LaserLog, turn: float) -> LaserLog:
     """The file says that the laser looks further to the left than it does, by a turn (rad)."""
     return replace(log, mount=log.mount + np.array([0.0, 0.0, turn]))

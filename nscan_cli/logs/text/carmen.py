@@ -94,6 +94,7 @@ def read(data: bytes, file: str, source: Source, options: ReadingOptions) -> Las
         doubtful,
         angle_max,
         scans.beams,
+        angles_assumed=not scans.head[:, 3:4].any(),
     )
     odometry = _odometry(tag, scans, times, by_logger, lines, options, findings)
     motion = RecordedMotion(odometry, *_true_poses(lines, by_logger, skips, warnings))

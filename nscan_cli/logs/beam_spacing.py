@@ -1,0 +1,181 @@
+"""The angle between beams, checked by walls: a wrong one bends them.
+
+A beam at angle u from another one on the same wall, and one at −u, satisfy 1 / r₋ + 1 / r₊ = 2 cos(u) / r. So
+three readings tell the angle between their beams; on a wall, two triples about one beam tell the same angle.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nscan_cli.logs.beam_angles import BeamDirections
+from nscan_cli.logs.laser_log import beam_counts
+from nscan_cli.logs.reading_options import ReadingOptions
+from nscan_cli.poses import Array
+
+if TYPE_CHECKING:
+    from nscan_cli.logs.assemble import RawScans
+    from nscan_cli.logs.range_limits import RangeLimits
+
+USUAL_VIEWS = (100, 120, 180, 190, 240, 255, 270, 360)
+"""Fields of view of lasers, degrees."""
+MAX_OFF_CENTRE = 3
+"""From so many beams more on one side on, a laser does not look ahead."""
+
+
+@dataclass(frozen=True)
+class BeamSpacingOptions:
+    """When walls contradict the angle between beams."""
+
+    half_width: float = 0.4
+    """Angle from a beam to those that it is compared with, rad. A larger value needs wider walls and tells
+    angles more precisely."""
+    same_wall: float = 0.15
+    """Largest difference of the angles that two triples about a beam tell, as a share. A larger value takes
+    more of what is no wall for one."""
+    same_angle: float = 0.06
+    """Largest difference of angles that count as one, as a share. A larger value gathers more beams."""
+    min_beams: int = 200
+    """Least number of beams on walls that tell another angle. A larger value contradicts fewer logs."""
+    min_ratio: float = 2.0
+    """Least ratio of these beams to those that tell the angle of the log. A larger value contradicts fewer
+    logs."""
+    min_difference: float = 0.15
+    """Least difference from the angle of the log, as a share. A larger value contradicts fewer logs."""
+    max_factor: float = 2.5
+    """Largest factor between the two angles that is tested."""
+    usual_view: float = 0.06
+    """Largest difference from a usual field of view that is taken for it, as a share."""
+    moved: float = 0.01
+    """Least median change of the readings between scans that are tested, as a share: a robot that stands sees
+    one scene only."""
+    max_scans: int = 200
+    """Number of scans that are tested. A larger value takes longer."""
+
+
+DEFAULT_BEAM_SPACING = BeamSpacingOptions()
+
+
+def checked_by_walls(
+    raw: RawScans,
+    directions: BeamDirections,
+    limits: RangeLimits,
+    options: ReadingOptions,
+    spacing: BeamSpacingOptions = DEFAULT_BEAM_SPACING,
+) -> tuple[BeamDirections, list[str]]:
+    """The directions, put right if walls tell a usual laser; and what is said if walls contradict them."""
+    if options.as_recorded or options.angle_increment is not None:
+        return directions, []
+    beams = beam_counts(raw.ranges, raw.beams)
+    rows = np.arange(0, len(beams), max(1, len(beams) // spacing.max_scans))
+    factor = _factor_of_walls(_usable(raw, limits, beams, rows), np.abs(directions.step[rows]), spacing)
+    if factor is None:
+        return directions, []
+    count = int(np.bincount(beams).argmax())
+    of_count = beams == count
+    first, step = (float(np.median(values[of_count])) for values in directions)
+    view, is_usual = _view(abs(step) * factor, count, spacing)
+    # The beams of a whole turn do not see its first direction twice.
+    between = count - 1 if view < 2 * math.pi or count % 2 else count
+    found = math.copysign(view / between, step)
+    centred = -found * between / 2
+    said = (
+        f"walls are straight with {_degrees(abs(found))}° from beam to beam, {count} beams over "
+        f"{_degrees(view)}°; with the {_degrees(abs(step))}° of "
+        f"{'the convention for such logs' if raw.angles_assumed else 'the log'} they are bent"
+    )
+    is_centred = raw.angles_assumed or abs(2 * first + step * (count - 1)) < MAX_OFF_CENTRE * abs(step)
+    if is_usual and is_centred and of_count.all() and options.angle_min is None:
+        ones = np.ones(len(beams))
+        return BeamDirections(centred * ones, found * ones), [
+            f"{said}: the {_degrees(abs(found))}° are used; --as-recorded leaves the beams as they are, "
+            "--angle-increment sets another angle"
+        ]
+    # As options count before --flip.
+    sign = -1 if options.flip else 1
+    start = f" --angle-min {_degrees(sign * centred)}" if is_centred else ""
+    return directions, [f"{said}; try --angle-increment {_degrees(sign * found)}{start}"]
+
+
+def _degrees(angle: float) -> str:
+    return f"{math.degrees(angle):.4g}"
+
+
+def _usable(
+    raw: RawScans, limits: RangeLimits, beams: NDArray[np.int64], rows: NDArray[np.int64]
+) -> Iterator[Array]:
+    """The readings (B,) of some scans, m; nan for those without return."""
+    for row in rows.tolist():
+        ranges = raw.ranges[row, : beams[row]].astype(np.float64)
+        with np.errstate(invalid="ignore"):
+            is_usable = (ranges > max(0.0, limits.low[row])) & (ranges < limits.high[row])
+        yield np.where(is_usable, ranges, np.nan)
+
+
+def _factor_of_walls(scans: Iterable[Array], steps: Array, options: BeamSpacingOptions) -> float | None:
+    """The factor from `steps` (S,), rad, to the angle between beams that walls tell; None if they agree."""
+    told = [np.zeros(0)]
+    last = np.zeros(0)
+    for ranges, step in zip(scans, steps.tolist(), strict=True):
+        if len(last) == len(ranges):
+            change = np.abs(ranges - last) / last
+            change = change[np.isfinite(change)]
+            if not len(change) or np.median(change) <= options.moved:
+                continue
+        last = ranges
+        half = round(options.half_width / step / 2) if step else 0
+        if half and 4 * half < len(ranges):
+            told.append(_told_steps(ranges, half, options) - math.log(step))
+    logs = np.sort(np.concatenate(told))
+    widest = math.log(options.max_factor)
+    centres = logs[np.abs(logs) <= widest]
+    if len(centres) < options.min_beams:
+        return None
+    counts = _within(logs, centres, options.same_angle)
+    best = int(counts.argmax())
+    as_log = int(_within(logs, np.zeros(1), options.same_angle)[0])
+    if counts[best] < max(options.min_beams, options.min_ratio * as_log):
+        return None
+    factor = math.exp(float(np.median(logs[np.abs(logs - centres[best]) <= options.same_angle])))
+    return factor if abs(math.log(factor)) >= options.min_difference else None
+
+
+def _within(values: Array, centres: Array, width: float) -> NDArray[np.int64]:
+    """How many of some sorted values (N,) lie within a width of each centre (M,)."""
+    ends = np.searchsorted(values, centres + width, side="right")
+    found: NDArray[np.int64] = ends - np.searchsorted(values, centres - width)
+    return found
+
+
+def _told_steps(ranges: Array, half: int, options: BeamSpacingOptions) -> Array:
+    """Logarithms of the angles between beams that the beams of a scan (B,) on walls tell."""
+    near = 1 / ranges
+    wide = _log_angles(near, 2 * half) - math.log(2 * half)
+    narrow = _log_angles(near, half)[half : len(ranges) - 3 * half] - math.log(half)
+    with np.errstate(invalid="ignore"):
+        return wide[np.abs(wide - narrow) < options.same_wall]
+
+
+def _log_angles(near: Array, between: int) -> Array:
+    """Logarithm of the angle u from each beam to those `between` places before and after it; nan where none.
+
+    near: 1 / r (B,) in 1/m. The angle is that of beams on one wall; the result has B − 2 `between` places.
+    """
+    middle = near[between : len(near) - between]
+    cosines = (near[: len(middle)] + near[2 * between :]) / (2 * middle)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        return np.log(np.arccos(np.where(cosines < 1, np.maximum(cosines, -1.0), np.nan)))
+
+
+def _view(step: float, beams: int, options: BeamSpacingOptions) -> tuple[float, bool]:
+    """The field of view (rad) of a number of beams with such a step (rad): if near, a usual one."""
+    view = step * (beams - 1)
+    usual = min(map(math.radians, USUAL_VIEWS), key=lambda angle: abs(math.log(angle / view)))
+    is_usual = abs(math.log(usual / view)) <= options.usual_view
+    return (usual if is_usual else view), is_usual

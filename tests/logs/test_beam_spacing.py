@@ -1,0 +1,111 @@
+"""The angle between beams by the walls: CARMEN's convention is replaced, what a file says is contradicted."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from nscan_cli.logs.laser_log import LaserLog
+from nscan_cli.logs.load import read_log
+from nscan_cli.logs.reading_options import ReadingOptions
+from tests.data import data_file
+from tests.logs import lines
+from tests.logs.noisy_room import BEAMS, FIRST, STEP, Readings, carmen, readings, recording
+
+
+def of_view(degrees: float, beams: int) -> Readings:
+    """The readings of a laser with so many beams over a field of view, looking ahead."""
+    view = math.radians(degrees)
+    between = beams if degrees == 360 and beams % 2 == 0 else beams - 1
+    return readings(beams=beams, first=-view / 2, step=view / between)
+
+
+def told(log: LaserLog) -> list[str]:
+    return [said for said in log.report.contradictions if "walls are straight" in said]
+
+
+@pytest.mark.parametrize(
+    ("beams", "degrees", "step"),
+    [
+        (541, 270, 0.5),
+        (1081, 270, 0.25),
+        (726, 255, 255 / 725),
+        (681, 240, 240 / 680),
+        (360, 360, 1.0),
+        (361, 360, 1.0),
+        (181, 240, 240 / 180),
+    ],
+)
+def test_a_laser_that_the_convention_does_not_fit_is_told_by_walls(tmp_path, beams, degrees, step):
+    log = lines.read(tmp_path, *carmen(of_view(degrees, beams)))
+    assert log.angle_increment == pytest.approx(math.radians(step))
+    assert log.angle_min == pytest.approx(-math.radians(degrees) / 2)
+    (said,) = told(log)
+    assert f"{beams} beams over {degrees}°; " in said
+    assert "of the convention for such logs they are bent" in said
+
+
+@pytest.mark.parametrize("beams", [181, 361, 541])
+def test_the_convention_stands_where_walls_are_straight_with_it(tmp_path, beams):
+    log = lines.read(tmp_path, *carmen(of_view(180, beams)))
+    assert log.angle_increment == pytest.approx(math.pi / (beams - 1))
+    assert not told(log)
+
+
+def test_as_recorded_keeps_the_convention_and_an_option_is_believed(tmp_path):
+    scans = carmen(of_view(270, 541))
+    recorded = lines.read(tmp_path, *scans, options=ReadingOptions(as_recorded=True))
+    chosen = lines.read(tmp_path, *scans, options=ReadingOptions(angle_increment=math.radians(0.4)))
+    assert recorded.angle_increment == pytest.approx(math.pi / 540)
+    assert chosen.angle_increment == pytest.approx(math.radians(0.4))
+    assert not told(recorded)
+    assert not told(chosen)
+
+
+@pytest.mark.parametrize("flip", [False, True])
+@pytest.mark.parametrize("factor", [0.5, 2 / 3, 1.5, 2.0])
+def test_a_wrong_step_of_a_file_is_put_right(read, factor, flip):
+    first = -STEP * (BEAMS - 1) / 2
+    log = read(recording(readings(first=first), angle_min=factor * first, step=factor * STEP), flip=flip)
+    (said,) = told(log)
+    assert f"over 360°; with the {2 * factor:.4g}° of the log they are bent: the 2° are used" in said
+    sign = -1 if flip else 1
+    assert log.angle_increment == pytest.approx(sign * STEP)
+    assert log.angle_min == pytest.approx(sign * -math.pi)
+
+
+@pytest.mark.parametrize("flip", [False, True])
+@pytest.mark.parametrize(("first", "beams"), [(0.0, BEAMS), (-0.5 * 152 * STEP, 153)])
+def test_where_the_first_beam_or_the_view_is_unusual_options_are_named(read, first, beams, flip):
+    """A laser that does not look ahead, and one that sees 304°."""
+    ranges = readings(beams=beams, first=first)
+    wrong = recording(ranges, angle_min=1.5 * first, step=1.5 * STEP)
+    (said,) = told(read(wrong, flip=flip))
+    words = said.split("; try ")[1].split()
+    assert words[::2] == ["--angle-increment", "--angle-min"][: 1 + (first < 0)]
+    angles = [math.radians(float(word)) for word in words[1::2]]
+    cured = read(wrong, flip=flip, angle_increment=angles[0], angle_min=angles[1] if first else None)
+    assert not told(cured)
+    sign = -1 if flip else 1
+    assert cured.angle_increment == pytest.approx(sign * angles[0])
+    assert abs(angles[0]) == pytest.approx(STEP, rel=0.03)
+    assert cured.angle_min == pytest.approx(sign * first, abs=0.03 * abs(first))
+
+
+@pytest.mark.parametrize("scale", [0.9, 1.1])
+def test_a_step_that_is_nearly_right_is_believed(read, scale):
+    assert not told(read(recording(readings(), angle_min=scale * FIRST, step=scale * STEP)))
+
+
+def test_a_robot_that_stands_and_scans_without_walls_tell_nothing(read):
+    standing = np.repeat(readings()[:1], 300, axis=0)
+    noise = np.random.default_rng(1).uniform(1, 9, (300, 180)).astype(np.float32)
+    for ranges in (standing, noise):
+        assert not told(read(recording(ranges, step=2 * STEP, angle_min=-STEP * BEAMS)))
+
+
+@pytest.mark.parametrize("name", ["mit-csail", "fr079", "intel", "fr-campus", "fr-clinic"])
+def test_walls_do_not_contradict_a_true_log(name):
+    assert not told(read_log(str(data_file(f"{name}.log.gz"))))
