@@ -7,9 +7,9 @@ three readings tell the angle between their beams; on a wall, two triples about 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,6 +25,8 @@ if TYPE_CHECKING:
 
 USUAL_VIEWS = (100, 120, 180, 190, 240, 255, 270, 360)
 """Fields of view of lasers, degrees."""
+MAX_VIEW = math.radians(380)
+"""No laser sees more, rad."""
 MAX_OFF_CENTRE = 3
 """From so many beams more on one side on, a laser does not look ahead."""
 
@@ -33,9 +35,17 @@ MAX_OFF_CENTRE = 3
 class BeamSpacingOptions:
     """When walls contradict the angle between beams."""
 
-    half_width: float = 0.4
+    half_width: float = 0.45
     """Angle from a beam to those that it is compared with, rad. A larger value needs wider walls and tells
     angles more precisely."""
+    narrow_half_width: float = 0.3
+    """A narrower one that must tell the same, rad: noise looks like wider angles the narrower it is."""
+    agreement: float = 0.1
+    """Largest difference of what the two tell, as a share. A larger value contradicts more logs."""
+    settled: float = 0.02
+    """The angle is found where it changes by less than this share from one round to the next."""
+    max_rounds: int = 5
+    """Largest number of rounds. A larger value contradicts more logs."""
     same_wall: float = 0.15
     """Largest difference of the angles that two triples about a beam tell, as a share. A larger value takes
     more of what is no wall for one."""
@@ -62,6 +72,15 @@ class BeamSpacingOptions:
 DEFAULT_BEAM_SPACING = BeamSpacingOptions()
 
 
+class _Scans(NamedTuple):
+    """A sample of scans."""
+
+    ranges: list[Array]
+    """The readings (B,) of each, m; nan for those without return."""
+    steps: Array
+    """Angle from beam to beam of each, rad."""
+
+
 def checked_by_walls(
     raw: RawScans,
     directions: BeamDirections,
@@ -74,8 +93,10 @@ def checked_by_walls(
         return directions, []
     beams = beam_counts(raw.ranges, raw.beams)
     rows = np.arange(0, len(beams), max(1, len(beams) // spacing.max_scans))
-    factor = _factor_of_walls(_usable(raw, limits, beams, rows), np.abs(directions.step[rows]), spacing)
-    if factor is None:
+    widest = float(np.max(np.abs(directions.step) * (beams - 1)))
+    scans = _Scans(list(_usable(raw, limits, beams, rows)), np.abs(directions.step[rows]))
+    factor = _factor_of_walls(scans, spacing)
+    if factor is None or factor * widest > MAX_VIEW:
         return directions, []
     count = int(np.bincount(beams).argmax())
     of_count = beams == count
@@ -118,23 +139,43 @@ def _usable(
         yield np.where(is_usable, ranges, np.nan)
 
 
-def _factor_of_walls(scans: Iterable[Array], steps: Array, options: BeamSpacingOptions) -> float | None:
-    """The factor from `steps` (S,), rad, to the angle between beams that walls tell; None if they agree."""
+def _factor_of_walls(scans: _Scans, options: BeamSpacingOptions) -> float | None:
+    """The factor from the steps of scans to the angle between beams that walls tell; None if they agree.
+
+    The angle from a beam to those that it is compared with is that of the factor found so far.
+    """
+    factor = 1.0
+    for _ in range(options.max_rounds):
+        found = _told_factor(scans, options.half_width / factor, options)
+        if found is None:
+            return None
+        change, factor = abs(math.log(found / factor)), found
+        if change < options.settled:
+            narrow = _told_factor(scans, options.narrow_half_width / factor, options)
+            agrees = narrow is not None and abs(math.log(narrow / factor)) <= options.agreement
+            return factor if agrees else None
+    return None
+
+
+def _told_factor(scans: _Scans, half_width: float, options: BeamSpacingOptions) -> float | None:
+    """What most beams on walls tell; None if no factor stands out or it is near 1.
+
+    half_width: angle from a beam to those that it is compared with by the steps of the scans, rad.
+    """
     told = [np.zeros(0)]
     last = np.zeros(0)
-    for ranges, step in zip(scans, steps.tolist(), strict=True):
+    for ranges, step in zip(scans.ranges, scans.steps.tolist(), strict=True):
         if len(last) == len(ranges):
             change = np.abs(ranges - last) / last
             change = change[np.isfinite(change)]
             if not len(change) or np.median(change) <= options.moved:
                 continue
         last = ranges
-        half = round(options.half_width / step / 2) if step else 0
+        half = round(half_width / step / 2) if step else 0
         if half and 4 * half < len(ranges):
             told.append(_told_steps(ranges, half, options) - math.log(step))
     logs = np.sort(np.concatenate(told))
-    widest = math.log(options.max_factor)
-    centres = logs[np.abs(logs) <= widest]
+    centres = logs[np.abs(logs) <= math.log(options.max_factor)]
     if len(centres) < options.min_beams:
         return None
     counts = _within(logs, centres, options.same_angle)

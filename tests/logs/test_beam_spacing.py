@@ -106,6 +106,12 @@ def test_a_robot_that_stands_and_scans_without_walls_tell_nothing(read):
         assert not told(read(recording(ranges, step=2 * STEP, angle_min=-STEP * BEAMS)))
 
 
+@pytest.mark.parametrize("sigma", [0.05, 0.1, 0.2, 0.4])
+def test_noise_does_not_look_like_another_angle(read, sigma):
+    noise = sigma * np.random.default_rng(5).standard_normal((40, BEAMS)).astype(np.float32)
+    assert not told(read(recording(np.maximum(readings() + noise, 0.1), range_max=20.0)))
+
+
 @pytest.mark.parametrize("name", ["mit-csail", "fr079", "intel", "fr-campus", "fr-clinic"])
 def test_walls_do_not_contradict_a_true_log(name):
     assert not told(read_log(str(data_file(f"{name}.log.gz"))))
