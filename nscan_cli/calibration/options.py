@@ -164,9 +164,9 @@ class FileCheckOptions:
     value accepts poorer explanations."""
     max_tail: float = 0.4
     """The same for the upper quartile of the residuals."""
-    min_mount_turn: float = 0.1
+    min_mount_turn: float = 0.06
     """Least error of the laser's direction in the file that a warning names, rad. It is 0.04 at most on real
-    logs. A larger value warns less."""
+    logs, with a standard deviation of 0.02. A larger value warns less."""
     min_mount_move: float = 0.15
     """Least error of the laser's place in the file, along an axis, that a warning names, m. It is 0.1 at most
     on real logs; a late clock looks like some centimetres. A larger value warns less."""

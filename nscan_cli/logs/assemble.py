@@ -23,9 +23,10 @@ from nscan_cli.logs.range_limits import RangeLimits, limits_in_force
 from nscan_cli.logs.range_unit import scaled, wrong_unit
 from nscan_cli.logs.reading_options import ReadingOptions
 from nscan_cli.logs.robot_parts import DEFAULT_ROBOT_PARTS, ScanTable
-from nscan_cli.logs.robot_path import RobotPath, robot_path
+from nscan_cli.logs.robot_path import RobotPath, poses_at, robot_path
 from nscan_cli.logs.scan_order import ScanOrder, selected_numbers
 from nscan_cli.logs.skips import Skips
+from nscan_cli.logs.slow_odometry import without_repeats
 from nscan_cli.logs.sweep import Sweep, SweepTimes, beam_times, sweep_of_file
 from nscan_cli.poses import Array, are_known
 
@@ -149,11 +150,9 @@ def laser_log(
     if sweep.origin:
         findings.used["turn"] = sweep.origin
     swept = beam_times(sweep.turns[numbers], angle_increment[rows], beams, options.stamp)
-    odometry, path = motion.odometry, motion.path
+    odometry, path, slow = _odometry(motion, times, raw.ranges, options)
     if odometry is not None:
-        odometry = scaled_odometry(odometry[numbers], options.odometry_scale)
-    if path is not None:
-        path = robot_path(path.times, scaled_odometry(path.poses, options.odometry_scale))
+        odometry = odometry[numbers]
     return LaserLog(
         source=source,
         format=form,
@@ -182,7 +181,7 @@ def laser_log(
             odometries=findings.odometries,
             corrected=findings.corrected,
             masked=tuple(sectors),
-            contradictions=(*findings.contradictions, *contradictions, *bent, *masked, *sweep.said),
+            contradictions=(*findings.contradictions, *contradictions, *bent, *masked, *slow, *sweep.said),
         ),
         beams=None if (beams == ranges.shape[1]).all() else beams,
         truth_times=motion.truth_times,
@@ -192,6 +191,30 @@ def laser_log(
         beam_times=swept,
         odometry_path=path,
     )
+
+
+def _odometry(
+    motion: RecordedMotion, times: ScanOrder, ranges: NDArray[np.float32], options: ReadingOptions
+) -> tuple[Array | None, RobotPath | None, list[str]]:
+    """The odometry (S, 3) of all scans in order of time, its path, and what is said if it is slow.
+
+    ranges (S, B) are in file order.
+    """
+    odometry, path = motion.odometry, motion.path
+    if odometry is None:
+        return None, path, []
+    said = ""
+    if path is not None:
+        poses = path.poses
+        if not options.as_recorded:
+            poses, said = without_repeats(poses, path.times)
+        path = robot_path(path.times, scaled_odometry(poses, options.odometry_scale))
+    elif not options.as_recorded:
+        odometry, said = without_repeats(odometry, times.times, ranges[times.rows])
+    odometry = scaled_odometry(odometry, options.odometry_scale)
+    if said and path is not None:
+        odometry = np.where(are_known(odometry)[:, None], poses_at(path, times.times), odometry)
+    return odometry, path, [said] if said else []
 
 
 def _sweep(raw: RawScans, increments: Array, times: ScanOrder, options: ReadingOptions) -> Sweep:

@@ -1,4 +1,4 @@
-"""The checks of a log against its own scans while it is read, which correct it."""
+"""The checks of a log while it is read, which correct it."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from nscan_cli.logs.range_unit import DEFAULT_RANGE_UNIT, RangeUnitOptions
 from nscan_cli.logs.recordings.alternating_lasers import DEFAULT_TWO_LASERS, TwoLaserOptions
 from nscan_cli.logs.recordings.turn_segments import DEFAULT_TURN_SEGMENTS, TurnSegmentOptions
 from nscan_cli.logs.robot_parts import DEFAULT_ROBOT_PARTS, RobotPartsOptions
+from nscan_cli.logs.slow_odometry import DEFAULT_SLOW_ODOMETRY, SlowOdometryOptions
 from nscan_cli.logs.sweep import DEFAULT_SWEEP, SweepOptions
 
 
@@ -21,4 +22,5 @@ class ScanCheckOptions:
     turn_segments: TurnSegmentOptions = DEFAULT_TURN_SEGMENTS
     two_lasers: TwoLaserOptions = DEFAULT_TWO_LASERS
     robot_parts: RobotPartsOptions = DEFAULT_ROBOT_PARTS
+    slow_odometry: SlowOdometryOptions = DEFAULT_SLOW_ODOMETRY
     sweep: SweepOptions = DEFAULT_SWEEP

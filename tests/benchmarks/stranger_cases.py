@@ -214,6 +214,7 @@ FAULTS: tuple[tuple[str, Fault, str], ...] = (
         lambda log: faults.odometry_held(log, _middle(log), False),
         "odometry (does not move|never moves|stands still)",
     ),
+    ("each pose five times", lambda log: faults.odometry_repeated(log, 5), "odometry comes less often"),
     ("readings reversed", faults.mirrored, "in the wrong order"),
     ("beams closer by a third", lambda log: faults.beams_apart(log, 2 / 3), "1° from beam to beam"),
     ("beams wider by a half", lambda log: faults.beams_apart(log, 1.5), "1° from beam to beam"),
@@ -232,7 +233,9 @@ FAULTS: tuple[tuple[str, Fault, str], ...] = (
     ("cart on a hinge", faults.cart, "goes along with the robot"),
 )  # fmt: skip
 """Name, fault, and what tells its cause."""
-FAULTS_OF_REAL_LOGS = ("", "two posts of 20°", "odometry × 1000", "odometry frozen for a third")
+FAULTS_OF_REAL_LOGS = (
+    "", "two posts of 20°", "odometry × 1000", "odometry frozen for a third", "each pose five times",
+)  # fmt: skip
 """Those that the real logs get: with all of them it takes an hour."""
 
 STRANGERS: tuple[tuple[str, str, str, str, float], ...] = (

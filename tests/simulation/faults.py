@@ -123,6 +123,11 @@ def odometry_held(log: LaserLog, rows: Rows, catches_up: bool) -> LaserLog:
     return replace(log, odometry=odometry)
 
 
+def odometry_repeated(log: LaserLog, times: int) -> LaserLog:
+    """The odometry comes with every so many-th scan, and is repeated until then."""
+    return replace(log, odometry=_odometry(log)[np.arange(len(log)) // times * times])
+
+
 def odometry_scaled(log: LaserLog, factor: float) -> LaserLog:
     """The positions by odometry in another unit."""
     return replace(log, odometry=_odometry(log) * (factor, factor, 1.0))
