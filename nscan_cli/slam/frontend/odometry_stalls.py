@@ -1,7 +1,7 @@
-"""Odometry that stands still for some scans while the robot drives on, and then makes up for it in one step.
+"""Odometry that falls behind the robot for some scans and makes up for it, or runs ahead and waits.
 
-A robot whose computer is busy reports an old pose for a while. The way is right in the end; where it lies in
-between is not known, and steady motion is the best guess.
+A robot whose computer is busy reports an old pose for a while, or with a wrong stamp. The way is right in the
+end; where it lies in between is not known, and steady motion is the best guess.
 """
 
 from __future__ import annotations
@@ -9,47 +9,150 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 
-from nscan_cli.poses import Array, Indices, compose, relative
+from nscan_cli.poses import Array, Indices, Mask, compose, relative
 
 
 class OdometryStallOptions(NamedTuple):
-    """When odometry stood still while the robot drove on, and made up for it in one step."""
+    """When odometry fell behind the robot, and made up for it."""
 
     min_steps: int = 2
-    """Least number of steps in which odometry stands. With a smaller number, odometry slower than the scans
-    would count as a stall."""
+    """Least number of steps in which odometry stands, for one step that makes up for all of them. With a
+    smaller number, odometry slower than the scans would count as a stall."""
     min_motion: float = 0.1
-    """Least length of the step that catches up, m + rad: a smaller one does not mislead a match. A larger
-    value evens out fewer stalls."""
+    """Least length of the step that makes up for them, and least error of the longest and of the shortest of
+    uneven steps, m + rad: a smaller one does not mislead a match. A larger value evens out fewer stalls."""
     factor: float = 2.0
-    """The step that catches up is faster than those before and after it by this factor; averaged over the
-    stall, the robot is not. A larger value evens out fewer stalls."""
+    """The step that makes up for a stall is faster than those before and after it by this factor; averaged
+    over the stall, the robot is not. A larger value evens out fewer stalls."""
+    most_uneven_steps: int = 4
+    """Largest number of steps, some too short and some too long, that are evened out together. A larger value
+    evens out more."""
+    uneven_factor: float = 1.5
+    """One of them is faster than those before and after them by this factor, and one is slower. A larger
+    value evens out fewer."""
+    steady_factor: float = 1.3
+    """Largest factor between the speeds before and after uneven steps; their mean speed differs from these by
+    no more than its root. A larger value evens out more."""
+    min_named: float = 0.3
+    """Least correction of a pose that a notice names, m + rad. A larger value names fewer stalls."""
+
+
+class Steps(NamedTuple):
+    """The steps of odometry from scan to scan, N of them."""
+
+    sizes: Array
+    """(N,) lengths, m + rad"""
+    periods: Array
+    """(N,) s"""
+    stands: Mask
+    """(N,) whether the pose stays exactly the same"""
+
+    def speeds(self) -> Array:
+        """(N,) m/s + rad/s; nan for a step without duration."""
+        speeds = np.full(len(self.sizes), np.nan)
+        np.divide(self.sizes, self.periods, out=speeds, where=self.periods > 0.0)
+        return speeds
+
+    def reversed(self) -> Steps:
+        """The steps backwards in time."""
+        return Steps(self.sizes[::-1], self.periods[::-1], self.stands[::-1])
 
 
 def without_stalls(odometry: Array, times: Array, options: OdometryStallOptions) -> tuple[Array, Indices]:
-    """Odometry (S, 3) whose stalls are evened out, and the rows (J,) with which they end; times (S,) in s.
+    """Odometry (S, 3) with stalls evened out, and the rows (J,) with which large ones end; times (S,) in s.
 
-    The step that makes up for a stall is shared out over its scans in proportion to time.
+    The way over the scans of a stall is shared out over them in proportion to time. Backwards in time, a step
+    makes up for what comes after it.
     """
-    ends: list[int] = []
     if len(odometry) < 4:
-        return odometry, np.array(ends, dtype=np.int64)
-    steps, periods = relative(odometry[1:], odometry[:-1]), np.diff(times)
-    sizes = np.hypot(steps[:, 0], steps[:, 1]) + np.abs(steps[:, 2])
-    stands, evened = (odometry[1:] == odometry[:-1]).all(axis=1), odometry.copy()
+        return odometry, np.zeros(0, dtype=np.int64)
+    steps = _steps(odometry, times)
+    last = len(steps.sizes)
+    stalls = _stalls(steps, options)
+    stalls += [(last - end, last - first) for first, end in _stalls(steps.reversed(), options)]
+    evened = _evened(odometry, times, stalls)
+    uneven = _uneven_steps(_steps(evened, times), options)
+    evened = _evened(evened, times, uneven)
+    corrections = _sizes(relative(evened, odometry))
+    ends = [end for first, end in stalls + uneven if corrections[first + 1 : end].max() >= options.min_named]
+    return evened, np.unique(ends).astype(np.int64)
+
+
+def _steps(odometry: Array, times: Array) -> Steps:
+    sizes = _sizes(relative(odometry[1:], odometry[:-1]))
+    return Steps(sizes, np.diff(times), (odometry[1:] == odometry[:-1]).all(axis=1))
+
+
+def _sizes(motions: Array) -> Array:
+    """(N,) lengths of motions (N, 3), m + rad."""
+    found: Array = np.hypot(motions[:, 0], motions[:, 1]) + np.abs(motions[:, 2])
+    return found
+
+
+def _evened(odometry: Array, times: Array, stalls: list[tuple[int, int]]) -> Array:
+    """Odometry (S, 3) that is steady between the rows of each stall."""
+    evened = odometry.copy()
+    for first, end in stalls:
+        shares = (times[first + 1 : end] - times[first]) / (times[end] - times[first])
+        step = relative(evened[end], evened[first])
+        evened[first + 1 : end] = compose(evened[first], shares[:, None] * step)
+    return evened
+
+
+def _stalls(steps: Steps, options: OdometryStallOptions) -> list[tuple[int, int]]:
+    """The rows between which odometry stands, and makes up for it in the last step."""
+    found = []
     # Steps first to end − 1 stand; the step at `end` makes up for them.
-    changes = np.flatnonzero(np.diff(np.concatenate([[False], stands, [False]]).astype(np.int8)))
+    changes = np.flatnonzero(np.diff(np.concatenate([[False], steps.stands, [False]]).astype(np.int8)))
     for first, end in changes.reshape(-1, 2).tolist():
-        if end - first < options.min_steps or first == 0 or end + 1 >= len(steps):
+        if end - first < options.min_steps or first == 0 or end + 1 >= len(steps.sizes):
             continue
-        since, until = times[first], times[end + 1]
-        if sizes[end] < options.min_motion or not (periods[[first - 1, end, end + 1]] > 0.0).all():
+        size, periods = steps.sizes[end], steps.periods[[first - 1, end, end + 1]]
+        if size < options.min_motion or not (periods > 0.0).all():
             continue
-        beside = sizes[[first - 1, end + 1]] / periods[[first - 1, end + 1]]
+        beside = steps.speeds()[[first - 1, end + 1]]
         slowest, fastest = beside.min() / options.factor, beside.max() * options.factor
-        if sizes[end] >= fastest * periods[end] and slowest < sizes[end] / (until - since) < fastest:
-            shares = (times[first + 1 : end + 1] - since) / (until - since)
-            evened[first + 1 : end + 1] = compose(odometry[first], shares[:, None] * steps[end])
-            ends.append(end + 1)
-    return evened, np.array(ends, dtype=np.int64)
+        duration = float(steps.periods[first : end + 1].sum())
+        if size >= fastest * periods[1] and slowest < size / duration < fastest:
+            found.append((first, end + 1))
+    return found
+
+
+def _uneven_steps(steps: Steps, options: OdometryStallOptions) -> list[tuple[int, int]]:
+    """The rows between which some steps are too short and others too long: first the fewest, then the most
+    uneven, so that the direction of time does not matter."""
+    candidates = []
+    for count in range(2, min(options.most_uneven_steps, len(steps.sizes) - 2) + 1):
+        spreads = _spreads(steps, count, options)
+        candidates += [(count, -spreads[row], int(row) + 1) for row in np.flatnonzero(spreads)]
+    is_taken = np.zeros(len(steps.sizes), dtype=np.bool_)
+    found = []
+    for count, _, first in sorted(candidates):
+        if not is_taken[first : first + count].any():
+            is_taken[first : first + count] = True
+            found.append((first, first + count))
+    return found
+
+
+def _spreads(steps: Steps, count: int, options: OdometryStallOptions) -> Array:
+    """By how much the longest and the shortest of so many steps differ from steady motion, m + rad.
+
+    For those from the second step on, from the third step on, …; 0 if they are no steady motion with wrong
+    stamps.
+    """
+    speeds = steps.speeds()
+    sizes, periods, within = (
+        sliding_window_view(values[1:-1], count) for values in (steps.sizes, steps.periods, speeds)
+    )
+    before, after = speeds[: len(sizes)], speeds[count + 1 :]
+    slower, faster = np.minimum(before, after), np.maximum(before, after)
+    mean = sizes.sum(axis=1) / periods.sum(axis=1)
+    off = sizes - mean[:, None] * periods
+    tolerated, beside = np.sqrt(options.steady_factor), 0.5 * (before + after)
+    is_steady = (slower > 0.0) & (faster <= options.steady_factor * slower)
+    is_steady &= (mean > beside / tolerated) & (mean < beside * tolerated)
+    has_slow = (within.min(axis=1) < slower / options.uneven_factor) & (off.min(axis=1) < -options.min_motion)
+    has_fast = (within.max(axis=1) > faster * options.uneven_factor) & (off.max(axis=1) > options.min_motion)
+    return np.where(is_steady & has_slow & has_fast, np.ptp(off, axis=1), 0.0)

@@ -20,7 +20,7 @@ from tests.simulation.faults import taken
 from tests.slam.frontend.test_tracker import SOUTH, end_off
 from tests.slam.mapped_logs import mapped, office_log
 
-STALLS = OdometryCheckOptions().stalls
+STALLS = OdometryCheckOptions().stalls._replace(min_named=0.0)
 PERIOD = 0.2
 """s"""
 
@@ -76,6 +76,14 @@ def test_a_jump_after_a_rest_is_no_stall():
     assert len(without_stalls(poses, times, STALLS)[1]) == 0
 
 
+def test_only_large_corrections_are_named():
+    poses, times = driven(np.tile([0.1, 0.0, 0.0], (24, 1)))
+    stalled = held(held(poses, 3, 2), 12, 5)
+    evened, ends = without_stalls(stalled, times, STALLS._replace(min_named=0.3))
+    np.testing.assert_allclose(evened, poses, atol=1e-9)
+    assert ends.tolist() == [18]
+
+
 def stalled_corridor() -> LaserLog:
     """22 m of corridor at 0.3 m a scan, with odometry that stands for four scans, twice."""
     log = taken(office_log(), np.arange(SOUTH.start, SOUTH.stop, 3))
@@ -98,3 +106,57 @@ def test_a_stall_of_mit_csail_breaks_nothing(every):
     log = read_log(str(data_file("mit-csail.log.gz")))
     part = taken(log, np.arange(240, 420, every))
     assert mapped(part).state.breaks == []
+
+
+@settings(deadline=None)
+@given(
+    st.integers(2, 20),
+    st.lists(st.floats(-1.0, 1.0), min_size=1, max_size=3),
+    st.floats(0.2, 0.5),
+    st.floats(-0.1, 0.1),
+)
+def test_poses_with_wrong_stamps_on_a_steady_way_are_where_they_would_be(row, late, step, turn):
+    """Poses of up to three scans are those of up to a scan before or after them."""
+    poses, times = driven(np.tile([step, 0.0, turn], (28, 1)))
+    wrong = poses.copy()
+    for k, share in enumerate(late, row + 1):
+        wrong[k] = compose(poses[k], share * np.array([step, 0.0, turn]))
+    evened, ends = without_stalls(wrong, times, STALLS)
+    off = np.hypot(*(evened - poses)[:, :2].T).max()
+    recorded = np.hypot(*(wrong - poses)[:, :2].T).max()
+    assert off <= recorded + 1e-9
+    if len(late) == 1 and abs(late[0]) * step > 1.1 * STALLS.min_motion and abs(late[0]) > 0.6:
+        assert ends.tolist() == [row + 2]
+        assert off < 0.05 * step
+
+
+@settings(deadline=None)
+@given(st.lists(st.tuples(st.floats(0.0, 0.6), st.floats(-0.4, 0.4)), min_size=4, max_size=40))
+def test_the_direction_of_time_does_not_matter(steps):
+    poses, times = driven(np.array([[step, 0.0, turn] for step, turn in steps]))
+    evened, ends = without_stalls(poses, times, STALLS)
+    backwards, starts = without_stalls(poses[::-1], -times[::-1], STALLS)
+    assert len(ends) == len(starts)
+    assert np.abs(backwards[::-1] - evened).max() < 0.1
+
+
+def test_a_stall_backwards_in_time_is_evened_out():
+    poses, times = driven(np.tile([0.2, 0.0, 0.02], (24, 1)))
+    stalled = held(poses, 8, 5)
+    forward, _ = without_stalls(stalled, times, STALLS)
+    backward, starts = without_stalls(stalled[::-1], -times[::-1], STALLS)
+    np.testing.assert_allclose(backward[::-1], forward, atol=1e-9)
+    assert starts.tolist() == [24 - 8]
+
+
+@settings(deadline=None)
+@given(st.lists(st.floats(0.05, 0.5), min_size=6, max_size=30), st.floats(-0.5, 0.5))
+def test_a_robot_that_changes_its_speed_is_believed(speeds, turn):
+    """Its speed rises and falls, once."""
+    steps = np.zeros((2 * len(speeds), 3))
+    steps[:, 0] = [*sorted(speeds), *sorted(speeds, reverse=True)]
+    steps[:, 2] = turn * steps[:, 0]
+    poses, times = driven(steps)
+    evened, ends = without_stalls(poses, times, STALLS)
+    assert len(ends) == 0
+    np.testing.assert_array_equal(evened, poses)
