@@ -35,6 +35,9 @@ class OdometryStallOptions(NamedTuple):
     steady_factor: float = 1.3
     """Largest factor between the speeds before and after uneven steps; their mean speed differs from these by
     no more than its root. A larger value evens out more."""
+    period_factor: float = 1.3
+    """Largest factor between the durations of these steps: where scans come unevenly, their own stamps may be
+    wrong. A larger value evens out more."""
     min_named: float = 0.3
     """Least correction of a pose that a notice names, m + rad. A larger value names fewer stalls."""
 
@@ -146,12 +149,14 @@ def _spreads(steps: Steps, count: int, options: OdometryStallOptions) -> Array:
     sizes, periods, within = (
         sliding_window_view(values[1:-1], count) for values in (steps.sizes, steps.periods, speeds)
     )
+    times = sliding_window_view(steps.periods, count + 2)
     before, after = speeds[: len(sizes)], speeds[count + 1 :]
     slower, faster = np.minimum(before, after), np.maximum(before, after)
     mean = sizes.sum(axis=1) / periods.sum(axis=1)
     off = sizes - mean[:, None] * periods
     tolerated, beside = np.sqrt(options.steady_factor), 0.5 * (before + after)
     is_steady = (slower > 0.0) & (faster <= options.steady_factor * slower)
+    is_steady &= times.max(axis=1) <= options.period_factor * times.min(axis=1)
     is_steady &= (mean > beside / tolerated) & (mean < beside * tolerated)
     has_slow = (within.min(axis=1) < slower / options.uneven_factor) & (off.min(axis=1) < -options.min_motion)
     has_fast = (within.max(axis=1) > faster * options.uneven_factor) & (off.max(axis=1) > options.min_motion)

@@ -76,6 +76,17 @@ def test_a_jump_after_a_rest_is_no_stall():
     assert len(without_stalls(poses, times, STALLS)[1]) == 0
 
 
+def test_where_scans_come_unevenly_odometry_is_believed():
+    """A scan that was logged late has its own odometry."""
+    poses, times = driven(np.tile([0.3, 0.0, 0.0], (24, 1)))
+    times[10] += 0.7 * PERIOD
+    wrong = poses.copy()
+    wrong[15] = poses[15] + (0.2, 0.0, 0.0)
+    evened, ends = without_stalls(wrong, times, STALLS)
+    np.testing.assert_allclose(evened, poses, atol=1e-9)
+    assert ends.tolist() == [16]
+
+
 def test_only_large_corrections_are_named():
     poses, times = driven(np.tile([0.1, 0.0, 0.0], (24, 1)))
     stalled = held(held(poses, 3, 2), 12, 5)
