@@ -7,6 +7,8 @@ scans before.
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from nscan_cli.poses import Array, Mask
@@ -16,12 +18,21 @@ from nscan_cli.slam.frontend.tracked_scans import TrackedScans
 from nscan_cli.slam.frontend.tracker import Tracker
 
 
+class MotionFromBehind(NamedTuple):
+    """How the robot moved where the track from behind fits better."""
+
+    poses: Array
+    """(n, 3); nan elsewhere."""
+    told_sigmas: Array
+    """(n,) standard deviation to which scans tell their places, m; 0 elsewhere."""
+
+
 def motion_from_behind(
     scans: ScanBatch, found: TrackedScans, tracker: Tracker, options: TrackingOptions
-) -> Array | None:
-    """Poses (n, 3) of scans as `tracker`, a new one, finds them from the last to the first.
+) -> MotionFromBehind | None:
+    """The motion of scans (n) as `tracker`, a new one, finds it from the last to the first.
 
-    nan except for stretches where the robot, as it was `found`, seems to stand, and where scans from behind
+    It is known in stretches where the robot, as it was `found`, seems to stand, and where scans from behind
     fit clearly better, with a longer way. None if there are no such. The scans stay as they are.
     """
     untold = untold_stretches(found, options)
@@ -33,15 +44,19 @@ def motion_from_behind(
     for first, end in untold:
         known[first:end] = np.nan
     behind = tracker.track(scans.backwards(known))
-    inliers, poses, guide = behind.inliers[::-1], behind.poses[::-1], np.full((len(scans), 3), np.nan)
+    inliers, poses, sigmas = behind.inliers[::-1], behind.poses[::-1], behind.told_sigmas[::-1]
+    # What scans tell from one side alone may be the ripple of their walls.
+    tells = sigmas <= options.degeneracy.trusted_sigma
+    sigmas = np.where(tells, sigmas, np.maximum(sigmas, found.told_sigmas))
+    motion = MotionFromBehind(np.full((len(scans), 3), np.nan), np.zeros(len(scans)))
     for first, end in stretches:
         before, now = found.inliers[first:end].mean(), inliers[first:end].mean()
         fits_better = now >= max(before + options.standstill_gain, options.restart_inliers)
         if fits_better and _way(poses, first, end) - _way(found.poses, first, end) > options.standstill_lag:
             # The step to the first of them, and the one from the last.
             whole = slice(max(first - 1, 0), end + 1)
-            guide[whole] = poses[whole]
-    return guide if np.isfinite(guide).any() else None
+            motion.poses[whole], motion.told_sigmas[whole] = poses[whole], sigmas[whole]
+    return motion if np.isfinite(motion.poses).any() else None
 
 
 def untold_stretches(found: TrackedScans, options: TrackingOptions) -> list[tuple[int, int]]:

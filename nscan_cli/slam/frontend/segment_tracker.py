@@ -144,7 +144,9 @@ class SegmentTracker:
         if motion is None:
             return scans, found
         self.tracker = before
-        return fresh, self.tracker.track(replace(fresh, odometry=motion))
+        found = self.tracker.track(replace(fresh, odometry=motion.poses))
+        np.maximum(found.told_sigmas, motion.told_sigmas, out=found.told_sigmas)
+        return fresh, found
 
     def _from_origin(self, found: TrackedScans, origin: Array) -> TrackedScans:
         """What was found in a later segment, in the frame of the first."""

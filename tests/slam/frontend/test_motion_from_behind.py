@@ -12,7 +12,9 @@ from nscan_cli.logs.load import log_from
 from nscan_cli.logs.reading_options import ReadingOptions
 from nscan_cli.poses import Array
 from nscan_cli.slam.consistency.repeated_maps import mirrored
+from nscan_cli.slam.diagnostics.notices import notices
 from tests.simulation.drive import Drive
+from tests.simulation.faults import taken
 from tests.simulation.laser import Laser
 from tests.simulation.scenes import Scene, corridor_and_room
 from tests.simulation.world import Builder
@@ -93,3 +95,21 @@ def test_a_bare_corridor_to_a_wall_far_ahead(laser, speed):
     log = dataclasses.replace(recording.log(), odometry=None)
     scans = int(np.argmax(recording.truth[:, 0] > -1.0))
     assert way(mapped(log).graph.poses, scans) == pytest.approx(way(recording.truth, scans), abs=0.05)
+
+
+@pytest.mark.parametrize(
+    ("laser", "speed"),
+    [
+        (Laser(682, -np.radians(120), np.radians(240 / 681), 4.0), 0.55),
+        (Laser(726, -np.radians(127.5), np.radians(255 / 725), 5.6), 1.2),
+    ],
+)
+def test_where_neither_side_tells_the_way_a_notice_says_so(laser, speed):
+    """14 m are lost, as nothing tells of them; both were silent."""
+    drive = Drive(speed=speed, period=0.1 if speed > 1.0 else 0.2)
+    recording = dataclasses.replace(tee(), laser=laser, drive=drive).record(5)
+    log = dataclasses.replace(taken(recording.log(), slice(None, None, 3)), odometry=None)
+    found = mapped(log)
+    scans = int(np.argmax(recording.truth[::3, 0] > -1.0))
+    assert way(found.graph.poses, scans) < way(recording.truth[::3], scans) - 1.0
+    assert any("the walls do not show how far" in said for said in notices(found.state))
