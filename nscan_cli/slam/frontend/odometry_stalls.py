@@ -38,6 +38,9 @@ class OdometryStallOptions(NamedTuple):
     period_factor: float = 1.3
     """Largest factor between the durations of these steps: where scans come unevenly, their own stamps may be
     wrong. A larger value evens out more."""
+    min_acceleration: float = 3.0
+    """Their speed changes faster than this from one to the next, (m + rad)/s²: no robot drives so. A larger
+    value evens out fewer."""
     min_named: float = 0.3
     """Least correction of a pose that a notice names, m + rad. A larger value names fewer stalls."""
 
@@ -73,8 +76,9 @@ def without_stalls(odometry: Array, times: Array, options: OdometryStallOptions)
         return odometry, np.zeros(0, dtype=np.int64)
     steps = _steps(odometry, times)
     last = len(steps.sizes)
-    stalls = _stalls(steps, options)
-    stalls += [(last - end, last - first) for first, end in _stalls(steps.reversed(), options)]
+    stalls = _stalls(steps, 0.0, options)
+    backwards = _stalls(steps.reversed(), options.min_acceleration, options)
+    stalls += [(last - end, last - first) for first, end in backwards]
     evened = _evened(odometry, times, stalls)
     uneven = _uneven_steps(_steps(evened, times), options)
     evened = _evened(evened, times, uneven)
@@ -104,8 +108,8 @@ def _evened(odometry: Array, times: Array, stalls: list[tuple[int, int]]) -> Arr
     return evened
 
 
-def _stalls(steps: Steps, options: OdometryStallOptions) -> list[tuple[int, int]]:
-    """The rows between which odometry stands, and makes up for it in the last step."""
+def _stalls(steps: Steps, min_acceleration: float, options: OdometryStallOptions) -> list[tuple[int, int]]:
+    """The rows between which odometry stands, and makes up for it in the last step, faster than robots do."""
     found = []
     # Steps first to end − 1 stand; the step at `end` makes up for them.
     changes = np.flatnonzero(np.diff(np.concatenate([[False], steps.stands, [False]]).astype(np.int8)))
@@ -118,7 +122,12 @@ def _stalls(steps: Steps, options: OdometryStallOptions) -> list[tuple[int, int]
         beside = steps.speeds()[[first - 1, end + 1]]
         slowest, fastest = beside.min() / options.factor, beside.max() * options.factor
         duration = float(steps.periods[first : end + 1].sum())
-        if size >= fastest * periods[1] and slowest < size / duration < fastest:
+        acceleration = (size / periods[1] - beside.max()) / periods[1]
+        if (
+            size >= fastest * periods[1]
+            and slowest < size / duration < fastest
+            and acceleration >= min_acceleration
+        ):
             found.append((first, end + 1))
     return found
 
@@ -150,6 +159,7 @@ def _spreads(steps: Steps, count: int, options: OdometryStallOptions) -> Array:
         sliding_window_view(values[1:-1], count) for values in (steps.sizes, steps.periods, speeds)
     )
     times = sliding_window_view(steps.periods, count + 2)
+    changes = np.abs(np.diff(sliding_window_view(speeds, count + 2), axis=1))
     before, after = speeds[: len(sizes)], speeds[count + 1 :]
     slower, faster = np.minimum(before, after), np.maximum(before, after)
     mean = sizes.sum(axis=1) / periods.sum(axis=1)
@@ -157,6 +167,7 @@ def _spreads(steps: Steps, count: int, options: OdometryStallOptions) -> Array:
     tolerated, beside = np.sqrt(options.steady_factor), 0.5 * (before + after)
     is_steady = (slower > 0.0) & (faster <= options.steady_factor * slower)
     is_steady &= times.max(axis=1) <= options.period_factor * times.min(axis=1)
+    is_steady &= changes.max(axis=1) >= options.min_acceleration * times.min(axis=1)
     is_steady &= (mean > beside / tolerated) & (mean < beside * tolerated)
     has_slow = (within.min(axis=1) < slower / options.uneven_factor) & (off.min(axis=1) < -options.min_motion)
     has_fast = (within.max(axis=1) > faster * options.uneven_factor) & (off.max(axis=1) > options.min_motion)

@@ -18,8 +18,11 @@ class LoopClosureOptions:
     disagreement: float = 4.0
     """Tracking may have slipped where it differs from odometry by more than the usual difference times this.
     A larger number searches less far after such a step."""
+    turning: float = 0.4
+    """Steps from keyframe to keyframe that turn by more than this have a usual difference of their own, rad:
+    in turns wheels slip. With a smaller value fewer of the other steps disagree."""
     min_compared_steps: int = 20
-    """Steps from keyframe to keyframe after which the usual difference is known."""
+    """Number of such steps after which their usual difference is known."""
     lever_arm: float = 20.0
     """Distance at which angles count when paths are compared by their uncertainty, m. With a larger one,
     paths with certain angles are preferred."""

@@ -16,17 +16,20 @@ class SlipEvidence:
     """Compares tracking with odometry from keyframe to keyframe.
 
     Where both agreed so far and now differ by far more, one of them has slipped, and nothing tells which. So
-    the path may be off by any part of the difference.
+    the path may be off by any part of the difference. Wheels slip in turns: these are compared with turns.
     """
 
-    def __init__(self, disagreement: float, min_steps: int) -> None:
+    def __init__(self, disagreement: float, turning: float, min_steps: int) -> None:
         """They disagree where they differ by more than `disagreement` times the usual difference.
 
-        The usual one is known after `min_steps` steps.
+        That of steps that turn by more than `turning` (rad) is another one than that of the others. Each is
+        known after `min_steps` such steps.
         """
-        self._disagreement, self._min_steps = disagreement, min_steps
-        self._squares: deque[tuple[float, float]] = deque(maxlen=REMEMBERED)
+        self._disagreement, self._turning, self._min_steps = disagreement, turning, min_steps
+        self._straight: deque[tuple[float, float]] = deque(maxlen=REMEMBERED)
         """Square differences a metre of path: of a coordinate, m²/m, and of the angle, rad²/m."""
+        self._turns: deque[tuple[float, float]] = deque(maxlen=REMEMBERED)
+        """The same of steps that turn."""
 
     def variances(self, step: Array, odometry: Array, length: float) -> tuple[float, float]:
         """By how much a step (3,) may have slipped: variances of a coordinate (m²) and of its angle (rad²).
@@ -39,9 +42,11 @@ class SlipEvidence:
             return 0.0, 0.0
         off = relative(step, odometry)
         squares = np.array([0.5 * (off[0] ** 2 + off[1] ** 2), wrap(off[2]) ** 2])
-        self._squares.append(tuple((squares / length).tolist()))
-        if len(self._squares) < self._min_steps:
+        turns = max(abs(step[2]), abs(odometry[2])) > self._turning
+        like = self._turns if turns else self._straight
+        like.append(tuple((squares / length).tolist()))
+        if len(like) < self._min_steps:
             return 0.0, 0.0
-        usual = np.median(np.array(self._squares), axis=0) * length
+        usual = np.median(np.array(like), axis=0) * length
         place, angle = np.where(squares > self._disagreement**2 * usual, squares / 3, 0.0).tolist()
         return place, angle

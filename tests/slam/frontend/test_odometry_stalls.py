@@ -76,6 +76,15 @@ def test_a_jump_after_a_rest_is_no_stall():
     assert len(without_stalls(poses, times, STALLS)[1]) == 0
 
 
+def test_scans_that_are_far_apart_see_a_robot_that_stops_and_goes():
+    """In 0.6 s a robot may brake and catch up; fr079 with every third scan was 2 m wrong there."""
+    steps = np.tile([0.3, 0.0, 0.0], (24, 1))
+    steps[10:12, 0] = 0.1, 0.5
+    poses, times = driven(steps)
+    assert len(without_stalls(poses, 3.0 * times, STALLS)[1]) == 0
+    assert without_stalls(poses, 0.5 * times, STALLS)[1].tolist() == [12]
+
+
 def test_where_scans_come_unevenly_odometry_is_believed():
     """A scan that was logged late has its own odometry."""
     poses, times = driven(np.tile([0.3, 0.0, 0.0], (24, 1)))
@@ -136,7 +145,8 @@ def test_poses_with_wrong_stamps_on_a_steady_way_are_where_they_would_be(row, la
     off = np.hypot(*(evened - poses)[:, :2].T).max()
     recorded = np.hypot(*(wrong - poses)[:, :2].T).max()
     assert off <= recorded + 1e-9
-    if len(late) == 1 and abs(late[0]) * step > 1.1 * STALLS.min_motion and abs(late[0]) > 0.6:
+    steep = 2.1 * abs(late[0]) * step > 1.1 * STALLS.min_acceleration * PERIOD**2
+    if len(late) == 1 and steep and abs(late[0]) * step > 1.1 * STALLS.min_motion and abs(late[0]) > 0.6:
         assert ends.tolist() == [row + 2]
         assert off < 0.05 * step
 
@@ -152,7 +162,7 @@ def test_the_direction_of_time_does_not_matter(steps):
 
 
 def test_a_stall_backwards_in_time_is_evened_out():
-    poses, times = driven(np.tile([0.2, 0.0, 0.02], (24, 1)))
+    poses, times = driven(np.tile([0.3, 0.0, 0.02], (24, 1)))
     stalled = held(poses, 8, 5)
     forward, _ = without_stalls(stalled, times, STALLS)
     backward, starts = without_stalls(stalled[::-1], -times[::-1], STALLS)

@@ -16,15 +16,19 @@ OPTIONS = LoopClosureOptions()
 
 def evidence(noise: float, steps: int = 200) -> SlipEvidence:
     """After some steps of 1.5 m whose coordinates and angle differ by `noise` (m and rad)."""
-    found, rng = SlipEvidence(OPTIONS.disagreement, OPTIONS.min_compared_steps), np.random.default_rng(1)
+    found, rng = no_evidence(), np.random.default_rng(1)
     for _ in range(steps):
         found.variances(STEP, odometry(rng.normal(0.0, noise, 3)), 1.5)
     return found
 
 
-def odometry(off: Array) -> Array:
-    """What odometry says of STEP where tracking differs from it by `off` (3,)."""
-    by_odometry: Array = compose(STEP, -np.asarray(off))
+def no_evidence() -> SlipEvidence:
+    return SlipEvidence(OPTIONS.disagreement, OPTIONS.turning, OPTIONS.min_compared_steps)
+
+
+def odometry(off: Array, step: Array = STEP) -> Array:
+    """What odometry says of a step where tracking differs from it by `off` (3,)."""
+    by_odometry: Array = compose(step, -np.asarray(off))
     return by_odometry
 
 
@@ -55,3 +59,15 @@ def test_nothing_is_told_before_the_usual_difference_is_known_or_without_odometr
 def test_turns_are_compared_across_the_jump_of_the_angle():
     near = np.array([0.0, 0.0, 2 * np.pi])
     assert evidence(0.01).variances(STEP, STEP + near, 1.5) == (0.0, 0.0)
+
+
+def test_turns_are_compared_with_turns():
+    """Wheels that slip in turns tell of no slip of tracking there; mit-killian was searched everywhere."""
+    found, rng = no_evidence(), np.random.default_rng(2)
+    turn, off = np.array([1.2, 0.4, 0.8]), np.array([0.0, 0.0, 0.3])
+    for _ in range(100):
+        found.variances(STEP, odometry(rng.normal(0.0, 0.01, 3)), 1.5)
+        found.variances(turn, odometry(rng.normal(0.0, (0.01, 0.01, 0.3)), turn), 1.5)
+    assert found.variances(turn, odometry(off, turn), 1.5)[1] == 0.0
+    assert found.variances(STEP, odometry(off), 1.5)[1] > 0.0
+    assert found.variances(turn, odometry(np.array([0.0, 0.0, 1.5]), turn), 1.5)[1] > 0.0
