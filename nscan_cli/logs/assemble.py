@@ -210,7 +210,7 @@ def _odometry(
             poses, said = without_repeats(poses, path.times)
         path = robot_path(path.times, scaled_odometry(poses, options.odometry_scale))
     elif not options.as_recorded:
-        odometry, said = without_repeats(odometry, times.times, ranges[times.rows])
+        odometry, said = without_repeats(odometry, times.times, (ranges, times.rows))
     odometry = scaled_odometry(odometry, options.odometry_scale)
     if said and path is not None:
         odometry = np.where(are_known(odometry)[:, None], poses_at(path, times.times), odometry)

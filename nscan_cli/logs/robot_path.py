@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import NamedTuple
 
 import numpy as np
@@ -95,6 +96,19 @@ def likelier_path(path: RobotPath, times: Array, poses: Array) -> RobotPath | No
         away = np.hypot(off[:, 0], off[:, 1]) + METRES_PER_RADIAN * np.abs(off[:, 2])
         errors.append(float(away.mean()))
     return steady if errors[0] < errors[1] else bent
+
+
+def steady_between(poses: Array, times: Array, stretches: Iterable[tuple[int, int]]) -> Array:
+    """Poses (S, 3) at times (S,), s, with those between the two rows of each stretch on its chord, by time.
+
+    Where stretches overlap, a later one goes by what an earlier one gave.
+    """
+    evened = poses.copy()
+    for first, last in stretches:
+        shares = (times[first + 1 : last] - times[first]) / (times[last] - times[first])
+        step = relative(evened[last], evened[first])
+        evened[first + 1 : last] = compose(evened[first], shares[:, None] * step)
+    return evened
 
 
 def poses_at(path: RobotPath, times: Array) -> Array:

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from nscan_cli.poses import Array, are_known, compose, relative
+from nscan_cli.logs.robot_path import steady_between
+from nscan_cli.poses import Array, are_known
 
 
 @dataclass(frozen=True)
@@ -38,13 +39,13 @@ DEFAULT_SLOW_ODOMETRY = SlowOdometryOptions()
 def without_repeats(
     odometry: Array,
     times: Array,
-    readings: NDArray[np.float32] | None = None,
+    scans: tuple[NDArray[np.float32], NDArray[np.int64]] | None = None,
     options: SlowOdometryOptions = DEFAULT_SLOW_ODOMETRY,
 ) -> tuple[Array, str]:
     """Odometry (S, 3) at times (S,), s, steady between two poses that differ if it is slow; and what to say.
 
-    readings (S, B): the scans at these times, m; None if the times are those of odometry. The text is empty
-    where nothing is changed. Unknown poses are nan and stay so.
+    scans: readings (S, B), m, and the rows (S,) of them at these times; None if the times are those of
+    odometry. The text is empty where nothing is changed. Unknown poses are nan and stay so.
     """
     stands = (odometry[1:] == odometry[:-1]).all(axis=1)
     moves = ~stands & are_known(odometry[1:]) & are_known(odometry[:-1])
@@ -55,18 +56,14 @@ def without_repeats(
     changes = np.flatnonzero(~stands)
     before = np.searchsorted(changes, ends) - 1
     repeats = np.stack([np.where(before >= 0, changes[before] + 1, 0), ends + 1], axis=1)
-    if readings is not None and not _robot_drives(repeats, readings, options):
+    if scans is not None and not _robot_drives(repeats, *scans, options):
         return odometry, ""
     durations = np.diff(times[repeats], axis=1)[:, 0]
     usual = float(np.median(durations))
     if usual > options.max_duration:
         return odometry, ""
-    evened = odometry.copy()
-    for (first, last), duration in zip(repeats.tolist(), durations.tolist(), strict=True):
-        if 0.0 < duration <= options.longest * usual:
-            shares = (times[first + 1 : last] - times[first]) / duration
-            step = relative(odometry[last], odometry[first])
-            evened[first + 1 : last] = compose(odometry[first], shares[:, None] * step)
+    is_drive = (durations > 0.0) & (durations <= options.longest * usual)
+    evened = steady_between(odometry, times, repeats[is_drive].tolist())
     return evened, (
         f"odometry comes less often than the log says: it repeats each pose for {usual:.2g} s; between two "
         "that differ the robot is taken to move steadily; --as-recorded believes the log"
@@ -74,12 +71,18 @@ def without_repeats(
 
 
 def _robot_drives(
-    repeats: NDArray[np.int64], readings: NDArray[np.float32], options: SlowOdometryOptions
+    repeats: NDArray[np.int64],
+    readings: NDArray[np.float32],
+    rows: NDArray[np.int64],
+    options: SlowOdometryOptions,
 ) -> bool:
-    """Whether readings (S, B) change as much while a pose is repeated as when it changes."""
+    """Whether readings (S, B) change as much while a pose is repeated as when it changes.
+
+    rows: those of the readings (S,) in order of time.
+    """
     changing: list[bool] = []
     for first, last in repeats[:: max(1, len(repeats) // options.scans)].tolist():
-        some = readings[[first, last - 1, last]]
+        some = readings[rows[[first, last - 1, last]]]
         some = some[:, (np.isfinite(some) & (some > 0)).all(axis=0)]
         if some.size:
             meanwhile, at_change = np.median(np.abs(np.diff(some, axis=0)), axis=1).tolist()

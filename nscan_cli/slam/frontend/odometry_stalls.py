@@ -11,7 +11,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
-from nscan_cli.poses import Array, Indices, Mask, compose, relative
+from nscan_cli.logs.robot_path import steady_between
+from nscan_cli.poses import Array, Indices, Mask, relative
 
 
 class OdometryStallOptions(NamedTuple):
@@ -79,9 +80,9 @@ def without_stalls(odometry: Array, times: Array, options: OdometryStallOptions)
     stalls = _stalls(steps, 0.0, options)
     backwards = _stalls(steps.reversed(), options.min_acceleration, options)
     stalls += [(last - end, last - first) for first, end in backwards]
-    evened = _evened(odometry, times, stalls)
+    evened = steady_between(odometry, times, stalls)
     uneven = _uneven_steps(_steps(evened, times), options)
-    evened = _evened(evened, times, uneven)
+    evened = steady_between(evened, times, uneven)
     corrections = _sizes(relative(evened, odometry))
     ends = [end for first, end in stalls + uneven if corrections[first + 1 : end].max() >= options.min_named]
     return evened, np.unique(ends).astype(np.int64)
@@ -98,19 +99,12 @@ def _sizes(motions: Array) -> Array:
     return found
 
 
-def _evened(odometry: Array, times: Array, stalls: list[tuple[int, int]]) -> Array:
-    """Odometry (S, 3) that is steady between the rows of each stall."""
-    evened = odometry.copy()
-    for first, end in stalls:
-        shares = (times[first + 1 : end] - times[first]) / (times[end] - times[first])
-        step = relative(evened[end], evened[first])
-        evened[first + 1 : end] = compose(evened[first], shares[:, None] * step)
-    return evened
-
-
 def _stalls(steps: Steps, min_acceleration: float, options: OdometryStallOptions) -> list[tuple[int, int]]:
-    """The rows between which odometry stands, and makes up for it in the last step, faster than robots do."""
-    found = []
+    """The rows between which odometry stands, and makes up for it in the last step.
+
+    Its speed rises by at least `min_acceleration` there, (m + rad)/s².
+    """
+    speeds, found = steps.speeds(), []
     # Steps first to end − 1 stand; the step at `end` makes up for them.
     changes = np.flatnonzero(np.diff(np.concatenate([[False], steps.stands, [False]]).astype(np.int8)))
     for first, end in changes.reshape(-1, 2).tolist():
@@ -119,7 +113,7 @@ def _stalls(steps: Steps, min_acceleration: float, options: OdometryStallOptions
         size, periods = steps.sizes[end], steps.periods[[first - 1, end, end + 1]]
         if size < options.min_motion or not (periods > 0.0).all():
             continue
-        beside = steps.speeds()[[first - 1, end + 1]]
+        beside = speeds[[first - 1, end + 1]]
         slowest, fastest = beside.min() / options.factor, beside.max() * options.factor
         duration = float(steps.periods[first : end + 1].sum())
         acceleration = (size / periods[1] - beside.max()) / periods[1]
@@ -133,8 +127,10 @@ def _stalls(steps: Steps, min_acceleration: float, options: OdometryStallOptions
 
 
 def _uneven_steps(steps: Steps, options: OdometryStallOptions) -> list[tuple[int, int]]:
-    """The rows between which some steps are too short and others too long: first the fewest, then the most
-    uneven, so that the direction of time does not matter."""
+    """The rows between which some steps are too short and others too long.
+
+    The fewest steps count first, then the most uneven: so the direction of time does not matter.
+    """
     candidates = []
     for count in range(2, min(options.most_uneven_steps, len(steps.sizes) - 2) + 1):
         spreads = _spreads(steps, count, options)
