@@ -49,14 +49,13 @@ class Compiling:
             self.has_begun = True
             say(f"{COMPILING}: {self._takes}", self._quiet)
 
-    def beforehand_for_slam(self, threads: int) -> None:
-        """Compile what `slam` needs in two processes, if nothing is compiled yet and there may be threads."""
+    def beforehand_for_slam(self) -> None:
+        """Compile what `slam` needs in two processes; the cache folder has to be there."""
         from nscan_cli.kernels.cache_folder import cache_folder
         from nscan_cli.nightly import kernel_exercises, warm_up
 
         folder = cache_folder()
-        if folder is None or threads < 2 or not warm_up.is_cold():
-            return
+        assert folder is not None
         self._begin()
         with self._bar(SLAM_KERNELS) as report:
             warm_up.compile_side_by_side(folder, kernel_exercises.FOR_SLAM, os.environ, report)

@@ -10,7 +10,7 @@ import numpy as np
 
 from nscan_cli.cli.nscan import INITIAL_WORDS, PRIOR_WORDS
 from nscan_cli.errors import InputDataError, WrongUsageError
-from nscan_cli.evaluation.time_association import TOLERANCE, nearest_in_time
+from nscan_cli.evaluation.time_association import TOLERANCE
 from nscan_cli.files.encoding import without_byte_order_mark
 from nscan_cli.files.inputs import base_name, label, read_bytes
 from nscan_cli.files.limits import GRAPH
@@ -20,6 +20,7 @@ from nscan_cli.graph.io.tum import Trajectory, parse_tum
 from nscan_cli.graph.model import Graph, Pairwise
 from nscan_cli.graph.relative_covariance import RelativePoses
 from nscan_cli.logs.laser_log import LaserLog
+from nscan_cli.logs.scan_order import nearest_in_time
 from nscan_cli.matching.joint.joint_energy import Priors
 from nscan_cli.matching.joint.nscan_match import PriorsAmong
 from nscan_cli.matching.joint.odometry_chain import odometry_priors, priors_of

@@ -54,14 +54,19 @@ def run_on_log(
 
     from nscan_cli.kernels.decorators import load_runtime
     from nscan_cli.logs.log_files import files_of
+    from nscan_cli.nightly.warm_up import is_cold
     from nscan_cli.slam.consistency.map_verification import add_verification
     from nscan_cli.slam.log_to_graph import map_log, notices_of_mapping
 
     compiling = Compiling("half a minute to a minute", quiet)
-    compiling.beforehand_for_slam(threads)
-    load_runtime()
     read = log_reader(log)
-    scans = read(reading)
+    early = None
+    if threads > 1 and is_cold():
+        # Whatever is wrong with the log is said at once, and not after the minute of compilation.
+        early = read(reading)
+        compiling.beforehand_for_slam()
+    load_runtime()
+    scans = early or read(reading)
     if calibrated:
         recorded, reading = reading, _calibrated(scans, reading, quiet)
         if reading != recorded:

@@ -13,11 +13,12 @@ import numpy as np
 
 from nscan_cli.errors import InputDataError
 from nscan_cli.evaluation.statistics import Spread
-from nscan_cli.evaluation.time_association import TOLERANCE, nearest_in_time, no_match
+from nscan_cli.evaluation.time_association import TOLERANCE, no_match
 from nscan_cli.files.inputs import base_name, label, read_text
 from nscan_cli.files.limits import DISTANCE, GRAPH, TIME
 from nscan_cli.graph.io.pose_columns import numbered_lines, split_fields
 from nscan_cli.graph.io.tum import Trajectory
+from nscan_cli.logs.scan_order import nearest_in_time
 from nscan_cli.poses import Array, Indices, relative, wrap
 
 COLUMNS = 8

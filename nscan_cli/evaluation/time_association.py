@@ -6,18 +6,11 @@ import numpy as np
 
 from nscan_cli.errors import InputDataError
 from nscan_cli.files.text import counted
+from nscan_cli.logs.scan_order import nearest_in_time
 from nscan_cli.poses import Array, Indices
 
 TOLERANCE = 0.1
 """s; largest distance in time of a match, as in Kümmerle's metric."""
-
-
-def nearest_in_time(times: Array, wanted: Array) -> Indices:
-    """The rows (M,) of `times` (N,), not decreasing, nearest to `wanted` (M,); of two as near the earlier."""
-    right = np.clip(np.searchsorted(times, wanted), 1, max(len(times) - 1, 1))
-    left = right - 1
-    right = np.minimum(right, len(times) - 1)
-    return np.where(wanted - times[left] <= times[right] - wanted, left, right).astype(np.int64)
 
 
 def mutual_nearest(times: Array, reference: Array) -> tuple[Indices, Indices]:

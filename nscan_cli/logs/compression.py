@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import zlib
 from collections.abc import Callable
+from importlib import import_module
 from typing import Any, NamedTuple
 
 from nscan_cli.files.inputs import FileBytes
@@ -20,46 +22,26 @@ class Compression(NamedTuple):
     magic: bytes
     """The first bytes of such a file."""
     new: Callable[[], Any]
-    """Makes a decompressor with the standard library's decompress(bytes), eof and unused_data."""
+    """Imports the library, and makes a decompressor with the standard library's decompress(bytes), eof and
+    unused_data."""
     command: str
     """The command that decompresses such a file."""
 
 
-def _gzip() -> Any:
-    import zlib
-
-    return zlib.decompressobj(zlib.MAX_WBITS | 16)
-
-
-def _bzip2() -> Any:
-    import bz2
-
-    return bz2.BZ2Decompressor()
-
-
-def _xz() -> Any:
-    import lzma
-
-    return lzma.LZMADecompressor(memlimit=INPUT.bytes)
-
-
-def _zstd() -> Any:
-    import zstandard
-
-    return zstandard.ZstdDecompressor().decompressobj()
-
-
-def _lz4() -> Any:
-    from lz4.frame import LZ4FrameDecompressor
-
-    return LZ4FrameDecompressor()
-
-
-GZIP = Compression("gzip", b"\x1f\x8b", _gzip, "gunzip")
-BZIP2 = Compression("bzip2", b"BZh", _bzip2, "bunzip2")
-XZ = Compression("xz", b"\xfd7zXZ\0", _xz, "unxz")
-ZSTD = Compression("zstd", b"\x28\xb5\x2f\xfd", _zstd, "unzstd")
-LZ4 = Compression("lz4", b"\x04\x22\x4d\x18", _lz4, "unlz4")
+GZIP = Compression("gzip", b"\x1f\x8b", lambda: zlib.decompressobj(zlib.MAX_WBITS | 16), "gunzip")
+BZIP2 = Compression("bzip2", b"BZh", lambda: import_module("bz2").BZ2Decompressor(), "bunzip2")
+XZ = Compression(
+    "xz", b"\xfd7zXZ\0", lambda: import_module("lzma").LZMADecompressor(memlimit=INPUT.bytes), "unxz"
+)
+ZSTD = Compression(
+    "zstd",
+    b"\x28\xb5\x2f\xfd",
+    lambda: import_module("zstandard").ZstdDecompressor().decompressobj(),
+    "unzstd",
+)
+LZ4 = Compression(
+    "lz4", b"\x04\x22\x4d\x18", lambda: import_module("lz4.frame").LZ4FrameDecompressor(), "unlz4"
+)
 COMPRESSIONS = (GZIP, BZIP2, XZ, ZSTD, LZ4)
 SUFFIXES = (".gz", ".bz2", ".xz", ".zst", ".zstd", ".lz4")
 """Suffixes of the names of compressed files."""

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nscan_cli.files.text import counted
+from nscan_cli.logs.scan_order import nearest_in_time, usual_period
 from nscan_cli.poses import Array, relative, wrap
 
 MOST_GAPS_NAMED = 5
@@ -52,9 +53,9 @@ def interpolated_poses(
     columns = (poses[:, 0], poses[:, 1], angles)
     found = np.stack([np.interp(times, at, column) for column in columns], axis=-1)
     found[:, 2] = wrap(found[:, 2])
-    in_gap, nearest = _in_gap(times, at, poses, limits), _nearest(times, at)
+    in_gap, nearest = _in_gap(times, at, poses, limits), nearest_in_time(at, times)
     found[in_gap] = poses[nearest[in_gap]]
-    margin = limits.beyond * _usual_period(at)
+    margin = limits.beyond * usual_period(at)
     missing = in_gap & (np.abs(times - at[nearest]) > margin)
     missing |= (times < at[0] - margin) | (times > at[-1] + margin)
     if missing.any():
@@ -86,24 +87,9 @@ def _in_gap(times: Array, at: Array, poses: Array, limits: OdometryGapLimits) ->
     """(S,) which of the `times` (S,) lie in a gap between two poses (P, 3) at times (P,)."""
     periods = np.diff(at)
     steps = np.abs(relative(poses[1:], poses[:-1]))
-    is_gap = (periods > limits.periods * _usual_period(at)) & (
+    is_gap = (periods > limits.periods * usual_period(at)) & (
         np.maximum(np.hypot(steps[:, 0], steps[:, 1]), steps[:, 2]) > limits.motion
     )
     after = np.searchsorted(at, times)
     found: NDArray[np.bool_] = (times > at[0]) & (times < at[-1]) & np.isin(after - 1, np.flatnonzero(is_gap))
     return found
-
-
-def _nearest(times: Array, at: Array) -> NDArray[np.int64]:
-    """(S,) the pose that is nearest in time, of those at sorted times (P,)."""
-    after = np.clip(np.searchsorted(at, times), 1, max(len(at) - 1, 1))
-    before = after - 1
-    if len(at) == 1:
-        return np.zeros(len(times), dtype=np.int64)
-    return np.where(times - at[before] <= at[after] - times, before, after).astype(np.int64)
-
-
-def _usual_period(at: Array) -> float:
-    """The median time from a pose to the next, s; 0 without any."""
-    periods = np.diff(at)
-    return float(np.median(periods[periods > 0.0])) if (periods > 0.0).any() else 0.0

@@ -12,7 +12,7 @@ from nscan_cli.errors import WrongUsageError
 from nscan_cli.files.limits import TIME
 from nscan_cli.files.text import counted
 from nscan_cli.logs.reading_options import ReadingOptions
-from nscan_cli.poses import Array
+from nscan_cli.poses import Array, Indices
 
 NOMINAL_PERIOD = 0.1
 """Time between scans without usable stamps, s."""
@@ -100,6 +100,21 @@ def _set_back(times: Array) -> list[tuple[int, float]]:
             times[at:] += by
             found.append((at, by))
     return found
+
+
+def usual_period(times: Array) -> float:
+    """The median time from one of the times (n,), in order, to the next, s; 0 if all are equal."""
+    periods = np.diff(times)
+    periods = periods[periods > 0.0]
+    return float(np.median(periods)) if len(periods) else 0.0
+
+
+def nearest_in_time(times: Array, wanted: Array) -> Indices:
+    """The rows (M,) of `times` (N,), not decreasing, nearest to `wanted` (M,); of two as near the earlier."""
+    right = np.clip(np.searchsorted(times, wanted), 1, max(len(times) - 1, 1))
+    left = right - 1
+    right = np.minimum(right, len(times) - 1)
+    return np.where(wanted - times[left] <= times[right] - wanted, left, right).astype(np.int64)
 
 
 def selected_numbers(times: Array, options: ReadingOptions, file: str) -> NDArray[np.int64]:

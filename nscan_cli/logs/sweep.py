@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from nscan_cli.logs.beam_times import BeamTimes
+from nscan_cli.logs.scan_order import usual_period
 from nscan_cli.poses import Array, Indices
 
 BEFORE_STAMP = {"first": 0.0, "middle": 0.5, "last": 1.0}
@@ -91,7 +92,7 @@ def sweep_of_file(
     usual_turn = float(np.median(np.abs(turns)))
     if usual_turn < options.shortest:
         return Sweep(none, f"time_increment of the messages: a turn takes {usual_turn * 1e3:.2g} ms")
-    period = _period(times)
+    period = usual_period(times)
     lasts = float(np.median(np.abs(per_beam) * np.maximum(beams - 1, 1)))
     too_long = period > 0.0 and lasts > options.jitter * period
     if as_recorded or (usual_turn >= options.fastest and not too_long):
@@ -113,13 +114,6 @@ def sweep_of_file(
         "as by --sweep; --as-recorded uses it as it is"
     )
     return Sweep(np.full(len(times), np.copysign(likely, usual)), origin, (said,))
-
-
-def _period(times: Array) -> float:
-    """The usual time from scan to scan, s; 0 with fewer than two."""
-    periods = np.diff(times)
-    periods = periods[periods > 0.0]
-    return float(np.median(periods)) if len(periods) else 0.0
 
 
 def beam_times(turns: Array, increments: Array, beams: Indices, stamp: str) -> BeamTimes | None:

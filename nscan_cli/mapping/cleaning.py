@@ -65,7 +65,7 @@ def cleaned_map(
     occupied &= ~specks
     hits[gone | specks] = 0
     free = ((states == FREE) | gone | specks) & (misses > 0)
-    reached = _connected(free, _cells_of(grid, poses))
+    reached = _connected(free, grid.cells_of(poses[:, :2]))
     walls, count = ndimage.label(occupied, around)
     seen = np.zeros(count + 1, dtype=np.bool_)
     seen[np.unique(walls[ndimage.binary_dilation(reached, around)])] = True
@@ -73,12 +73,6 @@ def cleaned_map(
     hits[unconnected] = misses[unconnected] = 0
     cleaned = grid_of_counts(hits, misses, grid.resolution, grid.origin, grid.options)
     return cleaned, Removed(gone & ~unconnected, specks & ~unconnected, unconnected)
-
-
-def _cells_of(grid: OccupancyGrid, poses: Array) -> tuple[Indices, Indices]:
-    """The rows and the columns of the cells in which the poses (N, 3) lie."""
-    columns, lines = np.floor((poses[:, :2] - np.array(grid.origin)) / grid.resolution).astype(np.int64).T
-    return lines, columns
 
 
 def _connected(free: Mask, start: tuple[Indices, Indices]) -> Mask:

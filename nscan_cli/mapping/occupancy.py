@@ -90,6 +90,11 @@ class OccupancyGrid:
         (height, width), (x, y) = self.shape, self.origin
         return x, y, x + width * self.resolution, y + height * self.resolution
 
+    def cells_of(self, points: Array) -> tuple[Indices, Indices]:
+        """The rows and the columns (n,) of the cells in which points (n, 2), m, lie, also beyond the grid."""
+        columns, rows = np.floor((points - np.array(self.origin)) / self.resolution).astype(np.int64).T
+        return rows, columns
+
     def states(self) -> NDArray[np.int8]:
         """(H, W) FREE, OCCUPIED or UNKNOWN.
 

@@ -6,6 +6,7 @@ import pytest
 
 from nscan_cli.cli.main import run
 from nscan_cli.graph.io.json_graph import write_graph
+from nscan_cli.nightly import warm_up
 from tests.cli.room_logs import ALL_OUTPUTS, room_log
 from tests.graph.small_graph import small_graph
 
@@ -60,6 +61,20 @@ def test_mistakes_are_one_line_and_leave_nothing_behind(folder, capsys, argument
     assert err.startswith("nscan-cli: ")
     assert said in err
     assert sorted(path.name for path in folder.rglob("*")) == before
+
+
+def test_a_log_that_cannot_be_read_is_told_before_kernels_are_compiled(folder, capsys, monkeypatch):
+    compiled = []
+    monkeypatch.setattr(warm_up, "is_cold", lambda: True)
+    monkeypatch.setattr(warm_up, "compile_side_by_side", lambda *_how: compiled.append(True))
+    (folder / "empty.log").write_bytes(b"")
+    assert run(["slam", "empty.log", "-o", "out.json", "--threads", "2"]) == 65
+    assert capsys.readouterr().err == "nscan-cli: empty.log: is empty; give a log with laser scans\n"
+    assert not compiled
+    (folder / "good.log").write_text(room_log(5))
+    assert run(["slam", "good.log", "-o", "out.json", "--threads", "2"]) == 0
+    assert capsys.readouterr().err.startswith("compiling the kernels")
+    assert compiled
 
 
 @pytest.mark.parametrize(

@@ -4,16 +4,10 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from nscan_cli.evaluation.time_association import TOLERANCE, mutual_nearest, nearest_in_time
+from nscan_cli.evaluation.time_association import TOLERANCE, mutual_nearest
 
 # Multiples of 1/64 s: differences are exact, and many times are equal.
 times = st.lists(st.integers(0, 640).map(lambda k: k / 64), min_size=1, max_size=12).map(sorted).map(np.array)
-
-
-@given(times, times)
-def test_nearest_is_what_a_search_of_all_finds(a: np.ndarray, b: np.ndarray):
-    rows = nearest_in_time(a, b)
-    np.testing.assert_array_equal(np.abs(a[rows] - b), np.abs(a[:, None] - b[None]).min(axis=0))
 
 
 @given(times, times)

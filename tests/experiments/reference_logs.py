@@ -11,13 +11,13 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from nscan_cli.evaluation.reference_relations import read_relations
-from nscan_cli.evaluation.time_association import nearest_in_time
 from nscan_cli.graph.model import Pairwise
 from nscan_cli.graph.optimise.chordal import chordal_start
 from nscan_cli.graph.optimise.graph_energy import GraphEnergy
 from nscan_cli.graph.optimise.graph_solver import optimise_poses
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.logs.load import read_log
+from nscan_cli.logs.scan_order import nearest_in_time
 from nscan_cli.poses import Array
 from tests.data import find_data
 

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from nscan_cli.errors import WrongUsageError
 from nscan_cli.logs.reading_options import ReadingOptions
-from nscan_cli.logs.scan_order import by_time, selected_numbers
+from nscan_cli.logs.scan_order import by_time, nearest_in_time, selected_numbers
 
 
 def test_sorted_stably_and_counted():
@@ -83,3 +83,12 @@ def test_messages_that_come_late_are_sorted_in():
     np.testing.assert_allclose(order.times, times, atol=1e-9)
     apart = np.concatenate([times + 3600.0, times])
     assert np.all(np.diff(by_time([f"{time:.1f}" for time in apart]).times) > 0)
+
+
+times = st.lists(st.integers(0, 640).map(lambda k: k / 64), min_size=1, max_size=12).map(sorted).map(np.array)
+
+
+@given(times, times)
+def test_nearest_is_what_a_search_of_all_finds(a: np.ndarray, b: np.ndarray):
+    rows = nearest_in_time(a, b)
+    np.testing.assert_array_equal(np.abs(a[rows] - b), np.abs(a[:, None] - b[None]).min(axis=0))

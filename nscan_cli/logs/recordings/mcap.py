@@ -23,6 +23,7 @@ from nscan_cli.errors import InputDataError
 from nscan_cli.files.inputs import FileBytes
 from nscan_cli.files.limits import INPUT, MB
 from nscan_cli.files.text import counted
+from nscan_cli.logs.compression import LZ4
 from nscan_cli.logs.recordings.container import DAMAGE_REMEDY, Channel, Recording
 from nscan_cli.logs.recordings.message_types import READ_TYPES, ros2_type_name
 
@@ -68,7 +69,7 @@ class Summary:
     start: int
     """Byte where the data section must end."""
     chunks: list[int] = field(default_factory=list)
-    """FileBytes where chunks begin."""
+    """Bytes where chunks begin."""
     counts: dict[int, int] | None = None
     """Number of messages by channel; None where the file does not state it."""
 
@@ -233,9 +234,7 @@ class _McapReader:
         size: int = chunk.uncompressed_size
         INPUT.check(size / MB, f"has a chunk of {size / MB:,.0f} MB")
         if chunk.compression == "lz4":
-            from lz4.frame import LZ4FrameDecompressor
-
-            content: bytes = LZ4FrameDecompressor().decompress(chunk.data, max_length=size + 1)
+            content: bytes = LZ4.new().decompress(chunk.data, max_length=size + 1)
         elif chunk.compression == "zstd":
             # The package allocates the size that the compressed data state.
             if zstandard.frame_content_size(chunk.data) > size:

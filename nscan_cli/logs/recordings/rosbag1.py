@@ -7,13 +7,11 @@ write a wrong one. The index is only compared with what was found.
 from __future__ import annotations
 
 import struct
-from bz2 import BZ2Decompressor
-from collections.abc import Callable
-from typing import Any
 
 from nscan_cli.errors import InputDataError
 from nscan_cli.files.inputs import FileBytes
 from nscan_cli.files.limits import INPUT, MB
+from nscan_cli.logs.compression import BZIP2, LZ4
 from nscan_cli.logs.recordings.container import DAMAGE_REMEDY, Channel, Recording
 from nscan_cli.logs.recordings.message_types import READ_TYPES, ros2_type_name
 from nscan_cli.logs.recordings.rosbag1_records import (
@@ -36,6 +34,7 @@ from nscan_cli.logs.recordings.rosbag1_records import (
 
 CHUNK_COUNT = struct.Struct("<II")
 """A connection, and how many of its messages a chunk has."""
+DECOMPRESSORS = {"bz2": BZIP2.new, "lz4": LZ4.new}
 WHOLE_READ = "its messages were found by reading all of it"
 
 
@@ -183,15 +182,6 @@ class _BagReader:
 
     def _damaged(self, broken: DamagedBagError) -> InputDataError:
         return InputDataError(self.file, _damage(broken), DAMAGE_REMEDY)
-
-
-def _lz4_decompressor() -> Any:
-    from lz4.frame import LZ4FrameDecompressor
-
-    return LZ4FrameDecompressor()
-
-
-DECOMPRESSORS: dict[str, Callable[[], Any]] = {"bz2": BZ2Decompressor, "lz4": _lz4_decompressor}
 
 
 def _damage(broken: DamagedBagError) -> str:

@@ -17,11 +17,11 @@ BAG_MAGIC = b"#ROSBAG V2.0\n"
 MESSAGE, HEADER, INDEX, CHUNK, CHUNK_INFO, CONNECTION = 2, 3, 4, 5, 6, 7
 """Types of records: the field op of their headers."""
 INDEX_ENTRY_SIZE = {INDEX: 12, CHUNK_INFO: 8}
-"""FileBytes of each entry in the two types of records that make up the index."""
+"""Bytes of each entry in the two types of records that make up the index."""
 CHUNK_FIELD = b"\x04\x00\x00\x00op=\x05"
 """The field op in the header of a chunk, with its length."""
 LONGEST_CHUNK_HEADER = 200
-"""FileBytes"""
+"""Bytes: the length field and the named fields of a chunk's header are shorter."""
 
 
 class DamagedBagError(Exception):

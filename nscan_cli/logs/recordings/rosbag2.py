@@ -15,7 +15,7 @@ from nscan_cli.logs.recordings.message_types import READ_TYPES, ros2_type_name
 from nscan_cli.logs.recordings.sqlite_journal import recovered_database
 
 JOURNAL_MODE = slice(18, 20)
-"""FileBytes of the header that can ask for a write-ahead log, which a database in memory cannot have."""
+"""Bytes of the header that can ask for a write-ahead log, which a database in memory cannot have."""
 ROLLBACK_JOURNAL = b"\x01\x01"
 FETCH_AGAIN = "fetch the file again"
 

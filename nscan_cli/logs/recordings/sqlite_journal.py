@@ -22,7 +22,7 @@ WAL, JOURNAL = "-wal", "-journal"
 JOURNAL_END = b"\xd9\xd5\x05\xf9\x20\xa1\x63\xd7"
 """The last bytes of a journal that ends with the name of another file."""
 WAL_HEADER, FRAME_HEADER = 32, 24
-"""FileBytes of the header of a write-ahead log, and of each frame in it (sqlite.org/fileformat2.html)."""
+"""Bytes of the header of a write-ahead log, and of each frame in it (sqlite.org/fileformat2.html)."""
 SALTS = slice(16, 24)
 FRAME_SALTS = slice(8, 16)
 

@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 from nscan_cli.mapping.counted_grid import grid_of_counts
 from nscan_cli.mapping.figures.axes import SCALE_BAR_MARGINS, draw_scale_bar
 from nscan_cli.mapping.figures.canvas import BLUE, VERMILLION, Canvas
-from nscan_cli.mapping.figures.map_plots import background_image
+from nscan_cli.mapping.figures.map_plots import background_image, points_of_cells
 from nscan_cli.mapping.occupancy import FREE, OCCUPIED, OccupancyGrid
-from nscan_cli.poses import Array, Mask
+from nscan_cli.poses import Array
 
 
 class DrawnResult(NamedTuple):
@@ -49,7 +49,7 @@ def plot_comparison(first: DrawnResult, second: DrawnResult) -> Canvas:
     background, cells_per_pixel = background_image(both)
     canvas = Canvas(both.bounds, 1 / (cells_per_pixel * size), background, SCALE_BAR_MARGINS)
     for drawn, cells, colour in ((first, alone[0], BLUE), (second, alone[1], VERMILLION)):
-        canvas.cloud(_points(cells, both, max(1, round(1 / cells_per_pixel))), colour, 1.0)
+        canvas.cloud(points_of_cells(cells, both, max(1, round(1 / cells_per_pixel))), colour, 1.0)
         canvas.line(drawn.path, colour, 1.2)
     draw_scale_bar(canvas, [("line", BLUE, first.name), ("line", VERMILLION, second.name)])
     return canvas
@@ -63,13 +63,3 @@ def _placed(grid: OccupancyGrid, left: int, bottom: int, shape: tuple[int, int])
     rows = slice(line - bottom, line - bottom + height)
     states[rows, column - left : column - left + width] = grid.states()
     return states
-
-
-def _points(cells: Mask, grid: OccupancyGrid, pixels: int) -> Array:
-    """(N, 2) a point in every pixel of the cells (H, W), m; a cell has `pixels` × `pixels`."""
-    lines, columns = np.nonzero(cells)
-    aside = (np.arange(pixels) + 0.5) / pixels
-    inner = np.stack(np.meshgrid(aside, aside), axis=-1).reshape(-1, 2)
-    corners = np.column_stack([columns, lines])[:, None, :]
-    points: Array = (corners + inner).reshape(-1, 2) * grid.resolution + np.array(grid.origin)
-    return points

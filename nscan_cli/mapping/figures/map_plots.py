@@ -25,7 +25,7 @@ from nscan_cli.mapping.figures.graph_edges import EDGE_COLOURS, edges_by_kind
 from nscan_cli.mapping.figures.panels import bounds_around
 from nscan_cli.mapping.map_server import gray_image
 from nscan_cli.mapping.occupancy import FREE, OCCUPIED, UNKNOWN, OccupancyGrid
-from nscan_cli.poses import Array, Indices, transform
+from nscan_cli.poses import Array, Indices, Mask, transform
 
 MIN_PIXELS, MAX_PIXELS = 1600, 3200
 """Limits of the longer side of a picture with overlays. The cells of a small map become squares of pixels.
@@ -127,6 +127,16 @@ def background_image(grid: OccupancyGrid) -> tuple[NDArray[np.uint8], float]:
     return np.where(darkest == SOFT_GRAYS[OCCUPIED], darkest, np.round(mean)).astype(np.uint8), float(side)
 
 
+def points_of_cells(cells: Mask, grid: OccupancyGrid, pixels: int) -> Array:
+    """(N, 2) a point in every pixel of the cells (H, W), m; a cell has `pixels` × `pixels`."""
+    lines, columns = np.nonzero(cells)
+    aside = (np.arange(pixels) + 0.5) / pixels
+    inner = np.stack(np.meshgrid(aside, aside), axis=-1).reshape(-1, 2)
+    corners = np.column_stack([columns, lines])[:, None, :]
+    points: Array = (corners + inner).reshape(-1, 2) * grid.resolution + np.array(grid.origin)
+    return points
+
+
 def _draw_graph(canvas: Canvas, graph: Graph) -> list[LegendEntry]:
     """Draws relations as lines and keyframes as dots. Returns the legend entries."""
     entries: list[LegendEntry] = []
@@ -154,7 +164,7 @@ def _points_of_occupied_cells(log: LaserLog, rows: Indices, poses: Array, grid: 
     """(M, 2) the end points of beams in occupied cells, m."""
     seen = list(log.moving_along(poses, rows).points_by_scan())
     points = np.concatenate([transform(pose, seen[row]) for row, pose in zip(rows, poses, strict=True)])
-    columns, lines = np.floor((points - np.array(grid.origin)) / grid.resolution).astype(np.int64).T
+    lines, columns = grid.cells_of(points)
     height, width = grid.shape
     inside = (columns >= 0) & (columns < width) & (lines >= 0) & (lines < height)
     points, columns, lines = points[inside], columns[inside], lines[inside]

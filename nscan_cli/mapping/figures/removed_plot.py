@@ -7,7 +7,7 @@ import numpy as np
 from nscan_cli.mapping.cleaning import Removed
 from nscan_cli.mapping.figures.axes import SCALE_BAR_MARGINS, LegendEntry, draw_scale_bar
 from nscan_cli.mapping.figures.canvas import PURPLE, SKY, VERMILLION, Canvas
-from nscan_cli.mapping.figures.map_plots import background_image
+from nscan_cli.mapping.figures.map_plots import background_image, points_of_cells
 from nscan_cli.mapping.occupancy import OccupancyGrid
 
 KINDS = (
@@ -22,15 +22,9 @@ def plot_removed(grid: OccupancyGrid, removed: Removed) -> Canvas:
     background, cells_per_pixel = background_image(grid)
     canvas = Canvas(grid.bounds, 1 / (cells_per_pixel * grid.resolution), background, SCALE_BAR_MARGINS)
     entries: list[LegendEntry] = []
-    # Every pixel of a cell that is larger than a pixel gets a point.
-    pixels = max(1, round(1 / cells_per_pixel))
-    aside = (np.arange(pixels) + 0.5) / pixels
-    inner = np.stack(np.meshgrid(aside, aside), axis=-1).reshape(-1, 2)
     for name, colour, text in KINDS:
-        lines, columns = np.nonzero(getattr(removed, name))
-        corners = np.column_stack([columns, lines])
-        points = (corners[:, None, :] + inner).reshape(-1, 2) * grid.resolution + np.array(grid.origin)
-        canvas.cloud(points, colour, 1.0)
-        entries.append(("disc", colour, f"{text}: {len(lines)} cells"))
+        cells = getattr(removed, name)
+        canvas.cloud(points_of_cells(cells, grid, max(1, round(1 / cells_per_pixel))), colour, 1.0)
+        entries.append(("disc", colour, f"{text}: {np.count_nonzero(cells)} cells"))
     draw_scale_bar(canvas, entries)
     return canvas
