@@ -15,7 +15,7 @@ Indices = NDArray[np.int64]
 Mask = NDArray[np.bool_]
 
 MIRRORED = np.array([1.0, -1.0, -1.0])
-"""Factors of a pose that is seen in a mirror along the x axis."""
+"""Factors that turn a pose (x, y, φ) into its mirror image across the x axis."""
 
 
 def wrap(angle: ArrayLike) -> Array:
@@ -25,7 +25,7 @@ def wrap(angle: ArrayLike) -> Array:
 
 
 def are_known(poses: ArrayLike) -> Mask:
-    """(…) which of the poses (…, 3) are known; the others are nan."""
+    """Which of the poses (…, 3) are known, as a mask (…); an unknown pose is nan."""
     known: Mask = ~np.isnan(np.asarray(poses, dtype=np.float64)[..., 0])
     return known
 
@@ -87,7 +87,7 @@ def _wrap(angle: float) -> float:
 
 
 def inverse(a: ArrayLike) -> Array:
-    """⊖a: the inverse pose, that is the frame that a is given in, seen from a."""
+    """⊖a: the inverse pose, that is the frame that a is given in, seen from frame a."""
     a = np.asarray(a, dtype=np.float64)
     return relative(np.zeros_like(a), a)
 

@@ -1,8 +1,7 @@
 """Export of a log with corrected poses as CARMEN text, as the relations metric and other tools read it.
 
-Laser records carry two poses: that of the laser, then that of the robot (CARMEN,
-src/logger/writelog.c). Both are corrected here. The time stamps are those of the source, so that tools
-find the same scans by them.
+Laser records carry two poses: that of the laser, then that of the robot (CARMEN, src/logger/writelog.c). Both
+are corrected here. The time stamps are those of the source, so that tools find the same scans by them.
 """
 
 from __future__ import annotations
@@ -25,17 +24,17 @@ HEADER = """\
 # the poses are corrected ones, a result of nscan-cli, and no odometry
 """
 ANGLE_TOLERANCE = 1e-6
-"""rad; largest difference of beam directions that counts as none."""
+"""Beam directions that differ by less count as equal, rad."""
 
 
 def corrected_log(log: LaserLog, rows: Indices, poses: Array) -> bytes:
     """The scans in `rows` (N,) of a log as CARMEN text, taken at the robot's `poses` (N, 3).
 
-    The records are FLASER where the beams have the directions that CARMEN assumes for their number and
-    end within CARMEN's largest range, else ROBOTLASER1, which states both. A beam without return gets the
-    least range that means so in the log (PARAM robot_front_laser_max), an invalid one 0. Ranges keep all
-    digits and poses 9 decimals, so that reading gives the same values. A laser that turns
-    is written as if it saw at once: the records have no times of beams. Raises NotFiniteError.
+    The records are FLASER where the beams have the directions that CARMEN assumes for their number and end
+    within CARMEN's largest range. Otherwise they are ROBOTLASER1, which states both. A beam without return
+    gets the least range that means so in the log (PARAM robot_front_laser_max), an invalid one 0. Ranges keep
+    all digits and poses 9 decimals, so that reading gives the same values. A laser that turns is written as
+    if it saw at once, since the records have no times of beams. Raises NotFiniteError.
     """
     check_finite("the corrected poses", poses)
     log = seen_at_once(log.moving_along(poses, rows))

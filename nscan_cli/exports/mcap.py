@@ -48,9 +48,8 @@ STREAMS = ("/tf", "/scan")
 """Topics with a message for every scan; the others have one that stays valid."""
 NANOSECONDS = 10**9
 SECONDS_A_YEAR = 365.25 * 86400
-"""s"""
 LAST_SECOND = 2**31
-"""A stamp's seconds are 32 bits wide."""
+"""The first second that a stamp of ROS cannot hold: its seconds are a signed integer of 32 bits."""
 
 
 def ros2_recording(log: LaserLog, rows: Indices, nodes: Indices, graph: Graph, grid: OccupancyGrid) -> bytes:

@@ -25,10 +25,11 @@ if TYPE_CHECKING:
 LINE_LIST, SPHERE_LIST = 5, 7
 """Types of visualization_msgs/Marker."""
 ADD_MARKER = 0
+"""Action of visualization_msgs/Marker."""
 KEYFRAME_SIZE, LINE_WIDTH = 0.15, 0.03
-"""m"""
+"""Diameter of the ball of a keyframe, and width of the line of a relation, m."""
 MARKER_HEIGHT = 0.05
-"""m above the map, which would hide the graph otherwise."""
+"""Height of the graph above the map, which would hide it otherwise, m."""
 
 
 class MessageFactory:

@@ -18,6 +18,7 @@ from nscan_cli.files.limits import CONFIG, INPUT, MB, Limit, LimitExceededError
 from nscan_cli.files.text import name_of_path
 
 STANDARD_INPUT = "-"
+"""The path that stands for standard input."""
 FileBytes = bytes | mmap.mmap
 """The bytes of a file, in memory or memory-mapped."""
 
@@ -25,8 +26,8 @@ FileBytes = bytes | mmap.mmap
 def read_bytes(path: str, limit: Limit = INPUT) -> bytes:
     """Read all bytes of the file `path`, or of standard input if it is "-".
 
-    Raises InputMissingError if the file is missing or cannot be read, InputDataError if it is larger than the
-    limit.
+    Raises InputMissingError if the file is missing or cannot be read, and InputDataError if it is larger than
+    the limit.
     """
     try:
         with _as_input_errors(path):

@@ -13,7 +13,9 @@ from dataclasses import dataclass
 from nscan_cli.errors import WrongUsageError
 
 LIMIT_PREFIX = "NSCAN_CLI_MAX_"
+"""Prefix of the names of the environment variables."""
 MB = 1 << 20
+"""Bytes of a megabyte, as limits count it."""
 
 
 class LimitExceededError(Exception):
@@ -29,7 +31,9 @@ class Limit:
     """An upper bound on something in an input."""
 
     name: str
+    """Name of the environment variable behind LIMIT_PREFIX."""
     default: float
+    """The limit where the variable is not set."""
     unit: str
     """The unit, written after the number in messages."""
 

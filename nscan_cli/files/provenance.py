@@ -11,20 +11,20 @@ from nscan_cli import __version__
 
 @dataclass(frozen=True)
 class Source:
-    """One file, or several that form one input: base name, SHA-256 of the stored bytes, size in bytes.
-
-    The SHA-256 of several files is inputs.common_hash of theirs.
-    """
+    """An input: one file, or several that belong together."""
 
     name: str
+    """Its base name."""
     sha256: str
+    """SHA-256 of the stored bytes; of several files, inputs.common_hash of theirs."""
     bytes: int
+    """Its size."""
     parts: tuple[Source, ...] = ()
     """The files, if there are several."""
 
     @property
     def record(self) -> dict[str, Any]:
-        """The input in documents."""
+        """The input in the provenance of documents."""
         return {"name": self.name, "sha256": self.sha256, "bytes": self.bytes}
 
     @property

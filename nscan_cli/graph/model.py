@@ -21,9 +21,12 @@ class Loop:
     """A candidate loop between two keyframes, and why it was accepted or refused."""
 
     nodes: tuple[int, int]
+    """Ids of the keyframes."""
     accepted: bool
     reason: str
+    """Why it was refused, or what was left out of it; "" if nothing was."""
     score: float
+    """Overlap of the match, or score of the best place that was found, 0 to 1."""
 
 
 @dataclass
@@ -36,10 +39,11 @@ class Graph:
     scans: Indices
     """(N,) scan numbers."""
     stamps: list[str]
+    """N times in seconds, as the log writes them."""
     poses: Array
     """(N, 3) global poses of the robot."""
     odometry: Array | None
-    """(N, 3) poses by odometry, nan where it is missing; None where there is none at all."""
+    """(N, 3) poses by odometry, nan where it is missing; None if the log has no odometry."""
     anchors: Indices
     """(N,) id of the keyframe that the node is attached to."""
     pairwise: list[Pairwise] = field(default_factory=list)

@@ -13,8 +13,8 @@ from nscan_cli.graph.optimise.whole_graph import Component, components
 from nscan_cli.poses import Array, relative, relative_jacobians
 
 ATTACHMENT_SIGMA = np.array([0.05, 0.05, 0.05])
-"""m, m, rad: standard deviations assumed for a node in the frame of its keyframe. The graph holds no
-measurement of it."""
+"""Standard deviations of a node in the frame of its keyframe, m, m and rad. They are assumed, since the graph
+has no measurement of it."""
 
 
 class RelativePoses:
@@ -32,8 +32,8 @@ class RelativePoses:
     def relation(self, a: int, b: int) -> Pairwise | None:
         """The pose of node b in the frame of node a, with its information from all relations of the graph.
 
-        A node that is no keyframe moves with its keyframe, within ATTACHMENT_SIGMA. None when no relations
-        lead from one to the other, or they leave a direction open.
+        A node that is no keyframe moves with its keyframe, within ATTACHMENT_SIGMA. None if no relations lead
+        from one node to the other, or if they leave a direction open.
         """
         graph, nodes = self._graph, (a, b)
         anchors = [int(graph.anchors[node]) for node in nodes]

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from nscan_cli.cli.main import run
-from nscan_cli.graph.io.json_graph import read_graph
+from nscan_cli.graph.io.load_graph import load_graph
 from tests.data import CORRIDOR_LOG, TURNING_LOG, data_file
 from tests.logs.recordings.messages import START, Odom, S, Scan, Tf, Written, turned
 from tests.logs.recordings.ros import ros2
@@ -91,7 +91,7 @@ def test_the_file_is_a_config_of_every_command(tmp_path, capsys):
     graph = tmp_path / "graph.json"
     assert run(["slam", CORRIDOR_LOG, "--config", str(robot), "-o", str(graph), "-q"]) == 0
     assert run(["info", CORRIDOR_LOG, "--config", str(robot)]) == 0
-    assert read_graph(str(graph)).provenance["parameters"]["reading"]["odometry_scale"] == 0.9869
+    assert load_graph(str(graph)).provenance["parameters"]["reading"]["odometry_scale"] == 0.9869
     capsys.readouterr()
 
 
@@ -101,7 +101,7 @@ def test_slam_calibrates_first(tmp_path, capsys):
     path = str(data_file("strangers/mirrored.mcap"))
     assert run(["slam", path, "--calibrate", "-o", str(graph)]) == 0
     assert "calibrated: --flip --mount" in capsys.readouterr().err
-    reading = read_graph(str(graph)).provenance["parameters"]["reading"]
+    reading = load_graph(str(graph)).provenance["parameters"]["reading"]
     assert reading["flip"] is True
     np.testing.assert_allclose(reading["mount"], [0.1, 0, -0.0171], atol=0.003)
 

@@ -18,7 +18,7 @@ import pytest
 from PIL import Image
 
 from nscan_cli.cli.main import run
-from nscan_cli.graph.io.json_graph import read_graph, write_graph
+from nscan_cli.graph.io.json_graph import write_graph
 from nscan_cli.graph.io.load_graph import load_graph
 from nscan_cli.logs.load import read_log
 from nscan_cli.logs.reading_options import ReadingOptions
@@ -54,11 +54,11 @@ def test_the_graph_is_valid_against_the_schema(everything):
     validate(document)
     assert [node["scan"] for node in document["nodes"]] == list(range(201))
     assert {relation["type"] for relation in document["relations"]} == {"pairwise", "nscan"}
-    assert (everything / "graph.json").read_bytes() == write_graph(read_graph(str(everything / "graph.json")))
+    assert (everything / "graph.json").read_bytes() == write_graph(load_graph(str(everything / "graph.json")))
 
 
 def test_the_graph_is_of_the_log(everything):
-    graph = read_graph(str(everything / "graph.json"))
+    graph = load_graph(str(everything / "graph.json"))
     log = read_log(OFFICE_LOG, ReadingOptions(end=40.0))
     assert log.truth is not None
     truth = log.truth[: len(log)]
@@ -71,7 +71,7 @@ def test_the_graph_is_of_the_log(everything):
 
 
 def test_trajectory_and_g2o_are_those_of_the_graph(everything):
-    graph = read_graph(str(everything / "graph.json"))
+    graph = load_graph(str(everything / "graph.json"))
     path = read_tum(str(everything / "path.tum"))
     assert list(path.stamps) == graph.stamps
     np.testing.assert_allclose(relative(path.poses, graph.poses), 0, atol=1e-8)
@@ -80,7 +80,7 @@ def test_trajectory_and_g2o_are_those_of_the_graph(everything):
 
 
 def test_the_corrected_log_has_the_graphs_poses_and_the_logs_scans(everything):
-    graph = read_graph(str(everything / "graph.json"))
+    graph = load_graph(str(everything / "graph.json"))
     log = read_log(OFFICE_LOG, ReadingOptions(end=40.0))
     corrected = read_log(str(everything / "corrected.log"), ReadingOptions(allow_corrected=True))
     assert corrected.stamps == log.stamps

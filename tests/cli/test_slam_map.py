@@ -9,7 +9,7 @@ import pytest
 from PIL import Image
 
 from nscan_cli.cli.main import run
-from nscan_cli.graph.io.json_graph import read_graph
+from nscan_cli.graph.io.load_graph import load_graph
 from tests.cli.documents import document_and_notices
 from tests.cli.test_slam import SHORT
 from tests.mapping.nav2 import load_map
@@ -40,7 +40,7 @@ def test_the_summary_as_json(folder, capsys):
         "slam", capsys, *SHORT, "-o", "a.json", "--trajectory", "a.tum", "--json"
     )
     assert notices == [f"warning: {warning}" for warning in facts["warnings"]]
-    graph = read_graph("a.json")
+    graph = load_graph("a.json")
     assert (facts["scans"], facts["keyframes"]) == (201, len(graph.keyframes))
     assert (facts["pairwise"], facts["nscan"]) == (len(graph.pairwise), len(graph.nscan))
     assert facts["duration"] == pytest.approx(40.0, abs=0.21)

@@ -12,7 +12,7 @@ import pytest
 
 from nscan_cli.cli.main import run
 from nscan_cli.cli.slam_summary import without_numbers
-from nscan_cli.graph.io.json_graph import read_graph
+from nscan_cli.graph.io.load_graph import load_graph
 from tests.cli.test_slam import SHORT
 from tests.data import OFFICE_LOG
 
@@ -21,7 +21,7 @@ def test_the_summary(folder, capsys):
     assert run(["slam", OFFICE_LOG, "--every", "10", "-o", "graph.json"]) == 0
     out, err = capsys.readouterr()
     assert out == ""
-    graph = read_graph("graph.json")
+    graph = load_graph("graph.json")
     accepted = sum(loop.accepted for loop in graph.loops)
     refused = len(graph.loops) - accepted
     lines = [line for line in err.splitlines() if not line.startswith("compiling")]
@@ -54,7 +54,7 @@ def test_the_graph_keeps_all_that_is_warned_of(folder, capsys):
     assert run(["slam", "short.log", "-o", "graph.json", "--json"]) == 0
     warnings = json.loads(capsys.readouterr().out)["warnings"]
     assert any(warning.startswith("1 record skipped") for warning in warnings)
-    assert read_graph("graph.json").provenance["notices"] == warnings
+    assert load_graph("graph.json").provenance["notices"] == warnings
 
 
 def test_more_is_said_when_asked_and_nothing_with_q(folder, capsys):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import tomllib
 
 from nscan_cli.cli.main import run
-from nscan_cli.graph.io.json_graph import read_graph
+from nscan_cli.graph.io.load_graph import load_graph
 from tests.cli.documents import document_of
 from tests.cli.test_slam import SHORT
 from tests.data import OFFICE_LOG
@@ -22,7 +22,7 @@ def test_without_odometry(folder):
 
 def test_max_scans_bounds_the_relations(folder):
     assert run(["slam", *SHORT, "--max-scans", "4", "-o", "graph.json", "-q"]) == 0
-    graph = read_graph("graph.json")
+    graph = load_graph("graph.json")
     assert graph.provenance["parameters"]["slam"]["nscan"]["max_scans"] == 4
     # Fewer where scans did not hang together with the others; two make no joint relation.
     sizes = {len(relation.nodes) for relation in graph.nscan}
@@ -35,8 +35,8 @@ def test_relations_of_one_kind(folder):
     assert run(["slam", *SHORT, "--relations", "nscan", "-o", "nscan.json", "-q"]) == 0
     for kind in ("pairwise", "nscan"):
         validate(document_of(folder / f"{kind}.json"))
-        assert read_graph(f"{kind}.json").provenance["parameters"]["slam"]["relations"] == kind
-    pairwise, nscan = read_graph("pairwise.json"), read_graph("nscan.json")
+        assert load_graph(f"{kind}.json").provenance["parameters"]["slam"]["relations"] == kind
+    pairwise, nscan = load_graph("pairwise.json"), load_graph("nscan.json")
     assert pairwise.nscan == []
     assert len(pairwise.pairwise) > 1.5 * len(pairwise.keyframes)
     assert len(nscan.nscan) >= 1
@@ -45,7 +45,7 @@ def test_relations_of_one_kind(folder):
 
 def test_no_loops(folder):
     assert run(["slam", OFFICE_LOG, "--every", "10", "--no-loops", "-o", "graph.json", "-q"]) == 0
-    graph = read_graph("graph.json")
+    graph = load_graph("graph.json")
     assert graph.provenance["parameters"]["slam"]["nscan"]["loops"] is False
     assert graph.loops == []
     assert {relation.origin for relation in graph.nscan} == {"nscan"}
@@ -70,6 +70,6 @@ def test_config_is_dumped_and_read_back(folder, capsys):
 def test_config_takes_effect(folder):
     (folder / "slam.toml").write_text('end = 20.0\n[slam]\nmax-scans = 3\noutput = "graph.json"\n')
     assert run(["slam", OFFICE_LOG, "--config", "slam.toml", "-q"]) == 0
-    graph = read_graph("graph.json")
+    graph = load_graph("graph.json")
     assert len(graph) == 101
     assert {len(relation.nodes) for relation in graph.nscan} == {3}

@@ -15,7 +15,8 @@ import pytest
 
 from nscan_cli.cli.main import run
 from nscan_cli.graph.io.g2o import write_g2o
-from nscan_cli.graph.io.json_graph import read_graph, write_graph
+from nscan_cli.graph.io.json_graph import write_graph
+from nscan_cli.graph.io.load_graph import load_graph
 from nscan_cli.logs.load import read_log
 from nscan_cli.logs.reading_options import ReadingOptions
 from nscan_cli.poses import relative
@@ -47,7 +48,7 @@ def test_with_its_log_a_graph_is_refined(folder, capsys):
     said = capsys.readouterr().err
     assert re.search(r"^optimised +energy .* iterations, then refined$", said, re.MULTILINE)
     assert re.search(r"^moved +poses by at most \S+ m$", said, re.MULTILINE)
-    before, after = read_graph("graph.json"), read_graph("again.json")
+    before, after = load_graph("graph.json"), load_graph("again.json")
     assert after.provenance == before.provenance
     np.testing.assert_allclose(relative(after.poses, before.poses), 0, atol=0.05)
     # The matches are made again: their last digits tell.
@@ -79,7 +80,7 @@ def test_without_its_log_a_graph_is_optimised_only(folder, capsys):
     assert warning.startswith("warning: optimised but not refined: graph.json: its log office.log.gz is")
     assert any(line.startswith("optimised    energy ") for line in summary)
     assert not any("refined" in line for line in summary)
-    before, after = read_graph("graph.json"), read_graph("again.json")
+    before, after = load_graph("graph.json"), load_graph("again.json")
     np.testing.assert_allclose(relative(after.poses, before.poses), 0, atol=1e-4)
     np.testing.assert_array_equal(after.nscan[0].hessian, before.nscan[0].hessian)
     assert after.provenance == before.provenance
@@ -104,7 +105,7 @@ def test_a_map_needs_the_log(folder, capsys):
 def test_another_log_is_refused(folder, capsys):
     other = gzip.compress(gzip.decompress(Path(OFFICE_LOG).read_bytes()) + b"# another\n", mtime=0)
     (folder / "office.log.gz").write_bytes(other)
-    assert hashlib.sha256(other).hexdigest() != read_graph("graph.json").provenance["inputs"][0]["sha256"]
+    assert hashlib.sha256(other).hexdigest() != load_graph("graph.json").provenance["inputs"][0]["sha256"]
     for arguments in ([], ["office.log.gz"]):
         assert run(["slam", "--from", "graph.json", *arguments, "-o", "again.json"]) == 65
         assert "office.log.gz: is not the log of graph.json: its SHA-256 differs" in capsys.readouterr().err
@@ -167,7 +168,7 @@ def test_what_a_g2o_file_has_that_is_not_read_is_said(folder, capsys):
         " 1 VERTEX_XY line skipped",
     ]
     assert all(warning.startswith("warning: more.g2o: ") for warning in warnings)
-    assert read_graph("more.json").provenance["skipped"] == {
+    assert load_graph("more.json").provenance["skipped"] == {
         "EDGE_PRIOR_SE2": 1,
         "EDGE_SE2_XY": 1,
         "VERTEX_XY": 1,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 
 from nscan_cli.cli.main import run
-from nscan_cli.graph.io.json_graph import read_graph
+from nscan_cli.graph.io.load_graph import load_graph
 from tests.cli.test_slam import SHORT
 
 
@@ -14,7 +14,7 @@ def test_differences_are_printed_and_kept(folder, capsys):
     said = capsys.readouterr().err
     for change in ("every second scan", "the other scans", "mirrored", "without odometry"):
         assert f"{change}: at most" in " ".join(said.split())
-    kept = read_graph("a.json").provenance["verification"]
+    kept = load_graph("a.json").provenance["verification"]
     assert kept["bound"] is None
     assert kept["greatest"] < 0.3
 

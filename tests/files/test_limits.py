@@ -15,7 +15,8 @@ from nscan_cli.errors import InputDataError, WrongUsageError
 from nscan_cli.files import limits
 from nscan_cli.files.inputs import read_bytes
 from nscan_cli.files.limits import MB
-from nscan_cli.graph.io.json_graph import read_graph, write_graph
+from nscan_cli.graph.io.json_graph import write_graph
+from nscan_cli.graph.io.load_graph import load_graph
 from nscan_cli.logs.load import read_log
 from nscan_cli.logs.reading_options import ReadingOptions
 from tests.cli.room_logs import room_log
@@ -217,13 +218,13 @@ def test_a_graph_with_numbers_beyond_reason(tmp_path, place, value, said):
     else:
         path = changed_graph(tmp_path / "g.json", **{place: value})
     with pytest.raises(InputDataError, match=said):
-        read_graph(path)
+        load_graph(path)
 
 
 def test_the_limit_of_distances_can_be_raised(tmp_path, monkeypatch):
     path = changed_graph(tmp_path / "g.json", nodes__0__pose=[2e9, 0, 0])
     set_limit(monkeypatch, limits.DISTANCE, 3e9)
-    assert read_graph(path).poses[0, 0] == 2e9
+    assert load_graph(path).poses[0, 0] == 2e9
 
 
 @pytest.mark.parametrize("text", ["[" * 100_000, '{"a":' * 100_000, '{"format": [' + "[" * 5000])
@@ -231,7 +232,7 @@ def test_json_nested_deeply_is_bad_data(tmp_path, text):
     path = tmp_path / "deep.json"
     path.write_text("{" + text if text[0] == "[" else text)
     with pytest.raises(InputDataError, match=r"deep\.json.*not JSON"):
-        read_graph(str(path))
+        load_graph(str(path))
 
 
 @pytest.mark.parametrize("text", ["a = " + "[" * 100_000, "a = " + "9" * 5000, "a = '\0'", "\xff"])

@@ -16,7 +16,7 @@ from nscan_cli.errors import NscanError
 from nscan_cli.evaluation.load_trajectory import load_trajectory
 from nscan_cli.evaluation.reference_relations import read_relations
 from nscan_cli.graph.io.g2o import write_g2o
-from nscan_cli.graph.io.json_graph import parse_graph, read_graph, write_graph
+from nscan_cli.graph.io.json_graph import parse_graph, write_graph
 from nscan_cli.graph.io.load_graph import load_graph
 from nscan_cli.graph.io.tum import write_tum
 from nscan_cli.logs.load import read_log
@@ -51,7 +51,7 @@ def log(path: str, chance: random.Random) -> None:
 
 def json_graph(path: str, chance: random.Random) -> None:
     """A graph that is read can be written, and reads back as the same."""
-    graph = read_graph(path)
+    graph = load_graph(path)
     written = write_graph(graph)
     if not _same(write_graph(parse_graph(written, "again")), written):
         raise UnsoundError("a graph that was read and written reads back as another")

@@ -13,9 +13,9 @@ import sys
 import tempfile
 import time
 from collections import Counter
+from collections.abc import Callable
 from pathlib import Path
 
-from nscan_cli.graph.io.json_graph import read_graph
 from nscan_cli.graph.io.load_graph import load_graph
 from nscan_cli.logs.load import read_log
 from nscan_cli.logs.reading_options import ReadingOptions
@@ -120,7 +120,9 @@ def _outcome(arguments: list[str], folder: Path) -> str:
 
 def _unreadable(folder: Path) -> str:
     """What is wrong with the files that a run has left; empty when all read back."""
-    readers = {"out.json": read_graph, "out.g2o": load_graph, "out.tum": read_tum, "out.log": _log}
+    readers: dict[str, Callable[[str], object]] = {
+        "out.json": load_graph, "out.g2o": load_graph, "out.tum": read_tum, "out.log": _log,
+    }  # fmt: skip
     for name, read in readers.items():
         if (folder / name).exists():
             try:

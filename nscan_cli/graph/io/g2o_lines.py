@@ -33,6 +33,7 @@ from nscan_cli.poses import Array
 
 G2O_REMEDY = "mend or remove the line"
 LARGEST_KEY = 2**64 - 1
+"""Keys of vertices have 64 bits."""
 GTSAM_SYMBOL = re.compile("([A-Za-z])([0-9]{1,17})")
 """A key as GTSAM shows it, such as x12: the letter is the highest of the key's eight bytes."""
 PLANAR_TOLERANCE = 1e-6
@@ -48,10 +49,11 @@ class G2oLines:
     """The content of a file: V vertices and E edges as columns, and the other lines by tag."""
 
     vertices: dict[int, int] = field(default_factory=dict)
-    """Key → line."""
+    """Key of each vertex → number of its line."""
     poses: array[float] = field(default_factory=lambda: array("d"))
     """3 V: x, y, θ."""
     edge_lines: array[int] = field(default_factory=lambda: array("q"))
+    """E line numbers."""
     ends: array[int] = field(default_factory=lambda: array("Q"))
     """2 E keys."""
     measurements: array[float] = field(default_factory=lambda: array("d"))
@@ -59,9 +61,9 @@ class G2oLines:
     information: array[float] = field(default_factory=lambda: array("d"))
     """6 E: the upper triangle, row by row, in the frame of the measurement."""
     fixed: dict[int, int] = field(default_factory=dict)
-    """Key → line."""
+    """Key of each fixed vertex → number of the line that fixes it."""
     skipped: Counter[str] = field(default_factory=Counter)
-    """Tag → number of lines."""
+    """Tag → number of lines with it, which are not read."""
     other_vertices: set[int] = field(default_factory=set)
     """Keys of vertices that are not poses."""
 

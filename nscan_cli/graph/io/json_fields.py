@@ -18,8 +18,9 @@ from nscan_cli.graph.relations.semidefinite import IndefiniteError, semidefinite
 from nscan_cli.poses import Array, wrap
 
 POSE_DECIMALS = 9
+"""Decimals of poses in files, m and rad."""
 LARGEST_ANGLE = 3.141592653
-"""rad; the largest angle below π with 9 decimals."""
+"""The largest angle below π with 9 decimals, rad."""
 LARGEST_INTEGER = 2**53
 """Above it, not every JSON reader keeps integers exact."""
 
@@ -130,7 +131,8 @@ class JsonRecord:
     def information(self, key: str, size: int, fixed: int | None = None) -> Array:
         """The positive semi-definite matrix (size, size) of an upper triangle.
 
-        Eigenvalues that rounding made negative are 0. The rows and columns of pose `fixed` are not checked.
+        Eigenvalues that rounding made negative become 0. The rows and columns of pose `fixed` are not
+        checked.
         """
         count = size * (size + 1) // 2
         numbers = f"{count} {_bounded(INFORMATION)}"

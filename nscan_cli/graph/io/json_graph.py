@@ -19,8 +19,7 @@ import numpy as np
 
 from nscan_cli.errors import InputDataError
 from nscan_cli.files.finite import check_finite
-from nscan_cli.files.inputs import label, read_text
-from nscan_cli.files.limits import GRAPH, TIME
+from nscan_cli.files.limits import TIME
 from nscan_cli.files.provenance import provenance_of
 from nscan_cli.graph.io.g2o_lines import LARGEST_KEY
 from nscan_cli.graph.io.json_fields import JsonRecord, MalformedError, pose_rows, six_digits, triangle
@@ -88,17 +87,11 @@ def write_graph(graph: Graph) -> bytes:
     return document.getvalue()
 
 
-def read_graph(path: str) -> Graph:
-    """The graph of a JSON file; "-" reads standard input.
-
-    Raises InputMissingError where the file cannot be read, InputDataError where it is not a graph or is
-    inconsistent.
-    """
-    return parse_graph(read_text(path, GRAPH), label(path))
-
-
 def parse_graph(data: bytes, name: str) -> Graph:
-    """The graph of a JSON document; errors name the file `name`. Raises InputDataError."""
+    """The graph of a JSON document; errors name the file `name`.
+
+    Raises InputDataError where it is not a graph or is inconsistent.
+    """
     try:
         document = json.loads(data, parse_constant=_refuse_constant)
     except (ValueError, RecursionError) as error:

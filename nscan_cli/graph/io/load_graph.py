@@ -15,7 +15,7 @@ def load_graph(path: str, notices: list[str] | None = None) -> Graph:
     """The graph in a JSON or a g2o file; "-" reads standard input.
 
     Notices of skipped lines are added to `notices`. Raises InputMissingError where the file cannot be read,
-    InputDataError where it is not a graph.
+    and InputDataError where it is not a graph.
     """
     return graph_from(read_bytes(path, GRAPH), path, notices)
 

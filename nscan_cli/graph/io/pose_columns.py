@@ -16,6 +16,7 @@ from nscan_cli.files.encoding import BYTE_ORDER_MARK
 COMMENT_MARKS = "#%"
 """First characters of comment lines, which may name the columns."""
 UNIT_IN_NAME = re.compile(r"[\[(].*?[\])]")
+"""A unit in brackets, as in `time [s]`."""
 WORD_IN_NAME = re.compile(r"[a-z]+|[0-9]+")
 ROTATION_PREFIXES = ("quat", "orient", "rot")
 """Beginnings of the words that name a quaternion, besides q."""
@@ -23,10 +24,8 @@ OTHER_VECTORS = ("v", "w", "b", "a", "twist", "vel", "linear", "angular", "covar
 """Words that name other vectors with x, y and z, such as velocities and biases."""
 POSITION_NAMES = ("", "t", "p", "pos", "position", "trans", "translation")
 """Words before the axis in the name of a coordinate."""
-SECOND_UNITS, NANOSECOND_UNITS = (
-    ("s", "sec", "secs", "seconds"),
-    ("ns", "nsec", "nsecs", "nanosec", "nanoseconds"),
-)
+SECOND_UNITS = ("s", "sec", "secs", "seconds")
+NANOSECOND_UNITS = ("ns", "nsec", "nsecs", "nanosec", "nanoseconds")
 TIME_POWERS = (
     {"ms": 3, "us": 6, "µs": 6} | dict.fromkeys(SECOND_UNITS, 0) | dict.fromkeys(NANOSECOND_UNITS, 9)
 )
@@ -34,7 +33,7 @@ TIME_POWERS = (
 UNIT_TOLERANCE = 0.01
 """Largest difference of a quaternion's length from 1, as rounding to a few digits makes it."""
 LATEST_SECONDS, POWER_STEP = 1e11, 1000
-"""Later times are in ms, times POWER_STEP later in µs, and later still in ns."""
+"""Times beyond LATEST_SECONDS are in ms, those beyond POWER_STEP times that in µs, and later ones in ns."""
 
 
 @dataclass(frozen=True)

@@ -1,7 +1,7 @@
 """Trajectories in the TUM format: `t x y z qx qy qz qw`, one pose a line, `#` comments.
 
-https://cvg.cit.tum.de/data/datasets/rgbd-dataset/file_formats. Variants are read
-as well: with commas, other columns, and times in ns (pose_columns.py).
+https://cvg.cit.tum.de/data/datasets/rgbd-dataset/file_formats. Variants are read as well: with commas, other
+columns, and times in ns (pose_columns.py).
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ class Trajectory:
     times: Array
     """(N,) seconds, not decreasing."""
     poses: Array
-    """(N, 3)"""
+    """(N, 3) x, y and φ."""
     stamps: tuple[str, ...]
     """N times, as written in the source."""
     rows: Indices | None = None

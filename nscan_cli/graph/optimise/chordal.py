@@ -18,8 +18,7 @@ from nscan_cli.matching.damped_newton import GRAPH_STEPS
 from nscan_cli.poses import Array, Indices
 
 REGULARISATION = 1e-9
-"""Lower bound of the information on a direction, as a share of the largest, so that the systems are
-regular."""
+"""Lower bound of the information on a direction, as a share of the largest. It makes the systems regular."""
 
 
 def chordal_start(energy: GraphEnergy, poses: Array) -> Array:

@@ -18,35 +18,30 @@ from nscan_cli.poses import Array, Mask
 
 @dataclass(frozen=True)
 class RobustOptions:
-    """Bounds and steps of graduated non-convexity; the defaults are for loops that may be wrong."""
+    """Bounds and steps of graduated non-convexity. The defaults are for loops that may be wrong."""
 
     tail_probability: float = 0.001
-    """A relation fits where its χ² is below the quantile that it exceeds with this probability. A smaller
-    value doubts fewer relations."""
+    """A relation fits if its χ² is below the quantile that χ² exceeds with this probability. A larger value
+    doubts more relations."""
     bound_factor: float = 3.0
-    """Factor on that quantile: relations that share scans are less independent than χ² assumes. A larger
-    value doubts fewer relations."""
+    """The quantile is multiplied by this, since relations that share scans are not independent, as χ²
+    assumes. A larger value doubts fewer relations."""
     narrowing: float = 1.4
     """Factor from one width of the kernel to the next. A larger value takes fewer and coarser steps."""
     iterations: int = 5
-    """Newton steps at each width. More steps follow the minimum more closely and take longer."""
+    """Most Newton steps at each width. More steps follow the minimum more closely and take longer."""
+    tolerance: float = 1e-4
+    """The steps at a width end with one below this, m and rad. A larger one ends them earlier."""
     max_widths: int = 12
     """Largest number of widths. Where the first width would need more, the narrowing is larger. A larger
-    value takes longer on graphs that fit badly."""
+    number takes longer on graphs that fit badly."""
 
 
-UNFOLDING = RobustOptions(tail_probability=0.05, bound_factor=1.0, narrowing=1.2, iterations=10)
-"""The options on the way out of a local minimum, where all relations are doubted."""
-
-
-def contradicting(
-    energy: GraphEnergy, poses: Array, doubted: Mask, options: RobustOptions | None = None
-) -> Mask:
+def contradicting(energy: GraphEnergy, poses: Array, doubted: Mask, options: RobustOptions) -> Mask:
     """Which of the doubted relations (R,) contradict the others; `poses` (K, 3) are at the energy's optimum.
 
     The relations are in the energy's order. None contradicts where all are within their bounds at the poses.
     """
-    options = options or RobustOptions()
     bounds = chi2_bounds(energy, options)
     robust_poses = _graduated(energy, poses, doubted, bounds, options)
     if robust_poses is None:
@@ -55,14 +50,14 @@ def contradicting(
     return doubted & (energy.terms(robust_poses) > bounds)
 
 
-def unfolded(energy: GraphEnergy, poses: Array) -> Array | None:
+def unfolded(energy: GraphEnergy, poses: Array, options: RobustOptions) -> Array | None:
     """Another start (K, 3) where a graph at `poses` (K, 3) may be in a local minimum; None where all fit.
 
     In a local minimum most relations are off a little, and a few a lot. The relations that fit least lose
     their weight, so that the others recover. From there, the poses that all relations agree on are found.
     """
     every = np.ones(len(energy.columns.fixed), dtype=np.bool_)
-    return _graduated(energy, poses, every, chi2_bounds(energy, UNFOLDING), UNFOLDING)
+    return _graduated(energy, poses, every, chi2_bounds(energy, options), options)
 
 
 def _graduated(
@@ -77,7 +72,7 @@ def _graduated(
     if not 1.0 < width < np.inf:
         return None
     narrowing = max(options.narrowing, width ** (1 / options.max_widths))
-    stop = StopOptions(options.iterations, 1e-4)
+    stop = StopOptions(options.iterations, options.tolerance)
     while width > 1.0:
         width = max(width / narrowing, 1.0)
         weights[doubted] = (width / (width + excess[doubted])) ** 2

@@ -34,10 +34,12 @@ DEFAULT_STOP = StopOptions()
 
 @dataclass(frozen=True)
 class Optimum:
-    """The result of a minimisation: poses (K, 3), the energy there, and how it was reached."""
+    """The result of a minimisation."""
 
     poses: Array
+    """(K, 3)"""
     energy: float
+    """The energy at the poses, Σ fᵗHf."""
     iterations: int
     converged: bool
     """Whether the last step was within the tolerance without being damped."""

@@ -3,26 +3,43 @@
 from __future__ import annotations
 
 import dataclasses
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from nscan_cli.graph.model import Graph
 from nscan_cli.graph.optimise.chordal import chordal_start
-from nscan_cli.graph.optimise.graduated_nonconvexity import unfolded
+from nscan_cli.graph.optimise.graduated_nonconvexity import RobustOptions, unfolded
 from nscan_cli.graph.optimise.graph_energy import GraphEnergy
 from nscan_cli.graph.optimise.graph_solver import Optimum, StopOptions, optimise_poses
 from nscan_cli.graph.relations.base import Relation
 from nscan_cli.poses import Array, Indices
 
-PATIENT_STOP = StopOptions(max_iterations=1000)
-TRIAL_ITERATIONS = 100
-"""Iterations after which the starts are compared; only the better one continues."""
-MAX_UNFOLDINGS = 3
-"""Largest number of attempts to leave a local minimum; each has to reach a lower energy than the one
-before."""
-SAME_ENERGY = 1e-6
-"""Energies that differ by less, relative to 1 + energy, count as equal: then the given poses are kept."""
+
+@dataclass(frozen=True)
+class WholeGraphOptions:
+    """How long a whole graph is optimised, and how other minima are tried."""
+
+    stop: StopOptions = field(default_factory=lambda: StopOptions(max_iterations=1000))
+    """When an optimisation ends."""
+    trial_iterations: int = 100
+    """Iterations after which the starts are compared, and only the better one goes on. A larger number takes
+    longer and compares minima that are nearer."""
+    max_unfoldings: int = 3
+    """Largest number of attempts to leave a local minimum. Each has to reach a lower energy than the one
+    before. A larger number takes longer."""
+    unfolding: RobustOptions = field(
+        default_factory=lambda: RobustOptions(
+            tail_probability=0.05, bound_factor=1.0, narrowing=1.2, iterations=10
+        )
+    )
+    """Graduated non-convexity on the way out of a local minimum, where all relations are doubted."""
+    same_energy: float = 1e-6
+    """Energies count as equal if they differ by a smaller share of 1 + energy. Of equal minima the first is
+    kept, which is that of the given poses. A larger share keeps these more often."""
+
+
+DEFAULT_OPTIONS = WholeGraphOptions()
 
 
 @dataclass(frozen=True)
@@ -30,8 +47,9 @@ class Component:
     """A connected component of the graph."""
 
     keyframes: Indices
-    """Ids, increasing; the first one is fixed."""
+    """(K,) ids, increasing; the first keyframe is fixed."""
     relations: list[Relation]
+    """All relations between these keyframes."""
 
     def energy(self, nodes: int) -> GraphEnergy:
         """The energy of the keyframes' poses; the graph has `nodes` nodes."""
@@ -40,7 +58,7 @@ class Component:
         return GraphEnergy(len(self.keyframes), self.relations, positions)
 
 
-def optimise_graph(graph: Graph, stop: StopOptions = PATIENT_STOP) -> Optimum:
+def optimise_graph(graph: Graph, options: WholeGraphOptions = DEFAULT_OPTIONS) -> Optimum:
     """Move the keyframes to the minimum of the graph's energy, and the attached nodes with them.
 
     The lowest minimum of several starts is kept. The first keyframe of each component stays. The graph's
@@ -51,7 +69,7 @@ def optimise_graph(graph: Graph, stop: StopOptions = PATIENT_STOP) -> Optimum:
     for part in components(graph):
         if len(part.keyframes) == 1:
             continue
-        lowest = _lowest_minimum(part.energy(len(graph)), poses[part.keyframes], stop)
+        lowest = _lowest_minimum(part.energy(len(graph)), poses[part.keyframes], options)
         poses[part.keyframes] = lowest.poses
         total += lowest.energy
         iterations += lowest.iterations
@@ -61,38 +79,38 @@ def optimise_graph(graph: Graph, stop: StopOptions = PATIENT_STOP) -> Optimum:
     return Optimum(graph.poses, total, iterations, converged)
 
 
-def _lowest_minimum(energy: GraphEnergy, given: Array, stop: StopOptions) -> Optimum:
+def _lowest_minimum(energy: GraphEnergy, given: Array, options: WholeGraphOptions) -> Optimum:
     """The lowest minimum from the poses given (K, 3), the chordal start, and the unfolded best of both.
 
     The iterations are those of all starts together.
     """
-    trial = dataclasses.replace(stop, max_iterations=min(TRIAL_ITERATIONS, stop.max_iterations))
-    iterations = 0
+    stop, iterations = options.stop, 0
+    trial = dataclasses.replace(stop, max_iterations=min(options.trial_iterations, stop.max_iterations))
     best: Optimum | None = None
     for start in (given, chordal_start(energy, given)):
         found = optimise_poses(energy, start, trial)
         iterations += found.iterations
-        if best is None or _is_lower(found, best):
+        if best is None or _is_lower(found, best, options.same_energy):
             best = found
     assert best is not None
     if not best.converged:
         best = optimise_poses(energy, best.poses, stop)
         iterations += best.iterations
-    for _ in range(MAX_UNFOLDINGS):
-        other_start = unfolded(energy, best.poses)
+    for _ in range(options.max_unfoldings):
+        other_start = unfolded(energy, best.poses, options.unfolding)
         if other_start is None:
             break
         found = optimise_poses(energy, other_start, stop)
         iterations += found.iterations
-        if not _is_lower(found, best):
+        if not _is_lower(found, best, options.same_energy):
             break
         best = found
     return dataclasses.replace(best, iterations=iterations)
 
 
-def _is_lower(found: Optimum, best: Optimum) -> bool:
+def _is_lower(found: Optimum, best: Optimum, same_energy: float) -> bool:
     """Whether a minimum is clearly lower than the best so far, or the best is not finite."""
-    return found.energy < best.energy - SAME_ENERGY * (1 + best.energy) or not np.isfinite(best.energy)
+    return found.energy < best.energy - same_energy * (1 + best.energy) or not np.isfinite(best.energy)
 
 
 def components(graph: Graph) -> list[Component]:

@@ -26,7 +26,9 @@ class NScan:
     fixed: int
     """Index into nodes of pose c, which carries the mapping from global to local coordinates."""
     origin: str
+    """Where it comes from: nscan, or loop."""
     score: float = 0.0
+    """Overlap of the scans, 0 to 1; 0 where it is not known."""
 
     def term(self) -> Term:
         """fᵗHf, eq. (23)."""

@@ -15,17 +15,18 @@ from nscan_cli.poses import Array
 
 @dataclass(frozen=True)
 class Pairwise:
-    """A measurement of x̂_b ⊖ x̂_a, eqs. (16) and (17), where (a, b) = nodes."""
+    """A measurement of x̂_b ⊖ x̂_a, eqs. (16) and (17), of the nodes (a, b)."""
 
     kind: ClassVar[str] = "pairwise"
     nodes: tuple[int, int]
     measurement: Array
     """(3,) pose of nodes[1] in the frame of nodes[0]."""
     information: Array
-    """(3, 3) C⁻¹ of the components of the measurement."""
+    """(3, 3) C⁻¹, the inverse covariance of the measurement."""
     origin: str
-    """odometry, track or loop."""
+    """Where it comes from: odometry, track or loop."""
     score: float = 0.0
+    """Overlap of the scans, 0 to 1; 0 where it is not known."""
 
     def term(self) -> Term:
         """ΔᵗC⁻¹Δ with Δ = (b ⊖ a) − p_ab, eqs. (16) and (17).

@@ -15,12 +15,13 @@ LEAST_EIGENVALUE_SHARE = 1e-9
 def pairwise_marginals(relation: Relation, poses: Array) -> list[Pairwise]:
     """A relation as pairwise relations from pose c to each other pose, which loses correlations.
 
-    With pose c held fixed, the information on pose i alone is the Schur complement
-    H_ii − H_ir H_rr⁺ H_ri over all other poses r (the inverse of its block of the covariance, where H has
-    an inverse), turned from the relation's frame into that of pose c.
-    A term that is not linear is taken at the global poses (n, 3).
-    Directions that the relation does not hold get next to no information (LEAST_EIGENVALUE_SHARE): with none
-    at all, readers that factorise after Cholesky (GTSAM) would make much out of rounding. The Hessian's
+    With pose c held fixed, the information on pose i alone is the Schur complement H_ii − H_ir H_rr⁺ H_ri
+    over all other poses r. Where H has an inverse, that is the inverse of pose i's block of the covariance.
+    It is turned from the relation's frame into that of pose c. A term that is not linear is taken at the
+    global poses (n, 3).
+
+    Directions that the relation does not hold get next to no information (LEAST_EIGENVALUE_SHARE). With none
+    at all, readers that factorise by Cholesky's method (GTSAM) would make much out of rounding. The Hessian's
     negative eigenvalues count as 0.
     """
     term = relation.term()

@@ -16,6 +16,7 @@ RELATION_TYPES: list[type[Relation]] = [
 """A new relation type takes one module and one line here."""
 
 ORIGINS = ("odometry", "track", "nscan", "loop")
+"""Where a relation can come from: odometry, tracking, a joint match, or a match that closes a loop."""
 
 
 def is_pairwise(relation: Relation) -> TypeGuard[Pairwise]:

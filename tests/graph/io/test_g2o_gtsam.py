@@ -17,7 +17,7 @@ from nscan_cli.graph.io.g2o import write_g2o
 from nscan_cli.graph.io.load_graph import load_graph
 from nscan_cli.graph.model import Graph
 from nscan_cli.graph.optimise.graph_solver import Optimum, StopOptions
-from nscan_cli.graph.optimise.whole_graph import optimise_graph
+from nscan_cli.graph.optimise.whole_graph import WholeGraphOptions, optimise_graph
 from tests.data import data_file
 from tests.graph.simulated_relations import disturbed, graph_of, mixed_ring
 
@@ -29,7 +29,7 @@ def optimised_file(folder: Path, graph: Graph) -> tuple[Optimum, Path]:
     path = folder / "graph.g2o"
     path.write_bytes(write_g2o(graph))
     graph = load_graph(str(path))
-    optimum = optimise_graph(graph, StopOptions(1000, 1e-9))
+    optimum = optimise_graph(graph, WholeGraphOptions(StopOptions(1000, 1e-9)))
     assert optimum.converged
     path.write_bytes(write_g2o(graph))
     return optimum, path

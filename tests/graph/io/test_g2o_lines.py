@@ -18,7 +18,7 @@ from nscan_cli.graph.io.g2o import parse_g2o, write_g2o
 from nscan_cli.graph.io.json_graph import parse_graph, write_graph
 from nscan_cli.graph.model import Graph
 from nscan_cli.graph.optimise.graph_solver import StopOptions
-from nscan_cli.graph.optimise.whole_graph import optimise_graph
+from nscan_cli.graph.optimise.whole_graph import WholeGraphOptions, optimise_graph
 from nscan_cli.poses import Array, relative
 from tests.graph.schema import validate
 from tests.graph.simulated_relations import disturbed, graph_of, pairwise_relations, ring, ring_edges
@@ -86,7 +86,7 @@ def test_gtsam_agrees_on_poses_in_space(tmp_path: Path):
     """At our minimum, with g2o's own error for what it reads, it has our energy, and nothing moves it."""
     gtsam = pytest.importorskip("gtsam", reason="gtsam is not installed: pip install nscan-cli[test]")
     graph = parse_g2o(IN_SPACE.encode(), "space.g2o")
-    optimum = optimise_graph(graph, StopOptions(1000, 1e-9))
+    optimum = optimise_graph(graph, WholeGraphOptions(StopOptions(1000, 1e-9)))
     path = tmp_path / "space.g2o"
     path.write_text(IN_SPACE)
     factors, values = gtsam.readG2o(str(path), True)

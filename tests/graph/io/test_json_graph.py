@@ -15,7 +15,8 @@ from hypothesis import given, settings
 
 from nscan_cli.errors import InputDataError, InputMissingError
 from nscan_cli.graph.io.json_fields import JsonRecord, MalformedError
-from nscan_cli.graph.io.json_graph import parse_graph, read_graph, write_graph
+from nscan_cli.graph.io.json_graph import parse_graph, write_graph
+from nscan_cli.graph.io.load_graph import load_graph
 from nscan_cli.graph.model import Graph, NScan, Pairwise
 from nscan_cli.graph.relations.registry import relation_of, relation_record
 from nscan_cli.poses import wrap
@@ -251,14 +252,14 @@ def test_a_graph_is_read_from_a_file_and_from_standard_input(tmp_path: Path, mon
     path = tmp_path / "graph.json"
     path.write_text(GOLDEN)
     monkeypatch.setattr(sys, "stdin", io.TextIOWrapper(io.BytesIO(GOLDEN.encode())))
-    assert write_graph(read_graph(str(path))).decode() == write_graph(read_graph("-")).decode() == GOLDEN
+    assert write_graph(load_graph(str(path))).decode() == write_graph(load_graph("-")).decode() == GOLDEN
 
 
 def test_a_missing_file_and_a_folder_say_what_to_do(tmp_path: Path):
     with pytest.raises(InputMissingError, match=r"nowhere\.json: no such file; check the path"):
-        read_graph(str(tmp_path / "nowhere.json"))
+        load_graph(str(tmp_path / "nowhere.json"))
     with pytest.raises(InputMissingError, match="is a folder; name a file in it"):
-        read_graph(str(tmp_path))
+        load_graph(str(tmp_path))
 
 
 def test_an_nscan_result_names_scans_instead_of_nodes():

@@ -10,7 +10,6 @@ from scipy.stats import chi2
 
 from nscan_cli.graph.model import NScan, Pairwise
 from nscan_cli.graph.optimise.graduated_nonconvexity import (
-    UNFOLDING,
     RobustOptions,
     chi2_bounds,
     chi2_by_three,
@@ -18,6 +17,7 @@ from nscan_cli.graph.optimise.graduated_nonconvexity import (
     unfolded,
 )
 from nscan_cli.graph.optimise.graph_solver import optimise_poses
+from nscan_cli.graph.optimise.whole_graph import WholeGraphOptions
 from nscan_cli.poses import relative
 from tests.graph.simulated_relations import (
     energy_of,
@@ -29,6 +29,7 @@ from tests.graph.simulated_relations import (
 )
 
 COUNT = 60
+LOOPS, EVERY = RobustOptions(), WholeGraphOptions().unfolding
 TRUE_LOOPS = [(a, a + 30) for a in range(0, 30, 3)]
 
 
@@ -63,7 +64,7 @@ def test_the_wrong_loops_are_found_and_no_right_one(wrong, seed):
     energy = energy_of(ring(COUNT), relations, [])
     poses = optimise_poses(energy, ring(COUNT)).poses
     doubted = np.array([relation.origin == "loop" for relation in relations])
-    assert contradicting(energy, poses, doubted).tolist() == expected
+    assert contradicting(energy, poses, doubted, LOOPS).tolist() == expected
 
 
 @pytest.mark.parametrize(
@@ -90,10 +91,10 @@ def test_those_named_are_the_ones_beyond_the_bound_without_them(seed, off):
     energy = energy_of(truth, relations, [])
     poses = optimise_poses(energy, truth).poses
     doubted = np.array([relation.origin == "loop" for relation in relations])
-    named = contradicting(energy, poses, doubted)
+    named = contradicting(energy, poses, doubted, LOOPS)
     kept = [relation for relation, wrong in zip(relations, named, strict=True) if not wrong]
     without = optimise_poses(energy_of(truth, kept, []), poses).poses
-    beyond = energy.terms(without) > chi2_bounds(energy, RobustOptions())
+    beyond = energy.terms(without) > chi2_bounds(energy, LOOPS)
     np.testing.assert_array_equal(named, doubted & beyond)
 
 
@@ -108,7 +109,7 @@ def test_a_wrong_joint_relation_is_found():
     energy = energy_of(truth, chain, nscan)
     poses = optimise_poses(energy, truth).poses
     doubted = np.array([False] * len(chain) + [True] * len(nscan))
-    assert np.flatnonzero(contradicting(energy, poses, doubted)).tolist() == [len(doubted) - 1]
+    assert np.flatnonzero(contradicting(energy, poses, doubted, LOOPS)).tolist() == [len(doubted) - 1]
 
 
 def test_a_visit_that_is_off_as_a_whole_shows_in_a_relation_of_many_scans():
@@ -131,7 +132,7 @@ def test_a_visit_that_is_off_as_a_whole_shows_in_a_relation_of_many_scans():
     doubted = np.array([False] * len(chain) + [True] * 6)
     assert energy.terms(truth)[-1] == pytest.approx(200, rel=1e-6)
     weighed = energy.weighted(np.where(np.arange(len(doubted)) < len(doubted) - 1, 100.0, 1.0))
-    assert np.flatnonzero(contradicting(weighed, truth, doubted)).tolist() == [len(doubted) - 1]
+    assert np.flatnonzero(contradicting(weighed, truth, doubted, LOOPS)).tolist() == [len(doubted) - 1]
 
 
 def test_quantiles_are_those_of_chi2():
@@ -139,7 +140,7 @@ def test_quantiles_are_those_of_chi2():
     energy = energy_of(truth, pairwise, nscan)
     freedom = 3 * (np.array([2] * len(pairwise) + [len(relation.nodes) for relation in nscan]) - 1)
     assert len(set(freedom)) > 1
-    loops, every = chi2_bounds(energy, RobustOptions()), chi2_bounds(energy, UNFOLDING)
+    loops, every = chi2_bounds(energy, LOOPS), chi2_bounds(energy, EVERY)
     np.testing.assert_allclose(loops, 3.0 * chi2.ppf(0.999, freedom), rtol=1e-9)
     np.testing.assert_allclose(every, chi2.ppf(0.95, freedom), rtol=1e-9)
 
@@ -147,23 +148,23 @@ def test_quantiles_are_those_of_chi2():
 def test_where_all_relations_fit_there_is_no_other_start():
     truth, pairwise, nscan = mixed_ring(12, noise=0.3)
     energy = energy_of(truth, pairwise, nscan)
-    assert unfolded(energy, optimise_poses(energy, truth).poses) is None
+    assert unfolded(energy, optimise_poses(energy, truth).poses, EVERY) is None
 
 
 def test_a_chi2_beyond_all_numbers_is_no_reason_to_narrow_for_ever():
     truth, pairwise, nscan = mixed_ring(12, noise=0.3)
     energy = energy_of(truth, pairwise, nscan).weighted(np.full(len(pairwise) + len(nscan), np.inf))
     assert not np.isfinite(energy.terms(truth)).all()
-    assert unfolded(energy, truth) is None
-    assert not contradicting(energy, truth, np.ones(len(pairwise) + len(nscan), dtype=bool)).any()
+    assert unfolded(energy, truth, EVERY) is None
+    assert not contradicting(energy, truth, np.ones(len(pairwise) + len(nscan), dtype=bool), LOOPS).any()
 
 
 def test_what_is_not_doubted_is_never_named():
     relations, _ = with_loops(3, seed=1)
     energy = energy_of(ring(COUNT), relations, [])
     poses = optimise_poses(energy, ring(COUNT)).poses
-    assert (energy.terms(poses) / chi2_bounds(energy, RobustOptions())).max() > 1.0
-    assert not contradicting(energy, poses, np.zeros(len(relations), dtype=bool)).any()
+    assert (energy.terms(poses) / chi2_bounds(energy, LOOPS)).max() > 1.0
+    assert not contradicting(energy, poses, np.zeros(len(relations), dtype=bool), LOOPS).any()
 
 
 def test_weights_multiply_the_terms():

@@ -15,7 +15,7 @@ from nscan_cli.graph.io.json_fields import JsonRecord
 from nscan_cli.graph.io.json_graph import parse_graph, write_graph
 from nscan_cli.graph.marginal_covariances import marginal_covariances
 from nscan_cli.graph.model import Graph
-from nscan_cli.graph.optimise.graduated_nonconvexity import contradicting
+from nscan_cli.graph.optimise.graduated_nonconvexity import RobustOptions, contradicting
 from nscan_cli.graph.optimise.graph_energy import GraphEnergy
 from nscan_cli.graph.optimise.whole_graph import components, optimise_graph
 from nscan_cli.graph.relations.base import Term
@@ -188,7 +188,7 @@ def test_one_that_contradicts_the_others_is_found():
     optimise_graph(graph)
     (part,) = components(graph)
     doubted = np.array([relation.origin == "loop" for relation in part.relations])
-    wrong = contradicting(part.energy(COUNT), graph.poses, doubted)
+    wrong = contradicting(part.energy(COUNT), graph.poses, doubted, RobustOptions())
     assert [part.relations[k].nodes for k in np.flatnonzero(wrong)] == [(0, 12)]
 
 

@@ -14,7 +14,7 @@ from nscan_cli.graph.io.symmetric_matrices import upper_triangle
 from nscan_cli.graph.model import Graph, NScan, Pairwise
 from nscan_cli.graph.optimise.graph_energy import GraphEnergy
 from nscan_cli.graph.optimise.graph_solver import StopOptions
-from nscan_cli.graph.optimise.whole_graph import optimise_graph
+from nscan_cli.graph.optimise.whole_graph import WholeGraphOptions, optimise_graph
 from nscan_cli.graph.relations.semidefinite import IndefiniteError, as_information, semidefinite
 from nscan_cli.poses import Array, compose, inverse, relative, rotated_information
 from tests.graph.simulated_relations import disturbed, graph_of, pairwise_relations, ring, ring_edges
@@ -130,7 +130,7 @@ def test_no_energy_is_below_0(pairwise, joint, given_poses, seed):
             terms = energy.terms(poses)
             assert (terms >= 0).all()
             assert (energy.evaluate(poses, exact=True).terms >= 0).all()
-        assert optimise_graph(back, StopOptions(30)).energy >= 0
+        assert optimise_graph(back, WholeGraphOptions(StopOptions(30))).energy >= 0
 
 
 def energy_of_graph(graph: Graph) -> GraphEnergy:
