@@ -19,7 +19,7 @@ from nscan_cli.kernels.decorators import kernel
 from nscan_cli.poses import Array
 
 FIELD_LEVELS = 5
-"""Levels of a field. This and the next three are the layout of its arrays, compiled into the kernels."""
+"""Levels of a field. Like the three constants below, it is a part of the layout of a field's arrays."""
 PAD = 1 << (FIELD_LEVELS - 1)
 """Cells on a side of a square of the coarsest level."""
 LANES = 8
@@ -33,15 +33,16 @@ class SearchOptions:
     """How far and how finely a pose is searched."""
 
     distance: float = 4.5
-    """Greatest shift to each side, m: covers two starts that are 1.5 m off, one of them turned by 30° and 3 m
-    away. A larger value takes longer, and finds poses farther away."""
+    """Greatest shift to each side, m. The default covers two scans 3 m apart whose starts are 1.5 m off, one
+    of them also turned by 30°. A larger value takes longer, and finds poses farther away."""
     turn: float = 1.1
-    """Greatest rotation to each side, rad: covers two starts that are turned by 30° each. A larger value
-    takes longer."""
+    """Greatest rotation to each side, rad. The default covers two starts that are turned by 30° each. A
+    larger value takes longer, and finds poses that are turned more."""
     cell: float = 0.2
     """Side of a cell of the field and of the lattice of poses, m. Larger cells are faster and less exact."""
     spread: float = 0.15
-    """Standard deviation by which points are blurred, m. With a larger value poses score similarly."""
+    """Standard deviation by which points are blurred, m. With a larger value poses near each other score
+    alike."""
     beams: int = 90
     """Most points of a scan that are used. More take longer, and tell similar places apart better."""
     lever: float = 15.0
@@ -50,7 +51,7 @@ class SearchOptions:
 
 
 class LikelihoodField(NamedTuple):
-    """A likelihood field and its levels, with a border of zeros: PAD cells before, one behind."""
+    """A likelihood field and its levels. It has a border of zeros, PAD cells before and one behind."""
 
     levels: NDArray[np.float32]
     """(FIELD_LEVELS − 1, w, h) values in [0, 1]; level l has at (ix, iy) the maximum of 2ˡ × 2ˡ cells from
@@ -59,9 +60,9 @@ class LikelihoodField(NamedTuple):
     """(PAD, w, ⌈h / PAD⌉ + 2 LANES) the last level; [r, ix, LANES + q] is its value at (ix, PAD q + r), so
     that squares side by side are neighbours."""
     x: float
-    """Left border of the cell at PAD, m."""
+    """Left border of the cells with index PAD, m."""
     y: float
-    """Lower border of the cell at PAD, m."""
+    """Lower border of the cells with index PAD, m."""
     cell: float
     """Side of a cell, m."""
 
@@ -70,7 +71,7 @@ class FoundPose(NamedTuple):
     """The best pose of a search."""
 
     score: float
-    """In [0, 1]."""
+    """Mean value of the field at the scan's points, in [0, 1]."""
     pose: Array
     """(3,)"""
 

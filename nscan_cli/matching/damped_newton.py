@@ -20,25 +20,26 @@ class StepControl(NamedTuple):
     least: float
     """Lower bound of the damping."""
     least_divided: float
-    """Smaller damping is not divided by 10 when a step is accepted, but becomes `least`."""
+    """After an accepted step, damping above this is divided by 10, and damping up to this becomes `least`."""
     least_raised: float
     """Lower bound of the damping after a rejected step."""
     greatest: float
     """The solver gives up when the damping exceeds this."""
     trusted: float
-    """With a larger damping, a step is short because it is damped."""
+    """A step with damping up to this is the last one if it is within the tolerance. With more damping it may
+    be short only because it is damped."""
     damped_share: float
-    """Share of the tolerance within which such a step is the last one. With 0 it never is."""
+    """A step with more damping than `trusted` is the last one if it is within this share of the tolerance."""
     rounding: float
-    """Relative increase of the value that is accepted as rounding."""
+    """A step that increases the value by less than this share is accepted, since that is rounding."""
 
 
 PAIRWISE_STEPS = StepControl(1e-3, 1e-7, 1e-7, 0.0, 1e6, 1e-3, 0.1, 0.0)
-"""Starts are rough, so steps are damped from the first on. One NDT is cheap to evaluate: 1e6 allows long
-searches where the energy jumps at borders of cells."""
+"""Starts are rough, so steps are damped from the first on. One NDT is cheap to evaluate, so a damping up to
+1e6 allows long searches where the energy jumps at borders of cells."""
 JOINT_STEPS = StepControl(1e-3, 1e-8, 1e-8, 0.0, 1e4, np.inf, 0.0, 0.0)
-"""An evaluation costs n (n − 1) times as much: it gives up earlier, and any step within the tolerance is the
-last one."""
+"""An evaluation costs n (n − 1) times as much. So the solver gives up earlier, and any step within the
+tolerance is the last one."""
 GRAPH_STEPS = StepControl(0.0, 0.0, 1e-9, 1e-6, 1e8, 1.0, 0.0, 1e-12)
 """The energy is smooth and nearly quadratic, so steps are undamped unless they fail. Sums over thousands of
 relations carry rounding errors."""

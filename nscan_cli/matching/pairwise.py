@@ -9,8 +9,13 @@ import numpy as np
 
 from nscan_cli.errors import InputDataError
 from nscan_cli.logs.laser_log import LaserLog
-from nscan_cli.matching.motion_model import Prior
-from nscan_cli.matching.pairwise_solver import PairProblem, minimise_pairwise, pairwise_objective
+from nscan_cli.matching.motion_model import Prior, no_prior
+from nscan_cli.matching.pairwise_solver import (
+    PairDescent,
+    PairProblem,
+    minimise_pairwise,
+    pairwise_objective,
+)
 from nscan_cli.matching.uncertainty import (
     ConvergenceOptions,
     Weakest,
@@ -22,6 +27,7 @@ from nscan_cli.matching.uncertainty import (
 from nscan_cli.ndt.association import begin_association
 from nscan_cli.ndt.energy import ENERGY_NUMBERS, inlier_share
 from nscan_cli.ndt.hash_grid import WALL_DIRECTION
+from nscan_cli.ndt.options import GaussianOptions
 from nscan_cli.ndt.transform import Ndt
 from nscan_cli.poses import Array, wrap
 
@@ -31,36 +37,41 @@ NO_DESCENT = "no step lowers the energy"
 
 
 @dataclass(frozen=True)
-class PairOptions:
+class PairOptions(GaussianOptions):
     """How single scans become Gaussians, and how one is matched with another."""
 
     cell: float = 1.0
     """Side of a cell, m ([19]). Larger cells converge from farther away, and describe walls more coarsely."""
     minimum: int = 3
     """Least number of points that make a Gaussian. A larger number leaves out what few beams hit."""
-    floor: float = 0.02
-    """Least standard deviation of a Gaussian, m. A larger value makes walls softer."""
     reach: float = 40.0
-    """Longest beam that is matched, m."""
+    """Longest beam that is matched, m. A larger value sees more and takes longer."""
     widenings: tuple[float, ...] = (0.05, 0.3, 1.0)
     """The w of the energy in each stage; the last is 1, the energy itself. Smaller first values converge from
     farther away."""
     scale: float = 0.6
-    """Factor that makes a negative log likelihood of the energy. On simulated scans with range noise of 1.5
-    cm the errors of matches are as large as their covariances with this value; a larger one makes these
+    """Factor that makes a negative log likelihood of the energy. With this value matches of simulated scans
+    with range noise of 1.5 cm are as far off as their covariances say. A larger value makes covariances
     smaller."""
     max_iterations: int = 50
-    """Most iterations in each stage."""
+    """Most iterations in each stage. A larger number lets slow matches converge."""
     tolerance: float = 1e-5
-    """A stage has converged when a step moves the pose by less, m and rad."""
+    """The last stage has converged when a step moves the pose by less, m and rad. A larger value ends it
+    earlier."""
     coarse_tolerance: float = 1e-5
-    """The same of the stages before the last. With a larger one a match is quicker, and its last stage begins
-    farther from where it ends."""
+    """A stage before the last has converged when a step moves the pose by less, m and rad. With a larger
+    value a match is quicker, and its last stage begins farther from where it ends."""
     inlier_bound: float = 9.0
-    """Squared Mahalanobis distance from a Gaussian within which a point lies on it."""
+    """A point lies on a Gaussian within this squared Mahalanobis distance. A larger value counts more
+    points."""
     least_overlap: float = 0.1
-    """A match with a smaller share of the scan's points on the reference has not converged."""
+    """A match with a smaller share of the scan's points on the reference has not converged. A larger value
+    refuses more matches."""
+    weak_sigma: float = 0.05
+    """A match is weak if its standard deviation in some direction is larger, m. In rooms it is 0.003 to
+    0.015, in a corridor without any doors about 0.1. With a larger value fewer matches are weak."""
     convergence: ConvergenceOptions = field(default_factory=ConvergenceOptions)
+    """The Newton step that may be left at a minimum."""
 
 
 @dataclass(frozen=True)
@@ -72,7 +83,7 @@ class PairMatch:
     energy: float
     """E, neither scaled nor with the prior."""
     gradient_norm: float
-    """That of the objective, scale · E + prior."""
+    """Length of the gradient of the objective, scale · E + prior."""
     decrement: float | None
     """Length of the remaining Newton step in standard deviations; None without a covariance."""
     hessian: Array
@@ -80,17 +91,17 @@ class PairMatch:
     covariance: Array | None
     """(3, 3) inverse of the Hessian; None when that is not positive definite."""
     eigenvalues: Array
-    """(3,) those of the Hessian, increasing."""
+    """(3,) eigenvalues of the Hessian, increasing."""
     weakest: Weakest
+    """The direction in which the position is least certain."""
     overlap: float
     """Share of the scan's points that lie on a Gaussian of the reference."""
     iterations: int
-    """Number in all stages."""
+    """Number of iterations in all stages."""
     evaluations: int
     """Number of evaluations of the energy in all stages."""
     unsettled: int
-    """Stages before the last that did not converge within their iterations, so that the pose is less
-    certain."""
+    """Number of stages before the last that did not converge, so that the pose is less certain."""
     reason: str | None
     """Why the match did not converge; None when it did."""
 
@@ -101,7 +112,7 @@ class PairMatch:
 
 
 class PairEnd(NamedTuple):
-    """Where the match of two scans has ended, without its uncertainty."""
+    """The relative pose of two scans without its uncertainty."""
 
     pose: Array
     """(3,) of the scan in the frame of the reference."""
@@ -129,30 +140,17 @@ def matched_points(log: LaserLog, row: int, options: PairOptions) -> Array:
 def scan_ndt(points: Array, options: PairOptions) -> Ndt:
     """The NDT of one scan's points (m, 2), in their own frame."""
     ends, poses = np.array([0, len(points)]), np.zeros((1, 3))
-    return Ndt.of_scans(
-        points, ends, poses, options.cell, options.minimum, options.floor, neighbourhood=WALL_DIRECTION
-    )
+    return Ndt.of_scans(points, ends, poses, options, neighbourhood=WALL_DIRECTION)
 
 
 def settle_pair(
     reference: Ndt, points: Array, start: Array, options: PairOptions, prior: Prior | None = None
 ) -> PairEnd:
-    """Match points (m, 2) of a scan as `match_pair` does; quick, for what asks for no uncertainty."""
-    prior = prior or Prior(np.zeros(3), np.zeros((3, 3)))
-    problem = PairProblem(reference.grid, reference.half, begin_association(points), options.scale, prior)
-    pose = start.copy()
-    _, energy, _, _, converged = minimise_pairwise(
-        problem,
-        pose,
-        np.array(options.widenings),
-        options.max_iterations,
-        options.coarse_tolerance,
-        options.tolerance,
-        np.empty((3, 3)),
-    )
+    """Match points (m, 2) of a scan as `match_pair` does, without the uncertainty, which takes less time."""
+    _, pose, found = _minimum(reference, points, start, prior, options)
     pose[2] = wrap(pose[2])
     overlap = inlier_share(reference.grid, reference.half, points, pose, options.inlier_bound)
-    return PairEnd(pose, energy, overlap, converged)
+    return PairEnd(pose, found.energy, overlap, found.converged)
 
 
 def match_pair(
@@ -161,28 +159,17 @@ def match_pair(
     """Match points (m, 2) of a scan with the NDT of another, from the relative pose `start` (3,).
 
     Minimises scale · E plus the prior (14) stage by stage. E jumps where points cross the borders of cells,
-    so the gradient at a minimum need not be zero: `decrement` tells the step that is left.
+    so the gradient at a minimum need not be zero. `decrement` tells the step that is left.
     """
-    prior = prior or Prior(np.zeros(3), np.zeros((3, 3)))
-    problem = PairProblem(reference.grid, reference.half, begin_association(points), options.scale, prior)
-    pose, hessian, gradient, out = start.copy(), np.empty((3, 3)), np.empty(3), np.empty(ENERGY_NUMBERS)
-    iterations, evaluations, last, converged = 0, 1, 0, [True]
-    # One stage a call: whether the match has converged depends on the last stage alone.
-    tolerances = [options.coarse_tolerance] * (len(options.widenings) - 1) + [options.tolerance]
-    for widening, enough in zip(options.widenings, tolerances, strict=True):
-        _, _, last, evaluated, ended = minimise_pairwise(
-            problem, pose, np.array([widening]), options.max_iterations, enough, enough, hessian
-        )
-        iterations += last
-        evaluations += evaluated
-        converged.append(ended)
+    problem, pose, found = _minimum(reference, points, start, prior, options)
+    hessian, gradient, out = np.empty((3, 3)), np.empty(3), np.empty(ENERGY_NUMBERS)
     pairwise_objective(problem, pose, 1.0, 1.0, out, gradient, hessian)
     overlap = inlier_share(reference.grid, reference.half, points, pose, options.inlier_bound)
     covariance = covariance_of(hessian)
     if overlap < options.least_overlap:
         reason: str | None = NO_OVERLAP
-    elif not converged[-1]:
-        reason = STEP_LIMIT if last == options.max_iterations else NO_DESCENT
+    elif not found.converged:
+        reason = STEP_LIMIT if found.last_iterations == options.max_iterations else NO_DESCENT
     else:
         reason = why_no_minimum(gradient, covariance, options.convergence)
     return PairMatch(
@@ -193,10 +180,21 @@ def match_pair(
         hessian=hessian,
         covariance=covariance,
         eigenvalues=np.linalg.eigvalsh(hessian).astype(np.float64),
-        weakest=weakest_translation(hessian),
+        weakest=weakest_translation(hessian, options.weak_sigma),
         overlap=overlap,
-        iterations=iterations,
-        evaluations=evaluations,
-        unsettled=converged[:-1].count(False),
+        iterations=found.iterations,
+        evaluations=found.evaluations + 1,
+        unsettled=found.unsettled,
         reason=reason,
     )
+
+
+def _minimum(
+    reference: Ndt, points: Array, start: Array, prior: Prior | None, options: PairOptions
+) -> tuple[PairProblem, Array, PairDescent]:
+    """The problem of a match, the pose (3,) of its minimum with any angle, and how it was found."""
+    association = begin_association(points)
+    problem = PairProblem(reference.grid, reference.half, association, options.scale, prior or no_prior())
+    pose, limits = start.copy(), (options.max_iterations, options.coarse_tolerance, options.tolerance)
+    found = minimise_pairwise(problem, pose, np.array(options.widenings), *limits, np.empty((3, 3)))
+    return problem, pose, found

@@ -13,7 +13,7 @@ import numpy as np
 from nscan_cli.kernels.array_assignment import assign, assign_rows
 from nscan_cli.kernels.decorators import kernel, leaf_kernel
 from nscan_cli.matching.damped_newton import PAIRWISE_STEPS, is_accepted, is_last, next_damping
-from nscan_cli.matching.motion_model import Prior
+from nscan_cli.matching.motion_model import Prior, prior_pull
 from nscan_cli.matching.small_matrices import solve_definite
 from nscan_cli.ndt.association import Association, update_association
 from nscan_cli.ndt.energy import ENERGY_NUMBERS, sum_association, unpack_derivatives
@@ -22,17 +22,36 @@ from nscan_cli.poses import Array
 
 
 class PairProblem(NamedTuple):
-    """The objective: scale · E(u) + ½ (u − z)ᵗ P (u − z)."""
+    """The objective of a pairwise match: scale · E(u) + ½ (u − z)ᵗ P (u − z)."""
 
     grid: Grid
     half: float
     """Side (m) of a lattice cell."""
     association: Association
-    """That of the points (m, 2) at the last pose."""
+    """The points (m, 2) of the scan at the last pose, with their Gaussians."""
     scale: float
     """Factor that makes a negative log likelihood of E."""
     prior: Prior
-    """(14), with mean z and information P."""
+    """Eq. (14), with mean z and information P."""
+
+
+class PairDescent(NamedTuple):
+    """What the minimisation of a pairwise objective has led to, and what it took."""
+
+    value: float
+    """The objective before the last step."""
+    energy: float
+    """E before the last step."""
+    iterations: int
+    """Number in all stages."""
+    last_iterations: int
+    """Number in the last stage."""
+    evaluations: int
+    """Number of evaluations of the objective in all stages."""
+    unsettled: int
+    """Number of stages before the last that did not converge."""
+    converged: bool
+    """Whether the last stage converged."""
 
 
 @leaf_kernel
@@ -45,26 +64,22 @@ def pairwise_objective(
     gradient: Array,
     hessian: Array,
 ) -> float:
-    """The objective at `pose`, to which the association moves.
+    """The objective at `pose` (3,), to which the association moves.
 
-    Writes the gradient (3,) and Hessian (3, 3) of the objective, and those of E into out (10,).
+    Writes the gradient (3,) and Hessian (3, 3) of the objective, and those of E into out (10,). With a
+    `curvature` of 1 the Hessian is exact, with 0 it is the semi-definite part.
     """
     association = problem.association
     update_association(problem.grid, problem.half, association, pose)
     sum_association(association, widening, curvature, out)
     unpack_derivatives(out, problem.scale, gradient, hessian)
     value = problem.scale * out[0]
-    mean, information = problem.prior
-    turn = pose[2] - mean[2]
-    turn -= 2 * np.pi * np.round(turn / (2 * np.pi))
+    off, pull = prior_pull(problem.prior, pose)
     for a in range(3):
-        pull = 0.0
         for b in range(3):
-            difference = turn if b == 2 else pose[b] - mean[b]
-            pull += information[a, b] * difference
-            hessian[a, b] += information[a, b]
-        gradient[a] += pull
-        value += 0.5 * pull * (turn if a == 2 else pose[a] - mean[a])
+            hessian[a, b] += problem.prior.information[a, b]
+        gradient[a] += pull[a]
+        value += 0.5 * pull[a] * off[a]
     return float(value)
 
 
@@ -77,25 +92,24 @@ def minimise_pairwise(
     near: float,
     tolerance: float,
     hessian: Array,
-) -> tuple[float, float, int, int, bool]:
-    """Levenberg–Marquardt from `pose` (3,), in place, one stage for each entry of `widenings`.
+) -> PairDescent:
+    """Minimise from `pose` (3,), in place, after Levenberg and Marquardt: a stage for each of `widenings`.
 
     The last stage ends with a step that moves the pose by less than `tolerance` (m, rad), the others with one
-    of less than `near`. Writes the last stage's semi-definite Hessian of the objective (3, 3). Returns the
-    values of the objective and of E, iterations, evaluations, and whether the last stage converged. Hessian
-    and values are those before the last step.
+    of less than `near`. Writes the semi-definite Hessian (3, 3) of the objective before the last step.
     """
     out, trial_out = np.empty(ENERGY_NUMBERS), np.empty(ENERGY_NUMBERS)
     gradient, step, trial = np.empty(3), np.empty(3), np.empty(3)
     trial_gradient, trial_hessian, damped = np.empty(3), np.empty((3, 3)), np.empty((3, 3))
-    value, iterations, evaluations, converged = 0.0, 0, 0, False
+    value, iterations, last, evaluations, unsettled, converged = 0.0, 0, 0, 0, 0, True
     for stage in range(widenings.shape[0]):
         widening, enough = widenings[stage], near if stage + 1 < widenings.shape[0] else tolerance
+        unsettled += not converged
         value = pairwise_objective(problem, pose, widening, 0.0, out, gradient, hessian)
         evaluations += 1
-        damping, converged = PAIRWISE_STEPS.first, False
+        damping, converged, last = PAIRWISE_STEPS.first, False, 0
         for _ in range(max_iterations):
-            iterations += 1
+            last += 1
             assign_rows(damped, hessian)
             for a in range(3):
                 damped[a, a] += damping * hessian[a, a] + 1e-12
@@ -123,4 +137,5 @@ def minimise_pairwise(
             damping = next_damping(damping, accepted, PAIRWISE_STEPS)
             if converged or damping > PAIRWISE_STEPS.greatest:
                 break
-    return value, out[0], iterations, evaluations, converged
+        iterations += last
+    return PairDescent(value, out[0], iterations, last, evaluations, unsettled, converged)

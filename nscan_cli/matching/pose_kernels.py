@@ -1,4 +1,4 @@
-"""SE(2) inside kernels: `nscan_cli.poses` for one pose at a time, without new arrays; the motion of many."""
+"""SE(2) inside kernels: `nscan_cli.poses` for one pose at a time, without new arrays."""
 
 from __future__ import annotations
 
@@ -32,7 +32,10 @@ def wrapped(angle: float) -> float:
 
 @kernel
 def largest_motion(before: Array, after: Array, fixed: int) -> tuple[float, float, float]:
-    """The largest motions of poses (n, 3), seen from one of them: distance, shift in x or y, m; turn, rad."""
+    """The largest motions of poses (n, 3) as seen from one of them.
+
+    They are the distance and the shift in x or y, m, and the turn, rad. `fixed` is the index of the one.
+    """
     distance, shift, turn, was, now = 0.0, 0.0, 0.0, np.empty(3), np.empty(3)
     for k in range(len(before)):
         relative_pose(before[k], before[fixed], was)

@@ -34,7 +34,7 @@ def inverted(matrix: Array) -> Array:
 
 @leaf_kernel
 def information_of_place(hessian: Array) -> tuple[float, float, float]:
-    """The information (1/m²) of x, of both, and of y in the Hessian (3, 3) of a pose whose angle is free."""
+    """The information (xx, xy, yy), 1/m², on the position of a pose with Hessian (3, 3) and a free angle."""
     turn = max(hessian[2, 2], 1e-9)
     xx = hessian[0, 0] - hessian[0, 2] * hessian[0, 2] / turn
     xy = hessian[0, 1] - hessian[0, 2] * hessian[1, 2] / turn

@@ -13,19 +13,19 @@ INDEFINITE = "the Hessian is not positive definite"
 CELL_BORDER = "stopped at a cell border, where the energy jumps"
 SINGULAR = 1e-10
 """An eigenvalue below this share of the greatest one is rounding, not information."""
-WEAK_SIGMA = 0.05
-"""m; matches with a larger standard deviation in some direction get a notice. In rooms it is 0.003 to 0.015,
-in a corridor without any doors about 0.1."""
 
 
 @dataclass(frozen=True)
 class ConvergenceOptions:
-    """The Newton step that may be left at a minimum: one of the bounds has to hold."""
+    """The Newton step that may be left at a minimum. One of the bounds has to hold.
+
+    With larger values more matches count as converged.
+    """
 
     deviations: float = 0.5
-    """Its length in standard deviations. With a larger value more matches count as converged."""
+    """Greatest length of the step, in standard deviations."""
     step: float = 0.01
-    """Its greatest component, m and rad: half of the least standard deviation of a Gaussian."""
+    """Greatest component of the step, m and rad: half of the least standard deviation of a Gaussian."""
 
 
 class Weakest(NamedTuple):
@@ -34,12 +34,9 @@ class Weakest(NamedTuple):
     direction: float
     """Angle of the direction in the frame of the reference, rad in (−π/2, π/2]."""
     sigma: float | None
-    """Standard deviation (m) along it; None when the match has no information there."""
-
-    @property
-    def is_weak(self) -> bool:
-        """Whether the user should know: as in a corridor, or worse."""
-        return self.sigma is None or self.sigma > WEAK_SIGMA
+    """Standard deviation along it, m; None when the match has no information there."""
+    is_weak: bool
+    """Whether the user should know it: as in a corridor, or worse."""
 
 
 def covariance_of(information: Array) -> Array | None:
@@ -57,17 +54,18 @@ def decrement(gradient: Array, covariance: Array) -> float:
 
 
 def why_no_minimum(gradient: Array, covariance: Array | None, options: ConvergenceOptions) -> str | None:
-    """Why a point is no minimum; None where the Newton step is short, in deviations or in m and rad."""
+    """Why a point is no minimum; None if the Newton step is short, in deviations or in m and rad."""
     if covariance is None:
         return INDEFINITE
     short = np.abs(covariance @ gradient).max() <= options.step
     return None if short or decrement(gradient, covariance) <= options.deviations else CELL_BORDER
 
 
-def weakest_translation(information: Array) -> Weakest:
+def weakest_translation(information: Array, weak_sigma: float) -> Weakest:
     """The weakest direction of the translation of a pose with an information matrix (3, 3).
 
-    Metres and radians do not compare, so the rotation is eliminated first (Schur complement).
+    It is weak if its standard deviation exceeds `weak_sigma` (m). Metres and radians do not compare, so the
+    rotation is eliminated first (Schur complement).
     """
     translation, coupling, rotation = information[:2, :2], information[:2, 2], information[2, 2]
     if rotation > 0.0:
@@ -76,5 +74,5 @@ def weakest_translation(information: Array) -> Weakest:
     # Of the two directions along an axis, the one with x > 0.
     x, y = vectors[:, 0] if vectors[0, 0] > 0.0 else -vectors[:, 0]
     direction = float(np.arctan2(y, x)) if x > 0.0 else np.pi / 2
-    known = eigenvalues[0] > SINGULAR * eigenvalues[1]
-    return Weakest(direction, float(eigenvalues[0] ** -0.5) if known else None)
+    sigma = float(eigenvalues[0] ** -0.5) if eigenvalues[0] > SINGULAR * eigenvalues[1] else None
+    return Weakest(direction, sigma, sigma is None or sigma > weak_sigma)

@@ -32,8 +32,9 @@ ENERGY_NUMBERS = 10
 LEAST_EXPONENT = -700.0
 """Lower bound of the exponent of s; the exponential of it is 10⁻³⁰⁴."""
 LOG2_E = 1.4426950408889634
+"""log₂ e"""
 LN2_HIGH, LN2_LOW = 0.6931471803691238, 1.9082149292705877e-10
-"""ln 2 in two parts; the first one times a whole number is exact."""
+"""ln 2 in two parts. The first one times a whole number is exact."""
 
 
 @leaf_kernel
@@ -173,7 +174,7 @@ def find_inliers(grid: Grid, half: float, points: Array, pose: Array, bound: flo
             key, row = cell, find_row(grid, cell)
         if row < 0:
             continue
-        for block in range(4):
+        for block in range(BLOCKS):
             link = facing_gaussian(grid, grid.links[row, block], rx, ry)
             if link < 0:
                 continue

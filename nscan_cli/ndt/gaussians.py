@@ -2,12 +2,12 @@
 
 Two things differ from [19]. The inverse of the larger eigenvalue is multiplied by the square of the ratio of
 the smaller to the larger one, so that a piece of wall, long and thin, hardly holds a point along itself. The
-spread of points along a wall depends on where the beams fell, not on where the wall is: unchanged, it drags
-the robot back in corridors, and the Hessian claims to know the position along them.
+spread of points along a wall depends on where the beams fell, not on where the wall is. Unchanged, it would
+drag the robot back in corridors, and the Hessian would claim to know the position along them.
 
 A Gaussian also has the side from which it was seen. A wall that is seen from a room and from the corridor has
-two faces, 10 or 15 cm apart; matched with each other they pull scans together by that distance, and one
-Gaussian of both pulls them into the wall. The points of a block are therefore split by the side that their
+two faces, 10 or 15 cm apart. Matched with each other, they pull scans together by that distance, and one
+Gaussian of both pulls scans into the wall. The points of a block are therefore split by the side that their
 beams come from. Each side has a Gaussian of its own, and a beam is associated with the one whose face it
 hits.
 """
@@ -17,7 +17,7 @@ from __future__ import annotations
 import numpy as np
 
 from nscan_cli.kernels.decorators import leaf_kernel, llvm_inline_kernel
-from nscan_cli.ndt.hash_grid import FACES, FLOOR, HALF_KEY, MINIMUM, Grid, find_row, unpack_key
+from nscan_cli.ndt.hash_grid import FACES, FLOOR, HALF_KEY, MINIMUM, SIDE_SHARE, Grid, find_row, unpack_key
 from nscan_cli.poses import Array
 
 Cells = tuple[int | np.int32, int, int, int]
@@ -29,16 +29,15 @@ Direction = tuple[float, float]
 """Cosine and sine of twice the angle of the long axis of a covariance."""
 NO_MOMENTS = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 """The moments of no points."""
-LEAST_SIDE_SHARE = 0.2
-"""Least mean component of the unit beams across a Gaussian that was seen from one side. A constant of the
-kernels."""
+LEAST_EIGENVALUE_RATIO = 0.001
+"""Lower bound of the smaller eigenvalue of a covariance, as a share of the larger one ([19])."""
 
 
 @leaf_kernel
 def make_gaussian(grid: Grid, row: int, half: float) -> None:
-    """Mean, inverse covariance and side of the block of four lattice cells whose lower left one is `row`.
+    """Make the Gaussian of the block of four lattice cells whose lower left one is `row`.
 
-    Two Gaussians where the points lie on two faces of a wall, if the grid has faces.
+    There are two Gaussians if the points lie on two faces of a wall and the grid has faces.
     """
     key, gaussian, other = grid.keys[row], grid.gaussians[row], grid.keys.shape[0] + row
     if gaussian[7] > 0.0:
@@ -70,25 +69,25 @@ def write_gaussian(
     nx, ny = _normal(long_axis)
     through = fx * nx + fy * ny
     gaussian[5] = gaussian[6] = 0.0
-    if abs(through) > LEAST_SIDE_SHARE:
+    if abs(through) > grid.settings[SIDE_SHARE]:
         side = -1.0 if through > 0.0 else 1.0
         gaussian[5], gaussian[6] = side * nx, side * ny
 
 
 @leaf_kernel
 def eigenvalues(grid: Grid, moments: Moments) -> tuple[float, float]:
-    """Those of a covariance, increasing; at least the floor, and at least 0.001 of the larger one ([19])."""
+    """The eigenvalues of a covariance, increasing: at least the squared floor, and not too different."""
     _, _, _, xx, xy, yy, _, _ = moments
     middle, radius, floor = 0.5 * (xx + yy), eigenvalue_radius(xx, xy, yy), grid.settings[FLOOR]
     large = max(middle + radius, floor * floor)
-    return max(middle - radius, floor * floor, 0.001 * large), large
+    return max(middle - radius, floor * floor, LEAST_EIGENVALUE_RATIO * large), large
 
 
 @llvm_inline_kernel
 def face_moments(grid: Grid, row: int, half: float) -> tuple[Moments, Moments]:
     """The moments of the points of the block of `row`, and of those on the other face of a wall there.
 
-    NO_MOMENTS where there are too few points.
+    Either are NO_MOMENTS if there are too few points.
     """
     above, right = grid.keys[row] + 1, grid.keys[row] + 2 * HALF_KEY
     cells = np.int32(row), find_row(grid, right), find_row(grid, above), find_row(grid, right + 1)
@@ -111,7 +110,7 @@ def face_moments(grid: Grid, row: int, half: float) -> tuple[Moments, Moments]:
 def _block_sums(grid: Grid, cells: Cells, half: float) -> tuple[Moments, tuple[float, float]]:
     """The sums of a block about the centre of its first cell, and the normal of the wall in it.
 
-    The normal is that of each part about its own mean, so that the distance of two faces does not count.
+    For the normal each part counts about its own mean, so that the distance of two faces makes no difference.
     """
     sums = NO_MOMENTS
     xx = xy = yy = 0.0
@@ -141,7 +140,8 @@ def _has_two_faces(grid: Grid, cells: Cells, normal: tuple[float, float]) -> boo
             else:
                 number_before += part[0]
                 against -= through
-    return against > LEAST_SIDE_SHARE * number_before and along > LEAST_SIDE_SHARE * number_behind
+    share = grid.settings[SIDE_SHARE]
+    return bool(against > share * number_before and along > share * number_behind)
 
 
 @leaf_kernel

@@ -1,9 +1,9 @@
 """Points of scans are added to the grid of an NDT and removed again ([19]; paper, III-F).
 
 The plane has four overlapping grids, shifted by half a cell against each other. Their common refinement is a
-lattice of half cells. A point falls into one lattice cell, and is associated with the Gaussians of the four 2
-× 2 blocks that contain the cell. Sums are therefore kept for lattice cells, and a Gaussian is made from those
-of its block. They can be subtracted again, so that a map follows the robot.
+lattice of half cells. A point falls into one lattice cell, and is associated with the Gaussians of the four
+2 × 2 blocks that contain the cell. Sums are therefore kept for lattice cells, and a Gaussian is made from
+those of its block. They can be subtracted again, so that a map follows the robot.
 """
 
 from __future__ import annotations
@@ -15,6 +15,9 @@ from nscan_cli.kernels.array_assignment import assign, assign_rows
 from nscan_cli.kernels.decorators import kernel, leaf_kernel
 from nscan_cli.ndt.gaussians import make_gaussian
 from nscan_cli.ndt.hash_grid import (
+    MAX_NEIGHBOUR,
+    MAX_SPACING,
+    MIN_SPACING,
     NEIGHBOURHOOD,
     OUTDATED,
     WALL_DIRECTION,
@@ -31,10 +34,6 @@ from nscan_cli.poses import Array
 
 CELLS_PER_POINT = 9
 """Most lattice cells that a point adds: its own and the eight around it."""
-NEIGHBOUR_POINTS = 10
-"""Most points to each side that are tried as the neighbour. These are constants of the kernels."""
-LEAST_SPACING, GREATEST_SPACING = 0.1, 0.5
-"""Distances (m) of the neighbour: nearer points differ by noise, farther ones belong to something else."""
 
 
 @leaf_kernel
@@ -61,10 +60,9 @@ def add_points(
                 row, rows = _insert_with_neighbours(grid, rows, ix, iy)
         touched[k] = row
         facing, sums = grid.facing[row], grid.sums[row]
-        # Only an empty cell gets a new normal, so that points are removed from the part that they were added
-        # to.
+        # Only an empty cell gets a new normal: points have to be removed from the part that has them.
         if sums[0, 0] + sums[1, 0] < 0.5:
-            tx, ty = _scan_tangent(points, k)
+            tx, ty = _scan_tangent(grid.settings, points, k)
             facing[0], facing[1] = -(sin * tx + cos * ty), cos * tx - sin * ty
         part = sums[1 if facing[0] * bx + facing[1] * by > 0.0 else 0]
         dx, dy = x - (ix + 0.5) * half, y - (iy + 0.5) * half
@@ -136,19 +134,20 @@ def _outdate_gaussians(grid: Grid, touched: NDArray[np.int32]) -> None:
 
 
 @leaf_kernel
-def _scan_tangent(points: Array, k: int) -> tuple[float, float]:
+def _scan_tangent(settings: Array, points: Array, k: int) -> tuple[float, float]:
     """The direction of the surface at point k of a scan (m, 2), from its neighbours; else across its beam."""
     x, y = points[k, 0], points[k, 1]
+    nearest, farthest = settings[MIN_SPACING], settings[MAX_SPACING]
     tx = ty = 0.0
     for step in (-1, 1):
-        for beside in range(1, NEIGHBOUR_POINTS + 1):
+        for beside in range(1, int(settings[MAX_NEIGHBOUR]) + 1):
             other = k + step * beside
             if other < 0 or other >= points.shape[0]:
                 break
             dx, dy = points[other, 0] - x, points[other, 1] - y
             apart = dx * dx + dy * dy
-            if apart > LEAST_SPACING * LEAST_SPACING:
-                if apart < GREATEST_SPACING * GREATEST_SPACING:
+            if apart > nearest * nearest:
+                if apart < farthest * farthest:
                     tx += step * dx
                     ty += step * dy
                 break

@@ -13,14 +13,17 @@ from nscan_cli.poses import Array, Indices
 HALF_KEY = 1 << 30
 """Offset that makes lattice coordinates positive in a packed key."""
 OUTDATED = -1.0
-"""Stands for the first number of Σ⁻¹ of a Gaussian that has to be made again. `update_association` does so;
-before any other look-up, `Ndt.make` has to make all Gaussians."""
+"""Stands for the first number of Σ⁻¹ of a Gaussian that has to be made again. `update_association` makes it.
+Before any other look-up, `Ndt.make` has to make all Gaussians."""
 MINIMUM, FLOOR, NEIGHBOURHOOD, FACES = 0, 1, 2, 3
 """Places in `Grid.settings`: the least number of points of a Gaussian, its least standard deviation (m), the
 use of its neighbourhood, and whether walls have two faces (0 or 1); see gaussians.py."""
+MAX_NEIGHBOUR, MIN_SPACING, MAX_SPACING, SIDE_SHARE, ELONGATION, COSINE, END_SHARE, END_RATIO = range(4, 12)
+"""The places behind these: the fields of WallOptions, in their order."""
 NO_NEIGHBOURS, WALL_DIRECTION, WALL_END = 0, 1, 2
-"""Uses of the neighbourhood of a Gaussian: none; the direction of a wall; the ends of a wall, which hold
-nothing along it; see neighbourhood.py."""
+"""Uses of the neighbourhood of a Gaussian, see neighbourhood.py. With NO_NEIGHBOURS there is none. With
+WALL_DIRECTION it tells the direction of a wall. With WALL_END it tells where walls end; an end holds nothing
+along the wall."""
 
 
 class Grid(NamedTuple):
@@ -38,16 +41,16 @@ class Grid(NamedTuple):
     links: NDArray[np.int32]
     """(R, 4) rows of the Gaussians of the four blocks that contain the lattice cell, or −1."""
     facing: Array
-    """(R, 2) the normal of what is in a lattice cell: beams against it belong to the first part of its sums,
-    others to the second."""
+    """(R, 2) the normal of the surface in a lattice cell. Beams against it belong to the first part of the
+    cell's sums, others to the second."""
     sums: Array
-    """(R, 2, 8) of both parts: n, Σx, Σy, Σx², Σxy, Σy² about the centre of the lattice cell, and the sum of
-    the unit vectors along the beams."""
+    """(R, 2, 8) the sums of both parts: n, Σx, Σy, Σx², Σxy, Σy² about the centre of the lattice cell, and
+    the sum of the unit vectors along the beams."""
     gaussians: Array
-    """(G, 8) mean x, y; Σ⁻¹ as (xx, xy, yy), 0 if there are too few points; the normal (x, y) of the face
-    that was seen, 0 if both were; and the row of the Gaussian of the other face, or 0."""
+    """(G, 8) the mean (x, y); Σ⁻¹ as (xx, xy, yy), 0 if there are too few points; the normal (x, y) of the
+    face that was seen, 0 if both were; and the row of the Gaussian of the other face, 0 if there is none."""
     settings: Array
-    """(4,) MINIMUM, FLOOR, NEIGHBOURHOOD and FACES; (0,) in a compact grid."""
+    """(12,) the options in the places above; (0,) in a compact grid."""
 
 
 @leaf_kernel

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import astuple, dataclass
 
 import numpy as np
 
@@ -12,6 +12,7 @@ from nscan_cli.ndt.grid_growth import add_points, change_points, make_all_gaussi
 from nscan_cli.ndt.hash_grid import (
     FACES,
     FLOOR,
+    MAX_NEIGHBOUR,
     MINIMUM,
     NEIGHBOURHOOD,
     NO_NEIGHBOURS,
@@ -20,6 +21,7 @@ from nscan_cli.ndt.hash_grid import (
     rehash,
     table_size,
 )
+from nscan_cli.ndt.options import GaussianOptions
 from nscan_cli.poses import Array, Indices
 
 INITIAL_CAPACITY = 512
@@ -97,20 +99,17 @@ class Ndt:
     @classmethod
     def empty(
         cls,
-        cell: float,
-        minimum: int = 3,
-        floor: float = 0.02,
+        options: GaussianOptions,
         capacity: int = INITIAL_CAPACITY,
         neighbourhood: int = NO_NEIGHBOURS,
         faces: bool = True,
     ) -> Ndt:
         """An NDT to which points are added.
 
-        `minimum` is the least number of points that make a Gaussian, `floor` its least standard deviation
-        (m), `neighbourhood` one of NO_NEIGHBOURS, WALL_DIRECTION and WALL_END. With `faces` a wall can have
-        two Gaussians, one for each face; see gaussians.py.
+        `neighbourhood` is one of NO_NEIGHBOURS, WALL_DIRECTION and WALL_END. With `faces` a wall can have two
+        Gaussians, one for each face; see gaussians.py.
         """
-        return cls(cell, empty_grid(capacity, _settings(minimum, floor, neighbourhood, faces)), 0)
+        return cls(options.cell, empty_grid(capacity, _settings(options, neighbourhood, faces)), 0)
 
     @classmethod
     def of_scans(
@@ -118,9 +117,7 @@ class Ndt:
         points: Array,
         ends: Indices,
         poses: Array,
-        cell: float,
-        minimum: int,
-        floor: float,
+        options: GaussianOptions,
         capacity: int = INITIAL_CAPACITY,
         neighbourhood: int = NO_NEIGHBOURS,
     ) -> Ndt:
@@ -128,9 +125,9 @@ class Ndt:
 
         Scan k has points[ends[k] : ends[k + 1]]. Other arguments as for `empty`.
         """
-        settings = _settings(minimum, floor, neighbourhood, faces=True)
-        grid = _grid_of_scans(points, ends, poses, 0.5 * cell, capacity, settings)
-        return cls(cell, grid, len(grid.keys))
+        settings = _settings(options, neighbourhood, faces=True)
+        grid = _grid_of_scans(points, ends, poses, 0.5 * options.cell, capacity, settings)
+        return cls(options.cell, grid, len(grid.keys))
 
     @property
     def half(self) -> float:
@@ -151,7 +148,8 @@ class Ndt:
         self.grid, self.rows = with_capacity(self.grid, self.rows, points)
 
 
-def _settings(minimum: int, floor: float, neighbourhood: int, faces: bool) -> Array:
-    settings = np.empty(4)
-    settings[[MINIMUM, FLOOR, NEIGHBOURHOOD, FACES]] = minimum, floor, neighbourhood, faces
+def _settings(options: GaussianOptions, neighbourhood: int, faces: bool) -> Array:
+    settings = np.empty(12)
+    settings[[MINIMUM, FLOOR, NEIGHBOURHOOD, FACES]] = options.minimum, options.floor, neighbourhood, faces
+    settings[MAX_NEIGHBOUR:] = astuple(options.walls)
     return settings

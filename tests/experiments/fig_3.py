@@ -116,7 +116,9 @@ def subset(which: tuple[int, ...]) -> Subset:
     return Subset(
         which,
         np.linalg.eigvalsh(hessian).astype(np.float64),
-        tuple(weakest_translation(_marginal(hessian, at)) for at in range(len(which) - 1)),
+        tuple(
+            weakest_translation(_marginal(hessian, at), OPTIONS.weak_sigma) for at in range(len(which) - 1)
+        ),
         error(which),
         float(np.median([error(which, seed) for seed in range(DRAWS)])),
     )

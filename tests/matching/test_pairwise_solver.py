@@ -56,17 +56,17 @@ def test_gradient_and_hessian_of_the_objective_are_its_derivatives():
 
 def test_without_overlap_the_prior_is_the_minimum():
     ndt = ndt_of(room(1) + 1000)
-    pose, hessian, (value, energy, _, _, converged) = run(ndt, room(2), np.zeros(3), MEAN, INFORMATION)
-    assert converged
-    assert (value, energy) == (pytest.approx(0, abs=1e-9), 0.0)
+    pose, hessian, found = run(ndt, room(2), np.zeros(3), MEAN, INFORMATION)
+    assert found.converged
+    assert (found.value, found.energy) == (pytest.approx(0, abs=1e-9), 0.0)
     np.testing.assert_allclose(pose, MEAN, atol=1e-6)
     np.testing.assert_allclose(hessian, INFORMATION)
 
 
 def test_without_anything_the_pose_stays():
     ndt = ndt_of(room(1) + 1000)
-    pose, _, (value, energy, *_) = run(ndt, room(2), np.array([1.0, 2.0, 0.5]), np.zeros(3), np.zeros((3, 3)))
-    assert (value, energy) == (0.0, 0.0)
+    pose, _, found = run(ndt, room(2), np.array([1.0, 2.0, 0.5]), np.zeros(3), np.zeros((3, 3)))
+    assert (found.value, found.energy) == (0.0, 0.0)
     np.testing.assert_allclose(pose, [1.0, 2.0, 0.5])
 
 
@@ -76,13 +76,11 @@ def test_a_moved_copy_is_brought_back(seed):
     rng = np.random.default_rng(seed)
     points = room(seed)
     start = rng.uniform(-1, 1, 3) * [0.3, 0.3, 0.1]
-    pose, hessian, (value, energy, _, evaluations, converged) = run(
-        ndt_of(points), points, start, np.zeros(3), np.zeros((3, 3))
-    )
-    assert converged
-    assert evaluations < 60
+    pose, hessian, found = run(ndt_of(points), points, start, np.zeros(3), np.zeros((3, 3)))
+    assert found.converged
+    assert found.evaluations < 60
     assert np.abs(pose).max() < 0.03
-    assert value == pytest.approx(SCALE * energy)
+    assert found.value == pytest.approx(SCALE * found.energy)
     assert np.linalg.eigvalsh(hessian)[0] > 0
 
 
@@ -90,7 +88,7 @@ def test_a_moved_copy_is_brought_back(seed):
 def test_wide_stages_that_end_early_lead_to_a_minimum_as_near_the_truth(seed):
     start = np.random.default_rng(seed).uniform(-1, 1, 3) * [0.3, 0.3, 0.1]
     ndt, points = ndt_of(room(seed)), room(seed)
-    whole, _, (*_, evaluations, _) = run(ndt, points, start, np.zeros(3), np.zeros((3, 3)))
-    early, _, (*_, fewer, _) = run(ndt, points, start, np.zeros(3), np.zeros((3, 3)), near=0.01)
+    whole, _, at_ease = run(ndt, points, start, np.zeros(3), np.zeros((3, 3)))
+    early, _, in_haste = run(ndt, points, start, np.zeros(3), np.zeros((3, 3)), near=0.01)
     assert max(np.abs(early).max(), np.abs(whole).max()) < 0.03
-    assert fewer < evaluations
+    assert in_haste.evaluations < at_ease.evaluations

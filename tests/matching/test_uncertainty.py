@@ -5,7 +5,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from nscan_cli.matching.pairwise import PairOptions
 from nscan_cli.matching.uncertainty import covariance_of, decrement, weakest_translation
+
+WEAK = PairOptions().weak_sigma
 
 
 def test_covariance_is_the_inverse_or_nothing():
@@ -34,7 +37,7 @@ def test_the_weakest_direction_is_the_longest_axis_of_the_marginal_covariance(an
     # Any correlation with the rotation that keeps the whole positive definite.
     covariance[:2, 2] = covariance[2, :2] = weak * 0.1 * (a * axis + b * across / ratio)
     covariance[2, 2] = 0.01
-    weakest = weakest_translation(np.linalg.inv(covariance).astype(np.float64))
+    weakest = weakest_translation(np.linalg.inv(covariance).astype(np.float64), WEAK)
     assert weakest.sigma == pytest.approx(weak, rel=1e-6)
     off = (weakest.direction - angle + np.pi / 2) % np.pi - np.pi / 2
     assert abs(off) < 1e-6
@@ -43,12 +46,12 @@ def test_the_weakest_direction_is_the_longest_axis_of_the_marginal_covariance(an
 
 def test_weak_is_what_five_centimetres_do_not_hold():
     for sigma, weak in ((0.04, False), (0.06, True)):
-        assert weakest_translation(np.diag([sigma**-2, 1e6, 1e6])).is_weak == weak
-    assert weakest_translation(np.diag([0.0, 1e6, 1e6])).is_weak
+        assert weakest_translation(np.diag([sigma**-2, 1e6, 1e6]), WEAK).is_weak == weak
+    assert weakest_translation(np.diag([0.0, 1e6, 1e6]), WEAK).is_weak
 
 
 def test_what_nothing_holds_has_no_deviation():
-    assert weakest_translation(np.zeros((3, 3))).sigma is None
-    open_along_y = weakest_translation(np.diag([100.0, 0.0, 5.0]))
+    assert weakest_translation(np.zeros((3, 3)), WEAK).sigma is None
+    open_along_y = weakest_translation(np.diag([100.0, 0.0, 5.0]), WEAK)
     assert open_along_y.sigma is None
     assert abs(open_along_y.direction) == pytest.approx(np.pi / 2)

@@ -12,13 +12,14 @@ from nscan_cli.ndt.association import (
 from nscan_cli.ndt.energy import ENERGY_NUMBERS, evaluate_energy, inlier_share, sum_association
 from nscan_cli.ndt.grid_growth import change_points
 from nscan_cli.ndt.hash_grid import OUTDATED
+from nscan_cli.ndt.options import GaussianOptions
 from nscan_cli.ndt.transform import Ndt
 from tests.ndt.wall_points import room
 
 
 def outside_in(count: int) -> Ndt:
     """An NDT whose walls are seen from one side, as a robot in the middle does."""
-    ndt = Ndt.empty(0.5)
+    ndt = Ndt.empty(GaussianOptions(0.5, 3))
     for seed in range(count):
         ndt.add(room(seed), np.array([0.02 * seed, 0.0, 0.01 * seed]))
     return ndt

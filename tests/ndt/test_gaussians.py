@@ -7,6 +7,7 @@ import pytest
 
 from nscan_cli.ndt.association import association_buffers, begin_association, update_association
 from nscan_cli.ndt.energy import ENERGY_NUMBERS, energy, evaluate_energy, inlier_share, sum_association
+from nscan_cli.ndt.options import GaussianOptions
 from nscan_cli.ndt.transform import Ndt
 from nscan_cli.poses import Array, compose, relative, transform
 from tests.ndt.transforms import assert_same, entries, gaussian_count, subtract
@@ -38,7 +39,7 @@ def relative_points(points: Array, pose: Array) -> Array:
 
 def added(*faces: tuple[Array, Array], frame: Array = FRAMES[0], minimum: int = 5) -> Ndt:
     """The NDT of faces, each seen from a pose."""
-    ndt = Ndt.empty(1.0, minimum, 0.02, 16)
+    ndt = Ndt.empty(GaussianOptions(1.0, minimum), 16)
     for points, pose in faces:
         ndt.add(seen(points, pose), compose(frame, pose))
     return ndt
@@ -131,7 +132,7 @@ def test_growing_and_compacting_keep_both_faces():
     assert [energy(ndt, *scan).value for scan in scans] == before
     ends, at = np.cumsum([0, *(len(points) for points, _ in scans)]), np.array([pose for _, pose in scans])
     points = np.concatenate([points for points, _ in scans])
-    compact = Ndt.of_scans(points, ends, at, 1.0, 5, 0.02, capacity=16)
+    compact = Ndt.of_scans(points, ends, at, GaussianOptions(1.0, 5), capacity=16)
     assert [energy(compact, *scan).value for scan in scans] == before
 
 

@@ -5,6 +5,7 @@ import pytest
 
 from nscan_cli.ndt.energy import energy, inlier_share
 from nscan_cli.ndt.hash_grid import find_row, pack_key
+from nscan_cli.ndt.options import GaussianOptions
 from nscan_cli.ndt.transform import Ndt
 from nscan_cli.poses import relative, transform
 from tests.ndt import reference_ndt
@@ -17,7 +18,7 @@ PROBE = np.array([0.1, -0.05, 0.04])
 
 
 def grown(points, cell=1.0, minimum=3, floor=0.02, capacity=512, pose=HERE) -> Ndt:
-    ndt = Ndt.empty(cell, minimum, floor, capacity)
+    ndt = Ndt.empty(GaussianOptions(cell, minimum, floor), capacity)
     ndt.add(points, pose)
     return ndt
 
@@ -107,7 +108,7 @@ def test_subtracting_takes_back_what_was_added():
 
 def test_capacity_grows_with_the_points():
     points = np.concatenate([transform(pose, room(5)) for pose in np.arange(30).reshape(10, 3) - 15.0])
-    small, large = Ndt.empty(1.0, capacity=16), grown(points, capacity=1 << 14)
+    small, large = Ndt.empty(GaussianOptions(1.0, 3), capacity=16), grown(points, capacity=1 << 14)
     for part in np.array_split(points, 50):
         small.add(part, HERE)
     assert len(small.grid.keys) > 500
@@ -121,7 +122,9 @@ def test_capacity_grows_with_the_points():
 def test_compacting_keeps_the_energy_in_less_memory():
     points = room(6)
     large = grown(points, capacity=4096)
-    compact = Ndt.of_scans(points, np.array([0, len(points)]), HERE[None], 1.0, 3, 0.02, capacity=4096)
+    compact = Ndt.of_scans(
+        points, np.array([0, len(points)]), HERE[None], GaussianOptions(1.0, 3), capacity=4096
+    )
     before, after = energy(large, room(7), PROBE), energy(compact, room(7), PROBE)
     assert after.value == before.value
     np.testing.assert_array_equal(after.hessian, before.hessian)
@@ -132,12 +135,12 @@ def test_scans_taken_together_are_as_if_added_one_by_one():
     """With any initial capacity: a full grid is copied into a larger one."""
     scans = [room(seed) for seed in range(12)]
     poses = np.array([[3.0 * k, 0.5 * k, 0.1 * k] for k in range(12)])
-    grown_by_each = Ndt.empty(0.5, capacity=16)
+    grown_by_each = Ndt.empty(GaussianOptions(0.5, 3), capacity=16)
     for points, pose in zip(scans, poses, strict=True):
         grown_by_each.add(points, pose)
     ends = np.cumsum([0, *map(len, scans)])
     for capacity in (16, 1 << 15):
-        together = Ndt.of_scans(np.concatenate(scans), ends, poses, 0.5, 3, 0.02, capacity)
+        together = Ndt.of_scans(np.concatenate(scans), ends, poses, GaussianOptions(0.5, 3), capacity)
         assert together.rows == len(together.grid.keys) < grown_by_each.rows
         assert gaussian_count(together) == gaussian_count(grown_by_each)
         for points, pose in zip(scans, poses, strict=True):
@@ -154,7 +157,10 @@ def test_an_ndt_without_points_has_no_gaussians():
 
 def test_a_map_that_moves_drops_empty_cells():
     """It has the same bits as a map with capacity for all cells that it ever had."""
-    small, large = Ndt.empty(0.5, capacity=16), Ndt.empty(0.5, capacity=1 << 17)
+    small, large = (
+        Ndt.empty(GaussianOptions(0.5, 3), capacity=16),
+        Ndt.empty(GaussianOptions(0.5, 3), capacity=1 << 17),
+    )
     poses = [np.array([3.0 * k, 0.5 * k, 0.1 * k]) for k in range(40)]
     sizes = []
     for k, pose in enumerate(poses):

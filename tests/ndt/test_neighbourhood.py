@@ -10,6 +10,7 @@ import pytest
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.ndt.energy import energy
 from nscan_cli.ndt.hash_grid import NO_NEIGHBOURS, WALL_END
+from nscan_cli.ndt.options import GaussianOptions
 from nscan_cli.ndt.transform import Ndt
 from nscan_cli.poses import Array, compose, relative
 from tests.simulation.laser import Laser
@@ -33,7 +34,9 @@ def wall(*places: tuple[float, float], seed: int = 1) -> Array:
 
 
 def ndt_of(points: Array, around: int, frame: Array = HERE) -> Ndt:
-    return Ndt.of_scans(points, np.array([0, len(points)]), frame[None], 1.0, 5, 0.02, neighbourhood=around)
+    return Ndt.of_scans(
+        points, np.array([0, len(points)]), frame[None], GaussianOptions(1.0, 5), neighbourhood=around
+    )
 
 
 def held(ndt: Ndt, points: Array, frame: Array, direction: Array) -> float:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from nscan_cli.ndt.grid_growth import change_points
+from nscan_cli.ndt.options import GaussianOptions
 from nscan_cli.ndt.transform import Ndt
 from nscan_cli.poses import Array
 
@@ -38,6 +39,6 @@ def assert_same(a: Ndt, b: Ndt, tolerance: float = 1e-9) -> None:
 
 
 def ndt_of(points: Array, cell: float = 1.0) -> Ndt:
-    ndt = Ndt.empty(cell)
+    ndt = Ndt.empty(GaussianOptions(cell, 3))
     ndt.add(points, np.zeros(3))
     return ndt

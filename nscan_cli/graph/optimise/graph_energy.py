@@ -20,6 +20,7 @@ class System(NamedTuple):
     """The energy at some poses, and its derivatives with respect to the F free poses, in order."""
 
     value: float
+    """Σ of the terms."""
     terms: Array
     """(Q,) the value of each relation: its χ² at the poses."""
     gradient: Array
@@ -69,7 +70,7 @@ class GraphEnergy:
     def terms(self, poses: Array) -> Array:
         """(Q,) the value of each relation at the poses (K, 3)."""
         poses = np.ascontiguousarray(poses, dtype=np.float64)
-        columns = self._columns_at(poses) if self._not_linear else self.columns
+        columns = self._columns_at(poses)
         terms = np.zeros(len(columns.fixed))
         _evaluate_values(columns, poses, terms)
         # Values below 0 are rounding errors.
@@ -78,7 +79,7 @@ class GraphEnergy:
     def evaluate(self, poses: Array, exact: bool) -> System:
         """Energy, gradient and Hessian (exact, or its Gauss–Newton part) at the poses (K, 3)."""
         poses = np.ascontiguousarray(poses, dtype=np.float64)
-        columns = self._columns_at(poses) if self._not_linear else self.columns
+        columns = self._columns_at(poses)
         terms = np.zeros(len(columns.fixed))
         gradient = np.zeros((len(poses), 3))
         blocks = np.zeros((len(self.pattern.rows), 3, 3))
@@ -87,8 +88,10 @@ class GraphEnergy:
         return System(float(terms.sum()), terms, gradient[self.free], blocks)
 
     def _columns_at(self, poses: Array) -> TermColumns:
-        """The columns with the nonlinear terms taken at the poses (K, 3)."""
+        """The columns, with the terms that are not linear taken at the poses (K, 3)."""
         columns = self.columns
+        if not self._not_linear:
+            return columns
         columns = columns._replace(local=columns.local.copy(), hessians=columns.hessians.copy())
         for k, at in self._not_linear:
             nodes = slice(columns.starts[k], columns.starts[k + 1])
@@ -166,6 +169,7 @@ def _evaluate_values(columns: TermColumns, poses: Array, terms: Array) -> None:
 
 @kernel
 def _poses_of(poses: Array, members: Indices) -> Array:
+    """(n, 3) the poses of the members of a relation."""
     gathered = np.empty((members.shape[0], 3))
     for i in range(members.shape[0]):
         for a in range(3):
@@ -177,6 +181,7 @@ def _poses_of(poses: Array, members: Indices) -> Array:
 def _add_term(
     members: Indices, part: Array, block: Array, targets: Indices, e: int, gradient: Array, blocks: Array
 ) -> int:
+    """Add a term's gradient (3n,) and Hessian (3n, 3n); e counts its blocks, and the next one is returned."""
     for i in range(members.shape[0]):
         for a in range(3):
             gradient[members[i], a] += part[3 * i + a]

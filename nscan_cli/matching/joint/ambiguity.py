@@ -1,8 +1,8 @@
 """The uncertainty of a joint match whose scans fit elsewhere, too: what its Hessian does not know.
 
-Along a corridor scans fit again and again: a door farther on, or anywhere. The Hessian tells how sharp the
-minimum is, to a centimetre. Other minima show only in the energy farther away, and only in the neutral one,
-since the energy itself falls wherever scans cover more of each other.
+Along a corridor scans fit again one door farther on, or anywhere. The Hessian tells only how sharp the
+minimum is. Other minima show in the energy farther away, and only in the neutral energy, since the energy
+itself falls wherever scans cover more of each other.
 """
 
 from __future__ import annotations

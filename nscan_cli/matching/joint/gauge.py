@@ -10,7 +10,7 @@ from nscan_cli.matching.small_matrices import solve_definite
 from nscan_cli.poses import Array
 
 FREE = -1
-"""Stands for a fixed scan where the gauge is free."""
+"""Stands for the index of the fixed scan where no scan is fixed."""
 
 
 def gauge_of(fixed: int | None) -> int:
@@ -24,8 +24,8 @@ def gauge_fixed_step(
 ) -> bool:
     """Write the step (n, 3) that solves (H + damping · diag H) Δp = −g, eq. (5), in the chosen gauge (III-D).
 
-    With `fixed` FREE the step is the shortest one, with no part along the three null directions. False when
-    the matrix is not positive definite.
+    `fixed` is the index of the scan that stays. If it is FREE, the step is the shortest one, with no part
+    along the three null directions. Returns whether the matrix is positive definite.
     """
     size = gradient.shape[0]
     matrix, right, solution = hessian.copy(), -gradient, np.empty(size)

@@ -24,9 +24,10 @@ IndexSetKind = Literal["all", "visible", "overlap"]
 def index_set(kind: IndexSetKind, options: IndexSetOptions, scans: ScanSet, poses: Array) -> Indices:
     """The ordered pairs (m, 2) of n scans at the poses (n, 3) that are to be matched, sorted.
 
-    `all`: every pair. `visible`: the position of one scan lies in the free space that the other saw.
-    `overlap`: enough points of one fall into cells where the other has a Gaussian, or more than for any other
-    scan. Their distance from it does not count, so starts may be poor. A scan can be in no pair.
+    `all`: every pair. `visible`: pairs in which the position of one scan lies in the free space that the
+    other saw. `overlap`: pairs in which enough points of one scan fall into cells where the other has a
+    Gaussian, or more points than for any other scan. The distance of the points from the Gaussian does not
+    count, so starts may be poor. A scan can be in no pair.
     """
     n = len(poses)
     if kind == "all":
@@ -45,7 +46,10 @@ def index_set(kind: IndexSetKind, options: IndexSetOptions, scans: ScanSet, pose
 
 
 def overlap_shares(scans: ScanSet, poses: Array, stride: int) -> Array:
-    """(n, n) at [i, j] the share of scan j's points in cells of scan i's Gaussians, of one in `stride`."""
+    """(n, n) at [i, j] the share of scan j's points in cells of scan i's Gaussians.
+
+    Of the points, one in `stride` counts.
+    """
     shares = np.zeros((len(poses), len(poses)))
     _write_shares(scans, poses, stride, np.empty(3), shares)
     return shares
@@ -67,7 +71,7 @@ def _write_visible(
             if distance < visible_distance:
                 shares[i, j] = 1.0
                 continue
-            # Of the beam nearest in direction; for small angles, sines replace them.
+            # The reach of the beam that is nearest in direction. For small angles, sines stand for them.
             nearest, reach = beam_angle, 0.0
             for k in range(points.shape[0]):
                 x, y = points[k, 0], points[k, 1]

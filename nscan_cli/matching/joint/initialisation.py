@@ -17,7 +17,7 @@ from nscan_cli.matching.joint.joint_match import JointMatch, PairsAt, match_near
 from nscan_cli.matching.joint.neutral_energy import neutral_energy, pair_energies
 from nscan_cli.matching.joint.options import InitialisationOptions, JointOptions
 from nscan_cli.matching.joint.overlap import Overlaps, overlaps, weakest_link
-from nscan_cli.matching.motion_model import Prior
+from nscan_cli.matching.motion_model import no_prior
 from nscan_cli.matching.pairwise import PairOptions
 from nscan_cli.matching.pairwise_solver import PairProblem, minimise_pairwise
 from nscan_cli.ndt.association import begin_association
@@ -35,9 +35,9 @@ def match_or_search(
 ) -> tuple[JointMatch, Overlaps]:
     """Match n scans with points (m_i, 2) from the poses `start` (n, 3), with a search if that is not sound.
 
-    A match is sound when large overlaps connect all scans, and each scan lowers the neutral energy. If it is
-    not, the scans are placed by search and matched from there. That match is taken if overlaps connect its
-    scans and its neutral energy is lower. Returns the overlaps of the match, too.
+    A match is sound if large overlaps connect all scans, and if each scan lowers the neutral energy. If it is
+    not sound, the scans are placed by search and matched from there. That match is taken if overlaps connect
+    its scans and its neutral energy is lower. Returns the overlaps of the match, too.
     """
     match = match_near_and_far(problem, start, joint, pairs_at)
     shares = overlaps(problem.scans, match.poses, joint.inlier_bound)
@@ -92,7 +92,7 @@ class Initialisation:
         return neutral_energy(self.problem, poses, self.share)
 
     def _placed_from(self, first: int) -> Array:
-        """Place all scans one by one, the best fitting next; `first` stays at its start."""
+        """Place all scans one by one, the one that fits best next; `first` stays at its start."""
         poses = self.start.copy()
         placed, left = [first], [scan for scan in range(len(poses)) if scan != first]
         while left:
@@ -145,11 +145,11 @@ class Initialisation:
     def _refined(self, scan: int, pose: Array, placed: Sequence[int], poses: Array) -> Array:
         """The pose (3,) matched with the NDT of all placed scans."""
         options, pose = self.options, pose.copy()
-        ndt = Ndt.empty(options.cell, options.minimum, options.floor)
+        ndt = Ndt.empty(options)
         for other in placed:
             ndt.add(self.points[other], poses[other])
-        none = Prior(np.zeros(3), np.zeros((3, 3)))
-        problem = PairProblem(ndt.grid, ndt.half, begin_association(self.points[scan]), options.scale, none)
+        association = begin_association(self.points[scan])
+        problem = PairProblem(ndt.grid, ndt.half, association, options.scale, no_prior())
         limits = options.max_iterations, options.tolerance, options.tolerance
         widenings = np.array(self.initialisation.widenings)
         minimise_pairwise(problem, pose, widenings, *limits, np.empty((3, 3)))
@@ -157,7 +157,7 @@ class Initialisation:
 
 
 def _rigid_motion(before: Array, after: Array, lever: float) -> Array:
-    """The rigid motion (3,) that best takes poses (k, 3) to others; `lever` metres weigh as a radian."""
+    """The rigid motion (3,) that takes poses (k, 3) nearest to others; a radian weighs as `lever` metres."""
     a, b = before[:, :2] - before[:, :2].mean(axis=0), after[:, :2] - after[:, :2].mean(axis=0)
     turns = after[:, 2] - before[:, 2]
     cos = (a * b).sum() + lever**2 * np.cos(turns).sum()

@@ -12,14 +12,14 @@ import numpy as np
 
 from nscan_cli.kernels.decorators import kernel, leaf_kernel
 from nscan_cli.matching.joint.scan_set import ScanSet, most_points, scan_grid, scan_points
+from nscan_cli.matching.motion_model import Prior, prior_pull
 from nscan_cli.matching.pose_kernels import relative_pose
-from nscan_cli.matching.small_matrices import multiply
 from nscan_cli.ndt.association import AssociationBuffers, association_buffers
 from nscan_cli.ndt.energy import ENERGY_NUMBERS, Energy, evaluate_energy, unpack_derivatives
 from nscan_cli.poses import Array, Indices
 
 NEUTRAL = 1.0
-"""Share of the usual s with which overlap neither raises nor lowers the neutral energy of a perfect match."""
+"""Share of the usual s with which overlap does not change the neutral energy of a perfect match."""
 
 
 class Priors(NamedTuple):
@@ -28,15 +28,16 @@ class Priors(NamedTuple):
     pairs: Indices
     """(Q, 2) a and b."""
     means: Array
-    """(Q, 3)"""
+    """(Q, 3) z of each."""
     information: Array
-    """(Q, 3, 3)"""
+    """(Q, 3, 3) P of each."""
 
 
 class JointProblem(NamedTuple):
-    """The objective: scale · Σ over (i, j) ∈ J of E_ij, plus priors."""
+    """The objective of a joint match: scale · Σ over (i, j) ∈ J of E_ij, plus priors."""
 
     scans: ScanSet
+    """The n scans."""
     pairs: Indices
     """(m, 2) the index set J of ordered pairs (i, j)."""
     priors: Priors
@@ -52,10 +53,11 @@ class PairBuffers(NamedTuple):
     g: Array
     """(3,) gradient of E_ij in u."""
     h: Array
-    """(3, 3) Hessian."""
+    """(3, 3) Hessian of E_ij in u."""
     out: Array
-    """(OUT,) both as `evaluate_energy` gives them."""
+    """(ENERGY_NUMBERS,) E_ij, g and h as `evaluate_energy` writes them."""
     met: AssociationBuffers
+    """The points of scan j at Gaussians of scan i."""
 
 
 def no_priors() -> Priors:
@@ -82,7 +84,7 @@ def joint_energy(problem: JointProblem, poses: Array, widening: float = 1.0, exa
 
 @kernel
 def buffers_for(scans: ScanSet, stride: int) -> PairBuffers:
-    """Buffers for any pair of the scans, of whose points one in `stride` counts."""
+    """Buffers for any pair of the scans. Of the points, one in `stride` counts."""
     met = association_buffers(most_points(scans), stride)
     return PairBuffers(np.empty(3), np.empty(3), np.empty((3, 3)), np.empty(ENERGY_NUMBERS), met)
 
@@ -98,9 +100,10 @@ def evaluate_joint(
     gradient: Array,
     hessian: Array,
 ) -> float:
-    """The joint energy; writes its gradient (3n,) and Hessian (3n, 3n), exact with a `curvature` of 1.
+    """The joint energy at the poses (n, 3), or the neutral one; writes gradient (3n,) and Hessian (3n, 3n).
 
-    Of the points, one in `stride` stands for its neighbours.
+    With a `curvature` of 1 the Hessian is exact, with 0 it is the semi-definite part. Of the points, one in
+    `stride` stands for its neighbours.
     """
     gradient[:] = 0.0
     hessian[:, :] = 0.0
@@ -115,12 +118,16 @@ def _add_pairs(
     poses: Array,
     widening: float,
     curvature: float,
-    neutral: float,
+    share: float,
     stride: int,
     buffers: PairBuffers,
     gradient: Array,
     hessian: Array,
 ) -> float:
+    """The energies of all pairs of J; adds their gradient and Hessian.
+
+    Every point on a Gaussian adds a `share` of the usual s, as in the neutral energy.
+    """
     scans, pairs, scale = problem.scans, problem.pairs, stride * problem.scale
     u, g, h, out, met = buffers
     value = 0.0
@@ -128,7 +135,7 @@ def _add_pairs(
         i, j = pairs[pair, 0], pairs[pair, 1]
         relative_pose(poses[j], poses[i], u)
         grid, points = scan_grid(scans, i), scan_points(scans, j)
-        baseline = neutral * scans.usual[i] if neutral > 0.0 else 0.0
+        baseline = share * scans.usual[i] if share > 0.0 else 0.0
         evaluate_energy(grid, scans.half, points, u, widening, curvature, baseline, stride, met, out)
         value += scale * out[0]
         unpack_derivatives(out, scale, g, h)
@@ -138,17 +145,14 @@ def _add_pairs(
 
 @kernel
 def add_priors(priors: Priors, poses: Array, curvature: float, gradient: Array, hessian: Array) -> float:
-    """The priors' value at the poses (n, 3); their gradient (3n,) and Hessian (3n, 3n) are added to these."""
-    u, g, difference = np.empty(3), np.empty(3), np.empty(3)
-    value = 0.0
+    """The value of the priors at the poses (n, 3); adds their gradient (3n,) and Hessian (3n, 3n)."""
+    u, g, value = np.empty(3), np.empty(3), 0.0
     for q in range(priors.pairs.shape[0]):
         i, j = priors.pairs[q, 0], priors.pairs[q, 1]
         relative_pose(poses[j], poses[i], u)
-        for a in range(3):
-            difference[a] = u[a] - priors.means[q, a]
-        difference[2] -= 2 * np.pi * np.round(difference[2] / (2 * np.pi))
-        multiply(priors.information[q], difference, g)
-        value += 0.5 * (difference[0] * g[0] + difference[1] * g[1] + difference[2] * g[2])
+        off, pull = prior_pull(Prior(priors.means[q], priors.information[q]), u)
+        g[0], g[1], g[2] = pull
+        value += 0.5 * (off[0] * g[0] + off[1] * g[1] + off[2] * g[2])
         _add_by_chain_rule(i, j, poses[i, 2], u, g, priors.information[q], curvature, gradient, hessian)
     return value
 

@@ -27,7 +27,7 @@ class JointMatch:
     """The result of nScan matching: local poses and the Hessian there."""
 
     poses: Array
-    """(n, 3)"""
+    """(n, 3) local poses."""
     gradient: Array
     """(3n,) of the objective at the poses."""
     hessian: Array
@@ -35,21 +35,24 @@ class JointMatch:
     pairs: Indices
     """(m, 2) the index set J at the end."""
     energy: float
-    """The objective's: scale · E with priors."""
+    """The objective at the poses: scale · E with priors."""
     iterations: int
+    """Number of iterations in all stages."""
     evaluations: int
+    """Number of evaluations of the energy in all stages."""
     last_iterations: int
-    """Number in the last stage."""
+    """Number of iterations in the last stage."""
     unsettled: int
-    """Stages before the last that did not converge within their iterations."""
+    """Number of stages before the last that did not converge."""
     converged: bool
+    """Whether the last stage converged."""
     searched: bool = False
     """Whether the poses come from scans that were placed by search, because the start led to nothing
     better."""
 
     @property
     def gradient_norm(self) -> float:
-        """That of the objective, scale · E with priors."""
+        """Length of the gradient of the objective, scale · E with priors."""
         return float(np.linalg.norm(self.gradient))
 
 
@@ -57,10 +60,13 @@ class Approach(NamedTuple):
     """Poses (n, 3) that an approach led to, and what it took."""
 
     poses: Array
+    """(n, 3)"""
     iterations: int
+    """Number of iterations in all its stages."""
     evaluations: int
+    """Number of evaluations of the energy in all its stages."""
     unsettled: int
-    """Stages that did not converge."""
+    """Number of its stages that did not converge."""
 
 
 def match_jointly(problem: JointProblem, start: Array, options: JointOptions) -> JointMatch:

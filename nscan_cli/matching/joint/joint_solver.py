@@ -19,7 +19,10 @@ OfApproach = tuple[int, int, int, float, bool]
 def approach(
     problem: JointProblem, poses: Array, widenings: Array, neutral: bool, of_approach: OfApproach
 ) -> tuple[int, int, int]:
-    """An approach, from the poses (n, 3) in place: iterations, evaluations, stages that did not converge."""
+    """Approach the minimum from the poses (n, 3), in place, with a stage for each of `widenings`.
+
+    Returns the numbers of iterations, of evaluations, and of stages that did not converge.
+    """
     stride, fixed, most, near, thorough = of_approach
     n = poses.shape[0]
     gradient, hessian = np.empty(3 * n), np.empty((3 * n, 3 * n))
@@ -50,9 +53,10 @@ def descend(
     gradient: Array,
     hessian: Array,
 ) -> tuple[float, int, int, bool]:
-    """One stage, from the poses (n, 3) in place: the value, iterations, evaluations, whether it converged.
+    """One stage, from the poses (n, 3), in place. Writes gradient (3n,) and Hessian (3n, 3n).
 
-    Writes gradient (3n,) and Hessian (3n, 3n) at the poses. `thorough` is that of JointOptions.
+    `thorough` is that of JointOptions. Returns the value of the objective, the numbers of iterations and of
+    evaluations, and whether the stage converged.
     """
     trial_gradient, trial_hessian = np.empty_like(gradient), np.empty_like(hessian)
     step, trial = np.empty_like(poses), np.empty_like(poses)

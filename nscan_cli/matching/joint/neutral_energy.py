@@ -1,8 +1,8 @@
 """The neutral energy of n scans: the joint energy without its reward for overlap.
 
 E rewards every point that meets a Gaussian, so it falls when scans slide over each other. In the neutral
-energy a point counts s minus a share of the usual s on the scan that it meets. Its derivatives are those of
-E; it serves to compare poses.
+energy a point counts s minus a share of the usual s of the scan that it meets. It serves to compare poses.
+Its derivatives are those of E.
 """
 
 from __future__ import annotations
@@ -20,14 +20,15 @@ from nscan_cli.poses import Array
 def pair_energies(problem: JointProblem, poses: Array, share: float) -> Array:
     """The neutral energy of each pair at the poses (n, 3): (n, n), 0 where (i, j) is not in J."""
     values = np.zeros((len(poses), len(poses)))
-    _add_pair_energies(problem, poses, share, 1, buffers_for(problem.scans, 1), values)
+    _write_pair_energies(problem, poses, share, 1, buffers_for(problem.scans, 1), values)
     return values
 
 
 def neutral_energy(problem: JointProblem, poses: Array, share: float, stride: int = 1) -> float:
     """The neutral energy with priors at the poses (n, 3).
 
-    `share` is that of the usual s which a point must exceed. Of the points one in `stride` counts for all.
+    A point lowers it if its s exceeds this `share` of the usual s. Of the points, one in `stride` counts for
+    all.
     """
     return float(neutral_energies(problem, poses[None], share, stride)[0])
 
@@ -39,15 +40,16 @@ def neutral_energies(problem: JointProblem, poses: Array, share: float, stride: 
     energies, values = np.empty(len(poses)), np.zeros((n, n))
     gradient, hessian = np.zeros(3 * n), np.zeros((3 * n, 3 * n))
     for k in range(len(poses)):
-        _add_pair_energies(problem, poses[k], share, stride, buffers, values)
+        _write_pair_energies(problem, poses[k], share, stride, buffers, values)
         energies[k] = values.sum() + add_priors(problem.priors, poses[k], 0.0, gradient, hessian)
     return energies
 
 
 @leaf_kernel
-def _add_pair_energies(
+def _write_pair_energies(
     problem: JointProblem, poses: Array, share: float, stride: int, buffers: PairBuffers, values: Array
 ) -> None:
+    """Write the neutral energy of each pair of J to values (n, n); others stay."""
     scans, u = problem.scans, buffers.u
     for pair in range(problem.pairs.shape[0]):
         i, j = problem.pairs[pair, 0], problem.pairs[pair, 1]

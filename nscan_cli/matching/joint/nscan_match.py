@@ -56,8 +56,8 @@ class NScanMatch:
     overlap: Array
     """(k,) the share of each scan's points that lie on at least one other scan."""
     weakest: tuple[Weakest, ...]
-    """The direction in which the others hold each of the k scans least, in the frame of the poses. Priors do
-    not count, so a corridor shows here."""
+    """k directions, in the frame of the poses, in which the other scans hold each scan least. Priors do not
+    count, so a corridor shows here."""
     reason: str | None
     """Why the match did not converge; None when it did."""
 
@@ -74,8 +74,9 @@ def nscan_match(
     """Match n scans with points (m_i, 2) jointly from the poses `start` (n, 3), by the index set `pairs`.
 
     The covariance is relative to the scan `fixed`, which stays where it is if `joint.fixed` is not None.
-    Scans that start too far from all others are excluded before the match. After it, those that overlap none
-    are excluded, or the one that contradicts its priors most, and the rest is matched again from `start`.
+    Scans that start too far from all others are excluded before the match. After it, those that overlap no
+    other are excluded; if there are none, the one that contradicts its priors most is, if any does. Then the
+    rest is matched again from `start`.
     Returns the match, None if fewer than two scans are left, and the excluded scans.
     """
     ndts = [scan_ndt(part, options) for part in points]
@@ -134,7 +135,7 @@ def _nscan(
         decrement=None if covariance is None else decrement(gradient, covariance),
         pairs=match.pairs,
         overlap=shares.scans,
-        weakest=tuple(weakest_translation(each) for each in information),
+        weakest=tuple(weakest_translation(each, options.weak_sigma) for each in information),
         reason=no_minimum if match.converged else NOT_CONVERGED,
     )
 

@@ -29,14 +29,13 @@ class ExcludedScan:
     overlap: float
     """Its greatest overlap with one other scan."""
     chi2: float | None = None
-    """Squared deviation from its priors, where that is the reason; see squared_deviations."""
+    """Squared deviation from its priors if that is the reason, else None; see squared_deviations."""
 
 
 def too_far(points: Sequence[Array], start: Array, error: float) -> list[int]:
     """The scans that can overlap no other, even if their poses `start` (n, 3) were wrong by `error` (m).
 
-    A scan may extend to the distance of its farthest point in any direction, since its angle may be wrong,
-    too.
+    A scan extends to the distance of its farthest point in all directions, since its angle may be wrong, too.
     """
     radii = np.array([np.hypot(part[:, 0], part[:, 1]).max(initial=0.0) for part in points])
     away = start[:, None, :2] - start[None, :, :2]
@@ -55,8 +54,8 @@ def outliers(
 ) -> list[ExcludedScan]:
     """The scans that do not belong to the others at the poses (n, 3) of a match by the index set (m, 2).
 
-    All that overlap none or are in no pair; if there are none, the one that contradicts its priors most.
-    `information` (n, 3, 3) is that of the match on each pose.
+    They are all that overlap no other or are in no pair. If there are none, it is the one that contradicts
+    its priors most, if any does. `information` (n, 3, 3) is that of the match on each pose.
     """
     best = np.maximum(shares.pairs, shares.pairs.T).max(axis=0)
     paired = np.isin(np.arange(len(poses)), pairs)

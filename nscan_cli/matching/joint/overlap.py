@@ -14,17 +14,20 @@ from nscan_cli.poses import Array, Mask
 
 
 class Overlaps(NamedTuple):
-    """Shares of points that lie on Gaussians."""
+    """Shares of the points of n scans that lie on Gaussians."""
 
     pairs: Array
-    """(n, n) [i, j]: of scan j's points, on those of scan i; 0 on the diagonal."""
+    """(n, n) at [i, j] the share of scan j's points that lie on Gaussians of scan i; 0 on the diagonal."""
     scans: Array
-    """(n,) of each scan's points, on those of at least one other scan."""
+    """(n,) the share of each scan's points that lie on Gaussians of at least one other scan."""
 
 
 @kernel
 def overlaps(scans: ScanSet, poses: Array, inlier_bound: float) -> Overlaps:
-    """The overlaps of n scans at the poses (n, 3), of points within a Mahalanobis distance² of the bound."""
+    """The overlaps of n scans at the poses (n, 3).
+
+    A point lies on a Gaussian within a squared Mahalanobis distance of `inlier_bound`.
+    """
     n = poses.shape[0]
     pairs, shares, u = np.zeros((n, n)), np.zeros(n), np.empty(3)
     inliers = np.empty(most_points(scans), dtype=np.bool_)
@@ -38,34 +41,27 @@ def overlaps(scans: ScanSet, poses: Array, inlier_bound: float) -> Overlaps:
 
 
 @kernel
-def connected_to(pairs: Array, least: float, scan: int) -> Mask:
-    """(n,) the scans that are connected to `scan` by overlaps (n, n) of at least `least`, either way."""
-    n = pairs.shape[0]
-    reached = np.zeros(n, dtype=np.bool_)
-    waiting = np.empty(n, dtype=np.int64)
-    reached[scan], waiting[0], count = True, scan, 1
-    while count > 0:
-        count -= 1
-        i = waiting[count]
-        for j in range(n):
-            if not reached[j] and max(pairs[i, j], pairs[j, i]) >= least:
-                reached[j], waiting[count] = True, j
-                count += 1
-    return reached
-
-
-@kernel
 def connectivity(
     scans: ScanSet, poses: Array, inlier_bound: float, least: float, scan: int
 ) -> tuple[Mask, float]:
-    """The scans (n,) connected to `scan` by overlap at the poses (n, 3), and the weakest link of all."""
+    """The scans (n,) that are connected to `scan` as in `connected_at`, and the weakest link of all."""
     pairs = overlaps(scans, poses, inlier_bound).pairs
-    return connected_to(pairs, least, scan), weakest_link(pairs)
+    return _connected(scans, poses, inlier_bound, least, scan, pairs), weakest_link(pairs)
 
 
 @kernel
 def connected_at(scans: ScanSet, poses: Array, inlier_bound: float, least: float, scan: int) -> Mask:
-    """As `connected_to` at the poses (n, 3), where only the overlaps that are needed are counted."""
+    """(n,) the scans connected to `scan` by overlaps of at least `least`, either way, at the poses (n, 3)."""
+    # Only the overlaps that are needed are counted.
+    unknown = np.full((poses.shape[0], poses.shape[0]), np.nan)
+    return _connected(scans, poses, inlier_bound, least, scan, unknown)
+
+
+@kernel
+def _connected(
+    scans: ScanSet, poses: Array, inlier_bound: float, least: float, scan: int, pairs: Array
+) -> Mask:
+    """As `connected_at`; `pairs` (n, n) are overlaps as far as they are known, else nan."""
     n = poses.shape[0]
     reached = np.zeros(n, dtype=np.bool_)
     waiting, u = np.empty(n, dtype=np.int64), np.empty(3)
@@ -75,12 +71,12 @@ def connected_at(scans: ScanSet, poses: Array, inlier_bound: float, least: float
         count -= 1
         i = waiting[count]
         for j in range(n):
-            if not reached[j] and (
-                _pair_overlap(scans, poses, i, j, inlier_bound, u, inliers) >= least
-                or _pair_overlap(scans, poses, j, i, inlier_bound, u, inliers) >= least
-            ):
-                reached[j], waiting[count] = True, j
-                count += 1
+            for a, b in ((i, j), (j, i)):
+                if not reached[j] and np.isnan(pairs[a, b]):
+                    pairs[a, b] = _pair_overlap(scans, poses, a, b, inlier_bound, u, inliers)
+                if not reached[j] and pairs[a, b] >= least:
+                    reached[j], waiting[count] = True, j
+                    count += 1
     return reached
 
 

@@ -27,14 +27,14 @@ class ScanSet(NamedTuple):
     half: float
     """Side (m) of a lattice cell."""
     usual: Array
-    """(n,) the usual s: the mean of each scan's points on its own Gaussians, as in a perfect match; or
-    nan."""
+    """(n,) the usual s of each scan: the mean s of its points on its own Gaussians, as in a perfect match;
+    nan if it is not needed."""
 
 
 def scan_set(ndts: Sequence[Ndt], points: Sequence[Array], neutral: bool = True) -> ScanSet:
     """Concatenate n NDTs of one cell size and the points (m_i, 2) of n scans.
 
-    Without `neutral` the `usual` s is nan, and the neutral energy cannot be computed.
+    Without `neutral`, `usual` is nan, and the neutral energy cannot be computed.
     """
     sizes = [
         (len(ndt.grid.table), ndt.rows, len(ndt.grid.gaussians), len(part))

@@ -29,7 +29,7 @@ class PointCloud(NamedTuple):
     arms: Array
     """(m, 2) the vector from the robot to each point."""
     scans: Indices
-    """(m,) the scan of each point."""
+    """(m,) the index of the scan of each point."""
 
 
 def fit_to_walls(
@@ -69,6 +69,7 @@ def _fit(
 
 @kernel
 def _point_cloud(scans: ScanSet, poses: Array) -> PointCloud:
+    """The points of all scans at the poses (n, 3)."""
     points, arms = np.empty_like(scans.points), np.empty_like(scans.points)
     of_scan = np.empty(points.shape[0], dtype=np.int64)
     for i in range(poses.shape[0]):
@@ -85,8 +86,8 @@ def _point_cloud(scans: ScanSet, poses: Array) -> PointCloud:
 def common_walls(cloud: PointCloud, options: WallFitOptions) -> tuple[Indices, Indices]:
     """The walls that more than one scan sees: their points, wall by wall, and the end of each among them.
 
-    A cell holds a wall when the points seen from each side of it lie on a line. Otherwise its quarters are
-    tested.
+    A cell holds a wall if the points that are seen from either side lie on a line. Otherwise its quarters
+    are tested.
     """
     m = cloud.points.shape[0]
     codes = _quadtree_codes(cloud.points, options.cell)

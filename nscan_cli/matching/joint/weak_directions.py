@@ -11,9 +11,9 @@ from nscan_cli.poses import Array
 def replace_weak_directions(problem: JointProblem, poses: Array, prior_share: float) -> Array | None:
     """The poses (n, 3), moved to where the priors want them in the directions that the scans leave open.
 
-    Those are the directions with a greater share of their information from the priors than `prior_share`.
-    Wide Gaussians slide scans together along a corridor, and nothing there brings them back. What the match
-    has found across the corridor and in rotation stays. None when the scans hold all directions.
+    A direction is open if more than `prior_share` of its information comes from the priors. Wide Gaussians
+    slide scans together along a corridor, and nothing there brings them back. What the match has found across
+    the corridor and in rotation stays. Returns None if the scans hold all directions.
     """
     from scipy.linalg import eigh
 

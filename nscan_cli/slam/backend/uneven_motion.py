@@ -166,8 +166,7 @@ class _Run:
         poses = poses_at(self._moving.path, self._log.times[near[others]])
         ends = np.append(0, np.cumsum(sizes[others]))
         return Ndt.of_scans(
-            points[np.repeat(others, sizes)], ends, poses, gaussians.cell, gaussians.minimum, gaussians.floor,
-            neighbourhood=WALL_DIRECTION,
+            points[np.repeat(others, sizes)], ends, poses, gaussians, neighbourhood=WALL_DIRECTION,
         )  # fmt: skip
 
     def _seen(self) -> TimedPoints:

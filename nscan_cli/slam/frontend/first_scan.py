@@ -26,9 +26,8 @@ def place_first(scans: ScanBatch, found: TrackedScans, options: TrackingOptions)
     joined = np.flatnonzero(found.in_map[1:]) + 1
     if not len(joined):
         return first
-    gaussians = options.gaussians
     points, ends = scans.chosen(joined)
-    ndt = Ndt.of_scans(points, ends, found.poses[joined], gaussians.cell, gaussians.minimum, gaussians.floor)
+    ndt = Ndt.of_scans(points, ends, found.poses[joined], options.gaussians)
     pose, hessian = first.copy(), np.empty((3, 3))
     step: Array = np.linalg.inv(found.prior_covariances[1]).astype(np.float64)
     prior = Prior(first, step)

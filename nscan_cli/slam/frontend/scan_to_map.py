@@ -24,7 +24,7 @@ def match_and_count(
     meeting = begin_association(points)
     problem = PairProblem(grid, settings.half, meeting, settings.scale, prior)
     limits = settings.max_iterations, settings.coarse_tolerance, settings.tolerance
-    value, _, _, _, _ = minimise_pairwise(problem, pose, settings.widenings, *limits, hessian)
+    value = minimise_pairwise(problem, pose, settings.widenings, *limits, hessian).value
     update_association(grid, settings.half, meeting, pose)
     return value, count_inliers(meeting, settings.inlier_bound) / max(points.shape[0], 1)
 

@@ -33,10 +33,7 @@ class Tracker:
         self, options: TrackingOptions, odometry: bool = True, laser: LaserView | None = None
     ) -> None:
         self.options = options
-        gaussians = options.gaussians
-        self.map = Ndt.empty(
-            gaussians.cell, gaussians.minimum, gaussians.floor, capacity=1 << 14, faces=odometry
-        )
+        self.map = Ndt.empty(options.gaussians, capacity=1 << 14, faces=odometry)
         self.searches = 0
         self._settings = TrackingParameters.of(options, odometry, laser)
         self._track = TrackState.begin(options.velocity_scans + 1, options.degeneracy.initial_sigma)

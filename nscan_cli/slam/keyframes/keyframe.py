@@ -64,9 +64,8 @@ class Keyframe:
         if self._ndt is None:
             points, sizes, poses = (np.concatenate(columns) for columns in zip(*around, strict=True))
             ends = np.append(0, np.cumsum(sizes))
-            poses, own = relative(poses, self.tracked.pose), self.gaussians
-            room = INITIAL_CELLS_PER_POINT * len(self.points)
-            ndt = Ndt.of_scans(points, ends, poses, own.cell, own.minimum, own.floor, room, WALL_END)
+            poses, room = relative(poses, self.tracked.pose), INITIAL_CELLS_PER_POINT * len(self.points)
+            ndt = Ndt.of_scans(points, ends, poses, self.gaussians, room, WALL_END)
             # In this order: another thread that makes it at the same time has what it needs.
             self._ndt, self.around = ndt, []
         return self._ndt

@@ -45,7 +45,7 @@ def at(canvas: Canvas, picture: np.ndarray, place: np.ndarray) -> np.ndarray:
 def pair_match(pose: np.ndarray, covariance: np.ndarray | None, reason: str | None = None) -> PairMatch:
     return PairMatch(
         pose=pose, energy=-1.0, gradient_norm=0.0, decrement=0.0, hessian=np.eye(3), covariance=covariance,
-        eigenvalues=np.ones(3), weakest=Weakest(0.0, 0.1), overlap=0.9, iterations=5, evaluations=6,
+        eigenvalues=np.ones(3), weakest=Weakest(0.0, 0.1, True), overlap=0.9, iterations=5, evaluations=6,
         unsettled=0, reason=reason,
     )  # fmt: skip
 

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from scipy.sparse.csgraph import connected_components, minimum_spanning_tree
 
 from nscan_cli.matching.joint.options import JointOptions
-from nscan_cli.matching.joint.overlap import connected_at, connected_to, overlaps, weakest_link
+from nscan_cli.matching.joint.overlap import connected_at, connectivity, overlaps, weakest_link
 from nscan_cli.matching.joint.scan_set import scan_set
 from nscan_cli.matching.pairwise import scan_ndt
 from tests.matching.problems import OPTIONS, Problem, office_problem
@@ -35,7 +35,7 @@ def test_connected_scans_are_a_component_of_the_overlaps(seed, least, scan):
     pairs = overlaps(scans, poses, BOUND).pairs
     labels = connected_components(np.maximum(pairs, pairs.T) >= least)[1]
     expected = (labels == labels[scan]) | (np.arange(5) == scan)
-    np.testing.assert_array_equal(connected_to(pairs, least, scan), expected)
+    np.testing.assert_array_equal(connectivity(scans, poses, BOUND, least, scan)[0], expected)
     np.testing.assert_array_equal(connected_at(scans, poses, BOUND, least, scan), expected)
 
 

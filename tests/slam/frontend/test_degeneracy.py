@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.matching.motion_model import Prior
 from nscan_cli.ndt.energy import energy
+from nscan_cli.ndt.options import GaussianOptions
 from nscan_cli.ndt.transform import Ndt
 from nscan_cli.poses import Array, wrap
 from nscan_cli.slam.frontend.degeneracy import (
@@ -57,7 +58,7 @@ def corridor(seed: int, count: int, end: float | None = None) -> Array:
 
 
 def ndt_of(points: Array) -> Ndt:
-    ndt = Ndt.empty(0.5, 5, 0.03, faces=False)
+    ndt = Ndt.empty(GaussianOptions(0.5, 5, 0.03), faces=False)
     ndt.add(points, np.zeros(3))
     return ndt
 

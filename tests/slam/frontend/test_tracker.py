@@ -15,6 +15,7 @@ import pytest
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.logs.load import read_log
 from nscan_cli.matching.correlative_search import SearchOptions
+from nscan_cli.ndt.options import GaussianOptions
 from nscan_cli.ndt.transform import Ndt
 from nscan_cli.poses import Array, compose, relative, transform, wrap
 from nscan_cli.slam.frontend.options import TrackingOptions
@@ -125,7 +126,7 @@ def test_the_first_scan_is_at_the_origin():
     (first,) = scans_of(tracker.track(sensed([room(1)], np.array([[7.0, -3.0, 2.0]]))))
     np.testing.assert_array_equal(first.pose, 0)
     assert (first.inliers, first.path, first.in_map) == (1.0, 0.0, True)
-    alone = Ndt.empty(0.5, 5, 0.03)
+    alone = Ndt.empty(GaussianOptions(0.5, 5, 0.03))
     alone.add(room(1), np.zeros(3))
     # Tracking makes the Gaussians that it meets, and no others.
     tracker.map.make()
@@ -146,7 +147,7 @@ def test_a_scan_joins_the_map_when_the_robot_has_moved():
 def window_map(found: list[TrackedScan], log: LaserLog, options: TrackingOptions) -> Ndt:
     """The NDT of just the scans that joined within the window's length of path."""
     gaussians = options.gaussians
-    ndt = Ndt.empty(gaussians.cell, gaussians.minimum, gaussians.floor)
+    ndt = Ndt.empty(gaussians)
     for row, scan in enumerate(found):
         if scan.in_map and scan.path >= found[-1].path - options.window:
             ndt.add(log.points(row), scan.pose)

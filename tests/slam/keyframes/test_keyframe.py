@@ -88,7 +88,7 @@ def test_the_same_scans_become_keyframes_however_many_are_taken_in_at_a_time(siz
 
 def expected(keyframe: Array, *scans: tuple[int, Array]) -> Ndt:
     """The NDT of the scans (seed, pose) seen from a keyframe's pose."""
-    ndt = Ndt.empty(GAUSSIANS.cell, GAUSSIANS.minimum, GAUSSIANS.floor, neighbourhood=WALL_END)
+    ndt = Ndt.empty(GAUSSIANS, neighbourhood=WALL_END)
     for seed, pose in scans:
         ndt.add(room(seed), relative(pose, keyframe))
     # What was made before the last scan came does not know all its surroundings.
