@@ -36,24 +36,16 @@ DEFAULT_DRAWN = 10
 @argument("result", type=PATH, tells="A graph, a TUM trajectory, or a CARMEN log with corrected poses; - is "
           "standard input.")  # fmt: skip
 @option("--relations", type=PATH, metavar="FILE", help="Relations of the benchmark of Kümmerle et al. 2009.")
-@option(
-    "--reference",
-    type=PATH,
-    metavar="FILE",
-    help="A trajectory (TUM, or EuRoC's CSV), a graph, a log with TRUEPOS, or a recording.",
-)
+@option("--reference", type=PATH, metavar="FILE",
+        help="A trajectory (TUM, or EuRoC's CSV), a graph, a log with TRUEPOS, or a recording.")  # fmt: skip
 @option("--reference-topic", metavar="TOPIC",
         help="Topic of the poses in a recording given as --reference, such as /vicon/robot/pose, or "
         "/tf:PARENT.CHILD for transforms.")  # fmt: skip
 @option("--worst", type=click.IntRange(0), metavar="N", help="List the N worst relations.")
 @option("--max-translation", type=click.FloatRange(0), metavar="M",
         help="Exit with code 3 if the mean error (relations) or RMSE (ATE) is larger.")  # fmt: skip
-@option(
-    "--max-rotation",
-    type=click.FloatRange(0),
-    metavar="DEG",
-    help="Exit with code 3 if the rotational error is larger.",
-)
+@option("--max-rotation", type=click.FloatRange(0), metavar="DEG",
+        help="Exit with code 3 if the rotational error is larger.")  # fmt: skip
 @option("--json", "as_json", is_flag=True, help="Print one JSON object (m, s, degrees).")
 @plot_option("the worst relations (10, or N) over the trajectory, or the error along the reference")
 @reading_options

@@ -20,13 +20,9 @@ if TYPE_CHECKING:
     from nscan_cli.mapping.map_server import MapImage
 
 resolution_option = option(
-    "--resolution",
-    type=click.FloatRange(0.001, 10),
-    default=0.05,
-    show_default=True,
-    metavar="M",
+    "--resolution", type=click.FloatRange(0.001, 10), default=0.05, show_default=True, metavar="M",
     help="Cell size of the map. Smaller cells take more time and memory.",
-)
+)  # fmt: skip
 
 
 def check_map_outputs(output: str, yaml: bool) -> None:

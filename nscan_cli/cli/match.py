@@ -54,27 +54,15 @@ class StartType(click.ParamType[Any]):
     ),
 )
 @log_argument()
-@option(
-    "--reference",
-    type=click.IntRange(0),
-    required=True,
-    metavar="I",
-    help="Number of the reference scan, which stays fixed.",
-)
-@option(
-    "--scan", type=click.IntRange(0), required=True, metavar="J", help="Number of the scan that is moved."
-)
-@option(
-    "--initial",
-    type=StartType(),
-    metavar="odometry|identity|X,Y,DEG",
-    help="Initial pose of J in the frame of I (m, degrees). Default: odometry, or identity if there is none.",
-)
-@option(
-    "--prior",
-    type=click.Choice(["odometry", "none"]),
-    help="Prior of the relative pose. Default: odometry, or none if there is none.",
-)
+@option("--reference", type=click.IntRange(0), required=True, metavar="I",
+        help="Number of the reference scan, which stays fixed.")  # fmt: skip
+@option("--scan", type=click.IntRange(0), required=True, metavar="J",
+        help="Number of the scan that is moved.")  # fmt: skip
+@option("--initial", type=StartType(), metavar="odometry|identity|X,Y,DEG",
+        help="Initial pose of J in the frame of I (m, degrees). Default: odometry, or identity if there is "
+        "none.")  # fmt: skip
+@option("--prior", type=click.Choice(["odometry", "none"]),
+        help="Prior of the relative pose. Default: odometry, or none if there is none.")  # fmt: skip
 @result_option
 @plot_option("both scans before and after the match, with the uncertainty")
 @reading_options

@@ -31,12 +31,8 @@ if TYPE_CHECKING:
 @option("-o", "--output", type=PATH, required=True, metavar="FOLDER",
         help="Folder for results, history and report; it is created.")  # fmt: skip
 @option("--data", type=PATH, metavar="FOLDER", help="Folder of the logs. Default: that of the manifest.")
-@option(
-    "--jobs",
-    type=click.IntRange(1),
-    metavar="N",
-    help="Number of logs to run at a time. Default: one per processor.",
-)
+@option("--jobs", type=click.IntRange(1), metavar="N",
+        help="Number of logs to run at a time. Default: one per processor.")  # fmt: skip
 @option("--scheduler", metavar="ADDRESS",
         help="Run on a Dask cluster with this scheduler, tcp://HOST:PORT.")  # fmt: skip
 @option("--timeout", type=click.FloatRange(0, min_open=True), default=3600, show_default=True, metavar="S",

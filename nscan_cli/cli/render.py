@@ -52,12 +52,8 @@ from nscan_cli.logs.reading_options import ReadingOptions
         help="A map for robots (map_server), or points and path on white with axes (paper).")  # fmt: skip
 @option("--yaml/--no-yaml", default=None,
         help="Write MAP.yaml for map_server and Nav2. Default: for plain maps only.")  # fmt: skip
-@option(
-    "--mcap",
-    type=PATH,
-    metavar="OUT.mcap",
-    help="Also write map, path, graph and scans for Foxglove and RViz.",
-)
+@option("--mcap", type=PATH, metavar="OUT.mcap",
+        help="Also write map, path, graph and scans for Foxglove and RViz.")  # fmt: skip
 @option("--poses", type=PATH, metavar="OUT.tum",
         help="Also write the poses in the frame of the map, in TUM format.")  # fmt: skip
 @option("--json", "as_json", is_flag=True, help="Print one JSON object (m, s, degrees).")

@@ -39,51 +39,25 @@ MAPPING_OPTIONS = ("max_scans", "relations", "no_loops", "calibrate", "verify", 
     ("nscan-cli slam robot.log.gz -o robot.json --verify-bound 0.5", "as a test: exit code 3 if it fails"),
 )
 @log_argument(required=False)
-@option(
-    "-o",
-    "--output",
-    type=PATH,
-    default="-",
-    metavar="GRAPH.json",
-    help="File for the graph. Default: standard output.",
-)
-@option(
-    "--map", "map_file", type=PATH, metavar="MAP.png", help="Also write the map (PNG or PGM), and MAP.yaml."
-)
+@option("-o", "--output", type=PATH, default="-", metavar="GRAPH.json",
+        help="File for the graph. Default: standard output.")  # fmt: skip
+@option("--map", "map_file", type=PATH, metavar="MAP.png",
+        help="Also write the map (PNG or PGM), and MAP.yaml.")  # fmt: skip
 @resolution_option
 @option("--trajectory", type=PATH, metavar="OUT.tum", help="Also write the pose of every scan in TUM format.")
-@option(
-    "--g2o",
-    type=PATH,
-    metavar="OUT.g2o",
-    help="Also write the graph of keyframes in g2o format; nScan relations become pairwise edges.",
-)
-@option(
-    "--carmen", type=PATH, metavar="OUT.log", help="Also write the log with corrected poses in CARMEN format."
-)
-@option(
-    "--from",
-    "from_file",
-    type=PATH,
-    metavar="GRAPH",
-    help="Optimise a saved graph (JSON or g2o), and refine it with its LOG, without tracking.",
-)
-@option(
-    "--max-scans",
-    type=click.IntRange(3),
-    default=10,
-    show_default=True,
-    metavar="N",
-    help="Maximum number of scans in an nScan relation.",
-)
-@option(
-    "--relations",
-    type=click.Choice(["pairwise", "nscan", "both"]),
-    default="both",
-    show_default=True,
-    help="Relations of neighbouring keyframes: pairwise matches, joint matches (nscan), or joint matches "
-    "plus the chain of tracked relations (both).",
-)
+@option("--g2o", type=PATH, metavar="OUT.g2o",
+        help="Also write the graph of keyframes in g2o format; nScan relations become pairwise "
+        "edges.")  # fmt: skip
+@option("--carmen", type=PATH, metavar="OUT.log",
+        help="Also write the log with corrected poses in CARMEN format.")  # fmt: skip
+@option("--from", "from_file", type=PATH, metavar="GRAPH",
+        help="Optimise a saved graph (JSON or g2o), and refine it with its LOG, without "
+        "tracking.")  # fmt: skip
+@option("--max-scans", type=click.IntRange(3), default=10, show_default=True, metavar="N",
+        help="Maximum number of scans in an nScan relation.")  # fmt: skip
+@option("--relations", type=click.Choice(["pairwise", "nscan", "both"]), default="both", show_default=True,
+        help="Relations of neighbouring keyframes: pairwise matches, joint matches (nscan), or joint matches "
+        "plus the chain of tracked relations (both).")  # fmt: skip
 @option("--calibrate", is_flag=True,
         help="First find and use the mounting, and the scale and clock of odometry.")  # fmt: skip
 @option("--no-loops", is_flag=True, help="Do not close loops: drift remains.")
@@ -91,15 +65,10 @@ MAPPING_OPTIONS = ("max_scans", "relations", "no_loops", "calibrate", "verify", 
         help="Map the drive again in ways that must give the same map; print the differences.")  # fmt: skip
 @option("--verify-bound", type=click.FloatRange(0, min_open=True), metavar="M",
         help="Like --verify; exit with code 3 if a difference is larger.")  # fmt: skip
-@option(
-    "--threads",
-    type=click.IntRange(1),
-    metavar="N",
-    help="Number of threads. Default: one per processor. The result does not depend on it.",
-)
-@option(
-    "--depfile", type=PATH, metavar="FILE", help="Also write the inputs of all outputs as a rule for make."
-)
+@option("--threads", type=click.IntRange(1), metavar="N",
+        help="Number of threads. Default: one per processor. The result does not depend on it.")  # fmt: skip
+@option("--depfile", type=PATH, metavar="FILE",
+        help="Also write the inputs of all outputs as a rule for make.")  # fmt: skip
 @option("--json", "as_json", is_flag=True, help="Print one JSON object (m, s, degrees).")
 @reading_options
 @common_options

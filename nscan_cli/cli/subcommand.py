@@ -123,13 +123,9 @@ log_argument = functools.partial(
 )
 
 result_option = option(
-    "-o",
-    "--output",
-    type=PATH,
-    default="-",
-    metavar="RESULT.json",
+    "-o", "--output", type=PATH, default="-", metavar="RESULT.json",
     help="File for the result. Default: standard output.",
-)
+)  # fmt: skip
 """The output option of commands whose result is a short document."""
 
 

@@ -11,14 +11,8 @@ from typing import Literal
 
 import numpy as np
 
+from nscan_cli.evaluation.options import DEFAULT_EVALUATION, AlignmentOptions
 from nscan_cli.poses import Array, compose
-
-LEAST_POSITION_ERROR = 0.02
-"""m; error of positions that is always assumed, because markers are not placed more exactly."""
-LARGEST_ANGLE_SIGMA = 0.2
-"""rad; where positions leave the angle more uncertain, headings may decide it."""
-DRIVEN_DISTANCE = 0.3
-"""m (RMS about the mean) of common motion from which on positions always decide the angle."""
 
 
 @dataclass(frozen=True)
@@ -32,13 +26,15 @@ class Alignment:
     """Common motion of result and reference, m (RMS about the mean)."""
 
 
-def alignment(poses: Array, truth: Array) -> Alignment:
+def alignment(
+    poses: Array, truth: Array, options: AlignmentOptions = DEFAULT_EVALUATION.alignment
+) -> Alignment:
     """The rigid motion that brings `poses` (N, 3) nearest to `truth` (N, 3).
 
-    Least squares in closed form: with positions a and b about their means, the angle is that of
-    Σ (a·b, a×b). Residuals and LEAST_POSITION_ERROR make it uncertain. Where that exceeds
-    LARGEST_ANGLE_SIGMA and the spread of the headings' differences, the angle is the mean of these
-    differences. Errors of trajectories are correlated, so more poses do not reduce the uncertainty.
+    Least squares in closed form: with positions a and b about their means, the angle is that of Σ (a·b, a×b).
+    Residuals and `position_error` make it uncertain. Where that exceeds `max_angle_sigma` and the spread of
+    the headings' differences, and the robot has moved little, the angle is the mean of these differences.
+    Errors of trajectories are correlated, so more poses do not reduce the uncertainty.
     """
     centre, true_centre = poses[:, :2].mean(axis=0), truth[:, :2].mean(axis=0)
     a, b = poses[:, :2] - centre, truth[:, :2] - true_centre
@@ -47,10 +43,8 @@ def alignment(poses: Array, truth: Array) -> Alignment:
     apart = max(((a**2).sum() + (b**2).sum()) / (2 * len(a)) - common, 0.0)
     angle, heading_angle, spread = float(np.arctan2(cross, dot)), *circular_mean(truth[:, 2] - poses[:, 2])
     # Multiplied out, because common can be 0.
-    by_heading = (
-        apart + LEAST_POSITION_ERROR**2 > max(LARGEST_ANGLE_SIGMA, spread) ** 2 * common
-        and common < DRIVEN_DISTANCE**2
-    )
+    least, sigma = options.position_error, max(options.max_angle_sigma, spread)
+    by_heading = apart + least**2 > sigma**2 * common and common < options.driven_distance**2
     if by_heading:
         angle = heading_angle
     turned = compose([0.0, 0.0, angle], [*centre, 0.0])

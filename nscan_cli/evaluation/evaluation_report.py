@@ -8,10 +8,11 @@ from dataclasses import asdict, dataclass, fields
 from typing import Any
 
 from nscan_cli.evaluation.alignment import Alignment
+from nscan_cli.evaluation.options import DEFAULT_EVALUATION, EvaluationOptions
 from nscan_cli.evaluation.reference_relations import ReferenceRelations, RelationErrors
 from nscan_cli.evaluation.statistics import Spread
-from nscan_cli.evaluation.time_association import TOLERANCE
-from nscan_cli.evaluation.trajectory_errors import RPE_DISTANCE, TrajectoryErrors
+from nscan_cli.evaluation.trajectory_errors import TrajectoryErrors
+from nscan_cli.files.provenance import as_parameters
 from nscan_cli.files.text import counted
 
 ERROR_UNITS = {"translation": "m", "rotation": "deg", "time": "s"}
@@ -30,6 +31,7 @@ class Evaluation:
     """How many of the worst relations are listed."""
     remarks: tuple[str, ...] = ()
     """Sentences on other differences of result and reference (remarks.py)."""
+    options: EvaluationOptions = DEFAULT_EVALUATION
 
     def bounded(self) -> list[tuple[str, float, float]]:
         """The errors that limits apply to, as (name, m, degrees): mean on relations, RMSE of the ATE."""
@@ -48,11 +50,11 @@ def evaluation_text(evaluation: Evaluation) -> str:
     blocks = [f"result     {evaluation.result}: {counted(evaluation.poses, 'pose')}"]
     if evaluation.relations:
         relations, errors = evaluation.relations
-        near = len(errors.used) - errors.exact
+        near, tolerance = len(errors.used) - errors.exact, evaluation.options.tolerance
         blocks.append(
             f"relations  {relations.name}: {len(errors.used)} of {len(relations)} used, "
             f"{errors.exact} at exact stamps,\n"
-            f"           {near} within {TOLERANCE} s; {errors.too_far} not used, because no pose is near\n\n"
+            f"           {near} within {tolerance} s; {errors.too_far} not used, because no pose is near\n\n"
             + _statistics_table(
                 {"translation, m": errors.translation_spread, "rotation, deg": errors.rotation_spread}
             )
@@ -61,14 +63,15 @@ def evaluation_text(evaluation: Evaluation) -> str:
             blocks.append(_worst_table(evaluation))
     if evaluation.reference:
         name, errors_ = evaluation.reference
+        distance = evaluation.options.relative_distance
         rows = {
             "ATE, m": errors_.absolute_translation,
             "ATE, deg": errors_.absolute_rotation,
-            f"RPE, m per {RPE_DISTANCE:g} m": errors_.relative_translation,
-            f"RPE, deg per {RPE_DISTANCE:g} m": errors_.relative_rotation,
+            f"RPE, m per {distance:g} m": errors_.relative_translation,
+            f"RPE, deg per {distance:g} m": errors_.relative_rotation,
         }
         blocks.append(
-            f"reference  {name}: {errors_.matched} poses match within {TOLERANCE} s, "
+            f"reference  {name}: {errors_.matched} poses match within {evaluation.options.tolerance} s, "
             f"{errors_.unmatched} do not\n{_alignment_note(errors_.alignment)}\n" + _statistics_table(rows)
         )
     return "\n\n".join(blocks) + "\n"
@@ -85,7 +88,8 @@ def _alignment_note(alignment: Alignment) -> str:
 
 
 def as_document(evaluation: Evaluation) -> dict[str, Any]:
-    """The evaluation as an object for JSON; lengths in m, angles in degrees."""
+    """The evaluation as an object for JSON; lengths in m, angles in degrees, those in its parameters in
+    rad."""
     document: dict[str, Any] = {"result": evaluation.result, "poses": evaluation.poses, "units": ERROR_UNITS}
     if evaluation.relations:
         relations, errors = evaluation.relations
@@ -112,12 +116,13 @@ def as_document(evaluation: Evaluation) -> dict[str, Any]:
                 "rotation": _statistics_record(against.absolute_rotation),
             },
             "rpe": {
-                "distance": RPE_DISTANCE,
+                "distance": evaluation.options.relative_distance,
                 "translation": _statistics_record(against.relative_translation),
                 "rotation": _statistics_record(against.relative_rotation),
             },
         }
     document["notes"] = list(evaluation.remarks)
+    document["parameters"] = as_parameters(evaluation.options)
     return document
 
 

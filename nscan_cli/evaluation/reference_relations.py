@@ -12,8 +12,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from nscan_cli.errors import InputDataError
+from nscan_cli.evaluation.options import DEFAULT_EVALUATION, EvaluationOptions
 from nscan_cli.evaluation.statistics import Spread
-from nscan_cli.evaluation.time_association import TOLERANCE, no_match
+from nscan_cli.evaluation.time_association import no_match
 from nscan_cli.files.inputs import base_name, label, read_text
 from nscan_cli.files.limits import DISTANCE, GRAPH, TIME
 from nscan_cli.graph.io.pose_columns import numbered_lines, split_fields
@@ -57,7 +58,7 @@ class RelationErrors:
     exact: int
     """How many of them found both stamps in the trajectory."""
     too_far: int
-    """How many relations were left out, because no pose is within 0.1 s of a stamp."""
+    """How many relations were left out, because no pose is near one of their stamps."""
     rows: Indices
     """(U, 2) rows of the trajectory."""
     translation: Array
@@ -108,17 +109,20 @@ def read_relations(path: str) -> ReferenceRelations:
 
 
 def relation_errors(
-    trajectory: Trajectory, relations: ReferenceRelations, name: str = "result"
+    trajectory: Trajectory,
+    relations: ReferenceRelations,
+    name: str = "result",
+    options: EvaluationOptions = DEFAULT_EVALUATION,
 ) -> RelationErrors:
     """The errors of a trajectory; `name` is what a message calls it.
 
-    A stamp takes the nearest pose within 0.1 s. With u the relative pose in the trajectory and z that of
-    the relation, the errors are ‖(u_x − z_x, u_y − z_y)‖ and |u_φ − z_φ| in degrees. Raises
-    InputDataError when no relation can be used.
+    A stamp takes the nearest pose, at most `tolerance` away in time. With u the relative pose in the
+    trajectory and z that of the relation, the errors are ‖(u_x − z_x, u_y − z_y)‖ and |u_φ − z_φ| in degrees.
+    Raises InputDataError when no relation can be used.
     """
     rows = nearest_in_time(trajectory.times, relations.times.ravel()).reshape(-1, 2)
     distance = np.abs(trajectory.times[rows] - relations.times).max(axis=1)
-    used = np.flatnonzero(distance <= TOLERANCE)
+    used = np.flatnonzero(distance <= options.tolerance)
     if len(used) == 0:
         raise no_match(name, trajectory.times, relations.name, relations.times.ravel())
     rows = rows[used]

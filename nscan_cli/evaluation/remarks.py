@@ -13,47 +13,39 @@ from dataclasses import replace
 import numpy as np
 
 from nscan_cli.evaluation.alignment import alignment
-from nscan_cli.evaluation.clock_lag import LARGEST_RESIDUAL, LEAST_MOTION, SMALLEST_LAG, Clocks
+from nscan_cli.evaluation.clock_lag import Clocks
+from nscan_cli.evaluation.options import DEFAULT_EVALUATION, RemarkOptions
 from nscan_cli.evaluation.similarity import Fit, LeverArm, fit, heading_difference, lever_arm
 from nscan_cli.evaluation.trajectory_errors import TrajectoryErrors
 from nscan_cli.files.text import counted
 from nscan_cli.graph.io.tum import Trajectory
 from nscan_cli.poses import Array, compose
 
-IMPROVEMENT = 3.0
-"""Least ratio of the residuals of the positions without and with a remark."""
 UNIT_FACTORS = {1000.0: "millimetres", 100.0: "centimetres", 1 / 0.3048: "feet", 1 / 0.0254: "inches"}
-UNIT_TOLERANCE, SMALLEST_FACTOR = 0.03, 0.03
-SIGNIFICANT_SIGMAS = 5.0
-"""Standard deviations by which a lever arm or a rotation must differ from 0."""
-SMALLEST_TURN, SMALLEST_LEVER = math.radians(3.0), 0.05
 NO_SIDE = math.radians(170.0)
 """rad; for larger rotations no side is given."""
-LEVER_IMPROVEMENT, AS_GOOD, ROUNDING_SHARE = 2.0, 1.5, 1e-5
-"""Least residual ratio of a lever arm, ratio of fits that are as good, share that is rounding."""
 OTHER_POINT = "the reference is of another point of the robot"
-LARGEST_HEIGHT_RANGE, LARGEST_TILT_RANGE = 0.2, math.radians(5.0)
-"""m and rad; larger motion out of the plane is reported."""
-PATH_RATIO = 2.0
-"""A path this many times longer in order of time than in order of the file is that of two runs."""
-REPEATED_SHARE, REPEATED_DISTANCE = 0.05, 0.05
-"""Least share of repeated stamps, and least distance of their poses (m), of two runs in one file."""
 
 
-def remarks(result: Trajectory, reference: Trajectory, errors: TrajectoryErrors) -> Iterator[str]:
+def remarks(
+    result: Trajectory,
+    reference: Trajectory,
+    errors: TrajectoryErrors,
+    options: RemarkOptions = DEFAULT_EVALUATION.remarks,
+) -> Iterator[str]:
     """Sentences on what differs between a result and a reference; none where nothing does."""
     both = (("result", result), ("reference", reference))
-    mixed = [(name, said) for name, trajectory in both if (said := _two_runs(trajectory))]
+    mixed = [(name, said) for name, trajectory in both if (said := _two_runs(trajectory, options))]
     for name, said in mixed:
         yield f"the {name} has two runs under the same stamps: {said}"
     for name, trajectory in both:
-        yield from _out_of_plane_motion(trajectory, name)
+        yield from _out_of_plane_motion(trajectory, name, options)
     # Fits mean nothing where two runs are mixed.
     if not mixed:
-        yield from _misfits(result, reference, errors)
+        yield from _misfits(result, reference, errors, options)
 
 
-def _two_runs(trajectory: Trajectory) -> str:
+def _two_runs(trajectory: Trajectory, options: RemarkOptions) -> str:
     """What shows that a file has two runs; empty where nothing does."""
     places, times = trajectory.poses[:, :2], trajectory.times
     steps = np.hypot(*np.diff(places, axis=0).T)
@@ -62,7 +54,7 @@ def _two_runs(trajectory: Trajectory) -> str:
         on = np.diff(times[written]) >= 0
         backward = int(np.sum(~on))
         path, there = float(np.hypot(*np.diff(places[written], axis=0)[on].T).sum()), float(steps.sum())
-        if backward and there > PATH_RATIO * path + REPEATED_DISTANCE:
+        if backward and there > options.path_ratio * path + options.repeated_distance:
             return (
                 f"time goes back {counted(backward, 'time')} in it, and in order of time its poses jump back "
                 f"and forth (a path of {there:.1f} m instead of {path:.1f} m)"
@@ -70,13 +62,13 @@ def _two_runs(trajectory: Trajectory) -> str:
     same = np.diff(times) == 0
     firsts = places[np.append(True, ~same)]
     typical = float(np.median(np.hypot(*np.diff(firsts, axis=0).T))) if len(firsts) > 1 else 0.0
-    apart = steps[same & (steps > max(REPEATED_DISTANCE, IMPROVEMENT * typical))]
-    if len(apart) >= max(3, REPEATED_SHARE * len(times)):
+    apart = steps[same & (steps > max(options.repeated_distance, options.improvement * typical))]
+    if len(apart) >= max(3, options.repeated_share * len(times)):
         return f"{counted(len(apart), 'stamp')} twice, with poses up to {apart.max():.2f} m apart"
     return ""
 
 
-def _out_of_plane_motion(trajectory: Trajectory, name: str) -> Iterator[str]:
+def _out_of_plane_motion(trajectory: Trajectory, name: str, options: RemarkOptions) -> Iterator[str]:
     if trajectory.spatial is None or len(trajectory) < 2:
         return
     heights, up = trajectory.spatial[:, 0], trajectory.spatial[:, 1:]
@@ -85,41 +77,38 @@ def _out_of_plane_motion(trajectory: Trajectory, name: str) -> Iterator[str]:
     low, high = np.percentile(heights, [1, 99])
     tilts = np.arccos(np.clip(up @ upright, -1, 1))
     tilt, lean = float(np.percentile(tilts, 95)), float(np.arccos(np.clip(upright[2], -1, 1)))
-    moves = [f"z by {high - low:.2f} m"] if high - low > LARGEST_HEIGHT_RANGE else []
-    moves += (
-        [f"roll and pitch by up to {math.degrees(tilts.max()):.1f}°"] if tilt > LARGEST_TILT_RANGE else []
-    )
+    moves = [f"z by {high - low:.2f} m"] if high - low > options.max_height else []
+    moves += [f"roll and pitch by up to {math.degrees(tilts.max()):.1f}°"] if tilt > options.max_tilt else []
     if moves:
         yield (
             f"the {name} moves out of the plane, {' and '.join(moves)}: x, y and heading alone are compared"
         )
-    if lean > LARGEST_TILT_RANGE and tilt <= LARGEST_TILT_RANGE:
+    if lean > options.max_tilt and tilt <= options.max_tilt:
         yield (
             f"the {name} is tilted by {math.degrees(lean):.1f}° throughout: its frame is not that of a robot "
             "on the floor, and its headings are about another axis"
         )
 
 
-def _misfits(result: Trajectory, reference: Trajectory, errors: TrajectoryErrors) -> Iterator[str]:
+def _misfits(
+    result: Trajectory, reference: Trajectory, errors: TrajectoryErrors, options: RemarkOptions
+) -> Iterator[str]:
     poses, truth = result.poses[errors.rows], reference.poses[errors.partners]
     now = fit(poses, truth)
     # Either of them can be in a larger unit.
-    if errors.alignment.by == "headings" or max(now.spread, fit(truth, poses).spread) < LEAST_MOTION:
-        found = _certain_lever_arm(poses, truth)
+    if errors.alignment.by == "headings" or max(now.spread, fit(truth, poses).spread) < options.min_motion:
+        found = _certain_lever_arm(poses, truth, options)
         if found is not None:
             yield f"{OTHER_POINT}: {_point_text(found.point)} that of the result"
         return
-    if (
-        now.apart_mirrored * IMPROVEMENT < now.apart_scaled
-        and now.apart_mirrored < LARGEST_RESIDUAL * now.spread
-    ):
+    if _is_better(now.apart_mirrored, now.apart_scaled, now, options):
         yield (
             "the result is the mirror image of the reference: mirrored, its error is "
             f"{now.apart_mirrored:.3g} m (RMS) instead of {now.apart_scaled:.3g} m"
         )
         return
-    clocks = Clocks.of(result.times[errors.rows], poses, reference)
-    lag, found, either = _lag_and_lever(clocks, _certain_lever_arm(poses, truth), now)
+    clocks = Clocks.of(result.times[errors.rows], poses, reference, options.clock_lag)
+    lag, found, either = _lag_and_lever(clocks, _certain_lever_arm(poses, truth, options), now, options)
     if lag:
         poses, truth = replace(clocks, times=result.times[errors.rows], poses=poses).at(lag)
     if found is not None and not either:
@@ -133,13 +122,14 @@ def _misfits(result: Trajectory, reference: Trajectory, errors: TrajectoryErrors
         else:
             yield f"{alone}: {clock}"
     factor = left.factor
-    if abs(math.log(max(factor, 1e-12))) > SMALLEST_FACTOR and _is_better(left.apart_scaled, left.apart, now):
-        yield f"factor {_factor_text(factor)}"
+    is_other_unit = abs(math.log(max(factor, 1e-12))) > options.min_factor
+    if is_other_unit and _is_better(left.apart_scaled, left.apart, now, options):
+        yield f"factor {_factor_text(factor, options.unit_tolerance)}"
         truth = truth / [factor, factor, 1.0]
         left = fit(poses, truth)
-    if left.apart < 2 * LARGEST_RESIDUAL * left.spread:
+    if left.apart < 2 * options.max_residual * left.spread:
         turn, spread = heading_difference(poses, truth)
-        if abs(turn) > max(SMALLEST_TURN, SIGNIFICANT_SIGMAS * max(spread, left.apart / left.spread)):
+        if abs(turn) > max(options.min_turn, options.min_sigmas * max(spread, left.apart / left.spread)):
             side = f", those of the reference to the {'left' if turn > 0 else 'right'}"
             yield (
                 f"the headings differ by {math.degrees(abs(turn)):.1f}° ± {math.degrees(spread):.1f}° "
@@ -149,7 +139,9 @@ def _misfits(result: Trajectory, reference: Trajectory, errors: TrajectoryErrors
         yield f"{OTHER_POINT}: {_point_text(found.point)} that of the result"
 
 
-def _lag_and_lever(clocks: Clocks, found: LeverArm | None, now: Fit) -> tuple[float, LeverArm | None, bool]:
+def _lag_and_lever(
+    clocks: Clocks, found: LeverArm | None, now: Fit, options: RemarkOptions
+) -> tuple[float, LeverArm | None, bool]:
     """The lag (s; 0: none) and the lever arm that are certain, and whether only one of them is meant.
 
     On a straight path, a lag looks like a lever arm. Both together are reported only where neither alone
@@ -160,43 +152,43 @@ def _lag_and_lever(clocks: Clocks, found: LeverArm | None, now: Fit) -> tuple[fl
     least = min(
         [now.apart_scaled, *(one[1] for one in (alone, both) if one)] + ([found.apart] if found else [])
     )
-    alone, both = (one if one and abs(one[0]) >= SMALLEST_LAG else None for one in (alone, both))
-    by_lag = alone if alone and _is_better(alone[1], now.apart_scaled, now) else None
+    alone, both = (one if one and abs(one[0]) >= options.clock_lag.min_lag else None for one in (alone, both))
+    by_lag = alone if alone and _is_better(alone[1], now.apart_scaled, now, options) else None
     # The remaining residual may be only rounding.
-    enough = AS_GOOD * least + ROUNDING_SHARE * now.spread
+    enough = options.as_good * least + options.rounding * now.spread
     if by_lag and by_lag[1] <= enough:
         either = found is not None and found.apart <= enough
         return by_lag[0], found if either else None, either
     if found is not None and found.apart <= enough:
         return 0.0, found, False
-    if both and _is_better(both[1], now.apart_scaled, now):
-        together = _certain_lever_arm(*clocks.at(both[0]))
+    if both and _is_better(both[1], now.apart_scaled, now, options):
+        together = _certain_lever_arm(*clocks.at(both[0]), options)
         if together is not None:
             return both[0], together, False
     return (by_lag[0], None, False) if by_lag else (0.0, found, False)
 
 
-def _certain_lever_arm(poses: Array, truth: Array) -> LeverArm | None:
+def _certain_lever_arm(poses: Array, truth: Array, options: RemarkOptions) -> LeverArm | None:
     """The lever arm; None where it is not certain."""
     found = lever_arm(poses, truth)
-    if found is None or np.hypot(*found.point) < max(SMALLEST_LEVER, SIGNIFICANT_SIGMAS * found.sigma):
+    if found is None or np.hypot(*found.point) < max(options.min_lever, options.min_sigmas * found.sigma):
         return None
-    if alignment(poses, truth).by == "positions":
-        return found if found.apart * LEVER_IMPROVEMENT < fit(poses, truth).apart_scaled else None
-    motion = alignment(poses, truth).motion
-    apart = float(np.sqrt(((compose(motion, poses) - truth)[:, :2] ** 2).sum() / len(poses)))
-    return found if found.apart * LEVER_IMPROVEMENT < apart else None
+    aligned = alignment(poses, truth)
+    apart = fit(poses, truth).apart_scaled
+    if aligned.by == "headings":
+        apart = float(np.sqrt(((compose(aligned.motion, poses) - truth)[:, :2] ** 2).sum() / len(poses)))
+    return found if found.apart * options.lever_improvement < apart else None
 
 
-def _is_better(apart: float, before: float, now: Fit) -> bool:
-    return apart * IMPROVEMENT < before and apart < LARGEST_RESIDUAL * now.spread
+def _is_better(apart: float, before: float, now: Fit, options: RemarkOptions) -> bool:
+    return apart * options.improvement < before and apart < options.max_residual * now.spread
 
 
-def _factor_text(factor: float) -> str:
+def _factor_text(factor: float, tolerance: float) -> str:
     """What a factor from the result to the reference means."""
     larger, which = (factor, "reference") if factor > 1 else (1 / factor, "result")
     for size, unit in UNIT_FACTORS.items():
-        if abs(larger / size - 1) < UNIT_TOLERANCE:
+        if abs(larger / size - 1) < tolerance:
             return f"{size:.4g}: the {which} seems to be in {unit}"
     return f"{larger:.3f}: the {which} is larger by this factor"
 

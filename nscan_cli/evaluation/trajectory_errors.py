@@ -12,13 +12,11 @@ import numpy as np
 from nscan_cli.errors import InputDataError
 from nscan_cli.evaluation.alignment import Alignment, alignment
 from nscan_cli.evaluation.clock_lag import lag_without_overlap
+from nscan_cli.evaluation.options import DEFAULT_EVALUATION, EvaluationOptions
 from nscan_cli.evaluation.statistics import Spread
 from nscan_cli.evaluation.time_association import mutual_nearest, no_match
 from nscan_cli.graph.io.tum import Trajectory
 from nscan_cli.poses import Array, Indices, compose, relative, wrap
-
-RPE_DISTANCE = 1.0
-"""Metres of path in the reference between the two poses of a relative error."""
 
 
 @dataclass(frozen=True)
@@ -40,32 +38,36 @@ class TrajectoryErrors:
     absolute_translation: Spread
     absolute_rotation: Spread
     relative_translation: Spread | None
-    """Per RPE_DISTANCE of path; None where the matched path is shorter than that."""
+    """Per `relative_distance` of path; None where the matched path is shorter than that."""
     relative_rotation: Spread | None
 
 
 def trajectory_errors(
-    result: Trajectory, reference: Trajectory, name: str = "result", reference_name: str = "the reference"
+    result: Trajectory,
+    reference: Trajectory,
+    name: str = "result",
+    reference_name: str = "the reference",
+    options: EvaluationOptions = DEFAULT_EVALUATION,
 ) -> TrajectoryErrors:
     """ATE after the best rigid alignment (alignment.py), and RPE, of the poses that match in time.
 
-    Poses match that are each other's nearest in time, at most 0.1 s apart. The RPE compares the motion
-    from every matched pose to the first one at least 1 m of path later. Messages use the names.
-    Raises InputDataError when fewer than two poses match.
+    Poses match that are each other's nearest in time, at most `tolerance` apart. The RPE compares the motion
+    from every matched pose to the first one at least `relative_distance` of path later. Messages use the
+    names. Raises InputDataError when fewer than two poses match.
     """
-    rows, partners = mutual_nearest(result.times, reference.times)
+    rows, partners = mutual_nearest(result.times, reference.times, options.tolerance)
     if len(rows) == 0:
-        lag = lag_without_overlap(result, reference)
+        lag = lag_without_overlap(result, reference, options.remarks)
         fits = "" if lag is None else f"; stamps off by {lag:+.2f} s fit best"
         raise no_match(name, result.times, reference_name, reference.times, fits)
     if len(rows) == 1:
         problem = f"only one pose matches {reference_name}"
         raise InputDataError(name, problem, "give a reference that covers more of it")
     poses, truth = result.poses[rows], reference.poses[partners]
-    found = alignment(poses, truth)
+    found = alignment(poses, truth, options.alignment)
     aligned = compose(found.motion, poses)
     translation = np.hypot(*(aligned - truth)[:, :2].T)
-    relative_errors = _relative_errors(poses, truth)
+    relative_errors = _relative_errors(poses, truth, options.relative_distance)
     return TrajectoryErrors(
         matched=len(rows),
         unmatched=len(result) - len(rows),
@@ -80,11 +82,11 @@ def trajectory_errors(
     )
 
 
-def _relative_errors(poses: Array, truth: Array) -> tuple[Array, Array]:
-    """Errors (M,) in m and degrees of the motions over RPE_DISTANCE of the true path."""
+def _relative_errors(poses: Array, truth: Array, distance: float) -> tuple[Array, Array]:
+    """Errors (M,) in m and degrees of the motions over a `distance` (m) of the true path."""
     path = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(truth[:, :2], axis=0).T))])
     # Rounding of the sum of steps must not decide which pose is taken.
-    ends = np.searchsorted(path, path + RPE_DISTANCE - 1e-9)
+    ends = np.searchsorted(path, path + distance - 1e-9)
     starts = np.flatnonzero(ends < len(path))
     ends = ends[starts]
     error = relative(poses[ends], poses[starts]) - relative(truth[ends], truth[starts])

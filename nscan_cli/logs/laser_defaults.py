@@ -7,7 +7,8 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from nscan_cli.logs.range_peaks import MIN_PEAK_READINGS, peak_at_limit
+from nscan_cli.logs.range_limit_options import DEFAULT_RANGE_LIMITS, RangeLimitOptions
+from nscan_cli.logs.range_peaks import peak_at_limit
 from nscan_cli.poses import Array, relative, wrap
 
 RAD_PER_DEGREE = math.pi / 180
@@ -15,8 +16,6 @@ CARMEN_MAX_RANGE = 80.0
 """CARMEN's maximum range for messages that carry none, m."""
 SICK_CODES = (81.825, 81.915)
 """A SICK LMS writes readings of 8183 to 8191 (13 bits, cm) if a return is too far or missing; in m."""
-MIN_DISTINCT_READINGS = 50
-"""Smallest number of distinct lower readings from which a no-return value is recognised."""
 
 
 def beam_angles(beams: int) -> tuple[float, float]:
@@ -31,14 +30,16 @@ def beam_angles(beams: int) -> tuple[float, float]:
     return -math.pi / 2, known.get(beams, 180.0 / max(beams - 1, 1)) * RAD_PER_DEGREE
 
 
-def no_return_value(ranges: NDArray[np.float32]) -> float | None:
+def no_return_value(
+    ranges: NDArray[np.float32], options: RangeLimitOptions = DEFAULT_RANGE_LIMITS
+) -> float | None:
     """The smallest reading (m) that means "no return", from all readings of a log; None if there is none.
 
     Without a return a laser writes one fixed value above all that it can measure. SICK's codes are known. Any
-    other value is a peak of the histogram within 0.25 m of the largest reading. It is sharp, so that half of
-    its readings share one centimetre, which noise prevents for a wall, and isolated, with ten times the
-    readings of the metre below. Or it is a single value there with ten times the readings of any other in
-    that metre. At least 50 distinct readings must be lower.
+    other value is a peak of the histogram within `top_range` of the largest reading. It is sharp, so that
+    half of its readings share one centimetre, which noise prevents for a wall, and isolated, with
+    `peak_ratio` times the readings of the metre below. Or it is a single value there with `peak_ratio` times
+    the readings of any other in that metre. At least `distinct_readings` must be lower.
     """
     usable = ranges[(ranges > 0) & (ranges < 1e4)]
     if usable.size == 0:
@@ -47,38 +48,34 @@ def no_return_value(ranges: NDArray[np.float32]) -> float | None:
     low, high = SICK_CODES
     if low <= largest <= high:
         return _rounded(usable[usable > low].min())
-    centimetres = np.rint(usable[usable > largest - 1.25].astype(np.float64) * 100).astype(np.int64)
-    values, counts = np.unique(centimetres, return_counts=True)
-    top = values > round((largest - 0.25) * 100)
+    near = usable[usable > largest - (options.top_range + options.compared_range)]
+    values, counts = np.unique(np.rint(near.astype(np.float64) * 100).astype(np.int64), return_counts=True)
+    top = values > round((largest - options.top_range) * 100)
     peak, below = int(counts[top].sum()), int(counts[~top].sum())
     sharpest = int(counts[top].max())
-    if peak < MIN_PEAK_READINGS or 2 * sharpest < peak or peak < 10 * below:
-        return _single_value(usable, largest)
-    least = int(values[top & (counts >= 0.01 * sharpest)].min()) / 100 - 0.005
-    lower = usable[usable < least]
-    if not _are_many_values(lower):
+    if peak < options.peak_readings or 2 * sharpest < peak or peak < options.peak_ratio * below:
+        return _single_value(usable, largest, options)
+    least = int(values[top & (counts >= options.top_share * sharpest)].min()) / 100 - 0.005
+    if not _are_many_values(usable[usable < least], options):
         return None
     return _rounded(usable[usable >= least].min())
 
 
-def _single_value(usable: NDArray[np.float32], largest: float) -> float | None:
+def _single_value(usable: NDArray[np.float32], largest: float, options: RangeLimitOptions) -> float | None:
     """The no-return value among readings (N,) above 0 if readings of a wall may lie near it."""
-    values, counts = np.unique(usable[usable > largest - 0.25], return_counts=True)
+    values, counts = np.unique(usable[usable > largest - options.top_range], return_counts=True)
     value, count = values[counts.argmax()], counts.max()
-    stands_out = peak_at_limit(
-        usable[None], np.array([value], dtype=np.float64), inside=-1, ratio_to_largest=10.0
-    )
-    if stands_out is None or 10 * np.count_nonzero(usable > value) > count:
+    limit = np.array([value], dtype=np.float64)
+    stands_out = peak_at_limit(usable[None], limit, -1, options.peak_ratio, options)
+    if stands_out is None or options.peak_ratio * np.count_nonzero(usable > value) > count:
         return None
-    return _rounded(value) if _are_many_values(usable[usable < value]) else None
+    return _rounded(value) if _are_many_values(usable[usable < value], options) else None
 
 
-def _are_many_values(readings: NDArray[np.float32]) -> bool:
+def _are_many_values(readings: NDArray[np.float32], options: RangeLimitOptions) -> bool:
     """Whether readings (N,) have enough distinct values; mostly the first of them tell."""
-    return any(
-        np.unique(some).size >= MIN_DISTINCT_READINGS
-        for some in (readings[: 100 * MIN_DISTINCT_READINGS], readings)
-    )
+    least = options.distinct_readings
+    return any(np.unique(some).size >= least for some in (readings[: 100 * least], readings))
 
 
 def _rounded(value: np.float32) -> float:

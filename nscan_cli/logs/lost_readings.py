@@ -8,14 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nscan_cli.errors import InputDataError
+from nscan_cli.logs.range_limit_options import DEFAULT_RANGE_LIMITS, RangeLimitOptions
 from nscan_cli.logs.range_limits import RangeLimits
 from nscan_cli.logs.range_unit import wrong_unit
 from nscan_cli.poses import Array
 
 ROWS_AT_ONCE = 4096
 """Scans that are counted together, to save memory."""
-MAX_LOST_SHARE = 0.9
-"""If a larger share of the readings is unusable, the user is told."""
 
 
 class LostReadings(NamedTuple):
@@ -29,7 +28,11 @@ class LostReadings(NamedTuple):
 
 
 def lost_readings(
-    ranges: NDArray[np.float32], beams: NDArray[np.int64], limits: RangeLimits, file: str
+    ranges: NDArray[np.float32],
+    beams: NDArray[np.int64],
+    limits: RangeLimits,
+    file: str,
+    checks: RangeLimitOptions = DEFAULT_RANGE_LIMITS,
 ) -> LostReadings:
     """The unusable ones among readings (S, B; m) as written, of which scans have `beams` (S,)."""
     wrong = limits.low >= limits.high
@@ -48,7 +51,7 @@ def lost_readings(
     total, lost = int(beams.sum()), sum(counts.values())
     found_unit = wrong_unit(ranges, limits)
     unit, remedy = ("", "") if found_unit is None else (f"; {found_unit.seems}", found_unit.remedy)
-    if lost <= MAX_LOST_SHARE * total and not unit:
+    if lost <= checks.max_lost_share * total and not unit:
         told = f"{counts.get(crossed, 0):,} of {_readings(total)} are unusable: {crossed}"
         return LostReadings(counts, [told] if crossed in counts else [], None)
     listed = ", ".join(f"{n:,} {'is' if n == 1 else 'are'} {why}" for why, n in counts.items()) + unit
@@ -57,7 +60,7 @@ def lost_readings(
     if not remedy and most in options_by_reason and not met_nothing:
         remedy = f"if they are valid, set {options_by_reason[most]}"
     if lost < total:
-        few = "only " if lost > MAX_LOST_SHARE * total else ""
+        few = "only " if lost > checks.max_lost_share * total else ""
         said = f"{few}{total - lost:,} of {_readings(total)} are usable" + (f": {listed}" if counts else unit)
         return LostReadings(counts, [f"{said}; {remedy}" if remedy else said], None)
     options = [option for option in ("--min-range", "--max-range") if f"({option})" in most]

@@ -16,17 +16,20 @@ MOST_GAPS_NAMED = 5
 
 
 @dataclass(frozen=True)
-class OdometryGapLimits:
+class OdometryGapOptions:
     """Where there is no odometry between two poses, because too much happens between them."""
 
     periods: float = 10.0
     """A gap is longer than this many median periods of the poses. A larger value interpolates over more."""
     motion: float = 0.2
     """The robot moves by more than this over a gap, m and rad. A robot that stands may send no pose: what is
-    interpolated then is right."""
+    interpolated then is right. A larger value interpolates over more."""
     beyond: float = 1.0
     """Periods from a pose, into a gap or beyond the first and the last, during which it is used. A larger
     value lets the robot stand longer there."""
+
+
+DEFAULT_ODOMETRY_GAPS = OdometryGapOptions()
 
 
 def interpolated_poses(
@@ -35,7 +38,7 @@ def interpolated_poses(
     poses: Array,
     name: str,
     warnings: list[str],
-    limits: OdometryGapLimits = OdometryGapLimits(),
+    options: OdometryGapOptions = DEFAULT_ODOMETRY_GAPS,
 ) -> Array | None:
     """Poses (S, 3) at `times` (S,), interpolated between `poses` (P, 3) at the sorted times `at` (P,).
 
@@ -53,9 +56,9 @@ def interpolated_poses(
     columns = (poses[:, 0], poses[:, 1], angles)
     found = np.stack([np.interp(times, at, column) for column in columns], axis=-1)
     found[:, 2] = wrap(found[:, 2])
-    in_gap, nearest = _in_gap(times, at, poses, limits), nearest_in_time(at, times)
+    in_gap, nearest = _in_gap(times, at, poses, options), nearest_in_time(at, times)
     found[in_gap] = poses[nearest[in_gap]]
-    margin = limits.beyond * usual_period(at)
+    margin = options.beyond * usual_period(at)
     missing = in_gap & (np.abs(times - at[nearest]) > margin)
     missing |= (times < at[0] - margin) | (times > at[-1] + margin)
     if missing.any():
@@ -83,12 +86,12 @@ def _scans(first: int, last: int) -> str:
     return f"scan {first}" if first == last else f"scans {first} to {last}"
 
 
-def _in_gap(times: Array, at: Array, poses: Array, limits: OdometryGapLimits) -> NDArray[np.bool_]:
+def _in_gap(times: Array, at: Array, poses: Array, options: OdometryGapOptions) -> NDArray[np.bool_]:
     """(S,) which of the `times` (S,) lie in a gap between two poses (P, 3) at times (P,)."""
     periods = np.diff(at)
     steps = np.abs(relative(poses[1:], poses[:-1]))
-    is_gap = (periods > limits.periods * usual_period(at)) & (
-        np.maximum(np.hypot(steps[:, 0], steps[:, 1]), steps[:, 2]) > limits.motion
+    is_gap = (periods > options.periods * usual_period(at)) & (
+        np.maximum(np.hypot(steps[:, 0], steps[:, 1]), steps[:, 2]) > options.motion
     )
     after = np.searchsorted(at, times)
     found: NDArray[np.bool_] = (times > at[0]) & (times < at[-1]) & np.isin(after - 1, np.flatnonzero(is_gap))

@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nscan_cli.logs.laser_defaults import no_return_value
-from nscan_cli.logs.range_peaks import MIN_PEAK_READINGS, ROUNDING, peak_at_limit
+from nscan_cli.logs.range_limit_options import DEFAULT_RANGE_LIMITS, RangeLimitOptions
+from nscan_cli.logs.range_peaks import ROUNDING, peak_at_limit
 from nscan_cli.logs.reading_options import ReadingOptions
 from nscan_cli.poses import Array
 
@@ -18,14 +19,6 @@ if TYPE_CHECKING:
 LARGEST_RANGE = 1e4
 """No laser measures farther, m. A limit beyond is ignored."""
 FROM_READINGS = "the no-return value found in the readings"
-NEIGHBOURHOOD_FACTOR = 1.25
-"""Returns just below and just beyond a distance are counted from 1 / 1.25 to 1.25 times that distance."""
-DROP_RATIO = 0.1
-"""A distance is a limit of the laser if the returns just beyond are fewer than this share of those just
-below. A larger value finds more limits."""
-MIN_REPORTED_SHARE, MAX_REPORTED_SHARE = 0.05, 0.5
-"""Shares of the returns beyond a limit between which the user is told. Above, another warning gives the
-number of usable readings."""
 
 
 class RangeLimits(NamedTuple):
@@ -52,7 +45,12 @@ class RangeLimits(NamedTuple):
         return float(self.low.min()), float(self.high.max())
 
 
-def limits_in_force(raw: RawScans, options: ReadingOptions, warnings: list[str]) -> RangeLimits:
+def limits_in_force(
+    raw: RawScans,
+    options: ReadingOptions,
+    warnings: list[str],
+    checks: RangeLimitOptions = DEFAULT_RANGE_LIMITS,
+) -> RangeLimits:
     """The limits from the options, else from the log, and at most the value that means "no return".
 
     That value is searched among all readings, and at the limits, which drivers write for readings beyond.
@@ -60,20 +58,20 @@ def limits_in_force(raw: RawScans, options: ReadingOptions, warnings: list[str])
     scans = len(raw.stamps)
     low, high = (np.array(np.broadcast_to(limit, scans), dtype=np.float64) for limit in raw.limits)
     low_from, high_from = raw.limits_from
-    no_return = no_return_value(raw.ranges)
+    no_return = no_return_value(raw.ranges, checks)
     if options.max_range is None:
         end = LARGEST_RANGE if no_return is None else no_return
-        high, high_from = _upper_limits(raw, high, high_from, end, warnings)
-    gap = peak_at_limit(raw.ranges, low, inside=1)
+        high, high_from = _upper_limits(raw, high, high_from, end, warnings, checks)
+    gap = peak_at_limit(raw.ranges, low, inside=1, options=checks)
     if gap is not None:
         low, low_from = low + gap, f"{low_from}, at a peak of invalid readings"
     if options.min_range is not None:
         low, low_from = np.full(scans, options.min_range), "--min-range"
-    gap = peak_at_limit(raw.ranges, high, inside=-1)
+    gap = peak_at_limit(raw.ranges, high, inside=-1, options=checks)
     if gap is not None and options.max_range is not None:
         beyond = (raw.ranges > high[:, None]) & (raw.ranges < options.max_range)
         # If more than a few readings lie beyond, the user asks for these.
-        gap = None if np.count_nonzero(beyond) >= MIN_PEAK_READINGS else gap
+        gap = None if np.count_nonzero(beyond) >= checks.peak_readings else gap
     if gap is not None:
         high, high_from = high - gap, f"{high_from}, at a peak of readings without return"
         if (high == high[0]).all():
@@ -86,7 +84,12 @@ def limits_in_force(raw: RawScans, options: ReadingOptions, warnings: list[str])
 
 
 def _upper_limits(
-    raw: RawScans, high: Array, high_from: str, end: float, warnings: list[str]
+    raw: RawScans,
+    high: Array,
+    high_from: str,
+    end: float,
+    warnings: list[str],
+    checks: RangeLimitOptions,
 ) -> tuple[Array, str]:
     """The upper limits (S,) that the log names, and their origin.
 
@@ -96,7 +99,7 @@ def _upper_limits(
     for limit, source in sorted(raw.doubtful):
         if limit >= high.max():
             continue
-        share = returns_beyond(raw.ranges, limit, min(end, float(high.max())))
+        share = returns_beyond(raw.ranges, limit, min(end, float(high.max())), checks)
         if share == 0.0:
             return np.minimum(high, limit), source
         warnings.append(
@@ -104,8 +107,8 @@ def _upper_limits(
             f"of the laser and is not used; --max-range {limit:g} would use it"
         )
     if (high == high[0]).all():
-        share = returns_beyond(raw.ranges, float(high[0]), end)
-        if MIN_REPORTED_SHARE <= share <= MAX_REPORTED_SHARE:
+        share = returns_beyond(raw.ranges, float(high[0]), end, checks)
+        if checks.min_reported_share <= share <= checks.max_reported_share:
             warnings.append(
                 f"{_percent(share)} of the returns lie beyond {high[0]:g} m ({high_from}) and are read as "
                 "no return; if they are valid, give a larger --max-range"
@@ -113,7 +116,7 @@ def _upper_limits(
     return high, high_from
 
 
-def returns_beyond(ranges: NDArray[np.float32], limit: float, end: float) -> float:
+def returns_beyond(ranges: NDArray[np.float32], limit: float, end: float, checks: RangeLimitOptions) -> float:
     """The share of returns from `limit` to `end` (m) if returns continue beyond the limit; else 0.
 
     Beyond a laser's own limit there are no returns, one single value, or far fewer than just below it, and
@@ -121,16 +124,15 @@ def returns_beyond(ranges: NDArray[np.float32], limit: float, end: float) -> flo
     """
     returns = ranges[(ranges > 0) & (ranges < end)]
     beyond = returns[returns > limit * (1 + ROUNDING)]
-    if beyond.size < MIN_PEAK_READINGS:
+    if beyond.size < checks.peak_readings:
         return 0.0
     _, counts = np.unique(np.rint(beyond * 100), return_counts=True)
-    below = np.count_nonzero((returns >= limit / NEIGHBOURHOOD_FACTOR) & (returns <= limit * (1 + ROUNDING)))
-    drops = np.count_nonzero(beyond <= limit * NEIGHBOURHOOD_FACTOR) < DROP_RATIO * below
-    if (
-        drops
-        or 2 * counts.max() >= beyond.size
-        or peak_at_limit(ranges, np.full(len(ranges), limit), -1) is not None
-    ):
+    near, far, slack = limit / checks.neighbourhood, limit * checks.neighbourhood, limit * (1 + ROUNDING)
+    below = np.count_nonzero((returns >= near) & (returns <= slack))
+    drops = np.count_nonzero(beyond <= far) < checks.max_drop * below
+    if drops or 2 * counts.max() >= beyond.size:
+        return 0.0
+    if peak_at_limit(ranges, np.full(len(ranges), limit), -1, options=checks) is not None:
         return 0.0
     return float(beyond.size / returns.size)
 

@@ -9,15 +9,14 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from nscan_cli.logs.range_limits import LARGEST_RANGE, NEIGHBOURHOOD_FACTOR, RangeLimits
+from nscan_cli.logs.range_limit_options import DEFAULT_RANGE_LIMITS
+from nscan_cli.logs.range_limits import LARGEST_RANGE, RangeLimits
 
 if TYPE_CHECKING:
     from nscan_cli.logs.assemble import RawScans
 
 UNITS = (("millimetres", 0.001), ("centimetres", 0.01))
 """Units that a log may have instead of metres, in metres."""
-LIMITS_APART = 1.0
-"""Lower limits of lasers are less, and upper limits are more, m."""
 
 
 @dataclass(frozen=True)
@@ -41,6 +40,9 @@ class RangeUnitOptions:
     corrects more logs."""
     min_returns: int = 50
     """Least number of returns that make a unit certain. A larger value corrects fewer logs."""
+    limits_apart: float = 1.0
+    """Lower limits of lasers are less, and upper limits are more, m: it tells in which unit a limit is. A
+    larger value leaves more limits as they are."""
     sample: int = 1 << 20
     """Number of readings from which the unit is told. A larger value takes longer."""
 
@@ -122,14 +124,14 @@ def _continue_beyond(readings: NDArray[np.float32], no_return: float) -> bool:
 
     Among whole numbers, any looks like a peak.
     """
-    beyond = readings[readings > NEIGHBOURHOOD_FACTOR * no_return]
+    beyond = readings[readings > DEFAULT_RANGE_LIMITS.neighbourhood * no_return]
     if 2 * beyond.size <= readings.size:
         return False
     _, counts = np.unique(beyond, return_counts=True)
     return bool(2 * counts.max() < beyond.size)
 
 
-def scaled(raw: RawScans, scale: float) -> RawScans:
+def scaled(raw: RawScans, scale: float, options: RangeUnitOptions = DEFAULT_RANGE_UNIT) -> RawScans:
     """The scans with ranges multiplied by `scale`; limits that were in the same unit are, too.
 
     An upper limit was in another unit if the median return is beyond it. No limit may become one that no
@@ -138,6 +140,7 @@ def scaled(raw: RawScans, scale: float) -> RawScans:
     returns = raw.ranges[(raw.ranges > 0) & np.isfinite(raw.ranges)]
     median = float(np.median(returns)) if returns.size else 0.0
     low, high = (np.asarray(limit, dtype=np.float64) for limit in raw.limits)
-    shares_unit = (high < LARGEST_RANGE) & (high >= median) & (high * scale >= LIMITS_APART)
-    limits = np.where(low >= LIMITS_APART, low * scale, low), np.where(shares_unit, high * scale, high)
+    shares_unit = (high < LARGEST_RANGE) & (high >= median) & (high * scale >= options.limits_apart)
+    low = np.where(low >= options.limits_apart, low * scale, low)
+    limits = low, np.where(shares_unit, high * scale, high)
     return replace(raw, ranges=raw.ranges * np.float32(scale), limits=limits)

@@ -60,13 +60,14 @@ class RobotPartsOptions:
     pairs: int = 512
     """Number of pairs for each lag that are looked at, if there are constant ranges. A larger value takes
     longer."""
+    scans_of_turn: int = 4
+    """Number of scans from the first of a pair to the second whose ranges are compared. A larger value takes
+    longer."""
     margin: float = np.radians(1.0)
     """Sectors are widened by this on each side, rad: a beam at an edge meets both. Gaps of twice this are
     closed. A larger value leaves out more."""
 
 
-SCANS_OF_TURN = 4
-"""Scans from the first of a pair to the second whose ranges are compared."""
 DEFAULT_ROBOT_PARTS = RobotPartsOptions()
 """Those of every log; the provenance of a graph has them."""
 
@@ -108,7 +109,7 @@ def robot_parts(table: ScanTable, options: RobotPartsOptions) -> list[Sector]:
     pairs = _turned_pairs(table, bearings, constant, options)
     if len(pairs) < options.min_pairs:
         return []
-    turning = np.unique(np.linspace(pairs[:, 0], pairs[:, 1], SCANS_OF_TURN).astype(np.int64))
+    turning = np.unique(np.linspace(pairs[:, 0], pairs[:, 1], options.scans_of_turn).astype(np.int64))
     ranges = _at_bearings(table, turning, bearings)
     constant &= _kept(ranges, medians, options).mean(axis=0) >= options.min_turning_share
     return _sectors(bearings, constant, medians, options.margin)

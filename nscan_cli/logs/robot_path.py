@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -12,14 +13,30 @@ from nscan_cli.poses import Array, are_known, compose, relative, wrap
 
 STRAIGHT = 1e-9
 """rad; a turn smaller than this is none: its arc is a straight line."""
-LONGEST_STEP = 1.0
-"""s; how the robot came from one pose to a later one is not known: it goes on as before."""
-LEAST_POSES = 10
-"""With fewer nothing is said of what leads from one to the next."""
-METRES_PER_RADIAN = 1.0
-"""An error of a heading counts as one of a place of so many metres: what a beam of that length is off by."""
-FASTEST, FASTEST_TURN = 10.0, 15.0
-"""m/s, rad/s; no robot with a laser drives so. It was carried, or lost, and goes on as before."""
+
+
+@dataclass(frozen=True)
+class RobotPathOptions:
+    """How a robot moves between two poses."""
+
+    longest_step: float = 1.0
+    """Longest time between two poses that tells how the robot came from one to the other, s. Over a longer
+    one it goes on as before. A larger value believes more steps."""
+    fastest: float = 10.0
+    """Greatest speed of a robot with a laser, m/s. A faster one was carried, or lost, and goes on as before.
+    A larger value believes more steps."""
+    fastest_turn: float = 15.0
+    """Greatest turn rate of a robot with a laser, rad/s. One that turns faster goes on as before. A larger
+    value believes more steps."""
+    least_poses: int = 10
+    """Least number of poses that tell whether odometry or steady motion leads better from one to the next.
+    With fewer it is odometry. A larger value believes odometry in more short logs."""
+    metres_per_radian: float = 1.0
+    """Length of a beam at whose end errors of headings and of places are compared, m. A larger value gives
+    the headings more weight."""
+
+
+DEFAULT_ROBOT_PATH = RobotPathOptions()
 
 
 class RobotPath(NamedTuple):
@@ -34,7 +51,9 @@ class RobotPath(NamedTuple):
     goes on as the one before."""
 
 
-def robot_path(times: Array, poses: Array) -> RobotPath | None:
+def robot_path(
+    times: Array, poses: Array, options: RobotPathOptions = DEFAULT_ROBOT_PATH
+) -> RobotPath | None:
     """The path through poses (S, 3) at times (S,), s, that do not decrease; None with fewer than two.
 
     Unknown poses are left out, and all but the first of those at one time.
@@ -46,9 +65,9 @@ def robot_path(times: Array, poses: Array) -> RobotPath | None:
     at, through = np.ascontiguousarray(times[used]), np.ascontiguousarray(poses[used])
     periods, twists = np.diff(at), np.empty((len(used), 3))
     twists[:-1] = _velocities(relative(through[1:], through[:-1]), periods)
-    unknown = periods > LONGEST_STEP
-    unknown |= np.hypot(twists[:-1, 0], twists[:-1, 1]) > FASTEST
-    unknown |= np.abs(twists[:-1, 2]) > FASTEST_TURN
+    unknown = periods > options.longest_step
+    unknown |= np.hypot(twists[:-1, 0], twists[:-1, 1]) > options.fastest
+    unknown |= np.abs(twists[:-1, 2]) > options.fastest_turn
     for row in np.flatnonzero(unknown).tolist():
         twists[row] = twists[row - 1] if row else 0.0
     twists[-1] = twists[-2]
@@ -78,14 +97,16 @@ def bent_path(path: RobotPath, times: Array, poses: Array) -> RobotPath | None:
     return robot_path(np.concatenate([times, at])[order], np.concatenate([poses, blended])[order])
 
 
-def likelier_path(path: RobotPath, times: Array, poses: Array) -> RobotPath | None:
+def likelier_path(
+    path: RobotPath, times: Array, poses: Array, options: RobotPathOptions = DEFAULT_ROBOT_PATH
+) -> RobotPath | None:
     """The path through poses (S, 3) at times (S,), s: bent, with the motion of `path` between two of them, or
     steady there if that tells better where every second pose is from those beside it.
 
     Odometry whose clock or wheels are off leads astray between two poses.
     """
     steady, bent = robot_path(times, poses), bent_path(path, times, poses)
-    if len(times) < LEAST_POSES or steady is None or bent is None:
+    if len(times) < options.least_poses or steady is None or bent is None:
         return bent
     some, others = slice(None, None, 2), slice(1, None, 2)
     errors = []
@@ -93,7 +114,7 @@ def likelier_path(path: RobotPath, times: Array, poses: Array) -> RobotPath | No
         if each is None:
             return bent
         off = relative(poses_at(each, times[others]), poses[others])
-        away = np.hypot(off[:, 0], off[:, 1]) + METRES_PER_RADIAN * np.abs(off[:, 2])
+        away = np.hypot(off[:, 0], off[:, 1]) + options.metres_per_radian * np.abs(off[:, 2])
         errors.append(float(away.mean()))
     return steady if errors[0] < errors[1] else bent
 

@@ -14,16 +14,26 @@ from nscan_cli.files.text import counted
 from nscan_cli.logs.reading_options import ReadingOptions
 from nscan_cli.poses import Array, Indices
 
-NOMINAL_PERIOD = 0.1
-"""Time between scans without usable stamps, s."""
-MIN_ALTERNATIONS = 20
-"""A clock was set back only if scans from before and after the step back alternate at least this often when
-sorted by time, and only if the step is longer than that number of scan periods. Messages that arrive late
-fill a gap instead."""
-MAX_STEPS_BACK = 20
-"""With more steps back, the lines are out of order, and no clock was set back."""
 STAMP = re.compile(r"[-+]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][-+]?[0-9]+)?")
 """A time in seconds as text. Other texts that float() accepts, such as 1_0, are none."""
+
+
+@dataclass(frozen=True)
+class ScanOrderOptions:
+    """When stamps are unusable, and when a clock was set back."""
+
+    nominal_period: float = 0.1
+    """Time between scans without usable stamps, s."""
+    min_alternations: int = 20
+    """A clock was set back only if scans from before and after the step back alternate at least this often
+    when sorted by time, and only if the step is longer than that number of scan periods: messages that arrive
+    late fill a gap instead. A larger value finds fewer such clocks."""
+    max_steps_back: int = 20
+    """With more steps back, the lines are out of order, and no clock was set back. A larger value finds more
+    such clocks."""
+
+
+DEFAULT_SCAN_ORDER = ScanOrderOptions()
 
 
 @dataclass(frozen=True)
@@ -43,7 +53,7 @@ class ScanOrder:
     warnings: list[str]
 
 
-def by_time(stamps: list[str]) -> ScanOrder:
+def by_time(stamps: list[str], options: ScanOrderOptions = DEFAULT_SCAN_ORDER) -> ScanOrder:
     """The scans sorted stably by their stamps, one per scan in file order, empty if there is none.
 
     If fewer than half of the stamps are finite, or fewer than half are distinct, the scans stay in file order
@@ -55,9 +65,9 @@ def by_time(stamps: list[str]) -> ScanOrder:
     size = len(stamps)
     warnings = []
     if 2 * good.sum() < size or (size > 1 and 2 * np.unique(times[good]).size < size):
-        times = np.arange(size, dtype=np.float64) * NOMINAL_PERIOD
+        times = np.arange(size, dtype=np.float64) * options.nominal_period
         warnings.append(
-            f"the time stamps are unusable; scans are read in file order, {NOMINAL_PERIOD:g} s apart"
+            f"the time stamps are unusable; scans are read in file order, {options.nominal_period:g} s apart"
         )
         texts = [f"{time:.6f}" for time in times]
         return ScanOrder(np.arange(size), times, texts, 0, True, warnings)
@@ -70,7 +80,7 @@ def by_time(stamps: list[str]) -> ScanOrder:
         warnings.append(
             f"{counted(int(np.sum(~good)), 'scan')} without a usable time stamp: interpolated between others"
         )
-    for since, by in _set_back(times):
+    for since, by in _set_back(times, options):
         times[since:] += by
         texts[since:] = [f"{time:.6f}" for time in times[since:]]
         warnings.append(
@@ -83,19 +93,19 @@ def by_time(stamps: list[str]) -> ScanOrder:
     return ScanOrder(rows, times[rows], [texts[row] for row in rows], backward, False, warnings)
 
 
-def _set_back(times: Array) -> list[tuple[int, float]]:
+def _set_back(times: Array, options: ScanOrderOptions) -> list[tuple[int, float]]:
     """Positions in the file at which the clock was set back, and the times (s) to add from there on."""
     if len(times) < 2:
         return []
     times, found = times.copy(), []
     period = float(np.median(np.abs(np.diff(times))))
-    steps = np.flatnonzero(np.diff(times) < -MIN_ALTERNATIONS * period) + 1
-    for at in steps.tolist() if len(steps) <= MAX_STEPS_BACK else ():
+    steps = np.flatnonzero(np.diff(times) < -options.min_alternations * period) + 1
+    for at in steps.tolist() if len(steps) <= options.max_steps_back else ():
         latest = float(times[:at].max())
         caught_up = times[at:] > latest
         until = at + (int(np.argmax(caught_up)) if caught_up.any() else len(caught_up))
         is_behind = np.argsort(times[:until], kind="stable") >= at
-        if np.count_nonzero(np.diff(is_behind)) >= MIN_ALTERNATIONS:
+        if np.count_nonzero(np.diff(is_behind)) >= options.min_alternations:
             by = latest + period - float(times[at])
             times[at:] += by
             found.append((at, by))

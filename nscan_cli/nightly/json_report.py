@@ -6,8 +6,9 @@ import json
 from typing import Any
 
 from nscan_cli import __version__
+from nscan_cli.files.provenance import as_parameters
 from nscan_cli.files.text import json_bytes
-from nscan_cli.nightly.regression_check import CheckResult, MeasuredErrors, headline
+from nscan_cli.nightly.regression_check import DEFAULT_REGRESSION, CheckResult, MeasuredErrors, headline
 
 
 def report_document(checks: list[CheckResult]) -> dict[str, Any]:
@@ -22,6 +23,7 @@ def report_document(checks: list[CheckResult]) -> dict[str, Any]:
         "units": {"translation": "m", "rotation": "deg", "time": "s"},
         "good": not any(check.is_failure for check in checks),
         "headline": headline(checks),
+        "parameters": as_parameters(DEFAULT_REGRESSION),
         "logs": [_log_json(check) for check in checks],
         "times": {"finished": finish_time(checks)},
     }

@@ -19,10 +19,20 @@ ATTENTION: dict[Status, tuple[str, str]] = {
 }
 """The words for each status that needs attention, for one log and for several."""
 
-MIN_RELATIVE_RISE = 0.05
-"""An error is worse only if it has risen by more than this share of the previous error."""
-MIN_TRANSLATION_RISE, MIN_ROTATION_RISE = 5e-4, 0.01
-"""An error is worse only if it has risen by more than this (m, degrees): rounding alone can cause less."""
+
+@dataclass(frozen=True)
+class RegressionOptions:
+    """When the errors of a log are worse than those of the run before. Larger values call less worse."""
+
+    relative_rise: float = 0.05
+    """Least rise of an error, as a share of the previous one."""
+    translation_rise: float = 5e-4
+    """Least rise of a translational error, m: rounding alone can cause less."""
+    rotation_rise: float = 0.01
+    """Least rise of a rotational error, degrees: rounding alone can cause less."""
+
+
+DEFAULT_REGRESSION = RegressionOptions()
 
 
 @dataclass(frozen=True)
@@ -95,7 +105,13 @@ class CheckResult:
         return self.status in ("failed", "above")
 
 
-def check_log(entry: ManifestEntry, runs: list[RunRecord], notes: list[str], absent: bool) -> CheckResult:
+def check_log(
+    entry: ManifestEntry,
+    runs: list[RunRecord],
+    notes: list[str],
+    absent: bool,
+    options: RegressionOptions = DEFAULT_REGRESSION,
+) -> CheckResult:
     """Check a log of the manifest. It has at least one run, unless it is `absent`."""
     done = [run for run in runs if run["outcome"] == "done"]
     last, previous = (done[-1] if done else None), (done[-2] if len(done) > 1 else None)
@@ -103,14 +119,18 @@ def check_log(entry: ManifestEntry, runs: list[RunRecord], notes: list[str], abs
     if absent:
         status, reasons = "absent", [f"{entry.inputs['log'].name} is missing"]
     else:
-        status, reasons = _status_and_reasons(entry, runs, last, previous)
+        status, reasons = _status_and_reasons(entry, runs, last, previous, options)
     if last is not None:
         notes = [*notes, *last["counts"]["warnings"]]
     return CheckResult(entry, status, reasons, runs, last, previous, notes)
 
 
 def _status_and_reasons(
-    entry: ManifestEntry, runs: list[RunRecord], last: RunRecord | None, previous: RunRecord | None
+    entry: ManifestEntry,
+    runs: list[RunRecord],
+    last: RunRecord | None,
+    previous: RunRecord | None,
+    options: RegressionOptions,
 ) -> tuple[Status, list[str]]:
     if runs[-1]["outcome"] != "done":
         return "failed", [runs[-1]["reason"]]
@@ -133,10 +153,10 @@ def _status_and_reasons(
     worse = [
         f"{errors.measure} rose from {old:.4f} to {new:.4f} {unit}"
         for old, new, least, unit in (
-            (earlier.metres, errors.metres, MIN_TRANSLATION_RISE, "m"),
-            (earlier.degrees, errors.degrees, MIN_ROTATION_RISE, "degrees"),
+            (earlier.metres, errors.metres, options.translation_rise, "m"),
+            (earlier.degrees, errors.degrees, options.rotation_rise, "degrees"),
         )
-        if new - old > max(least, MIN_RELATIVE_RISE * old)
+        if new - old > max(least, options.relative_rise * old)
     ]
     return ("worse" if worse else "good"), worse
 

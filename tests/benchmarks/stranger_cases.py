@@ -22,7 +22,7 @@ from nscan_cli.logs.load import read_log
 from nscan_cli.logs.text.corrected_poses import OWN_HOST
 from nscan_cli.poses import Array
 from tests.logs.excerpts import truth_of
-from tests.simulation import faults
+from tests.simulation import faults, odometry_faults
 from tests.simulation.laser import Laser
 from tests.simulation.scenes import office
 
@@ -179,7 +179,7 @@ def _posts(*degrees: tuple[float, float, float]) -> Fault:
 
 
 def _frozen(log: LaserLog) -> LaserLog:
-    return faults.odometry_turning(faults.odometry_scaled(log, 0.0), 0.0)
+    return odometry_faults.turning(odometry_faults.scaled(log, 0.0), 0.0)
 
 
 def _looking(degrees: float) -> Fault:
@@ -194,27 +194,27 @@ def _middle(log: LaserLog) -> slice:
 
 FAULTS: tuple[tuple[str, Fault, str], ...] = (
     ("", lambda log: log, ""),
-    ("odometry × 1000", lambda log: faults.odometry_scaled(log, 1000.0), "odometry-scale 0.001"),
-    ("odometry × 300", lambda log: faults.odometry_scaled(log, 300.0), "odometry-scale 0.003"),
-    ("odometry × 0.01", lambda log: faults.odometry_scaled(log, 0.01), "odometry-scale (100|9|10)"),
-    ("odometry × 2", lambda log: faults.odometry_scaled(log, 2.0), "scale of odometry"),
-    ("odometry × 0.5", lambda log: faults.odometry_scaled(log, 0.5), "scale of odometry"),
-    ("odometry turns × 0.5", lambda log: faults.odometry_turning(log, 0.5), "odometry.* turns"),
-    ("odometry turns × 1.6", lambda log: faults.odometry_turning(log, 1.6), "odometry.* turns"),
-    ("odometry turns × −1", lambda log: faults.odometry_turning(log, -1.0), "turns the wrong way"),
-    ("odometry's x reversed", faults.odometry_reversed, "odometry counts x or y the wrong way"),
-    ("odometry backwards", faults.odometry_behind, "counts forward as backward"),
+    ("odometry × 1000", lambda log: odometry_faults.scaled(log, 1000.0), "odometry-scale 0.001"),
+    ("odometry × 300", lambda log: odometry_faults.scaled(log, 300.0), "odometry-scale 0.003"),
+    ("odometry × 0.01", lambda log: odometry_faults.scaled(log, 0.01), "odometry-scale (100|9|10)"),
+    ("odometry × 2", lambda log: odometry_faults.scaled(log, 2.0), "scale of odometry"),
+    ("odometry × 0.5", lambda log: odometry_faults.scaled(log, 0.5), "scale of odometry"),
+    ("odometry turns × 0.5", lambda log: odometry_faults.turning(log, 0.5), "odometry.* turns"),
+    ("odometry turns × 1.6", lambda log: odometry_faults.turning(log, 1.6), "odometry.* turns"),
+    ("odometry turns × −1", lambda log: odometry_faults.turning(log, -1.0), "turns the wrong way"),
+    ("odometry's x reversed", odometry_faults.x_reversed, "odometry counts x or y the wrong way"),
+    ("odometry backwards", odometry_faults.behind, "counts forward as backward"),
     ("odometry frozen", _frozen, "never moves"),
     ("odometry frozen for a third, then jumps",
-        lambda log: faults.odometry_held(log, _middle(log), True),
+        lambda log: odometry_faults.held(log, _middle(log), True),
         "odometry (does not move|never moves|stands still)",
     ),
     (
         "odometry frozen for a third",
-        lambda log: faults.odometry_held(log, _middle(log), False),
+        lambda log: odometry_faults.held(log, _middle(log), False),
         "odometry (does not move|never moves|stands still)",
     ),
-    ("each pose five times", lambda log: faults.odometry_repeated(log, 5), "odometry comes less often"),
+    ("each pose five times", lambda log: odometry_faults.repeated(log, 5), "odometry comes less often"),
     ("readings reversed", faults.mirrored, "in the wrong order"),
     ("beams closer by a third", lambda log: faults.beams_apart(log, 2 / 3), "1° from beam to beam"),
     ("beams wider by a half", lambda log: faults.beams_apart(log, 1.5), "1° from beam to beam"),
@@ -222,9 +222,9 @@ FAULTS: tuple[tuple[str, Fault, str], ...] = (
     ("looks 90° right", _looking(90.0), "(90|89|91)° further to the right"),
     ("looks back", _looking(180.0), "looks 180° further"),
     ("looks 30° left", _looking(-30.0), "(29|30|31)° further to the left"),
-    ("odometry 30 s late", lambda log: faults.odometry_late(log, 30.0), "clock of odometry"),
-    ("odometry 3 s early", lambda log: faults.odometry_late(log, -3.0), "clock of odometry"),
-    ("odometry 1 s late", lambda log: faults.odometry_late(log, 1.0), "clock of odometry"),
+    ("odometry 30 s late", lambda log: odometry_faults.late(log, 30.0), "clock of odometry"),
+    ("odometry 3 s early", lambda log: odometry_faults.late(log, -3.0), "clock of odometry"),
+    ("odometry 1 s late", lambda log: odometry_faults.late(log, 1.0), "clock of odometry"),
     ("two posts of 10°", _posts((40.0, 50.0, 0.3), (-50.0, -40.0, 0.3)), "see the robot itself"),
     ("two posts of 20°", _posts((35.0, 55.0, 0.3), (-55.0, -35.0, 0.3)), "see the robot itself"),
     ("a wheel of 15° at 0.15 m", _posts((70.0, 85.0, 0.15)), "see the robot itself"),

@@ -22,7 +22,7 @@ from nscan_cli.poses import compose, relative
 from tests.benchmarks.lasers import turning
 from tests.data import OFFICE_LOG, data_file
 from tests.logs.excerpts import excerpt
-from tests.simulation import faults
+from tests.simulation import faults, odometry_faults
 from tests.simulation.drive import Drive, Odometry
 from tests.simulation.laser import Laser
 from tests.simulation.office import office_way, office_world
@@ -59,7 +59,7 @@ def drive(laser: Laser, mount: tuple[float, float, float], seed: int) -> LaserLo
 @functools.cache
 def found(laser: Laser, mount: tuple[float, float, float], seed: int) -> dict[str, Estimate]:
     """What comes out where the clock of odometry is late."""
-    return calibrated(faults.odometry_late(drive(laser, mount, seed), LATE)).values
+    return calibrated(odometry_faults.late(drive(laser, mount, seed), LATE)).values
 
 
 @pytest.mark.parametrize("robot", ROBOTS)

@@ -19,7 +19,7 @@ from nscan_cli.poses import wrap
 from nscan_cli.slam.diagnostics.notices import notices
 from tests.data import data_file
 from tests.logs.excerpts import truth_of
-from tests.simulation import faults
+from tests.simulation import faults, odometry_faults
 from tests.simulation.laser import Laser
 from tests.simulation.scenes import office
 from tests.slam.mapped_logs import mapped, position_rmse
@@ -80,7 +80,7 @@ def test_it_is_looked_for_once():
     """Before the log is mapped where odometry tells the path and is not in doubt, else afterwards."""
     log, options = drive(), FileCheckOptions()
     assert checked_file(log, ReadingOptions(), options).followed
-    without = faults.odometry_missing(log, slice(100, 110))
+    without = odometry_faults.missing(log, slice(100, 110))
     for other in (without, faults.mirrored(log), replace(log, odometry=None, odometry_path=None)):
         assert not checked_file(other, ReadingOptions(), options).followed
     assert not checked_file(log, ReadingOptions(as_recorded=True), options).followed

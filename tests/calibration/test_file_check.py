@@ -17,7 +17,7 @@ from nscan_cli.logs.load import read_log
 from nscan_cli.logs.reading_options import ReadingOptions
 from nscan_cli.poses import are_known, compose
 from tests.data import CORRIDOR_LOG, OFFICE_LOG, data_file
-from tests.simulation import faults
+from tests.simulation import faults, odometry_faults
 from tests.simulation.scenes import bare_corridor
 from tests.slam.keyframe_drives import round_scene
 
@@ -47,7 +47,7 @@ LIKELY: dict[str, tuple[Fault, str]] = {
         "180° further.*try --mount 0.1,0,0, or --odometry-scale -1 if",
     ),
     "drives backwards": (
-        faults.odometry_behind,
+        odometry_faults.behind,
         "forward as backward;.*where the file says; try --odometry-scale -1, or --mount 0.1,0,180 if",
     ),
     "is elsewhere": (
@@ -55,16 +55,16 @@ LIKELY: dict[str, tuple[Fault, str]] = {
         r"by -0\.(29|30|31) m ahead and \+0\.(19|20|21) m to the left.*try --mount 0.(09|1|11),-?0",
     ),
     "turns the wrong way": (
-        lambda log: faults.odometry_turning(log, -1.0),
+        lambda log: odometry_faults.turning(log, -1.0),
         "try --flip; if left and right are correct in the map, odometry turns the wrong way",
     ),
     "looks askew": (lambda log: faults.mounted_otherwise(log, 0.6), "try --mount 0.1,0,0$"),
-    "half as long": (lambda log: faults.odometry_scaled(log, 0.5), r"try --odometry-scale (1\.9|2\.0|2)"),
-    "a third too long": (lambda log: faults.odometry_scaled(log, 1.33), r"try --odometry-scale 0\.7"),
-    "late by 30 s": (lambda log: faults.odometry_late(log, 30.0), r"ahead.*--clock-offset -(30\.0|29\.9)"),
-    "early by 2 s": (lambda log: faults.odometry_late(log, -2.0), r"behind.*--clock-offset (2\.0|1\.9|2\.1)"),
+    "half as long": (lambda log: odometry_faults.scaled(log, 0.5), r"try --odometry-scale (1\.9|2\.0|2)"),
+    "a third too long": (lambda log: odometry_faults.scaled(log, 1.33), r"try --odometry-scale 0\.7"),
+    "late by 30 s": (lambda log: odometry_faults.late(log, 30.0), r"ahead.*--clock-offset -(30\.0|29\.9)"),
+    "early by 2 s": (lambda log: odometry_faults.late(log, -2.0), r"behind.*--clock-offset (2\.0|1\.9|2\.1)"),
     "turns by half": (
-        lambda log: faults.odometry_turning(log, 0.5),
+        lambda log: odometry_faults.turning(log, 0.5),
         r"turns by odometry are 0\.5\d? times.*--no-odometry",
     ),
 }
@@ -86,7 +86,7 @@ SCALES = (1000.0, 10.0, 0.1, 300.0)
 
 @pytest.mark.parametrize("scale", SCALES)
 def test_a_scale_beyond_doubt_is_put_right(scale):
-    log = faults.odometry_scaled(drive(), scale)
+    log = odometry_faults.scaled(drive(), scale)
     checked = checked_file(log, ReadingOptions(), FileCheckOptions())
     recorded = drive().odometry
     assert recorded is not None
@@ -98,7 +98,7 @@ def test_a_scale_beyond_doubt_is_put_right(scale):
 
 
 def frozen(log: LaserLog) -> LaserLog:
-    return faults.odometry_scaled(faults.odometry_turning(log, 0.0), 0.0)
+    return odometry_faults.scaled(odometry_faults.turning(log, 0.0), 0.0)
 
 
 def headings_reversed(log: LaserLog) -> LaserLog:
@@ -110,11 +110,11 @@ def headings_reversed(log: LaserLog) -> LaserLog:
     ("make", "words"),
     [
         (frozen, "odometry never moves, but the scans do in"),
-        (faults.odometry_reversed, "odometry counts x or y the wrong way"),
+        (odometry_faults.x_reversed, "odometry counts x or y the wrong way"),
         (headings_reversed, "odometry counts headings the wrong way"),
-        (lambda log: faults.odometry_scaled(log, 0.0), "the position by odometry never moves"),
+        (lambda log: odometry_faults.scaled(log, 0.0), "the position by odometry never moves"),
         (
-            lambda log: faults.odometry_turning(log, 180.0 / np.pi),
+            lambda log: odometry_faults.turning(log, 180.0 / np.pi),
             "odometry contradicts the scans: no scale and no clock explains its turns",
         ),
     ],
@@ -136,7 +136,7 @@ def central(log: LaserLog) -> LaserLog:
 def test_a_robot_with_its_laser_in_the_middle_mostly_drives_forward():
     (looks,) = found(faults.mounted_otherwise(central(drive()), np.pi))
     assert re.search(r"180° further.*100% of the steps by odometry go forward; try --mount 0,0,-?0", looks)
-    (counts,) = found(faults.odometry_behind(central(drive())))
+    (counts,) = found(odometry_faults.behind(central(drive())))
     assert re.search("forward as backward;.* 0% of the steps.*; try --odometry-scale -1, or --mount", counts)
 
 
@@ -157,14 +157,14 @@ def test_a_laser_aside_tells_mirrored_readings_from_odometry_that_turns_the_wron
 
 
 def test_a_late_clock_of_a_mirrored_drive_is_found():
-    late, mirrored = found(faults.mirrored(faults.odometry_late(drive(), 3.0)))
+    late, mirrored = found(faults.mirrored(odometry_faults.late(drive(), 3.0)))
     assert "try --clock-offset -3.0" in late
     assert "in the wrong order" in mirrored
 
 
 def test_where_odometry_stands_it_says_nothing_of_the_mounting_elsewhere():
     rows = slice(len(drive()) // 3, len(drive()) // 2)
-    held = faults.odometry_held(faults.mounted_otherwise(drive(), -np.pi / 2), rows, True)
+    held = odometry_faults.held(faults.mounted_otherwise(drive(), -np.pi / 2), rows, True)
     stands, looks = found(held)
     assert stands.startswith("odometry stands still")
     assert "90° further to the left" in looks
@@ -175,7 +175,7 @@ def test_where_odometry_stands_it_says_nothing_of_the_mounting_elsewhere():
 def test_odometry_that_stands_for_a_part_is_missing_there(log, catches_up):
     whole = log()
     rows = slice(len(whole) // 3, len(whole) // 2)
-    held = faults.odometry_held(whole, rows, catches_up)
+    held = odometry_faults.held(whole, rows, catches_up)
     checked = checked_file(held, ReadingOptions(), FileCheckOptions())
     assert checked.messages[0].startswith("odometry stands still while the scans move, from scan ")
     assert checked.log.odometry is not None
@@ -195,7 +195,7 @@ def test_positions_without_headings_are_not_used():
     )
 
 
-@pytest.mark.parametrize("make", [frozen, faults.mirrored, lambda log: faults.odometry_scaled(log, 1000.0)])
+@pytest.mark.parametrize("make", [frozen, faults.mirrored, lambda log: odometry_faults.scaled(log, 1000.0)])
 def test_as_recorded_believes_the_file(make):
     log, reading = make(drive()), ReadingOptions(as_recorded=True)
     checked = checked_file(log, reading, FileCheckOptions())
@@ -219,11 +219,11 @@ def test_nothing_is_contradicted_on_real_logs(name):
 OUTDOORS: dict[str, tuple[Fault, str]] = {
     "mirrored": (faults.mirrored, "in the wrong order.* try --flip"),
     "looks 90° left": (lambda log: faults.mounted_otherwise(log, -np.pi / 2), "90° further to the left"),
-    "millimetres": (lambda log: faults.odometry_scaled(log, 1000.0), "as by --odometry-scale 0.001"),
-    "a third too long": (lambda log: faults.odometry_scaled(log, 1.33), r"try --odometry-scale 0\.7"),
-    "x": (faults.odometry_reversed, "counts x or y the wrong way"),
+    "millimetres": (lambda log: odometry_faults.scaled(log, 1000.0), "as by --odometry-scale 0.001"),
+    "a third too long": (lambda log: odometry_faults.scaled(log, 1.33), r"try --odometry-scale 0\.7"),
+    "x": (odometry_faults.x_reversed, "counts x or y the wrong way"),
     "held": (
-        lambda log: faults.odometry_held(log, slice(3000, 5000), True),
+        lambda log: odometry_faults.held(log, slice(3000, 5000), True),
         "stands still while the scans move",
     ),
 }
@@ -255,7 +255,7 @@ def test_nothing_is_contradicted_on_samples():
 def test_a_bare_corridor_tells_nothing():
     """Along it a match ends where it starts: no step is measured."""
     log = bare_corridor().record(1).log()
-    assert found(faults.odometry_scaled(log, 1000.0)) == []
+    assert found(odometry_faults.scaled(log, 1000.0)) == []
     assert found(log) == []
 
 

@@ -1,4 +1,4 @@
-"""JSON documents that commands write."""
+"""JSON documents that commands write, and the line that says what is wrong."""
 
 from __future__ import annotations
 
@@ -24,3 +24,10 @@ def document_and_notices(
 def document_of(path: Path) -> dict[str, Any]:
     document: dict[str, Any] = json.loads(path.read_bytes(), parse_constant=pytest.fail)
     return document
+
+
+def assert_error_line(capsys: pytest.CaptureFixture[str], said: str) -> None:
+    """A command has printed one line on standard error, with these words, and nothing on standard output."""
+    out, err = capsys.readouterr()
+    assert (out, len(err.splitlines()), err[:11]) == ("", 1, "nscan-cli: ")
+    assert said in err

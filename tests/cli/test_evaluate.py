@@ -14,6 +14,7 @@ from nscan_cli.graph.io.tum import write_tum
 from nscan_cli.mapping.figures.canvas import BLUE, VERMILLION
 from nscan_cli.mapping.figures.colormap import plasma
 from nscan_cli.mapping.figures.error_plots import REFERENCE_COLOUR
+from tests.cli.documents import assert_error_line
 from tests.mapping.figures.pixels import count
 
 # The robot drives 1 m a second along x; the relations say 1.1 m, and 1 m with 2° more.
@@ -134,10 +135,7 @@ def test_a_mistake_is_one_line_and_its_code(
     files: Path, capsys: pytest.CaptureFixture[str], arguments: list[str], code: int, problem: str
 ):
     assert run(["evaluate", *arguments]) == code
-    out, err = capsys.readouterr()
-    assert out == ""
-    assert problem in err
-    assert len(err.splitlines()) == 1
+    assert_error_line(capsys, problem)
 
 
 def plotted(capsys: pytest.CaptureFixture[str], *arguments: str) -> np.ndarray:
@@ -214,8 +212,5 @@ def test_a_plot_that_cannot_be_is_refused_before_the_work(
 ):
     before = {path: path.read_bytes() for path in files.iterdir()}
     assert run(["evaluate", "result.tum", "--relations", "floor.relations", "--plot", plot]) == code
-    out, err = capsys.readouterr()
-    assert out == ""
-    assert problem in err
-    assert len(err.splitlines()) == 1
+    assert_error_line(capsys, problem)
     assert {path: path.read_bytes() for path in files.iterdir()} == before

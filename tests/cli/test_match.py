@@ -17,10 +17,10 @@ from nscan_cli.graph.io.symmetric_matrices import from_upper_triangle
 from nscan_cli.logs.load import read_log
 from nscan_cli.mapping.figures.canvas import BLUE, PURPLE, VERMILLION
 from nscan_cli.poses import relative
-from tests.cli.documents import document_and_notices
+from tests.cli.documents import assert_error_line, document_and_notices
 from tests.data import CORRIDOR_LOG, OFFICE_LOG, data_file
 from tests.logs.lines import flaser
-from tests.simulation.faults import odometry_missing
+from tests.simulation import odometry_faults
 
 KEYS = [
     "format", "version", "units", "provenance", "reference", "scan", "initial", "pose", "energy",
@@ -188,10 +188,7 @@ def test_a_plot_that_cannot_be_is_refused_before_the_work(
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr("nscan_cli.logs.load.read_log", pytest.fail)
     assert run(["match", OFFICE_LOG, "--reference", "10", "--scan", "12", *arguments]) == code
-    out, err = capsys.readouterr()
-    assert out == ""
-    assert len(err.splitlines()) == 1
-    assert said in err
+    assert_error_line(capsys, said)
     assert list(tmp_path.iterdir()) == []
 
 
@@ -218,10 +215,7 @@ def test_a_plot_that_cannot_be_is_refused_before_the_work(
 def test_mistakes_are_one_line(tmp_path, monkeypatch, capsys, arguments, code, said):
     monkeypatch.chdir(tmp_path)
     assert run(["match", OFFICE_LOG, *arguments]) == code
-    out, err = capsys.readouterr()
-    assert out == ""
-    assert len(err.splitlines()) == 1
-    assert said in err
+    assert_error_line(capsys, said)
     assert list(tmp_path.iterdir()) == []
 
 
@@ -261,7 +255,7 @@ def test_a_stage_that_was_cut_off_is_told_though_the_match_has_converged(capsys)
 
 
 def test_scans_whose_odometry_is_missing_start_from_identity(capsys):
-    log = odometry_missing(read_log(OFFICE_LOG), slice(12, 13))
+    log = odometry_faults.missing(read_log(OFFICE_LOG), slice(12, 13))
     assert with_defaults(log, (10, 11), None, None, quiet=False) == ("odometry", "odometry")
     assert with_defaults(log, (10, 12), None, None, quiet=False) == ("identity", "none")
     assert capsys.readouterr().err == "no odometry at scan 12: initial identity, prior none\n"

@@ -14,31 +14,18 @@ from tests.data import SAMPLE_LOGS, data_file
 from tests.nightly.small_logs import copy_of, results, write_logs
 
 
-@pytest.fixture(scope="module")
-def manifest(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return write_logs(tmp_path_factory.mktemp("logs"))
-
-
-@pytest.fixture(scope="module")
-def first(manifest: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The folder of a first night; not to be changed."""
-    folder = tmp_path_factory.mktemp("first") / "nights"
-    assert run(["nightly", str(manifest), "-o", str(folder), "--jobs", "2", "-q"]) == 0
-    return folder
-
-
 def report(folder: Path):
     return json.loads((folder / "report.json").read_bytes(), parse_constant=pytest.fail)
 
 
-def test_the_results_are_those_of_slam_and_evaluate(manifest, first, tmp_path, monkeypatch, capsys):
+def test_the_results_are_those_of_slam_and_evaluate(small, undisturbed, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     outputs = ["-o", "graph.json", "--map", "map.png", "--trajectory", "trajectory.tum"]
-    assert run(["slam", str(manifest.parent / "two.log"), *outputs, "-q"]) == 0
+    assert run(["slam", str(small.parent / "two.log"), *outputs, "-q"]) == 0
     for name in ("graph.json", "map.png", "map.yaml", "trajectory.tum"):
-        assert (first / "two" / name).read_bytes() == (tmp_path / name).read_bytes(), name
-    assert run(["evaluate", "graph.json", "--reference", str(manifest.parent / "two.tum"), "--json"]) == 0
-    document = report(first)
+        assert (undisturbed / "two" / name).read_bytes() == (tmp_path / name).read_bytes(), name
+    assert run(["evaluate", "graph.json", "--reference", str(small.parent / "two.tum"), "--json"]) == 0
+    document = report(undisturbed)
     assert document["good"] is True
     assert document["headline"] == "All 3 logs are good"
     assert [log["name"] for log in document["logs"]] == ["one", "two", "three"]
@@ -46,20 +33,20 @@ def test_the_results_are_those_of_slam_and_evaluate(manifest, first, tmp_path, m
 
 
 @pytest.mark.parametrize("jobs", ["1", "3"])
-def test_the_same_bytes_whatever_the_jobs(manifest, first, tmp_path, jobs):
-    assert run(["nightly", str(manifest), "-o", str(tmp_path / "n"), "--jobs", jobs, "-q"]) == 0
-    assert results(tmp_path / "n") == results(first)
+def test_the_same_bytes_whatever_the_jobs(small, undisturbed, tmp_path, jobs):
+    assert run(["nightly", str(small), "-o", str(tmp_path / "n"), "--jobs", jobs, "-q"]) == 0
+    assert results(tmp_path / "n") == results(undisturbed)
 
 
-def test_a_second_call_does_nothing_and_says_so_without_loading_anything(manifest, first, tmp_path):
-    folder = copy_of(first, tmp_path / "nights")
+def test_a_second_call_does_nothing_and_says_so_without_loading_anything(small, undisturbed, tmp_path):
+    folder = copy_of(undisturbed, tmp_path / "nights")
     before = {path: (path.stat().st_mtime_ns, path.stat().st_ino) for path in folder.rglob("*.*")}
     script = (
         "import sys; from nscan_cli.cli.main import run; assert run(sys.argv[1:]) == 0; "
         "heavy = {'numpy', 'scipy', 'numba', 'PIL', 'rich', 'distributed'} & set(sys.modules); "
         "assert not heavy, heavy"
     )
-    call = [sys.executable, "-c", script, "nightly", str(manifest), "-o", str(folder)]
+    call = [sys.executable, "-c", script, "nightly", str(small), "-o", str(folder)]
     said = subprocess.run(call, check=True, capture_output=True, text=True)
     assert said.stdout == ""
     assert said.stderr == (
@@ -68,12 +55,12 @@ def test_a_second_call_does_nothing_and_says_so_without_loading_anything(manifes
     assert {path: (path.stat().st_mtime_ns, path.stat().st_ino) for path in folder.rglob("*.*")} == before
 
 
-def test_what_has_changed_is_done_again_and_compared(manifest, first, tmp_path, capsys):
-    folder = copy_of(first, tmp_path / "nights")
+def test_what_has_changed_is_done_again_and_compared(small, undisturbed, tmp_path, capsys):
+    folder = copy_of(undisturbed, tmp_path / "nights")
     changed = tmp_path / "changed.toml"
-    text = manifest.read_text().replace('name = "two"', 'name = "two"\nparameters = { every = 3 }')
+    text = small.read_text().replace('name = "two"', 'name = "two"\nparameters = { every = 3 }')
     changed.write_text(text)
-    arguments = ["nightly", str(changed), "-o", str(folder), "--data", str(manifest.parent)]
+    arguments = ["nightly", str(changed), "-o", str(folder), "--data", str(small.parent)]
     assert run(arguments) == 0
     lines = capsys.readouterr().err.splitlines()
     assert len(lines) == 2
@@ -81,13 +68,13 @@ def test_what_has_changed_is_done_again_and_compared(manifest, first, tmp_path, 
     one, two, _three = report(folder)["logs"]
     assert [len(log["nights"]) for log in (one, two)] == [1, 2]
     assert one["before"] is None
-    assert two["before"] == two["nights"][0]["errors"] == report(first)["logs"][1]["errors"]
+    assert two["before"] == two["nights"][0]["errors"] == report(undisturbed)["logs"][1]["errors"]
     assert two["counts"]["scans"] == 6
 
 
-def test_failures_have_their_reasons_and_code_3(manifest, first, tmp_path, capsys):
+def test_failures_have_their_reasons_and_code_3(small, undisturbed, tmp_path, capsys):
     """A damaged log, one above its bound, two that are not there, of which one is optional; one is fine."""
-    folder = copy_of(first, tmp_path / "nights")
+    folder = copy_of(undisturbed, tmp_path / "nights")
     logs = tmp_path / "logs"
     logs.mkdir()
     write_logs(logs)
@@ -121,8 +108,8 @@ def test_failures_have_their_reasons_and_code_3(manifest, first, tmp_path, capsy
     assert sorted(said) == ["four", "nscan-cli", "nscan-cli", "nscan-cli", "nscan-cli", "one"]
 
 
-def test_optional_logs_that_are_not_there_are_one_line(manifest, first, tmp_path, capsys):
-    folder, logs = copy_of(first, tmp_path / "nights"), tmp_path / "logs"
+def test_optional_logs_that_are_not_there_are_one_line(small, undisturbed, tmp_path, capsys):
+    folder, logs = copy_of(undisturbed, tmp_path / "nights"), tmp_path / "logs"
     logs.mkdir()
     write_logs(logs)
     more = [
@@ -145,11 +132,11 @@ def test_optional_logs_that_are_not_there_are_one_line(manifest, first, tmp_path
     ]
 
 
-def test_force(manifest, first, tmp_path, capsys):
-    folder = copy_of(first, tmp_path / "nights")
-    assert run(["nightly", str(manifest), "-o", str(folder), "--force"]) == 0
+def test_force(small, undisturbed, tmp_path, capsys):
+    folder = copy_of(undisturbed, tmp_path / "nights")
+    assert run(["nightly", str(small), "-o", str(folder), "--force"]) == 0
     assert len(capsys.readouterr().err.splitlines()) == 4
-    assert results(folder) == results(first)
+    assert results(folder) == results(undisturbed)
 
 
 @pytest.mark.parametrize(

@@ -18,7 +18,7 @@ from nscan_cli.graph.relations.registry import relation_of
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.logs.load import read_log
 from nscan_cli.poses import compose, relative
-from tests.cli.documents import document_and_notices
+from tests.cli.documents import assert_error_line, document_and_notices
 from tests.data import CORRIDOR_LOG, OFFICE_LOG, data_file
 from tests.matching.problems import errors
 
@@ -225,10 +225,7 @@ def test_mistakes_are_one_line(tmp_path, monkeypatch, capsys, office, arguments,
     graph.provenance["inputs"][0]["sha256"] = "0" * 64
     (tmp_path / "other.json").write_bytes(write_graph(graph))
     assert run(["nscan", OFFICE_LOG, *arguments]) == code
-    out, err = capsys.readouterr()
-    assert out == ""
-    assert len(err.splitlines()) == 1
-    assert said in err
+    assert_error_line(capsys, said)
 
 
 def test_standard_input_is_one_input(capsys):

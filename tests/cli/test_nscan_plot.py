@@ -15,6 +15,7 @@ from nscan_cli.logs.load import read_log
 from nscan_cli.mapping.figures.canvas import BLACK, GRAY
 from nscan_cli.mapping.figures.colormap import plasma
 from nscan_cli.poses import relative
+from tests.cli.documents import assert_error_line
 from tests.cli.test_nscan import SCANS, SPEC, graph_of, matched
 from tests.data import OFFICE_LOG
 from tests.mapping.figures.pixels import count
@@ -84,8 +85,5 @@ def test_a_plot_that_cannot_be_is_refused_before_the_work(
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr("nscan_cli.logs.load.read_log", pytest.fail)
     assert run(["nscan", OFFICE_LOG, "--scans", "1,2", *arguments]) == code
-    out, err = capsys.readouterr()
-    assert out == ""
-    assert len(err.splitlines()) == 1
-    assert said in err
+    assert_error_line(capsys, said)
     assert list(tmp_path.iterdir()) == []

@@ -7,6 +7,7 @@ import pytest
 from nscan_cli.cli.main import run
 from nscan_cli.graph.io.json_graph import write_graph
 from nscan_cli.nightly import warm_up
+from tests.cli.documents import assert_error_line
 from tests.cli.room_logs import ALL_OUTPUTS, room_log
 from tests.graph.small_graph import small_graph
 
@@ -55,11 +56,7 @@ def test_mistakes_are_one_line_and_leave_nothing_behind(folder, capsys, argument
     (folder / "wrong.toml").write_text("[slam]\nmax_scans = 3\n")
     before = sorted(path.name for path in folder.rglob("*"))
     assert run(["slam", *ALL_OUTPUTS, *arguments]) == code
-    out, err = capsys.readouterr()
-    assert out == ""
-    assert len(err.splitlines()) == 1
-    assert err.startswith("nscan-cli: ")
-    assert said in err
+    assert_error_line(capsys, said)
     assert sorted(path.name for path in folder.rglob("*")) == before
 
 

@@ -9,9 +9,8 @@ import numpy as np
 import pytest
 
 from nscan_cli.logs.assemble import RawScans
-from nscan_cli.logs.beam_angles import beam_directions
+from nscan_cli.logs.beam_angles import beam_directions, second_is_straighter
 from nscan_cli.logs.reading_options import ReadingOptions
-from nscan_cli.logs.wall_straightness import second_is_straighter
 from tests.logs import lines
 from tests.logs.noisy_room import BEAMS, FIRST, STEP, readings, recording
 from tests.logs.recordings.messages import Scan

@@ -99,65 +99,6 @@ def frozen(log: LaserLog, rows: Rows) -> LaserLog:
     return replace(log, ranges=ranges)
 
 
-def odometry_reset(log: LaserLog, at: int) -> LaserLog:
-    """The odometry begins at (0, 0, 0) again with row `at`."""
-    odometry = _odometry(log).copy()
-    odometry[at:] = relative(odometry[at:], odometry[at])
-    return replace(log, odometry=odometry)
-
-
-def odometry_missing(log: LaserLog, rows: Rows) -> LaserLog:
-    """The odometry says nothing at `rows`, as where a node had died or a topic was not recorded."""
-    odometry = _odometry(log).copy()
-    odometry[rows] = np.nan
-    return replace(log, odometry=odometry)
-
-
-def odometry_held(log: LaserLog, rows: Rows, catches_up: bool) -> LaserLog:
-    """The odometry does not move in `rows`; then it jumps to where it would be, or it has lost the way."""
-    some, odometry = np.arange(len(log))[rows], _odometry(log).copy()
-    first, last = int(some[0]), int(some[-1])
-    if not catches_up:
-        odometry[last + 1 :] = compose(odometry[first], relative(odometry[last + 1 :], odometry[last]))
-    odometry[some] = odometry[first]
-    return replace(log, odometry=odometry)
-
-
-def odometry_repeated(log: LaserLog, times: int) -> LaserLog:
-    """The odometry comes with every so many-th scan, and is repeated until then."""
-    return replace(log, odometry=_odometry(log)[np.arange(len(log)) // times * times])
-
-
-def odometry_scaled(log: LaserLog, factor: float) -> LaserLog:
-    """The positions by odometry in another unit."""
-    return replace(log, odometry=_odometry(log) * (factor, factor, 1.0))
-
-
-def odometry_reversed(log: LaserLog) -> LaserLog:
-    """The odometry counts x the wrong way; its headings are right."""
-    return replace(log, odometry=_odometry(log) * (-1.0, 1.0, 1.0))
-
-
-def odometry_behind(log: LaserLog) -> LaserLog:
-    """The odometry counts forward as backward, in every step; its turns are right."""
-    steps = relative(_odometry(log)[1:], _odometry(log)[:-1]) * (-1.0, -1.0, 1.0)
-    return replace(log, odometry=_summed(_odometry(log)[0], steps))
-
-
-def odometry_late(log: LaserLog, seconds: float) -> LaserLog:
-    """The clock of the odometry is ahead of the laser's by so much: it tells what was before."""
-    at, odometry = log.times + seconds, _odometry(log)
-    turned = np.unwrap(odometry[:, 2])
-    columns = [np.interp(log.times, at, column) for column in (*odometry[:, :2].T, turned)]
-    return replace(log, odometry=np.stack([*columns[:2], wrap(columns[2])], axis=1))
-
-
-def odometry_turning(log: LaserLog, factor: float) -> LaserLog:
-    """The odometry multiplies each turn."""
-    steps = relative(_odometry(log)[1:], _odometry(log)[:-1]) * (1.0, 1.0, factor)
-    return replace(log, odometry=_summed(_odometry(log)[0], steps))
-
-
 def mirrored(log: LaserLog) -> LaserLog:
     """The readings of each scan in the wrong order."""
     return replace(log, angle_min=-log.angle_min, angle_increment=-log.angle_increment)
@@ -173,27 +114,6 @@ def beams_apart(log: LaserLog, factor: float) -> LaserLog:
 def mounted_otherwise(log: LaserLog, turn: float) -> LaserLog:
     """The file says that the laser looks further to the left than it does, by a turn (rad)."""
     return replace(log, mount=log.mount + np.array([0.0, 0.0, turn]))
-
-
-def odometry_jump(log: LaserLog, at: int, jump: tuple[float, float, float]) -> LaserLog:
-    """From row `at` on the odometry is off by a pose, in its own frame."""
-    odometry = _odometry(log).copy()
-    odometry[at:] = compose(np.array(jump), odometry[at:])
-    return replace(log, odometry=odometry)
-
-
-def odometry_spike(log: LaserLog, at: int, value: tuple[float, float, float]) -> LaserLog:
-    """A single wrong value in row `at`."""
-    odometry = _odometry(log).copy()
-    odometry[at] = value
-    return replace(log, odometry=odometry)
-
-
-def odometry_wrapped(log: LaserLog, limit: float) -> LaserLog:
-    """Coordinates kept in [−limit, limit), as a counter of too few bits does."""
-    odometry = _odometry(log).copy()
-    odometry[:, :2] = np.mod(odometry[:, :2] + limit, 2 * limit) - limit
-    return replace(log, odometry=odometry)
 
 
 def clock_jump(log: LaserLog, at: int, seconds: float) -> LaserLog:
@@ -291,16 +211,3 @@ def _to_outline(beams: Array, corners: Array) -> Array:
         met = (away > 0.0) & (along >= 0.0) & (along <= 1.0)
         nearest = np.where(met & (away < nearest), away, nearest)
     return nearest
-
-
-def _summed(first: Array, steps: Array) -> Array:
-    """(n + 1, 3) the poses to which steps (n, 3) lead from the first."""
-    poses = [first]
-    for step in steps:
-        poses.append(compose(poses[-1], step))
-    return np.array(poses)
-
-
-def _odometry(log: LaserLog) -> Array:
-    assert log.odometry is not None
-    return log.odometry

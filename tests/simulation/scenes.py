@@ -55,6 +55,19 @@ def bare_corridor() -> Scene:
     return Scene("bare_corridor", plan.world(), np.array([(-20.0, 0.0), (20.0, 0.0)]))
 
 
+def tee() -> Scene:
+    """A bare corridor of 25 m, and a wall across its end."""
+    plan = Builder()
+    plan.line(-25.0, -1.0, 0.0, -1.0)
+    plan.line(-25.0, 1.0, 0.0, 1.0)
+    plan.line(-25.0, -1.0, -25.0, 1.0)
+    for y in (-8.0, 8.0):
+        plan.line(0.0, np.sign(y), 0.0, y)
+        plan.line(0.0, y, 2.0, y)
+    plan.line(2.0, -8.0, 2.0, 8.0)
+    return Scene("tee", plan.world(), np.array([(-18.0, 0.0), (1.0, 0.0), (1.0, 6.0)]))
+
+
 def corridor_and_room() -> Scene:
     """The situation of the paper's Fig. 3; `FIG_3` has the poses of its three scans.
 

@@ -11,7 +11,7 @@ import numpy as np
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.poses import Array
 from tests.logs.excerpts import truth_of
-from tests.simulation import faults
+from tests.simulation import faults, odometry_faults
 from tests.simulation.scenes import Scene, office
 from tests.simulation.world import Builder
 from tests.slam.keyframe_drives import path_of
@@ -76,22 +76,22 @@ def frozen(log: LaserLog, since: float, until: float) -> Case:
 
 def odometry_reset(log: LaserLog, at: float) -> Case:
     row = at_metre(log, at)
-    return Case(faults.odometry_reset(log, row), row, row)
+    return Case(odometry_faults.reset(log, row), row, row)
 
 
 def odometry_jump(log: LaserLog, at: float) -> Case:
     row = at_metre(log, at)
-    return Case(faults.odometry_jump(log, row, (30.0, 5.0, 2.0)), row, row)
+    return Case(odometry_faults.jump(log, row, (30.0, 5.0, 2.0)), row, row)
 
 
 def odometry_spike(log: LaserLog, at: float) -> Case:
     row = at_metre(log, at)
-    return Case(faults.odometry_spike(log, row, (300.0, 5.0, 2.0)), row, row + 1)
+    return Case(odometry_faults.spike(log, row, (300.0, 5.0, 2.0)), row, row + 1)
 
 
 def odometry_missing(log: LaserLog, since: float, until: float) -> Case:
     a, b = at_metre(log, since), at_metre(log, until)
-    return Case(faults.odometry_missing(log, slice(a, b)), a, b)
+    return Case(odometry_faults.missing(log, slice(a, b)), a, b)
 
 
 def odometry_wrapped(log: LaserLog, at: float) -> Case:
@@ -99,7 +99,7 @@ def odometry_wrapped(log: LaserLog, at: float) -> Case:
     assert log.odometry is not None
     row = at_metre(log, at)
     limit = float(np.abs(log.odometry[:row, :2]).max())
-    return Case(faults.odometry_wrapped(log, limit), row, row)
+    return Case(odometry_faults.wrapped(log, limit), row, row)
 
 
 def clock_jump(log: LaserLog, at: float, seconds: float) -> Case:

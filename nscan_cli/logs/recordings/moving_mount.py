@@ -17,8 +17,8 @@ SHOWN_RISE = 0.001
 
 
 @dataclass(frozen=True)
-class MountingLimits:
-    """How far a laser may be from level and at rest; larger limits accept more recordings and worse scans."""
+class MountingOptions:
+    """How far a laser may be from level and at rest. Larger values accept more recordings and worse scans."""
 
     tilt: float = math.radians(1.0)
     """Largest tilt of a laser that does not move, rad."""
@@ -30,13 +30,16 @@ class MountingLimits:
     """Largest horizontal shift from the mean, m. Rocking by 5° shifts a laser 1 m above its axis by 0.09."""
 
 
+DEFAULT_MOUNTING = MountingOptions()
+
+
 @dataclass(frozen=True)
 class MovingMount:
     """The poses of a laser on its robot, over time."""
 
     poses: Array
     """(n, 4, 4), n > 1"""
-    limits: MountingLimits = MountingLimits()
+    options: MountingOptions = DEFAULT_MOUNTING
 
     @property
     def hangs(self) -> bool:
@@ -75,7 +78,7 @@ class MovingMount:
     @property
     def nods(self) -> bool:
         """Whether it is tilted by more than a robot rocks."""
-        return bool(self.tilts.max() >= self.limits.rocking)
+        return bool(self.tilts.max() >= self.options.rocking)
 
     def extent(self) -> str:
         """How far a laser moves that rocks, as the end of a sentence."""
@@ -87,10 +90,10 @@ class MovingMount:
         """Why no map can be made of the scans, as the predicate of "the laser …"; empty when one can."""
         if self.nods:
             return self._nodding()
-        if np.abs(self.turns).max() > self.limits.turn:
+        if np.abs(self.turns).max() > self.options.turn:
             low, high = _degrees_span(self._yaws)
             return "pans" + (_full_turns(low, high) or f", from {low:.1f}° to {high:.1f}°")
-        if self.shifts.max() > self.limits.shift:
+        if self.shifts.max() > self.options.shift:
             return f"slides, by up to {self.shifts.max():.2f} m to either side"
         return ""
 

@@ -7,19 +7,34 @@ would be turned by half a degree, and scan matching would follow it.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from nscan_cli.poses import Array, Indices, Mask
 
-MIN_BEAMS = 90
-"""Least number of readings of the longer scans: shorter scans are parts."""
-MIN_SHARE = 0.05
-"""Least share of the log that both kinds of scans have: a single short scan is a damaged one."""
-SAME = 1e-3
-"""Largest difference of directions and steps that are the same, as a share of the step: they are printed."""
+
+@dataclass(frozen=True)
+class InterlacedOptions:
+    """When scans of a CARMEN log are interlaced."""
+
+    min_beams: int = 90
+    """Least number of readings of the longer scans: shorter scans are parts. A larger value finds fewer
+    logs."""
+    min_share: float = 0.05
+    """Least share of the log that both kinds of scans have: a single short scan is a damaged one. A larger
+    value finds fewer logs."""
+    same: float = 1e-3
+    """Largest difference of directions and steps that are the same, as a share of the step: they are rounded.
+    A larger value finds more logs."""
 
 
-def between_the_others(beams: Indices, first: Array, step: Array) -> Mask:
+DEFAULT_INTERLACED = InterlacedOptions()
+
+
+def between_the_others(
+    beams: Indices, first: Array, step: Array, options: InterlacedOptions = DEFAULT_INTERLACED
+) -> Mask:
     """(S,) which scans have their beams between those of the others.
 
     `beams` (S,) are the numbers of readings, `first` and `step` (S,) the first direction and the step that
@@ -27,7 +42,8 @@ def between_the_others(beams: Indices, first: Array, step: Array) -> Mask:
     """
     most = int(beams.max(initial=0))
     short, whole = beams == most - 1, beams == most
-    if most < MIN_BEAMS or min(short.mean(), whole.mean()) < MIN_SHARE or not (short | whole).all():
+    shares = min(short.mean(), whole.mean())
+    if most < options.min_beams or shares < options.min_share or not (short | whole).all():
         return np.zeros(len(beams), dtype=np.bool_)
-    is_same = max(np.ptp(first), np.ptp(step)) <= SAME * abs(step[0])
+    is_same = max(np.ptp(first), np.ptp(step)) <= options.same * abs(step[0])
     return short if is_same else np.zeros(len(beams), dtype=np.bool_)

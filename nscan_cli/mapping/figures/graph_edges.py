@@ -9,9 +9,8 @@ from nscan_cli.graph.relations.base import Relation
 from nscan_cli.graph.relations.registry import is_joint
 from nscan_cli.mapping.figures.canvas import GRAY, GREEN, VERMILLION
 from nscan_cli.poses import Indices
+from nscan_cli.slam.local_matching.options import NScanOptions
 
-REVISIT_DISTANCE = 20.0
-"""Least path between scans of different visits, m; the same as in the joint matches of slam."""
 EDGE_COLOURS = {"nScan": GREEN, "pairwise": GRAY, "loop": VERMILLION}
 """In the order of drawing, with loops on top."""
 
@@ -31,7 +30,7 @@ def edges_by_kind(graph: Graph) -> dict[str, Indices]:
         centre = joint.nodes[joint.term().fixed]
         others = [node for node in joint.nodes if node != centre]
         closing = others if joint.origin == "loop" else []
-        if far := [node for node in closing if abs(path[node] - path[centre]) > REVISIT_DISTANCE]:
+        if far := [node for node in closing if abs(path[node] - path[centre]) > NScanOptions.visit_path]:
             closing = far
         found["loop"].update((centre, node) for node in closing)
         kind = "nScan" if is_joint(joint) else "pairwise"

@@ -16,8 +16,7 @@ from nscan_cli.slam.diagnostics.notices import notices
 from tests.simulation.drive import Drive
 from tests.simulation.faults import taken
 from tests.simulation.laser import Laser
-from tests.simulation.scenes import Scene, corridor_and_room
-from tests.simulation.world import Builder
+from tests.simulation.scenes import corridor_and_room, tee
 from tests.slam.mapped_logs import mapped
 
 HALT = 60
@@ -63,19 +62,6 @@ def test_the_sample_is_mapped_without_odometry_as_with_it():
         for given in (False, True)
     )
     np.testing.assert_allclose(alone.graph.poses[rows], guided.graph.poses[rows], atol=0.03)
-
-
-def tee() -> Scene:
-    """A bare corridor of 25 m, and a wall across its end."""
-    plan = Builder()
-    plan.line(-25.0, -1.0, 0.0, -1.0)
-    plan.line(-25.0, 1.0, 0.0, 1.0)
-    plan.line(-25.0, -1.0, -25.0, 1.0)
-    for y in (-8.0, 8.0):
-        plan.line(0.0, np.sign(y), 0.0, y)
-        plan.line(0.0, y, 2.0, y)
-    plan.line(2.0, -8.0, 2.0, 8.0)
-    return Scene("tee", plan.world(), np.array([(-18.0, 0.0), (1.0, 0.0), (1.0, 6.0)]))
 
 
 LASERS = {

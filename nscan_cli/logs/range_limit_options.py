@@ -1,0 +1,49 @@
+"""The options of reading which ranges are distances, and which value means "no return"."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class RangeLimitOptions:
+    """What a peak of readings is, and what limits of a laser."""
+
+    peak_readings: int = 20
+    """Least number of readings of a peak at one value. A larger value finds fewer peaks."""
+    peak_distance: float = 0.0015
+    """Largest distance of a peak from a limit, m: most lasers count millimetres. A larger value finds more
+    peaks."""
+    compared_range: float = 1.0
+    """Distance from a limit up to which readings are compared with a peak, m. With a larger value walls
+    farther away count."""
+    peak_ratio: float = 10.0
+    """Least ratio of a peak to the mean count of the values that it is compared with. A larger value finds
+    fewer peaks."""
+    peak_ratio_to_largest: float = 2.0
+    """Least ratio of a peak at a limit to the largest of these counts. A larger value finds fewer peaks."""
+    top_range: float = 0.25
+    """Distance from the largest reading within which the value for "no return" is looked for, m. With a
+    larger value, less sharp peaks fail to stand out."""
+    top_share: float = 0.01
+    """Least share of the sharpest count of a value that belongs to its peak. A larger value makes the peak
+    narrower."""
+    distinct_readings: int = 50
+    """Least number of distinct readings below a value for "no return". A larger value finds it in fewer
+    logs."""
+    neighbourhood: float = 1.25
+    """Factor between a distance and the farthest returns that count as just below or just beyond it. A larger
+    value compares more returns."""
+    max_drop: float = 0.1
+    """A distance is a limit of the laser if the returns just beyond are fewer than this share of those just
+    below. A larger value finds more limits."""
+    min_reported_share: float = 0.05
+    """Least share of returns beyond a limit of which the user is told. A larger value tells less."""
+    max_reported_share: float = 0.5
+    """Largest share of returns beyond a limit of which the user is told: with more, another warning gives the
+    number of usable readings. A larger value tells more."""
+    max_lost_share: float = 0.9
+    """If a larger share of the readings is unusable, the user is told. A larger value tells less."""
+
+
+DEFAULT_RANGE_LIMITS = RangeLimitOptions()
