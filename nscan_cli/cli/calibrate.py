@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import json
 import math
 from typing import TYPE_CHECKING, Any
 
@@ -11,11 +10,11 @@ from nscan_cli.cli.compilation import Compiling
 from nscan_cli.cli.log_reader import log_reader
 from nscan_cli.cli.robot_toml import changed_flags, robot_table, robot_toml
 from nscan_cli.cli.shared_options import common_options, reading_options
-from nscan_cli.cli.standard_streams import print_result
-from nscan_cli.cli.subcommand import PATH, log_argument, option, subcommand
+from nscan_cli.cli.standard_streams import print_json, print_result
+from nscan_cli.cli.subcommand import PATH, json_option, log_argument, option, subcommand
 from nscan_cli.cli.summary import Row, summary_table
 from nscan_cli.files.outputs import check_writable, write_atomically
-from nscan_cli.files.text import counted, json_bytes
+from nscan_cli.files.text import counted
 from nscan_cli.logs.reading_options import ReadingOptions
 
 if TYPE_CHECKING:
@@ -48,7 +47,7 @@ VALUE_UNITS = {
 @log_argument()
 @option("-o", "--output", type=PATH, metavar="ROBOT.toml",
         help="Also write the options for --config of all commands.")  # fmt: skip
-@option("--json", "as_json", is_flag=True, help="Print one JSON object (m, s, degrees).")
+@json_option
 @reading_options
 @common_options
 def command(
@@ -77,9 +76,7 @@ def command(
     ]
     if as_json:
         lasers = [one.facts() for one in found]
-        facts = lasers[0] if len(lasers) == 1 else {"lasers": lasers}
-        text = json.dumps(facts, ensure_ascii=False, allow_nan=False)
-        write_atomically("-", json_bytes(f"{text}\n"))
+        print_json(lasers[0] if len(lasers) == 1 else {"lasers": lasers})
     else:
         tables = [summary_table(one.rows(with_name=len(found) > 1)) for one in found]
         print_result("\n\n".join(tables) + "\n")

@@ -10,7 +10,7 @@ from nscan_cli.cli.plot_option import check_plot, plot_option, write_plot
 from nscan_cli.cli.progress import say
 from nscan_cli.cli.shared_options import common_options, reading_options
 from nscan_cli.cli.standard_streams import print_result
-from nscan_cli.cli.subcommand import PATH, argument, option, subcommand
+from nscan_cli.cli.subcommand import PATH, argument, json_option, option, subcommand
 from nscan_cli.errors import CheckFailedError, WrongUsageError
 from nscan_cli.logs.reading_options import ReadingOptions
 
@@ -46,7 +46,7 @@ DEFAULT_DRAWN = 10
         help="Exit with code 3 if the mean error (relations) or RMSE (ATE) is larger.")  # fmt: skip
 @option("--max-rotation", type=click.FloatRange(0), metavar="DEG",
         help="Exit with code 3 if the rotational error is larger.")  # fmt: skip
-@option("--json", "as_json", is_flag=True, help="Print one JSON object (m, s, degrees).")
+@json_option
 @plot_option("the worst relations (10, or N) over the trajectory, or the error along the reference")
 @reading_options
 @common_options

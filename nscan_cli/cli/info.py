@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-import json
 import math
 from typing import TYPE_CHECKING, Any
 
 from nscan_cli.cli.compilation import Compiling
 from nscan_cli.cli.laser_survey import laser_line, rate_of, survey_of
 from nscan_cli.cli.shared_options import common_options, reading_options
-from nscan_cli.cli.standard_streams import print_result
-from nscan_cli.cli.subcommand import log_argument, option, subcommand
+from nscan_cli.cli.standard_streams import print_json, print_result
+from nscan_cli.cli.subcommand import json_option, log_argument, subcommand
 from nscan_cli.cli.summary import Row, summary_table
-from nscan_cli.files.outputs import write_atomically
-from nscan_cli.files.text import counted, json_bytes
+from nscan_cli.files.text import counted
 from nscan_cli.logs.reading_options import ReadingOptions
 
 if TYPE_CHECKING:
@@ -26,7 +24,7 @@ if TYPE_CHECKING:
     ("nscan-cli info --json robot.mcap | jq .scans", "one value, for a script"),
 )
 @log_argument()
-@option("--json", "as_json", is_flag=True, help="Print one JSON object (m, s, degrees).")
+@json_option
 @reading_options
 @common_options
 def command(log: tuple[str, ...], as_json: bool, reading: ReadingOptions, **_common: Any) -> None:
@@ -43,8 +41,7 @@ def command(log: tuple[str, ...], as_json: bool, reading: ReadingOptions, **_com
         Compiling("half a minute", bool(_common["quiet"]))
         facts["warnings"] += _contradictions(survey.log, reading)
     if as_json:
-        text = json.dumps(facts, ensure_ascii=False, allow_nan=False)
-        write_atomically("-", json_bytes(f"{text}\n"))
+        print_json(facts)
     else:
         print_result(f"{facts_table(facts)}\n")
     if survey.refused is not None:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import json
-
 import click
 
 from nscan_cli.cli.map_comparison import draw_comparison
@@ -14,11 +12,12 @@ from nscan_cli.cli.plot_option import check_second_output, check_second_outputs
 from nscan_cli.cli.progress import say
 from nscan_cli.cli.result_over_log import load_result, log_of, over_log
 from nscan_cli.cli.shared_options import common_options, reading_options
-from nscan_cli.cli.subcommand import PATH, argument, option, subcommand
+from nscan_cli.cli.standard_streams import print_json
+from nscan_cli.cli.subcommand import PATH, argument, json_option, option, subcommand
 from nscan_cli.errors import WrongUsageError
 from nscan_cli.files.inputs import base_name
 from nscan_cli.files.outputs import check_writable, is_device, write_atomically
-from nscan_cli.files.text import counted, json_bytes
+from nscan_cli.files.text import counted
 from nscan_cli.logs.reading_options import ReadingOptions
 
 
@@ -56,7 +55,7 @@ from nscan_cli.logs.reading_options import ReadingOptions
         help="Also write map, path, graph and scans for Foxglove and RViz.")  # fmt: skip
 @option("--poses", type=PATH, metavar="OUT.tum",
         help="Also write the poses in the frame of the map, in TUM format.")  # fmt: skip
-@option("--json", "as_json", is_flag=True, help="Print one JSON object (m, s, degrees).")
+@json_option
 @shape_options
 @reading_options
 @common_options
@@ -178,8 +177,7 @@ def command(
 
         write_atomically(poses, write_tum(whole.stamps, whole.poses))
     if as_json:
-        facts = json.dumps(shaped.facts(output, len(rows)), ensure_ascii=False, allow_nan=False)
-        write_atomically("-", json_bytes(f"{facts}\n"))
+        print_json(shaped.facts(output, len(rows)))
     elif output != "-":
         low_x, low_y, high_x, high_y = grid.bounds
         size = f"{high_x - low_x:.1f} m × {high_y - low_y:.1f} m"

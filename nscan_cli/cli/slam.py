@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import sys
 import time
 from typing import TYPE_CHECKING, Any
@@ -14,11 +13,10 @@ from nscan_cli.cli.progress import say
 from nscan_cli.cli.shared_options import common_options, reading_options
 from nscan_cli.cli.slam_outputs import SlamOutputs
 from nscan_cli.cli.slam_summary import facts_lines
-from nscan_cli.cli.subcommand import PATH, log_argument, option, subcommand
+from nscan_cli.cli.standard_streams import print_json
+from nscan_cli.cli.subcommand import PATH, json_option, log_argument, option, subcommand
 from nscan_cli.errors import CheckFailedError, WrongUsageError
 from nscan_cli.files.inputs import label
-from nscan_cli.files.outputs import write_atomically
-from nscan_cli.files.text import json_bytes
 from nscan_cli.logs.reading_options import ReadingOptions
 
 if TYPE_CHECKING:
@@ -69,7 +67,7 @@ MAPPING_OPTIONS = ("max_scans", "relations", "no_loops", "calibrate", "verify", 
         help="Number of threads. Default: one per processor. The result does not depend on it.")  # fmt: skip
 @option("--depfile", type=PATH, metavar="FILE",
         help="Also write the inputs of all outputs as a rule for make.")  # fmt: skip
-@option("--json", "as_json", is_flag=True, help="Print one JSON object (m, s, degrees).")
+@json_option
 @reading_options
 @common_options
 def command(
@@ -149,7 +147,7 @@ def command(
         "written": outputs.files(),
     }
     if as_json:
-        write_atomically("-", json_bytes(f"{json.dumps(facts, ensure_ascii=False, allow_nan=False)}\n"))
+        print_json(facts)
     else:
         say(facts_lines(facts, verbose > 0), quiet)
     _check_bound(run.inputs[0], facts["verification"])

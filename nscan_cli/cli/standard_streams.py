@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import codecs
 import io
+import json
 import sys
+from typing import Any
 
-from nscan_cli.files.text import encode_fallback, printable
+from nscan_cli.files.outputs import write_atomically
+from nscan_cli.files.text import encode_fallback, json_bytes, printable
 
 HANDLER = "nscan-cli"
 """Name of the encoding error handler of both streams."""
@@ -23,6 +26,12 @@ def configure_streams() -> None:
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors=HANDLER)
+
+
+def print_json(facts: dict[str, Any]) -> None:
+    """Print one JSON object to standard output, in UTF-8. Raises OutputError."""
+    text = json.dumps(facts, ensure_ascii=False, allow_nan=False)
+    write_atomically("-", json_bytes(f"{text}\n"))
 
 
 def print_result(text: str) -> None:

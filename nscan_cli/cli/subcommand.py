@@ -127,6 +127,8 @@ result_option = option(
     help="File for the result. Default: standard output.",
 )  # fmt: skip
 """The output option of commands whose result is a short document."""
+json_option = option("--json", "as_json", is_flag=True, help="Print one JSON object (m, s, degrees).")
+"""The option of commands that can print their result or their summary for a program."""
 
 
 class Subcommand(click.Command):

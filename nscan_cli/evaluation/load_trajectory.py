@@ -14,14 +14,7 @@ from nscan_cli.graph.io.json_graph import parse_graph
 from nscan_cli.graph.io.pose_columns import is_pose_table
 from nscan_cli.graph.io.tum import Trajectory, parse_tum
 from nscan_cli.logs.laser_log import DEFAULT_READING, LaserLog
-from nscan_cli.logs.load import (
-    content_of,
-    log_from,
-    read_log,
-    read_recording,
-    recording_from,
-    stored_bytes,
-)
+from nscan_cli.logs.load import content_of, log_from, read_log, read_recording, recording_from, stored_bytes
 from nscan_cli.logs.reading_options import ReadingOptions
 from nscan_cli.logs.recordings.pose_topics import poses_on_topic
 from nscan_cli.poses import are_known

@@ -60,7 +60,8 @@ class RemarkOptions:
     """Least ratio of the residuals of the positions without and with the remark. A larger value remarks
     less."""
     lever_improvement: float = 2.0
-    """The same ratio for another point of the robot, whose turns show it. A larger value remarks less."""
+    """Least ratio of the residuals without and with another point of the robot. A larger value remarks
+    less."""
     as_good: float = 1.5
     """Largest ratio of the residuals of two explanations that are as good as each other. A larger value
     prefers the simpler one more often."""

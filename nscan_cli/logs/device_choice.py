@@ -27,12 +27,7 @@ class OpenChoiceError(WrongUsageError):
     """A log has several lasers or odometries, and the user has not chosen one."""
 
     def __init__(
-        self,
-        file: str,
-        what: DeviceKind,
-        devices: Sequence[Device],
-        option: str,
-        thing: str,
+        self, file: str, what: DeviceKind, devices: Sequence[Device], option: str, thing: str
     ) -> None:
         several = {"laser": "lasers", "odometry": "odometries"}[what]
         none = ", or none by --no-odometry" if what == "odometry" else ""

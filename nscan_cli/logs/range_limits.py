@@ -84,12 +84,7 @@ def limits_in_force(
 
 
 def _upper_limits(
-    raw: RawScans,
-    high: Array,
-    high_from: str,
-    end: float,
-    warnings: list[str],
-    checks: RangeLimitOptions,
+    raw: RawScans, high: Array, high_from: str, end: float, warnings: list[str], checks: RangeLimitOptions
 ) -> tuple[Array, str]:
     """The upper limits (S,) that the log names, and their origin.
 

@@ -24,20 +24,20 @@ class RangeUnitOptions:
     """When the readings are not in metres."""
 
     min_median: float = 0.2
-    """Least median reading of a plausible unit, m. A smaller value takes larger units for possible."""
+    """Least median reading of a plausible unit, m. A larger value takes fewer units for possible."""
     max_median: float = 40.0
     """Largest median reading of a plausible unit, m; it bounds metres too. A larger value warns of fewer
     logs."""
     remote_median: float = 100.0
     """From this median reading on, the unit cannot be metres, m. A larger value corrects fewer logs."""
     typical_median: float = 3.0
-    """Median reading that is expected, m."""
+    """Median reading that is expected, m. A larger value prefers larger units."""
     certain_factor: float = 4.0
     """A unit is certain if the median is within this factor of the typical one. A larger value corrects more
     logs."""
     unlikely_factor: float = 6.0
-    """And if the median in every other unit is off the typical one by more than this factor. A smaller value
-    corrects more logs."""
+    """Least factor by which the median in every other unit is off the typical one, if a unit is certain. A
+    larger value corrects fewer logs."""
     min_returns: int = 50
     """Least number of returns that make a unit certain. A larger value corrects fewer logs."""
     limits_apart: float = 1.0

@@ -32,7 +32,7 @@ class RobotPartsOptions:
     max_tolerance: float = 0.05
     """Largest deviation that is allowed, m. A larger value finds looser parts."""
     min_share: float = 0.6
-    """Least share of all scans in which the range is constant. A smaller value finds what is added later."""
+    """Least share of all scans in which the range is constant. A larger value misses what was added later."""
     min_turning_share: float = 0.85
     """Least share of scans in turns in which the range is constant. For a wall at the side it is two thirds
     in a turn at a corner, where another wall comes next. A smaller value finds parts that the laser often

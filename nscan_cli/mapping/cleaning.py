@@ -1,6 +1,6 @@
 """A map without what robots cannot use: space seen through glass, single specks, and people who went.
 
-Each changes the counts of cells, so that all that is made of the map agrees.
+What is removed leaves the counts of hits and misses, so that all that is made of the map agrees.
 """
 
 from __future__ import annotations
@@ -22,14 +22,17 @@ class CleaningOptions:
     """Decide what is removed."""
 
     visit_length: float = 20.0
-    """Path of one visit, m. Whoever stands at a place during a shorter one is seen in one visit only."""
+    """Length of the path of one visit, m. A larger value keeps more people: who stands at a place throughout
+    is in one visit, and no other looks through."""
     min_looks: int = 2
-    """Least beams of a visit through a cell that has looked through it. More spare what stray beams pass."""
+    """Least number of beams of a visit through a cell for the visit to have looked through it. A larger value
+    removes less, as it ignores stray beams."""
     looks_per_hit: float = 2.0
-    """Visits that look through a cell for each visit that hits it, from which on what stood there has gone.
-    With less, doors that were open half of the time go as well."""
+    """Least ratio of visits that look through a cell to those that hit it if what stood there has gone. A
+    larger value removes less. A smaller one also removes doors that were open half of the time."""
     visits_of_post: int = 2
-    """Visits that have hit a single cell that stays: a post, or the leg of a table. More remove railings."""
+    """Least number of visits that have hit a single occupied cell that stays, as a post or the leg of a
+    table. A larger value removes more, such as railings."""
 
 
 class Removed(NamedTuple):

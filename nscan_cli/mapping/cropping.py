@@ -21,10 +21,10 @@ class CroppingOptions:
     """Decide what an automatic rectangle leaves out."""
 
     outside: float = 0.001
-    """Share of the hits that may lie outside on each side. More cuts off real walls, less keeps what was
-    seen through a window far away."""
+    """Share of the hits that may lie outside on each side. A larger value cuts off real walls; a smaller one
+    keeps what was seen through a window far away."""
     margin: float = 0.5
-    """Space to spare around the rest, m."""
+    """Space around the rest, m. A larger value makes larger maps."""
 
 
 def automatic_box(grid: OccupancyGrid, path: Array, options: CroppingOptions | None = None) -> Box:

@@ -17,14 +17,7 @@ from numpy.typing import NDArray
 from nscan_cli.errors import WrongUsageError
 from nscan_cli.files.limits import MAP_CELLS
 from nscan_cli.logs.laser_log import LaserLog
-from nscan_cli.mapping.ray_casting import (
-    TILE,
-    ScanRays,
-    SweptRays,
-    TileCounts,
-    cast_rays,
-    ray_bounds,
-)
+from nscan_cli.mapping.ray_casting import TILE, ScanRays, SweptRays, TileCounts, cast_rays, ray_bounds
 from nscan_cli.poses import Array, Indices
 
 

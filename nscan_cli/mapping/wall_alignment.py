@@ -22,12 +22,14 @@ class WallAlignmentOptions:
     coarse_step: float = math.radians(0.25)
     """Step of the first search through 90°, rad. With a larger one long walls can be missed."""
     coarse_width: float = 0.1
-    """Standard deviation of the lines in the first search, m. It has to hold what a step displaces the ends
-    of walls."""
+    """Standard deviation of the lines in the first search, m. A larger value tells directions less; a smaller
+    one does not hold walls whose ends a step displaces by more."""
     fine_step: float = math.radians(0.01)
-    """Step of the search around the best, rad: 1.7 cm at the end of a wall of 100 m."""
+    """Step of the search around the best turn, rad: 1.7 cm at the end of a wall of 100 m. A larger value
+    turns less exactly."""
     fine_width: float = 0.05
-    """The same for the lines there, m. With less than a cell, the raster of the map attracts its walls."""
+    """Standard deviation of the lines in the search around the best turn, m. A larger value tells directions
+    less. With less than a cell, the raster of the map attracts its walls."""
 
 
 def wall_alignment(grid: OccupancyGrid, options: WallAlignmentOptions | None = None) -> float:

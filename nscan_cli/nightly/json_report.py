@@ -58,11 +58,7 @@ def _log_json(check: CheckResult) -> dict[str, Any]:
         "evaluation": None if last is None else last["evaluation"],
         "outputs": [] if last is None else [f"{entry.name}/{name}" for name in last["outputs"]],
         "nights": [
-            {
-                "tool": run["tool"],
-                "outcome": run["outcome"],
-                "errors": _errors_json(MeasuredErrors.of(run)),
-            }
+            {"tool": run["tool"], "outcome": run["outcome"], "errors": _errors_json(MeasuredErrors.of(run))}
             for run in check.runs
         ],
         "times": {"nights": [run["times"] for run in check.runs]},

@@ -20,12 +20,13 @@ class TwoLaserOptions:
     sample: int = 128
     """Number of scans that are compared with the next two. A larger value takes longer."""
     min_scans: int = 20
-    """Least number of scans of which something is said."""
+    """Least number of scans of a topic that are tested. A larger value finds fewer lasers."""
     min_compared: int = 10
-    """Least number of beams with a return in both of two scans that are compared."""
+    """Least number of beams with a return in both of two scans that are compared. A larger value compares
+    fewer scans."""
     min_difference: float = 0.1
-    """Least difference between the scans of two lasers, as a share of the ranges. A smaller value finds more
-    lasers, and takes noise for them."""
+    """Least difference between the scans of two lasers, as a share of the ranges. A larger value finds fewer
+    lasers; a smaller one takes noise for them."""
     max_ratio: float = 0.5
     """Greatest ratio of the difference between a scan and the second next to that between it and the next, if
     the second next is of the same laser. A larger value finds more lasers."""

@@ -131,11 +131,7 @@ def _transforms_from_odom(tree: TransformTree) -> dict[str, list[LoggedTransform
 
 
 def _poses_at_scans(
-    rows: Sequence[LoggedTransform],
-    source: str,
-    clock: ScanClock,
-    offset: float,
-    findings: Findings,
+    rows: Sequence[LoggedTransform], source: str, clock: ScanClock, offset: float, findings: Findings
 ) -> tuple[Array | None, RobotPath | None]:
     """Interpolated poses (S, 3) at the times of the scans, and the path; None without a valid pose.
 

@@ -26,7 +26,8 @@ class TurnSegmentOptions:
     """Least share of messages that go on where the one before ends. A larger value joins fewer recordings."""
     min_gap_ratio: float = 2.0
     """A turn begins after the longest pause if that is so many times the median one. Else it begins at the
-    end of the field of view, or with the first message if there is no end."""
+    end of the field of view, or with the first message if there is no end. A larger value needs longer
+    pauses."""
 
 
 DEFAULT_TURN_SEGMENTS = TurnSegmentOptions()

@@ -45,12 +45,7 @@ def plot_relations(poses: Array, pairs: Indices, errors: Array, title: str, besi
 
 
 def plot_against_reference(
-    poses: Array,
-    rows: Indices,
-    errors: Array,
-    reference: Array,
-    title: str,
-    beside: bool = False,
+    poses: Array, rows: Indices, errors: Array, reference: Array, title: str, beside: bool = False
 ) -> Canvas:
     """A trajectory `poses` (N, 3), aligned to the `reference` (M, 3), with its errors in colour.
 

@@ -61,12 +61,7 @@ def plot_over_map(grid: OccupancyGrid, graph: Graph, overlays: Overlays) -> Canv
 
 
 def plot_paper_figure(
-    log: LaserLog,
-    rows: Indices,
-    poses: Array,
-    grid: OccupancyGrid,
-    graph: Graph,
-    overlays: Overlays,
+    log: LaserLog, rows: Indices, poses: Array, grid: OccupancyGrid, graph: Graph, overlays: Overlays
 ) -> Canvas:
     """Points and path on white with axes in metres, as in Figs. 6 and 7 of the paper.
 

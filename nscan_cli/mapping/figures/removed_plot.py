@@ -10,11 +10,7 @@ from nscan_cli.mapping.figures.canvas import PURPLE, SKY, VERMILLION, Canvas
 from nscan_cli.mapping.figures.map_plots import background_image, points_of_cells
 from nscan_cli.mapping.occupancy import OccupancyGrid
 
-KINDS = (
-    ("unconnected", SKY, "not connected"),
-    ("specks", VERMILLION, "specks"),
-    ("gone", PURPLE, "gone"),
-)
+KINDS = (("unconnected", SKY, "not connected"), ("specks", VERMILLION, "specks"), ("gone", PURPLE, "gone"))
 
 
 def plot_removed(grid: OccupancyGrid, removed: Removed) -> Canvas:

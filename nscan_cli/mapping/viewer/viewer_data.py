@@ -29,9 +29,7 @@ COMPRESSION = 6
 
 
 def viewer_data(
-    graph: Graph,
-    bounds: tuple[float, float, float, float],
-    scans: tuple[LaserLog, Indices, Indices] | None,
+    graph: Graph, bounds: tuple[float, float, float, float], scans: tuple[LaserLog, Indices, Indices] | None
 ) -> bytes:
     """The block for a graph over a picture of the map with `bounds` (m).
 
