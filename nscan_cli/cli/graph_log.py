@@ -14,7 +14,7 @@ from nscan_cli.files.limits import DISTANCE
 from nscan_cli.files.provenance import is_made_from
 from nscan_cli.files.text import counted, name_of_path, path_of_name
 from nscan_cli.logs.log_files import JOURNAL_SUFFIXES
-from nscan_cli.logs.reading_options import ReadingOptions
+from nscan_cli.logs.reading_options import ReadingOptions, as_tuples
 
 if TYPE_CHECKING:
     from nscan_cli.files.provenance import Source
@@ -142,13 +142,8 @@ def _options_of_slam(reading: ReadingOptions, graph_file: str, provenance: dict[
             if not _is_value_of(value, str(option.type)):
                 problem = f"provenance.parameters.reading: {option.name} is {str(value)[:40]!r}"
                 raise InputDataError(graph_file, problem, "correct it, or create the graph again")
-            kept[option.name] = _as_tuples(value)
+            kept[option.name] = as_tuples(value)
     return dataclasses.replace(reading, **kept)
-
-
-def _as_tuples(value: Any) -> Any:
-    """The value with tuples in place of lists."""
-    return tuple(_as_tuples(part) for part in value) if isinstance(value, list) else value
 
 
 def _is_value_of(value: Any, kind: str) -> bool:

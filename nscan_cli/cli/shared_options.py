@@ -46,13 +46,12 @@ class MaskType(click.ParamType[Any]):
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
         """Parse the sectors; a wrong form is a usage error."""
+        from nscan_cli.logs.beam_mask import sectors_from
+
         try:
-            sectors = [tuple(float(part) for part in sector.split(":")) for sector in value.split(",")]
+            return sectors_from(value)
         except ValueError:
-            sectors = [()]
-        if not all(len(sector) == 2 and all(map(math.isfinite, sector)) for sector in sectors):
             self.fail(f"{value!r} is not of the form FROM:TO,..., as in 130:150,-150:-130", param, ctx)
-        return tuple((math.radians(first), math.radians(last)) for first, last in sectors)
 
 
 class SweepType(click.ParamType[Any]):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 from nscan_cli.errors import WrongUsageError
 
@@ -102,3 +103,8 @@ class ReadingOptions:
     def _refuse(self, option: str, value: str | None, file: str, form: str, instead: str) -> None:
         if value is not None:
             raise WrongUsageError(f"{file}: is {form}, without topics; leave out {option}, see {instead}")
+
+
+def as_tuples(value: Any) -> Any:
+    """The value of an option from a document, with tuples in place of lists."""
+    return tuple(as_tuples(part) for part in value) if isinstance(value, list) else value

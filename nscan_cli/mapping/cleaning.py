@@ -11,8 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from nscan_cli.logs.laser_log import LaserLog
-from nscan_cli.mapping.counted_grid import grid_of_counts
-from nscan_cli.mapping.occupancy import FREE, OCCUPIED, OccupancyGrid
+from nscan_cli.mapping.occupancy import FREE, OCCUPIED, OccupancyGrid, grid_of_counts
 from nscan_cli.mapping.visits import visit_counts
 from nscan_cli.poses import Array, Indices, Mask
 

@@ -8,8 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from nscan_cli.errors import WrongUsageError
-from nscan_cli.mapping.counted_grid import grid_of_counts
-from nscan_cli.mapping.occupancy import OCCUPIED, OccupancyGrid
+from nscan_cli.mapping.occupancy import OCCUPIED, OccupancyGrid, grid_of_counts
 from nscan_cli.poses import Array
 
 Box = tuple[float, float, float, float]

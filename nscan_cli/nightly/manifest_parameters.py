@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from nscan_cli.errors import InputDataError, WrongUsageError
+from nscan_cli.logs.beam_mask import Bearings, sectors_from
 from nscan_cli.logs.reading_options import ReadingOptions
 
 RELATION_CHOICES = ("pairwise", "nscan", "both")
@@ -34,6 +35,8 @@ class LogParameters:
                 continue
             if key == "odometry":
                 table["no-odometry"] = True
+            elif key == "mask":
+                table[key] = ",".join(f"{math.degrees(a):.9g}:{math.degrees(b):.9g}" for a, b in value)
             elif key == "mount":
                 table[key] = [value[0], value[1], round(math.degrees(value[2]), 9)]
             else:
@@ -61,6 +64,8 @@ def parameters_from(place: str, table: dict[str, Any]) -> LogParameters:
             reading["mount"] = _mount_pose(place, value)
         elif key == "no-odometry":
             reading["odometry"] = not value
+        elif key == "mask":
+            reading["mask"] = _mask_sectors(place, value)
         else:
             reading[key.replace("-", "_")] = math.radians(value) if key in DEGREE_OPTIONS else value
     if mapping.get("max-scans", 3) < 3:
@@ -97,7 +102,7 @@ def _reading_options() -> dict[str, type]:
         kind = str(option.type).partition(" ")[0].partition("[")[0]
         name = "no-odometry" if option.name == "odometry" else option.name.replace("_", "-")
         options[name] = types[kind]
-    return options
+    return {**options, "mask": str}
 
 
 def _is_a(value: Any, wanted: type) -> bool:
@@ -110,6 +115,13 @@ def _mount_pose(place: str, value: list[Any]) -> tuple[float, float, float]:
         raise _parameter_error(place, "mount", value, TYPE_WORDS[list])
     x, y, degrees = value
     return float(x), float(y), math.radians(degrees)
+
+
+def _mask_sectors(place: str, value: str) -> tuple[Bearings, ...]:
+    try:
+        return sectors_from(value)
+    except ValueError as error:
+        raise _parameter_error(place, "mask", value, "FROM:TO,..., as in 130:150,-150:-130") from error
 
 
 def _parameter_error(place: str, key: str, value: Any, wanted: str) -> InputDataError:

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from nscan_cli.logs.reading_options import ReadingOptions
+from nscan_cli.logs.reading_options import ReadingOptions, as_tuples
 from nscan_cli.nightly.manifest import ManifestEntry
 
 OUTPUTS, TASK, RESULT = "outputs", "task.json", "result.json"
@@ -45,8 +45,7 @@ class Task:
 
 def reading_options_from(record: dict[str, Any]) -> ReadingOptions:
     """The reading options of a task's JSON."""
-    mount = record["mount"]
-    return ReadingOptions(**{**record, "mount": None if mount is None else tuple(mount)})
+    return ReadingOptions(**{name: as_tuples(value) for name, value in record.items()})
 
 
 @dataclass(frozen=True)

@@ -7,8 +7,7 @@ import pytest
 
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.mapping.cleaning import Removed, cleaned_map
-from nscan_cli.mapping.counted_grid import grid_of_counts
-from nscan_cli.mapping.occupancy import FREE, OCCUPIED, UNKNOWN, OccupancyGrid, occupancy_grid
+from nscan_cli.mapping.occupancy import FREE, OCCUPIED, UNKNOWN, OccupancyGrid, grid_of_counts, occupancy_grid
 from nscan_cli.mapping.visits import visit_counts
 from tests.mapping.handmade_logs import log_of
 

@@ -2,8 +2,8 @@ import numpy as np
 import pytest
 
 from nscan_cli.errors import WrongUsageError
-from nscan_cli.mapping.counted_grid import grid_of_counts
 from nscan_cli.mapping.cropping import automatic_box, cropped_grid
+from nscan_cli.mapping.occupancy import grid_of_counts
 
 
 @pytest.fixture

@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from nscan_cli.mapping.counted_grid import grid_of_counts
 from nscan_cli.mapping.map_server import map_image, map_png, map_yaml
-from nscan_cli.mapping.occupancy import FREE, OCCUPIED, UNKNOWN, OccupancyGrid
+from nscan_cli.mapping.occupancy import FREE, OCCUPIED, UNKNOWN, OccupancyGrid, grid_of_counts
 from tests.mapping.nav2 import load_map
 
 

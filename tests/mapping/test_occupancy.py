@@ -7,13 +7,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from nscan_cli.errors import WrongUsageError
-from nscan_cli.mapping.counted_grid import grid_of_counts
 from nscan_cli.mapping.occupancy import (
     DEFAULT_OCCUPANCY,
     FREE,
     OCCUPIED,
     UNKNOWN,
     OccupancyGrid,
+    grid_of_counts,
     occupancy_grid,
 )
 from tests.mapping.handmade_logs import half_circle, log_of

@@ -3,8 +3,7 @@ import math
 import numpy as np
 import pytest
 
-from nscan_cli.mapping.counted_grid import grid_of_counts
-from nscan_cli.mapping.occupancy import OccupancyGrid
+from nscan_cli.mapping.occupancy import OccupancyGrid, grid_of_counts
 from nscan_cli.mapping.wall_alignment import wall_alignment
 
 SIZE = 0.05

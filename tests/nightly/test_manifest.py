@@ -84,7 +84,8 @@ def test_what_is_known_of_a_log(tmp_path):
 
 
 def test_parameters_as_a_table(tmp_path):
-    table = {"mount": [0.1, 0.0, 90.0], "angle-min": -90.0, "no-odometry": True, "max-scans": 4, "laser": "R"}
+    table = {"mount": [0.1, 0.0, 90.0], "angle-min": -90.0, "no-odometry": True, "max-scans": 4, "laser": "R",
+             "mask": "130:150,-150:-130"}  # fmt: skip
     parameters = parameters_from("", table)
     assert parameters.as_table() == table
     assert json.loads(json.dumps(parameters.as_table())) == table
@@ -136,6 +137,8 @@ def test_parameters_are_options_of_slam(tmp_path):
         ('[[log]]\nname = "a"\nparameters = { flip = 1 }', "parameters: flip is 1; give true or false"),
         ('[[log]]\nname = "a"\nparameters = { max-scans = 2 }', "max-scans is 2; give 3 or more"),
         ('[[log]]\nname = "a"\nparameters = { relations = "x" }', "give one of pairwise, nscan, both"),
+        ('[[log]]\nname = "a"\nparameters = { mask = "13" }', "mask is '13'; give FROM:TO,"),
+        ('[[log]]\nname = "a"\nparameters = { mask = [[1, 2]] }', r"mask is \[\[1, 2\]\]; give a text"),
         ('[[log]]\nname = "a"\nparameters = { mount = [1] }', r"mount is \[1\]; give \[x, y, degrees\]"),
         ('[[log]]\nname = "a"\nparameters = { start = 9, end = 5 }', "parameters: --start is after --end"),
     ],

@@ -7,11 +7,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from nscan_cli.mapping.counted_grid import grid_of_counts
 from nscan_cli.mapping.figures.axes import SCALE_BAR_MARGINS, draw_scale_bar
 from nscan_cli.mapping.figures.canvas import BLUE, VERMILLION, Canvas
 from nscan_cli.mapping.figures.map_plots import background_image, points_of_cells
-from nscan_cli.mapping.occupancy import FREE, OCCUPIED, OccupancyGrid
+from nscan_cli.mapping.occupancy import FREE, OCCUPIED, OccupancyGrid, grid_of_counts
 from nscan_cli.poses import Array
 
 

@@ -2,13 +2,12 @@ import numpy as np
 import pytest
 
 from nscan_cli.graph.model import Graph, NScan, Pairwise
-from nscan_cli.mapping.counted_grid import grid_of_counts
 from nscan_cli.mapping.figures import map_plots
 from nscan_cli.mapping.figures.axes import round_length
 from nscan_cli.mapping.figures.canvas import BLUE, GRAY, GREEN, PURPLE, SKY, VERMILLION, Canvas
 from nscan_cli.mapping.figures.graph_edges import edges_by_kind
 from nscan_cli.mapping.figures.map_plots import Overlays, plot_over_map, plot_paper_figure
-from nscan_cli.mapping.occupancy import OccupancyGrid, occupancy_grid
+from nscan_cli.mapping.occupancy import OccupancyGrid, grid_of_counts, occupancy_grid
 from tests.mapping.handmade_logs import half_circle
 
 PATH = np.array([[0.0, 0.0, 0.0], [4.0, 0.0, 0.0], [4.0, 4.0, 0.0], [0.0, 4.0, 0.0]])

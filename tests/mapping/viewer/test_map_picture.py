@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from nscan_cli.mapping.counted_grid import grid_of_counts
 from nscan_cli.mapping.figures.map_plots import SOFT_GRAYS
-from nscan_cli.mapping.occupancy import FREE, OCCUPIED, UNKNOWN
+from nscan_cli.mapping.occupancy import FREE, OCCUPIED, UNKNOWN, grid_of_counts
 from nscan_cli.mapping.viewer.map_picture import map_picture
 
 
