@@ -11,14 +11,11 @@ class AlignmentOptions:
     """When headings decide the angle of an alignment, and not positions."""
 
     position_error: float = 0.02
-    """Error of positions that is always assumed, m: markers are not placed more exactly. A larger value lets
-    headings decide more often."""
+    """Error of positions that is always assumed, m. A larger value lets headings decide more often."""
     max_angle_sigma: float = 0.2
-    """Largest uncertainty of the angle by positions, rad. Beyond, headings may decide it. A larger value lets
-    headings decide less often."""
+    """Largest sigma of an angle by positions, rad. A larger value lets headings decide less often."""
     driven_distance: float = 0.3
-    """Common motion from which on positions always decide the angle, m (RMS about the mean). A larger value
-    lets headings decide more often."""
+    """Least common motion (RMS) with which positions decide, m. With a larger value, headings do."""
 
 
 @dataclass(frozen=True)
@@ -34,18 +31,15 @@ class ClockLagOptions:
     max_poses: int = 500
     """Number of poses of the result that are compared, evenly spread. A larger value takes longer."""
     min_poses: int = 20
-    """Least number of poses of paths without a common time: with fewer, some lag makes any two paths fit. A
-    larger value finds fewer lags."""
+    """Least poses of paths without a common time: any two short paths fit. A larger value finds less."""
     kept_poses: float = 0.6
-    """Least share of the overlapping poses that a lag must keep. A larger value finds fewer lags."""
+    """Least share of the overlapping poses that a lag must keep. A larger value finds less."""
     kept_motion: float = 0.5
-    """Least share of the motion in the overlapping poses that a lag must keep. A larger value finds fewer
-    lags."""
+    """Least share of the motion in the overlapping poses that a lag must keep. A larger value finds less."""
     other_lag: float = 1.0
-    """Difference from the best lag from which on another one must be worse, s: robots can drive in circles. A
-    larger value finds more lags."""
+    """Least difference of another lag, which must be worse, from the best, s. A larger value finds more."""
     cost_ratio: float = 1.5
-    """Least ratio of the cost of any other lag to that of the best. A larger value finds fewer lags."""
+    """Least ratio of the cost of any other lag to that of the best. A larger value finds less."""
 
 
 @dataclass(frozen=True)
@@ -57,17 +51,14 @@ class RemarkOptions:
     max_residual: float = 0.1
     """Largest residual of a path with the remark, as a share of its motion. A larger value remarks more."""
     improvement: float = 3.0
-    """Least ratio of the residuals of the positions without and with the remark. A larger value remarks
-    less."""
+    """Least ratio of the residuals without and with the remark. A larger value remarks less."""
     lever_improvement: float = 2.0
     """Least ratio of the residuals without and with another point of the robot. A larger value remarks
     less."""
     as_good: float = 1.5
-    """Largest ratio of the residuals of two explanations that are as good as each other. A larger value
-    prefers the simpler one more often."""
+    """Largest ratio of the residuals of two equal explanations. A larger value prefers the simpler one."""
     rounding: float = 1e-5
-    """Residual that may be rounding, as a share of the motion. A larger value prefers the simpler of two
-    explanations more often."""
+    """Residual that may be rounding, as a share of the motion. A larger value prefers the simpler one."""
     min_sigmas: float = 5.0
     """Least size of a turn or of a lever arm, in standard deviations. A larger value remarks less."""
     min_turn: float = math.radians(3.0)
@@ -83,8 +74,7 @@ class RemarkOptions:
     max_tilt: float = math.radians(5.0)
     """Largest tilt of a path in the plane, rad. A larger value remarks less."""
     path_ratio: float = 2.0
-    """A path that is this many times longer in order of time than in order of the file is that of two runs. A
-    larger value remarks less."""
+    """Least ratio of a path by time to that by the file, of two runs. A larger value remarks less."""
     repeated_share: float = 0.05
     """Least share of repeated stamps in a file of two runs. A larger value remarks less."""
     repeated_distance: float = 0.05
@@ -97,8 +87,7 @@ class EvaluationOptions:
     """All options of an evaluation."""
 
     tolerance: float = 0.1
-    """Largest difference in time of two poses that match, s, as in Kümmerle's metric. A larger value compares
-    more poses."""
+    """Largest time between two poses that match (Kümmerle's metric), s. A larger value compares more."""
     relative_distance: float = 1.0
     """Path in the reference between the two poses of a relative error, m. Over a larger value, errors
     grow."""

@@ -31,19 +31,15 @@ class BeamAngleOptions:
     max_scans: int = 200
     """Number of scans whose walls are tested. A larger value takes longer."""
     max_half_width: float = 0.5
-    """Largest angle between two beams that are compared, rad: walls seldom extend farther to each side. A
-    larger value tells finer differences."""
+    """Largest angle between two beams that are compared, rad. A larger value needs wider walls."""
     min_difference: float = 0.03
-    """Least difference of 2 cos(k s) between two steps s that noise of 1 % does not hide. A larger value
-    compares beams that are farther apart."""
+    """Least difference of 2 cos(k s) of two steps s, above noise of 1 %. A larger value needs wider walls."""
     max_deviation: float = 0.02
-    """Largest deviation of a beam on a wall from 2 cos(k s). A larger value takes more of what is no wall for
-    one."""
+    """Largest deviation of a beam on a wall from 2 cos(k s). A larger value takes more for walls."""
     min_votes: int = 200
     """Least number of beams on walls for a decision. A larger value decides in fewer logs."""
     min_vote_ratio: float = 1.5
-    """Least ratio of the beams on walls by the chosen step to those by the other one. A larger value decides
-    in fewer logs."""
+    """Least ratio of the beams on walls by the two steps. A larger value decides in fewer logs."""
 
 
 DEFAULT_BEAM_ANGLES = BeamAngleOptions()

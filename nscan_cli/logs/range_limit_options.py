@@ -12,31 +12,23 @@ class RangeLimitOptions:
     peak_readings: int = 20
     """Least number of readings of a peak at one value. A larger value finds fewer peaks."""
     peak_distance: float = 0.0015
-    """Largest distance of a peak from a limit, m: most lasers count millimetres. A larger value finds more
-    peaks."""
+    """Largest distance of a peak from a limit, m. A larger value finds more peaks."""
     compared_range: float = 1.0
-    """Distance from a limit up to which readings are compared with a peak, m. With a larger value walls
-    farther away count."""
+    """Range beside a limit whose readings are compared with a peak, m. A larger value compares more."""
     peak_ratio: float = 10.0
-    """Least ratio of a peak to the mean count of the values that it is compared with. A larger value finds
-    fewer peaks."""
+    """Least ratio of a peak to the mean count of the values compared. A larger value finds fewer peaks."""
     peak_ratio_to_largest: float = 2.0
-    """Least ratio of a peak at a limit to the largest of these counts. A larger value finds fewer peaks."""
+    """Least ratio of a peak at a limit to the largest count compared. A larger value finds fewer peaks."""
     top_range: float = 0.25
-    """Distance from the largest reading within which the value for "no return" is looked for, m. With a
-    larger value, less sharp peaks fail to stand out."""
+    """Range below the largest reading in which "no return" is looked for, m. A larger value looks farther."""
     top_share: float = 0.01
-    """Least share of the sharpest count of a value that belongs to its peak. A larger value makes the peak
-    narrower."""
+    """Least share of the sharpest count that belongs to its peak. A larger value narrows peaks."""
     distinct_readings: int = 50
-    """Least number of distinct readings below a value for "no return". A larger value finds it in fewer
-    logs."""
+    """Least distinct readings below a value for "no return". A larger value finds it in fewer logs."""
     neighbourhood: float = 1.25
-    """Factor between a distance and the farthest returns that count as just below or just beyond it. A larger
-    value compares more returns."""
+    """Factor up to which returns are just below or beyond a distance. A larger value compares more."""
     max_drop: float = 0.1
-    """A distance is a limit of the laser if the returns just beyond are fewer than this share of those just
-    below. A larger value finds more limits."""
+    """Largest ratio of returns just beyond a limit to those just below. A larger value finds more limits."""
     min_reported_share: float = 0.05
     """Least share of returns beyond a limit of which the user is told. A larger value tells less."""
     max_reported_share: float = 0.5

@@ -22,6 +22,7 @@ RESERVED_NAMES = ("report.html", "report.json")
 """Names of files in the results folder, which no log can have."""
 SHA256 = re.compile(r"[0-9a-f]{64}")
 ROLES = ("log", "relations", "reference")
+COPIED_KEYS = ("max_translation", "max_rotation", "optional", "about", "published_map")
 
 
 @dataclass(frozen=True)
@@ -126,15 +127,11 @@ def _manifest_entry(file: str, number: int, table: dict[str, Any], folder: Path)
     return ManifestEntry(
         name=name,
         inputs=inputs,
-        max_translation=table.get("max_translation"),
-        max_rotation=table.get("max_rotation"),
         published={method: float(error) for method, error in table.get("published", {}).items()},
         parameters=parameters_from(place, table.get("parameters", {})),
         sources={role: table[_origin_keys(role)[0]] for role in ROLES if _origin_keys(role)[0] in table},
         sha256={role: table[_origin_keys(role)[1]] for role in ROLES if _origin_keys(role)[1] in table},
-        optional=table.get("optional", False),
-        about=table.get("about", ""),
-        published_map=table.get("published_map", ""),
+        **{key: table[key] for key in COPIED_KEYS if key in table},
     )
 
 

@@ -19,14 +19,11 @@ class InterlacedOptions:
     """When scans of a CARMEN log are interlaced."""
 
     min_beams: int = 90
-    """Least number of readings of the longer scans: shorter scans are parts. A larger value finds fewer
-    logs."""
+    """Least number of readings of the longer scans. A larger value finds fewer logs."""
     min_share: float = 0.05
-    """Least share of the log that both kinds of scans have: a single short scan is a damaged one. A larger
-    value finds fewer logs."""
+    """Least share of the log that both kinds of scans have. A larger value finds fewer logs."""
     same: float = 1e-3
-    """Largest difference of directions and steps that are the same, as a share of the step: they are rounded.
-    A larger value finds more logs."""
+    """Largest difference of equal directions and steps, as a share of the step. A larger value finds more."""
 
 
 DEFAULT_INTERLACED = InterlacedOptions()
