@@ -17,7 +17,7 @@ from nscan_cli.errors import InputDataError, WrongUsageError
 from nscan_cli.files.inputs import read_toml
 from nscan_cli.files.outputs import write_atomically
 from nscan_cli.files.text import path_of_name
-from nscan_cli.logs.reading_options import STAMPS, ReadingOptions
+from nscan_cli.logs.reading_options import STAMPS, ReadingOptions, sectors_from
 
 Command = Callable[..., Any]
 NOT_PARAMETERS = ("config", "dump_config", "quiet", "verbose")
@@ -46,8 +46,6 @@ class MaskType(click.ParamType[Any]):
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
         """Parse the sectors; a wrong form is a usage error."""
-        from nscan_cli.logs.beam_mask import sectors_from
-
         try:
             return sectors_from(value)
         except ValueError:

@@ -37,17 +37,6 @@ def _said(found: Sequence[Sector]) -> str:
     )
 
 
-def sectors_from(text: str) -> tuple[Bearings, ...]:
-    """The sectors of a text as --mask takes it: FROM:TO,… in degrees. Raises ValueError if it is none."""
-    sectors = []
-    for part in text.split(","):
-        first, last = (math.radians(float(bearing)) for bearing in part.split(":"))
-        if not math.isfinite(first + last):
-            raise ValueError(f"{part} has no bearings")
-        sectors.append((first, last))
-    return tuple(sectors)
-
-
 def sectors_text(sectors: Sequence[tuple[float, float]]) -> str:
     """Sectors (degrees) as --mask takes them."""
     return ",".join(f"{round(first, 1):g}:{round(last, 1):g}" for first, last in sectors)

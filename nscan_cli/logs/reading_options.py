@@ -105,6 +105,17 @@ class ReadingOptions:
             raise WrongUsageError(f"{file}: is {form}, without topics; leave out {option}, see {instead}")
 
 
+def sectors_from(text: str) -> tuple[tuple[float, float], ...]:
+    """The sectors of a text as --mask takes it: FROM:TO,… in degrees. Raises ValueError if it is none."""
+    sectors = []
+    for part in text.split(","):
+        first, last = (math.radians(float(bearing)) for bearing in part.split(":"))
+        if not math.isfinite(first + last):
+            raise ValueError(f"{part} has no bearings")
+        sectors.append((first, last))
+    return tuple(sectors)
+
+
 def as_tuples(value: Any) -> Any:
     """The value of an option from a document, with tuples in place of lists."""
     return tuple(as_tuples(part) for part in value) if isinstance(value, list) else value

@@ -8,8 +8,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from nscan_cli.errors import InputDataError, WrongUsageError
-from nscan_cli.logs.beam_mask import Bearings, sectors_from
-from nscan_cli.logs.reading_options import ReadingOptions
+from nscan_cli.logs.reading_options import ReadingOptions, sectors_from
 
 RELATION_CHOICES = ("pairwise", "nscan", "both")
 MAPPING_PARAMETERS = {"max-scans": int, "relations": str, "no-loops": bool, "verify-bound": float}
@@ -117,7 +116,7 @@ def _mount_pose(place: str, value: list[Any]) -> tuple[float, float, float]:
     return float(x), float(y), math.radians(degrees)
 
 
-def _mask_sectors(place: str, value: str) -> tuple[Bearings, ...]:
+def _mask_sectors(place: str, value: str) -> tuple[tuple[float, float], ...]:
     try:
         return sectors_from(value)
     except ValueError as error:
