@@ -20,6 +20,9 @@ from nscan_cli.graph.relations.base import Relation
 from nscan_cli.graph.relations.registry import is_joint, is_pairwise
 from nscan_cli.poses import Array, Indices
 
+# Matches have few sizes, and computing the indices takes longer than taking the entries.
+_upper_triangle = functools.cache(np.triu_indices)
+
 
 def component_information(graph: Graph, component: Component) -> tuple[GraphEnergy, Factor]:
     """The energy of a component, and the factor of its information at the graph's poses.
@@ -54,11 +57,6 @@ def _each_pair_once(relations: Sequence[Relation]) -> Array:
 def _pair_keys(nodes: Sequence[int]) -> Indices:
     """(n (n − 1) / 2,) the pairs of n nodes, each packed into one integer."""
     ordered = np.sort(np.array(nodes, dtype=np.int64))
-    a, b = _all_pairs(len(ordered))
+    a, b = _upper_triangle(len(ordered), 1)
     pairs: Indices = ordered[a] << 32 | ordered[b]
     return pairs
-
-
-@functools.cache
-def _all_pairs(n: int) -> tuple[Indices, Indices]:
-    return np.triu_indices(n, 1)

@@ -1,6 +1,6 @@
 """The folder where the kernels' machine code is cached.
 
-Its name has a hash of all files with kernels: when one of them changes, all kernels are compiled again. So a
+Its name has a hash of all files with kernels. When one of them changes, all kernels are compiled again. So a
 constant that a kernel uses must stand in a file with kernels.
 
 When a version makes its folder, obsolete folders are removed. A process that still uses one of them goes on
@@ -81,8 +81,8 @@ def _claim(folder: Path) -> None:
 def _is_obsolete(other: os.DirEntry[str]) -> bool:
     """Whether a cache folder is of no more use.
 
-    Its package is gone or has other kernels now, it was not used for EXPIRY, or it has no owner file, as
-    folders of old versions.
+    That is so if its package is gone or has other kernels now, if it was not used for EXPIRY, or if it has no
+    owner file, as folders of old versions.
     """
     if not other.is_dir(follow_symlinks=False):
         return False

@@ -11,7 +11,7 @@ from pathlib import Path
 LOCK_SUFFIX = ".lock"
 """Suffix of the file that a process locks while it compiles the kernel of that name."""
 PATIENCE = 120.0
-"""Longest wait for another process, which may have been stopped, s. Then this one compiles the kernel too."""
+"""Longest wait for another process, s. It may have been stopped, so this one then compiles the kernel too."""
 INTERVAL = 0.02
 """Time between two looks at the lock, s."""
 

@@ -36,6 +36,7 @@ HARMLESS_VARIABLES = {"NUMBA_CACHE_DIR", "NUMBA_NUM_THREADS", "NUMBA_DISABLE_INT
 NUMBA_CONFIG = ".numba_config.yaml"
 """The file in the current folder that numba reads settings from."""
 SUFFIX = ".code"
+"""Suffix of a file with the machine code of a kernel."""
 LEFT_TO_NUMBA = ".left"
 """Suffix of an empty file that marks a kernel whose code cannot be cached here, only by numba itself."""
 PICKLED_TYPE = re.compile(rb"\x80\x04\x95.{8}\x8c.([\w.]+)\x94\x8c.(\w+)\x94\x93\x94\.", re.DOTALL)
@@ -102,9 +103,9 @@ def _short_hash(value: object) -> str:
 def save(file: Path, name: str, compile_kernel: Callable[[], Any]) -> Callable[..., Any] | None:
     """Compile a kernel and write it to the file, unless that exists or there is no room.
 
-    Returns the function, or None if its code can be linked in a process of numba only. The file that is
-    written first counts for all processes: a kernel that is compiled twice can round differently, since its
-    machine code also depends on the order in which kernels are compiled.
+    Returns the function, or None if its code can run only in a process that has imported numba. The file that
+    is written first counts for all processes: a kernel that is compiled twice can round differently, since
+    its machine code also depends on the order in which kernels are compiled.
 
     The file has a line of JSON with the names that the code defines and needs, a line with the CRC-32 of the
     code, and the code.

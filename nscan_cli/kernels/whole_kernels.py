@@ -20,7 +20,8 @@ NEVER = 1_000_000
 def dispatcher_for_kernels(function: Any, options: dict[str, Any]) -> Any:
     """numba's dispatcher of a function for calls from kernels. Python cannot call it.
 
-    numba would compile it again for each constant that kernels pass. Here a constant is a number like others.
+    numba would compile it again for each constant that kernels pass. Here a constant is a number like any
+    other.
     """
     import numba
     import numba.core.types
@@ -64,8 +65,8 @@ def compile_whole(dispatcher: Any, types: tuple[Any, ...]) -> Any:
 def _without_full_collections() -> Iterator[None]:
     """In this block the garbage collector looks at young objects alone.
 
-    numba makes millions of objects that stay. To look at all of them again and again took an eighth of the
-    time. Of old garbage there is little.
+    numba makes millions of objects that stay. To look at all of them again and again takes an eighth of the
+    time, and finds little garbage.
     """
     before = gc.get_threshold()
     gc.set_threshold(*before[:2], NEVER)

@@ -20,10 +20,10 @@ GAUSSIAN_NUMBERS = 7
 
 
 class AssociationBuffers(NamedTuple):
-    """Buffers for n points and their pairs with Gaussians."""
+    """Buffers for n points and their pairs with Gaussians. Symbols are those of energy.py."""
 
     moved: Array
-    """(4, n) R(φ) x, and the lattice coordinates of x'."""
+    """(4, n) of each point: R(φ) x, and the lattice coordinates of x'."""
     pairs: Array
     """(7, 4 n) of each pair: R(φ) x, v, and Σ⁻¹ as (xx, xy, yy)."""
 
@@ -88,15 +88,15 @@ class Association(NamedTuple):
     """m points at the last pose, and the Gaussians that they are associated with there."""
 
     points: Array
-    """(2, m) in their own frame."""
+    """(2, m) the points in the frame of their scan."""
     cells: Array
-    """(2, m) lattice coordinates of the Gaussians; nan before the first pose."""
+    """(2, m) the lattice coordinates for which the Gaussians were looked up; nan before the first pose."""
     cells_now: Array
-    """(2, m) lattice coordinates at the new pose, before the look-up."""
+    """(2, m) the lattice coordinates at the new pose, before the look-up."""
     moved: Array
     """(4, m) R(φ) x, and x'."""
     gaussians: Array
-    """(4, 7, m) those of the four blocks; 0 where there is none."""
+    """(4, 7, m) the Gaussians of the four blocks of each point; 0 where there is none."""
 
 
 @kernel

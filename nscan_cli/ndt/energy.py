@@ -188,17 +188,19 @@ def find_inliers(grid: Grid, half: float, points: Array, pose: Array, bound: flo
 
 
 class Energy(NamedTuple):
-    """An energy with its gradient and Hessian: (3,) and (3, 3) for E of one pose (x, y, φ)."""
+    """An energy of n poses (x, y, φ) with its derivatives."""
 
     value: float
     gradient: Array
+    """(3n,)"""
     hessian: Array
+    """(3n, 3n)"""
 
 
 def energy(ndt: Ndt, points: Array, pose: Array, widening: float = 1.0, exact: bool = True) -> Energy:
-    """E_ij(u) of points (m, 2) of scan j at the pose u (3,) in the frame of the NDT of scan i.
+    """E_ij(u) of the points (m, 2) of scan j at the pose u (3,) in the frame of the NDT of scan i.
 
-    `exact=False` leaves out the parts of the Hessian that can be negative.
+    Of the Hessian, `exact=False` leaves out the parts that can be negative.
     """
     out = np.empty(ENERGY_NUMBERS)
     buffers = association_buffers(len(points), 1)

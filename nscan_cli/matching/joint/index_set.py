@@ -9,13 +9,13 @@ from typing import Literal
 
 import numpy as np
 
-from nscan_cli.kernels.decorators import leaf_kernel
+from nscan_cli.kernels.decorators import kernel
 from nscan_cli.matching.joint.joint_energy import all_pairs
 from nscan_cli.matching.joint.options import IndexSetOptions
 from nscan_cli.matching.joint.scan_set import ScanSet, scan_grid, scan_points
 from nscan_cli.matching.pose_kernels import relative_pose
 from nscan_cli.ndt.hash_grid import facing_gaussian, find_row, pack_key
-from nscan_cli.poses import Array, Indices
+from nscan_cli.poses import Array, Indices, Mask
 
 IndexSetKind = Literal["all", "visible", "overlap"]
 """How the index set is chosen; see index_set."""
@@ -33,9 +33,7 @@ def index_set(kind: IndexSetKind, options: IndexSetOptions, scans: ScanSet, pose
     if kind == "all":
         return all_pairs(n)
     if kind == "visible":
-        shares = np.zeros((n, n))
-        _write_visible(scans, poses, options.beam_angle, options.visible_distance, np.empty(3), shares)
-        linked = shares > 0.0
+        linked = _visible(scans, poses, options.beam_angle, options.visible_distance)
     else:
         shares = overlap_shares(scans, poses, options.stride)
         linked = shares >= options.least_share
@@ -45,22 +43,11 @@ def index_set(kind: IndexSetKind, options: IndexSetOptions, scans: ScanSet, pose
     return np.ascontiguousarray(np.argwhere(linked | linked.T), dtype=np.int64)
 
 
-def overlap_shares(scans: ScanSet, poses: Array, stride: int) -> Array:
-    """(n, n) at [i, j] the share of scan j's points in cells of scan i's Gaussians.
-
-    Of the points, one in `stride` counts.
-    """
-    shares = np.zeros((len(poses), len(poses)))
-    _write_shares(scans, poses, stride, np.empty(3), shares)
-    return shares
-
-
-@leaf_kernel
-def _write_visible(
-    scans: ScanSet, poses: Array, beam_angle: float, visible_distance: float, u: Array, shares: Array
-) -> None:
-    """Write 1 to shares (n, n) at [i, j] where scan i saw the position of scan j; `u` (3,) is a buffer."""
+@kernel
+def _visible(scans: ScanSet, poses: Array, beam_angle: float, visible_distance: float) -> Mask:
+    """(n, n) at [i, j] whether scan i saw the position of scan j."""
     n = poses.shape[0]
+    visible, u = np.zeros((n, n), dtype=np.bool_), np.empty(3)
     for i in range(n):
         points = scan_points(scans, i)
         for j in range(n):
@@ -69,7 +56,7 @@ def _write_visible(
             relative_pose(poses[j], poses[i], u)
             distance = np.hypot(u[0], u[1])
             if distance < visible_distance:
-                shares[i, j] = 1.0
+                visible[i, j] = True
                 continue
             # The reach of the beam that is nearest in direction. For small angles, sines stand for them.
             nearest, reach = beam_angle, 0.0
@@ -79,17 +66,18 @@ def _write_visible(
                 off = abs(x * u[1] - y * u[0])
                 if off < nearest * length * distance and x * u[0] + y * u[1] > 0.0:
                     nearest, reach = off / (length * distance), length
-            if distance < reach:
-                shares[i, j] = 1.0
+            visible[i, j] = distance < reach
+    return visible
 
 
-@leaf_kernel
-def _write_shares(scans: ScanSet, poses: Array, stride: int, u: Array, shares: Array) -> None:
-    """Write to shares (n, n) at [i, j] the share of scan j's points in cells where scan i has a Gaussian.
+@kernel
+def overlap_shares(scans: ScanSet, poses: Array, stride: int) -> Array:
+    """(n, n) at [i, j] the share of scan j's points in cells where scan i has a Gaussian.
 
-    A Gaussian that the beam would hit from behind does not count. `u` (3,) is a buffer.
+    A Gaussian that the beam would hit from behind does not count. Of the points, one in `stride` counts.
     """
     n = poses.shape[0]
+    shares, u = np.zeros((n, n)), np.empty(3)
     for j in range(n):
         points = scan_points(scans, j)[::stride]
         weight = 1.0 / max(points.shape[0], 1)
@@ -110,3 +98,4 @@ def _write_shares(scans: ScanSet, poses: Array, stride: int, u: Array, shares: A
                     if facing_gaussian(grid, link, rx, ry) >= 0:
                         shares[i, j] += weight
                         break
+    return shares

@@ -7,7 +7,7 @@ next. The result depends on the first scan, so each is tried as the first, and t
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -15,7 +15,7 @@ from nscan_cli.matching.correlative_search import FoundPose, LikelihoodField, li
 from nscan_cli.matching.joint.joint_energy import JointProblem
 from nscan_cli.matching.joint.joint_match import JointMatch, PairsAt, match_near_and_far
 from nscan_cli.matching.joint.neutral_energy import neutral_energy, pair_energies
-from nscan_cli.matching.joint.options import InitialisationOptions, JointOptions
+from nscan_cli.matching.joint.options import JointOptions
 from nscan_cli.matching.joint.overlap import Overlaps, overlaps, weakest_link
 from nscan_cli.matching.motion_model import no_prior
 from nscan_cli.matching.pairwise import PairOptions
@@ -68,20 +68,15 @@ def _all_fit(problem: JointProblem, poses: Array, share: float) -> bool:
     return bool(np.all(values.sum(axis=0) + values.sum(axis=1) <= 0.0))
 
 
+@dataclass(frozen=True)
 class Initialisation:
     """The search for the poses of n scans with points (m_i, 2) near `start` (n, 3)."""
 
-    def __init__(
-        self,
-        problem: JointProblem,
-        points: Sequence[Array],
-        start: Array,
-        options: PairOptions,
-        joint: JointOptions,
-    ) -> None:
-        self.problem, self.points, self.start = problem, points, start
-        self.options, self.share = options, joint.overlap_reward
-        self.initialisation: InitialisationOptions = joint.initialisation
+    problem: JointProblem
+    points: Sequence[Array]
+    start: Array
+    options: PairOptions
+    joint: JointOptions
 
     def best(self) -> Array:
         """The poses (n, 3) of the lowest neutral energy that were found."""
@@ -89,14 +84,14 @@ class Initialisation:
         return self._placed_again(min(placed, key=self._energy))
 
     def _energy(self, poses: Array) -> float:
-        return neutral_energy(self.problem, poses, self.share)
+        return neutral_energy(self.problem, poses, self.joint.overlap_reward)
 
     def _placed_from(self, first: int) -> Array:
         """Place all scans one by one, the one that fits best next; `first` stays at its start."""
         poses = self.start.copy()
         placed, left = [first], [scan for scan in range(len(poses)) if scan != first]
         while left:
-            field = likelihood_field(self._points_of(placed, poses), self.initialisation.search)
+            field = self._field_of(placed, poses)
             best: tuple[int, FoundPose] | None = None
             for scan in left:
                 least = best[1].score if best else 0.0
@@ -114,11 +109,11 @@ class Initialisation:
     def _placed_again(self, poses: Array) -> Array:
         """Search every scan among all others, and take what lowers the energy."""
         energy = self._energy(poses)
-        for _ in range(self.initialisation.sweeps):
+        for _ in range(self.joint.initialisation.sweeps):
             before = energy
             for scan in range(len(poses)):
                 others = [other for other in range(len(poses)) if other != scan]
-                field = likelihood_field(self._points_of(others, poses), self.initialisation.search)
+                field = self._field_of(others, poses)
                 found = self._search(scan, field, others, poses, 0.0)
                 if found is None:
                     continue
@@ -130,14 +125,15 @@ class Initialisation:
                 break
         return poses
 
-    def _points_of(self, placed: Sequence[int], poses: Array) -> Array:
-        return np.concatenate([transform(poses[scan], self.points[scan]) for scan in placed])
+    def _field_of(self, placed: Sequence[int], poses: Array) -> LikelihoodField:
+        points = [transform(poses[scan], self.points[scan]) for scan in placed]
+        return likelihood_field(np.concatenate(points), self.joint.initialisation.search)
 
     def _search(
         self, scan: int, field: LikelihoodField, placed: Sequence[int], poses: Array, least: float
     ) -> FoundPose | None:
         """Search a scan near its start, moved as the placed scans have moved as a whole."""
-        options = self.initialisation
+        options = self.joint.initialisation
         motion = _rigid_motion(self.start[placed], poses[placed], options.lever)
         expected = compose(motion, self.start[scan])
         return search(field, self.points[scan], expected, least, options.search)
@@ -151,7 +147,7 @@ class Initialisation:
         association = begin_association(self.points[scan])
         problem = PairProblem(ndt.grid, ndt.half, association, options.scale, no_prior())
         limits = options.max_iterations, options.tolerance, options.tolerance
-        widenings = np.array(self.initialisation.widenings)
+        widenings = np.array(self.joint.initialisation.widenings)
         minimise_pairwise(problem, pose, widenings, *limits, np.empty((3, 3)))
         return pose
 

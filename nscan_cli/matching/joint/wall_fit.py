@@ -41,16 +41,13 @@ def fit_to_walls(
     the gauge free.
     """
     fitted = poses.copy()
-    variances = np.array([options.range_sigma**2, options.wall_sigma**2])
-    _fit(scans, fitted, hessian, gauge_of(fixed), variances, options)
+    _fit(scans, fitted, hessian, gauge_of(fixed), options)
     fitted[:, 2] = wrap(fitted[:, 2])
     return fitted
 
 
 @kernel
-def _fit(
-    scans: ScanSet, poses: Array, hessian: Array, fixed: int, variances: Array, options: WallFitOptions
-) -> None:
+def _fit(scans: ScanSet, poses: Array, hessian: Array, fixed: int, options: WallFitOptions) -> None:
     """Minimise Σ d² / σ² of points on walls + ½ Δᵗ (prior_share · H) Δ, from the poses (n, 3) in place."""
     start, step, gradient = poses.copy(), np.empty_like(poses), np.empty(poses.size)
     for _ in range(options.steps):
@@ -60,7 +57,7 @@ def _fit(
         multiply(information, (poses - start).ravel(), gradient)
         first = 0
         for end in ends:
-            _add_wall(cloud, members[first:end], variances, options.direction_noise, gradient, information)
+            _add_wall(cloud, members[first:end], options, gradient, information)
             first = end
         if not gauge_fixed_step(gradient, information, poses, 0.0, fixed, step):
             return
@@ -175,12 +172,7 @@ def _split_by_side(cloud: PointCloud, chosen: Indices, sides: Indices) -> int:
 
 @kernel
 def _add_wall(
-    cloud: PointCloud,
-    chosen: Indices,
-    variances: Array,
-    direction_noise: float,
-    gradient: Array,
-    hessian: Array,
+    cloud: PointCloud, chosen: Indices, options: WallFitOptions, gradient: Array, hessian: Array
 ) -> None:
     """Add the derivatives of the points' distances from one wall, with the wall's line eliminated.
 
@@ -188,17 +180,16 @@ def _add_wall(
     turn. With u the position along it from the weighted mean, these two directions are orthogonal, and their
     elimination subtracts (Σ wJ)(Σ wJ)ᵗ / Σ w and (Σ wuJ)(Σ wuJ)ᵗ / Σ wu² from Σ wJJᵗ. The variance of the
     line's angle is 1 / Σ wu²; by its noise Σ wJJᵗ claims that much information along the line.
-    `variances` (2,) are those of a range along its beam and of a wall from a straight line, m².
     """
     x, y, xx, xy, yy = _moments(cloud, chosen)
     along = 0.5 * np.arctan2(2 * xy, xx - yy)
     nx, ny = -np.sin(along), np.cos(along)
-    m = chosen.shape[0]
+    m, range_variance = chosen.shape[0], options.range_sigma * options.range_sigma
     weights, along_line, distances = np.empty(m), np.empty(m), np.empty(m)
     for at, k in enumerate(chosen):
         ax, ay = cloud.arms[k, 0], cloud.arms[k, 1]
         head_on = (ax * nx + ay * ny) ** 2 / (ax * ax + ay * ay + 1e-12)
-        weights[at] = 1.0 / (variances[0] * head_on + variances[1])
+        weights[at] = 1.0 / (range_variance * head_on + options.wall_sigma * options.wall_sigma)
         dx, dy = cloud.points[k, 0] - x, cloud.points[k, 1] - y
         along_line[at], distances[at] = dx * ny - dy * nx, dx * nx + dy * ny
     total = weights.sum()
@@ -207,7 +198,7 @@ def _add_wall(
     distances -= (weights * distances).sum() / total + along_line * (
         (weights * along_line * distances).sum() / spread
     )
-    angle_noise = direction_noise / spread
+    angle_noise = options.direction_noise / spread
     size = gradient.shape[0]
     shifts, turns, slides = np.zeros(size), np.zeros(size), np.zeros(size)
     across, by = np.empty(3), np.empty(3)
