@@ -9,7 +9,7 @@ import numpy as np
 from nscan_cli.kernels.decorators import kernel, leaf_kernel
 from nscan_cli.poses import Array, relative
 
-Vector = tuple[float, float, float]
+Triple = tuple[float, float, float]
 
 
 class Prior(NamedTuple):
@@ -27,7 +27,7 @@ def no_prior() -> Prior:
 
 
 @leaf_kernel
-def prior_pull(prior: Prior, pose: Array) -> tuple[Vector, Vector]:
+def prior_pull(prior: Prior, pose: Array) -> tuple[Triple, Triple]:
     """u − z at a relative pose u (3,), and the prior's gradient there, P (u − z)."""
     mean, information = prior
     turn = pose[2] - mean[2]
@@ -36,7 +36,7 @@ def prior_pull(prior: Prior, pose: Array) -> tuple[Vector, Vector]:
 
 
 @leaf_kernel
-def _row(row: Array, vector: Vector) -> float:
+def _row(row: Array, vector: Triple) -> float:
     """The product of a row (3,) of a matrix with a vector."""
     total = 0.0
     for a in range(3):
