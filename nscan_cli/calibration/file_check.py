@@ -9,6 +9,7 @@ from nscan_cli.calibration.contradictions import find_contradictions
 from nscan_cli.calibration.held_odometry import checked_held
 from nscan_cli.calibration.options import FileCheckOptions
 from nscan_cli.calibration.sweep_check import checked_sweep
+from nscan_cli.calibration.unsigned_odometry import checked_signs
 from nscan_cli.logs.assemble import scaled_odometry
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.logs.reading_options import ReadingOptions
@@ -35,6 +36,7 @@ def checked_file(log: LaserLog, reading: ReadingOptions, options: FileCheckOptio
         return CheckedFile(log, reading, said)
     recorded = log
     log, held = checked_held(recorded, options.held, options.steps)
+    log, reversing = checked_signs(log, options.unsigned, options.steps)
     findings = find_contradictions(log, reading, options)
     if held and any(finding.is_of_clocks for finding in findings):
         # A clock that is behind makes odometry begin late, as if it stood.
@@ -43,7 +45,7 @@ def checked_file(log: LaserLog, reading: ReadingOptions, options: FileCheckOptio
         if finding.corrected:
             corrected = replace(reading, **finding.corrected)
             log, reading = _as_read(log, reading, corrected), corrected
-    said += held + [finding.message for finding in findings]
+    said += held + reversing + [finding.message for finding in findings]
     if any(not finding.corrected for finding in findings):
         # Where the robot has been is in doubt.
         return CheckedFile(log, reading, said)

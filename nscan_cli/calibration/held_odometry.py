@@ -7,14 +7,11 @@ from dataclasses import replace
 import numpy as np
 
 from nscan_cli.calibration.measured_steps import measure_steps
+from nscan_cli.calibration.named_stretches import named_stretches
 from nscan_cli.calibration.options import HeldOdometryOptions, StepOptions
-from nscan_cli.files.text import counted
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.logs.robot_path import robot_path
 from nscan_cli.poses import relative
-
-MOST_STRETCHES_NAMED = 5
-"""Stretches that a message names."""
 
 
 def checked_held(
@@ -24,17 +21,9 @@ def checked_held(
     held = held_stretches(log, options, steps)
     if not held:
         return log, []
-    some = ", ".join(
-        f"{log.numbers[first]} to {log.numbers[last]}" for first, last in held[:MOST_STRETCHES_NAMED]
-    )
-    more = (
-        f" and {counted(len(held) - MOST_STRETCHES_NAMED, 'more stretch')}"
-        if len(held) > MOST_STRETCHES_NAMED
-        else ""
-    )
     message = (
-        f"odometry stands still while the scans move, from scan {some}{more}: it is not used there, and "
-        "steady motion takes its place; --as-recorded uses it as it is"
+        f"odometry stands still while the scans move, from scan {named_stretches(log, held)}: it is not used "
+        "there, and steady motion takes its place; --as-recorded uses it as it is"
     )
     return without_held(log, held), [message]
 

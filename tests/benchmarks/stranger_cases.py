@@ -24,6 +24,7 @@ from nscan_cli.poses import Array
 from tests.logs.excerpts import truth_of
 from tests.simulation import faults, odometry_faults
 from tests.simulation.laser import Laser
+from tests.simulation.reversing import there_and_back
 from tests.simulation.scenes import office
 
 Fault = Callable[[LaserLog], LaserLog]
@@ -213,6 +214,10 @@ FAULTS: tuple[tuple[str, Fault, str], ...] = (
         "odometry frozen for a third",
         lambda log: odometry_faults.held(log, _middle(log), False),
         "odometry (does not move|never moves|stands still)",
+    ),
+    ("odometry without signs, three reversals",
+        lambda log: odometry_faults.unsigned(there_and_back(log, [(40, 80), (200, 260), (270, 280)])),
+        "counts reversing as driving forward",
     ),
     ("each pose five times", lambda log: odometry_faults.repeated(log, 5), "odometry comes less often"),
     ("readings reversed", faults.mirrored, "in the wrong order"),

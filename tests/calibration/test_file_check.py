@@ -213,7 +213,11 @@ def test_a_real_log_tells_the_same(make):
 
 @pytest.mark.parametrize("name", REAL)
 def test_nothing_is_contradicted_on_real_logs(name):
-    assert found(read_log(str(data_file(f"{name}.log.gz")))) == []
+    """But for fr079's odometry, which never reverses though its robot does."""
+    said = found(read_log(str(data_file(f"{name}.log.gz"))))
+    assert [each.split(":")[0] for each in said] == (
+        ["odometry counts reversing as driving forward"] if name == "fr079" else []
+    )
 
 
 OUTDOORS: dict[str, tuple[Fault, str]] = {

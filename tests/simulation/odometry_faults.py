@@ -60,6 +60,13 @@ def behind(log: LaserLog) -> LaserLog:
     return replace(log, odometry=_summed(_odometry(log)[0], steps))
 
 
+def unsigned(log: LaserLog) -> LaserLog:
+    """It counts reversing as driving forward; its turns are right."""
+    steps = relative(_odometry(log)[1:], _odometry(log)[:-1])
+    steps[:, :2] *= np.where(steps[:, :1] < 0.0, -1.0, 1.0)
+    return replace(log, odometry=_summed(_odometry(log)[0], steps), odometry_path=None)
+
+
 def late(log: LaserLog, seconds: float) -> LaserLog:
     """The clock of the odometry is ahead of the laser's by so much: it tells what was before."""
     at, odometry = log.times + seconds, _odometry(log)

@@ -1,0 +1,216 @@
+"""Odometry that counts reversing as driving forward: its encoders do not tell which way the wheels turn."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nscan_cli.calibration.measured_steps import measure_steps
+from nscan_cli.calibration.named_stretches import named_stretches
+from nscan_cli.calibration.options import StepOptions, UnsignedOdometryOptions
+from nscan_cli.kernels.decorators import kernel
+from nscan_cli.logs.laser_log import LaserLog
+from nscan_cli.logs.robot_path import robot_path
+from nscan_cli.poses import Array, Indices, are_known, compose, relative
+
+REVERSED = np.array([-1.0, -1.0, 1.0])
+"""Factors of a step if the wheels turned the other way: its turn is known from their difference."""
+
+
+class ReversedStretch(NamedTuple):
+    """A stretch over which the robot drives the other way than odometry says."""
+
+    first: Indices
+    """(n,) rows where steps in it begin."""
+    last: Indices
+    """(n,) rows where they end."""
+    begin: float
+    """Time when the robot changes its direction, s."""
+    end: float
+
+
+def checked_signs(
+    log: LaserLog, options: UnsignedOdometryOptions, steps: StepOptions
+) -> tuple[LaserLog, list[str]]:
+    """The log with its odometry reversed where the robot drives the other way, and what is said of it."""
+    found = reversed_stretches(log, options)
+    votes = [_votes(log, each, options, steps) for each in found]
+    if not any(vote > 0 for vote in votes):
+        return log, []
+    # Once scans have shown one, ranges alone tell of those where no scans match.
+    stretches = [each for each, vote in zip(found, votes, strict=True) if vote >= 0]
+    names = named_stretches(log, ((int(each.first[0]), int(each.last[-1])) for each in stretches))
+    message = (
+        "odometry counts reversing as driving forward: the scans show the robot going the other way from "
+        f"scan {names}; odometry is reversed there; --as-recorded uses it as it is"
+    )
+    return with_reversed(log, stretches), [message]
+
+
+def reversed_stretches(log: LaserLog, options: UnsignedOdometryOptions) -> list[ReversedStretch]:
+    """The stretches over which the ranges change as if the robot drove the other way than odometry says.
+
+    There are none if odometry itself goes both ways, or if the ranges say so of most of the drive: then the
+    file has the laser or the odometry the wrong way round.
+    """
+    if log.odometry is None or len(log) < 2 or not _goes_one_way(log.odometry, options):
+        return []
+    first, last = _step_rows(log, options)
+    step = relative(log.odometry[last], log.odometry[first])
+    errors = np.empty((len(first), 2))
+    for column, robot in enumerate((step, step * REVERSED)):
+        motion = relative(compose(robot, log.mount), log.mount)
+        errors[:, column] = _prediction_errors(
+            log.ranges, log.angle_min, log.angle_increment, (first, last), motion, options
+        )
+    clear = np.full(len(first), False)
+    np.less(errors.min(axis=1), options.max_error_ratio * errors.max(axis=1), out=clear)
+    first, last, backs = first[clear], last[clear], errors[clear, 1] < errors[clear, 0]
+    if 2 * np.count_nonzero(backs) >= len(backs):
+        return []
+    # A direction lasts until the next clear step that has the other one.
+    changes = np.flatnonzero(np.diff(np.concatenate([[False], backs, [False]]).astype(np.int8)))
+    found = []
+    for begin, end in changes.reshape(-1, 2).tolist():
+        if end - begin < options.min_steps:
+            continue
+        way = np.hypot(*(log.odometry[last[begin:end], :2] - log.odometry[first[begin:end], :2]).T)
+        speed = float((way / (log.times[last[begin:end]] - log.times[first[begin:end]])).max())
+        stops = log.times[[0, -1]].tolist()
+        for side, at in enumerate((begin - 1, end - 1)):
+            if 0 <= at < len(first) - 1:
+                stops[side], slowest = _slowest(log, int(first[at]), int(last[at + 1]))
+                if slowest > options.max_stop_speed * speed:
+                    break
+        else:
+            found.append(ReversedStretch(first[begin:end], last[begin:end], *stops))
+    return found
+
+
+def with_reversed(log: LaserLog, stretches: list[ReversedStretch]) -> LaserLog:
+    """The log with its odometry driving the other way over each stretch."""
+    assert log.odometry is not None
+    path = log.odometry_path
+    return replace(
+        log,
+        odometry=_reversed(log.times, log.odometry, stretches),
+        odometry_path=None
+        if path is None
+        else robot_path(path.times, _reversed(path.times, path.poses, stretches)),
+    )
+
+
+def _reversed(times: Array, poses: Array, stretches: list[ReversedStretch]) -> Array:
+    """Poses (S, 3) at times (S,), s, whose steps lead the other way within the stretches.
+
+    The headings stay as they are.
+    """
+    known = np.flatnonzero(are_known(poses))
+    turned, middle = poses.copy(), 0.5 * (times[known[1:]] + times[known[:-1]])
+    steps = np.diff(poses[known, :2], axis=0)
+    for each in stretches:
+        steps[(middle > each.begin) & (middle < each.end)] *= -1.0
+    turned[known[1:], :2] = poses[known[:1], :2] + np.cumsum(steps, axis=0)
+    return turned
+
+
+def _goes_one_way(odometry: Array, options: UnsignedOdometryOptions) -> bool:
+    ahead = np.nan_to_num(relative(odometry[1:], odometry[:-1])[:, 0])
+    forward, backward = float(ahead[ahead > 0.0].sum()), -float(ahead[ahead < 0.0].sum())
+    least, most = sorted((forward, backward))
+    return most > 0.0 and least <= options.max_backward_share * most
+
+
+def _step_rows(log: LaserLog, options: UnsignedOdometryOptions) -> tuple[Indices, Indices]:
+    """Rows (n,) between which odometry drives far enough for the ranges to tell its direction."""
+    assert log.odometry is not None
+    steps = np.nan_to_num(relative(log.odometry[1:], log.odometry[:-1]))
+    way = np.concatenate([[0.0], np.cumsum(np.hypot(steps[:, 0], steps[:, 1]))])
+    ends = np.flatnonzero(np.diff(np.floor(way / options.step_length), prepend=-1.0) > 0.0)
+    first, last = ends[:-1], ends[1:]
+    kept = log.times[last] - log.times[first] <= options.max_duration
+    kept &= are_known(log.odometry[first]) & are_known(log.odometry[last])
+    return first[kept], last[kept]
+
+
+def _slowest(log: LaserLog, first: int, last: int) -> tuple[float, float]:
+    """The time (s) between two rows at which the robot is slowest by odometry, and its speed (m/s) there."""
+    if log.odometry_path is not None:
+        times, poses = log.odometry_path.times, log.odometry_path.poses
+        inside = slice(*np.searchsorted(times, log.times[[first, last]]).tolist())
+        times, poses = times[inside], poses[inside]
+    if log.odometry_path is None or len(times) < 2:
+        assert log.odometry is not None
+        times, poses = log.times[first : last + 1], log.odometry[first : last + 1]
+    speeds = np.hypot(*np.diff(poses[:, :2], axis=0).T) / np.maximum(np.diff(times), 1e-6)
+    slowest = int(np.nanargmin(speeds))
+    return float(0.5 * (times[slowest] + times[slowest + 1])), float(speeds[slowest])
+
+
+def _votes(
+    log: LaserLog, stretch: ReversedStretch, options: UnsignedOdometryOptions, steps: StepOptions
+) -> int:
+    """How many more steps of a stretch, matched without odometry, say that it is reversed than do not."""
+    assert log.odometry is not None
+    some = np.unique(np.linspace(0, len(stretch.first) - 1, options.measured_steps).astype(np.int64))
+    found = measure_steps(log, (stretch.first[some], stretch.last[some]), steps)
+    said = found.odometry(log.odometry)
+    apart = [
+        np.hypot(*(relative(compose(robot, log.mount), log.mount) - found.laser)[:, :2].T)
+        for robot in (said, said * REVERSED)
+    ]
+    return 2 * int((apart[1] < options.max_error_ratio * apart[0]).sum()) - len(found)
+
+
+def _prediction_errors(
+    ranges: NDArray[np.float32],
+    angle_min: Array,
+    angle_increment: Array,
+    rows: tuple[Indices, Indices],
+    motions: Array,
+    options: UnsignedOdometryOptions,
+) -> Array:
+    """(n,) as `_range_errors` for ranges (S, B), with as many beams of a scan as the options say."""
+    every = max(ranges.shape[1] // options.max_beams, 1)
+    least = options.min_beams, options.max_error
+    return np.asarray(_range_errors(ranges, angle_min, angle_increment, *rows, motions, every, *least))
+
+
+@kernel
+def _range_errors(
+    ranges: NDArray[np.float32],
+    angle_min: Array,
+    angle_increment: Array,
+    first: Indices,
+    last: Indices,
+    motions: Array,
+    every: int,
+    min_beams: int,
+    max_error: float,
+) -> Array:
+    """(n,) mean difference, m, of the ranges of the last scans to what the first ones predict; inf for few.
+
+    The laser moves by motions (n, 3) meanwhile. A difference counts as `max_error` at most.
+    """
+    errors = np.full(len(first), np.inf)
+    for k in range(len(first)):
+        i, j, motion = first[k], last[k], motions[k]
+        c, s = np.cos(motion[2]), np.sin(motion[2])
+        around = round(2 * np.pi / abs(angle_increment[j]))
+        total, count = 0.0, 0
+        for beam in range(0, ranges.shape[1], every):
+            if not np.isfinite(ranges[i, beam]):
+                continue
+            length, angle = np.float64(ranges[i, beam]), angle_min[i] + beam * angle_increment[i]
+            dx, dy = length * np.cos(angle) - motion[0], length * np.sin(angle) - motion[1]
+            x, y = c * dx + s * dy, c * dy - s * dx
+            at = round((np.arctan2(y, x) - angle_min[j]) / angle_increment[j]) % around
+            if at < ranges.shape[1] and np.isfinite(ranges[j, at]):
+                total += min(abs(np.hypot(x, y) - ranges[j, at]), max_error)
+                count += 1
+        if count >= min_beams:
+            errors[k] = total / count
+    return errors
