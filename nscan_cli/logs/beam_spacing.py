@@ -7,7 +7,6 @@ three readings tell the angle between their beams; on a wall, two triples about 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -67,18 +66,21 @@ class BeamSpacingOptions:
     one scene only."""
     max_scans: int = 200
     """Number of scans that are tested. A larger value takes longer."""
+    first_of: int = 4
+    """One in so many of these is tested first; the others are not where walls agree with the log. A larger
+    value takes less time."""
 
 
 DEFAULT_BEAM_SPACING = BeamSpacingOptions()
 
 
 class _Scans(NamedTuple):
-    """A sample of scans."""
+    """N scans of a sample, none of which sees what the one before saw."""
 
-    ranges: list[Array]
-    """The readings (B,) of each, m; nan for those without return."""
+    ranges: Array
+    """(N, B) readings, m; nan for those without return."""
     steps: Array
-    """Angle from beam to beam of each, rad."""
+    """(N,) angle from beam to beam, rad."""
 
 
 def checked_by_walls(
@@ -94,8 +96,10 @@ def checked_by_walls(
     beams = beam_counts(raw.ranges, raw.beams)
     rows = np.arange(0, len(beams), max(1, len(beams) // spacing.max_scans))
     widest = float(np.max(np.abs(directions.step) * (beams - 1)))
-    scans = _Scans(list(_usable(raw, limits, beams, rows)), np.abs(directions.step[rows]))
-    factor = _factor_of_walls(scans, spacing)
+    # Walls mostly agree with the log, and a few scans show it.
+    if _walls_agree(_sample(raw, directions, limits, rows[:: spacing.first_of], spacing), spacing):
+        return directions, []
+    factor = _factor_of_walls(_sample(raw, directions, limits, rows, spacing), spacing)
     if factor is None or factor * widest > MAX_VIEW:
         return directions, []
     count = int(np.bincount(beams).argmax())
@@ -128,15 +132,32 @@ def _degrees(angle: float) -> str:
     return f"{math.degrees(angle):.4g}"
 
 
-def _usable(
-    raw: RawScans, limits: RangeLimits, beams: NDArray[np.int64], rows: NDArray[np.int64]
-) -> Iterator[Array]:
-    """The readings (B,) of some scans, m; nan for those without return."""
-    for row in rows.tolist():
-        ranges = raw.ranges[row, : beams[row]].astype(np.float64)
-        with np.errstate(invalid="ignore"):
-            is_usable = (ranges > max(0.0, limits.low[row])) & (ranges < limits.high[row])
-        yield np.where(is_usable, ranges, np.nan)
+def _sample(
+    raw: RawScans,
+    directions: BeamDirections,
+    limits: RangeLimits,
+    rows: NDArray[np.int64],
+    options: BeamSpacingOptions,
+) -> _Scans:
+    """Those of some scans whose readings have changed."""
+    ranges = raw.ranges[rows].astype(np.float64)
+    with np.errstate(invalid="ignore"):
+        is_usable = (ranges > np.maximum(0.0, limits.low[rows, None])) & (ranges < limits.high[rows, None])
+    ranges[~is_usable] = np.nan
+    moved = [0]
+    for row in range(1, len(rows)):
+        last = ranges[moved[-1]]
+        change = np.abs(ranges[row] - last) / last
+        if 2 * np.count_nonzero(change > options.moved) > np.count_nonzero(change >= 0.0):
+            moved.append(row)
+    return _Scans(ranges[moved], np.abs(directions.step[rows[moved]]))
+
+
+def _walls_agree(scans: _Scans, options: BeamSpacingOptions) -> bool:
+    """Whether more beams on walls tell the angle of the log than any other that would contradict it."""
+    logs, centres, counts = _votes(scans, options.half_width, options)
+    others = counts[np.abs(centres) >= options.min_difference]
+    return _beams_as_log(logs, options) >= max(options.min_beams, int(others.max(initial=0)))
 
 
 def _factor_of_walls(scans: _Scans, options: BeamSpacingOptions) -> float | None:
@@ -162,29 +183,39 @@ def _told_factor(scans: _Scans, half_width: float, options: BeamSpacingOptions) 
 
     half_width: angle from a beam to those that it is compared with by the steps of the scans, rad.
     """
-    told = [np.zeros(0)]
-    last = np.zeros(0)
-    for ranges, step in zip(scans.ranges, scans.steps.tolist(), strict=True):
-        if len(last) == len(ranges):
-            change = np.abs(ranges - last) / last
-            change = change[np.isfinite(change)]
-            if not len(change) or np.median(change) <= options.moved:
-                continue
-        last = ranges
-        half = round(half_width / step / 2) if step else 0
-        if half and 4 * half < len(ranges):
-            told.append(_told_steps(ranges, half, options) - math.log(step))
-    logs = np.sort(np.concatenate(told))
-    centres = logs[np.abs(logs) <= math.log(options.max_factor)]
+    logs, centres, counts = _votes(scans, half_width, options)
     if len(centres) < options.min_beams:
         return None
-    counts = _within(logs, centres, options.same_angle)
     best = int(counts.argmax())
-    as_log = int(_within(logs, np.zeros(1), options.same_angle)[0])
-    if counts[best] < max(options.min_beams, options.min_ratio * as_log):
+    if counts[best] < max(options.min_beams, options.min_ratio * _beams_as_log(logs, options)):
         return None
     factor = math.exp(float(np.median(logs[np.abs(logs - centres[best]) <= options.same_angle])))
     return factor if abs(math.log(factor)) >= options.min_difference else None
+
+
+def _votes(
+    scans: _Scans, half_width: float, options: BeamSpacingOptions
+) -> tuple[Array, Array, NDArray[np.int64]]:
+    """Sorted logarithms (V,) of the factors that beams on walls tell, those (C,) within `max_factor`, and how
+    many (C,) are as these.
+    """
+    told, halves = [np.zeros(0)], np.zeros(len(scans.steps), dtype=np.int64)
+    some = scans.steps > 0.0
+    # No more than there are beams: a damaged log may have hardly any angle between them.
+    halves[some] = np.rint(np.minimum(half_width / scans.steps[some] / 2, scans.ranges.shape[1]))
+    for half in np.unique(halves[halves > 0]).tolist():
+        if 4 * half < scans.ranges.shape[1]:
+            those = halves == half
+            rows, steps = _told_steps(scans.ranges[those], half, options)
+            told.append(steps - np.log(scans.steps[those])[rows])
+    logs = np.sort(np.concatenate(told))
+    centres = logs[np.abs(logs) <= math.log(options.max_factor)]
+    return logs, centres, _within(logs, centres, options.same_angle)
+
+
+def _beams_as_log(logs: Array, options: BeamSpacingOptions) -> int:
+    """How many of some sorted logarithms of factors (V,) tell the angle of the log."""
+    return int(_within(logs, np.zeros(1), options.same_angle)[0])
 
 
 def _within(values: Array, centres: Array, width: float) -> NDArray[np.int64]:
@@ -194,22 +225,23 @@ def _within(values: Array, centres: Array, width: float) -> NDArray[np.int64]:
     return found
 
 
-def _told_steps(ranges: Array, half: int, options: BeamSpacingOptions) -> Array:
-    """Logarithms of the angles between beams that the beams of a scan (B,) on walls tell."""
+def _told_steps(ranges: Array, half: int, options: BeamSpacingOptions) -> tuple[NDArray[np.int64], Array]:
+    """Rows (V,) of beams of scans (N, B) on walls, and logarithms (V,) of the angles that they tell."""
     near = 1 / ranges
     wide = _log_angles(near, 2 * half) - math.log(2 * half)
-    narrow = _log_angles(near, half)[half : len(ranges) - 3 * half] - math.log(half)
+    narrow = _log_angles(near, half)[:, half : ranges.shape[1] - 3 * half] - math.log(half)
     with np.errstate(invalid="ignore"):
-        return wide[np.abs(wide - narrow) < options.same_wall]
+        rows, beams = np.nonzero(np.abs(wide - narrow) < options.same_wall)
+    return rows, wide[rows, beams]
 
 
 def _log_angles(near: Array, between: int) -> Array:
     """Logarithm of the angle u from each beam to those `between` places before and after it; nan where none.
 
-    near: 1 / r (B,) in 1/m. The angle is that of beams on one wall; the result has B − 2 `between` places.
+    near: 1 / r (N, B) in 1/m. The angle is that of beams on one wall; the result has B − 2 `between` places.
     """
-    middle = near[between : len(near) - between]
-    cosines = (near[: len(middle)] + near[2 * between :]) / (2 * middle)
+    middle = near[:, between : near.shape[1] - between]
+    cosines = (near[:, : middle.shape[1]] + near[:, 2 * between :]) / (2 * middle)
     with np.errstate(invalid="ignore", divide="ignore"):
         return np.log(np.arccos(np.where(cosines < 1, np.maximum(cosines, -1.0), np.nan)))
 

@@ -43,7 +43,7 @@ class RangeUnitOptions:
     limits_apart: float = 1.0
     """Lower limits of lasers are less, and upper limits are more, m: it tells in which unit a limit is. A
     larger value leaves more limits as they are."""
-    sample: int = 1 << 20
+    sample: int = 1 << 17
     """Number of readings from which the unit is told. A larger value takes longer."""
 
 

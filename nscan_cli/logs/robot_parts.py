@@ -147,12 +147,19 @@ def _constant_beams(
     """Which beams of scans (n, B) mostly have the same near range, and the median (B,) of that; else nan."""
     near = (ranges < options.max_range).mean(axis=0) >= options.min_share
     medians = np.full(ranges.shape[1], np.nan, dtype=np.float32)
-    for beam in np.flatnonzero(near):
-        some = ranges[:, beam]
-        medians[beam] = np.median(some[some < options.max_range])
+    medians[near] = _medians_below(ranges[:, near], options.max_range)
     constant = near.copy()
     constant[near] = _kept(ranges[:, near], medians[near], options).mean(axis=0) >= options.min_share
     return constant, medians
+
+
+def _medians_below(ranges: NDArray[np.float32], limit: float) -> NDArray[np.float32]:
+    """(B,) median of those of the ranges of scans (n, B) below a limit, of which each beam has some."""
+    ordered = np.sort(np.where(ranges < limit, ranges, np.inf).T, axis=1)
+    counts = np.isfinite(ordered).sum(axis=1)
+    beams = np.arange(len(ordered))
+    found: NDArray[np.float32] = (ordered[beams, (counts - 1) // 2] + ordered[beams, counts // 2]) / 2
+    return found
 
 
 def _kept(

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from nscan_cli.logs.recordings.decoded_messages import ScanMessage
 from nscan_cli.logs.recordings.turn_segments import TimedScan
-from nscan_cli.poses import Array
+from nscan_cli.poses import Array, Indices
 
 
 @dataclass(frozen=True)
@@ -19,6 +19,12 @@ class TwoLaserOptions:
 
     sample: int = 128
     """Number of scans that are compared with the next two. A larger value takes longer."""
+    first_of: int = 8
+    """One in so many of these is compared first; the others are not if there is clearly one laser. A larger
+    value takes less time."""
+    one_laser_share: float = 0.5
+    """There is clearly one laser if a smaller share of these resembles the second next. A larger value takes
+    less time."""
     min_scans: int = 20
     """Least number of scans of a topic that are tested. A larger value finds fewer lasers."""
     min_compared: int = 10
@@ -60,15 +66,29 @@ def _alternate(scans: Sequence[ScanMessage], options: TwoLaserOptions) -> bool:
     if len(scans) < options.min_scans:
         return False
     rows = np.unique(np.linspace(0, len(scans) - 3, options.sample).astype(np.int64))
+    _, share = _differences(scans, rows[:: options.first_of], options)
+    if share < options.one_laser_share:
+        return False
+    to_next, share = _differences(scans, rows, options)
+    return to_next >= options.min_difference and share >= options.min_share
+
+
+def _differences(
+    scans: Sequence[ScanMessage], rows: Indices, options: TwoLaserOptions
+) -> tuple[float, float]:
+    """The median difference between some scans and the next, and the share that resembles the second next.
+
+    Zeros where no scans compare.
+    """
     to_next, to_second = (
         np.array([_difference(scans[row], scans[row + later], options.min_compared) for row in rows.tolist()])
         for later in (1, 2)
     )
     known = np.isfinite(to_next) & np.isfinite(to_second)
-    if not known.any() or float(np.median(to_next[known])) < options.min_difference:
-        return False
+    if not known.any():
+        return 0.0, 0.0
     alternates = to_second[known] <= options.max_ratio * to_next[known]
-    return bool(alternates.mean() >= options.min_share)
+    return float(np.median(to_next[known])), float(alternates.mean())
 
 
 def _is_first(scans: Sequence[ScanMessage], options: TwoLaserOptions) -> NDArray[np.bool_]:
