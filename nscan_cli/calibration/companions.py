@@ -73,14 +73,18 @@ def find_companion(log: LaserLog, poses: Array, options: CompanionOptions) -> Co
     path = np.stack([np.interp(at, along, column) for column in poses[rows, :2].T], axis=1)
     # Evenly by the way: a robot that stands tells nothing.
     some = np.unique(np.searchsorted(along, np.linspace(0.0, along[-1], options.scans)))
-    found, looked_at = [], 0
-    for k in some.tolist():
-        begin, end = np.searchsorted(at, along[k] + options.farthest * np.array([-1.0, 1.0]))
-        about = path[begin:end][np.abs(at[begin:end] - along[k]) > options.nearest]
-        seen = _seen(log, int(rows[k]), poses[rows[k]], about, options)
-        looked_at += seen is not None
-        if seen is not None and len(seen):
-            found.append(seen)
+    found, looked_at = list[Indices](), 0
+    for part in range(options.first_of):
+        for k in some[part :: options.first_of].tolist():
+            begin, end = np.searchsorted(at, along[k] + options.farthest * np.array([-1.0, 1.0]))
+            about = path[begin:end][np.abs(at[begin:end] - along[k]) > options.nearest]
+            seen = _seen(log, int(rows[k]), poses[rows[k]], about, options)
+            looked_at += seen is not None
+            if seen is not None and len(seen):
+                found.append(seen)
+        # Mostly nothing goes along, and a few scans show it.
+        if len(found) < options.clear_share * looked_at:
+            return None
     share = len(found) / max(looked_at, 1)
     return None if share < options.min_share else Companion(share, _sectors(found, options))
 

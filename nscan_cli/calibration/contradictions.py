@@ -8,11 +8,18 @@ import numpy as np
 
 from nscan_cli.calibration import findings
 from nscan_cli.calibration.findings import Finding
-from nscan_cli.calibration.measured_steps import MeasuredSteps, measure_steps
+from nscan_cli.calibration.measured_steps import MeasuredSteps, measure_steps, no_steps
 from nscan_cli.calibration.mount_fit import MountFit, TurnFit
 from nscan_cli.calibration.odometry_clock import ClockLag, clock_lag
 from nscan_cli.calibration.options import FileCheckOptions
-from nscan_cli.calibration.step_evidence import StepEvidence, explains, is_excluded, is_nearer, turns_agree
+from nscan_cli.calibration.step_evidence import (
+    StepEvidence,
+    agrees_clearly,
+    explains,
+    is_excluded,
+    is_nearer,
+    turns_agree,
+)
 from nscan_cli.calibration.step_sampling import telling_steps
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.logs.reading_options import ReadingOptions
@@ -31,21 +38,22 @@ def find_contradictions(log: LaserLog, reading: ReadingOptions, options: FileChe
     if log.odometry is None:
         return []
     evidence = _evidence(log, log.odometry, options)
-    if evidence.moving < options.min_steps:
+    if evidence is None or evidence.moving < options.min_steps:
         return []
     is_still = _is_still(log.odometry, options.still)
     if is_still[:2].all():
         return [findings.frozen(evidence, "odometry" if is_still[2] else "the position by odometry")]
-    turns = evidence.turns()
+    turns = evidence.turns
     if turns is not None and not turns_agree(turns, options):
         found = _of_clocks(log, evidence.steps, reading, options)
         if found:
             return found
-    fit, mirrored = evidence.fit(), evidence.fit(mirrored=True)
-    unusable = _unusable(evidence, turns, fit, mirrored, options)
+    fit = evidence.fit
+    unusable = _unusable(evidence, turns, options)
     if unusable is not None:
         return [unusable]
     if turns is not None and turns.ratio < 0.0 and _are_told(turns, options):
+        mirrored = evidence.mirrored_fit
         if turns_agree(turns, options) and mirrored is not None and explains(mirrored, options):
             return _of_opposite_turns(log.mount, turns, mirrored, evidence, reading, options)
         return [findings.wrong_turns(turns), *_of_positions(log.mount, fit, evidence, reading, options)]
@@ -55,12 +63,21 @@ def find_contradictions(log: LaserLog, reading: ReadingOptions, options: FileChe
     return found + _of_positions(log.mount, fit, evidence, reading, options)
 
 
-def _evidence(log: LaserLog, odometry: Array, options: FileCheckOptions) -> StepEvidence:
-    """The steps of a sample, which is larger where scans tell few of them, as outdoors."""
+def _evidence(log: LaserLog, odometry: Array, options: FileCheckOptions) -> StepEvidence | None:
+    """The steps of a sample, which is larger where scans tell few of them, as outdoors.
+
+    None if a part of it clearly agrees with the file already: the rest is not measured.
+    """
     count, most = options.steps.count, min(int(0.5 * options.max_share * len(log)), options.more_steps)
     while True:
-        steps = measure_steps(log, telling_steps(log, options.steps, count), options.steps)
-        evidence = StepEvidence(odometry, steps, options)
+        steps = no_steps()
+        first, last = telling_steps(log, options.steps, count)
+        for part in range(options.parts):
+            some = slice(part, None, options.parts)
+            steps = steps.with_others(measure_steps(log, (first[some], last[some]), options.steps))
+            evidence = StepEvidence(odometry, steps, options)
+            if agrees_clearly(evidence, log.mount, options):
+                return None
         if evidence.tells_enough or count >= most:
             return evidence
         count = min(2 * count, most)
@@ -79,19 +96,13 @@ def _are_told(turns: TurnFit, options: FileCheckOptions) -> bool:
     return turns.steps >= options.min_steps and turns.spread <= options.max_spread
 
 
-def _unusable(
-    evidence: StepEvidence,
-    turns: TurnFit | None,
-    fit: MountFit | None,
-    mirrored: MountFit | None,
-    options: FileCheckOptions,
-) -> Finding | None:
+def _unusable(evidence: StepEvidence, turns: TurnFit | None, options: FileCheckOptions) -> Finding | None:
     """Why odometry cannot be used at all; None if it can."""
-    is_explained = explains(fit, options) or explains(mirrored, options)
+    is_explained = explains(evidence.fit, options) or explains(evidence.mirrored_fit, options)
     if not is_explained and explains(evidence.fit_with_signs(ONE_AXIS_REVERSED), options):
         is_heading = turns is not None and turns.ratio < 0.0
         return findings.wrong_signs(evidence, "headings" if is_heading else "x or y")
-    if is_excluded(fit, options) and is_excluded(mirrored, options):
+    if is_excluded(evidence.fit, options) and is_excluded(evidence.mirrored_fit, options):
         return findings.excluded(evidence)
     if turns is not None and turns.steps >= options.min_steps and turns.spread > options.excluded_turn_spread:
         return findings.excluded_turns(turns)

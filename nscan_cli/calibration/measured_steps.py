@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from nscan_cli.calibration.options import StepOptions
-from nscan_cli.errors import InputDataError
+from nscan_cli.calibration.thinned_scans import thinned_scan
 from nscan_cli.logs.laser_log import LaserLog
-from nscan_cli.matching.pairwise import PairMatch, match_pair, matched_points, scan_ndt, settle_pair
+from nscan_cli.matching.scan_pairs import match_scans
+from nscan_cli.matching.uncertainty import covariance_of, why_no_minimum
 from nscan_cli.poses import Array, Indices, relative
 
 
@@ -34,6 +35,22 @@ class MeasuredSteps:
         """(n, 3) the same steps of the robot by odometry, of which `poses` (S, 3) are those of all scans."""
         return relative(poses[self.last], poses[self.first])
 
+    def with_others(self, others: MeasuredSteps) -> MeasuredSteps:
+        """These and other steps, in order of their first rows."""
+        order = np.argsort(np.concatenate([self.first, others.first]), kind="stable")
+        return MeasuredSteps(
+            np.concatenate([self.first, others.first])[order],
+            np.concatenate([self.last, others.last])[order],
+            np.concatenate([self.laser, others.laser])[order],
+            np.concatenate([self.covariances, others.covariances])[order],
+        )
+
+
+def no_steps() -> MeasuredSteps:
+    """None at all."""
+    rows = np.zeros(0, dtype=np.int64)
+    return MeasuredSteps(rows, rows, np.zeros((0, 3)), np.zeros((0, 3, 3)))
+
 
 def measure_steps(
     log: LaserLog,
@@ -46,44 +63,44 @@ def measure_steps(
     Every step is matched without odometry, so that the result is independent of it. `corrected` gives the
     points (m, 2) of a row in the laser's frame if the laser turns; None: as if it saw all beams at once.
     """
-    at_laser = replace(log, mount=np.zeros(3), path=None)
-    found: list[tuple[int, int, PairMatch]] = []
+    found: list[tuple[int, int, Array, Array]] = []
     first, last = rows
     for begin, end in zip(first.tolist(), last.tolist(), strict=True):
         before, after = (
-            _thinned_points(at_laser, row, options) if corrected is None else corrected(row)
+            _thinned_points(log, row, options) if corrected is None else corrected(row)
             for row in (begin, end)
         )
-        match = _measured(before, after, options)
-        if match is not None:
-            found.append((begin, end, match))
-    ends = np.array([(begin, end) for begin, end, _ in found], dtype=np.int64).reshape(-1, 2)
+        measured = _measured(before, after, options)
+        if measured is not None:
+            found.append((begin, end, *measured))
+    ends = np.array([(begin, end) for begin, end, *_ in found], dtype=np.int64).reshape(-1, 2)
     return MeasuredSteps(
         ends[:, 0],
         ends[:, 1],
-        np.array([match.pose for *_, match in found]).reshape(-1, 3),
-        np.array([match.covariance for *_, match in found]).reshape(-1, 3, 3),
+        np.array([pose for _, _, pose, _ in found]).reshape(-1, 3),
+        np.array([covariance for *_, covariance in found]).reshape(-1, 3, 3),
     )
 
 
-def _measured(reference: Array | None, points: Array | None, options: StepOptions) -> PairMatch | None:
-    """The pose of a scan's points (m, 2) in the frame of the reference (n, 2); None where it is in doubt."""
+def _measured(
+    reference: Array | None, points: Array | None, options: StepOptions
+) -> tuple[Array, Array] | None:
+    """The pose of a scan's points (m, 2) in the frame of the reference (n, 2), and its covariance (3, 3).
+
+    None where it is in doubt.
+    """
     if reference is None or points is None:
         return None
-    gaussians = scan_ndt(reference, options.pair)
-    match = match_pair(gaussians, points, np.zeros(3), None, options.pair)
-    if not match.converged or match.covariance is None or match.overlap < options.min_overlap:
+    match = match_scans(reference, points, np.zeros(3), options.pair, options.probe)
+    if not match.converged or match.overlap < options.min_overlap or match.apart > options.agreement:
         return None
-    aside = options.probe * np.array([np.cos(match.weakest.direction), np.sin(match.weakest.direction), 0.0])
-    again = settle_pair(gaussians, points, match.pose + aside, options.pair)
-    apart = np.abs(relative(again.pose, match.pose)).max()
-    return match if apart <= options.agreement else None
+    covariance = covariance_of(match.information)
+    if covariance is None or why_no_minimum(match.gradient, covariance, options.pair.convergence) is not None:
+        return None
+    return match.pose, covariance
 
 
 def _thinned_points(log: LaserLog, row: int, options: StepOptions) -> Array | None:
     """The points (m, 2) of a scan, of so many beams as are matched; None for too few."""
-    try:
-        points = matched_points(log, row, options.pair)
-    except InputDataError:
-        return None
-    return points[:: max(log.ranges.shape[1] // options.max_beams, 1)].copy()
+    scan = thinned_scan(log, row, options)
+    return None if scan is None else scan.points

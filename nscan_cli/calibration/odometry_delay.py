@@ -22,23 +22,23 @@ from nscan_cli.poses import Array, Indices, are_known
 def odometry_delay(log: LaserLog, motion: ScanMotion, options: SweepCheckOptions) -> float:
     """Seconds to add to the stamps of odometry, so that its turns fit best to those by scans; 0 in doubt.
 
-    Only half of the scans in turns are matched if these fit hardly better with any delay.
+    Only a part of the scans in turns is matched if these fit hardly better with any delay.
     """
     path, measured = log.odometry_path, dict[int, float]()
     if log.odometry is None or path is None or log.beam_times is None:
         return 0.0
     rows, turn, delay = _turning(motion, options), usual_turn(log), 0.0
-    for part in (rows[::2], rows[1::2]):
+    for part in (rows[::4], rows[2::4], rows[1::2]):
         found = {row: motion.turned(row, turn) for row in part}
         measured.update({row: turned for row, turned in found.items() if turned is not None})
         turns = np.array(list(measured.values()))
         count = np.count_nonzero(np.abs(turns) > options.min_winding)
         if count >= options.few_delay_turns:
             delay, gain = _best_delay(log, path, log.beam_times, np.array(list(measured)), turns, options)
+            if gain > options.no_delay_gain:
+                return 0.0
             if count < options.min_delay_turns and gain > options.few_delay_gain:
                 delay = 0.0
-            elif gain > options.no_delay_gain:
-                return 0.0
     return delay
 
 

@@ -103,6 +103,11 @@ class CompanionOptions:
 
     scans: int = 100
     """Number of scans that are checked, evenly spread over the path. More take longer."""
+    first_of: int = 3
+    """One in so many of these is checked first. A larger value takes less time."""
+    clear_share: float = 0.1
+    """The others are not checked if a smaller share of these has such readings. A smaller value takes
+    longer."""
     max_beams: int = 180
     """Approximate number of beams of a scan that are checked, evenly spread. More take longer."""
     min_way: float = 5.0
@@ -230,6 +235,17 @@ class FileCheckOptions:
     excluded_turn_spread: float = 1.0
     """Odometry is not used if the median residual of its turns is at least this multiple of the turns by
     scans. It is 0.004 to 0.4 on real logs. A larger value uses poorer odometry."""
+    parts: int = 3
+    """The sample is measured in so many parts, each of which is spread over the log; the others are not where
+    one clearly agrees with the file. More take less time, and less evidence is then enough."""
+    min_clear_steps: int = 8
+    """Least number of steps with motion, and with a turn, that clearly agree. A larger value takes longer."""
+    clear_share: float = 0.5
+    """Steps clearly agree with the file if their residuals are at most this share of those that a finding may
+    have. A smaller value takes longer."""
+    clear_sigmas: float = 2.0
+    """And if an error of the file that a warning names is out of the question by this number of standard
+    deviations. A larger value takes longer."""
     min_steps_to_exclude: int = 30
     """Least number of steps with motion for that. A larger value excludes less."""
 

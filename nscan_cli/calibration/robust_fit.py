@@ -10,6 +10,8 @@ from nscan_cli.poses import Array, Indices
 
 SWEEPS, FIRST_SWEEPS = 30, 10
 """Sweeps of reweighting, and how many of them minimise the sum of absolute values: it has one minimum."""
+SETTLED = 1e-6
+"""Sweeps end where they change the solution by a smaller share."""
 TO_SIGMA = 1.4826
 """The standard deviation of a Gaussian in medians of its absolute value."""
 CAUCHY = 2.385
@@ -46,19 +48,30 @@ def robust_fit(coefficients: Array, measured: Array, groups: Indices | None = No
     weights = np.ones(n)
     values: Array = np.zeros(m)
     residuals: Array = np.zeros(n)
+    rows, wanted = coefficients.reshape(n * d, m), measured.ravel()
+    before: Array = np.full(m, np.inf)
     for sweep in range(SWEEPS):
-        roots = np.sqrt(weights)
-        rows = (coefficients * roots[:, None, None]).reshape(n * d, m)
-        solution = np.linalg.lstsq(rows, (measured * roots[:, None]).ravel(), rcond=None)
+        weighted = (coefficients * weights[:, None, None]).reshape(n * d, m).T
+        # What the equations leave open is 0.
+        solution = np.linalg.lstsq(weighted @ rows, weighted @ wanted, rcond=None)
         values = np.asarray(solution[0], dtype=np.float64)
-        residuals = np.sqrt(((coefficients @ values - measured) ** 2).sum(axis=1))
-        sigma = max(TO_SIGMA * float(np.median(residuals)) / np.sqrt(d), LEAST_SIGMA)
+        residuals = np.sqrt(((rows @ values - wanted).reshape(n, d) ** 2).sum(axis=1))
+        sigma = max(TO_SIGMA * _median(residuals) / np.sqrt(d), LEAST_SIGMA)
+        if sweep > FIRST_SWEEPS and np.abs(values - before).max() <= SETTLED * np.abs(values).max():
+            break
+        before = values
         if sweep < FIRST_SWEEPS:
             weights = 1.0 / np.maximum(residuals, sigma / CAUCHY)
         else:
             weights = 1.0 / (1.0 + (residuals / (CAUCHY * sigma)) ** 2)
     off = coefficients @ values - measured
     return RobustFit(values, _covariance(coefficients, off, CAUCHY * sigma, groups), residuals)
+
+
+def _median(values: Array) -> float:
+    """That of some values (n,), as numpy has it in more time."""
+    ordered = np.sort(values)
+    return 0.5 * float(ordered[(len(values) - 1) // 2] + ordered[len(values) // 2])
 
 
 def _covariance(coefficients: Array, off: Array, scale: float, groups: Indices | None) -> Array:

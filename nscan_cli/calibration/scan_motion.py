@@ -10,10 +10,10 @@ import numpy as np
 from nscan_cli.calibration.options import StepOptions
 from nscan_cli.calibration.scan_turns import scan_turns
 from nscan_cli.calibration.sweep_options import SweepCheckOptions, SweepTimeOptions
-from nscan_cli.errors import InputDataError
+from nscan_cli.calibration.thinned_scans import thinned_scan
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.logs.robot_path import move_along_arc
-from nscan_cli.matching.pairwise import PairEnd, matched_points, scan_ndt, settle_pair
+from nscan_cli.matching.scan_pairs import match_scans
 from nscan_cli.poses import Array, Indices
 
 
@@ -22,12 +22,13 @@ class ScanMotion:
     """The scans of a log as its laser sees them, without odometry, and what was measured of their motion."""
 
     log: LaserLog
-    """The laser is the robot, and every scan seen at once."""
+    """Its scans are taken as seen at once, from the laser."""
     steps: StepOptions
     longest_step: float
     """Longest time from a scan to the next, s, over which motion is measured."""
     _points: dict[int, tuple[Array, Array] | None] = field(default_factory=dict)
-    _twists: dict[int, tuple[Array, Array] | None] = field(default_factory=dict)
+    _velocities: dict[int, Array | None] = field(default_factory=dict)
+    _rates: dict[int, float] = field(default_factory=dict)
 
     @staticmethod
     def of_log(log: LaserLog, steps: StepOptions, options: SweepCheckOptions) -> ScanMotion:
@@ -36,14 +37,14 @@ class ScanMotion:
 
     def rates(self, rows: Indices) -> Array:
         """(n,) rad/s; about how fast the laser turns at rows (n,) with a scan on both sides; 0 at a gap."""
-        times = self.log.times
-        seconds = times[rows + 1] - times[rows - 1]
+        new = np.array([row for row in np.unique(rows).tolist() if row not in self._rates], dtype=np.int64)
+        seconds = self.log.times[new + 1] - self.log.times[new - 1]
         is_measured = (seconds > 0.0) & (seconds <= 2 * self.longest_step)
-        rates = np.zeros(len(rows))
-        if is_measured.any():
-            those = rows[is_measured]
+        rates, those = np.zeros(len(new)), new[is_measured]
+        if len(those):
             rates[is_measured] = scan_turns(self.log, those - 1, those + 1) / seconds[is_measured]
-        return rates
+        self._rates.update(zip(new.tolist(), rates.tolist(), strict=True))
+        return np.array([self._rates[row] for row in rows.tolist()])
 
     def spread_rows(self, options: SweepCheckOptions) -> Indices:
         """Rows (n,) of scans that are spread over the log, with a scan on both sides."""
@@ -77,24 +78,28 @@ class ScanMotion:
 
     def _on_both_sides(self, row: int) -> tuple[Array, Array] | None:
         """The velocities (3,) from the scan before, and to the next one; None in doubt."""
-        if row not in self._twists:
-            self._twists[row] = self._measured(row)
-        return self._twists[row]
+        before = self._velocity(row - 1)
+        after = None if before is None else self._velocity(row)
+        return None if before is None or after is None else (before, after)
 
-    def _measured(self, row: int) -> tuple[Array, Array] | None:
-        velocities: list[Array] = []
-        for begin in (row - 1, row):
-            seconds = float(self.log.times[begin + 1] - self.log.times[begin])
-            reference, scan = self._scan(begin), self._scan(begin + 1)
-            if not 0.0 < seconds <= self.longest_step or reference is None or scan is None:
-                return None
-            # A step is about as long as the one before it.
-            start = velocities[-1] * seconds if velocities else np.zeros(3)
-            end = self._matched(reference[0], scan[0], start)
-            if not end.converged or end.overlap < self.steps.min_overlap:
-                return None
-            velocities.append(end.pose / seconds)
-        return velocities[0], velocities[1]
+    def _velocity(self, row: int) -> Array | None:
+        """(3,) velocity of the laser from a row to the next, m/s and rad/s; None in doubt."""
+        if row not in self._velocities:
+            self._velocities[row] = self._measured(row)
+        return self._velocities[row]
+
+    def _measured(self, row: int) -> Array | None:
+        seconds = float(self.log.times[row + 1] - self.log.times[row])
+        reference, scan = self._scan(row), self._scan(row + 1)
+        if not 0.0 < seconds <= self.longest_step or reference is None or scan is None:
+            return None
+        # A step is about as long as the one before it.
+        before = self._velocities.get(row - 1)
+        start = np.zeros(3) if before is None else before * seconds
+        end = match_scans(reference[0], scan[0], start, self.steps.pair)
+        if not end.converged or end.overlap < self.steps.min_overlap:
+            return None
+        return end.pose / seconds
 
     def corrected(self, row: int, turn: float) -> Array | None:
         """Points (m, 2) of a scan from where the laser is at its middle beam, if its turn takes so long (s).
@@ -118,7 +123,11 @@ class ScanMotion:
         if before is None or at is None or after is None or twist is None:
             return None
         seconds = np.diff(self.log.times[row - 1 : row + 2]).tolist()
-        ends = self._matched(before, at, twist * seconds[0]), self._matched(at, after, twist * seconds[1])
+        # Its twist was measured by matches of these scans.
+        ends = [
+            match_scans(reference, points, twist * time, self.steps.pair, is_near=True)
+            for reference, points, time in ((before, at, seconds[0]), (at, after, seconds[1]))
+        ]
         return float(sum(end.pose[2] for end in ends)) if all(end.converged for end in ends) else None
 
     def energies(self, one: int, other: int, turns: Sequence[float]) -> Array | None:
@@ -132,11 +141,9 @@ class ScanMotion:
             first, second = self.corrected(one, turn), self.corrected(other, turn)
             if first is None or second is None:
                 return None
-            found[k] = self._matched(first, second, way).energy / len(second)
+            end = match_scans(first, second, way, self.steps.pair, is_near=k > 0)
+            found[k], way = end.energy / len(second), end.pose
         return found
-
-    def _matched(self, reference: Array, points: Array, start: Array) -> PairEnd:
-        return settle_pair(scan_ndt(reference, self.steps.pair), points, start, self.steps.pair)
 
     def _scan(self, row: int) -> tuple[Array, Array] | None:
         """Points (m, 2) of a scan, and where in a turn (m,) each was measured, in turns from the middle beam.
@@ -144,17 +151,13 @@ class ScanMotion:
         None with too few points.
         """
         if row not in self._points:
-            try:
-                self._points[row] = self._thinned(row)
-            except InputDataError:
-                self._points[row] = None
+            self._points[row] = self._thinned(row)
         return self._points[row]
 
-    def _thinned(self, row: int) -> tuple[Array, Array]:
-        ranges, pair = self.log.ranges[row], self.steps.pair
-        points = matched_points(self.log, row, pair)
-        beams = np.flatnonzero(np.isfinite(ranges) & (ranges <= pair.reach))
+    def _thinned(self, row: int) -> tuple[Array, Array] | None:
+        scan = thinned_scan(self.log, row, self.steps)
+        if scan is None:
+            return None
         increment = abs(self.log.angle_increment[row])
-        places = (beams - 0.5 * (len(self.log.readings(row)) - 1)) * increment / (2 * np.pi)
-        every = max(len(ranges) // self.steps.max_beams, 1)
-        return points[::every].copy(), places[::every].copy()
+        middle = 0.5 * (len(self.log.readings(row)) - 1)
+        return scan.points, (scan.beams - middle) * increment / (2 * np.pi)

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import functools
+
 import numpy as np
 
 from nscan_cli.calibration.measured_steps import MeasuredSteps
 from nscan_cli.calibration.mount_fit import MountFit, TurnFit, fit_mount, fit_turns
 from nscan_cli.calibration.options import FileCheckOptions
-from nscan_cli.poses import MIRRORED, Array, are_known
+from nscan_cli.poses import MIRRORED, Array, are_known, wrap
 
 
 class StepEvidence:
@@ -20,12 +22,18 @@ class StepEvidence:
         self._known = are_known(by_odometry)
         laser, self.odometry = steps.laser[self._known], by_odometry[self._known]
         self.laser, least = laser, options.steps.min_motion
-        self._is_moving = (np.hypot(laser[:, 0], laser[:, 1]) >= least) | (np.abs(laser[:, 2]) >= least)
+        self._is_turning = np.abs(laser[:, 2]) >= least
+        self._is_moving = (np.hypot(laser[:, 0], laser[:, 1]) >= least) | self._is_turning
 
     @property
     def moving(self) -> int:
         """The number of steps with motion by scans."""
         return int(self._is_moving.sum())
+
+    @property
+    def turning(self) -> int:
+        """The number of steps with a turn by scans."""
+        return int(self._is_turning.sum())
 
     @property
     def forward_share(self) -> float:
@@ -35,28 +43,55 @@ class StepEvidence:
     @property
     def tells_enough(self) -> bool:
         """Whether there is nothing that more steps would tell."""
-        turns = self.turns()
-        is_turned = turns is not None and turns.steps >= self.options.min_steps
-        return is_turned and self.moving >= self.options.min_steps_to_exclude
+        return self.turning >= self.options.min_steps and self.moving >= self.options.min_steps_to_exclude
 
+    @functools.cached_property
     def turns(self) -> TurnFit | None:
         """Turns by odometry as a multiple of those by scans; None for few."""
         return fit_turns(self.laser, self.odometry, self.options.steps.min_motion)
 
-    def fit(self, mirrored: bool = False) -> MountFit | None:
-        """The mounting and the scale that explain the steps with motion, of scans or of mirrored scans."""
-        laser = self.laser[self._is_moving] * (MIRRORED if mirrored else 1.0)
-        return fit_mount(laser, self.odometry[self._is_moving], self.options.steps.metres_per_radian)
+    @functools.cached_property
+    def fit(self) -> MountFit | None:
+        """The mounting and the scale that explain the steps with motion."""
+        return self._fit(self.laser, self.odometry)
+
+    @functools.cached_property
+    def mirrored_fit(self) -> MountFit | None:
+        """Those that explain the steps of mirrored scans."""
+        return self._fit(self.laser * MIRRORED, self.odometry)
 
     def fit_with_signs(self, signs: Array) -> MountFit | None:
         """The fit of odometry whose coordinates are multiplied by signs (3,)."""
-        odometry = self.steps.odometry(self.poses * signs)[self._known][self._is_moving]
-        return fit_mount(self.laser[self._is_moving], odometry, self.options.steps.metres_per_radian)
+        return self._fit(self.laser, self.steps.odometry(self.poses * signs)[self._known])
+
+    def _fit(self, laser: Array, odometry: Array) -> MountFit | None:
+        moving = self._is_moving
+        return fit_mount(laser[moving], odometry[moving], self.options.steps.metres_per_radian)
 
 
 def explains(fit: MountFit | None, options: FileCheckOptions) -> bool:
     """Whether a mounting and a scale explain the positions."""
     return fit is not None and fit.spread <= options.max_spread and fit.tail <= options.max_tail
+
+
+def agrees_clearly(evidence: StepEvidence, mount: Array, options: FileCheckOptions) -> bool:
+    """Whether steps agree so well with odometry and the mounting (3,) that more would contradict neither.
+
+    Whatever would be named is farther off than `clear_sigmas`, and residuals are at most `clear_share` of
+    what they may be.
+    """
+    if min(evidence.turning, evidence.moving) < options.min_clear_steps:
+        return False
+    turns, fit, share = evidence.turns, evidence.fit, options.clear_share
+    if turns is None or fit is None:
+        return False
+    if max(turns.spread, fit.spread) > share * options.max_spread or fit.tail > share * options.max_tail:
+        return False
+    off = fit.mount - mount
+    errors = np.abs([np.log(fit.scale), off[0], off[1], wrap(off[2])])
+    errors += options.clear_sigmas * fit.sigmas / [fit.scale, 1.0, 1.0, 1.0]
+    bounds = [np.log(options.min_scale_factor), *[options.min_mount_move] * 2, options.min_mount_turn]
+    return bool((errors <= bounds).all()) and abs(turns.ratio - 1.0) <= share * options.max_turn_error
 
 
 def is_excluded(fit: MountFit | None, options: FileCheckOptions) -> bool:

@@ -77,8 +77,13 @@ def sweep_evidence(
 
 
 def _is_settled(evidence: SweepEvidence, told: float, options: SweepCheckOptions) -> bool:
-    """Whether the time that the file tells fits better than the others already, or far worse than another."""
+    """Whether the time that the file tells fits better than the others already, or far worse than another.
+
+    Or whether others fit hardly better than it, so that more pairs would not make one certain.
+    """
     pairs, best = len(evidence.energies), evidence.sharpest
+    if pairs >= options.least_decisive and evidence.sigmas(best, told) < options.hopeless_sigmas:
+        return True
     if best == told:
         least = options.settled_sigmas if pairs >= options.least_pairs else np.inf
     elif pairs >= options.least_decisive and evidence.sigmas(best, told) >= options.decided_sigmas:

@@ -72,8 +72,11 @@ class SweepCheckOptions:
     dropped_sigmas: float = 2.0
     """A time that fits worse than the file's by so many is not tried on more pairs. A larger value takes
     longer."""
+    hopeless_sigmas: float = 0.5
+    """And once the best time makes scans sharper than the file's by less than so many. A larger value takes
+    less time, and leaves the file as it is more often."""
     least_decisive: int = 10
-    """Least pairs for the last two. More take longer."""
+    """Least pairs for the last three. More take longer."""
     shifts: tuple[int, ...] = (-2, 2, -4, 4, -7, 7)
     """Scans from the first of a pair to the second: the robot must move differently there and see the same.
     More shifts find more pairs and take longer."""

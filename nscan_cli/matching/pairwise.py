@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import NamedTuple
 
 import numpy as np
 
@@ -111,19 +110,6 @@ class PairMatch:
         return self.reason is None
 
 
-class PairEnd(NamedTuple):
-    """The relative pose of two scans without its uncertainty."""
-
-    pose: Array
-    """(3,) of the scan in the frame of the reference."""
-    energy: float
-    """E before the last step."""
-    overlap: float
-    """Share of the scan's points that lie on a Gaussian of the reference."""
-    converged: bool
-    """Whether the last stage has ended by its tolerance."""
-
-
 def matched_points(log: LaserLog, row: int, options: PairOptions) -> Array:
     """The end points (m, 2) of a scan's beams within reach, in the robot's frame.
 
@@ -141,16 +127,6 @@ def scan_ndt(points: Array, options: PairOptions) -> Ndt:
     """The NDT of one scan's points (m, 2), in their own frame."""
     ends, poses = np.array([0, len(points)]), np.zeros((1, 3))
     return Ndt.of_scans(points, ends, poses, options, neighbourhood=WALL_DIRECTION)
-
-
-def settle_pair(
-    reference: Ndt, points: Array, start: Array, options: PairOptions, prior: Prior | None = None
-) -> PairEnd:
-    """Match points (m, 2) of a scan as `match_pair` does, without the uncertainty, which takes less time."""
-    _, pose, found = _minimum(reference, points, start, prior, options)
-    pose[2] = wrap(pose[2])
-    overlap = inlier_share(reference.grid, reference.half, points, pose, options.inlier_bound)
-    return PairEnd(pose, found.energy, overlap, found.converged)
 
 
 def match_pair(

@@ -109,7 +109,7 @@ class Ndt:
         `neighbourhood` is one of NO_NEIGHBOURS, WALL_DIRECTION and WALL_END. With `faces` a wall can have two
         Gaussians, one for each face; see gaussians.py.
         """
-        return cls(options.cell, empty_grid(capacity, _settings(options, neighbourhood, faces)), 0)
+        return cls(options.cell, empty_grid(capacity, grid_settings(options, neighbourhood, faces)), 0)
 
     @classmethod
     def of_scans(
@@ -125,7 +125,7 @@ class Ndt:
 
         Scan k has points[ends[k] : ends[k + 1]]. Other arguments as for `empty`.
         """
-        settings = _settings(options, neighbourhood, faces=True)
+        settings = grid_settings(options, neighbourhood, faces=True)
         grid = _grid_of_scans(points, ends, poses, 0.5 * options.cell, capacity, settings)
         return cls(options.cell, grid, len(grid.keys))
 
@@ -148,7 +148,8 @@ class Ndt:
         self.grid, self.rows = with_capacity(self.grid, self.rows, points)
 
 
-def _settings(options: GaussianOptions, neighbourhood: int, faces: bool) -> Array:
+def grid_settings(options: GaussianOptions, neighbourhood: int, faces: bool) -> Array:
+    """`Grid.settings` (12,); the arguments are those of `Ndt.empty`."""
     settings = np.empty(12)
     settings[[MINIMUM, FLOOR, NEIGHBOURHOOD, FACES]] = options.minimum, options.floor, neighbourhood, faces
     settings[MAX_NEIGHBOUR:] = astuple(options.walls)
