@@ -170,8 +170,8 @@ class UnsignedOdometryOptions:
     larger value finds more, also by chance. At this one 2 of 36,000 steps of real logs are clear by
     chance."""
     min_steps: int = 2
-    """Least number of successive clear steps that go the other way. A larger value misses short
-    reversals."""
+    """Least number of successive clear steps that go the other way, in one stretch at least. Where there is
+    one, shorter ones count too, if scans confirm them. A larger value finds less."""
     max_stop_speed: float = 0.8
     """At both ends of such a stretch the robot slows down to this share of its greatest speed in it, at
     least: it has to stop to change its direction, though scans that are far apart blur it. A larger value

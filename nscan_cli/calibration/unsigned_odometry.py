@@ -38,10 +38,11 @@ def checked_signs(
     """The log with its odometry reversed where the robot drives the other way, and what is said of it."""
     found = reversed_stretches(log, options)
     votes = [_votes(log, each, options, steps) for each in found]
-    if not any(vote > 0 for vote in votes):
+    long = [len(each.first) >= options.min_steps for each in found]
+    if not any(is_long and vote > 0 for is_long, vote in zip(long, votes, strict=True)):
         return log, []
-    # Once scans have shown one, ranges alone tell of those where no scans match.
-    stretches = [each for each, vote in zip(found, votes, strict=True) if vote >= 0]
+    # Once scans have shown one, ranges alone tell of long ones where no scans match.
+    stretches = [each for each, is_long, vote in zip(found, long, votes, strict=True) if vote > -is_long]
     names = named_stretches(log, ((int(each.first[0]), int(each.last[-1])) for each in stretches))
     message = (
         "odometry counts reversing as driving forward: the scans show the robot going the other way from "
@@ -75,14 +76,13 @@ def reversed_stretches(log: LaserLog, options: UnsignedOdometryOptions) -> list[
     changes = np.flatnonzero(np.diff(np.concatenate([[False], backs, [False]]).astype(np.int8)))
     found = []
     for begin, end in changes.reshape(-1, 2).tolist():
-        if end - begin < options.min_steps:
-            continue
         way = np.hypot(*(log.odometry[last[begin:end], :2] - log.odometry[first[begin:end], :2]).T)
         speed = float((way / (log.times[last[begin:end]] - log.times[first[begin:end]])).max())
         stops = log.times[[0, -1]].tolist()
         for side, at in enumerate((begin - 1, end - 1)):
             if 0 <= at < len(first) - 1:
-                stops[side], slowest = _slowest(log, int(first[at]), int(last[at + 1]))
+                rows = [(int(first[row]), int(last[row])) for row in (at, at + 1)]
+                stops[side], slowest = _change(log, *rows)
                 if slowest > options.max_stop_speed * speed:
                     break
         else:
@@ -136,18 +136,27 @@ def _step_rows(log: LaserLog, options: UnsignedOdometryOptions) -> tuple[Indices
     return first[kept], last[kept]
 
 
-def _slowest(log: LaserLog, first: int, last: int) -> tuple[float, float]:
-    """The time (s) between two rows at which the robot is slowest by odometry, and its speed (m/s) there."""
+def _change(log: LaserLog, before: tuple[int, int], after: tuple[int, int]) -> tuple[float, float]:
+    """The time (s) when the robot changes its direction from one step to a later one, given by their rows,
+    and its least speed (m/s) over both.
+
+    It changes where it is slowest by odometry, between the middles of the two steps.
+    """
+    assert log.odometry is not None
+    times, poses = log.times[before[0] : after[1] + 1], log.odometry[before[0] : after[1] + 1]
     if log.odometry_path is not None:
-        times, poses = log.odometry_path.times, log.odometry_path.poses
-        inside = slice(*np.searchsorted(times, log.times[[first, last]]).tolist())
-        times, poses = times[inside], poses[inside]
-    if log.odometry_path is None or len(times) < 2:
-        assert log.odometry is not None
-        times, poses = log.times[first : last + 1], log.odometry[first : last + 1]
-    speeds = np.hypot(*np.diff(poses[:, :2], axis=0).T) / np.maximum(np.diff(times), 1e-6)
-    slowest = int(np.nanargmin(speeds))
-    return float(0.5 * (times[slowest] + times[slowest + 1])), float(speeds[slowest])
+        inside = slice(*np.searchsorted(log.odometry_path.times, times[[0, -1]]).tolist())
+        if inside.stop - inside.start > len(times):
+            times, poses = log.odometry_path.times[inside], log.odometry_path.poses[inside]
+    lengths = np.nan_to_num(np.hypot(*np.diff(poses[:, :2], axis=0).T))
+    periods, speeds = np.diff(times), np.full(len(lengths), np.inf)
+    np.divide(lengths, periods, out=speeds, where=periods > 0.0)
+    middles, ways = 0.5 * (times[1:] + times[:-1]), np.cumsum(lengths)
+    ends = np.interp(log.times[[before[1], after[0]]], times[1:], ways)
+    halfway = ways - 0.5 * lengths
+    between = np.flatnonzero((halfway > 0.5 * ends[0]) & (halfway < 0.5 * (ends[1] + ways[-1])))
+    at = middles[between[np.argmin(speeds[between])]] if len(between) else log.times[after[0]]
+    return float(at), float(speeds.min())
 
 
 def _votes(

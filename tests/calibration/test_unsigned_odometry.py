@@ -76,7 +76,19 @@ def test_odometry_that_reverses_is_left_alone() -> None:
 
 
 def test_a_drive_that_never_reverses_is_left_alone() -> None:
-    assert not reversed_stretches(read_log(str(OFFICE_LOG)), OPTIONS)
+    log = read_log(str(OFFICE_LOG))
+    assert checked(log)[0] is log
+
+
+@pytest.mark.parametrize("every", [1, 2, 3])
+def test_the_robot_changes_its_direction_where_it_stops(every: int) -> None:
+    """However far the scans are apart, odometry is reversed between the stops, and nowhere else."""
+    drive = there_and_back(excerpt(read_log(str(OFFICE_LOG)), slice(0, 400)), STRETCHES, stop=9)
+    log = excerpt(drive, slice(None, None, every))
+    corrected, said = checked(odometry_faults.unsigned(log))
+    off = relative(odometry(corrected), odometry(log))
+    assert len(said) == 1
+    assert np.hypot(off[:, 0], off[:, 1]).max() < 0.05
 
 
 def test_odometry_that_is_wrong_all_over_has_another_cause() -> None:
