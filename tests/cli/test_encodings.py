@@ -25,6 +25,14 @@ STREAMS = {
 }
 
 
+@pytest.fixture(scope="module", autouse=True)
+def compiled(tmp_path_factory: pytest.TempPathFactory) -> None:
+    """The kernels that `info` needs, so that no later call says that it compiles them."""
+    path = tmp_path_factory.mktemp("compiled") / "room.log"
+    path.write_text(room_log(12))
+    assert run(["info", str(path)]) == 0
+
+
 @pytest.fixture
 def log(folder: Path) -> str:
     """A log in the current folder, and its true poses."""
