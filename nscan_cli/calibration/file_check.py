@@ -40,7 +40,7 @@ def checked_file(log: LaserLog, reading: ReadingOptions, options: FileCheckOptio
     findings = find_contradictions(log, reading, options)
     if held and any(finding.is_of_clocks for finding in findings):
         # A clock that is behind makes odometry begin late, as if it stood.
-        log, held = recorded, []
+        log, held, reversing = recorded, [], []
     for finding in findings:
         if finding.corrected:
             corrected = replace(reading, **finding.corrected)
