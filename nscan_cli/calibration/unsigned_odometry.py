@@ -13,6 +13,7 @@ from nscan_cli.calibration.named_stretches import named_stretches
 from nscan_cli.calibration.options import StepOptions, UnsignedOdometryOptions
 from nscan_cli.kernels.decorators import kernel
 from nscan_cli.logs.laser_log import LaserLog
+from nscan_cli.logs.mask_runs import mask_runs
 from nscan_cli.logs.robot_path import robot_path
 from nscan_cli.poses import Array, Indices, are_known, compose, relative
 
@@ -63,19 +64,18 @@ def reversed_stretches(log: LaserLog, options: UnsignedOdometryOptions) -> list[
     step = relative(log.odometry[last], log.odometry[first])
     errors = np.empty((len(first), 2))
     for column, robot in enumerate((step, step * REVERSED)):
-        motion = relative(compose(robot, log.mount), log.mount)
-        errors[:, column] = _prediction_errors(
-            log.ranges, log.angle_min, log.angle_increment, (first, last), motion, options
-        )
+        errors[:, column] = _range_errors(
+            log.ranges, log.angle_min, log.angle_increment, first, last, _of_laser(robot, log.mount),
+            max(log.ranges.shape[1] // options.max_beams, 1), options.min_beams, options.max_error,
+        )  # fmt: skip
     clear = np.full(len(first), False)
     np.less(errors.min(axis=1), options.max_error_ratio * errors.max(axis=1), out=clear)
     first, last, backs = first[clear], last[clear], errors[clear, 1] < errors[clear, 0]
     if 2 * np.count_nonzero(backs) >= len(backs):
         return []
     # A direction lasts until the next clear step that has the other one.
-    changes = np.flatnonzero(np.diff(np.concatenate([[False], backs, [False]]).astype(np.int8)))
     found = []
-    for begin, end in changes.reshape(-1, 2).tolist():
+    for begin, end in mask_runs(backs):
         way = np.hypot(*(log.odometry[last[begin:end], :2] - log.odometry[first[begin:end], :2]).T)
         speed = float((way / (log.times[last[begin:end]] - log.times[first[begin:end]])).max())
         stops = log.times[[0, -1]].tolist()
@@ -168,24 +168,14 @@ def _votes(
     found = measure_steps(log, (stretch.first[some], stretch.last[some]), steps)
     said = found.odometry(log.odometry)
     apart = [
-        np.hypot(*(relative(compose(robot, log.mount), log.mount) - found.laser)[:, :2].T)
-        for robot in (said, said * REVERSED)
+        np.hypot(*(_of_laser(robot, log.mount) - found.laser)[:, :2].T) for robot in (said, said * REVERSED)
     ]
     return 2 * int((apart[1] < options.max_error_ratio * apart[0]).sum()) - len(found)
 
 
-def _prediction_errors(
-    ranges: NDArray[np.float32],
-    angle_min: Array,
-    angle_increment: Array,
-    rows: tuple[Indices, Indices],
-    motions: Array,
-    options: UnsignedOdometryOptions,
-) -> Array:
-    """(n,) as `_range_errors` for ranges (S, B), with as many beams of a scan as the options say."""
-    every = max(ranges.shape[1] // options.max_beams, 1)
-    least = options.min_beams, options.max_error
-    return np.asarray(_range_errors(ranges, angle_min, angle_increment, *rows, motions, every, *least))
+def _of_laser(steps: Array, mount: Array) -> Array:
+    """(n, 3) the steps of a laser on a robot that makes these steps (n, 3)."""
+    return relative(compose(steps, mount), mount)
 
 
 @kernel

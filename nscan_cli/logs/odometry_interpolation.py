@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nscan_cli.files.text import counted
+from nscan_cli.logs.mask_runs import mask_runs
 from nscan_cli.logs.scan_order import nearest_in_time, usual_period
 from nscan_cli.poses import Array, relative, wrap
 
@@ -69,8 +70,7 @@ def interpolated_poses(
 
 def _missing_notice(missing: NDArray[np.bool_], times: Array, name: str) -> str:
     """The sentence that says at which scans (S,) odometry is missing; times (S,) in s."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], missing, [False]]).astype(np.int8)))
-    gaps = edges.reshape(-1, 2).tolist()
+    gaps = mask_runs(missing)
     stretches = [_scans(first, end - 1) for first, end in gaps[:MOST_GAPS_NAMED]]
     more = len(gaps) - MOST_GAPS_NAMED
     rest = f" and in {counted(more, 'more gap')}" if more > 0 else ""

@@ -11,6 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from nscan_cli.logs.mask_runs import mask_runs
 from nscan_cli.poses import Array, Mask
 from nscan_cli.slam.frontend.options import TrackingOptions
 from nscan_cli.slam.frontend.scan_batch import ScanBatch
@@ -61,9 +62,7 @@ def motion_from_behind(
 
 def untold_stretches(found: TrackedScans, options: TrackingOptions) -> list[tuple[int, int]]:
     """The stretches (first, end) of scans that fit badly or do not tell their place."""
-    # The first scan of a log has nothing to be matched with, and tells.
-    told = np.concatenate([[True], _in_runs_that_tell(found, options), [True]])
-    return [(first, end) for first, end in np.flatnonzero(np.diff(told)).reshape(-1, 2).tolist()]
+    return mask_runs(~_in_runs_that_tell(found, options))
 
 
 def _seems_to_stand(poses: Array, first: int, end: int, options: TrackingOptions) -> bool:

@@ -11,6 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
+from nscan_cli.logs.mask_runs import mask_runs
 from nscan_cli.logs.robot_path import steady_between
 from nscan_cli.poses import Array, Indices, Mask, relative
 
@@ -106,8 +107,7 @@ def _stalls(steps: Steps, min_acceleration: float, options: OdometryStallOptions
     """
     speeds, found = steps.speeds(), []
     # Steps first to end − 1 stand; the step at `end` makes up for them.
-    changes = np.flatnonzero(np.diff(np.concatenate([[False], steps.stands, [False]]).astype(np.int8)))
-    for first, end in changes.reshape(-1, 2).tolist():
+    for first, end in mask_runs(steps.stands):
         if end - first < options.min_steps or first == 0 or end + 1 >= len(steps.sizes):
             continue
         size, periods = steps.sizes[end], steps.periods[[first - 1, end, end + 1]]
