@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 
 from nscan_cli.calibration.measured_steps import measure_steps
-from nscan_cli.calibration.named_stretches import named_stretches
 from nscan_cli.calibration.options import HeldOdometryOptions, StepOptions
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.logs.robot_path import robot_path
+from nscan_cli.logs.stretch_names import stretch_names
 from nscan_cli.poses import relative
 
 
@@ -21,8 +21,9 @@ def checked_held(
     held = held_stretches(log, options, steps)
     if not held:
         return log, []
+    names = stretch_names((log.numbers[first], log.numbers[last]) for first, last in held)
     message = (
-        f"odometry stands still while the scans move, from scan {named_stretches(log, held)}: it is not used "
+        f"odometry stands still while the scans move, from scan {names}: it is not used "
         "there, and steady motion takes its place; --as-recorded uses it as it is"
     )
     return without_held(log, held), [message]

@@ -9,12 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nscan_cli.calibration.measured_steps import measure_steps
-from nscan_cli.calibration.named_stretches import named_stretches
 from nscan_cli.calibration.options import StepOptions, UnsignedOdometryOptions
 from nscan_cli.kernels.decorators import kernel
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.logs.mask_runs import mask_runs
 from nscan_cli.logs.robot_path import robot_path
+from nscan_cli.logs.stretch_names import stretch_names
 from nscan_cli.poses import Array, Indices, are_known, compose, relative
 
 REVERSED = np.array([-1.0, -1.0, 1.0])
@@ -44,7 +44,7 @@ def checked_signs(
         return log, []
     # Once scans have shown one, ranges alone tell of long ones where no scans match.
     stretches = [each for each, is_long, vote in zip(found, long, votes, strict=True) if vote > -is_long]
-    names = named_stretches(log, ((int(each.first[0]), int(each.last[-1])) for each in stretches))
+    names = stretch_names((log.numbers[each.first[0]], log.numbers[each.last[-1]]) for each in stretches)
     message = (
         "odometry counts reversing as driving forward: the scans show the robot going the other way from "
         f"scan {names}; odometry is reversed there; --as-recorded uses it as it is"

@@ -28,6 +28,7 @@ from nscan_cli.logs.scan_order import ScanOrder, selected_numbers
 from nscan_cli.logs.skips import Skips
 from nscan_cli.logs.slow_odometry import without_repeats
 from nscan_cli.logs.sweep import Sweep, SweepTimes, beam_times, sweep_of_file
+from nscan_cli.logs.unit_stretches import in_one_unit
 from nscan_cli.poses import Array, are_known
 
 
@@ -133,7 +134,7 @@ def laser_log(
     numbers = selected_numbers(times.times, options, file)
     rows = times.rows[numbers]
     warnings = findings.warnings
-    raw, limits, contradictions = _in_metres(raw, options, warnings)
+    raw, limits, contradictions = _in_metres(raw, times, options, warnings)
     written = beam_directions(raw, options, warnings)
     (angle_min, angle_increment), bent = checked_by_walls(raw, written, limits, options)
     findings.used |= {"range_min": limits.low_from, "range_max": limits.high_from}
@@ -227,17 +228,18 @@ def _sweep(raw: RawScans, increments: Array, times: ScanOrder, options: ReadingO
 
 
 def _in_metres(
-    raw: RawScans, options: ReadingOptions, warnings: list[str]
+    raw: RawScans, times: ScanOrder, options: ReadingOptions, warnings: list[str]
 ) -> tuple[RawScans, RangeLimits, list[str]]:
     """The scans in metres, their limits, and what is said if the scans contradict the unit of the log."""
     if options.range_scale is not None:
         raw = scaled(raw, options.range_scale)
         return raw, limits_in_force(raw, options, warnings), []
+    raw, mixed = (raw, []) if options.as_recorded else in_one_unit(raw, times)
     said: list[str] = []
     limits = limits_in_force(raw, options, said)
     unit = None if options.as_recorded else wrong_unit(raw.ranges, limits)
     if unit is None or not unit.is_certain:
         warnings += said
-        return raw, limits, []
+        return raw, limits, mixed
     raw = scaled(raw, unit.scale)
-    return raw, limits_in_force(raw, options, warnings), [unit.correction]
+    return raw, limits_in_force(raw, options, warnings), [*mixed, unit.correction]

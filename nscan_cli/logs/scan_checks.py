@@ -18,6 +18,7 @@ from nscan_cli.logs.scan_order import DEFAULT_SCAN_ORDER, ScanOrderOptions
 from nscan_cli.logs.slow_odometry import DEFAULT_SLOW_ODOMETRY, SlowOdometryOptions
 from nscan_cli.logs.sweep import DEFAULT_SWEEP, SweepOptions
 from nscan_cli.logs.text.interlaced_scans import DEFAULT_INTERLACED, InterlacedOptions
+from nscan_cli.logs.unit_stretches import DEFAULT_UNIT_STRETCHES, UnitStretchOptions
 
 
 @dataclass(frozen=True)
@@ -27,6 +28,7 @@ class ScanCheckOptions:
     scan_order: ScanOrderOptions = DEFAULT_SCAN_ORDER
     range_limits: RangeLimitOptions = DEFAULT_RANGE_LIMITS
     range_unit: RangeUnitOptions = DEFAULT_RANGE_UNIT
+    unit_stretches: UnitStretchOptions = DEFAULT_UNIT_STRETCHES
     beam_angles: BeamAngleOptions = DEFAULT_BEAM_ANGLES
     beam_spacing: BeamSpacingOptions = DEFAULT_BEAM_SPACING
     interlaced: InterlacedOptions = DEFAULT_INTERLACED

@@ -188,6 +188,11 @@ def _looking(degrees: float) -> Fault:
     return lambda log: faults.mounted_otherwise(log, np.radians(degrees))
 
 
+def _from_half_way(factor: float) -> Fault:
+    """The second half of the scans has its ranges multiplied."""
+    return lambda log: faults.ranges_scaled(log, factor, slice(len(log) // 2, None))
+
+
 def _middle(log: LaserLog) -> slice:
     """The middle third of a log."""
     return slice(len(log) // 3, 2 * len(log) // 3)
@@ -220,6 +225,9 @@ FAULTS: tuple[tuple[str, Fault, str], ...] = (
         "counts reversing as driving forward",
     ),
     ("each pose five times", lambda log: odometry_faults.repeated(log, 5), "odometry comes less often"),
+    ("ranges in mm from half-way on", _from_half_way(1000.0), "in millimetres, the others in metres"),
+    ("ranges in cm from half-way on", _from_half_way(100.0), "in centimetres, the others in metres"),
+    ("ranges in feet from half-way on", _from_half_way(3.281), "all ranges are multiplied"),
     ("readings reversed", faults.mirrored, "in the wrong order"),
     ("beams closer by a third", lambda log: faults.beams_apart(log, 2 / 3), "1° from beam to beam"),
     ("beams wider by a half", lambda log: faults.beams_apart(log, 1.5), "1° from beam to beam"),

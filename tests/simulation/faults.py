@@ -99,6 +99,13 @@ def frozen(log: LaserLog, rows: Rows) -> LaserLog:
     return replace(log, ranges=ranges)
 
 
+def ranges_scaled(log: LaserLog, factor: float, rows: Rows) -> LaserLog:
+    """Some scans are in another unit."""
+    ranges = log.ranges.copy()
+    ranges[rows] *= np.float32(factor)
+    return replace(log, ranges=ranges)
+
+
 def mirrored(log: LaserLog) -> LaserLog:
     """The readings of each scan in the wrong order."""
     return replace(log, angle_min=-log.angle_min, angle_increment=-log.angle_increment)
