@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from nscan_cli.calibration.companions import checked_companion
 from nscan_cli.calibration.contradictions import find_contradictions
 from nscan_cli.calibration.held_odometry import checked_held
+from nscan_cli.calibration.odometry_units import checked_units
 from nscan_cli.calibration.options import FileCheckOptions
 from nscan_cli.calibration.sweep_check import checked_sweep
 from nscan_cli.calibration.unsigned_odometry import checked_signs
@@ -35,17 +36,21 @@ def checked_file(log: LaserLog, reading: ReadingOptions, options: FileCheckOptio
     if reading.as_recorded:
         return CheckedFile(log, reading, said)
     recorded = log
-    log, held = checked_held(recorded, options.held, options.steps)
+    log, units = checked_units(recorded, options.units, options.steps)
+    log, held = checked_held(log, options.held, options.steps)
     log, reversing = checked_signs(log, options.unsigned, options.steps)
     findings = find_contradictions(log, reading, options)
     if held and any(finding.is_of_clocks for finding in findings):
         # A clock that is behind makes odometry begin late, as if it stood.
-        log, held, reversing = recorded, [], []
+        log, units, held, reversing = recorded, [], [], []
     for finding in findings:
         if finding.corrected:
             corrected = replace(reading, **finding.corrected)
             log, reading = _as_read(log, reading, corrected), corrected
-    said += held + reversing + [finding.message for finding in findings]
+            if not reversing and "odometry_scale" in finding.corrected:
+                # In another unit the ranges did not change as odometry says.
+                log, reversing = checked_signs(log, options.unsigned, options.steps)
+    said += units + held + reversing + [finding.message for finding in findings]
     if any(not finding.corrected for finding in findings):
         # Where the robot has been is in doubt.
         return CheckedFile(log, reading, said)

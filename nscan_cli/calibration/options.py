@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
+from nscan_cli.calibration.scale_options import OdometryUnitOptions
 from nscan_cli.calibration.sweep_options import SweepCheckOptions
 from nscan_cli.matching.pairwise import PairOptions
 
@@ -191,6 +192,7 @@ class FileCheckOptions:
     clock: ClockOptions = field(default_factory=ClockOptions)
     sweep: SweepCheckOptions = field(default_factory=SweepCheckOptions)
     held: HeldOdometryOptions = field(default_factory=HeldOdometryOptions)
+    units: OdometryUnitOptions = field(default_factory=OdometryUnitOptions)
     unsigned: UnsignedOdometryOptions = field(default_factory=UnsignedOdometryOptions)
     companion: CompanionOptions = field(default_factory=CompanionOptions)
     min_steps: int = 12

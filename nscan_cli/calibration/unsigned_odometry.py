@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -10,10 +9,10 @@ from numpy.typing import NDArray
 
 from nscan_cli.calibration.measured_steps import measure_steps
 from nscan_cli.calibration.options import StepOptions, UnsignedOdometryOptions
+from nscan_cli.calibration.scaled_steps import with_scaled_steps
 from nscan_cli.kernels.decorators import kernel
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.logs.mask_runs import mask_runs
-from nscan_cli.logs.robot_path import robot_path
 from nscan_cli.logs.stretch_names import stretch_names
 from nscan_cli.poses import Array, Indices, are_known, compose, relative
 
@@ -49,7 +48,8 @@ def checked_signs(
         "odometry counts reversing as driving forward: the scans show the robot going the other way from "
         f"scan {names}; odometry is reversed there; --as-recorded uses it as it is"
     )
-    return with_reversed(log, stretches), [message]
+    reversed_log = with_scaled_steps(log, ((each.begin, each.end) for each in stretches), -1.0)
+    return reversed_log, [message]
 
 
 def reversed_stretches(log: LaserLog, options: UnsignedOdometryOptions) -> list[ReversedStretch]:
@@ -88,33 +88,6 @@ def reversed_stretches(log: LaserLog, options: UnsignedOdometryOptions) -> list[
         else:
             found.append(ReversedStretch(first[begin:end], last[begin:end], *stops))
     return found
-
-
-def with_reversed(log: LaserLog, stretches: list[ReversedStretch]) -> LaserLog:
-    """The log with its odometry driving the other way over each stretch."""
-    assert log.odometry is not None
-    path = log.odometry_path
-    return replace(
-        log,
-        odometry=_reversed(log.times, log.odometry, stretches),
-        odometry_path=None
-        if path is None
-        else robot_path(path.times, _reversed(path.times, path.poses, stretches)),
-    )
-
-
-def _reversed(times: Array, poses: Array, stretches: list[ReversedStretch]) -> Array:
-    """Poses (S, 3) at times (S,), s, whose steps lead the other way within the stretches.
-
-    The headings stay as they are.
-    """
-    known = np.flatnonzero(are_known(poses))
-    turned, middle = poses.copy(), 0.5 * (times[known[1:]] + times[known[:-1]])
-    steps = np.diff(poses[known, :2], axis=0)
-    for each in stretches:
-        steps[(middle > each.begin) & (middle < each.end)] *= -1.0
-    turned[known[1:], :2] = poses[known[:1], :2] + np.cumsum(steps, axis=0)
-    return turned
 
 
 def _goes_one_way(odometry: Array, options: UnsignedOdometryOptions) -> bool:

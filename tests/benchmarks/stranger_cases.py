@@ -201,6 +201,10 @@ def _middle(log: LaserLog) -> slice:
 FAULTS: tuple[tuple[str, Fault, str], ...] = (
     ("", lambda log: log, ""),
     ("odometry × 1000", lambda log: odometry_faults.scaled(log, 1000.0), "odometry-scale 0.001"),
+    ("odometry × 1000 from half-way on",
+        lambda log: odometry_faults.scaled_in(log, 1000.0, slice(len(log) // 2, None)),
+        "in millimetres, elsewhere in metres",
+    ),
     ("odometry × 300", lambda log: odometry_faults.scaled(log, 300.0), "odometry-scale 0.003"),
     ("odometry × 0.01", lambda log: odometry_faults.scaled(log, 0.01), "odometry-scale (100|9|10)"),
     ("odometry × 2", lambda log: odometry_faults.scaled(log, 2.0), "scale of odometry"),
@@ -222,6 +226,12 @@ FAULTS: tuple[tuple[str, Fault, str], ...] = (
     ),
     ("odometry without signs, three reversals",
         lambda log: odometry_faults.unsigned(there_and_back(log, [(40, 80), (200, 260), (270, 280)])),
+        "counts reversing as driving forward",
+    ),
+    ("odometry × 1000 without signs, three reversals",
+        lambda log: odometry_faults.scaled(
+            odometry_faults.unsigned(there_and_back(log, [(40, 80), (200, 260), (270, 280)])), 1000.0
+        ),
         "counts reversing as driving forward",
     ),
     ("each pose five times", lambda log: odometry_faults.repeated(log, 5), "odometry comes less often"),

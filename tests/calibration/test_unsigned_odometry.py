@@ -54,6 +54,15 @@ def test_unsigned_odometry_is_put_right() -> None:
     assert said[0].count(" to ") == len(STRETCHES)
 
 
+def test_signs_are_looked_for_once_the_unit_is_put_right() -> None:
+    log = odometry_faults.scaled(odometry_faults.unsigned(reversing()), 1000.0)
+    whole = checked_file(log, ReadingOptions(), FileCheckOptions())
+    off = relative(odometry(whole.log), odometry(reversing()))
+    assert np.hypot(off[:, 0], off[:, 1]).max() < 0.1
+    assert "counts reversing as driving forward" in whole.messages[0]
+    assert "--odometry-scale 0.001" in whole.messages[1]
+
+
 def test_odometry_at_its_own_times_is_put_right_too() -> None:
     log = odometry_faults.unsigned(reversing())
     corrected, _ = checked(replace(log, odometry_path=robot_path(log.times, odometry(log))))

@@ -49,6 +49,14 @@ def scaled(log: LaserLog, factor: float) -> LaserLog:
     return replace(log, odometry=_odometry(log) * (factor, factor, 1.0))
 
 
+def scaled_in(log: LaserLog, factor: float, rows: Rows) -> LaserLog:
+    """The steps that end in `rows` are in another unit."""
+    steps, some = relative(_odometry(log)[1:], _odometry(log)[:-1]), np.zeros(len(log), dtype=bool)
+    some[rows] = True
+    steps[some[1:], :2] *= factor
+    return replace(log, odometry=_summed(_odometry(log)[0], steps))
+
+
 def x_reversed(log: LaserLog) -> LaserLog:
     """The odometry counts x the wrong way; its headings are right."""
     return replace(log, odometry=_odometry(log) * (-1.0, 1.0, 1.0))

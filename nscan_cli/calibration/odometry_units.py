@@ -1,0 +1,94 @@
+"""Odometry in millimetres or centimetres over a part of a log: two drivers, or one that was updated."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from nscan_cli.calibration.measured_steps import measure_steps
+from nscan_cli.calibration.options import StepOptions
+from nscan_cli.calibration.scale_options import OdometryUnitOptions
+from nscan_cli.calibration.scaled_steps import with_scaled_steps
+from nscan_cli.logs.laser_log import LaserLog
+from nscan_cli.logs.mask_runs import mask_runs
+from nscan_cli.logs.range_unit import UNITS
+from nscan_cli.logs.stretch_names import stretch_names
+from nscan_cli.poses import Array, Indices, Mask, relative
+
+
+def checked_units(
+    log: LaserLog, options: OdometryUnitOptions, steps: StepOptions
+) -> tuple[LaserLog, list[str]]:
+    """The log with all of its odometry in metres if a part is in another unit, and what is said of it."""
+    if log.odometry is None or len(log) < 2:
+        return log, []
+    lengths = np.hypot(*np.nan_to_num(relative(log.odometry[1:], log.odometry[:-1]))[:, :2].T)
+    periods = np.diff(log.times)
+    is_fast, moves = lengths > options.too_fast * periods, lengths > options.still * periods
+    if min(np.count_nonzero(is_fast), np.count_nonzero(moves & ~is_fast)) < options.min_steps:
+        return log, []
+    # A step from one frame to another may be of any length, and a slow robot is not too fast in centimetres.
+    usual = [float(np.median(lengths[some])) for some in (moves & ~is_fast, is_fast)]
+    is_large = _as_most(lengths > np.sqrt(usual[0] * usual[1]), moves)
+    parts = [_metres_by_scans(log, some, options, steps) for some in (moves & ~is_large, moves & is_large)]
+    for name, scale in UNITS:
+        if all(
+            part is not None and abs(np.log(part / unit)) < options.tolerance
+            for part, unit in zip(parts, (1.0, scale), strict=True)
+        ):
+            stretches = mask_runs(is_large)
+            names = stretch_names(
+                (log.numbers[first + (first > 0)], log.numbers[end]) for first, end in stretches
+            )
+            times = [(float(log.times[first]), float(log.times[end])) for first, end in stretches]
+            return with_scaled_steps(log, times, scale), [
+                f"odometry from scan {names} is in {name}, elsewhere in metres: it is multiplied by "
+                f"{scale:g} there; --as-recorded uses it as it is"
+            ]
+    return log, []
+
+
+def _as_most(is_large: Mask, moves: Mask) -> Mask:
+    """(n,) which steps are large, each as the moving ones about it, so that single ones do not count.
+
+    A large one beside others does.
+    """
+    at = np.flatnonzero(moves)
+    most = _of_five(is_large[at]) >= 3
+    most |= is_large[at] & (_of_five(most) > 0)
+    found: Mask = most[np.clip(np.searchsorted(at, np.arange(len(moves))), 0, len(at) - 1)]
+    return found
+
+
+def _of_five(mask: Mask) -> Indices:
+    """(n,) how many of each row and the two on both sides are marked in a mask (n,)."""
+    return np.convolve(np.pad(mask.astype(np.int64), 2, mode="edge"), np.ones(5, dtype=np.int64), "valid")
+
+
+def _metres_by_scans(
+    log: LaserLog, is_so: Mask, options: OdometryUnitOptions, steps: StepOptions
+) -> float | None:
+    """Metres by scans for one metre by odometry, the median over steps that are so (n,); None for too few."""
+    assert log.odometry is not None
+    first, last = _within(log.times, is_so, steps.duration)
+    if not len(first):
+        return None
+    some = np.unique(np.linspace(0, len(first) - 1, options.measured_steps).astype(np.int64))
+    found = measure_steps(log, (first[some], last[some]), steps)
+    by_scans = np.hypot(*found.laser[:, :2].T)
+    by_odometry = np.hypot(*found.odometry(log.odometry)[:, :2].T)
+    clear = (by_scans >= steps.min_motion) & (by_odometry > 0.0)
+    if np.count_nonzero(clear) < options.min_measured:
+        return None
+    return float(np.median(by_scans[clear] / by_odometry[clear]))
+
+
+def _within(times: Array, is_so: Mask, duration: float) -> tuple[Indices, Indices]:
+    """Rows (m,) between which steps of some duration, s, begin and end that consist of single ones (n,)
+    that are so.
+    """
+    first = np.arange(len(times))
+    last = np.maximum(np.searchsorted(times, times + duration), first + 1)
+    first, last = first[last < len(times)], last[last < len(times)]
+    so = np.append(0, np.cumsum(is_so))
+    whole = so[last] - so[first] == last - first
+    return first[whole], last[whole]
