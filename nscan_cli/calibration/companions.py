@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from nscan_cli.calibration.options import CompanionOptions
-from nscan_cli.logs.beam_mask import Bearings, mask_beams, sectors_text
+from nscan_cli.logs.beam_mask import Bearings, mask_beams, mask_text
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.logs.reading_options import ReadingOptions
 from nscan_cli.poses import Array, Indices, Mask, are_known, compose, transform
@@ -40,11 +40,6 @@ class Companion:
     def mask(self, others: tuple[Bearings, ...]) -> tuple[Bearings, ...]:
         """Its sectors and others, as they are read without."""
         return (*others, *self.sectors)
-
-
-def mask_text(sectors: tuple[Bearings, ...]) -> str:
-    """Sectors (rad) as --mask takes them."""
-    return sectors_text([(float(np.degrees(first)), float(np.degrees(last))) for first, last in sectors])
 
 
 def checked_companion(

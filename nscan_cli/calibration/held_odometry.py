@@ -9,6 +9,7 @@ import numpy as np
 from nscan_cli.calibration.measured_steps import measure_steps
 from nscan_cli.calibration.options import HeldOdometryOptions, StepOptions
 from nscan_cli.logs.laser_log import LaserLog
+from nscan_cli.logs.mask_runs import mask_runs
 from nscan_cli.logs.robot_path import robot_path
 from nscan_cli.logs.stretch_names import stretch_names
 from nscan_cli.poses import relative
@@ -37,14 +38,14 @@ def held_stretches(log: LaserLog, options: HeldOdometryOptions, steps: StepOptio
     if log.odometry is None or len(log) < 2:
         return []
     moves = np.abs(relative(log.odometry[1:], log.odometry[:-1])).max(axis=1)
-    # An unknown pose neither stands nor moves: it ends a stretch.
-    stands = np.concatenate([[False], moves <= options.still, [False]])
-    begins = np.flatnonzero(~stands[:-1] & stands[1:])
-    ends = np.flatnonzero(stands[:-1] & ~stands[1:])
-    long = log.times[ends] - log.times[begins] >= options.min_duration
-    long &= (begins > 0) | (ends < len(log) - 1)
-    stretches = zip(begins[long].tolist(), ends[long].tolist(), strict=True)
-    return [(first, last) for first, last in stretches if _scans_move(log, first, last, options, steps)]
+    return [
+        (first, last)
+        # An unknown pose neither stands nor moves: it ends a stretch.
+        for first, last in mask_runs(moves <= options.still)
+        if log.times[last] - log.times[first] >= options.min_duration
+        and last - first < len(log) - 1
+        and _scans_move(log, first, last, options, steps)
+    ]
 
 
 def without_held(log: LaserLog, stretches: list[tuple[int, int]]) -> LaserLog:

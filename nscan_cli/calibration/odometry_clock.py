@@ -8,6 +8,7 @@ import numpy as np
 
 from nscan_cli.calibration.measured_steps import MeasuredSteps
 from nscan_cli.calibration.options import ClockOptions
+from nscan_cli.calibration.parabola import parabola_minimum
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.poses import Array, are_known
 
@@ -32,11 +33,9 @@ class ClockLag:
 def clock_lag(
     log: LaserLog, steps: MeasuredSteps, options: ClockOptions, turn_sign: float = 1.0
 ) -> ClockLag | None:
-    """The best offset, to about a tenth of the resolution; None without turns.
+    """The best offset within half of the log's length, to about a tenth of the resolution.
 
-    It is looked for within half of the log's length.
-
-    `turn_sign` −1 compares with the turns of mirrored scans.
+    None without turns. `turn_sign` −1 compares with the turns of mirrored scans.
     """
     assert log.odometry is not None
     known = are_known(log.odometry)
@@ -49,27 +48,15 @@ def clock_lag(
     resolution = options.resolution
     span = min(options.span, 0.5 * float(log.times[-1] - log.times[0]))
     count = int(np.ceil(span / resolution))
-    offsets = resolution * np.arange(-count, count + 1)
+    offsets = resolution * np.arange(-count, count + 1, dtype=np.float64)
     off = np.array([_disagreement(at + by, headings, begins, ends, turns) for by in offsets]) / whole
     best = int(np.argmin(off))
-    return ClockLag(
-        float(offsets[best] + resolution * _vertex(off, best)),
-        float(off[best]),
-        float(off[count]),
-        float(np.median(off)),
-    )
+    is_inside = 0 < best < len(off) - 1
+    offset = parabola_minimum(offsets, off) if is_inside else float(offsets[best])
+    return ClockLag(offset, float(off[best]), float(off[count]), float(np.median(off)))
 
 
 def _disagreement(at: Array, headings: Array, begins: Array, ends: Array, turns: Array) -> float:
     """The sum of capped differences (rad) of turns (n,) from those of headings (S,) at times `at` (S,)."""
     told = np.interp(ends, at, headings) - np.interp(begins, at, headings)
     return float(np.minimum(np.abs(told - turns), CAPPED).sum())
-
-
-def _vertex(values: Array, best: int) -> float:
-    """Where between its neighbours a parabola through the best of the values has its vertex, in samples."""
-    if not 0 < best < len(values) - 1:
-        return 0.0
-    before, at, after = values[best - 1 : best + 2].tolist()
-    bend = before - 2 * at + after
-    return 0.5 * (before - after) / bend if bend > 0.0 else 0.0

@@ -10,6 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from nscan_cli.calibration.parabola import parabola_minimum
 from nscan_cli.calibration.scan_motion import ScanMotion
 from nscan_cli.calibration.sweep_options import SweepCheckOptions
 from nscan_cli.calibration.turn_of_file import usual_turn
@@ -66,16 +67,14 @@ def _best_delay(
         return float(np.abs(turned - by_odometry).mean())
 
     count = round(options.longest_delay / options.delay_step)
-    delays = options.delay_step * np.arange(-count, count + 1)
+    delays = options.delay_step * np.arange(-count, count + 1, dtype=np.float64)
     off = np.array([disagreement(delay) for delay in delays.tolist()])
     best = int(np.argmin(off))
     gain = float(off[best] / off[count]) if off[count] > 0.0 else 1.0
-    near = slice(max(best - options.delays_fitted, 0), best + options.delays_fitted + 1)
     # At an end of the range the best one may lie beyond.
     if best in (0, 2 * count) or gain > options.delay_gain:
         return 0.0, gain
-    bend, slope, _ = np.polyfit(delays[near] - delays[best], off[near], 2).tolist()
-    delay = round(float(delays[best]) - (slope / (2 * bend) if bend > 0.0 else 0.0), 3)
+    delay = round(parabola_minimum(delays, off, options.delays_fitted), 3)
     return (delay if abs(delay) >= options.least_delay else 0.0), gain
 
 

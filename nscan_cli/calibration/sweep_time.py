@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from nscan_cli.calibration.parabola import parabola_minimum
 from nscan_cli.calibration.scan_motion import ScanMotion
 from nscan_cli.calibration.sweep_evidence import LEAST_PAIRS, turning_pairs
 from nscan_cli.calibration.sweep_options import SweepCheckOptions, SweepTimeOptions
@@ -94,8 +95,5 @@ def _sharpest(turns: Array, energies: Array, options: SweepTimeOptions) -> float
     above = energies - energies.min(axis=1, keepdims=True)
     most = options.cap * float(np.median(above.max(axis=1)))
     means: Array = np.minimum(above, most).mean(axis=0)
-    best, step = int(np.argmin(means)), float(turns[1] - turns[0])
-    near = slice(max(best - options.fitted, 0), best + options.fitted + 1)
-    bend, slope, _ = np.polyfit(turns[near] - turns[best], means[near], 2).tolist()
-    off = -slope / (2 * bend) if bend > 0.0 else 0.0
-    return float(turns[best] + np.clip(off, -step, step))
+    best, step = float(turns[np.argmin(means)]), float(turns[1] - turns[0])
+    return float(np.clip(parabola_minimum(turns, means, options.fitted), best - step, best + step))

@@ -137,9 +137,7 @@ def second_is_straighter(
 ) -> bool | None:
     """Whether the second of two steps (rad) of each scan makes walls straighter; None if that is unclear.
 
-    `rows` are the readings (B,) of each scan, m; unusable ones are infinite or not above 0. On a wall at
-    distance d with normal direction α, a beam in direction φ measures 1 / r = cos(φ − α) / d. Beams k steps
-    of s before and after a beam therefore satisfy 1 / r₋ + 1 / r₊ = 2 cos(k s) / r.
+    `rows` are the readings (B,) of each scan, m; unusable ones are infinite or not above 0.
     """
     first = second = 0
     for ranges, one, other in zip(rows, ones, others, strict=True):
@@ -163,10 +161,22 @@ def _beams_on_walls(ranges: NDArray[np.float32], steps: Array, options: BeamAngl
         return 0, 0
     with np.errstate(divide="ignore", invalid="ignore"):
         near = 1 / np.where((ranges > 0) & np.isfinite(ranges), ranges, np.nan).astype(np.float64)
-        found = (near[: beams - 2 * k] + near[2 * k :]) / near[k : beams - k]
+        found = double_cosines(near, k)
     within = min(options.max_deviation, abs(first - second) / 4)
     by_one, by_other = (int(np.count_nonzero(np.abs(found - value) < within)) for value in (first, second))
     return by_one, by_other
+
+
+def double_cosines(near: Array, k: int) -> Array:
+    """2 cos u (…, B − 2 k) of the angle u from each beam to those `k` places beside it, as a wall has it.
+
+    `near` (…, B) are 1 / r, 1/m. On a wall at distance d with normal direction α, a beam in direction φ
+    measures 1 / r = cos(φ − α) / d. Those at angles −u and u from it thus satisfy
+    1 / r₋ + 1 / r₊ = 2 cos(u) / r.
+    """
+    beams = near.shape[-1]
+    found: Array = (near[..., : beams - 2 * k] + near[..., 2 * k :]) / near[..., k : beams - k]
+    return found
 
 
 def _degrees_text(angle: float) -> str:

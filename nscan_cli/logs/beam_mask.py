@@ -29,17 +29,17 @@ def masked_sectors(
 
 
 def _said(found: Sequence[Sector]) -> str:
-    sectors = [(math.degrees(sector.first), math.degrees(sector.last)) for sector in found]
     ranges = " and ".join(f"{distance:.2f}" for distance in sorted({round(one.range, 2) for one in found}))
     return (
         f"beams keep their range ({ranges} m) while the robot turns, so they see the robot itself; they are "
-        f"left out, as by --mask {sectors_text(sectors)}; --as-recorded uses them"
+        f"left out, as by --mask {mask_text([sector[:2] for sector in found])}; --as-recorded uses them"
     )
 
 
-def sectors_text(sectors: Sequence[tuple[float, float]]) -> str:
-    """Sectors (degrees) as --mask takes them."""
-    return ",".join(f"{round(first, 1):g}:{round(last, 1):g}" for first, last in sectors)
+def mask_text(sectors: Sequence[Bearings]) -> str:
+    """Sectors (rad) as --mask takes them, in degrees."""
+    degrees = ((math.degrees(first), math.degrees(last)) for first, last in sectors)
+    return ",".join(f"{round(first, 1):g}:{round(last, 1):g}" for first, last in degrees)
 
 
 def mask_beams(

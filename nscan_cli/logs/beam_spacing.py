@@ -1,7 +1,7 @@
 """The angle between beams, checked by walls: a wrong one bends them.
 
-A beam at angle u from another one on the same wall, and one at −u, satisfy 1 / r₋ + 1 / r₊ = 2 cos(u) / r. So
-three readings tell the angle between their beams; on a wall, two triples about one beam tell the same angle.
+Three readings of beams on one wall tell the angle between these (beam_angles.double_cosines). On a wall, two
+triples about one beam tell the same angle.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from nscan_cli.logs.beam_angles import BeamDirections
+from nscan_cli.logs.beam_angles import BeamDirections, double_cosines
 from nscan_cli.logs.laser_log import beam_counts
 from nscan_cli.logs.reading_options import ReadingOptions
 from nscan_cli.poses import Array
@@ -240,8 +240,7 @@ def _log_angles(near: Array, between: int) -> Array:
 
     near: 1 / r (N, B) in 1/m. The angle is that of beams on one wall; the result has B − 2 `between` places.
     """
-    middle = near[:, between : near.shape[1] - between]
-    cosines = (near[:, : middle.shape[1]] + near[:, 2 * between :]) / (2 * middle)
+    cosines = 0.5 * double_cosines(near, between)
     with np.errstate(invalid="ignore", divide="ignore"):
         return np.log(np.arccos(np.where(cosines < 1, np.maximum(cosines, -1.0), np.nan)))
 

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from nscan_cli.kernels.decorators import kernel, llvm_inline_kernel
-from nscan_cli.poses import Array, are_known, compose, relative, wrap
+from nscan_cli.poses import Array, Indices, are_known, compose, relative, wrap
 
 STRAIGHT = 1e-9
 """rad; a turn smaller than this is none: its arc is a straight line."""
@@ -82,19 +82,28 @@ def bent_path(path: RobotPath, times: Array, poses: Array) -> RobotPath | None:
     inside = (path.times > times[0]) & (path.times < times[-1])
     at = path.times[inside]
     after = np.searchsorted(times, at)
-    on_path = poses_at(path, times)
     before = after - 1
-    between = path.poses[inside]
-    from_before = compose(poses[before], relative(between, on_path[before]))
-    from_after = compose(poses[after], relative(between, on_path[after]))
-    off = from_after - from_before
-    off[:, 2] = wrap(off[:, 2])
     share = (at - times[before]) / (times[after] - times[before])
-    blended = from_before + share[:, None] * off
-    blended[:, 2] = wrap(blended[:, 2])
+    blended = bent_between(path.poses[inside], poses_at(path, times), poses, (before, after), share)
     # Those of the scans come first where both are at one time.
     order = np.argsort(np.concatenate([times, at]), kind="stable")
     return robot_path(np.concatenate([times, at])[order], np.concatenate([poses, blended])[order])
+
+
+def bent_between(
+    path: Array, anchors: Array, moved: Array, beside: tuple[Indices, Indices], share: Array
+) -> Array:
+    """Poses (n, 3) of a path whose anchors (K, 3), also on the path, have `moved` (K, 3).
+
+    `beside` are the anchors (n,) before and after each pose. If these have moved against each other, a pose
+    has two places, one as seen from each. It is put between both, at its `share` (n,) of the way.
+    """
+    from_before, from_after = (compose(moved[anchor], relative(path, anchors[anchor])) for anchor in beside)
+    apart = from_after - from_before
+    apart[:, 2] = wrap(apart[:, 2])
+    bent: Array = from_before + share[:, None] * apart
+    bent[:, 2] = wrap(bent[:, 2])
+    return bent
 
 
 def likelier_path(

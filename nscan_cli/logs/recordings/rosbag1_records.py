@@ -66,7 +66,13 @@ class BagRecord(NamedTuple):
 
 def record_at(data: FileBytes, at: int, end: int) -> BagRecord:
     """The record that begins at a byte and ends before `end`. Raises DamagedBagError when there is none."""
-    fields, begin = fields_at(data, at, end, "a record's header")
+    if at + LENGTH.size > end:
+        raise DamagedBagError(at, "it ends within a record's header")
+    (size,) = LENGTH.unpack_from(data, at)
+    first, begin = at + LENGTH.size, at + LENGTH.size + size
+    if begin > end:
+        raise DamagedBagError(at, "it ends within a record's header")
+    fields = parse_fields(data, first, begin, at)
     if begin + LENGTH.size > end:
         raise DamagedBagError(at, "it ends within a record")
     (size,) = LENGTH.unpack_from(data, begin)
@@ -87,17 +93,6 @@ def records(data: FileBytes, start: int, end: int) -> Iterator[BagRecord]:
         record = record_at(data, at, end)
         at = record.end
         yield record
-
-
-def fields_at(data: FileBytes, at: int, end: int, what: str) -> tuple[dict[bytes, bytes], int]:
-    """The fields of a header that begins with its length, and the byte behind it. Raises DamagedBagError."""
-    if at + LENGTH.size > end:
-        raise DamagedBagError(at, f"it ends within {what}")
-    (size,) = LENGTH.unpack_from(data, at)
-    begin, stop = at + LENGTH.size, at + LENGTH.size + size
-    if stop > end:
-        raise DamagedBagError(at, f"it ends within {what}")
-    return parse_fields(data, begin, stop, at), stop
 
 
 def parse_fields(data: FileBytes, begin: int, stop: int, at: int) -> dict[bytes, bytes]:

@@ -15,6 +15,7 @@ import numpy as np
 
 from nscan_cli.graph.optimise.graph_solver import newton_step
 from nscan_cli.logs.laser_log import LaserLog
+from nscan_cli.logs.mask_runs import mask_runs
 from nscan_cli.logs.robot_path import DEFAULT_ROBOT_PATH, RobotPath, poses_at, robot_path
 from nscan_cli.matching.damped_newton import PAIRWISE_STEPS, is_accepted, is_last, next_damping
 from nscan_cli.ndt.hash_grid import WALL_DIRECTION
@@ -90,11 +91,9 @@ def _is_uneven(times: Array, poses: Array, known: Mask, options: UnevenMotionOpt
 
 def _runs(marks: Mask, longest: int) -> Iterator[tuple[int, int]]:
     """First and last row of each run of marks (S,), cut into parts of no more than so many rows."""
-    rows = np.flatnonzero(marks)
-    for run in np.split(rows, np.flatnonzero(np.diff(rows) > 1) + 1):
-        for begin in range(0, len(run), longest):
-            part = run[begin : begin + longest]
-            yield int(part[0]), int(part[-1])
+    for first, end in mask_runs(marks):
+        for begin in range(first, end, longest):
+            yield begin, min(begin + longest, end) - 1
 
 
 class _Run:

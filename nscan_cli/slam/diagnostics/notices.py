@@ -6,9 +6,10 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 
-from nscan_cli.calibration.companions import find_companion, mask_text
+from nscan_cli.calibration.companions import find_companion
 from nscan_cli.files.text import counted
 from nscan_cli.graph.optimise.graduated_nonconvexity import chi2_by_three
+from nscan_cli.logs.beam_mask import mask_text
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.poses import relative
 from nscan_cli.slam.backend.untold_sigmas import told_relations

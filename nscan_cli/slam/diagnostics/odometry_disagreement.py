@@ -12,6 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from nscan_cli.logs.mask_runs import mask_runs
 from nscan_cli.poses import Array, Indices, are_known
 from nscan_cli.slam.diagnostics.options import OdometryDisagreementOptions
 
@@ -56,11 +57,9 @@ def odometry_disagreements(
     change = np.zeros(len(rows) + 1, dtype=np.int64)
     np.add.at(change, wrong, 1)
     np.add.at(change, until[wrong], -1)
-    inside = np.append(False, np.cumsum(change) > 0)
-    firsts, lasts = (np.flatnonzero(inside[1:] & ~inside[:-1]), np.flatnonzero(~inside[1:] & inside[:-1]))
     return [
         OdometryDisagreement(int(rows[a]), int(rows[b]), *_lengths(tracks[:, _ends(until, a, b)]).tolist())
-        for a, b in zip(firsts.tolist(), lasts.tolist(), strict=True)
+        for a, b in mask_runs(np.cumsum(change) > 0)
     ]
 
 

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from nscan_cli.logs.mask_runs import mask_runs
-from nscan_cli.poses import Array, Mask
+from nscan_cli.poses import Array
 from nscan_cli.slam.frontend.options import TrackingOptions
 from nscan_cli.slam.frontend.scan_batch import ScanBatch
 from nscan_cli.slam.frontend.tracked_scans import TrackedScans
@@ -61,8 +61,13 @@ def motion_from_behind(
 
 
 def untold_stretches(found: TrackedScans, options: TrackingOptions) -> list[tuple[int, int]]:
-    """The stretches (first, end) of scans that fit badly or do not tell their place."""
-    return mask_runs(~_in_runs_that_tell(found, options))
+    """The stretches (first, end) without `velocity_scans` in a row that fit and tell their place."""
+    tells = found.inliers >= options.restart_inliers
+    tells &= found.told_sigmas <= options.degeneracy.trusted_sigma
+    for first, end in mask_runs(tells):
+        if end - first < options.velocity_scans:
+            tells[first:end] = False
+    return mask_runs(~tells)
 
 
 def _seems_to_stand(poses: Array, first: int, end: int, options: TrackingOptions) -> bool:
@@ -80,14 +85,3 @@ def _seems_to_stand(poses: Array, first: int, end: int, options: TrackingOptions
 def _way(poses: Array, first: int, end: int) -> float:
     """Distance (m) from the scan before a stretch to its last."""
     return float(np.hypot(*(poses[end - 1] - poses[max(first - 1, 0)])[:2]))
-
-
-def _in_runs_that_tell(found: TrackedScans, options: TrackingOptions) -> Mask:
-    """Of each scan (n,), whether it is one of `velocity_scans` in a row that fit and tell their place."""
-    tells, run = found.inliers >= options.restart_inliers, options.velocity_scans
-    tells &= found.told_sigmas <= options.degeneracy.trusted_sigma
-    in_run = np.zeros(len(tells), dtype=np.bool_)
-    for first in range(len(tells) - run + 1):
-        if tells[first : first + run].all():
-            in_run[first : first + run] = True
-    return in_run

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from nscan_cli.matching.correlative_search import likelihood_field, search
-from nscan_cli.matching.motion_model import Prior
+from nscan_cli.matching.motion_model import no_prior
 from nscan_cli.ndt.transform import Ndt
 from nscan_cli.poses import Array
 from nscan_cli.slam.frontend.local_map import ROWS
@@ -37,7 +37,7 @@ class Tracker:
         self.searches = 0
         self._settings = TrackingParameters.of(options, odometry, laser)
         self._track = TrackState.begin(options.velocity_scans + 1, options.degeneracy.initial_sigma)
-        self._prior = Prior(np.zeros(3), np.zeros((3, 3)))
+        self._prior = no_prior()
 
     @property
     def restarts(self) -> int:

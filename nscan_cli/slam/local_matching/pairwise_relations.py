@@ -13,7 +13,7 @@ import numpy as np
 
 from nscan_cli.files.text import counted
 from nscan_cli.graph.model import Pairwise
-from nscan_cli.matching.motion_model import Prior
+from nscan_cli.matching.motion_model import Prior, no_prior
 from nscan_cli.matching.pairwise_solver import PairProblem, minimise_pairwise
 from nscan_cli.matching.pose_kernels import largest_motion
 from nscan_cli.ndt.association import begin_association
@@ -108,7 +108,7 @@ def _prior(chain: Sequence[Pairwise], other: int, centre: int) -> Prior:
         # The measurement is the inverse of the pose that is asked for.
         _, by_pose = relative_jacobians(np.zeros(3), mean)
         return Prior(mean, np.ascontiguousarray(by_pose.T @ chain[centre].information @ by_pose))
-    return Prior(np.zeros(3), np.zeros((3, 3)))
+    return no_prior()
 
 
 def _overlap(other: Keyframe, centre: Keyframe, pose: Array, inlier_bound: float) -> float:

@@ -6,9 +6,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from nscan_cli.kernels.decorators import kernel
 from nscan_cli.matching.correlative_search import LikelihoodField, SearchOptions, likelihood_field
-from nscan_cli.poses import Array, Indices, relative
+from nscan_cli.poses import Array, Indices, relative, transform
 from nscan_cli.slam.keyframes.keyframe import Keyframe
 from nscan_cli.slam.keyframes.route import Route
 from nscan_cli.slam.loop_closure.options import LoopClosureOptions
@@ -39,18 +38,5 @@ def _cloud(keyframes: Sequence[Keyframe], chosen: Indices, poses: Array) -> Arra
     """The points (m, 2) of the chosen keyframes (n,), at poses (n, 3)."""
     points = [keyframes[k].points for k in chosen.tolist()]
     cloud = np.concatenate([np.empty((0, 2)), *points])
-    _transform_clouds(poses, np.array([len(each) for each in points], dtype=np.int64), cloud)
-    return cloud
-
-
-@kernel
-def _transform_clouds(poses: Array, counts: Indices, points: Array) -> None:
-    """Transform the points (m, 2) in place: the first sizes[0] by the first pose, and so on, eq. (1)."""
-    end = 0
-    for k in range(len(poses)):
-        cos, sin = np.cos(poses[k, 2]), np.sin(poses[k, 2])
-        start, end = end, end + counts[k]
-        for p in range(start, end):
-            x, y = points[p, 0], points[p, 1]
-            points[p, 0] = cos * x - sin * y + poses[k, 0]
-            points[p, 1] = sin * x + cos * y + poses[k, 1]
+    counts = np.array([len(each) for each in points], dtype=np.int64)
+    return transform(np.repeat(poses, counts, axis=0), cloud)
