@@ -16,9 +16,6 @@ from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.logs.reading_options import ReadingOptions
 from nscan_cli.poses import Array, Indices, Mask, are_known, compose, transform
 
-BIN = np.radians(2.0)
-"""rad; sectors consist of bins of this width."""
-
 
 @dataclass(frozen=True)
 class Companion:
@@ -110,7 +107,7 @@ def _seen(log: LaserLog, row: int, pose: Array, path: Array, options: CompanionO
     is_joined = np.hypot(*np.diff(places, axis=0).T) < options.max_gap
     groups = np.append(0, np.cumsum(~is_joined))
     is_of_it = np.isin(groups, groups[is_on_path]) & (np.hypot(*(places - middle).T) < options.max_size)
-    return np.unique(np.floor(np.mod(bearings[is_of_it], 2 * np.pi) / BIN).astype(np.int64))
+    return np.unique(np.floor(np.mod(bearings[is_of_it], 2 * np.pi) / options.bin_width).astype(np.int64))
 
 
 def _is_on_path(places: Array, path: Array, radius: float) -> Mask:
@@ -122,7 +119,7 @@ def _is_on_path(places: Array, path: Array, radius: float) -> Mask:
 
 def _sectors(seen: list[Indices], options: CompanionOptions) -> list[Bearings]:
     """The sectors of bins that are seen in more than a few of the scans, and a bin to each side."""
-    size = round(2 * np.pi / BIN)
+    size = round(2 * np.pi / options.bin_width)
     counts = np.bincount(np.concatenate(seen), minlength=size)[:size]
     # No more than half of all: the rest is what the map is made from.
     often = counts > max(options.min_sector_share * len(seen), int(np.sort(counts)[size // 2]))
@@ -133,10 +130,11 @@ def _sectors(seen: list[Indices], options: CompanionOptions) -> list[Bearings]:
     if len(ends) and ends[0] <= begins[0]:
         ends = np.roll(ends, -1)
     return [
-        (_bearing(begin), _bearing(end)) for begin, end in zip(begins.tolist(), ends.tolist(), strict=True)
+        (_bearing(begin * options.bin_width), _bearing(end * options.bin_width))
+        for begin, end in zip(begins.tolist(), ends.tolist(), strict=True)
     ]
 
 
-def _bearing(bin_edge: int) -> float:
-    """The bearing of an edge between two bins, from −π to π, rad."""
-    return float(np.mod(bin_edge * BIN + np.pi, 2 * np.pi) - np.pi)
+def _bearing(angle: float) -> float:
+    """An angle (rad) as a bearing from −π to π."""
+    return float(np.mod(angle + np.pi, 2 * np.pi) - np.pi)

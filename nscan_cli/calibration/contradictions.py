@@ -25,8 +25,6 @@ from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.logs.reading_options import ReadingOptions
 from nscan_cli.poses import MIRRORED, Array, Mask, are_known, relative, wrap
 
-OPPOSITE_WITHIN = 0.1
-"""rad; a laser that seems to look back to within this may be one of a robot that seems to drive backwards."""
 BACKWARDS = np.array([-1.0, -1.0, 1.0])
 """Factors of a mounting: of a robot that counts forward as backward the laser seems to be there, turned."""
 ONE_AXIS_REVERSED = np.array([-1.0, 1.0, 1.0])
@@ -174,7 +172,7 @@ def _of_positions(
     found = []
     if findings.is_wrong_scale(fit, options):
         found.append(findings.wrong_scale(fit, reading, options))
-    if abs(float(wrap(fit.mount[2] - mount[2]))) > np.pi - OPPOSITE_WITHIN:
+    if abs(float(wrap(fit.mount[2] - mount[2]))) > np.pi - options.opposite_within:
         return [*found, _opposite(mount, fit, evidence, reading, options)]
     mounting = findings.wrong_mounting(mount, fit, options)
     return found if mounting is None else [*found, mounting]
@@ -195,4 +193,4 @@ def _opposite(
     else:
         is_backward = forward < 0.5
         why = f"{forward:.0%} of the steps by odometry go forward"
-    return findings.opposite(mount, fit, why, is_backward, reading)
+    return findings.opposite(mount, fit, why, is_backward, reading, options)

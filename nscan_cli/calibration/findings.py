@@ -16,10 +16,6 @@ from nscan_cli.files.text import counted
 from nscan_cli.logs.reading_options import ReadingOptions
 from nscan_cli.poses import Array, wrap
 
-ROUND_ANGLE, ROUND_WITHIN = 15.0, 3.0
-"""Degrees: lasers are mounted at round angles; a measured one this near to one is that."""
-MOST_WRONG_RANGES = 10.0
-"""Ranges that are wrong by a larger factor are not of a room, which a reader notices."""
 UNDONE = "--as-recorded uses it as it is"
 
 
@@ -123,7 +119,7 @@ def wrong_scale(fit: MountFit, reading: ReadingOptions, options: FileCheckOption
     scale = reading.odometry_scale * (decimal if is_decimal else float(f"{fit.scale:.3g}"))
     evidence = f"one metre by odometry is {fit.scale:.3g} m by scans, in {counted(fit.steps, 'step')}"
     ranges = f"{(reading.range_scale or 1.0) / fit.scale:.3g}"
-    is_either = not is_decimal and max(fit.scale, 1.0 / fit.scale) <= MOST_WRONG_RANGES
+    is_either = not is_decimal and max(fit.scale, 1.0 / fit.scale) <= options.max_range_factor
     other = f"; if the ranges are wrong instead, --range-scale {ranges}" if is_either else ""
     if max(fit.scale, 1.0 / fit.scale) > options.certain_scale_factor:
         message = (
@@ -147,7 +143,7 @@ def wrong_mounting(mount: Array, fit: MountFit, options: FileCheckOptions) -> Fi
         return None
     place = np.round(fit.mount[:2], 2) + 0.0 if is_moved else mount[:2]
     x, y = (f"{part:g}" for part in place.tolist())
-    angle = _round_angle(math.degrees(fit.mount[2] if is_turned else mount[2]), is_turned)
+    angle = _degrees(_round_angle(fit.mount[2], options) if is_turned else mount[2])
     agree = f"then scans and odometry agree about {counted(fit.steps, 'step')}"
     cure = f"try --mount {x},{y},{angle}"
     if not is_turned:
@@ -160,13 +156,18 @@ def wrong_mounting(mount: Array, fit: MountFit, options: FileCheckOptions) -> Fi
 
 
 def opposite(
-    mount: Array, fit: MountFit, evidence: str, is_odometry: bool, reading: ReadingOptions
+    mount: Array,
+    fit: MountFit,
+    evidence: str,
+    is_odometry: bool,
+    reading: ReadingOptions,
+    options: FileCheckOptions,
 ) -> Finding:
     """Odometry counts forward as backward, or the laser looks back; `evidence` says why it is this one.
 
     `mount` (3,) is the mounting in the file.
     """
-    angle = _round_angle(math.degrees(fit.mount[2]), is_measured=True)
+    angle = _degrees(_round_angle(fit.mount[2], options))
     by_mount = f"--mount {mount[0]:g},{mount[1]:g},{angle}"
     by_scale = f"--odometry-scale {-reading.odometry_scale:g}"
     if is_odometry:
@@ -179,9 +180,13 @@ def opposite(
     return Finding(f"{what}; {agree}; try {cures[0]}, or {cures[1]} if {other}")
 
 
-def _round_angle(degrees: float, is_measured: bool) -> str:
-    if is_measured:
-        rounded = ROUND_ANGLE * round(degrees / ROUND_ANGLE)
-        degrees = rounded if abs(rounded - degrees) <= ROUND_WITHIN else round(degrees)
+def _round_angle(angle: float, options: FileCheckOptions) -> float:
+    """A measured angle of a mounting (rad), rounded to one that lasers are mounted at, or to a degree."""
+    rounded = options.round_angle * round(angle / options.round_angle)
+    is_near = abs(rounded - angle) <= options.round_angle_tolerance
+    return rounded if is_near else math.radians(round(math.degrees(angle)))
+
+
+def _degrees(angle: float) -> str:
     # −180° and 180° are one direction.
-    return f"{math.degrees(float(wrap(math.radians(degrees)))):g}"
+    return f"{math.degrees(float(wrap(angle))):g}"

@@ -10,10 +10,7 @@ from nscan_cli.calibration.measured_steps import MeasuredSteps
 from nscan_cli.calibration.options import ClockOptions
 from nscan_cli.calibration.parabola import parabola_minimum
 from nscan_cli.logs.laser_log import LaserLog
-from nscan_cli.poses import Array, are_known
-
-CAPPED = 0.1
-"""rad; turns that differ by more count as this much: they are slips, or matches that failed."""
+from nscan_cli.poses import are_known
 
 
 @dataclass(frozen=True)
@@ -40,23 +37,23 @@ def clock_lag(
     assert log.odometry is not None
     known = are_known(log.odometry)
     turns = turn_sign * steps.laser[:, 2]
-    whole = float(np.minimum(np.abs(turns), CAPPED).sum())
+    whole = float(np.minimum(np.abs(turns), options.max_difference).sum())
     if known.sum() < 2 or whole == 0.0:
         return None
     at, headings = log.times[known], np.unwrap(log.odometry[known, 2])
     begins, ends = log.times[steps.first], log.times[steps.last]
+
+    def differences(offset: float) -> float:
+        """The sum of the capped differences of all turns, rad."""
+        told = np.interp(ends, at + offset, headings) - np.interp(begins, at + offset, headings)
+        return float(np.minimum(np.abs(told - turns), options.max_difference).sum())
+
     resolution = options.resolution
     span = min(options.span, 0.5 * float(log.times[-1] - log.times[0]))
     count = int(np.ceil(span / resolution))
     offsets = resolution * np.arange(-count, count + 1, dtype=np.float64)
-    off = np.array([_disagreement(at + by, headings, begins, ends, turns) for by in offsets]) / whole
+    off = np.array([differences(by) for by in offsets.tolist()]) / whole
     best = int(np.argmin(off))
     is_inside = 0 < best < len(off) - 1
     offset = parabola_minimum(offsets, off) if is_inside else float(offsets[best])
     return ClockLag(offset, float(off[best]), float(off[count]), float(np.median(off)))
-
-
-def _disagreement(at: Array, headings: Array, begins: Array, ends: Array, turns: Array) -> float:
-    """The sum of capped differences (rad) of turns (n,) from those of headings (S,) at times `at` (S,)."""
-    told = np.interp(ends, at, headings) - np.interp(begins, at, headings)
-    return float(np.minimum(np.abs(told - turns), CAPPED).sum())

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 
 from nscan_cli.calibration.scale_options import OdometryUnitOptions
@@ -60,6 +61,9 @@ class ClockOptions:
     """Largest clock offset that is tried, s. A larger value takes longer."""
     resolution: float = 0.1
     """Interval between the offsets that are tried, s. A smaller value takes longer."""
+    max_difference: float = 0.1
+    """Turns of a step that differ by more count as different by this, rad: such steps are slips, or matches
+    that failed. A larger value gives them more weight."""
     gain: float = 0.6
     """An offset is found if the turns disagree by less than this share of their disagreement without it, and
     of that anywhere else. With a larger share an offset is found more often, also where there is none.
@@ -142,6 +146,8 @@ class CompanionOptions:
     max_size: float = 0.5
     """Largest distance of its readings from the middle of those on the path, m. A larger value leaves out
     more."""
+    bin_width: float = math.radians(2.0)
+    """Bearings are left out in bins of this width, rad. A larger value leaves out more beside it."""
     min_sector_share: float = 0.07
     """Bearings are left out if it is seen there in more than this share of these scans. A larger value leaves
     out less."""
@@ -214,6 +220,14 @@ class FileCheckOptions:
     on real logs; a late clock looks like some centimetres. A larger value warns less."""
     mount_sigmas: float = 5.0
     """Such an error must also exceed this number of its standard deviations. A larger value warns less."""
+    opposite_within: float = 0.1
+    """A laser that seems to look back to within this angle may be one of a robot that seems to drive
+    backwards, rad. A larger value takes more lasers for such ones."""
+    round_angle: float = math.radians(15.0)
+    """Lasers are mounted at multiples of this angle, rad."""
+    round_angle_tolerance: float = math.radians(3.0)
+    """An angle of the mounting that a warning suggests is such a multiple if it is this near to one, rad. A
+    larger value rounds more."""
     min_scale_factor: float = 1.2
     """Least factor by which the scale of odometry is wrong, beside `mount_sigmas`. It is 1.11 at most on real
     logs. A larger value warns less."""
@@ -223,6 +237,9 @@ class FileCheckOptions:
     decimal_tolerance: float = 0.08
     """A scale this near to a power of ten (relative) is that power: the file is in millimetres or
     centimetres. A larger value rounds more scales."""
+    max_range_factor: float = 10.0
+    """A warning of a wrong scale says that the ranges may be wrong instead, up to this factor: with a larger
+    one they are not those of a room, as a user sees. A larger value says it more often."""
     max_turn_error: float = 0.3
     """Largest relative difference of the turns by odometry and by scans. A larger value warns less."""
     more_steps: int = 200
@@ -264,6 +281,9 @@ class CalibrationOptions:
     min_turns: int = 12
     """Least number of steps with a turn for what turns tell: the place of the laser, and the clocks. A larger
     value leaves these open more often."""
+    dependent_steps: int = 3
+    """Number of successive steps whose errors depend on each other: they have scans in common. A larger value
+    makes standard deviations less certain."""
     max_turn_spread: float = 0.4
     """Turns tell nothing if their median residual is more than this share of them: outdoors single matches
     turn where the robot does not. A larger value believes poorer turns."""

@@ -32,8 +32,6 @@ TURNS_DIFFER = "turns by odometry and by scans have too little in common"
 NO_OFFSET = "turns agree at no offset of the clocks better than at others"
 FEW_STEPS = "too few steps go far enough"
 STEPS_ALIKE = "all steps are alike"
-TOGETHER = 3
-"""Steps that follow each other whose errors have to do with each other: they have scans in common."""
 
 
 @dataclass(frozen=True)
@@ -231,7 +229,9 @@ class _Drive:
 
     def mount_fit(self, offset: float, mirrored: bool) -> MountFit | None:
         laser, told = self.laser[self.moving] * (MIRRORED if mirrored else 1.0), self.odometry(offset)
-        group = np.searchsorted(chains(self.steps, TOGETHER), np.flatnonzero(self.moving), side="right")
+        group = np.searchsorted(
+            chains(self.steps, self.options.dependent_steps), np.flatnonzero(self.moving), side="right"
+        )
         groups = np.flatnonzero(np.diff(group, prepend=0))
         return fit_mount(laser, told[self.moving], self.options.steps.metres_per_radian, groups)
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from nscan_cli.calibration.options import StepOptions
 from nscan_cli.calibration.scan_turns import scan_turns
-from nscan_cli.calibration.sweep_options import SweepCheckOptions, SweepTimeOptions
+from nscan_cli.calibration.sweep_options import ScanTurnOptions, SweepCheckOptions, SweepTimeOptions
 from nscan_cli.calibration.thinned_scans import thinned_scan
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.logs.robot_path import move_along_arc
@@ -26,6 +26,7 @@ class ScanMotion:
     steps: StepOptions
     longest_step: float
     """Longest time from a scan to the next, s, over which motion is measured."""
+    turns: ScanTurnOptions
     _points: dict[int, tuple[Array, Array] | None] = field(default_factory=dict)
     _velocities: dict[int, Array | None] = field(default_factory=dict)
     _rates: dict[int, float] = field(default_factory=dict)
@@ -33,7 +34,8 @@ class ScanMotion:
     @staticmethod
     def of_log(log: LaserLog, steps: StepOptions, options: SweepCheckOptions) -> ScanMotion:
         """Of a log of a robot, of which nothing was measured yet."""
-        return ScanMotion(replace(log, mount=np.zeros(3), path=None), steps, options.longest_step)
+        seen = replace(log, mount=np.zeros(3), path=None)
+        return ScanMotion(seen, steps, options.longest_step, options.scan_turns)
 
     def rates(self, rows: Indices) -> Array:
         """(n,) rad/s; about how fast the laser turns at rows (n,) with a scan on both sides; 0 at a gap."""
@@ -42,7 +44,7 @@ class ScanMotion:
         is_measured = (seconds > 0.0) & (seconds <= 2 * self.longest_step)
         rates, those = np.zeros(len(new)), new[is_measured]
         if len(those):
-            rates[is_measured] = scan_turns(self.log, those - 1, those + 1) / seconds[is_measured]
+            rates[is_measured] = scan_turns(self.log, those - 1, those + 1, self.turns) / seconds[is_measured]
         self._rates.update(zip(new.tolist(), rates.tolist(), strict=True))
         return np.array([self._rates[row] for row in rows.tolist()])
 

@@ -10,34 +10,30 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from nscan_cli.calibration.sweep_options import ScanTurnOptions
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.poses import Array, Indices
 
-CELLS = 120
-"""Directions all around; a scan has one range for each."""
-MOST = 20
-"""Cells; a turn of more is not looked for: 60°."""
-DIFFERS = 0.5
-"""m; two ranges that differ by more see different things, however far apart these are."""
 NOTHING = 1e3
 """m; the range of a direction without return, and of one that the laser does not look in."""
 
 
-def scan_turns(log: LaserLog, first: Indices, last: Indices) -> Array:
+def scan_turns(log: LaserLog, first: Indices, last: Indices, options: ScanTurnOptions) -> Array:
     """(n,) about how far (rad) the laser turned from the scans in rows `first` (n,) to those in `last`."""
-    before, after = _profiles(log, first), _profiles(log, last)
-    around = np.concatenate([before[:, -MOST:], before, before[:, :MOST]], axis=1)
-    costs = np.empty((len(first), 2 * MOST + 1))
-    for shift in range(2 * MOST + 1):
-        apart = np.abs(around[:, shift : shift + CELLS] - after)
-        costs[:, shift] = np.minimum(apart, np.float32(DIFFERS)).sum(axis=1)
-    return (_lowest(costs) - MOST) * (2 * np.pi / CELLS)
+    cells, most = options.cells, options.most_cells
+    before, after = _profiles(log, first, cells), _profiles(log, last, cells)
+    around = np.concatenate([before[:, -most:], before, before[:, :most]], axis=1)
+    costs = np.empty((len(first), 2 * most + 1))
+    for shift in range(2 * most + 1):
+        apart = np.abs(around[:, shift : shift + cells] - after)
+        costs[:, shift] = np.minimum(apart, np.float32(options.max_difference)).sum(axis=1)
+    return (_lowest(costs) - most) * (2 * np.pi / cells)
 
 
-def _profiles(log: LaserLog, rows: Indices) -> NDArray[np.float32]:
-    """(n, CELLS) the range (m) that the scan in each row has in each direction, from −π on."""
+def _profiles(log: LaserLog, rows: Indices, cells: int) -> NDArray[np.float32]:
+    """(n, cells) the range (m) that the scan in each row has in each direction, from −π on."""
     step, beams = log.angle_increment[rows][:, None], log.beam_counts()[rows][:, None]
-    directions = np.linspace(-np.pi, np.pi, CELLS, endpoint=False)
+    directions = np.linspace(-np.pi, np.pi, cells, endpoint=False)
     ahead = np.mod((directions - log.angle_min[rows][:, None]) * np.sign(step), 2 * np.pi)
     beam = np.rint(ahead / np.abs(step)).astype(np.int64)
     # All around, the direction before the first beam is that of the last, or of the first.

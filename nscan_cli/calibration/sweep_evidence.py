@@ -16,11 +16,6 @@ from nscan_cli.calibration.scan_motion import ScanMotion
 from nscan_cli.calibration.sweep_options import SweepCheckOptions
 from nscan_cli.poses import Array
 
-LEAST_PAIRS = 5
-"""With fewer their spread says little of their mean."""
-FARTHEST = 3.0
-"""Standard deviations from the median. What is farther from it counts as if it were there: matches slip."""
-
 
 @dataclass(frozen=True)
 class SweepEvidence:
@@ -30,13 +25,14 @@ class SweepEvidence:
     """(T,) the times that were tried, s; negative: readings in the reverse order of time."""
     energies: Array
     """(P, T) energy of each of P pairs matched with each time, per point; smaller is sharper."""
+    options: SweepCheckOptions
 
     def sigmas(self, better: float, worse: float) -> float:
         """By how many standard deviations one of the times fits better than another; 0 with too few pairs."""
         places = [int(np.argmin(np.abs(self.turns - turn))) for turn in (better, worse)]
-        if len(self.energies) < LEAST_PAIRS:
+        if len(self.energies) < self.options.min_pairs:
             return 0.0
-        gains = clipped(self.energies[:, places[1]] - self.energies[:, places[0]])
+        gains = self._clipped(self.energies[:, places[1]] - self.energies[:, places[0]])
         spread = float(gains.std(ddof=1)) / np.sqrt(len(gains))
         return float(gains.mean()) / max(float(spread), 1e-12)
 
@@ -45,16 +41,15 @@ class SweepEvidence:
         """The time with the least energy of all pairs, s."""
         if not len(self.energies):
             return float(self.turns[0])
-        gains = clipped(self.energies - self.energies[:, :1])
+        gains = self._clipped(self.energies - self.energies[:, :1])
         return float(self.turns[int(np.argmin(gains.mean(axis=0)))])
 
-
-def clipped(values: Array) -> Array:
-    """Columns (P, ...) without what is farther than `FARTHEST` from their medians."""
-    middle = np.median(values, axis=0)
-    most = FARTHEST * TO_SIGMA * np.median(np.abs(values - middle), axis=0)
-    found: Array = np.clip(values, middle - most, middle + most)
-    return found
+    def _clipped(self, values: Array) -> Array:
+        """Columns (P, ...) without what is far from their medians."""
+        middle = np.median(values, axis=0)
+        most = self.options.outlier_sigmas * TO_SIGMA * np.median(np.abs(values - middle), axis=0)
+        found: Array = np.clip(values, middle - most, middle + most)
+        return found
 
 
 def sweep_evidence(
@@ -65,7 +60,7 @@ def sweep_evidence(
     No more pairs are compared where `told`, one of those times, fits better than the others, or another far
     better than it. Times that fit clearly worse than it are left out.
     """
-    evidence = SweepEvidence(np.array(turns), np.empty((0, len(turns))))
+    evidence = SweepEvidence(np.array(turns), np.empty((0, len(turns))), options)
     for one, other in turning_pairs(motion, max(abs(turn) for turn in turns), options):
         energies = motion.energies(one, other, evidence.turns.tolist())
         if energies is not None:
@@ -98,7 +93,7 @@ def _without_worse(evidence: SweepEvidence, told: float, options: SweepCheckOpti
     if len(evidence.energies) < options.least_decisive:
         return evidence
     kept = [evidence.sigmas(told, turn) < options.dropped_sigmas for turn in evidence.turns.tolist()]
-    return SweepEvidence(evidence.turns[kept], evidence.energies[:, kept])
+    return replace(evidence, turns=evidence.turns[kept], energies=evidence.energies[:, kept])
 
 
 def turning_pairs(motion: ScanMotion, turn: float, options: SweepCheckOptions) -> Iterator[tuple[int, int]]:

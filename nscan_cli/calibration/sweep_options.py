@@ -7,6 +7,19 @@ from dataclasses import dataclass, field
 
 
 @dataclass(frozen=True)
+class ScanTurnOptions:
+    """How turns of the robot are estimated from the ranges of two scans alone."""
+
+    cells: int = 120
+    """Directions all around, for each of which a scan has one range. More are finer and take longer."""
+    most_cells: int = 20
+    """Largest turn that is looked for, in cells. A larger value takes longer."""
+    max_difference: float = 0.5
+    """Ranges that differ by more count as different by this, m: they are of different things. A larger value
+    gives edges more weight."""
+
+
+@dataclass(frozen=True)
 class SweepTimeOptions:
     """How the time of a turn is measured, with its standard deviation."""
 
@@ -62,6 +75,11 @@ class SweepCheckOptions:
     pairs: int = 24
     """Most pairs of scans that are compared, those where the robot turns fastest. More tell more and take
     longer."""
+    min_pairs: int = 5
+    """Least number of pairs whose spread tells how certain their mean is. A larger value finds less."""
+    outlier_sigmas: float = 3.0
+    """A pair that is farther from the median than this number of standard deviations counts as if it were so
+    far: matches slip. A larger value gives such pairs more weight."""
     least_pairs: int = 5
     """Least number of pairs after which the file can count as right. More take longer where it is."""
     settled_sigmas: float = 1.5
@@ -95,6 +113,8 @@ class SweepCheckOptions:
     """Shortest scan period of such a laser, s. A smaller value checks more lasers."""
     longest: float = 0.5
     """Longest scan period of such a laser, s. A larger value checks more lasers."""
+    scan_turns: ScanTurnOptions = field(default_factory=ScanTurnOptions)
+    """How scans in turns are found."""
     time: SweepTimeOptions = field(default_factory=SweepTimeOptions)
     """How its time is measured if the file has none."""
     longest_delay: float = 0.4

@@ -13,7 +13,7 @@ import numpy as np
 
 from nscan_cli.calibration.parabola import parabola_minimum
 from nscan_cli.calibration.scan_motion import ScanMotion
-from nscan_cli.calibration.sweep_evidence import LEAST_PAIRS, turning_pairs
+from nscan_cli.calibration.sweep_evidence import turning_pairs
 from nscan_cli.calibration.sweep_options import SweepCheckOptions, SweepTimeOptions
 from nscan_cli.poses import Array
 
@@ -54,7 +54,7 @@ def sweep_time(motion: ScanMotion, longest: float, options: SweepCheckOptions) -
     turns = time.step * longest * np.arange(-count, count + 1, dtype=np.float64)
     energies = _energies(motion, longest, turns, options)
     pairs = len(energies)
-    if pairs < LEAST_PAIRS:
+    if pairs < options.min_pairs:
         return SweepTime(0.0, np.inf, pairs)
     turn = _sharpest(turns, energies, time)
     if abs(turn) >= turns[-2]:

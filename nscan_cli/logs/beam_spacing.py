@@ -22,13 +22,6 @@ if TYPE_CHECKING:
     from nscan_cli.logs.assemble import RawScans
     from nscan_cli.logs.range_limits import RangeLimits
 
-USUAL_VIEWS = (100, 120, 180, 190, 240, 255, 270, 360)
-"""Fields of view of lasers, degrees."""
-MAX_VIEW = math.radians(380)
-"""No laser sees more, rad."""
-MAX_OFF_CENTRE = 3
-"""From so many beams more on one side on, a laser does not look ahead."""
-
 
 @dataclass(frozen=True)
 class BeamSpacingOptions:
@@ -59,6 +52,13 @@ class BeamSpacingOptions:
     """Least difference from the angle of the log, as a share. A larger value contradicts fewer logs."""
     max_factor: float = 2.5
     """Largest factor between the two angles that is tested."""
+    max_view: float = math.radians(380)
+    """Largest field of view that the angle found may give, rad. A larger value contradicts more logs."""
+    max_off_centre: float = 3.0
+    """A laser looks ahead if it has fewer beams more than this on one side. With a larger value the angles of
+    more logs are put right, and not only named."""
+    usual_views: tuple[float, ...] = tuple(map(math.radians, (100, 120, 180, 190, 240, 255, 270, 360)))
+    """Fields of view of lasers, rad. With more of them more logs are put right."""
     usual_view: float = 0.06
     """Largest difference from a usual field of view that is taken for it, as a share."""
     moved: float = 0.01
@@ -100,7 +100,7 @@ def checked_by_walls(
     if _walls_agree(_sample(raw, directions, limits, rows[:: spacing.first_of], spacing), spacing):
         return directions, []
     factor = _factor_of_walls(_sample(raw, directions, limits, rows, spacing), spacing)
-    if factor is None or factor * widest > MAX_VIEW:
+    if factor is None or factor * widest > spacing.max_view:
         return directions, []
     count = int(np.bincount(beams).argmax())
     of_count = beams == count
@@ -115,7 +115,9 @@ def checked_by_walls(
         f"{_degrees(view)}°; with the {_degrees(abs(step))}° of "
         f"{'the convention for such logs' if raw.angles_assumed else 'the log'} they are bent"
     )
-    is_centred = raw.angles_assumed or abs(2 * first + step * (count - 1)) < MAX_OFF_CENTRE * abs(step)
+    is_centred = raw.angles_assumed or abs(2 * first + step * (count - 1)) < spacing.max_off_centre * abs(
+        step
+    )
     if is_usual and is_centred and of_count.all() and options.angle_min is None:
         ones = np.ones(len(beams))
         return BeamDirections(centred * ones, found * ones), [
@@ -248,6 +250,6 @@ def _log_angles(near: Array, between: int) -> Array:
 def _view(step: float, beams: int, options: BeamSpacingOptions) -> tuple[float, bool]:
     """The field of view (rad) of a number of beams with such a step (rad): if near, a usual one."""
     view = step * (beams - 1)
-    usual = min(map(math.radians, USUAL_VIEWS), key=lambda angle: abs(math.log(angle / view)))
+    usual = min(options.usual_views, key=lambda angle: abs(math.log(angle / view)))
     is_usual = abs(math.log(usual / view)) <= options.usual_view
     return (usual if is_usual else view), is_usual

@@ -41,7 +41,7 @@ def no_return_value(
     `peak_ratio` times the readings of the metre below. Or it is a single value there with `peak_ratio` times
     the readings of any other in that metre. At least `distinct_readings` must be lower.
     """
-    usable = ranges[(ranges > 0) & (ranges < 1e4)]
+    usable = ranges[(ranges > 0) & (ranges < options.largest_range)]
     if usable.size == 0:
         return None
     largest = float(usable.max())

@@ -9,6 +9,8 @@ from dataclasses import dataclass
 class RangeLimitOptions:
     """What a peak of readings is, and what limits of a laser."""
 
+    largest_range: float = 1e4
+    """No laser measures farther, m: larger readings and limits are ignored. A larger value believes more."""
     peak_readings: int = 20
     """Least number of readings of a peak at one value. A larger value finds fewer peaks."""
     peak_distance: float = 0.0015

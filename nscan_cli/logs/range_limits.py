@@ -16,8 +16,6 @@ from nscan_cli.poses import Array
 if TYPE_CHECKING:
     from nscan_cli.logs.assemble import RawScans
 
-LARGEST_RANGE = 1e4
-"""No laser measures farther, m. A limit beyond is ignored."""
 FROM_READINGS = "the no-return value found in the readings"
 
 
@@ -60,7 +58,7 @@ def limits_in_force(
     low_from, high_from = raw.limits_from
     no_return = no_return_value(raw.ranges, checks)
     if options.max_range is None:
-        end = LARGEST_RANGE if no_return is None else no_return
+        end = checks.largest_range if no_return is None else no_return
         high, high_from = _upper_limits(raw, high, high_from, end, warnings, checks)
     gap = peak_at_limit(raw.ranges, low, inside=1, options=checks)
     if gap is not None:

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nscan_cli.logs.range_limit_options import DEFAULT_RANGE_LIMITS
-from nscan_cli.logs.range_limits import LARGEST_RANGE, RangeLimits
+from nscan_cli.logs.range_limits import RangeLimits
 
 if TYPE_CHECKING:
     from nscan_cli.logs.assemble import RawScans
@@ -140,7 +140,11 @@ def scaled(raw: RawScans, scale: float, options: RangeUnitOptions = DEFAULT_RANG
     returns = raw.ranges[(raw.ranges > 0) & np.isfinite(raw.ranges)]
     median = float(np.median(returns)) if returns.size else 0.0
     low, high = (np.asarray(limit, dtype=np.float64) for limit in raw.limits)
-    shares_unit = (high < LARGEST_RANGE) & (high >= median) & (high * scale >= options.limits_apart)
+    shares_unit = (
+        (high < DEFAULT_RANGE_LIMITS.largest_range)
+        & (high >= median)
+        & (high * scale >= options.limits_apart)
+    )
     low = np.where(low >= options.limits_apart, low * scale, low)
     limits = low, np.where(shares_unit, high * scale, high)
     return replace(raw, ranges=raw.ranges * np.float32(scale), limits=limits)

@@ -50,6 +50,11 @@ class RobotPartsOptions:
     max_mismatch: float = 0.5
     """A turn counts if the scans differ, once turned by it, by at most this share of their difference before.
     A larger value finds more turns, also false ones."""
+    max_difference: float = 1.0
+    """Ranges of two scans whose logarithms differ by more count as different by this. A larger value gives
+    edges more weight."""
+    min_compared_share: float = 0.25
+    """Least share of beams that have a range in both scans, once turned. A larger value finds fewer turns."""
     max_hidden_share: float = 0.5
     """Greatest share of beams of constant range that are left out when turns are looked for. A larger value
     finds parts of the robot that hide more, and fewer in narrow corridors."""
@@ -212,11 +217,11 @@ def _turns(
     for shift in range(-most, most + 1):
         a = one[:, max(shift, 0) : one.shape[1] + min(shift, 0)]
         b = other[:, max(-shift, 0) : one.shape[1] + min(-shift, 0)]
-        apart = np.minimum(np.abs(a - b), 1.0)
+        apart = np.minimum(np.abs(a - b), options.max_difference)
         there = np.isfinite(apart)
         compared = there.sum(axis=1)
         sums = np.where(there, apart, 0.0).sum(axis=1)
-        enough = compared >= max(one.shape[1] // 4, 1)
+        enough = compared >= max(int(options.min_compared_share * one.shape[1]), 1)
         differences[shift + most, enough] = sums[enough] / compared[enough]
     best = differences.argmin(axis=0)
     least = differences[best, np.arange(len(pairs))]

@@ -10,7 +10,7 @@ from nscan_cli.logs.odometry_interpolation import DEFAULT_ODOMETRY_GAPS, Odometr
 from nscan_cli.logs.range_limit_options import DEFAULT_RANGE_LIMITS, RangeLimitOptions
 from nscan_cli.logs.range_unit import DEFAULT_RANGE_UNIT, RangeUnitOptions
 from nscan_cli.logs.recordings.alternating_lasers import DEFAULT_TWO_LASERS, TwoLaserOptions
-from nscan_cli.logs.recordings.moving_mount import DEFAULT_MOUNTING, MountingOptions
+from nscan_cli.logs.recordings.mounting_options import DEFAULT_MOUNTING, MountingOptions
 from nscan_cli.logs.recordings.turn_segments import DEFAULT_TURN_SEGMENTS, TurnSegmentOptions
 from nscan_cli.logs.robot_parts import DEFAULT_ROBOT_PARTS, RobotPartsOptions
 from nscan_cli.logs.robot_path import DEFAULT_ROBOT_PATH, RobotPathOptions
@@ -18,6 +18,7 @@ from nscan_cli.logs.scan_order import DEFAULT_SCAN_ORDER, ScanOrderOptions
 from nscan_cli.logs.slow_odometry import DEFAULT_SLOW_ODOMETRY, SlowOdometryOptions
 from nscan_cli.logs.sweep import DEFAULT_SWEEP, SweepOptions
 from nscan_cli.logs.text.interlaced_scans import DEFAULT_INTERLACED, InterlacedOptions
+from nscan_cli.logs.text.text_log_options import DEFAULT_TEXT_LOGS, TextLogOptions
 from nscan_cli.logs.unit_stretches import DEFAULT_UNIT_STRETCHES, UnitStretchOptions
 
 
@@ -31,6 +32,7 @@ class ScanCheckOptions:
     unit_stretches: UnitStretchOptions = DEFAULT_UNIT_STRETCHES
     beam_angles: BeamAngleOptions = DEFAULT_BEAM_ANGLES
     beam_spacing: BeamSpacingOptions = DEFAULT_BEAM_SPACING
+    text_logs: TextLogOptions = DEFAULT_TEXT_LOGS
     interlaced: InterlacedOptions = DEFAULT_INTERLACED
     turn_segments: TurnSegmentOptions = DEFAULT_TURN_SEGMENTS
     two_lasers: TwoLaserOptions = DEFAULT_TWO_LASERS

@@ -31,6 +31,12 @@ class ScanOrderOptions:
     max_steps_back: int = 20
     """With more steps back, the lines are out of order, and no clock was set back. A larger value finds more
     such clocks."""
+    longest_first_step: float = 1.0
+    """A stamp of 0 is that of a simulated clock if the next one follows within this time, or within the
+    longest other step, s; else it was never set. A larger value believes more of them."""
+    longest_pause: float = 60.0
+    """Longest pause between two files of one recording, s: a recorder that splits goes on at once. A larger
+    value joins more files."""
 
 
 DEFAULT_SCAN_ORDER = ScanOrderOptions()

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from nscan_cli.calibration.scan_turns import scan_turns
+from nscan_cli.calibration.sweep_options import ScanTurnOptions
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.poses import Array, relative, wrap
 from tests.benchmarks.lasers import turning
@@ -28,7 +29,7 @@ def errors(log: LaserLog, apart: int) -> Array:
     first = np.arange(len(log) - apart)
     assert log.truth is not None
     true = relative(log.truth[first + apart], log.truth[first])[:, 2]
-    off: Array = np.abs(wrap(scan_turns(log, first, first + apart) - true))
+    off: Array = np.abs(wrap(scan_turns(log, first, first + apart, ScanTurnOptions()) - true))
     return off
 
 
@@ -47,9 +48,13 @@ def test_readings_that_go_clockwise_turn_the_same_way():
         angle_min=log.angle_min + 359 * log.angle_increment,
         angle_increment=-log.angle_increment,
     )
-    np.testing.assert_allclose(scan_turns(back, rows, rows + 2), scan_turns(log, rows, rows + 2), atol=0.02)
+    np.testing.assert_allclose(
+        scan_turns(back, rows, rows + 2, ScanTurnOptions()),
+        scan_turns(log, rows, rows + 2, ScanTurnOptions()),
+        atol=0.02,
+    )
 
 
 def test_a_scan_has_not_turned_against_itself():
     rows = np.arange(5)
-    np.testing.assert_allclose(scan_turns(drive(AHEAD), rows, rows), 0.0, atol=1e-6)
+    np.testing.assert_allclose(scan_turns(drive(AHEAD), rows, rows, ScanTurnOptions()), 0.0, atol=1e-6)

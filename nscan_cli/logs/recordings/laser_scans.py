@@ -12,7 +12,7 @@ from nscan_cli.logs import scan_order as order
 from nscan_cli.logs.assemble import Findings, RawScans, RecordedMotion, laser_log, scan_table
 from nscan_cli.logs.frame_names import distinct_frame_names
 from nscan_cli.logs.laser_log import LaserLog
-from nscan_cli.logs.range_limits import LARGEST_RANGE
+from nscan_cli.logs.range_limit_options import DEFAULT_RANGE_LIMITS
 from nscan_cli.logs.reading_options import ReadingOptions
 from nscan_cli.logs.recordings.alternating_lasers import first_of_two_lasers
 from nscan_cli.logs.recordings.container import Message, Recording
@@ -27,7 +27,7 @@ from nscan_cli.logs.recordings.topics import devices, scan_topic
 from nscan_cli.logs.recordings.turn_segments import TimedScan, joined_turns
 from nscan_cli.logs.skips import Skips
 from nscan_cli.logs.sweep import SweepTimes
-from nscan_cli.logs.text.line_records import beams_problem
+from nscan_cli.logs.text.line_records import MAX_ANGLE, beams_problem
 from nscan_cli.poses import Array
 
 
@@ -126,8 +126,7 @@ def _recording_delay(stamps: Sequence[int | None], log_times: Sequence[int]) -> 
 def _scan_problem(scan: ScanMessage) -> str:
     """Why a scan cannot be used; empty when it can."""
     problem = beams_problem(len(scan.ranges))
-    two_turns = 4 * np.pi
-    if not (abs(scan.angle_min) <= two_turns and 0 < abs(scan.angle_increment) <= two_turns):
+    if not (abs(scan.angle_min) <= MAX_ANGLE and 0 < abs(scan.angle_increment) <= MAX_ANGLE):
         problem = problem or "an angle is out of bounds"
     return problem
 
@@ -135,7 +134,8 @@ def _scan_problem(scan: ScanMessage) -> str:
 def _raw_scans(scans: Sequence[ScanMessage], stamps: list[str]) -> RawScans:
     """The scans as columns, with the range limits of the messages."""
     low, low_from = _range_limit("range_min", [scan.range_min for scan in scans], 0.0)
-    high, high_from = _range_limit("range_max", [scan.range_max for scan in scans], LARGEST_RANGE)
+    largest = DEFAULT_RANGE_LIMITS.largest_range
+    high, high_from = _range_limit("range_max", [scan.range_max for scan in scans], largest)
     return RawScans(
         scan_table([scan.ranges for scan in scans]),
         np.array([scan.angle_min for scan in scans], dtype=np.float64),
@@ -157,8 +157,8 @@ def _raw_scans(scans: Sequence[ScanMessage], stamps: list[str]) -> RawScans:
 
 
 def _range_limit(name: str, values: list[float], default: float) -> tuple[Array, str]:
-    """The limits (S,) between 0 and LARGEST_RANGE, `default` for others, and where they are from."""
+    """The plausible limits (S,), `default` for others, and where they are from."""
     limits = np.array(values, dtype=np.float64)
-    valid = (limits > 0) & (limits < LARGEST_RANGE)
+    valid = (limits > 0) & (limits < DEFAULT_RANGE_LIMITS.largest_range)
     origin = f"{name} of the messages" if valid.any() else "none in the messages"
     return np.where(valid, limits, default), origin

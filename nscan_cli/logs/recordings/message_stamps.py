@@ -7,19 +7,17 @@ from collections.abc import Sequence
 import numpy as np
 
 from nscan_cli.logs.recordings.decoded_messages import S
-
-LONGEST_FIRST_STEP = 1 * S
-"""ns; with a longer first step 0 is no stamp of a simulated clock, unless a later step is as long."""
+from nscan_cli.logs.scan_order import DEFAULT_SCAN_ORDER, ScanOrderOptions
 
 
-def valid_stamps(stamps: Sequence[int]) -> list[int | None]:
+def valid_stamps(stamps: Sequence[int], options: ScanOrderOptions = DEFAULT_SCAN_ORDER) -> list[int | None]:
     """The stamps (ns) of messages; None for a 0 that was never set.
 
     A simulated clock begins at 0, and the next stamps follow closely: there 0 is valid. Where the other
     stamps are far from 0, such as those since 1970, it was never set.
     """
     others = np.unique([stamp for stamp in stamps if stamp > 0])
-    longest = max(LONGEST_FIRST_STEP, int(np.diff(others).max(initial=0)))
+    longest = max(int(options.longest_first_step * S), int(np.diff(others).max(initial=0)))
     begins_at_zero = others.size > 0 and int(others[0]) <= longest
     return [stamp if stamp > 0 or begins_at_zero else None for stamp in stamps]
 

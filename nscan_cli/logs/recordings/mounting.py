@@ -12,7 +12,8 @@ from nscan_cli.logs.assemble import Findings
 from nscan_cli.logs.reading_options import ReadingOptions
 from nscan_cli.logs.recordings.decoded_messages import ScanMessage
 from nscan_cli.logs.recordings.frame_ids import BASE_FRAMES, is_world_frame, tf_prefix, without_prefix
-from nscan_cli.logs.recordings.moving_mount import DEFAULT_MOUNTING, MovingMount, moving_mount
+from nscan_cli.logs.recordings.mounting_options import DEFAULT_MOUNTING
+from nscan_cli.logs.recordings.moving_mount import MovingMount, moving_mount
 from nscan_cli.logs.recordings.poses_3d import TimedPoses, planar_mount
 from nscan_cli.logs.recordings.tf_chains import ChainLink, chain_links, composed, shortest_chain
 from nscan_cli.logs.recordings.tf_tree import FramePair, TransformTree

@@ -7,9 +7,7 @@ from collections.abc import Sequence
 from nscan_cli.errors import WrongUsageError
 from nscan_cli.logs.recordings.container import Recording
 from nscan_cli.logs.recordings.decoded_messages import S
-
-LONGEST_PAUSE = 60
-"""s between two files of one recording; a recorder that splits goes on at once."""
+from nscan_cli.logs.scan_order import DEFAULT_SCAN_ORDER
 
 
 def order_by_start(recordings: Sequence[tuple[str, Recording]]) -> list[int]:
@@ -25,9 +23,8 @@ def order_by_start(recordings: Sequence[tuple[str, Recording]]) -> list[int]:
 def merge_recordings(recordings: Sequence[tuple[str, Recording]], are_parts: bool) -> Recording:
     """One recording of several named ones, which are in the order of order_by_start.
 
-    `are_parts` says that metadata or names show that they belong together; otherwise a pause longer than
-    LONGEST_PAUSE is an error. Raises WrongUsageError for it, and LimitExceededError when they are too large
-    together.
+    `are_parts` says that metadata or names show that they belong together; otherwise a long pause is an
+    error. Raises WrongUsageError for it, and LimitExceededError when they are too large together.
     """
     whole = Recording(recordings[0][1].form)
     checksums: dict[str, None] = {}
@@ -43,7 +40,7 @@ def merge_recordings(recordings: Sequence[tuple[str, Recording]], are_parts: boo
         if span is None:
             continue
         pause = 0.0 if last is None else (span[0] - last[0]) / S
-        if last is not None and pause > LONGEST_PAUSE:
+        if last is not None and pause > DEFAULT_SCAN_ORDER.longest_pause:
             problem = f"{name} begins {pause:,.0f} s after {last[1]} ends"
             if not are_parts:
                 raise WrongUsageError(

@@ -7,13 +7,11 @@ from typing import NamedTuple
 import numpy as np
 
 from nscan_cli.files.limits import BEAMS
+from nscan_cli.logs.text.text_log_options import DEFAULT_TEXT_LOGS
 from nscan_cli.poses import Array, Indices
 
-MAX_DECIMALS = 6
-"""Largest number of decimals that bearings are written with."""
-MAX_UNEVENNESS = 0.05
-"""Largest distance of a bearing from its even place, beyond rounding, in steps. A larger value accepts less
-even bearings."""
+MAX_RADIANS = 2 * np.pi + 0.01
+"""The largest size of a heading or bearing in rad, which its log has rounded."""
 
 
 class EvenBearings(NamedTuple):
@@ -32,7 +30,7 @@ def are_degrees(greatest: Array) -> bool:
 
     A bearing in rad is at most 2π. A laser that sees less than 6° to each side is not expected.
     """
-    return bool(len(greatest)) and float(np.median(greatest)) > 2 * np.pi + 0.01
+    return bool(len(greatest)) and float(np.median(greatest)) > MAX_RADIANS
 
 
 def even_bearings(bearings: Array, in_degrees: bool) -> EvenBearings | None:
@@ -51,7 +49,7 @@ def even_bearings(bearings: Array, in_degrees: bool) -> EvenBearings | None:
             continue
         first, step = _fitted_line(places, bearings)
         off = float(np.abs(first + step * places - bearings).max())
-        if step != 0 and off <= rounding + MAX_UNEVENNESS * abs(step):
+        if step != 0 and off <= rounding + DEFAULT_TEXT_LOGS.max_unevenness * abs(step):
             hundredths = np.round(np.degrees(np.array([first, step]) * to_radians), 2)
             restored = np.radians(hundredths) / to_radians
             if restored[1] and np.abs(restored[0] + restored[1] * places - bearings).max() <= rounding:
@@ -62,11 +60,12 @@ def even_bearings(bearings: Array, in_degrees: bool) -> EvenBearings | None:
 
 def _rounding(values: Array) -> float:
     """The value of the last decimal that any of the values has."""
-    for decimals in range(MAX_DECIMALS):
+    most = DEFAULT_TEXT_LOGS.max_decimals
+    for decimals in range(most):
         scaled = values * 10.0**decimals
         if np.allclose(scaled, np.rint(scaled), rtol=0, atol=1e-6):
             return float(10.0**-decimals)
-    return float(10.0**-MAX_DECIMALS)
+    return float(10.0**-most)
 
 
 def _with_gaps(bearings: Array, turn: float) -> Indices | None:

@@ -22,13 +22,12 @@ from nscan_cli.logs.text.carmen_records import CarmenScans, TaggedLines
 from nscan_cli.logs.text.corrected_poses import sign_of_correction
 from nscan_cli.logs.text.interlaced_scans import between_the_others
 from nscan_cli.logs.text.odometry_records import odometry_of_records, odometry_of_scans
+from nscan_cli.logs.text.text_log_options import DEFAULT_TEXT_LOGS
 from nscan_cli.poses import Array, relative, wrap
 
 LASERS = ("FLASER", "ROBOTLASER1", "ROBOTLASER0", "RAWLASER1", "RLASER", "ROBOTLASER2", "RAWLASER2",
           "RAWLASER3", "RAWLASER4", "RAWLASER5", "LASER3", "LASER4", "LASER5")  # fmt: skip
 """Tags of laser records in order of preference: first those of the front laser that carry poses."""
-MAX_MOUNT_OFFSET = 1e3
-"""Values of a mounting in PARAM of this size or more (m, rad) are ignored."""
 REAR_LASERS = ("RLASER", "ROBOTLASER2", "RAWLASER2")
 FRONT_LASERS = ("FLASER", "ROBOTLASER1", "ROBOTLASER0", "RAWLASER1")
 KNOWN_TAGS = re.compile(
@@ -165,8 +164,8 @@ def _carmen_mount(
     if scans.robot.shape[1] and not np.array_equal(scans.laser, scans.robot):
         mount = mount_from_poses(scans.laser, scans.robot)
         if given is not None:
-            off = np.abs(relative(mount, given))
-            if max(off[0], off[1]) > 0.01 or off[2] > np.radians(0.5):
+            off, checks = np.abs(relative(mount, given)), DEFAULT_TEXT_LOGS
+            if max(off[0], off[1]) > checks.mount_difference or off[2] > checks.mount_turn_difference:
                 warnings.append(
                     f"PARAM mounts the laser at {_pose_text(given)}, the poses at {_pose_text(mount)}: "
                     "that of the poses is used"
@@ -194,7 +193,7 @@ def _param_mount(tag: str, params: Mapping[str, float]) -> Array | None:
         return None
     default = (0.0, 0.0, np.pi if side == "rear" else 0.0)
     values = np.array([params.get(name, value) for name, value in zip(names, default, strict=True)])
-    if not (np.abs(values) < MAX_MOUNT_OFFSET).all():
+    if not (np.abs(values) < DEFAULT_TEXT_LOGS.max_mount).all():
         return None
     values[2] = wrap(values[2])
     return values

@@ -17,6 +17,7 @@ from nscan_cli.files.limits import RECORD_KINDS
 from nscan_cli.logs.assemble import empty_scan_table
 from nscan_cli.logs.skips import Skips
 from nscan_cli.logs.text.line_records import (
+    MAX_ANGLE,
     Block,
     LineRecord,
     ascii_text,
@@ -192,7 +193,7 @@ def _plausible_records(
     if head:
         after = head + 1 + block.beams
         remissions = values[:, after] == values.shape[1] - (after + 1 + tail)
-        angles = rows_within_bounds(values[:, :head]) & (np.abs(values[:, [1, 3]]).max(axis=1) <= 4 * np.pi)
+        angles = rows_within_bounds(values[:, :head]) & (np.abs(values[:, [1, 3]]).max(axis=1) <= MAX_ANGLE)
         problems += [("wrong number of values", ~remissions), ("an angle is out of bounds", ~angles)]
     if poses:
         at = values.shape[1] - tail

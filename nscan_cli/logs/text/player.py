@@ -18,6 +18,7 @@ from nscan_cli.logs.skips import Skips
 from nscan_cli.logs.text import player_bearings, player_records
 from nscan_cli.logs.text.odometry_records import odometry_of_records, odometry_of_scans
 from nscan_cli.logs.text.player_records import DeviceLines, PlayerScans, Version
+from nscan_cli.logs.text.text_log_options import DEFAULT_TEXT_LOGS
 from nscan_cli.poses import Array, wrap
 
 LINE_PATTERNS: tuple[tuple[Version, re.Pattern[bytes]], ...] = (
@@ -84,8 +85,9 @@ def read(data: bytes, file: str, source: Source, options: ReadingOptions) -> Las
 def _begin_at_zero(scans: PlayerScans) -> bool:
     """Whether the bearings go from 0° to about 180°, as lasers with 90° ahead count them."""
     last = scans.raw.angle_min + scans.raw.angle_increment * (scans.raw.ranges.shape[1] - 1)
-    ends = np.degrees(np.array([scans.raw.angle_min, last]))
-    return scans.bearings is not None and bool((ends.min() > -1) & (np.abs(ends.max() - 180) < 30))
+    ends, checks = np.array([scans.raw.angle_min, last]), DEFAULT_TEXT_LOGS
+    ends_there = abs(ends.max() - checks.last_bearing) < checks.last_bearing_tolerance
+    return scans.bearings is not None and bool(ends.min() > checks.first_bearing and ends_there)
 
 
 def _version(data: bytes) -> Version | None:

@@ -14,15 +14,14 @@ from numpy.typing import NDArray
 from nscan_cli.logs.assemble import RawScans, empty_scan_table
 from nscan_cli.logs.laser_defaults import CARMEN_MAX_RANGE
 from nscan_cli.logs.skips import Skips
-from nscan_cli.logs.text.bearings import EvenBearings, are_degrees, even_bearings
+from nscan_cli.logs.text.bearings import MAX_RADIANS, EvenBearings, are_degrees, even_bearings
 from nscan_cli.logs.text.line_records import LineRecord, beams_problem, parsed, within_bounds
+from nscan_cli.logs.text.text_log_options import DEFAULT_TEXT_LOGS
 from nscan_cli.poses import Array
 
 VALUES_PER_BEAM = 3
 MAX_DIGITS = 10
 """An index, type or beam count of a Player record has fewer digits."""
-MAX_BEARING = 720.0
-"""Records with a bearing above this size are skipped, degrees."""
 
 
 class BearingScan(NamedTuple):
@@ -78,7 +77,7 @@ def has_degrees(poses: Array) -> bool:
 
     Headings within 2π, and those of a robot that does not move, are taken as rad.
     """
-    if not len(poses) or np.abs(poses[:, 2]).max() <= 2 * np.pi + 0.01:
+    if not len(poses) or np.abs(poses[:, 2]).max() <= MAX_RADIANS:
         return False
     x, y = np.diff(poses[:, 0]), np.diff(poses[:, 1])
     far = np.hypot(x, y) > 0
@@ -111,7 +110,7 @@ def _rows(records: list[LineRecord], skips: Skips) -> list[BearingScan]:
     rows = []
     for record, _, values in parsed(whole, skips):
         bearings = values[1::VALUES_PER_BEAM]
-        if not within_bounds(bearings) or np.abs(bearings).max() > MAX_BEARING:
+        if not within_bounds(bearings) or np.abs(bearings).max() > DEFAULT_TEXT_LOGS.max_bearing:
             skips.add("a bearing is out of bounds", record.line)
         else:
             rows.append(BearingScan(record, values[::VALUES_PER_BEAM], bearings))

@@ -22,6 +22,7 @@ from nscan_cli.logs.laser_defaults import CARMEN_MAX_RANGE
 from nscan_cli.logs.skips import Skips
 from nscan_cli.logs.text import player_bearings
 from nscan_cli.logs.text.line_records import (
+    MAX_ANGLE,
     LineRecord,
     ascii_text,
     beam_count,
@@ -180,4 +181,4 @@ def _scan_record(line: PayloadLine, head: int, skips: Skips) -> tuple[LineRecord
 def _is_plausible(head: Array, version: Version) -> bool:
     """Whether angles, step and pose before the ranges are within bounds."""
     angles = head[ANGLES[version]]
-    return within_bounds(head) and bool(np.abs(angles).max() <= 4 * np.pi) and angles[2] != 0
+    return within_bounds(head) and bool(np.abs(angles).max() <= MAX_ANGLE) and angles[2] != 0

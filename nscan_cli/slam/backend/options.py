@@ -73,6 +73,9 @@ class UnevenMotionOptions:
     """Standard deviation of the places at the middles of the turns before, m: no match slides along walls."""
     turn_sigma: float = 0.1
     """The same of the headings, rad."""
+    max_sigmas: float = 3.0
+    """The path stays as it was if a place or a heading moves by more of these standard deviations. A larger
+    value accepts larger corrections, also wrong ones."""
     min_gain: float = 1.0
     """The path stays where the beams fit better by less than so many nats for each part. A larger value
     leaves more of it to odometry, or as steady."""

@@ -152,7 +152,7 @@ class _Run:
         for widening in uneven.pair.widenings:
             self._knots = _least(energy, self._knots, widening, uneven)
         off = np.abs(self._knots - start)[:: uneven.parts]
-        near = (off < 3 * np.array([uneven.sigma, uneven.sigma, uneven.turn_sigma])).all()
+        near = (off < uneven.max_sigmas * np.array([uneven.sigma, uneven.sigma, uneven.turn_sigma])).all()
         fits = [energy.evaluate(knots, 1.0).terms[FIT] for knots in (start, self._knots)]
         return bool(near) and fits[0] - fits[1] > uneven.min_gain * (len(start) - 1)
 

@@ -141,6 +141,9 @@ class TrackingOptions:
     range_limit_share: float = 0.01
     """The range limit ends walls if this share of the ranges is in the last cell before it. Lasers of 12 m
     and more have 0.001 to 0.004 there, those of 6 m and less 0.02 to 0.05."""
+    whole_turn_beams: int = 4
+    """A laser sees all around if at most this many beams are missing to a whole turn. With a larger number
+    fewer lasers are matched sector by sector."""
     sector_margin: float = 0.1
     """Points this near (m) to the border of what the laser had in view are not matched there: walls end. A
     larger margin matches fewer points."""

@@ -23,16 +23,13 @@ from nscan_cli.slam.frontend.track_state import TrackState
 from nscan_cli.slam.frontend.tracked_scans import TrackedScans
 from nscan_cli.slam.frontend.visible_points import range_limit
 
-WHOLE_TURN_BEAMS = 4
-"""A laser sees all around if no more than this many beams are missing to a whole turn."""
-
 
 def laser_view(log: LaserLog, options: TrackingOptions) -> LaserView:
     """What the laser of a log has in view."""
     limit = range_limit(log.ranges[log.ranges < options.max_range], options)
     first, last, step = field_of_view(log)
     half = 0.5 * abs(last - first)
-    if half > np.pi - 0.5 * WHOLE_TURN_BEAMS * abs(step):
+    if half > np.pi - 0.5 * options.whole_turn_beams * abs(step):
         return LaserView.all_around(limit)
     return LaserView(limit, compose(log.mount, np.array([0.0, 0.0, 0.5 * (first + last)])), half)
 

@@ -48,7 +48,7 @@ class LoopDetector:
     ) -> None:
         self.options, self.nscan, self.match, self.energies = options, nscan, match, energies
         self.tracked_path = TrackedPath(options.drift, options.drift_angle)
-        self._slips = SlipEvidence(options.disagreement, options.turning, options.min_compared_steps)
+        self._slips = SlipEvidence(options)
         self._refused: list[Loop] = []
         self._waiting: list[tuple[Place, str]] = []
         self._uncertainty, self._links = RelativeUncertainty(), LinkCache()

@@ -22,7 +22,11 @@ class LoopClosureOptions:
     """Steps from keyframe to keyframe that turn by more than this have a usual difference of their own, rad:
     in turns wheels slip. With a smaller value fewer of the other steps disagree."""
     min_compared_steps: int = 20
-    """Number of such steps after which their usual difference is known."""
+    """Number of steps of a kind after which their usual difference is known. A larger number finds slips
+    later."""
+    usual_steps: int = 1000
+    """Number of the last steps of a kind whose median difference is the usual one. A larger number follows
+    changes more slowly."""
     lever_arm: float = 20.0
     """Distance at which angles count when paths are compared by their uncertainty, m. With a larger one,
     paths with certain angles are preferred."""

@@ -7,9 +7,7 @@ from collections import deque
 import numpy as np
 
 from nscan_cli.poses import Array, relative, wrap
-
-REMEMBERED = 1000
-"""Steps whose median difference is the usual one: enough that more change nothing."""
+from nscan_cli.slam.loop_closure.options import LoopClosureOptions
 
 
 class SlipEvidence:
@@ -19,16 +17,11 @@ class SlipEvidence:
     the path may be off by any part of the difference. Wheels slip in turns: these are compared with turns.
     """
 
-    def __init__(self, disagreement: float, turning: float, min_steps: int) -> None:
-        """They disagree where they differ by more than `disagreement` times the usual difference.
-
-        That of steps that turn by more than `turning` (rad) is another one than that of the others. Each is
-        known after `min_steps` such steps.
-        """
-        self._disagreement, self._turning, self._min_steps = disagreement, turning, min_steps
-        self._straight: deque[tuple[float, float]] = deque(maxlen=REMEMBERED)
+    def __init__(self, options: LoopClosureOptions) -> None:
+        self._options = options
+        self._straight: deque[tuple[float, float]] = deque(maxlen=options.usual_steps)
         """Square differences a metre of path: of a coordinate, m²/m, and of the angle, rad²/m."""
-        self._turns: deque[tuple[float, float]] = deque(maxlen=REMEMBERED)
+        self._turns: deque[tuple[float, float]] = deque(maxlen=options.usual_steps)
         """The same of steps that turn."""
 
     def variances(self, step: Array, odometry: Array, length: float) -> tuple[float, float]:
@@ -38,15 +31,16 @@ class SlipEvidence:
         0 where both agree. If all places between both are as likely, the variance about one end is a third of
         the square.
         """
+        options = self._options
         if not (np.isfinite(odometry).all() and length > 0.0):
             return 0.0, 0.0
         off = relative(step, odometry)
         squares = np.array([0.5 * (off[0] ** 2 + off[1] ** 2), wrap(off[2]) ** 2])
-        turns = max(abs(step[2]), abs(odometry[2])) > self._turning
+        turns = max(abs(step[2]), abs(odometry[2])) > options.turning
         like = self._turns if turns else self._straight
         like.append(tuple((squares / length).tolist()))
-        if len(like) < self._min_steps:
+        if len(like) < options.min_compared_steps:
             return 0.0, 0.0
         usual = np.median(np.array(like), axis=0) * length
-        place, angle = np.where(squares > self._disagreement**2 * usual, squares / 3, 0.0).tolist()
+        place, angle = np.where(squares > options.disagreement**2 * usual, squares / 3, 0.0).tolist()
         return place, angle

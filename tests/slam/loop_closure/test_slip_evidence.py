@@ -23,7 +23,7 @@ def evidence(noise: float, steps: int = 200) -> SlipEvidence:
 
 
 def no_evidence() -> SlipEvidence:
-    return SlipEvidence(OPTIONS.disagreement, OPTIONS.turning, OPTIONS.min_compared_steps)
+    return SlipEvidence(OPTIONS)
 
 
 def odometry(off: Array, step: Array = STEP) -> Array:

@@ -1,0 +1,37 @@
+"""The options of reading text logs: which of their numbers are plausible, and how they are rounded."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class TextLogOptions:
+    """What numbers in the records of text logs may be."""
+
+    max_mount: float = 1e3
+    """A mounting in PARAM with a value of this size or more is ignored, m and rad. A larger value believes
+    more."""
+    mount_difference: float = 0.01
+    """Largest difference of two mountings in one log that a warning does not name, m. A larger value warns
+    less."""
+    mount_turn_difference: float = math.radians(0.5)
+    """The same of their angles, rad."""
+    max_decimals: int = 6
+    """Largest number of decimals that bearings are written with. A larger number rounds less."""
+    max_unevenness: float = 0.05
+    """Largest distance of a bearing from its even place, beyond rounding, in steps. A larger value accepts
+    less even bearings."""
+    max_bearing: float = 720.0
+    """Records with a larger bearing are skipped, in degrees or rad as written. A larger value skips less."""
+    first_bearing: float = math.radians(-1.0)
+    """Bearings that begin beyond this and end near `last_bearing` are likely counted from the side, rad: a
+    warning says so. A larger value warns less."""
+    last_bearing: float = math.radians(180.0)
+    """Where such bearings end, rad."""
+    last_bearing_tolerance: float = math.radians(30.0)
+    """Largest distance of the last bearing from there, rad. A larger value warns more."""
+
+
+DEFAULT_TEXT_LOGS = TextLogOptions()
