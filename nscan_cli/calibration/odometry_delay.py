@@ -44,12 +44,7 @@ def odometry_delay(log: LaserLog, motion: ScanMotion, options: SweepCheckOptions
 
 
 def _best_delay(
-    log: LaserLog,
-    path: RobotPath,
-    beams: BeamTimes,
-    rows: Indices,
-    turned: Array,
-    options: SweepCheckOptions,
+    log: LaserLog, path: RobotPath, beams: BeamTimes, rows: Indices, turned: Array, options: SweepCheckOptions
 ) -> tuple[float, float]:
     """The delay (s) with which odometry disagrees least with the turns (n,) at rows (n,), 0 in doubt.
 

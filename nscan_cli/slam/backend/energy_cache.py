@@ -24,11 +24,7 @@ class EnergyCache:
         self._terms = TermCache()
 
     def of(
-        self,
-        route: Route,
-        relations: Sequence[Relation],
-        fixed: int = 0,
-        free: Mask | None = None,
+        self, route: Route, relations: Sequence[Relation], fixed: int = 0, free: Mask | None = None
     ) -> GraphEnergy:
         """The energy of all keyframes. `fixed` is held, and so are the keyframes that are not `free` (K,)."""
         positions = np.full(self._scans, -1)

@@ -38,13 +38,7 @@ def choose_neighbours(poses: Array, paths: Array, centre: int, options: NScanOpt
 
 @kernel
 def _choose(
-    poses: Array,
-    paths: Array,
-    centre: int,
-    radius: float,
-    recent: float,
-    first_visits: int,
-    most: int,
+    poses: Array, paths: Array, centre: int, radius: float, recent: float, first_visits: int, most: int
 ) -> tuple[Indices, Mask, int]:
     """The kernel of choose_neighbours. Keyframes more than `recent` (m) of path apart are of different
     visits."""

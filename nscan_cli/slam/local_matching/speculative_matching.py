@@ -62,14 +62,7 @@ class SpeculativeMatching:
                 self._begun[keyframe] = _Begun(route, near, made)
                 return
 
-    def begin(
-        self,
-        route: Route,
-        whole: int,
-        centre: int,
-        near: Neighbours,
-        covered: Coverage,
-    ) -> None:
+    def begin(self, route: Route, whole: int, centre: int, near: Neighbours, covered: Coverage) -> None:
         """Begin the matches that follow the one of keyframe `centre`.
 
         The first `whole` keyframes of the route have all their scans; those that are not in the graph yet

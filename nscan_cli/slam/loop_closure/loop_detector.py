@@ -66,13 +66,7 @@ class LoopDetector:
             slip = self._slips.variances(relation.measurement, odometry, length)
         self.tracked_path.extend(relation, length, slip)
 
-    def close(
-        self,
-        route: Route,
-        centre: int,
-        left_out: Indices,
-        loops: Loops,
-    ) -> list[Place]:
+    def close(self, route: Route, centre: int, left_out: Indices, loops: Loops) -> list[Place]:
         """The places of a keyframe and of earlier ones that agree with it. Empty if they are too few.
 
         `left_out` (m,) are keyframes of another visit that the joint match about `centre` left out. `loops`
@@ -105,13 +99,7 @@ class LoopDetector:
         self._waiting = [each for each in self._waiting if each[0] not in agreeing]
         return agreeing
 
-    def why_doubted(
-        self,
-        route: Route,
-        centre: int,
-        local_match: LocalMatch,
-        loops: Loops,
-    ) -> str | None:
+    def why_doubted(self, route: Route, centre: int, local_match: LocalMatch, loops: Loops) -> str | None:
         """Why the joint match about `centre` may be at a wrong place of an earlier visit, or None.
 
         Arguments as for close. A match that started near enough, or closes no loop, is not doubted.
@@ -185,13 +173,7 @@ class LoopDetector:
         older = paths[centre] - paths > self.nscan.visit_path
         return np.flatnonzero(older & may_be & (bound > options.match_reach))
 
-    def _search(
-        self,
-        route: Route,
-        centre: int,
-        near: Indices,
-        sigma: RelativeSigma,
-    ) -> Place | None:
+    def _search(self, route: Route, centre: int, near: Indices, sigma: RelativeSigma) -> Place | None:
         """Search among the visit that is most likely near. If not even the direction is known, search all."""
         away = _distances_from(route, centre)
         places, lost = [], is_lost(sigma, self.options)
@@ -207,11 +189,7 @@ class LoopDetector:
         return max(places, key=_visit_overlap, default=None)
 
     def _visit(
-        self,
-        route: Route,
-        centre: int,
-        first: int,
-        sigma: RelativeSigma,
+        self, route: Route, centre: int, first: int, sigma: RelativeSigma
     ) -> tuple[SearchOptions, Indices]:
         """Where to search keyframe `centre` about an older one, the `first`, and among which keyframes (m,).
 

@@ -14,11 +14,7 @@ from nscan_cli.slam.loop_closure.options import LoopClosureOptions
 
 
 def search_submaps(
-    route: Route,
-    centre: int,
-    earlier: Indices,
-    window: SearchOptions,
-    closing: LoopClosureOptions,
+    route: Route, centre: int, earlier: Indices, window: SearchOptions, closing: LoopClosureOptions
 ) -> tuple[Array, LikelihoodField] | None:
     """The points (m, 2) around keyframe `centre`, in its frame, and the likelihood field of the `earlier`
     ones (m,).
