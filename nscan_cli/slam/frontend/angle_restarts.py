@@ -3,17 +3,14 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from nscan_cli.kernels.array_assignment import assign, assign_rows
 from nscan_cli.kernels.decorators import kernel
-from nscan_cli.matching.motion_model import Prior
-from nscan_cli.ndt.hash_grid import Grid
 from nscan_cli.poses import Array
 from nscan_cli.slam.frontend.options import TrackingParameters
 from nscan_cli.slam.frontend.scan_to_map import match_and_count
 from nscan_cli.slam.frontend.track_state import RESTARTS, TrackState
-from nscan_cli.slam.frontend.tracked_scans import TrackedScans
+from nscan_cli.slam.frontend.tracking_problem import TrackingProblem
 
 
 @kernel
@@ -31,32 +28,24 @@ def restart_threshold(track: TrackState, settings: TrackingParameters) -> float:
 
 
 @kernel
-def match_from_other_angles(
-    grid: Grid,
-    settings: TrackingParameters,
-    points: Array,
-    prior: Prior,
-    threshold: float,
-    counts: NDArray[np.int64],
-    found: TrackedScans,
-    k: int,
-) -> None:
+def match_from_other_angles(problem: TrackingProblem, points: Array, threshold: float, k: int) -> None:
     """Match scan k, which has fewer inliers than `threshold`, from angles beside the expected one too.
 
     A match with clearly more inliers and a lower objective takes the place of the first one.
     """
+    settings, prior, found = problem.settings, problem.prior, problem.found
     pose, hessian = np.empty(3), np.empty((3, 3))
     for ring in range(settings.restart_angles.shape[0]):
         if found.inliers[k] >= threshold - (settings.far_restart_margin if ring > 0 else 0.0):
             break
-        counts[RESTARTS] += 1
+        problem.track.counts[RESTARTS] += 1
         for angle in settings.restart_angles[ring]:
             for sign in (1.0, -1.0):
                 if np.isnan(angle):
                     continue
                 assign(pose, prior.mean)
                 pose[2] += sign * angle
-                value, inliers = match_and_count(grid, settings, points, prior, pose, hessian)
+                value, inliers = match_and_count(problem.grid, settings, points, prior, pose, hessian)
                 # From elsewhere a scan may slide along a corridor; a wrong angle shows in the inliers.
                 if inliers > found.inliers[k] + settings.inlier_margin and value < found.values[k]:
                     found.values[k], found.inliers[k] = value, inliers

@@ -8,17 +8,14 @@ when the robot has moved by `match_motion`. The scans before it follow, with a m
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from nscan_cli.kernels.decorators import kernel
-from nscan_cli.matching.motion_model import Prior
 from nscan_cli.matching.pose_kernels import composed_pose, relative_pose, wrapped
-from nscan_cli.ndt.hash_grid import Grid
 from nscan_cli.poses import Array
 from nscan_cli.slam.frontend.options import TrackingParameters
 from nscan_cli.slam.frontend.scan_to_map import match_from_prediction
 from nscan_cli.slam.frontend.track_state import NEXT, TrackState
-from nscan_cli.slam.frontend.tracked_scans import TrackedScans
+from nscan_cli.slam.frontend.tracking_problem import TrackingProblem
 from nscan_cli.slam.frontend.visible_points import points_in_view
 
 LEAST_STEP = 1e-4
@@ -53,24 +50,14 @@ def _is_short(step: Array, settings: TrackingParameters) -> bool:
 
 
 @kernel
-def match_between(
-    track: TrackState,
-    grid: Grid,
-    settings: TrackingParameters,
-    points: Array,
-    ends: NDArray[np.int64],
-    odometry: Array,
-    before: tuple[Array, Array],
-    first: int,
-    last: int,
-    found: TrackedScans,
-) -> None:
-    """Match the scans from the `first` on, before the `last`, which is settled.
+def match_between(problem: TrackingProblem, before: tuple[Array, Array], first: int, last: int) -> None:
+    """Match the scans from the `first` on, before the `last`, which is settled. Overwrites the prior.
 
     `before` has the pose (3,) of the matched scan before them and its odometry (3,). The error of odometry at
     the last scan is distributed over the way; so is the covariance of the step.
     """
     pose_before, odometry_before = before
+    settings, ends, odometry, found = problem.settings, problem.ends, problem.odometry, problem.found
     step, length = np.empty(3), 0.0
     lengths = np.empty(last - first + 1)
     for k in range(first, last + 1):
@@ -79,8 +66,9 @@ def match_between(
         lengths[k - first] = length
     relative_pose(odometry[last], odometry_before, step)
     path = found.paths[last] - (np.hypot(step[0], step[1]) if found.in_map[last] else 0.0)
-    prior, missing = Prior(np.empty(3), np.zeros((3, 3))), np.empty(3)
+    prior, missing = problem.prior, np.empty(3)
     composed_pose(pose_before, step, prior.mean)
+    prior.information[:, :] = 0.0
     for a in range(3):
         missing[a] = found.poses[last, a] - prior.mean[a]
         prior.information[a, a] = settings.between_sigma**-2
@@ -93,8 +81,8 @@ def match_between(
         for a in range(3):
             prior.mean[a] += share * missing[a]
         prior.mean[2] = wrapped(prior.mean[2])
-        in_view = points_in_view(track, settings, points[ends[k] : ends[k + 1]], prior.mean)
-        match_from_prediction(grid, settings, in_view, prior, found, k)
+        points = problem.points[ends[k] : ends[k + 1]]
+        match_from_prediction(problem, points_in_view(problem.track, settings, points, prior.mean), k)
         # The map holds the last scan: what differs from the scans before it is an inlier there.
         found.inliers[k] = min(found.inliers[k], found.inliers[last])
         found.poses[k, 2] = wrapped(found.poses[k, 2])

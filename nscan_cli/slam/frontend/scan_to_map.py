@@ -10,7 +10,7 @@ from nscan_cli.ndt.association import begin_association, count_inliers, update_a
 from nscan_cli.ndt.hash_grid import Grid
 from nscan_cli.poses import Array
 from nscan_cli.slam.frontend.options import TrackingParameters
-from nscan_cli.slam.frontend.tracked_scans import TrackedScans
+from nscan_cli.slam.frontend.tracking_problem import TrackingProblem
 
 
 @kernel
@@ -30,11 +30,10 @@ def match_and_count(
 
 
 @kernel
-def match_from_prediction(
-    grid: Grid, settings: TrackingParameters, points: Array, prior: Prior, found: TrackedScans, k: int
-) -> None:
-    """Match the points (m, 2) of scan k from its prediction; writes what match_and_count gives to `found`."""
+def match_from_prediction(problem: TrackingProblem, points: Array, k: int) -> None:
+    """Match the points (m, 2) of scan k from its prediction; writes what is found of it."""
+    found, prior = problem.found, problem.prior
     assign(found.poses[k], prior.mean)
     found.values[k], found.inliers[k] = match_and_count(
-        grid, settings, points, prior, found.poses[k], found.hessians[k]
+        problem.grid, problem.settings, points, prior, found.poses[k], found.hessians[k]
     )

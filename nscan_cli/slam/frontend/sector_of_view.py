@@ -12,15 +12,13 @@ import numpy as np
 from nscan_cli.kernels.decorators import kernel
 from nscan_cli.logs.field_of_view import field_of_view
 from nscan_cli.logs.laser_log import LaserLog
-from nscan_cli.matching.motion_model import Prior
 from nscan_cli.matching.pose_kernels import wrapped
-from nscan_cli.ndt.hash_grid import Grid
 from nscan_cli.poses import Array, compose
 from nscan_cli.slam.frontend.local_map import NEWEST, OLDEST
 from nscan_cli.slam.frontend.options import LaserView, TrackingOptions, TrackingParameters
 from nscan_cli.slam.frontend.scan_to_map import match_and_count, match_from_prediction
 from nscan_cli.slam.frontend.track_state import TrackState
-from nscan_cli.slam.frontend.tracked_scans import TrackedScans
+from nscan_cli.slam.frontend.tracking_problem import TrackingProblem
 from nscan_cli.slam.frontend.visible_points import range_limit
 
 
@@ -77,48 +75,34 @@ def _write_sector(placed: Array, middle: Array, half: float, sector: Array) -> N
 
 
 @kernel
-def match_in_sector(
-    track: TrackState,
-    grid: Grid,
-    settings: TrackingParameters,
-    points: Array,
-    prior: Prior,
-    threshold: float,
-    found: TrackedScans,
-    k: int,
-) -> Array:
+def match_in_sector(problem: TrackingProblem, points: Array, threshold: float, k: int) -> Array:
     """Match scan k from its prediction with those of its points (m, 2) that lie in the sector there.
 
     If that has fewer inliers than `threshold`, or turns the scan far from the prediction, the prediction was
     wrong, and with it the choice: all points are matched. Returns the points that were.
     """
-    in_sector = points_in_sector(track, settings, points, prior.mean)
-    match_from_prediction(grid, settings, in_sector, prior, found, k)
+    settings, prior, found = problem.settings, problem.prior, problem.found
+    in_sector = points_in_sector(problem.track, settings, points, prior.mean)
+    match_from_prediction(problem, in_sector, k)
     turned = abs(wrapped(found.poses[k, 2] - prior.mean[2]))
     if in_sector.shape[0] == points.shape[0] or (
         found.inliers[k] >= threshold and turned <= settings.sector_turn
     ):
         return in_sector
-    match_from_prediction(grid, settings, points, prior, found, k)
+    match_from_prediction(problem, points, k)
     return points
 
 
 @kernel
-def match_again_in_sector(
-    track: TrackState,
-    grid: Grid,
-    settings: TrackingParameters,
-    points: Array,
-    prior: Prior,
-    found: TrackedScans,
-    k: int,
-) -> Array:
+def match_again_in_sector(problem: TrackingProblem, points: Array, k: int) -> Array:
     """Match scan k from where all of its points (m, 2) were matched, with those in the sector there.
 
     The share of inliers stays that of all. Returns the points that were matched.
     """
-    in_sector = points_in_sector(track, settings, points, found.poses[k])
+    grid, settings, found = problem.grid, problem.settings, problem.found
+    in_sector = points_in_sector(problem.track, settings, points, found.poses[k])
     if in_sector.shape[0] == points.shape[0] or in_sector.shape[0] == 0:
         return points
-    found.values[k], _ = match_and_count(grid, settings, in_sector, prior, found.poses[k], found.hessians[k])
+    pose, hessian = found.poses[k], found.hessians[k]
+    found.values[k], _ = match_and_count(grid, settings, in_sector, problem.prior, pose, hessian)
     return in_sector

@@ -19,6 +19,7 @@ from nscan_cli.slam.frontend.scan_to_map import match_and_count
 from nscan_cli.slam.frontend.track_state import NEXT, RESTARTS, TrackState
 from nscan_cli.slam.frontend.tracked_scans import TrackedScans
 from nscan_cli.slam.frontend.tracking_kernels import settle, track_scans
+from nscan_cli.slam.frontend.tracking_problem import TrackingProblem
 from nscan_cli.slam.frontend.visible_points import points_in_view
 
 
@@ -46,8 +47,7 @@ class Tracker:
 
     def track(self, scans: ScanBatch, may_wait: bool = False) -> TrackedScans:
         """Track the next scans. Of the last ones, which may wait for scans after them, nothing is found."""
-        n, k = len(scans), 0
-        points, ends = scans.points, scans.ends
+        n, k, ends = len(scans), 0, scans.ends
         odometry = np.full((n, 3), np.nan) if scans.odometry is None else scans.odometry
         roomy = self._track.map.with_room(n, int(ends[-1] - ends[0]))
         self._track = self._track._replace(map=roomy)
@@ -56,13 +56,14 @@ class Tracker:
         while k < n:
             self.map.reserve(int(ends[k + 1] - ends[k]))
             self._track.map.counts[ROWS] = self.map.rows
-            track, grid, settings, prior = self._track, self.map.grid, self._settings, self._prior
-            k = track_scans(
-                track, grid, settings, points, ends, scans.shares, odometry, k, may_wait, prior, found
-            )
+            problem = TrackingProblem(
+                self._track, self.map.grid, self._settings, scans.points, ends, scans.shares, odometry,
+                self._prior, found,
+            )  # fmt: skip
+            k = track_scans(problem, k, may_wait)
             if k < n and np.isfinite(found.inliers[k]):
                 self._search(scans.of(k), found, k)
-                settle(track, grid, settings, points, ends, odometry, prior, found, k)
+                settle(problem, k)
                 k += 1
             self.map.rows = int(self._track.map.counts[ROWS])
         return found.part(0, int(self._track.counts[NEXT]))

@@ -3,47 +3,36 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from nscan_cli.kernels.array_assignment import assign, assign_rows
 from nscan_cli.kernels.decorators import kernel
-from nscan_cli.matching.motion_model import Prior, motion_sigmas, prior_value
+from nscan_cli.matching.motion_model import motion_sigmas, prior_value
 from nscan_cli.matching.pose_kernels import relative_pose, wrapped
 from nscan_cli.ndt.grid_growth import CELLS_PER_POINT
-from nscan_cli.ndt.hash_grid import Grid
 from nscan_cli.poses import Array
 from nscan_cli.slam.frontend.angle_restarts import match_from_other_angles, restart_threshold
 from nscan_cli.slam.frontend.between_scans import match_between, waits_for_motion
 from nscan_cli.slam.frontend.degeneracy import keep_prediction
 from nscan_cli.slam.frontend.local_map import ROWS, insert_scan
 from nscan_cli.slam.frontend.odometry_noise import learn_noise
-from nscan_cli.slam.frontend.options import TrackingParameters
 from nscan_cli.slam.frontend.prediction import contradicts, predict, predict_by_trusted_odometry
 from nscan_cli.slam.frontend.scan_to_map import match_from_prediction
 from nscan_cli.slam.frontend.sector_of_view import match_again_in_sector, match_in_sector
 from nscan_cli.slam.frontend.sweep_correction import correct_by_last_step, correct_by_match
-from nscan_cli.slam.frontend.track_state import KNOWN, NEXT, TrackState
-from nscan_cli.slam.frontend.tracked_scans import TrackedScans
+from nscan_cli.slam.frontend.track_state import KNOWN, NEXT
+from nscan_cli.slam.frontend.tracking_problem import TrackingProblem
 from nscan_cli.slam.frontend.visible_points import points_in_view
 
 
 @kernel
-def settle(
-    track: TrackState,
-    grid: Grid,
-    settings: TrackingParameters,
-    points: Array,
-    ends: NDArray[np.int64],
-    odometry: Array,
-    prior: Prior,
-    found: TrackedScans,
-    k: int,
-) -> None:
+def settle(problem: TrackingProblem, k: int) -> None:
     """Take over the match of scan k into the state, then match the scans that wait for it.
 
     The scan joins the map if the robot has moved. Its pose, inliers and Hessian of the objective were written
-    to `found`; the rest is written here. The arrays are those of `track_scans`.
+    to `found`; the rest is written here.
     """
+    track, settings, odometry = problem.track, problem.settings, problem.odometry
+    prior, found, ends = problem.prior, problem.found, problem.ends
     counts, pose, step = track.counts, found.poses[k], np.empty(3)
     before = track.poses[-1].copy(), track.odometry.copy()
     pose[2] = wrapped(pose[2])
@@ -55,7 +44,7 @@ def settle(
     if joins:
         track.map.path[0] += distance
         assign(track.inserted, pose)
-        insert_scan(track.map, grid, settings, points[ends[k] : ends[k + 1]], pose)
+        insert_scan(track.map, problem.grid, settings, problem.points[ends[k] : ends[k + 1]], pose)
     found.odometry_sigmas[k], length, along = 0.0, np.nan, np.inf
     if np.isfinite(odometry[k, 0]) and np.isfinite(track.odometry[0]):
         relative_pose(odometry[k], track.odometry, step)
@@ -76,7 +65,7 @@ def settle(
     )
     first = counts[NEXT]
     if first < k:
-        match_between(track, grid, settings, points, ends, odometry, before, first, k, found)
+        match_between(problem, before, first, k)
     for scan in range(first, k + 1):
         for row in range(track.poses.shape[0] - 1):
             assign(track.poses[row], track.poses[row + 1])
@@ -85,32 +74,23 @@ def settle(
 
 
 @kernel
-def match_with_doubt(
-    track: TrackState,
-    grid: Grid,
-    settings: TrackingParameters,
-    points: Array,
-    odometry: Array,
-    prior: Prior,
-    threshold: float,
-    found: TrackedScans,
-    k: int,
-) -> None:
-    """Match scan k again with a wide prior if it contradicts odometry (3,) or has few inliers.
+def match_with_doubt(problem: TrackingProblem, points: Array, threshold: float, k: int) -> None:
+    """Match the points (m, 2) of scan k again with a wide prior if it contradicts odometry or fits badly.
 
     With fewer inliers than `threshold` it is also matched from other angles. Another match replaces the first
     one if it has clearly more inliers; if the first one contradicts odometry, a lower energy is enough.
     """
+    settings, prior, found = problem.settings, problem.prior, problem.found
     is_contradiction = contradicts(prior, found.poses[k], settings.contradiction_sigmas)
     if not is_contradiction and found.inliers[k] >= threshold:
         return
     trusted, inliers, value = prior.information.copy(), found.inliers[k], found.values[k]
     energy = value - prior_value(prior, found.poses[k])
     pose, hessian = found.poses[k].copy(), found.hessians[k].copy()
-    predict(track, settings, odometry, settings.odometry, prior)
-    match_from_prediction(grid, settings, points, prior, found, k)
+    predict(problem.track, settings, problem.odometry[k], settings.odometry, prior)
+    match_from_prediction(problem, points, k)
     if found.inliers[k] < threshold:
-        match_from_other_angles(grid, settings, points, prior, threshold, track.counts, found, k)
+        match_from_other_angles(problem, points, threshold, k)
     has_more = found.inliers[k] > inliers + settings.inlier_margin
     fits_better = found.values[k] - prior_value(prior, found.poses[k]) < energy
     if not (has_more or (is_contradiction and fits_better)):
@@ -121,30 +101,18 @@ def match_with_doubt(
 
 
 @kernel
-def track_scans(
-    track: TrackState,
-    grid: Grid,
-    settings: TrackingParameters,
-    points: Array,
-    ends: NDArray[np.int64],
-    shares: Array,
-    odometry: Array,
-    first: int,
-    may_wait: bool,
-    prior: Prior,
-    found: TrackedScans,
-) -> int:
+def track_scans(problem: TrackingProblem, first: int, may_wait: bool) -> int:
     """Track scans from the `first` on; returns the next one, which is not settled.
 
-    Scan k has points[ends[k] : ends[k + 1]] and odometry[k], nan where there is none. Points are corrected in
-    place by their `shares` (P,), see sweep_correction; these are empty if there is nothing to correct. A
-    scan waits until the robot has moved; the last ones settle unless they `may_wait` for scans that are not
+    A scan waits until the robot has moved; the last ones settle unless they `may_wait` for scans that are not
     here yet. A scan that is not settled is lost: its inliers in `found` are too few. Or the grid has no room:
     its inliers are nan.
     """
-    step = np.empty(3)
+    track, grid, settings = problem.track, problem.grid, problem.settings
+    ends, odometry, prior, found = problem.ends, problem.odometry, problem.prior, problem.found
+    step, sweeps = np.empty(3), problem.shares.shape[0] > 0
     for k in range(first, ends.shape[0] - 1):
-        scan = points[ends[k] : ends[k + 1]]
+        scan = problem.points[ends[k] : ends[k + 1]]
         if track.map.counts[ROWS] + CELLS_PER_POINT * scan.shape[0] > grid.keys.shape[0]:
             found.inliers[k] = np.nan
             return k
@@ -154,28 +122,26 @@ def track_scans(
         else:
             predict_by_trusted_odometry(track, settings, odometry[k], prior)
             has_odometry = np.isfinite(odometry[k, 0])
-            if shares.shape[0] > 0:
-                correct_by_last_step(track, scan, shares[ends[k] : ends[k + 1]], step)
+            shares = problem.shares[ends[k] : ends[k + 1]]
+            if sweeps:
+                correct_by_last_step(track, scan, shares, step)
             in_view = points_in_view(track, settings, scan, prior.mean)
             threshold = restart_threshold(track, settings)
-            matched = match_in_sector(track, grid, settings, in_view, prior, threshold, found, k)
-            if shares.shape[0] > 0 and correct_by_match(
-                track, settings, scan, shares[ends[k] : ends[k + 1]], step, found.poses[k]
-            ):
+            matched = match_in_sector(problem, in_view, threshold, k)
+            if sweeps and correct_by_match(track, settings, scan, shares, step, found.poses[k]):
                 in_view = points_in_view(track, settings, scan, prior.mean)
-                matched = match_in_sector(track, grid, settings, in_view, prior, threshold, found, k)
-            is_predicted = has_odometry and np.isfinite(track.odometry[0])
-            if is_predicted:
-                match_with_doubt(track, grid, settings, matched, odometry[k], prior, threshold, found, k)
+                matched = match_in_sector(problem, in_view, threshold, k)
+            if has_odometry and np.isfinite(track.odometry[0]):
+                match_with_doubt(problem, matched, threshold, k)
             elif found.inliers[k] < threshold:
-                match_from_other_angles(grid, settings, matched, prior, threshold, track.counts, found, k)
+                match_from_other_angles(problem, matched, threshold, k)
             if waits_for_motion(track, settings, odometry, k, found.poses[k], may_wait):
                 continue
             if found.inliers[k] < (settings.lost_inliers if has_odometry else settings.restart_inliers):
                 return k
             if matched.shape[0] == in_view.shape[0]:
-                matched = match_again_in_sector(track, grid, settings, in_view, prior, found, k)
+                matched = match_again_in_sector(problem, in_view, k)
             if track.counts[KNOWN] >= settings.degeneracy_poses and not has_odometry:
                 keep_prediction(grid, settings, matched, prior, track.mean_square_deviation, found, k)
-        settle(track, grid, settings, points, ends, odometry, prior, found, k)
+        settle(problem, k)
     return int(ends.shape[0]) - 1

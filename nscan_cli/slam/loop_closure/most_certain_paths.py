@@ -127,19 +127,10 @@ def relations_on_paths(before: Indices, wanted: Mask) -> Mask:
 @kernel
 def _incident(links: Links, nodes: int) -> tuple[Indices, Indices]:
     """The links at each node: where they begin (K + 1,), and their indices (2E,)."""
-    count = links.held.shape[0]
-    starts = np.zeros(nodes + 1, dtype=np.int64)
-    for link in range(count):
-        starts[links.held[link] + 1] += 1
-        starts[links.other[link] + 1] += 1
-    for node in range(nodes):
-        starts[node + 1] += starts[node]
-    at, incident = starts[:-1].copy(), np.empty(2 * count, dtype=np.int64)
-    for link in range(count):
-        for node in (links.held[link], links.other[link]):
-            incident[at[node]] = link
-            at[node] += 1
-    return starts, incident
+    ends = np.empty(2 * links.held.shape[0], dtype=np.int64)
+    ends[::2], ends[1::2] = links.held, links.other
+    order = np.argsort(ends, kind="mergesort")
+    return np.searchsorted(ends[order], np.arange(nodes + 1)), order // 2
 
 
 @kernel
