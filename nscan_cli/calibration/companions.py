@@ -22,7 +22,7 @@ class Companion:
     """Something that goes along."""
 
     share: float
-    """Of the scans that were looked at, those in which it is on the robot's path."""
+    """Share of the checked scans in which it is on the robot's path."""
     sectors: list[Bearings]
     """In which it is seen, in the laser's frame, rad."""
 

@@ -26,7 +26,7 @@ class Estimate:
 
 
 def estimate(value: float, sigma: float, recorded: float | None, why_open: str) -> Estimate:
-    """A value that the drive leaves open, for a reason in words, where `sigma` is inf."""
+    """An estimate; where `sigma` is inf, the drive leaves the value open, for the reason `why_open`."""
     return Estimate(value, sigma, recorded, "" if np.isfinite(sigma) else why_open)
 
 

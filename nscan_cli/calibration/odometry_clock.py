@@ -22,9 +22,9 @@ class ClockLag:
     disagreement: float
     """Sum of the differences of turns there, as a share of the sum of turns by scans; each is capped."""
     as_stamped: float
-    """The same without an offset."""
+    """This share without an offset."""
     elsewhere: float
-    """The median of the same over all offsets: what turns that have nothing in common give."""
+    """Median of this share over all offsets: that of turns that have nothing in common."""
 
 
 def clock_lag(

@@ -48,7 +48,7 @@ def _best_delay(
 ) -> tuple[float, float]:
     """The delay (s) with which odometry disagrees least with the turns (n,) at rows (n,), 0 in doubt.
 
-    And by what share of what it does without it disagrees then.
+    Also returns the disagreement with it as a share of that without it.
     """
     # What a scan tells is where the robot is at its middle beam.
     middle = beams.first + 0.5 * (log.beam_counts() - 1) * beams.step

@@ -124,8 +124,8 @@ class CompanionOptions:
     """Readings are compared with the path from this distance on, before and behind the robot, m. A larger
     value misses what is near."""
     farthest: float = 4.0
-    """And up to this distance along the path, m. A larger value finds more, also where drift of odometry has
-    put a wall onto the path."""
+    """Readings are compared with the path up to this distance along it, before and behind the robot, m. A
+    larger value finds more, also where drift of odometry has put a wall onto the path."""
     path_step: float = 0.05
     """Distance between the points of the path that are compared, m. A smaller value takes longer."""
     clearance: float = 0.2
@@ -211,7 +211,8 @@ class FileCheckOptions:
     """A finding explains the steps if the median residual is at most this share of their motion. A larger
     value accepts poorer explanations."""
     max_tail: float = 0.4
-    """The same for the upper quartile of the residuals."""
+    """A finding explains the steps if the upper quartile of the residuals is at most this share of their
+    motion. A larger value accepts poorer explanations."""
     min_mount_turn: float = 0.06
     """Least error of the laser's direction in the file that a warning names, rad. It is 0.04 at most on real
     logs, with a standard deviation of 0.02. A larger value warns less."""
@@ -219,15 +220,16 @@ class FileCheckOptions:
     """Least error of the laser's place in the file, along an axis, that a warning names, m. It is 0.1 at most
     on real logs; a late clock looks like some centimetres. A larger value warns less."""
     mount_sigmas: float = 5.0
-    """Such an error must also exceed this number of its standard deviations. A larger value warns less."""
+    """An error of the laser's direction, its place or the scale must also exceed this number of its standard
+    deviations. A larger value warns less."""
     opposite_within: float = 0.1
     """A laser that seems to look back to within this angle may be one of a robot that seems to drive
     backwards, rad. A larger value takes more lasers for such ones."""
     round_angle: float = math.radians(15.0)
-    """Lasers are mounted at multiples of this angle, rad."""
+    """A warning suggests a multiple of this angle as the angle of the mounting, rad, if one is near. A
+    smaller value suggests more exact angles."""
     round_angle_tolerance: float = math.radians(3.0)
-    """An angle of the mounting that a warning suggests is such a multiple if it is this near to one, rad. A
-    larger value rounds more."""
+    """Largest distance of a measured angle from such a multiple, rad. A larger value rounds more angles."""
     min_scale_factor: float = 1.2
     """Least factor by which the scale of odometry is wrong, beside `mount_sigmas`. It is 1.11 at most on real
     logs. A larger value warns less."""
@@ -263,10 +265,11 @@ class FileCheckOptions:
     """Steps clearly agree with the file if their residuals are at most this share of those that a finding may
     have. A smaller value takes longer."""
     clear_sigmas: float = 2.0
-    """And if an error of the file that a warning names is out of the question by this number of standard
-    deviations. A larger value takes longer."""
+    """Steps clearly agree with the file only if every error that a warning names is excluded by this number
+    of standard deviations. A larger value takes longer."""
     min_steps_to_exclude: int = 30
-    """Least number of steps with motion for that. A larger value excludes less."""
+    """Least number of steps with motion where odometry is not used. A larger value uses odometry more
+    often."""
 
 
 @dataclass(frozen=True)
@@ -299,16 +302,20 @@ class CalibrationOptions:
     """A value differs from the file's if it is off by more than this number of standard deviations. A larger
     value keeps the file's more often."""
     max_place_sigma: float = 0.02
-    """A mounting with a larger standard deviation is not applied, m. A larger value applies less certain
-    ones."""
+    """A place of the laser with a larger standard deviation is not applied, m. A larger value applies less
+    certain ones."""
     max_angle_sigma: float = 0.01
-    """The same for its angle, rad."""
+    """An angle of the mounting with a larger standard deviation is not applied, rad. A larger value applies
+    less certain ones."""
     max_scale_sigma: float = 0.01
-    """The same for the scale of odometry, as a share."""
+    """A scale of odometry with a larger standard deviation, as a share, is not applied. A larger value
+    applies less certain ones."""
     max_clock_sigma: float = 0.03
-    """The same for the offset of the clocks, s."""
+    """An offset of the clocks with a larger standard deviation is not applied, s. A larger value applies less
+    certain ones."""
     max_sweep_sigma: float = 0.1
-    """The same for the time of the laser's turn, as a share."""
+    """A time of the laser's turn with a larger standard deviation, as a share, is not applied. A larger value
+    applies less certain ones."""
     max_sideways: float = 0.05
     """Odometry is that of two wheels if its steps go to the side by no more than this share, in the median.
     It is 0.001 to 0.013 on real logs."""

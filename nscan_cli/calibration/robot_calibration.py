@@ -42,11 +42,11 @@ class Evidence:
     measured: int
     """Steps that the scans measure beyond doubt and that odometry has."""
     turns: int
-    """Those that turn."""
+    """Measured steps with a turn."""
     distance: float
-    """m, of the measured steps."""
+    """Length of the measured steps, m."""
     turned: float
-    """rad, of the measured steps."""
+    """Sum of the turns of the measured steps, rad."""
     pairs: int
     """Pairs of scans that the time of the laser's turn rests on."""
 

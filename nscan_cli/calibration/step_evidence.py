@@ -57,7 +57,7 @@ class StepEvidence:
 
     @functools.cached_property
     def mirrored_fit(self) -> MountFit | None:
-        """Those that explain the steps of mirrored scans."""
+        """The mounting and the scale that explain the steps of mirrored scans."""
         return self._fit(self.laser * MIRRORED, self.odometry)
 
     def fit_with_signs(self, signs: Array) -> MountFit | None:

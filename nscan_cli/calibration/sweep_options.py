@@ -83,18 +83,20 @@ class SweepCheckOptions:
     least_pairs: int = 5
     """Least number of pairs after which the file can count as right. More take longer where it is."""
     settled_sigmas: float = 1.5
-    """The comparison ends once the file's time makes scans sharper than the others by this number of standard
-    deviations. A larger value takes longer."""
+    """The comparison ends once the best time, the file's or one that is decided, makes scans sharper than all
+    others by this number of standard deviations. A larger value takes longer."""
     decided_sigmas: float = 6.0
-    """Nor once another time makes scans sharper than the file's by so many. A larger value takes longer."""
+    """Another time is decided once it makes scans sharper than the file's by this number of standard
+    deviations. A larger value takes longer."""
     dropped_sigmas: float = 2.0
-    """A time that fits worse than the file's by so many is not tried on more pairs. A larger value takes
-    longer."""
+    """A time that fits worse than the file's by this number of standard deviations is not tried on more
+    pairs. A larger value takes longer."""
     hopeless_sigmas: float = 0.5
-    """And once the best time makes scans sharper than the file's by less than so many. A larger value takes
-    less time, and leaves the file as it is more often."""
+    """The comparison also ends once the best time makes scans sharper than the file's by less than this
+    number of standard deviations. A larger value takes less time, and leaves the file as it is more often."""
     least_decisive: int = 10
-    """Least pairs for the last three. More take longer."""
+    """Least number of pairs after which another time is decided, a time is dropped, or the comparison ends as
+    hopeless. More take longer."""
     shifts: tuple[int, ...] = (-2, 2, -4, 4, -7, 7)
     """Scans from the first of a pair to the second: the robot must move differently there and see the same.
     More shifts find more pairs and take longer."""
@@ -114,9 +116,9 @@ class SweepCheckOptions:
     longest: float = 0.5
     """Longest scan period of such a laser, s. A larger value checks more lasers."""
     scan_turns: ScanTurnOptions = field(default_factory=ScanTurnOptions)
-    """How scans in turns are found."""
+    """How turns of the robot are found."""
     time: SweepTimeOptions = field(default_factory=SweepTimeOptions)
-    """How its time is measured if the file has none."""
+    """How the time of a turn is measured where the file has none, and by `calibrate`."""
     longest_delay: float = 0.4
     """Longest delay of odometry that is looked for, s. A larger value takes longer."""
     delay_step: float = 0.01
@@ -139,12 +141,13 @@ class SweepCheckOptions:
     min_delay_turns: int = 15
     """Least number of scans in turns that a delay rests on. A larger value finds less."""
     few_delay_turns: int = 8
-    """So many are enough where the delay is clear. A larger value finds less in short drives."""
+    """Least number of scans in turns that a clear delay rests on. A larger value finds less in short
+    drives."""
     few_delay_gain: float = 0.4
-    """It is clear if turns disagree by at most this share of their disagreement without it. A larger value
-    finds more in short drives, also where there is none."""
+    """A delay is clear if turns disagree by at most this share of their disagreement without it. A larger
+    value finds more in short drives, also where there is none."""
     max_delay_turns: int = 40
-    """Largest number of them. More tell more and take longer."""
+    """Largest number of scans in turns that a delay rests on. More tell more and take longer."""
     sigmas: float = 3.0
     """Another time than the file's is believed if it makes scans sharper by at least this number of standard
     deviations. A larger value believes the file more often."""

@@ -35,7 +35,8 @@ class BeamSpacingOptions:
     agreement: float = 0.1
     """Largest difference of what the two tell, as a share. A larger value contradicts more logs."""
     settled: float = 0.02
-    """The angle is found where it changes by less than this share from one round to the next."""
+    """The angle is found once it changes by less than this share from one round to the next. A larger value
+    is faster and less exact."""
     max_rounds: int = 5
     """Largest number of rounds. A larger value contradicts more logs."""
     same_wall: float = 0.15
@@ -51,7 +52,8 @@ class BeamSpacingOptions:
     min_difference: float = 0.15
     """Least difference from the angle of the log, as a share. A larger value contradicts fewer logs."""
     max_factor: float = 2.5
-    """Largest factor between the two angles that is tested."""
+    """Largest factor between the angle of the log and that of the walls. A larger value contradicts more
+    logs."""
     max_view: float = math.radians(380)
     """Largest field of view that the angle found may give, rad. A larger value contradicts more logs."""
     max_off_centre: float = 3.0
@@ -60,10 +62,11 @@ class BeamSpacingOptions:
     usual_views: tuple[float, ...] = tuple(map(math.radians, (100, 120, 180, 190, 240, 255, 270, 360)))
     """Fields of view of lasers, rad. With more of them more logs are put right."""
     usual_view: float = 0.06
-    """Largest difference from a usual field of view that is taken for it, as a share."""
+    """Largest difference of a field of view from a usual one that it is taken for, as a share. A larger value
+    puts more logs right."""
     moved: float = 0.01
-    """Least median change of the readings between scans that are tested, as a share: a robot that stands sees
-    one scene only."""
+    """Least median change of the readings between two scans that are tested, as a share: a robot that stands
+    sees one scene only. A larger value tests fewer scans."""
     max_scans: int = 200
     """Number of scans that are tested. A larger value takes longer."""
     first_of: int = 4

@@ -57,7 +57,7 @@ class WrongUnit(NamedTuple):
     scale: float
     """m"""
     median: float
-    """Of the readings as written."""
+    """Median of the readings as written."""
     others: tuple[float, ...]
     """Scales of the other units that the readings may have, m."""
     is_certain: bool

@@ -170,7 +170,7 @@ def _medians_below(ranges: NDArray[np.float32], limit: float) -> NDArray[np.floa
 def _kept(
     ranges: NDArray[np.float32], medians: NDArray[np.float32], options: RobotPartsOptions
 ) -> NDArray[np.bool_]:
-    """(n, B) whether the ranges of scans are the medians (B,), m."""
+    """(n, B) whether the ranges of scans equal the medians (B,) within the tolerance, m."""
     tolerance = np.clip(options.relative_tolerance * medians, options.min_tolerance, options.max_tolerance)
     kept: NDArray[np.bool_] = np.abs(ranges - medians) <= tolerance
     return kept

@@ -23,7 +23,7 @@ class ScanOrderOptions:
     """When stamps are unusable, and when a clock was set back."""
 
     nominal_period: float = 0.1
-    """Time between scans without usable stamps, s."""
+    """Time between scans without usable stamps, s. A larger value makes the robot slower."""
     min_alternations: int = 20
     """A clock was set back only if scans from before and after the step back alternate at least this often
     when sorted by time, and only if the step is longer than that number of scan periods: messages that arrive

@@ -38,7 +38,7 @@ class Counts:
 
     @classmethod
     def of(cls, graph: Graph) -> Counts:
-        """Those of a graph."""
+        """The counts of a graph."""
         refused = Counter(loop.reason for loop in graph.loops if not loop.accepted)
         accepted = len(graph.loops) - refused.total()
         return cls(len(graph.keyframes), len(graph.pairwise), len(graph.nscan), accepted, refused)

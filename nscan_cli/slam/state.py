@@ -38,7 +38,7 @@ class SlamState:
     log: LaserLog
     """If the laser turns, each scan is at the time of its middle beam until the last optimisation."""
     recorded: LaserLog
-    """The same log as it was read: each scan is at the time of its stamp."""
+    """The log as it was read: each scan is at the time of its stamp."""
     options: SlamOptions
     threads: int
     odometry: Array | None
@@ -57,7 +57,7 @@ class SlamState:
     tracked: list[Array] = field(default_factory=list)
     """(n, 3) poses of the scans as tracking found them, batch by batch."""
     told_sigmas: list[Array] = field(default_factory=list)
-    """(n,) to what standard deviation (m) each scan told its place (TrackedScans), batch by batch."""
+    """(n,) standard deviations of the positions that scans measure, m, batch by batch; see TrackedScans."""
     breaks: list[int] = field(default_factory=list)
     """Rows of the keyframes before which the track broke, increasing."""
     matched_pairs: list[Pairwise] = field(default_factory=list)

@@ -21,7 +21,7 @@ class Channel:
     type: str
     """As ROS 2 writes it, such as sensor_msgs/msg/LaserScan."""
     encoding: str
-    """Of the messages: ros1, cdr, protobuf or json."""
+    """The encoding of the messages: ros1, cdr, protobuf or json."""
     schema_encoding: str
     """ros1msg, ros2msg, ros2idl, protobuf or jsonschema; empty without a schema."""
     schema: bytes

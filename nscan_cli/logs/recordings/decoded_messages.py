@@ -42,7 +42,7 @@ class ScanMessage(NamedTuple):
     ranges: NDArray[Any]
     """(B,) m"""
     pose: Pose3D | None
-    """Of the laser in `frame`; None where the message has none."""
+    """Pose of the laser in `frame`; None where the message has none."""
     angle_max: float = math.nan
     """rad; nan where the message does not have it beside the increment."""
     time_increment: float = 0.0

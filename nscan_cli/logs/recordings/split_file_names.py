@@ -32,7 +32,7 @@ class RecordingFile:
     recording: tuple[str, str]
     """The name without number, date and endings; and the ending, empty if it is none of a recording."""
     number: int | None
-    """Of the part; None without one."""
+    """Number of the part; None without one."""
 
 
 def without_compression(name: str) -> str:

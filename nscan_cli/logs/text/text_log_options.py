@@ -17,7 +17,8 @@ class TextLogOptions:
     """Largest difference of two mountings in one log that a warning does not name, m. A larger value warns
     less."""
     mount_turn_difference: float = math.radians(0.5)
-    """The same of their angles, rad."""
+    """Largest difference of the angles of two mountings in one log that a warning does not name, rad. A
+    larger value warns less."""
     max_decimals: int = 6
     """Largest number of decimals that bearings are written with. A larger number rounds less."""
     max_unevenness: float = 0.05
@@ -29,9 +30,9 @@ class TextLogOptions:
     """Bearings that begin beyond this and end near `last_bearing` are likely counted from the side, rad: a
     warning says so. A larger value warns less."""
     last_bearing: float = math.radians(180.0)
-    """Where such bearings end, rad."""
+    """Where bearings end that are counted from the side, rad."""
     last_bearing_tolerance: float = math.radians(30.0)
-    """Largest distance of the last bearing from there, rad. A larger value warns more."""
+    """Largest distance of the last bearing from `last_bearing`, rad. A larger value warns more."""
 
 
 DEFAULT_TEXT_LOGS = TextLogOptions()

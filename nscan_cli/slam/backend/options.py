@@ -22,8 +22,8 @@ class ScheduleOptions:
     """Most keyframes that are optimised at a time: those nearest to the new ones. A larger number is slower
     and more exact."""
     whole_new_share: float = 0.1
-    """All keyframes are optimised when this share is new since they last were. A larger share is faster and
-    less exact."""
+    """All keyframes are optimised once this share of them is new since the last time. A larger share is
+    faster and less exact."""
 
 
 @dataclass(frozen=True)
@@ -46,44 +46,51 @@ class UnevenMotionOptions:
     """Odometry with poses at most so far apart, in the times from scan to scan, tells the motion within a
     turn. A larger value believes coarser odometry."""
     min_change: float = 0.05
-    """The motion is uneven if it differs by more from one turn of the laser to the next, m. A larger value
-    takes less time, and leaves the poses between two turns less certain."""
+    """The motion is uneven if the way during one turn of the laser differs by more from that during the next,
+    m. A larger value takes less time, and leaves the poses between two turns less certain."""
     min_turn_change: float = 0.02
-    """The same of the heading, rad."""
+    """The motion is also uneven if the turns of the robot during two such turns differ by more, rad. A larger
+    value takes less time, and leaves the headings less certain."""
     longest_step: float = 2.5
-    """Over a longer time, in the usual times from scan to scan, how the robot moved is not known."""
+    """Longest step from scan to scan whose motion is known, in usual steps. A larger value believes more of
+    them."""
     scans: int = 6
-    """Scans before and after, each, that those in uneven motion are matched with."""
+    """Number of scans before, and as many after, that those in uneven motion are matched with. More tell more
+    and take longer."""
     longest_run: int = 8
-    """Most scans in uneven motion that are matched with the same others."""
+    """Largest number of scans in uneven motion that are matched together. More bend the path at fewer places,
+    and leave it farther from what they are matched with."""
     parts: int = 4
-    """Parts of steady motion from the middle of one turn to the next. With more the moment when a turn of
-    the robot begins is told more exactly, and it takes longer."""
+    """Number of parts of steady motion from the middle of one turn to the next. With more the moment when a
+    turn of the robot begins is more exact, and it takes longer."""
     groups: int = 2
-    """Groups of beams in each of these, which are matched from where the robot was in their middle. More
-    take longer."""
+    """Number of groups of beams in each part, which are matched from where the robot was in their middle.
+    More are more exact and take longer."""
     speed_change: float = 0.05
-    """Usual change of the speed from one part to the next, m/s. Larger ones are seldom; with a larger value
-    the path is rougher where the beams tell little."""
+    """Usual change of the speed from one part to the next, m/s. With a larger value the path is rougher where
+    the beams tell little."""
     turn_change: float = 0.1
-    """The same of the rate of the turn, rad/s."""
+    """Usual change of the turn rate from one part to the next, rad/s. With a larger value the headings are
+    rougher where the beams tell little."""
     iterations: int = 8
-    """Most steps for each widening."""
+    """Largest number of Newton steps for each widening. A larger number lets slow matches converge."""
     sigma: float = 0.05
-    """Standard deviation of the places at the middles of the turns before, m: no match slides along walls."""
+    """Standard deviation of the known places at the middles of the turns, m: it keeps matches from sliding
+    along walls. A larger value believes the beams more."""
     turn_sigma: float = 0.1
-    """The same of the headings, rad."""
+    """Standard deviation of the known headings there, rad. A larger value believes the beams more."""
     max_sigmas: float = 3.0
     """The path stays as it was if a place or a heading moves by more of these standard deviations. A larger
     value accepts larger corrections, also wrong ones."""
     min_gain: float = 1.0
-    """The path stays where the beams fit better by less than so many nats for each part. A larger value
-    leaves more of it to odometry, or as steady."""
+    """Least gain of the fit of the beams, in nats for each part, with which the path changes. A larger value
+    changes less of it."""
     min_points: int = 50
-    """With fewer points in a turn of the laser, on average, the path stays. With a smaller number blind
-    lasers move it."""
+    """Least mean number of points in a turn of the laser with which the path changes. With a smaller number
+    blind lasers change it."""
     max_beams: int = 300
-    """Beams of a scan that are matched, evenly spread, are about so many. More tell more and take longer."""
+    """Approximate number of beams of a scan that are matched, evenly spread. More tell more and take
+    longer."""
     pair: PairOptions = field(
         default_factory=lambda: PairOptions(
             widenings=(0.3, 1.0), scale=0.3, tolerance=5e-4, coarse_tolerance=3e-3
@@ -109,5 +116,5 @@ class UntoldSigmaOptions:
     """Standard deviation of the robot's speed there, as a share of its usual one: it may stand, or hurry. A
     larger share makes such ways less certain."""
     most_steps: int = 3
-    """Nodes of a relation that are more keyframes apart are of different visits, and measured. A larger value
-    makes more relations less certain."""
+    """Largest number of keyframes between two nodes of a relation of one visit. Relations between visits are
+    measured, and stay as certain. A larger value makes more relations less certain."""

@@ -22,7 +22,7 @@ class Subgraph(NamedTuple):
 
     relations: Sequence[Relation]
     free: Mask | None = None
-    """All, when None; the others are held where they are."""
+    """(K,) which keyframes can move; the others are held. None: all can."""
 
 
 def held_by_others(route: Route, relations: Sequence[Relation], free: Mask) -> Subgraph:

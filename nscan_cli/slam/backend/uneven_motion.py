@@ -1,9 +1,9 @@
 """Where the motion changes from one turn of the laser to the next: the path between the middles of two turns.
 
-The poses at the middles of the turns are known, but where the robot begins to turn between two of them, a
-steady motion from one to the next is off by some degrees there; so is odometry that has a pose a turn. The
-beams tell more: each part of a turn is matched with the scans before and after. All parts of a run of such
-scans are matched at once, with the path between them, as a change of motion moves the points of all of them.
+The poses at the middles of the turns are known. If the robot begins to turn between two of them, steady
+motion from one to the next is off by some degrees there, and so is odometry with one pose a turn. The beams
+tell more: each part of a turn is matched with the scans before and after. A change of motion moves the points
+of all parts of a run of such scans. So these are matched at once, with the path between them.
 """
 
 from __future__ import annotations

@@ -19,7 +19,8 @@ class VerificationOptions:
     """A way is left out if a repeated map has two successive scans on it that are farther apart, m: with
     every second scan it may be lost there. A larger value compares more."""
     max_turn: float = 0.26
-    """The same for the turn between them, rad."""
+    """A way is also left out if two successive scans on it are turned against each other by more, rad. A
+    larger value compares more."""
     start: float = 0.3
     """Without odometry a robot that begins in a bare corridor seems to stand at first. The comparison begins
     where the repeated map is this far from its start, m. A larger value compares less."""

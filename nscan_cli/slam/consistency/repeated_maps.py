@@ -28,7 +28,7 @@ class MappedPath:
     breaks: Indices
     """Rows before which its track broke."""
     notices: tuple[str, ...]
-    """What it says of itself."""
+    """The notices of the run."""
     untold: Indices = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
     """Rows of scans along bare walls, without odometry, that do not tell their places."""
     has_odometry: bool = True

@@ -27,7 +27,7 @@ class OdometryDisagreement(NamedTuple):
     by_odometry: float
     """Distance that the robot came by odometry, m."""
     by_scans: float
-    """The same by the scans, m."""
+    """Distance that it came by the scans, m."""
 
 
 def odometry_disagreements(

@@ -25,7 +25,7 @@ class MotionFromBehind(NamedTuple):
     poses: Array
     """(n, 3); nan elsewhere."""
     told_sigmas: Array
-    """(n,) standard deviation to which scans tell their places, m; 0 elsewhere."""
+    """(n,) standard deviation of the positions that the scans measure, m; 0 elsewhere."""
 
 
 def motion_from_behind(
@@ -34,7 +34,7 @@ def motion_from_behind(
     """The motion of scans (n) as `tracker`, a new one, finds it from the last to the first.
 
     It is known in stretches where the robot, as it was `found`, seems to stand, and where scans from behind
-    fit clearly better, with a longer way. None if there are no such. The scans stay as they are.
+    fit clearly better, with a longer way. None without such stretches. The scans stay as they are.
     """
     untold = untold_stretches(found, options)
     stretches = [each for each in untold if _seems_to_stand(found.poses, *each, options)]

@@ -37,7 +37,8 @@ class OdometryNoiseOptions(NamedTuple):
     turn_arm: float = 1.0
     """A turn by one radian counts as this length of way, m. A longer one widens the prior of turns."""
     min_share: float = 0.1
-    """Least share of the standard deviation of `trusted_odometry` that a prior keeps."""
+    """Least share of the standard deviation of `trusted_odometry` that a prior keeps. A larger share trusts
+    good odometry less."""
 
 
 class OdometryNoise(NamedTuple):
@@ -100,7 +101,8 @@ def learn_noise(
 def learned_shares(
     noise: OdometryNoise, options: OdometryNoiseOptions, length: float, along: float, about: float
 ) -> tuple[float, float]:
-    """The shares of the deviations `along` (m) and `about` (rad) that a step of this length (m) has."""
+    """The factors by which the deviations `along` (m) and `about` (rad) of a step of this length (m)
+    shrink."""
     if noise.counts[SAMPLES] < options.min_pieces:
         return 1.0, 1.0
     distance = options.factor * np.sqrt(noise.variances[0] * length) / along

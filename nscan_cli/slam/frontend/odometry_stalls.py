@@ -32,8 +32,8 @@ class OdometryStallOptions(NamedTuple):
     """Largest number of steps, some too short and some too long, that are evened out together. A larger value
     evens out more."""
     uneven_factor: float = 1.5
-    """One of them is faster than those before and after them by this factor, and one is slower. A larger
-    value evens out fewer."""
+    """Of uneven steps one is faster than those before and after them by this factor, and one is slower. A
+    larger value evens out fewer."""
     steady_factor: float = 1.3
     """Largest factor between the speeds before and after uneven steps; their mean speed differs from these by
     no more than its root. A larger value evens out more."""
@@ -41,8 +41,8 @@ class OdometryStallOptions(NamedTuple):
     """Largest factor between the durations of these steps: where scans come unevenly, their own stamps may be
     wrong. A larger value evens out more."""
     min_acceleration: float = 3.0
-    """Their speed changes faster than this from one to the next, (m + rad)/s²: no robot drives so. A larger
-    value evens out fewer."""
+    """The speed of uneven steps changes faster than this from one to the next, (m + rad)/s²: no robot drives
+    so. A larger value evens out fewer."""
     min_named: float = 0.3
     """Least correction of a pose that a notice names, m + rad. A larger value names fewer stalls."""
 
@@ -145,10 +145,10 @@ def _uneven_steps(steps: Steps, options: OdometryStallOptions) -> list[tuple[int
 
 
 def _spreads(steps: Steps, count: int, options: OdometryStallOptions) -> Array:
-    """By how much the longest and the shortest of so many steps differ from steady motion, m + rad.
+    """The spread of `count` successive steps about steady motion, m + rad.
 
-    For those from the second step on, from the third step on, …; 0 if they are no steady motion with wrong
-    stamps.
+    The first value is that of the steps from the second on, the next that of those from the third on, and so
+    on. It is 0 where they are no steady motion with wrong stamps.
     """
     speeds = steps.speeds()
     sizes, periods, within = (

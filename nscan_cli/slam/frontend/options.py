@@ -81,9 +81,11 @@ class TrackingOptions:
     clear_inliers: float = 0.9
     """A scan with a larger share of inliers sees clearly. A larger value restarts less."""
     clear_inlier_drop: float = 0.1
-    """Without odometry, a match that has fewer inliers by this than a clear scan before it starts again."""
+    """Without odometry a match starts again if its share of inliers is lower by this than that of a clear
+    scan before it. A larger value restarts less."""
     restart_angles: tuple[tuple[float, ...], ...] = ((0.1, 0.2), (0.4, 0.7), (1.0, 1.3))
-    """Rings of angles to start again from, to both sides, rad: each if the one before did not help."""
+    """Rings of angles to start again from, to both sides, rad. A ring is tried if the one before did not
+    help. More take longer."""
     far_restart_margin: float = 0.3
     """Rings after the first are tried only if the share is too small by more than this: outdoors most scans
     have few inliers. A larger value is faster."""
@@ -105,21 +107,23 @@ class TrackingOptions:
     max_waiting: int = 100
     """Most scans between two that are matched: a robot may stand for hours. More take more memory."""
     trusted_odometry: MotionModel = field(default_factory=lambda: MotionModel(distance=0.02))
-    """Standard deviations of the odometry from one matched scan to the next, as a prior of the match."""
+    """Standard deviations of the odometry from one matched scan to the next, as a prior of the match. Larger
+    ones trust the scans more."""
     odometry_noise: OdometryNoiseOptions = field(default_factory=OdometryNoiseOptions)
     """How these standard deviations shrink as the odometry proves good."""
     contradiction_sigmas: float = 2.0
     """A match that is off that prior by more standard deviations is repeated with the prior of `odometry`. A
     larger value trusts the odometry more."""
     odometry: MotionModel = field(default_factory=MotionModel)
-    """Standard deviations of the odometry where scans contradict it."""
+    """Standard deviations of the odometry where scans contradict it. Larger ones trust the scans more."""
     between_sigma: float = 0.05
     """Standard deviation of a scan between two matched ones from its place by odometry, m and rad. A larger
     value trusts the odometry less."""
     constant_velocity: MotionModel = field(
         default_factory=lambda: MotionModel(distance=0.3, angle=0.3, distance_per_metre=0.3)
     )
-    """Standard deviations of a step without odometry, predicted by constant velocity."""
+    """Standard deviations of a step without odometry, predicted by constant velocity. Larger ones trust the
+    scans more."""
     velocity_scans: int = 5
     """Number of steps whose mean is the velocity. More even out jitter of stamps, and follow turns later."""
     degeneracy_poses: int = 3
@@ -129,7 +133,7 @@ class TrackingOptions:
     """Without odometry, scans that tell little are tracked from behind, too, if the robot goes less far there
     than this share of its way at the highest speed after them. A larger share takes more time."""
     standstill_lag: float = 0.2
-    """Nothing is done about a shorter way that is missing, m. A larger value keeps more scans as they are."""
+    """Least length of the missing way for this, m. A larger value keeps more scans as they are."""
     standstill_gain: float = 0.03
     """From behind these scans must have a share of inliers that is larger by this. A larger value keeps more
     scans as they are."""
@@ -274,10 +278,13 @@ class BreakOptions:
     """A segment that begins farther away by odometry is no break, m: other things are in view there, and
     odometry bridges the way. A larger value breaks more often."""
     bridged_turn: float = 1.0
-    """The same bound for a turn, rad."""
+    """A segment that begins turned farther than this by odometry is no break either, rad. A larger value
+    breaks more often."""
     path: float = 40.0
-    """Length of path that a break counts as, m: the keyframes before it are of another visit."""
+    """Length of path that a break counts as, m: the keyframes before it are of another visit. A larger value
+    separates longer visits."""
     distance_sigma: float = 100.0
     """Standard deviation of the relation over a break, m. A larger value searches farther."""
     turn_sigma: float = 1.8
-    """Standard deviation of the turn over a break, rad: all angles are about equally likely."""
+    """Standard deviation of the turn over a break, rad: all angles are about equally likely. A larger value
+    makes them more alike."""

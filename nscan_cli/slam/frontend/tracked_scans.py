@@ -52,8 +52,8 @@ class TrackedScans(NamedTuple):
     odometry_sigmas: Array
     """(n,)"""
     told_sigmas: Array
-    """(n,) standard deviation to which a scan without odometry tells its place in its weakest direction, m;
-    0 where the others tell as much."""
+    """(n,) standard deviation of the position that a scan without odometry measures along its weakest
+    direction, m; 0 where no direction is weak."""
 
     @classmethod
     def room(cls, n: int) -> TrackedScans:

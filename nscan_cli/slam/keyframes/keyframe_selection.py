@@ -29,7 +29,7 @@ class Keyframes:
         self._prior_covariance = np.zeros((3, 3))
 
     def without_any(self) -> Keyframes:
-        """None yet, to be selected in the same way."""
+        """No keyframes yet, with the same options and distance."""
         empty = Keyframes(self.options, self.gaussians)
         empty.distance = self.distance
         return empty

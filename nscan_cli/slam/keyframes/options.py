@@ -34,7 +34,8 @@ class KeyframeOptions:
     """Standard deviation of the chain that no match shows, m/√m. A larger value lets loops move the path
     more."""
     drift_angle: float = 0.001
-    """The same for the angle, rad/√m."""
+    """Standard deviation of the heading along the chain that no match shows, rad/√m. A larger value lets
+    loops turn the path more."""
     drift_min_path: float = 0.01
     """Length added to the path between two keyframes for the drift, m: no relation is exact. A larger value
     lets loops move the path more."""

@@ -19,7 +19,7 @@ class Route(NamedTuple):
     """K keyframes along the path, and their poses in the graph."""
 
     keyframes: Sequence[Keyframe]
-    """These, and maybe more that are not in the graph yet."""
+    """The keyframes of the route, and maybe more that are not in the graph yet."""
     rows: Indices
     """(K,) their rows in the log, which are the ids of their nodes."""
     chain: Sequence[Pairwise]
@@ -27,7 +27,7 @@ class Route(NamedTuple):
     paths: Array
     """(K,) the length of path up to each, m."""
     poses: Array
-    """(K, 3) global ones."""
+    """(K, 3) global poses."""
 
 
 def route_of(keyframes: Sequence[Keyframe], chain: Sequence[Pairwise], poses: Array) -> Route:
@@ -38,7 +38,7 @@ def route_of(keyframes: Sequence[Keyframe], chain: Sequence[Pairwise], poses: Ar
 
 
 def extended(route: Route, size: int) -> Route:
-    """The route with its next keyframes, up to a number of `size`, where the chain places them."""
+    """The route with its first `size` keyframes; the chain places the new ones."""
     known = len(route.poses)
     new, poses = route.keyframes[known:size], [route.poses[-1]]
     for relation in route.chain[known - 1 : size - 1]:

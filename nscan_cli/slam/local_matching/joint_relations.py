@@ -40,7 +40,7 @@ class LocalMatch:
 
     @property
     def relations(self) -> list[Pairwise | NScan]:
-        """All of them."""
+        """All relations of the match."""
         return [*self.pairwise, *([] if self.nscan is None else [self.nscan])]
 
     def tie(self, centre: int) -> tuple[int, Array] | None:

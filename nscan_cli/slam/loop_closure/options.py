@@ -59,9 +59,9 @@ class LoopClosureOptions:
     min_score: float = 0.55
     """Least share of points that fit at a place. A larger share refuses more."""
     min_score_far: float = 0.45
-    """The same share where the path may be off by more than `min_distance`. It is smaller, since only such a
-    loop corrects the path there, and a laser that looks ahead sees half of what it saw from the opposite
-    direction."""
+    """Least share of points that fit where the path may be off by more than `min_distance`. It is smaller
+    than `min_score`: only such a loop corrects the path there, and a laser that looks ahead sees half of what
+    it saw from the opposite direction. A larger share refuses more."""
     rival_score: float = 0.88
     """A place is ambiguous if another one scores this share of its score. A larger share refuses less."""
     rival_distance: float = 1.5
@@ -83,8 +83,9 @@ class LoopClosureOptions:
     min_agreeing: int = 2
     """Number of keyframes that have to find the same place. A larger number accepts less."""
     min_agreeing_doubtful: int = 3
-    """The same number, if the track has broken since or the place is farther off than the path drifts: there
-    rooms that look alike are not told apart by their distance."""
+    """Number of keyframes that have to find the same place if the track has broken since, or if the place is
+    farther off than the path drifts: there distance does not tell apart rooms that look alike. A larger
+    number accepts less."""
     drift_sigmas: float = 2.5
     """A place is farther off than the path drifts if it is off by more standard deviations than this, and by
     more than `slip_distance`. A larger number accepts more."""

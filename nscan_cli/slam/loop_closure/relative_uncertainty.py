@@ -82,7 +82,7 @@ def held_pose_marginals(energy: GraphEnergy, poses: Array) -> HeldPoseMarginals:
 
 
 def _sigma_of(covariances: Array) -> RelativeSigma:
-    """Of covariances (K, 3, 3); inf where they are."""
+    """The standard deviations of covariances (K, 3, 3); inf where a covariance is."""
     known = np.isfinite(covariances[:, 0, 0])
     distance, angle = np.full((2, len(covariances)), np.inf)
     xx, xy, yy = covariances[known, 0, 0], covariances[known, 0, 1], covariances[known, 1, 1]
@@ -110,9 +110,9 @@ class RelativeUncertainty:
         self._marginals: HeldPoseMarginals | None = None
 
     def compute(self, energy: GraphEnergy, poses: Array) -> RelativeSigma:
-        """By the graph: (K,) as seen from the keyframe at which its energy is fixed.
+        """The standard deviations (K,) by the graph, as seen from the keyframe that its energy holds.
 
-        If other keyframes are held too, theirs keep the bound from that keyframe.
+        If the energy holds other keyframes too, these keep the upper bound as seen from that keyframe.
         """
         self._marginals = held_pose_marginals(energy, poses)
         sigma = self._marginals.sigma()
@@ -122,7 +122,7 @@ class RelativeUncertainty:
         return sigma
 
     def seen_from(self, other: int) -> RelativeSigma:
-        """(K,) from another keyframe, by the graph that was computed last."""
+        """The standard deviations (K,) as seen from another keyframe, by the graph that was computed last."""
         assert self._marginals is not None
         return self._marginals.seen_from(other)
 
