@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import re
+from collections.abc import Sequence
 from pathlib import Path
 
 LONE_SURROGATES = re.compile("[\ud800-\udc7f\udd00-\udfff]")
@@ -28,6 +29,12 @@ def counted(count: int, thing: str) -> str:
     if count == 1:
         return f"1 {thing}"
     return f"{count} {thing}{'es' if thing.endswith(('s', 'x', 'ch', 'sh')) else 's'}"
+
+
+def shortened_list(names: Sequence[str], thing: str = "other", most: int = 5, separator: str = ", ") -> str:
+    """The first names of a list, `most` of them, and how many other things there are."""
+    more = f" and {counted(len(names) - most, thing)}" if len(names) > most else ""
+    return separator.join(names[:most]) + more
 
 
 def name_of_path(path: str) -> str:

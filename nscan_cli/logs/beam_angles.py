@@ -5,18 +5,16 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from nscan_cli.files.text import counted
 from nscan_cli.logs.laser_log import beam_counts
+from nscan_cli.logs.raw_scans import RawScans
 from nscan_cli.logs.reading_options import ReadingOptions
 from nscan_cli.poses import Array
-
-if TYPE_CHECKING:
-    from nscan_cli.logs.assemble import RawScans
 
 
 @dataclass(frozen=True)

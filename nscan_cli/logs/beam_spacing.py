@@ -15,11 +15,11 @@ from numpy.typing import NDArray
 
 from nscan_cli.logs.beam_angles import BeamDirections, double_cosines
 from nscan_cli.logs.laser_log import beam_counts
+from nscan_cli.logs.raw_scans import RawScans
 from nscan_cli.logs.reading_options import ReadingOptions
 from nscan_cli.poses import Array
 
 if TYPE_CHECKING:
-    from nscan_cli.logs.assemble import RawScans
     from nscan_cli.logs.range_limits import RangeLimits
 
 

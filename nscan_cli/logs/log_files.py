@@ -12,7 +12,7 @@ from typing import Any
 from nscan_cli.errors import InputMissingError, WrongUsageError
 from nscan_cli.files.inputs import STANDARD_INPUT, base_name, label, read_bytes
 from nscan_cli.files.limits import CONFIG
-from nscan_cli.files.text import counted
+from nscan_cli.files.text import counted, shortened_list
 from nscan_cli.logs.formats import FORMS
 from nscan_cli.logs.recordings.split_file_names import (
     RECORDING_SUFFIXES,
@@ -20,7 +20,6 @@ from nscan_cli.logs.recordings.split_file_names import (
     have_own_numbers,
     missing_parts,
     parse_name,
-    shortened_list,
     sorted_parts,
     without_compression,
 )

@@ -7,13 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from nscan_cli.files.text import counted
+from nscan_cli.files.text import counted, shortened_list
 from nscan_cli.logs.mask_runs import mask_runs
 from nscan_cli.logs.scan_order import nearest_in_time, usual_period
 from nscan_cli.poses import Array, relative, wrap
-
-MOST_GAPS_NAMED = 5
-"""Gaps that the message about missing odometry names."""
 
 
 @dataclass(frozen=True)
@@ -70,14 +67,11 @@ def interpolated_poses(
 
 def _missing_notice(missing: NDArray[np.bool_], times: Array, name: str) -> str:
     """The sentence that says at which scans (S,) odometry is missing; times (S,) in s."""
-    gaps = mask_runs(missing)
-    stretches = [_scans(first, end - 1) for first, end in gaps[:MOST_GAPS_NAMED]]
-    more = len(gaps) - MOST_GAPS_NAMED
-    rest = f" and in {counted(more, 'more gap')}" if more > 0 else ""
+    gaps = shortened_list([_scans(first, end - 1) for first, end in mask_runs(missing)])
     seconds = float(np.gradient(times)[missing].sum()) if len(times) > 1 else 0.0
     return (
         f"odometry is missing at {counted(int(missing.sum()), 'scan')} ({seconds:.1f} s): no {name} near "
-        f"{', '.join(stretches)}{rest}; the robot is assumed to keep its velocity there"
+        f"{gaps}; the robot is assumed to keep its velocity there"
     )
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,11 +10,9 @@ from numpy.typing import NDArray
 from nscan_cli.logs.laser_defaults import no_return_value
 from nscan_cli.logs.range_limit_options import DEFAULT_RANGE_LIMITS, RangeLimitOptions
 from nscan_cli.logs.range_peaks import ROUNDING, peak_at_limit
+from nscan_cli.logs.raw_scans import RawScans
 from nscan_cli.logs.reading_options import ReadingOptions
 from nscan_cli.poses import Array
-
-if TYPE_CHECKING:
-    from nscan_cli.logs.assemble import RawScans
 
 FROM_READINGS = "the no-return value found in the readings"
 

@@ -4,16 +4,14 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from nscan_cli.logs.range_limit_options import DEFAULT_RANGE_LIMITS
 from nscan_cli.logs.range_limits import RangeLimits
-
-if TYPE_CHECKING:
-    from nscan_cli.logs.assemble import RawScans
+from nscan_cli.logs.raw_scans import RawScans
 
 UNITS = (("millimetres", 0.001), ("centimetres", 0.01))
 """Units that a log may have instead of metres, in metres."""

@@ -4,20 +4,17 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from nscan_cli.files.text import counted
+from nscan_cli.files.text import shortened_list
 from nscan_cli.logs.mask_runs import mask_runs
 from nscan_cli.logs.range_unit import DEFAULT_RANGE_UNIT, UNITS, scaled
+from nscan_cli.logs.raw_scans import RawScans
 from nscan_cli.logs.scan_order import ScanOrder
-from nscan_cli.logs.stretch_names import MOST_STRETCHES_NAMED, stretch_names
+from nscan_cli.logs.stretch_names import stretch_names
 from nscan_cli.poses import Array, Indices, Mask
-
-if TYPE_CHECKING:
-    from nscan_cli.logs.assemble import RawScans
 
 
 @dataclass(frozen=True)
@@ -42,12 +39,12 @@ class UnitStretchOptions:
     """Least factor by which the readings of two successive scans differ where the user is told. A smaller
     value tells more."""
     factor_tolerance: float = 0.08
-    """These readings differ by one factor to within this share. A larger value tells more."""
+    """The readings of two scans differ by one factor to within this share. A larger value tells more."""
     min_factor_share: float = 0.75
-    """Least share of the readings of both scans that differ by it: 0.58 at most on real
-    logs, for a factor of 1.5. A larger value tells less."""
+    """Least share of the readings of both scans that differ by one factor: 0.58 at most on real logs, for a
+    factor of 1.5. A larger value tells less."""
     min_factor_readings: int = 12
-    """Least number of readings that both scans have. A larger value tells less."""
+    """Least number of beams with a reading in both scans. A larger value tells less."""
 
 
 DEFAULT_UNIT_STRETCHES = UnitStretchOptions()
@@ -160,11 +157,9 @@ def _sudden_factors(
             found.append((row + 1, math.exp(factor)))
     if not found:
         return []
-    names = ", ".join(f"{row} by {factor:.3g}" for row, factor in found[:MOST_STRETCHES_NAMED])
-    others = len(found) - MOST_STRETCHES_NAMED
-    more = f" and {counted(others, 'more time')}" if others > 0 else ""
+    names = shortened_list([f"{row} by {factor:.3g}" for row, factor in found], "more time")
     return [
-        f"all ranges are multiplied from one scan to the next, at scan {names}{more}: parts of the log are "
+        f"all ranges are multiplied from one scan to the next, at scan {names}: parts of the log are "
         f"likely in different units; {_apart(times, found[0][0])}"
     ]
 

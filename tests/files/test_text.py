@@ -84,7 +84,7 @@ NEVER_ONE = {
     ("cli/slam_summary.py", " scans a second, "): "a rate",
     ("evaluation/evaluation_report.py", " poses match within "): "a trajectory is aligned by several",
     ("graph/io/json_fields.py", " poses of three "): "of a joint relation",
-    ("logs/assemble.py", " scans of up to "): "beyond a limit",
+    ("logs/raw_scans.py", " scans of up to "): "beyond a limit",
     ("logs/text/carmen.py", " records"): "a tag",
     ("logs/text/carmen.py", " scans; --laser can be "): "a tag",
     ("logs/text/corrected_poses.py", " records"): "a tag",

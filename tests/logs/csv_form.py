@@ -8,8 +8,9 @@ import numpy as np
 
 from nscan_cli.errors import InputDataError
 from nscan_cli.files.provenance import Source
-from nscan_cli.logs.assemble import Findings, RawScans, RecordedMotion, laser_log, scan_table
+from nscan_cli.logs.assemble import Findings, RecordedMotion, laser_log
 from nscan_cli.logs.laser_log import LaserLog
+from nscan_cli.logs.raw_scans import RawScans, scan_table
 from nscan_cli.logs.reading_options import ReadingOptions
 from nscan_cli.logs.scan_order import by_time
 from nscan_cli.logs.skips import Skips

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from nscan_cli.logs.assemble import RawScans
 from nscan_cli.logs.beam_angles import beam_directions, second_is_straighter
+from nscan_cli.logs.raw_scans import RawScans
 from nscan_cli.logs.reading_options import ReadingOptions
 from tests.logs import lines
 from tests.logs.noisy_room import BEAMS, FIRST, STEP, readings, recording

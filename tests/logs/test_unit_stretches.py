@@ -8,8 +8,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from nscan_cli.logs.assemble import RawScans
 from nscan_cli.logs.laser_log import LaserLog
+from nscan_cli.logs.raw_scans import RawScans
 from nscan_cli.logs.scan_order import by_time
 from nscan_cli.logs.unit_stretches import DEFAULT_UNIT_STRETCHES, in_one_unit
 from nscan_cli.poses import Mask

@@ -83,7 +83,7 @@ def test_what_went_wrong_is_said_by_the_numbers_of_the_scans():
     state.odometry_stalls = np.array([5])
     several = ", ".join(str(number) for number in numbers[:10])
     assert notices(state)[1:] == [
-        f"the odometry jumps at scans {several} and 2 more; each is replaced by the step before it",
+        f"the odometry jumps at scans {several} and 2 others; each is replaced by the step before it",
         f"the odometry stands still and catches up at scan {numbers[5]}; "
         "the step there is shared out over the scans before it",
         f"the laser repeats itself at scans {numbers[3]}, {numbers[7]}; these scans are not matched",

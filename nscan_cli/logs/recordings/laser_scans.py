@@ -9,10 +9,11 @@ import numpy as np
 from nscan_cli.errors import InputDataError, WrongUsageError
 from nscan_cli.files.provenance import Source
 from nscan_cli.logs import scan_order as order
-from nscan_cli.logs.assemble import Findings, RawScans, RecordedMotion, laser_log, scan_table
+from nscan_cli.logs.assemble import Findings, RecordedMotion, laser_log
 from nscan_cli.logs.frame_names import distinct_frame_names
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.logs.range_limit_options import DEFAULT_RANGE_LIMITS
+from nscan_cli.logs.raw_scans import RawScans, scan_table
 from nscan_cli.logs.reading_options import ReadingOptions
 from nscan_cli.logs.recordings.alternating_lasers import first_of_two_lasers
 from nscan_cli.logs.recordings.container import Message, Recording

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from nscan_cli.files.inputs import base_name
-from nscan_cli.files.text import counted
+from nscan_cli.files.text import shortened_list
 from nscan_cli.logs.compression import SUFFIXES
 
 RECORDING_SUFFIXES = (".mcap", ".db3", ".bag")
@@ -20,8 +20,6 @@ NUMBERED_STEM = re.compile(r"(?P<of>.*?)_?(?P<number>\d{1,9})")
 """Recorders end the names of parts with _0, _1, …."""
 DATE = re.compile(r"_?\d{4}(-\d\d){5}")
 """ROS 1 adds the start time to the name of each part."""
-LONGEST_LIST = 5
-"""Names that a message lists at most."""
 
 
 @dataclass(frozen=True)
@@ -79,9 +77,3 @@ def missing_parts(parts: Sequence[RecordingFile], first: int | None) -> tuple[st
     if not missing:
         return ()
     return (f"parts are missing: number {shortened_list(missing)}",)
-
-
-def shortened_list(names: Sequence[str]) -> str:
-    """The first names for a message, and how many others there are."""
-    more = f" and {counted(len(names) - LONGEST_LIST, 'other')}" if len(names) > LONGEST_LIST else ""
-    return ", ".join(names[:LONGEST_LIST]) + more

@@ -9,12 +9,13 @@ import numpy as np
 
 from nscan_cli.errors import InputDataError, WrongUsageError
 from nscan_cli.files.provenance import Source
-from nscan_cli.files.text import counted
+from nscan_cli.files.text import counted, shortened_list
 from nscan_cli.logs import scan_order as order
-from nscan_cli.logs.assemble import Findings, RawScans, RecordedMotion, laser_log
+from nscan_cli.logs.assemble import Findings, RecordedMotion, laser_log
 from nscan_cli.logs.device_choice import Device
 from nscan_cli.logs.laser_defaults import CARMEN_MAX_RANGE, beam_angles, mount_from_poses
 from nscan_cli.logs.laser_log import LaserLog
+from nscan_cli.logs.raw_scans import RawScans
 from nscan_cli.logs.reading_options import ReadingOptions
 from nscan_cli.logs.skips import Skips
 from nscan_cli.logs.text import carmen_records
@@ -35,8 +36,6 @@ KNOWN_TAGS = re.compile(
     r"|SONAR|BUMPER|PANTILT|PTU\w*|GPS\w*|NMEA\w*|NEFF|WEIGHT|MARKER|COMMENT|SM_UPDATE|SCANMARK|POSITION)"
 )
 """The tags that CARMEN and GMapping write, and others that are usual in such logs."""
-MAX_KINDS_LISTED = 5
-"""Number of unknown kinds of records that a warning lists."""
 CARMEN_LINE = re.compile(
     rb"^[ \t]*(FLASER|RLASER|(RAW|ROBOT)?LASER\d|ODOM|TRUEPOS|PARAM|SYNC|GLOBALPOS)[ \t]", re.MULTILINE
 )
@@ -62,11 +61,8 @@ def read(data: bytes, file: str, source: Source, options: ReadingOptions) -> Las
     tag, used["laser"] = _chosen_laser(lines, options, file, warnings)
     unknown = {name: count for name, count in findings.records.items() if not KNOWN_TAGS.fullmatch(name)}
     if unknown:
-        kinds = ", ".join(f"{name} ({count})" for name, count in list(unknown.items())[:MAX_KINDS_LISTED])
-        more = ", …" if len(unknown) > MAX_KINDS_LISTED else ""
-        warnings.append(
-            f"{counted(sum(unknown.values()), 'record')} of kinds unknown to CARMEN: {kinds}{more}"
-        )
+        kinds = shortened_list([f"{name} ({count})" for name, count in unknown.items()])
+        warnings.append(f"{counted(sum(unknown.values()), 'record')} of kinds unknown to CARMEN: {kinds}")
     scans = carmen_records.carmen_scans(tag, lines[tag], skips)
     if not scans.stamps:
         raise skips.nothing_read(f"{tag} record")

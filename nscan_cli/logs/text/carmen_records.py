@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nscan_cli.files.limits import RECORD_KINDS
-from nscan_cli.logs.assemble import empty_scan_table
+from nscan_cli.logs.raw_scans import empty_scan_table
 from nscan_cli.logs.skips import Skips
 from nscan_cli.logs.text.line_records import (
     MAX_ANGLE,

@@ -11,8 +11,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from nscan_cli.logs.assemble import RawScans, empty_scan_table
 from nscan_cli.logs.laser_defaults import CARMEN_MAX_RANGE
+from nscan_cli.logs.raw_scans import RawScans, empty_scan_table
 from nscan_cli.logs.skips import Skips
 from nscan_cli.logs.text.bearings import MAX_RADIANS, EvenBearings, are_degrees, even_bearings
 from nscan_cli.logs.text.line_records import LineRecord, beams_problem, parsed, within_bounds

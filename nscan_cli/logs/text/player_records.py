@@ -17,8 +17,8 @@ from typing import Literal
 import numpy as np
 
 from nscan_cli.files.limits import RECORD_KINDS
-from nscan_cli.logs.assemble import RawScans, scan_table
 from nscan_cli.logs.laser_defaults import CARMEN_MAX_RANGE
+from nscan_cli.logs.raw_scans import RawScans, scan_table
 from nscan_cli.logs.skips import Skips
 from nscan_cli.logs.text import player_bearings
 from nscan_cli.logs.text.line_records import (

@@ -16,11 +16,12 @@ from nscan_cli.errors import InputDataError
 from nscan_cli.files.limits import RECORD_KINDS
 from nscan_cli.files.provenance import Source
 from nscan_cli.logs import scan_order as order
-from nscan_cli.logs.assemble import Findings, RawScans, RecordedMotion, laser_log, scan_table
+from nscan_cli.logs.assemble import Findings, RecordedMotion, laser_log
 from nscan_cli.logs.device_choice import Device, choose_device
 from nscan_cli.logs.formats import FIRST_LINE
 from nscan_cli.logs.laser_defaults import CARMEN_MAX_RANGE
 from nscan_cli.logs.laser_log import LaserLog
+from nscan_cli.logs.raw_scans import RawScans, scan_table
 from nscan_cli.logs.reading_options import ReadingOptions
 from nscan_cli.logs.skips import Skips
 from nscan_cli.logs.text.line_records import LineRecord, beam_count, parsed, parsed_poses

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 
 from nscan_cli.calibration.companions import find_companion
-from nscan_cli.files.text import counted
+from nscan_cli.files.text import shortened_list
 from nscan_cli.graph.optimise.graduated_nonconvexity import chi2_by_three
 from nscan_cli.logs.beam_mask import mask_text
 from nscan_cli.logs.laser_log import LaserLog
@@ -183,15 +183,12 @@ def _free_space_violations(state: SlamState) -> list[str]:
     ]
 
 
-def _stretches(each: Iterable[str]) -> str:
+def _stretches(named: Iterable[str]) -> str:
     """Stretches of the path, the first of many."""
-    named = list(each)
-    more = [f"and {counted(len(named) - MOST_NAMED, 'more stretch')}"] if len(named) > MOST_NAMED else []
-    return "; ".join(named[:MOST_NAMED] + more)
+    return shortened_list(list(named), "more stretch", MOST_NAMED, "; ")
 
 
 def _numbered(log: LaserLog, rows: Sequence[int]) -> str:
     """The numbers of the scans in some rows, of the first of many."""
-    some = ", ".join(str(log.numbers[row]) for row in rows[:MOST_NAMED])
-    more = "" if len(rows) <= MOST_NAMED else f" and {len(rows) - MOST_NAMED} more"
-    return f"scan{'s' if len(rows) > 1 else ''} {some}{more}"
+    numbers = [str(log.numbers[row]) for row in rows]
+    return f"scan{'s' if len(rows) > 1 else ''} {shortened_list(numbers, most=MOST_NAMED)}"
