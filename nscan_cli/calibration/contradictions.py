@@ -16,8 +16,10 @@ from nscan_cli.calibration.step_evidence import (
     StepEvidence,
     agrees_clearly,
     explains,
+    is_change,
     is_excluded,
     is_nearer,
+    is_wrong_scale,
     turns_agree,
 )
 from nscan_cli.calibration.step_sampling import telling_steps
@@ -46,6 +48,9 @@ def find_contradictions(log: LaserLog, reading: ReadingOptions, options: FileChe
         found = _of_clocks(log, evidence.steps, reading, options)
         if found:
             return found
+    changed = _of_change(log, evidence, reading, options)
+    if changed is not None:
+        return [changed]
     fit = evidence.fit
     unusable = _unusable(evidence, turns, options)
     if unusable is not None:
@@ -77,8 +82,21 @@ def _evidence(log: LaserLog, odometry: Array, options: FileCheckOptions) -> Step
             if agrees_clearly(evidence, log.mount, options):
                 return None
         if evidence.tells_enough or count >= most:
-            return evidence
+            break
         count = min(2 * count, most)
+    if count < options.more_steps and _is_in_doubt(evidence, options):
+        steps = measure_steps(log, telling_steps(log, options.steps, options.more_steps), options.steps)
+        return StepEvidence(odometry, steps, options)
+    return evidence
+
+
+def _is_in_doubt(evidence: StepEvidence, options: FileCheckOptions) -> bool:
+    """Whether the scale of odometry seems wrong, but by no more than the wheels of some robots are."""
+    fit = evidence.fit
+    if fit is None:
+        return False
+    is_odd = is_wrong_scale(fit, options) and max(fit.scale, 1.0 / fit.scale) < options.clear_scale_factor
+    return is_odd or is_change(evidence.change, options, options.change.doubt_sigmas)
 
 
 def _is_still(odometry: Array, still: float) -> Mask:
@@ -105,6 +123,21 @@ def _unusable(evidence: StepEvidence, turns: TurnFit | None, options: FileCheckO
     if turns is not None and turns.steps >= options.min_steps and turns.spread > options.excluded_turn_spread:
         return findings.excluded_turns(turns)
     return None
+
+
+def _of_change(
+    log: LaserLog, evidence: StepEvidence, reading: ReadingOptions, options: FileCheckOptions
+) -> Finding | None:
+    """A change of the scale of odometry or ranges within the log; None if there is none that explains it."""
+    change = evidence.change
+    if change is None or not is_change(change, options, options.change.sigmas):
+        return None
+    without = evidence.fit_without(change)
+    if not explains(without, options):
+        return None
+    rows = list(evidence.rows_at(change.step))
+    times = log.times[rows] - log.times[0] + (reading.start or 0.0)
+    return findings.changed_scale(change, evidence.moving, log.numbers[rows], times, reading)
 
 
 def _of_clocks(
@@ -170,7 +203,7 @@ def _of_positions(
     if fit is None or not explains(fit, options):
         return []
     found = []
-    if findings.is_wrong_scale(fit, options):
+    if is_wrong_scale(fit, options):
         found.append(findings.wrong_scale(fit, reading, options))
     if abs(float(wrap(fit.mount[2] - mount[2]))) > np.pi - options.opposite_within:
         return [*found, _opposite(mount, fit, evidence, reading, options)]

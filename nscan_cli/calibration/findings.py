@@ -11,10 +11,11 @@ import numpy as np
 from nscan_cli.calibration.mount_fit import MountFit, TurnFit
 from nscan_cli.calibration.odometry_clock import ClockLag
 from nscan_cli.calibration.options import FileCheckOptions
-from nscan_cli.calibration.step_evidence import StepEvidence
+from nscan_cli.calibration.scale_change import ScaleChange
+from nscan_cli.calibration.step_evidence import StepEvidence, is_wrong_scale
 from nscan_cli.files.text import counted
 from nscan_cli.logs.reading_options import ReadingOptions
-from nscan_cli.poses import Array, wrap
+from nscan_cli.poses import Array, Indices, wrap
 
 UNDONE = "--as-recorded uses it as it is"
 
@@ -106,12 +107,6 @@ def wrong_turns(turns: TurnFit) -> Finding:
     return Finding(f"odometry likely turns {what}: {turns_of(turns)}; try --no-odometry")
 
 
-def is_wrong_scale(fit: MountFit, options: FileCheckOptions) -> bool:
-    """Whether odometry and scans count lengths in different units."""
-    off, sigma = abs(math.log(fit.scale)), float(fit.sigmas[0]) / fit.scale
-    return off > max(math.log(options.min_scale_factor), options.mount_sigmas * sigma)
-
-
 def wrong_scale(fit: MountFit, reading: ReadingOptions, options: FileCheckOptions) -> Finding:
     """Odometry counts in another unit than the ranges, beyond doubt or likely."""
     decimal = 10.0 ** round(math.log10(fit.scale))
@@ -120,7 +115,11 @@ def wrong_scale(fit: MountFit, reading: ReadingOptions, options: FileCheckOption
     evidence = f"one metre by odometry is {fit.scale:.3g} m by scans, in {counted(fit.steps, 'step')}"
     ranges = f"{(reading.range_scale or 1.0) / fit.scale:.3g}"
     is_either = not is_decimal and max(fit.scale, 1.0 / fit.scale) <= options.max_range_factor
-    other = f"; if the ranges are wrong instead, --range-scale {ranges}" if is_either else ""
+    other = (
+        f"; if the ranges, and so the size of the map, are wrong instead, --range-scale {ranges}"
+        if is_either
+        else ""
+    )
     if max(fit.scale, 1.0 / fit.scale) > options.certain_scale_factor:
         message = (
             f"{evidence}: its positions are multiplied, as by --odometry-scale {scale:g}{other}; {UNDONE}"
@@ -128,6 +127,24 @@ def wrong_scale(fit: MountFit, reading: ReadingOptions, options: FileCheckOption
         return Finding(message, {"odometry_scale": scale})
     return Finding(
         f"the scale of odometry is likely wrong: {evidence}; try --odometry-scale {scale:g}{other}"
+    )
+
+
+def changed_scale(
+    change: ScaleChange, steps: int, numbers: Indices, times: Array, reading: ReadingOptions
+) -> Finding:
+    """Odometry or the ranges count otherwise from a scan on, which is between two numbers (2,).
+
+    `times` (2,) are the times of these scans from the first of the log, s.
+    """
+    ratio, (end, start) = change.behind / change.before, times.tolist()
+    by_ranges = f"--range-scale {(reading.range_scale or 1.0) / ratio:.3g}"
+    by_odometry = f"--odometry-scale {reading.odometry_scale * ratio:.3g}"
+    return Finding(
+        f"odometry or the ranges change their scale from scan {numbers[0]} to {numbers[1]}: one metre by "
+        f"odometry is {change.before:.3g} m by scans before and {change.behind:.3g} m behind, in "
+        f"{counted(steps, 'step')}; map each part by itself: try --end {end:.2f}, or --start {start:.2f}, "
+        f"with {by_ranges} if the ranges are wrong there, or {by_odometry} if odometry is"
     )
 
 

@@ -5,7 +5,11 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 
-from nscan_cli.calibration.scale_options import OdometryUnitOptions
+from nscan_cli.calibration.odometry_options import (
+    OdometryUnitOptions,
+    ScaleChangeOptions,
+    UnsignedOdometryOptions,
+)
 from nscan_cli.calibration.sweep_options import SweepCheckOptions
 from nscan_cli.matching.pairwise import PairOptions
 
@@ -154,40 +158,6 @@ class CompanionOptions:
 
 
 @dataclass(frozen=True)
-class UnsignedOdometryOptions:
-    """When odometry counts reversing as driving forward."""
-
-    max_backward_share: float = 0.002
-    """Odometry goes one way if it goes the other way over no more than this share of the path. It is 0.0008
-    at most on real logs whose odometry never reverses, and 0.14 where it does. A larger value checks more
-    logs."""
-    step_length: float = 0.1
-    """Length of a step over which ranges are compared, m. A larger value misses short reversals."""
-    max_duration: float = 3.0
-    """Longest step that is compared, s. A larger value compares across longer gaps."""
-    max_beams: int = 180
-    """Approximate number of beams of a scan that are compared, evenly spread. More take longer."""
-    min_beams: int = 20
-    """Least number of beams of a step that are compared. A larger value compares fewer steps."""
-    max_error: float = 0.3
-    """Largest difference between a range and its prediction that counts, m: beyond it another thing is seen.
-    A larger value gives edges more weight."""
-    max_error_ratio: float = 0.7
-    """A step is clear if the ranges are off by less than this share in one direction of that in the other. A
-    larger value finds more, also by chance. At this one 2 of 36,000 steps of real logs are clear by
-    chance."""
-    min_steps: int = 2
-    """Least number of successive clear steps that go the other way, in one stretch at least. Where there is
-    one, shorter ones count too, if scans confirm them. A larger value finds less."""
-    max_stop_speed: float = 0.8
-    """At both ends of such a stretch the robot slows down to this share of its greatest speed in it, at
-    least: it has to stop to change its direction, though scans that are far apart blur it. A larger value
-    finds more."""
-    measured_steps: int = 5
-    """Number of steps of such a stretch that are matched; most must agree. More take longer."""
-
-
-@dataclass(frozen=True)
 class FileCheckOptions:
     """When scans contradict what their file says of odometry, mounting and clocks.
 
@@ -199,6 +169,7 @@ class FileCheckOptions:
     sweep: SweepCheckOptions = field(default_factory=SweepCheckOptions)
     held: HeldOdometryOptions = field(default_factory=HeldOdometryOptions)
     units: OdometryUnitOptions = field(default_factory=OdometryUnitOptions)
+    change: ScaleChangeOptions = field(default_factory=ScaleChangeOptions)
     unsigned: UnsignedOdometryOptions = field(default_factory=UnsignedOdometryOptions)
     companion: CompanionOptions = field(default_factory=CompanionOptions)
     min_steps: int = 12
@@ -230,9 +201,11 @@ class FileCheckOptions:
     smaller value suggests more exact angles."""
     round_angle_tolerance: float = math.radians(3.0)
     """Largest distance of a measured angle from such a multiple, rad. A larger value rounds more angles."""
-    min_scale_factor: float = 1.2
-    """Least factor by which the scale of odometry is wrong, beside `mount_sigmas`. It is 1.11 at most on real
-    logs. A larger value warns less."""
+    min_scale_factor: float = 1.09
+    """Least factor by which the scale of odometry is wrong, beside `mount_sigmas`. It is 1.08 at most on real
+    logs, those of one robot. A larger value warns less."""
+    clear_scale_factor: float = 1.2
+    """Up to this factor `more_steps` are measured before a warning names it. A larger value takes longer."""
     certain_scale_factor: float = 3.0
     """A scale that is wrong by more than this factor is corrected: no wheel slips so much. A larger value
     corrects less."""

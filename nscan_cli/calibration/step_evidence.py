@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import functools
+import math
 
 import numpy as np
 
 from nscan_cli.calibration.measured_steps import MeasuredSteps
 from nscan_cli.calibration.mount_fit import MountFit, TurnFit, fit_mount, fit_turns
 from nscan_cli.calibration.options import FileCheckOptions
+from nscan_cli.calibration.scale_change import ScaleChange, scale_change
 from nscan_cli.poses import MIRRORED, Array, are_known, wrap
 
 
@@ -60,6 +62,24 @@ class StepEvidence:
         """The mounting and the scale that explain the steps of mirrored scans."""
         return self._fit(self.laser * MIRRORED, self.odometry)
 
+    @functools.cached_property
+    def change(self) -> ScaleChange | None:
+        """The clearest change of scale along the steps."""
+        if self.fit is None:
+            return None
+        return scale_change(self.laser, self.odometry, self.fit, self.options.change)
+
+    def rows_at(self, step: int) -> tuple[int, int]:
+        """The rows where the step before one of those that have both begins, and where this one ends."""
+        known = np.flatnonzero(self._known)
+        return int(self.steps.first[known[step - 1]]), int(self.steps.last[known[step]])
+
+    def fit_without(self, change: ScaleChange) -> MountFit | None:
+        """The fit of odometry whose scale does not change."""
+        odometry = self.odometry.copy()
+        odometry[change.step :, :2] *= change.behind / change.before
+        return self._fit(self.laser, odometry)
+
     def fit_with_signs(self, signs: Array) -> MountFit | None:
         """The fit of odometry whose coordinates are multiplied by signs (3,)."""
         return self._fit(self.laser, self.steps.odometry(self.poses * signs)[self._known])
@@ -85,6 +105,8 @@ def agrees_clearly(evidence: StepEvidence, mount: Array, options: FileCheckOptio
     turns, fit, share = evidence.turns, evidence.fit, options.clear_share
     if turns is None or fit is None:
         return False
+    if evidence.change is None or is_change(evidence.change, options, options.change.doubt_sigmas):
+        return False
     if max(turns.spread, fit.spread) > share * options.max_spread or fit.tail > share * options.max_tail:
         return False
     off = fit.mount - mount
@@ -92,6 +114,17 @@ def agrees_clearly(evidence: StepEvidence, mount: Array, options: FileCheckOptio
     errors += options.clear_sigmas * fit.sigmas / [fit.scale, 1.0, 1.0, 1.0]
     bounds = [np.log(options.min_scale_factor), *[options.min_mount_move] * 2, options.min_mount_turn]
     return bool((errors <= bounds).all()) and abs(turns.ratio - 1.0) <= share * options.max_turn_error
+
+
+def is_change(change: ScaleChange | None, options: FileCheckOptions, sigmas: float) -> bool:
+    """Whether the scale changes along the steps, by so many standard deviations."""
+    return change is not None and change.exceeds(options.change.min_factor, sigmas)
+
+
+def is_wrong_scale(fit: MountFit, options: FileCheckOptions) -> bool:
+    """Whether odometry and scans count lengths in different units."""
+    off, sigma = abs(math.log(fit.scale)), float(fit.sigmas[0]) / fit.scale
+    return off > max(math.log(options.min_scale_factor), options.mount_sigmas * sigma)
 
 
 def is_excluded(fit: MountFit | None, options: FileCheckOptions) -> bool:

@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nscan_cli.calibration.measured_steps import measure_steps
-from nscan_cli.calibration.options import StepOptions, UnsignedOdometryOptions
+from nscan_cli.calibration.odometry_options import UnsignedOdometryOptions
+from nscan_cli.calibration.options import StepOptions
 from nscan_cli.calibration.scaled_steps import with_scaled_steps
 from nscan_cli.kernels.decorators import kernel
 from nscan_cli.logs.laser_log import LaserLog

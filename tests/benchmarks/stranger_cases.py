@@ -48,6 +48,9 @@ class Case:
     """The log, and the arguments of `evaluate`; what is not there is written to an empty folder."""
     untouched: float | None = None
     """Error (m) of the drive if nothing is wrong; None: that of the case without a fault."""
+    cure: str = ""
+    """Regular expression of the option, of several, that the owner of the file knows to be right; empty: the
+    first one."""
 
 
 def strangers(data: Path) -> Iterator[Case]:
@@ -74,7 +77,8 @@ def siblings(data: Path) -> Iterator[Case]:
             continue
         for fault, make, cause in FAULTS:
             if drive == SIMULATED or fault in FAULTS_OF_REAL_LOGS:
-                yield Case(drive, fault, cause, partial(_sibling, data, drive, make))
+                files = partial(_sibling, data, drive, make)
+                yield Case(drive, fault, cause, files, cure=KNOWN_CURES.get(fault, ""))
     for fault, form, cause in (
         ("", _with_angles, ""),
         ("FLASER, which has no angles", _without_angles, "541 beams over 270°"),
@@ -238,6 +242,8 @@ FAULTS: tuple[tuple[str, Fault, str], ...] = (
     ("ranges in mm from half-way on", _from_half_way(1000.0), "in millimetres, the others in metres"),
     ("ranges in cm from half-way on", _from_half_way(100.0), "in centimetres, the others in metres"),
     ("ranges in feet from half-way on", _from_half_way(3.281), "all ranges are multiplied"),
+    ("ranges × 1.15 from half-way on", _from_half_way(1.15), "change their scale from scan"),
+    ("ranges × 0.9", lambda log: faults.ranges_scaled(log, 0.9, slice(None)), "range-scale 1.1"),
     ("readings reversed", faults.mirrored, "in the wrong order"),
     ("beams closer by a third", lambda log: faults.beams_apart(log, 2 / 3), "1° from beam to beam"),
     ("beams wider by a half", lambda log: faults.beams_apart(log, 1.5), "1° from beam to beam"),
@@ -256,6 +262,11 @@ FAULTS: tuple[tuple[str, Fault, str], ...] = (
     ("cart on a hinge", faults.cart, "goes along with the robot"),
 )  # fmt: skip
 """Name, fault, and what tells its cause."""
+KNOWN_CURES = {
+    "ranges × 0.9": r"--range-scale \S+",
+    "ranges × 1.15 from half-way on": r"--end [\d.]+",
+}
+"""The options that the owner chooses where messages name several causes."""
 FAULTS_OF_REAL_LOGS = (
     "", "two posts of 20°", "odometry × 1000", "odometry frozen for a third", "each pose five times",
 )  # fmt: skip

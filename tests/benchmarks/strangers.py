@@ -55,13 +55,16 @@ def outcome(case: Case) -> Outcome:
         log, reference = case.files(Path(folder))
         slam = [str(log), "-o", str(Path(folder, "graph.json"))]
         default = _run(slam, reference)
-        cure = " ".join(_cures(default.said))
+        cure = " ".join(_cures(default.said, case.cure))
         cured = _run([*slam, *cure.split()], reference) if cure else None
         return Outcome(case, default, cure, cured, _run([*slam, "--as-recorded"], reference))
 
 
-def _cures(said: Sequence[str]) -> list[str]:
-    """The first option of each message that says to try one."""
+def _cures(said: Sequence[str], known: str) -> list[str]:
+    """The first option of each message that says to try one; or the one that the owner knows to be right."""
+    if known:
+        named = [re.search(known, message) for message in said]
+        return [option.group() for option in named if option]
     found = [CURES.search(message) for message in said]
     return [cure.group(1) or cure.group(2) for cure in found if cure]
 

@@ -60,6 +60,15 @@ LIKELY: dict[str, tuple[Fault, str]] = {
     ),
     "looks askew": (lambda log: faults.mounted_otherwise(log, 0.6), "try --mount 0.1,0,0$"),
     "half as long": (lambda log: odometry_faults.scaled(log, 0.5), r"try --odometry-scale (1\.9|2\.0|2)"),
+    "a tenth too short, or the ranges too long": (
+        lambda log: odometry_faults.scaled(log, 0.9),
+        r"odometry is 1\.1\d? m by.*try --odometry-scale 1\.1\d?; if the ranges,.*--range-scale 0\.9",
+    ),
+    "another scale from half-way on": (
+        lambda log: faults.ranges_scaled(log, 1.2, slice(len(log) // 2, None)),
+        r"change their scale from scan \d+ to \d+: one metre .* is (1|0\.9\d+|1\.0\d) m by scans before and "
+        r"1\.[12]\d? m .* --end [\d.]+, or --start [\d.]+, with --range-scale 0\.8\d+ .*-scale 1\.[12]\d?",
+    ),
     "a third too long": (lambda log: odometry_faults.scaled(log, 1.33), r"try --odometry-scale 0\.7"),
     "late by 30 s": (lambda log: odometry_faults.late(log, 30.0), r"ahead.*--clock-offset -(30\.0|29\.9)"),
     "early by 2 s": (lambda log: odometry_faults.late(log, -2.0), r"behind.*--clock-offset (2\.0|1\.9|2\.1)"),

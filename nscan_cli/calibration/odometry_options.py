@@ -1,0 +1,78 @@
+"""The parameters of what may be wrong with odometry over parts of a log."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class ScaleChangeOptions:
+    """When odometry, or the ranges, change their scale within a log."""
+
+    min_length: float = 0.05
+    """Least length of a step, m. With a larger value fewer steps count, and each tells more."""
+    min_steps: int = 8
+    """Least number of steps before a change, and behind. A larger value finds fewer changes."""
+    min_factor: float = 1.09
+    """Least factor between the scales before and behind. It is 1.08 at most in recordings of
+    others. A larger value warns less."""
+    sigmas: float = 5.0
+    """And it must exceed this number of standard deviations. It is 3 at most on real logs. A larger value
+    warns less."""
+    doubt_sigmas: float = 2.0
+    """More steps are measured where it exceeds this number. A larger value takes less time."""
+
+
+@dataclass(frozen=True)
+class OdometryUnitOptions:
+    """When odometry counts in another unit over a part of the log."""
+
+    too_fast: float = 15.0
+    """No robot that maps drives faster, m/s. A larger value finds less."""
+    still: float = 0.01
+    """A robot that is slower by odometry tells nothing, m/s. A larger value counts fewer steps."""
+    min_steps: int = 20
+    """Least number of steps from scan to scan that are too fast, and of others with motion. A larger value
+    finds less."""
+    measured_steps: int = 12
+    """Number of steps of both kinds that are measured, spread over the log. More tell more and take
+    longer."""
+    min_measured: int = 4
+    """Least number of these steps, of both kinds, that the scans measure. A larger value finds less."""
+    tolerance: float = 0.2
+    """Odometry has changed from metres to another unit if one metre by it is one by scans, and then one of
+    that unit, to within this share. A larger value finds more."""
+
+
+@dataclass(frozen=True)
+class UnsignedOdometryOptions:
+    """When odometry counts reversing as driving forward."""
+
+    max_backward_share: float = 0.002
+    """Odometry goes one way if it goes the other way over no more than this share of the path. It is 0.0008
+    at most on real logs whose odometry never reverses, and 0.14 where it does. A larger value checks more
+    logs."""
+    step_length: float = 0.1
+    """Length of a step over which ranges are compared, m. A larger value misses short reversals."""
+    max_duration: float = 3.0
+    """Longest step that is compared, s. A larger value compares across longer gaps."""
+    max_beams: int = 180
+    """Approximate number of beams of a scan that are compared, evenly spread. More take longer."""
+    min_beams: int = 20
+    """Least number of beams of a step that are compared. A larger value compares fewer steps."""
+    max_error: float = 0.3
+    """Largest difference between a range and its prediction that counts, m: beyond it another thing is seen.
+    A larger value gives edges more weight."""
+    max_error_ratio: float = 0.7
+    """A step is clear if the ranges are off by less than this share in one direction of that in the other. A
+    larger value finds more, also by chance. At this one 2 of 36,000 steps of real logs are clear by
+    chance."""
+    min_steps: int = 2
+    """Least number of successive clear steps that go the other way, in one stretch at least. Where there is
+    one, shorter ones count too, if scans confirm them. A larger value finds less."""
+    max_stop_speed: float = 0.8
+    """At both ends of such a stretch the robot slows down to this share of its greatest speed in it, at
+    least: it has to stop to change its direction, though scans that are far apart blur it. A larger value
+    finds more."""
+    measured_steps: int = 5
+    """Number of steps of such a stretch that are matched; most must agree. More take longer."""

@@ -1,0 +1,65 @@
+"""A scan from which on odometry, or the ranges, count lengths by another factor."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from nscan_cli.calibration.mount_fit import MountFit, robot_lengths
+from nscan_cli.calibration.odometry_options import ScaleChangeOptions
+from nscan_cli.poses import Array, Indices
+
+SIGMA_OF_MEDIAN = 1.2533
+"""Standard deviation of the median of normal values, as a multiple of that of their mean."""
+SIGMA_OF_DEVIATION = 1.4826
+"""Standard deviation of normal values, as a multiple of their median absolute deviation."""
+
+
+class ScaleChange(NamedTuple):
+    """Metres by scans for one metre by odometry, in the steps before and behind a place."""
+
+    step: int
+    """The first step behind it."""
+    before: float
+    behind: float
+    sigma: float
+    """Standard deviation of the logarithm of their ratio."""
+
+    def exceeds(self, factor: float, sigmas: float) -> bool:
+        """Whether the two differ by more than a factor, and by more than so many standard deviations."""
+        off = abs(math.log(self.behind / self.before))
+        return off > max(math.log(factor), sigmas * self.sigma)
+
+
+def scale_change(
+    laser: Array, odometry: Array, fit: MountFit, options: ScaleChangeOptions
+) -> ScaleChange | None:
+    """The clearest change along steps (n, 3) of laser and robot, in order; None for too few steps.
+
+    It is where two medians explain the logarithms of scales with the least absolute residuals.
+    `fit` is the mounting that explains the steps.
+    """
+    by_scans, by_odometry = robot_lengths(laser, fit.mount), np.hypot(odometry[:, 0], odometry[:, 1])
+    told: Indices = np.flatnonzero((by_scans >= options.min_length) & (by_odometry > 0.0))
+    values = np.log(by_scans[told] / by_odometry[told])
+    places = range(options.min_steps, len(told) - options.min_steps + 1)
+    if not places:
+        return None
+    k = min(places, key=lambda place: _residual(values[:place]) + _residual(values[place:]))
+    (before, one), (behind, other) = (_median(some) for some in (values[:k], values[k:]))
+    return ScaleChange(
+        int(told[k]), float(np.exp(before)), float(np.exp(behind)), float(np.hypot(one, other))
+    )
+
+
+def _residual(values: Array) -> float:
+    return float(np.abs(values - np.median(values)).sum())
+
+
+def _median(values: Array) -> tuple[float, float]:
+    """The median of values (n,) and its standard deviation."""
+    median = float(np.median(values))
+    deviation = SIGMA_OF_DEVIATION * float(np.median(np.abs(values - median)))
+    return median, max(SIGMA_OF_MEDIAN * deviation / np.sqrt(len(values)), 1e-6)
