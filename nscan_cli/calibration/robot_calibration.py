@@ -35,7 +35,7 @@ STEPS_ALIKE = "all steps are alike"
 
 
 @dataclass(frozen=True)
-class Evidence:
+class CalibrationEvidence:
     """The steps that a calibration rests on."""
 
     sampled: int
@@ -61,7 +61,7 @@ class Calibration:
     """sweep_time; mount_x, mount_y, mount_angle; odometry_scale, turn_ratio (turns by odometry as a multiple
     of those by scans), veer (heading that odometry gains per metre); wheel_difference and track_width
     (wheels.py); clock_offset; noise_distance (per metre) and noise_turn (per radian) of steps by odometry."""
-    evidence: Evidence
+    evidence: CalibrationEvidence
     sweep: float
     """The time of the laser's turn that the steps were measured with, s; negative if the readings are in the
     reverse order of time, 0 if all are seen at once."""
@@ -256,8 +256,8 @@ class _Drive:
             "noise_turn": _noise(about, np.abs(turns[self.turning]), float(by_match[1])),
         }
 
-    def evidence(self, sampled: int, pairs: int) -> Evidence:
-        return Evidence(
+    def evidence(self, sampled: int, pairs: int) -> CalibrationEvidence:
+        return CalibrationEvidence(
             sampled,
             len(self.laser),
             int(self.turning.sum()),

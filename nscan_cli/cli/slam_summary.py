@@ -17,9 +17,9 @@ Facts = dict[str, Any]
 
 def graph_facts(graph: Graph) -> Facts:
     """The facts that any graph has, in m; a run adds those of its mode, and how long it took."""
-    from nscan_cli.slam.log_to_graph import Counts
+    from nscan_cli.slam.log_to_graph import GraphCounts
 
-    counts = Counts.of(graph)
+    counts = GraphCounts.of(graph)
     reasons: Counter[str] = Counter()
     for reason, count in counts.refused.items():
         reasons[without_numbers(reason)] += count

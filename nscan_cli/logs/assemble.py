@@ -31,7 +31,7 @@ from nscan_cli.poses import Array, are_known
 
 
 @dataclass
-class Findings:
+class ReaderFindings:
     """What a reader collects for the report."""
 
     skips: Skips
@@ -72,7 +72,7 @@ def laser_log(
     times: ScanOrder,
     mount: Array,
     motion: RecordedMotion,
-    findings: Findings,
+    findings: ReaderFindings,
     options: ReadingOptions,
     file: str,
 ) -> LaserLog:
@@ -172,7 +172,7 @@ def _sweep(raw: RawScans, increments: Array, times: ScanOrder, options: ReadingO
     if options.sweep is not None:
         return Sweep(np.full(len(times.times), options.sweep), "--sweep")
     rows, beams = times.rows, beam_counts(raw.ranges, raw.beams)
-    told = None if raw.sweep_times is None else raw.sweep_times.of(rows)
+    told = None if raw.recorded_sweep is None else raw.recorded_sweep.of(rows)
     return sweep_of_file(told, increments[rows], beams[rows], times.times, options.as_recorded)
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nscan_cli.files.limits import READINGS
-from nscan_cli.logs.sweep import SweepTimes
+from nscan_cli.logs.sweep import RecordedSweep
 from nscan_cli.poses import Array
 
 
@@ -36,7 +36,7 @@ class RawScans:
     """(S,) direction of the last beam as written beside the step, rad; nan if a scan has none."""
     beams: NDArray[np.int64] | None = None
     """(S,) number of beams of each scan; None if all have B."""
-    sweep_times: SweepTimes | None = None
+    recorded_sweep: RecordedSweep | None = None
     """The times of the beams as written; None if the log has none."""
     angles_assumed: bool = False
     """Whether the directions are a convention of the form of log, and not written in it."""

@@ -37,7 +37,7 @@ DEFAULT_SWEEP = SweepOptions()
 
 
 @dataclass(frozen=True)
-class SweepTimes:
+class RecordedSweep:
     """What the messages of S scans say, in file order."""
 
     increment: Array
@@ -45,9 +45,9 @@ class SweepTimes:
     scan_time: Array
     """(S,) time from scan to scan, s; 0 or nan where they do not say."""
 
-    def of(self, rows: Indices) -> SweepTimes:
+    def of(self, rows: Indices) -> RecordedSweep:
         """Those of some scans."""
-        return SweepTimes(self.increment[rows], self.scan_time[rows])
+        return RecordedSweep(self.increment[rows], self.scan_time[rows])
 
 
 @dataclass(frozen=True)
@@ -63,7 +63,7 @@ class Sweep:
 
 
 def sweep_of_file(
-    told: SweepTimes | None,
+    told: RecordedSweep | None,
     increments: Array,
     beams: Indices,
     times: Array,

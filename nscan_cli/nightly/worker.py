@@ -61,7 +61,7 @@ def map_and_evaluate(
     from nscan_cli.nightly import kernel_exercises, warm_up
     from nscan_cli.slam.consistency.map_verification import add_verification
     from nscan_cli.slam.consistency.options import VerificationOptions
-    from nscan_cli.slam.log_to_graph import Counts, map_log, notices_of_mapping, slam_options
+    from nscan_cli.slam.log_to_graph import GraphCounts, map_log, notices_of_mapping, slam_options
 
     if cache_folder() is None:
         for share in kernel_exercises.FOR_ALL:
@@ -98,7 +98,7 @@ def map_and_evaluate(
         viewer_page(Path(task["inputs"]["log"]).name, grid, graph, log, rows, rows)
     )
     (outputs / "viewer.html").write_bytes(embedded_viewer(Path(task["inputs"]["log"]).name, grid, graph))
-    made = Counts.of(graph)
+    made = GraphCounts.of(graph)
     counts = {
         "scans": len(log),
         "duration": round(float(log.times[-1] - log.times[0]), 3),

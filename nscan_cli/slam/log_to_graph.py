@@ -25,7 +25,7 @@ MappingProgress = Callable[[int, int, int], None]
 
 
 @dataclass(frozen=True)
-class Counts:
+class GraphCounts:
     """What a graph is made of."""
 
     keyframes: int
@@ -37,7 +37,7 @@ class Counts:
     """Reason → loops that were refused for it."""
 
     @classmethod
-    def of(cls, graph: Graph) -> Counts:
+    def of(cls, graph: Graph) -> GraphCounts:
         """The counts of a graph."""
         refused = Counter(loop.reason for loop in graph.loops if not loop.accepted)
         accepted = len(graph.loops) - refused.total()

@@ -8,7 +8,7 @@ import numpy as np
 
 from nscan_cli.errors import InputDataError
 from nscan_cli.files.provenance import Source
-from nscan_cli.logs.assemble import Findings, RecordedMotion, laser_log
+from nscan_cli.logs.assemble import ReaderFindings, RecordedMotion, laser_log
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.logs.raw_scans import RawScans, scan_table
 from nscan_cli.logs.reading_options import ReadingOptions
@@ -24,7 +24,7 @@ def recognises(data: bytes) -> bool:
 
 def read(data: bytes, file: str, source: Source, options: ReadingOptions) -> LaserLog:
     options.refuse_topics(file, "a CSV log", "--mount")
-    findings = Findings(Skips(file, options.strict))
+    findings = ReaderFindings(Skips(file, options.strict))
     rows, stamps = [], []
     for number, line in enumerate(data.splitlines()[1:], start=2):
         fields = line.decode("ascii", "replace").split(",")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from nscan_cli.logs.sweep import Sweep, SweepTimes, sweep_of_file
+from nscan_cli.logs.sweep import RecordedSweep, Sweep, sweep_of_file
 
 SCANS, BEAMS = 50, 360
 INCREMENT = 2 * np.pi / BEAMS
@@ -14,7 +14,7 @@ INCREMENT = 2 * np.pi / BEAMS
 def sweep(
     increment: float | np.ndarray, scan_time: float, period: float, beams: int = BEAMS, raw: bool = False
 ) -> Sweep:
-    told = SweepTimes(np.full(SCANS, increment), np.full(SCANS, scan_time))
+    told = RecordedSweep(np.full(SCANS, increment), np.full(SCANS, scan_time))
     sizes, times = np.full(SCANS, beams), np.linspace(0.0, period * (SCANS - 1), SCANS)
     return sweep_of_file(told, np.full(SCANS, INCREMENT), sizes, times, raw)
 

@@ -13,7 +13,7 @@ from nscan_cli.graph.model import Graph, Loop
 from nscan_cli.logs.load import read_log
 from nscan_cli.logs.reading_options import ReadingOptions
 from nscan_cli.slam.frontend.scan_batch import SCANS_PER_BATCH
-from nscan_cli.slam.log_to_graph import Counts, map_log, slam_options
+from nscan_cli.slam.log_to_graph import GraphCounts, map_log, slam_options
 from nscan_cli.slam.options import SlamOptions
 from tests.data import CORRIDOR_LOG
 
@@ -49,4 +49,4 @@ def test_loops_are_counted_by_their_verdicts():
     loops = [Loop((0, 3), True, "", 0.9), Loop((0, 4), False, "a", 0.1), Loop((1, 4), False, "a", 0.1),
              Loop((1, 5), False, "b", 0.1)]  # fmt: skip
     graph = Graph(np.arange(3), list("012"), np.zeros((3, 3)), None, np.array([0, 0, 2]), loops=loops)
-    assert Counts.of(graph) == Counts(2, 0, 0, 1, Counter({"a": 2, "b": 1}))
+    assert GraphCounts.of(graph) == GraphCounts(2, 0, 0, 1, Counter({"a": 2, "b": 1}))

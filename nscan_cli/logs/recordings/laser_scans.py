@@ -9,7 +9,7 @@ import numpy as np
 from nscan_cli.errors import InputDataError, WrongUsageError
 from nscan_cli.files.provenance import Source
 from nscan_cli.logs import scan_order as order
-from nscan_cli.logs.assemble import Findings, RecordedMotion, laser_log
+from nscan_cli.logs.assemble import ReaderFindings, RecordedMotion, laser_log
 from nscan_cli.logs.frame_names import distinct_frame_names
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.logs.range_limit_options import DEFAULT_RANGE_LIMITS
@@ -27,7 +27,7 @@ from nscan_cli.logs.recordings.tf_tree import TransformTree
 from nscan_cli.logs.recordings.topics import devices, scan_topic
 from nscan_cli.logs.recordings.turn_segments import TimedScan, joined_turns
 from nscan_cli.logs.skips import Skips
-from nscan_cli.logs.sweep import SweepTimes
+from nscan_cli.logs.sweep import RecordedSweep
 from nscan_cli.logs.text.line_records import MAX_ANGLE, beams_problem
 from nscan_cli.poses import Array
 
@@ -42,7 +42,7 @@ def log_from_recording(recording: Recording, file: str, source: Source, options:
         raise WrongUsageError(f"{file}: has topics, no lasers by tag; leave out --laser, see --topic")
     choice = scan_topic(recording, options, file)
     skips = Skips(file, options.strict, place="message")
-    findings = Findings(skips, recording.topic_counts(), recording.warnings)
+    findings = ReaderFindings(skips, recording.topic_counts(), recording.warnings)
     findings.used = {"laser": choice.why, "checksums": recording.checksums}
     findings.lasers, findings.laser_option = tuple(devices(recording, SCAN_TYPES)), "--topic"
     findings.odometries = tuple(devices(recording, ODOMETRY_TYPES))
@@ -81,7 +81,7 @@ def log_from_recording(recording: Recording, file: str, source: Source, options:
     )
 
 
-def _of_one_laser(timed: Sequence[TimedScan], findings: Findings) -> list[TimedScan]:
+def _of_one_laser(timed: Sequence[TimedScan], findings: ReaderFindings) -> list[TimedScan]:
     """The scans of one laser, each of a whole turn."""
     turns, joined = joined_turns(timed)
     scans, left_out = first_of_two_lasers(turns)
@@ -150,7 +150,7 @@ def _raw_scans(scans: Sequence[ScanMessage], stamps: list[str]) -> RawScans:
         (low_from, high_from),
         angle_max=np.array([scan.angle_max for scan in scans], dtype=np.float64),
         beams=np.array([len(scan.ranges) for scan in scans], dtype=np.int64),
-        sweep_times=SweepTimes(
+        recorded_sweep=RecordedSweep(
             np.array([scan.time_increment for scan in scans], dtype=np.float64),
             np.array([scan.scan_time for scan in scans], dtype=np.float64),
         ),

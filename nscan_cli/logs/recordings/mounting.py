@@ -8,7 +8,7 @@ from collections.abc import Iterator, Mapping, Sequence
 import numpy as np
 
 from nscan_cli.errors import InputDataError
-from nscan_cli.logs.assemble import Findings
+from nscan_cli.logs.assemble import ReaderFindings
 from nscan_cli.logs.reading_options import ReadingOptions
 from nscan_cli.logs.recordings.decoded_messages import ScanMessage
 from nscan_cli.logs.recordings.frame_ids import BASE_FRAMES, is_world_frame, tf_prefix, without_prefix
@@ -33,7 +33,7 @@ def laser_mounting(
     robot: str,
     tree: TransformTree,
     options: ReadingOptions,
-    findings: Findings,
+    findings: ReaderFindings,
     file: str,
 ) -> tuple[Array, bool, str]:
     """The laser's pose on the robot (3,), whether it is upside down, and the robot's frame if it is known.

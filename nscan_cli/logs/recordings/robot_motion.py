@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from nscan_cli.logs.assemble import Findings
+from nscan_cli.logs.assemble import ReaderFindings
 from nscan_cli.logs.device_choice import Device, OpenChoiceError
 from nscan_cli.logs.odometry_interpolation import interpolated_poses
 from nscan_cli.logs.reading_options import ReadingOptions
@@ -57,7 +57,7 @@ def robot_odometry(
     tree: TransformTree,
     clock: ScanClock,
     options: ReadingOptions,
-    findings: Findings,
+    findings: ReaderFindings,
     file: str,
 ) -> RobotMotion:
     """The robot's motion from the topic that --odom-topic names, from the only one, or from tf.
@@ -131,7 +131,7 @@ def _transforms_from_odom(tree: TransformTree) -> dict[str, list[LoggedTransform
 
 
 def _poses_at_scans(
-    rows: Sequence[LoggedTransform], source: str, clock: ScanClock, offset: float, findings: Findings
+    rows: Sequence[LoggedTransform], source: str, clock: ScanClock, offset: float, findings: ReaderFindings
 ) -> tuple[Array | None, RobotPath | None]:
     """Interpolated poses (S, 3) at the times of the scans, and the path; None without a valid pose.
 

@@ -11,7 +11,7 @@ from nscan_cli.errors import InputDataError, WrongUsageError
 from nscan_cli.files.provenance import Source
 from nscan_cli.files.text import counted, shortened_list
 from nscan_cli.logs import scan_order as order
-from nscan_cli.logs.assemble import Findings, RecordedMotion, laser_log
+from nscan_cli.logs.assemble import ReaderFindings, RecordedMotion, laser_log
 from nscan_cli.logs.device_choice import Device
 from nscan_cli.logs.laser_defaults import CARMEN_MAX_RANGE, beam_angles, mount_from_poses
 from nscan_cli.logs.laser_log import LaserLog
@@ -54,7 +54,7 @@ def read(data: bytes, file: str, source: Source, options: ReadingOptions) -> Las
     """
     skips = Skips(file, options.strict)
     lines = carmen_records.lines_by_tag(data, skips)
-    findings = Findings(skips, {name: len(found) for name, found in lines.items()})
+    findings = ReaderFindings(skips, {name: len(found) for name, found in lines.items()})
     warnings, used = findings.warnings, findings.used
     options.refuse_topics(file, "a CARMEN log", "--laser")
     findings.lasers = tuple(Device(tag, tag, len(lines[tag])) for tag in LASERS if tag in lines)
@@ -248,7 +248,7 @@ def _odometry(
     by_logger: bool,
     lines: TaggedLines,
     options: ReadingOptions,
-    findings: Findings,
+    findings: ReaderFindings,
 ) -> Array | None:
     """Poses of the robot (S, 3) in order of time: the scans' own, else those of the ODOM records."""
     if not options.odometry:

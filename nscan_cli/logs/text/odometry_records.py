@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from nscan_cli.logs.assemble import Findings
+from nscan_cli.logs.assemble import ReaderFindings
 from nscan_cli.logs.odometry_interpolation import interpolated_poses
 from nscan_cli.logs.reading_options import ReadingOptions
 from nscan_cli.logs.scan_order import ScanOrder
@@ -10,7 +10,7 @@ from nscan_cli.poses import Array
 
 
 def odometry_of_scans(
-    scans: ScanOrder, poses: Array, options: ReadingOptions, findings: Findings
+    scans: ScanOrder, poses: Array, options: ReadingOptions, findings: ReaderFindings
 ) -> Array | None:
     """Poses (S, 3) at the times of the scans from those (S, 3) in the records of the scans, or None.
 
@@ -29,7 +29,7 @@ def odometry_of_records(
     name: str,
     origin: str,
     options: ReadingOptions,
-    findings: Findings,
+    findings: ReaderFindings,
 ) -> Array | None:
     """Poses (S, 3) at the times of the scans from poses (P, 3) of records in order of time, or None.
 

@@ -9,7 +9,7 @@ import numpy as np
 from nscan_cli.errors import InputDataError
 from nscan_cli.files.provenance import Source
 from nscan_cli.logs import scan_order as order
-from nscan_cli.logs.assemble import Findings, RecordedMotion, laser_log
+from nscan_cli.logs.assemble import ReaderFindings, RecordedMotion, laser_log
 from nscan_cli.logs.device_choice import Device, choose_device
 from nscan_cli.logs.formats import FIRST_LINE
 from nscan_cli.logs.laser_log import LaserLog
@@ -57,7 +57,7 @@ def read(data: bytes, file: str, source: Source, options: ReadingOptions) -> Las
     assert version is not None
     skips = Skips(file, options.strict)
     lines = player_records.lines_by_device(data, version, skips)
-    findings = Findings(
+    findings = ReaderFindings(
         skips, {f"{device} {kind}".strip(): len(found) for (device, kind), found in lines.items()}
     )
     lasers = _devices(LASER_INTERFACES, lines)
@@ -107,7 +107,7 @@ def _devices(interfaces: tuple[str, ...], lines: DeviceLines) -> list[Device]:
     return [Device(device, device.split(":")[-2], count) for device, count in counts.items()]
 
 
-def _player_mount(laser: str, lines: DeviceLines, options: ReadingOptions, findings: Findings) -> Array:
+def _player_mount(laser: str, lines: DeviceLines, options: ReadingOptions, findings: ReaderFindings) -> Array:
     """Pose (3,) of the laser on the robot: --mount, else the log's geometry record (4:1), else zero."""
     if options.mount is not None:
         findings.used["mounting"] = "--mount"
@@ -128,7 +128,7 @@ def _odometry(
     lines: DeviceLines,
     times: order.ScanOrder,
     options: ReadingOptions,
-    findings: Findings,
+    findings: ReaderFindings,
     file: str,
 ) -> Array | None:
     """Poses of the robot (S, 3) in order of time: those in the scans, else those of a position device."""

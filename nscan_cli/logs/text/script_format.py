@@ -16,7 +16,7 @@ from nscan_cli.errors import InputDataError
 from nscan_cli.files.limits import RECORD_KINDS
 from nscan_cli.files.provenance import Source
 from nscan_cli.logs import scan_order as order
-from nscan_cli.logs.assemble import Findings, RecordedMotion, laser_log
+from nscan_cli.logs.assemble import ReaderFindings, RecordedMotion, laser_log
 from nscan_cli.logs.device_choice import Device, choose_device
 from nscan_cli.logs.formats import FIRST_LINE
 from nscan_cli.logs.laser_defaults import CARMEN_MAX_RANGE
@@ -51,7 +51,7 @@ def read(data: bytes, file: str, source: Source, options: ReadingOptions) -> Las
     options.refuse_topics(file, "a .script log", "--laser")
     skips = Skips(file, options.strict)
     records = _records_by_tag(data, skips)
-    findings = Findings(skips, {tag: len(found) for tag, found in records.items()})
+    findings = ReaderFindings(skips, {tag: len(found) for tag, found in records.items()})
     findings.lasers = tuple(
         Device(tag, LASER_RANGE, len(found))
         for tag, found in records.items()
@@ -130,7 +130,7 @@ def _script_scans(laser_records: list[tuple[LineRecord, bytes]], skips: Skips) -
 
 
 def _odometry(
-    records: ScriptRecords, times: order.ScanOrder, options: ReadingOptions, findings: Findings
+    records: ScriptRecords, times: order.ScanOrder, options: ReadingOptions, findings: ReaderFindings
 ) -> Array | None:
     """Poses of the robot (S, 3) in order of time, those of the POS records, or None."""
     if not options.odometry:

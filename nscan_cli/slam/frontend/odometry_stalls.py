@@ -47,7 +47,7 @@ class OdometryStallOptions(NamedTuple):
     """Least correction of a pose that a notice names, m + rad. A larger value names fewer stalls."""
 
 
-class Steps(NamedTuple):
+class OdometrySteps(NamedTuple):
     """The steps of odometry from scan to scan, N of them."""
 
     sizes: Array
@@ -63,9 +63,9 @@ class Steps(NamedTuple):
         np.divide(self.sizes, self.periods, out=speeds, where=self.periods > 0.0)
         return speeds
 
-    def reversed(self) -> Steps:
+    def reversed(self) -> OdometrySteps:
         """The steps backwards in time."""
-        return Steps(self.sizes[::-1], self.periods[::-1], self.stands[::-1])
+        return OdometrySteps(self.sizes[::-1], self.periods[::-1], self.stands[::-1])
 
 
 def without_stalls(odometry: Array, times: Array, options: OdometryStallOptions) -> tuple[Array, Indices]:
@@ -89,9 +89,9 @@ def without_stalls(odometry: Array, times: Array, options: OdometryStallOptions)
     return evened, np.unique(ends).astype(np.int64)
 
 
-def _steps(odometry: Array, times: Array) -> Steps:
+def _steps(odometry: Array, times: Array) -> OdometrySteps:
     sizes = _sizes(relative(odometry[1:], odometry[:-1]))
-    return Steps(sizes, np.diff(times), (odometry[1:] == odometry[:-1]).all(axis=1))
+    return OdometrySteps(sizes, np.diff(times), (odometry[1:] == odometry[:-1]).all(axis=1))
 
 
 def _sizes(motions: Array) -> Array:
@@ -100,13 +100,15 @@ def _sizes(motions: Array) -> Array:
     return found
 
 
-def _stalls(steps: Steps, min_acceleration: float, options: OdometryStallOptions) -> list[tuple[int, int]]:
+def _stalls(
+    steps: OdometrySteps, min_acceleration: float, options: OdometryStallOptions
+) -> list[tuple[int, int]]:
     """The rows between which odometry stands, and makes up for it in the last step.
 
     Its speed rises by at least `min_acceleration` there, (m + rad)/s².
     """
     speeds, found = steps.speeds(), []
-    # Steps first to end − 1 stand; the step at `end` makes up for them.
+    # OdometrySteps first to end − 1 stand; the step at `end` makes up for them.
     for first, end in mask_runs(steps.stands):
         if end - first < options.min_steps or first == 0 or end + 1 >= len(steps.sizes):
             continue
@@ -126,7 +128,7 @@ def _stalls(steps: Steps, min_acceleration: float, options: OdometryStallOptions
     return found
 
 
-def _uneven_steps(steps: Steps, options: OdometryStallOptions) -> list[tuple[int, int]]:
+def _uneven_steps(steps: OdometrySteps, options: OdometryStallOptions) -> list[tuple[int, int]]:
     """The rows between which some steps are too short and others too long.
 
     The fewest steps count first, then the most uneven: so the direction of time does not matter.
@@ -144,7 +146,7 @@ def _uneven_steps(steps: Steps, options: OdometryStallOptions) -> list[tuple[int
     return found
 
 
-def _spreads(steps: Steps, count: int, options: OdometryStallOptions) -> Array:
+def _spreads(steps: OdometrySteps, count: int, options: OdometryStallOptions) -> Array:
     """The spread of `count` successive steps about steady motion, m + rad.
 
     The first value is that of the steps from the second on, the next that of those from the third on, and so
