@@ -10,7 +10,8 @@ from nscan_cli.calibration.robot_calibration import Calibration
 from nscan_cli.logs.reading_options import ReadingOptions
 
 DECIMALS = 4
-"""Of lengths, angles, times and relative scales that are passed on: a tenth of what a drive tells."""
+"""Decimals of the lengths, angles, times and relative scales that are passed on: ten times finer than what a
+drive tells."""
 
 
 def calibrated_reading(

@@ -24,7 +24,7 @@ class Companion:
     share: float
     """Share of the checked scans in which it is on the robot's path."""
     sectors: list[Bearings]
-    """In which it is seen, in the laser's frame, rad."""
+    """Sectors in which it is seen, in the laser's frame, rad."""
 
     @property
     def seen(self) -> str:
@@ -35,7 +35,7 @@ class Companion:
         )
 
     def mask(self, others: tuple[Bearings, ...]) -> tuple[Bearings, ...]:
-        """Its sectors and others, as they are read without."""
+        """The sectors to leave out: `others`, which are already, and its own."""
         return (*others, *self.sectors)
 
 

@@ -26,13 +26,13 @@ class MeasuredSteps:
     laser: Array
     """(n, 3) pose of the laser at the end, in the laser's frame at the beginning, m and rad."""
     covariances: Array
-    """(n, 3, 3) of these poses."""
+    """(n, 3, 3) covariances of these poses."""
 
     def __len__(self) -> int:
         return len(self.first)
 
     def odometry(self, poses: Array) -> Array:
-        """(n, 3) the same steps of the robot by odometry, of which `poses` (S, 3) are those of all scans."""
+        """(n, 3) these steps of the robot by odometry, from the `poses` (S, 3) of all scans."""
         return relative(poses[self.last], poses[self.first])
 
     def with_others(self, others: MeasuredSteps) -> MeasuredSteps:
@@ -58,7 +58,7 @@ def measure_steps(
     options: StepOptions,
     corrected: Callable[[int], Array | None] | None = None,
 ) -> MeasuredSteps:
-    """Of the steps from the first rows (n,) to the last (n,), those that the scans measure beyond doubt.
+    """Measure the steps from the first rows (n,) to the last (n,); those in doubt are left out.
 
     Every step is matched without odometry, so that the result is independent of it. `corrected` gives the
     points (m, 2) of a row in the laser's frame if the laser turns; None: as if it saw all beams at once.
@@ -101,6 +101,6 @@ def _measured(
 
 
 def _thinned_points(log: LaserLog, row: int, options: StepOptions) -> Array | None:
-    """The points (m, 2) of a scan, of so many beams as are matched; None for too few."""
+    """The points (m, 2) of a scan of which only some beams are matched; None for too few."""
     scan = thinned_scan(log, row, options)
     return None if scan is None else scan.points

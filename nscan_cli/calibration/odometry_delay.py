@@ -83,7 +83,7 @@ def _turning(motion: ScanMotion, options: SweepCheckOptions) -> list[int]:
 
 
 def with_delay(log: LaserLog, delay: float) -> LaserLog:
-    """The log with so many seconds added to the stamps of its odometry."""
+    """The log with `delay` (s) added to the stamps of its odometry."""
     path, odometry = log.odometry_path, log.odometry
     if path is None or odometry is None:
         return log

@@ -13,15 +13,15 @@ SWEEPS, FIRST_SWEEPS = 30, 10
 SETTLED = 1e-6
 """Sweeps end where they change the solution by a smaller share."""
 TO_SIGMA = 1.4826
-"""The standard deviation of a Gaussian in medians of its absolute value."""
+"""Standard deviation of a Gaussian as a multiple of the median of its absolute value."""
 CAUCHY = 2.385
-"""Residuals of so many standard deviations have half the weight: 95 % efficiency where all are Gaussian."""
+"""Residuals of this number of standard deviations have half the weight: 95 % efficiency for Gaussian ones."""
 MOST_CONDITION = 1e12
 """A system with a larger condition number leaves a value open."""
 MOST_LEVERAGE = 0.99
-"""Of the share of a residual that its own equation takes away: one alone may take it all."""
+"""Factor of the leverage of each equation: with a leverage of 1 its residual would be divided by 0."""
 LEAST_SIGMA = 1e-9
-"""Residuals are at least so large, to divide by."""
+"""Least standard deviation of the residuals, to divide by."""
 
 
 class RobustFit(NamedTuple):
@@ -30,7 +30,7 @@ class RobustFit(NamedTuple):
     values: Array
     """(m,) the unknowns."""
     covariance: Array
-    """(m, m) of the unknowns; inf where the system leaves one open."""
+    """(m, m) covariance of the unknowns; inf where the system leaves one open."""
     residuals: Array
     """(n,) length of each equation's residual."""
 
@@ -69,18 +69,19 @@ def robust_fit(coefficients: Array, measured: Array, groups: Indices | None = No
 
 
 def _median(values: Array) -> float:
-    """That of some values (n,), as numpy has it in more time."""
+    """The median of values (n,), faster than by np.median."""
     ordered = np.sort(values)
     return 0.5 * float(ordered[(len(values) - 1) // 2] + ordered[len(values) // 2])
 
 
 def _covariance(coefficients: Array, off: Array, scale: float, groups: Indices | None) -> Array:
-    """(m, m) of the values, from the residuals off (n, d) themselves: they may be larger along one row of an
-    equation than along another. `scale` (in their unit) is that of the loss; inf where a value is open.
+    """The covariance (m, m) of the unknowns from the residuals `off` (n, d); inf where a value is open.
 
-    The sandwich of the M-estimator: P. Huber, "Robust Statistics", 1981, 6.3 and 7.6. An equation that moves
-    the fit has a smaller residual by it, which is made up for: J. MacKinnon, H. White, "Some
-    Heteroskedasticity-Consistent Covariance Matrix Estimators", 1985 (their HC3).
+    `scale`, in the unit of the residuals, is that of the loss. Residuals may be larger along one row of an
+    equation than along another, so they are used themselves, in the sandwich of the M-estimator: P. Huber,
+    "Robust Statistics", 1981, 6.3 and 7.6. An equation that moves the fit makes its own residual smaller. Its
+    leverage corrects this: J. MacKinnon, H. White, "Some Heteroskedasticity-Consistent Covariance Matrix
+    Estimators", 1985 (their HC3).
     """
     n, d, m = coefficients.shape
     weights = 1.0 / (1.0 + (off**2).sum(axis=1) / scale**2)

@@ -22,7 +22,7 @@ class ScanMotion:
     """The scans of a log as its laser sees them, without odometry, and what was measured of their motion."""
 
     log: LaserLog
-    """Its scans are taken as seen at once, from the laser."""
+    """The log, whose scans are taken as seen at once, from the laser."""
     steps: StepOptions
     longest_step: float
     """Longest time from a scan to the next, s, over which motion is measured."""
@@ -33,7 +33,7 @@ class ScanMotion:
 
     @staticmethod
     def of_log(log: LaserLog, steps: StepOptions, options: SweepCheckOptions) -> ScanMotion:
-        """Of a log of a robot, of which nothing was measured yet."""
+        """The scans of a robot's log, before any motion is measured."""
         seen = replace(log, mount=np.zeros(3), path=None)
         return ScanMotion(seen, steps, options.longest_step, options.scan_turns)
 
@@ -54,7 +54,8 @@ class ScanMotion:
         return np.unique(np.linspace(1, max(len(self.log) - 2, 1), count).astype(np.int64))
 
     def turning_rows(self, turn: float, options: SweepCheckOptions) -> Indices:
-        """Rows (n,) of scans in turns that count if the laser turns for so long (s), the fastest first."""
+        """Rows (n,) of scans in which the robot turns enough during a `turn` of the laser (s), the fastest
+        first."""
         rows = self.spread_rows(options)
         rates = np.abs(self.rates(rows))
         order = np.argsort(-rates, kind="stable")
@@ -104,7 +105,7 @@ class ScanMotion:
         return end.pose / seconds
 
     def corrected(self, row: int, turn: float) -> Array | None:
-        """Points (m, 2) of a scan from where the laser is at its middle beam, if its turn takes so long (s).
+        """Points (m, 2) of a scan from where the laser is at its middle beam, if it turns in `turn` (s).
 
         None in doubt.
         """
@@ -133,7 +134,7 @@ class ScanMotion:
         return float(sum(end.pose[2] for end in ends)) if all(end.converged for end in ends) else None
 
     def energies(self, one: int, other: int, turns: Sequence[float]) -> Array | None:
-        """(T,) energy of two scans, per point, if a turn of the laser takes so long (T,); None in doubt."""
+        """(T,) energy of two scans, per point, for each assumed time of a turn (T,), s; None in doubt."""
         before, after = self.twist(one), self.twist(other)
         if before is None or after is None:
             return None

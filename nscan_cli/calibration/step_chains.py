@@ -13,7 +13,8 @@ from nscan_cli.poses import Indices
 
 
 def chains(steps: MeasuredSteps, longest: int) -> Indices:
-    """(c,) where chains of up to `longest` steps begin, each of which begins where the one before ends."""
+    """The first steps (c,) of chains of up to `longest` steps, each of which begins where the one before
+    ends."""
     follows = np.append(False, steps.first[1:] == steps.last[:-1])
     begins: list[int] = []
     for at, is_next in enumerate(follows.tolist()):

@@ -22,11 +22,11 @@ class CalibratedSweep:
     """The turn of a laser by the scans of a log."""
 
     log: LaserLog
-    """With the times of beams of that turn."""
+    """The log with the times of beams of that turn."""
     estimate: Estimate
-    """Its time, s; negative where the readings are in the reverse order of time."""
+    """The time of a turn, s; negative where the readings are in the reverse order of time."""
     pairs: int
-    """Pairs of scans that it rests on."""
+    """Number of pairs of scans that the estimate rests on."""
     seconds: float
     """The time that is used: the file's unless the scans contradict it."""
     options: CalibrationOptions

@@ -61,7 +61,8 @@ def _measured_turn(log: LaserLog, whole: float, options: FileCheckOptions) -> fl
 def _without_delay(
     log: LaserLog, reading: ReadingOptions, delay: float, options: FileCheckOptions
 ) -> tuple[LaserLog, ReadingOptions, str]:
-    """The log whose odometry, stamped so much (s) too early, is where the scans have it; and what is said.
+    """The log whose odometry, stamped too early by `delay` (s), is put right; how it is read, and what is
+    said.
 
     Scans that are stamped at their middle or last beam look like that.
     """

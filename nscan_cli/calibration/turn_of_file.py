@@ -21,7 +21,7 @@ def sweep_turns(log: LaserLog) -> Array:
 
 
 def with_turns(log: LaserLog, turns: Array, stamp: str) -> LaserLog:
-    """The log of a laser whose turns take so long (S,), s, with its scans stamped at that beam."""
+    """The log of a laser whose turns take `turns` (S,), s, with its scans stamped at the beam `stamp`."""
     return replace(log, beam_times=beam_times(turns, log.angle_increment, log.beam_counts(), stamp))
 
 

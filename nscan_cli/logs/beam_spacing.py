@@ -70,8 +70,8 @@ class BeamSpacingOptions:
     max_scans: int = 200
     """Number of scans that are tested. A larger value takes longer."""
     first_of: int = 4
-    """One in so many of these is tested first; the others are not where walls agree with the log. A larger
-    value takes less time."""
+    """One in this number of these is tested first; the others are not where walls agree with the log. A
+    larger value takes less time."""
 
 
 DEFAULT_BEAM_SPACING = BeamSpacingOptions()
@@ -144,7 +144,7 @@ def _sample(
     rows: NDArray[np.int64],
     options: BeamSpacingOptions,
 ) -> _Scans:
-    """Those of some scans whose readings have changed."""
+    """The scans in some rows whose readings have changed since the one before."""
     ranges = raw.ranges[rows].astype(np.float64)
     with np.errstate(invalid="ignore"):
         is_usable = (ranges > np.maximum(0.0, limits.low[rows, None])) & (ranges < limits.high[rows, None])

@@ -16,12 +16,12 @@ class BeamTimes(NamedTuple):
     """The times of the beams of S scans, from the stamp of each scan."""
 
     first: Array
-    """(S,) of the first beam, s."""
+    """(S,) time of the first beam, s."""
     step: Array
-    """(S,) from beam to beam, s; negative where the readings are in the reverse order of time."""
+    """(S,) time from beam to beam, s; negative where the readings are in the reverse order of time."""
 
     def of(self, rows: slice | Indices) -> BeamTimes:
-        """Those of some scans."""
+        """The times of the beams of some scans."""
         return BeamTimes(self.first[rows], self.step[rows])
 
 

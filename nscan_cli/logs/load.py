@@ -163,7 +163,7 @@ def content_of(stored: bytes, path: str, salvage: bool) -> tuple[bytes, list[str
 
 
 def _content(stored: FileBytes, path: str, salvage: bool) -> tuple[FileBytes, list[str]]:
-    """As content_of; a mapped file is not compressed."""
+    """The decompressed bytes and warnings, as of content_of; a mapped file is not compressed."""
     return content_of(stored, path, salvage) if isinstance(stored, bytes) else (stored, [])
 
 

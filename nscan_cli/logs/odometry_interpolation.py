@@ -15,7 +15,7 @@ from nscan_cli.poses import Array, relative, wrap
 
 @dataclass(frozen=True)
 class OdometryGapOptions:
-    """Where there is no odometry between two poses, because too much happens between them."""
+    """When two poses of the odometry have a gap between them, over which nothing is interpolated."""
 
     periods: float = 10.0
     """A gap is longer than this many median periods of the poses. A larger value interpolates over more."""

@@ -74,7 +74,7 @@ class RobotPartsOptions:
 
 
 DEFAULT_ROBOT_PARTS = RobotPartsOptions()
-"""Those of every log; the provenance of a graph has them."""
+"""The options of every log; the provenance of a graph has them."""
 
 
 class Sector(NamedTuple):
@@ -121,7 +121,7 @@ def robot_parts(table: ScanTable, options: RobotPartsOptions) -> list[Sector]:
 
 
 def _evenly(size: int, most: int) -> NDArray[np.int64]:
-    """At most so many places, spread over `size`."""
+    """At most `most` places, spread evenly over `size`."""
     return np.unique(np.linspace(0, size - 1, most).astype(np.int64))
 
 

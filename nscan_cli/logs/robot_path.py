@@ -155,7 +155,7 @@ def poses_at(path: RobotPath, times: Array) -> Array:
 
 
 def _velocities(steps: Array, periods: Array) -> Array:
-    """(n, 3) steady velocities that lead over steps (n, 3) in so many seconds (n,)."""
+    """(n, 3) steady velocities, m/s and rad/s, that lead over steps (n, 3) in the periods (n,), s."""
     half = 0.5 * steps[:, 2]
     # An arc turns its chord by half of its turn, and is longer by that angle over its sine.
     turning = np.abs(half) > STRAIGHT

@@ -32,7 +32,7 @@ def ranges_at_once(log: LaserLog, rows: Indices) -> NDArray[np.float32]:
 
 
 def _ranges(log: LaserLog, row: int) -> NDArray[np.float32]:
-    """(B,) those of one scan."""
+    """The ranges (B,) of one scan, as of ranges_at_once."""
     measured = log.ranges[row]
     found = np.where(np.isinf(measured), np.float32(np.inf), np.float32(np.nan))
     points = transform(inverse(log.mount), log.batch_points(slice(row, row + 1), math.inf)[0])

@@ -33,7 +33,7 @@ class SweepOptions:
 
 
 DEFAULT_SWEEP = SweepOptions()
-"""Those of every log; the provenance of a graph has them."""
+"""The options of every log; the provenance of a graph has them."""
 
 
 @dataclass(frozen=True)
@@ -46,7 +46,7 @@ class RecordedSweep:
     """(S,) time from scan to scan, s; 0 or nan where they do not say."""
 
     def of(self, rows: Indices) -> RecordedSweep:
-        """Those of some scans."""
+        """The times that the messages of some scans say."""
         return RecordedSweep(self.increment[rows], self.scan_time[rows])
 
 
@@ -55,9 +55,9 @@ class Sweep:
     """How long the turns of S scans take, in order of time."""
 
     turns: Array
-    """(S,) s for 360°, negative where the readings are in the reverse order of time; 0: seen at once."""
+    """(S,) time of 360°, s; negative where the readings are in the reverse order of time; 0: seen at once."""
     origin: str
-    """Where that is from, for `info`; empty if the log has nothing about it."""
+    """The origin of the times, for `info`; empty if the log has nothing about them."""
     said: tuple[str, ...] = ()
     """A sentence for the user if the file contradicts itself."""
 

@@ -87,7 +87,7 @@ def in_one_unit(
 
 
 def _are_most(is_so: Mask, is_told: Mask, options: UnitStretchOptions) -> Mask:
-    """(S,) of which scans with enough readings most are so; both (S, B)."""
+    """(S,) whether most told readings of a scan are so, and enough are told."""
     count = np.count_nonzero(is_told, axis=1)
     found: Mask = 2 * np.count_nonzero(is_so & is_told, axis=1) > np.maximum(count, options.min_readings)
     return found

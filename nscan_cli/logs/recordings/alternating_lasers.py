@@ -20,8 +20,8 @@ class TwoLaserOptions:
     sample: int = 128
     """Number of scans that are compared with the next two. A larger value takes longer."""
     first_of: int = 8
-    """One in so many of these is compared first; the others are not if there is clearly one laser. A larger
-    value takes less time."""
+    """One in this number of these is compared first; the others are not if there is clearly one laser. A
+    larger value takes less time."""
     one_laser_share: float = 0.5
     """There is clearly one laser if a smaller share of these resembles the second next. A larger value takes
     less time."""

@@ -19,7 +19,7 @@ class Channel:
 
     topic: str
     type: str
-    """As ROS 2 writes it, such as sensor_msgs/msg/LaserScan."""
+    """The type as ROS 2 writes it, such as sensor_msgs/msg/LaserScan."""
     encoding: str
     """The encoding of the messages: ros1, cdr, protobuf or json."""
     schema_encoding: str
@@ -42,7 +42,7 @@ class Recording:
 
     form: str
     messages: dict[str, list[Message]] = field(default_factory=dict)
-    """By topic, in the order of the file."""
+    """The messages by topic, in the order of the file."""
     counts: dict[Channel, int] = field(default_factory=dict)
     """Also of the channels whose messages are not kept."""
     warnings: list[str] = field(default_factory=list)

@@ -28,7 +28,7 @@ UNREADABLE_DEFINITION = (TypesysError, KeyError, ValueError, IndexError, Attribu
                          AssertionError, RecursionError)  # fmt: skip
 """Errors that a damaged definition can raise."""
 TF_DEFINITION = "geometry_msgs/TransformStamped[] transforms"
-"""Of all ROS types in TRANSFORM_TYPES; rosbags has only some of them."""
+"""The definition of all ROS types in TRANSFORM_TYPES; rosbags has only some of them."""
 IDL_ARITHMETIC = re.compile(r"\bconst\b|<<|\*")
 """Expressions in IDL can make numbers of any size; the definitions that are read have none."""
 IDL_COMMENT = re.compile(r"//[^\n]*|/\*.*?\*/", re.DOTALL)
@@ -193,7 +193,7 @@ ROS_CONVERTERS: Mapping[str, Callable[[Any], list[StampedTransform]]] = {
     "PoseWithCovarianceStamped": _ros_pose,
     "Path": _ros_path,
 }
-"""By the name of the type; types of transforms are not listed."""
+"""Conversions by the name of the type; _ros_transforms converts the types that are not listed."""
 
 
 def _stamped_transform(header: Any, child: str, translation: Any, rotation: Any) -> StampedTransform:

@@ -15,7 +15,7 @@ from nscan_cli.logs.compression import SUFFIXES
 RECORDING_SUFFIXES = (".mcap", ".db3", ".bag")
 """Endings of the names of recordings, before those of compression and of unfinished bags."""
 UNFINISHED_SUFFIX = ".active"
-"""Of a bag that is being recorded, or whose recorder was killed."""
+"""Suffix of a bag that is being recorded, or whose recorder was killed."""
 NUMBERED_STEM = re.compile(r"(?P<of>.*?)_?(?P<number>\d{1,9})")
 """Recorders end the names of parts with _0, _1, …."""
 DATE = re.compile(r"_?\d{4}(-\d\d){5}")

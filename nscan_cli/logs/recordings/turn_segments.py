@@ -25,9 +25,9 @@ class TurnSegmentOptions:
     min_share: float = 0.5
     """Least share of messages that go on where the one before ends. A larger value joins fewer recordings."""
     min_gap_ratio: float = 2.0
-    """A turn begins after the longest pause if that is so many times the median one. Else it begins at the
-    end of the field of view, or with the first message if there is no end. A larger value needs longer
-    pauses."""
+    """A turn begins after the longest pause if that is at least this multiple of the median one. Else it
+    begins at the end of the field of view, or with the first message if there is no end. A larger value needs
+    longer pauses."""
 
 
 DEFAULT_TURN_SEGMENTS = TurnSegmentOptions()
@@ -75,7 +75,7 @@ def joined_turns(
 
 
 def _places(scans: Sequence[ScanMessage], options: TurnSegmentOptions) -> tuple[Indices, int]:
-    """Where in a turn, in beams from the first message's first, each message begins; and beams in a turn.
+    """The places in a turn at which the messages begin, in beams from the first one; and the beams of a turn.
 
     Empty unless messages mostly go on where the one before ends.
     """

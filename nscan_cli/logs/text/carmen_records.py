@@ -49,7 +49,7 @@ class CarmenScans:
     """The scans of one laser, in file order: S scans of at most B beams."""
 
     ranges: NDArray[np.float32]
-    """(S, B) as written; nan beyond a scan's own beams."""
+    """(S, B) readings as written, m; nan beyond a scan's own beams."""
     beams: NDArray[np.int64]
     """(S,) number of beams."""
     head: Array

@@ -40,7 +40,7 @@ class OptimisationOptions:
 
 @dataclass(frozen=True)
 class UnevenMotionOptions:
-    """Where the path of a robot is matched more finely, if its laser turns."""
+    """When and how the path of a robot is matched more finely, if its laser turns."""
 
     odometry_periods: float = 0.4
     """Odometry with poses at most so far apart, in the times from scan to scan, tells the motion within a

@@ -46,7 +46,7 @@ def without_others(
 
 
 def nearest_keyframes(poses: Array, first: int, end: int, most: int) -> Mask:
-    """At most so many of K poses (K, 3), those nearest to any of those from `first` to `end`."""
+    """(K,) the `most` of the poses (K, 3) that are nearest to any of those from `first` to `end`."""
     order = np.argsort(_distances(poses, first, end), kind="stable")
     chosen = np.zeros(len(poses), dtype=np.bool_)
     chosen[order[:most]] = True
@@ -55,7 +55,7 @@ def nearest_keyframes(poses: Array, first: int, end: int, most: int) -> Mask:
 
 @kernel
 def _distances(poses: Array, first: int, end: int) -> Array:
-    """(K,) squared distances (m²) to the nearest of those from `first` to `end`."""
+    """(K,) squared distances (m²) of poses (K, 3) from the nearest of those from `first` to `end`."""
     distances = np.full(len(poses), np.inf)
     for k in range(len(poses)):
         for other in range(first, end):

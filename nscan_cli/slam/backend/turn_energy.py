@@ -30,7 +30,7 @@ class TimedPoints(NamedTuple):
     """Points that a laser saw one after another."""
 
     points: Array
-    """(m, 2) as the robot saw them, each from where it was."""
+    """(m, 2) points in the robot's frame, each from where it was then."""
     times: Array
     """(m,) s; increasing."""
 
@@ -44,22 +44,22 @@ class TurnProblem(NamedTuple):
     points: Array
     """(m, 2) in order of time."""
     shares: Array
-    """(m,) of the part that has passed when they were seen."""
+    """(m,) share of the part that had passed when each point was seen."""
     ends: Indices
-    """(G + 1,) where the points of each group begin."""
+    """(G + 1,) group g has points[ends[g] : ends[g + 1]]."""
     groups: int
     """Groups in a part."""
     seconds: Array
-    """(K − 1,) what the parts take."""
+    """(K − 1,) durations of the parts, s."""
     start: Array
-    """(K, 3) where the knots were before."""
+    """(K, 3) poses of the knots before the match."""
     parts: int
-    """One knot in so many is a pose that was known before."""
+    """Number of parts, and so of knots, from one known pose to the next."""
     scale: float
     """Factor that makes a negative log likelihood of the energy of the points."""
     sigmas: Array
-    """(4,) those of the place (m) and heading (rad) of known poses, and the usual changes of speed (m/s) and
-    rate of turn (rad/s)."""
+    """(4,) standard deviations of the place (m) and heading (rad) of known poses, and the usual changes of
+    speed (m/s) and turn rate (rad/s)."""
 
 
 class TurnEnergy:

@@ -1,4 +1,4 @@
-"""Where the motion changes from one turn of the laser to the next: the path between the middles of two turns.
+"""The path between the middles of two turns of the laser, where the robot moves unevenly.
 
 The poses at the middles of the turns are known. If the robot begins to turn between two of them, steady
 motion from one to the next is off by some degrees there, and so is odometry with one pose a turn. The beams
@@ -90,7 +90,7 @@ def _is_uneven(times: Array, poses: Array, known: Mask, options: UnevenMotionOpt
 
 
 def _runs(marks: Mask, longest: int) -> Iterator[tuple[int, int]]:
-    """First and last row of each run of marks (S,), cut into parts of no more than so many rows."""
+    """First and last row of each run of marks (S,), cut into parts of at most `longest` rows."""
     for first, end in mask_runs(marks):
         for begin in range(first, end, longest):
             yield begin, min(begin + longest, end) - 1
@@ -126,12 +126,12 @@ class _Run:
 
     @property
     def times(self) -> Array:
-        """(n,) of the knots of the path that is found, s."""
+        """(n,) times of the knots of the path that is found, s."""
         return self._times[self._inside]
 
     @property
     def knots(self) -> Array:
-        """(n, 3)"""
+        """(n, 3) poses of the knots."""
         found = self._knots[self._inside].copy()
         found[:, 2] = wrap(found[:, 2])
         return found

@@ -22,7 +22,8 @@ from nscan_cli.slam.diagnostics.untold_way import UntoldWay, untold_ways
 from nscan_cli.slam.state import SlamState
 
 Between = list[tuple[int, int]]
-"""Of each two successive nodes of a relation: the first and the last step from keyframe to keyframe."""
+"""For each two successive nodes of a relation, the first and the last step from keyframe to keyframe between
+them."""
 
 
 def relations_as_told(state: SlamState) -> tuple[list[Pairwise], list[NScan]]:

@@ -46,9 +46,9 @@ class VisitViews(NamedTuple):
     """What K scans saw, and from where."""
 
     poses: Array
-    """(K, 3) of the laser."""
+    """(K, 3) poses of the laser."""
     paths: Array
-    """(K,) m"""
+    """(K,) lengths of path, m."""
     points: Array
     """(P, 2) one scan after another, each in the laser's frame."""
     ends: Indices

@@ -136,7 +136,7 @@ def _companions(state: SlamState) -> list[str]:
 
 
 def _view_mismatches(state: SlamState) -> list[str]:
-    """Where tracking may have held on to something that moves along."""
+    """The notice of scans for which tracking may have held on to something that moves along."""
     options, poses = state.options, np.concatenate(state.tracked)
     reach, view, judged = options.tracking.max_range, options.breaks.view, options.diagnostics.view
     worst = view_mismatches(state.log, poses, state.keyframes.list, reach, view, judged, state.threads)

@@ -23,9 +23,9 @@ class UntoldWay(NamedTuple):
     last: int
     """Row of its last scan."""
     path: float
-    """Its length as mapped, m."""
+    """Length of the stretch as mapped, m."""
     possible: float
-    """Its length at the speed that the robot usually drives at, m: it may only seem to stand."""
+    """Length of the stretch at the robot's usual speed, m: it may only seem to stand."""
 
     def is_long(self, options: UntoldWayOptions) -> bool:
         """Whether it is long as mapped."""

@@ -36,14 +36,14 @@ class ViewMismatch(NamedTuple):
 
 
 class KeyframeViews(NamedTuple):
-    """Where tracking has scans, and the keyframes with their points."""
+    """The poses of scans by tracking, and the keyframes with their points."""
 
     poses: Array
     """(S, 3)"""
     rows: Indices
-    """(K,) of the keyframes."""
+    """(K,) rows of the keyframes."""
     points: Array
-    """(P, 2) of one keyframe after another, each in the robot's frame."""
+    """(P, 2) points of one keyframe after another, each in the robot's frame."""
     ends: Indices
     """(K + 1,) keyframe k has points[ends[k] : ends[k + 1]]."""
 

@@ -23,7 +23,7 @@ class LocalMap(NamedTuple):
     """The scans that joined the map; scan s has points[ends[s] : ends[s + 1]]."""
 
     points: Array
-    """(P, 2) of one scan after another, each in its robot's frame."""
+    """(P, 2) points of one scan after another, each in its robot's frame."""
     ends: NDArray[np.int64]
     """(W + 1,)"""
     placed: Array

@@ -87,7 +87,8 @@ def frozen_scans(log: LaserLog, odometry: Array | None, options: OdometryCheckOp
 
 
 def repeated_scans(log: LaserLog, moves: NDArray[np.bool_]) -> NDArray[np.int64]:
-    """Of the rows to which the robot `moves` (S − 1,), those (H,) whose readings repeat those before."""
+    """The rows (H,) whose readings repeat those before, among the rows to which the robot `moves` (S −
+    1,)."""
     rows = np.flatnonzero(moves & _equal_readings(log.ranges[:, ::BEAM_STRIDE])) + 1
     repeats = [_equal_readings(log.ranges[row - 1 : row + 1])[0] for row in rows.tolist()]
     return rows[np.array(repeats, dtype=np.bool_) & np.isfinite(log.ranges[rows]).any(axis=1)]

@@ -45,7 +45,7 @@ class OdometryNoise(NamedTuple):
     """What is learned, which the kernels change."""
 
     pose: Array
-    """(3,) where the present piece of the path begins."""
+    """(3,) pose where the present piece of the path begins."""
     odometry: Array
     """(3,) the odometry there; nan before the first piece."""
     variances: Array

@@ -174,7 +174,7 @@ class LaserView(NamedTuple):
 
     @classmethod
     def all_around(cls, range_limit: float = np.inf) -> LaserView:
-        """That of a laser that sees all around, up to the range limit (m)."""
+        """The view of a laser that sees all around, up to the range limit (m)."""
         return cls(range_limit, np.zeros(3), np.inf)
 
 
@@ -220,7 +220,8 @@ class TrackingParameters(NamedTuple):
     def of(
         cls, options: TrackingOptions, has_odometry: bool = False, laser: LaserView | None = None
     ) -> TrackingParameters:
-        """Those for a log with or without odometry, whose laser has this view: all around by default."""
+        """The parameters for a log with or without odometry, whose laser has this view: all around by
+        default."""
         laser = laser or LaserView.all_around()
         rings = options.restart_angles
         angles = np.full((len(rings), max(map(len, rings), default=0)), np.nan)

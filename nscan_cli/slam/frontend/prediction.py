@@ -1,4 +1,5 @@
-"""Where the next scan is expected: the odometry as a prior of its match, or without it constant velocity."""
+"""The prediction of the next scan's pose: odometry as a prior of its match, or without it constant
+velocity."""
 
 from __future__ import annotations
 
@@ -45,7 +46,8 @@ def predict(
 def predict_by_trusted_odometry(
     track: TrackState, settings: TrackingParameters, odometry: Array, prior: Prior
 ) -> None:
-    """As `predict`, with the deviations of trusted odometry, narrowed by what was learned of it."""
+    """Write the prior as `predict` does, with the deviations of trusted odometry, narrowed by what was
+    learned."""
     predict(track, settings, odometry, settings.trusted_odometry, prior)
     if np.isfinite(odometry[0]) and np.isfinite(track.odometry[0]):
         step, options = np.empty(3), settings.odometry_noise

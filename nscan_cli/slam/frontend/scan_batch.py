@@ -25,7 +25,7 @@ class ScanBatch:
     first: int
     """Row of the first scan in the log."""
     points: Array
-    """(P, 2) of these and maybe other scans, one after another, each in its robot's frame."""
+    """(P, 2) points of these and maybe other scans, one after another, each in its robot's frame."""
     ends: Indices
     """(n + 1,) scan k has points[ends[k] : ends[k + 1]]."""
     odometry: Array | None

@@ -49,9 +49,9 @@ class SegmentTracker:
         self._has_odometry, self._laser = odometry, laser
         self.tracker = self._new_tracker()
         self._restarts = self._searches = 0
-        """Those of the trackers of earlier segments."""
+        """Restarts and searches of the trackers of earlier segments."""
         self._origin: Array | None = None
-        """Where the segment begins, unless it is the first."""
+        """(3,) pose where the segment begins, unless it is the first."""
         self._path = 0.0
         """Length of the path up to there, m."""
         self._last: TrackedBatch | None = None

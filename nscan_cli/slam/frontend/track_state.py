@@ -20,15 +20,15 @@ class TrackState(NamedTuple):
     """The state of tracking, which its kernels change."""
 
     poses: Array
-    """(h, 3) of the last scans, the newest last."""
+    """(h, 3) poses of the last scans, the newest last."""
     odometry: Array
-    """(3,) of the last matched scan; nan where there is none."""
+    """(3,) pose of the last matched scan by odometry; nan without odometry."""
     inserted: Array
     """(3,) pose of the last scan that joined the map."""
     inliers: Array
     """(1,) share of inliers of the last scan."""
     mean_square_deviation: Array
-    """(1,) of scans from their predictions without odometry, m²."""
+    """(1,) mean square deviation of scans from their predictions without odometry, m²."""
     odometry_noise: OdometryNoise
     counts: NDArray[np.int64]
     """(3,) KNOWN, RESTARTS and NEXT"""

@@ -17,11 +17,11 @@ class TrackedScan:
     """What tracking found of one scan."""
 
     pose: Array
-    """(3,) of the robot in the tracker's frame."""
+    """(3,) pose of the robot in the tracker's frame."""
     hessian: Array
-    """(3, 3) of scale · E there, without the prior."""
+    """(3, 3) Hessian of scale · E there, without the prior."""
     prior_covariance: Array
-    """(3, 3) of the step to here before the match, by odometry or by constant velocity."""
+    """(3, 3) covariance of the step to here before the match, by odometry or by constant velocity."""
     inliers: float
     """Share of the points that lie on a Gaussian of the map."""
     path: float
@@ -36,7 +36,7 @@ class TrackedScans(NamedTuple):
     """What tracking finds of n scans, as TrackedScan says, and the objective of each match."""
 
     values: Array
-    """(n,) the objective's."""
+    """(n,) values of the objective."""
     poses: Array
     """(n, 3)"""
     hessians: Array
@@ -66,16 +66,16 @@ class TrackedScans(NamedTuple):
 
     @classmethod
     def together(cls, parts: Iterable[TrackedScans]) -> TrackedScans:
-        """Several, one after another."""
+        """What was found of several batches, one after another."""
         return cls(*(np.concatenate(columns) for columns in zip(*parts, strict=True)))
 
     def part(self, first: int, end: int) -> TrackedScans:
-        """Those of the scans from the `first` on, before the `end`."""
+        """What was found of the scans from the `first` on, before the `end`."""
         columns: Iterable[Any] = (column[first:end] for column in self)
         return TrackedScans(*columns)
 
     def scan(self, k: int) -> TrackedScan:
-        """That of one scan, with arrays of its own."""
+        """What was found of one scan, with arrays of its own."""
         return TrackedScan(
             self.poses[k].copy(),
             self.hessians[k].copy(),

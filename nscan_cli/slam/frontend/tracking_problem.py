@@ -28,6 +28,6 @@ class TrackingProblem(NamedTuple):
     odometry: Array
     """(n, 3) poses, nan where there is none."""
     prior: Prior
-    """That of the scan that is matched now; each scan overwrites it."""
+    """The prior of the scan that is matched now; each scan overwrites it."""
     found: TrackedScans
     """What is found of the n scans, to be filled."""

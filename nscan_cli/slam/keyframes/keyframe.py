@@ -40,10 +40,10 @@ class Keyframe:
     """A scan of the graph."""
 
     row: int
-    """In the log; the id of its node."""
+    """Row in the log; the id of its node."""
     tracked: TrackedScan
     prior_covariance: Array
-    """(3, 3) of the way from the keyframe before, without any match."""
+    """(3, 3) covariance of the way from the keyframe before, without any match."""
     points: Array
     """(m, 2) in the robot's frame."""
     cells: int

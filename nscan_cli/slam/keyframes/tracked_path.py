@@ -26,7 +26,7 @@ class TrackedPath:
 
     @property
     def covariances(self) -> Array:
-        """(len, 3, 3) of the relations' measurements."""
+        """(len, 3, 3) covariances of the relations' measurements."""
         return self._covariances[: len(self.relations)]
 
     def extend(self, relation: Pairwise, length: float, slip: tuple[float, float] = (0.0, 0.0)) -> None:

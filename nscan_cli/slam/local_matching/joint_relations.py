@@ -30,7 +30,8 @@ class LocalMatch:
     pairwise: tuple[Pairwise, ...]
     """The relations of single matches."""
     nscan: NScan | None
-    """That of a joint match; None when too few scans match each other, or the match did not converge."""
+    """The relation of a joint match; None when too few scans match each other, or the match did not
+    converge."""
     loop: Loop | None
     """The verdict on what another visit saw; None where nothing was."""
     moved: float

@@ -46,8 +46,8 @@ class NScanOptions:
     tolerance: float = 1e-3
     """The last stage ends with a step below this, m and rad. A larger one ends it earlier."""
     thinning: int = 4
-    """In the last stage alone, every so many points are matched first. A larger number is faster and less
-    exact at first."""
+    """Where the last stage runs alone, one point in this number is matched first. A larger number is faster
+    and less exact at first."""
     min_overlap: float = 0.65
     """Least share of inliers, of one scan on the other, that ties two scans. A larger share drops more."""
     inlier_bound: float = 9.0

@@ -31,7 +31,7 @@ class _Single:
     """The match of the centre's points with the Gaussians of another keyframe."""
 
     pose: Array
-    """(3,) of the centre in the other's frame."""
+    """(3,) pose of the centre in the other's frame."""
     overlap: float
     """The greater of the shares of points of one that lie on Gaussians of the other.
 

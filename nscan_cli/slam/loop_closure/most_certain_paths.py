@@ -25,11 +25,11 @@ class Links(NamedTuple):
     """E links between keyframes: the covariance that a relation gives one of them when the other is held."""
 
     held: Indices
-    """(E,)"""
+    """(E,) keyframes that are held."""
     other: Indices
-    """(E,)"""
+    """(E,) keyframes at the other ends."""
     covariances: Array
-    """(E, 3, 3) of the other one, in the global frame."""
+    """(E, 3, 3) covariances of the other keyframes, in the global frame."""
 
 
 class LinkCache:

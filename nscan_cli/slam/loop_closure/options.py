@@ -73,8 +73,9 @@ class LoopClosureOptions:
     agreement_path: float = 30.0
     """Largest length of path between keyframes that agree, m. A larger one accepts more."""
     stretch_radius: float = 10.0
-    """Where single scans of both visits see too little of the same, those within so much more of the centre
-    are matched together, m. A larger radius sees more of both visits and takes longer."""
+    """If single scans of both visits see too little of the same, keyframes within this distance beyond
+    `radius` of the centre are matched together, m. A larger radius sees more of both visits and takes
+    longer."""
     stretch_scans: int = 20
     """Most keyframes of such a match, half of them of other visits. More take longer."""
     stretch_overlap: float = 0.55

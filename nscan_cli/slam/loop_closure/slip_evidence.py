@@ -22,14 +22,14 @@ class SlipEvidence:
         self._straight: deque[tuple[float, float]] = deque(maxlen=options.usual_steps)
         """Square differences a metre of path: of a coordinate, m²/m, and of the angle, rad²/m."""
         self._turns: deque[tuple[float, float]] = deque(maxlen=options.usual_steps)
-        """The same of steps that turn."""
+        """Square differences a metre of path, of steps that turn."""
 
     def variances(self, step: Array, odometry: Array, length: float) -> tuple[float, float]:
-        """By how much a step (3,) may have slipped: variances of a coordinate (m²) and of its angle (rad²).
+        """The variances of a coordinate (m²) and of the angle (rad²) by which a step (3,) may have slipped.
 
-        `odometry` is that step (3,) by odometry, nan where there is none, and `length` that of its path (m).
-        0 where both agree. If all places between both are as likely, the variance about one end is a third of
-        the square.
+        `odometry` is the step (3,) by odometry, nan where there is none; `length` is that of its path (m).
+        The variances are 0 where both agree. If all places between both are as likely, the variance about one
+        end is a third of the square.
         """
         options = self._options
         if not (np.isfinite(odometry).all() and length > 0.0):
