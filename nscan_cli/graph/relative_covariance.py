@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 
@@ -12,16 +13,28 @@ from nscan_cli.graph.model import Graph, Pairwise
 from nscan_cli.graph.optimise.whole_graph import Component, components
 from nscan_cli.poses import Array, relative, relative_jacobians
 
-ATTACHMENT_SIGMA = np.array([0.05, 0.05, 0.05])
-"""Standard deviations of a node in the frame of its keyframe, m, m and rad. They are assumed, since the graph
-has no measurement of it."""
+
+class AttachmentOptions(NamedTuple):
+    """How certain a scan that is no keyframe is in the frame of its keyframe, where the graph measures
+    nothing."""
+
+    sigma: float = 0.05
+    """Standard deviation of its position along each axis, m. A larger value makes relations of such scans
+    less certain."""
+    angle_sigma: float = 0.05
+    """Standard deviation of its heading, rad. A larger value makes relations of such scans less certain."""
+
+
+DEFAULT_ATTACHMENT = AttachmentOptions()
 
 
 class RelativePoses:
     """The relative poses of some nodes of a graph at its optimum, with their covariances."""
 
-    def __init__(self, graph: Graph, nodes: Sequence[int]) -> None:
-        self._graph = graph
+    def __init__(
+        self, graph: Graph, nodes: Sequence[int], attachment: AttachmentOptions = DEFAULT_ATTACHMENT
+    ) -> None:
+        self._graph, self._attachment = graph, attachment
         anchors = set(graph.anchors[list(nodes)].tolist())
         self._components: list[tuple[list[int], Array]] = []
         for part in components(graph):
@@ -32,8 +45,8 @@ class RelativePoses:
     def relation(self, a: int, b: int) -> Pairwise | None:
         """The pose of node b in the frame of node a, with its information from all relations of the graph.
 
-        A node that is no keyframe moves with its keyframe, within ATTACHMENT_SIGMA. None if no relations lead
-        from one node to the other, or if they leave a direction open.
+        A node that is no keyframe moves with its keyframe, as far as `attachment` says. None if no relations
+        lead from one node to the other, or if they leave a direction open.
         """
         graph, nodes = self._graph, (a, b)
         anchors = [int(graph.anchors[node]) for node in nodes]
@@ -47,7 +60,9 @@ class RelativePoses:
             at = 3 * chosen.index(anchor)
             jacobian[:, at : at + 3] += by @ _rigid_jacobian(graph.poses[node] - graph.poses[anchor])
         spread = sum(node != anchor for node, anchor in zip(nodes, anchors, strict=True))
-        relative_covariance = jacobian @ covariance @ jacobian.T + spread * np.diag(ATTACHMENT_SIGMA**2)
+        sigma, angle_sigma = self._attachment
+        own = spread * np.diag([sigma**2, sigma**2, angle_sigma**2])
+        relative_covariance = jacobian @ covariance @ jacobian.T + own
         measurement = relative(graph.poses[b], graph.poses[a])
         return Pairwise((a, b), measurement, np.linalg.inv(relative_covariance), "track")
 

@@ -7,11 +7,12 @@ import pytest
 
 from nscan_cli.graph.model import Graph, Pairwise
 from nscan_cli.graph.optimise.whole_graph import optimise_graph
-from nscan_cli.graph.relative_covariance import ATTACHMENT_SIGMA, RelativePoses
+from nscan_cli.graph.relative_covariance import DEFAULT_ATTACHMENT, RelativePoses
 from nscan_cli.poses import Array, compose, relative, relative_jacobians
 from tests.graph.simulated_relations import dense_matrix, each_pair_once, energy_of, graph_of, mixed_ring
 
 CHOSEN = (0, 3, 4, 11, 25)
+ATTACHED = np.array([DEFAULT_ATTACHMENT.sigma, DEFAULT_ATTACHMENT.sigma, DEFAULT_ATTACHMENT.angle_sigma])
 
 
 @pytest.fixture(scope="module")
@@ -77,12 +78,12 @@ def test_an_attached_node_moves_with_its_keyframe(ring):
         [(seen(ring.poses[4] + unit) - seen(ring.poses[4] - unit)) / (2 * step) for unit in step * np.eye(3)],
         axis=1,
     )
-    expected = jacobian @ covariance @ jacobian.T + np.diag(ATTACHMENT_SIGMA**2)
+    expected = jacobian @ covariance @ jacobian.T + np.diag(ATTACHED**2)
     np.testing.assert_allclose(np.linalg.inv(relation.information), expected, rtol=1e-5, atol=1e-9)
     with_its_own = RelativePoses(graph, (4, 30)).relation(4, 30)
     assert with_its_own is not None
     np.testing.assert_allclose(with_its_own.measurement, offset, atol=1e-12)
-    np.testing.assert_allclose(with_its_own.information, np.diag(ATTACHMENT_SIGMA**-2), rtol=1e-6)
+    np.testing.assert_allclose(with_its_own.information, np.diag(ATTACHED**-2), rtol=1e-6)
 
 
 def test_nodes_that_no_relations_connect_have_none(ring):
