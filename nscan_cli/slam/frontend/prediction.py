@@ -1,5 +1,4 @@
-"""The prediction of the next scan's pose: odometry as a prior of its match, or without it constant
-velocity."""
+"""The prediction of the next scan's pose: odometry as a prior of its match, else constant velocity."""
 
 from __future__ import annotations
 
