@@ -78,7 +78,9 @@ def find_companion(log: LaserLog, poses: Array, options: CompanionOptions) -> Co
         if len(found) < options.clear_share * looked_at:
             return None
     share = len(found) / max(looked_at, 1)
-    return None if share < options.min_share else Companion(share, _sectors(found, options))
+    if share < options.min_share or not _is_somewhere(found, options):
+        return None
+    return Companion(share, _sectors(found, options))
 
 
 def _seen(log: LaserLog, row: int, pose: Array, path: Array, options: CompanionOptions) -> Indices | None:
@@ -115,6 +117,13 @@ def _is_on_path(places: Array, path: Array, radius: float) -> Mask:
     squares = (places[:, :1] - path[:, 0]) ** 2 + (places[:, 1:] - path[:, 1]) ** 2
     near: Mask = np.any(squares < radius**2, axis=1)
     return near
+
+
+def _is_somewhere(seen: list[Indices], options: CompanionOptions) -> bool:
+    """Whether bins of bearings are mostly seen in the same quarter of them: dust and noise are everywhere."""
+    size = round(2 * np.pi / options.bin_width)
+    counts = np.sort(np.bincount(np.concatenate(seen), minlength=size))[::-1]
+    return bool(counts[: size // 4].sum() >= options.min_quarter_share * counts.sum())
 
 
 def _sectors(seen: list[Indices], options: CompanionOptions) -> list[Bearings]:

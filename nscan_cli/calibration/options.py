@@ -155,6 +155,9 @@ class CompanionOptions:
     min_sector_share: float = 0.07
     """Bearings are left out if it is seen there in more than this share of these scans. A larger value leaves
     out less."""
+    min_quarter_share: float = 0.75
+    """Least share of what is seen that the best quarter of all bearings has: it is 0.94 or more for a
+    cart or a follower, and 0.57 at most for dust and noise. A larger value finds less."""
 
 
 @dataclass(frozen=True)

@@ -41,6 +41,9 @@ class RangeUnitOptions:
     limits_apart: float = 1.0
     """Lower limits of lasers are less, and upper limits are more, m: it tells in which unit a limit is. A
     larger value leaves more limits as they are."""
+    max_neighbour_change: float = 0.3
+    """Largest median difference of neighbouring readings, as a share of the median reading: those of walls
+    differ by 0.05 at most, and random numbers by 0.5. A larger value takes more numbers for ranges."""
     sample: int = 1 << 17
     """Number of readings from which the unit is told. A larger value takes longer."""
 
@@ -108,13 +111,22 @@ def wrong_unit(
         for name, scale in UNITS
         if options.min_median <= median * scale <= options.max_median and upper_quartile * scale < highest
     )
-    if not fitting:
+    if not fitting or not _are_of_walls(ranges, median, options):
         return None
     (off, name, scale), *others = fitting
     near, far = math.log(options.certain_factor), math.log(options.unlikely_factor)
     is_certain = median >= options.remote_median and some.size >= options.min_returns
     is_certain &= off <= near and all(other[0] > far for other in others)
     return WrongUnit(name, scale, median, tuple(other[2] for other in others), is_certain)
+
+
+def _are_of_walls(ranges: NDArray[np.float32], median: float, options: RangeUnitOptions) -> bool:
+    """Whether neighbouring readings (S, B) are alike: intensities in place of ranges are often not."""
+    some = ranges[:: -(-ranges.size // options.sample)]
+    some = np.where((some > 0) & np.isfinite(some), some, np.nan)
+    changes = np.abs(np.diff(some, axis=1))
+    changes = changes[np.isfinite(changes)]
+    return not changes.size or float(np.median(changes)) <= options.max_neighbour_change * median
 
 
 def _continue_beyond(readings: NDArray[np.float32], no_return: float) -> bool:

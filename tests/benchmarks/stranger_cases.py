@@ -259,6 +259,7 @@ FAULTS: tuple[tuple[str, Fault, str], ...] = (
     ("a wheel of 15° at 0.15 m", _posts((70.0, 85.0, 0.15)), "see the robot itself"),
     ("someone follows at 0.6 m", lambda log: faults.follower(log, 0.6), "goes along with the robot"),
     ("someone follows at 0.4 m", lambda log: faults.follower(log, 0.4), "goes along with the robot"),
+    ("15 % of the readings are dust", lambda log: faults.dust(log, 0.15, 0.1), ""),
     ("cart on a hinge", faults.cart, "goes along with the robot"),
 )  # fmt: skip
 """Name, fault, and what tells its cause."""

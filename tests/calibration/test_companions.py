@@ -106,6 +106,15 @@ def test_somebody_who_leads_is_seen_on_real_logs_and_nobody_else(name):
     assert found.share > 0.5
 
 
+def test_dust_is_everywhere():
+    """Single readings at 0.1 m are on the path, but in no direction more than in others."""
+    log = faults.dust(drive(), 0.15, 0.1)
+    assert checked_file(log, ReadingOptions(), FileCheckOptions()).messages == []
+    anywhere = replace(CompanionOptions(), min_quarter_share=0.0)
+    assert log.odometry is not None
+    assert find_companion(log, log.odometry, anywhere) is not None
+
+
 def test_a_robot_that_hardly_moves_has_no_path():
     log = faults.taken(faults.cart(drive()), slice(0, 10))
     assert log.odometry is not None

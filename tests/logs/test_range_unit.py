@@ -67,6 +67,14 @@ def test_a_code_for_no_return_is_no_unit(read):
     assert np.isfinite(log.ranges).mean() > 0.2
 
 
+def test_intensities_are_no_ranges(read):
+    """Numbers from 0 to 255 whose neighbours have nothing in common: no unit makes walls of them."""
+    numbers = np.random.default_rng(4).uniform(0.0, 255.0, readings().shape)
+    log = read(recording(numbers.astype(np.float32), range_max=300.0))
+    assert log.report.contradictions == ()
+    assert not [said for said in log.report.notices() if "centimetres" in said]
+
+
 def test_two_units_that_fit_are_both_named(read):
     """Half of the returns are beyond 900: 9 m or 0.9 m."""
     ranges = readings() * np.float32(900 / np.median(readings()))

@@ -106,6 +106,13 @@ def ranges_scaled(log: LaserLog, factor: float, rows: Rows) -> LaserLog:
     return replace(log, ranges=ranges)
 
 
+def dust(log: LaserLog, share: float, reading: float) -> LaserLog:
+    """A share of the beams, each by chance, ends at one reading (m)."""
+    ranges = log.ranges.copy()
+    ranges[np.random.default_rng(7).random(ranges.shape) < share] = reading
+    return replace(log, ranges=ranges)
+
+
 def mirrored(log: LaserLog) -> LaserLog:
     """The readings of each scan in the wrong order."""
     return replace(log, angle_min=-log.angle_min, angle_increment=-log.angle_increment)
