@@ -6,6 +6,7 @@ from collections.abc import Callable
 from functools import partial
 
 from nscan_cli.graph.model import Graph
+from nscan_cli.slam.backend.contradicting_visits import mend_contradicting_visits
 from nscan_cli.slam.backend.finish import finish_graph
 from nscan_cli.slam.backend.optimisation import optimise, optimise_if_due
 from nscan_cli.slam.backend.refinement import refine
@@ -52,6 +53,7 @@ def run_slam(state: SlamState, report: LoopProgress) -> Graph:
     reject_contradicting_loops(state)
     correct_swept_scans(state)
     refine(state)
+    mend_contradicting_visits(state)
     return finish_graph(state)
 
 

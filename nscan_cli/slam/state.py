@@ -22,6 +22,7 @@ from nscan_cli.slam.keyframes.route import Route, route_of
 from nscan_cli.slam.local_matching.coverage import Coverage
 from nscan_cli.slam.local_matching.joint_relations import LocalMatcher, match_neighbours
 from nscan_cli.slam.local_matching.pairwise_relations import match_neighbours_pairwise
+from nscan_cli.slam.loop_closure.free_space_violations import FreeSpaceViolation
 from nscan_cli.slam.loop_closure.loop_detector import LoopDetector
 from nscan_cli.slam.loop_closure.place import Place
 from nscan_cli.slam.options import SlamOptions
@@ -69,6 +70,8 @@ class SlamState:
     """The verdicts on loops, accepted and refused ones."""
     places: list[Place] = field(default_factory=list)
     """Places of earlier visits that a search found."""
+    judged: tuple[Route, FreeSpaceViolation | None] | None = None
+    """The route that was compared with earlier visits last, and where it contradicts them most."""
     tracking_restarts: int = 0
     """Scan matches that tracking started again from other angles."""
     tracking_searches: int = 0

@@ -12,12 +12,13 @@ from nscan_cli.graph.optimise.graduated_nonconvexity import chi2_by_three
 from nscan_cli.logs.beam_mask import mask_text
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.poses import relative
+from nscan_cli.slam.backend.contradicting_visits import worst_violation
 from nscan_cli.slam.backend.untold_sigmas import told_relations
-from nscan_cli.slam.diagnostics.free_space_violations import free_space_violations, sound_share
 from nscan_cli.slam.diagnostics.odometry_disagreement import odometry_disagreements
 from nscan_cli.slam.diagnostics.untold_way import untold_ways
 from nscan_cli.slam.diagnostics.view_mismatch import view_mismatches
 from nscan_cli.slam.frontend.odometry_checks import jumps_of, repeated_scans
+from nscan_cli.slam.loop_closure.free_space_violations import is_sound, sound_share
 from nscan_cli.slam.state import SlamState
 
 MOST_NAMED = 10
@@ -168,13 +169,10 @@ def _contradictions(state: SlamState) -> list[str]:
 
 def _free_space_violations(state: SlamState) -> list[str]:
     """Whether visits of a place contradict each other, however well they match."""
-    nscan, options = state.options.nscan, state.options.diagnostics.free_space
-    worst = free_space_violations(state.log, state.route, nscan, options, state.threads)
-    if worst is None:
+    worst, options = worst_violation(state), state.options.loop_closure.free_space
+    if worst is None or is_sound(worst, options):
         return []
     most = sound_share(worst.within, options)
-    if worst.share <= most:
-        return []
     first, last = state.log.numbers[[worst.first, worst.last]].tolist()
     return [
         f"places look different on another visit: from scan {first} to {last}, beams pass through "

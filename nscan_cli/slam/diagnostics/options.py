@@ -3,36 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import NamedTuple
-
-
-class FreeSpaceOptions(NamedTuple):
-    """When one visit looks through too much of what another one saw."""
-
-    keyframes: int = 40
-    """Number of keyframes that are judged together. In a sound map few keyframes see a change: the worst ten
-    of fr-campus look through 24 % of what was there before, the worst forty 8 %. A larger number warns
-    less."""
-    min_keyframes: int = 3
-    """Least number of keyframes at places seen before. A larger number judges fewer maps."""
-    min_points: int = 50
-    """Least number of compared points of a keyframe that counts. A larger number counts fewer keyframes."""
-    compared: int = 8
-    """Number of other keyframes that each is compared with: the nearest of other visits, and as many of its
-    own. More take longer."""
-    tolerance: float = 0.2
-    """A point is looked through if it is nearer by this than the shortest of four neighbouring beams, m. A
-    larger value warns less."""
-    tolerance_per_metre: float = 0.02
-    """Growth of the tolerance with the range, m/m. A larger value warns less."""
-    within_factor: float = 2.5
-    """A sound map looks through at most this multiple of the share within visits. It is 0.5 to 1.6 in real
-    buildings, and 4 to 300 in simulated maps that are metres wrong. A larger value warns less."""
-    margin: float = 0.01
-    """Share that is added to that bound. A larger value warns less."""
-    max_share: float = 0.15
-    """Upper limit of that bound. The share is 0.08 in mit-killian and fr-campus, and 0.26 and more in maps of
-    these that are metres wrong. A larger value warns less."""
 
 
 @dataclass(frozen=True)
@@ -79,7 +49,6 @@ class UntoldWayOptions:
 class DiagnosticsOptions:
     """From where on the notices of a graph warn."""
 
-    free_space: FreeSpaceOptions = field(default_factory=FreeSpaceOptions)
     odometry: OdometryDisagreementOptions = field(default_factory=OdometryDisagreementOptions)
     view: ViewMismatchOptions = field(default_factory=ViewMismatchOptions)
     untold_way: UntoldWayOptions = field(default_factory=UntoldWayOptions)

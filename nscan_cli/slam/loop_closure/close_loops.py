@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from nscan_cli.poses import Indices
@@ -25,12 +27,28 @@ def close_loops_left_open(state: SlamState) -> list[Place]:
     closed = np.isin(route.rows, related)
     # A keyframe between two that are related lies well.
     closed[1:-1] |= closed[:-2] & closed[2:]
-    state.detector.begin_again()
+    state.detector.begin_again(state.options.loop_closure)
     for centre in np.flatnonzero(~closed).tolist():
         near = choose_neighbours(state.poses, route.paths, centre, state.options.nscan)
         earlier = near.members[near.from_other_visit & (near.members < centre)]
         if len(earlier):
             _search(state, centre, earlier)
+    return state.places[known:]
+
+
+def close_loops_between(state: SlamState, first: int, last: int) -> list[Place]:
+    """Search once more for the keyframes in rows `first` to `last`; returns the places found.
+
+    Earlier visits of these places contradict them: each is searched `contradicted_distance` away at least,
+    however certain it seems. Changes what `close_loops` changes.
+    """
+    route, known, options = state.route, len(state.places), state.options.loop_closure
+    reach = options.contradicted_distance
+    state.detector.begin_again(replace(options, min_distance=max(reach, options.min_distance)))
+    for centre in np.flatnonzero((route.rows >= first) & (route.rows <= last)).tolist():
+        away = np.hypot(*(state.poses[:centre, :2] - state.poses[centre, :2]).T)
+        earlier = route.paths[centre] - route.paths[:centre] > state.options.nscan.visit_path
+        _search(state, centre, np.flatnonzero(earlier & (away <= reach)))
     return state.places[known:]
 
 

@@ -54,8 +54,12 @@ class LoopDetector:
         self._uncertainty, self._links = RelativeUncertainty(), LinkCache()
         self._searched = -np.inf
 
-    def begin_again(self) -> None:
-        """Let the keyframes come anew. Verdicts stay; places that wait for a second keyframe are refused."""
+    def begin_again(self, options: LoopClosureOptions) -> None:
+        """Let the keyframes come anew, to be searched with these options.
+
+        Verdicts stay; places that wait for a second keyframe are refused.
+        """
+        self.options = options
         self._refused, self._waiting = self.refused(), []
         self._searched, self._uncertainty = -np.inf, RelativeUncertainty()
 
@@ -141,18 +145,18 @@ class LoopDetector:
         part = Subgraph([*self.tracked_path.relations, *loops()])
         if len(route.rows) > self.options.max_exact_keyframes:
             wanted = nearest_keyframes(route.poses, centre, centre + 1, self.options.max_exact_keyframes)
-            wanted |= _distances_from(route, centre) <= self.options.earlier_radius + self._farthest(bound)
+            wanted |= (
+                _distances_from(route, centre) <= self.options.earlier_radius + self.options.max_distance
+            )
             part = without_others(
                 route, self.tracked_path.relations, loops(), relations_on_paths(before, wanted)
             )
         energy = self.energies.of(route, part.relations, centre, part.free)
         return self._uncertainty.compute(energy, route.poses)
 
-    def _farthest(self, sigma: RelativeSigma) -> Array:
-        """(K,) largest distance (m) at which each keyframe is searched."""
-        return np.where(
-            is_lost(sigma, self.options), self.options.max_distance_lost, self.options.max_distance
-        )
+    def _farthest(self, away: float) -> float:
+        """The largest distance that is searched where all that may be found is up to `away` (m) from here."""
+        return min(max(away, 0.5 * self.options.max_distance), self.options.max_distance)
 
     def _may_be_off(self, sigma: RelativeSigma, keyframe: int) -> bool:
         """Whether a keyframe may be too far off for a joint match."""
@@ -169,7 +173,7 @@ class LoopDetector:
         """The older keyframes that may be near and may be too far off for a joint match."""
         options, paths, away = self.options, route.paths, _distances_from(route, centre)
         bound = options.sigmas * sigma.distance
-        may_be = away <= self.nscan.radius + np.minimum(bound, self._farthest(sigma))
+        may_be = away <= self.nscan.radius + np.minimum(bound, options.max_distance)
         older = paths[centre] - paths > self.nscan.visit_path
         return np.flatnonzero(older & may_be & (bound > options.match_reach))
 
@@ -197,7 +201,7 @@ class LoopDetector:
         piece. `sigma` is that from the centre, for which it was computed last.
         """
         options, paths, away = self.options, route.paths, _distances_from(route, centre)
-        farthest = min(float(self._farthest(sigma)[first]), max(float(away.max()), options.max_distance))
+        farthest = self._farthest(float(away.max()))
         distance = max(options.sigmas * sigma.distance[first], options.min_distance)
         turn = max(options.sigmas * sigma.angle[first], options.min_turn)
         window = replace(options.search, distance=min(distance, farthest), turn=min(turn, float(np.pi)))

@@ -3,8 +3,38 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 from nscan_cli.matching.correlative_search import SearchOptions
+
+
+class FreeSpaceOptions(NamedTuple):
+    """When one visit looks through too much of what another one saw."""
+
+    keyframes: int = 40
+    """Number of keyframes that are judged together. In a sound map few keyframes see a change: the worst ten
+    of fr-campus look through 24 % of what was there before, the worst forty 8 %. A larger number warns
+    less."""
+    min_keyframes: int = 3
+    """Least number of keyframes at places seen before. A larger number judges fewer maps."""
+    min_points: int = 50
+    """Least number of compared points of a keyframe that counts. A larger number counts fewer keyframes."""
+    compared: int = 8
+    """Number of other keyframes that each is compared with: the nearest of other visits, and as many of its
+    own. More take longer."""
+    tolerance: float = 0.2
+    """A point is looked through if it is nearer by this than the shortest of four neighbouring beams, m. A
+    larger value warns less."""
+    tolerance_per_metre: float = 0.02
+    """Growth of the tolerance with the range, m/m. A larger value warns less."""
+    within_factor: float = 2.5
+    """A sound map looks through at most this multiple of the share within visits. It is 0.5 to 1.6 in real
+    buildings, and 4 to 300 in simulated maps that are metres wrong. A larger value warns less."""
+    margin: float = 0.01
+    """Share that is added to that bound. A larger value warns less."""
+    max_share: float = 0.15
+    """Upper limit of that bound. The share is 0.08 in mit-killian and fr-campus, and 0.26 and more in maps of
+    these that are metres wrong. A larger value warns less."""
 
 
 @dataclass(frozen=True)
@@ -46,10 +76,9 @@ class LoopClosureOptions:
     """Least distance that is searched, m: a slip while all else is well known. A larger one is slower."""
     min_turn: float = 0.3
     """Least angle that is searched, rad. A larger one is slower."""
-    max_distance: float = 50.0
-    """Largest distance that is searched, m. A larger one closes larger loops and is slower."""
-    max_distance_lost: float = 100.0
-    """Largest distance that is searched after the track has broken, m. A larger one is slower."""
+    max_distance: float = 100.0
+    """Largest distance that is searched, m. In a map smaller than half of this, half of it is. A larger one
+    closes larger loops and is slower."""
     scan_path: float = 6.0
     """Keyframes within this length of path are searched together with the centre, m. A larger one tells
     places apart better, and drifts more."""
@@ -92,3 +121,10 @@ class LoopClosureOptions:
     more than `slip_distance`. A larger number accepts more."""
     slip_distance: float = 5.0
     """Largest distance by which tracking slips, m. A larger one accepts more."""
+    free_space: FreeSpaceOptions = field(default_factory=FreeSpaceOptions)
+    contradicted_distance: float = 10.0
+    """Where visits of a place contradict each other in the finished map, the search covers at least this
+    distance, m. A larger one mends larger errors and is slower."""
+    contradicted_share: float = 0.5
+    """What such a search finds is kept if the map is sound by it, or if beams pass through at most this share
+    of what they passed through before. A larger share keeps more."""

@@ -91,7 +91,7 @@ def test_the_window_is_as_wide_as_the_graph_is_unsure(searches):
     assert 9.0 < max(windows[1])[0] < 16.0
     assert 0.6 < max(windows[1])[1] < 0.8
     # Where not even the direction is known it is searched among all that there is.
-    assert options.max_distance <= max(windows[2])[0] <= options.max_distance_lost
+    assert 0.5 * options.max_distance <= max(windows[2])[0] <= options.max_distance
     assert max(windows[2])[1] == np.pi
 
 

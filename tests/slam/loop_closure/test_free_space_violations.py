@@ -10,17 +10,17 @@ import pytest
 
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.poses import Array
-from nscan_cli.slam.diagnostics.free_space_violations import (
-    FreeSpaceViolation,
-    free_space_violations,
-    sound_share,
-)
-from nscan_cli.slam.diagnostics.options import FreeSpaceOptions
 from nscan_cli.slam.frontend.tracked_scans import TrackedScan
 from nscan_cli.slam.keyframes.keyframe_selection import Keyframes
 from nscan_cli.slam.keyframes.options import KeyframeOptions
 from nscan_cli.slam.keyframes.route import Route, route_of
 from nscan_cli.slam.local_matching.options import NScanOptions
+from nscan_cli.slam.loop_closure.free_space_violations import (
+    FreeSpaceViolation,
+    free_space_violations,
+    sound_share,
+)
+from nscan_cli.slam.loop_closure.options import FreeSpaceOptions
 from tests.logs.excerpts import truth_of
 from tests.simulation.laser import Laser
 from tests.slam.keyframe_drives import ROUND, path_of, round_scene

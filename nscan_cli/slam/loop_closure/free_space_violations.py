@@ -20,9 +20,9 @@ from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.logs.seen_at_once import ranges_at_once
 from nscan_cli.matching.pose_kernels import relative_pose
 from nscan_cli.poses import Array, Indices, inverse, transform
-from nscan_cli.slam.diagnostics.options import FreeSpaceOptions
 from nscan_cli.slam.keyframes.route import Route
 from nscan_cli.slam.local_matching.options import NScanOptions
+from nscan_cli.slam.loop_closure.options import FreeSpaceOptions
 from nscan_cli.threads import map_in_threads
 
 KEYFRAMES_PER_THREAD = 64
@@ -63,6 +63,11 @@ def sound_share(within: float, options: FreeSpaceOptions) -> float:
     """The largest share that a sound map explains, where this share is looked through within visits."""
     allowed = options.within_factor * within + options.margin
     return options.max_share if np.isnan(within) else min(allowed, options.max_share)
+
+
+def is_sound(worst: FreeSpaceViolation, options: FreeSpaceOptions) -> bool:
+    """Whether a sound map explains it."""
+    return worst.share <= sound_share(worst.within, options)
 
 
 def free_space_violations(
