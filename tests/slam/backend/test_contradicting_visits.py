@@ -84,7 +84,12 @@ def test_without_loops_nothing_is_searched(office, monkeypatch):
 
 def test_a_route_is_compared_with_earlier_visits_once(office, monkeypatch):
     calls = []
-    monkeypatch.setattr(contradicting_visits, "free_space_violations", lambda *_: calls.append(1) or SOUND)
+
+    def compare(*_: object) -> FreeSpaceViolation:
+        calls.append(1)
+        return SOUND
+
+    monkeypatch.setattr(contradicting_visits, "free_space_violations", compare)
     state = replace(office, judged=None)
     assert worst_violation(state) == worst_violation(state) == SOUND
     assert len(calls) == 1
