@@ -1,4 +1,4 @@
-"""The real logs with disturbed odometry and cut beginnings: `python -m tests.benchmarks.robustness OUT.md`.
+"""Real logs with disturbed odometry, or cut: `python -m tests.benchmarks.robustness OUT.md [LOG…]`.
 
 Each log ten times with noise on its odometry, and with five other first scans; with joint relations, and
 with single ones only. A table a log goes to docs/robustness.md. Takes half an hour on two cores.
@@ -9,6 +9,7 @@ from __future__ import annotations
 import dataclasses
 import os
 import sys
+from collections.abc import Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
@@ -31,7 +32,10 @@ from tests.data import find_data
 from tests.experiments.output import table
 from tests.logs.excerpts import excerpt
 
-WANTED = {"intel": 0.014, "fr079": 0.0312, "mit-csail": 0.0262, "mit-killian": 0.0255, "fr-campus": 0.26}
+WANTED = {
+    "intel": 0.014, "fr079": 0.0312, "mit-csail": 0.0262, "mit-killian": 0.0255, "fr-campus": 0.26,
+    "fr-clinic": 0.108,
+}  # fmt: skip
 """m; fr-campus: ATE RMSE, the others: mean error of the relations."""
 SEEDS = 10
 DROPPED = (0, 50, 130, 250, 400, 500)
@@ -177,9 +181,9 @@ def document(outcomes: list[Outcome]) -> str:
     return "\n\n".join(parts) + "\n"
 
 
-def main(out: str) -> None:
-    """Run all logs that are there, in two processes; write the document."""
-    logs = [log for log in WANTED if find_data(f"{log}.log.gz")]
+def main(out: str, names: Sequence[str]) -> None:
+    """Run all logs that are there, or those of these names, in two processes; write the document."""
+    logs = [log for log in names or WANTED if find_data(f"{log}.log.gz")]
     with ProcessPoolExecutor(2) as pool:
         truths = dict(zip(logs, pool.map(undisturbed, logs), strict=True))
         todo = [run for log in logs for relations in ("both", "pairwise") for run in runs(log, relations)]
@@ -199,4 +203,4 @@ def undisturbed(log: str) -> Array:
 if __name__ == "__main__":
     # One thread a process, as the command line does it.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-    main(sys.argv[1])
+    main(sys.argv[1], sys.argv[2:])
