@@ -25,7 +25,9 @@ def mend_contradicting_visits(state: SlamState) -> None:
     options, before = state.options.loop_closure, worst_violation(state)
     if not state.options.nscan.loops or before is None or is_sound(before, options.free_space):
         return
-    kept = state.route, state.matched_pairs, state.nscan_relations, list(state.loops), list(state.places)
+    # The search adds to these lists.
+    pairs, joint = list(state.matched_pairs), list(state.nscan_relations)
+    kept = state.route, pairs, joint, list(state.loops), list(state.places)
     if not close_loops_between(state, before.first, before.last):
         return
     refine(state)

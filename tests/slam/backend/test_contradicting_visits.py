@@ -28,8 +28,18 @@ HALF_AS_WRONG, HARDLY_BETTER = WRONG._replace(share=0.19), WRONG._replace(share=
 @pytest.fixture
 def office() -> SlamState:
     """The state of a finished loop, which may be changed."""
-    state = mapped(office_log()).state
-    return replace(state, loops=list(state.loops), places=list(state.places))
+    return copied(mapped(office_log()).state)
+
+
+def copied(state: SlamState) -> SlamState:
+    """The same state, with lists of its own of what the search changes."""
+    return replace(
+        state,
+        matched_pairs=list(state.matched_pairs),
+        nscan_relations=list(state.nscan_relations),
+        loops=list(state.loops),
+        places=list(state.places),
+    )
 
 
 def mended(
@@ -37,14 +47,16 @@ def mended(
 ) -> list[tuple[int, int]]:
     """Mend a state whose visits contradict each other so before and after; where loops were searched.
 
-    The search moves the route and forgets all relations.
+    The search moves the route, and adds to all lists or empties them.
     """
     searched, found = [], iter(violations)
 
     def close(state: SlamState, first: int, last: int) -> list[int]:
         searched.append((first, last))
         state.route = state.route._replace(poses=state.route.poses + 1.0)
-        state.nscan_relations, state.loops[:], state.places[:] = [], [], []
+        state.matched_pairs.append(state.chain[0])
+        for found in (state.nscan_relations, state.loops, state.places):
+            found.clear()
         return [0]
 
     monkeypatch.setattr(contradicting_visits, "worst_violation", lambda _: next(found))
@@ -68,10 +80,11 @@ def test_what_ends_the_contradiction_is_kept(office, monkeypatch, after):
 
 
 def test_what_does_not_is_dropped(office, monkeypatch):
-    before = replace(office, loops=list(office.loops), places=list(office.places))
+    before = copied(office)
     assert mended(office, monkeypatch, [WRONG, HARDLY_BETTER]) == [(10, 20)]
     assert office.route is before.route
-    assert office.nscan_relations is before.nscan_relations
+    assert office.matched_pairs == before.matched_pairs
+    assert office.nscan_relations == before.nscan_relations
     assert office.loops == before.loops
     assert office.places == before.places
 
