@@ -8,11 +8,12 @@ from nscan_cli.calibration.measured_steps import measure_steps
 from nscan_cli.calibration.odometry_options import OdometryUnitOptions
 from nscan_cli.calibration.options import StepOptions
 from nscan_cli.calibration.scaled_steps import with_scaled_steps
+from nscan_cli.calibration.step_sampling import possible_steps
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.logs.mask_runs import mask_runs
 from nscan_cli.logs.range_unit import UNITS
 from nscan_cli.logs.stretch_names import stretch_names
-from nscan_cli.poses import Array, Indices, Mask, relative
+from nscan_cli.poses import Indices, Mask, relative
 
 
 def checked_units(
@@ -69,7 +70,10 @@ def _metres_by_scans(
 ) -> float | None:
     """Metres by scans for one metre by odometry, the median over steps that are so (n,); None for too few."""
     assert log.odometry is not None
-    first, last = _within(log.times, is_so, steps.duration)
+    first, last = possible_steps(log, steps)
+    before = np.append(0, np.cumsum(is_so))
+    whole = before[last] - before[first] == last - first
+    first, last = first[whole], last[whole]
     if not len(first):
         return None
     some = np.unique(np.linspace(0, len(first) - 1, options.measured_steps).astype(np.int64))
@@ -80,15 +84,3 @@ def _metres_by_scans(
     if np.count_nonzero(clear) < options.min_measured:
         return None
     return float(np.median(by_scans[clear] / by_odometry[clear]))
-
-
-def _within(times: Array, is_so: Mask, duration: float) -> tuple[Indices, Indices]:
-    """Rows (m,) between which steps of some duration, s, begin and end that consist of single ones (n,)
-    that are so.
-    """
-    first = np.arange(len(times))
-    last = np.maximum(np.searchsorted(times, times + duration), first + 1)
-    first, last = first[last < len(times)], last[last < len(times)]
-    so = np.append(0, np.cumsum(is_so))
-    whole = so[last] - so[first] == last - first
-    return first[whole], last[whole]

@@ -9,12 +9,11 @@ import numpy as np
 
 from nscan_cli.calibration.mount_fit import MountFit, robot_lengths
 from nscan_cli.calibration.odometry_options import ScaleChangeOptions
+from nscan_cli.calibration.robust_fit import TO_SIGMA
 from nscan_cli.poses import Array, Indices
 
 SIGMA_OF_MEDIAN = 1.2533
 """Standard deviation of the median of normal values, as a multiple of that of their mean."""
-SIGMA_OF_DEVIATION = 1.4826
-"""Standard deviation of normal values, as a multiple of their median absolute deviation."""
 
 
 class ScaleChange(NamedTuple):
@@ -61,5 +60,5 @@ def _residual(values: Array) -> float:
 def _median(values: Array) -> tuple[float, float]:
     """The median of values (n,) and its standard deviation."""
     median = float(np.median(values))
-    deviation = SIGMA_OF_DEVIATION * float(np.median(np.abs(values - median)))
+    deviation = TO_SIGMA * float(np.median(np.abs(values - median)))
     return median, max(SIGMA_OF_MEDIAN * deviation / np.sqrt(len(values)), 1e-6)

@@ -15,7 +15,7 @@ def telling_steps(log: LaserLog, options: StepOptions, count: int | None = None)
     There are `count` of each, by default `options.count`.
     """
     count = count or options.count
-    first, last = _all_steps(log, options)
+    first, last = possible_steps(log, options)
     if not len(first):
         return first, last
     chosen = [np.linspace(0, len(first) - 1, count).astype(np.int64)]
@@ -35,7 +35,7 @@ def successive_steps(log: LaserLog, options: StepOptions) -> tuple[Indices, Indi
     No two steps overlap, so their errors are independent. In a long log, chains of `options.chain` steps are
     spread evenly.
     """
-    first, last = _all_steps(log, options)
+    first, last = possible_steps(log, options)
     chosen, free = [], 0
     for at, (begin, end) in enumerate(zip(first.tolist(), last.tolist(), strict=True)):
         if begin >= free:
@@ -48,7 +48,7 @@ def successive_steps(log: LaserLog, options: StepOptions) -> tuple[Indices, Indi
     return first[kept], last[kept]
 
 
-def _all_steps(log: LaserLog, options: StepOptions) -> tuple[Indices, Indices]:
+def possible_steps(log: LaserLog, options: StepOptions) -> tuple[Indices, Indices]:
     """Each row that a step can begin at, and the first row that is far enough in time."""
     first = np.arange(len(log), dtype=np.int64)
     last = np.maximum(np.searchsorted(log.times, log.times + options.duration), first + 1)

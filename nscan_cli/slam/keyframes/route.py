@@ -30,6 +30,12 @@ class Route(NamedTuple):
     """(K, 3) global poses."""
 
 
+def distances_from(route: Route, keyframe: int) -> Array:
+    """(K,) distances of the keyframes from one of them, m."""
+    away: Array = np.hypot(*(route.poses[:, :2] - route.poses[keyframe, :2]).T)
+    return away
+
+
 def route_of(keyframes: Sequence[Keyframe], chain: Sequence[Pairwise], poses: Array) -> Route:
     """The route of the first K keyframes, at poses (K, 3)."""
     own = keyframes[: len(poses)]

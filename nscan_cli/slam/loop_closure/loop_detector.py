@@ -19,7 +19,7 @@ from nscan_cli.matching.correlative_search import SearchOptions
 from nscan_cli.poses import Array, Indices, compose
 from nscan_cli.slam.backend.energy_cache import EnergyCache
 from nscan_cli.slam.backend.subgraph import Subgraph, nearest_keyframes, without_others
-from nscan_cli.slam.keyframes.route import Route
+from nscan_cli.slam.keyframes.route import Route, distances_from
 from nscan_cli.slam.keyframes.tracked_path import TrackedPath
 from nscan_cli.slam.local_matching.joint_relations import LocalMatch, LocalMatcher
 from nscan_cli.slam.local_matching.options import NScanOptions
@@ -145,18 +145,12 @@ class LoopDetector:
         part = Subgraph([*self.tracked_path.relations, *loops()])
         if len(route.rows) > self.options.max_exact_keyframes:
             wanted = nearest_keyframes(route.poses, centre, centre + 1, self.options.max_exact_keyframes)
-            wanted |= (
-                _distances_from(route, centre) <= self.options.earlier_radius + self.options.max_distance
-            )
+            wanted |= distances_from(route, centre) <= self.options.earlier_radius + self.options.max_distance
             part = without_others(
                 route, self.tracked_path.relations, loops(), relations_on_paths(before, wanted)
             )
         energy = self.energies.of(route, part.relations, centre, part.free)
         return self._uncertainty.compute(energy, route.poses)
-
-    def _farthest(self, away: float) -> float:
-        """The largest distance that is searched where all that may be found is up to `away` (m) from here."""
-        return min(max(away, 0.5 * self.options.max_distance), self.options.max_distance)
 
     def _may_be_off(self, sigma: RelativeSigma, keyframe: int) -> bool:
         """Whether a keyframe may be too far off for a joint match."""
@@ -171,7 +165,7 @@ class LoopDetector:
 
     def _near(self, route: Route, centre: int, sigma: RelativeSigma) -> Indices:
         """The older keyframes that may be near and may be too far off for a joint match."""
-        options, paths, away = self.options, route.paths, _distances_from(route, centre)
+        options, paths, away = self.options, route.paths, distances_from(route, centre)
         bound = options.sigmas * sigma.distance
         may_be = away <= self.nscan.radius + np.minimum(bound, options.max_distance)
         older = paths[centre] - paths > self.nscan.visit_path
@@ -179,7 +173,7 @@ class LoopDetector:
 
     def _search(self, route: Route, centre: int, near: Indices, sigma: RelativeSigma) -> Place | None:
         """Search among the visit that is most likely near. If not even the direction is known, search all."""
-        away = _distances_from(route, centre)
+        away = distances_from(route, centre)
         places, lost = [], is_lost(sigma, self.options)
         while len(near):
             first = int(near[np.argmin(away[near] - self.options.sigmas * sigma.distance[near])])
@@ -200,8 +194,8 @@ class LoopDetector:
         These are the keyframes that the graph knows well as seen from the first, so that their map is in one
         piece. `sigma` is that from the centre, for which it was computed last.
         """
-        options, paths, away = self.options, route.paths, _distances_from(route, centre)
-        farthest = self._farthest(float(away.max()))
+        options, paths, away = self.options, route.paths, distances_from(route, centre)
+        farthest = min(max(float(away.max()), 0.5 * options.max_distance), options.max_distance)
         distance = max(options.sigmas * sigma.distance[first], options.min_distance)
         turn = max(options.sigmas * sigma.angle[first], options.min_turn)
         window = replace(options.search, distance=min(distance, farthest), turn=min(turn, float(np.pi)))
@@ -209,12 +203,6 @@ class LoopDetector:
         near = away <= options.earlier_radius + window.distance
         in_one_piece = options.sigmas * self._uncertainty.seen_from(first).distance <= options.match_reach
         return window, np.flatnonzero(older & near & in_one_piece)
-
-
-def _distances_from(route: Route, centre: int) -> Array:
-    """(K,) distances of keyframes from one of them, m."""
-    away: Array = np.hypot(*(route.poses[:, :2] - route.poses[centre, :2]).T)
-    return away
 
 
 def _visit_overlap(place: Place) -> float:
