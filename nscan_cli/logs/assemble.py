@@ -16,6 +16,7 @@ from nscan_cli.logs.frame_names import DEFAULT_FRAMES, FrameNames
 from nscan_cli.logs.laser_defaults import mark_no_returns
 from nscan_cli.logs.laser_log import LaserLog, LogReport, beam_counts
 from nscan_cli.logs.lost_readings import lost_readings
+from nscan_cli.logs.odometry_outliers import without_outliers
 from nscan_cli.logs.range_limits import RangeLimits, limits_in_force
 from nscan_cli.logs.range_unit import scaled, wrong_unit
 from nscan_cli.logs.raw_scans import RawScans
@@ -146,25 +147,29 @@ def laser_log(
 def _odometry(
     motion: RecordedMotion, times: ScanOrder, ranges: NDArray[np.float32], options: ReadingOptions
 ) -> tuple[Array | None, RobotPath | None, list[str]]:
-    """The odometry (S, 3) of all scans in order of time, its path, and what is said if it is slow.
+    """The odometry (S, 3) of all scans in order of time, its path, and what is said
+    of what was put right.
 
     ranges (S, B) are in file order.
     """
     odometry, path = motion.odometry, motion.path
     if odometry is None:
         return None, path, []
-    said = ""
+    wrong = slow = ""
     if path is not None:
         poses = path.poses
         if not options.as_recorded:
-            poses, said = without_repeats(poses, path.times)
+            poses, wrong = without_outliers(poses, path.times)
+            poses, slow = without_repeats(poses, path.times)
         path = robot_path(path.times, scaled_odometry(poses, options.odometry_scale))
     elif not options.as_recorded:
-        odometry, said = without_repeats(odometry, times.times, (ranges, times.rows))
+        odometry, wrong = without_outliers(odometry, times.times)
+        odometry, slow = without_repeats(odometry, times.times, (ranges, times.rows))
     odometry = scaled_odometry(odometry, options.odometry_scale)
+    said = [text for text in (wrong, slow) if text]
     if said and path is not None:
         odometry = np.where(are_known(odometry)[:, None], poses_at(path, times.times), odometry)
-    return odometry, path, [said] if said else []
+    return odometry, path, said
 
 
 def _sweep(raw: RawScans, increments: Array, times: ScanOrder, options: ReadingOptions) -> Sweep:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from nscan_cli.logs.beam_angles import DEFAULT_BEAM_ANGLES, BeamAngleOptions
 from nscan_cli.logs.beam_spacing import DEFAULT_BEAM_SPACING, BeamSpacingOptions
 from nscan_cli.logs.odometry_interpolation import DEFAULT_ODOMETRY_GAPS, OdometryGapOptions
+from nscan_cli.logs.odometry_outliers import DEFAULT_ODOMETRY_OUTLIERS, OdometryOutlierOptions
 from nscan_cli.logs.range_limit_options import DEFAULT_RANGE_LIMITS, RangeLimitOptions
 from nscan_cli.logs.range_unit import DEFAULT_RANGE_UNIT, RangeUnitOptions
 from nscan_cli.logs.recordings.alternating_lasers import DEFAULT_TWO_LASERS, TwoLaserOptions
@@ -39,6 +40,7 @@ class ScanCheckOptions:
     robot_parts: RobotPartsOptions = DEFAULT_ROBOT_PARTS
     mounting: MountingOptions = DEFAULT_MOUNTING
     odometry_gaps: OdometryGapOptions = DEFAULT_ODOMETRY_GAPS
+    odometry_outliers: OdometryOutlierOptions = DEFAULT_ODOMETRY_OUTLIERS
     slow_odometry: SlowOdometryOptions = DEFAULT_SLOW_ODOMETRY
     robot_path: RobotPathOptions = DEFAULT_ROBOT_PATH
     sweep: SweepOptions = DEFAULT_SWEEP

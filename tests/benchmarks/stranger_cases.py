@@ -239,6 +239,7 @@ FAULTS: tuple[tuple[str, Fault, str], ...] = (
         "counts reversing as driving forward",
     ),
     ("each pose five times", lambda log: odometry_faults.repeated(log, 5), "odometry comes less often"),
+    ("odometry zero at every 50th scan", lambda log: odometry_faults.zeros(log, 50), "single wrong values"),
     ("ranges in mm from half-way on", _from_half_way(1000.0), "in millimetres, the others in metres"),
     ("ranges in cm from half-way on", _from_half_way(100.0), "in centimetres, the others in metres"),
     ("ranges in feet from half-way on", _from_half_way(3.281), "all ranges are multiplied"),

@@ -103,6 +103,13 @@ def spike(log: LaserLog, at: int, value: tuple[float, float, float]) -> LaserLog
     return replace(log, odometry=odometry)
 
 
+def zeros(log: LaserLog, every: int) -> LaserLog:
+    """One value in so many is all zeros."""
+    odometry = _odometry(log).copy()
+    odometry[::every] = 0.0
+    return replace(log, odometry=odometry)
+
+
 def wrapped(log: LaserLog, limit: float) -> LaserLog:
     """Coordinates kept in [−limit, limit), as a counter of too few bits does."""
     odometry = _odometry(log).copy()

@@ -1,0 +1,119 @@
+"""Single wrong values of the odometry: a driver that sends zeros now and then, a bit that flips.
+
+The poses before and behind agree with each other, and such a value is far from both.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from nscan_cli.files.text import counted
+from nscan_cli.logs.mask_runs import mask_runs
+from nscan_cli.logs.robot_path import steady_between
+from nscan_cli.logs.scan_order import usual_period
+from nscan_cli.poses import Array, Mask, are_known, relative
+
+SHORTEST_PERIOD = 1e-3
+"""s; a usual period is at least this, to divide by."""
+
+
+@dataclass(frozen=True)
+class OdometryOutlierOptions:
+    """When poses of the odometry are single wrong values."""
+
+    factor: float = 5.0
+    """They are farther from the poses before and behind than this multiple of the usual longest step. A
+    larger value finds fewer."""
+    min_distance: float = 1.0
+    """And farther than this, m and rad: a match corrects a smaller error by itself, and where messages come
+    in the wrong order poses go to and fro by up to 0.9 rad on real logs. A larger value finds fewer."""
+    quantile: float = 0.99
+    """Quantile of the steps that is the usual longest one; of three poses the shortest step counts, so that
+    single wrong values do not. A larger value finds fewer."""
+    max_return: float = 0.5
+    """The poses before and behind are apart by at most this share of the distance to both. A larger value
+    finds more, also where odometry begins anew twice."""
+    most_poses: int = 5
+    """Largest number of successive wrong poses. A larger value finds longer stretches, and guesses more of
+    the way."""
+    max_share: float = 0.34
+    """With a larger share of wrong poses it is open which are right, and none is replaced. A larger value
+    believes more."""
+
+
+DEFAULT_ODOMETRY_OUTLIERS = OdometryOutlierOptions()
+
+
+def without_outliers(
+    odometry: Array, times: Array, options: OdometryOutlierOptions = DEFAULT_ODOMETRY_OUTLIERS
+) -> tuple[Array, str]:
+    """Odometry (S, 3) at times (S,), s, steady where single values are wrong; and what to say.
+
+    Unknown poses are nan and stay so. The text is empty where nothing is changed.
+    """
+    known = np.flatnonzero(are_known(odometry))
+    poses, at = odometry[known], times[known]
+    stretches = _excursions(poses, at, options)
+    wrong = poses[_between(stretches, len(poses))]
+    if not 0 < len(wrong) <= options.max_share * len(poses):
+        return odometry, ""
+    values = counted(len(wrong), "single wrong value")
+    said = f"odometry has {values}, far from those before and behind, which agree"
+    if len(wrong) > 1 and (wrong == wrong[0]).all():
+        # The same value is as wrong where the robot is near to it.
+        runs = mask_runs((poses == wrong[0]).all(axis=1))
+        stretches = [
+            (first - 1, end)
+            for first, end in runs
+            if first > 0 and end < len(poses) and end - first <= options.most_poses
+        ]
+        said += f" (all are {', '.join(f'{part:.4g}' for part in wrong[0])})"
+    evened = odometry.copy()
+    evened[known] = steady_between(poses, at, stretches)
+    since = at[stretches[0][0] + 1] - at[0]
+    return evened, (
+        f"{said}; the first is {since:.1f} s after the beginning; the robot is taken to move steadily there; "
+        "--as-recorded believes the log"
+    )
+
+
+def _between(stretches: list[tuple[int, int]], size: int) -> Mask:
+    """(size,) which rows lie between the two rows of a stretch."""
+    between = np.zeros(size, dtype=np.bool_)
+    for first, last in stretches:
+        between[first + 1 : last] = True
+    return between
+
+
+def _excursions(poses: Array, times: Array, options: OdometryOutlierOptions) -> list[tuple[int, int]]:
+    """The rows before and behind each stretch of wrong poses (n, 3), known at times (n,), s."""
+    if len(poses) < 3:
+        return []
+    steps = _sizes(poses[1:], poses[:-1])
+    least = np.minimum(np.minimum(steps[1:], steps[:-1]), _sizes(poses[2:], poses[:-2]))
+    usual = np.quantile(least, options.quantile, axis=0, method="lower")
+    limits = np.maximum(options.factor * usual, options.min_distance)
+    # After a pause a step may be longer in proportion.
+    periods = np.maximum(np.diff(times) / max(usual_period(times), SHORTEST_PERIOD), 1.0)
+    far = np.flatnonzero((steps > limits * periods[:, None]).any(axis=1)).tolist()
+    found: list[tuple[int, int]] = []
+    for k, away in enumerate(far):
+        if found and away < found[-1][1]:
+            continue
+        for back in far[k + 1 : k + 1 + options.most_poses]:
+            apart = _sizes(poses[back + 1], poses[away])
+            excursion = np.minimum(steps[away], steps[back])
+            is_excursion = (excursion > limits) & (apart <= options.max_return * excursion)
+            is_near = back - away <= options.most_poses and (apart <= limits).all()
+            if is_excursion.any() and is_near and times[back + 1] > times[away]:
+                found.append((away, back + 1))
+                break
+    return found
+
+
+def _sizes(poses: Array, others: Array) -> Array:
+    """(…, 2) length, m, and turn, rad, of the steps to poses (…, 3) from others."""
+    steps = relative(poses, others)
+    return np.stack([np.hypot(steps[..., 0], steps[..., 1]), np.abs(steps[..., 2])], axis=-1)
