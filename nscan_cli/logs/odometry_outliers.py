@@ -15,9 +15,6 @@ from nscan_cli.logs.robot_path import steady_between
 from nscan_cli.logs.scan_order import usual_period
 from nscan_cli.poses import Array, Mask, are_known, relative
 
-SHORTEST_PERIOD = 1e-3
-"""s; a usual period is at least this, to divide by."""
-
 
 @dataclass(frozen=True)
 class OdometryOutlierOptions:
@@ -96,7 +93,7 @@ def _excursions(poses: Array, times: Array, options: OdometryOutlierOptions) -> 
     usual = np.quantile(least, options.quantile, axis=0, method="lower")
     limits = np.maximum(options.factor * usual, options.min_distance)
     # After a pause a step may be longer in proportion.
-    periods = np.maximum(np.diff(times) / max(usual_period(times), SHORTEST_PERIOD), 1.0)
+    periods = np.maximum(np.diff(times) / (usual_period(times) or 1.0), 1.0)
     far = np.flatnonzero((steps > limits * periods[:, None]).any(axis=1)).tolist()
     found: list[tuple[int, int]] = []
     for k, away in enumerate(far):
