@@ -19,6 +19,7 @@ from nscan_cli.calibration.step_evidence import (
     is_change,
     is_excluded,
     is_nearer,
+    is_view_in_doubt,
     is_wrong_scale,
     turns_agree,
 )
@@ -43,6 +44,9 @@ def find_contradictions(log: LaserLog, reading: ReadingOptions, options: FileChe
     is_still = _is_still(log.odometry, options.still)
     if is_still[:2].all():
         return [findings.frozen(evidence, "odometry" if is_still[2] else "the position by odometry")]
+    changed_view = _of_view(log, evidence, reading, options)
+    if changed_view is not None:
+        return [changed_view]
     turns = evidence.turns
     if turns is not None and not turns_agree(turns, options):
         found = _of_clocks(log, evidence.steps, reading, options)
@@ -84,15 +88,18 @@ def _evidence(log: LaserLog, odometry: Array, options: FileCheckOptions) -> Step
         if evidence.tells_enough or count >= most:
             break
         count = min(2 * count, most)
-    if count < options.more_steps and _is_in_doubt(evidence, options):
+    if count < options.more_steps and _is_in_doubt(evidence, log.mount, options):
         steps = measure_steps(log, telling_steps(log, options.steps, options.more_steps), options.steps)
         return StepEvidence(odometry, steps, options)
     return evidence
 
 
-def _is_in_doubt(evidence: StepEvidence, options: FileCheckOptions) -> bool:
-    """Whether the scale of odometry seems wrong, but by no more than the wheels of some robots are."""
+def _is_in_doubt(evidence: StepEvidence, mount: Array, options: FileCheckOptions) -> bool:
+    """Whether a few more steps may tell: the scale of odometry is wrong by no more than the wheels of some
+    robots are, or the laser, mounted at (3,), was perhaps turned."""
     fit = evidence.fit
+    if is_view_in_doubt(evidence, mount, options):
+        return True
     if fit is None:
         return False
     is_odd = is_wrong_scale(fit, options) and max(fit.scale, 1.0 / fit.scale) < options.clear_scale_factor
@@ -135,9 +142,34 @@ def _of_change(
     without = evidence.fit_without(change)
     if not explains(without, options):
         return None
-    rows = list(evidence.rows_at(change.step))
-    times = log.times[rows] - log.times[0] + (reading.start or 0.0)
-    return findings.changed_scale(change, evidence.moving, log.numbers[rows], times, reading)
+    place = _place(log, evidence, change.step, reading)
+    return findings.changed_scale(change, evidence.moving, place, reading)
+
+
+def _of_view(
+    log: LaserLog, evidence: StepEvidence, reading: ReadingOptions, options: FileCheckOptions
+) -> Finding | None:
+    """Readings in another order, or a laser that looks elsewhere, from a scan on; None if nothing changes."""
+    view = options.view
+    turned = evidence.direction_change(log.mount, view.min_steps)
+    mirrored = evidence.turn_change(view.min_steps)
+    if mirrored is not None and mirrored.is_order:
+        return findings.changed_order(mirrored, _place(log, evidence, mirrored.step, reading), reading)
+    if turned is None or not turned.exceeds(view.min_direction, view.sigmas):
+        return None
+    # With a wrong sign of x or y directions depend on where the robot heads.
+    if explains(evidence.fit_with_signs(ONE_AXIS_REVERSED), options):
+        return None
+    if not explains(evidence.fit_turned(turned), options):
+        return None
+    return findings.changed_direction(turned, _place(log, evidence, turned.step, reading), log.mount, options)
+
+
+def _place(log: LaserLog, evidence: StepEvidence, step: int, reading: ReadingOptions) -> findings.Place:
+    """The scans between which a step begins something else."""
+    before, behind = evidence.rows_at(step)
+    end, start = (log.times[[before, behind]] - log.times[0] + (reading.start or 0.0)).tolist()
+    return findings.Place(int(log.numbers[before]), int(log.numbers[behind]), end, start)
 
 
 def _of_clocks(

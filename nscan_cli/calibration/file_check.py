@@ -38,8 +38,13 @@ def checked_file(log: LaserLog, reading: ReadingOptions, options: FileCheckOptio
     recorded = log
     log, units = checked_units(recorded, options.units, options.steps)
     log, held = checked_held(log, options.held, options.steps)
-    log, reversing = checked_signs(log, options.unsigned, options.steps)
-    findings = find_contradictions(log, reading, options)
+    signed, reversing = checked_signs(log, options.unsigned, options.steps)
+    findings = find_contradictions(signed, reading, options)
+    if reversing:
+        # A laser that is turned within the log sees the robot go elsewhere, too.
+        turned = [one for one in find_contradictions(log, reading, options) if one.is_of_view]
+        findings, signed, reversing = (turned, log, []) if turned else (findings, signed, reversing)
+    log = signed
     if held and any(finding.is_of_clocks for finding in findings):
         # A clock that is behind makes odometry begin late, as if it stood.
         log, units, held, reversing = recorded, [], [], []

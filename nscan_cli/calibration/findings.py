@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -13,9 +13,10 @@ from nscan_cli.calibration.odometry_clock import ClockLag
 from nscan_cli.calibration.options import FileCheckOptions
 from nscan_cli.calibration.scale_change import ScaleChange
 from nscan_cli.calibration.step_evidence import StepEvidence, is_wrong_scale
+from nscan_cli.calibration.view_change import DirectionChange, TurnChange
 from nscan_cli.files.text import counted
 from nscan_cli.logs.reading_options import ReadingOptions
-from nscan_cli.poses import Array, Indices, wrap
+from nscan_cli.poses import Array, wrap
 
 UNDONE = "--as-recorded uses it as it is"
 
@@ -30,6 +31,8 @@ class Finding:
     """Reading options that put it right, where it is beyond doubt."""
     is_of_clocks: bool = False
     """Whether odometry and scans are compared at wrong times before it is put right."""
+    is_of_view: bool = False
+    """Whether the laser looks elsewhere, or its readings come in another order, in a part of the log."""
 
 
 def frozen(evidence: StepEvidence, what: str) -> Finding:
@@ -130,21 +133,69 @@ def wrong_scale(fit: MountFit, reading: ReadingOptions, options: FileCheckOption
     )
 
 
-def changed_scale(
-    change: ScaleChange, steps: int, numbers: Indices, times: Array, reading: ReadingOptions
-) -> Finding:
-    """Odometry or the ranges count otherwise from a scan on, which is between two numbers (2,).
+class Place(NamedTuple):
+    """Two scans between which something changes."""
 
-    `times` (2,) are the times of these scans from the first of the log, s.
-    """
-    ratio, (end, start) = change.behind / change.before, times.tolist()
+    before: int
+    """Number of the last scan that is surely before it."""
+    behind: int
+    """Number of the first scan that is surely behind it."""
+    end: float
+    """Time of the former from the first scan of the log, s."""
+    start: float
+    """Time of the latter, s."""
+
+    def cures(self, before: str = "", behind: str = "") -> str:
+        """How to map both parts, each with more options."""
+        one, other = (f" {options}" if options else "" for options in (before, behind))
+        return f"map each part by itself: try --end {self.end:.2f}{one}, or --start {self.start:.2f}{other}"
+
+
+def changed_scale(change: ScaleChange, steps: int, place: Place, reading: ReadingOptions) -> Finding:
+    """Odometry or the ranges count otherwise from a scan on."""
+    ratio = change.behind / change.before
     by_ranges = f"--range-scale {(reading.range_scale or 1.0) / ratio:.3g}"
     by_odometry = f"--odometry-scale {reading.odometry_scale * ratio:.3g}"
     return Finding(
-        f"odometry or the ranges change their scale from scan {numbers[0]} to {numbers[1]}: one metre by "
+        f"odometry or the ranges change their scale from scan {place.before} to {place.behind}: one metre by "
         f"odometry is {change.before:.3g} m by scans before and {change.behind:.3g} m behind, in "
-        f"{counted(steps, 'step')}; map each part by itself: try --end {end:.2f}, or --start {start:.2f}, "
+        f"{counted(steps, 'step')}; {place.cures()}, "
         f"with {by_ranges} if the ranges are wrong there, or {by_odometry} if odometry is"
+    )
+
+
+def changed_order(change: TurnChange, place: Place, reading: ReadingOptions) -> Finding:
+    """The readings come in the other order from a scan on, or odometry turns the other way."""
+    as_read, otherwise = ("--flip", "") if reading.flip else ("", "--flip")
+    cures = place.cures(*((as_read, otherwise) if change.before > 0.0 else (otherwise, as_read)))
+    return Finding(
+        f"the order of the readings likely changes from scan {place.before} to {place.behind}: turns by "
+        f"odometry are {change.before:.2f} times those by scans before and {change.behind:.2f} times behind, "
+        f"in {counted(change.steps, 'step')}; {cures}; if left and right are correct in both maps without "
+        "--flip, odometry turns the wrong way in one of them, and --no-odometry maps all",
+        is_of_view=True,
+    )
+
+
+def changed_direction(
+    change: DirectionChange, place: Place, mount: Array, options: FileCheckOptions
+) -> Finding:
+    """The laser, at `mount` (3,) by the file, looks elsewhere from a scan on."""
+    turn = math.degrees(float(wrap(change.behind - change.before)))
+    side = "left" if turn > 0 else "right"
+    mounts = [
+        f"--mount {mount[0]:g},{mount[1]:g},{_degrees(_round_angle(angle, options))}"
+        if abs(float(wrap(angle - mount[2]))) > options.min_mount_turn
+        else ""
+        for angle in (change.before, change.behind)
+    ]
+    is_opposite = abs(turn) > 180.0 - math.degrees(options.opposite_within)
+    other = ", or odometry counts forward as backward in one of them" if is_opposite else ""
+    return Finding(
+        f"the laser looks {abs(turn):.0f}° further to the {side} behind a place from scan {place.before} to "
+        f"{place.behind} than before, in {counted(change.steps, 'step')}: it was turned, or its bearings are "
+        f"counted from elsewhere{other}; {place.cures(*mounts)}",
+        is_of_view=True,
     )
 
 

@@ -24,6 +24,33 @@ class ScaleChangeOptions:
 
 
 @dataclass(frozen=True)
+class ViewChangeOptions:
+    """When the readings come in another order, or the laser looks elsewhere, from a scan on."""
+
+    min_turn: float = 0.05
+    """Least turn of a step whose sign counts, rad. With a larger value fewer steps count, and each tells
+    more."""
+    min_length: float = 0.05
+    """Least length of a step whose direction counts, m. With a larger value fewer steps count, and each tells
+    more."""
+    min_steps: int = 8
+    """Least number of such steps before a change, and behind. A larger value finds fewer changes."""
+    min_agreement: float = 0.6
+    """Least mean of the signs of turns on both sides: at 0.6 four of five are alike. A larger value finds
+    fewer changes."""
+    min_direction: float = 0.1
+    """Least change of the direction of the laser, rad. A larger value warns less."""
+    sigmas: float = 5.0
+    """And it must exceed this number of standard deviations. A larger value warns less."""
+    doubt_steps: int = 2
+    """More steps are measured where so many steps before and behind show a change. A larger value takes less
+    time, and misses what changes near the beginning or the end."""
+    doubt_sigmas: float = 2.5
+    """More steps are measured where a change of direction exceeds this number of standard deviations. A
+    larger value takes less time."""
+
+
+@dataclass(frozen=True)
 class OdometryUnitOptions:
     """When odometry counts in another unit over a part of the log."""
 

@@ -9,6 +9,7 @@ from nscan_cli.calibration.odometry_options import (
     OdometryUnitOptions,
     ScaleChangeOptions,
     UnsignedOdometryOptions,
+    ViewChangeOptions,
 )
 from nscan_cli.calibration.sweep_options import SweepCheckOptions
 from nscan_cli.matching.pairwise import PairOptions
@@ -173,6 +174,7 @@ class FileCheckOptions:
     held: HeldOdometryOptions = field(default_factory=HeldOdometryOptions)
     units: OdometryUnitOptions = field(default_factory=OdometryUnitOptions)
     change: ScaleChangeOptions = field(default_factory=ScaleChangeOptions)
+    view: ViewChangeOptions = field(default_factory=ViewChangeOptions)
     unsigned: UnsignedOdometryOptions = field(default_factory=UnsignedOdometryOptions)
     companion: CompanionOptions = field(default_factory=CompanionOptions)
     min_steps: int = 12

@@ -11,7 +11,8 @@ from nscan_cli.calibration.measured_steps import MeasuredSteps
 from nscan_cli.calibration.mount_fit import MountFit, TurnFit, fit_mount, fit_turns
 from nscan_cli.calibration.options import FileCheckOptions
 from nscan_cli.calibration.scale_change import ScaleChange, scale_change
-from nscan_cli.poses import MIRRORED, Array, are_known, wrap
+from nscan_cli.calibration.view_change import DirectionChange, TurnChange, direction_change, turn_change
+from nscan_cli.poses import MIRRORED, Array, are_known, transform, wrap
 
 
 class StepEvidence:
@@ -69,6 +70,15 @@ class StepEvidence:
             return None
         return scale_change(self.laser, self.odometry, self.fit, self.options.change)
 
+    def turn_change(self, least: int) -> TurnChange | None:
+        """The clearest change of the signs of turns, with at least so many turns before and behind."""
+        return turn_change(self.laser, self.odometry, least, self.options.view)
+
+    def direction_change(self, mount: Array, least: int) -> DirectionChange | None:
+        """The clearest change of the direction of a laser, mounted at (3,), with so many steps on both
+        sides."""
+        return direction_change(self.laser, self.odometry, mount, least, self.options.view)
+
     def rows_at(self, step: int) -> tuple[int, int]:
         """The rows where the step before one of those that have both begins, and where this one ends."""
         known = np.flatnonzero(self._known)
@@ -79,6 +89,12 @@ class StepEvidence:
         odometry = self.odometry.copy()
         odometry[change.step :, :2] *= change.behind / change.before
         return self._fit(self.laser, odometry)
+
+    def fit_turned(self, change: DirectionChange) -> MountFit | None:
+        """The fit of a laser that looks where it does before a change."""
+        laser, turn = self.laser.copy(), change.behind - change.before
+        laser[change.step :, :2] = transform(np.array([0.0, 0.0, turn]), laser[change.step :, :2])
+        return self._fit(laser, self.odometry)
 
     def fit_with_signs(self, signs: Array) -> MountFit | None:
         """The fit of odometry whose coordinates are multiplied by signs (3,)."""
@@ -107,6 +123,8 @@ def agrees_clearly(evidence: StepEvidence, mount: Array, options: FileCheckOptio
         return False
     if evidence.change is None or is_change(evidence.change, options, options.change.doubt_sigmas):
         return False
+    if is_view_in_doubt(evidence, mount, options):
+        return False
     if max(turns.spread, fit.spread) > share * options.max_spread or fit.tail > share * options.max_tail:
         return False
     off = fit.mount - mount
@@ -119,6 +137,15 @@ def agrees_clearly(evidence: StepEvidence, mount: Array, options: FileCheckOptio
 def is_change(change: ScaleChange | None, options: FileCheckOptions, sigmas: float) -> bool:
     """Whether the scale changes along the steps, by so many standard deviations."""
     return change is not None and change.exceeds(options.change.min_factor, sigmas)
+
+
+def is_view_in_doubt(evidence: StepEvidence, mount: Array, options: FileCheckOptions) -> bool:
+    """Whether the laser, mounted at (3,), may be turned, or its readings reversed, from a scan on."""
+    view = options.view
+    turned = evidence.direction_change(mount, view.doubt_steps)
+    mirrored = evidence.turn_change(view.doubt_steps)
+    is_turned = turned is not None and turned.exceeds(view.min_direction, view.doubt_sigmas)
+    return is_turned or (mirrored is not None and mirrored.is_order)
 
 
 def is_wrong_scale(fit: MountFit, options: FileCheckOptions) -> bool:

@@ -131,7 +131,7 @@ def document(outcomes: Sequence[Outcome]) -> str:
         "# Files of strangers",
         "Written by `make strangers`. Files that say something wrong, made after reports of their owners, "
         "and the same faults put into a simulated drive and real logs "
-        "(`tests/benchmarks/stranger_cases.py`). Errors are in m: for simulated drives the root mean "
+        "(`tests/benchmarks/stranger_faults.py`). Errors are in m: for simulated drives the root mean "
         "square error of positions (ATE), for real logs the mean error on their relations. A map is right "
         f"if its error is at most {FACTOR:g} times that of the untouched drive, or at most {1000 * MORE:g} "
         'mm larger. "As recorded" is with `--as-recorded`: the file is believed. "As the message says" '

@@ -118,6 +118,21 @@ def mirrored(log: LaserLog) -> LaserLog:
     return replace(log, angle_min=-log.angle_min, angle_increment=-log.angle_increment)
 
 
+def mirrored_in(log: LaserLog, rows: Rows) -> LaserLog:
+    """The readings of some scans in the wrong order."""
+    first, between = log.angle_min.copy(), log.angle_increment.copy()
+    first[rows] *= -1.0
+    between[rows] *= -1.0
+    return replace(log, angle_min=first, angle_increment=between)
+
+
+def turned_in(log: LaserLog, turn: float, rows: Rows) -> LaserLog:
+    """The bearings of some scans are too large by a turn (rad)."""
+    first = log.angle_min.copy()
+    first[rows] += turn
+    return replace(log, angle_min=first)
+
+
 def beams_apart(log: LaserLog, factor: float) -> LaserLog:
     """The file says that beams are so many times as far apart as they are, about the same middle."""
     middle = log.angle_min + 0.5 * log.angle_increment * (log.beam_counts() - 1)

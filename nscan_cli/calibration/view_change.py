@@ -1,0 +1,104 @@
+"""A scan from which on the readings come in the other order, or the laser looks elsewhere."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from nscan_cli.calibration.odometry_options import ViewChangeOptions
+from nscan_cli.calibration.robust_fit import TO_SIGMA
+from nscan_cli.calibration.scale_change import SIGMA_OF_MEDIAN
+from nscan_cli.poses import Array, Indices, compose, relative, wrap
+
+
+class TurnChange(NamedTuple):
+    """Turns by odometry as a multiple of those by scans, in the steps before and behind a place."""
+
+    step: int
+    """The first step behind it."""
+    before: float
+    behind: float
+    steps: int
+    """Number of steps with a turn."""
+
+    @property
+    def is_order(self) -> bool:
+        """Whether the turns are opposite on one side of it alone."""
+        return self.before * self.behind < 0.0
+
+
+class DirectionChange(NamedTuple):
+    """Where the laser looks on the robot in the steps before and behind a place, rad."""
+
+    step: int
+    """The first step behind it."""
+    before: float
+    behind: float
+    sigma: float
+    """Standard deviation of their difference."""
+    steps: int
+    """Number of steps with motion."""
+
+    def exceeds(self, turn: float, sigmas: float) -> bool:
+        """Whether the two differ by more than a turn, rad, and by more than so many standard deviations."""
+        return abs(float(wrap(self.behind - self.before))) > max(turn, sigmas * self.sigma)
+
+
+def turn_change(laser: Array, odometry: Array, least: int, options: ViewChangeOptions) -> TurnChange | None:
+    """The clearest change of the signs of turns along steps (n, 3) of laser and robot, in order.
+
+    None for fewer turns than `least` on both sides, and where the turns of one side are of both signs.
+    """
+    told: Indices = np.flatnonzero(np.abs(laser[:, 2]) >= options.min_turn)
+    ratios = odometry[told, 2] / laser[told, 2]
+    signs = np.sign(ratios)
+    place = _clearest_split(signs[:, None], least)
+    if place is None:
+        return None
+    sides = [signs[:place], signs[place:]]
+    if min(abs(float(side.mean())) for side in sides) < options.min_agreement:
+        return None
+    before, behind = (float(np.median(some)) for some in (ratios[:place], ratios[place:]))
+    return TurnChange(int(told[place]), before, behind, len(told))
+
+
+def direction_change(
+    laser: Array, odometry: Array, mount: Array, least: int, options: ViewChangeOptions
+) -> DirectionChange | None:
+    """The clearest change of the direction of the laser along steps (n, 3) of it and the robot, in order.
+
+    `mount` (3,) is the mounting in the file, whose place is believed. None for fewer
+    steps than `least` on both sides.
+    """
+    place = np.array([*mount[:2], 0.0])
+    by_odometry = relative(compose(odometry, place), place)
+    lengths = [np.hypot(steps[:, 0], steps[:, 1]) for steps in (laser, by_odometry)]
+    told: Indices = np.flatnonzero(np.minimum(*lengths) >= options.min_length)
+    angles = np.arctan2(by_odometry[told, 1], by_odometry[told, 0]) - np.arctan2(
+        laser[told, 1], laser[told, 0]
+    )
+    split = _clearest_split(np.stack([np.cos(angles), np.sin(angles)], axis=1), least)
+    if split is None:
+        return None
+    (before, one), (behind, other) = (_direction(some) for some in (angles[:split], angles[split:]))
+    return DirectionChange(int(told[split]), before, behind, float(np.hypot(one, other)), len(told))
+
+
+def _clearest_split(values: Array, least: int) -> int | None:
+    """The place at which two means explain values (n, d) best, with so many on both sides; None if few."""
+    places = np.arange(least, len(values) - least + 1)
+    if not len(places):
+        return None
+    sums = np.cumsum(values, axis=0)
+    before, behind = sums[places - 1], sums[-1] - sums[places - 1]
+    gains = (before**2).sum(axis=1) / places + (behind**2).sum(axis=1) / (len(values) - places)
+    return int(places[np.argmax(gains)])
+
+
+def _direction(angles: Array) -> tuple[float, float]:
+    """The usual one of directions (n,), rad, and its standard deviation."""
+    usual = float(np.arctan2(np.median(np.sin(angles)), np.median(np.cos(angles))))
+    off = wrap(angles - usual)
+    deviation = TO_SIGMA * float(np.median(np.abs(off)))
+    return float(wrap(usual + np.median(off))), max(SIGMA_OF_MEDIAN * deviation / np.sqrt(len(angles)), 1e-6)

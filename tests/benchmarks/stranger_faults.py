@@ -1,0 +1,125 @@
+"""Faults that are put into a simulated drive and into real logs, with the words that tell the cause."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from nscan_cli.logs.laser_log import LaserLog
+from tests.simulation import faults, odometry_faults
+from tests.simulation.reversing import there_and_back
+
+Fault = Callable[[LaserLog], LaserLog]
+
+
+def _posts(*degrees: tuple[float, float, float]) -> Fault:
+    sectors = [(np.radians(first), np.radians(last), distance) for first, last, distance in degrees]
+    return lambda log: faults.own_parts(log, sectors)
+
+
+def _frozen(log: LaserLog) -> LaserLog:
+    return odometry_faults.turning(odometry_faults.scaled(log, 0.0), 0.0)
+
+
+def _looking(degrees: float) -> Fault:
+    """The file says that the laser looks so much further to the left than it does."""
+    return lambda log: faults.mounted_otherwise(log, np.radians(degrees))
+
+
+def _from_half_way(factor: float) -> Fault:
+    """The second half of the scans has its ranges multiplied."""
+    return lambda log: faults.ranges_scaled(log, factor, slice(len(log) // 2, None))
+
+
+def _turned_from_half_way(degrees: float) -> Fault:
+    """The second half of the scans has its bearings counted from elsewhere."""
+    return lambda log: faults.turned_in(log, np.radians(degrees), slice(len(log) // 2, None))
+
+
+def _middle(log: LaserLog) -> slice:
+    """The middle third of a log."""
+    return slice(len(log) // 3, 2 * len(log) // 3)
+
+
+FAULTS: tuple[tuple[str, Fault, str], ...] = (
+    ("", lambda log: log, ""),
+    ("odometry × 1000", lambda log: odometry_faults.scaled(log, 1000.0), "odometry-scale 0.001"),
+    ("odometry × 1000 from half-way on",
+        lambda log: odometry_faults.scaled_in(log, 1000.0, slice(len(log) // 2, None)),
+        "in millimetres, elsewhere in metres",
+    ),
+    ("odometry × 300", lambda log: odometry_faults.scaled(log, 300.0), "odometry-scale 0.003"),
+    ("odometry × 0.01", lambda log: odometry_faults.scaled(log, 0.01), "odometry-scale (100|9|10)"),
+    ("odometry × 2", lambda log: odometry_faults.scaled(log, 2.0), "scale of odometry"),
+    ("odometry × 0.5", lambda log: odometry_faults.scaled(log, 0.5), "scale of odometry"),
+    ("odometry turns × 0.5", lambda log: odometry_faults.turning(log, 0.5), "odometry.* turns"),
+    ("odometry turns × 1.6", lambda log: odometry_faults.turning(log, 1.6), "odometry.* turns"),
+    ("odometry turns × −1", lambda log: odometry_faults.turning(log, -1.0), "turns the wrong way"),
+    ("odometry's x reversed", odometry_faults.x_reversed, "odometry counts x or y the wrong way"),
+    ("odometry backwards", odometry_faults.behind, "counts forward as backward"),
+    ("odometry frozen", _frozen, "never moves"),
+    ("odometry frozen for a third, then jumps",
+        lambda log: odometry_faults.held(log, _middle(log), True),
+        "odometry (does not move|never moves|stands still)",
+    ),
+    (
+        "odometry frozen for a third",
+        lambda log: odometry_faults.held(log, _middle(log), False),
+        "odometry (does not move|never moves|stands still)",
+    ),
+    ("odometry without signs, three reversals",
+        lambda log: odometry_faults.unsigned(there_and_back(log, [(40, 80), (200, 260), (270, 280)])),
+        "counts reversing as driving forward",
+    ),
+    ("odometry × 1000 without signs, three reversals",
+        lambda log: odometry_faults.scaled(
+            odometry_faults.unsigned(there_and_back(log, [(40, 80), (200, 260), (270, 280)])), 1000.0
+        ),
+        "counts reversing as driving forward",
+    ),
+    ("each pose five times", lambda log: odometry_faults.repeated(log, 5), "odometry comes less often"),
+    ("odometry zero at every 50th scan", lambda log: odometry_faults.zeros(log, 50), "single wrong values"),
+    ("ranges in mm from half-way on", _from_half_way(1000.0), "in millimetres, the others in metres"),
+    ("ranges in cm from half-way on", _from_half_way(100.0), "in centimetres, the others in metres"),
+    ("ranges in feet from half-way on", _from_half_way(3.281), "all ranges are multiplied"),
+    ("ranges × 1.15 from half-way on", _from_half_way(1.15), "change their scale from scan"),
+    ("ranges × 0.9", lambda log: faults.ranges_scaled(log, 0.9, slice(None)), "range-scale 1.1"),
+    ("readings reversed", faults.mirrored, "in the wrong order"),
+    ("readings reversed from half-way on",
+        lambda log: faults.mirrored_in(log, slice(len(log) // 2, None)),
+        "order of the readings likely changes",
+    ),
+    ("readings reversed in the last fifth",
+        lambda log: faults.mirrored_in(log, slice(4 * len(log) // 5, None)),
+        "order of the readings likely changes",
+    ),
+    ("looks 30° left from half-way on", _turned_from_half_way(30.0), "looks 30° further"),
+    ("looks 90° left from half-way on", _turned_from_half_way(90.0), "looks (89|90|91)° further"),
+    ("beams closer by a third", lambda log: faults.beams_apart(log, 2 / 3), "1° from beam to beam"),
+    ("beams wider by a half", lambda log: faults.beams_apart(log, 1.5), "1° from beam to beam"),
+    ("looks 90° left", _looking(-90.0), "90° further to the left"),
+    ("looks 90° right", _looking(90.0), "(90|89|91)° further to the right"),
+    ("looks back", _looking(180.0), "looks 180° further"),
+    ("looks 30° left", _looking(-30.0), "(29|30|31)° further to the left"),
+    ("odometry 30 s late", lambda log: odometry_faults.late(log, 30.0), "clock of odometry"),
+    ("odometry 3 s early", lambda log: odometry_faults.late(log, -3.0), "clock of odometry"),
+    ("odometry 1 s late", lambda log: odometry_faults.late(log, 1.0), "clock of odometry"),
+    ("two posts of 10°", _posts((40.0, 50.0, 0.3), (-50.0, -40.0, 0.3)), "see the robot itself"),
+    ("two posts of 20°", _posts((35.0, 55.0, 0.3), (-55.0, -35.0, 0.3)), "see the robot itself"),
+    ("a wheel of 15° at 0.15 m", _posts((70.0, 85.0, 0.15)), "see the robot itself"),
+    ("someone follows at 0.6 m", lambda log: faults.follower(log, 0.6), "goes along with the robot"),
+    ("someone follows at 0.4 m", lambda log: faults.follower(log, 0.4), "goes along with the robot"),
+    ("15 % of the readings are dust", lambda log: faults.dust(log, 0.15, 0.1), ""),
+    ("cart on a hinge", faults.cart, "goes along with the robot"),
+)  # fmt: skip
+"""Name, fault, and what tells its cause."""
+KNOWN_CURES = {
+    "ranges × 0.9": r"--range-scale \S+",
+    "ranges × 1.15 from half-way on": r"--end [\d.]+",
+}
+"""The options that the owner chooses where messages name several causes."""
+FAULTS_OF_REAL_LOGS = (
+    "", "two posts of 20°", "odometry × 1000", "odometry frozen for a third", "each pose five times",
+)  # fmt: skip
+"""Those that the real logs get: with all of them it takes an hour."""
