@@ -165,11 +165,13 @@ def _of_view(
     return findings.changed_direction(turned, _place(log, evidence, turned.step, reading), log.mount, options)
 
 
-def _place(log: LaserLog, evidence: StepEvidence, step: int, reading: ReadingOptions) -> findings.Place:
+def _place(
+    log: LaserLog, evidence: StepEvidence, step: int, reading: ReadingOptions
+) -> findings.PlaceOfChange:
     """The scans between which a step begins something else."""
     before, behind = evidence.rows_at(step)
     end, start = (log.times[[before, behind]] - log.times[0] + (reading.start or 0.0)).tolist()
-    return findings.Place(int(log.numbers[before]), int(log.numbers[behind]), end, start)
+    return findings.PlaceOfChange(int(log.numbers[before]), int(log.numbers[behind]), end, start)
 
 
 def _of_clocks(

@@ -133,7 +133,7 @@ def wrong_scale(fit: MountFit, reading: ReadingOptions, options: FileCheckOption
     )
 
 
-class Place(NamedTuple):
+class PlaceOfChange(NamedTuple):
     """Two scans between which something changes."""
 
     before: int
@@ -151,7 +151,7 @@ class Place(NamedTuple):
         return f"map each part by itself: try --end {self.end:.2f}{one}, or --start {self.start:.2f}{other}"
 
 
-def changed_scale(change: ScaleChange, steps: int, place: Place, reading: ReadingOptions) -> Finding:
+def changed_scale(change: ScaleChange, steps: int, place: PlaceOfChange, reading: ReadingOptions) -> Finding:
     """Odometry or the ranges count otherwise from a scan on."""
     ratio = change.behind / change.before
     by_ranges = f"--range-scale {(reading.range_scale or 1.0) / ratio:.3g}"
@@ -164,7 +164,7 @@ def changed_scale(change: ScaleChange, steps: int, place: Place, reading: Readin
     )
 
 
-def changed_order(change: TurnChange, place: Place, reading: ReadingOptions) -> Finding:
+def changed_order(change: TurnChange, place: PlaceOfChange, reading: ReadingOptions) -> Finding:
     """The readings come in the other order from a scan on, or odometry turns the other way."""
     as_read, otherwise = ("--flip", "") if reading.flip else ("", "--flip")
     cures = place.cures(*((as_read, otherwise) if change.before > 0.0 else (otherwise, as_read)))
@@ -178,7 +178,7 @@ def changed_order(change: TurnChange, place: Place, reading: ReadingOptions) -> 
 
 
 def changed_direction(
-    change: DirectionChange, place: Place, mount: Array, options: FileCheckOptions
+    change: DirectionChange, place: PlaceOfChange, mount: Array, options: FileCheckOptions
 ) -> Finding:
     """The laser, at `mount` (3,) by the file, looks elsewhere from a scan on."""
     turn = math.degrees(float(wrap(change.behind - change.before)))
