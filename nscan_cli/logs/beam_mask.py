@@ -8,6 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from nscan_cli.logs.dead_beams import DeadBeamOptions, dead_beams
 from nscan_cli.logs.reading_options import ReadingOptions
 from nscan_cli.logs.robot_parts import RobotPartsOptions, ScanTable, Sector, robot_parts
 from nscan_cli.poses import Array
@@ -19,21 +20,37 @@ BEARING_ROUNDING = 1e-5
 
 
 def masked_sectors(
-    table: ScanTable, options: ReadingOptions, parts: RobotPartsOptions
+    table: ScanTable, options: ReadingOptions, parts: RobotPartsOptions, dead: DeadBeamOptions
 ) -> tuple[list[Bearings], list[str]]:
     """The sectors that are not read, and what is said of them."""
     if options.mask is not None:
         return list(options.mask), []
-    found = [] if options.as_recorded else robot_parts(table, parts)
-    return [(sector.first, sector.last) for sector in found], [_said(found)] if found else []
+    if options.as_recorded:
+        return [], []
+    found, constant = robot_parts(table, parts), dead_beams(table, dead)
+    constant = [one for one in constant if not any(_is_within(one, part) for part in found)]
+    sectors = [(sector.first, sector.last) for sector in (*found, *constant)]
+    left_out = f"are left out, as by --mask {mask_text(sectors)}; --as-recorded uses them"
+    said = []
+    if found:
+        said.append(
+            f"beams keep their range ({_ranges(found)} m) while the robot turns, so they see the robot "
+            f"itself; they {left_out}"
+        )
+    if constant:
+        said.append(
+            f"beams say exactly the same ({_ranges(constant)} m) in all scans while the others change, so "
+            f"they see the robot itself or are dead; they {left_out}"
+        )
+    return sectors, said
 
 
-def _said(found: Sequence[Sector]) -> str:
-    ranges = " and ".join(f"{distance:.2f}" for distance in sorted({round(one.range, 2) for one in found}))
-    return (
-        f"beams keep their range ({ranges} m) while the robot turns, so they see the robot itself; they are "
-        f"left out, as by --mask {mask_text([sector[:2] for sector in found])}; --as-recorded uses them"
-    )
+def _is_within(sector: Sector, other: Sector) -> bool:
+    return other.first <= sector.first and sector.last <= other.last
+
+
+def _ranges(found: Sequence[Sector]) -> str:
+    return " and ".join(f"{distance:.2f}" for distance in sorted({round(one.range, 2) for one in found}))
 
 
 def mask_text(sectors: Sequence[Bearings]) -> str:

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 from nscan_cli.logs.beam_angles import DEFAULT_BEAM_ANGLES, BeamAngleOptions
 from nscan_cli.logs.beam_spacing import DEFAULT_BEAM_SPACING, BeamSpacingOptions
+from nscan_cli.logs.dead_beams import DEFAULT_DEAD_BEAMS, DeadBeamOptions
 from nscan_cli.logs.odometry_interpolation import DEFAULT_ODOMETRY_GAPS, OdometryGapOptions
 from nscan_cli.logs.odometry_outliers import DEFAULT_ODOMETRY_OUTLIERS, OdometryOutlierOptions
 from nscan_cli.logs.range_limit_options import DEFAULT_RANGE_LIMITS, RangeLimitOptions
@@ -38,6 +39,7 @@ class ScanCheckOptions:
     turn_segments: TurnSegmentOptions = DEFAULT_TURN_SEGMENTS
     two_lasers: TwoLaserOptions = DEFAULT_TWO_LASERS
     robot_parts: RobotPartsOptions = DEFAULT_ROBOT_PARTS
+    dead_beams: DeadBeamOptions = DEFAULT_DEAD_BEAMS
     mounting: MountingOptions = DEFAULT_MOUNTING
     odometry_gaps: OdometryGapOptions = DEFAULT_ODOMETRY_GAPS
     odometry_outliers: OdometryOutlierOptions = DEFAULT_ODOMETRY_OUTLIERS

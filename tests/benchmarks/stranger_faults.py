@@ -108,6 +108,7 @@ FAULTS: tuple[tuple[str, Fault, str], ...] = (
     ("two posts of 10°", _posts((40.0, 50.0, 0.3), (-50.0, -40.0, 0.3)), "see the robot itself"),
     ("two posts of 20°", _posts((35.0, 55.0, 0.3), (-55.0, -35.0, 0.3)), "see the robot itself"),
     ("a wheel of 15° at 0.15 m", _posts((70.0, 85.0, 0.15)), "see the robot itself"),
+    ("a sixth of the beams always says 5 m", lambda log: faults.dead_beams(log, 5.0), "exactly the same"),
     ("someone follows at 0.6 m", lambda log: faults.follower(log, 0.6), "goes along with the robot"),
     ("someone follows at 0.4 m", lambda log: faults.follower(log, 0.4), "goes along with the robot"),
     ("15 % of the readings are dust", lambda log: faults.dust(log, 0.15, 0.1), ""),
@@ -120,6 +121,6 @@ KNOWN_CURES = {
 }
 """The options that the owner chooses where messages name several causes."""
 FAULTS_OF_REAL_LOGS = (
-    "", "two posts of 20°", "odometry × 1000", "odometry frozen for a third", "each pose five times",
+    "", "two posts of 20°", "a sixth of the beams always says 5 m", "odometry × 1000", "odometry frozen for a third", "each pose five times",
 )  # fmt: skip
 """Those that the real logs get: with all of them it takes an hour."""

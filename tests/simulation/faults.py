@@ -186,6 +186,13 @@ def own_parts(
     return replace(log, ranges=ranges)
 
 
+def dead_beams(log: LaserLog, reading: float) -> LaserLog:
+    """A sixth of the beams, those next to the first sixth, always says one reading (m)."""
+    ranges, sixth = log.ranges.copy(), log.ranges.shape[1] // 6
+    ranges[:, sixth : 2 * sixth] = reading
+    return replace(log, ranges=ranges)
+
+
 def follower(log: LaserLog, distance: float, width: float = 0.5, seed: int = 1) -> LaserLog:
     """Somebody walks behind the robot: a disc that sways by 0.1 m and 0.1 rad."""
     ranges, rng = log.ranges.copy(), np.random.default_rng(seed)
