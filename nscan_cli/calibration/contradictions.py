@@ -195,7 +195,7 @@ def _of_clocks(
     if sign > 0.0:
         return [findings.two_clocks(lag, reading)]
     evidence = "turns by odometry, at that offset, are those by scans the other way round"
-    return [findings.two_clocks(lag, reading), findings.opposite_turns(evidence, reading, False)]
+    return [findings.two_clocks(lag, reading), findings.opposite_turns(evidence, reading, False, False)]
 
 
 def _is_offset(lag: ClockLag, options: FileCheckOptions) -> bool:
@@ -222,7 +222,7 @@ def _of_opposite_turns(
     if is_nearer(fit, other, mount, options.mount_sigmas):
         return [findings.wrong_turns(turns), *_of_positions(other, fit, evidence, reading, options)]
     is_certain = is_nearer(fit, mount, other, options.mount_sigmas)
-    mirrored = findings.opposite_turns(findings.turns_of(turns), reading, is_certain)
+    mirrored = findings.opposite_turns(findings.turns_of(turns), reading, is_certain, True)
     return [mirrored, *_of_positions(mount, fit, evidence, reading, options)]
 
 

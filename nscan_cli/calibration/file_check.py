@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from nscan_cli.calibration.companions import checked_companion
 from nscan_cli.calibration.contradictions import find_contradictions
 from nscan_cli.calibration.held_odometry import checked_held
+from nscan_cli.calibration.mirrored_odometry import with_mirrored_odometry
 from nscan_cli.calibration.odometry_units import checked_units
 from nscan_cli.calibration.options import FileCheckOptions
 from nscan_cli.calibration.sweep_check import checked_sweep
@@ -44,6 +45,9 @@ def checked_file(log: LaserLog, reading: ReadingOptions, options: FileCheckOptio
         # A laser that is turned within the log sees the robot go elsewhere, too.
         turned = [one for one in find_contradictions(log, reading, options) if one.is_of_view]
         findings, signed, reversing = (turned, log, []) if turned else (findings, signed, reversing)
+    if any(finding.is_mirror_image for finding in findings):
+        # The ranges changed as its mirror image says.
+        signed, reversing = checked_signs(with_mirrored_odometry(log), options.unsigned, options.steps)
     log = signed
     if held and any(finding.is_of_clocks for finding in findings):
         # A clock that is behind makes odometry begin late, as if it stood.

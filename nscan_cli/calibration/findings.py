@@ -31,6 +31,8 @@ class Finding:
     """Reading options that put it right, where it is beyond doubt."""
     is_of_clocks: bool = False
     """Whether odometry and scans are compared at wrong times before it is put right."""
+    is_mirror_image: bool = False
+    """Whether odometry is the mirror image of what the scans show as they are read."""
     is_of_view: bool = False
     """Whether the laser looks elsewhere, or its readings come in another order, in a part of the log."""
 
@@ -80,12 +82,14 @@ def two_clocks(lag: ClockLag, reading: ReadingOptions) -> Finding:
     )
 
 
-def opposite_turns(evidence: str, reading: ReadingOptions, is_certain: bool) -> Finding:
+def opposite_turns(evidence: str, reading: ReadingOptions, is_certain: bool, is_mended: bool) -> Finding:
     """Scans turn the other way than odometry. `is_certain`: the mounting shows that the readings are wrong.
 
     If not certain, odometry may be wrong instead: scans and odometry are then mirror images of each other.
+    `is_mended`: odometry is mirrored, so that both are of one kind.
     """
     cure = "leave out --flip" if reading.flip else "try --flip"
+    mended = "; odometry is mirrored as well, so that it agrees with them" if is_mended else ""
     other = (
         ""
         if is_certain
@@ -95,7 +99,9 @@ def opposite_turns(evidence: str, reading: ReadingOptions, is_certain: bool) -> 
         )
     )
     return Finding(
-        f"the readings are likely in the wrong order, and the map is mirrored: {evidence}; {cure}{other}"
+        f"the readings are likely in the wrong order, and the map is mirrored: {evidence}{mended}; "
+        f"{cure}{other}",
+        is_mirror_image=is_mended,
     )
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from nscan_cli.calibration.odometry_options import ViewChangeOptions
 from nscan_cli.calibration.robust_fit import TO_SIGMA
 from nscan_cli.calibration.scale_change import SIGMA_OF_MEDIAN
-from nscan_cli.poses import Array, Indices, compose, relative, wrap
+from nscan_cli.poses import Array, Indices, Mask, compose, relative, wrap
 
 
 class TurnChange(NamedTuple):
@@ -71,13 +71,17 @@ def direction_change(
     `mount` (3,) is the mounting in the file, whose place is believed. None for fewer
     steps than `least` on both sides.
     """
+    # Odometry may be in another unit than the place of the laser.
+    lengths = [np.hypot(steps[:, 0], steps[:, 1]) for steps in (laser, odometry)]
+    moves: Mask = (lengths[0] >= options.min_length) & (lengths[1] > 0.0)
+    if not moves.any():
+        return None
+    scale = float(np.median(lengths[0][moves] / lengths[1][moves]))
     place = np.array([*mount[:2], 0.0])
-    by_odometry = relative(compose(odometry, place), place)
-    lengths = [np.hypot(steps[:, 0], steps[:, 1]) for steps in (laser, by_odometry)]
-    told: Indices = np.flatnonzero(np.minimum(*lengths) >= options.min_length)
-    angles = np.arctan2(by_odometry[told, 1], by_odometry[told, 0]) - np.arctan2(
-        laser[told, 1], laser[told, 0]
-    )
+    by_odometry = relative(compose(odometry * (scale, scale, 1.0), place), place)
+    told: Indices = np.flatnonzero(moves & (np.hypot(*by_odometry[:, :2].T) >= options.min_length))
+    driven, seen = (np.arctan2(steps[told, 1], steps[told, 0]) for steps in (by_odometry, laser))
+    angles = driven - seen
     split = _clearest_split(np.stack([np.cos(angles), np.sin(angles)], axis=1), least)
     if split is None:
         return None

@@ -121,6 +121,8 @@ KNOWN_CURES = {
 }
 """The options that the owner chooses where messages name several causes."""
 FAULTS_OF_REAL_LOGS = (
-    "", "two posts of 20°", "a sixth of the beams always says 5 m", "odometry × 1000", "odometry frozen for a third", "each pose five times",
+    "", "two posts of 20°", "a sixth of the beams always says 5 m", "odometry × 1000", "odometry turns × −1",
+    "odometry frozen for a third", "each pose five times", "odometry zero at every 50th scan",
+    "readings reversed", "readings reversed in the last fifth",
 )  # fmt: skip
 """Those that the real logs get: with all of them it takes an hour."""

@@ -56,9 +56,12 @@ def test_turns_of_mirrored_scans_are_opposite():
     assert found.behind == pytest.approx(-1.0, abs=0.1)
 
 
-def test_noise_is_no_change():
+@pytest.mark.parametrize("scale", [1.0, 1000.0, 0.01])
+def test_noise_is_no_change(scale):
+    """Also where odometry is in another unit than the mounting."""
     for seed in range(200):
         laser, odometry = steps(seed)
+        odometry[:, :2] *= scale
         found = direction_change(laser, odometry, MOUNT, OPTIONS.min_steps, OPTIONS)
         assert found is not None
         assert not found.exceeds(OPTIONS.min_direction, OPTIONS.sigmas)
