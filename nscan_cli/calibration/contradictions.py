@@ -15,6 +15,7 @@ from nscan_cli.calibration.options import FileCheckOptions
 from nscan_cli.calibration.step_evidence import (
     StepEvidence,
     agrees_clearly,
+    are_of_one_size,
     explains,
     is_change,
     is_excluded,
@@ -48,7 +49,8 @@ def find_contradictions(log: LaserLog, reading: ReadingOptions, options: FileChe
     if changed_view is not None:
         return [changed_view]
     turns = evidence.turns
-    if turns is not None and not turns_agree(turns, options):
+    is_doubtful = evidence.disagreement > options.clock.max_disagreement
+    if turns is not None and (is_doubtful or not turns_agree(turns, options)):
         found = _of_clocks(log, evidence.steps, reading, options)
         if found:
             return found
@@ -59,9 +61,9 @@ def find_contradictions(log: LaserLog, reading: ReadingOptions, options: FileChe
     unusable = _unusable(evidence, turns, options)
     if unusable is not None:
         return [unusable]
-    if turns is not None and turns.ratio < 0.0 and _are_told(turns, options):
+    if turns is not None and _are_opposite(turns, evidence, options):
         mirrored = evidence.mirrored_fit
-        if turns_agree(turns, options) and mirrored is not None and explains(mirrored, options):
+        if are_of_one_size(turns, options) and mirrored is not None and explains(mirrored, options):
             return _of_opposite_turns(log.mount, turns, mirrored, evidence, reading, options)
         return [findings.wrong_turns(turns), *_of_positions(log.mount, fit, evidence, reading, options)]
     found = []
@@ -117,6 +119,12 @@ def _is_still(odometry: Array, still: float) -> Mask:
 def _are_told(turns: TurnFit, options: FileCheckOptions) -> bool:
     """Whether turns by odometry are a multiple of those by scans."""
     return turns.steps >= options.min_steps and turns.spread <= options.max_spread
+
+
+def _are_opposite(turns: TurnFit, evidence: StepEvidence, options: FileCheckOptions) -> bool:
+    """Whether odometry turns the other way than the scans: in most steps, or by a clear multiple."""
+    is_most = turns.steps >= options.min_steps and evidence.opposite_share >= options.min_opposite_share
+    return turns.ratio < 0.0 and (_are_told(turns, options) or is_most)
 
 
 def _unusable(evidence: StepEvidence, turns: TurnFit | None, options: FileCheckOptions) -> Finding | None:

@@ -28,7 +28,8 @@ class CheckedFile:
     """The options that read the log as it is now."""
     messages: list[str]
     followed: bool = False
-    """Whether what goes along with the robot was looked for at all scans, by their odometry."""
+    """Whether what goes along with the robot was looked for at all scans, by their odometry, or cannot be:
+    with a wrong mounting walls seem to be where the robot has been."""
 
 
 def checked_file(log: LaserLog, reading: ReadingOptions, options: FileCheckOptions) -> CheckedFile:
@@ -62,7 +63,8 @@ def checked_file(log: LaserLog, reading: ReadingOptions, options: FileCheckOptio
     said += units + held + reversing + [finding.message for finding in findings]
     if any(not finding.corrected for finding in findings):
         # Where the robot has been is in doubt.
-        return CheckedFile(log, reading, said)
+        is_elsewhere = any(finding.is_of_mount or finding.is_of_view for finding in findings)
+        return CheckedFile(log, reading, said, is_elsewhere)
     is_followed = log.odometry is not None and bool(are_known(log.odometry).all())
     log, reading, along = checked_companion(log, reading, options.companion)
     return CheckedFile(log, reading, said + along, is_followed)

@@ -31,6 +31,8 @@ class Finding:
     """Reading options that put it right, where it is beyond doubt."""
     is_of_clocks: bool = False
     """Whether odometry and scans are compared at wrong times before it is put right."""
+    is_of_mount: bool = False
+    """Whether the laser may be elsewhere on the robot, or look elsewhere, than the file says."""
     is_mirror_image: bool = False
     """Whether odometry is the mirror image of what the scans show as they are read."""
     is_of_view: bool = False
@@ -223,10 +225,10 @@ def wrong_mounting(mount: Array, fit: MountFit, options: FileCheckOptions) -> Fi
     if not is_turned:
         along = f"{off[0]:+.2f} m ahead and {off[1]:+.2f} m to the left"
         what = f"the laser is likely elsewhere on the robot than the file says, by {along}"
-        return Finding(f"{what}; {agree}; {cure}")
+        return Finding(f"{what}; {agree}; {cure}", is_of_mount=True)
     side, degrees = "left" if turn > 0 else "right", abs(math.degrees(turn))
     what = f"the laser likely looks {degrees:.0f}° further to the {side} than the file says"
-    return Finding(f"{what}; {agree}; {cure}")
+    return Finding(f"{what}; {agree}; {cure}", is_of_mount=True)
 
 
 def opposite(
@@ -251,7 +253,7 @@ def opposite(
         what = "the laser likely looks 180° further to the left than the file says"
         other, cures = "odometry counts forward as backward", (by_mount, by_scale)
     agree = f"then scans and odometry agree about {counted(fit.steps, 'step')}, and {evidence}"
-    return Finding(f"{what}; {agree}; try {cures[0]}, or {cures[1]} if {other}")
+    return Finding(f"{what}; {agree}; try {cures[0]}, or {cures[1]} if {other}", is_of_mount=True)
 
 
 def _round_angle(angle: float, options: FileCheckOptions) -> float:

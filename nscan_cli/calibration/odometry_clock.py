@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from nscan_cli.calibration.measured_steps import MeasuredSteps
-from nscan_cli.calibration.options import ClockOptions
+from nscan_cli.calibration.odometry_options import ClockOptions
 from nscan_cli.calibration.parabola import parabola_minimum
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.poses import are_known

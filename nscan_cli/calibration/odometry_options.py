@@ -1,8 +1,31 @@
-"""The parameters of what may be wrong with odometry over parts of a log."""
+"""The parameters of what may be wrong with odometry: its clock, and what changes within a log."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class ClockOptions:
+    """How the offset between the clocks of odometry and scans is looked for."""
+
+    span: float = 120.0
+    """Largest clock offset that is tried, s. A larger value takes longer."""
+    resolution: float = 0.1
+    """Interval between the offsets that are tried, s. A smaller value takes longer."""
+    max_difference: float = 0.1
+    """Turns of a step that differ by more count as different by this, rad: such steps are slips, or matches
+    that failed. A larger value gives them more weight."""
+    gain: float = 0.6
+    """An offset is found if the turns disagree by less than this share of their disagreement without it, and
+    of that anywhere else. With a larger share an offset is found more often, also where there is none.
+    Mirrored turns are found in the same way."""
+    max_disagreement: float = 0.8
+    """An offset is looked for, however well most turns agree, if turns as stamped disagree by more than this
+    share. A larger value takes less time."""
+    min_offset: float = 0.5
+    """Smallest offset that a warning names, s: tracking hardly notices a smaller one. A larger value warns
+    less."""
 
 
 @dataclass(frozen=True)

@@ -6,6 +6,7 @@ import math
 from dataclasses import dataclass, field
 
 from nscan_cli.calibration.odometry_options import (
+    ClockOptions,
     OdometryUnitOptions,
     ScaleChangeOptions,
     UnsignedOdometryOptions,
@@ -56,26 +57,6 @@ class StepOptions:
     metres_per_radian: float = 0.3
     """Motion that a turn of one radian counts as, m. With a larger value turns weigh more."""
     pair: PairOptions = field(default_factory=lambda: PairOptions(tolerance=1e-4, coarse_tolerance=3e-3))
-
-
-@dataclass(frozen=True)
-class ClockOptions:
-    """How the offset between the clocks of odometry and scans is looked for."""
-
-    span: float = 120.0
-    """Largest clock offset that is tried, s. A larger value takes longer."""
-    resolution: float = 0.1
-    """Interval between the offsets that are tried, s. A smaller value takes longer."""
-    max_difference: float = 0.1
-    """Turns of a step that differ by more count as different by this, rad: such steps are slips, or matches
-    that failed. A larger value gives them more weight."""
-    gain: float = 0.6
-    """An offset is found if the turns disagree by less than this share of their disagreement without it, and
-    of that anywhere else. With a larger share an offset is found more often, also where there is none.
-    Mirrored turns are found in the same way."""
-    min_offset: float = 0.5
-    """Smallest offset that a warning names, s: tracking hardly notices a smaller one. A larger value warns
-    less."""
 
 
 @dataclass(frozen=True)
@@ -222,6 +203,9 @@ class FileCheckOptions:
     one they are not those of a room, as a user sees. A larger value says it more often."""
     max_turn_error: float = 0.3
     """Largest relative difference of the turns by odometry and by scans. A larger value warns less."""
+    min_opposite_share: float = 0.8
+    """Odometry turns the other way if its turns are opposite to those by scans in this share of the steps,
+    however much their sizes vary. A larger value finds less."""
     more_steps: int = 200
     """Number of steps of each half of the sample if turns disagree, to find the offset of the clocks; also
     the limit where scans tell little. More take longer."""

@@ -39,6 +39,23 @@ class StepEvidence:
         return int(self._is_turning.sum())
 
     @property
+    def opposite_share(self) -> float:
+        """The share of the steps with a turn by scans whose turn by odometry is opposite; 0 for none."""
+        turns = self.laser[self._is_turning, 2] * self.odometry[self._is_turning, 2]
+        return float((turns < 0.0).mean()) if len(turns) else 0.0
+
+    @property
+    def disagreement(self) -> float:
+        """The sum of the differences of turns by scans and by odometry, as a share of all turns by scans.
+
+        That of mirrored scans if it is less.
+        """
+        most, turns = self.options.clock.max_difference, self.laser[:, 2]
+        whole = float(np.minimum(np.abs(turns), most).sum())
+        off = [np.minimum(np.abs(wrap(self.odometry[:, 2] - seen)), most).sum() for seen in (turns, -turns)]
+        return float(min(off)) / whole if whole > 0.0 else 0.0
+
+    @property
     def forward_share(self) -> float:
         """The share of the steps with motion that go forward by odometry."""
         return float((self.odometry[self._is_moving, 0] > 0.0).mean())
@@ -163,7 +180,12 @@ def is_excluded(fit: MountFit | None, options: FileCheckOptions) -> bool:
 
 def turns_agree(turns: TurnFit, options: FileCheckOptions) -> bool:
     """Whether turns by odometry and by scans are of the same size; they may be opposite."""
-    return turns.spread <= options.max_spread and abs(abs(turns.ratio) - 1.0) <= options.max_turn_error
+    return turns.spread <= options.max_spread and are_of_one_size(turns, options)
+
+
+def are_of_one_size(turns: TurnFit, options: FileCheckOptions) -> bool:
+    """Whether turns by odometry and by scans are of the same size in the mean; they may be opposite."""
+    return abs(abs(turns.ratio) - 1.0) <= options.max_turn_error
 
 
 def is_nearer(fit: MountFit, one: Array, other: Array, sigmas: float) -> bool:

@@ -182,6 +182,31 @@ def test_a_laser_aside_tells_mirrored_readings_from_odometry_that_turns_the_wron
     assert re.search("odometry likely turns the wrong way: .*; try --no-odometry$", turning)
 
 
+def test_what_goes_along_is_not_looked_for_with_a_wrong_mounting():
+    assert not checked_file(drive(), ReadingOptions(as_recorded=True), FileCheckOptions()).followed
+    for make in (faults.mirrored, odometry_faults.behind):
+        log = make(drive())
+        looked = checked_file(log, ReadingOptions(), FileCheckOptions()).followed
+        assert looked == (make is odometry_faults.behind)
+    looks_back = faults.mounted_otherwise(drive(), np.pi)
+    assert checked_file(looks_back, ReadingOptions(), FileCheckOptions()).followed
+
+
+@pytest.mark.parametrize("make", [faults.mirrored, lambda log: odometry_faults.turning(log, -1.0)])
+def test_opposite_turns_are_found_where_their_sizes_vary(make):
+    """Its odometry is late, so turns differ by half of their size in the median."""
+    log = read_log(str(data_file("field/urg-corridor-2.bag")))
+    (said,) = found(make(replace(log, odometry_path=None)))
+    assert re.search("in the wrong order, and the map is mirrored: .*try --flip", said)
+
+
+def test_a_late_clock_is_found_though_most_turns_agree():
+    """A robot that stands turns as its odometry, whatever the clocks."""
+    log = read_log(str(data_file("mit-killian.log.gz")))
+    (said,) = found(odometry_faults.late(log, 3.0))
+    assert re.search(r"ahead.*--clock-offset -2\.\d", said)
+
+
 def test_a_late_clock_of_a_mirrored_drive_is_found():
     late, mirrored = found(faults.mirrored(odometry_faults.late(drive(), 3.0)))
     assert "try --clock-offset -3.0" in late
