@@ -22,6 +22,7 @@ from nscan_cli.calibration.step_evidence import (
     is_nearer,
     is_view_in_doubt,
     is_wrong_scale,
+    looks_like,
     turns_agree,
 )
 from nscan_cli.calibration.step_sampling import telling_steps
@@ -160,7 +161,9 @@ def _of_view(
     """Readings in another order, or a laser that looks elsewhere, from a scan on; None if nothing changes."""
     view = options.view
     turned = evidence.direction_change(log.mount, view.min_steps)
-    mirrored = evidence.turn_change(view.min_steps)
+    # Reversed readings of a laser that looks aside lead the other way, and a few turns tell them.
+    is_image = turned is not None and turned.may_be_mirrored(view.min_direction)
+    mirrored = evidence.turn_change(view.doubt_steps if is_image else view.min_steps)
     if mirrored is not None and mirrored.is_order:
         return findings.changed_order(mirrored, _place(log, evidence, mirrored.step, reading), reading)
     if turned is None or not turned.exceeds(view.min_direction, view.sigmas):
@@ -221,15 +224,15 @@ def _of_opposite_turns(
 ) -> list[Finding]:
     """Readings in the wrong order, or odometry that turns the wrong way; `fit` is that of mirrored scans.
 
-    The two are mirror images, except for the place of the laser on the robot: if it is beside the middle, its
-    side in the file is right in only one of the two cases.
+    The two are mirror images, except for the mounting: if the laser is beside the middle of the robot, or
+    looks aside, its side in the file is right in only one of the two cases.
     """
     other = mount * MIRRORED
     # Small steps aside, which may be of either sign, would pass for a place farther ahead or behind.
     options = replace(options, min_mount_move=np.inf)
-    if is_nearer(fit, other, mount, options.mount_sigmas):
+    if is_nearer(fit, other, mount, options.mount_sigmas) or looks_like(fit, other, mount, options):
         return [findings.wrong_turns(turns), *_of_positions(other, fit, evidence, reading, options)]
-    is_certain = is_nearer(fit, mount, other, options.mount_sigmas)
+    is_certain = is_nearer(fit, mount, other, options.mount_sigmas) or looks_like(fit, mount, other, options)
     mirrored = findings.opposite_turns(findings.turns_of(turns), reading, is_certain, True)
     return [mirrored, *_of_positions(mount, fit, evidence, reading, options)]
 

@@ -75,9 +75,11 @@ def _scans_move(
     for count in (options.steps, options.more_steps):
         some = within[np.unique(np.linspace(0, len(within) - 1, count).astype(np.int64))]
         laser = measure_steps(log, (first + some, ends[some]), steps).laser
-        if len(laser) >= options.min_measured:
-            break
-    else:
-        return False
-    size = np.maximum(np.hypot(laser[:, 0], laser[:, 1]), np.abs(laser[:, 2]))
-    return float((size >= steps.min_motion).mean()) >= options.min_moving_share
+        if len(laser) < options.min_measured:
+            continue
+        size = np.maximum(np.hypot(laser[:, 0], laser[:, 1]), np.abs(laser[:, 2]))
+        share = float((size >= steps.min_motion).mean())
+        # Of a few steps some may be of a robot that stood just then.
+        if not options.standing_share < share < options.min_moving_share:
+            return share >= options.min_moving_share
+    return False

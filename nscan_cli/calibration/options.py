@@ -77,9 +77,13 @@ class HeldOdometryOptions:
     steps: int = 7
     """Number of steps that are measured, spread over that time. More tell more and take longer."""
     more_steps: int = 28
-    """Number of steps where the scans tell too few of these, as outdoors. More tell more and take longer."""
+    """Number of steps where the scans tell too few of these, as outdoors, or where the robot seems to move in
+    some alone. More tell more and take longer."""
     min_measured: int = 3
     """Least number of steps that the scans measure. A larger value finds less."""
+    standing_share: float = 0.3
+    """The robot stands if no more than this share of the first few steps have motion; where robots stand on
+    real logs it is 0.15 at most. A larger value takes less time."""
     min_moving_share: float = 0.7
     """Least share of the measured steps with motion. A larger value finds less; a small one takes people who
     pass a standing robot for motion."""

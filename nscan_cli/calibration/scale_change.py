@@ -47,18 +47,24 @@ def scale_change(
     if not places:
         return None
     k = min(places, key=lambda place: _residual(values[:place]) + _residual(values[place:]))
-    (before, one), (behind, other) = (_median(some) for some in (values[:k], values[k:]))
-    return ScaleChange(
-        int(told[k]), float(np.exp(before)), float(np.exp(behind)), float(np.hypot(one, other))
-    )
+    before, behind = (float(np.median(some)) for some in (values[:k], values[k:]))
+    sigma = sigma_of_change(values[:k] - before, values[k:] - behind)
+    return ScaleChange(int(told[k]), float(np.exp(before)), float(np.exp(behind)), sigma)
+
+
+def sigma_of_change(before: Array, behind: Array) -> float:
+    """Standard deviation of the difference of two medians, from the residuals (n,) and (m,) about them.
+
+    That of each is at least what the residuals of both say: a few values may be alike by chance.
+    """
+    own = [float(np.median(np.abs(some))) for some in (before, behind)]
+    both = float(np.median(np.abs(np.concatenate([before, behind]))))
+    sigmas = [
+        SIGMA_OF_MEDIAN * TO_SIGMA * max(deviation, both) / np.sqrt(len(some))
+        for deviation, some in zip(own, (before, behind), strict=True)
+    ]
+    return max(float(np.hypot(*sigmas)), 1e-6)
 
 
 def _residual(values: Array) -> float:
     return float(np.abs(values - np.median(values)).sum())
-
-
-def _median(values: Array) -> tuple[float, float]:
-    """The median of values (n,) and its standard deviation."""
-    median = float(np.median(values))
-    deviation = TO_SIGMA * float(np.median(np.abs(values - median)))
-    return median, max(SIGMA_OF_MEDIAN * deviation / np.sqrt(len(values)), 1e-6)

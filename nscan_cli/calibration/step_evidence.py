@@ -199,3 +199,10 @@ def is_nearer(fit: MountFit, one: Array, other: Array, sigmas: float) -> bool:
     away, from_other = (float(np.hypot(*(fit.mount - mount)[:2])) for mount in (one, other))
     # From the line half-way between both.
     return from_other**2 - away**2 > 2.0 * apart * sigmas * float(fit.sigmas[1:3].max())
+
+
+def looks_like(fit: MountFit, one: Array, other: Array, options: FileCheckOptions) -> bool:
+    """Whether a laser clearly looks as on one mounting (3,), and not as on another."""
+    off, from_other = (abs(float(wrap(fit.mount[2] - mount[2]))) for mount in (one, other))
+    bound = max(options.min_mount_turn, options.mount_sigmas * float(fit.sigmas[3]))
+    return off <= bound < from_other - bound

@@ -7,8 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from nscan_cli.calibration.odometry_options import ViewChangeOptions
-from nscan_cli.calibration.robust_fit import TO_SIGMA
-from nscan_cli.calibration.scale_change import SIGMA_OF_MEDIAN
+from nscan_cli.calibration.scale_change import sigma_of_change
 from nscan_cli.poses import Array, Indices, Mask, compose, relative, wrap
 
 
@@ -43,6 +42,11 @@ class DirectionChange(NamedTuple):
     def exceeds(self, turn: float, sigmas: float) -> bool:
         """Whether the two differ by more than a turn, rad, and by more than so many standard deviations."""
         return abs(float(wrap(self.behind - self.before))) > max(turn, sigmas * self.sigma)
+
+    def may_be_mirrored(self, tolerance: float) -> bool:
+        """Whether the directions are mirror images of each other, to within a tolerance (rad)."""
+        apart, sum_of_both = (abs(float(wrap(self.behind + sign * self.before))) for sign in (-1.0, 1.0))
+        return apart > tolerance and sum_of_both < tolerance
 
 
 def turn_change(laser: Array, odometry: Array, least: int, options: ViewChangeOptions) -> TurnChange | None:
@@ -85,8 +89,9 @@ def direction_change(
     split = _clearest_split(np.stack([np.cos(angles), np.sin(angles)], axis=1), least)
     if split is None:
         return None
-    (before, one), (behind, other) = (_direction(some) for some in (angles[:split], angles[split:]))
-    return DirectionChange(int(told[split]), before, behind, float(np.hypot(one, other)), len(told))
+    before, behind = (_usual_direction(some) for some in (angles[:split], angles[split:]))
+    sigma = sigma_of_change(wrap(angles[:split] - before), wrap(angles[split:] - behind))
+    return DirectionChange(int(told[split]), before, behind, sigma, len(told))
 
 
 def _clearest_split(values: Array, least: int) -> int | None:
@@ -100,9 +105,7 @@ def _clearest_split(values: Array, least: int) -> int | None:
     return int(places[np.argmax(gains)])
 
 
-def _direction(angles: Array) -> tuple[float, float]:
-    """The usual one of directions (n,), rad, and its standard deviation."""
+def _usual_direction(angles: Array) -> float:
+    """The median of directions (n,), rad."""
     usual = float(np.arctan2(np.median(np.sin(angles)), np.median(np.cos(angles))))
-    off = wrap(angles - usual)
-    deviation = TO_SIGMA * float(np.median(np.abs(off)))
-    return float(wrap(usual + np.median(off))), max(SIGMA_OF_MEDIAN * deviation / np.sqrt(len(angles)), 1e-6)
+    return float(wrap(usual + np.median(wrap(angles - usual))))

@@ -182,6 +182,19 @@ def test_a_laser_aside_tells_mirrored_readings_from_odometry_that_turns_the_wron
     assert re.search("odometry likely turns the wrong way: .*; try --no-odometry$", turning)
 
 
+def turned(log: LaserLog) -> LaserLog:
+    """The drive with a laser that looks 90° to the left."""
+    quarter = np.array([0.0, 0.0, np.pi / 2])
+    return replace(faults.turned_in(log, -np.pi / 2, slice(None)), mount=compose(log.mount, quarter))
+
+
+def test_a_laser_that_looks_aside_tells_them_as_well():
+    (mirrored,) = found(faults.mirrored(turned(central(drive()))))
+    assert re.search("in the wrong order, and the map is mirrored: .*; try --flip$", mirrored)
+    (turning,) = found(odometry_faults.turning(turned(central(drive())), -1.0))
+    assert re.search("odometry likely turns the wrong way: .*; try --no-odometry$", turning)
+
+
 def test_what_goes_along_is_not_looked_for_with_a_wrong_mounting():
     assert not checked_file(drive(), ReadingOptions(as_recorded=True), FileCheckOptions()).followed
     for make in (faults.mirrored, odometry_faults.behind):
@@ -234,6 +247,17 @@ def test_odometry_that_stands_for_a_part_is_missing_there(log, catches_up):
     assert abs(len(unknown) - (rows.stop - rows.start)) < 25
     assert checked.reading == ReadingOptions()
     assert found(held, ReadingOptions(as_recorded=True)) == []
+
+
+@pytest.mark.parametrize(
+    ("name", "first", "last"), [("field/urg-corridor-1.bag", 256, 512), ("intel.log.gz", 6815, None)]
+)
+def test_odometry_that_stands_is_found_though_the_robot_stood_at_times(name, first, last):
+    log = replace(read_log(str(data_file(name))), odometry_path=None)
+    held = odometry_faults.held(log, slice(first, last), False)
+    said = found(held)
+    assert [text for text in said if "as it is" in text] == said
+    assert said[-1].startswith(f"odometry stands still while the scans move, from scan {first} to ")
 
 
 def test_positions_without_headings_are_not_used():
