@@ -24,9 +24,9 @@ def spaced_points(points: Array, ends: Indices, spacing: float) -> Mask:
     """(P,) which points (P, 2) are kept, so that those kept are about `spacing` (m) apart along their scan.
 
     Scan k has points[ends[k] : ends[k + 1]], in the order of the beams. The distance from a point to the next
-    one is measured between its neighbours on both sides. Its own noise must not decide whether it is kept: who
-    keeps the first point that is far enough from the last one, keeps those that lie too far on ahead, and maps
-    a straight corridor as a bend.
+    one is measured between its neighbours on both sides. Its own noise must not decide whether it is kept. If
+    the first point that is far enough from the last one were kept, points ahead would lie too far on, and a
+    straight corridor would be mapped as a bend.
     """
     kept = np.zeros(points.shape[0], dtype=np.bool_)
     for k in range(ends.shape[0] - 1):

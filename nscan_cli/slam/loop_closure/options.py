@@ -122,7 +122,7 @@ class LoopClosureOptions:
     slip_distance: float = 5.0
     """Largest distance by which tracking slips, m. A larger one accepts more."""
     free_space: FreeSpaceOptions = field(default_factory=FreeSpaceOptions)
-    contradicted_distance: float = 10.0
+    contradicted_distance: float = 20.0
     """Where visits of a place contradict each other in the finished map, the search covers at least this
     distance, m. A larger one mends larger errors and is slower."""
     contradicted_share: float = 0.5
