@@ -20,6 +20,8 @@ class DeadBeamOptions:
 
     scans: int = 256
     """Number of scans that are compared, evenly spread. More take longer."""
+    min_scans: int = 32
+    """Least number of scans of a log that is looked at. A larger number finds fewer."""
     min_share: float = 0.95
     """Least share of these scans in which the beam says exactly the same. A smaller value leaves out more."""
     max_usual_share: float = 0.5
@@ -34,6 +36,8 @@ DEFAULT_DEAD_BEAMS = DeadBeamOptions()
 
 def dead_beams(table: ScanTable, options: DeadBeamOptions = DEFAULT_DEAD_BEAMS) -> list[Sector]:
     """The sectors whose beams say exactly one usable range in nearly all scans; none if the robot stands."""
+    if len(table.rows) < options.min_scans:
+        return []
     places = np.unique(np.linspace(0, len(table.rows) - 1, options.scans).astype(np.int64))
     ranges = table.ranges[table.rows[places]]
     # One of two scans may be one of the few in which a beam says something else.

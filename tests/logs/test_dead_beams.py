@@ -57,6 +57,10 @@ def test_what_changes_for_a_tenth_of_the_scans_is_none(read):
     assert not read(recording(ranges)).report.contradictions
 
 
+def test_few_scans_tell_nothing(read):
+    assert not read(recording(with_dead_beams(31))).report.contradictions
+
+
 def test_most_beams_are_never_left_out(read):
     ranges = readings()
     ranges[:, : BEAMS // 2 + 1] = 5.0

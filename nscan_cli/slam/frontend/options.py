@@ -51,9 +51,8 @@ class TrackingOptions:
     max_range: float = 40.0
     """Longest beam that is matched, m. A larger value sees more and takes longer."""
     point_spacing: float = 0.03
-    """Distance between neighbouring points of a scan that are matched, m; some are left out where they are
-    closer. A larger one is faster, and blurs small things; with none a wall beside the robot outweighs all
-    the rest."""
+    """Least distance between neighbouring points of a scan, m. A larger one is faster, and blurs small
+    things; with none a wall beside the robot outweighs all the rest."""
     window: float = 12.0
     """Length of the path whose scans the local map holds, m. A longer window drifts less and costs memory."""
     min_motion: float = 0.05

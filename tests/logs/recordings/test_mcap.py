@@ -155,7 +155,8 @@ def test_what_is_not_known_is_named(read, name, encoding, form, said):
 
 def test_many_scans_keep_their_order(read):
     written = drive(300, beams=30)
-    log = read(ros2(written))
+    # The last beam always says 3 m.
+    log = read(ros2(written), as_recorded=True)
     np.testing.assert_array_equal(
         log.ranges, [one.content.ranges for one in written if isinstance(one.content, Scan)]
     )

@@ -124,12 +124,12 @@ def clinic(reverse: bool, contradiction_sigmas: float) -> tuple[Mapped, float]:
 
 @pytest.mark.logs
 def test_a_turn_that_tracking_has_wrong_leaves_no_loop_open(monkeypatch):
-    """Tracking turns by 5° too much where bushes are. Measured: 0.107 m; 0.310 m without the search."""
-    found, error = clinic(False, 1.5)
+    """Tracking turns by 5° too much where bushes are. Measured: 0.107 m; 0.312 m without the search."""
+    found, error = clinic(False, 2.5)
     assert error < 0.12
     assert len(found.state.places) >= 3
     monkeypatch.setattr(pipeline, "mend_contradicting_visits", lambda _: None)
-    assert clinic(False, 1.5)[1] > 0.2
+    assert clinic(False, 2.5)[1] > 0.2
 
 
 @pytest.mark.logs
