@@ -78,7 +78,6 @@ FAULTS: tuple[tuple[str, Fault, str], ...] = (
         ),
         "counts reversing as driving forward",
     ),
-    ("two drives in one file", faults.two_drives, "several drives in the log"),
     ("each pose five times", lambda log: odometry_faults.repeated(log, 5), "odometry comes less often"),
     ("odometry zero at every 50th scan", lambda log: odometry_faults.zeros(log, 50), "single wrong values"),
     ("ranges in mm from half-way on", _from_half_way(1000.0), "in millimetres, the others in metres"),

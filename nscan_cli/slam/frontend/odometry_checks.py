@@ -42,7 +42,7 @@ def without_jumps(
 
     Where it is reset, wraps round or has a wrong value, the step before takes the place of the jump.
     """
-    jumps = np.union1d(jumps_of(odometry, options, times), restarts_of(odometry, options))
+    jumps = jumps_of(odometry, options, times)
     if not len(jumps):
         return odometry, jumps
     steps, mended = relative(odometry[1:], odometry[:-1]), odometry.copy()
@@ -53,18 +53,6 @@ def without_jumps(
         if known[row] and known[row + 1]:
             mended[row + 1] = compose(mended[row], steps[row])
     return mended, jumps
-
-
-def restarts_of(odometry: Array, options: OdometryCheckOptions) -> NDArray[np.int64]:
-    """The rows (J,) at which odometry (S, 3) begins again, exactly at its first pose or at zero, from afar.
-
-    However long the pause before: no robot comes back so exactly.
-    """
-    if len(odometry) < 2:
-        return np.zeros(0, dtype=np.int64)
-    begins = (odometry == 0.0).all(axis=1) | (odometry == odometry[0]).all(axis=1)
-    away = np.abs(relative(odometry[1:], odometry[:-1])).max(axis=1) > options.min_jump
-    return np.flatnonzero(begins[1:] & away) + 1
 
 
 def jumps_of(poses: Array, options: OdometryCheckOptions, times: Array | None = None) -> NDArray[np.int64]:

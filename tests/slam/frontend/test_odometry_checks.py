@@ -51,20 +51,6 @@ def test_a_pause_in_which_the_robot_drove_on_is_believed():
     assert jumps.tolist() == [20]
 
 
-def test_odometry_that_begins_again_after_a_long_pause_is_not_believed():
-    """Another drive in the same file: by odometry the robot came back to its start in the pause."""
-    times = clock(150)
-    times[20:] += 60.0
-    first = np.array([3.0, 4.0, 0.3])
-    for start in (np.zeros(3), first):
-        odometry = steady() + first - steady()[0]
-        odometry[20:] += start - odometry[20]
-        _, jumps = without_jumps(odometry, times, CHECKS)
-        assert jumps.tolist() == [20]
-    odometry[20:] += (1e-3, 0.0, 0.0)
-    assert len(without_jumps(odometry, times, CHECKS)[1]) == 0
-
-
 def test_a_laser_hangs_only_if_the_robot_moves():
     log = round_scene().record(5).log()
     moves = faults.frozen(log, slice(40, 45))
