@@ -72,8 +72,8 @@ def direction_change(
 ) -> DirectionChange | None:
     """The clearest change of the direction of the laser along steps (n, 3) of it and the robot, in order.
 
-    `mount` (3,) is the mounting in the file, whose place is believed. None for fewer
-    steps than `least` on both sides.
+    `mount` (3,) is the mounting in the file, whose place is believed. None for fewer steps than `least` on
+    both sides.
     """
     # Odometry may be in another unit than the place of the laser.
     lengths = [np.hypot(steps[:, 0], steps[:, 1]) for steps in (laser, odometry)]

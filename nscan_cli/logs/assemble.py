@@ -148,8 +148,7 @@ def laser_log(
 def _odometry(
     motion: RecordedMotion, times: ScanOrder, ranges: NDArray[np.float32], options: ReadingOptions
 ) -> tuple[Array | None, RobotPath | None, list[str]]:
-    """The odometry (S, 3) of all scans in order of time, its path, and what is said
-    of what was put right.
+    """The odometry (S, 3) of all scans in order of time, its path, and what was put right.
 
     ranges (S, B) are in file order.
     """

@@ -15,7 +15,7 @@ from nscan_cli.calibration.options import FileCheckOptions
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.logs.load import read_log
 from nscan_cli.logs.reading_options import ReadingOptions
-from nscan_cli.poses import MIRRORED, are_known, compose, inverse, relative
+from nscan_cli.poses import are_known, compose
 from tests.data import CORRIDOR_LOG, OFFICE_LOG, data_file
 from tests.simulation import faults, odometry_faults
 from tests.simulation.scenes import bare_corridor
@@ -90,23 +90,6 @@ def test_what_is_likely_is_said_with_its_cure_and_left_alone(name):
     assert checked.reading == ReadingOptions()
 
 
-@pytest.mark.parametrize("mount", [(0.2, 0.0, 0.0), (0.1, 0.3, 0.7)])
-def test_odometry_agrees_with_readings_in_the_wrong_order(mount):
-    """Whatever the mounting, the laser moves as the scans show it."""
-    log, laser = drive(), np.array(mount)
-    assert log.odometry is not None
-    poses = compose(log.odometry, compose(log.mount, inverse(laser)))
-    checked = checked_file(
-        faults.mirrored(replace(log, odometry=poses, mount=laser)), ReadingOptions(), FileCheckOptions()
-    )
-    assert "odometry is mirrored as well" in checked.messages[0]
-    assert checked.log.odometry is not None
-    assert found(checked.log) == []
-    path, mirrored = log.laser_pose(log.odometry), checked.log.laser_pose(checked.log.odometry)
-    image = relative(path, path[0]) * MIRRORED
-    np.testing.assert_allclose(relative(mirrored, mirrored[0]), image, atol=1e-9)
-
-
 SCALES = (1000.0, 10.0, 0.1, 300.0)
 
 
@@ -166,35 +149,6 @@ def test_a_robot_with_its_laser_in_the_middle_mostly_drives_forward():
     assert re.search("forward as backward;.* 0% of the steps.*; try --odometry-scale -1, or --mount", counts)
 
 
-def aside(log: LaserLog) -> LaserLog:
-    """The drive with its laser 0.3 m to the left of where it was: odometry is that of the moved middle."""
-    assert log.odometry is not None
-    moved = np.array([0.0, -0.3, 0.0])
-    return replace(log, odometry=compose(log.odometry, moved), mount=log.mount - moved)
-
-
-def test_a_laser_aside_tells_mirrored_readings_from_odometry_that_turns_the_wrong_way():
-    (mirrored,) = found(faults.mirrored(aside(drive())))
-    assert re.search("in the wrong order, and the map is mirrored: .*; try --flip$", mirrored)
-    log = aside(drive())
-    assert log.odometry is not None
-    (turning,) = found(replace(log, odometry=log.odometry * (1.0, -1.0, -1.0)))
-    assert re.search("odometry likely turns the wrong way: .*; try --no-odometry$", turning)
-
-
-def turned(log: LaserLog) -> LaserLog:
-    """The drive with a laser that looks 90° to the left."""
-    quarter = np.array([0.0, 0.0, np.pi / 2])
-    return replace(faults.turned_in(log, -np.pi / 2, slice(None)), mount=compose(log.mount, quarter))
-
-
-def test_a_laser_that_looks_aside_tells_them_as_well():
-    (mirrored,) = found(faults.mirrored(turned(central(drive()))))
-    assert re.search("in the wrong order, and the map is mirrored: .*; try --flip$", mirrored)
-    (turning,) = found(odometry_faults.turning(turned(central(drive())), -1.0))
-    assert re.search("odometry likely turns the wrong way: .*; try --no-odometry$", turning)
-
-
 def test_what_goes_along_is_not_looked_for_with_a_wrong_mounting():
     assert not checked_file(drive(), ReadingOptions(as_recorded=True), FileCheckOptions()).followed
     for make in (faults.mirrored, odometry_faults.behind):
@@ -203,14 +157,6 @@ def test_what_goes_along_is_not_looked_for_with_a_wrong_mounting():
         assert looked == (make is odometry_faults.behind)
     looks_back = faults.mounted_otherwise(drive(), np.pi)
     assert checked_file(looks_back, ReadingOptions(), FileCheckOptions()).followed
-
-
-@pytest.mark.parametrize("make", [faults.mirrored, lambda log: odometry_faults.turning(log, -1.0)])
-def test_opposite_turns_are_found_where_their_sizes_vary(make):
-    """Its odometry is late, so turns differ by half of their size in the median."""
-    log = read_log(str(data_file("field/urg-corridor-2.bag")))
-    (said,) = found(make(replace(log, odometry_path=None)))
-    assert re.search("in the wrong order, and the map is mirrored: .*try --flip", said)
 
 
 def test_a_late_clock_is_found_though_most_turns_agree():

@@ -115,7 +115,7 @@ def dust(log: LaserLog, share: float, reading: float) -> LaserLog:
 
 def mirrored(log: LaserLog) -> LaserLog:
     """The readings of each scan in the wrong order."""
-    return replace(log, angle_min=-log.angle_min, angle_increment=-log.angle_increment)
+    return mirrored_in(log, slice(None))
 
 
 def mirrored_in(log: LaserLog, rows: Rows) -> LaserLog:
