@@ -105,7 +105,8 @@ def _step_rows(log: LaserLog, options: UnsignedOdometryOptions) -> tuple[Indices
     way = np.concatenate([[0.0], np.cumsum(np.hypot(steps[:, 0], steps[:, 1]))])
     ends = np.flatnonzero(np.diff(np.floor(way / options.step_length), prepend=-1.0) > 0.0)
     first, last = ends[:-1], ends[1:]
-    kept = log.times[last] - log.times[first] <= options.max_duration
+    seconds = log.times[last] - log.times[first]
+    kept = (seconds > 0.0) & (seconds <= options.max_duration)
     kept &= are_known(log.odometry[first]) & are_known(log.odometry[last])
     return first[kept], last[kept]
 

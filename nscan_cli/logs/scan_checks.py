@@ -17,6 +17,7 @@ from nscan_cli.logs.recordings.turn_segments import DEFAULT_TURN_SEGMENTS, TurnS
 from nscan_cli.logs.robot_parts import DEFAULT_ROBOT_PARTS, RobotPartsOptions
 from nscan_cli.logs.robot_path import DEFAULT_ROBOT_PATH, RobotPathOptions
 from nscan_cli.logs.scan_order import DEFAULT_SCAN_ORDER, ScanOrderOptions
+from nscan_cli.logs.shared_stamps import DEFAULT_SHARED_STAMPS, SharedStampOptions
 from nscan_cli.logs.slow_odometry import DEFAULT_SLOW_ODOMETRY, SlowOdometryOptions
 from nscan_cli.logs.sweep import DEFAULT_SWEEP, SweepOptions
 from nscan_cli.logs.text.interlaced_scans import DEFAULT_INTERLACED, InterlacedOptions
@@ -29,6 +30,7 @@ class ScanCheckOptions:
     """The options of reading, as the provenance of a graph has them."""
 
     scan_order: ScanOrderOptions = DEFAULT_SCAN_ORDER
+    shared_stamps: SharedStampOptions = DEFAULT_SHARED_STAMPS
     range_limits: RangeLimitOptions = DEFAULT_RANGE_LIMITS
     range_unit: RangeUnitOptions = DEFAULT_RANGE_UNIT
     unit_stretches: UnitStretchOptions = DEFAULT_UNIT_STRETCHES

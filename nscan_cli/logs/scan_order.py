@@ -12,6 +12,7 @@ from nscan_cli.errors import WrongUsageError
 from nscan_cli.files.limits import TIME
 from nscan_cli.files.text import counted
 from nscan_cli.logs.reading_options import ReadingOptions
+from nscan_cli.logs.shared_stamps import spread_stamps
 from nscan_cli.poses import Array, Indices
 
 STAMP = re.compile(r"[-+]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][-+]?[0-9]+)?")
@@ -63,10 +64,12 @@ def by_time(stamps: list[str], options: ScanOrderOptions = DEFAULT_SCAN_ORDER) -
     """The scans sorted stably by their stamps, one per scan in file order, empty if there is none.
 
     If fewer than half of the stamps are finite, or fewer than half are distinct, the scans stay in file order
-    with nominal times. Otherwise a missing stamp is interpolated between its neighbours in the file.
+    with nominal times. Otherwise a missing stamp is interpolated between its neighbours in the file. Scans
+    that share a stamp are spread up to the next one.
     """
-    times: Array = np.array([_seconds(stamp) for stamp in stamps], dtype=np.float64)
-    times[np.abs(times) > TIME.value] = np.nan
+    written: Array = np.array([_seconds(stamp) for stamp in stamps], dtype=np.float64)
+    written[np.abs(written) > TIME.value] = np.nan
+    times = spread_stamps(written)
     good = np.isfinite(times)
     size = len(stamps)
     warnings = []
@@ -78,6 +81,14 @@ def by_time(stamps: list[str], options: ScanOrderOptions = DEFAULT_SCAN_ORDER) -
         texts = [f"{time:.6f}" for time in times]
         return ScanOrder(np.arange(size), times, texts, 0, True, warnings)
     texts = list(stamps)
+    moved = np.flatnonzero(good & (times != written))
+    if len(moved):
+        for row in moved.tolist():
+            texts[row] = f"{times[row]:.6f}"
+        warnings.append(
+            f"{counted(len(moved), 'scan')} with the time stamp of the scan before: they are spread evenly "
+            "up to the next stamp"
+        )
     if not good.all():
         places = np.arange(size)
         times[~good] = np.interp(places[~good], places[good], times[good])

@@ -111,7 +111,10 @@ def _wide(form: Callable[[LaserLog], bytes], folder: Path) -> tuple[Path, list[s
 def _reference(log: LaserLog, folder: Path) -> list[str]:
     """The arguments of `evaluate` for the true poses, which are written to the folder."""
     truth = folder / "truth.tum"
-    truth.write_bytes(write_tum(log.stamps, truth_of(log)))
+    assert log.truth_times is not None
+    # The stamps of the file may be wrong.
+    stamps = [f"{time:.6f}" for time in log.truth_times]
+    truth.write_bytes(write_tum(stamps, truth_of(log)))
     return ["--reference", str(truth)]
 
 

@@ -80,6 +80,7 @@ FAULTS: tuple[tuple[str, Fault, str], ...] = (
     ),
     ("each pose five times", lambda log: odometry_faults.repeated(log, 5), "odometry comes less often"),
     ("odometry zero at every 50th scan", lambda log: odometry_faults.zeros(log, 50), "single wrong values"),
+    ("two scans a stamp", lambda log: faults.shared_stamps(log, 2), "with the time stamp of the scan before"),
     ("ranges in mm from half-way on", _from_half_way(1000.0), "in millimetres, the others in metres"),
     ("ranges in cm from half-way on", _from_half_way(100.0), "in centimetres, the others in metres"),
     ("ranges in feet from half-way on", _from_half_way(3.281), "all ranges are multiplied"),

@@ -75,6 +75,29 @@ def test_a_clock_that_is_set_back_while_the_robot_drives_on_goes_on():
     ]
 
 
+def test_scans_that_share_a_stamp_are_spread_up_to_the_next_one():
+    """Two with each stamp, and a clock in whole seconds; after a pause none is drawn out."""
+    times = 100.0 + 0.2 * np.arange(60)
+    order = by_time([f"{time:.1f}" for time in np.repeat(times[::2], 2)])
+    np.testing.assert_allclose(order.times, times, atol=1e-6)
+    assert order.stamps[:3] == ["100.0", "100.200000", "100.4"]
+    assert order.warnings == [
+        "30 scans with the time stamp of the scan before: they are spread evenly up to the next stamp"
+    ]
+    times[30:] += 60.0
+    order = by_time([f"{time:.0f}" for time in np.floor(times + 1e-6)])
+    assert not order.nominal
+    np.testing.assert_allclose(order.times, times, atol=1e-6)
+
+
+def test_single_stamps_that_are_shared_stay():
+    stamps = [f"{time:.1f}" for time in 0.2 * np.arange(60)]
+    stamps[30] = stamps[29]
+    order = by_time(stamps)
+    assert order.stamps == stamps
+    assert order.warnings == []
+
+
 def test_messages_that_come_late_are_sorted_in():
     """They fill the gap that they left; nor is a clock set back that meets no time again."""
     times = 0.2 * np.arange(200)

@@ -153,6 +153,12 @@ def clock_jump(log: LaserLog, at: int, seconds: float) -> LaserLog:
     return replace(taken(log, order.rows), stamps=tuple(order.stamps), times=order.times)
 
 
+def shared_stamps(log: LaserLog, count: int) -> LaserLog:
+    """So many successive scans have the stamp of the first of them; they are true at their own times."""
+    stamps = tuple(log.stamps[row // count * count] for row in range(len(log)))
+    return replace(log, stamps=stamps, times=np.array([float(stamp) for stamp in stamps]))
+
+
 def people(log: LaserLog, walkers: Array, speed: float = 1.2, radius: float = 0.25) -> LaserLog:
     """People walk to and fro: discs, each between two points of the floor plan, walkers (W, 4)."""
     ranges, truth = log.ranges.copy(), truth_of(log)
