@@ -92,7 +92,7 @@ def by_time(stamps: list[str], options: ScanOrderOptions = DEFAULT_SCAN_ORDER) -
     if not good.all():
         places = np.arange(size)
         times[~good] = np.interp(places[~good], places[good], times[good])
-        for row in np.flatnonzero(~good):
+        for row in np.flatnonzero(~good).tolist():
             texts[row] = f"{times[row]:.6f}"
         warnings.append(
             f"{counted(int(np.sum(~good)), 'scan')} without a usable time stamp: interpolated between others"
