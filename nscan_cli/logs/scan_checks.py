@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from nscan_cli.logs.beam_angles import DEFAULT_BEAM_ANGLES, BeamAngleOptions
 from nscan_cli.logs.beam_spacing import DEFAULT_BEAM_SPACING, BeamSpacingOptions
 from nscan_cli.logs.dead_beams import DEFAULT_DEAD_BEAMS, DeadBeamOptions
+from nscan_cli.logs.heading_unit import DEFAULT_HEADING_UNIT, HeadingUnitOptions
 from nscan_cli.logs.odometry_interpolation import DEFAULT_ODOMETRY_GAPS, OdometryGapOptions
 from nscan_cli.logs.odometry_outliers import DEFAULT_ODOMETRY_OUTLIERS, OdometryOutlierOptions
 from nscan_cli.logs.range_limit_options import DEFAULT_RANGE_LIMITS, RangeLimitOptions
@@ -44,6 +45,7 @@ class ScanCheckOptions:
     dead_beams: DeadBeamOptions = DEFAULT_DEAD_BEAMS
     mounting: MountingOptions = DEFAULT_MOUNTING
     odometry_gaps: OdometryGapOptions = DEFAULT_ODOMETRY_GAPS
+    heading_unit: HeadingUnitOptions = DEFAULT_HEADING_UNIT
     odometry_outliers: OdometryOutlierOptions = DEFAULT_ODOMETRY_OUTLIERS
     slow_odometry: SlowOdometryOptions = DEFAULT_SLOW_ODOMETRY
     robot_path: RobotPathOptions = DEFAULT_ROBOT_PATH

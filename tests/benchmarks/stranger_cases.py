@@ -80,8 +80,12 @@ def siblings(data: Path) -> Iterator[Case]:
     for fault, form, cause in (
         ("", _with_angles, ""),
         ("FLASER, which has no angles", _without_angles, "541 beams over 270°"),
+        ("headings in degrees", _headings_in_degrees, "headings of odometry are in degrees"),
     ):
         yield Case(WIDE, fault, cause, partial(_wide, form))
+    if (data / "mit-csail.log.gz").exists():
+        files = partial(_in_degrees, data / "mit-csail.log.gz")
+        yield Case("mit-csail", "headings in degrees", "headings of odometry are in degrees", files)
     recording = data / "mit-csail.ros2.mcap"
     if recording.exists():
         for fault, first, last in (
@@ -123,6 +127,25 @@ def _with_angles(log: LaserLog) -> bytes:
     assert log.odometry is not None
     # By its host alone a reader would know that the poses may be no odometry.
     return corrected_log(log, np.arange(len(log)), log.odometry).replace(OWN_HOST, b"robot")
+
+
+def _headings_in_degrees(log: LaserLog) -> bytes:
+    """A log whose poses have headings in degrees."""
+    lines = [line.split(b" ") for line in _with_angles(log).split(b"\n")]
+    for line in lines:
+        # Behind the poses of laser and robot are so many values.
+        behind = {b"ROBOTLASER1": 8, b"FLASER": 3}.get(line[0])
+        if behind is not None:
+            for place in (-behind - 4, -behind - 1):
+                line[place] = f"{np.degrees(float(line[place])):.6f}".encode()
+    return b"\n".join(b" ".join(line) for line in lines)
+
+
+def _in_degrees(log: Path, folder: Path) -> tuple[Path, list[str]]:
+    """A real log with such headings."""
+    path = folder / "degrees.log"
+    path.write_bytes(_headings_in_degrees(_real(log)))
+    return path, ["--relations", str(log.with_name("mit-csail.relations"))]
 
 
 def _without_angles(log: LaserLog) -> bytes:

@@ -22,7 +22,11 @@ from nscan_cli.logs.text import carmen_records
 from nscan_cli.logs.text.carmen_records import CarmenScans, TaggedLines
 from nscan_cli.logs.text.corrected_poses import sign_of_correction
 from nscan_cli.logs.text.interlaced_scans import between_the_others
-from nscan_cli.logs.text.odometry_records import odometry_of_records, odometry_of_scans
+from nscan_cli.logs.text.odometry_records import (
+    headings_in_radians,
+    odometry_of_records,
+    odometry_of_scans,
+)
 from nscan_cli.logs.text.text_log_options import DEFAULT_TEXT_LOGS
 from nscan_cli.poses import Array, relative, wrap
 
@@ -76,6 +80,7 @@ def read(data: bytes, file: str, source: Source, options: ReadingOptions) -> Las
         warnings.append(f"the poses are a mapper's result, not odometry ({sign})")
     params = _params(lines)
     times, by_logger = _scan_order(lines[tag], scans, warnings)
+    headings_in_radians([scans.robot, scans.laser], times.rows, options, findings)
     mount, used["mounting"] = _carmen_mount(tag, scans, params, options, warnings)
     angle_min, angle_increment, angle_max = _angles(scans, used)
     farthest, doubtful = _max_range(tag, scans, params)
@@ -257,6 +262,7 @@ def _odometry(
     if not scans.robot.shape[1]:
         values, stamps = carmen_records.carmen_poses(lines.get("ODOM", []), findings.skips, by_logger)
         recorded = order.by_time(stamps)
+        headings_in_radians([values], recorded.rows, options, findings)
         name, origin = "ODOM record", "ODOM records, interpolated"
         return odometry_of_records(times, recorded, values[recorded.rows], name, origin, options, findings)
     if len(times.rows) > 1 and not scans.robot.any():

@@ -1,12 +1,39 @@
-"""Odometry of a text log whose poses are in records of their own, beside the scans."""
+"""Odometry of a text log: headings in radians, and poses in the scans or in records of their own."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
+import numpy as np
+
 from nscan_cli.logs.assemble import ReaderFindings
+from nscan_cli.logs.heading_unit import DEFAULT_HEADING_UNIT, are_in_degrees
 from nscan_cli.logs.odometry_interpolation import interpolated_poses
 from nscan_cli.logs.reading_options import ReadingOptions
 from nscan_cli.logs.scan_order import ScanOrder
-from nscan_cli.poses import Array
+from nscan_cli.poses import Array, Indices
+
+HEADINGS_CONVERTED = (
+    "the headings of odometry are in degrees, for the robot then drives along them: they are converted to "
+    "radians; --as-recorded takes them as radians"
+)
+
+
+def headings_in_radians(
+    columns: Sequence[Array], rows: Indices, options: ReadingOptions, findings: ReaderFindings
+) -> None:
+    """Convert headings in degrees to radians, in place, and say so.
+
+    `columns` (R, 3) are the poses of the robot, as written, which in `rows` (R,) are in order of time, and
+    other poses beside them.
+    """
+    robot, most = columns[0], DEFAULT_HEADING_UNIT.max_radians
+    if options.as_recorded or not options.odometry or not robot.shape[1] or not are_in_degrees(robot[rows]):
+        return
+    for poses in columns:
+        if np.abs(poses[:, 2]).max() > most:
+            poses[:, 2] = np.radians(poses[:, 2])
+    findings.contradictions.append(HEADINGS_CONVERTED)
 
 
 def odometry_of_scans(

@@ -12,15 +12,22 @@ from nscan_cli.logs import scan_order as order
 from nscan_cli.logs.assemble import ReaderFindings, RecordedMotion, laser_log
 from nscan_cli.logs.device_choice import Device, choose_device
 from nscan_cli.logs.formats import FIRST_LINE
+from nscan_cli.logs.heading_unit import HeadingUnitOptions, are_in_degrees
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.logs.reading_options import ReadingOptions
 from nscan_cli.logs.skips import Skips
-from nscan_cli.logs.text import player_bearings, player_records
-from nscan_cli.logs.text.odometry_records import odometry_of_records, odometry_of_scans
+from nscan_cli.logs.text import player_records
+from nscan_cli.logs.text.odometry_records import (
+    headings_in_radians,
+    odometry_of_records,
+    odometry_of_scans,
+)
 from nscan_cli.logs.text.player_records import DeviceLines, PlayerScans, Version
 from nscan_cli.logs.text.text_log_options import DEFAULT_TEXT_LOGS
 from nscan_cli.poses import Array, wrap
 
+BESIDE_DEGREES = HeadingUnitOptions(min_steps=2, min_along=0.0, min_gain=0.0)
+"""Where bearings are in degrees, headings likely are, too: any way that is rather along them tells it."""
 LINE_PATTERNS: tuple[tuple[Version, re.Pattern[bytes]], ...] = (
     (0, re.compile(rb"(laser|position(2d)?)[ \t]+\d+[ \t]+\d+(\.\d+)?(\s|$)")),
     (1, re.compile(rb"\d+\.\d+[ \t]+\S+[ \t]+\d+[ \t]+[a-z]\w*[ \t]+\d+[ \t]+\d+\.\d+(\s|$)")),
@@ -137,6 +144,7 @@ def _odometry(
         used["odometry"] = "none: --no-odometry"
         return None
     if scans.robot is not None and scans.robot.any() and options.odom_topic is None:
+        headings_in_radians([scans.robot], times.rows, options, findings)
         poses = scans.robot[times.rows]
         poses[:, 2] = wrap(poses[:, 2])
         used["odometry"] = "the poses in the scans (1:2)"
@@ -146,8 +154,9 @@ def _odometry(
     values, stamps = player_records.device_poses(found, findings.skips)
     recorded = order.by_time(stamps)
     poses, origin = values[recorded.rows], f"{device}, {why}, interpolated"
-    if scans.bearings == "degrees" and player_bearings.has_degrees(poses):
+    if scans.bearings == "degrees" and are_in_degrees(poses, BESIDE_DEGREES):
         poses[:, 2] = np.radians(poses[:, 2])
         origin += ", headings in degrees"
+    headings_in_radians([poses], np.arange(len(poses)), options, findings)
     name = f"record of {device or 'a position device'}"
     return odometry_of_records(times, recorded, poses, name, origin, options, findings)

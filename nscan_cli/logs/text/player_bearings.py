@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from nscan_cli.logs.laser_defaults import CARMEN_MAX_RANGE
 from nscan_cli.logs.raw_scans import RawScans, empty_scan_table
 from nscan_cli.logs.skips import Skips
-from nscan_cli.logs.text.bearings import MAX_RADIANS, EvenBearings, are_degrees, even_bearings
+from nscan_cli.logs.text.bearings import EvenBearings, are_degrees, even_bearings
 from nscan_cli.logs.text.line_records import LineRecord, beams_problem, parsed, within_bounds
 from nscan_cli.logs.text.text_log_options import DEFAULT_TEXT_LOGS
 from nscan_cli.poses import Array
@@ -70,24 +70,6 @@ def bearing_scans(records: list[LineRecord], skips: Skips) -> tuple[RawScans, st
         beams=np.array([int(found.places[-1]) + 1 for _, found in whole], dtype=np.int64),
     )
     return raw, "degrees" if in_degrees else "rad"
-
-
-def has_degrees(poses: Array) -> bool:
-    """Whether the headings of poses (P, 3) are in degrees, because the robot then moves along them.
-
-    Headings within 2π, and those of a robot that does not move, are taken as rad.
-    """
-    if not len(poses) or np.abs(poses[:, 2]).max() <= MAX_RADIANS:
-        return False
-    x, y = np.diff(poses[:, 0]), np.diff(poses[:, 1])
-    far = np.hypot(x, y) > 0
-    directions, headings = np.arctan2(y, x)[far], poses[:-1, 2][far]
-    # Twice the angle, because the robot may drive backwards.
-    lengths = np.hypot(x, y)[far]
-    in_degrees, in_rad = (
-        float(np.cos(2 * (directions - angles)) @ lengths) for angles in (np.radians(headings), headings)
-    )
-    return in_degrees > max(in_rad, 0.0)
 
 
 def _has_head(record: LineRecord) -> bool:

@@ -1,0 +1,57 @@
+"""The unit of headings: degrees in place of radians, told by the way that the robot drives along them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from nscan_cli.poses import Array, are_known
+
+
+@dataclass(frozen=True)
+class HeadingUnitOptions:
+    """When headings are in degrees."""
+
+    max_radians: float = 2 * np.pi + 0.01
+    """Largest size of headings that may not be degrees, rad, with what their log has rounded. A larger value
+    converts fewer logs."""
+    min_step: float = 0.05
+    """Least length of a step whose direction counts, m. A larger value lets fewer steps tell."""
+    min_steps: int = 10
+    """Least number of such steps. A larger value converts fewer logs."""
+    min_along: float = 0.9
+    """Least mean cosine of twice the angle between such steps and the headings in degrees. It is 0.989 or
+    more on all logs in their own unit, and 0.33 at most in the other one. A larger value converts fewer
+    logs."""
+    min_gain: float = 0.3
+    """And it is larger by so much than with the headings in radians: a straight drive tells little. A larger
+    value converts fewer logs."""
+
+
+DEFAULT_HEADING_UNIT = HeadingUnitOptions()
+
+
+def are_in_degrees(poses: Array, options: HeadingUnitOptions = DEFAULT_HEADING_UNIT) -> bool:
+    """Whether the headings of poses (P, 3), in order of time and as written, are in degrees.
+
+    Headings within 2π, and those of a robot that does not move, are taken as rad.
+    """
+    poses = poses[are_known(poses)]
+    if len(poses) < 2 or np.abs(poses[:, 2]).max() <= options.max_radians:
+        return False
+    way = np.cumsum(np.hypot(*np.diff(poses[:, :2], axis=0).T))
+    ends = np.append(0, np.flatnonzero(np.diff(np.floor(way / options.min_step), prepend=0.0) > 0.0) + 1)
+    if len(ends) <= options.min_steps:
+        return False
+    x, y = np.diff(poses[ends, :2], axis=0).T
+    directions = np.arctan2(y, x)
+
+    def along(headings: Array) -> float:
+        # Half-way between both ends of a step, and of twice the angle, because the robot may drive backwards.
+        turned = np.unwrap(headings)
+        middle = 0.5 * (turned[ends[1:]] + turned[ends[:-1]])
+        return float(np.cos(2 * (directions - middle)).mean())
+
+    in_degrees = along(np.radians(poses[:, 2]))
+    return in_degrees >= max(options.min_along, along(poses[:, 2]) + options.min_gain)
