@@ -15,6 +15,7 @@ from nscan_cli.poses import Array, Indices
 from nscan_cli.slam.backend.energy_cache import EnergyCache
 from nscan_cli.slam.backend.schedule import OptimisationSchedule
 from nscan_cli.slam.frontend.odometry_checks import frozen_scans, without_jumps
+from nscan_cli.slam.frontend.odometry_restarts import restarts_of
 from nscan_cli.slam.frontend.odometry_stalls import without_stalls
 from nscan_cli.slam.frontend.scan_batch import ScanBatch, scan_batches
 from nscan_cli.slam.keyframes.keyframe_selection import Keyframes
@@ -93,7 +94,8 @@ class SlamState:
         jumps = stalls = np.zeros(0, dtype=np.int64)
         if odometry is not None:
             odometry, stalls = without_stalls(odometry, log.times, options.odometry_checks.stalls)
-            odometry, jumps = without_jumps(odometry, log.times, options.odometry_checks)
+            restarts = restarts_of(recorded, options.odometry_checks, options.breaks)
+            odometry, jumps = without_jumps(odometry, log.times, options.odometry_checks, restarts)
         seen = log.ranges[log.ranges < options.tracking.max_range]
         median_range = float(np.median(seen)) if len(seen) else 0.0
         keyframes = Keyframes(options.keyframes, options.nscan.gaussians, median_range)

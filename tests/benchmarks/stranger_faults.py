@@ -78,6 +78,7 @@ FAULTS: tuple[tuple[str, Fault, str], ...] = (
         ),
         "counts reversing as driving forward",
     ),
+    ("two drives in one file", faults.two_drives, "several drives in the log"),
     ("each pose five times", lambda log: odometry_faults.repeated(log, 5), "odometry comes less often"),
     ("odometry zero at every 50th scan", lambda log: odometry_faults.zeros(log, 50), "single wrong values"),
     ("two scans a stamp", lambda log: faults.shared_stamps(log, 2), "with the time stamp of the scan before"),

@@ -92,6 +92,20 @@ def spliced(parts: list[LaserLog], pause: float = 5.0) -> LaserLog:
     )
 
 
+def two_drives(log: LaserLog, begin: float = 0.3) -> LaserLog:
+    """The first 60 % of a drive, and its last part from `begin` (share of it) on, as two drives.
+
+    The odometry of each begins at zero.
+    """
+    rows = len(log)
+    parts = [taken(log, slice(0, 6 * rows // 10)), taken(log, slice(int(begin * rows), None))]
+    both, at = spliced(parts), len(parts[0])
+    odometry = both.odometry
+    assert odometry is not None
+    each = [relative(poses, poses[0]) for poses in (odometry[:at], odometry[at:])]
+    return replace(both, odometry=np.concatenate(each))
+
+
 def frozen(log: LaserLog, rows: Rows) -> LaserLog:
     """The laser repeats its reading before the first of `rows`, while the robot drives on."""
     some, ranges = np.arange(len(log))[rows], log.ranges.copy()

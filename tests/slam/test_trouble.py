@@ -90,6 +90,22 @@ def test_what_went_wrong_is_said_by_the_numbers_of_the_scans():
     ]
 
 
+def test_several_drives_in_one_log_are_said():
+    """Odometry begins anew where the scans see another place, or after a pause."""
+    made, found = case("carried by 5 m")
+    state, row = copy.copy(found.state), made.before
+    state.odometry_jumps = np.array([row])
+    between = made.log.times[row - 1 : row + 1].mean() - made.log.times[0]
+    for breaks in ([row], []):
+        state.breaks = breaks
+        said = [text for text in notices(state) if "several drives in the log" in text]
+        assert len(said) == 1
+        assert said[0].startswith(f"odometry begins anew at scan {made.log.numbers[row]},")
+        assert said[0].endswith(f"try --end {between:.2f}, or --start {between:.2f}")
+    state.odometry_jumps = np.array([row - 3])
+    assert not any("several drives" in text for text in notices(state))
+
+
 def test_without_odometry_a_jump_along_a_corridor_is_said():
     """The scans fit as well there, 7 m short."""
     made, found = case("carried by 10 m", odometry=False)

@@ -36,6 +36,7 @@ def notices(state: SlamState, followed: bool = False) -> list[str]:
             f"tracking broke at {_numbered(log, state.breaks)}; how the robot moved there is unknown"
         )
     jumps = state.odometry_jumps.tolist()
+    found += _drives(state, jumps)
     if jumps:
         found.append(f"the odometry jumps at {_numbered(log, jumps)}; each is replaced by the step before it")
     stalls = state.odometry_stalls.tolist()
@@ -56,6 +57,21 @@ def notices(state: SlamState, followed: bool = False) -> list[str]:
         + _contradictions(state)
         + _free_space_violations(state)
     )
+
+
+def _drives(state: SlamState, jumps: list[int]) -> list[str]:
+    """Where odometry begins anew and the scans see another place, or after a pause: another drive."""
+    log, periods = state.log, np.diff(state.log.times)
+    longest = state.options.diagnostics.gap_periods * float(np.median(periods)) if len(periods) else 0.0
+    rows = [row for row in jumps if row in state.breaks or periods[row - 1] > longest]
+    if not rows:
+        return []
+    between = (log.reading.start or 0.0) + float(log.times[rows[0] - 1 : rows[0] + 1].mean() - log.times[0])
+    return [
+        f"odometry begins anew at {_numbered(log, rows)}, after a pause or where the scans see another "
+        "place: there are likely several drives in the log, or the robot was carried; if they do not fit "
+        f"together in the map, map each by itself: try --end {between:.2f}, or --start {between:.2f}"
+    ]
 
 
 def _odometry_notices(state: SlamState) -> list[str]:

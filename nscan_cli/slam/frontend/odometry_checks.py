@@ -8,13 +8,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nscan_cli.logs.laser_log import LaserLog
-from nscan_cli.poses import Array, are_known, compose, relative
+from nscan_cli.poses import Array, Indices, are_known, compose, relative
 from nscan_cli.slam.frontend.odometry_stalls import OdometryStallOptions
 
 SHORTEST_PERIOD = 1e-3
 """s; a median period is at least this, to divide by."""
 BEAM_STRIDE = 16
 """Every beam in this many is compared first; these tell nearly all scans apart."""
+NO_ROWS: Indices = np.zeros(0, dtype=np.int64)
 
 
 @dataclass(frozen=True)
@@ -34,15 +35,16 @@ class OdometryCheckOptions:
 
 
 def without_jumps(
-    odometry: Array, times: Array, options: OdometryCheckOptions
+    odometry: Array, times: Array, options: OdometryCheckOptions, restarts: Indices = NO_ROWS
 ) -> tuple[Array, NDArray[np.int64]]:
     """Odometry (S, 3) without its jumps, and the rows (J,) to which it jumped; times (S,) in s.
 
-    Odometry is nan where it is missing; no step leads to such a row or from it.
+    `restarts` (R,) are rows to which it jumps, however long the pause before. Odometry is nan where it is
+    missing; no step leads to such a row or from it.
 
     Where it is reset, wraps round or has a wrong value, the step before takes the place of the jump.
     """
-    jumps = jumps_of(odometry, options, times)
+    jumps = np.union1d(jumps_of(odometry, options, times), restarts)
     if not len(jumps):
         return odometry, jumps
     steps, mended = relative(odometry[1:], odometry[:-1]), odometry.copy()
