@@ -43,7 +43,11 @@ def checked_signs(
     if not any(is_long and vote > 0 for is_long, vote in zip(long, votes, strict=True)):
         return log, []
     # Once scans have shown one, ranges alone tell of long ones where no scans match.
-    stretches = [each for each, is_long, vote in zip(found, long, votes, strict=True) if vote > -is_long]
+    stretches = [
+        each
+        for each, is_long, vote in zip(found, long, votes, strict=True)
+        if vote > 0 or (is_long and vote == 0)
+    ]
     names = stretch_names((log.numbers[each.first[0]], log.numbers[each.last[-1]]) for each in stretches)
     message = (
         "odometry counts reversing as driving forward: the scans show the robot going the other way from "
