@@ -146,11 +146,9 @@ def command(
     held = 0 if fixed is None else numbers.index(fixed)
     match, left_out = nscan_match(points, start, priors, held, options, joint, pairs)
     if match is None:
-        raise InputDataError(
-            scans.source.name,
-            f"no two of the scans match: {_left_out_line(numbers, left_out)}",
-            "choose scans that see the same walls, or another --initial",
-        )
+        why = "; ".join(_left_out_lines(numbers, left_out))
+        remedy = "choose scans that see the same walls, or another --initial"
+        raise InputDataError(scans.source.name, f"no two of the scans match: {why}", remedy)
     parameters = {
         "reading": dataclasses.asdict(reading),
         "matching": as_parameters(options),
@@ -226,7 +224,7 @@ def _nscan_rows(numbers: tuple[int, ...], match: NScanMatch, left_out: list[Excl
         ("match", match_outcome(match.reason, joint.iterations, joint.evaluations, joint.unsettled)),
         ("placed", [searched] if joint.searched else []),
         ("weak", [*weak[:LISTED_SCANS], *more]),
-        ("left out", [f"scan {numbers[out.scan]} {out.reason}" for out in left_out]),
+        ("left out", _left_out_lines(numbers, left_out)),
     ]
 
 
@@ -235,5 +233,5 @@ def _weakly_held_line(number: int, weakest: Weakest) -> str:
     return f"scan {number} along {math.degrees(weakest.direction):.0f}° ({known})"
 
 
-def _left_out_line(numbers: tuple[int, ...], left_out: list[ExcludedScan]) -> str:
-    return "; ".join(f"scan {numbers[out.scan]} {out.reason}" for out in left_out)
+def _left_out_lines(numbers: tuple[int, ...], left_out: list[ExcludedScan]) -> list[str]:
+    return [f"scan {numbers[out.scan]} {out.reason}" for out in left_out]

@@ -12,17 +12,15 @@ Row = tuple[str, Sequence[str]]
 """A title, and the lines beside it. A row without lines is left out."""
 
 
-def summary_table(rows: Sequence[Row], width: int | None = TERMINAL_WIDTH) -> str:
-    """The rows, with titles in the first column. Lines are wrapped at `width`, None for not at all."""
+def summary_table(rows: Sequence[Row]) -> str:
+    """The rows, with titles in the first column."""
     filled = [(title, lines) for title, lines in rows if lines]
     aside = max(len(title) for title, _lines in filled) + 2
+    broken = textwrap.TextWrapper(TERMINAL_WIDTH - aside, break_long_words=False, break_on_hyphens=False)
     shown = []
     for title, lines in filled:
-        if width is not None:
-            broken = textwrap.TextWrapper(width - aside, break_long_words=False, break_on_hyphens=False)
-            lines = [part for line in lines for part in broken.wrap(line)]
-        for line in lines:
-            shown.append(f"{title:{aside}}{line}")
+        for part in (part for line in lines for part in broken.wrap(line)):
+            shown.append(f"{title:{aside}}{part}")
             title = ""
     return "\n".join(shown)
 

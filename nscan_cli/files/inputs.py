@@ -75,13 +75,13 @@ def read_text(path: str, limit: Limit = INPUT) -> bytes:
     return without_byte_order_mark(read_bytes(path, limit), label(path))
 
 
-def read_all(read: Callable[[int], bytes], limit: Limit, problem: str = "goes on and on") -> bytes:
+def read_all(read: Callable[[int], bytes], limit: Limit) -> bytes:
     """Read a stream of unknown length. Raises LimitExceededError if it is longer than the limit."""
     pieces, size, most = [], 0, limit.bytes
     while piece := read(MB):
         size += len(piece)
         if size > most:
-            raise LimitExceededError(limit, problem)
+            raise LimitExceededError(limit, "goes on and on")
         pieces.append(piece)
     return b"".join(pieces)
 

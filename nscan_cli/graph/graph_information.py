@@ -7,11 +7,11 @@ with the number of relations of one pair.
 
 from __future__ import annotations
 
-import functools
 from collections.abc import Sequence
 
 import numpy as np
 
+from nscan_cli.graph.io.symmetric_matrices import upper_indices
 from nscan_cli.graph.linalg.block_cholesky import Factor, factorise
 from nscan_cli.graph.model import Graph
 from nscan_cli.graph.optimise.graph_energy import GraphEnergy
@@ -19,9 +19,6 @@ from nscan_cli.graph.optimise.whole_graph import Component
 from nscan_cli.graph.relations.base import Relation
 from nscan_cli.graph.relations.registry import is_joint, is_pairwise
 from nscan_cli.poses import Array, Indices
-
-# Matches have few sizes, and computing the indices takes longer than taking the entries.
-_upper_triangle = functools.cache(np.triu_indices)
 
 
 def component_information(graph: Graph, component: Component) -> tuple[GraphEnergy, Factor]:
@@ -57,6 +54,6 @@ def _each_pair_once(relations: Sequence[Relation]) -> Array:
 def _pair_keys(nodes: Sequence[int]) -> Indices:
     """(n (n − 1) / 2,) the pairs of n nodes, each packed into one integer."""
     ordered = np.sort(np.array(nodes, dtype=np.int64))
-    a, b = _upper_triangle(len(ordered), 1)
+    a, b = upper_indices(len(ordered), 1)
     pairs: Indices = ordered[a] << 32 | ordered[b]
     return pairs

@@ -240,12 +240,6 @@ def _sectors(
             found[-1] = found[-1]._replace(last=bearing + margin)
         else:
             found.append(Sector(bearing - margin, bearing + margin, 0.0))
-    return [
-        sector._replace(range=float(np.median(medians[chosen & _within(bearings, sector)])))
-        for sector in found
-    ]
-
-
-def _within(bearings: Array, sector: Sector) -> NDArray[np.bool_]:
-    inside: NDArray[np.bool_] = (bearings >= sector.first) & (bearings <= sector.last)
-    return inside
+    inside = [chosen & (bearings >= sector.first) & (bearings <= sector.last) for sector in found]
+    ranges = [float(np.median(medians[beams])) for beams in inside]
+    return [sector._replace(range=distance) for sector, distance in zip(found, ranges, strict=True)]

@@ -13,6 +13,7 @@ from nscan_cli.kernels.decorators import kernel
 from nscan_cli.matching.motion_model import Prior
 from nscan_cli.matching.pairwise import PairOptions
 from nscan_cli.matching.pairwise_solver import PairProblem, minimise_pairwise, pairwise_objective
+from nscan_cli.matching.pose_kernels import relative_pose, wrapped
 from nscan_cli.matching.small_matrices import information_of_place
 from nscan_cli.ndt.association import begin_association
 from nscan_cli.ndt.energy import ENERGY_NUMBERS, inlier_share
@@ -93,19 +94,17 @@ def _match(
     hessian, prior = np.empty((3, 3)), Prior(np.zeros(3), np.zeros((3, 3)))
     problem = PairProblem(grid, half, begin_association(points), scale, prior)
     found = minimise_pairwise(problem, pose, widenings, max_iterations, near, tolerance, hessian)
-    pose[2] -= 2 * np.pi * np.ceil((pose[2] - np.pi) / (2 * np.pi))
+    pose[2] = wrapped(pose[2])
     overlap, apart = inlier_share(grid, half, points, pose, bound), 0.0
     if probe > 0.0:
         pairwise_objective(problem, pose, 1.0, 1.0, np.empty(ENERGY_NUMBERS), gradient, information)
         # The rotation is unknown, too. Of two eigenvectors, the one of the smaller eigenvalue.
         xx, xy, yy = information_of_place(information)
         weakest = 0.5 * np.arctan2(2.0 * xy, xx - yy) + 0.5 * np.pi
-        again = pose.copy()
+        again, step = pose.copy(), np.empty(3)
         again[0] += probe * np.cos(weakest)
         again[1] += probe * np.sin(weakest)
         minimise_pairwise(problem, again, widenings, max_iterations, near, tolerance, hessian)
-        cos, sin, dx, dy = np.cos(pose[2]), np.sin(pose[2]), again[0] - pose[0], again[1] - pose[1]
-        turn = again[2] - pose[2]
-        turn -= 2 * np.pi * np.round(turn / (2 * np.pi))
-        apart = max(abs(cos * dx + sin * dy), abs(cos * dy - sin * dx), abs(turn))
+        relative_pose(again, pose, step)
+        apart = max(abs(step[0]), abs(step[1]), abs(wrapped(step[2])))
     return found.energy, overlap, found.converged, apart

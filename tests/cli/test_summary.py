@@ -16,4 +16,3 @@ def test_lines_are_broken_at_80_columns_but_no_word_is():
     assert all(line.startswith(" " * 9) for line in words[1:])
     assert shown.count("word") == 30
     assert last == f"file     {name}"
-    assert len(summary_table([("warning", ["word " * 30])], width=None).splitlines()) == 1

@@ -86,14 +86,9 @@ def _sigma_of(covariances: Array) -> RelativeSigma:
     known = np.isfinite(covariances[:, 0, 0])
     distance, angle = np.full((2, len(covariances)), np.inf)
     xx, xy, yy = covariances[known, 0, 0], covariances[known, 0, 1], covariances[known, 1, 1]
-    distance[known] = np.sqrt(_largest_eigenvalues(xx, xy, yy))
+    distance[known] = np.sqrt(np.maximum(0.5 * (xx + yy) + np.hypot(0.5 * (xx - yy), xy), 0.0))
     angle[known] = np.sqrt(np.maximum(covariances[known, 2, 2], 0.0))
     return RelativeSigma(distance, angle)
-
-
-def _largest_eigenvalues(xx: Array, xy: Array, yy: Array) -> Array:
-    """The largest eigenvalues (K,) of covariances [[xx, xy], [xy, yy]]."""
-    return np.maximum(0.5 * (xx + yy) + np.hypot(0.5 * (xx - yy), xy), 0.0)
 
 
 class RelativeUncertainty:
