@@ -10,7 +10,7 @@ import numpy as np
 
 from nscan_cli.graph.model import Pairwise
 from nscan_cli.graph.relations.semidefinite import as_information
-from nscan_cli.poses import Array, Indices, compose, relative
+from nscan_cli.poses import Array, Indices, Mask, compose, relative
 from nscan_cli.slam.keyframes.keyframe import Keyframe
 from nscan_cli.slam.keyframes.options import KeyframeOptions
 
@@ -34,6 +34,12 @@ def distances_from(route: Route, keyframe: int) -> Array:
     """(K,) distances of the keyframes from one of them, m."""
     away: Array = np.hypot(*(route.poses[:, :2] - route.poses[keyframe, :2]).T)
     return away
+
+
+def is_earlier(route: Route, keyframe: int, path: float) -> Mask:
+    """(K,) whether each keyframe is of a visit before that of a keyframe: earlier by more than a path, m."""
+    earlier: Mask = route.paths[keyframe] - route.paths > path
+    return earlier
 
 
 def route_of(keyframes: Sequence[Keyframe], chain: Sequence[Pairwise], poses: Array) -> Route:

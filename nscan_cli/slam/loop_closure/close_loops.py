@@ -8,7 +8,7 @@ import numpy as np
 
 from nscan_cli.poses import Indices
 from nscan_cli.slam.backend.optimisation import optimise
-from nscan_cli.slam.keyframes.route import distances_from
+from nscan_cli.slam.keyframes.route import distances_from, is_earlier
 from nscan_cli.slam.local_matching.joint_relations import LocalMatch
 from nscan_cli.slam.local_matching.match_keyframe import add_relations
 from nscan_cli.slam.local_matching.neighbours import Neighbours, choose_neighbours
@@ -48,8 +48,8 @@ def close_loops_between(state: SlamState, first: int, last: int) -> list[Place]:
     state.detector.begin_again(replace(options, min_distance=max(reach, options.min_distance)))
     for centre in np.flatnonzero((route.rows >= first) & (route.rows <= last)).tolist():
         is_near = distances_from(state.route, centre) <= reach
-        is_earlier = route.paths[centre] - route.paths > state.options.nscan.visit_path
-        _search(state, centre, np.flatnonzero(is_earlier & is_near))
+        older = is_earlier(route, centre, state.options.nscan.visit_path)
+        _search(state, centre, np.flatnonzero(older & is_near))
     return state.places[known:]
 
 

@@ -19,7 +19,7 @@ from nscan_cli.matching.correlative_search import SearchOptions
 from nscan_cli.poses import Array, Indices, compose
 from nscan_cli.slam.backend.energy_cache import EnergyCache
 from nscan_cli.slam.backend.subgraph import Subgraph, nearest_keyframes, without_others
-from nscan_cli.slam.keyframes.route import Route, distances_from
+from nscan_cli.slam.keyframes.route import Route, distances_from, is_earlier
 from nscan_cli.slam.keyframes.tracked_path import TrackedPath
 from nscan_cli.slam.local_matching.joint_relations import LocalMatch, LocalMatcher
 from nscan_cli.slam.local_matching.options import NScanOptions
@@ -165,10 +165,10 @@ class LoopDetector:
 
     def _near(self, route: Route, centre: int, sigma: RelativeSigma) -> Indices:
         """The older keyframes that may be near and may be too far off for a joint match."""
-        options, paths, away = self.options, route.paths, distances_from(route, centre)
+        options, away = self.options, distances_from(route, centre)
         bound = options.sigmas * sigma.distance
         may_be = away <= self.nscan.radius + np.minimum(bound, options.max_distance)
-        older = paths[centre] - paths > self.nscan.visit_path
+        older = is_earlier(route, centre, self.nscan.visit_path)
         return np.flatnonzero(older & may_be & (bound > options.match_reach))
 
     def _search(self, route: Route, centre: int, near: Indices, sigma: RelativeSigma) -> Place | None:
@@ -194,12 +194,12 @@ class LoopDetector:
         These are the keyframes that the graph knows well as seen from the first, so that their map is in one
         piece. `sigma` is that from the centre, for which it was computed last.
         """
-        options, paths, away = self.options, route.paths, distances_from(route, centre)
+        options, away = self.options, distances_from(route, centre)
         farthest = min(max(float(away.max()), 0.5 * options.max_distance), options.max_distance)
         distance = max(options.sigmas * sigma.distance[first], options.min_distance)
         turn = max(options.sigmas * sigma.angle[first], options.min_turn)
         window = replace(options.search, distance=min(distance, farthest), turn=min(turn, float(np.pi)))
-        older = paths[centre] - paths > self.nscan.visit_path
+        older = is_earlier(route, centre, self.nscan.visit_path)
         near = away <= options.earlier_radius + window.distance
         in_one_piece = options.sigmas * self._uncertainty.seen_from(first).distance <= options.match_reach
         return window, np.flatnonzero(older & near & in_one_piece)
