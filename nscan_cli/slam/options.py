@@ -8,11 +8,11 @@ from typing import Literal
 from nscan_cli.calibration.options import FileCheckOptions
 from nscan_cli.graph.optimise.graduated_nonconvexity import RobustOptions
 from nscan_cli.slam.backend.options import (
+    DegenerateRelationOptions,
     OptimisationOptions,
     RefinementOptions,
     ScheduleOptions,
     UnevenMotionOptions,
-    UntoldSigmaOptions,
 )
 from nscan_cli.slam.diagnostics.options import DiagnosticsOptions
 from nscan_cli.slam.frontend.odometry_checks import OdometryCheckOptions
@@ -41,7 +41,7 @@ class SlamOptions:
     rejection: RobustOptions = field(default_factory=RobustOptions)
     uneven_motion: UnevenMotionOptions = field(default_factory=UnevenMotionOptions)
     refinement: RefinementOptions = field(default_factory=RefinementOptions)
-    untold_sigmas: UntoldSigmaOptions = field(default_factory=UntoldSigmaOptions)
+    degenerate_relations: DegenerateRelationOptions = field(default_factory=DegenerateRelationOptions)
     diagnostics: DiagnosticsOptions = field(default_factory=DiagnosticsOptions)
     relations: Relations = "both"
     """both: the chain of pairwise relations from tracking, and nScan relations of joint matches. nscan: of

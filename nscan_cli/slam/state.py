@@ -58,7 +58,7 @@ class SlamState:
     """Relations of tracking: `chain[k]` leads from keyframe k to k + 1. The route holds the same list."""
     tracked: list[Array] = field(default_factory=list)
     """(n, 3) poses of the scans as tracking found them, batch by batch."""
-    told_sigmas: list[Array] = field(default_factory=list)
+    weakest_sigmas: list[Array] = field(default_factory=list)
     """(n,) standard deviations of the positions that scans measure, m, batch by batch; see TrackedScans."""
     breaks: list[int] = field(default_factory=list)
     """Rows of the keyframes before which the track broke, increasing."""
@@ -112,6 +112,12 @@ class SlamState:
     def poses(self) -> Array:
         """(K, 3) global poses of the keyframes in the graph."""
         return self.route.poses
+
+    @property
+    def degenerate_scans(self) -> Indices:
+        """Rows of the tracked scans that, without odometry, do not tell their places along the walls."""
+        sigma = self.options.diagnostics.degenerate_stretch.sigma
+        return np.flatnonzero(np.concatenate(self.weakest_sigmas) > sigma)
 
     @property
     def relations(self) -> list[Relation]:

@@ -100,9 +100,9 @@ def scans_of(found: TrackedScans) -> list[TrackedScan]:
 
 def found_of(*scans: TrackedScan) -> TrackedScans:
     """The same as columns; the objective's value is nobody's."""
-    names = ("pose", "hessian", "prior_covariance", "inliers", "path", "in_map", "odometry_sigmas")
+    names = ("pose", "hessian", "prior_covariance", "inliers", "path", "in_map")
     columns = [np.array([getattr(scan, name) for scan in scans]) for name in names]
-    return TrackedScans._make([np.full(len(scans), np.nan), *columns, np.zeros(len(scans))])
+    return TrackedScans._make([np.full(len(scans), np.nan), *columns, *np.zeros((2, len(scans)))])
 
 
 def poses_of(found: list[TrackedScan]) -> Array:

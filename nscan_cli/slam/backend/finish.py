@@ -6,8 +6,8 @@ import numpy as np
 
 from nscan_cli.graph.marginal_covariances import marginal_covariances
 from nscan_cli.graph.model import Graph
+from nscan_cli.slam.backend.degenerate_relations import widened_relations
 from nscan_cli.slam.backend.scan_poses import between_keyframes
-from nscan_cli.slam.backend.untold_sigmas import relations_as_told
 from nscan_cli.slam.state import SlamState
 
 
@@ -17,7 +17,7 @@ def finish_graph(state: SlamState) -> Graph:
     log, rows = state.log, state.route.rows
     anchors = rows[np.searchsorted(rows, np.arange(len(log)), side="right") - 1]
     turn = state.options.optimisation.metres_per_radian
-    pairwise, nscan = relations_as_told(state)
+    pairwise, nscan = widened_relations(state)
     graph = Graph(
         scans=log.numbers,
         stamps=list(log.stamps),

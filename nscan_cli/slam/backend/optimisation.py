@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from nscan_cli.graph.optimise import graph_solver
 from nscan_cli.graph.optimise.graph_solver import StopOptions
+from nscan_cli.slam.backend.degenerate_relations import all_widened_relations
 from nscan_cli.slam.backend.subgraph import Subgraph
-from nscan_cli.slam.backend.untold_sigmas import told_relations
 from nscan_cli.slam.state import SlamState
 
 
 def optimise(state: SlamState, stop: StopOptions, part: Subgraph | None = None) -> None:
     """Optimise the poses of all keyframes, or of a part. Changes route, schedule."""
-    part = Subgraph(told_relations(state)) if part is None else part
+    part = Subgraph(all_widened_relations(state)) if part is None else part
     state.schedule.optimised(len(state.poses), part)
     if len(state.poses) < 2:
         return

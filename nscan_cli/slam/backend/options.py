@@ -109,8 +109,8 @@ class RefinementOptions:
 
 
 @dataclass(frozen=True)
-class UntoldSigmaOptions:
-    """How certain the length of a way is that no scan tells, see diagnostics.untold_way."""
+class DegenerateRelationOptions:
+    """How certain the length of a way is that no scan tells, see diagnostics.degenerate_stretch."""
 
     speed_share: float = 0.5
     """Standard deviation of the robot's speed there, as a share of its usual one: it may stand, or hurry. A

@@ -8,8 +8,8 @@ import numpy as np
 
 from nscan_cli.graph.optimise.graduated_nonconvexity import contradicting
 from nscan_cli.graph.relations.registry import centre_of
+from nscan_cli.slam.backend.degenerate_relations import all_widened_relations
 from nscan_cli.slam.backend.optimisation import optimise
-from nscan_cli.slam.backend.untold_sigmas import told_relations
 from nscan_cli.slam.state import SlamState
 
 CONTRADICTS = "contradicts the rest of the graph"
@@ -19,7 +19,7 @@ def reject_contradicting_loops(state: SlamState) -> None:
     """Remove the relations of loops that contradict the others. Changes relations, loops, route."""
     relations = state.relations
     # These are in the same order.
-    energy = state.energies.of(state.route, told_relations(state))
+    energy = state.energies.of(state.route, all_widened_relations(state))
     closes_loop = np.array([relation.origin == "loop" for relation in relations], dtype=np.bool_)
     wrong = contradicting(energy, state.poses, closes_loop, state.options.rejection)
     if not wrong.any():

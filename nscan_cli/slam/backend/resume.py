@@ -64,7 +64,8 @@ def resume(graph: Graph, log: LaserLog, rows: Indices, threads: int = 1) -> Grap
 
     `rows` (N,) are the rows of the log with the scans of the nodes. `can_refine` has to hold.
     """
-    state = state_of_graph(graph, _log_of_rows(log, rows), options_of(graph), threads)
+    log = log if np.array_equal(rows, np.arange(len(log))) else excerpt(log, rows)
+    state = state_of_graph(graph, log, options_of(graph), threads)
     reject_contradicting_loops(state)
     refine(state, search=False)
     refined = finish_graph(state)
@@ -95,13 +96,6 @@ def state_of_graph(graph: Graph, log: LaserLog, options: SlamOptions, threads: i
     )
 
 
-def _log_of_rows(log: LaserLog, rows: Indices) -> LaserLog:
-    """The log with the scans in some rows (N,) alone."""
-    if np.array_equal(rows, np.arange(len(log))):
-        return log
-    return excerpt(log, rows)
-
-
 def _breaks(graph: Graph, options: SlamOptions) -> set[int]:
     """The keyframes before which the track broke: the relation to them says nothing of the turn."""
     least = (options.breaks.turn_sigma / 2) ** -2
@@ -121,7 +115,7 @@ def _chain_of_graph(graph: Graph, options: SlamOptions) -> list[Pairwise]:
             tracked.setdefault(pair.nodes, pair)
     chain = []
     for a, b in itertools.pairwise(graph.keyframes.tolist()):
-        step, information = odometry_prior(graph.poses[a], graph.poses[b], options.tracking.odometry)
+        step, information = odometry_prior(graph.poses[a], graph.poses[b], options.tracking.scan.odometry)
         chain.append(tracked.get((a, b)) or Pairwise((a, b), step, information, "track"))
     return chain
 

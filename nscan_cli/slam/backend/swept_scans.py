@@ -77,7 +77,7 @@ def add_keyframes_at(state: SlamState, found: TrackedScans, is_keyframe: Mask, b
 
 def tracked_at(poses: Array, breaks: set[int], options: SlamOptions) -> TrackedScans:
     """The scans as if tracking had found them at poses (S, 3), without information."""
-    found, step, path = TrackedScans.room(len(poses)), options.tracking.min_motion, 0.0
+    found, step, path = TrackedScans.room(len(poses)), options.tracking.scan.min_motion, 0.0
     found.poses[:], found.values[:], found.inliers[:] = poses, 0.0, 1.0
     found.hessians[:], found.prior_covariances[:], found.odometry_sigmas[:] = 0.0, 0.0, 0.0
     joined_at = poses[0]

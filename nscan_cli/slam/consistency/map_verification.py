@@ -59,7 +59,10 @@ class Verification:
                     "counts": run.counts,
                     "breaks": len(run.path.breaks),
                     "notices": list(run.path.notices),
-                    "differences": [_in_scans(each, numbers) for each in run.differences],
+                    "differences": [
+                        asdict(each) | {"first": int(numbers[each.first]), "last": int(numbers[each.last])}
+                        for each in run.differences
+                    ],
                 }
                 for run in self.repeats
             ],
@@ -82,8 +85,7 @@ def verify(state: SlamState, graph: Graph, options: VerificationOptions, threads
     log, slam = state.recorded, state.options
     rows, breaks = np.arange(len(log)), np.array(state.breaks, dtype=np.int64)
     # A map without odometry is no better told than its repeats.
-    untold = np.concatenate(state.told_sigmas) > slam.diagnostics.untold_way.sigma
-    path = MappedPath(rows, graph.poses, breaks, (), rows if log.odometry is None else rows[untold])
+    path = MappedPath(rows, graph.poses, breaks, (), rows if log.odometry is None else state.degenerate_scans)
     runs = repeats(log)
     paths = map_in_threads(threads, lambda run: run(log, slam), runs.values())
     found = [path_differences(path, again, options) for again in paths]
@@ -105,11 +107,6 @@ def add_verification(state: SlamState, graph: Graph, options: VerificationOption
     notice = found.notice(numbers)
     if notice is not None:
         provenance["notices"].append(notice)
-
-
-def _in_scans(difference: PathDifference, numbers: Indices) -> dict[str, Any]:
-    scans = {"first": int(numbers[difference.first]), "last": int(numbers[difference.last])}
-    return asdict(difference) | scans
 
 
 class _RelativeSigmas:

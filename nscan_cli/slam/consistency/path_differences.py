@@ -75,7 +75,9 @@ def _is_apart(poses: Array, path: MappedPath, repeat: MappedPath, options: Verif
     steps = relative(poses[1:], poses[:-1])
     far = (np.hypot(steps[:, 0], steps[:, 1]) > options.max_step) | (np.abs(steps[:, 2]) > options.max_turn)
     # What the repeat alone guesses says nothing of the path.
-    guessed = np.setdiff1d(np.union1d(repeat.untold, repeat.standing_rows(options.start)), path.untold)
+    guessed = np.setdiff1d(
+        np.union1d(repeat.degenerate, repeat.standing_rows(options.start)), path.degenerate
+    )
     broken = np.searchsorted(repeat.rows, np.union1d(np.union1d(path.breaks, repeat.breaks), guessed)) - 1
     far[np.clip(broken, 0, len(far) - 1)] = True
     return far

@@ -29,7 +29,7 @@ class MappedPath:
     """Rows before which its track broke."""
     notices: tuple[str, ...]
     """The notices of the run."""
-    untold: Indices = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
+    degenerate: Indices = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
     """Rows of scans along bare walls, without odometry, that do not tell their places."""
     has_odometry: bool = True
     """Whether its log had any."""
@@ -60,9 +60,8 @@ def path_of(log: LaserLog, options: SlamOptions, rows: Indices | None = None) ->
     state = SlamState.of_log(log if len(rows) == len(log) else excerpt(log, rows), options)
     graph = run_slam(state, lambda *_counts: None)
     breaks = rows[np.array(state.breaks, dtype=np.int64)]
-    untold = np.concatenate(state.told_sigmas) > options.diagnostics.untold_way.sigma
-    has_odometry = log.odometry is not None
-    return MappedPath(rows, graph.poses, breaks, tuple(notices(state)), rows[untold], has_odometry)
+    degenerate, has_odometry = rows[state.degenerate_scans], log.odometry is not None
+    return MappedPath(rows, graph.poses, breaks, tuple(notices(state)), degenerate, has_odometry)
 
 
 def path_of_mirrored(log: LaserLog, options: SlamOptions) -> MappedPath:

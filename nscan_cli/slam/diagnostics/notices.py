@@ -13,9 +13,9 @@ from nscan_cli.logs.beam_mask import mask_text
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.poses import relative
 from nscan_cli.slam.backend.contradicting_visits import worst_violation
-from nscan_cli.slam.backend.untold_sigmas import told_relations
+from nscan_cli.slam.backend.degenerate_relations import all_widened_relations
+from nscan_cli.slam.diagnostics.degenerate_stretches import degenerate_stretches
 from nscan_cli.slam.diagnostics.odometry_disagreement import odometry_disagreements
-from nscan_cli.slam.diagnostics.untold_way import untold_ways
 from nscan_cli.slam.diagnostics.view_mismatch import view_mismatches
 from nscan_cli.slam.frontend.odometry_checks import jumps_of, repeated_scans
 from nscan_cli.slam.loop_closure.free_space_violations import is_sound, sound_share
@@ -51,7 +51,7 @@ def notices(state: SlamState, followed: bool = False) -> list[str]:
     found += _scan_notices(state) if state.odometry is None else _odometry_notices(state)
     return (
         found
-        + _untold_ways(state)
+        + _degenerate_stretches(state)
         + ([] if followed else _companions(state))
         + _view_mismatches(state)
         + _contradictions(state)
@@ -123,13 +123,13 @@ def _scan_notices(state: SlamState) -> list[str]:
     return found
 
 
-def _untold_ways(state: SlamState) -> list[str]:
+def _degenerate_stretches(state: SlamState) -> list[str]:
     """Without odometry: where steady motion alone says how far the robot went."""
-    log, poses, sigmas = state.log, np.concatenate(state.tracked), state.told_sigmas
+    log, poses, sigmas = state.log, np.concatenate(state.tracked), state.weakest_sigmas
     if not sigmas:
         return []
-    options = state.options.diagnostics.untold_way
-    ways = untold_ways(poses, log.times, np.concatenate(sigmas), options)
+    options = state.options.diagnostics.degenerate_stretch
+    ways = degenerate_stretches(poses, log.times, np.concatenate(sigmas), options)
     if not ways:
         return []
     named = _stretches(
@@ -168,7 +168,7 @@ def _view_mismatches(state: SlamState) -> list[str]:
 
 def _contradictions(state: SlamState) -> list[str]:
     """Whether the relations of the graph agree as well as their information says."""
-    relations, options = told_relations(state), state.options.diagnostics
+    relations, options = all_widened_relations(state), state.options.diagnostics
     if not relations:
         return []
     chi2 = chi2_by_three(state.energies.of(state.route, relations), state.poses)

@@ -29,7 +29,7 @@ class ViewMismatchOptions:
 
 
 @dataclass(frozen=True)
-class UntoldWayOptions:
+class DegenerateStretchOptions:
     """When a way without odometry is held by steady motion alone, since its walls look alike all along."""
 
     sigma: float = 0.15
@@ -51,7 +51,7 @@ class DiagnosticsOptions:
 
     odometry: OdometryDisagreementOptions = field(default_factory=OdometryDisagreementOptions)
     view: ViewMismatchOptions = field(default_factory=ViewMismatchOptions)
-    untold_way: UntoldWayOptions = field(default_factory=UntoldWayOptions)
+    degenerate_stretch: DegenerateStretchOptions = field(default_factory=DegenerateStretchOptions)
     gap_periods: float = 3.0
     """Scans are missing if the next one comes later than this multiple of the median period. A larger value
     warns less."""

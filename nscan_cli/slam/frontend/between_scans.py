@@ -12,7 +12,7 @@ import numpy as np
 from nscan_cli.kernels.decorators import kernel
 from nscan_cli.matching.pose_kernels import composed_pose, relative_pose, wrapped
 from nscan_cli.poses import Array
-from nscan_cli.slam.frontend.options import TrackingParameters
+from nscan_cli.slam.frontend.options import ScanTrackingOptions
 from nscan_cli.slam.frontend.scan_to_map import match_from_prediction
 from nscan_cli.slam.frontend.track_state import NEXT, TrackState
 from nscan_cli.slam.frontend.tracking_problem import TrackingProblem
@@ -24,7 +24,7 @@ LEAST_STEP = 1e-4
 
 @kernel
 def waits_for_motion(
-    track: TrackState, settings: TrackingParameters, odometry: Array, k: int, pose: Array, may_wait: bool
+    track: TrackState, options: ScanTrackingOptions, odometry: Array, k: int, pose: Array, may_wait: bool
 ) -> bool:
     """Whether scan k is still close to the last matched scan, by odometry (n, 3) and its match, `pose` (3,).
 
@@ -33,20 +33,20 @@ def waits_for_motion(
     has_next = k + 1 < odometry.shape[0]
     if not (np.isfinite(odometry[k + 1, 0]) if has_next else may_wait):
         return False
-    if k - track.counts[NEXT] + 1 >= settings.max_waiting:
+    if k - track.counts[NEXT] + 1 >= options.max_waiting:
         return False
     step = np.full(3, np.nan)
     relative_pose(odometry[k], track.odometry, step)
-    if not _is_short(step, settings):
+    if not _is_short(step, options):
         return False
     relative_pose(pose, track.poses[-1], step)
-    return _is_short(step, settings)
+    return _is_short(step, options)
 
 
 @kernel
-def _is_short(step: Array, settings: TrackingParameters) -> bool:
+def _is_short(step: Array, options: ScanTrackingOptions) -> bool:
     distance, turn = np.hypot(step[0], step[1]), abs(wrapped(step[2]))
-    return bool(distance < settings.match_motion and turn < settings.match_motion)
+    return bool(distance < options.match_motion and turn < options.match_motion)
 
 
 @kernel
@@ -71,7 +71,7 @@ def match_between(problem: TrackingProblem, before: tuple[Array, Array], first: 
     prior.information[:, :] = 0.0
     for a in range(3):
         missing[a] = found.poses[last, a] - prior.mean[a]
-        prior.information[a, a] = settings.between_sigma**-2
+        prior.information[a, a] = settings.options.between_sigma**-2
     missing[2] = wrapped(missing[2])
     shares = 0.0
     for k in range(first, last):

@@ -41,9 +41,9 @@ def keep_prediction(
     """Move scan k, which was matched, back to its prediction as far as it does not tell its position.
 
     `points` (m, 2) are its own. `mean_square_deviation` (1,) of scans from their predictions (m²) is updated.
-    Writes `told_sigmas` of `found`.
+    Writes `weakest_sigmas` of `found`.
     """
-    options, pose, along = settings.degeneracy, found.poses[k], np.empty(2)
+    options, pose, along = settings.options.degeneracy, found.poses[k], np.empty(2)
     if weakest_direction(found.hessians[k], along) > options.max_information_ratio:
         x, y = pose[0] - prior.mean[0], pose[1] - prior.mean[1]
         mean_square_deviation[0] += options.smoothing * (0.5 * (x * x + y * y) - mean_square_deviation[0])
@@ -60,13 +60,13 @@ def keep_prediction(
             assign(pose, trial)
             assign_rows(found.hessians[k], hessian)
     off = ahead(pose, prior, along)
-    told = measured_variance(places, values, prior, options.profile_step)
-    found.told_sigmas[k] = np.sqrt(told)
-    untold = max(told - options.trusted_sigma**2, 0.0)
-    if untold == 0.0:
+    variance = measured_variance(places, values, prior, options.profile_step)
+    found.weakest_sigmas[k] = np.sqrt(variance)
+    excess = max(variance - options.trusted_sigma**2, 0.0)
+    if excess == 0.0:
         mean_square_deviation[0] += options.smoothing * (off * off - mean_square_deviation[0])
     allowed = max(options.min_deviation**2, options.deviation_factor**2 * mean_square_deviation[0])
-    back = off * untold / (allowed + untold)
+    back = off * excess / (allowed + excess)
     pose[0] -= back * along[0]
     pose[1] -= back * along[1]
 
@@ -96,10 +96,11 @@ def profile(
 ) -> tuple[Array, Array]:
     """The objective on the line `along` (2,) through `pose` (3,): places (n,), in m ahead of the prediction,
     and its values (n,)."""
-    problem = PairProblem(grid, settings.half, begin_association(points), settings.scale, prior)
+    problem = PairProblem(grid, settings.half, begin_association(points), settings.options.scale, prior)
     out, gradient, hessian, there = np.empty(ENERGY_NUMBERS), np.empty(3), np.empty((3, 3)), pose.copy()
-    own, apart = ahead(pose, prior, along), settings.degeneracy.profile_step
-    farthest = int(np.ceil(settings.degeneracy.profile_sigmas / np.sqrt(prior.information[0, 0]) / apart))
+    own, options = ahead(pose, prior, along), settings.options.degeneracy
+    apart = options.profile_step
+    farthest = int(np.ceil(options.profile_sigmas / np.sqrt(prior.information[0, 0]) / apart))
     places, values = np.empty(2 * farthest + 1), np.empty(2 * farthest + 1)
     for at in range(len(places)):
         places[at] = apart * (at - farthest)

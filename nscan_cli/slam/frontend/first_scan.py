@@ -32,4 +32,4 @@ def place_first(scans: ScanBatch, found: TrackedScans, options: TrackingOptions)
     step: Array = np.linalg.inv(found.prior_covariances[1]).astype(np.float64)
     prior = Prior(first, step)
     _, inliers = match_and_count(ndt.grid, TrackingParameters.of(options), scans.of(0), prior, pose, hessian)
-    return pose if inliers >= options.restart_inliers else first
+    return pose if inliers >= options.scan.restart_inliers else first

@@ -78,7 +78,7 @@ def insert_scan(
     local_map.placed[newest, 3] = local_map.path[0]
     counts[NEWEST] += 1
     _change_grid(local_map, grid, settings, newest, 1.0)
-    while local_map.placed[counts[OLDEST], 3] < local_map.path[0] - settings.window:
+    while local_map.placed[counts[OLDEST], 3] < local_map.path[0] - settings.options.window:
         _change_grid(local_map, grid, settings, counts[OLDEST], -1.0)
         counts[OLDEST] += 1
 

@@ -24,7 +24,7 @@ class MotionFromBehind(NamedTuple):
 
     poses: Array
     """(n, 3); nan elsewhere."""
-    told_sigmas: Array
+    weakest_sigmas: Array
     """(n,) standard deviation of the positions that the scans measure, m; 0 elsewhere."""
 
 
@@ -36,34 +36,34 @@ def motion_from_behind(
     It is known in stretches where the robot, as it was `found`, seems to stand, and where scans from behind
     fit clearly better, with a longer way. None without such stretches. The scans stay as they are.
     """
-    untold = untold_stretches(found, options)
-    stretches = [each for each in untold if _seems_to_stand(found.poses, *each, options)]
+    doubtful = doubtful_stretches(found, options)
+    stretches = [each for each in doubtful if _seems_to_stand(found.poses, *each, options)]
     if not stretches:
         return None
     # Where scans tell the motion, it leads from behind, too.
     known = found.poses.copy()
-    for first, end in untold:
+    for first, end in doubtful:
         known[first:end] = np.nan
     behind = tracker.track(scans.backwards(known))
-    inliers, poses, sigmas = behind.inliers[::-1], behind.poses[::-1], behind.told_sigmas[::-1]
+    inliers, poses, sigmas = behind.inliers[::-1], behind.poses[::-1], behind.weakest_sigmas[::-1]
     # What scans tell from one side alone may be the ripple of their walls.
-    tells = sigmas <= options.degeneracy.trusted_sigma
-    sigmas = np.where(tells, sigmas, np.maximum(sigmas, found.told_sigmas))
+    tells = sigmas <= options.scan.degeneracy.trusted_sigma
+    sigmas = np.where(tells, sigmas, np.maximum(sigmas, found.weakest_sigmas))
     motion = MotionFromBehind(np.full((len(scans), 3), np.nan), np.zeros(len(scans)))
     for first, end in stretches:
         before, now = found.inliers[first:end].mean(), inliers[first:end].mean()
-        fits_better = now >= max(before + options.standstill_gain, options.restart_inliers)
+        fits_better = now >= max(before + options.standstill_gain, options.scan.restart_inliers)
         if fits_better and _way(poses, first, end) - _way(found.poses, first, end) > options.standstill_lag:
             # The step to the first of them, and the one from the last.
             whole = slice(max(first - 1, 0), end + 1)
-            motion.poses[whole], motion.told_sigmas[whole] = poses[whole], sigmas[whole]
+            motion.poses[whole], motion.weakest_sigmas[whole] = poses[whole], sigmas[whole]
     return motion if np.isfinite(motion.poses).any() else None
 
 
-def untold_stretches(found: TrackedScans, options: TrackingOptions) -> list[tuple[int, int]]:
+def doubtful_stretches(found: TrackedScans, options: TrackingOptions) -> list[tuple[int, int]]:
     """The stretches (first, end) without `velocity_scans` in a row that fit and tell their place."""
-    tells = found.inliers >= options.restart_inliers
-    tells &= found.told_sigmas <= options.degeneracy.trusted_sigma
+    tells = found.inliers >= options.scan.restart_inliers
+    tells &= found.weakest_sigmas <= options.scan.degeneracy.trusted_sigma
     for first, end in mask_runs(tells):
         if end - first < options.velocity_scans:
             tells[first:end] = False

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -43,27 +43,16 @@ class DegeneracyOptions(NamedTuple):
     """Least deviation that is allowed, m. A larger value trusts matches more."""
 
 
-@dataclass(frozen=True)
-class TrackingOptions:
-    """Step 1: every scan is matched with the local map, the NDT of the last metres of the path."""
+class ScanTrackingOptions(NamedTuple):
+    """How each scan is tracked: what kernels take as it is."""
 
-    gaussians: GaussianOptions = field(default_factory=lambda: GaussianOptions(floor=0.03))
-    max_range: float = 40.0
-    """Longest beam that is matched, m. A larger value sees more and takes longer."""
-    point_spacing: float = 0.03
-    """Least distance between neighbouring points of a scan, m. A larger one is faster, and blurs small
-    things; with none a wall beside the robot outweighs all the rest."""
     window: float = 12.0
     """Length of the path whose scans the local map holds, m. A longer window drifts less and costs memory."""
     min_motion: float = 0.05
     """A scan joins the local map when the robot has moved farther (m) or turned more (rad) than this since
     the last one that joined. A larger value makes the map sparser."""
-    widenings: tuple[float, ...] = (0.05, 0.3, 1.0)
-    """Stages of a match: factors of the exponent of the energy. Smaller ones lead from farther off."""
     max_iterations: int = 20
     """Largest number of Newton steps of a stage. A larger number lets slow matches converge."""
-    coarse_tolerance: float = 5e-3
-    """With odometry, earlier stages end with a step below this, m and rad. A larger one ends them earlier."""
     tolerance: float = 1e-4
     """The last stage ends with a step shorter than this, m and rad; without odometry all stages do. A larger
     value ends them earlier."""
@@ -83,9 +72,6 @@ class TrackingOptions:
     clear_inlier_drop: float = 0.1
     """Without odometry a match starts again if its share of inliers is lower by this than that of a clear
     scan before it. A larger value restarts less."""
-    restart_angles: tuple[tuple[float, ...], ...] = ((0.1, 0.2), (0.4, 0.7), (1.0, 1.3))
-    """Rings of angles to start again from, to both sides, rad. A ring is tried if the one before did not
-    help. More take longer."""
     far_restart_margin: float = 0.3
     """Rings after the first are tried only if the share is too small by more than this: outdoors most scans
     have few inliers. A larger value is faster."""
@@ -93,10 +79,6 @@ class TrackingOptions:
     """With a smaller share of inliers a scan with odometry is searched among the last ones; without odometry
     `restart_inliers` decides. It is also the least score of a place that the search finds. A larger value
     searches more and accepts less."""
-    lost_search: SearchOptions = field(default_factory=lambda: SearchOptions(distance=1.5, turn=1.5))
-    """The search for a lost scan, around its prediction."""
-    lost_search_path: float = 5.0
-    """Length of the path among whose scans a lost scan is searched, m. A larger value takes longer."""
     match_motion: float = 0.1
     """With odometry a scan is matched when the robot has moved this far (m) or turned this much (rad) since
     the last one that was. The scans between follow. Larger values drift less and see less."""
@@ -106,29 +88,58 @@ class TrackingOptions:
     map where the robot begins to turn."""
     max_waiting: int = 100
     """Most scans between two that are matched: a robot may stand for hours. More take more memory."""
-    trusted_odometry: MotionModel = field(default_factory=lambda: MotionModel(distance=0.02))
+    trusted_odometry: MotionModel = MotionModel(distance=0.02)
     """Standard deviations of the odometry from one matched scan to the next, as a prior of the match. Larger
     ones trust the scans more."""
-    odometry_noise: OdometryNoiseOptions = field(default_factory=OdometryNoiseOptions)
+    odometry_noise: OdometryNoiseOptions = OdometryNoiseOptions()
     """How these standard deviations shrink as the odometry proves good."""
     contradiction_sigmas: float = 2.0
     """A match that is off that prior by more standard deviations is repeated with the prior of `odometry`. A
     larger value trusts the odometry more."""
-    odometry: MotionModel = field(default_factory=MotionModel)
+    odometry: MotionModel = MotionModel()
     """Standard deviations of the odometry where scans contradict it. Larger ones trust the scans more."""
     between_sigma: float = 0.05
     """Standard deviation of a scan between two matched ones from its place by odometry, m and rad. A larger
     value trusts the odometry less."""
-    constant_velocity: MotionModel = field(
-        default_factory=lambda: MotionModel(distance=0.3, angle=0.3, distance_per_metre=0.3)
-    )
+    constant_velocity: MotionModel = MotionModel(distance=0.3, angle=0.3, distance_per_metre=0.3)
     """Standard deviations of a step without odometry, predicted by constant velocity. Larger ones trust the
     scans more."""
-    velocity_scans: int = 5
-    """Number of steps whose mean is the velocity. More even out jitter of stamps, and follow turns later."""
     degeneracy_poses: int = 3
     """Number of known poses from which on `degeneracy` is checked: fewer give no velocity."""
-    degeneracy: DegeneracyOptions = field(default_factory=DegeneracyOptions)
+    degeneracy: DegeneracyOptions = DegeneracyOptions()
+    sector_margin: float = 0.1
+    """Points this near (m) to the border of what the laser had in view are not matched there: walls end. A
+    larger margin matches fewer points."""
+    sector_turn: float = 0.15
+    """A scan that is matched farther from its prediction than this (rad) is first matched with all points:
+    which of them lie in view is not known before. A larger value does so less often."""
+
+
+@dataclass(frozen=True)
+class TrackingOptions:
+    """Step 1: every scan is matched with the local map, the NDT of the last metres of the path."""
+
+    gaussians: GaussianOptions = field(default_factory=lambda: GaussianOptions(floor=0.03))
+    max_range: float = 40.0
+    """Longest beam that is matched, m. A larger value sees more and takes longer."""
+    point_spacing: float = 0.03
+    """Least distance between neighbouring points of a scan, m. A larger one is faster, and blurs small
+    things; with none a wall beside the robot outweighs all the rest."""
+    scan: ScanTrackingOptions = field(default_factory=ScanTrackingOptions)
+    """How each scan is matched with the local map, and joins it."""
+    widenings: tuple[float, ...] = (0.05, 0.3, 1.0)
+    """Stages of a match: factors of the exponent of the energy. Smaller ones lead from farther off."""
+    coarse_tolerance: float = 5e-3
+    """With odometry, earlier stages end with a step below this, m and rad. A larger one ends them earlier."""
+    restart_angles: tuple[tuple[float, ...], ...] = ((0.1, 0.2), (0.4, 0.7), (1.0, 1.3))
+    """Rings of angles to start again from, to both sides, rad. A ring is tried if the one before did not
+    help. More take longer."""
+    lost_search: SearchOptions = field(default_factory=lambda: SearchOptions(distance=1.5, turn=1.5))
+    """The search for a lost scan, around its prediction."""
+    lost_search_path: float = 5.0
+    """Length of the path among whose scans a lost scan is searched, m. A larger value takes longer."""
+    velocity_scans: int = 5
+    """Number of steps whose mean is the velocity. More even out jitter of stamps, and follow turns later."""
     standstill_share: float = 0.5
     """Without odometry, scans that tell little are tracked from behind, too, if the robot goes less far there
     than this share of its way at the highest speed after them. A larger share takes more time."""
@@ -148,12 +159,6 @@ class TrackingOptions:
     whole_turn_beams: int = 4
     """A laser sees all around if at most this many beams are missing to a whole turn. With a larger number
     fewer lasers are matched sector by sector."""
-    sector_margin: float = 0.1
-    """Points this near (m) to the border of what the laser had in view are not matched there: walls end. A
-    larger margin matches fewer points."""
-    sector_turn: float = 0.15
-    """A scan that is matched farther from its prediction than this (rad) is first matched with all points:
-    which of them lie in view is not known before. A larger value does so less often."""
     first_scan_path: float = 5.0
     """Length of the path whose scans place the first scan of a track segment, m. A larger value is more exact
     and takes longer."""
@@ -179,42 +184,18 @@ class LaserView(NamedTuple):
 
 
 class TrackingParameters(NamedTuple):
-    """The fields of TrackingOptions that kernels use, and what follows from the log."""
+    """The options that kernels use, and what follows from them and from the log."""
 
+    options: ScanTrackingOptions
     half: float
     """Side of a lattice cell of the map, m."""
     visible_range: float
     """Distance from where a scan was taken up to which it had whole cells in view, m."""
     laser: LaserView
-    sector_margin: float
-    sector_turn: float
-    window: float
-    min_motion: float
     widenings: Array
-    max_iterations: int
     coarse_tolerance: float
-    tolerance: float
-    scale: float
-    inlier_bound: float
-    restart_inliers: float
-    inlier_margin: float
-    clear_inliers: float
-    clear_inlier_drop: float
     restart_angles: Array
     """(rings, angles), with nan where a ring has fewer."""
-    far_restart_margin: float
-    lost_inliers: float
-    match_motion: float
-    sweep_step_change: float
-    max_waiting: int
-    trusted_odometry: MotionModel
-    odometry_noise: OdometryNoiseOptions
-    contradiction_sigmas: float
-    odometry: MotionModel
-    between_sigma: float
-    constant_velocity: MotionModel
-    degeneracy_poses: int
-    degeneracy: DegeneracyOptions
 
     @classmethod
     def of(
@@ -222,21 +203,20 @@ class TrackingParameters(NamedTuple):
     ) -> TrackingParameters:
         """The parameters for a log with or without odometry, whose laser has this view: all around by
         default."""
-        laser = laser or LaserView.all_around()
+        laser, cell = laser or LaserView.all_around(), options.gaussians.cell
         rings = options.restart_angles
         angles = np.full((len(rings), max(map(len, rings), default=0)), np.nan)
         for row, ring in zip(angles, rings, strict=True):
             row[: len(ring)] = ring
-        values: dict[str, Any] = {name: value for name, value in vars(options).items() if name in cls._fields}
-        values |= {
-            "laser": laser,
-            "half": 0.5 * options.gaussians.cell,
-            "visible_range": max(laser.range_limit - options.gaussians.cell, 0.5 * laser.range_limit),
-            "widenings": np.array(options.widenings),
-            "coarse_tolerance": options.coarse_tolerance if has_odometry else options.tolerance,
-            "restart_angles": angles,
-        }
-        return cls(**values)
+        return cls(
+            options.scan,
+            half=0.5 * cell,
+            visible_range=max(laser.range_limit - cell, 0.5 * laser.range_limit),
+            laser=laser,
+            widenings=np.array(options.widenings),
+            coarse_tolerance=options.coarse_tolerance if has_odometry else options.scan.tolerance,
+            restart_angles=angles,
+        )
 
 
 class ViewSimilarityOptions(NamedTuple):

@@ -9,13 +9,13 @@ from nscan_cli.matching.motion_model import MotionModel, Prior, motion_sigmas
 from nscan_cli.matching.pose_kernels import composed_pose, relative_pose, wrapped
 from nscan_cli.poses import Array
 from nscan_cli.slam.frontend.odometry_noise import learned_shares
-from nscan_cli.slam.frontend.options import TrackingParameters
+from nscan_cli.slam.frontend.options import ScanTrackingOptions
 from nscan_cli.slam.frontend.track_state import KNOWN, TrackState
 
 
 @kernel
 def predict(
-    track: TrackState, settings: TrackingParameters, odometry: Array, motion: MotionModel, prior: Prior
+    track: TrackState, options: ScanTrackingOptions, odometry: Array, motion: MotionModel, prior: Prior
 ) -> None:
     """Write the prior on the next scan's pose, in the tracker's frame; its odometry (3,) may be nan.
 
@@ -32,7 +32,7 @@ def predict(
         relative_pose(last, track.poses[-known], step)
         step[2] = wrapped(step[2])
         step /= max(known - 1, 1)
-        along, about = motion_sigmas(step, settings.constant_velocity)
+        along, about = motion_sigmas(step, options.constant_velocity)
     composed_pose(last, step, prior.mean)
     prior.mean[2] = wrapped(prior.mean[2])
     # The same variance along the path as across it: the information needs no rotation.
@@ -43,18 +43,18 @@ def predict(
 
 @kernel
 def predict_by_trusted_odometry(
-    track: TrackState, settings: TrackingParameters, odometry: Array, prior: Prior
+    track: TrackState, options: ScanTrackingOptions, odometry: Array, prior: Prior
 ) -> None:
     """Write the prior as `predict` does, with the deviations of trusted odometry, narrowed by what was
     learned."""
-    predict(track, settings, odometry, settings.trusted_odometry, prior)
+    predict(track, options, odometry, options.trusted_odometry, prior)
     if np.isfinite(odometry[0]) and np.isfinite(track.odometry[0]):
-        step, options = np.empty(3), settings.odometry_noise
+        step, noise = np.empty(3), options.odometry_noise
         relative_pose(odometry, track.odometry, step)
-        length = max(np.hypot(step[0], step[1]), settings.match_motion)
-        length += abs(wrapped(step[2])) * options.turn_arm
+        length = max(np.hypot(step[0], step[1]), options.match_motion)
+        length += abs(wrapped(step[2])) * noise.turn_arm
         along, about = prior.information[0, 0] ** -0.5, prior.information[2, 2] ** -0.5
-        shares = learned_shares(track.odometry_noise, options, length, along, about)
+        shares = learned_shares(track.odometry_noise, noise, length, along, about)
         prior.information[0, 0] = prior.information[1, 1] = (along * shares[0]) ** -2
         prior.information[2, 2] = (about * shares[1]) ** -2
 

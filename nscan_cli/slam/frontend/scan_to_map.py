@@ -22,11 +22,11 @@ def match_and_count(
     Writes the Hessian (3, 3) of the objective.
     """
     meeting = begin_association(points)
-    problem = PairProblem(grid, settings.half, meeting, settings.scale, prior)
-    limits = settings.max_iterations, settings.coarse_tolerance, settings.tolerance
+    problem = PairProblem(grid, settings.half, meeting, settings.options.scale, prior)
+    limits = settings.options.max_iterations, settings.coarse_tolerance, settings.options.tolerance
     value = minimise_pairwise(problem, pose, settings.widenings, *limits, hessian).value
     update_association(grid, settings.half, meeting, pose)
-    return value, count_inliers(meeting, settings.inlier_bound) / max(points.shape[0], 1)
+    return value, count_inliers(meeting, settings.options.inlier_bound) / max(points.shape[0], 1)
 
 
 @kernel

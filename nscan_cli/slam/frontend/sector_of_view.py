@@ -38,7 +38,7 @@ def points_in_sector(track: TrackState, settings: TrackingParameters, points: Ar
 
     Points at its border do not count: the map's piece of their wall is cut there.
     """
-    half, middle, margin = settings.laser.half_angle, settings.laser.middle, settings.sector_margin
+    half, middle, margin = settings.laser.half_angle, settings.laser.middle, settings.options.sector_margin
     if half >= np.pi:
         return points
     placed = track.map.placed[track.map.counts[OLDEST] : track.map.counts[NEWEST]]
@@ -86,7 +86,7 @@ def match_in_sector(problem: TrackingProblem, points: Array, threshold: float, k
     match_from_prediction(problem, in_sector, k)
     turned = abs(wrapped(found.poses[k, 2] - prior.mean[2]))
     if in_sector.shape[0] == points.shape[0] or (
-        found.inliers[k] >= threshold and turned <= settings.sector_turn
+        found.inliers[k] >= threshold and turned <= settings.options.sector_turn
     ):
         return in_sector
     match_from_prediction(problem, points, k)

@@ -22,7 +22,7 @@ from nscan_cli.slam.frontend.break_detection import (
     sees_the_same,
 )
 from nscan_cli.slam.frontend.first_scan import place_first
-from nscan_cli.slam.frontend.motion_from_behind import motion_from_behind, untold_stretches
+from nscan_cli.slam.frontend.motion_from_behind import doubtful_stretches, motion_from_behind
 from nscan_cli.slam.frontend.options import BreakOptions, LaserView, TrackingOptions
 from nscan_cli.slam.frontend.scan_batch import ScanBatch
 from nscan_cli.slam.frontend.sector_of_view import laser_view
@@ -137,7 +137,7 @@ class SegmentTracker:
         fresh, before = scans.copied(), copy.deepcopy(self.tracker)
         found = self.tracker.track(scans)
         waits = may_wait and self._last is None and len(scans) < self.options.standstill_scans
-        if waits and (0, len(scans)) in untold_stretches(found, self.options):
+        if waits and (0, len(scans)) in doubtful_stretches(found, self.options):
             self.tracker = before
             return fresh, found.part(0, 0)
         motion = motion_from_behind(fresh, found, self._new_tracker(), self.options)
@@ -145,7 +145,7 @@ class SegmentTracker:
             return scans, found
         self.tracker = before
         found = self.tracker.track(replace(fresh, odometry=motion.poses))
-        np.maximum(found.told_sigmas, motion.told_sigmas, out=found.told_sigmas)
+        np.maximum(found.weakest_sigmas, motion.weakest_sigmas, out=found.weakest_sigmas)
         return fresh, found
 
     def _from_origin(self, found: TrackedScans, origin: Array) -> TrackedScans:
@@ -212,7 +212,7 @@ class SegmentTracker:
         """
         usual = float(np.median(self._usual))
         # Without odometry nothing but the scans leads a tracker on that is lost.
-        is_lost = not self._has_odometry and usual < self.options.lost_inliers
+        is_lost = not self._has_odometry and usual < self.options.scan.lost_inliers
         if not (is_lost or contradicts_map(self._doubted[0], usual, self.breaking)):
             return []
         kept = self.tracker, self._origin, self._path

@@ -12,7 +12,7 @@ from nscan_cli.kernels.decorators import kernel
 from nscan_cli.logs.robot_path import move_along_arc
 from nscan_cli.matching.pose_kernels import relative_pose, wrapped
 from nscan_cli.poses import Array
-from nscan_cli.slam.frontend.options import TrackingParameters
+from nscan_cli.slam.frontend.options import ScanTrackingOptions
 from nscan_cli.slam.frontend.track_state import KNOWN, TrackState
 
 
@@ -32,7 +32,7 @@ def correct_by_last_step(track: TrackState, points: Array, shares: Array, step: 
 
 @kernel
 def correct_by_match(
-    track: TrackState, settings: TrackingParameters, points: Array, shares: Array, step: Array, pose: Array
+    track: TrackState, options: ScanTrackingOptions, points: Array, shares: Array, step: Array, pose: Array
 ) -> bool:
     """Correct points anew, in place, if the scan's match at `pose` (3,) has another step than `step` (3,).
 
@@ -41,7 +41,7 @@ def correct_by_match(
     found = np.empty(3)
     relative_pose(pose, track.poses[-1], found)
     found[2] = wrapped(found[2])
-    bound = settings.sweep_step_change
+    bound = options.sweep_step_change
     differs = np.hypot(found[0] - step[0], found[1] - step[1]) > bound or abs(found[2] - step[2]) > bound
     if differs:
         move_along_arc(points, shares, step, True)

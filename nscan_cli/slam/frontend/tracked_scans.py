@@ -28,8 +28,6 @@ class TrackedScan:
     """Length of the path up to here, m."""
     in_map: bool
     """Whether the scan's points joined the local map."""
-    odometry_sigmas: float = 0.0
-    """Distance from where the odometry has the scan, in standard deviations; 0 without odometry."""
 
 
 class TrackedScans(NamedTuple):
@@ -50,8 +48,8 @@ class TrackedScans(NamedTuple):
     in_map: NDArray[np.bool_]
     """(n,)"""
     odometry_sigmas: Array
-    """(n,)"""
-    told_sigmas: Array
+    """(n,) distance from where the odometry has the scan, in standard deviations; 0 without odometry."""
+    weakest_sigmas: Array
     """(n,) standard deviation of the position that a scan without odometry measures along its weakest
     direction, m; 0 where no direction is weak."""
 
@@ -83,5 +81,4 @@ class TrackedScans(NamedTuple):
             float(self.inliers[k]),
             float(self.paths[k]),
             bool(self.in_map[k]),
-            float(self.odometry_sigmas[k]),
         )

@@ -37,7 +37,7 @@ class Tracker:
         self.map = Ndt.empty(options.gaussians, capacity=1 << 14, faces=odometry)
         self.searches = 0
         self._settings = TrackingParameters.of(options, odometry, laser)
-        self._track = TrackState.begin(options.velocity_scans + 1, options.degeneracy.initial_sigma)
+        self._track = TrackState.begin(options.velocity_scans + 1, options.scan.degeneracy.initial_sigma)
         self._prior = no_prior()
 
     @property
@@ -75,7 +75,7 @@ class Tracker:
         if not len(cloud) or not len(points):
             return
         field = likelihood_field(cloud, options.lost_search)
-        place = search(field, points, self._prior.mean, options.lost_inliers, options.lost_search)
+        place = search(field, points, self._prior.mean, options.scan.lost_inliers, options.lost_search)
         if place is None:
             return
         self.searches += 1

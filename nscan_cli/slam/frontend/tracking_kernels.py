@@ -32,6 +32,7 @@ def settle(problem: TrackingProblem, k: int) -> None:
     to `found`; the rest is written here.
     """
     track, settings, odometry = problem.track, problem.settings, problem.odometry
+    options = settings.options
     prior, found, ends = problem.prior, problem.found, problem.ends
     counts, pose, step = track.counts, found.poses[k], np.empty(3)
     before = track.poses[-1].copy(), track.odometry.copy()
@@ -40,7 +41,7 @@ def settle(problem: TrackingProblem, k: int) -> None:
     distance = np.hypot(step[0], step[1])
     # Before anything was seen there is nothing to move against.
     nothing_seen = track.map.counts[ROWS] == 0
-    joins = nothing_seen or distance > settings.min_motion or abs(wrapped(step[2])) > settings.min_motion
+    joins = nothing_seen or distance > options.min_motion or abs(wrapped(step[2])) > options.min_motion
     if joins:
         track.map.path[0] += distance
         assign(track.inserted, pose)
@@ -48,7 +49,7 @@ def settle(problem: TrackingProblem, k: int) -> None:
     found.odometry_sigmas[k], length, along = 0.0, np.nan, np.inf
     if np.isfinite(odometry[k, 0]) and np.isfinite(track.odometry[0]):
         relative_pose(odometry[k], track.odometry, step)
-        length, along = np.hypot(step[0], step[1]), motion_sigmas(step, settings.trusted_odometry)[0]
+        length, along = np.hypot(step[0], step[1]), motion_sigmas(step, options.trusted_odometry)[0]
         off = np.hypot(pose[0] - prior.mean[0], pose[1] - prior.mean[1])
         found.odometry_sigmas[k] = off / max(along, prior.information[0, 0] ** -0.5)
     assign(track.odometry, odometry[k])
@@ -61,7 +62,7 @@ def settle(problem: TrackingProblem, k: int) -> None:
         if prior.information[a, a] > 0.0:
             found.prior_covariances[k, a, a] = 1.0 / prior.information[a, a]
     learn_noise(
-        track.odometry_noise, settings.odometry_noise, pose, odometry[k], length, found.hessians[k], along**-2
+        track.odometry_noise, options.odometry_noise, pose, odometry[k], length, found.hessians[k], along**-2
     )
     first = counts[NEXT]
     if first < k:
@@ -80,18 +81,18 @@ def match_with_doubt(problem: TrackingProblem, points: Array, threshold: float, 
     With fewer inliers than `threshold` it is also matched from other angles. Another match replaces the first
     one if it has clearly more inliers; if the first one contradicts odometry, a lower energy is enough.
     """
-    settings, prior, found = problem.settings, problem.prior, problem.found
-    is_contradiction = contradicts(prior, found.poses[k], settings.contradiction_sigmas)
+    options, prior, found = problem.settings.options, problem.prior, problem.found
+    is_contradiction = contradicts(prior, found.poses[k], options.contradiction_sigmas)
     if not is_contradiction and found.inliers[k] >= threshold:
         return
     trusted, inliers, value = prior.information.copy(), found.inliers[k], found.values[k]
     energy = value - prior_value(prior, found.poses[k])
     pose, hessian = found.poses[k].copy(), found.hessians[k].copy()
-    predict(problem.track, settings, problem.odometry[k], settings.odometry, prior)
+    predict(problem.track, options, problem.odometry[k], options.odometry, prior)
     match_from_prediction(problem, points, k)
     if found.inliers[k] < threshold:
         match_from_other_angles(problem, points, threshold, k)
-    has_more = found.inliers[k] > inliers + settings.inlier_margin
+    has_more = found.inliers[k] > inliers + options.inlier_margin
     fits_better = found.values[k] - prior_value(prior, found.poses[k]) < energy
     if not (has_more or (is_contradiction and fits_better)):
         found.values[k], found.inliers[k] = value, inliers
@@ -109,6 +110,7 @@ def track_scans(problem: TrackingProblem, first: int, may_wait: bool) -> int:
     its inliers are nan.
     """
     track, grid, settings = problem.track, problem.grid, problem.settings
+    options = settings.options
     ends, odometry, prior, found = problem.ends, problem.odometry, problem.prior, problem.found
     step, sweeps = np.empty(3), problem.shares.shape[0] > 0
     for k in range(first, ends.shape[0] - 1):
@@ -120,28 +122,28 @@ def track_scans(problem: TrackingProblem, first: int, may_wait: bool) -> int:
             prior.mean[:], prior.information[:, :] = 0.0, 0.0
             found.values[k], found.poses[k], found.hessians[k], found.inliers[k] = 0.0, 0.0, 0.0, 1.0
         else:
-            predict_by_trusted_odometry(track, settings, odometry[k], prior)
+            predict_by_trusted_odometry(track, options, odometry[k], prior)
             has_odometry = np.isfinite(odometry[k, 0])
             shares = problem.shares[ends[k] : ends[k + 1]]
             if sweeps:
                 correct_by_last_step(track, scan, shares, step)
             in_view = points_in_view(track, settings, scan, prior.mean)
-            threshold = restart_threshold(track, settings)
+            threshold = restart_threshold(track, options)
             matched = match_in_sector(problem, in_view, threshold, k)
-            if sweeps and correct_by_match(track, settings, scan, shares, step, found.poses[k]):
+            if sweeps and correct_by_match(track, options, scan, shares, step, found.poses[k]):
                 in_view = points_in_view(track, settings, scan, prior.mean)
                 matched = match_in_sector(problem, in_view, threshold, k)
             if has_odometry and np.isfinite(track.odometry[0]):
                 match_with_doubt(problem, matched, threshold, k)
             elif found.inliers[k] < threshold:
                 match_from_other_angles(problem, matched, threshold, k)
-            if waits_for_motion(track, settings, odometry, k, found.poses[k], may_wait):
+            if waits_for_motion(track, options, odometry, k, found.poses[k], may_wait):
                 continue
-            if found.inliers[k] < (settings.lost_inliers if has_odometry else settings.restart_inliers):
+            if found.inliers[k] < (options.lost_inliers if has_odometry else options.restart_inliers):
                 return k
             if matched.shape[0] == in_view.shape[0]:
                 matched = match_again_in_sector(problem, in_view, k)
-            if track.counts[KNOWN] >= settings.degeneracy_poses and not has_odometry:
+            if track.counts[KNOWN] >= options.degeneracy_poses and not has_odometry:
                 keep_prediction(grid, settings, matched, prior, track.mean_square_deviation, found, k)
         settle(problem, k)
     return int(ends.shape[0]) - 1

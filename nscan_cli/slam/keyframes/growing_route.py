@@ -14,7 +14,7 @@ from nscan_cli.slam.state import SlamState
 def add_keyframes(state: SlamState, batch: TrackedBatch) -> bool:
     """Choose keyframes among tracked scans; returns whether there are any.
 
-    Changes keyframes, chain, tracked, told_sigmas and breaks.
+    Changes keyframes, chain, tracked, weakest_sigmas and breaks.
     """
     known = len(state.keyframes)
     if batch.starts_segment:
@@ -24,7 +24,7 @@ def add_keyframes(state: SlamState, batch: TrackedBatch) -> bool:
     state.keyframes.select(batch.scans, batch.tracked, batch.starts_segment)
     state.chain += chain_relations(state.keyframes.list[max(known - 1, 0) :], state.options.keyframes)
     state.tracked.append(batch.tracked.poses)
-    state.told_sigmas.append(batch.tracked.told_sigmas)
+    state.weakest_sigmas.append(batch.tracked.weakest_sigmas)
     return len(state.keyframes) > known
 
 

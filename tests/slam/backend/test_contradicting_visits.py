@@ -13,7 +13,7 @@ from nscan_cli.logs.reading_options import ReadingOptions
 from nscan_cli.slam import pipeline
 from nscan_cli.slam.backend import contradicting_visits
 from nscan_cli.slam.backend.contradicting_visits import mend_contradicting_visits, worst_violation
-from nscan_cli.slam.frontend.options import TrackingOptions
+from nscan_cli.slam.frontend.options import ScanTrackingOptions, TrackingOptions
 from nscan_cli.slam.loop_closure.free_space_violations import FreeSpaceViolation
 from nscan_cli.slam.options import SlamOptions
 from nscan_cli.slam.state import SlamState
@@ -115,7 +115,8 @@ def clinic(reverse: bool, contradiction_sigmas: float) -> tuple[Mapped, float]:
     """fr-clinic mapped with another bound on what contradicts odometry, and its mean error, m."""
     log = read_log(str(data_file("fr-clinic.log.gz")), ReadingOptions())
     relations = read_relations(str(data_file("fr-clinic.relations")))
-    options = SlamOptions(tracking=TrackingOptions(contradiction_sigmas=contradiction_sigmas))
+    scan = ScanTrackingOptions(contradiction_sigmas=contradiction_sigmas)
+    options = SlamOptions(tracking=TrackingOptions(scan=scan))
     found = mapped(backwards(log) if reverse else log, options, threads=2)
     poses = found.graph.poses[::-1] if reverse else found.graph.poses
     errors = relation_errors(Trajectory(log.times, poses, log.stamps), relations, "fr-clinic")

@@ -61,10 +61,10 @@ def test_no_way_is_so_long():
 def test_what_the_repeat_alone_guesses_says_nothing():
     slipped = straight()
     slipped[:60, 0] -= 0.4
-    repeat = replace(path(slipped), untold=np.array([58, 59, 60, 61]))
+    repeat = replace(path(slipped), degenerate=np.array([58, 59, 60, 61]))
     assert max(each.max for each in path_differences(path(straight()), repeat, OPTIONS)) < 1e-9
     # A map that guesses there as well may be wrong.
-    guess = replace(path(straight()), untold=np.array([57, 58, 59, 60, 61]))
+    guess = replace(path(straight()), degenerate=np.array([57, 58, 59, 60, 61]))
     assert path_differences(guess, repeat, OPTIONS)[0].max == pytest.approx(0.4)
 
 

@@ -8,7 +8,7 @@ import pytest
 from nscan_cli.logs.load import read_log
 from nscan_cli.logs.reading_options import ReadingOptions
 from nscan_cli.poses import Array, relative
-from nscan_cli.slam.frontend.options import TrackingOptions
+from nscan_cli.slam.frontend.options import ScanTrackingOptions, TrackingOptions
 from nscan_cli.slam.frontend.tracker import Tracker
 from tests.data import data_file
 from tests.slam.mapped_logs import mapped, sensed
@@ -41,8 +41,8 @@ def test_a_bare_corridor_is_as_long_as_odometry_has_it_however_dense_the_scans(e
 def test_scans_that_are_all_matched_with_a_wide_prior_lose_the_way():
     """The ripple of the map holds the robot back: what the scans between are there for."""
     points, odometry = corridor(151)
-    wide = TrackingOptions().odometry
-    options = TrackingOptions(match_motion=0.0, trusted_odometry=wide)
+    wide = ScanTrackingOptions().odometry
+    options = TrackingOptions(scan=ScanTrackingOptions(match_motion=0.0, trusted_odometry=wide))
     found = Tracker(options).track(sensed(points, odometry))
     assert found.poses[-1, 0] - found.poses[0, 0] < 0.97 * odometry[-1, 0]
 

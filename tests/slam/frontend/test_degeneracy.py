@@ -37,7 +37,7 @@ from tests.slam.frontend.test_tracker import end_off
 from tests.slam.mapped_logs import mapped, poses_of, tracked
 
 SETTINGS = TrackingParameters.of(TrackingOptions())
-OPTIONS = SETTINGS.degeneracy
+OPTIONS = SETTINGS.options.degeneracy
 SIGMA = 0.3
 """m; of steady motion."""
 EXPECTED = Prior(np.array([0.11, 0.0, 0.0]), np.diag([SIGMA**-2, SIGMA**-2, SIGMA**-2]))
@@ -101,7 +101,9 @@ def test_the_profile_is_the_objective_along_a_line(pose):
         assert ahead(there, prior, along) == pytest.approx(place, abs=1e-12)
         off = there - prior.mean
         off[2] = wrap(off[2])
-        expected = SETTINGS.scale * energy(ndt, points, there).value + 0.5 * off @ prior.information @ off
+        expected = (
+            SETTINGS.options.scale * energy(ndt, points, there).value + 0.5 * off @ prior.information @ off
+        )
         assert value == pytest.approx(expected, rel=1e-9)
 
 
@@ -148,7 +150,7 @@ def test_a_place_that_fits_better_is_found_though_it_is_far_from_where_the_match
     ndt, points = ndt_of(corridor(1, 1000, 6.0)), corridor(2, 100, 6.0) - np.array([0.5, 0.0])
     found = matched(ndt, points, np.array([0.0, 0.0, 0.0]))
     found.poses[0] = 0.0
-    found.values[0] = SETTINGS.scale * energy(ndt, points, np.zeros(3)).value
+    found.values[0] = SETTINGS.options.scale * energy(ndt, points, np.zeros(3)).value
     keep_prediction(ndt.grid, SETTINGS, points, EXPECTED, np.array([OPTIONS.initial_sigma**2]), found, 0)
     np.testing.assert_allclose(found.poses[0], [0.5, 0.0, 0.0], atol=0.03)
 

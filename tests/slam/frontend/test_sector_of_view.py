@@ -12,7 +12,12 @@ from hypothesis import strategies as st
 
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.poses import Array, compose, relative, wrap
-from nscan_cli.slam.frontend.options import LaserView, TrackingOptions, TrackingParameters
+from nscan_cli.slam.frontend.options import (
+    LaserView,
+    ScanTrackingOptions,
+    TrackingOptions,
+    TrackingParameters,
+)
 from nscan_cli.slam.frontend.sector_of_view import laser_view, points_in_sector
 from nscan_cli.slam.frontend.track_state import TrackState
 from tests.benchmarks.consistency import backwards
@@ -20,7 +25,7 @@ from tests.benchmarks.lasers import KINDS, WAY
 from tests.simulation.building import building, drive
 from tests.slam.frontend.test_visible_points import along, tracked_poses
 
-TRACKING = TrackingOptions(sector_margin=0.0)
+TRACKING = TrackingOptions(scan=ScanTrackingOptions(sector_margin=0.0))
 
 
 @functools.cache
@@ -53,7 +58,8 @@ def test_points_near_the_border_of_the_sector_do_not_count():
     track = TrackState.begin(2, 0.05)
     track = track._replace(map=track.map._replace(placed=np.zeros((1, 4)), counts=np.array([1, 0, 0])))
     ahead = LaserView(np.inf, np.zeros(3), np.pi / 2)
-    margin = TrackingParameters.of(TrackingOptions(sector_margin=0.1), True, ahead)
+    options = TrackingOptions(scan=ScanTrackingOptions(sector_margin=0.1))
+    margin = TrackingParameters.of(options, True, ahead)
     np.testing.assert_array_equal(points_in_sector(track, margin, points, np.zeros(3)), points[1:3])
     around = TrackingParameters.of(TrackingOptions(), True)
     np.testing.assert_array_equal(points_in_sector(track, around, points, np.zeros(3)), points)

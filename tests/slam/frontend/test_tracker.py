@@ -18,7 +18,7 @@ from nscan_cli.matching.correlative_search import SearchOptions
 from nscan_cli.ndt.options import GaussianOptions
 from nscan_cli.ndt.transform import Ndt
 from nscan_cli.poses import Array, compose, relative, transform, wrap
-from nscan_cli.slam.frontend.options import TrackingOptions
+from nscan_cli.slam.frontend.options import ScanTrackingOptions, TrackingOptions
 from nscan_cli.slam.frontend.tracked_scans import TrackedScan
 from nscan_cli.slam.frontend.tracker import Tracker
 from tests.data import data_file
@@ -149,14 +149,14 @@ def window_map(found: list[TrackedScan], log: LaserLog, options: TrackingOptions
     gaussians = options.gaussians
     ndt = Ndt.empty(gaussians)
     for row, scan in enumerate(found):
-        if scan.in_map and scan.path >= found[-1].path - options.window:
+        if scan.in_map and scan.path >= found[-1].path - options.scan.window:
             ndt.add(log.points(row), scan.pose)
     return ndt
 
 
 def test_the_map_holds_no_more_than_the_scans_of_the_window():
     log = excerpt(office_log(), SOUTH)
-    options = TrackingOptions(window=4.0)
+    options = TrackingOptions(scan=ScanTrackingOptions(window=4.0))
     found, tracker = tracked(log, options)
     assert found[-1].path > 20
     expected = window_map(found, log, options)
@@ -200,7 +200,7 @@ def test_a_scan_with_fewer_inliers_than_the_one_before_is_matched_from_other_ang
     log = excerpt(jumped(office_log(), row, off), slice(row - 700, row + 1))
     found, _ = tracked(log)
     assert np.abs(end_off(poses_of(found), truth_of(log))).max() < 0.05
-    assert found[-1].inliers > found[-2].inliers - TrackingOptions().inlier_margin
+    assert found[-1].inliers > found[-2].inliers - ScanTrackingOptions().inlier_margin
 
 
 def test_without_odometry_a_jump_is_found_by_search():

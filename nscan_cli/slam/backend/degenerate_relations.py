@@ -17,8 +17,8 @@ import numpy as np
 from nscan_cli.graph.model import NScan, Pairwise
 from nscan_cli.graph.relations.base import Relation
 from nscan_cli.poses import Array, Indices
-from nscan_cli.slam.backend.options import UntoldSigmaOptions
-from nscan_cli.slam.diagnostics.untold_way import UntoldWay, untold_ways
+from nscan_cli.slam.backend.options import DegenerateRelationOptions
+from nscan_cli.slam.diagnostics.degenerate_stretches import DegenerateStretch, degenerate_stretches
 from nscan_cli.slam.state import SlamState
 
 Between = list[tuple[int, int]]
@@ -26,31 +26,32 @@ Between = list[tuple[int, int]]
 them."""
 
 
-def relations_as_told(state: SlamState) -> tuple[list[Pairwise], list[NScan]]:
+def widened_relations(state: SlamState) -> tuple[list[Pairwise], list[NScan]]:
     """The pairwise and the nScan relations, as certain as scans tell the way."""
-    pairwise, nscan, options = state.pairwise_relations, state.nscan_relations, state.options.untold_sigmas
-    if not state.told_sigmas:
+    pairwise, nscan = state.pairwise_relations, state.nscan_relations
+    if not state.weakest_sigmas:
         return pairwise, nscan
     # Scans after the last keyframe may be tracked by another thread at this moment.
     end = int(state.route.rows[-1]) + 1
-    path, sigmas = np.concatenate(list(state.tracked))[:end], np.concatenate(list(state.told_sigmas))[:end]
-    times, untold = state.log.times[:end], state.options.diagnostics.untold_way
+    path, sigmas = np.concatenate(list(state.tracked))[:end], np.concatenate(list(state.weakest_sigmas))[:end]
+    times, stretch = state.log.times[:end], state.options.diagnostics.degenerate_stretch
     # A robot that seems to stand mostly does.
-    ways = [way for way in untold_ways(path, times, sigmas, untold) if way.is_long(untold)]
+    ways = [way for way in degenerate_stretches(path, times, sigmas, stretch) if way.is_long(stretch)]
     if not ways:
         return pairwise, nscan
-    variances = untold_variances(state.route.rows, times, ways, options)
-    return with_untold_variances(pairwise, nscan, state.route.rows, variances, options.most_steps)
+    options = state.options.degenerate_relations
+    variances = guess_variances(state.route.rows, times, ways, options)
+    return with_guess_variances(pairwise, nscan, state.route.rows, variances, options.most_steps)
 
 
-def told_relations(state: SlamState) -> list[Relation]:
+def all_widened_relations(state: SlamState) -> list[Relation]:
     """All relations, in the order of the graph, as certain as scans tell the way."""
-    pairwise, nscan = relations_as_told(state)
+    pairwise, nscan = widened_relations(state)
     return [*pairwise, *nscan, *state.other_relations]
 
 
-def untold_variances(
-    rows: Indices, times: Array, ways: Sequence[UntoldWay], options: UntoldSigmaOptions
+def guess_variances(
+    rows: Indices, times: Array, ways: Sequence[DegenerateStretch], options: DegenerateRelationOptions
 ) -> Array:
     """The variance (K − 1,) in m² of the guess from each of the keyframes in rows (K,) to the next.
 
@@ -66,7 +67,7 @@ def untold_variances(
     return variances
 
 
-def with_untold_variances(
+def with_guess_variances(
     pairwise: Sequence[Pairwise], nscan: Sequence[NScan], rows: Indices, variances: Array, most_steps: int
 ) -> tuple[list[Pairwise], list[NScan]]:
     """The relations among keyframes in rows (K,), less certain along ways that no scan tells.

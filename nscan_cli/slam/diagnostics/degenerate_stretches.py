@@ -11,11 +11,11 @@ from typing import NamedTuple
 import numpy as np
 
 from nscan_cli.poses import Array, Mask
-from nscan_cli.slam.diagnostics.options import UntoldWayOptions
+from nscan_cli.slam.diagnostics.options import DegenerateStretchOptions
 from nscan_cli.slam.frontend.odometry_checks import SHORTEST_PERIOD
 
 
-class UntoldWay(NamedTuple):
+class DegenerateStretch(NamedTuple):
     """A stretch of the path."""
 
     first: int
@@ -27,33 +27,35 @@ class UntoldWay(NamedTuple):
     possible: float
     """Length of the stretch at the robot's usual speed, m: it may only seem to stand."""
 
-    def is_long(self, options: UntoldWayOptions) -> bool:
+    def is_long(self, options: DegenerateStretchOptions) -> bool:
         """Whether it is long as mapped."""
         return self.path >= options.path
 
 
-def untold_ways(poses: Array, times: Array, told_sigmas: Array, options: UntoldWayOptions) -> list[UntoldWay]:
+def degenerate_stretches(
+    poses: Array, times: Array, weakest_sigmas: Array, options: DegenerateStretchOptions
+) -> list[DegenerateStretch]:
     """The stretches that are or may be long, among scans at poses (S, 3) and times (S,) in s.
 
-    The scans tell their places to `told_sigmas` (S,) in m.
+    The scans tell their places to `weakest_sigmas` (S,) in m.
     """
-    rows = np.flatnonzero(told_sigmas > options.sigma)
+    rows = np.flatnonzero(weakest_sigmas > options.sigma)
     if not len(rows):
         return []
     steps = np.append(0.0, np.hypot(*np.diff(poses[:, :2], axis=0).T))
     along = np.cumsum(steps)
     pieces = np.split(rows, np.flatnonzero(np.diff(rows) > options.scans_between + 1) + 1)
-    speed, ways = _usual_speed(poses, times, told_sigmas <= options.sigma, options), []
+    speed, ways = _usual_speed(poses, times, weakest_sigmas <= options.sigma, options), []
     for piece in pieces:
         begin, last = max(int(piece[0]) - 1, 0), int(piece[-1])
         possible = speed * float(times[last] - times[begin])
-        way = UntoldWay(int(piece[0]), last, float(along[last] - along[begin]), possible)
+        way = DegenerateStretch(int(piece[0]), last, float(along[last] - along[begin]), possible)
         if max(way.path, way.possible) >= options.path:
             ways.append(way)
     return ways
 
 
-def _usual_speed(poses: Array, times: Array, is_told: Mask, options: UntoldWayOptions) -> float:
+def _usual_speed(poses: Array, times: Array, is_told: Mask, options: DegenerateStretchOptions) -> float:
     """The median speed (m/s) along a path (S, 3) of a robot that moves, where scans or odometry tell it."""
     speeds = np.hypot(*np.diff(poses[:, :2], axis=0).T) / np.maximum(np.diff(times), SHORTEST_PERIOD)
     moves = speeds > options.least_speed

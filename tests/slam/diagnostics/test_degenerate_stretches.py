@@ -12,15 +12,15 @@ from hypothesis import strategies as st
 
 from nscan_cli.logs.load import read_log
 from nscan_cli.logs.reading_options import ReadingOptions
+from nscan_cli.slam.diagnostics.degenerate_stretches import degenerate_stretches
 from nscan_cli.slam.diagnostics.notices import notices
-from nscan_cli.slam.diagnostics.options import UntoldWayOptions
-from nscan_cli.slam.diagnostics.untold_way import untold_ways
+from nscan_cli.slam.diagnostics.options import DegenerateStretchOptions
 from tests.data import data_file
 from tests.slam.frontend.test_degeneracy import into_a_bare_corridor
 from tests.slam.frontend.test_tracker import straight_corridor
 from tests.slam.mapped_logs import mapped, office_log
 
-OPTIONS = UntoldWayOptions()
+OPTIONS = DegenerateStretchOptions()
 STEP = 0.1
 """m"""
 
@@ -34,7 +34,7 @@ def test_a_way_is_named_that_is_long_enough(first, count, between):
     sigmas[first : last + 1] = 0.3
     middle = first + count // 2
     sigmas[middle : middle + between] = 0.01
-    ways = untold_ways(poses, np.arange(80.0), sigmas, OPTIONS)
+    ways = degenerate_stretches(poses, np.arange(80.0), sigmas, OPTIONS)
     if between <= OPTIONS.scans_between:
         long_enough = STEP * (count + 1) >= OPTIONS.path - 1e-9
         assert len(ways) == (1 if long_enough else 0) or abs(STEP * (count + 1) - OPTIONS.path) < 1e-6
@@ -50,7 +50,7 @@ def test_a_way_is_named_where_the_robot_only_seems_to_stand():
     steps[20:80], sigmas[20:80] = 0.0, 0.3
     poses = np.zeros((120, 3))
     poses[:, 0] = np.cumsum(steps)
-    (way,) = untold_ways(poses, 0.1 * np.arange(120.0), sigmas, OPTIONS)
+    (way,) = degenerate_stretches(poses, 0.1 * np.arange(120.0), sigmas, OPTIONS)
     assert (way.first, way.last) == (20, 79)
     assert way.path == pytest.approx(0.0)
     assert way.possible == pytest.approx(3.0)

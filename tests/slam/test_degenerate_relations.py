@@ -10,10 +10,10 @@ from nscan_cli.graph.marginal_covariances import marginal_covariances
 from nscan_cli.graph.model import Graph, NScan, Pairwise
 from nscan_cli.logs.load import read_log
 from nscan_cli.poses import Array, relative
-from nscan_cli.slam.backend.options import UntoldSigmaOptions
-from nscan_cli.slam.backend.untold_sigmas import untold_variances, with_untold_variances
+from nscan_cli.slam.backend.degenerate_relations import guess_variances, with_guess_variances
+from nscan_cli.slam.backend.options import DegenerateRelationOptions
+from nscan_cli.slam.diagnostics.degenerate_stretches import DegenerateStretch
 from nscan_cli.slam.diagnostics.notices import notices
-from nscan_cli.slam.diagnostics.untold_way import UntoldWay
 from tests.data import data_file
 from tests.slam.mapped_logs import mapped
 
@@ -47,12 +47,12 @@ def end_sigmas(pairwise: list[Pairwise], nscan: list[NScan]) -> Array:
 @pytest.mark.parametrize("joints", [[], [(0, 1, 2, 3), (2, 3, 4, 5), (3, 4, 5, 6)]])
 def test_all_relations_together_have_the_variance_of_the_guess(joints):
     rows, times = np.arange(SIZE), np.arange(float(SIZE))
-    way = UntoldWay(2, 5, 6.0, possible=8.0)
-    variances = untold_variances(rows, times, [way], UntoldSigmaOptions(speed_share=0.5))
+    way = DegenerateStretch(2, 5, 6.0, possible=8.0)
+    variances = guess_variances(rows, times, [way], DegenerateRelationOptions(speed_share=0.5))
     # Half of 8 m, over four steps.
     np.testing.assert_allclose(variances, [0.0, 4.0, 4.0, 4.0, 4.0, 0.0])
     nscan = [joint(nodes) for nodes in joints]
-    x, y, _ = end_sigmas(*with_untold_variances(chain(), nscan, rows, variances, 3))
+    x, y, _ = end_sigmas(*with_guess_variances(chain(), nscan, rows, variances, 3))
     assert x == pytest.approx(4.0, rel=0.3)
     assert y < 0.02
 
@@ -60,7 +60,7 @@ def test_all_relations_together_have_the_variance_of_the_guess(joints):
 def test_other_relations_and_other_visits_stay():
     rows, variances = np.arange(SIZE), np.array([0.0, 0.0, 9.0, 0.0, 0.0, 0.0])
     loop = Pairwise((1, 6), np.array([10.0, 0.0, 0.0]), SURE * np.eye(3), "loop")
-    known, _ = with_untold_variances([*chain(), loop], [], rows, variances, 3)
+    known, _ = with_guess_variances([*chain(), loop], [], rows, variances, 3)
     changed = [k for k, (old, new) in enumerate(zip([*chain(), loop], known, strict=True)) if old is not new]
     assert len(known) == SIZE
     assert [known[k].nodes for k in changed if known[k].information[0, 0] < SURE] == [(2, 3)]
