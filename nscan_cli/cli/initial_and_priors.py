@@ -10,7 +10,7 @@ import numpy as np
 
 from nscan_cli.cli.nscan import INITIAL_WORDS, PRIOR_WORDS
 from nscan_cli.errors import InputDataError, WrongUsageError
-from nscan_cli.evaluation.options import DEFAULT_EVALUATION
+from nscan_cli.evaluation.options import EvaluationOptions
 from nscan_cli.files.encoding import without_byte_order_mark
 from nscan_cli.files.inputs import base_name, label, read_bytes
 from nscan_cli.files.limits import GRAPH
@@ -91,7 +91,7 @@ def initial_poses(knowledge: PoseFile, log: LaserLog, rows: Sequence[int]) -> Ar
     else:
         times = log.times[rows]
         found = nearest_in_time(content.times, times)
-        missing = np.abs(content.times[found] - times) > DEFAULT_EVALUATION.tolerance
+        missing = np.abs(content.times[found] - times) > EvaluationOptions.tolerance
     if missing.any():
         number = log.numbers[rows[int(np.argmax(missing))]]
         raise InputDataError(knowledge.name, f"has no pose of scan {number}", "leave the scan out")

@@ -126,7 +126,7 @@ def command(
     check_plot(plot, [output, *files_of(log), *files])
     from nscan_cli.cli.initial_and_priors import initial_and_priors
     from nscan_cli.files.inputs import base_name
-    from nscan_cli.graph.relative_covariance import DEFAULT_ATTACHMENT
+    from nscan_cli.graph.relative_covariance import AttachmentOptions
     from nscan_cli.logs.load import read_log
     from nscan_cli.matching.joint.nscan_match import nscan_match
     from nscan_cli.matching.joint.options import JointOptions
@@ -158,7 +158,7 @@ def command(
         "initial": base_name(initial),
         "prior": base_name(prior),
         "odometry": as_parameters(model),
-        "attachment": as_parameters(DEFAULT_ATTACHMENT),
+        "attachment": as_parameters(AttachmentOptions()),
     }
     provenance = provenance_of([scans.source, *sources], parameters)
     write_atomically(output, match_document(NSCAN_FORMAT, provenance, _fields(numbers, match, left_out)))

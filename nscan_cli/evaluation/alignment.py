@@ -11,7 +11,7 @@ from typing import Literal
 
 import numpy as np
 
-from nscan_cli.evaluation.options import DEFAULT_EVALUATION, AlignmentOptions
+from nscan_cli.evaluation.options import AlignmentOptions, EvaluationOptions
 from nscan_cli.poses import Array, compose
 
 
@@ -27,7 +27,7 @@ class Alignment:
 
 
 def alignment(
-    poses: Array, truth: Array, options: AlignmentOptions = DEFAULT_EVALUATION.alignment
+    poses: Array, truth: Array, options: AlignmentOptions = EvaluationOptions.alignment
 ) -> Alignment:
     """The rigid motion that brings `poses` (N, 3) nearest to `truth` (N, 3).
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from nscan_cli.evaluation.options import DEFAULT_EVALUATION, ClockLagOptions, RemarkOptions
+from nscan_cli.evaluation.options import ClockLagOptions, EvaluationOptions, RemarkOptions
 from nscan_cli.evaluation.similarity import fit
 from nscan_cli.graph.io.tum import Trajectory
 from nscan_cli.poses import Array, Mask, wrap
@@ -75,7 +75,7 @@ class Clocks:
 
 
 def lag_without_overlap(
-    result: Trajectory, reference: Trajectory, options: RemarkOptions = DEFAULT_EVALUATION.remarks
+    result: Trajectory, reference: Trajectory, options: RemarkOptions = EvaluationOptions.remarks
 ) -> float | None:
     """The lag (s) of clocks without a common time; None unless the paths clearly fit with it."""
     if min(len(result), len(reference)) < options.clock_lag.min_poses:

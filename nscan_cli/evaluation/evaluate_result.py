@@ -11,7 +11,6 @@ from nscan_cli.evaluation.remarks import remarks
 from nscan_cli.evaluation.trajectory_errors import trajectory_errors
 from nscan_cli.files.inputs import base_name, label
 from nscan_cli.graph.io.tum import Trajectory
-from nscan_cli.logs.laser_log import DEFAULT_READING
 from nscan_cli.logs.reading_options import ReadingOptions
 
 
@@ -31,7 +30,7 @@ def evaluate_result(
     relations: str | None,
     reference: str | None,
     worst: int = 0,
-    reading: ReadingOptions = DEFAULT_READING,
+    reading: ReadingOptions = ReadingOptions(),
     reference_topic: str | None = None,
 ) -> EvaluatedResult:
     """The errors of the file `result`, and its `worst` relations.

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, dataclass, field, fields
 from typing import Any
 
 from nscan_cli.evaluation.alignment import Alignment
-from nscan_cli.evaluation.options import DEFAULT_EVALUATION, EvaluationOptions
+from nscan_cli.evaluation.options import EvaluationOptions
 from nscan_cli.evaluation.reference_relations import ReferenceRelations, RelationErrors
 from nscan_cli.evaluation.statistics import Spread
 from nscan_cli.evaluation.trajectory_errors import TrajectoryErrors
@@ -31,7 +31,7 @@ class Evaluation:
     """How many of the worst relations are listed."""
     remarks: tuple[str, ...] = ()
     """Sentences on other differences of result and reference (remarks.py)."""
-    options: EvaluationOptions = DEFAULT_EVALUATION
+    options: EvaluationOptions = field(default_factory=EvaluationOptions)
 
     def bounded(self) -> list[tuple[str, float, float]]:
         """The errors that limits apply to, as (name, m, degrees): mean on relations, RMSE of the ATE."""
@@ -139,7 +139,7 @@ def _alignment_record(errors: TrajectoryErrors) -> dict[str, Any]:
 
 def _statistics_table(rows: Mapping[str, Spread | None]) -> str:
     """A table with a row for each spread."""
-    headings = [field.name.replace("_", " ") for field in fields(Spread)]
+    headings = [each.name.replace("_", " ") for each in fields(Spread)]
     lines = [" " * 18 + "".join(f"{heading:>{_width(heading)}}" for heading in headings)]
     for name, spread in rows.items():
         if spread is None:

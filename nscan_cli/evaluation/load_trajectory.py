@@ -13,7 +13,7 @@ from nscan_cli.files.limits import GRAPH, MB, LimitExceededError
 from nscan_cli.graph.io.json_graph import parse_graph
 from nscan_cli.graph.io.pose_columns import is_pose_table
 from nscan_cli.graph.io.tum import Trajectory, parse_tum
-from nscan_cli.logs.laser_log import DEFAULT_READING, LaserLog
+from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.logs.load import content_of, log_from, read_log, read_recording, recording_from, stored_bytes
 from nscan_cli.logs.reading_options import ReadingOptions
 from nscan_cli.logs.recordings.pose_topics import poses_on_topic
@@ -21,7 +21,7 @@ from nscan_cli.poses import are_known
 
 
 def load_trajectory(
-    path: str, options: ReadingOptions = DEFAULT_READING, notices: list[str] | None = None
+    path: str, options: ReadingOptions = ReadingOptions(), notices: list[str] | None = None
 ) -> Trajectory:
     """The poses of all scans of a graph, of a TUM file, or the robot's poses in a (corrected) log.
 
@@ -48,7 +48,7 @@ def load_trajectory(
 
 def load_reference(
     path: str,
-    options: ReadingOptions = DEFAULT_READING,
+    options: ReadingOptions = ReadingOptions(),
     notices: list[str] | None = None,
     topic: str | None = None,
 ) -> Trajectory:

@@ -93,6 +93,3 @@ class EvaluationOptions:
     grow."""
     alignment: AlignmentOptions = AlignmentOptions()
     remarks: RemarkOptions = RemarkOptions()
-
-
-DEFAULT_EVALUATION = EvaluationOptions()

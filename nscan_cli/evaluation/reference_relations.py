@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from nscan_cli.errors import InputDataError
-from nscan_cli.evaluation.options import DEFAULT_EVALUATION, EvaluationOptions
+from nscan_cli.evaluation.options import EvaluationOptions
 from nscan_cli.evaluation.statistics import Spread
 from nscan_cli.evaluation.time_association import no_match
 from nscan_cli.files.inputs import base_name, label, read_text
@@ -112,7 +112,7 @@ def relation_errors(
     trajectory: Trajectory,
     relations: ReferenceRelations,
     name: str = "result",
-    options: EvaluationOptions = DEFAULT_EVALUATION,
+    options: EvaluationOptions = EvaluationOptions(),
 ) -> RelationErrors:
     """The errors of a trajectory; `name` is what a message calls it.
 

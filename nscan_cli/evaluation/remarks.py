@@ -14,7 +14,7 @@ import numpy as np
 
 from nscan_cli.evaluation.alignment import alignment
 from nscan_cli.evaluation.clock_lag import Clocks
-from nscan_cli.evaluation.options import DEFAULT_EVALUATION, RemarkOptions
+from nscan_cli.evaluation.options import EvaluationOptions, RemarkOptions
 from nscan_cli.evaluation.similarity import Fit, LeverArm, fit, heading_difference, lever_arm
 from nscan_cli.evaluation.trajectory_errors import TrajectoryErrors
 from nscan_cli.files.text import counted
@@ -31,7 +31,7 @@ def remarks(
     result: Trajectory,
     reference: Trajectory,
     errors: TrajectoryErrors,
-    options: RemarkOptions = DEFAULT_EVALUATION.remarks,
+    options: RemarkOptions = EvaluationOptions.remarks,
 ) -> Iterator[str]:
     """Sentences on what differs between a result and a reference; none where nothing does."""
     both = (("result", result), ("reference", reference))

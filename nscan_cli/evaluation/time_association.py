@@ -5,14 +5,14 @@ from __future__ import annotations
 import numpy as np
 
 from nscan_cli.errors import InputDataError
-from nscan_cli.evaluation.options import DEFAULT_EVALUATION
+from nscan_cli.evaluation.options import EvaluationOptions
 from nscan_cli.files.text import counted
 from nscan_cli.logs.scan_order import nearest_in_time
 from nscan_cli.poses import Array, Indices
 
 
 def mutual_nearest(
-    times: Array, reference: Array, tolerance: float = DEFAULT_EVALUATION.tolerance
+    times: Array, reference: Array, tolerance: float = EvaluationOptions.tolerance
 ) -> tuple[Indices, Indices]:
     """Rows of `times` and of `reference`, pair by pair, that are each other's nearest, at most `tolerance`
     apart.
@@ -35,7 +35,7 @@ def no_match(
     """
     a, b, c, d = times.min(), times.max(), reference_times.min(), reference_times.max()
     problem = (
-        f"no stamp of {reference} lies within {DEFAULT_EVALUATION.tolerance} s of it; "
+        f"no stamp of {reference} lies within {EvaluationOptions.tolerance} s of it; "
         f"the result spans {a:.3f} to {b:.3f} s ({counted(len(times), 'pose')}), "
         f"the reference {c:.3f} to {d:.3f} s ({counted(len(reference_times), 'stamp')}), "
         f"{c - a:+.3f} s off at the start{fits}"

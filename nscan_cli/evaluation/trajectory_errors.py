@@ -12,7 +12,7 @@ import numpy as np
 from nscan_cli.errors import InputDataError
 from nscan_cli.evaluation.alignment import Alignment, alignment
 from nscan_cli.evaluation.clock_lag import lag_without_overlap
-from nscan_cli.evaluation.options import DEFAULT_EVALUATION, EvaluationOptions
+from nscan_cli.evaluation.options import EvaluationOptions
 from nscan_cli.evaluation.statistics import Spread
 from nscan_cli.evaluation.time_association import mutual_nearest, no_match
 from nscan_cli.graph.io.tum import Trajectory
@@ -47,7 +47,7 @@ def trajectory_errors(
     reference: Trajectory,
     name: str = "result",
     reference_name: str = "the reference",
-    options: EvaluationOptions = DEFAULT_EVALUATION,
+    options: EvaluationOptions = EvaluationOptions(),
 ) -> TrajectoryErrors:
     """ATE after the best rigid alignment (alignment.py), and RPE, of the poses that match in time.
 

@@ -25,14 +25,11 @@ class AttachmentOptions(NamedTuple):
     """Standard deviation of its heading, rad. A larger value makes relations of such scans less certain."""
 
 
-DEFAULT_ATTACHMENT = AttachmentOptions()
-
-
 class RelativePoses:
     """The relative poses of some nodes of a graph at its optimum, with their covariances."""
 
     def __init__(
-        self, graph: Graph, nodes: Sequence[int], attachment: AttachmentOptions = DEFAULT_ATTACHMENT
+        self, graph: Graph, nodes: Sequence[int], attachment: AttachmentOptions = AttachmentOptions()
     ) -> None:
         self._graph, self._attachment = graph, attachment
         anchors = set(graph.anchors[list(nodes)].tolist())

@@ -11,7 +11,7 @@ from nscan_cli.files.provenance import Source
 from nscan_cli.logs.beam_angles import beam_directions
 from nscan_cli.logs.beam_mask import mask_beams, masked_sectors
 from nscan_cli.logs.beam_spacing import checked_by_walls
-from nscan_cli.logs.dead_beams import DEFAULT_DEAD_BEAMS
+from nscan_cli.logs.dead_beams import DeadBeamOptions
 from nscan_cli.logs.device_choice import Device
 from nscan_cli.logs.frame_names import DEFAULT_FRAMES, FrameNames
 from nscan_cli.logs.laser_defaults import mark_no_returns
@@ -22,7 +22,7 @@ from nscan_cli.logs.range_limits import RangeLimits, limits_in_force
 from nscan_cli.logs.range_unit import scaled, wrong_unit
 from nscan_cli.logs.raw_scans import RawScans
 from nscan_cli.logs.reading_options import ReadingOptions
-from nscan_cli.logs.robot_parts import DEFAULT_ROBOT_PARTS, ScanTable
+from nscan_cli.logs.robot_parts import RobotPartsOptions, ScanTable
 from nscan_cli.logs.robot_path import RobotPath, poses_at, robot_path
 from nscan_cli.logs.scan_order import ScanOrder, selected_numbers
 from nscan_cli.logs.skips import Skips
@@ -90,7 +90,7 @@ def laser_log(
     (angle_min, angle_increment), bent = checked_by_walls(raw, written, limits, options)
     findings.used |= {"range_min": limits.low_from, "range_max": limits.high_from}
     table = ScanTable(raw.ranges, limits, angle_min, angle_increment, times.rows, times.times)
-    sectors, masked = masked_sectors(table, options, DEFAULT_ROBOT_PARTS, DEFAULT_DEAD_BEAMS)
+    sectors, masked = masked_sectors(table, options, RobotPartsOptions(), DeadBeamOptions())
     ranges = raw.ranges if np.array_equal(rows, np.arange(len(raw.stamps))) else raw.ranges[rows]
     beams, limits = beam_counts(raw.ranges, raw.beams)[rows], limits.of(rows)
     lost = lost_readings(ranges, beams, limits, file)

@@ -40,9 +40,6 @@ class BeamAngleOptions:
     """Least ratio of the beams on walls by the two steps. A larger value decides in fewer logs."""
 
 
-DEFAULT_BEAM_ANGLES = BeamAngleOptions()
-
-
 class BeamDirections(NamedTuple):
     """Where the beams of each scan point."""
 
@@ -56,7 +53,7 @@ def beam_directions(
     raw: RawScans,
     options: ReadingOptions,
     warnings: list[str],
-    checks: BeamAngleOptions = DEFAULT_BEAM_ANGLES,
+    checks: BeamAngleOptions = BeamAngleOptions(),
 ) -> BeamDirections:
     """The directions of the beams from the options, else from the log."""
     size = len(raw.stamps)
@@ -131,7 +128,7 @@ def second_is_straighter(
     rows: Iterable[NDArray[np.float32]],
     ones: Iterable[float],
     others: Iterable[float],
-    options: BeamAngleOptions = DEFAULT_BEAM_ANGLES,
+    options: BeamAngleOptions = BeamAngleOptions(),
 ) -> bool | None:
     """Whether the second of two steps (rad) of each scan makes walls straighter; None if that is unclear.
 

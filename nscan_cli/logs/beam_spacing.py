@@ -74,9 +74,6 @@ class BeamSpacingOptions:
     larger value takes less time."""
 
 
-DEFAULT_BEAM_SPACING = BeamSpacingOptions()
-
-
 class _Scans(NamedTuple):
     """N scans of a sample, none of which sees what the one before saw."""
 
@@ -91,7 +88,7 @@ def checked_by_walls(
     directions: BeamDirections,
     limits: RangeLimits,
     options: ReadingOptions,
-    spacing: BeamSpacingOptions = DEFAULT_BEAM_SPACING,
+    spacing: BeamSpacingOptions = BeamSpacingOptions(),
 ) -> tuple[BeamDirections, list[str]]:
     """The directions, put right if walls tell a usual laser; and what is said if walls contradict them."""
     if options.as_recorded or options.angle_increment is not None:

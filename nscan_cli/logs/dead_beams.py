@@ -31,10 +31,7 @@ class DeadBeamOptions:
     """Greatest share of the beams that are left out. A larger value leaves less to make a map from."""
 
 
-DEFAULT_DEAD_BEAMS = DeadBeamOptions()
-
-
-def dead_beams(table: ScanTable, options: DeadBeamOptions = DEFAULT_DEAD_BEAMS) -> list[Sector]:
+def dead_beams(table: ScanTable, options: DeadBeamOptions = DeadBeamOptions()) -> list[Sector]:
     """The sectors whose beams say exactly one usable range in nearly all scans; none if the robot stands."""
     if len(table.rows) < options.min_scans:
         return []

@@ -29,10 +29,7 @@ class HeadingUnitOptions:
     value converts fewer logs."""
 
 
-DEFAULT_HEADING_UNIT = HeadingUnitOptions()
-
-
-def are_in_degrees(poses: Array, options: HeadingUnitOptions = DEFAULT_HEADING_UNIT) -> bool:
+def are_in_degrees(poses: Array, options: HeadingUnitOptions = HeadingUnitOptions()) -> bool:
     """Whether the headings of poses (P, 3), in order of time and as written, are in degrees.
 
     Headings within 2π, and those of a robot that does not move, are taken as rad.

@@ -7,7 +7,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from nscan_cli.logs.range_limit_options import DEFAULT_RANGE_LIMITS, RangeLimitOptions
+from nscan_cli.logs.range_limit_options import RangeLimitOptions
 from nscan_cli.logs.range_peaks import peak_at_limit
 from nscan_cli.poses import Array, relative, wrap
 
@@ -31,7 +31,7 @@ def beam_angles(beams: int) -> tuple[float, float]:
 
 
 def no_return_value(
-    ranges: NDArray[np.float32], options: RangeLimitOptions = DEFAULT_RANGE_LIMITS
+    ranges: NDArray[np.float32], options: RangeLimitOptions = RangeLimitOptions()
 ) -> float | None:
     """The smallest reading (m) that means "no return", from all readings of a log; None if there is none.
 

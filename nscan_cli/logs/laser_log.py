@@ -22,7 +22,6 @@ from nscan_cli.logs.reading_options import ReadingOptions
 from nscan_cli.logs.robot_path import RobotPath, likelier_path, poses_at, robot_path
 from nscan_cli.poses import Array, Indices, are_known, compose
 
-DEFAULT_READING = ReadingOptions()
 SCANS_AT_ONCE = 256
 """Scans whose points are computed together."""
 
@@ -110,7 +109,7 @@ class LaserLog:
     truth: Array | None = None
     """(T, 3) true poses of the robot, or None."""
     frames: FrameNames = DEFAULT_FRAMES
-    reading: ReadingOptions = DEFAULT_READING
+    reading: ReadingOptions = field(default_factory=ReadingOptions)
     """The options that the log was read with."""
     beam_times: BeamTimes | None = None
     """The times of the beams of a laser that turns; None if each scan is seen at once."""

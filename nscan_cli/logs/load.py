@@ -19,7 +19,7 @@ from nscan_cli.files.limits import LimitExceededError
 from nscan_cli.files.provenance import Source
 from nscan_cli.logs.compression import compression_of, decompressed
 from nscan_cli.logs.formats import FORMS, Form, foreign_kind, readable_forms
-from nscan_cli.logs.laser_log import DEFAULT_READING, LaserLog
+from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.logs.log_files import Parts, first_bytes, journals_of, parts_of
 from nscan_cli.logs.reading_options import ReadingOptions
 from nscan_cli.logs.recordings import split_recordings
@@ -54,7 +54,7 @@ RESERVED_MEMORY = 4 << 20
 
 
 def read_log(
-    paths: str | Sequence[str], options: ReadingOptions = DEFAULT_READING, even_unusable: bool = False
+    paths: str | Sequence[str], options: ReadingOptions = ReadingOptions(), even_unusable: bool = False
 ) -> LaserLog:
     """The log at a path ("-": standard input), in a folder, or in the files of a split recording.
 
@@ -110,7 +110,7 @@ def read_recording(folder: str, salvage: bool) -> Recording | None:
 
 
 def log_from(
-    stored: FileBytes, path: str, options: ReadingOptions = DEFAULT_READING, even_unusable: bool = False
+    stored: FileBytes, path: str, options: ReadingOptions = ReadingOptions(), even_unusable: bool = False
 ) -> LaserLog:
     """The log in the stored bytes of `path`. Raises the errors of read_log."""
     name = label(path)

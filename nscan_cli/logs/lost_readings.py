@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nscan_cli.errors import InputDataError
-from nscan_cli.logs.range_limit_options import DEFAULT_RANGE_LIMITS, RangeLimitOptions
+from nscan_cli.logs.range_limit_options import RangeLimitOptions
 from nscan_cli.logs.range_limits import RangeLimits
 from nscan_cli.logs.range_unit import wrong_unit
 from nscan_cli.poses import Array
@@ -32,7 +32,7 @@ def lost_readings(
     beams: NDArray[np.int64],
     limits: RangeLimits,
     file: str,
-    checks: RangeLimitOptions = DEFAULT_RANGE_LIMITS,
+    checks: RangeLimitOptions = RangeLimitOptions(),
 ) -> LostReadings:
     """The unusable ones among readings (S, B; m) as written, of which scans have `beams` (S,)."""
     wrong = limits.low >= limits.high

@@ -38,6 +38,3 @@ class RangeLimitOptions:
     number of usable readings. A larger value tells more."""
     max_lost_share: float = 0.9
     """If a larger share of the readings is unusable, the user is told. A larger value tells less."""
-
-
-DEFAULT_RANGE_LIMITS = RangeLimitOptions()

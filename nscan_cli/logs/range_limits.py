@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nscan_cli.logs.laser_defaults import no_return_value
-from nscan_cli.logs.range_limit_options import DEFAULT_RANGE_LIMITS, RangeLimitOptions
+from nscan_cli.logs.range_limit_options import RangeLimitOptions
 from nscan_cli.logs.range_peaks import ROUNDING, peak_at_limit
 from nscan_cli.logs.raw_scans import RawScans
 from nscan_cli.logs.reading_options import ReadingOptions
@@ -45,7 +45,7 @@ def limits_in_force(
     raw: RawScans,
     options: ReadingOptions,
     warnings: list[str],
-    checks: RangeLimitOptions = DEFAULT_RANGE_LIMITS,
+    checks: RangeLimitOptions = RangeLimitOptions(),
 ) -> RangeLimits:
     """The limits from the options, else from the log, and at most the value that means "no return".
 

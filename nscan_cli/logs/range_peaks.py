@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from nscan_cli.logs.range_limit_options import DEFAULT_RANGE_LIMITS, RangeLimitOptions
+from nscan_cli.logs.range_limit_options import RangeLimitOptions
 from nscan_cli.poses import Array
 
 ROUNDING = 2e-6
@@ -17,7 +17,7 @@ def peak_at_limit(
     limits: Array,
     inside: int,
     ratio_to_largest: float | None = None,
-    options: RangeLimitOptions = DEFAULT_RANGE_LIMITS,
+    options: RangeLimitOptions = RangeLimitOptions(),
 ) -> float | None:
     """The distance (m) inside the limits (S,) up to which readings (S, B) form a peak; None without a peak.
 

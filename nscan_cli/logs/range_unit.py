@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from nscan_cli.logs.range_limit_options import DEFAULT_RANGE_LIMITS
+from nscan_cli.logs.range_limit_options import RangeLimitOptions
 from nscan_cli.logs.range_limits import RangeLimits
 from nscan_cli.logs.raw_scans import RawScans
 
@@ -48,9 +48,6 @@ class RangeUnitOptions:
     """Number of readings from which the unit is told. A larger value takes longer."""
 
 
-DEFAULT_RANGE_UNIT = RangeUnitOptions()
-
-
 class WrongUnit(NamedTuple):
     """The unit that the readings of a log seem to have in place of metres."""
 
@@ -85,7 +82,7 @@ class WrongUnit(NamedTuple):
 
 
 def wrong_unit(
-    ranges: NDArray[np.float32], limits: RangeLimits, options: RangeUnitOptions = DEFAULT_RANGE_UNIT
+    ranges: NDArray[np.float32], limits: RangeLimits, options: RangeUnitOptions = RangeUnitOptions()
 ) -> WrongUnit | None:
     """The unit of readings (S, B) as written; None for metres, or if no unit fits.
 
@@ -134,14 +131,14 @@ def _continue_beyond(readings: NDArray[np.float32], no_return: float) -> bool:
 
     Among whole numbers, any looks like a peak.
     """
-    beyond = readings[readings > DEFAULT_RANGE_LIMITS.neighbourhood * no_return]
+    beyond = readings[readings > RangeLimitOptions.neighbourhood * no_return]
     if 2 * beyond.size <= readings.size:
         return False
     _, counts = np.unique(beyond, return_counts=True)
     return bool(2 * counts.max() < beyond.size)
 
 
-def scaled(raw: RawScans, scale: float, options: RangeUnitOptions = DEFAULT_RANGE_UNIT) -> RawScans:
+def scaled(raw: RawScans, scale: float, options: RangeUnitOptions = RangeUnitOptions()) -> RawScans:
     """The scans with ranges multiplied by `scale`; limits that were in the same unit are, too.
 
     An upper limit was in another unit if the median return is beyond it. No limit may become one that no
@@ -151,9 +148,7 @@ def scaled(raw: RawScans, scale: float, options: RangeUnitOptions = DEFAULT_RANG
     median = float(np.median(returns)) if returns.size else 0.0
     low, high = (np.asarray(limit, dtype=np.float64) for limit in raw.limits)
     shares_unit = (
-        (high < DEFAULT_RANGE_LIMITS.largest_range)
-        & (high >= median)
-        & (high * scale >= options.limits_apart)
+        (high < RangeLimitOptions.largest_range) & (high >= median) & (high * scale >= options.limits_apart)
     )
     low = np.where(low >= options.limits_apart, low * scale, low)
     limits = low, np.where(shares_unit, high * scale, high)

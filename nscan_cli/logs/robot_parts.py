@@ -73,10 +73,6 @@ class RobotPartsOptions:
     closed. A larger value leaves out more."""
 
 
-DEFAULT_ROBOT_PARTS = RobotPartsOptions()
-"""The options of every log; the provenance of a graph has them."""
-
-
 class Sector(NamedTuple):
     """Bearings in the laser's frame, from the first counter-clockwise to the last."""
 

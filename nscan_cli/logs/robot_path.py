@@ -36,9 +36,6 @@ class RobotPathOptions:
     the headings more weight."""
 
 
-DEFAULT_ROBOT_PATH = RobotPathOptions()
-
-
 class RobotPath(NamedTuple):
     """Poses at P ≥ 2 times. From one to the next the robot moves steadily: along an arc, as wheels do."""
 
@@ -52,7 +49,7 @@ class RobotPath(NamedTuple):
 
 
 def robot_path(
-    times: Array, poses: Array, options: RobotPathOptions = DEFAULT_ROBOT_PATH
+    times: Array, poses: Array, options: RobotPathOptions = RobotPathOptions()
 ) -> RobotPath | None:
     """The path through poses (S, 3) at times (S,), s, that do not decrease; None with fewer than two.
 
@@ -107,7 +104,7 @@ def bent_between(
 
 
 def likelier_path(
-    path: RobotPath, times: Array, poses: Array, options: RobotPathOptions = DEFAULT_ROBOT_PATH
+    path: RobotPath, times: Array, poses: Array, options: RobotPathOptions = RobotPathOptions()
 ) -> RobotPath | None:
     """The path through poses (S, 3) at times (S,), s: bent, with the motion of `path` between two of them, or
     steady there if that tells better where every second pose is from those beside it.

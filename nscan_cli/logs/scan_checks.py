@@ -2,51 +2,51 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
-from nscan_cli.logs.beam_angles import DEFAULT_BEAM_ANGLES, BeamAngleOptions
-from nscan_cli.logs.beam_spacing import DEFAULT_BEAM_SPACING, BeamSpacingOptions
-from nscan_cli.logs.dead_beams import DEFAULT_DEAD_BEAMS, DeadBeamOptions
-from nscan_cli.logs.heading_unit import DEFAULT_HEADING_UNIT, HeadingUnitOptions
-from nscan_cli.logs.odometry_interpolation import DEFAULT_ODOMETRY_GAPS, OdometryGapOptions
-from nscan_cli.logs.odometry_outliers import DEFAULT_ODOMETRY_OUTLIERS, OdometryOutlierOptions
-from nscan_cli.logs.range_limit_options import DEFAULT_RANGE_LIMITS, RangeLimitOptions
-from nscan_cli.logs.range_unit import DEFAULT_RANGE_UNIT, RangeUnitOptions
-from nscan_cli.logs.recordings.alternating_lasers import DEFAULT_TWO_LASERS, TwoLaserOptions
-from nscan_cli.logs.recordings.mounting_options import DEFAULT_MOUNTING, MountingOptions
-from nscan_cli.logs.recordings.turn_segments import DEFAULT_TURN_SEGMENTS, TurnSegmentOptions
-from nscan_cli.logs.robot_parts import DEFAULT_ROBOT_PARTS, RobotPartsOptions
-from nscan_cli.logs.robot_path import DEFAULT_ROBOT_PATH, RobotPathOptions
-from nscan_cli.logs.scan_order import DEFAULT_SCAN_ORDER, ScanOrderOptions
-from nscan_cli.logs.shared_stamps import DEFAULT_SHARED_STAMPS, SharedStampOptions
-from nscan_cli.logs.slow_odometry import DEFAULT_SLOW_ODOMETRY, SlowOdometryOptions
-from nscan_cli.logs.sweep import DEFAULT_SWEEP, SweepOptions
-from nscan_cli.logs.text.interlaced_scans import DEFAULT_INTERLACED, InterlacedOptions
-from nscan_cli.logs.text.text_log_options import DEFAULT_TEXT_LOGS, TextLogOptions
-from nscan_cli.logs.unit_stretches import DEFAULT_UNIT_STRETCHES, UnitStretchOptions
+from nscan_cli.logs.beam_angles import BeamAngleOptions
+from nscan_cli.logs.beam_spacing import BeamSpacingOptions
+from nscan_cli.logs.dead_beams import DeadBeamOptions
+from nscan_cli.logs.heading_unit import HeadingUnitOptions
+from nscan_cli.logs.odometry_interpolation import OdometryGapOptions
+from nscan_cli.logs.odometry_outliers import OdometryOutlierOptions
+from nscan_cli.logs.range_limit_options import RangeLimitOptions
+from nscan_cli.logs.range_unit import RangeUnitOptions
+from nscan_cli.logs.recordings.alternating_lasers import TwoLaserOptions
+from nscan_cli.logs.recordings.mounting_options import MountingOptions
+from nscan_cli.logs.recordings.turn_segments import TurnSegmentOptions
+from nscan_cli.logs.robot_parts import RobotPartsOptions
+from nscan_cli.logs.robot_path import RobotPathOptions
+from nscan_cli.logs.scan_order import ScanOrderOptions
+from nscan_cli.logs.shared_stamps import SharedStampOptions
+from nscan_cli.logs.slow_odometry import SlowOdometryOptions
+from nscan_cli.logs.sweep import SweepOptions
+from nscan_cli.logs.text.interlaced_scans import InterlacedOptions
+from nscan_cli.logs.text.text_log_options import TextLogOptions
+from nscan_cli.logs.unit_stretches import UnitStretchOptions
 
 
 @dataclass(frozen=True)
 class ScanCheckOptions:
     """The options of reading, as the provenance of a graph has them."""
 
-    scan_order: ScanOrderOptions = DEFAULT_SCAN_ORDER
-    shared_stamps: SharedStampOptions = DEFAULT_SHARED_STAMPS
-    range_limits: RangeLimitOptions = DEFAULT_RANGE_LIMITS
-    range_unit: RangeUnitOptions = DEFAULT_RANGE_UNIT
-    unit_stretches: UnitStretchOptions = DEFAULT_UNIT_STRETCHES
-    beam_angles: BeamAngleOptions = DEFAULT_BEAM_ANGLES
-    beam_spacing: BeamSpacingOptions = DEFAULT_BEAM_SPACING
-    text_logs: TextLogOptions = DEFAULT_TEXT_LOGS
-    interlaced: InterlacedOptions = DEFAULT_INTERLACED
-    turn_segments: TurnSegmentOptions = DEFAULT_TURN_SEGMENTS
-    two_lasers: TwoLaserOptions = DEFAULT_TWO_LASERS
-    robot_parts: RobotPartsOptions = DEFAULT_ROBOT_PARTS
-    dead_beams: DeadBeamOptions = DEFAULT_DEAD_BEAMS
-    mounting: MountingOptions = DEFAULT_MOUNTING
-    odometry_gaps: OdometryGapOptions = DEFAULT_ODOMETRY_GAPS
-    heading_unit: HeadingUnitOptions = DEFAULT_HEADING_UNIT
-    odometry_outliers: OdometryOutlierOptions = DEFAULT_ODOMETRY_OUTLIERS
-    slow_odometry: SlowOdometryOptions = DEFAULT_SLOW_ODOMETRY
-    robot_path: RobotPathOptions = DEFAULT_ROBOT_PATH
-    sweep: SweepOptions = DEFAULT_SWEEP
+    scan_order: ScanOrderOptions = field(default_factory=ScanOrderOptions)
+    shared_stamps: SharedStampOptions = field(default_factory=SharedStampOptions)
+    range_limits: RangeLimitOptions = field(default_factory=RangeLimitOptions)
+    range_unit: RangeUnitOptions = field(default_factory=RangeUnitOptions)
+    unit_stretches: UnitStretchOptions = field(default_factory=UnitStretchOptions)
+    beam_angles: BeamAngleOptions = field(default_factory=BeamAngleOptions)
+    beam_spacing: BeamSpacingOptions = field(default_factory=BeamSpacingOptions)
+    text_logs: TextLogOptions = field(default_factory=TextLogOptions)
+    interlaced: InterlacedOptions = field(default_factory=InterlacedOptions)
+    turn_segments: TurnSegmentOptions = field(default_factory=TurnSegmentOptions)
+    two_lasers: TwoLaserOptions = field(default_factory=TwoLaserOptions)
+    robot_parts: RobotPartsOptions = field(default_factory=RobotPartsOptions)
+    dead_beams: DeadBeamOptions = field(default_factory=DeadBeamOptions)
+    mounting: MountingOptions = field(default_factory=MountingOptions)
+    odometry_gaps: OdometryGapOptions = field(default_factory=OdometryGapOptions)
+    heading_unit: HeadingUnitOptions = field(default_factory=HeadingUnitOptions)
+    odometry_outliers: OdometryOutlierOptions = field(default_factory=OdometryOutlierOptions)
+    slow_odometry: SlowOdometryOptions = field(default_factory=SlowOdometryOptions)
+    robot_path: RobotPathOptions = field(default_factory=RobotPathOptions)
+    sweep: SweepOptions = field(default_factory=SweepOptions)

@@ -40,9 +40,6 @@ class ScanOrderOptions:
     value joins more files."""
 
 
-DEFAULT_SCAN_ORDER = ScanOrderOptions()
-
-
 @dataclass(frozen=True)
 class ScanOrder:
     """The scans of a log in order of time."""
@@ -60,7 +57,7 @@ class ScanOrder:
     warnings: list[str]
 
 
-def by_time(stamps: list[str], options: ScanOrderOptions = DEFAULT_SCAN_ORDER) -> ScanOrder:
+def by_time(stamps: list[str], options: ScanOrderOptions = ScanOrderOptions()) -> ScanOrder:
     """The scans sorted stably by their stamps, one per scan in file order, empty if there is none.
 
     If fewer than half of the stamps are finite, or fewer than half are distinct, the scans stay in file order

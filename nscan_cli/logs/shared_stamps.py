@@ -19,10 +19,7 @@ class SharedStampOptions:
     """Least number of different stamps: fewer tell no period. A larger value spreads fewer."""
 
 
-DEFAULT_SHARED_STAMPS = SharedStampOptions()
-
-
-def spread_stamps(times: Array, options: SharedStampOptions = DEFAULT_SHARED_STAMPS) -> Array:
+def spread_stamps(times: Array, options: SharedStampOptions = SharedStampOptions()) -> Array:
     """The times (S,) of scans in file order, s, without shared ones; `times` itself if few are shared.
 
     Scans with one stamp follow each other from there at even intervals up to the next stamp, at most at the

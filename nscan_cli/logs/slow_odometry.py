@@ -33,14 +33,11 @@ class SlowOdometryOptions:
     value lets it stand less."""
 
 
-DEFAULT_SLOW_ODOMETRY = SlowOdometryOptions()
-
-
 def without_repeats(
     odometry: Array,
     times: Array,
     scans: tuple[NDArray[np.float32], NDArray[np.int64]] | None = None,
-    options: SlowOdometryOptions = DEFAULT_SLOW_ODOMETRY,
+    options: SlowOdometryOptions = SlowOdometryOptions(),
 ) -> tuple[Array, str]:
     """Odometry (S, 3) at times (S,), s, steady between two poses that differ if it is slow; and what to say.
 

@@ -32,10 +32,6 @@ class SweepOptions:
     value follows lasers whose speed changes more, and more errors of drivers."""
 
 
-DEFAULT_SWEEP = SweepOptions()
-"""The options of every log; the provenance of a graph has them."""
-
-
 @dataclass(frozen=True)
 class RecordedSweep:
     """What the messages of S scans say, in file order."""
@@ -68,7 +64,7 @@ def sweep_of_file(
     beams: Indices,
     times: Array,
     as_recorded: bool = False,
-    options: SweepOptions = DEFAULT_SWEEP,
+    options: SweepOptions = SweepOptions(),
 ) -> Sweep:
     """The likeliest times of the turns, from what S scans say of them.
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from nscan_cli.files.text import shortened_list
 from nscan_cli.logs.mask_runs import mask_runs
-from nscan_cli.logs.range_unit import DEFAULT_RANGE_UNIT, UNITS, scaled
+from nscan_cli.logs.range_unit import UNITS, RangeUnitOptions, scaled
 from nscan_cli.logs.raw_scans import RawScans
 from nscan_cli.logs.scan_order import ScanOrder
 from nscan_cli.logs.stretch_names import stretch_names
@@ -47,11 +47,8 @@ class UnitStretchOptions:
     """Least number of beams with a reading in both scans. A larger value tells less."""
 
 
-DEFAULT_UNIT_STRETCHES = UnitStretchOptions()
-
-
 def in_one_unit(
-    raw: RawScans, order: ScanOrder, options: UnitStretchOptions = DEFAULT_UNIT_STRETCHES
+    raw: RawScans, order: ScanOrder, options: UnitStretchOptions = UnitStretchOptions()
 ) -> tuple[RawScans, list[str]]:
     """The scans in metres if those of some stretches are in metres and the others are not, and what is said.
 
@@ -60,10 +57,10 @@ def in_one_unit(
     rows, times = order.rows, order.times
     some = raw.ranges[rows, :: max(raw.ranges.shape[1] // options.beams, 1)]
     is_told = (some > 0) & np.isfinite(some)
-    is_far = _are_most(some >= DEFAULT_RANGE_UNIT.remote_median, is_told, options)
+    is_far = _are_most(some >= RangeUnitOptions.remote_median, is_told, options)
     if not is_far.any():
         return raw, _sudden_factors(some, is_told, times, options)
-    is_near = _are_most(some <= DEFAULT_RANGE_UNIT.max_median, is_told, options)
+    is_near = _are_most(some <= RangeUnitOptions.max_median, is_told, options)
     far, near = some[is_far][is_told[is_far]], some[is_near][is_told[is_near]]
     if not near.size or np.unique(far, return_counts=True)[1].max() > options.max_same_share * far.size:
         return raw, _sudden_factors(some, is_told, times, options)
@@ -113,7 +110,7 @@ def _unit(
     both = is_told[at] & is_told[at + 1]
     with np.errstate(divide="ignore", invalid="ignore"):
         off = np.abs(np.log(some[at + 1] / some[at]))
-    sure = DEFAULT_RANGE_UNIT
+    sure = RangeUnitOptions()
     for name, scale in UNITS:
         has_ratio = both & (np.abs(off + math.log(scale)) < options.tolerance)
         shows = np.count_nonzero(has_ratio, axis=1) >= np.maximum(

@@ -35,7 +35,6 @@ class OccupancyOptions:
     """Least number of hits of an occupied cell. With 1, a single stray return makes a cell occupied."""
 
 
-DEFAULT_OCCUPANCY = OccupancyOptions()
 DEFAULT_CELL_SIZE = 0.05
 """m"""
 MAX_SUGGESTED_CELL_SIZE = 10.0
@@ -56,7 +55,7 @@ class OccupancyGrid:
         shape: tuple[int, int],
         resolution: float,
         origin: tuple[float, float],
-        options: OccupancyOptions = DEFAULT_OCCUPANCY,
+        options: OccupancyOptions = OccupancyOptions(),
     ) -> None:
         self._tiles = tiles
         self.shape = shape
@@ -124,7 +123,7 @@ def occupancy_grid(
     poses: Array,
     resolution: float = DEFAULT_CELL_SIZE,
     threads: int = 1,
-    options: OccupancyOptions = DEFAULT_OCCUPANCY,
+    options: OccupancyOptions = OccupancyOptions(),
 ) -> OccupancyGrid:
     """The grid of the scans in `rows` (N,) of the log at the robot's `poses` (N, 3).
 
@@ -166,7 +165,7 @@ def grid_of_counts(
     misses: NDArray[np.int32],
     resolution: float,
     origin: tuple[float, float],
-    options: OccupancyOptions = DEFAULT_OCCUPANCY,
+    options: OccupancyOptions = OccupancyOptions(),
 ) -> OccupancyGrid:
     """The grid with these hits and misses (H, W), the least y first."""
     height, width = hits.shape

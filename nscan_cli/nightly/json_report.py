@@ -8,7 +8,7 @@ from typing import Any
 from nscan_cli import __version__
 from nscan_cli.files.provenance import as_parameters
 from nscan_cli.files.text import json_bytes
-from nscan_cli.nightly.regression_check import DEFAULT_REGRESSION, CheckResult, MeasuredErrors, headline
+from nscan_cli.nightly.regression_check import CheckResult, MeasuredErrors, RegressionOptions, headline
 
 
 def report_document(checks: list[CheckResult]) -> dict[str, Any]:
@@ -23,7 +23,7 @@ def report_document(checks: list[CheckResult]) -> dict[str, Any]:
         "units": {"translation": "m", "rotation": "deg", "time": "s"},
         "good": not any(check.is_failure for check in checks),
         "headline": headline(checks),
-        "parameters": as_parameters(DEFAULT_REGRESSION),
+        "parameters": as_parameters(RegressionOptions()),
         "logs": [_log_json(check) for check in checks],
         "times": {"finished": finish_time(checks)},
     }

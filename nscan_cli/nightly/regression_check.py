@@ -32,9 +32,6 @@ class RegressionOptions:
     """Least rise of a rotational error, degrees: rounding alone can cause less."""
 
 
-DEFAULT_REGRESSION = RegressionOptions()
-
-
 @dataclass(frozen=True)
 class MeasuredErrors:
     """The errors of a run; one statistic of them is compared with the bounds."""
@@ -110,7 +107,7 @@ def check_log(
     runs: list[RunRecord],
     notes: list[str],
     absent: bool,
-    options: RegressionOptions = DEFAULT_REGRESSION,
+    options: RegressionOptions = RegressionOptions(),
 ) -> CheckResult:
     """Check a log of the manifest. It has at least one run, unless it is `absent`."""
     done = [run for run in runs if run["outcome"] == "done"]

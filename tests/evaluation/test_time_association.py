@@ -4,7 +4,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from nscan_cli.evaluation.options import DEFAULT_EVALUATION
+from nscan_cli.evaluation.options import EvaluationOptions
 from nscan_cli.evaluation.time_association import mutual_nearest
 
 # Multiples of 1/64 s: differences are exact, and many times are equal.
@@ -15,7 +15,7 @@ times = st.lists(st.integers(0, 640).map(lambda k: k / 64), min_size=1, max_size
 def test_matches_are_pairs_and_close(a: np.ndarray, b: np.ndarray):
     rows, partners = mutual_nearest(a, b)
     assert len(set(rows.tolist())) == len(set(partners.tolist())) == len(rows)
-    assert (np.abs(a[rows] - b[partners]) <= DEFAULT_EVALUATION.tolerance).all()
+    assert (np.abs(a[rows] - b[partners]) <= EvaluationOptions.tolerance).all()
 
 
 def test_a_dense_trajectory_matches_a_sparse_one_once():

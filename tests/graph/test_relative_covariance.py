@@ -7,12 +7,12 @@ import pytest
 
 from nscan_cli.graph.model import Graph, Pairwise
 from nscan_cli.graph.optimise.whole_graph import optimise_graph
-from nscan_cli.graph.relative_covariance import DEFAULT_ATTACHMENT, RelativePoses
+from nscan_cli.graph.relative_covariance import AttachmentOptions, RelativePoses
 from nscan_cli.poses import Array, compose, relative, relative_jacobians
 from tests.graph.simulated_relations import dense_matrix, each_pair_once, energy_of, graph_of, mixed_ring
 
 CHOSEN = (0, 3, 4, 11, 25)
-ATTACHED = np.array([DEFAULT_ATTACHMENT.sigma, DEFAULT_ATTACHMENT.sigma, DEFAULT_ATTACHMENT.angle_sigma])
+ATTACHED = np.array([AttachmentOptions().sigma, AttachmentOptions().sigma, AttachmentOptions().angle_sigma])
 
 
 @pytest.fixture(scope="module")

@@ -22,7 +22,7 @@ def flaser(
     return f"{tag} {len(ranges)} {values} {stamp} nohost 0.1"
 
 
-def read(folder: Path, *lines: str, options: ReadingOptions = ReadingOptions()) -> LaserLog:  # noqa: B008
+def read(folder: Path, *lines: str, options: ReadingOptions = ReadingOptions()) -> LaserLog:
     """The log that these lines make."""
     path = folder / "test.log"
     path.write_text("\n".join(lines) + "\n")

@@ -11,7 +11,7 @@ import pytest
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.logs.raw_scans import RawScans
 from nscan_cli.logs.scan_order import by_time
-from nscan_cli.logs.unit_stretches import DEFAULT_UNIT_STRETCHES, in_one_unit
+from nscan_cli.logs.unit_stretches import UnitStretchOptions, in_one_unit
 from nscan_cli.poses import Mask
 from tests.logs import lines
 from tests.logs.noisy_room import FIRST, SCANS, STEP, Readings, carmen, readings, recording
@@ -109,5 +109,5 @@ def test_bounds_are_options():
         (0.0, 80.0),
     )
     assert in_one_unit(raw, order)[1]
-    options = replace(DEFAULT_UNIT_STRETCHES, least_factor=3.0)
+    options = replace(UnitStretchOptions(), least_factor=3.0)
     assert in_one_unit(raw, order, options)[1] == []

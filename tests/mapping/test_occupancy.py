@@ -8,11 +8,11 @@ from hypothesis import strategies as st
 
 from nscan_cli.errors import WrongUsageError
 from nscan_cli.mapping.occupancy import (
-    DEFAULT_OCCUPANCY,
     FREE,
     OCCUPIED,
     UNKNOWN,
     OccupancyGrid,
+    OccupancyOptions,
     grid_of_counts,
     occupancy_grid,
 )
@@ -20,7 +20,7 @@ from tests.mapping.handmade_logs import half_circle, log_of
 
 ORIGIN = np.zeros((1, 3))
 
-MAX_LENGTH = DEFAULT_OCCUPANCY.max_beam_length
+MAX_LENGTH = OccupancyOptions.max_beam_length
 
 
 def one_beam(x: float, y: float, end_x: float, end_y: float, resolution: float = 1.0) -> OccupancyGrid:

@@ -10,7 +10,6 @@ import pytest
 
 from nscan_cli.graph.io.tum import parse_tum
 from nscan_cli.graph.model import Graph
-from nscan_cli.logs.laser_log import DEFAULT_READING
 from nscan_cli.logs.load import read_log
 from nscan_cli.logs.reading_options import ReadingOptions
 from nscan_cli.slam.log_to_graph import map_log
@@ -31,12 +30,12 @@ def truth(name: str) -> np.ndarray:
 
 
 @functools.cache
-def mapped_file(name: str, reading: ReadingOptions = DEFAULT_READING) -> Graph:
+def mapped_file(name: str, reading: ReadingOptions = ReadingOptions()) -> Graph:
     log = read_log(str(data_file(f"strangers/{name}")), reading)
     return map_log(log, reading, SlamOptions(), 1, lambda *_progress: None)[1]
 
 
-def error(name: str, reference: str, reading: ReadingOptions = DEFAULT_READING) -> float:
+def error(name: str, reference: str, reading: ReadingOptions = ReadingOptions()) -> float:
     """ATE RMSE of a recording, m."""
     found = mapped_file(name, reading).poses
     return position_rmse(found, truth(reference)[: len(found)])

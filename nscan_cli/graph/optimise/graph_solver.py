@@ -29,9 +29,6 @@ class StopOptions:
     the last: it moves less than a thousandth of a standard deviation. A larger share ends earlier."""
 
 
-DEFAULT_STOP = StopOptions()
-
-
 @dataclass(frozen=True)
 class Optimum:
     """The result of a minimisation."""
@@ -45,7 +42,7 @@ class Optimum:
     """Whether the last step was within the tolerance without being damped."""
 
 
-def optimise_poses(energy: GraphEnergy, poses: Array, stop: StopOptions = DEFAULT_STOP) -> Optimum:
+def optimise_poses(energy: GraphEnergy, poses: Array, stop: StopOptions = StopOptions()) -> Optimum:
     """Minimise from the poses (K, 3) until a step moves no pose by more than `stop.tolerance` (m, rad).
 
     Newton steps use the Gauss–Newton part of the Hessian while they are long, and the exact Hessian (25) once

@@ -39,9 +39,6 @@ class WholeGraphOptions:
     kept, which is that of the given poses. A larger share keeps these more often."""
 
 
-DEFAULT_OPTIONS = WholeGraphOptions()
-
-
 @dataclass(frozen=True)
 class Component:
     """A connected component of the graph."""
@@ -58,7 +55,7 @@ class Component:
         return GraphEnergy(len(self.keyframes), self.relations, positions)
 
 
-def optimise_graph(graph: Graph, options: WholeGraphOptions = DEFAULT_OPTIONS) -> Optimum:
+def optimise_graph(graph: Graph, options: WholeGraphOptions = WholeGraphOptions()) -> Optimum:
     """Move the keyframes to the minimum of the graph's energy, and the attached nodes with them.
 
     The lowest minimum of several starts is kept. The first keyframe of each component stays. The graph's

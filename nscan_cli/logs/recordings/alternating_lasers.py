@@ -41,11 +41,8 @@ class TwoLaserOptions:
     fewer lasers."""
 
 
-DEFAULT_TWO_LASERS = TwoLaserOptions()
-
-
 def first_of_two_lasers(
-    messages: Sequence[TimedScan], options: TwoLaserOptions = DEFAULT_TWO_LASERS
+    messages: Sequence[TimedScan], options: TwoLaserOptions = TwoLaserOptions()
 ) -> tuple[list[TimedScan], str]:
     """The scans of the first laser alone, and what is said of it; all scans if there is one laser."""
     scans = [message.scan for message in messages]

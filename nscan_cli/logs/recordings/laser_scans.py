@@ -12,7 +12,7 @@ from nscan_cli.logs import scan_order as order
 from nscan_cli.logs.assemble import ReaderFindings, RecordedMotion, laser_log
 from nscan_cli.logs.frame_names import distinct_frame_names
 from nscan_cli.logs.laser_log import LaserLog
-from nscan_cli.logs.range_limit_options import DEFAULT_RANGE_LIMITS
+from nscan_cli.logs.range_limit_options import RangeLimitOptions
 from nscan_cli.logs.raw_scans import RawScans, scan_table
 from nscan_cli.logs.reading_options import ReadingOptions
 from nscan_cli.logs.recordings.alternating_lasers import first_of_two_lasers
@@ -135,7 +135,7 @@ def _scan_problem(scan: ScanMessage) -> str:
 def _raw_scans(scans: Sequence[ScanMessage], stamps: list[str]) -> RawScans:
     """The scans as columns, with the range limits of the messages."""
     low, low_from = _range_limit("range_min", [scan.range_min for scan in scans], 0.0)
-    largest = DEFAULT_RANGE_LIMITS.largest_range
+    largest = RangeLimitOptions.largest_range
     high, high_from = _range_limit("range_max", [scan.range_max for scan in scans], largest)
     return RawScans(
         scan_table([scan.ranges for scan in scans]),
@@ -160,6 +160,6 @@ def _raw_scans(scans: Sequence[ScanMessage], stamps: list[str]) -> RawScans:
 def _range_limit(name: str, values: list[float], default: float) -> tuple[Array, str]:
     """The plausible limits (S,), `default` for others, and where they are from."""
     limits = np.array(values, dtype=np.float64)
-    valid = (limits > 0) & (limits < DEFAULT_RANGE_LIMITS.largest_range)
+    valid = (limits > 0) & (limits < RangeLimitOptions.largest_range)
     origin = f"{name} of the messages" if valid.any() else "none in the messages"
     return np.where(valid, limits, default), origin

@@ -7,10 +7,10 @@ from collections.abc import Sequence
 import numpy as np
 
 from nscan_cli.logs.recordings.decoded_messages import S
-from nscan_cli.logs.scan_order import DEFAULT_SCAN_ORDER, ScanOrderOptions
+from nscan_cli.logs.scan_order import ScanOrderOptions
 
 
-def valid_stamps(stamps: Sequence[int], options: ScanOrderOptions = DEFAULT_SCAN_ORDER) -> list[int | None]:
+def valid_stamps(stamps: Sequence[int], options: ScanOrderOptions = ScanOrderOptions()) -> list[int | None]:
     """The stamps (ns) of messages; None for a 0 that was never set.
 
     A simulated clock begins at 0, and the next stamps follow closely: there 0 is valid. Where the other

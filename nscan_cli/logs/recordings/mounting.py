@@ -12,7 +12,7 @@ from nscan_cli.logs.assemble import ReaderFindings
 from nscan_cli.logs.reading_options import ReadingOptions
 from nscan_cli.logs.recordings.decoded_messages import ScanMessage
 from nscan_cli.logs.recordings.frame_ids import BASE_FRAMES, is_world_frame, tf_prefix, without_prefix
-from nscan_cli.logs.recordings.mounting_options import DEFAULT_MOUNTING
+from nscan_cli.logs.recordings.mounting_options import MountingOptions
 from nscan_cli.logs.recordings.moving_mount import MovingMount, moving_mount
 from nscan_cli.logs.recordings.poses_3d import TimedPoses, planar_mount
 from nscan_cli.logs.recordings.tf_chains import ChainLink, chain_links, composed, shortest_chain
@@ -58,7 +58,7 @@ def laser_mounting(
     moving = moving_mount(links)
     if moving is None:
         mount, hanging, tilt = planar_mount(composed(links)[0])
-        if tilt > DEFAULT_MOUNTING.tilt:
+        if tilt > MountingOptions.tilt:
             problem = f"its laser is tilted by {math.degrees(tilt):.1f}° (tf {' → '.join(frames)})"
             raise MountingError(file, problem, "give --mount X,Y,DEG to use its scans as if it were level")
     elif moving.problem():

@@ -25,6 +25,3 @@ class MountingOptions:
     fixed_tolerance: float = 1e-6
     """A transform is fixed if its coordinates (m) and its quaternion change by no more. A larger value takes
     more lasers for fixed."""
-
-
-DEFAULT_MOUNTING = MountingOptions()

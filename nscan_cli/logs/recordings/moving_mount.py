@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
-from nscan_cli.logs.recordings.mounting_options import DEFAULT_MOUNTING, MountingOptions
+from nscan_cli.logs.recordings.mounting_options import MountingOptions
 from nscan_cli.logs.recordings.poses_3d import rounded_mount
 from nscan_cli.logs.recordings.tf_chains import ChainLink, composed
 from nscan_cli.poses import Array, wrap
@@ -23,7 +23,7 @@ class MovingMount:
 
     poses: Array
     """(n, 4, 4), n > 1"""
-    options: MountingOptions = DEFAULT_MOUNTING
+    options: MountingOptions = field(default_factory=MountingOptions)
 
     @property
     def hangs(self) -> bool:

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from nscan_cli.errors import WrongUsageError
 from nscan_cli.logs.recordings.container import Recording
 from nscan_cli.logs.recordings.decoded_messages import S
-from nscan_cli.logs.scan_order import DEFAULT_SCAN_ORDER
+from nscan_cli.logs.scan_order import ScanOrderOptions
 
 
 def order_by_start(recordings: Sequence[tuple[str, Recording]]) -> list[int]:
@@ -40,7 +40,7 @@ def merge_recordings(recordings: Sequence[tuple[str, Recording]], are_parts: boo
         if span is None:
             continue
         pause = 0.0 if last is None else (span[0] - last[0]) / S
-        if last is not None and pause > DEFAULT_SCAN_ORDER.longest_pause:
+        if last is not None and pause > ScanOrderOptions.longest_pause:
             problem = f"{name} begins {pause:,.0f} s after {last[1]} ends"
             if not are_parts:
                 raise WrongUsageError(

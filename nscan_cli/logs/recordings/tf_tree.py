@@ -9,7 +9,7 @@ from nscan_cli.logs.recordings.decoded_messages import StampedTransform
 from nscan_cli.logs.recordings.decoding import UNDECODABLE, transform_decoder
 from nscan_cli.logs.recordings.message_stamps import valid_stamps
 from nscan_cli.logs.recordings.message_types import TRANSFORM_TYPES
-from nscan_cli.logs.recordings.mounting_options import DEFAULT_MOUNTING
+from nscan_cli.logs.recordings.mounting_options import MountingOptions
 from nscan_cli.logs.recordings.poses_3d import TimedPoses, as_matrix
 from nscan_cli.logs.skips import Skips
 from nscan_cli.poses import Array
@@ -105,6 +105,6 @@ def constant_transforms(transforms: Iterable[StampedTransform]) -> list[StampedT
         if known is not transform and pair not in moving:
             before, now = known.pose, transform.pose
             parts = (*before.translation, *before.rotation), (*now.translation, *now.rotation)
-            if not all(abs(a - b) <= DEFAULT_MOUNTING.fixed_tolerance for a, b in zip(*parts, strict=True)):
+            if not all(abs(a - b) <= MountingOptions.fixed_tolerance for a, b in zip(*parts, strict=True)):
                 moving.add(pair)
     return [transform for pair, transform in first.items() if pair not in moving]

@@ -30,9 +30,6 @@ class TurnSegmentOptions:
     longer pauses."""
 
 
-DEFAULT_TURN_SEGMENTS = TurnSegmentOptions()
-
-
 class TimedScan(NamedTuple):
     """A scan and its times."""
 
@@ -44,7 +41,7 @@ class TimedScan(NamedTuple):
 
 
 def joined_turns(
-    messages: Sequence[TimedScan], options: TurnSegmentOptions = DEFAULT_TURN_SEGMENTS
+    messages: Sequence[TimedScan], options: TurnSegmentOptions = TurnSegmentOptions()
 ) -> tuple[list[TimedScan], str]:
     """The scans with the segments of each turn put together, and what is said of it; as they are if none are.
 

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from nscan_cli.files.limits import BEAMS
-from nscan_cli.logs.text.text_log_options import DEFAULT_TEXT_LOGS
+from nscan_cli.logs.text.text_log_options import TextLogOptions
 from nscan_cli.poses import Array, Indices
 
 MAX_RADIANS = 2 * np.pi + 0.01
@@ -49,7 +49,7 @@ def even_bearings(bearings: Array, in_degrees: bool) -> EvenBearings | None:
             continue
         first, step = _fitted_line(places, bearings)
         off = float(np.abs(first + step * places - bearings).max())
-        if step != 0 and off <= rounding + DEFAULT_TEXT_LOGS.max_unevenness * abs(step):
+        if step != 0 and off <= rounding + TextLogOptions.max_unevenness * abs(step):
             hundredths = np.round(np.degrees(np.array([first, step]) * to_radians), 2)
             restored = np.radians(hundredths) / to_radians
             if restored[1] and np.abs(restored[0] + restored[1] * places - bearings).max() <= rounding:
@@ -60,7 +60,7 @@ def even_bearings(bearings: Array, in_degrees: bool) -> EvenBearings | None:
 
 def _rounding(values: Array) -> float:
     """The value of the last decimal that any of the values has."""
-    most = DEFAULT_TEXT_LOGS.max_decimals
+    most = TextLogOptions.max_decimals
     for decimals in range(most):
         scaled = values * 10.0**decimals
         if np.allclose(scaled, np.rint(scaled), rtol=0, atol=1e-6):

@@ -27,7 +27,7 @@ from nscan_cli.logs.text.odometry_records import (
     odometry_of_records,
     odometry_of_scans,
 )
-from nscan_cli.logs.text.text_log_options import DEFAULT_TEXT_LOGS
+from nscan_cli.logs.text.text_log_options import TextLogOptions
 from nscan_cli.poses import Array, relative, wrap
 
 LASERS = ("FLASER", "ROBOTLASER1", "ROBOTLASER0", "RAWLASER1", "RLASER", "ROBOTLASER2", "RAWLASER2",
@@ -165,7 +165,7 @@ def _carmen_mount(
     if scans.robot.shape[1] and not np.array_equal(scans.laser, scans.robot):
         mount = mount_from_poses(scans.laser, scans.robot)
         if given is not None:
-            off, checks = np.abs(relative(mount, given)), DEFAULT_TEXT_LOGS
+            off, checks = np.abs(relative(mount, given)), TextLogOptions()
             if max(off[0], off[1]) > checks.mount_difference or off[2] > checks.mount_turn_difference:
                 warnings.append(
                     f"PARAM mounts the laser at {_pose_text(given)}, the poses at {_pose_text(mount)}: "
@@ -194,7 +194,7 @@ def _param_mount(tag: str, params: Mapping[str, float]) -> Array | None:
         return None
     default = (0.0, 0.0, np.pi if side == "rear" else 0.0)
     values = np.array([params.get(name, value) for name, value in zip(names, default, strict=True)])
-    if not (np.abs(values) < DEFAULT_TEXT_LOGS.max_mount).all():
+    if not (np.abs(values) < TextLogOptions.max_mount).all():
         return None
     values[2] = wrap(values[2])
     return values

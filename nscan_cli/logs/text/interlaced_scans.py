@@ -26,11 +26,8 @@ class InterlacedOptions:
     """Largest difference of equal directions and steps, as a share of the step. A larger value finds more."""
 
 
-DEFAULT_INTERLACED = InterlacedOptions()
-
-
 def between_the_others(
-    beams: Indices, first: Array, step: Array, options: InterlacedOptions = DEFAULT_INTERLACED
+    beams: Indices, first: Array, step: Array, options: InterlacedOptions = InterlacedOptions()
 ) -> Mask:
     """(S,) which scans have their beams between those of the others.
 

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from nscan_cli.logs.assemble import ReaderFindings
-from nscan_cli.logs.heading_unit import DEFAULT_HEADING_UNIT, are_in_degrees
+from nscan_cli.logs.heading_unit import HeadingUnitOptions, are_in_degrees
 from nscan_cli.logs.odometry_interpolation import interpolated_poses
 from nscan_cli.logs.reading_options import ReadingOptions
 from nscan_cli.logs.scan_order import ScanOrder
@@ -27,7 +27,7 @@ def headings_in_radians(
     `columns` (R, 3) are the poses of the robot, as written, which in `rows` (R,) are in order of time, and
     other poses beside them.
     """
-    robot, most = columns[0], DEFAULT_HEADING_UNIT.max_radians
+    robot, most = columns[0], HeadingUnitOptions.max_radians
     if options.as_recorded or not options.odometry or not robot.shape[1] or not are_in_degrees(robot[rows]):
         return
     for poses in columns:

@@ -23,7 +23,7 @@ from nscan_cli.logs.text.odometry_records import (
     odometry_of_scans,
 )
 from nscan_cli.logs.text.player_records import DeviceLines, PlayerScans, Version
-from nscan_cli.logs.text.text_log_options import DEFAULT_TEXT_LOGS
+from nscan_cli.logs.text.text_log_options import TextLogOptions
 from nscan_cli.poses import Array, wrap
 
 BESIDE_DEGREES = HeadingUnitOptions(min_steps=2, min_along=0.0, min_gain=0.0)
@@ -92,7 +92,7 @@ def read(data: bytes, file: str, source: Source, options: ReadingOptions) -> Las
 def _begin_at_zero(scans: PlayerScans) -> bool:
     """Whether the bearings go from 0° to about 180°, as lasers with 90° ahead count them."""
     last = scans.raw.angle_min + scans.raw.angle_increment * (scans.raw.ranges.shape[1] - 1)
-    ends, checks = np.array([scans.raw.angle_min, last]), DEFAULT_TEXT_LOGS
+    ends, checks = np.array([scans.raw.angle_min, last]), TextLogOptions()
     ends_there = abs(ends.max() - checks.last_bearing) < checks.last_bearing_tolerance
     return scans.bearings is not None and bool(ends.min() > checks.first_bearing and ends_there)
 

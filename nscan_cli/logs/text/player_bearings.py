@@ -16,7 +16,7 @@ from nscan_cli.logs.raw_scans import RawScans, empty_scan_table
 from nscan_cli.logs.skips import Skips
 from nscan_cli.logs.text.bearings import EvenBearings, are_degrees, even_bearings
 from nscan_cli.logs.text.line_records import LineRecord, beams_problem, parsed, within_bounds
-from nscan_cli.logs.text.text_log_options import DEFAULT_TEXT_LOGS
+from nscan_cli.logs.text.text_log_options import TextLogOptions
 from nscan_cli.poses import Array
 
 VALUES_PER_BEAM = 3
@@ -92,7 +92,7 @@ def _rows(records: list[LineRecord], skips: Skips) -> list[BearingScan]:
     rows = []
     for record, _, values in parsed(whole, skips):
         bearings = values[1::VALUES_PER_BEAM]
-        if not within_bounds(bearings) or np.abs(bearings).max() > DEFAULT_TEXT_LOGS.max_bearing:
+        if not within_bounds(bearings) or np.abs(bearings).max() > TextLogOptions.max_bearing:
             skips.add("a bearing is out of bounds", record.line)
         else:
             rows.append(BearingScan(record, values[::VALUES_PER_BEAM], bearings))

@@ -33,6 +33,3 @@ class TextLogOptions:
     """Where bearings end that are counted from the side, rad."""
     last_bearing_tolerance: float = math.radians(30.0)
     """Largest distance of the last bearing from `last_bearing`, rad. A larger value warns more."""
-
-
-DEFAULT_TEXT_LOGS = TextLogOptions()

@@ -16,7 +16,7 @@ import numpy as np
 from nscan_cli.graph.optimise.graph_solver import newton_step
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.logs.mask_runs import mask_runs
-from nscan_cli.logs.robot_path import DEFAULT_ROBOT_PATH, RobotPath, poses_at, robot_path
+from nscan_cli.logs.robot_path import RobotPath, RobotPathOptions, poses_at, robot_path
 from nscan_cli.matching.damped_newton import PAIRWISE_STEPS, is_accepted, is_last, next_damping
 from nscan_cli.ndt.hash_grid import WALL_DIRECTION
 from nscan_cli.ndt.transform import Ndt
@@ -67,7 +67,7 @@ def _known_steps(times: Array, breaks: Sequence[int], options: UnevenMotionOptio
     """(S − 1,) whether it is known how the robot came from each scan to the next."""
     seconds = np.diff(times)
     usual = float(np.median(seconds)) if len(seconds) else 0.0
-    longest = min(DEFAULT_ROBOT_PATH.longest_step, options.longest_step * usual)
+    longest = min(RobotPathOptions.longest_step, options.longest_step * usual)
     known: Mask = (seconds > 0.0) & (seconds < longest)
     known[np.array(breaks, dtype=np.int64) - 1] = False
     return known

@@ -54,7 +54,7 @@ def revisit(foreign: dict[int, int] | None = None) -> list[Keyframe]:
 def matched(
     keyframes: list[Keyframe],
     off: Array,
-    options: NScanOptions = NScanOptions(),  # noqa: B008
+    options: NScanOptions = NScanOptions(),
 ) -> LocalMatch:
     """Match the last keyframe when all of the second drive are off the truth by one motion."""
     poses = office_truth()[list(ROWS)]

@@ -45,7 +45,7 @@ NEVER = LoopClosureOptions(min_score=1.1, min_score_far=1.1)
 """No scan fits better than entirely."""
 
 
-def closing(options: LoopClosureOptions = LoopClosureOptions()) -> LoopDetector:  # noqa: B008
+def closing(options: LoopClosureOptions = LoopClosureOptions()) -> LoopDetector:
     return LoopDetector(options, NSCAN, match_neighbours, EnergyCache(ROWS * len(round_drive().keyframes)))
 
 
