@@ -30,6 +30,11 @@ def are_known(poses: ArrayLike) -> Mask:
     return known
 
 
+def path_lengths(poses: Array) -> Array:
+    """The length of the path (m) from the first of the poses (N, 3) to each of them, as (N,)."""
+    return np.append(0.0, np.cumsum(np.hypot(*np.diff(poses[:, :2], axis=0).T)))
+
+
 def transform(pose: ArrayLike, points: ArrayLike) -> Array:
     """Eq. (1): transform points (…, 2) from the pose's frame to the frame that the pose is given in."""
     p, x = np.asarray(pose, dtype=np.float64), np.asarray(points, dtype=np.float64)

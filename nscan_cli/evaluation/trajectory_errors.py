@@ -16,7 +16,7 @@ from nscan_cli.evaluation.options import EvaluationOptions
 from nscan_cli.evaluation.statistics import Spread
 from nscan_cli.evaluation.time_association import mutual_nearest, no_match
 from nscan_cli.graph.io.tum import Trajectory
-from nscan_cli.poses import Array, Indices, compose, relative, wrap
+from nscan_cli.poses import Array, Indices, compose, path_lengths, relative, wrap
 
 
 @dataclass(frozen=True)
@@ -84,7 +84,7 @@ def trajectory_errors(
 
 def _relative_errors(poses: Array, truth: Array, distance: float) -> tuple[Array, Array]:
     """Errors (M,) in m and degrees of the motions over a `distance` (m) of the true path."""
-    path = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(truth[:, :2], axis=0).T))])
+    path = path_lengths(truth)
     # Rounding of the sum of steps must not decide which pose is taken.
     ends = np.searchsorted(path, path + distance - 1e-9)
     starts = np.flatnonzero(ends < len(path))

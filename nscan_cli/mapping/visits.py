@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.mapping.occupancy import OccupancyGrid, occupancy_grid
-from nscan_cli.poses import Array, Indices
+from nscan_cli.poses import Array, Indices, path_lengths
 
 
 class VisitCounts(NamedTuple):
@@ -31,7 +31,7 @@ def visit_counts(
     """
     from scipy import ndimage
 
-    path = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(poses[:, :2], axis=0).T))])
+    path = path_lengths(poses)
     numbers = (path / length).astype(np.int64)
     found = VisitCounts(np.zeros(grid.shape, dtype=np.int32), np.zeros(grid.shape, dtype=np.int32))
     around = np.ones((3, 3), dtype=np.bool_)

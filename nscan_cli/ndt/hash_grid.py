@@ -14,7 +14,7 @@ HALF_KEY = 1 << 30
 """Offset that makes lattice coordinates positive in a packed key."""
 OUTDATED = -1.0
 """Stands for the first number of Σ⁻¹ of a Gaussian that has to be made again. `update_association` makes it.
-Before any other look-up, `Ndt.make` has to make all Gaussians."""
+Before any other look-up, `make_all_gaussians` has to make them."""
 MINIMUM, FLOOR, NEIGHBOURHOOD, FACES = 0, 1, 2, 3
 """Places in `Grid.settings`: the least number of points of a Gaussian, its least standard deviation (m), the
 use of its neighbourhood, and whether walls have two faces (0 or 1); see gaussians.py."""

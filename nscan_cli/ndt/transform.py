@@ -139,10 +139,6 @@ class Ndt:
         self.reserve(len(points))
         self.rows = change_points(self.grid, self.rows, self.half, points, pose, 1.0, True)
 
-    def make(self) -> None:
-        """Make all Gaussians, so that none is outdated."""
-        make_all_gaussians(self.grid, self.rows, self.half)
-
     def reserve(self, points: int) -> None:
         """Get capacity for a number of new points."""
         self.grid, self.rows = with_capacity(self.grid, self.rows, points)

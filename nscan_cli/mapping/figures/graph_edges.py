@@ -8,7 +8,7 @@ from nscan_cli.graph.model import Graph
 from nscan_cli.graph.relations.base import Relation
 from nscan_cli.graph.relations.registry import is_joint
 from nscan_cli.mapping.figures.canvas import GRAY, GREEN, VERMILLION
-from nscan_cli.poses import Indices
+from nscan_cli.poses import Indices, path_lengths
 from nscan_cli.slam.local_matching.options import NScanOptions
 
 EDGE_COLOURS = {"nScan": GREEN, "pairwise": GRAY, "loop": VERMILLION}
@@ -21,7 +21,7 @@ def edges_by_kind(graph: Graph) -> dict[str, Indices]:
     A joint relation joins its fixed scan with each of the others. If it closes a loop, its edges to other
     visits are of the kind loop, or all its edges if none leads to another visit.
     """
-    path = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(graph.poses[:, :2], axis=0).T))])
+    path = path_lengths(graph.poses)
     found: dict[str, set[tuple[int, int]]] = {kind: set() for kind in EDGE_COLOURS}
     for relation in graph.pairwise:
         found["loop" if relation.origin == "loop" else "pairwise"].add(relation.nodes)

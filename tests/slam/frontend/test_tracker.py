@@ -15,6 +15,7 @@ import pytest
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.logs.load import read_log
 from nscan_cli.matching.correlative_search import SearchOptions
+from nscan_cli.ndt.grid_growth import make_all_gaussians
 from nscan_cli.ndt.options import GaussianOptions
 from nscan_cli.ndt.transform import Ndt
 from nscan_cli.poses import Array, compose, relative, transform, wrap
@@ -129,7 +130,7 @@ def test_the_first_scan_is_at_the_origin():
     alone = Ndt.empty(GaussianOptions(0.5, 5, 0.03))
     alone.add(room(1), np.zeros(3))
     # Tracking makes the Gaussians that it meets, and no others.
-    tracker.map.make()
+    make_all_gaussians(tracker.map.grid, tracker.map.rows, tracker.map.half)
     assert_same(tracker.map, alone)
 
 
@@ -160,7 +161,7 @@ def test_the_map_holds_no_more_than_the_scans_of_the_window():
     found, tracker = tracked(log, options)
     assert found[-1].path > 20
     expected = window_map(found, log, options)
-    tracker.map.make()
+    make_all_gaussians(tracker.map.grid, tracker.map.rows, tracker.map.half)
     # 150 scans came and went: what their sums leave behind is rounding.
     assert_same(tracker.map, expected, tolerance=1e-5)
     assert gaussian_count(tracker.map) < 0.7 * gaussian_count(tracked(log)[1].map)

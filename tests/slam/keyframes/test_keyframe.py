@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 
 from nscan_cli.graph.model import Pairwise
 from nscan_cli.ndt.energy import energy
+from nscan_cli.ndt.grid_growth import make_all_gaussians
 from nscan_cli.ndt.hash_grid import WALL_END
 from nscan_cli.ndt.options import GaussianOptions
 from nscan_cli.ndt.transform import Ndt
@@ -92,7 +93,7 @@ def expected(keyframe: Array, *scans: tuple[int, Array]) -> Ndt:
     for seed, pose in scans:
         ndt.add(room(seed), relative(pose, keyframe))
     # What was made before the last scan came does not know all its surroundings.
-    ndt.make()
+    make_all_gaussians(ndt.grid, ndt.rows, ndt.half)
     return ndt
 
 
