@@ -11,6 +11,7 @@ from nscan_cli.poses import (
     Array,
     compose,
     inverse,
+    path_lengths,
     relative,
     relative_jacobians,
     rotated_information,
@@ -79,6 +80,12 @@ def test_eq_2_by_hand():
     frame = np.array([1.0, 2.0, math.pi / 2])
     seen = relative([[1.0, 5.0, math.pi], [0.0, 2.0, 0.0]], frame)
     np.testing.assert_allclose(seen, [[3.0, 0.0, math.pi / 2], [0.0, 1.0, -math.pi / 2]], atol=1e-15)
+
+
+def test_the_path_begins_at_the_first_pose_and_turns_are_no_way():
+    path = np.array([[1.0, 1.0, 0.0], [4.0, 5.0, 0.0], [4.0, 5.0, 3.0], [4.0, 3.0, 3.0]])
+    assert path_lengths(path).tolist() == [0.0, 5.0, 5.0, 7.0]
+    assert path_lengths(path[:1]).tolist() == [0.0]
 
 
 def test_leading_axes_broadcast():

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from nscan_cli.poses import Array, are_known
+from nscan_cli.poses import Array, are_known, path_lengths
 
 
 @dataclass(frozen=True)
@@ -37,8 +37,8 @@ def are_in_degrees(poses: Array, options: HeadingUnitOptions = HeadingUnitOption
     poses = poses[are_known(poses)]
     if len(poses) < 2 or np.abs(poses[:, 2]).max() <= options.max_radians:
         return False
-    way = np.cumsum(np.hypot(*np.diff(poses[:, :2], axis=0).T))
-    ends = np.append(0, np.flatnonzero(np.diff(np.floor(way / options.min_step), prepend=0.0) > 0.0) + 1)
+    pieces = np.floor(path_lengths(poses) / options.min_step)
+    ends = np.append(0, np.flatnonzero(np.diff(pieces) > 0.0) + 1)
     if len(ends) <= options.min_steps:
         return False
     x, y = np.diff(poses[ends, :2], axis=0).T

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from nscan_cli.poses import Array, Mask
+from nscan_cli.poses import Array, Mask, path_lengths
 from nscan_cli.slam.diagnostics.options import DegenerateStretchOptions
 from nscan_cli.slam.frontend.odometry_checks import SHORTEST_PERIOD
 
@@ -42,8 +42,7 @@ def degenerate_stretches(
     rows = np.flatnonzero(weakest_sigmas > options.sigma)
     if not len(rows):
         return []
-    steps = np.append(0.0, np.hypot(*np.diff(poses[:, :2], axis=0).T))
-    along = np.cumsum(steps)
+    along = path_lengths(poses)
     pieces = np.split(rows, np.flatnonzero(np.diff(rows) > options.scans_between + 1) + 1)
     speed, ways = _usual_speed(poses, times, weakest_sigmas <= options.sigma, options), []
     for piece in pieces:
