@@ -10,6 +10,7 @@ from nscan_cli.calibration.held_odometry import checked_held
 from nscan_cli.calibration.mirrored_odometry import with_mirrored_odometry
 from nscan_cli.calibration.odometry_units import checked_units
 from nscan_cli.calibration.options import FileCheckOptions
+from nscan_cli.calibration.range_jumps import checked_ranges
 from nscan_cli.calibration.sweep_check import checked_sweep
 from nscan_cli.calibration.unsigned_odometry import checked_signs
 from nscan_cli.logs.assemble import scaled_odometry
@@ -37,6 +38,7 @@ def checked_file(log: LaserLog, reading: ReadingOptions, options: FileCheckOptio
     log, reading, said = checked_sweep(log, reading, options)
     if reading.as_recorded:
         return CheckedFile(log, reading, said)
+    log, jumps = checked_ranges(log, options)
     recorded = log
     log, units = checked_units(recorded, options.units, options.steps)
     log, held = checked_held(log, options.held, options.steps)
@@ -60,7 +62,7 @@ def checked_file(log: LaserLog, reading: ReadingOptions, options: FileCheckOptio
             if not reversing and "odometry_scale" in finding.corrected:
                 # In another unit the ranges did not change as odometry says.
                 log, reversing = checked_signs(log, options.unsigned, options.steps)
-    said += units + held + reversing + [finding.message for finding in findings]
+    said += jumps + units + held + reversing + [finding.message for finding in findings]
     if any(not finding.corrected for finding in findings):
         # Where the robot has been is in doubt.
         is_elsewhere = any(finding.is_of_mount or finding.is_of_view for finding in findings)

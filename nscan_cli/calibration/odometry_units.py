@@ -30,7 +30,7 @@ def checked_units(
     # A step from one frame to another may be of any length, and a slow robot is not too fast in centimetres.
     usual = [float(np.median(lengths[some])) for some in (moves & ~is_fast, is_fast)]
     is_large = _as_most(lengths > np.sqrt(usual[0] * usual[1]), moves)
-    parts = [_metres_by_scans(log, some, options, steps) for some in (moves & ~is_large, moves & is_large)]
+    parts = [metres_by_scans(log, some, options, steps) for some in (moves & ~is_large, moves & is_large)]
     for name, scale in UNITS:
         if all(
             part is not None and abs(np.log(part / unit)) < options.tolerance
@@ -62,7 +62,7 @@ def _as_most(is_large: Mask, moves: Mask) -> Mask:
     return found
 
 
-def _metres_by_scans(
+def metres_by_scans(
     log: LaserLog, is_so: Mask, options: OdometryUnitOptions, steps: StepOptions
 ) -> float | None:
     """Metres by scans for one metre by odometry, the median over steps that are so (n,); None for too few."""

@@ -85,7 +85,8 @@ FAULTS: tuple[tuple[str, Fault, str], ...] = (
     ("ranges in mm from half-way on", _from_half_way(1000.0), "in millimetres, the others in metres"),
     ("ranges in cm from half-way on", _from_half_way(100.0), "in centimetres, the others in metres"),
     ("ranges in feet from half-way on", _from_half_way(3.281), "all ranges are multiplied"),
-    ("ranges × 1.15 from half-way on", _from_half_way(1.15), "change their scale from scan"),
+    ("ranges × 1.15 from half-way on", _from_half_way(1.15), "times the others"),
+    ("ranges × 1.05 from half-way on", _from_half_way(1.05), "times the others"),
     ("ranges × 0.9", lambda log: faults.ranges_scaled(log, 0.9, slice(None)), "range-scale 1.1"),
     ("readings reversed", faults.mirrored, "in the wrong order"),
     ("readings reversed from half-way on",
@@ -119,7 +120,6 @@ FAULTS: tuple[tuple[str, Fault, str], ...] = (
 """Name, fault, and what tells its cause."""
 KNOWN_CURES = {
     "ranges × 0.9": r"--range-scale \S+",
-    "ranges × 1.15 from half-way on": r"--end [\d.]+",
 }
 """The options that the owner chooses where messages name several causes."""
 FAULTS_OF_REAL_LOGS = (

@@ -65,7 +65,7 @@ LIKELY: dict[str, tuple[Fault, str]] = {
         r"odometry is 1\.1\d? m by.*try --odometry-scale 1\.1\d?; if the ranges,.*--range-scale 0\.9",
     ),
     "another scale from half-way on": (
-        lambda log: faults.ranges_scaled(log, 1.2, slice(len(log) // 2, None)),
+        lambda log: odometry_faults.scaled_in(log, 1 / 1.2, slice(len(log) // 2, None)),
         r"change their scale from scan \d+ to \d+: one metre .* is (1|0\.9\d+|1\.0\d) m by scans before and "
         r"1\.[12]\d? m .* --end [\d.]+, or --start [\d.]+, with --range-scale 0\.8\d+ .*-scale 1\.[12]\d?",
     ),

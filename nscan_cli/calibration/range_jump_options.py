@@ -1,0 +1,34 @@
+"""The parameters of the check of ranges that all change by one factor within a log."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class RangeJumpOptions:
+    """When all ranges change by one factor from one scan to the next."""
+
+    max_beams: int = 48
+    """Approximate number of beams of a scan that are compared, evenly spread. More take longer."""
+    min_beams: int = 20
+    """Least number of beams of two scans that are compared. A larger value compares fewer scans."""
+    min_factor: float = 1.03
+    """Least factor between the ranges of two scans, or its inverse. A larger value finds less, and takes less
+    time."""
+    tolerance: float = math.log(1.02)
+    """Ranges have changed by the usual factor if the logarithm of theirs differs by less than this. A larger
+    value matches more scans."""
+    min_share: float = 0.3
+    """Least share of the beams that have. A smaller value matches more scans."""
+    max_candidates: int = 24
+    """Largest number of places at which scans are matched, those with the largest shares. More take
+    longer."""
+    min_gain: float = 0.2
+    """The energy per point of four pairs of scans, one before the place and one behind, is lower by so much
+    with the factor than without it, and that of two pairs on one side is higher. At 5 % it is lower by 0.3 to
+    2 mostly. A larger value finds less."""
+    refinement: float = math.log(1.01)
+    """The factor is the minimum of a parabola through five energies this far apart, as a logarithm. A larger
+    value finds more, and is less exact."""

@@ -1,0 +1,185 @@
+"""Ranges that all change by one factor from one scan to the next: a driver or a laser that was exchanged.
+
+Odometry predicts each scan from the one before. Where the usual factor between both is not 1, scans before
+and behind are matched at several scales: a wrong step of odometry explains such a factor as well, and then
+the scans match best as they are.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from nscan_cli.calibration.odometry_units import metres_by_scans
+from nscan_cli.calibration.options import FileCheckOptions
+from nscan_cli.calibration.parabola import parabola_minimum
+from nscan_cli.calibration.range_jump_options import RangeJumpOptions
+from nscan_cli.calibration.thinned_scans import thinned_scan
+from nscan_cli.logs.laser_log import LaserLog
+from nscan_cli.logs.mask_runs import mask_runs
+from nscan_cli.logs.stretch_names import stretch_names
+from nscan_cli.matching.scan_pairs import match_scans
+from nscan_cli.poses import Array, Indices, compose, relative
+
+AT_ONCE = 2_048
+"""Scans that are compared at a time, to bound memory."""
+
+
+class RangeJump(NamedTuple):
+    """A scan from which on all ranges are multiplied."""
+
+    row: int
+    factor: float
+
+
+def checked_ranges(log: LaserLog, options: FileCheckOptions) -> tuple[LaserLog, list[str]]:
+    """The log with all of its ranges in one scale, and what is said of it."""
+    jumps = range_jumps(log, options)
+    if not jumps:
+        return log, []
+    scales = _scales(len(log), jumps, options.jumps)
+    scales /= _right_scale(log, scales, options)
+    is_wrong = np.abs(np.log(scales)) > 0.5 * math.log(options.jumps.min_factor)
+    names = stretch_names(log.numbers[[first, end - 1]].tolist() for first, end in mask_runs(is_wrong))
+    factors = sorted({f"{scale:.3g}" for scale in scales[is_wrong].tolist()})
+    other = (log.reading.range_scale or 1.0) * float(scales[is_wrong][0])
+    message = (
+        f"the ranges of scans {names} are {' or '.join(factors)} times the others, as all of them change "
+        "from one scan to the next: they are divided by it; if the others are wrong instead, "
+        f"--range-scale {other:.3g}; --as-recorded uses them as they are"
+    )
+    ranges = log.ranges.copy()
+    ranges[is_wrong] /= scales[is_wrong, None].astype(np.float32)
+    return replace(log, ranges=ranges), [message]
+
+
+def _scales(size: int, jumps: list[RangeJump], options: RangeJumpOptions) -> Array:
+    """(size,) the scales of all scans, that of the first is 1; a scale that comes back is the same again."""
+    scales, known = np.ones(size), [1.0]
+    for jump in jumps:
+        scale = known[-1] * jump.factor
+        known.append(min(known, key=lambda each: abs(math.log(each / scale))))
+        if abs(math.log(known[-1] / scale)) > options.refinement:
+            known[-1] = scale
+        scales[jump.row :] = known[-1]
+    return scales
+
+
+def range_jumps(log: LaserLog, options: FileCheckOptions) -> list[RangeJump]:
+    """The scans from which on all ranges are multiplied, in order."""
+    jumps = options.jumps
+    if len(log) < 4:
+        return []
+    logarithms, shares = _usual_factors(log, jumps)
+    is_odd = (np.abs(logarithms) > math.log(jumps.min_factor)) & (shares >= jumps.min_share)
+    # Two scans before each place and two behind are matched.
+    places = np.flatnonzero(is_odd[1:-1]) + 1
+    best = places[np.argsort(-shares[places], kind="stable")[: jumps.max_candidates]]
+    found = []
+    for place in np.sort(best).tolist():
+        factor = _matched_factor(log, place + 1, float(np.exp(logarithms[place])), options)
+        if factor is not None:
+            found.append(RangeJump(place + 1, factor))
+    return found
+
+
+def _usual_factors(log: LaserLog, options: RangeJumpOptions) -> tuple[Array, Array]:
+    """(S − 1,) the logarithm of the usual factor from each scan to the next, and the share of the beams that
+    have it; nan and 0 for few beams."""
+    logarithms, shares = np.full(len(log) - 1, np.nan), np.zeros(len(log) - 1)
+    for begin in range(0, len(log) - 1, AT_ONCE):
+        first = np.arange(begin, min(begin + AT_ONCE, len(log) - 1))
+        values = _factors(log, first, options)
+        told = np.isfinite(values)
+        count = told.sum(axis=1)
+        enough = np.flatnonzero(count >= options.min_beams)
+        usual = np.nanmedian(values[enough], axis=1)
+        near = np.abs(values[enough] - usual[:, None]) < options.tolerance
+        logarithms[first[enough]], shares[first[enough]] = usual, near.sum(axis=1) / count[enough]
+    return logarithms, shares
+
+
+def _factors(log: LaserLog, first: Indices, options: RangeJumpOptions) -> Array:
+    """(n, B) the logarithms of the ranges of the scans behind rows (n,), divided by those that these scans
+    predict; nan where there is none."""
+    last, width = first + 1, log.ranges.shape[1]
+    beams = np.arange(0, width, max(width // options.max_beams, 1))
+    steps = _laser_steps(log, first, last)[:, :, None]
+    lengths = log.ranges[first[:, None], beams].astype(np.float64)
+    lengths[~np.isfinite(lengths)] = np.nan
+    angles = log.angle_min[first, None] + beams * log.angle_increment[first, None]
+    x, y = lengths * np.cos(angles) - steps[:, 0], lengths * np.sin(angles) - steps[:, 1]
+    between = log.angle_increment[last, None]
+    places = np.round((np.arctan2(y, x) - steps[:, 2] - log.angle_min[last, None]) / between)
+    is_told = np.isfinite(places)
+    at = (np.where(is_told, places, 0.0) % np.round(2 * np.pi / np.abs(between))).astype(np.int64)
+    is_told &= at < width
+    behind = log.ranges[last[:, None], np.where(is_told, at, 0)].astype(np.float64)
+    is_told &= np.isfinite(behind)
+    return np.where(is_told, np.log(np.where(is_told, behind, 1.0) / np.hypot(x, y)), np.nan)
+
+
+def _laser_steps(log: LaserLog, first: Indices, last: Indices) -> Array:
+    """(n, 3) the steps of the laser between rows by odometry; none where there is no odometry."""
+    if log.odometry is None:
+        return np.zeros((len(first), 3))
+    robot = relative(log.odometry[last], log.odometry[first])
+    return np.nan_to_num(relative(compose(robot, log.mount), log.mount))
+
+
+def _matched_factor(log: LaserLog, row: int, factor: float, options: FileCheckOptions) -> float | None:
+    """The factor of the ranges from a row on by matches, near to one; None if scans match better as they
+    are."""
+    near = math.log(factor) + options.jumps.refinement * np.arange(-2.0, 3.0)
+    gain, energies = options.jumps.min_gain, []
+    for first, last in ((row - 1, row), (row - 2, row), (row - 1, row + 1), (row - 2, row + 1)):
+        each = _energies(log, first, last, [1.0, *np.exp(near).tolist()], options)
+        if each is None or each[1:].min() > each[0] - gain:
+            return None
+        energies.append(each)
+    of_all = np.array(energies)
+    total = of_all[:, 1:].sum(axis=0)
+    best = int(np.argmin(total))
+    if best in (0, len(near) - 1) or (of_all[:, 1 + best] > of_all[:, 0] - gain).any():
+        return None
+    # Where scans match better at another scale for other reasons, those of one side do so, too.
+    for first in (row - 2, row):
+        each = _energies(log, first, first + 1, [1.0, factor], options)
+        if each is None or each[0] > each[1] - gain:
+            return None
+    found = parabola_minimum(near, total)
+    return math.exp(found) if abs(found) > math.log(options.jumps.min_factor) else None
+
+
+def _energies(
+    log: LaserLog, first: int, last: int, scales: list[float], options: FileCheckOptions
+) -> Array | None:
+    """(n,) energy per point of two scans, the later one divided by each scale; None for too few points."""
+    before, behind = (thinned_scan(log, row, options.steps) for row in (first, last))
+    if before is None or behind is None:
+        return None
+    start = _laser_steps(log, np.array([first]), np.array([last]))[0]
+    pair = options.steps.pair
+    found = [match_scans(before.points, behind.points / scale, start, pair).energy for scale in scales]
+    return np.array(found) / len(behind.points)
+
+
+def _right_scale(log: LaserLog, scales: Array, options: FileCheckOptions) -> float:
+    """The one of the scales of scans (S,) that is likely right: that of most scans, of equal parts the first.
+
+    If they differ clearly, it is the one with which odometry agrees, if there is one such.
+    """
+    values, first, counts = np.unique(scales, return_index=True, return_counts=True)
+    most = float(values[np.lexsort((first, -counts))[0]])
+    if log.odometry is None or values[-1] < options.clear_scale_factor * values[0]:
+        return most
+    agree = []
+    for value in values.tolist():
+        is_so = (scales[1:] == value) & (scales[:-1] == value)
+        metres = metres_by_scans(log, is_so, options.units, options.steps)
+        if metres is not None and abs(math.log(metres)) < math.log(options.min_scale_factor):
+            agree.append(value)
+    return agree[0] if len(agree) == 1 else most
