@@ -8,7 +8,7 @@ import numpy as np
 
 from nscan_cli.calibration import findings
 from nscan_cli.calibration.findings import Finding
-from nscan_cli.calibration.measured_steps import MeasuredSteps, measure_steps, no_steps
+from nscan_cli.calibration.measured_steps import KnownSteps, MeasuredSteps, measure_steps, no_steps
 from nscan_cli.calibration.mount_fit import MountFit, TurnFit
 from nscan_cli.calibration.odometry_clock import ClockLag, clock_lag
 from nscan_cli.calibration.options import FileCheckOptions
@@ -36,11 +36,17 @@ ONE_AXIS_REVERSED = np.array([-1.0, 1.0, 1.0])
 """Factors of poses: with x and y it is the same, seen from behind; so it is with the sign of headings."""
 
 
-def find_contradictions(log: LaserLog, reading: ReadingOptions, options: FileCheckOptions) -> list[Finding]:
-    """What the scans of a log contradict; empty without odometry, and where the scans tell too little."""
+def find_contradictions(
+    log: LaserLog, reading: ReadingOptions, options: FileCheckOptions, known: KnownSteps | None = None
+) -> list[Finding]:
+    """What the scans of a log contradict; empty without odometry, and where the scans tell too little.
+
+    `known` are the steps that its scans have measured already; others are added.
+    """
+    known = {} if known is None else known
     if log.odometry is None:
         return []
-    evidence = _evidence(log, log.odometry, options)
+    evidence = _evidence(log, log.odometry, options, known)
     if evidence is None or evidence.moving < options.min_steps:
         return []
     is_still = _is_still(log.odometry, options.still)
@@ -73,7 +79,9 @@ def find_contradictions(log: LaserLog, reading: ReadingOptions, options: FileChe
     return found + _of_positions(log.mount, fit, evidence, reading, options)
 
 
-def _evidence(log: LaserLog, odometry: Array, options: FileCheckOptions) -> StepEvidence | None:
+def _evidence(
+    log: LaserLog, odometry: Array, options: FileCheckOptions, known: KnownSteps
+) -> StepEvidence | None:
     """The steps of a sample, which is larger where scans tell few of them, as outdoors.
 
     None if a part of it clearly agrees with the file already: the rest is not measured.
@@ -84,7 +92,8 @@ def _evidence(log: LaserLog, odometry: Array, options: FileCheckOptions) -> Step
         first, last = telling_steps(log, options.steps, count)
         for part in range(options.parts):
             some = slice(part, None, options.parts)
-            steps = steps.with_others(measure_steps(log, (first[some], last[some]), options.steps))
+            part_of_all = measure_steps(log, (first[some], last[some]), options.steps, known=known)
+            steps = steps.with_others(part_of_all)
             evidence = StepEvidence(odometry, steps, options)
             if agrees_clearly(evidence, log.mount, options):
                 return None
@@ -92,7 +101,8 @@ def _evidence(log: LaserLog, odometry: Array, options: FileCheckOptions) -> Step
             break
         count = min(2 * count, most)
     if count < options.more_steps and _is_in_doubt(evidence, log.mount, options):
-        steps = measure_steps(log, telling_steps(log, options.steps, options.more_steps), options.steps)
+        rows = telling_steps(log, options.steps, options.more_steps)
+        steps = measure_steps(log, rows, options.steps, known=known)
         return StepEvidence(odometry, steps, options)
     return evidence
 

@@ -7,9 +7,11 @@ from dataclasses import dataclass, replace
 from nscan_cli.calibration.companions import checked_companion
 from nscan_cli.calibration.contradictions import find_contradictions
 from nscan_cli.calibration.held_odometry import checked_held
+from nscan_cli.calibration.measured_steps import KnownSteps
 from nscan_cli.calibration.mirrored_odometry import with_mirrored_odometry
 from nscan_cli.calibration.odometry_units import checked_units
 from nscan_cli.calibration.options import FileCheckOptions
+from nscan_cli.calibration.order_jumps import checked_order
 from nscan_cli.calibration.range_jumps import checked_ranges
 from nscan_cli.calibration.sweep_check import checked_sweep
 from nscan_cli.calibration.unsigned_odometry import checked_signs
@@ -38,15 +40,17 @@ def checked_file(log: LaserLog, reading: ReadingOptions, options: FileCheckOptio
     log, reading, said = checked_sweep(log, reading, options)
     if reading.as_recorded:
         return CheckedFile(log, reading, said)
+    log, order = checked_order(log, options)
     log, jumps = checked_ranges(log, options)
     recorded = log
     log, units = checked_units(recorded, options.units, options.steps)
     log, held = checked_held(log, options.held, options.steps)
     signed, reversing = checked_signs(log, options.unsigned, options.steps)
-    findings = find_contradictions(signed, reading, options)
+    known: KnownSteps = {}
+    findings = find_contradictions(signed, reading, options, known)
     if reversing:
-        # A laser that is turned within the log sees the robot go elsewhere, too.
-        turned = [one for one in find_contradictions(log, reading, options) if one.is_of_view]
+        # A laser that is turned within the log sees the robot go elsewhere, too. The steps by scans stay.
+        turned = [one for one in find_contradictions(log, reading, options, known) if one.is_of_view]
         findings, signed, reversing = (turned, log, []) if turned else (findings, signed, reversing)
     if any(finding.is_mirror_image for finding in findings):
         # The ranges changed as its mirror image says.
@@ -62,7 +66,7 @@ def checked_file(log: LaserLog, reading: ReadingOptions, options: FileCheckOptio
             if not reversing and "odometry_scale" in finding.corrected:
                 # In another unit the ranges did not change as odometry says.
                 log, reversing = checked_signs(log, options.unsigned, options.steps)
-    said += jumps + units + held + reversing + [finding.message for finding in findings]
+    said += order + jumps + units + held + reversing + [finding.message for finding in findings]
     if any(not finding.corrected for finding in findings):
         # Where the robot has been is in doubt.
         is_elsewhere = any(finding.is_of_mount or finding.is_of_view for finding in findings)

@@ -14,6 +14,9 @@ from nscan_cli.matching.scan_pairs import match_scans
 from nscan_cli.matching.uncertainty import covariance_of, why_no_minimum
 from nscan_cli.poses import Array, Indices, relative
 
+KnownSteps = dict[tuple[int, int], tuple[Array, Array] | None]
+"""The pose (3,) and its covariance (3, 3) of steps from a row to another; None of those in doubt."""
+
 
 @dataclass(frozen=True)
 class MeasuredSteps:
@@ -57,20 +60,27 @@ def measure_steps(
     rows: tuple[Indices, Indices],
     options: StepOptions,
     corrected: Callable[[int], Array | None] | None = None,
+    known: KnownSteps | None = None,
 ) -> MeasuredSteps:
     """Measure the steps from the first rows (n,) to the last (n,); those in doubt are left out.
 
     Every step is matched without odometry, so that the result is independent of it. `corrected` gives the
     points (m, 2) of a row in the laser's frame if the laser turns; None: as if it saw all beams at once.
+    Those in `known` are taken from there, and others are added to it.
     """
     found: list[tuple[int, int, Array, Array]] = []
     first, last = rows
     for begin, end in zip(first.tolist(), last.tolist(), strict=True):
-        before, after = (
-            _thinned_points(log, row, options) if corrected is None else corrected(row)
-            for row in (begin, end)
-        )
-        measured = _measured(before, after, options)
+        if known is not None and (begin, end) in known:
+            measured = known[begin, end]
+        else:
+            before, after = (
+                _thinned_points(log, row, options) if corrected is None else corrected(row)
+                for row in (begin, end)
+            )
+            measured = _measured(before, after, options)
+            if known is not None:
+                known[begin, end] = measured
         if measured is not None:
             found.append((begin, end, *measured))
     ends = np.array([(begin, end) for begin, end, *_ in found], dtype=np.int64).reshape(-1, 2)

@@ -34,6 +34,9 @@ class ScaleChangeOptions:
 
     min_length: float = 0.05
     """Least length of a step, m. With a larger value fewer steps count, and each tells more."""
+    max_sigma: float = 0.15
+    """Largest standard deviation of such a length, as a share of it. A larger value lets more steps count,
+    also those along bare walls."""
     min_steps: int = 8
     """Least number of steps before a change, and behind. A larger value finds fewer changes."""
     min_factor: float = 1.09

@@ -1,4 +1,4 @@
-"""The parameters of the check of ranges that all change by one factor within a log."""
+"""The parameters of the checks of scans that change from one to the next: of their scale, and their order."""
 
 from __future__ import annotations
 
@@ -32,3 +32,20 @@ class RangeJumpOptions:
     refinement: float = math.log(1.01)
     """The factor is the minimum of a parabola through five energies this far apart, as a logarithm. A larger
     value finds more, and is less exact."""
+
+
+@dataclass(frozen=True)
+class OrderJumpOptions:
+    """When the readings come in the other order from a scan on."""
+
+    tolerance: float = 0.05
+    """A beam agrees with a prediction if the logarithm of their ratio is less than this. A larger value
+    matches other scans."""
+    min_share_gain: float = 0.1
+    """Scans are matched where so many more of the beams agree in the other order, as a share. A smaller value
+    matches more scans."""
+    max_candidates: int = 24
+    """Largest number of places at which scans are matched, those with the largest gains. More take longer."""
+    min_gain: float = 0.3
+    """The energy per point of four pairs of scans, one before the place and one behind, is lower by so much
+    if one is mirrored, and that of two pairs on one side is higher. A larger value finds less."""

@@ -24,7 +24,7 @@ from nscan_cli.logs.stretch_names import stretch_names
 from nscan_cli.matching.scan_pairs import match_scans
 from nscan_cli.poses import Array, Indices, compose, relative
 
-AT_ONCE = 2_048
+SCANS_COMPARED_AT_ONCE = 2_048
 """Scans that are compared at a time, to bound memory."""
 
 
@@ -90,9 +90,9 @@ def _usual_factors(log: LaserLog, options: RangeJumpOptions) -> tuple[Array, Arr
     """(S − 1,) the logarithm of the usual factor from each scan to the next, and the share of the beams that
     have it; nan and 0 for few beams."""
     logarithms, shares = np.full(len(log) - 1, np.nan), np.zeros(len(log) - 1)
-    for begin in range(0, len(log) - 1, AT_ONCE):
-        first = np.arange(begin, min(begin + AT_ONCE, len(log) - 1))
-        values = _factors(log, first, options)
+    for begin in range(0, len(log) - 1, SCANS_COMPARED_AT_ONCE):
+        first = np.arange(begin, min(begin + SCANS_COMPARED_AT_ONCE, len(log) - 1))
+        values = range_factors(log, first, options)
         told = np.isfinite(values)
         count = told.sum(axis=1)
         enough = np.flatnonzero(count >= options.min_beams)
@@ -102,18 +102,21 @@ def _usual_factors(log: LaserLog, options: RangeJumpOptions) -> tuple[Array, Arr
     return logarithms, shares
 
 
-def _factors(log: LaserLog, first: Indices, options: RangeJumpOptions) -> Array:
+def range_factors(log: LaserLog, first: Indices, options: RangeJumpOptions, mirrored: bool = False) -> Array:
     """(n, B) the logarithms of the ranges of the scans behind rows (n,), divided by those that these scans
-    predict; nan where there is none."""
+    predict; nan where there is none. `mirrored`: as if the later scans were mirror images."""
     last, width = first + 1, log.ranges.shape[1]
     beams = np.arange(0, width, max(width // options.max_beams, 1))
-    steps = _laser_steps(log, first, last)[:, :, None]
+    steps = laser_steps(log, first, last)[:, :, None]
     lengths = log.ranges[first[:, None], beams].astype(np.float64)
     lengths[~np.isfinite(lengths)] = np.nan
     angles = log.angle_min[first, None] + beams * log.angle_increment[first, None]
     x, y = lengths * np.cos(angles) - steps[:, 0], lengths * np.sin(angles) - steps[:, 1]
     between = log.angle_increment[last, None]
-    places = np.round((np.arctan2(y, x) - steps[:, 2] - log.angle_min[last, None]) / between)
+    directions = np.arctan2(y, x) - steps[:, 2]
+    if mirrored:
+        directions = -directions
+    places = np.round((directions - log.angle_min[last, None]) / between)
     is_told = np.isfinite(places)
     at = (np.where(is_told, places, 0.0) % np.round(2 * np.pi / np.abs(between))).astype(np.int64)
     is_told &= at < width
@@ -122,7 +125,7 @@ def _factors(log: LaserLog, first: Indices, options: RangeJumpOptions) -> Array:
     return np.where(is_told, np.log(np.where(is_told, behind, 1.0) / np.hypot(x, y)), np.nan)
 
 
-def _laser_steps(log: LaserLog, first: Indices, last: Indices) -> Array:
+def laser_steps(log: LaserLog, first: Indices, last: Indices) -> Array:
     """(n, 3) the steps of the laser between rows by odometry; none where there is no odometry."""
     if log.odometry is None:
         return np.zeros((len(first), 3))
@@ -136,6 +139,10 @@ def _matched_factor(log: LaserLog, row: int, factor: float, options: FileCheckOp
     near = math.log(factor) + options.jumps.refinement * np.arange(-2.0, 3.0)
     gain, energies = options.jumps.min_gain, []
     for first, last in ((row - 1, row), (row - 2, row), (row - 1, row + 1), (row - 2, row + 1)):
+        # Two scales tell nearly always that nothing changes.
+        some = _energies(log, first, last, [1.0, factor], options)
+        if some is None or some[1] > some[0]:
+            return None
         each = _energies(log, first, last, [1.0, *np.exp(near).tolist()], options)
         if each is None or each[1:].min() > each[0] - gain:
             return None
@@ -161,7 +168,7 @@ def _energies(
     before, behind = (thinned_scan(log, row, options.steps) for row in (first, last))
     if before is None or behind is None:
         return None
-    start = _laser_steps(log, np.array([first]), np.array([last]))[0]
+    start = laser_steps(log, np.array([first]), np.array([last]))[0]
     pair = options.steps.pair
     found = [match_scans(before.points, behind.points / scale, start, pair).energy for scale in scales]
     return np.array(found) / len(behind.points)

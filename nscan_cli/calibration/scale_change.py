@@ -33,15 +33,19 @@ class ScaleChange(NamedTuple):
 
 
 def scale_change(
-    laser: Array, odometry: Array, fit: MountFit, options: ScaleChangeOptions
+    laser: Array, odometry: Array, sigmas: Array, fit: MountFit, options: ScaleChangeOptions
 ) -> ScaleChange | None:
     """The clearest change along steps (n, 3) of laser and robot, in order; None for too few steps.
+
+    `sigmas` (n,) are the standard deviations of the lengths by scans, m.
 
     It is where two medians explain the logarithms of scales with the least absolute residuals.
     `fit` is the mounting that explains the steps.
     """
     by_scans, by_odometry = robot_lengths(laser, fit.mount), np.hypot(odometry[:, 0], odometry[:, 1])
-    told: Indices = np.flatnonzero((by_scans >= options.min_length) & (by_odometry > 0.0))
+    # Along bare walls scans tell hardly any length, and too short ones.
+    is_told = (by_scans >= options.min_length) & (sigmas <= options.max_sigma * by_scans)
+    told: Indices = np.flatnonzero(is_told & (by_odometry > 0.0))
     values = np.log(by_scans[told] / by_odometry[told])
     places = range(options.min_steps, len(told) - options.min_steps + 1)
     if not places:

@@ -85,7 +85,8 @@ class StepEvidence:
         """The clearest change of scale along the steps."""
         if self.fit is None:
             return None
-        return scale_change(self.laser, self.odometry, self.fit, self.options.change)
+        sigmas = _length_sigmas(self.laser, self.steps.covariances[self._known])
+        return scale_change(self.laser, self.odometry, sigmas, self.fit, self.options.change)
 
     def turn_change(self, least: int) -> TurnChange | None:
         """The clearest change of the signs of turns, with at least so many turns before and behind."""
@@ -120,6 +121,14 @@ class StepEvidence:
     def _fit(self, laser: Array, odometry: Array) -> MountFit | None:
         moving = self._is_moving
         return fit_mount(laser[moving], odometry[moving], self.options.steps.metres_per_radian)
+
+
+def _length_sigmas(laser: Array, covariances: Array) -> Array:
+    """(n,) standard deviations of the lengths of steps (n, 3) with covariances (n, 3, 3), m."""
+    lengths = np.hypot(laser[:, 0], laser[:, 1])
+    along = laser[:, :2] / np.maximum(lengths, np.finfo(float).tiny)[:, None]
+    sigmas: Array = np.sqrt(np.einsum("ni,nij,nj->n", along, covariances[:, :2, :2], along))
+    return sigmas
 
 
 def explains(fit: MountFit | None, options: FileCheckOptions) -> bool:

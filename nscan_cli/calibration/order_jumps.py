@@ -1,0 +1,112 @@
+"""Readings that come in the other order from a scan on: scans before and behind show it, with no turn at all.
+
+A scan that is read in the wrong order is the mirror image of what it would be. Beside the place scans match
+mirror images of each other better than themselves.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from nscan_cli.calibration.measured_steps import measure_steps
+from nscan_cli.calibration.options import FileCheckOptions
+from nscan_cli.calibration.range_jumps import SCANS_COMPARED_AT_ONCE, laser_steps, range_factors
+from nscan_cli.calibration.step_sampling import telling_steps
+from nscan_cli.calibration.thinned_scans import thinned_scan
+from nscan_cli.logs.laser_log import LaserLog
+from nscan_cli.logs.mask_runs import mask_runs
+from nscan_cli.logs.stretch_names import stretch_names
+from nscan_cli.matching.scan_pairs import match_scans
+from nscan_cli.poses import Array, Mask
+
+
+def checked_order(log: LaserLog, options: FileCheckOptions) -> tuple[LaserLog, list[str]]:
+    """The log with all of its readings in one order, and what is said of it.
+
+    That is the order with which odometry turns as the scans do; without it, that of most scans.
+    """
+    rows = order_jumps(log, options)
+    if not rows:
+        return log, []
+    is_other: Mask = np.zeros(len(log), dtype=np.bool_)
+    for row in rows:
+        is_other[row:] = ~is_other[row:]
+    votes = _turn_votes(log, is_other, options) or len(log) - 2 * np.count_nonzero(is_other)
+    if votes < 0:
+        is_other = ~is_other
+    names = stretch_names(log.numbers[[first, end - 1]].tolist() for first, end in mask_runs(is_other))
+    message = (
+        f"the readings of scans {names} come in the other order than those of the others, whose "
+        "mirror images they match: they are read in the order of the others; --as-recorded reads them as "
+        "they are"
+    )
+    first, between = log.angle_min.copy(), log.angle_increment.copy()
+    first[is_other] *= -1.0
+    between[is_other] *= -1.0
+    return replace(log, angle_min=first, angle_increment=between), [message]
+
+
+def _turn_votes(log: LaserLog, is_other: Mask, options: FileCheckOptions) -> int:
+    """How many more turns by odometry agree with the scans if the scans in `is_other` (S,) are mirrored than
+    if the others are; 0 without odometry."""
+    if log.odometry is None:
+        return 0
+    found = measure_steps(log, telling_steps(log, options.steps), options.steps)
+    laser, odometry = found.laser[:, 2], found.odometry(log.odometry)[:, 2]
+    told = (np.abs(laser) >= options.view.min_turn) & (is_other[found.first] == is_other[found.last])
+    agree = np.sign(laser * np.nan_to_num(odometry)) * np.where(is_other[found.first], -1.0, 1.0)
+    return int(agree[told].sum())
+
+
+def order_jumps(log: LaserLog, options: FileCheckOptions) -> list[int]:
+    """The rows from which on the readings come in the other order than before."""
+    if len(log) < 4:
+        return []
+    order = options.order
+    gains = _gains(log, options)
+    # Two scans before each place and two behind are matched.
+    places = np.flatnonzero(gains[1:-1] >= order.min_share_gain) + 1
+    best = places[np.argsort(-gains[places], kind="stable")[: order.max_candidates]]
+    return [row for row in (np.sort(best) + 1).tolist() if _changes_at(log, row, options)]
+
+
+def _gains(log: LaserLog, options: FileCheckOptions) -> Array:
+    """(S − 1,) by how much more of the beams of a scan, read in the other order, agree with what the scan
+    before predicts, than as they are; as a share of all that are compared."""
+    gains = np.zeros(len(log) - 1)
+    for begin in range(0, len(log) - 1, SCANS_COMPARED_AT_ONCE):
+        first = np.arange(begin, min(begin + SCANS_COMPARED_AT_ONCE, len(log) - 1))
+        shares = []
+        for is_reversed in (False, True):
+            values = range_factors(log, first, options.jumps, is_reversed)
+            count = np.maximum(np.isfinite(values).sum(axis=1), options.jumps.min_beams)
+            shares.append((np.abs(values) < options.order.tolerance).sum(axis=1) / count)
+        gains[first] = shares[1] - shares[0]
+    return gains
+
+
+def _changes_at(log: LaserLog, row: int, options: FileCheckOptions) -> bool:
+    """Whether scans before a row match the mirror images of those behind, and those of one side do not."""
+    gain = options.order.min_gain
+    across = ((row - 1, row), (row - 2, row), (row - 1, row + 1), (row - 2, row + 1))
+    return all(_mirror_gain(log, *rows, options) > gain for rows in across) and all(
+        _mirror_gain(log, first, first + 1, options) < -gain for first in (row - 2, row)
+    )
+
+
+def _mirror_gain(log: LaserLog, first: int, last: int, options: FileCheckOptions) -> float:
+    """By how much the energy per point of two scans is lower with the later one mirrored; 0 for few."""
+    before, behind = (thinned_scan(log, row, options.steps) for row in (first, last))
+    if before is None or behind is None:
+        return 0.0
+    start = laser_steps(log, np.array([first]), np.array([last]))[0]
+    mirrored = behind.points * (1.0, -1.0)
+    # Odometry itself may turn the wrong way.
+    starts = (start, np.zeros(3))
+    energies = [
+        min(match_scans(before.points, points, each, options.steps.pair).energy for each in starts)
+        for points in (behind.points, mirrored)
+    ]
+    return (energies[0] - energies[1]) / len(behind.points)

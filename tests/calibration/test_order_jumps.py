@@ -1,0 +1,69 @@
+"""Readings that come in the other order from a scan on are put into one, and it is said."""
+
+from __future__ import annotations
+
+import functools
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from nscan_cli.calibration.options import FileCheckOptions
+from nscan_cli.calibration.order_jumps import checked_order, order_jumps
+from nscan_cli.logs.laser_log import LaserLog
+from nscan_cli.logs.load import read_log
+from tests.data import data_file
+from tests.simulation import faults, odometry_faults
+from tests.slam.keyframe_drives import round_scene
+
+OPTIONS = FileCheckOptions()
+
+
+@functools.cache
+def drive() -> LaserLog:
+    return round_scene().record(5).log()
+
+
+@pytest.mark.parametrize("share", [0.25, 0.5, 0.8])
+def test_the_wrong_part_is_read_in_the_order_of_the_others(share):
+    """Odometry tells which part is wrong, however long it is."""
+    log = drive()
+    at = int(share * len(log))
+    right, said = checked_order(faults.mirrored_in(log, slice(at, None)), OPTIONS)
+    assert len(said) == 1
+    assert said[0].startswith(f"the readings of scans {at} to {len(log) - 1} come in the other order")
+    for scan in (0, at - 1, at, len(log) - 1):
+        off = right.points(scan)[:, None] - log.points(scan)[None]
+        assert np.hypot(*off.T).min(axis=0).max() < 1e-6
+
+
+def test_without_odometry_the_shorter_part_is_read_otherwise():
+    log = replace(drive(), odometry=None)
+    at = len(log) // 4
+    _, said = checked_order(faults.mirrored_in(log, slice(at, None)), OPTIONS)
+    assert said[0].startswith(f"the readings of scans 0 to {at - 1} come in the other order")
+
+
+def test_there_and_back_again():
+    log = drive()
+    at = len(log) // 3
+    _, said = checked_order(faults.mirrored_in(log, slice(at, 2 * at)), OPTIONS)
+    assert said[0].startswith(f"the readings of scans {at} to {2 * at - 1} come in the other order")
+
+
+def test_what_is_wrong_all_along_or_with_odometry_is_no_change():
+    for log in (faults.mirrored(drive()), odometry_faults.turning(drive(), -1.0), drive()):
+        assert checked_order(log, OPTIONS)[1] == []
+
+
+@pytest.mark.parametrize("name", ["intel", "fr079", "mit-csail", "mit-killian", "fr-campus", "fr-clinic"])
+def test_no_real_log_changes(name):
+    log = read_log(str(data_file(f"{name}.log.gz")))
+    assert order_jumps(log, OPTIONS) == []
+
+
+@pytest.mark.parametrize("name", ["intel", "fr079", "mit-csail"])
+def test_it_is_found_in_a_real_log(name):
+    log = read_log(str(data_file(f"{name}.log.gz")))
+    at = 4 * len(log) // 5
+    assert order_jumps(faults.mirrored_in(log, slice(at, None)), OPTIONS) == [at]
