@@ -66,5 +66,5 @@ def test_without_odometry_the_scans_tell_where_the_robot_is_between_two_turns_of
     at_once, swept, uncorrected = found
     assert swept[0] <= 2 * at_once[0]
     assert uncorrected[0] > 2 * swept[0]
-    assert swept[1] <= max(at_once[1], 0.4)
+    assert swept[1] <= max(2 * at_once[1], 0.4)
     assert uncorrected[1] > 20 * swept[1]

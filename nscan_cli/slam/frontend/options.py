@@ -122,9 +122,10 @@ class TrackingOptions:
     gaussians: GaussianOptions = field(default_factory=lambda: GaussianOptions(floor=0.03))
     max_range: float = 40.0
     """Longest beam that is matched, m. A larger value sees more and takes longer."""
-    point_spacing: float = 0.03
-    """Least distance between neighbouring points of a scan, m. A larger one is faster, and blurs small
-    things; with none a wall beside the robot outweighs all the rest."""
+    point_spacing: float = 0.04
+    """Distance between neighbouring points of a scan that are matched, m; some are left out where they are
+    closer. A larger one is faster, and blurs small things; with none a wall beside the robot outweighs all
+    the rest."""
     scan: ScanTrackingOptions = field(default_factory=ScanTrackingOptions)
     """How each scan is matched with the local map, and joins it."""
     widenings: tuple[float, ...] = (0.05, 0.3, 1.0)
@@ -140,8 +141,8 @@ class TrackingOptions:
     """Length of the path among whose scans a lost scan is searched, m. A larger value takes longer."""
     velocity_scans: int = 5
     """Number of steps whose mean is the velocity. More even out jitter of stamps, and follow turns later."""
-    standstill_share: float = 0.5
-    """Without odometry, scans that tell little are tracked from behind, too, if the robot goes less far there
+    standstill_share: float = 0.9
+    """Without odometry, scans that tell little are tracked from behind, too, where the robot goes less far
     than this share of its way at the highest speed after them. A larger share takes more time."""
     standstill_lag: float = 0.2
     """Least length of the missing way for this, m. A larger value keeps more scans as they are."""
@@ -149,8 +150,8 @@ class TrackingOptions:
     """From behind these scans must have a share of inliers that is larger by this. A larger value keeps more
     scans as they are."""
     standstill_scans: int = 1024
-    """Most first scans of a log that wait for one that tells its place. A larger number takes more time and
-    memory where a log begins in a bare corridor."""
+    """Most scans without odometry that wait for one that tells its place. A larger number takes more time and
+    memory in bare corridors."""
     range_limit_outliers: float = 0.001
     """Share of ranges that may exceed the range limit, as echoes. A larger one gives a shorter limit."""
     range_limit_share: float = 0.01

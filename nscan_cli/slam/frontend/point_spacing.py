@@ -8,24 +8,35 @@ with odometry.
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from nscan_cli.kernels.decorators import kernel
 from nscan_cli.poses import Array, Indices, Mask
 
+NEIGHBOURS = 4
+"""Points on each side of a point between which the distance to the next one is measured."""
+
 
 @kernel
 def spaced_points(points: Array, ends: Indices, spacing: float) -> Mask:
-    """(P,) which points (P, 2) are at least `spacing` (m) from the last one kept of their scan, in the order
-    of the beams. Scan k has points[ends[k] : ends[k + 1]]."""
+    """(P,) which points (P, 2) are kept, so that those kept are about `spacing` (m) apart along their scan.
+
+    Scan k has points[ends[k] : ends[k + 1]], in the order of the beams. The distance from a point to the next
+    one is measured between its neighbours on both sides. Its own noise must not decide whether it is kept. If
+    the first point that is far enough from the last one were kept, points ahead would lie too far on, and a
+    straight corridor would be mapped as a bend.
+    """
     kept = np.zeros(points.shape[0], dtype=np.bool_)
     for k in range(ends.shape[0] - 1):
-        last = -1
-        for i in range(ends[k], ends[k + 1]):
-            if last >= 0:
-                x, y = points[i, 0] - points[last, 0], points[i, 1] - points[last, 1]
-                if x * x + y * y < spacing * spacing:
-                    continue
-            kept[i] = True
-            last = i
+        first, last, way = ends[k], ends[k + 1] - 1, 0.5
+        for i in range(first, last + 1):
+            low, high = max(first, i - NEIGHBOURS), min(last, i + NEIGHBOURS)
+            x, y = points[high, 0] - points[low, 0], points[high, 1] - points[low, 1]
+            reached = spacing * (high - low)
+            way += 1.0 if x * x + y * y >= reached * reached else math.sqrt(x * x + y * y) / reached
+            if way >= 1.0:
+                way -= 1.0
+                kept[i] = True
     return kept
