@@ -36,8 +36,9 @@ def motion_from_behind(
     It is known in stretches where the robot, as it was `found`, seems to stand, and where scans from behind
     fit clearly better, with a longer way. None without such stretches. The scans stay as they are.
     """
-    doubtful = doubtful_stretches(found, options)
-    stretches = [each for each in doubtful if _seems_to_stand(found.poses, *each, options)]
+    doubtful, count = _doubtful_stretches(found, options), len(found.values)
+    parts = [_standing_part(found.poses, each, range(each[1] + 1, count), options) for each in doubtful]
+    stretches = [part for part in parts if part is not None]
     if not stretches:
         return None
     # Where scans tell the motion, it leads from behind, too.
@@ -60,26 +61,55 @@ def motion_from_behind(
     return motion if np.isfinite(motion.poses).any() else None
 
 
-def doubtful_stretches(found: TrackedScans, options: TrackingOptions) -> list[tuple[int, int]]:
-    """The stretches (first, end) without `velocity_scans` in a row that fit and tell their place."""
+def count_before_doubt(found: TrackedScans, options: TrackingOptions, is_start: bool) -> int:
+    """The number of scans before a stretch at the end that later scans may tell more of; else that of all.
+
+    Too few scans after it tell how fast the robot goes. It does not tell its place, and the robot seems to
+    stand, or it is the start of a track.
+    """
+    *_, (first, end) = _doubtful_stretches(found, options) or [(0, 0)]
+    count = len(found.values)
+    if first == end or count - end > options.velocity_scans:
+        return count
+    stands = _standing_part(found.poses, (first, end), range(1, first), options) is not None
+    return first if stands or (is_start and first == 0) else count
+
+
+def _doubtful_stretches(found: TrackedScans, options: TrackingOptions) -> list[tuple[int, int]]:
+    """The stretches (first, end) without `velocity_scans` in a row that fit and tell their place.
+
+    Two are one if the robot seems to stand between them: a ripple may hold it there, too.
+    """
     tells = found.inliers >= options.scan.restart_inliers
     tells &= found.weakest_sigmas <= options.scan.degeneracy.trusted_sigma
     for first, end in mask_runs(tells):
-        if end - first < options.velocity_scans:
+        stands = first > 0 and end < len(tells) and _way(found.poses, first, end) <= options.standstill_lag
+        if stands or end - first < options.velocity_scans:
             tells[first:end] = False
     return mask_runs(~tells)
 
 
-def _seems_to_stand(poses: Array, first: int, end: int, options: TrackingOptions) -> bool:
-    """Whether in a stretch the robot falls far behind where it had come at the highest speed after it.
+def _standing_part(
+    poses: Array, stretch: tuple[int, int], others: range, options: TrackingOptions
+) -> tuple[int, int] | None:
+    """The part (first, end) of a stretch in which the robot falls far behind its highest speed in `others`.
 
     A stretch of all scans may be one of a short log, with the highest speed in it.
     """
-    run = options.velocity_scans
-    starts = range(1 if (first, end) == (0, len(poses)) else end + 1, len(poses) - run + 1)
+    first, end = stretch
+    run, others = options.velocity_scans, range(1, len(poses)) if end - first == len(poses) else others
+    starts = range(others.start, others.stop - run + 1)
     fastest = max((_way(poses, at, at + run) / run for at in starts), default=0.0)
-    expected, way = fastest * (end - first), _way(poses, first, end)
-    return way < options.standstill_share * expected and expected - way > options.standstill_lag
+    begins, lag, most, part = first, 0.0, 0.0, None
+    for k in range(first, end):
+        if lag <= 0.0:
+            begins, lag = k, 0.0
+        lag += options.standstill_share * fastest - _way(poses, k, k + 1)
+        if lag > most:
+            most, part = lag, (begins, k + 1)
+    if part is None or fastest * (part[1] - part[0]) - _way(poses, *part) <= options.standstill_lag:
+        return None
+    return part
 
 
 def _way(poses: Array, first: int, end: int) -> float:

@@ -22,7 +22,7 @@ from nscan_cli.slam.frontend.break_detection import (
     sees_the_same,
 )
 from nscan_cli.slam.frontend.first_scan import place_first
-from nscan_cli.slam.frontend.motion_from_behind import doubtful_stretches, motion_from_behind
+from nscan_cli.slam.frontend.motion_from_behind import count_before_doubt, motion_from_behind
 from nscan_cli.slam.frontend.options import BreakOptions, LaserView, TrackingOptions
 from nscan_cli.slam.frontend.scan_batch import ScanBatch
 from nscan_cli.slam.frontend.sector_of_view import laser_view
@@ -132,14 +132,19 @@ class SegmentTracker:
     def _track_both_ways(self, scans: ScanBatch, may_wait: bool) -> tuple[ScanBatch, TrackedScans]:
         """Track scans without odometry, guided by their track from behind where they fit better so.
 
-        The first scans of a log may wait until some tell their place. Returns the scans as corrected.
+        Scans that do not tell their place wait for ones that do: from behind, these tell it. Returns the
+        scans as corrected.
         """
         fresh, before = scans.copied(), copy.deepcopy(self.tracker)
         found = self.tracker.track(scans)
-        waits = may_wait and self._last is None and len(scans) < self.options.standstill_scans
-        if waits and (0, len(scans)) in doubtful_stretches(found, self.options):
-            self.tracker = before
-            return fresh, found.part(0, 0)
+        if may_wait and len(scans) < self.options.standstill_scans:
+            known = count_before_doubt(found, self.options, self._last is None)
+            if known < len(scans):
+                self.tracker = before
+                if known == 0:
+                    return fresh, found.part(0, 0)
+                tracked, found = self._track_both_ways(fresh.part(0, known), may_wait=False)
+                return ScanBatch.together([tracked, fresh.part(known, len(fresh))]), found
         motion = motion_from_behind(fresh, found, self._new_tracker(), self.options)
         if motion is None:
             return scans, found
