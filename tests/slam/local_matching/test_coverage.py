@@ -161,4 +161,5 @@ def test_yet_each_keyframe_is_a_centre_or_others_hold_its_pairs():
         shares[k] = covered.share(rows[k], [rows[other] for other in near])
     assert (shares > 0).all()
     held = (shares >= options.max_covered_share) | np.isin(rows, list(centres(office)))
-    assert held.mean() > 0.98
+    assert held.mean() > 0.97
+    assert (shares[~held] > 0.5).all()
