@@ -12,9 +12,13 @@ import numpy as np
 
 from nscan_cli.calibration.measured_steps import measure_steps
 from nscan_cli.calibration.options import FileCheckOptions
-from nscan_cli.calibration.range_jumps import SCANS_COMPARED_AT_ONCE, laser_steps, range_factors
+from nscan_cli.calibration.range_jumps import (
+    SCANS_COMPARED_AT_ONCE,
+    pairs_across,
+    range_factors,
+    scans_to_match,
+)
 from nscan_cli.calibration.step_sampling import telling_steps
-from nscan_cli.calibration.thinned_scans import thinned_scan
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.logs.mask_runs import mask_runs
 from nscan_cli.logs.stretch_names import stretch_names
@@ -90,23 +94,22 @@ def _gains(log: LaserLog, options: FileCheckOptions) -> Array:
 def _changes_at(log: LaserLog, row: int, options: FileCheckOptions) -> bool:
     """Whether scans before a row match the mirror images of those behind, and those of one side do not."""
     gain = options.order.min_gain
-    across = ((row - 1, row), (row - 2, row), (row - 1, row + 1), (row - 2, row + 1))
-    return all(_mirror_gain(log, *rows, options) > gain for rows in across) and all(
+    return all(_mirror_gain(log, *rows, options) > gain for rows in pairs_across(row)) and all(
         _mirror_gain(log, first, first + 1, options) < -gain for first in (row - 2, row)
     )
 
 
 def _mirror_gain(log: LaserLog, first: int, last: int, options: FileCheckOptions) -> float:
     """By how much the energy per point of two scans is lower with the later one mirrored; 0 for few."""
-    before, behind = (thinned_scan(log, row, options.steps) for row in (first, last))
-    if before is None or behind is None:
+    pair_of_scans = scans_to_match(log, first, last, options)
+    if pair_of_scans is None:
         return 0.0
-    start = laser_steps(log, np.array([first]), np.array([last]))[0]
-    mirrored = behind.points * (1.0, -1.0)
+    before, behind, start = pair_of_scans
+    mirrored = behind * (1.0, -1.0)
     # Odometry itself may turn the wrong way.
     starts = (start, np.zeros(3))
     energies = [
-        min(match_scans(before.points, points, each, options.steps.pair).energy for each in starts)
-        for points in (behind.points, mirrored)
+        min(match_scans(before, points, each, options.steps.pair).energy for each in starts)
+        for points in (behind, mirrored)
     ]
-    return (energies[0] - energies[1]) / len(behind.points)
+    return (energies[0] - energies[1]) / len(behind)

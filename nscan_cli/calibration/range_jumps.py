@@ -133,12 +133,28 @@ def laser_steps(log: LaserLog, first: Indices, last: Indices) -> Array:
     return np.nan_to_num(relative(compose(robot, log.mount), log.mount))
 
 
+def pairs_across(row: int) -> list[tuple[int, int]]:
+    """The pairs of one of the two rows before `row` and of one of the two from it on, nearest first."""
+    return [(row - 1, row), (row - 2, row), (row - 1, row + 1), (row - 2, row + 1)]
+
+
+def scans_to_match(
+    log: LaserLog, first: int, last: int, options: FileCheckOptions
+) -> tuple[Array, Array, Array] | None:
+    """The points of two scans, (m, 2) and (n, 2), and the step (3,) of the laser between them by odometry;
+    None for too few points."""
+    before, behind = (thinned_scan(log, row, options.steps) for row in (first, last))
+    if before is None or behind is None:
+        return None
+    return before.points, behind.points, laser_steps(log, np.array([first]), np.array([last]))[0]
+
+
 def _matched_factor(log: LaserLog, row: int, factor: float, options: FileCheckOptions) -> float | None:
     """The factor of the ranges from a row on by matches, near to one; None if scans match better as they
     are."""
     near = math.log(factor) + options.jumps.refinement * np.arange(-2.0, 3.0)
     gain, energies = options.jumps.min_gain, []
-    for first, last in ((row - 1, row), (row - 2, row), (row - 1, row + 1), (row - 2, row + 1)):
+    for first, last in pairs_across(row):
         # Two scales tell nearly always that nothing changes.
         some = _energies(log, first, last, [1.0, factor], options)
         if some is None or some[1] > some[0]:
@@ -165,13 +181,13 @@ def _energies(
     log: LaserLog, first: int, last: int, scales: list[float], options: FileCheckOptions
 ) -> Array | None:
     """(n,) energy per point of two scans, the later one divided by each scale; None for too few points."""
-    before, behind = (thinned_scan(log, row, options.steps) for row in (first, last))
-    if before is None or behind is None:
+    pair_of_scans = scans_to_match(log, first, last, options)
+    if pair_of_scans is None:
         return None
-    start = laser_steps(log, np.array([first]), np.array([last]))[0]
+    before, behind, start = pair_of_scans
     pair = options.steps.pair
-    found = [match_scans(before.points, behind.points / scale, start, pair).energy for scale in scales]
-    return np.array(found) / len(behind.points)
+    found = [match_scans(before, behind / scale, start, pair).energy for scale in scales]
+    return np.array(found) / len(behind)
 
 
 def _right_scale(log: LaserLog, scales: Array, options: FileCheckOptions) -> float:
