@@ -52,9 +52,9 @@ def find_contradictions(
     is_still = _is_still(log.odometry, options.still)
     if is_still[:2].all():
         return [findings.frozen(evidence, "odometry" if is_still[2] else "the position by odometry")]
-    changed_view = _of_view(log, evidence, reading, options)
-    if changed_view is not None:
-        return [changed_view]
+    view = _of_view(log, evidence, reading, options)
+    if view is not None:
+        return [view]
     turns = evidence.turns
     is_doubtful = evidence.disagreement > options.clock.max_disagreement
     if turns is not None and (is_doubtful or not turns_agree(turns, options)):
@@ -77,6 +77,17 @@ def find_contradictions(
     if turns is not None and _are_told(turns, options) and not turns_agree(turns, options):
         found.append(findings.wrong_turns(turns))
     return found + _of_positions(log.mount, fit, evidence, reading, options)
+
+
+def changed_view(
+    log: LaserLog, reading: ReadingOptions, options: FileCheckOptions, known: KnownSteps
+) -> Finding | None:
+    """A change of the view within a log, the only one of its contradictions that is looked for; None if there
+    is none. `known` is that of `find_contradictions`."""
+    evidence = None if log.odometry is None else _evidence(log, log.odometry, options, known)
+    if evidence is None or evidence.moving < options.min_steps:
+        return None
+    return _of_view(log, evidence, reading, options)
 
 
 def _evidence(

@@ -5,7 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 from nscan_cli.calibration.companions import checked_companion
-from nscan_cli.calibration.contradictions import find_contradictions
+from nscan_cli.calibration.compared_ranges import compare_ranges
+from nscan_cli.calibration.contradictions import changed_view, find_contradictions
 from nscan_cli.calibration.held_odometry import checked_held
 from nscan_cli.calibration.measured_steps import KnownSteps
 from nscan_cli.calibration.mirrored_odometry import with_mirrored_odometry
@@ -40,8 +41,11 @@ def checked_file(log: LaserLog, reading: ReadingOptions, options: FileCheckOptio
     log, reading, said = checked_sweep(log, reading, options)
     if reading.as_recorded:
         return CheckedFile(log, reading, said)
-    log, order = checked_order(log, options)
-    log, jumps = checked_ranges(log, options)
+    compared = compare_ranges(log, options)
+    log, order = checked_order(log, compared, options)
+    if order:
+        compared = compare_ranges(log, options)
+    log, jumps = checked_ranges(log, compared, options)
     recorded = log
     log, units = checked_units(recorded, options.units, options.steps)
     log, held = checked_held(log, options.held, options.steps)
@@ -50,8 +54,8 @@ def checked_file(log: LaserLog, reading: ReadingOptions, options: FileCheckOptio
     findings = find_contradictions(signed, reading, options, known)
     if reversing:
         # A laser that is turned within the log sees the robot go elsewhere, too. The steps by scans stay.
-        turned = [one for one in find_contradictions(log, reading, options, known) if one.is_of_view]
-        findings, signed, reversing = (turned, log, []) if turned else (findings, signed, reversing)
+        turned = changed_view(log, reading, options, known)
+        findings, signed, reversing = (findings, signed, reversing) if turned is None else ([turned], log, [])
     if any(finding.is_mirror_image for finding in findings):
         # The ranges changed as its mirror image says.
         signed, reversing = checked_signs(with_mirrored_odometry(log), options.unsigned, options.steps)

@@ -54,16 +54,11 @@ def _best_delay(
     middle = beams.first + 0.5 * (log.beam_counts() - 1) * beams.step
     begin, end = (log.times + middle)[rows - 1], (log.times + middle)[rows + 1]
     heading = np.unwrap(path.poses[:, 2])
-
-    def disagreement(delay: float) -> float:
-        by_odometry = np.interp(end - delay, path.times, heading) - np.interp(
-            begin - delay, path.times, heading
-        )
-        return float(np.abs(turned - by_odometry).mean())
-
     count = round(options.longest_delay / options.delay_step)
     delays = options.delay_step * np.arange(-count, count + 1, dtype=np.float64)
-    off = np.array([disagreement(delay) for delay in delays.tolist()])
+    by_odometry = np.interp(end - delays[:, None], path.times, heading)
+    by_odometry -= np.interp(begin - delays[:, None], path.times, heading)
+    off = np.abs(turned - by_odometry).mean(axis=1)
     best = int(np.argmin(off))
     gain = float(off[best] / off[count]) if off[count] > 0.0 else 1.0
     # At an end of the range the best one may lie beyond.

@@ -13,7 +13,7 @@ from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.logs.mask_runs import mask_runs
 from nscan_cli.logs.range_unit import UNITS
 from nscan_cli.logs.stretch_names import stretch_names
-from nscan_cli.poses import Mask, relative
+from nscan_cli.poses import Indices, Mask, relative
 
 
 def checked_units(
@@ -53,13 +53,19 @@ def _as_most(is_large: Mask, moves: Mask) -> Mask:
 
     A large one beside others does.
     """
-    from scipy.ndimage import maximum_filter1d, median_filter
-
     at = np.flatnonzero(moves)
-    most = median_filter(is_large[at].astype(np.int8), 5, mode="nearest")
-    most |= is_large[at] & maximum_filter1d(most, 5, mode="nearest")
-    found: Mask = most[np.clip(np.searchsorted(at, np.arange(len(moves))), 0, len(at) - 1)] > 0
+    most = _of_five(is_large[at]) >= 3
+    most |= is_large[at] & (_of_five(most) > 0)
+    found: Mask = most[np.clip(np.searchsorted(at, np.arange(len(moves))), 0, len(at) - 1)]
     return found
+
+
+def _of_five(mask: Mask) -> Indices:
+    """(n,) how many of each row and the two on both sides are marked in a mask (n,).
+
+    SciPy has filters for this, but importing these takes longer than all else that this check does.
+    """
+    return np.convolve(np.pad(mask.astype(np.int64), 2, mode="edge"), np.ones(5, dtype=np.int64), "valid")
 
 
 def metres_by_scans(

@@ -10,28 +10,26 @@ from dataclasses import replace
 
 import numpy as np
 
+from nscan_cli.calibration.compared_ranges import ComparedRanges
 from nscan_cli.calibration.measured_steps import measure_steps
 from nscan_cli.calibration.options import FileCheckOptions
-from nscan_cli.calibration.range_jumps import (
-    SCANS_COMPARED_AT_ONCE,
-    pairs_across,
-    range_factors,
-    scans_to_match,
-)
+from nscan_cli.calibration.range_jumps import pairs_across, scans_to_match
 from nscan_cli.calibration.step_sampling import telling_steps
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.logs.mask_runs import mask_runs
 from nscan_cli.logs.stretch_names import stretch_names
 from nscan_cli.matching.scan_pairs import match_scans
-from nscan_cli.poses import Array, Mask
+from nscan_cli.poses import Mask
 
 
-def checked_order(log: LaserLog, options: FileCheckOptions) -> tuple[LaserLog, list[str]]:
-    """The log with all of its readings in one order, and what is said of it.
+def checked_order(
+    log: LaserLog, compared: ComparedRanges, options: FileCheckOptions
+) -> tuple[LaserLog, list[str]]:
+    """The log with all of its readings in one order, and what is said of it. `compared` are its scans.
 
     That is the order with which odometry turns as the scans do; without it, that of most scans.
     """
-    rows = order_jumps(log, options)
+    rows = order_jumps(log, compared, options)
     if not rows:
         return log, []
     is_other: Mask = np.zeros(len(log), dtype=np.bool_)
@@ -64,31 +62,15 @@ def _turn_votes(log: LaserLog, is_other: Mask, options: FileCheckOptions) -> int
     return int(agree[told].sum())
 
 
-def order_jumps(log: LaserLog, options: FileCheckOptions) -> list[int]:
+def order_jumps(log: LaserLog, compared: ComparedRanges, options: FileCheckOptions) -> list[int]:
     """The rows from which on the readings come in the other order than before."""
     if len(log) < 4:
         return []
-    order = options.order
-    gains = _gains(log, options)
+    order, gains = options.order, compared.mirror_gains
     # Two scans before each place and two behind are matched.
     places = np.flatnonzero(gains[1:-1] >= order.min_share_gain) + 1
     best = places[np.argsort(-gains[places], kind="stable")[: order.max_candidates]]
     return [row for row in (np.sort(best) + 1).tolist() if _changes_at(log, row, options)]
-
-
-def _gains(log: LaserLog, options: FileCheckOptions) -> Array:
-    """(S − 1,) by how much more of the beams of a scan, read in the other order, agree with what the scan
-    before predicts, than as they are; as a share of all that are compared."""
-    gains = np.zeros(len(log) - 1)
-    for begin in range(0, len(log) - 1, SCANS_COMPARED_AT_ONCE):
-        first = np.arange(begin, min(begin + SCANS_COMPARED_AT_ONCE, len(log) - 1))
-        shares = []
-        for is_reversed in (False, True):
-            values = range_factors(log, first, options.jumps, is_reversed)
-            count = np.maximum(np.isfinite(values).sum(axis=1), options.jumps.min_beams)
-            shares.append((np.abs(values) < options.order.tolerance).sum(axis=1) / count)
-        gains[first] = shares[1] - shares[0]
-    return gains
 
 
 def _changes_at(log: LaserLog, row: int, options: FileCheckOptions) -> bool:

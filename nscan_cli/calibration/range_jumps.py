@@ -13,6 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from nscan_cli.calibration.compared_ranges import ComparedRanges, laser_steps
 from nscan_cli.calibration.odometry_units import metres_by_scans
 from nscan_cli.calibration.options import FileCheckOptions
 from nscan_cli.calibration.parabola import parabola_minimum
@@ -22,10 +23,7 @@ from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.logs.mask_runs import mask_runs
 from nscan_cli.logs.stretch_names import stretch_names
 from nscan_cli.matching.scan_pairs import match_scans
-from nscan_cli.poses import Array, Indices, compose, relative
-
-SCANS_COMPARED_AT_ONCE = 2_048
-"""Scans that are compared at a time, to bound memory."""
+from nscan_cli.poses import Array
 
 
 class RangeJump(NamedTuple):
@@ -35,9 +33,11 @@ class RangeJump(NamedTuple):
     factor: float
 
 
-def checked_ranges(log: LaserLog, options: FileCheckOptions) -> tuple[LaserLog, list[str]]:
-    """The log with all of its ranges in one scale, and what is said of it."""
-    jumps = range_jumps(log, options)
+def checked_ranges(
+    log: LaserLog, compared: ComparedRanges, options: FileCheckOptions
+) -> tuple[LaserLog, list[str]]:
+    """The log with all of its ranges in one scale, and what is said of it. `compared` are its scans."""
+    jumps = range_jumps(log, compared, options)
     if not jumps:
         return log, []
     scales = _scales(len(log), jumps, options.jumps)
@@ -68,12 +68,11 @@ def _scales(size: int, jumps: list[RangeJump], options: RangeJumpOptions) -> Arr
     return scales
 
 
-def range_jumps(log: LaserLog, options: FileCheckOptions) -> list[RangeJump]:
+def range_jumps(log: LaserLog, compared: ComparedRanges, options: FileCheckOptions) -> list[RangeJump]:
     """The scans from which on all ranges are multiplied, in order."""
-    jumps = options.jumps
+    jumps, logarithms, shares = options.jumps, compared.logarithms, compared.shares
     if len(log) < 4:
         return []
-    logarithms, shares = _usual_factors(log, jumps)
     is_odd = (np.abs(logarithms) > math.log(jumps.min_factor)) & (shares >= jumps.min_share)
     # Two scans before each place and two behind are matched.
     places = np.flatnonzero(is_odd[1:-1]) + 1
@@ -84,53 +83,6 @@ def range_jumps(log: LaserLog, options: FileCheckOptions) -> list[RangeJump]:
         if factor is not None:
             found.append(RangeJump(place + 1, factor))
     return found
-
-
-def _usual_factors(log: LaserLog, options: RangeJumpOptions) -> tuple[Array, Array]:
-    """(S − 1,) the logarithm of the usual factor from each scan to the next, and the share of the beams that
-    have it; nan and 0 for few beams."""
-    logarithms, shares = np.full(len(log) - 1, np.nan), np.zeros(len(log) - 1)
-    for begin in range(0, len(log) - 1, SCANS_COMPARED_AT_ONCE):
-        first = np.arange(begin, min(begin + SCANS_COMPARED_AT_ONCE, len(log) - 1))
-        values = range_factors(log, first, options)
-        told = np.isfinite(values)
-        count = told.sum(axis=1)
-        enough = np.flatnonzero(count >= options.min_beams)
-        usual = np.nanmedian(values[enough], axis=1)
-        near = np.abs(values[enough] - usual[:, None]) < options.tolerance
-        logarithms[first[enough]], shares[first[enough]] = usual, near.sum(axis=1) / count[enough]
-    return logarithms, shares
-
-
-def range_factors(log: LaserLog, first: Indices, options: RangeJumpOptions, mirrored: bool = False) -> Array:
-    """(n, B) the logarithms of the ranges of the scans behind rows (n,), divided by those that these scans
-    predict; nan where there is none. `mirrored`: as if the later scans were mirror images."""
-    last, width = first + 1, log.ranges.shape[1]
-    beams = np.arange(0, width, max(width // options.max_beams, 1))
-    steps = laser_steps(log, first, last)[:, :, None]
-    lengths = log.ranges[first[:, None], beams].astype(np.float64)
-    lengths[~np.isfinite(lengths)] = np.nan
-    angles = log.angle_min[first, None] + beams * log.angle_increment[first, None]
-    x, y = lengths * np.cos(angles) - steps[:, 0], lengths * np.sin(angles) - steps[:, 1]
-    between = log.angle_increment[last, None]
-    directions = np.arctan2(y, x) - steps[:, 2]
-    if mirrored:
-        directions = -directions
-    places = np.round((directions - log.angle_min[last, None]) / between)
-    is_told = np.isfinite(places)
-    at = (np.where(is_told, places, 0.0) % np.round(2 * np.pi / np.abs(between))).astype(np.int64)
-    is_told &= at < width
-    behind = log.ranges[last[:, None], np.where(is_told, at, 0)].astype(np.float64)
-    is_told &= np.isfinite(behind)
-    return np.where(is_told, np.log(np.where(is_told, behind, 1.0) / np.hypot(x, y)), np.nan)
-
-
-def laser_steps(log: LaserLog, first: Indices, last: Indices) -> Array:
-    """(n, 3) the steps of the laser between rows by odometry; none where there is no odometry."""
-    if log.odometry is None:
-        return np.zeros((len(first), 3))
-    robot = relative(log.odometry[last], log.odometry[first])
-    return np.nan_to_num(relative(compose(robot, log.mount), log.mount))
 
 
 def pairs_across(row: int) -> list[tuple[int, int]]:

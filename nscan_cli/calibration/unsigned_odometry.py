@@ -174,20 +174,27 @@ def _range_errors(
     The laser moves by motions (n, 3) meanwhile. A difference counts as `max_error` at most.
     """
     errors = np.full(len(first), np.inf)
+    directions, begin, between = np.empty((ranges.shape[1], 2)), np.nan, np.nan
     for k in range(len(first)):
         i, j, motion = first[k], last[k], motions[k]
+        if angle_min[i] != begin or angle_increment[i] != between:
+            # Nearly all scans of a log have the same directions.
+            begin, between = angle_min[i], angle_increment[i]
+            for beam in range(0, ranges.shape[1], every):
+                angle = begin + beam * between
+                directions[beam, 0], directions[beam, 1] = np.cos(angle), np.sin(angle)
         c, s = np.cos(motion[2]), np.sin(motion[2])
         around = round(2 * np.pi / abs(angle_increment[j]))
         total, count = 0.0, 0
         for beam in range(0, ranges.shape[1], every):
             if not np.isfinite(ranges[i, beam]):
                 continue
-            length, angle = np.float64(ranges[i, beam]), angle_min[i] + beam * angle_increment[i]
-            dx, dy = length * np.cos(angle) - motion[0], length * np.sin(angle) - motion[1]
+            length = np.float64(ranges[i, beam])
+            dx, dy = length * directions[beam, 0] - motion[0], length * directions[beam, 1] - motion[1]
             x, y = c * dx + s * dy, c * dy - s * dx
             at = round((np.arctan2(y, x) - angle_min[j]) / angle_increment[j]) % around
             if at < ranges.shape[1] and np.isfinite(ranges[j, at]):
-                total += min(abs(np.hypot(x, y) - ranges[j, at]), max_error)
+                total += min(abs(np.sqrt(x * x + y * y) - ranges[j, at]), max_error)
                 count += 1
         if count >= min_beams:
             errors[k] = total / count

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import astuple, dataclass
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -148,5 +148,6 @@ def grid_settings(options: GaussianOptions, neighbourhood: int, faces: bool) -> 
     """`Grid.settings` (12,); the arguments are those of `Ndt.empty`."""
     settings = np.empty(12)
     settings[[MINIMUM, FLOOR, NEIGHBOURHOOD, FACES]] = options.minimum, options.floor, neighbourhood, faces
-    settings[MAX_NEIGHBOUR:] = astuple(options.walls)
+    # As `astuple`, which copies each value by itself: many grids are for one match of two scans.
+    settings[MAX_NEIGHBOUR:] = list(vars(options.walls).values())
     return settings

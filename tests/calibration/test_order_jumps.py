@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from nscan_cli.calibration.compared_ranges import compare_ranges
 from nscan_cli.calibration.options import FileCheckOptions
 from nscan_cli.calibration.order_jumps import checked_order, order_jumps
 from nscan_cli.logs.laser_log import LaserLog
@@ -24,12 +25,20 @@ def drive() -> LaserLog:
     return round_scene().record(5).log()
 
 
+def jumps_of(log: LaserLog) -> list[int]:
+    return order_jumps(log, compare_ranges(log, OPTIONS), OPTIONS)
+
+
+def checked(log: LaserLog) -> tuple[LaserLog, list[str]]:
+    return checked_order(log, compare_ranges(log, OPTIONS), OPTIONS)
+
+
 @pytest.mark.parametrize("share", [0.25, 0.5, 0.8])
 def test_the_wrong_part_is_read_in_the_order_of_the_others(share):
     """Odometry tells which part is wrong, however long it is."""
     log = drive()
     at = int(share * len(log))
-    right, said = checked_order(faults.mirrored_in(log, slice(at, None)), OPTIONS)
+    right, said = checked(faults.mirrored_in(log, slice(at, None)))
     assert len(said) == 1
     assert said[0].startswith(f"the readings of scans {at} to {len(log) - 1} come in the other order")
     for scan in (0, at - 1, at, len(log) - 1):
@@ -40,30 +49,30 @@ def test_the_wrong_part_is_read_in_the_order_of_the_others(share):
 def test_without_odometry_the_shorter_part_is_read_otherwise():
     log = replace(drive(), odometry=None)
     at = len(log) // 4
-    _, said = checked_order(faults.mirrored_in(log, slice(at, None)), OPTIONS)
+    _, said = checked(faults.mirrored_in(log, slice(at, None)))
     assert said[0].startswith(f"the readings of scans 0 to {at - 1} come in the other order")
 
 
 def test_there_and_back_again():
     log = drive()
     at = len(log) // 3
-    _, said = checked_order(faults.mirrored_in(log, slice(at, 2 * at)), OPTIONS)
+    _, said = checked(faults.mirrored_in(log, slice(at, 2 * at)))
     assert said[0].startswith(f"the readings of scans {at} to {2 * at - 1} come in the other order")
 
 
 def test_what_is_wrong_all_along_or_with_odometry_is_no_change():
     for log in (faults.mirrored(drive()), odometry_faults.turning(drive(), -1.0), drive()):
-        assert checked_order(log, OPTIONS)[1] == []
+        assert checked(log)[1] == []
 
 
 @pytest.mark.parametrize("name", ["intel", "fr079", "mit-csail", "mit-killian", "fr-campus", "fr-clinic"])
 def test_no_real_log_changes(name):
     log = read_log(str(data_file(f"{name}.log.gz")))
-    assert order_jumps(log, OPTIONS) == []
+    assert jumps_of(log) == []
 
 
 @pytest.mark.parametrize("name", ["intel", "fr079", "mit-csail"])
 def test_it_is_found_in_a_real_log(name):
     log = read_log(str(data_file(f"{name}.log.gz")))
     at = 4 * len(log) // 5
-    assert order_jumps(faults.mirrored_in(log, slice(at, None)), OPTIONS) == [at]
+    assert jumps_of(faults.mirrored_in(log, slice(at, None))) == [at]

@@ -8,8 +8,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from nscan_cli.calibration.compared_ranges import compare_ranges
 from nscan_cli.calibration.options import FileCheckOptions
-from nscan_cli.calibration.range_jumps import checked_ranges, range_jumps
+from nscan_cli.calibration.range_jumps import RangeJump, checked_ranges, range_jumps
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.logs.load import read_log
 from tests.data import data_file
@@ -24,12 +25,20 @@ def drive() -> LaserLog:
     return round_scene().record(5).log()
 
 
+def jumps_of(log: LaserLog) -> list[RangeJump]:
+    return range_jumps(log, compare_ranges(log, OPTIONS), OPTIONS)
+
+
+def checked(log: LaserLog) -> tuple[LaserLog, list[str]]:
+    return checked_ranges(log, compare_ranges(log, OPTIONS), OPTIONS)
+
+
 @pytest.mark.parametrize("factor", [0.9, 0.95, 1.05, 1.1, 1.5])
 @pytest.mark.parametrize("odometry", [True, False])
 def test_the_scan_and_the_factor_are_found(factor, odometry):
     log = drive() if odometry else replace(drive(), odometry=None)
     at = len(log) // 2
-    (jump,) = range_jumps(faults.ranges_scaled(log, factor, slice(at, None)), OPTIONS)
+    (jump,) = jumps_of(faults.ranges_scaled(log, factor, slice(at, None)))
     assert jump.row == at
     assert jump.factor == pytest.approx(factor, rel=0.004)
 
@@ -37,7 +46,7 @@ def test_the_scan_and_the_factor_are_found(factor, odometry):
 def test_the_shorter_part_is_put_right_and_said():
     log = drive()
     at = len(log) // 3
-    right, said = checked_ranges(faults.ranges_scaled(log, 1.05, slice(at, 2 * at)), OPTIONS)
+    right, said = checked(faults.ranges_scaled(log, 1.05, slice(at, 2 * at)))
     assert len(said) == 1
     assert said[0].startswith(f"the ranges of scans {at} to {2 * at - 1} are 1.05 times the others")
     assert "--range-scale 1.05" in said[0]
@@ -47,10 +56,10 @@ def test_the_shorter_part_is_put_right_and_said():
 def test_odometry_tells_the_right_part_where_the_factor_is_large():
     log = drive()
     scaled = faults.ranges_scaled(log, 1.5, slice(len(log) // 4, None))
-    right, said = checked_ranges(scaled, OPTIONS)
+    right, said = checked(scaled)
     assert said[0].startswith(f"the ranges of scans {len(log) // 4} to {len(log) - 1} are 1.5 times")
     np.testing.assert_allclose(right.ranges, log.ranges, rtol=0.004)
-    _, said = checked_ranges(replace(scaled, odometry=None), OPTIONS)
+    _, said = checked(replace(scaled, odometry=None))
     assert said[0].startswith(f"the ranges of scans 0 to {len(log) // 4 - 1} are 0.66")
 
 
@@ -58,19 +67,19 @@ def test_a_wrong_step_of_odometry_is_no_change():
     log = drive()
     for jump in ((0.3, 0.0, 0.0), (0.0, -0.3, 0.1)):
         wrong = odometry_faults.jump(log, len(log) // 2, jump)
-        assert checked_ranges(wrong, OPTIONS)[1] == []
+        assert checked(wrong)[1] == []
 
 
 @pytest.mark.parametrize("name", ["intel", "fr079", "mit-csail", "mit-killian", "fr-campus", "fr-clinic"])
 def test_no_real_log_changes(name):
     log = read_log(str(data_file(f"{name}.log.gz")))
-    assert range_jumps(log, OPTIONS) == []
+    assert jumps_of(log) == []
 
 
 @pytest.mark.parametrize(("name", "place"), [("intel", 0.3), ("fr079", 0.5), ("fr-clinic", 0.25)])
 def test_it_is_found_in_a_real_log(name, place):
     log = read_log(str(data_file(f"{name}.log.gz")))
     at = int(place * len(log))
-    (jump,) = range_jumps(faults.ranges_scaled(log, 1.1, slice(at, None)), OPTIONS)
+    (jump,) = jumps_of(faults.ranges_scaled(log, 1.1, slice(at, None)))
     assert jump.row == at
     assert jump.factor == pytest.approx(1.1, rel=0.01)
