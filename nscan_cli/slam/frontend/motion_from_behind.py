@@ -38,27 +38,50 @@ def motion_from_behind(
     """
     doubtful, count = _doubtful_stretches(found, options), len(found.values)
     parts = [_standing_part(found.poses, each, range(each[1] + 1, count), options) for each in doubtful]
-    stretches = [part for part in parts if part is not None]
+    stretches = [part for part in parts if part is not None and _may_fit_better(found, part, options)]
     if not stretches:
         return None
     # Where scans tell the motion, it leads from behind, too.
     known = found.poses.copy()
     for first, end in doubtful:
         known[first:end] = np.nan
-    behind = tracker.track(scans.backwards(known))
+    # No scan before the step to the first of them matters.
+    since = max(stretches[0][0] - 1, 0)
+    behind = tracker.track(scans.part(since, count).backwards(known[since:]))
     inliers, poses, sigmas = behind.inliers[::-1], behind.poses[::-1], behind.weakest_sigmas[::-1]
     # What scans tell from one side alone may be the ripple of their walls.
     tells = sigmas <= options.scan.degeneracy.trusted_sigma
-    sigmas = np.where(tells, sigmas, np.maximum(sigmas, found.weakest_sigmas))
-    motion = MotionFromBehind(np.full((len(scans), 3), np.nan), np.zeros(len(scans)))
+    sigmas = np.where(tells, sigmas, np.maximum(sigmas, found.weakest_sigmas[since:]))
+    motion = MotionFromBehind(np.full((count, 3), np.nan), np.zeros(count))
     for first, end in stretches:
-        before, now = found.inliers[first:end].mean(), inliers[first:end].mean()
-        fits_better = now >= max(before + options.standstill_gain, options.scan.restart_inliers)
-        if fits_better and _way(poses, first, end) - _way(found.poses, first, end) > options.standstill_lag:
+        fits_better = inliers[first - since : end - since].mean() >= _better_share(
+            found, (first, end), options
+        )
+        way = _way(poses, first - since, end - since)
+        if fits_better and way - _way(found.poses, first, end) > options.standstill_lag:
             # The step to the first of them, and the one from the last.
             whole = slice(max(first - 1, 0), end + 1)
-            motion.poses[whole], motion.weakest_sigmas[whole] = poses[whole], sigmas[whole]
+            motion.poses[whole] = poses[whole.start - since : whole.stop - since]
+            motion.weakest_sigmas[whole] = sigmas[whole.start - since : whole.stop - since]
     return motion if np.isfinite(motion.poses).any() else None
+
+
+def _better_share(found: TrackedScans, stretch: tuple[int, int], options: TrackingOptions) -> float:
+    """The share of inliers from which on the scans of a stretch fit clearly better than as `found`."""
+    share = float(found.inliers[slice(*stretch)].mean())
+    return max(share + options.standstill_gain, options.scan.restart_inliers)
+
+
+def _may_fit_better(found: TrackedScans, stretch: tuple[int, int], options: TrackingOptions) -> bool:
+    """Whether tracking a stretch from behind is worth its time: scans after it fit that well, and clearly.
+
+    Outdoors few do. A stretch of fewer scans than tell a velocity does not tell that the robot stands.
+    """
+    first, end = stretch
+    if end - first < options.velocity_scans or end == len(found.values):
+        return False
+    after = found.inliers[end:].mean()
+    return bool(after >= max(_better_share(found, stretch, options), options.scan.clear_inliers))
 
 
 def count_before_doubt(found: TrackedScans, options: TrackingOptions, is_start: bool) -> int:

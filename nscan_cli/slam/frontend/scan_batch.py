@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -48,7 +48,13 @@ class ScanBatch:
 
     def copied(self) -> ScanBatch:
         """The same scans, with points and shares of their own."""
-        return replace(self, points=self.points.copy(), shares=self.shares.copy())
+        return ScanBatch.together([self])
+
+    def correct(self, corrected: ScanBatch) -> None:
+        """Take over points and shares of a copy of the first of these scans, in place."""
+        first, end = self.ends[0], self.ends[len(corrected)]
+        mine, theirs = slice(first, end), slice(corrected.ends[0], corrected.ends[-1])
+        self.points[mine], self.shares[mine] = corrected.points[theirs], corrected.shares[theirs]
 
     def backwards(self, poses: Array) -> ScanBatch:
         """A copy of the scans from the last to the first, as if time went backwards.
@@ -62,7 +68,7 @@ class ScanBatch:
 
     def chosen(self, chosen: Indices) -> tuple[Array, Indices]:
         """A copy of the points (P, 2) of the scans with indices `chosen` (c,), and their `ends` (c + 1,)."""
-        points = np.concatenate([self.of(k) for k in chosen])
+        points = np.concatenate([self.points[:0], *(self.of(k) for k in chosen)])
         return points, np.append(0, np.cumsum(np.diff(self.ends)[chosen]))
 
     @classmethod

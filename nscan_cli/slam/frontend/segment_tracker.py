@@ -6,7 +6,6 @@ tracked as part of the segment, and also as a segment of their own.
 
 from __future__ import annotations
 
-import copy
 from collections import deque
 from dataclasses import replace
 
@@ -22,13 +21,13 @@ from nscan_cli.slam.frontend.break_detection import (
     sees_the_same,
 )
 from nscan_cli.slam.frontend.first_scan import place_first
-from nscan_cli.slam.frontend.motion_from_behind import count_before_doubt, motion_from_behind
 from nscan_cli.slam.frontend.options import BreakOptions, LaserView, TrackingOptions
 from nscan_cli.slam.frontend.scan_batch import ScanBatch
 from nscan_cli.slam.frontend.sector_of_view import laser_view
 from nscan_cli.slam.frontend.tracked_batch import TrackedBatch
 from nscan_cli.slam.frontend.tracked_scans import TrackedScans
 from nscan_cli.slam.frontend.tracker import Tracker
+from nscan_cli.slam.frontend.two_sided_tracker import TwoSidedTracker
 from nscan_cli.slam.options import SlamOptions
 
 
@@ -111,47 +110,22 @@ class SegmentTracker:
         self.tracker = self._new_tracker()
         return settled
 
-    def _new_tracker(self) -> Tracker:
-        return Tracker(self.options, self._has_odometry, self._laser)
+    def _new_tracker(self) -> Tracker | TwoSidedTracker:
+        if self._has_odometry:
+            return Tracker(self.options, laser=self._laser)
+        return TwoSidedTracker(self.options, self._laser)
 
     def _track(self, scans: ScanBatch, may_wait: bool) -> TrackedBatch:
         """Track scans, and those after them or before them that waited; the last ones may wait now."""
         unmatched = self._unmatched
         together = sorted([scans, *unmatched], key=lambda batch: batch.first)
         scans = ScanBatch.together(together) if unmatched else scans
-        if self._has_odometry:
-            found = self.tracker.track(scans, may_wait)
-        else:
-            scans, found = self._track_both_ways(scans, may_wait)
+        found = self.tracker.track(scans, may_wait)
         n = len(found.values)
         self._unmatched = [scans.part(n, len(scans))] if n < len(scans) else []
         if self._origin is not None:
             found = self._from_origin(found, self._origin)
         return TrackedBatch(scans.part(0, n), found)
-
-    def _track_both_ways(self, scans: ScanBatch, may_wait: bool) -> tuple[ScanBatch, TrackedScans]:
-        """Track scans without odometry, guided by their track from behind where they fit better so.
-
-        Scans that do not tell their place wait for ones that do: from behind, these tell it. Returns the
-        scans as corrected.
-        """
-        fresh, before = scans.copied(), copy.deepcopy(self.tracker)
-        found = self.tracker.track(scans)
-        if may_wait and len(scans) < self.options.standstill_scans:
-            known = count_before_doubt(found, self.options, self._last is None)
-            if known < len(scans):
-                self.tracker = before
-                if known == 0:
-                    return fresh, found.part(0, 0)
-                tracked, found = self._track_both_ways(fresh.part(0, known), may_wait=False)
-                return ScanBatch.together([tracked, fresh.part(known, len(fresh))]), found
-        motion = motion_from_behind(fresh, found, self._new_tracker(), self.options)
-        if motion is None:
-            return scans, found
-        self.tracker = before
-        found = self.tracker.track(replace(fresh, odometry=motion.poses))
-        np.maximum(found.weakest_sigmas, motion.weakest_sigmas, out=found.weakest_sigmas)
-        return fresh, found
 
     def _from_origin(self, found: TrackedScans, origin: Array) -> TrackedScans:
         """What was found in a later segment, in the frame of the first."""

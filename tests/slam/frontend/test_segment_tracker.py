@@ -14,6 +14,7 @@ from nscan_cli.slam.frontend.options import BreakOptions, TrackingOptions
 from nscan_cli.slam.frontend.scan_batch import ScanBatch
 from nscan_cli.slam.frontend.segment_tracker import SegmentTracker
 from nscan_cli.slam.frontend.tracked_batch import TrackedBatch
+from nscan_cli.slam.frontend.tracker import Tracker
 from tests.data import data_file
 from tests.logs.excerpts import excerpt
 from tests.slam.keyframe_drives import round_scene
@@ -55,6 +56,7 @@ def test_when_all_is_tracked_the_map_goes_and_what_was_counted_stays():
     follower.follow(scans())
     counted = follower.restarts, follower.searches
     assert counted > (0, 0)
+    assert isinstance(follower.tracker, Tracker)
     assert follower.tracker.map.rows > 0
     follower.finish()
     assert follower.tracker.map.rows == 0
