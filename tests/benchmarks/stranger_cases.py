@@ -9,12 +9,14 @@ from __future__ import annotations
 import functools
 import io
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import numpy as np
 
+from nscan_cli import build_graph
 from nscan_cli.exports.carmen import corrected_log
 from nscan_cli.graph.io.tum import parse_tum, write_tum
 from nscan_cli.logs.laser_log import LaserLog
@@ -26,7 +28,9 @@ from tests.logs.excerpts import truth_of
 from tests.simulation.laser import Laser
 from tests.simulation.scenes import office
 
-SIMULATED = "office, simulated"
+SIMULATED, URG = "office, simulated", "urg-corridor-1"
+OWN_REPEATABILITY = 0.02
+"""m; RMSE between maps of all scans and of every third one of the drive whose truth is its own map."""
 WIDE = "office, 541 beams over 270°"
 WIDE_LASER = Laser(541, np.radians(-135.0), np.radians(0.5), 20.0, no_return=81.0, mount=(0.2, 0.0, 0.0))
 ROUND_LASER = Laser(360, -np.pi, np.radians(1.0), 12.0, no_return=13.0, mount=(0.2, 0.0, 0.0))
@@ -70,22 +74,24 @@ def _stranger(log: Path, truth: Path, folder: Path) -> tuple[Path, list[str]]:
 
 def siblings(data: Path) -> Iterator[Case]:
     """The faults on a simulated drive and on real logs."""
-    for drive in (SIMULATED, "mit-csail", "fr079", "intel"):
-        if drive != SIMULATED and not (data / f"{drive}.log.gz").exists():
+    for drive in (SIMULATED, "mit-csail", "fr079", "intel", URG):
+        if drive != SIMULATED and not _recording(data, drive).exists():
             continue
+        untouched = OWN_REPEATABILITY if drive == URG else None
         for fault, make, cause in FAULTS:
             if drive == SIMULATED or fault in FAULTS_OF_REAL_LOGS:
                 files = partial(_sibling, data, drive, make)
-                yield Case(drive, fault, cause, files, cure=KNOWN_CURES.get(fault, ""))
+                yield Case(drive, fault, cause, files, untouched, KNOWN_CURES.get(fault, ""))
     for fault, form, cause in (
         ("", _with_angles, ""),
         ("FLASER, which has no angles", _without_angles, "541 beams over 270°"),
         ("headings in degrees", _headings_in_degrees, "headings of odometry are in degrees"),
     ):
         yield Case(WIDE, fault, cause, partial(_wide, form))
-    if (data / "mit-csail.log.gz").exists():
-        files = partial(_in_degrees, data / "mit-csail.log.gz")
-        yield Case("mit-csail", "headings in degrees", "headings of odometry are in degrees", files)
+    for drive in ("mit-csail", "fr079", "intel"):
+        if _recording(data, drive).exists():
+            files = partial(_in_degrees, _recording(data, drive))
+            yield Case(drive, "headings in degrees", "headings of odometry are in degrees", files)
     recording = data / "mit-csail.ros2.mcap"
     if recording.exists():
         for fault, first, last in (
@@ -97,12 +103,20 @@ def siblings(data: Path) -> Iterator[Case]:
 
 def _sibling(data: Path, drive: str, fault: Fault, folder: Path) -> tuple[Path, list[str]]:
     """A drive with a fault, as a file whose poses are its odometry."""
-    log = fault(_simulated(ROUND_LASER) if drive == SIMULATED else _real(data / f"{drive}.log.gz"))
-    path = folder / "sibling.log"
+    if drive == SIMULATED:
+        log = _simulated(ROUND_LASER)
+    else:
+        log = (_with_own_map if drive == URG else _real)(_recording(data, drive))
+    log, path = fault(log), folder / "sibling.log"
     path.write_bytes(_with_angles(log))
-    if drive != SIMULATED:
+    if log.truth is None:
         return path, ["--relations", str(data / f"{drive}.relations")]
     return path, _reference(log, folder)
+
+
+def _recording(data: Path, drive: str) -> Path:
+    """The file of a real drive."""
+    return data / "field" / f"{drive}.bag" if drive == URG else data / f"{drive}.log.gz"
 
 
 def _wide(form: Callable[[LaserLog], bytes], folder: Path) -> tuple[Path, list[str]]:
@@ -145,7 +159,7 @@ def _in_degrees(log: Path, folder: Path) -> tuple[Path, list[str]]:
     """A real log with such headings."""
     path = folder / "degrees.log"
     path.write_bytes(_headings_in_degrees(_real(log)))
-    return path, ["--relations", str(log.with_name("mit-csail.relations"))]
+    return path, ["--relations", str(log.with_name(log.name.replace(".log.gz", ".relations")))]
 
 
 def _without_angles(log: LaserLog) -> bytes:
@@ -173,6 +187,16 @@ def _with_gap(recording: Path, first: float, last: float, folder: Path) -> tuple
 @functools.cache
 def _real(path: Path) -> LaserLog:
     return read_log(str(path))
+
+
+@functools.cache
+def _with_own_map(path: Path) -> LaserLog:
+    """A drive that no reference knows, as a text log has it: the truth is its own map."""
+    log = replace(read_log(str(path)), beam_times=None, path=None, odometry_path=None)
+    with TemporaryDirectory() as folder:
+        Path(folder, "own.log").write_bytes(_with_angles(log))
+        truth = build_graph(read_log(str(Path(folder, "own.log")))).poses
+    return replace(log, truth_times=log.times, truth=truth)
 
 
 @functools.cache

@@ -86,6 +86,7 @@ FAULTS: tuple[tuple[str, Fault, str], ...] = (
     ("ranges in cm from half-way on", _from_half_way(100.0), "in centimetres, the others in metres"),
     ("ranges in feet from half-way on", _from_half_way(3.281), "all ranges are multiplied"),
     ("ranges × 1.15 from half-way on", _from_half_way(1.15), "times the others"),
+    ("ranges × 1.1 from half-way on", _from_half_way(1.1), "times the others"),
     ("ranges × 1.05 from half-way on", _from_half_way(1.05), "times the others"),
     ("ranges × 0.9", lambda log: faults.ranges_scaled(log, 0.9, slice(None)), "range-scale 1.1"),
     ("readings reversed", faults.mirrored, "in the wrong order"),
@@ -125,6 +126,8 @@ KNOWN_CURES = {
 FAULTS_OF_REAL_LOGS = (
     "", "two posts of 20°", "a sixth of the beams always says 5 m", "odometry × 1000", "odometry turns × −1",
     "odometry frozen for a third", "each pose five times", "odometry zero at every 50th scan",
-    "readings reversed", "readings reversed in the last fifth",
+    "two drives in one file", "two scans a stamp", "ranges × 1.1 from half-way on",
+    "ranges × 1.05 from half-way on", "readings reversed", "readings reversed from half-way on",
+    "readings reversed in the last fifth",
 )  # fmt: skip
 """Those that the real logs get: with all of them it takes an hour."""
