@@ -13,6 +13,7 @@ from nscan_cli.files.limits import TIME
 from nscan_cli.files.text import counted
 from nscan_cli.logs.reading_options import ReadingOptions
 from nscan_cli.logs.shared_stamps import spread_stamps
+from nscan_cli.logs.stamp_unit import stamp_unit
 from nscan_cli.poses import Array, Indices
 
 STAMP = re.compile(r"[-+]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][-+]?[0-9]+)?")
@@ -35,6 +36,10 @@ class ScanOrderOptions:
     longest_first_step: float = 1.0
     """A stamp of 0 is that of a simulated clock if the next one follows within this time, or within the
     longest other step, s; else it was never set. A larger value believes more of them."""
+    longest_absence: float = 86_400.0
+    """A clock was also set back where all later stamps lie by more than this before the earlier ones, s: no
+    drive lasts so long. There are at least `min_alternations` of both. A larger value finds fewer such
+    clocks."""
     longest_pause: float = 60.0
     """Longest pause between two files of one recording, s: a recorder that splits goes on at once. A larger
     value joins more files."""
@@ -61,10 +66,14 @@ def by_time(stamps: list[str], options: ScanOrderOptions = ScanOrderOptions()) -
     """The scans sorted stably by their stamps, one per scan in file order, empty if there is none.
 
     If fewer than half of the stamps are finite, or fewer than half are distinct, the scans stay in file order
-    with nominal times. Otherwise a missing stamp is interpolated between its neighbours in the file. Scans
-    that share a stamp are spread up to the next one.
+    with nominal times. Otherwise stamps in another unit are converted to seconds, a missing stamp is
+    interpolated between its neighbours in the file, and scans that share a stamp are spread up to the next
+    one.
     """
     written: Array = np.array([_seconds(stamp) for stamp in stamps], dtype=np.float64)
+    unit = stamp_unit(written)
+    if unit is not None:
+        written *= unit.seconds
     written[np.abs(written) > TIME.value] = np.nan
     times = spread_stamps(written)
     good = np.isfinite(times)
@@ -78,6 +87,9 @@ def by_time(stamps: list[str], options: ScanOrderOptions = ScanOrderOptions()) -
         texts = [f"{time:.6f}" for time in times]
         return ScanOrder(np.arange(size), times, texts, 0, True, warnings)
     texts = list(stamps)
+    if unit is not None:
+        texts = [f"{time:.6f}" for time in written]
+        warnings.append(f"the time stamps are in {unit.name}: they are multiplied by {unit.seconds:g}")
     moved = np.flatnonzero(good & (times != written))
     if len(moved):
         for row in moved.tolist():
@@ -119,7 +131,9 @@ def _set_back(times: Array, options: ScanOrderOptions) -> list[tuple[int, float]
         caught_up = times[at:] > latest
         until = at + (int(np.argmax(caught_up)) if caught_up.any() else len(caught_up))
         is_behind = np.argsort(times[:until], kind="stable") >= at
-        if np.count_nonzero(np.diff(is_behind)) >= options.min_alternations:
+        is_apart = times[at:].max() + options.longest_absence < times[:at].min()
+        is_apart &= min(at, len(times) - at) >= options.min_alternations
+        if is_apart or np.count_nonzero(np.diff(is_behind)) >= options.min_alternations:
             by = latest + period - float(times[at])
             times[at:] += by
             found.append((at, by))

@@ -82,6 +82,7 @@ FAULTS: tuple[tuple[str, Fault, str], ...] = (
     ("each pose five times", lambda log: odometry_faults.repeated(log, 5), "odometry comes less often"),
     ("odometry zero at every 50th scan", lambda log: odometry_faults.zeros(log, 50), "single wrong values"),
     ("two scans a stamp", lambda log: faults.shared_stamps(log, 2), "with the time stamp of the scan before"),
+    ("stamps in ms", lambda log: faults.stamps_scaled(log, 1e3), "stamps are in milliseconds"),
     ("ranges in mm from half-way on", _from_half_way(1000.0), "in millimetres, the others in metres"),
     ("ranges in cm from half-way on", _from_half_way(100.0), "in centimetres, the others in metres"),
     ("ranges in feet from half-way on", _from_half_way(3.281), "all ranges are multiplied"),
@@ -126,7 +127,7 @@ KNOWN_CURES = {
 FAULTS_OF_REAL_LOGS = (
     "", "two posts of 20°", "a sixth of the beams always says 5 m", "odometry × 1000", "odometry turns × −1",
     "odometry frozen for a third", "each pose five times", "odometry zero at every 50th scan",
-    "two drives in one file", "two scans a stamp", "ranges × 1.1 from half-way on",
+    "two drives in one file", "two scans a stamp", "stamps in ms", "ranges × 1.1 from half-way on",
     "ranges × 1.05 from half-way on", "readings reversed", "readings reversed from half-way on",
     "readings reversed in the last fifth",
 )  # fmt: skip

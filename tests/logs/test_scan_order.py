@@ -115,3 +115,12 @@ times = st.lists(st.integers(0, 640).map(lambda k: k / 64), min_size=1, max_size
 def test_nearest_is_what_a_search_of_all_finds(a: np.ndarray, b: np.ndarray):
     rows = nearest_in_time(a, b)
     np.testing.assert_array_equal(np.abs(a[rows] - b), np.abs(a[:, None] - b[None]).min(axis=0))
+
+
+def test_a_clock_that_is_set_back_by_more_than_a_drive_lasts_goes_on():
+    """As where it is 1970 from then on: no later stamp meets an earlier one."""
+    times = 1.7e9 + 0.2 * np.arange(200)
+    order = by_time([f"{time:.1f}" for time in np.concatenate([times[:120], times[120:] - 1.7e9])])
+    assert order.rows.tolist() == list(range(200))
+    np.testing.assert_allclose(np.diff(order.times), 0.2, atol=1e-6)
+    assert order.warnings[0].startswith("the clock was set back by 1700000000.0 s at scan 120")

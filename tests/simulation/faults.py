@@ -173,6 +173,11 @@ def shared_stamps(log: LaserLog, count: int) -> LaserLog:
     return replace(log, stamps=stamps, times=np.array([float(stamp) for stamp in stamps]))
 
 
+def stamps_scaled(log: LaserLog, per_second: float) -> LaserLog:
+    """The stamps in another unit, so many to a second; the scans are true at their own times."""
+    return replace(log, stamps=tuple(f"{time * per_second:.0f}" for time in log.times))
+
+
 def people(log: LaserLog, walkers: Array, speed: float = 1.2, radius: float = 0.25) -> LaserLog:
     """People walk to and fro: discs, each between two points of the floor plan, walkers (W, 4)."""
     ranges, truth = log.ranges.copy(), truth_of(log)

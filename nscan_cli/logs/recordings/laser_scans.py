@@ -19,7 +19,7 @@ from nscan_cli.logs.recordings.alternating_lasers import first_of_two_lasers
 from nscan_cli.logs.recordings.container import Message, Recording
 from nscan_cli.logs.recordings.decoded_messages import S, ScanMessage, decimal_seconds
 from nscan_cli.logs.recordings.decoding import UNDECODABLE, scan_decoder
-from nscan_cli.logs.recordings.message_stamps import order_messages, valid_stamps
+from nscan_cli.logs.recordings.message_stamps import are_in_seconds, order_messages, valid_stamps
 from nscan_cli.logs.recordings.message_types import ODOMETRY_TYPES, SCAN_TYPES
 from nscan_cli.logs.recordings.mounting import laser_mounting
 from nscan_cli.logs.recordings.robot_motion import ScanClock, robot_odometry
@@ -48,7 +48,7 @@ def log_from_recording(recording: Recording, file: str, source: Source, options:
     findings.odometries = tuple(devices(recording, ODOMETRY_TYPES))
     scans, log_times = _decoded_scans(recording.messages.get(choice.topic, []), choice.topic, skips, file)
     stamps = valid_stamps([scan.stamp for scan in scans])
-    use_stamps = order_messages(stamps)
+    use_stamps = order_messages(stamps) and are_in_seconds(stamps)
     if not use_stamps:
         findings.warnings.append("the scans' own time stamps are unusable: the times of recording are used")
         stamps = [*log_times]

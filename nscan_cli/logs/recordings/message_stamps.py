@@ -8,6 +8,7 @@ import numpy as np
 
 from nscan_cli.logs.recordings.decoded_messages import S
 from nscan_cli.logs.scan_order import ScanOrderOptions
+from nscan_cli.logs.stamp_unit import stamp_unit
 
 
 def valid_stamps(stamps: Sequence[int], options: ScanOrderOptions = ScanOrderOptions()) -> list[int | None]:
@@ -26,3 +27,8 @@ def order_messages(stamps: Sequence[int | None]) -> bool:
     """Whether stamps give the order of their messages: at least half are set, and half of these differ."""
     valid = [stamp for stamp in stamps if stamp is not None]
     return 2 * len(valid) >= len(stamps) and (len(stamps) == 1 or 2 * len(set(valid)) >= len(stamps))
+
+
+def are_in_seconds(stamps: Sequence[int | None]) -> bool:
+    """Whether stamps, given in ns, are what they say: other units are told by their period."""
+    return stamp_unit(np.array([stamp for stamp in stamps if stamp is not None]) / S) is None

@@ -14,6 +14,7 @@ from nscan_cli.logs.reading_options import ReadingOptions
 from nscan_cli.logs.recordings.container import Recording
 from nscan_cli.logs.recordings.decoded_messages import S
 from nscan_cli.logs.recordings.frame_ids import BASE_FRAMES, ODOM_FRAMES, without_prefix
+from nscan_cli.logs.recordings.message_stamps import are_in_seconds
 from nscan_cli.logs.recordings.message_types import ODOMETRY_TYPES, TRANSFORM_TYPES
 from nscan_cli.logs.recordings.poses_3d import heading
 from nscan_cli.logs.recordings.tf_tree import (
@@ -138,7 +139,12 @@ def _poses_at_scans(
     The `offset` (s) is added to the times of the poses.
     """
     found, found_at, delays = [], [], []
-    stamps = transform_times(rows) if clock.stamped else [log_time for _, log_time in rows]
+    logged = [log_time - round(clock.delay * S) for _, log_time in rows]
+    stamps = transform_times(rows) if clock.stamped else logged
+    if not are_in_seconds(stamps):
+        # In the clock of the scans.
+        findings.warnings.append(f"the time stamps of {source} are unusable: the times of recording are used")
+        stamps = [*logged]
     for number, ((transform, log_time), stamp) in enumerate(zip(rows, stamps, strict=True), 1):
         angle = heading(transform.pose)
         if angle is None or stamp is None:

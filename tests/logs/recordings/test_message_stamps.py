@@ -84,3 +84,17 @@ def test_where_no_message_was_ever_stamped_the_times_of_recording_hold(read):
     assert log.stamps[0] == f"{(START + 7) // S}.{(START + 7) % S:09d}"
     np.testing.assert_allclose(log.odometry[:, 0], [0.0, 0.1, 0.2, 0.3, 0.4], atol=1e-6)
     assert "the scans' own time stamps are unusable: the times of recording are used" in log.report.warnings
+
+
+@pytest.mark.parametrize("wrong", [(Scan, Odom), (Scan,), (Odom,)])
+def test_where_stamps_are_in_milliseconds_the_times_of_recording_hold(wrong, read):
+    written = [
+        Written(one.topic, one.log_time, one.content._replace(stamp=1000 * one.content.stamp))
+        if isinstance(one.content, wrong)
+        else one
+        for one in simulated(100)
+    ]
+    log = read(written, mount=(0.0, 0.0, 0.0))
+    np.testing.assert_allclose(np.diff(log.times), 0.1, atol=1e-6)
+    np.testing.assert_allclose(log.odometry[:, 0], 0.1 * np.arange(100), atol=1e-6)
+    assert any("unusable: the times of recording are used" in warning for warning in log.report.warnings)

@@ -1,0 +1,56 @@
+"""The unit of time stamps: seconds, unless scans came so seldom that another unit is likely."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from nscan_cli.poses import Array
+
+
+@dataclass(frozen=True)
+class StampUnitOptions:
+    """When stamps are not in seconds."""
+
+    shortest_period: float = 0.02
+    """Shortest usual time between scans, s: a laser of more than 50 Hz in milliseconds passes for a slow one
+    in seconds. A smaller value puts more logs right, and may take one scan in 10 s for 100 scans a second."""
+    min_scans: int = 50
+    """Least number of scans that tell. A larger value converts fewer logs."""
+    min_steady_share: float = 0.8
+    """Least share of periods within a factor of 1.5 of the median: a laser keeps its period, and a robot that
+    takes one scan at each stop does not. A larger value converts fewer logs."""
+
+
+class StampUnit(NamedTuple):
+    """A unit of time."""
+
+    name: str
+    seconds: float
+
+
+UNITS_OF_TIME = (
+    StampUnit("milliseconds", 1e-3),
+    StampUnit("microseconds", 1e-6),
+    StampUnit("nanoseconds", 1e-9),
+)
+"""Units that stamps may have instead of seconds."""
+
+
+def stamp_unit(stamps: Array, options: StampUnitOptions = StampUnitOptions()) -> StampUnit | None:
+    """The unit of stamps (n,), in the order of their scans and as written; None for seconds.
+
+    nan are left out. Units are a thousand times each other, so that only one of them gives a period from the
+    shortest one to a thousand times as much; in seconds all real logs are there.
+    """
+    periods = np.abs(np.diff(stamps[np.isfinite(stamps)]))
+    periods = periods[periods > 0.0]
+    if len(periods) < options.min_scans - 1:
+        return None
+    period, least = float(np.median(periods)), options.shortest_period
+    is_steady = (1.5 * periods > period) & (periods < 1.5 * period)
+    if is_steady.mean() < options.min_steady_share:
+        return None
+    return next((unit for unit in UNITS_OF_TIME if least <= period * unit.seconds < 1e3 * least), None)
