@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -37,18 +38,27 @@ def are_in_degrees(poses: Array, options: HeadingUnitOptions = HeadingUnitOption
     poses = poses[are_known(poses)]
     if len(poses) < 2 or np.abs(poses[:, 2]).max() <= options.max_radians:
         return False
-    pieces = np.floor(path_lengths(poses) / options.min_step)
+    fits = along_way(poses[:, :2], [np.radians(poses[:, 2]), poses[:, 2]], options)
+    return fits is not None and fits[0] >= max(options.min_along, fits[1] + options.min_gain)
+
+
+def along_way(positions: Array, headings: Sequence[Array], options: HeadingUnitOptions) -> list[float] | None:
+    """How well a robot at positions (P, 2) drives along each of several headings (P,), rad, in order of time.
+
+    It is the mean cosine of twice the angle between both, because the robot may drive backwards. None for
+    few steps.
+    """
+    pieces = np.floor(path_lengths(positions) / options.min_step)
     ends = np.append(0, np.flatnonzero(np.diff(pieces) > 0.0) + 1)
     if len(ends) <= options.min_steps:
-        return False
-    x, y = np.diff(poses[ends, :2], axis=0).T
+        return None
+    x, y = np.diff(positions[ends], axis=0).T
     directions = np.arctan2(y, x)
 
-    def along(headings: Array) -> float:
-        # Half-way between both ends of a step, and of twice the angle, because the robot may drive backwards.
-        turned = np.unwrap(headings)
+    def along(angles: Array) -> float:
+        # Half-way between both ends of a step.
+        turned = np.unwrap(angles)
         middle = 0.5 * (turned[ends[1:]] + turned[ends[:-1]])
         return float(np.cos(2 * (directions - middle)).mean())
 
-    in_degrees = along(np.radians(poses[:, 2]))
-    return in_degrees >= max(options.min_along, along(poses[:, 2]) + options.min_gain)
+    return [along(angles) for angles in headings]

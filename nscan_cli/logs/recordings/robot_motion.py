@@ -16,6 +16,7 @@ from nscan_cli.logs.recordings.decoded_messages import S
 from nscan_cli.logs.recordings.frame_ids import BASE_FRAMES, ODOM_FRAMES, without_prefix
 from nscan_cli.logs.recordings.message_stamps import are_in_seconds
 from nscan_cli.logs.recordings.message_types import ODOMETRY_TYPES, TRANSFORM_TYPES
+from nscan_cli.logs.recordings.orientations import headings_of
 from nscan_cli.logs.recordings.poses_3d import heading
 from nscan_cli.logs.recordings.tf_tree import (
     LoggedTransform,
@@ -81,7 +82,7 @@ def robot_odometry(
         rows = by_frame.get(asked or "", []) or _odometry_in_tf(tree, file)
         source = f"tf from {rows[0][0].parent} to {rows[0][0].child}" if rows else ""
         why = "no topic has odometry" if asked is None else f"{asked} is asked for"
-    poses, path = _poses_at_scans(rows, source or "tf", clock, options.clock_offset, findings)
+    poses, path = _poses_at_scans(rows, source or "tf", clock, options, findings)
     if poses is not None:
         findings.used["odometry"] = f"{source}, {why}, interpolated"
     elif rows:
@@ -132,21 +133,32 @@ def _transforms_from_odom(tree: TransformTree) -> dict[str, list[LoggedTransform
 
 
 def _poses_at_scans(
-    rows: Sequence[LoggedTransform], source: str, clock: ScanClock, offset: float, findings: ReaderFindings
+    rows: Sequence[LoggedTransform],
+    source: str,
+    clock: ScanClock,
+    options: ReadingOptions,
+    findings: ReaderFindings,
 ) -> tuple[Array | None, RobotPath | None]:
     """Interpolated poses (S, 3) at the times of the scans, and the path; None without a valid pose.
 
-    The `offset` (s) is added to the times of the poses.
+    The clock offset of the options is added to the times of the poses.
     """
-    found, found_at, delays = [], [], []
+    found, found_at, delays, offset = [], [], [], options.clock_offset
+    as_written = [transform.pose for transform, _ in rows]
+    if options.as_recorded:
+        angles = [heading(pose) for pose in as_written]
+    else:
+        angles, mended = headings_of(as_written)
+        if mended:
+            findings.contradictions.append(f"{source}: {mended}; --as-recorded reads them as they are")
     logged = [log_time - round(clock.delay * S) for _, log_time in rows]
     stamps = transform_times(rows) if clock.stamped else logged
     if not are_in_seconds(stamps):
         # In the clock of the scans.
         findings.warnings.append(f"the time stamps of {source} are unusable: the times of recording are used")
         stamps = [*logged]
-    for number, ((transform, log_time), stamp) in enumerate(zip(rows, stamps, strict=True), 1):
-        angle = heading(transform.pose)
+    for number, (row, stamp, angle) in enumerate(zip(rows, stamps, angles, strict=True), 1):
+        transform, log_time = row
         if angle is None or stamp is None:
             findings.skips.add(f"{source}: {'not a pose' if angle is None else 'without a time'}", number)
             continue
