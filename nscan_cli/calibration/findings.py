@@ -12,11 +12,11 @@ from nscan_cli.calibration.mount_fit import MountFit, TurnFit
 from nscan_cli.calibration.odometry_clock import ClockLag
 from nscan_cli.calibration.options import FileCheckOptions
 from nscan_cli.calibration.scale_change import ScaleChange
-from nscan_cli.calibration.step_evidence import StepEvidence, is_wrong_scale
+from nscan_cli.calibration.step_evidence import StepEvidence, is_nearer, is_wrong_scale
 from nscan_cli.calibration.view_change import DirectionChange, TurnChange
 from nscan_cli.files.text import counted
 from nscan_cli.logs.reading_options import ReadingOptions
-from nscan_cli.poses import Array, wrap
+from nscan_cli.poses import Array, transform, wrap
 
 UNDONE = "--as-recorded uses it as it is"
 
@@ -49,7 +49,7 @@ def excluded(evidence: StepEvidence) -> Finding:
     """Nothing explains the positions."""
     return _unused(
         "odometry contradicts the scans: no scale, mounting or clock explains its positions, "
-        f"in {counted(evidence.moving, 'step')}"
+        f"in {counted(evidence.moving, 'step')} (headings in degrees?)"
     )
 
 
@@ -226,9 +226,19 @@ def wrong_mounting(mount: Array, fit: MountFit, options: FileCheckOptions) -> Fi
         along = f"{off[0]:+.2f} m ahead and {off[1]:+.2f} m to the left"
         what = f"the laser is likely elsewhere on the robot than the file says, by {along}"
         return Finding(f"{what}; {agree}; {cure}", is_of_mount=True)
-    side, degrees = "left" if turn > 0 else "right", abs(math.degrees(turn))
-    what = f"the laser likely looks {degrees:.0f}° further to the {side} than the file says"
-    return Finding(f"{what}; {agree}; {cure}", is_of_mount=True)
+    side, other = ("left", "right") if turn > 0 else ("right", "left")
+    degrees = f"{abs(math.degrees(turn)):.0f}°"
+    by_laser = f"the laser likely looks {degrees} further to the {side} than the file says"
+    by_headings = f"the headings of odometry are likely {degrees} too far to the {other}"
+    turned = transform(np.array([0.0, 0.0, turn]), mount[:2])
+    if is_nearer(fit, np.array([*turned, mount[2] + turn]), mount, sigmas):
+        # Seen from a robot that is turned, the laser is elsewhere, too.
+        x, y = (f"{part:g}" for part in (np.round(turned, 2) + 0.0).tolist())
+        return Finding(f"{by_headings}; {agree}; try --mount {x},{y},{angle}", is_of_mount=True)
+    if not mount[:2].any():
+        # In the middle of the robot both are the same.
+        by_laser += f", or the headings of odometry are {degrees} too far to the {other}"
+    return Finding(f"{by_laser}; {agree}; {cure}", is_of_mount=True)
 
 
 def opposite(

@@ -24,6 +24,7 @@ from nscan_cli.logs.raw_scans import RawScans
 from nscan_cli.logs.reading_options import ReadingOptions
 from nscan_cli.logs.robot_parts import RobotPartsOptions, ScanTable
 from nscan_cli.logs.robot_path import RobotPath, poses_at, robot_path
+from nscan_cli.logs.rounded_ranges import rounding_of_ranges
 from nscan_cli.logs.scan_order import ScanOrder, selected_numbers
 from nscan_cli.logs.skips import Skips
 from nscan_cli.logs.slow_odometry import without_repeats
@@ -95,6 +96,9 @@ def laser_log(
     beams, limits = beam_counts(raw.ranges, raw.beams)[rows], limits.of(rows)
     lost = lost_readings(ranges, beams, limits, file)
     mark_no_returns(ranges, limits.low, limits.high)
+    rounded = rounding_of_ranges(ranges)
+    if rounded:
+        warnings.append(rounded)
     hidden = mask_beams(ranges, angle_min[rows], angle_increment[rows], sectors)
     if hidden:
         lost.counts["in masked sectors"] = hidden

@@ -57,6 +57,10 @@ FAULTS: tuple[tuple[str, Fault, str], ...] = (
     ("odometry turns × 1.6", lambda log: odometry_faults.turning(log, 1.6), "odometry.* turns"),
     ("odometry turns × −1", lambda log: odometry_faults.turning(log, -1.0), "turns the wrong way"),
     ("odometry's x reversed", odometry_faults.x_reversed, "odometry counts x or y the wrong way"),
+    ("odometry heads 90° too far left",
+        lambda log: odometry_faults.heading_elsewhere(log, np.radians(90.0)),
+        "headings of odometry are",
+    ),
     ("odometry backwards", odometry_faults.behind, "counts forward as backward"),
     ("odometry frozen", _frozen, "never moves"),
     ("odometry frozen for a third, then jumps",
@@ -90,6 +94,7 @@ FAULTS: tuple[tuple[str, Fault, str], ...] = (
     ("ranges × 1.1 from half-way on", _from_half_way(1.1), "times the others"),
     ("ranges × 1.05 from half-way on", _from_half_way(1.05), "times the others"),
     ("ranges × 0.9", lambda log: faults.ranges_scaled(log, 0.9, slice(None)), "range-scale 1.1"),
+    ("ranges rounded to 0.1 m", lambda log: faults.ranges_rounded(log, 0.1), "multiples of 0.1 m"),
     ("readings reversed", faults.mirrored, "in the wrong order"),
     ("readings reversed from half-way on",
         lambda log: faults.mirrored_in(log, slice(len(log) // 2, None)),
@@ -126,7 +131,8 @@ KNOWN_CURES = {
 """The options that the owner chooses where messages name several causes."""
 FAULTS_OF_REAL_LOGS = (
     "", "two posts of 20°", "a sixth of the beams always says 5 m", "odometry × 1000", "odometry turns × −1",
-    "odometry frozen for a third", "each pose five times", "odometry zero at every 50th scan",
+    "odometry heads 90° too far left", "odometry frozen for a third", "each pose five times",
+    "odometry zero at every 50th scan", "ranges rounded to 0.1 m",
     "two drives in one file", "two scans a stamp", "stamps in ms", "ranges × 1.1 from half-way on",
     "ranges × 1.05 from half-way on", "readings reversed", "readings reversed from half-way on",
     "readings reversed in the last fifth",

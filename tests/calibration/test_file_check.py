@@ -42,6 +42,14 @@ def found(log: LaserLog, reading: ReadingOptions | None = None) -> list[str]:
 LIKELY: dict[str, tuple[Fault, str]] = {
     "mirrored": (faults.mirrored, "in the wrong order, and the map is mirrored.*try --flip"),
     "looks to the left": (lambda log: faults.mounted_otherwise(log, -np.pi / 2), "90° further to the left"),
+    "heads to the left": (
+        lambda log: odometry_faults.heading_elsewhere(log, np.pi / 2),
+        "headings of odometry are likely 90° too far to the left;.*try --mount 0,-0.1,-90$",
+    ),
+    "in the middle, and looks to the left": (
+        lambda log: replace(log, mount=np.array([0.0, 0.0, -np.pi / 2])),
+        "90° further to the left than the file says, or the headings of odometry are 90° too far to the r",
+    ),
     "looks back": (
         lambda log: faults.mounted_otherwise(log, np.pi),
         "180° further.*try --mount 0.1,0,0, or --odometry-scale -1 if",

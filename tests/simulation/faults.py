@@ -120,6 +120,11 @@ def ranges_scaled(log: LaserLog, factor: float, rows: Rows) -> LaserLog:
     return replace(log, ranges=ranges)
 
 
+def ranges_rounded(log: LaserLog, step: float) -> LaserLog:
+    """All ranges as multiples of a step (m)."""
+    return replace(log, ranges=np.float32(step) * np.round(log.ranges / np.float32(step)))
+
+
 def dust(log: LaserLog, share: float, reading: float) -> LaserLog:
     """A share of the beams, each by chance, ends at one reading (m)."""
     ranges = log.ranges.copy()

@@ -89,6 +89,13 @@ def turning(log: LaserLog, factor: float) -> LaserLog:
     return replace(log, odometry=_summed(_odometry(log)[0], steps))
 
 
+def heading_elsewhere(log: LaserLog, turn: float) -> LaserLog:
+    """The headings by odometry are too far to the left by a turn (rad); its positions are right."""
+    odometry = _odometry(log).copy()
+    odometry[:, 2] = wrap(odometry[:, 2] + turn)
+    return replace(log, odometry=odometry)
+
+
 def jump(log: LaserLog, at: int, jump: tuple[float, float, float]) -> LaserLog:
     """From row `at` on the odometry is off by a pose, in its own frame."""
     odometry = _odometry(log).copy()
