@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
+from nscan_cli.calibration.bearing_jitter import checked_bearings
 from nscan_cli.calibration.companions import checked_companion
 from nscan_cli.calibration.compared_ranges import compare_ranges
 from nscan_cli.calibration.contradictions import changed_view, find_contradictions
@@ -41,6 +42,7 @@ def checked_file(log: LaserLog, reading: ReadingOptions, options: FileCheckOptio
     log, reading, said = checked_sweep(log, reading, options)
     if reading.as_recorded:
         return CheckedFile(log, reading, said)
+    log, jitter = checked_bearings(log, options)
     compared = compare_ranges(log, options)
     log, order = checked_order(log, compared, options)
     if order:
@@ -70,7 +72,7 @@ def checked_file(log: LaserLog, reading: ReadingOptions, options: FileCheckOptio
             if not reversing and "odometry_scale" in finding.corrected:
                 # In another unit the ranges did not change as odometry says.
                 log, reversing = checked_signs(log, options.unsigned, options.steps)
-    said += order + jumps + units + held + reversing + [finding.message for finding in findings]
+    said += jitter + order + jumps + units + held + reversing + [finding.message for finding in findings]
     if any(not finding.corrected for finding in findings):
         # Where the robot has been is in doubt.
         is_elsewhere = any(finding.is_of_mount or finding.is_of_view for finding in findings)

@@ -12,7 +12,7 @@ from nscan_cli.calibration.odometry_options import (
     UnsignedOdometryOptions,
     ViewChangeOptions,
 )
-from nscan_cli.calibration.range_jump_options import OrderJumpOptions, RangeJumpOptions
+from nscan_cli.calibration.range_jump_options import BearingJitterOptions, OrderJumpOptions, RangeJumpOptions
 from nscan_cli.calibration.sweep_options import SweepCheckOptions
 from nscan_cli.matching.pairwise import PairOptions
 
@@ -161,6 +161,7 @@ class FileCheckOptions:
     units: OdometryUnitOptions = field(default_factory=OdometryUnitOptions)
     jumps: RangeJumpOptions = field(default_factory=RangeJumpOptions)
     order: OrderJumpOptions = field(default_factory=OrderJumpOptions)
+    jitter: BearingJitterOptions = field(default_factory=BearingJitterOptions)
     change: ScaleChangeOptions = field(default_factory=ScaleChangeOptions)
     view: ViewChangeOptions = field(default_factory=ViewChangeOptions)
     unsigned: UnsignedOdometryOptions = field(default_factory=UnsignedOdometryOptions)

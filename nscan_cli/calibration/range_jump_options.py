@@ -49,3 +49,15 @@ class OrderJumpOptions:
     min_gain: float = 0.3
     """The energy per point of four pairs of scans, one before the place and one behind, is lower by so much
     if one is mirrored, and that of two pairs on one side is higher. A larger value finds less."""
+
+
+@dataclass(frozen=True)
+class BearingJitterOptions:
+    """When first directions jitter in the file alone."""
+
+    min_jitter: float = math.radians(0.5)
+    """Least usual change of the first direction from one scan to the next, rad. A smaller value checks more
+    logs."""
+    sigmas: float = 2.5
+    """The share of such changes by which turns by scans and by odometry differ exceeds one half by so many
+    standard deviations. A larger value finds less."""

@@ -152,6 +152,12 @@ def turned_in(log: LaserLog, turn: float, rows: Rows) -> LaserLog:
     return replace(log, angle_min=first)
 
 
+def first_directions_jitter(log: LaserLog, sigma: float, seed: int = 1) -> LaserLog:
+    """The file has first directions that are off by chance, with this standard deviation (rad)."""
+    jitter = sigma * np.random.default_rng(seed).standard_normal(len(log))
+    return replace(log, angle_min=log.angle_min + jitter)
+
+
 def beams_apart(log: LaserLog, factor: float) -> LaserLog:
     """The file says that beams are so many times as far apart as they are, about the same middle."""
     middle = log.angle_min + 0.5 * log.angle_increment * (log.beam_counts() - 1)
