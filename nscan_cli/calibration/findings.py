@@ -230,13 +230,13 @@ def wrong_mounting(mount: Array, fit: MountFit, options: FileCheckOptions) -> Fi
     degrees = f"{abs(math.degrees(turn)):.0f}°"
     by_laser = f"the laser likely looks {degrees} further to the {side} than the file says"
     by_headings = f"the headings of odometry are likely {degrees} too far to the {other}"
-    turned = transform(np.array([0.0, 0.0, turn]), mount[:2])
-    if is_nearer(fit, np.array([*turned, mount[2] + turn]), mount, sigmas):
-        # Seen from a robot that is turned, the laser is elsewhere, too.
-        x, y = (f"{part:g}" for part in (np.round(turned, 2) + 0.0).tolist())
+    # Seen from a robot that is turned, the laser is elsewhere, too.
+    turned = np.array([*transform(np.array([0.0, 0.0, turn]), mount[:2]), mount[2] + turn])
+    if is_nearer(fit, turned, mount, sigmas):
+        x, y = (f"{part:g}" for part in (np.round(turned[:2], 2) + 0.0).tolist())
         return Finding(f"{by_headings}; {agree}; try --mount {x},{y},{angle}", is_of_mount=True)
-    if not mount[:2].any():
-        # In the middle of the robot both are the same.
+    if not is_nearer(fit, mount, turned, sigmas):
+        # Near the middle of the robot both are the same.
         by_laser += f", or the headings of odometry are {degrees} too far to the {other}"
     return Finding(f"{by_laser}; {agree}; {cure}", is_of_mount=True)
 
