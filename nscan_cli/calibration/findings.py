@@ -228,17 +228,16 @@ def wrong_mounting(mount: Array, fit: MountFit, options: FileCheckOptions) -> Fi
         return Finding(f"{what}; {agree}; {cure}", is_of_mount=True)
     side, other = ("left", "right") if turn > 0 else ("right", "left")
     degrees = f"{abs(math.degrees(turn)):.0f}°"
-    by_laser = f"the laser likely looks {degrees} further to the {side} than the file says"
-    by_headings = f"the headings of odometry are likely {degrees} too far to the {other}"
     # Seen from a robot that is turned, the laser is elsewhere, too.
     turned = np.array([*transform(np.array([0.0, 0.0, turn]), mount[:2]), mount[2] + turn])
+    headings = f"the headings of odometry are likely {degrees} too far to the {other}"
     if is_nearer(fit, turned, mount, sigmas):
-        x, y = (f"{part:g}" for part in (np.round(turned[:2], 2) + 0.0).tolist())
-        return Finding(f"{by_headings}; {agree}; try --mount {x},{y},{angle}", is_of_mount=True)
+        return Finding(f"{headings}; {agree}; try --no-odometry", is_of_mount=True)
     if not is_nearer(fit, mount, turned, sigmas):
-        # Near the middle of the robot both are the same.
-        by_laser += f", or the headings of odometry are {degrees} too far to the {other}"
-    return Finding(f"{by_laser}; {agree}; {cure}", is_of_mount=True)
+        # Near the middle of the robot both look the same.
+        cure += f", or --no-odometry if the headings of odometry are {degrees} too far to the {other}"
+    what = f"the laser likely looks {degrees} further to the {side} than the file says"
+    return Finding(f"{what}; {agree}; {cure}", is_of_mount=True)
 
 
 def opposite(

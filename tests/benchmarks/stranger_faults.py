@@ -42,6 +42,9 @@ def _middle(log: LaserLog) -> slice:
     return slice(len(log) // 3, 2 * len(log) // 3)
 
 
+JUMP_OF_RANGES = "times the others|odometry or the ranges change their scale"
+JUMP_OF_ORDER = "in the other order than those of the others|order of the readings likely changes"
+"""What tells such changes where the scans before and behind show them, or else odometry."""
 FAULTS: tuple[tuple[str, Fault, str], ...] = (
     ("", lambda log: log, ""),
     ("odometry × 1000", lambda log: odometry_faults.scaled(log, 1000.0), "odometry-scale 0.001"),
@@ -90,19 +93,19 @@ FAULTS: tuple[tuple[str, Fault, str], ...] = (
     ("ranges in mm from half-way on", _from_half_way(1000.0), "in millimetres, the others in metres"),
     ("ranges in cm from half-way on", _from_half_way(100.0), "in centimetres, the others in metres"),
     ("ranges in feet from half-way on", _from_half_way(3.281), "all ranges are multiplied"),
-    ("ranges × 1.15 from half-way on", _from_half_way(1.15), "times the others"),
-    ("ranges × 1.1 from half-way on", _from_half_way(1.1), "times the others"),
-    ("ranges × 1.05 from half-way on", _from_half_way(1.05), "times the others"),
+    ("ranges × 1.15 from half-way on", _from_half_way(1.15), JUMP_OF_RANGES),
+    ("ranges × 1.1 from half-way on", _from_half_way(1.1), JUMP_OF_RANGES),
+    ("ranges × 1.05 from half-way on", _from_half_way(1.05), JUMP_OF_RANGES),
     ("ranges × 0.9", lambda log: faults.ranges_scaled(log, 0.9, slice(None)), "range-scale 1.1"),
     ("ranges rounded to 0.1 m", lambda log: faults.ranges_rounded(log, 0.1), "multiples of 0.1 m"),
     ("readings reversed", faults.mirrored, "in the wrong order"),
     ("readings reversed from half-way on",
         lambda log: faults.mirrored_in(log, slice(len(log) // 2, None)),
-        "in the other order than those of the others",
+        JUMP_OF_ORDER,
     ),
     ("readings reversed in the last fifth",
         lambda log: faults.mirrored_in(log, slice(4 * len(log) // 5, None)),
-        "in the other order than those of the others",
+        JUMP_OF_ORDER,
     ),
     ("looks 30° left from half-way on", _turned_from_half_way(30.0), "looks 30° further"),
     ("looks 90° left from half-way on", _turned_from_half_way(90.0), "looks (89|90|91)° further"),
@@ -130,6 +133,7 @@ FAULTS: tuple[tuple[str, Fault, str], ...] = (
 )  # fmt: skip
 """Name, fault, and what tells its cause."""
 KNOWN_CURES = {
+    "odometry heads 90° too far left": "--no-odometry",
     "ranges × 0.9": r"--range-scale \S+",
 }
 """The options that the owner chooses where messages name several causes."""

@@ -44,11 +44,11 @@ LIKELY: dict[str, tuple[Fault, str]] = {
     "looks to the left": (lambda log: faults.mounted_otherwise(log, -np.pi / 2), "90° further to the left"),
     "heads to the left": (
         lambda log: odometry_faults.heading_elsewhere(log, np.pi / 2),
-        "headings of odometry are likely 90° too far to the left;.*try --mount 0,-0.1,-90$",
+        "headings of odometry are likely 90° too far to the left;.*try --no-odometry$",
     ),
     "in the middle, and looks to the left": (
         lambda log: replace(log, mount=np.array([0.0, 0.0, -np.pi / 2])),
-        "90° further to the left than the file says, or the headings of odometry are 90° too far to the r",
+        "90° further to the left.*--mount 0,0,0, or --no-odometry if the headings .* 90° too far to the right",
     ),
     "looks back": (
         lambda log: faults.mounted_otherwise(log, np.pi),
@@ -66,7 +66,7 @@ LIKELY: dict[str, tuple[Fault, str]] = {
         lambda log: odometry_faults.turning(log, -1.0),
         "try --flip; if left and right are correct in the map, odometry turns the wrong way",
     ),
-    "looks askew": (lambda log: faults.mounted_otherwise(log, 0.6), "try --mount 0.1,0,0$"),
+    "looks askew": (lambda log: faults.mounted_otherwise(log, 0.6), "try --mount 0.1,0,0(, or|$)"),
     "half as long": (lambda log: odometry_faults.scaled(log, 0.5), r"try --odometry-scale (1\.9|2\.0|2)"),
     "a tenth too short, or the ranges too long": (
         lambda log: odometry_faults.scaled(log, 0.9),
