@@ -48,7 +48,7 @@ LIKELY: dict[str, tuple[Fault, str]] = {
     ),
     "in the middle, and looks to the left": (
         lambda log: replace(log, mount=np.array([0.0, 0.0, -np.pi / 2])),
-        "90° further to the left.*--mount 0,0,0, or --no-odometry if the headings .* 90° too far to the right",
+        "90° further to the left.*--mount 0,0,0, or --no-odometry if the headings .* too far to the right",
     ),
     "looks back": (
         lambda log: faults.mounted_otherwise(log, np.pi),
