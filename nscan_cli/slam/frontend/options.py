@@ -126,6 +126,10 @@ class TrackingOptions:
     """Distance between neighbouring points of a scan that are matched, m; some are left out where they are
     closer. A larger one is faster, and blurs small things; with none a wall beside the robot outweighs all
     the rest."""
+    bridged_gap: float = 1.0
+    """Without odometry, points of the first scan of a track get others between them if they are at most this
+    far apart, m, and if fewer than `lost_inliers` of them lie on Gaussians of their own: walls far away. A
+    larger value bridges more gaps that are none."""
     scan: ScanTrackingOptions = field(default_factory=ScanTrackingOptions)
     """How each scan is matched with the local map, and joins it."""
     widenings: tuple[float, ...] = (0.05, 0.3, 1.0)

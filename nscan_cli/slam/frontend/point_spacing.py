@@ -1,4 +1,4 @@
-"""Step 1: points of a scan that are closer together than needed are left out.
+"""Step 1: points of a scan that are closer together than needed are left out; wide gaps may be bridged.
 
 A laser hits a wall beside the robot with hundreds of beams within half a metre, and one a few metres off with
 a dozen. So many points in one place outweigh all the rest. The map has them where the robot was, so in a bare
@@ -13,6 +13,7 @@ import math
 import numpy as np
 
 from nscan_cli.kernels.decorators import kernel
+from nscan_cli.ndt.options import GaussianOptions
 from nscan_cli.poses import Array, Indices, Mask
 
 NEIGHBOURS = 4
@@ -40,3 +41,18 @@ def spaced_points(points: Array, ends: Indices, spacing: float) -> Mask:
                 way -= 1.0
                 kept[i] = True
     return kept
+
+
+def points_between(points: Array, options: GaussianOptions, longest: float) -> Array:
+    """Points (n, 2) on the lines between neighbouring points (m, 2) of a scan, at most `longest` (m) apart.
+
+    They are so close that a wall that crosses a cell has enough of them for a Gaussian.
+    """
+    steps = np.diff(points, axis=0)
+    gaps = np.hypot(steps[:, 0], steps[:, 1])
+    spacing = options.cell / (options.minimum + 1)
+    counts = np.where(gaps <= longest, np.ceil(gaps / spacing) - 1, 0).clip(0).astype(np.int64)
+    before = np.repeat(np.arange(len(counts)), counts)
+    number = 1 + np.arange(len(before)) - np.repeat(np.cumsum(counts) - counts, counts)
+    between: Array = points[before] + (number / (counts[before] + 1))[:, None] * steps[before]
+    return between

@@ -10,13 +10,15 @@ import numpy as np
 
 from nscan_cli.matching.correlative_search import likelihood_field, search
 from nscan_cli.matching.motion_model import no_prior
+from nscan_cli.ndt.energy import inlier_share
 from nscan_cli.ndt.transform import Ndt
 from nscan_cli.poses import Array
-from nscan_cli.slam.frontend.local_map import ROWS
+from nscan_cli.slam.frontend.local_map import ROWS, insert_scan
 from nscan_cli.slam.frontend.options import LaserView, TrackingOptions, TrackingParameters
+from nscan_cli.slam.frontend.point_spacing import points_between
 from nscan_cli.slam.frontend.scan_batch import ScanBatch
 from nscan_cli.slam.frontend.scan_to_map import match_and_count
-from nscan_cli.slam.frontend.track_state import NEXT, RESTARTS, TrackState
+from nscan_cli.slam.frontend.track_state import KNOWN, NEXT, RESTARTS, TrackState
 from nscan_cli.slam.frontend.tracked_scans import TrackedScans
 from nscan_cli.slam.frontend.tracking_kernels import settle, track_scans
 from nscan_cli.slam.frontend.tracking_problem import TrackingProblem
@@ -36,6 +38,8 @@ class Tracker:
         self.options = options
         self.map = Ndt.empty(options.gaussians, capacity=1 << 14, faces=odometry)
         self.searches = 0
+        self._is_alone = not odometry
+        """Whether nothing but the scans tells how the robot moves."""
         self._settings = TrackingParameters.of(options, odometry, laser)
         self._track = TrackState.begin(options.velocity_scans + 1, options.scan.degeneracy.initial_sigma)
         self._prior = no_prior()
@@ -47,6 +51,8 @@ class Tracker:
 
     def track(self, scans: ScanBatch, may_wait: bool = False) -> TrackedScans:
         """Track the next scans. Of the last ones, which may wait for scans after them, nothing is found."""
+        if self._is_alone and self._track.counts[KNOWN] == 0 and len(scans):
+            self._bridge_gaps(scans.of(0))
         n, k, ends = len(scans), 0, scans.ends
         odometry = np.full((n, 3), np.nan) if scans.odometry is None else scans.odometry
         roomy = self._track.map.with_room(n, int(ends[-1] - ends[0]))
@@ -67,6 +73,23 @@ class Tracker:
                 k += 1
             self.map.rows = int(self._track.map.counts[ROWS])
         return found.part(0, int(self._track.counts[NEXT]))
+
+    def _bridge_gaps(self, points: Array) -> None:
+        """Let points between those of the first scan (m, 2) join the map if alone it makes few Gaussians."""
+        options, origin = self.options, np.zeros(3)
+        own = Ndt.of_scans(points, np.array([0, len(points)]), origin[None], options.gaussians)
+        if (
+            inlier_share(own.grid, own.half, points, origin, options.scan.inlier_bound)
+            > options.scan.lost_inliers
+        ):
+            return
+        between = points_between(points, options.gaussians, options.bridged_gap)
+        self.map.reserve(len(between))
+        local_map = self._track.map.with_room(1, len(between))
+        self._track = self._track._replace(map=local_map)
+        local_map.counts[ROWS] = self.map.rows
+        insert_scan(local_map, self.map.grid, self._settings, between, origin)
+        self.map.rows = int(local_map.counts[ROWS])
 
     def _search(self, points: Array, found: TrackedScans, k: int) -> None:
         """Match scan k from where a search among the last scans finds it too; keep the lower objective."""

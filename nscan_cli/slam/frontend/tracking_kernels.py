@@ -40,7 +40,7 @@ def settle(problem: TrackingProblem, k: int) -> None:
     relative_pose(pose, track.inserted, step)
     distance = np.hypot(step[0], step[1])
     # Before anything was seen there is nothing to move against.
-    nothing_seen = track.map.counts[ROWS] == 0
+    nothing_seen = counts[KNOWN] == 0 or track.map.counts[ROWS] == 0
     joins = nothing_seen or distance > options.min_motion or abs(wrapped(step[2])) > options.min_motion
     if joins:
         track.map.path[0] += distance

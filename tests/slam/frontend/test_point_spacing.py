@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 import dataclasses
+import itertools
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
 
 from nscan_cli.logs.load import read_log
 from nscan_cli.logs.reading_options import ReadingOptions
-from nscan_cli.slam.frontend.point_spacing import spaced_points
+from nscan_cli.ndt.options import GaussianOptions
+from nscan_cli.slam.frontend.point_spacing import points_between, spaced_points
 from nscan_cli.slam.options import SlamOptions
 from tests.benchmarks.consistency import backwards
 from tests.data import data_file
@@ -75,3 +78,18 @@ def test_a_robot_that_drives_backwards_beside_a_wall_keeps_its_odometry():
 def way(poses: np.ndarray) -> float:
     """How far the robot came while odometry went 1.17 m, m."""
     return float(np.linalg.norm(poses[441, :2] - poses[381, :2]))
+
+
+@settings(deadline=None)
+@given(arrays(np.float64, (12, 2), elements=st.floats(-2.0, 2.0)), st.floats(0.1, 3.0))
+def test_points_between_neighbours_divide_gaps_that_are_short_enough_into_equal_steps(points, longest):
+    options = GaussianOptions()
+    between, spacing = points_between(points, options, longest), options.cell / (options.minimum + 1)
+    for one, other in itertools.pairwise(points):
+        gap = np.linalg.norm(other - one)
+        if spacing < gap <= longest:
+            parts = int(np.ceil(gap / spacing))
+            expected = np.linspace(one, other, parts + 1)[1:-1]
+            np.testing.assert_allclose(between[: parts - 1], expected, atol=1e-12)
+            between = between[parts - 1 :]
+    assert len(between) == 0

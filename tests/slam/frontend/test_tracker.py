@@ -26,7 +26,9 @@ from tests.data import data_file
 from tests.logs.excerpts import excerpt, truth_of
 from tests.ndt.transforms import assert_same, gaussian_count
 from tests.ndt.wall_points import room
+from tests.simulation.drive import Drive
 from tests.simulation.faults import taken
+from tests.simulation.laser import Laser
 from tests.simulation.scenes import Scene
 from tests.simulation.world import Builder
 from tests.slam.mapped_logs import office_log, poses_of, scans_of, sensed, sensed_in, tracked
@@ -264,3 +266,19 @@ def test_without_odometry_a_clear_drop_of_inliers_starts_a_match_again():
     rows = np.arange(700, 860)
     dense, sparse = (poses_of(tracked(taken(log, rows[::every]))[0])[:: 3 - every] for every in (1, 2))
     assert np.abs(steps_off(dense, sparse)).max() < 0.05
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_between_walls_so_far_off_that_one_scan_makes_no_gaussians_the_robot_does_not_seem_to_stand(seed):
+    """No scan joined the map until the robot had moved against it. All was lost, and 60 m of fr-clinic."""
+    plan = Builder()
+    plan.box(-40.0, -22.0, 60.0, 26.0)
+    for x, y in ((-10.0, 15.0), (14.0, -14.0), (26.0, 17.0)):
+        plan.box(x, y, x + 6.0, y + 3.0)
+    way, laser = np.array([(0.0, 0.0), (20.0, 0.0)]), Laser(max_range=80.0)
+    log = Scene("yard", plan.world(), way, Drive(speed=1.0, period=0.2), laser).record(seed).log()
+    scans, truth = sensed_in(dataclasses.replace(log, odometry=None)), truth_of(log)
+    alone = Tracker(TrackingOptions(bridged_gap=0.0), odometry=False).track(scans)
+    assert np.hypot(*end_off(alone.poses, truth)[:2]) > 19.0, "the yard tells more than that of fr-clinic"
+    found = Tracker(TrackingOptions(), odometry=False).track(scans)
+    assert np.hypot(*end_off(found.poses, truth)[:2]) < 0.05
