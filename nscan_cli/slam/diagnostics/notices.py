@@ -17,6 +17,7 @@ from nscan_cli.slam.backend.degenerate_relations import all_widened_relations
 from nscan_cli.slam.diagnostics.degenerate_stretches import degenerate_stretches
 from nscan_cli.slam.diagnostics.odometry_disagreement import odometry_disagreements
 from nscan_cli.slam.diagnostics.view_mismatch import view_mismatches
+from nscan_cli.slam.frontend.degeneracy import NOTHING_TOLD
 from nscan_cli.slam.frontend.odometry_checks import jumps_of, repeated_scans
 from nscan_cli.slam.loop_closure.free_space_violations import is_sound, sound_share
 from nscan_cli.slam.state import SlamState
@@ -128,8 +129,14 @@ def _degenerate_stretches(state: SlamState) -> list[str]:
     log, poses, sigmas = state.log, np.concatenate(state.tracked), state.weakest_sigmas
     if not sigmas:
         return []
-    options = state.options.diagnostics.degenerate_stretch
-    ways = degenerate_stretches(poses, log.times, np.concatenate(sigmas), options)
+    options, told = state.options.diagnostics.degenerate_stretch, np.concatenate(sigmas)
+    lost = int((told >= NOTHING_TOLD).sum())
+    if lost > options.max_lost_share * len(told):
+        return [
+            f"{lost} of {len(told)} scans fit nothing that was seen before; without odometry nothing tells "
+            "how the robot moved: the laser sees too little, or the file is wrong"
+        ]
+    ways = degenerate_stretches(poses, log.times, told, options)
     if not ways:
         return []
     named = _stretches(

@@ -43,6 +43,9 @@ class DegenerateStretchOptions:
     ways."""
     least_speed: float = 0.05
     """A slower robot stands, m/s. A larger value makes the usual speed that of fast drives."""
+    max_lost_share: float = 0.5
+    """If more of the scans than this share fit nothing that was seen before, that is named in place of the
+    ways. A larger value names ways more often."""
 
 
 @dataclass(frozen=True)

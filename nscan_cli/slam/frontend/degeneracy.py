@@ -27,6 +27,9 @@ from nscan_cli.slam.frontend.options import TrackingParameters
 from nscan_cli.slam.frontend.scan_to_map import match_and_count
 from nscan_cli.slam.frontend.tracked_scans import TrackedScans
 
+NOTHING_TOLD = 1e3
+"""Standard deviation of a position of which a scan tells nothing, m."""
+
 
 @kernel
 def keep_prediction(
@@ -115,7 +118,7 @@ def measured_variance(places: Array, values: Array, prior: Prior, apart: float) 
     """The variance (m²) of the position that a scan itself measures: the prior's part is taken out."""
     expected = entropy_power(0.5 * prior.information[0, 0] * places * places, apart)
     told = 1 / max(entropy_power(values, apart), 1e-12) - 1 / expected
-    return 1 / max(told, 1e-6)
+    return 1 / max(told, NOTHING_TOLD**-2)
 
 
 @kernel

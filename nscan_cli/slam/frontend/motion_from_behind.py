@@ -73,15 +73,13 @@ def _better_share(found: TrackedScans, stretch: tuple[int, int], options: Tracki
 
 
 def _may_fit_better(found: TrackedScans, stretch: tuple[int, int], options: TrackingOptions) -> bool:
-    """Whether tracking a stretch from behind is worth its time: scans after it fit that well, and clearly.
+    """Whether scans of a stretch could fit clearly better from behind, where there are later ones to begin with.
 
-    Outdoors few do. A stretch of fewer scans than tell a velocity does not tell that the robot stands.
+    A stretch of fewer scans than tell a velocity does not tell that the robot stands.
     """
     first, end = stretch
-    if end - first < options.velocity_scans or end == len(found.values):
-        return False
-    after = found.inliers[end:].mean()
-    return bool(after >= max(_better_share(found, stretch, options), options.scan.clear_inliers))
+    is_long = end - first >= options.velocity_scans and end < len(found.values)
+    return is_long and _better_share(found, stretch, options) <= 1.0
 
 
 def count_before_doubt(found: TrackedScans, options: TrackingOptions, is_start: bool) -> int:

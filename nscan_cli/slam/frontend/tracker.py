@@ -13,6 +13,7 @@ from nscan_cli.matching.motion_model import no_prior
 from nscan_cli.ndt.energy import inlier_share
 from nscan_cli.ndt.transform import Ndt
 from nscan_cli.poses import Array
+from nscan_cli.slam.frontend.degeneracy import NOTHING_TOLD
 from nscan_cli.slam.frontend.local_map import ROWS, insert_scan
 from nscan_cli.slam.frontend.options import LaserView, TrackingOptions, TrackingParameters
 from nscan_cli.slam.frontend.point_spacing import points_between
@@ -69,6 +70,8 @@ class Tracker:
             k = track_scans(problem, k, may_wait)
             if k < n and np.isfinite(found.inliers[k]):
                 self._search(scans.of(k), found, k)
+                if self._is_alone and found.inliers[k] < self.options.scan.lost_inliers:
+                    found.weakest_sigmas[k] = NOTHING_TOLD
                 settle(problem, k)
                 k += 1
             self.map.rows = int(self._track.map.counts[ROWS])

@@ -17,7 +17,7 @@ from nscan_cli.slam.diagnostics.notices import notices
 from nscan_cli.slam.diagnostics.options import DegenerateStretchOptions
 from tests.data import data_file
 from tests.slam.frontend.test_degeneracy import into_a_bare_corridor
-from tests.slam.frontend.test_tracker import straight_corridor
+from tests.slam.frontend.test_tracker import across_a_yard, straight_corridor
 from tests.slam.mapped_logs import mapped, office_log
 
 OPTIONS = DegenerateStretchOptions()
@@ -77,3 +77,11 @@ def test_the_hallway_of_a_real_recording_is_told():
     assert told is not None
     assert float(told[1]) > 2.0
     assert 270 < int(told[2]) < int(told[3]) < 360
+
+
+def test_a_laser_that_sees_next_to_nothing_is_told():
+    """The robot seemed to stand, without a word."""
+    said = notices(mapped(dataclasses.replace(across_a_yard(4.0, 1), truth=None)).state)
+    assert any("scans fit nothing that was seen before" in notice for notice in said)
+    said = notices(mapped(dataclasses.replace(across_a_yard(1.0, 1), truth=None)).state)
+    assert said == []

@@ -268,17 +268,22 @@ def test_without_odometry_a_clear_drop_of_inliers_starts_a_match_again():
     assert np.abs(steps_off(dense, sparse)).max() < 0.05
 
 
+def across_a_yard(size: float, seed: int) -> LaserLog:
+    """20 m across a yard with walls 22 · `size` m to both sides, without odometry."""
+    plan = Builder()
+    plan.box(-40.0 * size, -22.0 * size, 60.0 * size, 26.0 * size)
+    for x, y in ((-10.0, 15.0), (14.0, -14.0), (26.0, 17.0)):
+        plan.box(x * size, y * size, x * size + 6.0, y * size + 3.0)
+    way, laser = np.array([(0.0, 0.0), (20.0, 0.0)]), Laser(max_range=80.0)
+    log = Scene("yard", plan.world(), way, Drive(speed=1.0, period=0.2), laser).record(seed).log()
+    return dataclasses.replace(log, odometry=None)
+
+
 @pytest.mark.parametrize("seed", [1, 2, 3])
 def test_between_walls_so_far_off_that_one_scan_makes_no_gaussians_the_robot_does_not_seem_to_stand(seed):
     """No scan joined the map until the robot had moved against it. All was lost, and 60 m of fr-clinic."""
-    plan = Builder()
-    plan.box(-40.0, -22.0, 60.0, 26.0)
-    for x, y in ((-10.0, 15.0), (14.0, -14.0), (26.0, 17.0)):
-        plan.box(x, y, x + 6.0, y + 3.0)
-    way, laser = np.array([(0.0, 0.0), (20.0, 0.0)]), Laser(max_range=80.0)
-    log = Scene("yard", plan.world(), way, Drive(speed=1.0, period=0.2), laser).record(seed).log()
-    scans, truth = sensed_in(dataclasses.replace(log, odometry=None)), truth_of(log)
-    alone = Tracker(TrackingOptions(bridged_gap=0.0), odometry=False).track(scans)
-    assert np.hypot(*end_off(alone.poses, truth)[:2]) > 19.0, "the yard tells more than that of fr-clinic"
-    found = Tracker(TrackingOptions(), odometry=False).track(scans)
-    assert np.hypot(*end_off(found.poses, truth)[:2]) < 0.05
+    log = across_a_yard(1.0, seed)
+    alone = Tracker(TrackingOptions(bridged_gap=0.0), odometry=False).track(sensed_in(log))
+    assert np.hypot(*end_off(alone.poses, truth_of(log))[:2]) > 19.0
+    found = Tracker(TrackingOptions(), odometry=False).track(sensed_in(log))
+    assert np.hypot(*end_off(found.poses, truth_of(log))[:2]) < 0.05
