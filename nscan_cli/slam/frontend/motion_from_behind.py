@@ -73,7 +73,7 @@ def _better_share(found: TrackedScans, stretch: tuple[int, int], options: Tracki
 
 
 def _may_fit_better(found: TrackedScans, stretch: tuple[int, int], options: TrackingOptions) -> bool:
-    """Whether scans of a stretch could fit clearly better from behind, where there are later ones to begin with.
+    """Whether scans of a stretch could fit clearly better from behind: there are later ones to begin with.
 
     A stretch of fewer scans than tell a velocity does not tell that the robot stands.
     """
