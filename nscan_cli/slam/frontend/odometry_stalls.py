@@ -160,7 +160,9 @@ def _spreads(steps: OdometrySteps, count: int, options: OdometryStallOptions) ->
     changes = np.abs(np.diff(sliding_window_view(speeds, count + 2), axis=1))
     before, after = speeds[: len(sizes)], speeds[count + 1 :]
     slower, faster = np.minimum(before, after), np.maximum(before, after)
-    mean = sizes.sum(axis=1) / periods.sum(axis=1)
+    # Steps that share a stamp have no speed, and are not steady.
+    durations, mean = periods.sum(axis=1), np.full(len(sizes), np.nan)
+    np.divide(sizes.sum(axis=1), durations, out=mean, where=durations > 0.0)
     off = sizes - mean[:, None] * periods
     tolerated, beside = np.sqrt(options.steady_factor), 0.5 * (before + after)
     is_steady = (slower > 0.0) & (faster <= options.steady_factor * slower)

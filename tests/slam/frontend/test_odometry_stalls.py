@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import warnings
 
 import numpy as np
 import pytest
@@ -181,3 +182,14 @@ def test_a_robot_that_changes_its_speed_is_believed(speeds, turn):
     evened, ends = without_stalls(poses, times, STALLS)
     assert len(ends) == 0
     np.testing.assert_array_equal(evened, poses)
+
+
+def test_poses_that_share_a_stamp_stay_as_they_are():
+    """They have no speed, and their mean was a division by zero."""
+    poses, times = driven(np.tile([0.1, 0.0, 0.0], (40, 1)))
+    times[10:25] = times[10]
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        evened, ends = without_stalls(poses, times, STALLS)
+    np.testing.assert_array_equal(evened, poses)
+    assert len(ends) == 0
