@@ -7,7 +7,7 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 
 from nscan_cli.calibration.companions import find_companion
-from nscan_cli.files.text import shortened_list
+from nscan_cli.files.text import counted, shortened_list
 from nscan_cli.graph.optimise.graduated_nonconvexity import chi2_by_three
 from nscan_cli.logs.beam_mask import mask_text
 from nscan_cli.logs.laser_log import LaserLog
@@ -133,8 +133,8 @@ def _degenerate_stretches(state: SlamState) -> list[str]:
     lost = int((told >= NOTHING_TOLD).sum())
     if lost > options.max_lost_share * len(told):
         return [
-            f"{lost} of {len(told)} scans fit nothing that was seen before; without odometry nothing tells "
-            "how the robot moved: the laser sees too little, or the file is wrong"
+            f"no match for {counted(lost, 'scan')} of {len(told)}: nothing there was seen before, and without "
+            "odometry nothing else tells how the robot moved; the laser sees too little, or the file is wrong"
         ]
     ways = degenerate_stretches(poses, log.times, told, options)
     if not ways:
