@@ -133,8 +133,9 @@ def _degenerate_stretches(state: SlamState) -> list[str]:
     lost = int((told >= NOTHING_TOLD).sum())
     if lost > options.max_lost_share * len(told):
         return [
-            f"no match for {counted(lost, 'scan')} of {len(told)}: nothing there was seen before, and without "
-            "odometry nothing else tells how the robot moved; the laser sees too little, or the file is wrong"
+            f"no match for {counted(lost, 'scan')} of {len(told)}: nothing there was seen before, and "
+            "without odometry nothing else tells how the robot moved; the laser sees too little, or the file "
+            "is wrong"
         ]
     ways = degenerate_stretches(poses, log.times, told, options)
     if not ways:
