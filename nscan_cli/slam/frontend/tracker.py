@@ -81,10 +81,8 @@ class Tracker:
         """Let points between those of the first scan (m, 2) join the map if alone it makes few Gaussians."""
         options, origin = self.options, np.zeros(3)
         own = Ndt.of_scans(points, np.array([0, len(points)]), origin[None], options.gaussians)
-        if (
-            inlier_share(own.grid, own.half, points, origin, options.scan.inlier_bound)
-            > options.scan.lost_inliers
-        ):
+        share = inlier_share(own.grid, own.half, points, origin, options.scan.inlier_bound)
+        if share > options.scan.lost_inliers:
             return
         between = points_between(points, options.gaussians, options.bridged_gap)
         self.map.reserve(len(between))

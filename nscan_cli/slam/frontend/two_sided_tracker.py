@@ -102,7 +102,7 @@ class TwoSidedTracker:
     def _fresh_scans(self, first: int, end: int) -> ScanBatch:
         """A copy of scans in rows from `first` on, before `end`, as they were before they were corrected."""
         since = ScanBatch.together(self._fresh)
-        return since.part(first - since.first, end - since.first).copied()
+        return since.part(first - since.first, end - since.first)
 
     def _forget(self, row: int) -> None:
         """Drop the checkpoints, and the scans since, that are not needed to go back to the scan in a row."""
