@@ -1,4 +1,4 @@
-"""The unit of time stamps: seconds, unless scans came so seldom that another unit is likely."""
+"""The unit of time stamps: seconds, unless these would be too large, or scans would come too seldom."""
 
 from __future__ import annotations
 
@@ -17,6 +17,8 @@ class StampUnitOptions:
     shortest_period: float = 0.02
     """Shortest usual time between scans, s: a laser of more than 50 Hz in milliseconds passes for a slow one
     in seconds. A smaller value puts more logs right, and may take one scan in 10 s for 100 scans a second."""
+    latest: float = 1e11
+    """Latest time, s: larger stamps count smaller units since 1970. A larger value converts fewer logs."""
     min_scans: int = 50
     """Least number of scans that tell. A larger value converts fewer logs."""
     min_steady_share: float = 0.8
@@ -45,7 +47,11 @@ def stamp_unit(stamps: Array, options: StampUnitOptions = StampUnitOptions()) ->
     nan are left out. Units are a thousand times each other, so that only one of them gives a period from the
     shortest one to a thousand times as much; in seconds all real logs are there.
     """
-    periods = np.abs(np.diff(stamps[np.isfinite(stamps)]))
+    stamps = stamps[np.isfinite(stamps)]
+    usual = float(np.median(np.abs(stamps))) if len(stamps) else 0.0
+    if usual > options.latest:
+        return next((unit for unit in UNITS_OF_TIME if usual * unit.seconds <= options.latest), None)
+    periods = np.abs(np.diff(stamps))
     periods = periods[periods > 0.0]
     if len(periods) < options.min_scans - 1:
         return None

@@ -53,9 +53,13 @@ class Outcome:
 
 
 def outcome(case: Case) -> Outcome:
-    """Map a file in three ways."""
+    """Map a file in three ways. A file that cannot be made has failed: the others are mapped."""
     with TemporaryDirectory() as folder:
-        log, reference = case.files(Path(folder))
+        try:
+            log, reference = case.files(Path(folder))
+        except Exception as error:
+            failed = Run(None, (f"{type(error).__name__}: {error}",))
+            return Outcome(case, failed, "", None, failed)
         slam = [str(log), "-o", str(Path(folder, "graph.json"))]
         default = _run(slam, reference)
         cure = " ".join(_cures(default.said, case.cure))
@@ -74,14 +78,22 @@ def _cures(said: Sequence[str], known: str) -> list[str]:
 
 def _run(slam: Sequence[str], reference: Sequence[str]) -> Run:
     path = str(Path(slam[2]).with_name("path.tum"))
-    done = _nscan_cli("slam", *slam, "--trajectory", path, "--json", "--threads", "1")
-    if done.returncode:
-        return Run(None, (done.stderr.strip().split("\n")[-1],))
-    said = tuple(json.loads(done.stdout)["warnings"])
-    found = json.loads(_nscan_cli("evaluate", path, *reference, "--json").stdout)
+    mapped = _nscan_cli("slam", *slam, "--trajectory", path, "--json", "--threads", "1")
+    if mapped.returncode:
+        return _failed(mapped, ())
+    said = tuple(json.loads(mapped.stdout)["warnings"])
+    measured = _nscan_cli("evaluate", path, *reference, "--json")
+    if measured.returncode:
+        return _failed(measured, said)
+    found = json.loads(measured.stdout)
     if "--reference" in reference:
         return Run(found["reference"]["ate"]["translation"]["rmse"], said)
     return Run(found["relations"]["translation"]["mean"], said)
+
+
+def _failed(done: subprocess.CompletedProcess[str], said: tuple[str, ...]) -> Run:
+    """A run without an error, with what was said before and why it failed."""
+    return Run(None, (*said, done.stderr.strip().split("\n")[-1]))
 
 
 def _nscan_cli(*arguments: str) -> subprocess.CompletedProcess[str]:
