@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nscan_cli.files.provenance import Source
+from nscan_cli.logs.angle_unit import with_radians
 from nscan_cli.logs.beam_angles import beam_directions
 from nscan_cli.logs.beam_mask import mask_beams, masked_sectors
 from nscan_cli.logs.beam_spacing import checked_by_walls
@@ -87,6 +88,9 @@ def laser_log(
     rows = times.rows[numbers]
     warnings = findings.warnings
     raw, limits, contradictions = _in_metres(raw, times, options, warnings)
+    if not options.as_recorded:
+        raw, converted = with_radians(raw)
+        contradictions += converted
     written = beam_directions(raw, options, warnings)
     (angle_min, angle_increment), bent = checked_by_walls(raw, written, limits, options)
     findings.used |= {"range_min": limits.low_from, "range_max": limits.high_from}

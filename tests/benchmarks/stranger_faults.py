@@ -115,6 +115,7 @@ FAULTS: tuple[tuple[str, Fault, str], ...] = (
     ),
     ("beams closer by a third", lambda log: faults.beams_apart(log, 2 / 3), "1° from beam to beam"),
     ("beams wider by a half", lambda log: faults.beams_apart(log, 1.5), "1° from beam to beam"),
+    ("angles in degrees", faults.angles_in_degrees, "angles of the beams are in degrees"),
     ("looks 90° left", _looking(-90.0), "90° further to the left"),
     ("looks 90° right", _looking(90.0), "(90|89|91)° further to the right"),
     ("looks back", _looking(180.0), "looks 180° further"),

@@ -165,6 +165,11 @@ def beams_apart(log: LaserLog, factor: float) -> LaserLog:
     return replace(log, angle_min=middle - 0.5 * step * (log.beam_counts() - 1), angle_increment=step)
 
 
+def angles_in_degrees(log: LaserLog) -> LaserLog:
+    """The file has first directions and steps in degrees."""
+    return replace(log, angle_min=np.degrees(log.angle_min), angle_increment=np.degrees(log.angle_increment))
+
+
 def mounted_otherwise(log: LaserLog, turn: float) -> LaserLog:
     """The file says that the laser looks further to the left than it does, by a turn (rad)."""
     return replace(log, mount=log.mount + np.array([0.0, 0.0, turn]))

@@ -20,8 +20,8 @@ LINES_AT_ONCE = 1024
 """Lines whose numbers are parsed together."""
 KERNEL_MIN_BYTES = 1 << 16
 """Bytes of text from which a kernel parses it. Loading the kernel takes longer than parsing less."""
-MAX_ANGLE = 4 * np.pi
-"""rad; a record with a larger direction or step is damaged."""
+MAX_ANGLE = 720.0
+"""rad or degrees; a record with a larger direction or step is damaged."""
 MAX_DECIMAL_PLACES = 22
 MAX_SIGNIFICAND = 2**53 // 10
 """The largest whole number to which another digit can be appended below 2⁵³."""

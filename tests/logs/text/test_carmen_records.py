@@ -25,7 +25,7 @@ def robotlaser(stamp: int, beams: int, start: str = "-1.5", pose: str = "1", rem
 PROBLEMS = {
     "whole": {},
     "wrong number of values": {"remissions": "1"},
-    "an angle is out of bounds": {"start": "13"},
+    "an angle is out of bounds": {"start": "721"},
     "a pose is out of bounds": {"pose": "nan"},
     "a value is not a number": {"start": "x"},
 }
