@@ -22,7 +22,7 @@ class RangeJumpOptions:
     value matches more scans."""
     min_share: float = 0.3
     """Least share of the beams that have. A smaller value matches more scans."""
-    max_candidates: int = 24
+    max_candidates: int = 48
     """Largest number of places at which scans are matched, those with the largest shares. More take
     longer."""
     min_gain: float = 0.2
@@ -32,6 +32,9 @@ class RangeJumpOptions:
     refinement: float = math.log(1.01)
     """The factor is the minimum of a parabola through five energies this far apart, as a logarithm. A larger
     value finds more, and is less exact."""
+    reach: int = 6
+    """The middle of them is looked for so many times as far about the usual factor of the beams. A larger
+    value finds more, and takes longer."""
 
 
 @dataclass(frozen=True)

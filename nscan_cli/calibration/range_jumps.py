@@ -104,29 +104,33 @@ def scans_to_match(
 def _matched_factor(log: LaserLog, row: int, factor: float, options: FileCheckOptions) -> float | None:
     """The factor of the ranges from a row on by matches, near to one; None if scans match better as they
     are."""
-    near = math.log(factor) + options.jumps.refinement * np.arange(-2.0, 3.0)
-    gain, energies = options.jumps.min_gain, []
-    for first, last in pairs_across(row):
+    jumps, pairs, as_read = options.jumps, pairs_across(row), []
+    for first, last in pairs:
         # Two scales tell nearly always that nothing changes.
         some = _energies(log, first, last, [1.0, factor], options)
         if some is None or some[1] > some[0]:
             return None
-        each = _energies(log, first, last, [1.0, *np.exp(near).tolist()], options)
-        if each is None or each[1:].min() > each[0] - gain:
-            return None
-        energies.append(each)
-    of_all = np.array(energies)
-    total = of_all[:, 1:].sum(axis=0)
-    best = int(np.argmin(total))
-    if best in (0, len(near) - 1) or (of_all[:, 1 + best] > of_all[:, 0] - gain).any():
+        as_read.append(some[0])
+    # Beams that meet other walls than before make the usual factor some percent wrong.
+    near = math.log(factor) + jumps.refinement * np.arange(-jumps.reach, jumps.reach + 1)
+    coarse = _energies(log, *pairs[0], np.exp(near).tolist(), options)
+    if coarse is None:
         return None
+    near = near[np.argmin(coarse)] + jumps.refinement * np.arange(-2.0, 3.0)
+    factor = math.exp(near[2])
     # Where scans match better at another scale for other reasons, those of one side do so, too.
     for first in (row - 2, row):
-        each = _energies(log, first, first + 1, [1.0, factor], options)
-        if each is None or each[0] > each[1] - gain:
+        some = _energies(log, first, first + 1, [1.0, factor], options)
+        if some is None or some[0] > some[1] - jumps.min_gain:
             return None
+    energies = [_energies(log, first, last, np.exp(near).tolist(), options) for first, last in pairs]
+    of_all = np.array(energies)
+    total = of_all.sum(axis=0)
+    best = int(np.argmin(total))
+    if best in (0, len(near) - 1) or (of_all[:, best] > np.array(as_read) - jumps.min_gain).any():
+        return None
     found = parabola_minimum(near, total)
-    return math.exp(found) if abs(found) > math.log(options.jumps.min_factor) else None
+    return math.exp(found) if abs(found) > math.log(jumps.min_factor) else None
 
 
 def _energies(

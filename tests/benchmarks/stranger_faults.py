@@ -136,6 +136,8 @@ FAULTS: tuple[tuple[str, Fault, str], ...] = (
 KNOWN_CURES = {
     "odometry heads 90° too far left": "--no-odometry",
     "ranges × 0.9": r"--range-scale \S+",
+    "ranges × 1.1 from half-way on": r"--range-scale [\d.]+|--end [\d.]+",
+    "ranges × 1.05 from half-way on": r"--range-scale [\d.]+|--end [\d.]+",
 }
 """The options that the owner chooses where messages name several causes."""
 FAULTS_OF_REAL_LOGS = (

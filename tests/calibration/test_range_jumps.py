@@ -76,7 +76,9 @@ def test_no_real_log_changes(name):
     assert jumps_of(log) == []
 
 
-@pytest.mark.parametrize(("name", "place"), [("intel", 0.3), ("fr079", 0.5), ("fr-clinic", 0.25)])
+@pytest.mark.parametrize(
+    ("name", "place"), [("intel", 0.3), ("fr079", 0.5), ("fr-clinic", 0.25), ("mit-csail", 0.7)]
+)
 def test_it_is_found_in_a_real_log(name, place):
     log = read_log(str(data_file(f"{name}.log.gz")))
     at = int(place * len(log))
