@@ -31,6 +31,7 @@ from nscan_cli.logs.skips import Skips
 from nscan_cli.logs.slow_odometry import without_repeats
 from nscan_cli.logs.sweep import Sweep, beam_times, sweep_of_file
 from nscan_cli.logs.unit_stretches import in_one_unit
+from nscan_cli.logs.whole_turn import in_whole_turns
 from nscan_cli.poses import Array, are_known
 
 
@@ -92,7 +93,9 @@ def laser_log(
         raw, converted = with_radians(raw)
         contradictions += converted
     written = beam_directions(raw, options, warnings)
-    (angle_min, angle_increment), bent = checked_by_walls(raw, written, limits, options)
+    directions, bent = checked_by_walls(raw, written, limits, options)
+    (angle_min, angle_increment), closed = in_whole_turns(raw, directions, limits, options)
+    contradictions += [*bent, *closed]
     findings.used |= {"range_min": limits.low_from, "range_max": limits.high_from}
     table = ScanTable(raw.ranges, limits, angle_min, angle_increment, times.rows, times.times)
     sectors, masked = masked_sectors(table, options, RobotPartsOptions(), DeadBeamOptions())
@@ -141,7 +144,7 @@ def laser_log(
             odometries=findings.odometries,
             corrected=findings.corrected,
             masked=tuple(sectors),
-            contradictions=(*findings.contradictions, *contradictions, *bent, *masked, *slow, *sweep.said),
+            contradictions=(*findings.contradictions, *contradictions, *masked, *slow, *sweep.said),
         ),
         beams=None if (beams == ranges.shape[1]).all() else beams,
         truth_times=motion.truth_times,

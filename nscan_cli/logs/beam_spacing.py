@@ -74,7 +74,7 @@ class BeamSpacingOptions:
     larger value takes less time."""
 
 
-class _Scans(NamedTuple):
+class SampledScans(NamedTuple):
     """N scans of a sample, none of which sees what the one before saw."""
 
     ranges: Array
@@ -97,9 +97,9 @@ def checked_by_walls(
     rows = np.arange(0, len(beams), max(1, len(beams) // spacing.max_scans))
     widest = float(np.max(np.abs(directions.step) * (beams - 1)))
     # Walls mostly agree with the log, and a few scans show it.
-    if _walls_agree(_sample(raw, directions, limits, rows[:: spacing.first_of], spacing), spacing):
+    if _walls_agree(sampled_scans(raw, directions, limits, rows[:: spacing.first_of], spacing), spacing):
         return directions, []
-    factor = _factor_of_walls(_sample(raw, directions, limits, rows, spacing), spacing)
+    factor = _factor_of_walls(sampled_scans(raw, directions, limits, rows, spacing), spacing)
     if factor is None or factor * widest > spacing.max_view:
         return directions, []
     count = int(np.bincount(beams).argmax())
@@ -134,13 +134,13 @@ def _degrees(angle: float) -> str:
     return f"{math.degrees(angle):.4g}"
 
 
-def _sample(
+def sampled_scans(
     raw: RawScans,
     directions: BeamDirections,
     limits: RangeLimits,
     rows: NDArray[np.int64],
     options: BeamSpacingOptions,
-) -> _Scans:
+) -> SampledScans:
     """The scans in some rows whose readings have changed since the one before."""
     ranges = raw.ranges[rows].astype(np.float64)
     with np.errstate(invalid="ignore"):
@@ -152,17 +152,17 @@ def _sample(
         change = np.abs(ranges[row] - last) / last
         if 2 * np.count_nonzero(change > options.moved) > np.count_nonzero(change >= 0.0):
             moved.append(row)
-    return _Scans(ranges[moved], np.abs(directions.step[rows[moved]]))
+    return SampledScans(ranges[moved], np.abs(directions.step[rows[moved]]))
 
 
-def _walls_agree(scans: _Scans, options: BeamSpacingOptions) -> bool:
+def _walls_agree(scans: SampledScans, options: BeamSpacingOptions) -> bool:
     """Whether more beams on walls tell the angle of the log than any other that would contradict it."""
     logs, centres, counts = _votes(scans, options.half_width, options)
     others = counts[np.abs(centres) >= options.min_difference]
     return _beams_as_log(logs, options) >= max(options.min_beams, int(others.max(initial=0)))
 
 
-def _factor_of_walls(scans: _Scans, options: BeamSpacingOptions) -> float | None:
+def _factor_of_walls(scans: SampledScans, options: BeamSpacingOptions) -> float | None:
     """The factor from the steps of scans to the angle between beams that walls tell; None if they agree.
 
     The angle from a beam to those that it is compared with is that of the factor found so far.
@@ -180,7 +180,7 @@ def _factor_of_walls(scans: _Scans, options: BeamSpacingOptions) -> float | None
     return None
 
 
-def _told_factor(scans: _Scans, half_width: float, options: BeamSpacingOptions) -> float | None:
+def _told_factor(scans: SampledScans, half_width: float, options: BeamSpacingOptions) -> float | None:
     """What most beams on walls tell; None if no factor stands out or it is near 1.
 
     half_width: angle from a beam to those that it is compared with by the steps of the scans, rad.
@@ -196,7 +196,7 @@ def _told_factor(scans: _Scans, half_width: float, options: BeamSpacingOptions) 
 
 
 def _votes(
-    scans: _Scans, half_width: float, options: BeamSpacingOptions
+    scans: SampledScans, half_width: float, options: BeamSpacingOptions
 ) -> tuple[Array, Array, NDArray[np.int64]]:
     """Sorted logarithms (V,) of the factors that beams on walls tell, those (C,) within `max_factor`, and how
     many (C,) are as these.

@@ -115,6 +115,8 @@ FAULTS: tuple[tuple[str, Fault, str], ...] = (
     ),
     ("beams closer by a third", lambda log: faults.beams_apart(log, 2 / 3), "1° from beam to beam"),
     ("beams wider by a half", lambda log: faults.beams_apart(log, 1.5), "1° from beam to beam"),
+    ("beams wider by 1 %", lambda log: faults.beams_apart(log, 1.01), "as if it were one turn"),
+    ("beams closer by 2 %", lambda log: faults.beams_apart(log, 0.98), "as if it were one turn"),
     ("angles in degrees", faults.angles_in_degrees, "angles of the beams are in degrees"),
     ("looks 90° left", _looking(-90.0), "90° further to the left"),
     ("looks 90° right", _looking(90.0), "(90|89|91)° further to the right"),
