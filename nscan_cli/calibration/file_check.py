@@ -54,6 +54,12 @@ def checked_file(log: LaserLog, reading: ReadingOptions, options: FileCheckOptio
     signed, reversing = checked_signs(log, options.unsigned, options.steps)
     known: KnownSteps = {}
     findings = find_contradictions(signed, reading, options, known)
+    if any("odometry" in finding.corrected for finding in findings):
+        # Steps by scans may be those of someone who goes along, and odometry is right without his beams.
+        alone, masked, seen = checked_companion(signed, reading, options.companion)
+        if seen and not find_contradictions(alone, masked, options, known := {}):
+            findings, signed, reading, log = [], alone, masked, alone
+            said += seen
     if reversing:
         # A laser that is turned within the log sees the robot go elsewhere, too. The steps by scans stay.
         turned = changed_view(log, reading, options, known)

@@ -131,6 +131,7 @@ FAULTS: tuple[tuple[str, Fault, str], ...] = (
     ("a sixth of the beams always says 5 m", lambda log: faults.dead_beams(log, 5.0), "exactly the same"),
     ("someone follows at 0.6 m", lambda log: faults.follower(log, 0.6), "goes along with the robot"),
     ("someone follows at 0.4 m", lambda log: faults.follower(log, 0.4), "goes along with the robot"),
+    ("someone leads at 0.6 m", lambda log: faults.leader(log, 0.6), "goes along with the robot"),
     ("15 % of the readings are dust", lambda log: faults.dust(log, 0.15, 0.1), ""),
     ("cart on a hinge", faults.cart, "goes along with the robot"),
 )  # fmt: skip
@@ -143,10 +144,11 @@ KNOWN_CURES = {
 }
 """The options that the owner chooses where messages name several causes."""
 FAULTS_OF_REAL_LOGS = (
-    "", "two posts of 20°", "a sixth of the beams always says 5 m", "odometry × 1000", "odometry turns × −1",
-    "odometry heads 90° too far left", "odometry frozen for a third", "each pose five times",
-    "odometry zero at every 50th scan", "ranges rounded to 0.1 m", "first directions jitter by 3°",
-    "two drives in one file", "two scans a stamp", "stamps in ms", "ranges × 1.1 from half-way on",
+    "", "someone leads at 0.6 m", "two posts of 20°", "a sixth of the beams always says 5 m",
+    "odometry × 1000", "odometry turns × −1", "odometry heads 90° too far left",
+    "odometry frozen for a third", "each pose five times", "odometry zero at every 50th scan",
+    "ranges rounded to 0.1 m", "first directions jitter by 3°", "two drives in one file",
+    "two scans a stamp", "stamps in ms", "ranges × 1.1 from half-way on",
     "ranges × 1.05 from half-way on", "readings reversed", "readings reversed from half-way on",
     "readings reversed in the last fifth",
 )  # fmt: skip

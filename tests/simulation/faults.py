@@ -250,6 +250,11 @@ def follower(log: LaserLog, distance: float, width: float = 0.5, seed: int = 1) 
     return replace(log, ranges=ranges)
 
 
+def leader(log: LaserLog, distance: float) -> LaserLog:
+    """Somebody walks before the robot: a follower of one that looks back."""
+    return replace(follower(mounted_otherwise(log, np.pi), distance), mount=log.mount)
+
+
 def cart(log: LaserLog, hitch: float = 0.35, length: float = 0.5, width: float = 0.5) -> LaserLog:
     """The robot pulls a cart: a box on a bar of 0.15 m whose hinge is `hitch` (m) behind the robot's middle.
 
