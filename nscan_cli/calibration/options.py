@@ -35,6 +35,8 @@ class StepOptions:
     max_duration: float = 2.0
     """Longest step that is measured, s: in a longer one scans are missing. A larger value measures across
     longer gaps."""
+    compared_beams: int = 32
+    """Approximate number of beams by which scans that repeat the one before are told. More take longer."""
     max_turn: float = 0.4
     """Steps that turn by more than this (rad) are not preferred to each other: they may not match. A larger
     value prefers larger turns."""

@@ -49,10 +49,15 @@ def successive_steps(log: LaserLog, options: StepOptions) -> tuple[Indices, Indi
 
 
 def possible_steps(log: LaserLog, options: StepOptions) -> tuple[Indices, Indices]:
-    """Each row that a step can begin at, and the first row that is far enough in time."""
-    first = np.arange(len(log), dtype=np.int64)
-    last = np.maximum(np.searchsorted(log.times, log.times + options.duration), first + 1)
-    kept = last < len(log)
-    first, last = first[kept], last[kept]
-    kept = log.times[last] - log.times[first] <= options.max_duration
-    return first[kept], last[kept]
+    """Each row that a step can begin at, and the first row that is far enough in time.
+
+    Scans that repeat the one before, bit by bit, are left out: they saw nothing at their own time.
+    """
+    some = log.ranges[:, :: max(log.ranges.shape[1] // options.compared_beams, 1)].view(np.int32)
+    rows = np.flatnonzero(np.append(True, (some[1:] != some[:-1]).any(axis=1)))
+    times = log.times[rows]
+    first = np.arange(len(rows))
+    last = np.maximum(np.searchsorted(times, times + options.duration), first + 1)
+    first, last = first[last < len(rows)], last[last < len(rows)]
+    kept = times[last] - times[first] <= options.max_duration
+    return rows[first[kept]], rows[last[kept]]
