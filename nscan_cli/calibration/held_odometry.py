@@ -1,4 +1,7 @@
-"""Stretches in which odometry stands while the scans move: a node hangs, or an encoder has failed."""
+"""Stretches in which odometry stands while the scans move: a node hangs, or encoders have failed.
+
+If encoders fail and a gyroscope goes on, the position alone stands; the other way round, the heading alone.
+"""
 
 from __future__ import annotations
 
@@ -12,7 +15,7 @@ from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.logs.mask_runs import mask_runs
 from nscan_cli.logs.robot_path import robot_path
 from nscan_cli.logs.stretch_names import stretch_names
-from nscan_cli.poses import relative
+from nscan_cli.poses import Array, relative
 
 
 def checked_held(
@@ -31,21 +34,25 @@ def checked_held(
 
 
 def held_stretches(log: LaserLog, options: HeldOdometryOptions, steps: StepOptions) -> list[tuple[int, int]]:
-    """First and last row of each stretch over which the scans move and odometry does not.
+    """First and last row of each stretch over which the scans move and the position by odometry does not, or
+    they turn and the heading does not.
 
     Odometry that never moves has none: it is of no use anywhere.
     """
     if log.odometry is None or len(log) < 2:
         return []
-    moves = np.abs(relative(log.odometry[1:], log.odometry[:-1])).max(axis=1)
-    return [
-        (first, last)
+    moves = np.abs(relative(log.odometry[1:], log.odometry[:-1]))
+    is_held = np.zeros(len(log), dtype=np.bool_)
+    for change, least, is_so in (
+        (moves[:, :2].max(axis=1), options.min_duration, _scans_move),
+        (moves[:, 2], options.min_heading_duration, _scans_turn),
+    ):
         # An unknown pose neither stands nor moves: it ends a stretch.
-        for first, last in mask_runs(moves <= options.still)
-        if log.times[last] - log.times[first] >= options.min_duration
-        and last - first < len(log) - 1
-        and _scans_move(log, first, last, options, steps)
-    ]
+        for first, last in mask_runs(change <= options.still):
+            is_long = log.times[last] - log.times[first] >= least and last - first < len(log) - 1
+            if is_long and is_so(log, first, last, options, steps):
+                is_held[first : last + 1] = True
+    return [(first, end - 1) for first, end in mask_runs(is_held)]
 
 
 def without_held(log: LaserLog, stretches: list[tuple[int, int]]) -> LaserLog:
@@ -68,13 +75,12 @@ def _scans_move(
     apart = np.abs(np.diff(both[:, np.isfinite(both).all(axis=0)], axis=0))
     if not apart.size or float((apart > options.changed_range).mean()) < options.min_changed_share:
         return False
-    ends = np.searchsorted(log.times, log.times[first : last + 1] + steps.duration)
-    within = np.flatnonzero(ends <= last)
-    if not len(within):
-        return False
+    assert log.odometry is not None
+    # If headings go on, the robot may turn on the spot: then steps without a turn tell.
+    turns = np.abs(np.diff(log.odometry[first : last + 1, 2])).max() > options.still
     for count in (options.steps, options.more_steps):
-        some = within[np.unique(np.linspace(0, len(within) - 1, count).astype(np.int64))]
-        laser = measure_steps(log, (first + some, ends[some]), steps).laser
+        laser = _steps_within(log, first, last, count, steps)
+        laser = laser[np.abs(laser[:, 2]) < steps.min_motion] if turns else laser
         if len(laser) < options.min_measured:
             continue
         size = np.maximum(np.hypot(laser[:, 0], laser[:, 1]), np.abs(laser[:, 2]))
@@ -83,3 +89,19 @@ def _scans_move(
         if not options.standing_share < share < options.min_moving_share:
             return share >= options.min_moving_share
     return False
+
+
+def _scans_turn(
+    log: LaserLog, first: int, last: int, options: HeldOdometryOptions, steps: StepOptions
+) -> bool:
+    """Whether a few of some steps, spread over a stretch, have a clear turn."""
+    turns = np.abs(_steps_within(log, first, last, options.more_steps, steps)[:, 2])
+    return int(np.count_nonzero(turns >= options.min_turn)) >= options.min_measured
+
+
+def _steps_within(log: LaserLog, first: int, last: int, count: int, steps: StepOptions) -> Array:
+    """(n, 3) steps of the laser by its scans, of up to `count` that are spread from a row to another."""
+    ends = np.searchsorted(log.times, log.times[first : last + 1] + steps.duration)
+    within = np.flatnonzero(ends <= last)
+    some = within[np.unique(np.linspace(0, len(within) - 1, min(count, len(within))).astype(np.int64))]
+    return measure_steps(log, (first + some, ends[some]), steps).laser

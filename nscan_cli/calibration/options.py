@@ -71,6 +71,11 @@ class HeldOdometryOptions:
     slow motion as standing."""
     min_duration: float = 3.0
     """Shortest time that odometry has to stand, s. A smaller value finds more, and takes longer."""
+    min_heading_duration: float = 30.0
+    """Shortest time that the heading alone has to stand, s: it does on straight ways. A smaller value finds
+    more, and takes longer."""
+    min_turn: float = 0.15
+    """Turn of a step that contradicts it, rad. A larger value finds less."""
     changed_range: float = 0.1
     """A range has changed if it differs by more than this at both ends of that time, m. A larger value finds
     less."""

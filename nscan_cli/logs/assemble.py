@@ -12,6 +12,7 @@ from nscan_cli.logs.angle_unit import with_radians
 from nscan_cli.logs.beam_angles import beam_directions
 from nscan_cli.logs.beam_mask import mask_beams, masked_sectors
 from nscan_cli.logs.beam_spacing import checked_by_walls
+from nscan_cli.logs.blind_scans import blind_scans
 from nscan_cli.logs.dead_beams import DeadBeamOptions
 from nscan_cli.logs.device_choice import Device
 from nscan_cli.logs.frame_names import DEFAULT_FRAMES, FrameNames
@@ -106,6 +107,7 @@ def laser_log(
     rounded = rounding_of_ranges(ranges)
     if rounded:
         warnings.append(rounded)
+    warnings += blind_scans(ranges, numbers)
     hidden = mask_beams(ranges, angle_min[rows], angle_increment[rows], sectors)
     if hidden:
         lost.counts["in masked sectors"] = hidden

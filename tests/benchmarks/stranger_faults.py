@@ -75,6 +75,14 @@ FAULTS: tuple[tuple[str, Fault, str], ...] = (
         lambda log: odometry_faults.held(log, _middle(log), False),
         "odometry (does not move|never moves|stands still)",
     ),
+    ("position by odometry frozen from half-way on",
+        lambda log: odometry_faults.partly_held(log, slice(len(log) // 2, None), slice(0, 2)),
+        "stands still|contradicts the scans",
+    ),
+    ("heading by odometry frozen from half-way on",
+        lambda log: odometry_faults.partly_held(log, slice(len(log) // 2, None), slice(2, 3)),
+        "stands still",
+    ),
     ("odometry without signs, three reversals",
         lambda log: odometry_faults.unsigned(there_and_back(log, [(40, 80), (200, 260), (270, 280)])),
         "counts reversing as driving forward",
@@ -132,6 +140,10 @@ FAULTS: tuple[tuple[str, Fault, str], ...] = (
     ("someone follows at 0.6 m", lambda log: faults.follower(log, 0.6), "goes along with the robot"),
     ("someone follows at 0.4 m", lambda log: faults.follower(log, 0.4), "goes along with the robot"),
     ("someone leads at 0.6 m", lambda log: faults.leader(log, 0.6), "goes along with the robot"),
+    ("the laser sees nothing for a tenth",
+        lambda log: faults.without_returns(log, slice(len(log) // 2, 6 * len(log) // 10)),
+        "sees nothing",
+    ),
     ("15 % of the readings are dust", lambda log: faults.dust(log, 0.15, 0.1), ""),
     ("cart on a hinge", faults.cart, "goes along with the robot"),
 )  # fmt: skip
@@ -144,7 +156,8 @@ KNOWN_CURES = {
 }
 """The options that the owner chooses where messages name several causes."""
 FAULTS_OF_REAL_LOGS = (
-    "", "someone leads at 0.6 m", "two posts of 20°", "a sixth of the beams always says 5 m",
+    "", "someone leads at 0.6 m", "heading by odometry frozen from half-way on",
+    "two posts of 20°", "a sixth of the beams always says 5 m",
     "odometry × 1000", "odometry turns × −1", "odometry heads 90° too far left",
     "odometry frozen for a third", "each pose five times", "odometry zero at every 50th scan",
     "ranges rounded to 0.1 m", "first directions jitter by 3°", "two drives in one file",

@@ -39,6 +39,15 @@ def held(log: LaserLog, rows: Rows, catches_up: bool) -> LaserLog:
     return replace(log, odometry=odometry)
 
 
+def partly_held(log: LaserLog, rows: Rows, columns: slice) -> LaserLog:
+    """Some of x, y and heading do not move in `rows`, and have lost the way: encoders or a gyroscope fail."""
+    some, odometry = np.arange(len(log))[rows], _odometry(log).copy()
+    first, last = int(some[0]), int(some[-1])
+    odometry[last + 1 :, columns] += odometry[first, columns] - odometry[last, columns]
+    odometry[some, columns] = odometry[first, columns]
+    return replace(log, odometry=odometry)
+
+
 def repeated(log: LaserLog, times: int) -> LaserLog:
     """The odometry comes with every so many-th scan, and is repeated until then."""
     return replace(log, odometry=_odometry(log)[np.arange(len(log)) // times * times])

@@ -1,0 +1,37 @@
+"""Stretches in which the laser sees nothing: a driver died, something covers it, or nothing is in reach."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nscan_cli.logs.mask_runs import mask_runs
+from nscan_cli.logs.stretch_names import stretch_names
+from nscan_cli.poses import Indices
+
+
+@dataclass(frozen=True)
+class BlindScanOptions:
+    """When scans count as blind."""
+
+    min_readings: int = 5
+    """Least number of readings of a scan that is not blind. A larger value names more."""
+    min_scans: int = 10
+    """Least number of such scans in a row that are named. A larger value names less."""
+
+
+def blind_scans(
+    ranges: NDArray[np.float32], numbers: Indices, options: BlindScanOptions = BlindScanOptions()
+) -> list[str]:
+    """What is said of scans with ranges (S, B) and numbers (S,) that see nothing for long."""
+    is_blind = np.count_nonzero(np.isfinite(ranges), axis=1) < options.min_readings
+    runs = [run for run in mask_runs(is_blind) if run[1] - run[0] >= options.min_scans]
+    if not runs:
+        return []
+    names = stretch_names((int(numbers[first]), int(numbers[end - 1])) for first, end in runs)
+    return [
+        f"the laser sees nothing from scan {names}: odometry alone tells the way there, or nothing does "
+        "without odometry"
+    ]
