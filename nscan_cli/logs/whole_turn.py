@@ -106,6 +106,8 @@ def _misfits(ranges: Array, step: float, gaps: list[float], checks: WholeTurnOpt
     beam to the first, rad. 1 / r = a cos φ + b sin φ on a wall, and a and b are least squares.
     """
     count = max(checks.least_beams, round(checks.width / step))
+    if 2 * count > ranges.shape[1]:
+        return np.empty((0, len(gaps)))
     both = np.concatenate([ranges[:, -count:], ranges[:, :count]], axis=1)
     both = both[np.isfinite(both).all(axis=1)]
     found = np.empty((len(both), len(gaps)))

@@ -153,8 +153,10 @@ def document(outcomes: Sequence[Outcome]) -> str:
         "square error of positions (ATE), for real logs the mean error on their relations, and for "
         "urg-corridor-1 the root mean square error against the map of the untouched drive. A map is right "
         f"if its error is at most {FACTOR:g} times that of the untouched drive, or at most {1000 * MORE:g} "
-        'mm larger. "As recorded" is with `--as-recorded`: the file is believed. "As the message says" '
-        "is with the first option that each message names.",
+        "mm larger. The map of urg-corridor-1 differs from its own by 0.024 m without odometry, by 0.031 m "
+        "with a sixth of its beams masked, and by 0.043 m with every second scan: so much is lost where a "
+        'fault hides as much. "As recorded" is with `--as-recorded`: the file is believed. '
+        '"As the message says" is with the first option that each message names.',
         table(header, rows),
     ]
     return "\n\n".join(parts) + "\n"

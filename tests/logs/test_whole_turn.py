@@ -56,6 +56,12 @@ def test_a_robot_that_stands_and_walls_farther_apart_tell_nothing(read):
     assert not told(read(recording(nothing_behind, step=STEP * 1.02)))
 
 
+@pytest.mark.parametrize("beams", [2, 5, 7])
+def test_a_ring_of_a_few_beams_tells_nothing(read, beams):
+    step = 1.02 * 2 * math.pi / beams
+    assert not told(read(recording(readings(SCANS, beams=beams, step=step), step=step)))
+
+
 @pytest.mark.logs
 @pytest.mark.parametrize("name", ["mocap.bag", "rplidar-floor", "rplidar-hallway.bag", "varying-beams.db3"])
 def test_no_real_laser_is_put_right(name):
