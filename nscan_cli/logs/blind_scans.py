@@ -1,4 +1,7 @@
-"""Stretches in which the laser sees nothing: a driver died, something covers it, or nothing is in reach."""
+"""Stretches in which no reading is usable: the laser's driver died, or something covers it.
+
+Beams that meet nothing, as in an open field, are usable: they say so.
+"""
 
 from __future__ import annotations
 
@@ -16,8 +19,6 @@ from nscan_cli.poses import Indices
 class BlindScanOptions:
     """When scans count as blind."""
 
-    min_readings: int = 5
-    """Least number of readings of a scan that is not blind. A larger value names more."""
     min_scans: int = 10
     """Least number of such scans in a row that are named. A larger value names less."""
 
@@ -26,7 +27,7 @@ def blind_scans(
     ranges: NDArray[np.float32], numbers: Indices, options: BlindScanOptions = BlindScanOptions()
 ) -> list[str]:
     """What is said of scans with ranges (S, B) and numbers (S,) that see nothing for long."""
-    is_blind = np.count_nonzero(np.isfinite(ranges), axis=1) < options.min_readings
+    is_blind = np.count_nonzero(np.isnan(ranges), axis=1) == ranges.shape[1]
     runs = [run for run in mask_runs(is_blind) if run[1] - run[0] >= options.min_scans]
     if not runs:
         return []

@@ -129,7 +129,7 @@ FAULTS: tuple[tuple[str, Fault, str], ...] = (
     ("someone follows at 0.6 m", lambda log: faults.follower(log, 0.6), "goes along with the robot"),
     ("someone leads at 0.6 m", lambda log: faults.leader(log, 0.6), "goes along with the robot"),
     ("the laser sees nothing for a tenth",
-        lambda log: faults.without_returns(log, slice(len(log) // 2, 6 * len(log) // 10)),
+        lambda log: faults.without_returns(log, slice(len(log) // 2, 6 * len(log) // 10), 0.0),
         "sees nothing",
     ),
     ("15 % of the readings are dust", lambda log: faults.dust(log, 0.15, 0.1), ""),
