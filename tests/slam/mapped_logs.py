@@ -85,7 +85,8 @@ def tracked(log: LaserLog, options: TrackingOptions | None = None) -> tuple[list
 def sensed(scans: Sequence[Array], odometry: Array | None = None) -> ScanBatch:
     """Scans with points (m, 2) each, as tracking takes them."""
     ends = np.cumsum([0, *map(len, scans)])
-    return ScanBatch(0, np.concatenate([np.empty((0, 2)), *scans]), ends, odometry)
+    times = np.arange(len(scans), dtype=np.float64)
+    return ScanBatch(0, np.concatenate([np.empty((0, 2)), *scans]), ends, times, odometry)
 
 
 def sensed_in(log: LaserLog) -> ScanBatch:
@@ -100,9 +101,18 @@ def scans_of(found: TrackedScans) -> list[TrackedScan]:
 
 def found_of(*scans: TrackedScan) -> TrackedScans:
     """The same as columns; the objective's value is nobody's."""
-    names = ("pose", "hessian", "prior_covariance", "inliers", "path", "in_map")
-    columns = [np.array([getattr(scan, name) for scan in scans]) for name in names]
-    return TrackedScans._make([np.full(len(scans), np.nan), *columns, *np.zeros((2, len(scans)))])
+    columns = {
+        "poses": "pose",
+        "hessians": "hessian",
+        "prior_covariances": "prior_covariance",
+        "inliers": "inliers",
+        "paths": "path",
+        "in_map": "in_map",
+        "guess_variances": "guess_variances",
+    }
+    found = {name: np.array([getattr(scan, one) for scan in scans]) for name, one in columns.items()}
+    nothing, zeros = np.full(len(scans), np.nan), np.zeros(len(scans))
+    return TrackedScans(values=nothing, odometry_sigmas=zeros, weakest_sigmas=zeros, **found)
 
 
 def poses_of(found: list[TrackedScan]) -> Array:

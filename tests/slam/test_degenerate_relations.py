@@ -52,13 +52,27 @@ def test_all_relations_together_have_the_variance_of_the_guess(joints):
     # Half of 8 m, over four steps.
     np.testing.assert_allclose(variances, [0.0, 4.0, 4.0, 4.0, 4.0, 0.0])
     nscan = [joint(nodes) for nodes in joints]
-    x, y, _ = end_sigmas(*with_guess_variances(chain(), nscan, rows, variances, 3))
+    along = np.column_stack([variances, np.zeros((SIZE - 1, 2))])
+    x, y, _ = end_sigmas(*with_guess_variances(chain(), nscan, rows, along, 3))
     assert x == pytest.approx(4.0, rel=0.3)
     assert y < 0.02
 
 
+@pytest.mark.parametrize("joints", [[], [(0, 1, 2, 3), (2, 3, 4, 5), (3, 4, 5, 6)]])
+def test_after_scans_that_fit_nothing_neither_place_nor_turn_is_known(joints):
+    """Of the step from 2 to 3; the end, 6 m farther on, swings with it."""
+    rows, variances = np.arange(SIZE), np.zeros((SIZE - 1, 3))
+    variances[2, 1:] = 0.3**2, 0.2**2
+    nscan = [joint(nodes) for nodes in joints]
+    x, y, turn = end_sigmas(*with_guess_variances(chain(), nscan, rows, variances, 3))
+    assert x == pytest.approx(0.3, rel=0.3)
+    assert y == pytest.approx(np.hypot(0.3, 6.0 * 0.2), rel=0.3)
+    assert turn == pytest.approx(0.2, rel=0.3)
+
+
 def test_other_relations_and_other_visits_stay():
-    rows, variances = np.arange(SIZE), np.array([0.0, 0.0, 9.0, 0.0, 0.0, 0.0])
+    rows, variances = np.arange(SIZE), np.zeros((SIZE - 1, 3))
+    variances[2, 0] = 9.0
     loop = Pairwise((1, 6), np.array([10.0, 0.0, 0.0]), SURE * np.eye(3), "loop")
     known, _ = with_guess_variances([*chain(), loop], [], rows, variances, 3)
     changed = [k for k, (old, new) in enumerate(zip([*chain(), loop], known, strict=True)) if old is not new]

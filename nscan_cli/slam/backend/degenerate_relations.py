@@ -37,10 +37,13 @@ def widened_relations(state: SlamState) -> tuple[list[Pairwise], list[NScan]]:
     times, stretch = state.log.times[:end], state.options.diagnostics.degenerate_stretch
     # A robot that seems to stand mostly does.
     ways = [way for way in degenerate_stretches(path, times, sigmas, stretch) if way.is_long(stretch)]
-    if not ways:
+    options, rows = state.options.degenerate_relations, state.route.rows
+    lost = [keyframe.guess_variances for keyframe in state.route.keyframes[1 : len(rows)]]
+    variances = np.column_stack(
+        [guess_variances(rows, times, ways, options), np.array(lost).reshape(len(rows) - 1, 2)]
+    )
+    if not variances.any():
         return pairwise, nscan
-    options = state.options.degenerate_relations
-    variances = guess_variances(state.route.rows, times, ways, options)
     return with_guess_variances(pairwise, nscan, state.route.rows, variances, options.most_steps)
 
 
@@ -72,7 +75,8 @@ def with_guess_variances(
 ) -> tuple[list[Pairwise], list[NScan]]:
     """The relations among keyframes in rows (K,), less certain along ways that no scan tells.
 
-    `variances` (K − 1,) are those from each keyframe to the next, m². Relations over more than `most_steps`
+    `variances` (K − 1, 3) are those from each keyframe to the next, along the way (m²), of place (m²) and of
+    turn (rad²). Relations over more than `most_steps`
     keyframes are of another visit: they measure, and stay.
     """
     known = [_widened_pair(pair, _steps(pair, rows, most_steps), variances) for pair in pairwise]
@@ -87,24 +91,35 @@ def _steps(relation: Pairwise | NScan, rows: Indices, most_steps: int) -> Betwee
 
 def _widened_pair(pair: Pairwise, steps: Between, variances: Array) -> Pairwise:
     ((first, last),) = steps
-    variance = float(variances[first:last].sum())
-    if variance == 0.0:
+    along, place, turn = variances[first:last].sum(axis=0).tolist()
+    if along + place + turn == 0.0:
         return pair
-    along = np.append(_direction(pair.measurement[:2], pair.measurement[2]), 0.0)
-    return replace(pair, information=_less_certain(pair.information, along, variance))
+    direction = np.append(_direction(pair.measurement[:2], pair.measurement[2]), 0.0)
+    information = _less_certain(pair.information, direction, along)
+    for axis, variance in zip(np.eye(3), (place, place, turn), strict=True):
+        information = _less_certain(information, axis, variance)
+    return replace(pair, information=information)
 
 
 def _widened_joint(joint: NScan, steps: Between, variances: Array) -> NScan:
     order = np.argsort(joint.nodes)
     poses, hessian = joint.poses[order], joint.hessian
     for after, (first, last) in enumerate(steps, start=1):
-        variance = float(variances[first:last].sum())
-        if variance == 0.0:
+        along, place, turn = variances[first:last].sum(axis=0).tolist()
+        if along + place + turn == 0.0:
             continue
-        motion = np.zeros((len(order), 3))
-        # The scans behind the step move along it together.
-        motion[order[after:], :2] = _direction(poses[after, :2] - poses[after - 1, :2], poses[after, 2])
-        hessian = _less_certain(hessian, motion.ravel(), variance)
+        direction = _direction(poses[after, :2] - poses[after - 1, :2], poses[after, 2])
+        # The scans behind the step move along it together, or turn about its end.
+        off = poses[after:, :2] - poses[after, :2]
+        for motion, variance in (
+            (np.append(direction, 0.0), along),
+            (np.array([1.0, 0.0, 0.0]), place),
+            (np.array([0.0, 1.0, 0.0]), place),
+            (np.column_stack([-off[:, 1], off[:, 0], np.ones(len(off))]), turn),
+        ):
+            motions = np.zeros((len(order), 3))
+            motions[order[after:]] = motion
+            hessian = _less_certain(hessian, motions.ravel(), variance)
     return joint if hessian is joint.hessian else replace(joint, hessian=hessian)
 
 

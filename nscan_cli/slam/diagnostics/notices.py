@@ -17,7 +17,6 @@ from nscan_cli.slam.backend.degenerate_relations import all_widened_relations
 from nscan_cli.slam.diagnostics.degenerate_stretches import degenerate_stretches
 from nscan_cli.slam.diagnostics.odometry_disagreement import odometry_disagreements
 from nscan_cli.slam.diagnostics.view_mismatch import view_mismatches
-from nscan_cli.slam.frontend.degeneracy import NOTHING_TOLD
 from nscan_cli.slam.frontend.odometry_checks import jumps_of, repeated_scans
 from nscan_cli.slam.loop_closure.free_space_violations import is_sound, sound_share
 from nscan_cli.slam.state import SlamState
@@ -130,7 +129,7 @@ def _degenerate_stretches(state: SlamState) -> list[str]:
     if not sigmas:
         return []
     options, told = state.options.diagnostics.degenerate_stretch, np.concatenate(sigmas)
-    lost = int((told >= NOTHING_TOLD).sum())
+    lost = int(np.isinf(told).sum())
     if lost > options.max_lost_share * len(told):
         return [
             f"no match for {counted(lost, 'scan')} of {len(told)}: nothing there was seen before, and "

@@ -28,7 +28,8 @@ from nscan_cli.slam.frontend.scan_to_map import match_and_count
 from nscan_cli.slam.frontend.tracked_scans import TrackedScans
 
 NOTHING_TOLD = 1e3
-"""Standard deviation of a position of which a scan tells nothing, m."""
+"""Standard deviation of a position of which a match tells nothing, m; that of a scan without any match is
+infinite."""
 
 
 @kernel

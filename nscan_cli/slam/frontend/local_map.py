@@ -84,6 +84,13 @@ def insert_scan(
 
 
 @kernel
+def remove_newest(local_map: LocalMap, grid: Grid, settings: TrackingParameters) -> None:
+    """Take the scan that joined the map last out of it."""
+    local_map.counts[NEWEST] -= 1
+    _change_grid(local_map, grid, settings, local_map.counts[NEWEST], -1.0)
+
+
+@kernel
 def _change_grid(
     local_map: LocalMap, grid: Grid, settings: TrackingParameters, scan: int, sign: float
 ) -> None:

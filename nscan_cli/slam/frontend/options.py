@@ -104,6 +104,20 @@ class ScanTrackingOptions(NamedTuple):
     constant_velocity: MotionModel = MotionModel(distance=0.3, angle=0.3, distance_per_metre=0.3)
     """Standard deviations of a step without odometry, predicted by constant velocity. Larger ones trust the
     scans more."""
+    longest_pause: float = 2.0
+    """Largest time between two scans, in periods of the last ones, that a robot of constant velocity goes on
+    in. A larger value predicts longer steps after pauses."""
+    prediction_smoothing: float = 0.02
+    """Weight of a new scan in the mean errors of predictions by constant velocity. A larger weight follows
+    changes of the motion faster."""
+    far_prediction: float = 3.0
+    """A poor match without odometry is repeated if it is off its prediction by more than this multiple of the
+    mean error of predictions. A larger value trusts matches more."""
+    prediction_sigmas: float = 3.0
+    """Standard deviation of the prior of that match, in mean errors of predictions. A larger value trusts the
+    scans more."""
+    min_prediction_error: float = 0.02
+    """Least mean error of predictions there, m and rad. A larger value trusts the scans more."""
     degeneracy_poses: int = 3
     """Number of known poses from which on `degeneracy` is checked: fewer give no velocity."""
     degeneracy: DegeneracyOptions = DegeneracyOptions()
@@ -143,6 +157,9 @@ class TrackingOptions:
     """The search for a lost scan, around its prediction."""
     lost_search_path: float = 5.0
     """Length of the path among whose scans a lost scan is searched, m. A larger value takes longer."""
+    lost_errors: float = 1.5
+    """Standard deviation of the prediction of a lost scan, in mean errors of predictions so far. A larger
+    value searches farther for loops after such scans."""
     velocity_scans: int = 5
     """Number of steps whose mean is the velocity. More even out jitter of stamps, and follow turns later."""
     standstill_share: float = 0.9
@@ -201,6 +218,8 @@ class TrackingParameters(NamedTuple):
     coarse_tolerance: float
     restart_angles: Array
     """(rings, angles), with nan where a ring has fewer."""
+    is_alone: bool
+    """Whether nothing but the scans tells how the robot moves: the log has no odometry."""
 
     @classmethod
     def of(
@@ -221,6 +240,7 @@ class TrackingParameters(NamedTuple):
             widenings=np.array(options.widenings),
             coarse_tolerance=options.coarse_tolerance if has_odometry else options.scan.tolerance,
             restart_angles=angles,
+            is_alone=not has_odometry,
         )
 
 

@@ -8,30 +8,33 @@ from nscan_cli.kernels.decorators import kernel
 from nscan_cli.matching.motion_model import MotionModel, Prior, motion_sigmas
 from nscan_cli.matching.pose_kernels import composed_pose, relative_pose, wrapped
 from nscan_cli.poses import Array
+from nscan_cli.slam.frontend.constant_velocity import constant_velocity
 from nscan_cli.slam.frontend.odometry_noise import learned_shares
 from nscan_cli.slam.frontend.options import ScanTrackingOptions
-from nscan_cli.slam.frontend.track_state import KNOWN, TrackState
+from nscan_cli.slam.frontend.track_state import TrackState
 
 
 @kernel
 def predict(
-    track: TrackState, options: ScanTrackingOptions, odometry: Array, motion: MotionModel, prior: Prior
+    track: TrackState,
+    options: ScanTrackingOptions,
+    time: float,
+    odometry: Array,
+    motion: MotionModel,
+    prior: Prior,
 ) -> None:
     """Write the prior on the next scan's pose, in the tracker's frame; its odometry (3,) may be nan.
 
     `motion` has the deviations of the odometry.
     """
-    known, last = track.counts[KNOWN], track.poses[-1]
-    step = np.empty(3)
+    last, step = track.poses[-1], np.empty(3)
     if np.isfinite(odometry[0]) and np.isfinite(track.odometry[0]):
         relative_pose(odometry, track.odometry, step)
         step[2] = wrapped(step[2])
         along, about = motion_sigmas(step, motion)
     else:
-        # Constant velocity: the mean of the last steps.
-        relative_pose(last, track.poses[-known], step)
-        step[2] = wrapped(step[2])
-        step /= max(known - 1, 1)
+        # The last step alone is that of a lost scan.
+        constant_velocity(track, options, time, track.inliers[0] < options.lost_inliers, step)
         along, about = motion_sigmas(step, options.constant_velocity)
     composed_pose(last, step, prior.mean)
     prior.mean[2] = wrapped(prior.mean[2])
@@ -43,11 +46,11 @@ def predict(
 
 @kernel
 def predict_by_trusted_odometry(
-    track: TrackState, options: ScanTrackingOptions, odometry: Array, prior: Prior
+    track: TrackState, options: ScanTrackingOptions, time: float, odometry: Array, prior: Prior
 ) -> None:
     """Write the prior as `predict` does, with the deviations of trusted odometry, narrowed by what was
     learned."""
-    predict(track, options, odometry, options.trusted_odometry, prior)
+    predict(track, options, time, odometry, options.trusted_odometry, prior)
     if np.isfinite(odometry[0]) and np.isfinite(track.odometry[0]):
         step, noise = np.empty(3), options.odometry_noise
         relative_pose(odometry, track.odometry, step)
@@ -57,6 +60,15 @@ def predict_by_trusted_odometry(
         shares = learned_shares(track.odometry_noise, noise, length, along, about)
         prior.information[0, 0] = prior.information[1, 1] = (along * shares[0]) ** -2
         prior.information[2, 2] = (about * shares[1]) ** -2
+
+
+@kernel
+def predict_steadily(track: TrackState, options: ScanTrackingOptions, time: float, prior: Prior) -> None:
+    """Move the prior without odometry to where the mean velocity of all last steps leads."""
+    step = np.empty(3)
+    constant_velocity(track, options, time, True, step)
+    composed_pose(track.poses[-1], step, prior.mean)
+    prior.mean[2] = wrapped(prior.mean[2])
 
 
 @kernel

@@ -28,6 +28,8 @@ class ScanBatch:
     """(P, 2) points of these and maybe other scans, one after another, each in its robot's frame."""
     ends: Indices
     """(n + 1,) scan k has points[ends[k] : ends[k + 1]]."""
+    times: Array
+    """(n,) s"""
     odometry: Array | None
     """(n, 3) poses of the robot, or None."""
     shares: Array = field(default_factory=lambda: NONE)
@@ -44,7 +46,8 @@ class ScanBatch:
     def part(self, first: int, end: int) -> ScanBatch:
         """The scans from the `first` on, before the `end`."""
         odometry = None if self.odometry is None else self.odometry[first:end]
-        return ScanBatch(self.first + first, self.points, self.ends[first : end + 1], odometry, self.shares)
+        ends, times = self.ends[first : end + 1], self.times[first:end]
+        return ScanBatch(self.first + first, self.points, ends, times, odometry, self.shares)
 
     def copied(self) -> ScanBatch:
         """The same scans, with points and shares of their own."""
@@ -64,7 +67,7 @@ class ScanBatch:
         order = np.arange(len(self))[::-1]
         points, ends = self.chosen(order)
         shares = np.concatenate([self.shares[self.ends[k] : self.ends[k + 1]] for k in order])
-        return ScanBatch(self.first, points, ends, poses[::-1], -shares)
+        return ScanBatch(self.first, points, ends, -self.times[::-1], poses[::-1], -shares)
 
     def chosen(self, chosen: Indices) -> tuple[Array, Indices]:
         """A copy of the points (P, 2) of the scans with indices `chosen` (c,), and their `ends` (c + 1,)."""
@@ -82,6 +85,7 @@ class ScanBatch:
             parts[0].first,
             np.concatenate([points for points, _ in scans]),
             np.concatenate([[0], np.cumsum(sizes)]),
+            np.concatenate([part.times for part in parts]),
             np.concatenate(odometry) if odometry else None,
             np.concatenate(shares),
         )
@@ -106,5 +110,6 @@ def scan_batches(
         if not kept.all():
             points, shares = points[kept], shares[kept] if is_corrected else NONE
             ends = np.concatenate([[0], np.cumsum(kept)])[ends]
-        yield ScanBatch(first, points, ends, None if odometry is None else odometry[first:end], shares)
+        known = None if odometry is None else odometry[first:end]
+        yield ScanBatch(first, points, ends, log.times[first:end], known, shares)
         first = end

@@ -21,6 +21,8 @@ class TrackState(NamedTuple):
 
     poses: Array
     """(h, 3) poses of the last scans, the newest last."""
+    times: Array
+    """(h,) times of these scans, s."""
     odometry: Array
     """(3,) pose of the last matched scan by odometry; nan without odometry."""
     inserted: Array
@@ -29,6 +31,9 @@ class TrackState(NamedTuple):
     """(1,) share of inliers of the last scan."""
     mean_square_deviation: Array
     """(1,) mean square deviation of scans from their predictions without odometry, m²."""
+    prediction_errors: Array
+    """(2, 2, h − 1) mean error of the place (m) and the turn (rad) as predicted by the mean velocity of the
+    last 1 to h − 1 steps, per scan and per second."""
     odometry_noise: OdometryNoise
     counts: NDArray[np.int64]
     """(3,) KNOWN, RESTARTS and NEXT"""
@@ -39,5 +44,7 @@ class TrackState(NamedTuple):
         """The state before the first scan, with room for the last `size` poses; `initial_sigma` in m."""
         poses, odometry, inserted = np.zeros((size, 3)), np.full(3, np.nan), np.zeros(3)
         deviation, counts = np.array([initial_sigma**2]), np.zeros(3, dtype=np.int64)
-        noise, empty = OdometryNoise.begin(), LocalMap.empty()
-        return cls(poses, odometry, inserted, np.zeros(1), deviation, noise, counts, empty)
+        noise, empty, errors = OdometryNoise.begin(), LocalMap.empty(), np.full((2, 2, size - 1), 0.1)
+        return cls(
+            poses, np.zeros(size), odometry, inserted, np.zeros(1), deviation, errors, noise, counts, empty
+        )

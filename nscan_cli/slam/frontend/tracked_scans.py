@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -28,6 +28,8 @@ class TrackedScan:
     """Length of the path up to here, m."""
     in_map: bool
     """Whether the scan's points joined the local map."""
+    guess_variances: Array = field(default_factory=lambda: np.zeros(2))
+    """(2,) variances of the place (m²) and the turn (rad²) of the way to here, where it is a guess."""
 
 
 class TrackedScans(NamedTuple):
@@ -51,7 +53,10 @@ class TrackedScans(NamedTuple):
     """(n,) distance from where the odometry has the scan, in standard deviations; 0 without odometry."""
     weakest_sigmas: Array
     """(n,) standard deviation of the position that a scan without odometry measures along its weakest
-    direction, m; 0 where no direction is weak."""
+    direction, m; 0 where no direction is weak, infinite where it fits nothing."""
+    guess_variances: Array
+    """(n, 2) variances of the place (m²) and the turn (rad²) of the way here from the scans before. They are
+    not 0 if scans fit nothing that was seen before, and this one only the last of these."""
 
     @classmethod
     def room(cls, n: int) -> TrackedScans:
@@ -60,7 +65,8 @@ class TrackedScans(NamedTuple):
         hessians, covariances = np.empty((2, n, 3, 3))
         in_map = np.empty(n, dtype=np.bool_)
         poses, told = np.empty((n, 3)), np.zeros(n)
-        return cls(values, poses, hessians, covariances, inliers, paths, in_map, sigmas, told)
+        guesses = np.zeros((n, 2))
+        return cls(values, poses, hessians, covariances, inliers, paths, in_map, sigmas, told, guesses)
 
     @classmethod
     def together(cls, parts: Iterable[TrackedScans]) -> TrackedScans:
@@ -81,4 +87,5 @@ class TrackedScans(NamedTuple):
             float(self.inliers[k]),
             float(self.paths[k]),
             bool(self.in_map[k]),
+            self.guess_variances[k].copy(),
         )

@@ -13,8 +13,8 @@ from nscan_cli.matching.motion_model import no_prior
 from nscan_cli.ndt.energy import inlier_share
 from nscan_cli.ndt.transform import Ndt
 from nscan_cli.poses import Array
-from nscan_cli.slam.frontend.degeneracy import NOTHING_TOLD
-from nscan_cli.slam.frontend.local_map import ROWS, insert_scan
+from nscan_cli.slam.frontend.constant_velocity import expected_errors
+from nscan_cli.slam.frontend.local_map import ROWS, insert_scan, remove_newest
 from nscan_cli.slam.frontend.options import LaserView, TrackingOptions, TrackingParameters
 from nscan_cli.slam.frontend.point_spacing import points_between
 from nscan_cli.slam.frontend.scan_batch import ScanBatch
@@ -39,11 +39,16 @@ class Tracker:
         self.options = options
         self.map = Ndt.empty(options.gaussians, capacity=1 << 14, faces=odometry)
         self.searches = 0
-        self._is_alone = not odometry
-        """Whether nothing but the scans tells how the robot moves."""
         self._settings = TrackingParameters.of(options, odometry, laser)
         self._track = TrackState.begin(options.velocity_scans + 1, options.scan.degeneracy.initial_sigma)
         self._prior = no_prior()
+        self._left_out: tuple[Array, Array] | None = None
+        """Points (m, 2) and pose (3,) of the last scan if it was lost: it joins the map only if the next one,
+        which fits nothing else, fits it."""
+        self._is_tried = False
+        """Whether it has joined the map, to be tried."""
+        self._guess = np.zeros(2)
+        """Variances of the place (m²) and the turn (rad²) of the way over the last scans that were lost."""
 
     @property
     def restarts(self) -> int:
@@ -52,45 +57,76 @@ class Tracker:
 
     def track(self, scans: ScanBatch, may_wait: bool = False) -> TrackedScans:
         """Track the next scans. Of the last ones, which may wait for scans after them, nothing is found."""
-        if self._is_alone and self._track.counts[KNOWN] == 0 and len(scans):
-            self._bridge_gaps(scans.of(0))
+        if self._settings.is_alone and self._track.counts[KNOWN] == 0 and len(scans):
+            self._insert(self._gap_points(scans.of(0)), np.zeros(3))
         n, k, ends = len(scans), 0, scans.ends
         odometry = np.full((n, 3), np.nan) if scans.odometry is None else scans.odometry
-        roomy = self._track.map.with_room(n, int(ends[-1] - ends[0]))
-        self._track = self._track._replace(map=roomy)
         found = TrackedScans.room(n)
         self._track.counts[NEXT] = 0
         while k < n:
+            roomy = self._track.map.with_room(n - k, int(ends[-1] - ends[k]))
+            self._track = self._track._replace(map=roomy)
             self.map.reserve(int(ends[k + 1] - ends[k]))
             self._track.map.counts[ROWS] = self.map.rows
             problem = TrackingProblem(
-                self._track, self.map.grid, self._settings, scans.points, ends, scans.shares, odometry,
+                self._track, self.map.grid, self._settings, scans.points, ends, scans.shares, scans.times,
+                odometry,
                 self._prior, found,
             )  # fmt: skip
-            k = track_scans(problem, k, may_wait)
-            if k < n and np.isfinite(found.inliers[k]):
-                self._search(scans.of(k), found, k)
-                if self._is_alone and found.inliers[k] < self.options.scan.lost_inliers:
-                    found.weakest_sigmas[k] = NOTHING_TOLD
-                settle(problem, k)
-                k += 1
+            begun, k = k, track_scans(problem, k, may_wait)
             self.map.rows = int(self._track.map.counts[ROWS])
+            if k > begun:
+                self._keep(found, begun)
+            if k == n or np.isnan(found.inliers[k]):
+                continue
+            self._search(scans.of(k), found, k)
+            is_lost = self._settings.is_alone and found.inliers[k] < self.options.scan.lost_inliers
+            if is_lost and self._left_out is not None and not self._is_tried:
+                points, pose = self._left_out
+                self._insert(np.concatenate([points, self._gap_points(points)]), pose)
+                self._is_tried = True
+                continue
+            if is_lost:
+                found.weakest_sigmas[k] = np.inf
+                if self._is_tried:
+                    remove_newest(self._track.map, self.map.grid, self._settings)
+            settle(problem, k)
+            self.map.rows = int(self._track.map.counts[ROWS])
+            if is_lost:
+                self._leave_out(scans.of(k), found, k)
+            else:
+                self._keep(found, k)
+            k += 1
         return found.part(0, int(self._track.counts[NEXT]))
 
-    def _bridge_gaps(self, points: Array) -> None:
-        """Let points between those of the first scan (m, 2) join the map if alone it makes few Gaussians."""
+    def _leave_out(self, points: Array, found: TrackedScans, k: int) -> None:
+        """Scan k of points (m, 2) is lost."""
+        errors = self.options.lost_errors * np.array(expected_errors(self._track))
+        self._guess += np.minimum(np.diag(found.prior_covariances[k])[1:], errors**2)
+        self._left_out, self._is_tried = (points.copy(), found.poses[k].copy()), False
+
+    def _keep(self, found: TrackedScans, k: int) -> None:
+        """Scan k fits, alone or with the scan before that was left out."""
+        if self._is_tried:
+            found.guess_variances[k] = self._guess
+        self._left_out, self._is_tried, self._guess = None, False, np.zeros(2)
+
+    def _insert(self, points: Array, pose: Array) -> None:
+        """Let points (m, 2) seen at `pose` (3,) join the map."""
+        self.map.reserve(len(points))
+        local_map = self._track.map.with_room(1, len(points))
+        self._track = self._track._replace(map=local_map)
+        local_map.counts[ROWS] = self.map.rows
+        insert_scan(local_map, self.map.grid, self._settings, points, pose)
+        self.map.rows = int(local_map.counts[ROWS])
+
+    def _gap_points(self, points: Array) -> Array:
+        """Points in the gaps between those of a scan (m, 2) that alone makes few Gaussians; else none."""
         options, origin = self.options, np.zeros(3)
         own = Ndt.of_scans(points, np.array([0, len(points)]), origin[None], options.gaussians)
         share = inlier_share(own.grid, own.half, points, origin, options.scan.inlier_bound)
-        if share > options.scan.lost_inliers:
-            return
-        between = points_between(points, options.gaussians, options.bridged_gap)
-        self.map.reserve(len(between))
-        local_map = self._track.map.with_room(1, len(between))
-        self._track = self._track._replace(map=local_map)
-        local_map.counts[ROWS] = self.map.rows
-        insert_scan(local_map, self.map.grid, self._settings, between, origin)
-        self.map.rows = int(local_map.counts[ROWS])
+        is_sparse = share <= options.scan.lost_inliers
+        return points_between(points, options.gaussians, options.bridged_gap) if is_sparse else points[:0]
 
     def _search(self, points: Array, found: TrackedScans, k: int) -> None:
         """Match scan k from where a search among the last scans finds it too; keep the lower objective."""

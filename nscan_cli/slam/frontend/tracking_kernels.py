@@ -12,10 +12,17 @@ from nscan_cli.ndt.grid_growth import CELLS_PER_POINT
 from nscan_cli.poses import Array
 from nscan_cli.slam.frontend.angle_restarts import match_from_other_angles, restart_threshold
 from nscan_cli.slam.frontend.between_scans import match_between, waits_for_motion
+from nscan_cli.slam.frontend.constant_velocity import learn_prediction
 from nscan_cli.slam.frontend.degeneracy import keep_prediction
 from nscan_cli.slam.frontend.local_map import ROWS, insert_scan
 from nscan_cli.slam.frontend.odometry_noise import learn_noise
-from nscan_cli.slam.frontend.prediction import contradicts, predict, predict_by_trusted_odometry
+from nscan_cli.slam.frontend.prediction import (
+    contradicts,
+    predict,
+    predict_by_trusted_odometry,
+    predict_steadily,
+)
+from nscan_cli.slam.frontend.prediction_restart import match_near_prediction
 from nscan_cli.slam.frontend.scan_to_map import match_from_prediction
 from nscan_cli.slam.frontend.sector_of_view import match_again_in_sector, match_in_sector
 from nscan_cli.slam.frontend.sweep_correction import correct_by_last_step, correct_by_match
@@ -41,7 +48,8 @@ def settle(problem: TrackingProblem, k: int) -> None:
     distance = np.hypot(step[0], step[1])
     # Before anything was seen there is nothing to move against.
     nothing_seen = counts[KNOWN] == 0 or track.map.counts[ROWS] == 0
-    joins = nothing_seen or distance > options.min_motion or abs(wrapped(step[2])) > options.min_motion
+    has_moved = distance > options.min_motion or abs(wrapped(step[2])) > options.min_motion
+    joins = nothing_seen or (has_moved and found.weakest_sigmas[k] < np.inf)
     if joins:
         track.map.path[0] += distance
         assign(track.inserted, pose)
@@ -64,13 +72,19 @@ def settle(problem: TrackingProblem, k: int) -> None:
     learn_noise(
         track.odometry_noise, options.odometry_noise, pose, odometry[k], length, found.hessians[k], along**-2
     )
+    tells = found.inliers[k] >= options.restart_inliers
+    tells &= found.weakest_sigmas[k] <= options.degeneracy.trusted_sigma
+    if tells and settings.is_alone:
+        learn_prediction(track, options, problem.times[k], pose)
     first = counts[NEXT]
     if first < k:
         match_between(problem, before, first, k)
     for scan in range(first, k + 1):
         for row in range(track.poses.shape[0] - 1):
             assign(track.poses[row], track.poses[row + 1])
+            track.times[row] = track.times[row + 1]
         assign(track.poses[-1], found.poses[scan])
+        track.times[-1] = problem.times[scan]
     counts[KNOWN], counts[NEXT] = min(counts[KNOWN] + k + 1 - first, track.poses.shape[0]), k + 1
 
 
@@ -88,7 +102,7 @@ def match_with_doubt(problem: TrackingProblem, points: Array, threshold: float, 
     trusted, inliers, value = prior.information.copy(), found.inliers[k], found.values[k]
     energy = value - prior_value(prior, found.poses[k])
     pose, hessian = found.poses[k].copy(), found.hessians[k].copy()
-    predict(problem.track, options, problem.odometry[k], options.odometry, prior)
+    predict(problem.track, options, problem.times[k], problem.odometry[k], options.odometry, prior)
     match_from_prediction(problem, points, k)
     if found.inliers[k] < threshold:
         match_from_other_angles(problem, points, threshold, k)
@@ -122,7 +136,7 @@ def track_scans(problem: TrackingProblem, first: int, may_wait: bool) -> int:
             prior.mean[:], prior.information[:, :] = 0.0, 0.0
             found.values[k], found.poses[k], found.hessians[k], found.inliers[k] = 0.0, 0.0, 0.0, 1.0
         else:
-            predict_by_trusted_odometry(track, options, odometry[k], prior)
+            predict_by_trusted_odometry(track, options, problem.times[k], odometry[k], prior)
             has_odometry = np.isfinite(odometry[k, 0])
             shares = problem.shares[ends[k] : ends[k + 1]]
             if sweeps:
@@ -137,6 +151,8 @@ def track_scans(problem: TrackingProblem, first: int, may_wait: bool) -> int:
                 match_with_doubt(problem, matched, threshold, k)
             elif found.inliers[k] < threshold:
                 match_from_other_angles(problem, matched, threshold, k)
+                if settings.is_alone:
+                    match_near_prediction(problem, matched, k)
             if waits_for_motion(track, options, odometry, k, found.poses[k], may_wait):
                 continue
             if found.inliers[k] < (options.lost_inliers if has_odometry else options.restart_inliers):
@@ -144,6 +160,9 @@ def track_scans(problem: TrackingProblem, first: int, may_wait: bool) -> int:
             if matched.shape[0] == in_view.shape[0]:
                 matched = match_again_in_sector(problem, in_view, k)
             if track.counts[KNOWN] >= options.degeneracy_poses and not has_odometry:
+                found.values[k] -= prior_value(prior, found.poses[k])
+                predict_steadily(track, options, problem.times[k], prior)
+                found.values[k] += prior_value(prior, found.poses[k])
                 keep_prediction(grid, settings, matched, prior, track.mean_square_deviation, found, k)
         settle(problem, k)
     return int(ends.shape[0]) - 1

@@ -25,6 +25,8 @@ class TrackingProblem(NamedTuple):
     """(n + 1,) scan k has points[ends[k] : ends[k + 1]]."""
     shares: Array
     """(P,) times of the points as in ScanBatch; empty if there is nothing to correct."""
+    times: Array
+    """(n,) s"""
     odometry: Array
     """(n, 3) poses, nan where there is none."""
     prior: Prior

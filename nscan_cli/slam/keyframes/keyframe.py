@@ -7,7 +7,7 @@ of motion fill the gaps between the beams. Its points are those of its own scan.
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
@@ -51,6 +51,9 @@ class Keyframe:
     gaussians: GaussianOptions
     around: list[KeyframePoints]
     """What the NDT is made of: its own scan, and those up to the keyframes beside it."""
+    guess_variances: Array = field(default_factory=lambda: np.zeros(2))
+    """(2,) variances of the place (m²) and the turn (rad²) of the way from the keyframe before, as far as it
+    is a guess that no scan tells."""
     _ndt: Ndt | None = None
 
     @property

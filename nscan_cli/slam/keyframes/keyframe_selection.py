@@ -27,6 +27,7 @@ class Keyframes:
         self._slips = SlipDetector(options)
         self._since: list[KeyframePoints] = []
         self._prior_covariance = np.zeros((3, 3))
+        self._guess_variances = np.zeros(2)
 
     def without_any(self) -> Keyframes:
         """No keyframes yet, with the same options and distance."""
@@ -42,7 +43,8 @@ class Keyframes:
         begins |= not self.list
         before = found.poses[0] if begins else self.list[-1].tracked.pose
         bounds = self.distance, self.options.turn, self.options.slip_factor
-        new = _new_keyframes(found.poses, self._slips.find(found), int(begins), before, bounds).tolist()
+        lost = np.isinf(found.weakest_sigmas)
+        new = _new_keyframes(found.poses, self._slips.find(found), lost, int(begins), before, bounds).tolist()
         first = 0
         for k in [0, *new] if begins else new:
             self.attach(scans, found, first, k)
@@ -54,6 +56,7 @@ class Keyframes:
         """Add scans from the `first` on, before the `end`, to the Gaussians of the keyframes beside them."""
         covariances = [self._prior_covariance[None], found.prior_covariances[first:end]]
         self._prior_covariance = np.add.reduce(np.concatenate(covariances))
+        self._guess_variances = self._guess_variances + found.guess_variances[first:end].sum(axis=0)
         inserted = first + np.flatnonzero(found.in_map[first:end])
         if len(inserted):
             points, ends = scans.chosen(inserted)
@@ -67,8 +70,9 @@ class Keyframes:
         cells = count_cells(points, 0.5 * self.gaussians.cell)
         own = KeyframePoints(points, np.array([len(points)]), tracked.pose[None])
         covariance = self._prior_covariance + tracked.prior_covariance
-        keyframe = Keyframe(row, tracked, covariance, points, cells, self.gaussians, [own, *since])
-        self._prior_covariance = np.zeros((3, 3))
+        guess = self._guess_variances + tracked.guess_variances
+        keyframe = Keyframe(row, tracked, covariance, points, cells, self.gaussians, [own, *since], guess)
+        self._prior_covariance, self._guess_variances = np.zeros((3, 3)), np.zeros(2)
         self.list.append(keyframe)
         return keyframe
 
@@ -81,16 +85,19 @@ class Keyframes:
 
 @kernel
 def _new_keyframes(
-    poses: Array, slipped: Mask, first: int, before: Array, bounds: tuple[float, float, float]
+    poses: Array, slipped: Mask, lost: Mask, first: int, before: Array, bounds: tuple[float, float, float]
 ) -> Indices:
     """Which of the poses (n, 3), from the `first` on, become keyframes.
 
-    Each is the first beyond a distance (m) or turn (rad) of the one before; the first of all, of `before`.
-    These are the first two bounds. Where a scan may have slipped, both are multiplied by the third.
+    Those that are `lost` do not. Each other one is the first beyond a distance (m) or turn (rad) of the one
+    before; the first of all, of `before`. These are the first two bounds. Where a scan may have slipped, both
+    are multiplied by the third.
     """
     distance, turn, slip_factor = bounds
     new, count, last = np.empty(len(poses), dtype=np.int64), 0, before
     for k in range(first, len(poses)):
+        if lost[k]:
+            continue
         away = np.hypot(poses[k, 0] - last[0], poses[k, 1] - last[1])
         factor = slip_factor if slipped[k] else 1.0
         if not (away <= factor * distance and abs(wrapped(poses[k, 2] - last[2])) <= factor * turn):

@@ -83,6 +83,8 @@ def chain_relations(keyframes: Sequence[Keyframe], options: KeyframeOptions) -> 
     drift = np.array([options.drift, options.drift, options.drift_angle]) ** 2
     covariances = np.linalg.inv(information + np.linalg.inv(expected))
     covariances[:, range(3), range(3)] += drift * (lengths[:, None] + options.drift_min_path)
+    guesses = np.array([each.guess_variances for each in keyframes[1:]])
+    covariances[:, range(3), range(3)] += guesses[:, [0, 0, 1]]
     return [
         Pairwise(
             nodes=(a.row, b.row),

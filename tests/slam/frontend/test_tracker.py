@@ -287,3 +287,31 @@ def test_between_walls_so_far_off_that_one_scan_makes_no_gaussians_the_robot_doe
     assert np.hypot(*end_off(alone.poses, truth_of(log))[:2]) > 19.0
     found = Tracker(TrackingOptions(), odometry=False).track(sensed_in(log))
     assert np.hypot(*end_off(found.poses, truth_of(log))[:2]) < 0.05
+
+
+def test_a_lost_scan_that_the_next_one_does_not_fit_stays_out_of_the_map():
+    """A robot that pitches sees a wall where the ground is. Where it seems to be then is a guess, no more."""
+    log = across_a_yard(0.5, 1)
+    scans, strange = [log.points(row) for row in range(len(log))], 40
+    angles = np.linspace(-1.5, 1.5, 180)
+    scans[strange] = 3.0 * np.column_stack([np.cos(angles), np.sin(angles)])
+    found = Tracker(TrackingOptions(), odometry=False).track(sensed(scans))
+    assert np.flatnonzero(np.isinf(found.weakest_sigmas)).tolist() == [strange]
+    assert not found.in_map[strange]
+    assert not found.guess_variances.any()
+    assert np.hypot(*end_off(found.poses, truth_of(log))[:2]) < 0.05
+
+
+def test_if_nothing_fits_any_more_tracking_goes_on_in_what_is_seen_now():
+    """The way into it is a guess, as uncertain as a step without any scan; after it all is known again."""
+    yard, office = across_a_yard(0.5, 1), office_log()
+    scans = [yard.points(row) for row in range(40)] + [office.points(row) for row in range(20)]
+    found = Tracker(TrackingOptions(), odometry=False).track(sensed(scans))
+    lost = np.flatnonzero(np.isinf(found.weakest_sigmas))
+    guessed = np.flatnonzero(found.guess_variances.any(axis=1))
+    assert lost[0] == 40
+    assert guessed.tolist() == [lost[-1] + 1]
+    place, turn = np.sqrt(found.guess_variances[guessed[0]])
+    assert place > 0.03
+    assert turn > 0.01
+    assert found.inliers[guessed[0] + 1 :].min() > 0.8
