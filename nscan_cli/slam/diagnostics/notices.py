@@ -113,6 +113,12 @@ def _scan_notices(state: SlamState) -> list[str]:
             f"the laser repeats itself at {_numbered(log, same)}: it is frozen, or the robot stands still; "
             "without odometry the robot is assumed to stand still"
         )
+    guessed = [each.row for each in state.route.keyframes if each.guess_variances.any()]
+    if guessed:
+        found.append(
+            f"nothing that was seen before fits what the laser sees before {_numbered(log, guessed)}; "
+            "without odometry the way there is a guess"
+        )
     jumps_found = jumps_of(np.concatenate(state.tracked), state.options.odometry_checks)
     jumps = np.setdiff1d(jumps_found, state.breaks).tolist()
     if jumps:

@@ -70,8 +70,7 @@ class Tracker:
             self._track.map.counts[ROWS] = self.map.rows
             problem = TrackingProblem(
                 self._track, self.map.grid, self._settings, scans.points, ends, scans.shares, scans.times,
-                odometry,
-                self._prior, found,
+                odometry, self._prior, found,
             )  # fmt: skip
             begun, k = k, track_scans(problem, k, may_wait)
             self.map.rows = int(self._track.map.counts[ROWS])
