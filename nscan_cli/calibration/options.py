@@ -71,7 +71,7 @@ class HeldOdometryOptions:
     slow motion as standing."""
     min_duration: float = 3.0
     """Shortest time that odometry has to stand, s. A smaller value finds more, and takes longer."""
-    min_heading_duration: float = 30.0
+    min_heading_duration: float = 45.0
     """Shortest time that the heading alone has to stand, s: it does on straight ways. A smaller value finds
     more, and takes longer."""
     min_turn: float = 0.15
