@@ -57,8 +57,9 @@ def checked_file(log: LaserLog, reading: ReadingOptions, options: FileCheckOptio
     if any("odometry" in finding.corrected for finding in findings):
         # Steps by scans may be those of someone who goes along, and odometry is right without his beams.
         alone, masked, seen = checked_companion(signed, reading, options.companion)
-        if seen and not find_contradictions(alone, masked, options, known := {}):
-            findings, signed, reading, log = [], alone, masked, alone
+        without_him: KnownSteps = {}
+        if seen and not find_contradictions(alone, masked, options, without_him):
+            findings, signed, reading, log, known = [], alone, masked, alone, without_him
             said += seen
     if reversing:
         # A laser that is turned within the log sees the robot go elsewhere, too. The steps by scans stay.

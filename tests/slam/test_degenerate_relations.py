@@ -10,7 +10,7 @@ from nscan_cli.graph.marginal_covariances import marginal_covariances
 from nscan_cli.graph.model import Graph, NScan, Pairwise
 from nscan_cli.logs.load import read_log
 from nscan_cli.poses import Array, relative
-from nscan_cli.slam.backend.degenerate_relations import guess_variances, with_guess_variances
+from nscan_cli.slam.backend.degenerate_relations import length_variances, with_guess_variances
 from nscan_cli.slam.backend.options import DegenerateRelationOptions
 from nscan_cli.slam.diagnostics.degenerate_stretches import DegenerateStretch
 from nscan_cli.slam.diagnostics.notices import notices
@@ -48,7 +48,7 @@ def end_sigmas(pairwise: list[Pairwise], nscan: list[NScan]) -> Array:
 def test_all_relations_together_have_the_variance_of_the_guess(joints):
     rows, times = np.arange(SIZE), np.arange(float(SIZE))
     way = DegenerateStretch(2, 5, 6.0, possible=8.0)
-    variances = guess_variances(rows, times, [way], DegenerateRelationOptions(speed_share=0.5))
+    variances = length_variances(rows, times, [way], DegenerateRelationOptions(speed_share=0.5))
     # Half of 8 m, over four steps.
     np.testing.assert_allclose(variances, [0.0, 4.0, 4.0, 4.0, 4.0, 0.0])
     nscan = [joint(nodes) for nodes in joints]

@@ -40,11 +40,11 @@ def widened_relations(state: SlamState) -> tuple[list[Pairwise], list[NScan]]:
     options, rows = state.options.degenerate_relations, state.route.rows
     lost = [keyframe.guess_variances for keyframe in state.route.keyframes[1 : len(rows)]]
     variances = np.column_stack(
-        [guess_variances(rows, times, ways, options), np.array(lost).reshape(len(rows) - 1, 2)]
+        [length_variances(rows, times, ways, options), np.array(lost).reshape(len(rows) - 1, 2)]
     )
     if not variances.any():
         return pairwise, nscan
-    return with_guess_variances(pairwise, nscan, state.route.rows, variances, options.most_steps)
+    return with_guess_variances(pairwise, nscan, rows, variances, options.most_steps)
 
 
 def all_widened_relations(state: SlamState) -> list[Relation]:
@@ -53,7 +53,7 @@ def all_widened_relations(state: SlamState) -> list[Relation]:
     return [*pairwise, *nscan, *state.other_relations]
 
 
-def guess_variances(
+def length_variances(
     rows: Indices, times: Array, ways: Sequence[DegenerateStretch], options: DegenerateRelationOptions
 ) -> Array:
     """The variance (K − 1,) in m² of the guess from each of the keyframes in rows (K,) to the next.
@@ -75,9 +75,9 @@ def with_guess_variances(
 ) -> tuple[list[Pairwise], list[NScan]]:
     """The relations among keyframes in rows (K,), less certain along ways that no scan tells.
 
-    `variances` (K − 1, 3) are those from each keyframe to the next, along the way (m²), of place (m²) and of
-    turn (rad²). Relations over more than `most_steps`
-    keyframes are of another visit: they measure, and stay.
+    `variances` (K − 1, 3) are those from each keyframe to the next: along the way (m²), and, where scans fit
+    nothing, of place (m²) and of turn (rad²). Relations over more than `most_steps` keyframes are of another
+    visit: they measure, and stay.
     """
     known = [_widened_pair(pair, _steps(pair, rows, most_steps), variances) for pair in pairwise]
     return known, [_widened_joint(joint, _steps(joint, rows, most_steps), variances) for joint in nscan]

@@ -141,9 +141,9 @@ class TrackingOptions:
     closer. A larger one is faster, and blurs small things; with none a wall beside the robot outweighs all
     the rest."""
     bridged_gap: float = 1.0
-    """Without odometry, points of the first scan of a track get others between them if they are at most this
-    far apart, m, and if fewer than `lost_inliers` of them lie on Gaussians of their own: walls far away. A
-    larger value bridges more gaps that are none."""
+    """Without odometry, points of the first scan of a track, or of a lost scan that joins the map, get others
+    between them if they are at most this far apart, m, and if fewer than `lost_inliers` of them lie on
+    Gaussians of their own: walls far away. A larger value bridges more gaps that are none."""
     scan: ScanTrackingOptions = field(default_factory=ScanTrackingOptions)
     """How each scan is matched with the local map, and joins it."""
     widenings: tuple[float, ...] = (0.05, 0.3, 1.0)
@@ -161,7 +161,8 @@ class TrackingOptions:
     """Standard deviation of the prediction of a lost scan, in mean errors of predictions so far. A larger
     value searches farther for loops after such scans."""
     velocity_scans: int = 5
-    """Number of steps whose mean is the velocity. More even out jitter of stamps, and follow turns later."""
+    """Largest number of last steps whose mean is the velocity. More even out jitter of stamps, and follow
+    turns later."""
     standstill_share: float = 0.9
     """Without odometry, scans that tell little are tracked from behind, too, where the robot goes less far
     than this share of its way at the highest speed after them. A larger share takes more time."""

@@ -33,8 +33,9 @@ def predict(
         step[2] = wrapped(step[2])
         along, about = motion_sigmas(step, motion)
     else:
-        # The last step alone is that of a lost scan.
-        constant_velocity(track, options, time, track.inliers[0] < options.lost_inliers, step)
+        # The step to a lost scan is a guess, and tells no velocity by itself.
+        was_lost = track.inliers[0] < options.lost_inliers
+        constant_velocity(track, options, time, was_lost, step)
         along, about = motion_sigmas(step, options.constant_velocity)
     composed_pose(last, step, prior.mean)
     prior.mean[2] = wrapped(prior.mean[2])
