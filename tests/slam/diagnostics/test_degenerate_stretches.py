@@ -17,7 +17,8 @@ from nscan_cli.slam.diagnostics.notices import notices
 from nscan_cli.slam.diagnostics.options import DegenerateStretchOptions
 from tests.data import data_file
 from tests.slam.frontend.test_degeneracy import into_a_bare_corridor
-from tests.slam.frontend.test_lost_scans import across_a_yard, straight_corridor
+from tests.slam.frontend.test_lost_scans import across_a_yard
+from tests.slam.frontend.test_tracker import straight_corridor
 from tests.slam.mapped_logs import mapped, office_log
 
 OPTIONS = DegenerateStretchOptions()
