@@ -1,7 +1,5 @@
-"""Stretches in which no reading is usable: the laser's driver died, or something covers it.
-
-Beams that meet nothing, as in an open field, are usable: they say so.
-"""
+"""Stretches in which no beam comes back: the laser's driver died, something covers it, or nothing is in
+range."""
 
 from __future__ import annotations
 
@@ -26,8 +24,11 @@ class BlindScanOptions:
 def blind_scans(
     ranges: NDArray[np.float32], numbers: Indices, options: BlindScanOptions = BlindScanOptions()
 ) -> list[str]:
-    """What is said of scans with ranges (S, B) and numbers (S,) that see nothing for long."""
-    is_blind = np.count_nonzero(np.isnan(ranges), axis=1) == ranges.shape[1]
+    """What is said of scans with ranges (S, B) and numbers (S,) that see nothing for long.
+
+    In an open field it is no fault, but nothing is mapped there, either.
+    """
+    is_blind = ~np.isfinite(ranges).any(axis=1)
     runs = [run for run in mask_runs(is_blind) if run[1] - run[0] >= options.min_scans]
     if not runs:
         return []
