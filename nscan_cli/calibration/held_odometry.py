@@ -11,11 +11,12 @@ import numpy as np
 
 from nscan_cli.calibration.measured_steps import measure_steps
 from nscan_cli.calibration.options import HeldOdometryOptions, StepOptions
+from nscan_cli.calibration.scan_turns import scan_turns
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.logs.mask_runs import mask_runs
 from nscan_cli.logs.robot_path import robot_path
 from nscan_cli.logs.stretch_names import stretch_names
-from nscan_cli.poses import Array, relative
+from nscan_cli.poses import Array, Indices, relative
 
 
 def checked_held(
@@ -79,7 +80,7 @@ def _scans_move(
     # If headings go on, the robot may turn on the spot: then steps without a turn tell.
     turns = np.abs(np.diff(log.odometry[first : last + 1, 2])).max() > options.still
     for count in (options.steps, options.more_steps):
-        laser = _steps_within(log, first, last, count, steps)
+        laser = measure_steps(log, _rows_within(log, first, last, count, steps), steps).laser
         laser = laser[np.abs(laser[:, 2]) < steps.min_motion] if turns else laser
         if len(laser) < options.min_measured:
             continue
@@ -95,13 +96,25 @@ def _scans_turn(
     log: LaserLog, first: int, last: int, options: HeldOdometryOptions, steps: StepOptions
 ) -> bool:
     """Whether a few of some steps, spread over a stretch, have a clear turn."""
-    turns = np.abs(_steps_within(log, first, last, options.more_steps, steps)[:, 2])
-    return int(np.count_nonzero(turns >= options.min_turn)) >= options.min_measured
+    begins, ends = _rows_within(log, first, last, options.more_steps, steps)
+    # On straight ways a rough look is enough.
+    rough = scan_turns(log, begins, ends, options.scan_turns)
+    if _clear_turns(rough, options) < options.min_measured:
+        return False
+    turns = measure_steps(log, (begins, ends), steps).laser[:, 2]
+    return _clear_turns(turns, options) >= options.min_measured
 
 
-def _steps_within(log: LaserLog, first: int, last: int, count: int, steps: StepOptions) -> Array:
-    """(n, 3) steps of the laser by its scans, of up to `count` that are spread from a row to another."""
+def _clear_turns(turns: Array, options: HeldOdometryOptions) -> int:
+    """How many of some turns (n,), rad, are clear."""
+    return int(np.count_nonzero(np.abs(turns) >= options.min_turn))
+
+
+def _rows_within(
+    log: LaserLog, first: int, last: int, count: int, steps: StepOptions
+) -> tuple[Indices, Indices]:
+    """The rows where up to `count` steps begin and end that are spread from a row to another."""
     ends = np.searchsorted(log.times, log.times[first : last + 1] + steps.duration)
     within = np.flatnonzero(ends <= last)
     some = within[np.unique(np.linspace(0, len(within) - 1, min(count, len(within))).astype(np.int64))]
-    return measure_steps(log, (first + some, ends[some]), steps).laser
+    return first + some, ends[some]

@@ -13,7 +13,7 @@ from nscan_cli.calibration.odometry_options import (
     ViewChangeOptions,
 )
 from nscan_cli.calibration.range_jump_options import BearingJitterOptions, OrderJumpOptions, RangeJumpOptions
-from nscan_cli.calibration.sweep_options import SweepCheckOptions
+from nscan_cli.calibration.sweep_options import ScanTurnOptions, SweepCheckOptions
 from nscan_cli.matching.pairwise import PairOptions
 
 
@@ -71,11 +71,13 @@ class HeldOdometryOptions:
     slow motion as standing."""
     min_duration: float = 3.0
     """Shortest time that odometry has to stand, s. A smaller value finds more, and takes longer."""
-    min_heading_duration: float = 45.0
+    min_heading_duration: float = 20.0
     """Shortest time that the heading alone has to stand, s: it does on straight ways. A smaller value finds
     more, and takes longer."""
-    min_turn: float = 0.15
-    """Turn of a step that contradicts it, rad. A larger value finds less."""
+    scan_turns: ScanTurnOptions = field(default_factory=ScanTurnOptions)
+    """How a rough look tells that the robot hardly turns there."""
+    min_turn: float = 0.08
+    """Turn of a step that contradicts it, rad: few of straight ways turn by 0.03. A larger value finds less."""
     changed_range: float = 0.1
     """A range has changed if it differs by more than this at both ends of that time, m. A larger value finds
     less."""
@@ -85,8 +87,7 @@ class HeldOdometryOptions:
     steps: int = 7
     """Number of steps that are measured, spread over that time. More tell more and take longer."""
     more_steps: int = 28
-    """Number of steps where the scans tell too few of these, as outdoors, or where the robot seems to move in
-    some alone. More tell more and take longer."""
+    """Number of steps where these tell too little, as outdoors or in stop and go. More take longer."""
     min_measured: int = 3
     """Least number of steps that the scans measure. A larger value finds less."""
     standing_share: float = 0.3
@@ -105,7 +106,7 @@ class CompanionOptions:
     """
 
     scans: int = 100
-    """Number of scans that are checked, evenly spread over the path. More take longer."""
+    """Number of scans that are checked, evenly spread. More take longer."""
     first_of: int = 3
     """One in so many of these is checked first. A larger value takes less time."""
     clear_share: float = 0.1

@@ -52,7 +52,8 @@ def test_no_real_odometry_stands(name):
 
 
 @pytest.mark.logs
-def test_a_gyroscope_that_fails_is_found_in_a_real_log():
-    log = replace(read_log(str(data_file("mit-csail.log.gz"))), odometry_path=None)
+@pytest.mark.parametrize("name", ["mit-csail.log.gz", "field/urg-corridor-1.bag"])
+def test_a_gyroscope_that_fails_is_found_in_a_real_log(name):
+    log = replace(read_log(str(data_file(name))), odometry_path=None)
     rows = slice(len(log) // 2, None)
     assert stretches(odometry_faults.partly_held(log, rows, HEADING)) == [(rows.start, len(log) - 1)]
