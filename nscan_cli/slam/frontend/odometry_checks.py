@@ -26,6 +26,12 @@ class OdometryCheckOptions:
     """Least step that counts as motion, m and rad. A larger value ignores slow drives."""
     step_quantile: float = 0.99
     """Quantile of the log's steps that is the usual longest step. A larger value finds fewer jumps."""
+    most_quantile: float = 0.9
+    """Quantile of the steps' lengths below which hardly any is a jump: those of counters that wrap round are
+    several percent. A larger value finds fewer jumps."""
+    longest_ratio: float = 4.0
+    """The usual longest length is at most this multiple of that quantile: it is 3.3 at most on real logs. A
+    larger value finds fewer jumps."""
     jump_factor: float = 5.0
     """A jump is longer than this multiple of the usual longest step. A larger value finds fewer jumps."""
     min_jump: float = 1.0
@@ -69,10 +75,14 @@ def jumps_of(poses: Array, options: OdometryCheckOptions, times: Array | None = 
         periods = np.diff(times)
         pauses = np.maximum(periods / max(float(np.median(periods)), SHORTEST_PERIOD), 1.0)
     jumps = np.zeros(len(steps), dtype=np.bool_)
-    for size in (np.hypot(steps[:, 0], steps[:, 1]), np.abs(steps[:, 2])):
+    lengths, turns = np.hypot(steps[:, 0], steps[:, 1]), np.abs(steps[:, 2])
+    # Most of the way a robot may go straight on, so that turns have no such ratio.
+    for size, ratio in ((lengths, options.longest_ratio), (turns, np.inf)):
         moving = size[size > options.min_motion]
         if len(moving):
-            longest = np.quantile(moving, options.step_quantile, method="lower")
+            usual = [options.step_quantile, options.most_quantile]
+            longest, most = np.quantile(moving, usual, method="lower")
+            longest = min(longest, ratio * most)
             jumps |= size > np.maximum(options.jump_factor * longest, options.min_jump) * pauses
     return np.flatnonzero(jumps) + 1
 
