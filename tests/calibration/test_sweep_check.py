@@ -51,6 +51,8 @@ def checked(data: bytes, reading: ReadingOptions | None = None) -> CheckedFile:
     (PERIOD, 2.8, -PERIOD, PERIOD, "the readings are in the reverse order of time"),
     (-PERIOD, 0.5, PERIOD, -PERIOD, "the readings are in the reverse order of time"),
     (0.0, 2.8, PERIOD, 0.0, "the laser sees all beams at once, though the file has times of beams"),
+    (0.0, 0.8, 0.2 * PERIOD, 0.0, "the laser sees all beams at once, though the file has times of beams"),
+    (0.2 * PERIOD, 0.8, 0.2 * PERIOD, None, ""),
 ])  # fmt: skip
 def test_the_scans_say_whether_and_how_the_laser_turns(turn, rate, told, used, said):
     found = checked(recording(turn, rate, told))

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from nscan_cli.poses import Array, relative
@@ -40,6 +42,17 @@ def test_a_reset_goes_on_as_in_the_step_before():
         np.tile(relative(steady()[1], steady()[0]), (149, 1)),
         atol=1e-9,
     )
+
+
+def test_counters_that_wrap_round_often_go_on():
+    """The robot drives along the place where they do, so that one step in thirty is a jump."""
+    odometry = steady()
+    odometry[:, 0] = np.mod(odometry[:, 0], 3.0)
+    believed, jumps = without_jumps(odometry, clock(150), CHECKS)
+    assert jumps.tolist() == [30, 60, 90, 120]
+    np.testing.assert_allclose(believed[-1], relative(steady()[-1], np.zeros(3)), atol=1e-9)
+    as_before = replace(CHECKS, longest_ratio=np.inf)
+    assert len(without_jumps(odometry, clock(150), as_before)[1]) == 0
 
 
 def test_a_pause_in_which_the_robot_drove_on_is_believed():
