@@ -77,7 +77,7 @@ class HeldOdometryOptions:
     scan_turns: ScanTurnOptions = field(default_factory=ScanTurnOptions)
     """How a rough look tells that the robot hardly turns there."""
     min_turn: float = 0.08
-    """Turn of a step that contradicts it, rad: few of straight ways turn by 0.03. A larger value finds less."""
+    """Turn of a step that contradicts it, rad: on straight ways few turn by 0.03. More finds less."""
     changed_range: float = 0.1
     """A range has changed if it differs by more than this at both ends of that time, m. A larger value finds
     less."""

@@ -31,6 +31,7 @@ from nscan_cli.logs.scan_order import ScanOrder, selected_numbers
 from nscan_cli.logs.skips import Skips
 from nscan_cli.logs.slow_odometry import without_repeats
 from nscan_cli.logs.sweep import Sweep, beam_times, sweep_of_file
+from nscan_cli.logs.two_odometries import of_one_source
 from nscan_cli.logs.unit_stretches import in_one_unit
 from nscan_cli.logs.whole_turn import in_whole_turns
 from nscan_cli.poses import Array, are_known
@@ -168,18 +169,20 @@ def _odometry(
     odometry, path = motion.odometry, motion.path
     if odometry is None:
         return None, path, []
-    wrong = slow = ""
+    both = wrong = slow = ""
     if path is not None:
         poses = path.poses
         if not options.as_recorded:
+            poses, both = of_one_source(poses, path.times)
             poses, wrong = without_outliers(poses, path.times)
             poses, slow = without_repeats(poses, path.times)
         path = robot_path(path.times, scaled_odometry(poses, options.odometry_scale))
     elif not options.as_recorded:
+        odometry, both = of_one_source(odometry, times.times)
         odometry, wrong = without_outliers(odometry, times.times)
         odometry, slow = without_repeats(odometry, times.times, (ranges, times.rows))
     odometry = scaled_odometry(odometry, options.odometry_scale)
-    said = [text for text in (wrong, slow) if text]
+    said = [text for text in (both, wrong, slow) if text]
     if said and path is not None:
         odometry = np.where(are_known(odometry)[:, None], poses_at(path, times.times), odometry)
     return odometry, path, said

@@ -28,7 +28,7 @@ def blind_scans(
 
     In an open field it is no fault, but nothing is mapped there, either.
     """
-    is_blind = ~np.isfinite(ranges).any(axis=1)
+    is_blind = np.logical_not(np.isfinite(ranges).any(axis=1))
     runs = [run for run in mask_runs(is_blind) if run[1] - run[0] >= options.min_scans]
     if not runs:
         return []

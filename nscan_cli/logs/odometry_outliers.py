@@ -88,10 +88,8 @@ def _excursions(poses: Array, times: Array, options: OdometryOutlierOptions) -> 
     """The rows before and behind each stretch of wrong poses (n, 3), known at times (n,), s."""
     if len(poses) < 3:
         return []
-    steps = _sizes(poses[1:], poses[:-1])
-    least = np.minimum(np.minimum(steps[1:], steps[:-1]), _sizes(poses[2:], poses[:-2]))
-    usual = np.quantile(least, options.quantile, axis=0, method="lower")
-    limits = np.maximum(options.factor * usual, options.min_distance)
+    steps = step_sizes(poses[1:], poses[:-1])
+    limits = np.maximum(options.factor * usual_longest_step(poses, options), options.min_distance)
     # After a pause a step may be longer in proportion.
     periods = np.maximum(np.diff(times) / (usual_period(times) or 1.0), 1.0)
     far = np.flatnonzero((steps > limits * periods[:, None]).any(axis=1)).tolist()
@@ -100,7 +98,7 @@ def _excursions(poses: Array, times: Array, options: OdometryOutlierOptions) -> 
         if found and away < found[-1][1]:
             continue
         for back in far[k + 1 : k + 1 + options.most_poses]:
-            apart = _sizes(poses[back + 1], poses[away])
+            apart = step_sizes(poses[back + 1], poses[away])
             excursion = np.minimum(steps[away], steps[back])
             is_excursion = (excursion > limits) & (apart <= options.max_return * excursion)
             is_near = back - away <= options.most_poses and (apart <= limits).all()
@@ -110,7 +108,15 @@ def _excursions(poses: Array, times: Array, options: OdometryOutlierOptions) -> 
     return found
 
 
-def _sizes(poses: Array, others: Array) -> Array:
+def usual_longest_step(poses: Array, options: OdometryOutlierOptions = DEFAULT_ODOMETRY_OUTLIERS) -> Array:
+    """(2,) length, m, and turn, rad, of the usual longest step between poses (n, 3), three at least."""
+    steps = step_sizes(poses[1:], poses[:-1])
+    least = np.minimum(np.minimum(steps[1:], steps[:-1]), step_sizes(poses[2:], poses[:-2]))
+    usual: Array = np.quantile(least, options.quantile, axis=0, method="lower")
+    return usual
+
+
+def step_sizes(poses: Array, others: Array) -> Array:
     """(…, 2) length, m, and turn, rad, of the steps to poses (…, 3) from others."""
     steps = relative(poses, others)
     return np.stack([np.hypot(steps[..., 0], steps[..., 1]), np.abs(steps[..., 2])], axis=-1)

@@ -23,6 +23,7 @@ from nscan_cli.logs.slow_odometry import SlowOdometryOptions
 from nscan_cli.logs.sweep import SweepOptions
 from nscan_cli.logs.text.interlaced_scans import InterlacedOptions
 from nscan_cli.logs.text.text_log_options import TextLogOptions
+from nscan_cli.logs.two_odometries import TwoOdometriesOptions
 from nscan_cli.logs.unit_stretches import UnitStretchOptions
 
 
@@ -46,6 +47,7 @@ class ScanCheckOptions:
     mounting: MountingOptions = field(default_factory=MountingOptions)
     odometry_gaps: OdometryGapOptions = field(default_factory=OdometryGapOptions)
     heading_unit: HeadingUnitOptions = field(default_factory=HeadingUnitOptions)
+    two_odometries: TwoOdometriesOptions = field(default_factory=TwoOdometriesOptions)
     odometry_outliers: OdometryOutlierOptions = field(default_factory=OdometryOutlierOptions)
     slow_odometry: SlowOdometryOptions = field(default_factory=SlowOdometryOptions)
     robot_path: RobotPathOptions = field(default_factory=RobotPathOptions)

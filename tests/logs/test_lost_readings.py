@@ -102,7 +102,8 @@ def test_few_readings_that_count_are_told_with_the_reasons_and_used(read):
     np.testing.assert_array_equal(np.isfinite(log.ranges), ranges > 0)
 
 
-def test_an_open_field_for_a_part_of_the_way_is_nothing_to_tell(read):
+def test_of_an_open_field_for_a_part_of_the_way_only_the_stretch_is_told(read):
     ranges = readings()
     ranges[5:38] = math.inf
-    assert read(recording(ranges, range_max=20.0)).report.warnings == ()
+    (said,) = read(recording(ranges, range_max=20.0)).report.warnings
+    assert said.startswith("the laser sees nothing from scan 5 to 37")

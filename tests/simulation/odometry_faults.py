@@ -126,6 +126,13 @@ def zeros(log: LaserLog, every: int) -> LaserLog:
     return replace(log, odometry=odometry)
 
 
+def alternating(log: LaserLog, frame: Array) -> LaserLog:
+    """Every second value is of another node, whose frame is at (3,) in that of the first."""
+    odometry = _odometry(log).copy()
+    odometry[1::2] = compose(frame, odometry[1::2])
+    return replace(log, odometry=odometry)
+
+
 def wrapped(log: LaserLog, limit: float) -> LaserLog:
     """Coordinates kept in [−limit, limit), as a counter of too few bits does."""
     odometry = _odometry(log).copy()
