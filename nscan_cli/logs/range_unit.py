@@ -1,4 +1,4 @@
-"""The unit of the readings: metres, unless the scans say millimetres or centimetres, or an option does."""
+"""The unit of the readings: metres, unless the scans say another one, or an option does."""
 
 from __future__ import annotations
 
@@ -15,6 +15,8 @@ from nscan_cli.logs.raw_scans import RawScans
 
 UNITS = (("millimetres", 0.001), ("centimetres", 0.01))
 """Units that a log may have instead of metres, in metres."""
+DIVIDED = (("metres divided by 100", 100.0), ("metres divided by 1000", 1000.0))
+"""What a log has if a driver and its recorder both take metres for another unit, in metres."""
 
 
 @dataclass(frozen=True)
@@ -26,6 +28,9 @@ class RangeUnitOptions:
     max_median: float = 40.0
     """Largest median reading of a plausible unit, m; it bounds metres too. A larger value warns of fewer
     logs."""
+    near_median: float = 0.05
+    """Below this median reading the unit cannot be metres, m: lasers see nothing nearer. A larger value
+    corrects more logs."""
     remote_median: float = 100.0
     """From this median reading on, the unit cannot be metres, m. A larger value corrects fewer logs."""
     typical_median: float = 3.0
@@ -64,7 +69,8 @@ class WrongUnit(NamedTuple):
     @property
     def seems(self) -> str:
         """What is wrong, as a part of a sentence."""
-        return f"half of the returns are beyond {self.median:,.0f}, which looks like {self.name}"
+        where = f"beyond {self.median:,.0f}" if self.scale < 1.0 else f"below {self.median:.2g}"
+        return f"half of the returns are {where}, which looks like {self.name}"
 
     @property
     def remedy(self) -> str:
@@ -86,8 +92,8 @@ def wrong_unit(
 ) -> WrongUnit | None:
     """The unit of readings (S, B) as written; None for metres, or if no unit fits.
 
-    The unit is wrong if the median return is beyond the limits or implausibly large, and three quarters of
-    the returns would be within the limits in another unit.
+    The unit is wrong if the median return is beyond the limits, or implausibly large or small, and three
+    quarters of the returns would be within the limits in another unit.
     """
     some = ranges.reshape(-1)[:: -(-ranges.size // options.sample)]
     some = some[(some > 0) & np.isfinite(some)]
@@ -98,21 +104,25 @@ def wrong_unit(
     highest = float(limits.high.max())
     plausible = min(highest, options.max_median)
     # To count is quicker than to sort, and mostly it tells.
-    if 2 * np.count_nonzero(some < plausible) > some.size:
+    is_near = 2 * np.count_nonzero(some < options.near_median) > some.size
+    if not is_near and 2 * np.count_nonzero(some < plausible) > some.size:
         return None
+    if is_near and highest < options.limits_apart:
+        # The limit was divided, too.
+        highest = math.inf
     median, upper_quartile = (float(value) for value in np.quantile(some, (0.5, 0.75)))
-    if median < plausible:
+    if not is_near and median < plausible:
         return None
     fitting = sorted(
         (abs(math.log(median * scale / options.typical_median)), name, scale)
-        for name, scale in UNITS
+        for name, scale in (DIVIDED if is_near else UNITS)
         if options.min_median <= median * scale <= options.max_median and upper_quartile * scale < highest
     )
     if not fitting or not _are_of_walls(ranges, median, options):
         return None
     (off, name, scale), *others = fitting
     near, far = math.log(options.certain_factor), math.log(options.unlikely_factor)
-    is_certain = median >= options.remote_median and some.size >= options.min_returns
+    is_certain = (is_near or median >= options.remote_median) and some.size >= options.min_returns
     is_certain &= off <= near and all(other[0] > far for other in others)
     return WrongUnit(name, scale, median, tuple(other[2] for other in others), is_certain)
 
@@ -150,6 +160,8 @@ def scaled(raw: RawScans, scale: float, options: RangeUnitOptions = RangeUnitOpt
     shares_unit = (
         (high < RangeLimitOptions.largest_range) & (high >= median) & (high * scale >= options.limits_apart)
     )
+    if scale > 1.0:
+        shares_unit &= high < options.limits_apart
     low = np.where(low >= options.limits_apart, low * scale, low)
     limits = low, np.where(shares_unit, high * scale, high)
     return replace(raw, ranges=raw.ranges * np.float32(scale), limits=limits)

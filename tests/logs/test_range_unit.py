@@ -49,6 +49,17 @@ def test_a_text_log_in_another_unit(tmp_path, factor, unit, scale):
     assert f"looks like {unit}: the ranges are multiplied by {scale:g}" in log.report.contradictions[0]
 
 
+@pytest.mark.parametrize(("factor", "scale"), [(0.01, 100), (0.001, 1000)])
+@pytest.mark.parametrize("unit_of_limits", [1.0, None])
+def test_metres_that_were_divided_are_put_right_and_said(read, factor, scale, unit_of_limits):
+    times = unit_of_limits or factor
+    log = read(recording(factor * readings(), range_min=0.0, range_max=9.9 * times))
+    np.testing.assert_allclose(log.ranges, np.where(readings() < 9.9, readings(), np.inf), atol=1e-4)
+    assert log.range_limits[1] == pytest.approx(9.9)
+    (said,) = log.report.contradictions
+    assert f"which looks like metres divided by {scale}: the ranges are multiplied by {scale}" in said
+
+
 def test_whole_numbers_hide_no_unit(read):
     """Those of 80 look like a peak of readings without return at the limit."""
     near = 0.4 * readings(200)

@@ -10,6 +10,7 @@ from nscan_cli.errors import InputDataError, WrongUsageError
 from nscan_cli.files.provenance import Source
 from nscan_cli.logs import scan_order as order
 from nscan_cli.logs.assemble import ReaderFindings, RecordedMotion, laser_log
+from nscan_cli.logs.copies import without_copies
 from nscan_cli.logs.frame_names import distinct_frame_names
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.logs.range_limit_options import RangeLimitOptions
@@ -46,7 +47,9 @@ def log_from_recording(recording: Recording, file: str, source: Source, options:
     findings.used = {"laser": choice.why, "checksums": recording.checksums}
     findings.lasers, findings.laser_option = tuple(devices(recording, SCAN_TYPES)), "--topic"
     findings.odometries = tuple(devices(recording, ODOMETRY_TYPES))
-    scans, log_times = _decoded_scans(recording.messages.get(choice.topic, []), choice.topic, skips, file)
+    messages, twice = without_copies(recording.messages.get(choice.topic, []), lambda each: each.data)
+    findings.warnings += [twice] if twice else []
+    scans, log_times = _decoded_scans(messages, choice.topic, skips, file)
     stamps = valid_stamps([scan.stamp for scan in scans])
     use_stamps = order_messages(stamps) and are_in_seconds(stamps)
     if not use_stamps:

@@ -12,6 +12,7 @@ from nscan_cli.files.provenance import Source
 from nscan_cli.files.text import counted, shortened_list
 from nscan_cli.logs import scan_order as order
 from nscan_cli.logs.assemble import ReaderFindings, RecordedMotion, laser_log
+from nscan_cli.logs.copies import without_copies
 from nscan_cli.logs.device_choice import Device
 from nscan_cli.logs.laser_defaults import CARMEN_MAX_RANGE, beam_angles, mount_from_poses
 from nscan_cli.logs.laser_log import LaserLog
@@ -67,6 +68,10 @@ def read(data: bytes, file: str, source: Source, options: ReadingOptions) -> Las
     if unknown:
         kinds = shortened_list([f"{name} ({count})" for name, count in unknown.items()])
         warnings.append(f"{counted(sum(unknown.values()), 'record')} of kinds unknown to CARMEN: {kinds}")
+    for name in {tag, "ODOM"} & lines.keys():
+        lines[name], twice = without_copies(lines[name], lambda line: line[1])
+        if twice and name == tag:
+            warnings.append(twice)
     scans = carmen_records.carmen_scans(tag, lines[tag], skips)
     if not scans.stamps:
         raise skips.nothing_read(f"{tag} record")

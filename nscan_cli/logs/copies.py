@@ -1,0 +1,31 @@
+"""Records that a log has twice: two files with a common part that were joined, or one that was written
+twice."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import TypeVar
+
+from nscan_cli.files.text import counted
+
+Record = TypeVar("Record")
+KEY = 64
+"""Bytes at an end of a record that tell nearly all apart: they have its time."""
+
+
+def without_copies(records: Sequence[Record], content: Callable[[Record], bytes]) -> tuple[list[Record], str]:
+    """The records whose content no earlier one has, but the one just before, and what to say; empty if all.
+
+    Records hold their time, so that two alike are one. Those beside each other may be of a robot that stands,
+    in a log without times.
+    """
+    texts = [content(record) for record in records]
+    if len({(text[:KEY], text[-KEY:]) for text in texts}) == len(texts):
+        return list(records), ""
+    seen, kept = set[bytes](), list[Record]()
+    for row, (record, text) in enumerate(zip(records, texts, strict=True)):
+        if text not in seen or text == texts[row - 1]:
+            kept.append(record)
+        seen.add(text)
+    copies = counted(len(records) - len(kept), "record")
+    return kept, "" if len(kept) == len(records) else f"{copies} that repeat earlier ones are left out"
