@@ -9,12 +9,12 @@ from typing import TypeVar
 from nscan_cli.files.text import counted
 
 Record = TypeVar("Record")
-KEY = 64
-"""Bytes at an end of a record that tell nearly all apart: they have its time."""
+KEY = 40
+"""Bytes at an end of a record that tell nearly all apart: they have its time. Shorter records have none."""
 
 
 def without_copies(records: Sequence[Record], content: Callable[[Record], bytes]) -> tuple[list[Record], str]:
-    """The records whose content no earlier one has, but the one just before, and what to say; empty if all.
+    """The records whose content no earlier one has, but the one just before; and what to say, empty if all.
 
     Records hold their time, so that two alike are one. Those beside each other may be of a robot that stands,
     in a log without times.
@@ -24,7 +24,7 @@ def without_copies(records: Sequence[Record], content: Callable[[Record], bytes]
         return list(records), ""
     seen, kept = set[bytes](), list[Record]()
     for row, (record, text) in enumerate(zip(records, texts, strict=True)):
-        if text not in seen or text == texts[row - 1]:
+        if text not in seen or text == texts[row - 1] or len(text) < KEY:
             kept.append(record)
         seen.add(text)
     copies = counted(len(records) - len(kept), "record")

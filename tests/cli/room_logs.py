@@ -34,11 +34,11 @@ def room_drive() -> list[Written]:
 
 
 def room_log(count: int) -> str:
-    """CARMEN text, with 30 beams to the front."""
+    """CARMEN text, with 30 beams to the front; after 50 scans the robot is back where it began."""
     angles = np.radians(-90 + 6 * np.arange(30))
     lines = []
     for k in range(count):
-        x = 0.1 * k
+        x = 0.1 * (k % 50)
         ranges = tuple(np.round(ranges_at(x, angles), 3).tolist())
         lines.append(flaser(100 + 0.2 * k, ranges, (x, 0.0, 0.0)))
     return "\n".join(lines) + "\n"
