@@ -64,14 +64,15 @@ class ViewChangeOptions:
     min_agreement: float = 0.6
     """Least mean of the signs of turns on both sides: at 0.6 four of five are alike. A larger value finds
     fewer changes."""
-    min_direction: float = 0.1
-    """Least change of the direction of the laser, rad. A larger value warns less."""
+    min_direction: float = 0.045
+    """Least change of the direction of the laser, rad. It is 0.03 at most on real logs. A larger value warns
+    less."""
     sigmas: float = 5.0
     """And it must exceed this number of standard deviations. A larger value warns less."""
     doubt_steps: int = 2
     """More steps are measured where so many steps before and behind show a change. A larger value takes less
     time, and misses what changes near the beginning or the end."""
-    doubt_sigmas: float = 2.5
+    doubt_sigmas: float = 3.0
     """More steps are measured where a change of direction exceeds this number of standard deviations. A
     larger value takes less time."""
 

@@ -115,6 +115,7 @@ FAULTS: tuple[tuple[str, Fault, str], ...] = (
         lambda log: faults.mirrored_in(log, slice(4 * len(log) // 5, None)),
         JUMP_OF_ORDER,
     ),
+    ("looks 4° left from half-way on", _turned_from_half_way(4.0), "looks [345]° further"),
     ("looks 30° left from half-way on", _turned_from_half_way(30.0), "looks 30° further"),
     ("looks 90° left from half-way on", _turned_from_half_way(90.0), "looks (89|90|91)° further"),
     ("first directions jitter by 3°",

@@ -109,6 +109,19 @@ def test_the_scan_from_which_the_laser_looks_elsewhere_is_named(log, degrees):
     assert int(named[2]) - 60 <= at <= int(named[3]) + 60
 
 
+@pytest.mark.parametrize("log", [drive, real_drive])
+def test_a_laser_that_was_knocked_is_named(log):
+    """Its map is 0.01 m off, in silence otherwise."""
+    whole = log()
+    turned = faults.turned_in(whole, np.radians(5.0), slice(len(whole) // 2, None))
+    (said,) = said_of(turned)
+    assert re.search(r"looks [56]° further to the right behind a place", said)
+    coarse = FileCheckOptions(view=replace(OPTIONS, min_direction=0.2))
+    assert not any(
+        "behind a place" in text for text in checked_file(turned, ReadingOptions(), coarse).messages
+    )
+
+
 def test_options_decide():
     log = faults.mirrored_in(real_drive(), slice(len(real_drive()) // 2, None))
     few = FileCheckOptions(view=replace(OPTIONS, min_steps=10_000))
