@@ -31,6 +31,9 @@ class RangeUnitOptions:
     near_median: float = 0.05
     """Below this median reading the unit cannot be metres, m: lasers see nothing nearer. A larger value
     corrects more logs."""
+    near_spread: float = 1.1
+    """The upper quartile of such readings is more than this multiple of their median: those of a covered
+    laser are alike. A larger value corrects fewer logs."""
     remote_median: float = 100.0
     """From this median reading on, the unit cannot be metres, m. A larger value corrects fewer logs."""
     typical_median: float = 3.0
@@ -111,7 +114,7 @@ def wrong_unit(
         # The limit was divided, too.
         highest = math.inf
     median, upper_quartile = (float(value) for value in np.quantile(some, (0.5, 0.75)))
-    if not is_near and median < plausible:
+    if upper_quartile <= options.near_spread * median if is_near else median < plausible:
         return None
     fitting = sorted(
         (abs(math.log(median * scale / options.typical_median)), name, scale)
