@@ -1,5 +1,4 @@
-"""Stretches in which no beam comes back: the laser's driver died, something covers it, or nothing is in
-range."""
+"""Stretches in which no beam comes back: a driver died, something covers the laser, or nothing is near."""
 
 from __future__ import annotations
 

@@ -1,5 +1,4 @@
-"""Records that a log has twice: two files with a common part that were joined, or one that was written
-twice."""
+"""Records that a log has twice: of files with a common part that were joined, or of one written twice."""
 
 from __future__ import annotations
 
