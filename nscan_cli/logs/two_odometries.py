@@ -47,7 +47,10 @@ def of_one_source(
     none.
     """
     known = np.flatnonzero(are_known(odometry))
-    poses, at = odometry[known], times[known]
+    recorded = odometry[known]
+    # A pose that is repeated tells nothing new, and next to no step all others seem long.
+    is_new = np.append(True, (recorded[1:] != recorded[:-1]).any(axis=1))[: len(known)]
+    poses = recorded[is_new]
     if len(poses) < options.min_poses:
         return odometry, ""
     limits = np.maximum(options.factor * usual_longest_step(poses), options.min_distance)
@@ -67,11 +70,12 @@ def of_one_source(
         return odometry, ""
     moves = [bool(np.ptp(poses[source == each], axis=0).max() > options.min_distance) for each in (0, 1)]
     used = int(np.argmax(shares * moves))
-    others = [(first - 1, end) for first, end in mask_runs(source != used) if first > 0 and end < len(poses)]
+    is_used = (source == used)[np.cumsum(is_new) - 1]
+    others = [(first - 1, end) for first, end in mask_runs(~is_used) if first > 0 and end < len(known)]
     evened = odometry.copy()
-    evened[known] = steady_between(poses, at, others)
+    evened[known] = steady_between(recorded, times[known], others)
     # Beyond the first and the last pose of the source nothing is known.
-    ends = np.flatnonzero(source == used)[[0, -1]]
+    ends = np.flatnonzero(is_used)[[0, -1]]
     evened[known[: ends[0]]] = evened[known[ends[1] + 1 :]] = np.nan
     return evened, (
         f"odometry comes from two sources that alternate, {counted(len(changes), 'time')}, {apart[0]:.3g} m "

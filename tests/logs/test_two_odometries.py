@@ -68,10 +68,10 @@ def test_a_source_that_stands_is_none():
 def test_noise_a_reset_and_few_wrong_values_are_no_second_source():
     poses, times = drive()
     noisy = poses + np.random.default_rng(1).normal(0.0, 0.5, poses.shape)
-    reset, wrong = poses.copy(), poses.copy()
+    reset, wrong, slow = poses.copy(), poses.copy(), poses[np.arange(len(poses)) // 5 * 5]
     reset[100:] += 10.0
     wrong[7::10] = 0.0
-    for odometry in (poses, noisy, reset, wrong, poses[:3]):
+    for odometry in (poses, noisy, reset, wrong, slow, poses[:3], poses[:0]):
         found, said = of_one_source(odometry, times[: len(odometry)])
         assert found is odometry
         assert said == ""
