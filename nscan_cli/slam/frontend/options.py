@@ -110,14 +110,14 @@ class ScanTrackingOptions(NamedTuple):
     prediction_smoothing: float = 0.02
     """Weight of a new scan in the mean errors of predictions by constant velocity. A larger weight follows
     changes of the motion faster."""
-    far_prediction: float = 3.0
-    """A poor match without odometry is repeated if it is off its prediction by more than this multiple of the
-    mean error of predictions. A larger value trusts matches more."""
     prediction_sigmas: float = 3.0
-    """Standard deviation of the prior of that match, in mean errors of predictions. A larger value trusts the
-    scans more."""
+    """A poor match without odometry that is farther from its prediction than this, in mean errors of
+    predictions, is repeated with a prior of this standard deviation. A larger value trusts matches more."""
     min_prediction_error: float = 0.02
     """Least mean error of predictions there, m and rad. A larger value trusts the scans more."""
+    max_surprise: float = 10.0
+    """Most that the objective of a pose grows because it is farther off than predictions usually are: now and
+    then a robot does what it never did. A larger value trusts predictions more."""
     degeneracy_poses: int = 3
     """Number of known poses from which on `degeneracy` is checked: fewer give no velocity."""
     degeneracy: DegeneracyOptions = DegeneracyOptions()
@@ -157,6 +157,18 @@ class TrackingOptions:
     """The search for a lost scan, around its prediction."""
     lost_search_path: float = 5.0
     """Length of the path among whose scans a lost scan is searched, m. A larger value takes longer."""
+    clear_score: float = 0.25
+    """Without odometry a lost scan is where the search finds it with at least this score, if no other place
+    has nearly the same. A larger value believes the search less often."""
+    clear_score_ratio: float = 0.85
+    """Another place has nearly the same score if it has more than this share of it. A larger value believes
+    the search more often."""
+    clear_score_distance: float = 0.6
+    """Places farther apart than this are different ones there, m. A larger value believes the search more
+    often."""
+    lost_steps: float = 2.0
+    """Farthest place from the prediction where a lost scan is found, in the longest of the last steps, for
+    each scan that was lost. A larger value believes the search more often."""
     lost_errors: float = 1.5
     """Standard deviation of the prediction of a lost scan, in mean errors of predictions so far. A larger
     value searches farther for loops after such scans."""

@@ -8,41 +8,65 @@ from __future__ import annotations
 
 import numpy as np
 
-from nscan_cli.kernels.array_assignment import assign
+from nscan_cli.kernels.array_assignment import assign, assign_rows
 from nscan_cli.kernels.decorators import kernel
-from nscan_cli.matching.motion_model import prior_value
+from nscan_cli.matching.motion_model import Prior, prior_value
 from nscan_cli.matching.pose_kernels import wrapped
 from nscan_cli.poses import Array
 from nscan_cli.slam.frontend.constant_velocity import expected_errors
+from nscan_cli.slam.frontend.options import ScanTrackingOptions
 from nscan_cli.slam.frontend.scan_to_map import match_and_count
+from nscan_cli.slam.frontend.track_state import TrackState
 from nscan_cli.slam.frontend.tracking_problem import TrackingProblem
+
+
+@kernel
+def narrow_information(track: TrackState, options: ScanTrackingOptions, prior: Prior, axis: int) -> float:
+    """Information of a prior along an axis (x, y, turn) that is as narrow as predictions have been exact."""
+    place, turn = expected_errors(track)
+    error = max(turn if axis == 2 else place, options.min_prediction_error)
+    return float(max(prior.information[axis, axis], (options.prediction_sigmas * error) ** -2))
+
+
+@kernel
+def surprise(track: TrackState, options: ScanTrackingOptions, prior: Prior, pose: Array) -> float:
+    """What the objective at a pose (3,) gains where the prior is as narrow as predictions have been exact.
+
+    It has a bound: now and then a robot does what it never did.
+    """
+    total, step = 0.0, pose - prior.mean
+    step[2] = wrapped(step[2])
+    for a in range(3):
+        narrower = narrow_information(track, options, prior, a) - prior.information[a, a]
+        total += 0.5 * narrower * step[a] * step[a]
+    return float(min(total, options.max_surprise))
 
 
 @kernel
 def match_near_prediction(problem: TrackingProblem, points: Array, k: int) -> None:
     """Match the points (m, 2) of scan k with a prior as narrow as predictions are, if its match is far off.
 
-    The other match takes its place unless it has clearly fewer inliers.
+    The other match takes its place if its objective is lower, with the surprise that each of them is.
     """
-    options, prior, found = problem.settings.options, problem.prior, problem.found
-    place, turn = expected_errors(problem.track)
-    place, turn = max(place, options.min_prediction_error), max(turn, options.min_prediction_error)
-    off = np.hypot(found.poses[k, 0] - prior.mean[0], found.poses[k, 1] - prior.mean[1])
-    turned = abs(wrapped(found.poses[k, 2] - prior.mean[2]))
-    if off <= options.far_prediction * place and turned <= options.far_prediction * turn:
+    track, options, prior, found = problem.track, problem.settings.options, problem.prior, problem.found
+    off, is_near = found.poses[k] - prior.mean, True
+    off[2] = wrapped(off[2])
+    for a in range(3):
+        is_near &= off[a] * off[a] * narrow_information(track, options, prior, a) <= 1.0
+    if is_near:
         return
     wide, pose, hessian = prior.information.copy(), prior.mean.copy(), np.empty((3, 3))
     for a in range(3):
-        narrow = options.prediction_sigmas * (turn if a == 2 else place)
-        prior.information[a, a] = max(prior.information[a, a], narrow**-2)
+        prior.information[a, a] = narrow_information(track, options, prior, a)
     value, inliers = match_and_count(problem.grid, problem.settings, points, prior, pose, hessian)
     value -= prior_value(prior, pose)
-    is_good = inliers >= found.inliers[k] - options.inlier_margin
     for a in range(3):
         for b in range(3):
-            if is_good:
-                found.hessians[k, a, b] = hessian[a, b] - prior.information[a, b] + wide[a, b]
+            hessian[a, b] += wide[a, b] - prior.information[a, b]
             prior.information[a, b] = wide[a, b]
-    if is_good:
-        found.values[k], found.inliers[k] = value + prior_value(prior, pose), inliers
+    value += prior_value(prior, pose)
+    first = found.values[k] + surprise(track, options, prior, found.poses[k])
+    if value + surprise(track, options, prior, pose) <= first:
+        found.values[k], found.inliers[k] = value, inliers
         assign(found.poses[k], pose)
+        assign_rows(found.hessians[k], hessian)

@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from nscan_cli.matching.correlative_search import likelihood_field, search
-from nscan_cli.matching.motion_model import no_prior
+from nscan_cli.matching.correlative_search import FoundPose, Search, likelihood_field
+from nscan_cli.matching.motion_model import Prior, no_prior
 from nscan_cli.ndt.energy import inlier_share
 from nscan_cli.ndt.transform import Ndt
 from nscan_cli.poses import Array
@@ -17,6 +17,7 @@ from nscan_cli.slam.frontend.constant_velocity import expected_errors
 from nscan_cli.slam.frontend.local_map import ROWS, insert_scan, remove_newest
 from nscan_cli.slam.frontend.options import LaserView, TrackingOptions, TrackingParameters
 from nscan_cli.slam.frontend.point_spacing import points_between
+from nscan_cli.slam.frontend.prediction_restart import surprise
 from nscan_cli.slam.frontend.scan_batch import ScanBatch
 from nscan_cli.slam.frontend.scan_to_map import match_and_count
 from nscan_cli.slam.frontend.track_state import KNOWN, NEXT, RESTARTS, TrackState
@@ -47,6 +48,8 @@ class Tracker:
         which fits nothing else, fits it."""
         self._is_tried = False
         """Whether it has joined the map, to be tried."""
+        self._lost_count = 0
+        """Number of the last scans that were lost."""
         self._guess = np.zeros(2)
         """Variances of the place (m²) and the turn (rad²) of the way over the last scans that were lost."""
 
@@ -78,8 +81,9 @@ class Tracker:
                 self._keep(found, begun)
             if k == n or np.isnan(found.inliers[k]):
                 continue
-            self._search(scans.of(k), found, k)
+            is_clear = self._search(scans.of(k), found, k)
             is_lost = self._settings.is_alone and found.inliers[k] < self.options.scan.lost_inliers
+            is_lost &= not is_clear
             if is_lost and self._left_out is not None and not self._is_tried:
                 points, pose = self._left_out
                 self._insert(np.concatenate([points, self._gap_points(points)]), pose)
@@ -101,6 +105,7 @@ class Tracker:
     def _leave_out(self, points: Array, found: TrackedScans, k: int) -> None:
         """Scan k of points (m, 2) is lost."""
         errors = self.options.lost_errors * np.array(expected_errors(self._track))
+        self._lost_count += 1
         self._guess += np.minimum(np.diag(found.prior_covariances[k])[1:], errors**2)
         self._left_out, self._is_tried = (points.copy(), found.poses[k].copy()), False
 
@@ -108,7 +113,7 @@ class Tracker:
         """Scan k fits, alone or with the scan before that was left out."""
         if self._is_tried:
             found.guess_variances[k] = self._guess
-        self._left_out, self._is_tried, self._guess = None, False, np.zeros(2)
+        self._left_out, self._is_tried, self._lost_count, self._guess = None, False, 0, np.zeros(2)
 
     def _insert(self, points: Array, pose: Array) -> None:
         """Let points (m, 2) seen at `pose` (3,) join the map."""
@@ -127,20 +132,47 @@ class Tracker:
         is_sparse = share <= options.scan.lost_inliers
         return points_between(points, options.gaussians, options.bridged_gap) if is_sparse else points[:0]
 
-    def _search(self, points: Array, found: TrackedScans, k: int) -> None:
-        """Match scan k from where a search among the last scans finds it too; keep the lower objective."""
-        options = self.options
-        cloud = self._track.map.recent_points(options.lost_search_path)
+    def _search(self, points: Array, found: TrackedScans, k: int) -> bool:
+        """Match scan k from where a search among the last ones finds it too; keep the lower objective.
+
+        Without odometry a lost scan that the search finds in one place only is there, whatever its prediction
+        says: where the robot turns, the last steps tell little of the next. Returns whether that is so.
+        """
+        options, is_alone, lost_inliers = (
+            self.options,
+            self._settings.is_alone,
+            self.options.scan.lost_inliers,
+        )
+        is_lost = is_alone and found.inliers[k] < lost_inliers
+        cloud = self._track.map.recent_points(options.scan.window if is_lost else options.lost_search_path)
         if not len(cloud) or not len(points):
-            return
+            return False
         field = likelihood_field(cloud, options.lost_search)
-        place = search(field, points, self._prior.mean, options.scan.lost_inliers, options.lost_search)
-        if place is None:
-            return
+        search = Search(field, points, self._prior.mean, options.lost_search)
+        place = search.best(options.clear_score if is_lost else lost_inliers)
+        is_clear = place is not None and is_lost and self._is_clear(search, place)
+        if place is None or not (is_clear or place.score > lost_inliers):
+            return False
         self.searches += 1
         pose, hessian = place.pose.copy(), np.empty((3, 3))
-        in_view = points_in_view(self._track, self._settings, points, self._prior.mean)
-        value, inliers = match_and_count(self.map.grid, self._settings, in_view, self._prior, pose, hessian)
-        if value < found.values[k]:
+        prior = Prior(place.pose, self._prior.information) if is_clear else self._prior
+        in_view = points_in_view(self._track, self._settings, points, prior.mean)
+        value, inliers = match_and_count(self.map.grid, self._settings, in_view, prior, pose, hessian)
+        gain = found.values[k] - value
+        if is_alone:
+            predicted = self._track, options.scan, self._prior
+            gain += surprise(*predicted, found.poses[k]) - surprise(*predicted, pose)
+        if gain > 0.0 or is_clear:
             found.values[k], found.inliers[k] = value, inliers
             found.poses[k], found.hessians[k] = pose, hessian
+        return is_clear
+
+    def _is_clear(self, search: Search, place: FoundPose) -> bool:
+        """Whether a lost scan fits in no other place nearly as well, and the robot may have come there."""
+        options, known = self.options, self._track.poses[-int(self._track.counts[KNOWN]) :, :2]
+        longest = np.hypot(*np.diff(known, axis=0).T).max(initial=0.0)
+        farthest = options.lost_steps * longest * (1 + self._lost_count)
+        if np.hypot(*(place.pose - self._prior.mean)[:2]) > farthest:
+            return False
+        second = options.clear_score_ratio * place.score
+        return search.best(second, (place.pose, options.clear_score_distance)) is None

@@ -105,7 +105,8 @@ def test_a_poor_match_far_off_its_prediction_gives_way_to_one_near_it_that_is_as
         track, ndt.grid, settings, scan, ends, np.zeros(0), np.array([50.0]), nowhere, prior, found
     )
     far = np.array([0.8, 0.0, 0.0])
-    found.poses[0], found.values[0], found.hessians[0] = far, -10.0, np.eye(3)
+    # Near the prediction it is -74.
+    found.poses[0], found.values[0], found.hessians[0] = far, -90.0 if clearly_better else -75.0, np.eye(3)
     fitting = np.concatenate([*seen[: 2 if clearly_better else 1], sides])
     found.inliers[0] = len(fitting) / len(scan)
     match_near_prediction(problem, scan, 0)

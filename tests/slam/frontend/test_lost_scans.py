@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from nscan_cli.logs.laser_log import LaserLog
+from nscan_cli.poses import relative, transform
 from nscan_cli.slam.frontend.options import TrackingOptions
 from nscan_cli.slam.frontend.tracker import Tracker
 from tests.logs.excerpts import truth_of
@@ -51,6 +52,28 @@ def test_a_lost_scan_that_the_next_one_does_not_fit_stays_out_of_the_map():
     assert not found.in_map[strange]
     assert not found.guess_variances.any()
     assert np.hypot(*end_off(found.poses, truth_of(log))[:2]) < 0.05
+
+
+@pytest.mark.parametrize(("clear_score", "is_found"), [(0.25, True), (1.0, False)])
+def test_a_scan_after_a_lost_one_is_where_a_search_finds_it_in_one_place_only(clear_score, is_found):
+    """The robot turns by 30° while a scan sees nothing; bushes hide two thirds of the next one."""
+    log = across_a_yard(0.5, 1)
+    scans, strange, turn = [log.points(row) for row in range(len(log))], 40, np.radians(30)
+    angles, noise = np.linspace(-1.5, 1.5, 180), np.random.default_rng(1)
+    scans[strange] = 3.0 * np.column_stack([np.cos(angles), np.sin(angles)])
+    for row in range(strange + 1, len(scans)):
+        scans[row] = transform(np.array([0.0, 0.0, -turn]), scans[row])
+    hidden = noise.random(len(scans[strange + 1])) < 0.65
+    scans[strange + 1][hidden] *= noise.uniform(0.1, 0.8, (hidden.sum(), 1))
+    options = TrackingOptions(clear_score=clear_score)
+    found = Tracker(options, odometry=False).track(sensed(scans))
+    lost = np.flatnonzero(np.isinf(found.weakest_sigmas)).tolist()
+    assert lost[:1] == [strange]
+    assert (strange + 1 not in lost) == is_found
+    if is_found:
+        after = relative(found.poses[strange + 1], truth_of(log)[strange + 1])
+        before = relative(found.poses[strange - 1], truth_of(log)[strange - 1])
+        np.testing.assert_allclose(after[2] - before[2], turn, atol=0.02)
 
 
 def test_if_nothing_fits_any_more_tracking_goes_on_in_what_is_seen_now():
