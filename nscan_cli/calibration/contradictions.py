@@ -46,6 +46,8 @@ def find_contradictions(
     known = {} if known is None else known
     if log.odometry is None:
         return []
+    # A factor that is offered takes the place of the one that the readings were multiplied by.
+    reading = replace(reading, range_scale=log.range_scale)
     evidence = _evidence(log, log.odometry, options, known)
     if evidence is None or evidence.moving < options.min_steps:
         return []

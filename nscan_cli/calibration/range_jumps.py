@@ -45,7 +45,7 @@ def checked_ranges(
     is_wrong = np.abs(np.log(scales)) > 0.5 * math.log(options.jumps.min_factor)
     names = stretch_names(log.numbers[[first, end - 1]].tolist() for first, end in mask_runs(is_wrong))
     factors = sorted({f"{scale:.3g}" for scale in scales[is_wrong].tolist()})
-    other = (log.reading.range_scale or 1.0) * float(scales[is_wrong][0])
+    other = log.range_scale * float(scales[is_wrong][0])
     message = (
         f"the ranges of scans {names} are {' or '.join(factors)} times the others, as all of them change "
         "from one scan to the next: they are divided by it; if the others are wrong instead, "

@@ -90,7 +90,7 @@ def laser_log(
     numbers = selected_numbers(times.times, options, file)
     rows = times.rows[numbers]
     warnings = findings.warnings
-    raw, limits, contradictions = _in_metres(raw, times, options, warnings)
+    raw, limits, contradictions = _in_metres(raw, times, options, findings)
     if not options.as_recorded:
         raw, converted = with_radians(raw)
         contradictions += converted
@@ -198,18 +198,18 @@ def _sweep(raw: RawScans, increments: Array, times: ScanOrder, options: ReadingO
 
 
 def _in_metres(
-    raw: RawScans, times: ScanOrder, options: ReadingOptions, warnings: list[str]
+    raw: RawScans, times: ScanOrder, options: ReadingOptions, findings: ReaderFindings
 ) -> tuple[RawScans, RangeLimits, list[str]]:
     """The scans in metres, their limits, and what is said if the scans contradict the unit of the log."""
     if options.range_scale is not None:
         raw = scaled(raw, options.range_scale)
-        return raw, limits_in_force(raw, options, warnings), []
+        return raw, limits_in_force(raw, options, findings.warnings), []
     raw, mixed = (raw, []) if options.as_recorded else in_one_unit(raw, times)
     said: list[str] = []
     limits = limits_in_force(raw, options, said)
     unit = None if options.as_recorded else wrong_unit(raw.ranges, limits)
     if unit is None or not unit.is_certain:
-        warnings += said
+        findings.warnings += said
         return raw, limits, mixed
-    raw = scaled(raw, unit.scale)
-    return raw, limits_in_force(raw, options, warnings), [*mixed, unit.correction]
+    raw, findings.used["range_scale"] = scaled(raw, unit.scale), f"{unit.scale:g}"
+    return raw, limits_in_force(raw, options, findings.warnings), [*mixed, unit.correction]

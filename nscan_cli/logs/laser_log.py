@@ -122,6 +122,11 @@ class LaserLog:
     def __len__(self) -> int:
         return len(self.stamps)
 
+    @property
+    def range_scale(self) -> float:
+        """What the readings were multiplied by to be in metres, by an option or as they look."""
+        return self.reading.range_scale or float(self.report.used.get("range_scale", "1"))
+
     def beam_counts(self) -> NDArray[np.int64]:
         """(S,) number of beams of each scan."""
         return beam_counts(self.ranges, self.beams)

@@ -39,6 +39,11 @@ def found(log: LaserLog, reading: ReadingOptions | None = None) -> list[str]:
     return checked_file(log, reading or ReadingOptions(), FileCheckOptions()).messages
 
 
+def in_centimetres(log: LaserLog) -> LaserLog:
+    """The log as if its readings had been taken for centimetres."""
+    return replace(log, report=replace(log.report, used={"range_scale": "0.01"}))
+
+
 LIKELY: dict[str, tuple[Fault, str]] = {
     "mirrored": (faults.mirrored, "in the wrong order, and the map is mirrored.*try --flip"),
     "looks to the left": (lambda log: faults.mounted_otherwise(log, -np.pi / 2), "90° further to the left"),
@@ -71,6 +76,10 @@ LIKELY: dict[str, tuple[Fault, str]] = {
     "a tenth too short, or the ranges too long": (
         lambda log: odometry_faults.scaled(log, 0.9),
         r"odometry is 1\.1\d? m by.*try --odometry-scale 1\.1\d?; if the ranges,.*--range-scale 0\.9",
+    ),
+    "a tenth too short, and the ranges looked like centimetres": (
+        lambda log: in_centimetres(odometry_faults.scaled(log, 0.9)),
+        r"if the ranges,.*--range-scale 0\.009",
     ),
     "another scale from half-way on": (
         lambda log: odometry_faults.scaled_in(log, 1 / 1.2, slice(len(log) // 2, None)),
