@@ -30,7 +30,7 @@ def narrow_information(track: TrackState, options: ScanTrackingOptions, prior: P
 
 @kernel
 def surprise(track: TrackState, options: ScanTrackingOptions, prior: Prior, pose: Array) -> float:
-    """What the objective at a pose (3,) gains where the prior is as narrow as predictions have been exact.
+    """How much the objective at a pose (3,) grows if its prior is as narrow as predictions have been exact.
 
     It has a bound: now and then a robot does what it never did.
     """
@@ -46,7 +46,7 @@ def surprise(track: TrackState, options: ScanTrackingOptions, prior: Prior, pose
 def match_near_prediction(problem: TrackingProblem, points: Array, k: int) -> None:
     """Match the points (m, 2) of scan k with a prior as narrow as predictions are, if its match is far off.
 
-    The other match takes its place if its objective is lower, with the surprise that each of them is.
+    Of both the one with the lower objective counts, each with the surprise that it is.
     """
     track, options, prior, found = problem.track, problem.settings.options, problem.prior, problem.found
     off, is_near = found.poses[k] - prior.mean, True

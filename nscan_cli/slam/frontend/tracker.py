@@ -138,11 +138,8 @@ class Tracker:
         Without odometry a lost scan that the search finds in one place only is there, whatever its prediction
         says: where the robot turns, the last steps tell little of the next. Returns whether that is so.
         """
-        options, is_alone, lost_inliers = (
-            self.options,
-            self._settings.is_alone,
-            self.options.scan.lost_inliers,
-        )
+        options, is_alone = self.options, self._settings.is_alone
+        lost_inliers = options.scan.lost_inliers
         is_lost = is_alone and found.inliers[k] < lost_inliers
         cloud = self._track.map.recent_points(options.scan.window if is_lost else options.lost_search_path)
         if not len(cloud) or not len(points):
