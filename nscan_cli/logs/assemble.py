@@ -34,7 +34,7 @@ from nscan_cli.logs.sweep import Sweep, beam_times, sweep_of_file
 from nscan_cli.logs.two_odometries import of_one_source
 from nscan_cli.logs.unit_stretches import in_one_unit
 from nscan_cli.logs.whole_turn import in_whole_turns
-from nscan_cli.poses import Array, are_known
+from nscan_cli.poses import Array, Indices, are_known
 
 
 @dataclass
@@ -169,23 +169,33 @@ def _odometry(
     odometry, path = motion.odometry, motion.path
     if odometry is None:
         return None, path, []
-    both = wrong = slow = ""
     if path is not None:
-        poses = path.poses
-        if not options.as_recorded:
-            poses, both = of_one_source(poses, path.times)
-            poses, wrong = without_outliers(poses, path.times)
-            poses, slow = without_repeats(poses, path.times)
+        poses, said = _credible(path.poses, path.times, None, options)
         path = robot_path(path.times, scaled_odometry(poses, options.odometry_scale))
-    elif not options.as_recorded:
-        odometry, both = of_one_source(odometry, times.times)
-        odometry, wrong = without_outliers(odometry, times.times)
-        odometry, slow = without_repeats(odometry, times.times, (ranges, times.rows))
+    else:
+        odometry, said = _credible(odometry, times.times, (ranges, times.rows), options)
     odometry = scaled_odometry(odometry, options.odometry_scale)
-    said = [text for text in (both, wrong, slow) if text]
     if said and path is not None:
         odometry = np.where(are_known(odometry)[:, None], poses_at(path, times.times), odometry)
     return odometry, path, said
+
+
+def _credible(
+    odometry: Array,
+    times: Array,
+    scans: tuple[NDArray[np.float32], Indices] | None,
+    options: ReadingOptions,
+) -> tuple[Array, list[str]]:
+    """Odometry (S, 3) at times (S,), s, of one source, without outliers and repeats; and what is said.
+
+    `scans` are as `without_repeats` takes them.
+    """
+    if options.as_recorded:
+        return odometry, []
+    odometry, both = of_one_source(odometry, times)
+    odometry, wrong = without_outliers(odometry, times)
+    odometry, slow = without_repeats(odometry, times, scans)
+    return odometry, [text for text in (both, wrong, slow) if text]
 
 
 def _sweep(raw: RawScans, increments: Array, times: ScanOrder, options: ReadingOptions) -> Sweep:

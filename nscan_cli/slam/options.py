@@ -15,8 +15,9 @@ from nscan_cli.slam.backend.options import (
     UnevenMotionOptions,
 )
 from nscan_cli.slam.diagnostics.options import DiagnosticsOptions
+from nscan_cli.slam.frontend.break_options import BreakOptions
 from nscan_cli.slam.frontend.odometry_checks import OdometryCheckOptions
-from nscan_cli.slam.frontend.options import BreakOptions, TrackingOptions
+from nscan_cli.slam.frontend.options import TrackingOptions
 from nscan_cli.slam.keyframes.options import KeyframeOptions
 from nscan_cli.slam.local_matching.options import NScanOptions
 from nscan_cli.slam.loop_closure.options import LoopClosureOptions

@@ -176,19 +176,6 @@ def test_what_goes_along_is_not_looked_for_with_a_wrong_mounting():
     assert checked_file(looks_back, ReadingOptions(), FileCheckOptions()).followed
 
 
-def test_a_late_clock_is_found_though_most_turns_agree():
-    """A robot that stands turns as its odometry, whatever the clocks."""
-    log = read_log(str(data_file("mit-killian.log.gz")))
-    (said,) = found(odometry_faults.late(log, 3.0))
-    assert re.search(r"ahead.*--clock-offset -2\.\d", said)
-
-
-def test_a_late_clock_of_a_mirrored_drive_is_found():
-    late, mirrored = found(faults.mirrored(odometry_faults.late(drive(), 3.0)))
-    assert "try --clock-offset -3.0" in late
-    assert "in the wrong order" in mirrored
-
-
 def test_where_odometry_stands_it_says_nothing_of_the_mounting_elsewhere():
     rows = slice(len(drive()) // 3, len(drive()) // 2)
     held = odometry_faults.held(faults.mounted_otherwise(drive(), -np.pi / 2), rows, True)
@@ -281,12 +268,6 @@ def test_outdoors_where_scans_tell_few_steps_more_are_measured(fault):
 
 def test_nothing_is_contradicted_on_a_log_from_the_field():
     assert found(read_log(str(data_file("field/player-2.1.2.log")))) == []
-
-
-@pytest.mark.parametrize("name", ["urg-carried.bag", "urg-corridor-1.bag", "urg-corridor-2.bag"])
-def test_the_odometry_of_this_robot_is_late_and_nothing_else(name):
-    (late,) = found(read_log(str(data_file(f"field/{name}"))))
-    assert re.match("odometry is stamped 0.1[2-6] s too early", late)
 
 
 def test_nothing_is_contradicted_on_samples():

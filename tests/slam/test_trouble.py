@@ -15,7 +15,7 @@ from nscan_cli.logs.load import read_log
 from nscan_cli.logs.reading_options import ReadingOptions
 from nscan_cli.poses import relative
 from nscan_cli.slam.diagnostics.notices import notices
-from nscan_cli.slam.frontend.options import BreakOptions
+from nscan_cli.slam.frontend.break_options import BreakOptions
 from nscan_cli.slam.log_to_graph import map_log
 from nscan_cli.slam.options import SlamOptions
 from tests.data import data_file

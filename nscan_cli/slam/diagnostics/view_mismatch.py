@@ -15,7 +15,7 @@ from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.matching.pose_kernels import relative_pose
 from nscan_cli.poses import Array, Indices
 from nscan_cli.slam.diagnostics.options import ViewMismatchOptions
-from nscan_cli.slam.frontend.options import ViewSimilarityOptions
+from nscan_cli.slam.frontend.break_options import ViewSimilarityOptions
 from nscan_cli.slam.frontend.view_similarity import nearest_ranges, share_alike
 from nscan_cli.slam.keyframes.keyframe import Keyframe
 from nscan_cli.threads import map_in_threads

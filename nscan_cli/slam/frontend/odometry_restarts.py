@@ -6,8 +6,8 @@ import numpy as np
 
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.poses import Array, Indices, Mask, are_known, relative
+from nscan_cli.slam.frontend.break_options import BreakOptions
 from nscan_cli.slam.frontend.odometry_checks import OdometryCheckOptions
-from nscan_cli.slam.frontend.options import BreakOptions
 from nscan_cli.slam.frontend.view_similarity import view_similarity
 
 

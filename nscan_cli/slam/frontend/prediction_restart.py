@@ -21,11 +21,19 @@ from nscan_cli.slam.frontend.tracking_problem import TrackingProblem
 
 
 @kernel
-def narrow_information(track: TrackState, options: ScanTrackingOptions, prior: Prior, axis: int) -> float:
-    """Information of a prior along an axis (x, y, turn) that is as narrow as predictions have been exact."""
+def narrow_information(
+    track: TrackState, options: ScanTrackingOptions, prior: Prior
+) -> tuple[float, float, float]:
+    """Information of x, y and turn in a prior that is as narrow as predictions have been exact."""
     place, turn = expected_errors(track)
-    error = max(turn if axis == 2 else place, options.min_prediction_error)
-    return float(max(prior.information[axis, axis], (options.prediction_sigmas * error) ** -2))
+    by_place = (options.prediction_sigmas * max(place, options.min_prediction_error)) ** -2
+    by_turn = (options.prediction_sigmas * max(turn, options.min_prediction_error)) ** -2
+    information = prior.information
+    return (
+        max(information[0, 0], by_place),
+        max(information[1, 1], by_place),
+        max(information[2, 2], by_turn),
+    )
 
 
 @kernel
@@ -34,11 +42,10 @@ def surprise(track: TrackState, options: ScanTrackingOptions, prior: Prior, pose
 
     It has a bound: now and then a robot does what it never did.
     """
-    total, step = 0.0, pose - prior.mean
+    total, step, narrow = 0.0, pose - prior.mean, narrow_information(track, options, prior)
     step[2] = wrapped(step[2])
     for a in range(3):
-        narrower = narrow_information(track, options, prior, a) - prior.information[a, a]
-        total += 0.5 * narrower * step[a] * step[a]
+        total += 0.5 * (narrow[a] - prior.information[a, a]) * step[a] * step[a]
     return float(min(total, options.max_surprise))
 
 
@@ -50,14 +57,14 @@ def match_near_prediction(problem: TrackingProblem, points: Array, k: int) -> No
     """
     track, options, prior, found = problem.track, problem.settings.options, problem.prior, problem.found
     off, is_near = found.poses[k] - prior.mean, True
-    off[2] = wrapped(off[2])
+    off[2], narrow = wrapped(off[2]), narrow_information(track, options, prior)
     for a in range(3):
-        is_near &= off[a] * off[a] * narrow_information(track, options, prior, a) <= 1.0
+        is_near &= off[a] * off[a] * narrow[a] <= 1.0
     if is_near:
         return
     wide, pose, hessian = prior.information.copy(), prior.mean.copy(), np.empty((3, 3))
     for a in range(3):
-        prior.information[a, a] = narrow_information(track, options, prior, a)
+        prior.information[a, a] = narrow[a]
     value, inliers = match_and_count(problem.grid, problem.settings, points, prior, pose, hessian)
     value -= prior_value(prior, pose)
     for a in range(3):

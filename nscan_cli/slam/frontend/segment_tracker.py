@@ -20,8 +20,9 @@ from nscan_cli.slam.frontend.break_detection import (
     see_enough,
     sees_the_same,
 )
+from nscan_cli.slam.frontend.break_options import BreakOptions
 from nscan_cli.slam.frontend.first_scan import place_first
-from nscan_cli.slam.frontend.options import BreakOptions, LaserView, TrackingOptions
+from nscan_cli.slam.frontend.options import LaserView, TrackingOptions
 from nscan_cli.slam.frontend.scan_batch import ScanBatch
 from nscan_cli.slam.frontend.sector_of_view import laser_view
 from nscan_cli.slam.frontend.tracked_batch import TrackedBatch

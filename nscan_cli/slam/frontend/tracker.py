@@ -82,8 +82,8 @@ class Tracker:
             if k == n or np.isnan(found.inliers[k]):
                 continue
             is_clear = self._search(scans.of(k), found, k)
-            is_lost = self._settings.is_alone and found.inliers[k] < self.options.scan.lost_inliers
-            is_lost &= not is_clear
+            has_few = found.inliers[k] < self.options.scan.lost_inliers
+            is_lost = self._settings.is_alone and has_few and not is_clear
             if is_lost and self._left_out is not None and not self._is_tried:
                 points, pose = self._left_out
                 self._insert(np.concatenate([points, self._gap_points(points)]), pose)

@@ -6,7 +6,7 @@ import numpy as np
 
 from nscan_cli.kernels.decorators import kernel
 from nscan_cli.poses import Array
-from nscan_cli.slam.frontend.options import ViewSimilarityOptions
+from nscan_cli.slam.frontend.break_options import ViewSimilarityOptions
 
 
 def view_similarity(points: Array, others: Array, options: ViewSimilarityOptions) -> float | None:

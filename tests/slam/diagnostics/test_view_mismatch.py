@@ -9,7 +9,7 @@ from nscan_cli.poses import transform
 from nscan_cli.slam.diagnostics.notices import notices
 from nscan_cli.slam.diagnostics.options import ViewMismatchOptions
 from nscan_cli.slam.diagnostics.view_mismatch import ViewMismatch, view_mismatches
-from nscan_cli.slam.frontend.options import ViewSimilarityOptions
+from nscan_cli.slam.frontend.break_options import ViewSimilarityOptions
 from nscan_cli.slam.frontend.view_similarity import view_similarity
 from tests.slam.keyframe_drives import round_scene
 from tests.slam.mapped_logs import mapped, mapped_real

@@ -10,7 +10,8 @@ import pytest
 
 from nscan_cli.logs.load import read_log
 from nscan_cli.logs.reading_options import ReadingOptions
-from nscan_cli.slam.frontend.options import BreakOptions, TrackingOptions
+from nscan_cli.slam.frontend.break_options import BreakOptions
+from nscan_cli.slam.frontend.options import TrackingOptions
 from nscan_cli.slam.frontend.scan_batch import ScanBatch
 from nscan_cli.slam.frontend.segment_tracker import SegmentTracker
 from nscan_cli.slam.frontend.tracked_batch import TrackedBatch

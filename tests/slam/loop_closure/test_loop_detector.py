@@ -10,7 +10,7 @@ import pytest
 from nscan_cli.graph.model import Loop, Pairwise
 from nscan_cli.poses import compose, relative
 from nscan_cli.slam.backend.energy_cache import EnergyCache
-from nscan_cli.slam.frontend.options import BreakOptions
+from nscan_cli.slam.frontend.break_options import BreakOptions
 from nscan_cli.slam.keyframes.route import route_of
 from nscan_cli.slam.local_matching.joint_relations import LocalMatch, match_neighbours
 from nscan_cli.slam.local_matching.options import NScanOptions
