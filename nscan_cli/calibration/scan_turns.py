@@ -47,7 +47,7 @@ def _sum_of_differences(one: NDArray[np.float32], other: NDArray[np.float32], mo
     total = np.float32(0.0)
     for k in range(len(other)):
         total += min(abs(one[k] - other[k]), most)
-    return total
+    return float(total)
 
 
 def _profiles(log: LaserLog, rows: Indices, cells: int) -> NDArray[np.float32]:

@@ -15,6 +15,7 @@ from nscan_cli.logs.beam_spacing import checked_by_walls
 from nscan_cli.logs.blind_scans import blind_scans
 from nscan_cli.logs.dead_beams import DeadBeamOptions
 from nscan_cli.logs.device_choice import Device
+from nscan_cli.logs.floor_line import FloorLineOptions, floor_line, without_floor
 from nscan_cli.logs.frame_names import DEFAULT_FRAMES, FrameNames
 from nscan_cli.logs.laser_defaults import mark_no_returns
 from nscan_cli.logs.laser_log import LaserLog, LogReport, beam_counts
@@ -101,6 +102,9 @@ def laser_log(
     findings.used |= {"range_min": limits.low_from, "range_max": limits.high_from}
     table = ScanTable(raw.ranges, limits, angle_min, angle_increment, times.rows, times.times)
     sectors, masked = masked_sectors(table, options, RobotPartsOptions(), DeadBeamOptions())
+    floor = (
+        None if options.as_recorded else floor_line(table, sectors, FloorLineOptions(), RobotPartsOptions())
+    )
     ranges = raw.ranges if np.array_equal(rows, np.arange(len(raw.stamps))) else raw.ranges[rows]
     beams, limits = beam_counts(raw.ranges, raw.beams)[rows], limits.of(rows)
     lost = lost_readings(ranges, beams, limits, file)
@@ -112,6 +116,10 @@ def laser_log(
     hidden = mask_beams(ranges, angle_min[rows], angle_increment[rows], sectors)
     if hidden:
         lost.counts["in masked sectors"] = hidden
+    if floor is not None:
+        bearings = angle_min[rows], angle_increment[rows]
+        lost.counts["of the floor"] = without_floor(ranges, *bearings, floor, FloorLineOptions())
+        masked.append(floor.said)
     sweep = _sweep(raw, angle_increment, times, options)
     if sweep.origin:
         findings.used["turn"] = sweep.origin

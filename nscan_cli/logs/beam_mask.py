@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from nscan_cli.logs.dead_beams import DeadBeamOptions, dead_beams
 from nscan_cli.logs.reading_options import ReadingOptions
 from nscan_cli.logs.robot_parts import RobotPartsOptions, ScanTable, Sector, robot_parts
-from nscan_cli.poses import Array
+from nscan_cli.poses import Array, Mask
 
 Bearings = tuple[float, float]
 """A sector from the first counter-clockwise to the last, in the laser's frame, rad."""
@@ -71,16 +71,21 @@ def mask_beams(
     is_same = (angle_min == angle_min[0]).all() and (angle_increment == angle_increment[0]).all()
     rows = slice(0, 1) if is_same else slice(None)
     bearings = angle_min[rows, None] + angle_increment[rows, None] * np.arange(ranges.shape[1])
+    chosen = np.broadcast_to(in_sectors(bearings, sectors), ranges.shape)
+    count = int(np.count_nonzero(chosen & ~np.isnan(ranges)))
+    ranges[chosen] = np.nan
+    return count
+
+
+def in_sectors(bearings: Array, sectors: Sequence[Bearings]) -> Mask:
+    """Which of some bearings, rad, are in one of the sectors; of the same shape."""
     chosen = np.zeros(bearings.shape, dtype=np.bool_)
     for first, last in sectors:
         chosen |= (
             np.mod(bearings - first + BEARING_ROUNDING, 2 * np.pi)
             <= _width(first, last) + 2 * BEARING_ROUNDING
         )
-    chosen = np.broadcast_to(chosen, ranges.shape)
-    count = int(np.count_nonzero(chosen & ~np.isnan(ranges)))
-    ranges[chosen] = np.nan
-    return count
+    return chosen
 
 
 def _width(first: float, last: float) -> float:

@@ -103,20 +103,20 @@ class ScanTable(NamedTuple):
 def robot_parts(table: ScanTable, options: RobotPartsOptions) -> list[Sector]:
     """The sectors in which the robot itself is in view, by increasing bearing; none if it never turns."""
     bearings = _bearings(table)
-    some = _at_bearings(table, _evenly(len(table.rows), options.scans), bearings)
+    some = ranges_at(table, evenly(len(table.rows), options.scans), bearings)
     constant, medians = _constant_beams(some, options)
     if not constant.any():
         return []
-    pairs = _turned_pairs(table, bearings, constant, options)
+    pairs = turned_pairs(table, bearings, constant, options)
     if len(pairs) < options.min_pairs:
         return []
     turning = np.unique(np.linspace(pairs[:, 0], pairs[:, 1], options.scans_of_turn).astype(np.int64))
-    ranges = _at_bearings(table, turning, bearings)
+    ranges = ranges_at(table, turning, bearings)
     constant &= _kept(ranges, medians, options).mean(axis=0) >= options.min_turning_share
     return _sectors(bearings, constant, medians, options.margin)
 
 
-def _evenly(size: int, most: int) -> NDArray[np.int64]:
+def evenly(size: int, most: int) -> NDArray[np.int64]:
     """At most `most` places, spread evenly over `size`."""
     return np.unique(np.linspace(0, size - 1, most).astype(np.int64))
 
@@ -128,7 +128,7 @@ def _bearings(table: ScanTable) -> Array:
     return found if table.angle_increment[row] > 0 else found[::-1]
 
 
-def _at_bearings(table: ScanTable, places: NDArray[np.int64], bearings: Array) -> NDArray[np.float32]:
+def ranges_at(table: ScanTable, places: NDArray[np.int64], bearings: Array) -> NDArray[np.float32]:
     """Ranges (n, B), in m, of the scans at `places` (n,) in order of time; inf or nan where there is none."""
     rows = table.rows[places]
     ranges = table.ranges[rows]
@@ -172,13 +172,13 @@ def _kept(
     return kept
 
 
-def _turned_pairs(
+def turned_pairs(
     table: ScanTable, bearings: Array, constant: NDArray[np.bool_], options: RobotPartsOptions
 ) -> NDArray[np.int64]:
     """Places (P, 2) of two scans each, between which the other beams show a turn of the robot."""
     found = []
     for lag in options.lags:
-        first = _evenly(len(table.times), options.pairs)
+        first = evenly(len(table.times), options.pairs)
         second = np.searchsorted(table.times, table.times[first] + lag)
         inside = second < len(table.times)
         pairs = np.stack([first[inside], second[inside]], axis=1)
@@ -203,7 +203,7 @@ def _turns(
     hidden = constant if constant.mean() <= options.max_hidden_share else np.zeros_like(constant)
     sides = []
     for places in pairs.T:
-        ranges = _at_bearings(table, places, bearings)
+        ranges = ranges_at(table, places, bearings)
         ranges[:, hidden] = np.nan
         ranges[~(np.isfinite(ranges) & (ranges > 0))] = np.nan
         sides.append(np.log(ranges[:, ::every]))

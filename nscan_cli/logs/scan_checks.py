@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from nscan_cli.logs.beam_angles import BeamAngleOptions
 from nscan_cli.logs.beam_spacing import BeamSpacingOptions
 from nscan_cli.logs.dead_beams import DeadBeamOptions
+from nscan_cli.logs.floor_line import FloorLineOptions
 from nscan_cli.logs.heading_unit import HeadingUnitOptions
 from nscan_cli.logs.odometry_interpolation import OdometryGapOptions
 from nscan_cli.logs.odometry_outliers import OdometryOutlierOptions
@@ -43,6 +44,7 @@ class ScanCheckOptions:
     turn_segments: TurnSegmentOptions = field(default_factory=TurnSegmentOptions)
     two_lasers: TwoLaserOptions = field(default_factory=TwoLaserOptions)
     robot_parts: RobotPartsOptions = field(default_factory=RobotPartsOptions)
+    floor_line: FloorLineOptions = field(default_factory=FloorLineOptions)
     dead_beams: DeadBeamOptions = field(default_factory=DeadBeamOptions)
     mounting: MountingOptions = field(default_factory=MountingOptions)
     odometry_gaps: OdometryGapOptions = field(default_factory=OdometryGapOptions)

@@ -9,6 +9,7 @@ import numpy as np
 from nscan_cli.logs.laser_log import LaserLog
 from tests.simulation import faults, odometry_faults
 from tests.simulation.reversing import there_and_back
+from tests.simulation.tilted_laser import tilted
 
 Fault = Callable[[LaserLog], LaserLog]
 
@@ -135,6 +136,7 @@ FAULTS: tuple[tuple[str, Fault, str], ...] = (
     ("two posts of 20°", _posts((35.0, 55.0, 0.3), (-55.0, -35.0, 0.3)), "see the robot itself"),
     ("a wheel of 15° at 0.15 m", _posts((70.0, 85.0, 0.15)), "see the robot itself"),
     ("a sixth of the beams always says 5 m", lambda log: faults.dead_beams(log, 5.0), "exactly the same"),
+    ("tilted, sees the floor 3 m ahead", lambda log: tilted(log, 3.0), "tilted and sees the floor"),
     ("someone follows at 0.6 m", lambda log: faults.follower(log, 0.6), "goes along with the robot"),
     ("someone leads at 0.6 m", lambda log: faults.leader(log, 0.6), "goes along with the robot"),
     ("the laser sees nothing for a tenth",
@@ -158,7 +160,7 @@ KNOWN_CURES = {
 """The options that the owner chooses where messages name several causes."""
 FAULTS_OF_REAL_LOGS = (
     "", "someone leads at 0.6 m", "heading by odometry frozen from half-way on",
-    "two posts of 20°", "a sixth of the beams always says 5 m",
+    "two posts of 20°", "a sixth of the beams always says 5 m", "tilted, sees the floor 3 m ahead",
     "odometry × 1000", "odometry turns × −1", "odometry heads 90° too far left",
     "odometry frozen for a third", "each pose five times", "odometry zero at every 50th scan",
     "ranges rounded to 0.1 m", "first directions jitter by 3°", "two drives in one file",
