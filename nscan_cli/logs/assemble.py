@@ -15,6 +15,7 @@ from nscan_cli.logs.beam_spacing import checked_by_walls
 from nscan_cli.logs.blind_scans import blind_scans
 from nscan_cli.logs.dead_beams import DeadBeamOptions
 from nscan_cli.logs.device_choice import Device
+from nscan_cli.logs.direction_changes import DirectionChangeOptions, as_before
 from nscan_cli.logs.floor_line import FloorLineOptions, floor_line, without_floor
 from nscan_cli.logs.frame_names import DEFAULT_FRAMES, FrameNames
 from nscan_cli.logs.laser_defaults import mark_no_returns
@@ -96,9 +97,13 @@ def laser_log(
         raw, converted = with_radians(raw)
         contradictions += converted
     written = beam_directions(raw, options, warnings)
+    beams, changed = beam_counts(raw.ranges, raw.beams), list[str]()
+    if not options.as_recorded:
+        seen = ScanTable(raw.ranges, limits, *written, times.rows, times.times)
+        written, changed = as_before(seen, beams, -1 if options.flip else 1, DirectionChangeOptions())
     directions, bent = checked_by_walls(raw, written, limits, options)
     (angle_min, angle_increment), closed = in_whole_turns(raw, directions, limits, options)
-    contradictions += [*bent, *closed]
+    contradictions += [*changed, *bent, *closed]
     findings.used |= {"range_min": limits.low_from, "range_max": limits.high_from}
     table = ScanTable(raw.ranges, limits, angle_min, angle_increment, times.rows, times.times)
     sectors, masked = masked_sectors(table, options, RobotPartsOptions(), DeadBeamOptions())
@@ -106,7 +111,7 @@ def laser_log(
         None if options.as_recorded else floor_line(table, sectors, FloorLineOptions(), RobotPartsOptions())
     )
     ranges = raw.ranges if np.array_equal(rows, np.arange(len(raw.stamps))) else raw.ranges[rows]
-    beams, limits = beam_counts(raw.ranges, raw.beams)[rows], limits.of(rows)
+    beams, limits = beams[rows], limits.of(rows)
     lost = lost_readings(ranges, beams, limits, file)
     mark_no_returns(ranges, limits.low, limits.high)
     rounded = rounding_of_ranges(ranges)

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from nscan_cli.logs.beam_angles import BeamAngleOptions
 from nscan_cli.logs.beam_spacing import BeamSpacingOptions
 from nscan_cli.logs.dead_beams import DeadBeamOptions
+from nscan_cli.logs.direction_changes import DirectionChangeOptions
 from nscan_cli.logs.floor_line import FloorLineOptions
 from nscan_cli.logs.heading_unit import HeadingUnitOptions
 from nscan_cli.logs.odometry_interpolation import OdometryGapOptions
@@ -38,6 +39,7 @@ class ScanCheckOptions:
     range_unit: RangeUnitOptions = field(default_factory=RangeUnitOptions)
     unit_stretches: UnitStretchOptions = field(default_factory=UnitStretchOptions)
     beam_angles: BeamAngleOptions = field(default_factory=BeamAngleOptions)
+    direction_changes: DirectionChangeOptions = field(default_factory=DirectionChangeOptions)
     beam_spacing: BeamSpacingOptions = field(default_factory=BeamSpacingOptions)
     text_logs: TextLogOptions = field(default_factory=TextLogOptions)
     interlaced: InterlacedOptions = field(default_factory=InterlacedOptions)

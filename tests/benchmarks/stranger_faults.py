@@ -46,6 +46,8 @@ def _middle(log: LaserLog) -> slice:
 JUMP_OF_RANGES = "times the others|odometry or the ranges change their scale"
 JUMP_OF_ORDER = "in the other order than those of the others|order of the readings likely changes"
 """What tells such changes where the scans before and behind show them, or else odometry."""
+JUMP_OF_DIRECTIONS = "see what those of the others see|if the laser did not change"
+"""What tells changes that are in the file alone."""
 FAULTS: tuple[tuple[str, Fault, str], ...] = (
     ("", lambda log: log, ""),
     ("odometry × 1000", lambda log: odometry_faults.scaled(log, 1000.0), "odometry-scale 0.001"),
@@ -116,9 +118,15 @@ FAULTS: tuple[tuple[str, Fault, str], ...] = (
         lambda log: faults.mirrored_in(log, slice(4 * len(log) // 5, None)),
         JUMP_OF_ORDER,
     ),
-    ("looks 4° left from half-way on", _turned_from_half_way(4.0), "looks [345]° further"),
-    ("looks 30° left from half-way on", _turned_from_half_way(30.0), "looks 30° further"),
-    ("looks 90° left from half-way on", _turned_from_half_way(90.0), "looks (89|90|91)° further"),
+    ("looks 4° left from half-way on", _turned_from_half_way(4.0), JUMP_OF_DIRECTIONS),
+    ("looks 30° left from half-way on", _turned_from_half_way(30.0), JUMP_OF_DIRECTIONS),
+    ("looks 90° left from half-way on", _turned_from_half_way(90.0), JUMP_OF_DIRECTIONS),
+    ("looks 90° left in the middle third",
+        lambda log: faults.turned_in(log, 0.5 * np.pi, _middle(log)), JUMP_OF_DIRECTIONS,
+    ),
+    ("beams twice as far apart from half-way on",
+        lambda log: faults.beams_apart(log, 2.0, slice(len(log) // 2, None)), JUMP_OF_DIRECTIONS,
+    ),
     ("first directions jitter by 3°",
         lambda log: faults.first_directions_jitter(log, np.radians(3.0)),
         "looks the same way",
@@ -167,6 +175,7 @@ FAULTS_OF_REAL_LOGS = (
     "odometry of two nodes in turn", "coordinates by odometry wrap round at 8 m",
     "two scans a stamp", "stamps in ms", "ranges × 1.1 from half-way on",
     "ranges × 1.05 from half-way on", "readings reversed", "readings reversed from half-way on",
-    "readings reversed in the last fifth",
+    "readings reversed in the last fifth", "looks 90° left in the middle third",
+    "beams twice as far apart from half-way on",
 )  # fmt: skip
 """Those that the real logs get: with all of them it takes an hour."""

@@ -158,10 +158,13 @@ def first_directions_jitter(log: LaserLog, sigma: float, seed: int = 1) -> Laser
     return replace(log, angle_min=log.angle_min + jitter)
 
 
-def beams_apart(log: LaserLog, factor: float) -> LaserLog:
+def beams_apart(log: LaserLog, factor: float, rows: Rows = slice(None)) -> LaserLog:
     """The file says that beams are so many times as far apart as they are, about the same middle."""
-    middle = log.angle_min + 0.5 * log.angle_increment * (log.beam_counts() - 1)
-    step = factor * log.angle_increment
+    middle, step = (
+        log.angle_min + 0.5 * log.angle_increment * (log.beam_counts() - 1),
+        log.angle_increment.copy(),
+    )
+    step[rows] *= factor
     return replace(log, angle_min=middle - 0.5 * step * (log.beam_counts() - 1), angle_increment=step)
 
 
