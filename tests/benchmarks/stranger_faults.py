@@ -176,6 +176,5 @@ FAULTS_OF_REAL_LOGS = (
     "two scans a stamp", "stamps in ms", "ranges × 1.1 from half-way on",
     "ranges × 1.05 from half-way on", "readings reversed", "readings reversed from half-way on",
     "readings reversed in the last fifth", "looks 90° left in the middle third",
-    "beams twice as far apart from half-way on",
 )  # fmt: skip
 """Those that the real logs get: with all of them it takes an hour."""
