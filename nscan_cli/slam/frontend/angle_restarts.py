@@ -34,6 +34,8 @@ def match_from_other_angles(problem: TrackingProblem, points: Array, threshold: 
     A match with clearly more inliers and a lower objective takes the place of the first one.
     """
     settings, prior, found = problem.settings, problem.prior, problem.found
+    # A robot may stand for hours: what is in vain for one scan there is so for the next ones.
+    threshold = min(threshold, problem.track.inliers[1] - settings.options.inlier_margin)
     pose, hessian = np.empty(3), np.empty((3, 3))
     for ring in range(settings.restart_angles.shape[0]):
         if found.inliers[k] >= threshold - (settings.options.far_restart_margin if ring > 0 else 0.0):

@@ -28,7 +28,8 @@ class TrackState(NamedTuple):
     inserted: Array
     """(3,) pose of the last scan that joined the map."""
     inliers: Array
-    """(1,) share of inliers of the last scan."""
+    """(2,) shares of inliers of the last scan, and of the first one since then that waits for motion and was
+    matched from other angles in vain; infinity if there is none."""
     mean_square_deviation: Array
     """(1,) mean square deviation of scans from their predictions without odometry, m²."""
     prediction_errors: Array
@@ -43,8 +44,9 @@ class TrackState(NamedTuple):
     def begin(cls, size: int, initial_sigma: float) -> TrackState:
         """The state before the first scan, with room for the last `size` poses; `initial_sigma` in m."""
         poses, odometry, inserted = np.zeros((size, 3)), np.full(3, np.nan), np.zeros(3)
+        inliers = np.array([0.0, np.inf])
         deviation, counts = np.array([initial_sigma**2]), np.zeros(3, dtype=np.int64)
         noise, empty, errors = OdometryNoise.begin(), LocalMap.empty(), np.full((2, 2, size - 1), 0.1)
         return cls(
-            poses, np.zeros(size), odometry, inserted, np.zeros(1), deviation, errors, noise, counts, empty
+            poses, np.zeros(size), odometry, inserted, inliers, deviation, errors, noise, counts, empty
         )

@@ -61,7 +61,7 @@ def settle(problem: TrackingProblem, k: int) -> None:
         off = np.hypot(pose[0] - prior.mean[0], pose[1] - prior.mean[1])
         found.odometry_sigmas[k] = off / max(along, prior.information[0, 0] ** -0.5)
     assign(track.odometry, odometry[k])
-    track.inliers[0] = found.inliers[k]
+    track.inliers[0], track.inliers[1] = found.inliers[k], np.inf
     found.paths[k], found.in_map[k] = track.map.path[0], joins
     found.prior_covariances[k] = 0.0
     for a in range(3):
@@ -154,6 +154,8 @@ def track_scans(problem: TrackingProblem, first: int, may_wait: bool) -> int:
                 if settings.is_alone:
                     match_near_prediction(problem, matched, k)
             if waits_for_motion(track, options, odometry, k, found.poses[k], may_wait):
+                if found.inliers[k] < threshold and track.inliers[1] == np.inf:
+                    track.inliers[1] = found.inliers[k]
                 continue
             if found.inliers[k] < (options.lost_inliers if has_odometry else options.restart_inliers):
                 return k
