@@ -116,8 +116,8 @@ class ScanTrackingOptions(NamedTuple):
     min_prediction_error: float = 0.02
     """Least mean error of predictions there, m and rad. A larger value trusts the scans more."""
     max_surprise: float = 10.0
-    """Most that the objective of a pose grows because it is farther off than predictions usually are: now and
-    then a robot does what it never did. A larger value trusts predictions more."""
+    """Most that the objective of a pose grows because it is farther off than predictions or odometry usually
+    are: now and then a robot does what it never did. A larger value trusts them more."""
     degeneracy_poses: int = 3
     """Number of known poses from which on `degeneracy` is checked: fewer give no velocity."""
     degeneracy: DegeneracyOptions = DegeneracyOptions()

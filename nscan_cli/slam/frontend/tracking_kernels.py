@@ -6,7 +6,7 @@ import numpy as np
 
 from nscan_cli.kernels.array_assignment import assign, assign_rows
 from nscan_cli.kernels.decorators import kernel
-from nscan_cli.matching.motion_model import motion_sigmas, prior_value
+from nscan_cli.matching.motion_model import Prior, motion_sigmas, prior_value
 from nscan_cli.matching.pose_kernels import relative_pose, wrapped
 from nscan_cli.ndt.grid_growth import CELLS_PER_POINT
 from nscan_cli.poses import Array
@@ -93,7 +93,8 @@ def match_with_doubt(problem: TrackingProblem, points: Array, threshold: float, 
     """Match the points (m, 2) of scan k again with a wide prior if it contradicts odometry or fits badly.
 
     With fewer inliers than `threshold` it is also matched from other angles. Another match replaces the first
-    one if it has clearly more inliers; if the first one contradicts odometry, a lower energy is enough.
+    one if it has clearly more inliers, and pays for being off the odometry unless the first one is lost. If
+    the first one contradicts odometry, a lower energy is enough.
     """
     options, prior, found = problem.settings.options, problem.prior, problem.found
     is_contradiction = contradicts(prior, found.poses[k], options.contradiction_sigmas)
@@ -107,8 +108,10 @@ def match_with_doubt(problem: TrackingProblem, points: Array, threshold: float, 
     if found.inliers[k] < threshold:
         match_from_other_angles(problem, points, threshold, k)
     has_more = found.inliers[k] > inliers + options.inlier_margin
-    fits_better = found.values[k] - prior_value(prior, found.poses[k]) < energy
-    if not (has_more or (is_contradiction and fits_better)):
+    own = found.values[k] - prior_value(prior, found.poses[k])
+    price = min(prior_value(Prior(prior.mean, trusted), found.poses[k]), options.max_surprise)
+    has_more &= inliers < options.lost_inliers or own + price < value
+    if not (has_more or (is_contradiction and own < energy)):
         found.values[k], found.inliers[k] = value, inliers
         assign(found.poses[k], pose)
         assign_rows(found.hessians[k], hessian)
