@@ -50,7 +50,8 @@ class ScanTrackingOptions(NamedTuple):
     """Length of the path whose scans the local map holds, m. A longer window drifts less and costs memory."""
     min_motion: float = 0.05
     """A scan joins the local map when the robot has moved farther (m) or turned more (rad) than this since
-    the last one that joined. A larger value makes the map sparser."""
+    the last one that joined. Odometry that has moved less (m) may stand while the robot is carried. A larger
+    value makes the map sparser."""
     max_iterations: int = 20
     """Largest number of Newton steps of a stage. A larger number lets slow matches converge."""
     tolerance: float = 1e-4

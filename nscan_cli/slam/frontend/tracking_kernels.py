@@ -108,14 +108,28 @@ def match_with_doubt(problem: TrackingProblem, points: Array, threshold: float, 
     if found.inliers[k] < threshold:
         match_from_other_angles(problem, points, threshold, k)
     has_more = found.inliers[k] > inliers + options.inlier_margin
-    own = found.values[k] - prior_value(prior, found.poses[k])
-    price = min(prior_value(Prior(prior.mean, trusted), found.poses[k]), options.max_surprise)
-    has_more &= inliers < options.lost_inliers or own + price < value
-    if not (has_more or (is_contradiction and own < energy)):
+    has_more &= inliers < options.lost_inliers or _pays_for_odometry(problem, trusted, value, k)
+    fits_better = found.values[k] - prior_value(prior, found.poses[k]) < energy
+    if not (has_more or (is_contradiction and fits_better)):
         found.values[k], found.inliers[k] = value, inliers
         assign(found.poses[k], pose)
         assign_rows(found.hessians[k], hessian)
         assign_rows(prior.information, trusted)
+
+
+@kernel
+def _pays_for_odometry(problem: TrackingProblem, trusted: Array, value: float, k: int) -> bool:
+    """Whether the match of scan k gains more than it costs to be off the odometry, whose information is
+    `trusted` (3, 3), against another match of this `value`.
+
+    Odometry that stands costs nothing: it does so where the robot is carried.
+    """
+    prior, pose, step = problem.prior, problem.found.poses[k], np.empty(3)
+    relative_pose(problem.odometry[k], problem.track.odometry, step)
+    if np.hypot(step[0], step[1]) < problem.settings.options.min_motion:
+        return True
+    price = min(prior_value(Prior(prior.mean, trusted), pose), problem.settings.options.max_surprise)
+    return bool(problem.found.values[k] - prior_value(prior, pose) + price < value)
 
 
 @kernel
