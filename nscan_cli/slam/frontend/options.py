@@ -117,8 +117,11 @@ class ScanTrackingOptions(NamedTuple):
     min_prediction_error: float = 0.02
     """Least mean error of predictions there, m and rad. A larger value trusts the scans more."""
     max_surprise: float = 10.0
-    """Most that the objective of a pose grows because it is farther off than predictions or odometry usually
-    are: now and then a robot does what it never did. A larger value trusts them more."""
+    """Most that the objective of a pose grows because it is farther off than predictions usually are: now and
+    then a robot does what it never did. A larger value trusts predictions more."""
+    max_odometry_surprise: float = 25.0
+    """Most that the objective of a poor match grows because it is off trusted odometry, which drives on: now
+    and then a wheel slips. A larger value trusts the odometry more."""
     degeneracy_poses: int = 3
     """Number of known poses from which on `degeneracy` is checked: fewer give no velocity."""
     degeneracy: DegeneracyOptions = DegeneracyOptions()

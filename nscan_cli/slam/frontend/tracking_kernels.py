@@ -124,11 +124,12 @@ def _pays_for_odometry(problem: TrackingProblem, trusted: Array, value: float, k
 
     Odometry that stands costs nothing: it does so where the robot is carried.
     """
-    prior, pose, step = problem.prior, problem.found.poses[k], np.empty(3)
+    options, prior = problem.settings.options, problem.prior
+    pose, step = problem.found.poses[k], np.empty(3)
     relative_pose(problem.odometry[k], problem.track.odometry, step)
-    if np.hypot(step[0], step[1]) < problem.settings.options.min_motion:
+    if np.hypot(step[0], step[1]) < options.min_motion:
         return True
-    price = min(prior_value(Prior(prior.mean, trusted), pose), problem.settings.options.max_surprise)
+    price = min(prior_value(Prior(prior.mean, trusted), pose), options.max_odometry_surprise)
     return bool(problem.found.values[k] - prior_value(prior, pose) + price < value)
 
 
