@@ -93,8 +93,8 @@ def match_with_doubt(problem: TrackingProblem, points: Array, threshold: float, 
     """Match the points (m, 2) of scan k again with a wide prior if it contradicts odometry or fits badly.
 
     With fewer inliers than `threshold` it is also matched from other angles. Another match replaces the first
-    one if it has clearly more inliers, and pays for being off the odometry unless the first one is lost. If
-    the first one contradicts odometry, a lower energy is enough.
+    one if it has clearly more inliers, and pays for being off the odometry unless only the first one is lost.
+    If the first one contradicts odometry, a lower energy is enough.
     """
     options, prior, found = problem.settings.options, problem.prior, problem.found
     is_contradiction = contradicts(prior, found.poses[k], options.contradiction_sigmas)
@@ -108,7 +108,8 @@ def match_with_doubt(problem: TrackingProblem, points: Array, threshold: float, 
     if found.inliers[k] < threshold:
         match_from_other_angles(problem, points, threshold, k)
     has_more = found.inliers[k] > inliers + options.inlier_margin
-    has_more &= inliers < options.lost_inliers or _pays_for_odometry(problem, trusted, value, k)
+    is_found = inliers < options.lost_inliers <= found.inliers[k]
+    has_more &= is_found or _pays_for_odometry(problem, trusted, value, k)
     fits_better = found.values[k] - prior_value(prior, found.poses[k]) < energy
     if not (has_more or (is_contradiction and fits_better)):
         found.values[k], found.inliers[k] = value, inliers
