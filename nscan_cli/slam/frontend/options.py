@@ -122,6 +122,9 @@ class ScanTrackingOptions(NamedTuple):
     max_odometry_surprise: float = 25.0
     """Most that the objective of a poor match grows because it is off trusted odometry, which drives on: now
     and then a wheel slips. A larger value trusts the odometry more."""
+    believed_contradictions: int = 1
+    """If more successive scans than this contradict odometry, leaving it costs nothing. A larger value trusts
+    the odometry longer."""
     degeneracy_poses: int = 3
     """Number of known poses from which on `degeneracy` is checked: fewer give no velocity."""
     degeneracy: DegeneracyOptions = DegeneracyOptions()

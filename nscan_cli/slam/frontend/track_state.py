@@ -11,9 +11,10 @@ from nscan_cli.poses import Array
 from nscan_cli.slam.frontend.local_map import LocalMap
 from nscan_cli.slam.frontend.odometry_noise import OdometryNoise
 
-KNOWN, RESTARTS, NEXT = 0, 1, 2
+KNOWN, RESTARTS, NEXT, LEFT = 0, 1, 2, 3
 """Places in `TrackState.counts`: the number of the last poses that are known, how often matches were started
-from other angles, and the first scan of a batch whose pose is not known."""
+from other angles, the first scan of a batch whose pose is not known, and how many of the last scans left the
+odometry."""
 
 
 class TrackState(NamedTuple):
@@ -37,7 +38,7 @@ class TrackState(NamedTuple):
     last 1 to h − 1 steps, per scan and per second."""
     odometry_noise: OdometryNoise
     counts: NDArray[np.int64]
-    """(3,) KNOWN, RESTARTS and NEXT"""
+    """(4,) KNOWN, RESTARTS, NEXT and LEFT"""
     map: LocalMap
 
     @classmethod
@@ -45,7 +46,7 @@ class TrackState(NamedTuple):
         """The state before the first scan, with room for the last `size` poses; `initial_sigma` in m."""
         poses, odometry, inserted = np.zeros((size, 3)), np.full(3, np.nan), np.zeros(3)
         inliers = np.array([0.0, np.inf])
-        deviation, counts = np.array([initial_sigma**2]), np.zeros(3, dtype=np.int64)
+        deviation, counts = np.array([initial_sigma**2]), np.zeros(4, dtype=np.int64)
         noise, empty, errors = OdometryNoise.begin(), LocalMap.empty(), np.full((2, 2, size - 1), 0.1)
         return cls(
             poses, np.zeros(size), odometry, inserted, inliers, deviation, errors, noise, counts, empty

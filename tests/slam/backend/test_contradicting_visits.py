@@ -112,10 +112,13 @@ def test_a_route_is_compared_with_earlier_visits_once(office, monkeypatch):
 
 
 def clinic(reverse: bool, contradiction_sigmas: float) -> tuple[Mapped, float]:
-    """fr-clinic mapped with another bound on what contradicts odometry, and its mean error, m."""
+    """fr-clinic mapped with other bounds on what contradicts odometry, and its mean error, m.
+
+    Any match with more inliers leaves odometry.
+    """
     log = read_log(str(data_file("fr-clinic.log.gz")), ReadingOptions())
     relations = read_relations(str(data_file("fr-clinic.relations")))
-    scan = ScanTrackingOptions(contradiction_sigmas=contradiction_sigmas)
+    scan = ScanTrackingOptions(contradiction_sigmas=contradiction_sigmas, max_odometry_surprise=0.0)
     options = SlamOptions(tracking=TrackingOptions(scan=scan))
     found = mapped(backwards(log) if reverse else log, options, threads=2)
     poses = found.graph.poses[::-1] if reverse else found.graph.poses
