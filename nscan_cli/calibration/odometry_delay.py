@@ -12,8 +12,8 @@ import numpy as np
 
 from nscan_cli.calibration.parabola import parabola_minimum
 from nscan_cli.calibration.scan_motion import ScanMotion
-from nscan_cli.calibration.scan_turns import scan_turns
 from nscan_cli.calibration.sweep_options import SweepCheckOptions
+from nscan_cli.calibration.turn_of_file import usual_turn
 from nscan_cli.logs.beam_times import BeamTimes
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.logs.robot_path import RobotPath, poses_at, robot_path
@@ -23,37 +23,24 @@ from nscan_cli.poses import Array, Indices, are_known
 def odometry_delay(log: LaserLog, motion: ScanMotion, options: SweepCheckOptions) -> float:
     """Seconds to add to the stamps of odometry, so that its turns fit best to those by scans; 0 in doubt.
 
-    Rough turns are enough: matches of scans give the same to within a hundredth of a second.
+    Only a part of the scans in turns is matched if these fit hardly better with any delay.
     """
-    path = log.odometry_path
+    path, measured = log.odometry_path, dict[int, float]()
     if log.odometry is None or path is None or log.beam_times is None:
         return 0.0
-    rows = motion.spread_rows(options)
-    turned = motion.rates(rows) * (log.times[rows + 1] - log.times[rows - 1])
-    rows = rows[np.abs(turned) > options.min_winding]
-    if len(rows) < options.few_delay_turns:
-        return 0.0
-    turned = _corrected_turns(motion, rows, log.beam_times, options)
-    delay, gain = _best_delay(log, path, log.beam_times, rows, turned, options)
-    return delay if len(rows) >= options.min_delay_turns or gain <= options.few_delay_gain else 0.0
-
-
-def _corrected_turns(
-    motion: ScanMotion, rows: Indices, beams: BeamTimes, options: SweepCheckOptions
-) -> Array:
-    """(n,) about how far (rad) the laser turns from the scan before each row to the one after it.
-
-    Scans of fast turns, which these stretch, are seen as from their middle beams.
-    """
-    log, rates = motion.log, np.zeros(len(motion.log))
-    some = np.unique(np.concatenate([rows - 1, rows + 1]))
-    some = some[(some > 0) & (some < len(log) - 1)]
-    rates[some] = motion.rates(some)
-    stretch = np.broadcast_to(beams.step, len(log)) * rates
-    stretch[np.abs(stretch) * 2 * np.pi <= options.corrected_winding * np.abs(log.angle_increment)] = 0.0
-    begin = log.angle_min - 0.5 * (log.beam_counts() - 1) * stretch
-    seen = replace(log, angle_min=begin, angle_increment=log.angle_increment + stretch)
-    return scan_turns(seen, rows - 1, rows + 1, motion.turns)
+    rows, turn, delay = _turning(motion, options), usual_turn(log), 0.0
+    for part in (rows[::4], rows[2::4], rows[1::2]):
+        found = {row: motion.turned(row, turn) for row in part}
+        measured.update({row: turned for row, turned in found.items() if turned is not None})
+        turns = np.array(list(measured.values()))
+        count = np.count_nonzero(np.abs(turns) > options.min_winding)
+        if count >= options.few_delay_turns:
+            delay, gain = _best_delay(log, path, log.beam_times, np.array(list(measured)), turns, options)
+            if gain > options.no_delay_gain:
+                return 0.0
+            if count < options.min_delay_turns and gain > options.few_delay_gain:
+                delay = 0.0
+    return delay
 
 
 def _best_delay(
@@ -71,7 +58,7 @@ def _best_delay(
     delays = options.delay_step * np.arange(-count, count + 1, dtype=np.float64)
     by_odometry = np.interp(end - delays[:, None], path.times, heading)
     by_odometry -= np.interp(begin - delays[:, None], path.times, heading)
-    off = np.minimum(np.abs(turned - by_odometry), options.largest_difference).mean(axis=1)
+    off = np.abs(turned - by_odometry).mean(axis=1)
     best = int(np.argmin(off))
     gain = float(off[best] / off[count]) if off[count] > 0.0 else 1.0
     # At an end of the range the best one may lie beyond.
@@ -79,6 +66,15 @@ def _best_delay(
         return 0.0, gain
     delay = round(parabola_minimum(delays, off, options.delays_fitted), 3)
     return (delay if abs(delay) >= options.least_delay else 0.0), gain
+
+
+def _turning(motion: ScanMotion, options: SweepCheckOptions) -> list[int]:
+    """Rows of scans in turns, evenly among them."""
+    rows = motion.spread_rows(options)
+    turned = np.abs(motion.rates(rows)) * (motion.log.times[rows + 1] - motion.log.times[rows - 1])
+    rows = rows[turned > options.min_winding]
+    used: list[int] = rows[:: max(-(-len(rows) // options.max_delay_turns), 1)].tolist()
+    return used
 
 
 def with_delay(log: LaserLog, delay: float) -> LaserLog:

@@ -116,6 +116,23 @@ class ScanMotion:
         move_along_arc(points, scan[1] * turn, twist, False)
         return points
 
+    def turned(self, row: int, turn: float) -> float | None:
+        """rad; how far the laser turns from the scan before a row to the one after it, by corrected scans.
+
+        None in doubt.
+        """
+        before, at, after = (self.corrected(each, turn) for each in (row - 1, row, row + 1))
+        twist = self.twist(row)
+        if before is None or at is None or after is None or twist is None:
+            return None
+        seconds = np.diff(self.log.times[row - 1 : row + 2]).tolist()
+        # Its twist was measured by matches of these scans.
+        ends = [
+            match_scans(reference, points, twist * time, self.steps.pair, is_near=True)
+            for reference, points, time in ((before, at, seconds[0]), (at, after, seconds[1]))
+        ]
+        return float(sum(end.pose[2] for end in ends)) if all(end.converged for end in ends) else None
+
     def energies(self, one: int, other: int, turns: Sequence[float]) -> Array | None:
         """(T,) energy of two scans, per point, for each assumed time of a turn (T,), s; None in doubt."""
         before, after = self.twist(one), self.twist(other)

@@ -131,15 +131,12 @@ class SweepCheckOptions:
     parabola."""
     least_delay: float = 0.03
     """Smallest delay of odometry that is corrected, s. A larger value leaves the file as it is more often."""
-    corrected_winding: float = math.radians(8.0)
-    """Scans in which the robot turns by more during a turn of the laser are corrected for that before a delay
-    is looked for, rad. A smaller value adds noise to slow turns."""
-    largest_difference: float = 0.2
-    """Turns that differ by more count as different by this, rad. A larger value gives scans that resemble
-    each other in the wrong place more weight."""
     delay_gain: float = 0.75
     """A delay is found if the turns disagree by at most this share of their disagreement without it. A larger
     value finds delays more often, also where there is none."""
+    no_delay_gain: float = 0.9
+    """No more turns are measured where half of them disagree by more than this share with any delay. A larger
+    value takes longer."""
     stamp_tolerance: float = 0.25
     """A delay of odometry is due to scans stamped at another beam if that explains it to within this share of
     the time between two such beams. A larger value blames the stamps more often, and the clock of odometry
@@ -152,6 +149,8 @@ class SweepCheckOptions:
     few_delay_gain: float = 0.4
     """A delay is clear if turns disagree by at most this share of their disagreement without it. A larger
     value finds more in short drives, also where there is none."""
+    max_delay_turns: int = 40
+    """Largest number of scans in turns that a delay rests on. More tell more and take longer."""
     sigmas: float = 3.0
     """Another time than the file's is believed if it makes scans sharper by at least this number of standard
     deviations. A larger value believes the file more often."""
