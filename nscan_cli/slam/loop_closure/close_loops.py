@@ -41,11 +41,16 @@ def close_loops_between(state: SlamState, first: int, last: int) -> list[Place]:
     """Search once more for the keyframes in rows `first` to `last`; returns the places found.
 
     Earlier visits of these places contradict them: each is searched `contradicted_distance` away at least,
-    however certain it seems. Changes what `close_loops` changes.
+    however certain it seems, and is no surprise there. Changes what `close_loops` changes.
     """
     route, known, options = state.route, len(state.places), state.options.loop_closure
     reach = options.contradicted_distance
-    state.detector.begin_again(replace(options, min_distance=max(reach, options.min_distance)))
+    again = replace(
+        options,
+        min_distance=max(reach, options.min_distance),
+        slip_distance=max(reach, options.slip_distance),
+    )
+    state.detector.begin_again(again)
     for centre in np.flatnonzero((route.rows >= first) & (route.rows <= last)).tolist():
         is_near = distances_from(state.route, centre) <= reach
         older = is_earlier(route, centre, state.options.nscan.visit_path)
