@@ -126,14 +126,14 @@ def _pays_for_odometry(problem: TrackingProblem, trusted: Array, value: float, k
     """Whether the match of scan k gains more than it costs to be off the odometry, whose information is
     `trusted` (3, 3), against another match of this `value`.
 
-    It costs nothing where several scans before left the odometry, too, or where the odometry stands: it does
-    so if the robot is carried.
+    It costs nothing where several scans before left the odometry, too, where the odometry stands, as it does
+    if the robot is carried, or where it is no odometry but the motion from behind.
     """
     options, prior = problem.settings.options, problem.prior
     pose, step = problem.found.poses[k], np.empty(3)
     relative_pose(problem.odometry[k], problem.track.odometry, step)
     has_slipped = problem.track.counts[LEFT] > options.believed_contradictions
-    if has_slipped or np.hypot(step[0], step[1]) < options.min_motion:
+    if problem.settings.is_alone or has_slipped or np.hypot(step[0], step[1]) < options.min_motion:
         return True
     price = min(prior_value(Prior(prior.mean, trusted), pose), options.max_odometry_surprise)
     return bool(problem.found.values[k] - prior_value(prior, pose) + price < value)
