@@ -14,7 +14,7 @@ class RangeJumpOptions:
     """Approximate number of beams of a scan that are compared, evenly spread. More take longer."""
     min_beams: int = 20
     """Least number of beams of two scans that are compared. A larger value compares fewer scans."""
-    min_factor: float = 1.012
+    min_factor: float = 1.03
     """Least factor between the ranges of two scans, or its inverse. A larger value finds less, and takes less
     time."""
     tolerance: float = math.log(1.02)
@@ -22,28 +22,13 @@ class RangeJumpOptions:
     value matches more scans."""
     min_share: float = 0.3
     """Least share of the beams that have. A smaller value matches more scans."""
-    clear_factor: float = 1.03
-    """From this factor on it need not be prominent. A smaller value matches more scans."""
-    beside: int = 3
-    """The usual factor of two scans is compared with those of so many pairs before and behind. A larger value
-    looks farther along the drive."""
-    usual: float = 0.002
-    """Least logarithm that the usual factors beside count as. A larger value matches fewer scans of robots
-    that stand."""
-    min_prominence: float = 3.0
-    """The logarithm of the usual factor is at least so many times that of the usual one of those beside,
-    where odometry is as wrong. A smaller value matches more scans."""
     max_candidates: int = 48
-    """Largest number of places at which scans are matched: first those with a clear factor, then those with
-    the largest shares. More take longer."""
+    """Largest number of places at which scans are matched, those with the largest shares. More take
+    longer."""
     min_gain: float = 0.2
     """The energy per point of four pairs of scans, one before the place and one behind, is lower by so much
     with the factor than without it, and that of two pairs on one side is higher. At 5 % it is lower by 0.3 to
     2 mostly. A larger value finds less."""
-    min_recovered: float = 0.65
-    """Least share of what the energy of the scans beside the place is above that of two scans on one side by
-    which the factor lowers it. It is 0.7 to 1 for such jumps, and 0.53 at most elsewhere on real logs. A
-    larger value finds less."""
     refinement: float = math.log(1.01)
     """The factor is the minimum of a parabola through five energies this far apart, as a logarithm. A larger
     value finds more, and is less exact."""

@@ -73,18 +73,10 @@ def range_jumps(log: LaserLog, compared: ComparedRanges, options: FileCheckOptio
     jumps, logarithms, shares = options.jumps, compared.logarithms, compared.shares
     if len(log) < 4:
         return []
-    sizes = np.nan_to_num(np.abs(logarithms))
-    beside = np.lib.stride_tricks.sliding_window_view(
-        np.pad(sizes, jumps.beside, mode="edge"), 2 * jumps.beside + 1
-    )
-    prominence = sizes / np.maximum(np.median(beside, axis=1), jumps.usual)
-    is_clear = sizes > math.log(jumps.clear_factor)
-    is_odd = is_clear | (sizes > math.log(jumps.min_factor)) & (prominence >= jumps.min_prominence)
-    is_odd &= shares >= jumps.min_share
+    is_odd = (np.abs(logarithms) > math.log(jumps.min_factor)) & (shares >= jumps.min_share)
     # Two scans before each place and two behind are matched.
     places = np.flatnonzero(is_odd[1:-1]) + 1
-    order = np.lexsort((-shares[places], ~is_clear[places]))
-    best = places[order[: jumps.max_candidates]]
+    best = places[np.argsort(-shares[places], kind="stable")[: jumps.max_candidates]]
     found = []
     for place in np.sort(best).tolist():
         factor = _matched_factor(log, place + 1, float(np.exp(logarithms[place])), options)
@@ -127,20 +119,15 @@ def _matched_factor(log: LaserLog, row: int, factor: float, options: FileCheckOp
     near = near[np.argmin(coarse)] + jumps.refinement * np.arange(-2.0, 3.0)
     factor = math.exp(near[2])
     # Where scans match better at another scale for other reasons, those of one side do so, too.
-    beside = list[float]()
     for first in (row - 2, row):
         some = _energies(log, first, first + 1, [1.0, factor], options)
         if some is None or some[0] > some[1] - jumps.min_gain:
             return None
-        beside.append(some[0])
     energies = [_energies(log, first, last, np.exp(near).tolist(), options) for first, last in pairs]
     of_all = np.array(energies)
     total = of_all.sum(axis=0)
     best = int(np.argmin(total))
     if best in (0, len(near) - 1) or (of_all[:, best] > np.array(as_read) - jumps.min_gain).any():
-        return None
-    # Then they match nearly as well as those of one side do.
-    if as_read[0] - of_all[0, best] < jumps.min_recovered * (as_read[0] - float(np.mean(beside))):
         return None
     found = parabola_minimum(near, total)
     return math.exp(found) if abs(found) > math.log(jumps.min_factor) else None

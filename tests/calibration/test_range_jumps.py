@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import functools
-import itertools
 from dataclasses import replace
 
 import numpy as np
@@ -34,11 +33,8 @@ def checked(log: LaserLog) -> tuple[LaserLog, list[str]]:
     return checked_ranges(log, compare_ranges(log, OPTIONS), OPTIONS)
 
 
-# The robot's motion hides two percent, unless odometry is known.
-@pytest.mark.parametrize(
-    ("factor", "odometry"),
-    [*itertools.product([0.9, 0.95, 1.05, 1.1, 1.5], [True, False]), (0.98, True), (1.02, True)],
-)
+@pytest.mark.parametrize("factor", [0.9, 0.95, 1.05, 1.1, 1.5])
+@pytest.mark.parametrize("odometry", [True, False])
 def test_the_scan_and_the_factor_are_found(factor, odometry):
     log = drive() if odometry else replace(drive(), odometry=None)
     at = len(log) // 2
@@ -78,15 +74,6 @@ def test_a_wrong_step_of_odometry_is_no_change():
 def test_no_real_log_changes(name):
     log = read_log(str(data_file(f"{name}.log.gz")))
     assert jumps_of(log) == []
-
-
-@pytest.mark.parametrize(("name", "place"), [("intel", 0.35), ("field/urg-corridor-1", 0.5)])
-def test_two_percent_are_found_in_a_real_log(name, place):
-    log = read_log(str(data_file(f"{name}.{'bag' if '/' in name else 'log.gz'}")))
-    at = int(place * len(log))
-    (jump,) = jumps_of(faults.ranges_scaled(log, 1.02, slice(at, None)))
-    assert jump.row == at
-    assert jump.factor == pytest.approx(1.02, abs=0.005)
 
 
 @pytest.mark.parametrize(
