@@ -83,7 +83,7 @@ def siblings(data: Path) -> Iterator[Case]:
                 files = partial(_sibling, data, drive, make)
                 yield Case(drive, fault, cause, files, untouched, KNOWN_CURES.get(fault, ""))
     for fault, form, cause in (
-        ("", _with_angles, ""),
+        ("", with_own_angles, ""),
         ("FLASER, which has no angles", _without_angles, "541 beams over 270°"),
         ("headings in degrees", _headings_in_degrees, "headings of odometry are in degrees"),
     ):
@@ -108,7 +108,7 @@ def _sibling(data: Path, drive: str, fault: Fault, folder: Path) -> tuple[Path, 
     else:
         log = (_with_own_map if drive == URG else _real)(_recording(data, drive))
     log, path = fault(log), folder / "sibling.log"
-    path.write_bytes(_with_angles(log))
+    path.write_bytes(with_own_angles(log))
     if log.truth is None:
         return path, ["--relations", str(data / f"{drive}.relations")]
     return path, _reference(log, folder)
@@ -136,7 +136,7 @@ def _reference(log: LaserLog, folder: Path) -> list[str]:
     return ["--reference", str(truth)]
 
 
-def _with_angles(log: LaserLog) -> bytes:
+def with_own_angles(log: LaserLog) -> bytes:
     """A log as CARMEN's newer records, whose poses are its odometry."""
     assert log.odometry is not None
     # By its host alone a reader would know that the poses may be no odometry.
@@ -145,7 +145,7 @@ def _with_angles(log: LaserLog) -> bytes:
 
 def _headings_in_degrees(log: LaserLog) -> bytes:
     """A log whose poses have headings in degrees."""
-    lines = [line.split(b" ") for line in _with_angles(log).split(b"\n")]
+    lines = [line.split(b" ") for line in with_own_angles(log).split(b"\n")]
     for line in lines:
         # Behind the poses of laser and robot are so many values.
         behind = {b"ROBOTLASER1": 8, b"FLASER": 3}.get(line[0])
@@ -194,7 +194,7 @@ def _with_own_map(path: Path) -> LaserLog:
     """A drive that no reference knows, as a text log has it: the truth is its own map."""
     log = replace(read_log(str(path)), beam_times=None, path=None, odometry_path=None)
     with TemporaryDirectory() as folder:
-        Path(folder, "own.log").write_bytes(_with_angles(log))
+        Path(folder, "own.log").write_bytes(with_own_angles(log))
         truth = build_graph(read_log(str(Path(folder, "own.log")))).poses
     return replace(log, truth_times=log.times, truth=truth)
 

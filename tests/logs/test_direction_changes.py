@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -11,13 +12,13 @@ from nscan_cli.logs.direction_changes import DirectionChangeOptions, as_before
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.logs.load import read_log
 from nscan_cli.logs.reading_options import ReadingOptions
-from tests.benchmarks.stranger_cases import _with_angles
+from tests.benchmarks.stranger_cases import with_own_angles
 from tests.data import data_file
 from tests.logs.test_robot_parts import office_log, table_of
 from tests.simulation import faults
 
 HALF, THIRD = slice(200, None), slice(133, 266)
-CHANGES = {
+CHANGES: dict[str, tuple[Callable[[LaserLog], LaserLog], str]] = {
     "turned by 90° for a third": (lambda log: faults.turned_in(log, 0.5 * np.pi, THIRD), "133 to 265"),
     "turned by 30°": (lambda log: faults.turned_in(log, np.pi / 6, HALF), "200 to 399"),
     "twice as far apart": (lambda log: faults.beams_apart(log, 2.0, HALF), "200 to 399"),
@@ -31,9 +32,7 @@ CHANGES = {
 def checked(log: LaserLog) -> tuple[LaserLog, list[str]]:
     """The log with the directions that are used, and what is said."""
     directions, said = as_before(table_of(log), log.beam_counts(), 1, DirectionChangeOptions())
-    return log.__class__(
-        **{**vars(log), "angle_min": directions.first, "angle_increment": directions.step}
-    ), said
+    return replace(log, angle_min=directions.first, angle_increment=directions.step), said
 
 
 @pytest.mark.parametrize("name", CHANGES)
@@ -67,7 +66,7 @@ def test_jitter_and_the_other_order_are_no_such_change():
 def test_in_doubt_the_options_are_named_that_read_all_scans_as_before(tmp_path):
     whole = read_log(str(data_file("mit-csail.log.gz")))
     path = tmp_path / "csail.log"
-    path.write_bytes(_with_angles(faults.beams_apart(whole, 2.0, slice(len(whole) // 2, None))))
+    path.write_bytes(with_own_angles(faults.beams_apart(whole, 2.0, slice(len(whole) // 2, None))))
     (said,) = read_log(str(path)).report.contradictions
     assert said.startswith("from scan 994 on the beams begin at -180° in steps of 1° by the file")
     assert said.endswith("try --angle-min -90 --angle-increment 0.5")
@@ -79,7 +78,7 @@ def test_in_doubt_the_options_are_named_that_read_all_scans_as_before(tmp_path):
 
 def test_a_log_is_read_so_and_says_so(tmp_path):
     path = tmp_path / "office.log"
-    path.write_bytes(_with_angles(faults.turned_in(office_log(), 0.5 * np.pi, THIRD)))
+    path.write_bytes(with_own_angles(faults.turned_in(office_log(), 0.5 * np.pi, THIRD)))
     read, as_recorded = read_log(str(path)), read_log(str(path), ReadingOptions(as_recorded=True))
     (said,) = read.report.contradictions
     assert "these directions are used; --as-recorded believes the file" in said

@@ -53,7 +53,8 @@ def last_pose(end_points: int, odometry_stands: bool = False, max_odometry_surpr
     scans.append(corridor(places[-1], END - 0.3, end_points, rng))
     scan = ScanTrackingOptions(max_odometry_surprise=max_odometry_surprise)
     found = Tracker(TrackingOptions(scan=scan)).track(sensed(scans, odometry))
-    return found.poses[-1] - odometry[-1]
+    off: Array = found.poses[-1] - odometry[-1]
+    return off
 
 
 def test_something_that_comes_nearer_does_not_outweigh_good_odometry():
