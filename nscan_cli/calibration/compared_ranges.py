@@ -9,11 +9,9 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from nscan_cli.calibration.options import FileCheckOptions
 from nscan_cli.calibration.range_jump_options import RangeJumpOptions
-from nscan_cli.kernels.decorators import kernel, leaf_kernel
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.poses import Array, Indices, compose, relative
 
@@ -65,64 +63,29 @@ def _factors(log: LaserLog, first: Indices, options: RangeJumpOptions) -> tuple[
     """(n, B) the logarithms of the ranges of the scans behind successive rows (n,), divided by those that
     these scans predict; nan where there is none. The second are those as if the later scans were mirror
     images."""
-    every = max(log.ranges.shape[1] // options.max_beams, 1)
-    found = np.full((2, len(first), -(-log.ranges.shape[1] // every)), np.nan)
-    steps = laser_steps(log, first, first + 1)
-    _write_factors(log.ranges, log.angle_min, log.angle_increment, int(first[0]), steps, every, found)
-    return found[0], found[1]
+    last, width = first + 1, log.ranges.shape[1]
+    beams = np.arange(0, width, max(width // options.max_beams, 1))
+    steps = laser_steps(log, first, last)[:, :, None]
+    lengths = log.ranges[first[0] : last[-1], beams].astype(np.float64)
+    lengths[~np.isfinite(lengths)] = np.nan
+    angles = log.angle_min[first, None] + beams * log.angle_increment[first, None]
+    x, y = lengths * np.cos(angles) - steps[:, 0], lengths * np.sin(angles) - steps[:, 1]
+    directions, predicted = np.arctan2(y, x) - steps[:, 2], np.hypot(x, y)
+    as_read, mirrored = (
+        np.log(_ranges_along(log, last, each) / predicted) for each in (directions, -directions)
+    )
+    return as_read, mirrored
 
 
-@kernel
-def _write_factors(
-    ranges: NDArray[np.float32],
-    angle_min: Array,
-    angle_increment: Array,
-    begin: int,
-    steps: Array,
-    every: int,
-    found: Array,
-) -> None:
-    """Write what `_factors` gives (2, n, B), of successive scans from row `begin` on, between which the laser
-    makes steps (n, 3)."""
-    directions, start, between = np.empty((ranges.shape[1], 2)), np.nan, np.nan
-    for k in range(len(steps)):
-        i, x0, y0, turn = begin + k, steps[k, 0], steps[k, 1], steps[k, 2]
-        if angle_min[i] != start or angle_increment[i] != between:
-            start, between = angle_min[i], angle_increment[i]
-            write_directions(directions, start, between, every)
-        around, per_beam = beams_around(angle_increment[i + 1]), 1.0 / angle_increment[i + 1]
-        for beam in range(0, ranges.shape[1], every):
-            if not np.isfinite(ranges[i, beam]):
-                continue
-            length = np.float64(ranges[i, beam])
-            x, y = length * directions[beam, 0] - x0, length * directions[beam, 1] - y0
-            direction, predicted = np.arctan2(y, x) - turn, np.sqrt(x * x + y * y)
-            for side in range(2):
-                towards = direction if side == 0 else -direction
-                seen = beam_at((towards - angle_min[i + 1]) * per_beam, around)
-                if seen < ranges.shape[1] and np.isfinite(ranges[i + 1, seen]):
-                    found[side, k, beam // every] = np.log(ranges[i + 1, seen] / predicted)
-
-
-@leaf_kernel
-def write_directions(out: Array, begin: float, between: float, every: int) -> None:
-    """Write the cosine and the sine (B, 2) of one in `every` of the directions of a scan."""
-    for beam in range(0, len(out), every):
-        out[beam, 0], out[beam, 1] = np.cos(begin + beam * between), np.sin(begin + beam * between)
-
-
-@leaf_kernel
-def beams_around(between: float) -> int:
-    """How many beams that are `between` (rad) apart go all around."""
-    return max(round(2 * np.pi / abs(between)), 1)
-
-
-@leaf_kernel
-def beam_at(place: float, around: int) -> int:
-    """The number of the beam nearest to a place among those of a scan, of which `around` go all around."""
-    beam = int(np.floor(place + 0.5))
-    # A division takes as long as all else.
-    return beam if 0 <= beam < around else beam % around
+def _ranges_along(log: LaserLog, rows: Indices, directions: Array) -> Array:
+    """(n, B) the ranges of scans in rows (n,) along directions (n, B), rad; nan for none."""
+    between = log.angle_increment[rows, None]
+    places = np.round((directions - log.angle_min[rows, None]) / between)
+    is_told = np.isfinite(places)
+    at = (np.where(is_told, places, 0.0) % np.round(2 * np.pi / np.abs(between))).astype(np.int64)
+    is_told &= at < log.ranges.shape[1]
+    found = log.ranges[rows[:, None], np.where(is_told, at, 0)].astype(np.float64)
+    return np.where(is_told & np.isfinite(found), found, np.nan)
 
 
 def laser_steps(log: LaserLog, first: Indices, last: Indices) -> Array:

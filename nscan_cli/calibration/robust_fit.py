@@ -6,8 +6,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from nscan_cli.kernels.decorators import kernel
-from nscan_cli.matching.small_matrices import solve_definite
 from nscan_cli.poses import Array, Indices
 
 SWEEPS, FIRST_SWEEPS = 30, 10
@@ -22,8 +20,6 @@ MOST_CONDITION = 1e12
 """A system with a larger condition number leaves a value open."""
 MOST_LEVERAGE = 0.99
 """Factor of the leverage of each equation: with a leverage of 1 its residual would be divided by 0."""
-LEAST_INFORMATION = 1e-14
-"""Share of all information that keeps a value at 0 that the equations leave open."""
 LEAST_SIGMA = 1e-9
 """Least standard deviation of the residuals, to divide by."""
 
@@ -48,59 +44,34 @@ def robust_fit(coefficients: Array, measured: Array, groups: Indices | None = No
     Iteratively reweighted least squares (P. Huber, "Robust Statistics", 1981), from the solution of least
     absolute values. An equation is a block of d rows, and gets one weight.
     """
-    values, residuals = np.zeros(coefficients.shape[2]), np.zeros(len(coefficients))
-    rows = np.ascontiguousarray(coefficients, dtype=np.float64)
-    sigma = _reweight(rows, np.ascontiguousarray(measured, dtype=np.float64), values, residuals)
+    n, d, m = coefficients.shape
+    weights = np.ones(n)
+    values: Array = np.zeros(m)
+    residuals: Array = np.zeros(n)
+    rows, wanted = coefficients.reshape(n * d, m), measured.ravel()
+    before: Array = np.full(m, np.inf)
+    for sweep in range(SWEEPS):
+        weighted = (coefficients * weights[:, None, None]).reshape(n * d, m).T
+        # What the equations leave open is 0.
+        solution = np.linalg.lstsq(weighted @ rows, weighted @ wanted, rcond=None)
+        values = np.asarray(solution[0], dtype=np.float64)
+        residuals = np.sqrt(((rows @ values - wanted).reshape(n, d) ** 2).sum(axis=1))
+        sigma = max(TO_SIGMA * _median(residuals) / np.sqrt(d), LEAST_SIGMA)
+        if sweep > FIRST_SWEEPS and np.abs(values - before).max() <= SETTLED * np.abs(values).max():
+            break
+        before = values
+        if sweep < FIRST_SWEEPS:
+            weights = 1.0 / np.maximum(residuals, sigma / CAUCHY)
+        else:
+            weights = 1.0 / (1.0 + (residuals / (CAUCHY * sigma)) ** 2)
     off = coefficients @ values - measured
     return RobustFit(values, _covariance(coefficients, off, CAUCHY * sigma, groups), residuals)
 
 
-def median(values: Array) -> float:
+def _median(values: Array) -> float:
     """The median of values (n,), faster than by np.median."""
     ordered = np.sort(values)
     return 0.5 * float(ordered[(len(values) - 1) // 2] + ordered[len(values) // 2])
-
-
-@kernel
-def _reweight(coefficients: Array, measured: Array, values: Array, residuals: Array) -> float:
-    """Write values (m,) and residuals (n,); returns the standard deviation of these along one axis."""
-    n, d, m = coefficients.shape
-    weights, before = np.ones(n), np.full(m, np.inf)
-    normal, right, sigma = np.empty((m, m)), np.empty(m), 0.0
-    for sweep in range(SWEEPS):
-        normal[:], right[:] = 0.0, 0.0
-        for i in range(n):
-            for k in range(d):
-                for a in range(m):
-                    weighted = weights[i] * coefficients[i, k, a]
-                    right[a] += weighted * measured[i, k]
-                    for b in range(a + 1):
-                        normal[a, b] += weighted * coefficients[i, k, b]
-        # What the equations leave open is 0.
-        open_weight = LEAST_INFORMATION * np.trace(normal)
-        for a in range(m):
-            normal[a, a] += open_weight
-        if not solve_definite(normal, right, values):
-            values[:] = 0.0
-        for i in range(n):
-            square = 0.0
-            for k in range(d):
-                off = -measured[i, k]
-                for a in range(m):
-                    off += coefficients[i, k, a] * values[a]
-                square += off * off
-            residuals[i] = np.sqrt(square)
-        ordered = np.sort(residuals)
-        sigma = max(TO_SIGMA * 0.5 * (ordered[(n - 1) // 2] + ordered[n // 2]) / np.sqrt(d), LEAST_SIGMA)
-        if sweep > FIRST_SWEEPS and np.abs(values - before).max() <= SETTLED * np.abs(values).max():
-            break
-        before[:] = values
-        for i in range(n):
-            if sweep < FIRST_SWEEPS:
-                weights[i] = 1.0 / max(residuals[i], sigma / CAUCHY)
-            else:
-                weights[i] = 1.0 / (1.0 + (residuals[i] / (CAUCHY * sigma)) ** 2)
-    return sigma
 
 
 def _covariance(coefficients: Array, off: Array, scale: float, groups: Indices | None) -> Array:

@@ -11,7 +11,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nscan_cli.calibration.sweep_options import ScanTurnOptions
-from nscan_cli.kernels.decorators import kernel, reduction_kernel
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.poses import Array, Indices
 
@@ -25,29 +24,10 @@ def scan_turns(log: LaserLog, first: Indices, last: Indices, options: ScanTurnOp
     before, after = _profiles(log, first, cells), _profiles(log, last, cells)
     around = np.concatenate([before[:, -most:], before, before[:, :most]], axis=1)
     costs = np.empty((len(first), 2 * most + 1))
-    _compare(around, after, options.max_difference, costs)
+    for shift in range(2 * most + 1):
+        apart = np.abs(around[:, shift : shift + cells] - after)
+        costs[:, shift] = np.minimum(apart, np.float32(options.max_difference)).sum(axis=1)
     return (_lowest(costs) - most) * (2 * np.pi / cells)
-
-
-@kernel
-def _compare(
-    around: NDArray[np.float32], after: NDArray[np.float32], max_difference: float, costs: Array
-) -> None:
-    """Write the sum of the differences, m, of ranges (n, cells) to those of others, shifted by m cells
-    (n, m)."""
-    for row in range(costs.shape[0]):
-        for shift in range(costs.shape[1]):
-            costs[row, shift] = _sum_of_differences(
-                around[row, shift : shift + after.shape[1]], after[row], np.float32(max_difference)
-            )
-
-
-@reduction_kernel
-def _sum_of_differences(one: NDArray[np.float32], other: NDArray[np.float32], most: np.float32) -> float:
-    total = np.float32(0.0)
-    for k in range(len(other)):
-        total += min(abs(one[k] - other[k]), most)
-    return float(total)
 
 
 def _profiles(log: LaserLog, rows: Indices, cells: int) -> NDArray[np.float32]:

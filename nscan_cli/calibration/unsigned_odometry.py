@@ -7,7 +7,6 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from nscan_cli.calibration.compared_ranges import beam_at, beams_around, write_directions
 from nscan_cli.calibration.measured_steps import measure_steps
 from nscan_cli.calibration.odometry_options import UnsignedOdometryOptions
 from nscan_cli.calibration.options import StepOptions
@@ -181,9 +180,11 @@ def _range_errors(
         if angle_min[i] != begin or angle_increment[i] != between:
             # Nearly all scans of a log have the same directions.
             begin, between = angle_min[i], angle_increment[i]
-            write_directions(directions, begin, between, every)
+            for beam in range(0, ranges.shape[1], every):
+                angle = begin + beam * between
+                directions[beam, 0], directions[beam, 1] = np.cos(angle), np.sin(angle)
         c, s = np.cos(motion[2]), np.sin(motion[2])
-        around, per_beam = beams_around(angle_increment[j]), 1.0 / angle_increment[j]
+        around = round(2 * np.pi / abs(angle_increment[j]))
         total, count = 0.0, 0
         for beam in range(0, ranges.shape[1], every):
             if not np.isfinite(ranges[i, beam]):
@@ -191,7 +192,7 @@ def _range_errors(
             length = np.float64(ranges[i, beam])
             dx, dy = length * directions[beam, 0] - motion[0], length * directions[beam, 1] - motion[1]
             x, y = c * dx + s * dy, c * dy - s * dx
-            at = beam_at((np.arctan2(y, x) - angle_min[j]) * per_beam, around)
+            at = round((np.arctan2(y, x) - angle_min[j]) / angle_increment[j]) % around
             if at < ranges.shape[1] and np.isfinite(ranges[j, at]):
                 total += min(abs(np.sqrt(x * x + y * y) - ranges[j, at]), max_error)
                 count += 1
