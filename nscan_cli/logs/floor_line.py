@@ -93,8 +93,9 @@ def floor_line(
     """The line of the floor in the scans of a log, outside some sectors; None if they show none, or the robot
     never turns."""
     first, step = float(table.angle_min[table.rows[0]]), float(table.angle_increment[table.rows[0]])
-    every = max(round(options.step / abs(step)), 1) if step else 1
-    bearings = np.sort(first + step * np.arange(0, table.ranges.shape[1], every))
+    beams = table.ranges.shape[1]
+    every = int(np.clip(options.step / max(abs(step), 1e-12), 1, max(beams, 1)))
+    bearings = np.sort(first + step * np.arange(0, beams, every))
     bearings = bearings[~in_sectors(bearings, sectors)]
     ranges = ranges_at(table, evenly(len(table.rows), options.scans), bearings)
     line = _fitted(ranges, bearings, options)
