@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import itertools
 import math
+from collections import Counter
 from dataclasses import dataclass
 
 import numpy as np
@@ -70,20 +71,19 @@ def as_before(
         else:
             groups.append([part])
             doubts += [part[0]] if gain > -options.min_gain else []
-    written = [(float(first[begin]), float(step[begin])) for begin, _ in parts]
-    lengths = {
-        each: sum(end - begin for other, (begin, end) in zip(written, parts, strict=True) if other == each)
-        for each in written
-    }
+    written = {part: (float(first[part[0]]), float(step[part[0]])) for part in parts}
+    lengths = Counter[tuple[float, float]]()
+    for (begin, end), directions in written.items():
+        lengths[directions] += end - begin
     said = list[str]()
     for group in groups:
-        used = max((written[parts.index(part)] for part in group), key=lambda each: lengths[each])
-        wrong = [part for part in group if written[parts.index(part)] != used]
+        used = max((written[part] for part in group), key=lambda each: lengths[each])
+        wrong = [part for part in group if written[part] != used]
         for begin, end in wrong:
             some = table.rows[begin:end]
             found.first[some], found.step[some] = used
         if wrong:
-            told = _named(*written[parts.index(wrong[0])])
+            told = _named(*written[wrong[0]])
             names = stretch_names((begin, end - 1) for begin, end in wrong)
             said.append(
                 f"the beams of scans {names} begin at {told} by the file, but see what those of the others "
@@ -112,7 +112,7 @@ def _gain_of_numbers(table: ScanTable, place: int, options: DirectionChangeOptio
     those in the same direction saw, as a share; the least of three pairs of scans."""
     last, gains = len(table.rows) - 1, []
     for one, other in ((place - 1, place), (max(place - 2, 0), place), (place - 1, min(place + 1, last))):
-        by_number, by_file = _bearings(table, one), _bearings(table, other)
+        by_number, by_file = _directions_at(table, one), _directions_at(table, other)
         seen = ranges_at(table, np.array([other]), by_file)[0]
         # The robot may turn meanwhile, by less than what is to be told.
         most = min(options.max_turn, 0.4 * float(np.abs(by_file - by_number)[[0, -1]].max()))
@@ -128,7 +128,7 @@ def _gain_of_numbers(table: ScanTable, place: int, options: DirectionChangeOptio
     return min(gains) if min(gains) > 0.0 else max(gains)
 
 
-def _bearings(table: ScanTable, place: int) -> Array:
+def _directions_at(table: ScanTable, place: int) -> Array:
     """(B,) the directions of the scan at a place in order of time, rad."""
     row = table.rows[place]
     found: Array = table.angle_min[row] + table.angle_increment[row] * np.arange(table.ranges.shape[1])
