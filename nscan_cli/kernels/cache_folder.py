@@ -28,6 +28,7 @@ COMPILER_SOURCES = {
     "kernels/cache_folder.py",
     "kernels/decorators.py",
     "kernels/machine_code.py",
+    "kernels/numba_shortcuts.py",
     "kernels/whole_kernels.py",
 }
 """Files of the package that decide how machine code is compiled and cached."""

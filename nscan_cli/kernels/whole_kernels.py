@@ -13,6 +13,8 @@ import gc
 from collections.abc import Iterator
 from typing import Any, cast
 
+from nscan_cli.kernels.numba_shortcuts import numba_shortcuts
+
 NEVER = 1_000_000
 """Collections of the second generation before a full one: more than there are in a process."""
 
@@ -47,7 +49,7 @@ def compile_whole(dispatcher: Any, types: tuple[Any, ...]) -> Any:
     from numba.core.registry import cpu_target
 
     options, target = dispatcher.targetoptions, cast(Any, cpu_target.target_context)
-    with _modules_alone(), _without_full_collections():
+    with _modules_alone(), _without_full_collections(), numba_shortcuts():
         dispatcher.get_call_template(types, {})
         called = dispatcher.overloads[types]
         context = target.subtarget(enable_nrt=options.get("_nrt", True))

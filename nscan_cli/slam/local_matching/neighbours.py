@@ -6,7 +6,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from nscan_cli.kernels.decorators import kernel
 from nscan_cli.poses import Array, Indices, Mask
 from nscan_cli.slam.local_matching.options import NScanOptions
 
@@ -31,45 +30,18 @@ def choose_neighbours(poses: Array, paths: Array, centre: int, options: NScanOpt
     the same again.
     """
     first = options.max_other_visits if options.loops else 0
-    return Neighbours(
-        *_choose(poses, paths, centre, options.radius, options.visit_path, first, options.max_scans)
-    )
-
-
-@kernel
-def _choose(
-    poses: Array, paths: Array, centre: int, radius: float, recent: float, first_visits: int, most: int
-) -> tuple[Indices, Mask, int]:
-    """The kernel of choose_neighbours. Keyframes more than `recent` (m) of path apart are of different
-    visits."""
-    near, distances = np.empty(len(poses), dtype=np.int64), np.empty(len(poses))
-    before, left_out = np.empty(len(poses), dtype=np.bool_), np.empty(len(poses), dtype=np.bool_)
-    n = visits = others = 0
-    visit, last = -1, -np.inf
-    for k in range(len(poses)):
-        dx, dy = poses[k, 0] - poses[centre, 0], poses[k, 1] - poses[centre, 1]
-        if abs(dx) > radius or abs(dy) > radius:
-            continue
-        distance = np.sqrt(dx * dx + dy * dy)
-        if distance > radius:
-            continue
-        near[n], distances[n] = k, distance
-        before[n] = left_out[n] = abs(paths[centre] - paths[k]) > recent
-        if before[n] and first_visits > 0:
-            visit += paths[k] - last > recent
-            last = paths[k]
-            left_out[n] = visit >= first_visits
-            others += not left_out[n]
-            if k < centre:
-                visits = visit + 1
-        n += 1
-    order, chosen = np.argsort(distances[:n], kind="mergesort"), np.zeros(n, dtype=np.bool_)
-    room = most - min(others, most // 2)
-    taken = 0
-    for of_before in (False, True):
-        for at in order:
-            if taken < room and before[at] == of_before and not left_out[at]:
-                chosen[at] = True
-                taken += 1
-        room = most
-    return near[:n][chosen], before[:n][chosen], visits
+    squared = np.square(poses[:, 0] - poses[centre, 0]) + np.square(poses[:, 1] - poses[centre, 1])
+    near = np.flatnonzero(squared <= options.radius**2)
+    before = np.abs(paths[centre] - paths[near]) > options.visit_path
+    left_out, visits = before.copy(), 0
+    if first and before.any():
+        earlier = paths[near[before]]
+        visit = np.cumsum(np.diff(earlier, prepend=-np.inf) > options.visit_path)
+        left_out[before] = visit > first
+        visits = int(visit[near[before] < centre][-1:].sum())
+    order = np.argsort(squared[near], kind="stable")
+    order = order[~left_out[order]]
+    others = order[before[order]]
+    same = order[~before[order]][: options.max_scans - min(len(others), options.max_scans // 2)]
+    chosen = np.sort(np.concatenate([same, others[: options.max_scans - len(same)]]))
+    return Neighbours(near[chosen], before[chosen], visits)

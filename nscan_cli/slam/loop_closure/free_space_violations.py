@@ -123,7 +123,7 @@ def _compare_views(
     """
     poses, ends, end = views.poses, views.ends, min(end, len(views.paths))
     counts, pose = np.zeros((end - first, 2, 2), dtype=np.int64), np.empty(3)
-    near, distances = np.empty(end, dtype=np.int64), np.empty(end)
+    near, distances = np.empty(options.compared, dtype=np.int64), np.empty(options.compared)
     for k in range(first, end):
         # Of a frozen laser nothing can be compared.
         if ends[k + 1] == ends[k]:
@@ -135,12 +135,15 @@ def _compare_views(
                 if is_recent != (within == 1) or ends[j + 1] == ends[j]:
                     continue
                 distance = np.hypot(poses[j, 0] - poses[k, 0], poses[j, 1] - poses[k, 1])
-                if distance <= radius:
-                    near[n], distances[n] = j, distance
-                    n += 1
-            order = np.argsort(distances[:n], kind="mergesort")
-            for at in order[: options.compared]:
-                j = near[at]
+                if distance > radius or (n == options.compared and distance >= distances[-1]):
+                    continue
+                n = min(n + 1, options.compared)
+                at = n - 1
+                while at > 0 and distances[at - 1] > distance:
+                    near[at], distances[at] = near[at - 1], distances[at - 1]
+                    at -= 1
+                near[at], distances[at] = j, distance
+            for j in near[:n]:
                 relative_pose(poses[k], poses[j], pose)
                 _count_violations(views, options, k, j, pose, counts[k - first, within])
                 relative_pose(poses[j], poses[k], pose)

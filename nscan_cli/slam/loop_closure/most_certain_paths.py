@@ -80,7 +80,6 @@ def _links_of(relation: Relation, rows: Indices) -> Links:
     return Links(np.full(len(others), nodes[term.fixed]), nodes[others], covariances)
 
 
-@kernel
 def most_certain_paths(links: Links, poses: Array, origin: int, lever_arm: float) -> tuple[Array, Indices]:
     """The most certain path from one pose to each of all (K, 3): covariances (K, 3, 3) along it, or inf.
 
@@ -89,7 +88,19 @@ def most_certain_paths(links: Links, poses: Array, origin: int, lever_arm: float
 
     E. Dijkstra, "A note on two problems in connexion with graphs", 1959.
     """
-    starts, incident = _incident(links, len(poses))
+    ends = np.column_stack([links.held, links.other]).ravel()
+    order = np.argsort(ends, kind="stable")
+    starts = np.searchsorted(ends[order], np.arange(len(poses) + 1))
+    return _most_certain_paths(links, (starts, order // 2), poses, origin, lever_arm)
+
+
+@kernel
+def _most_certain_paths(
+    links: Links, incident: tuple[Indices, Indices], poses: Array, origin: int, lever_arm: float
+) -> tuple[Array, Indices]:
+    """The kernel of most_certain_paths. `incident` has where the links at each node begin (K + 1,), and their
+    indices (2E,)."""
+    starts, at_node = incident
     covariances, best = np.full((len(poses), 3, 3), np.inf), np.full(len(poses), np.inf)
     by, done = np.full(len(poses), -1), np.zeros(len(poses), dtype=np.bool_)
     before = np.full(len(poses), -1)
@@ -103,7 +114,7 @@ def most_certain_paths(links: Links, poses: Array, origin: int, lever_arm: float
         if by[here] >= 0:
             before[here] = links.held[by[here]] + links.other[by[here]] - here
             _follow(links, by[here], here, poses, covariances)
-        for link in incident[starts[here] : starts[here + 1]]:
+        for link in at_node[starts[here] : starts[here + 1]]:
             there, own = links.held[link] + links.other[link] - here, links.covariances[link]
             farther = cost + own[0, 0] + own[1, 1] + lever_arm * lever_arm * own[2, 2]
             if farther < best[there]:
@@ -122,15 +133,6 @@ def relations_on_paths(before: Indices, wanted: Mask) -> Mask:
             here = before[here]
             on[here] = True
     return on
-
-
-@kernel
-def _incident(links: Links, nodes: int) -> tuple[Indices, Indices]:
-    """The links at each node: where they begin (K + 1,), and their indices (2E,)."""
-    ends = np.empty(2 * links.held.shape[0], dtype=np.int64)
-    ends[::2], ends[1::2] = links.held, links.other
-    order = np.argsort(ends, kind="mergesort")
-    return np.searchsorted(ends[order], np.arange(nodes + 1)), order // 2
 
 
 @kernel
