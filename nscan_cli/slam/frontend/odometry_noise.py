@@ -1,9 +1,9 @@
 """Step 1 with odometry: how good the odometry of this robot is, learned during tracking.
 
 Odometry differs from robot to robot by a factor of ten. Over each piece of the path along which all scans
-tell their place, the distance by scans is compared with that by odometry. The difference has the noise of
-both, so it is an upper bound on that of odometry. A prior as narrow as this bound keeps good odometry where
-scans tell little.
+tell their place, the distance by scans is compared with that by odometry, without its bias. The difference
+has the noise of both, so it is an upper bound on that of odometry. A prior as narrow as this bound keeps good
+odometry where scans tell little.
 """
 
 from __future__ import annotations
@@ -17,6 +17,12 @@ from nscan_cli.kernels.decorators import kernel
 from nscan_cli.matching.pose_kernels import relative_pose, wrapped
 from nscan_cli.matching.small_matrices import information_of_place
 from nscan_cli.poses import Array
+from nscan_cli.slam.frontend.odometry_bias import (
+    OdometryBias,
+    OdometryBiasOptions,
+    learn_bias,
+    take_out_bias,
+)
 
 SAMPLES, PATH, TELLING = 0, 1, 2
 """Places in `OdometryNoise.counts`: the pieces of the path that were compared, the length (m) of the present
@@ -39,6 +45,8 @@ class OdometryNoiseOptions(NamedTuple):
     min_share: float = 0.1
     """Least share of the standard deviation of `trusted_odometry` that a prior keeps. A larger share trusts
     good odometry less."""
+    bias: OdometryBiasOptions = OdometryBiasOptions()
+    """When what is the same in all pieces is taken out."""
 
 
 class OdometryNoise(NamedTuple):
@@ -52,11 +60,13 @@ class OdometryNoise(NamedTuple):
     """(2,) mean square difference of both ways: of a coordinate, m² a metre; of the angle, rad² a metre."""
     counts: Array
     """(3,) SAMPLES, PATH and TELLING."""
+    bias: OdometryBias
+    """What is the same in all pieces."""
 
     @classmethod
     def begin(cls) -> OdometryNoise:
         """Nothing is known."""
-        return cls(np.zeros(3), np.full(3, np.nan), np.zeros(2), np.zeros(3))
+        return cls(np.zeros(3), np.full(3, np.nan), np.zeros(2), np.zeros(3), OdometryBias.begin())
 
 
 @kernel
@@ -86,6 +96,8 @@ def learn_noise(
     if np.isfinite(noise.odometry[0]) and counts[TELLING] > 0.0:
         relative_pose(pose, noise.pose, way)
         relative_pose(odometry, noise.odometry, by_odometry)
+        learn_bias(noise.bias, options.bias, way, by_odometry, counts[PATH])
+        take_out_bias(noise.bias, options.bias, by_odometry, counts[PATH])
         off, turned = way - by_odometry, wrapped(way[2] - by_odometry[2])
         counts[SAMPLES] += 1.0
         weight = max(1.0 / counts[SAMPLES], options.smoothing)

@@ -9,6 +9,7 @@ from nscan_cli.matching.motion_model import MotionModel, Prior, motion_sigmas
 from nscan_cli.matching.pose_kernels import composed_pose, relative_pose, wrapped
 from nscan_cli.poses import Array
 from nscan_cli.slam.frontend.constant_velocity import constant_velocity
+from nscan_cli.slam.frontend.odometry_bias import take_out_bias
 from nscan_cli.slam.frontend.odometry_noise import learned_shares
 from nscan_cli.slam.frontend.options import ScanTrackingOptions
 from nscan_cli.slam.frontend.track_state import TrackState
@@ -25,12 +26,14 @@ def predict(
 ) -> None:
     """Write the prior on the next scan's pose, in the tracker's frame; its odometry (3,) may be nan.
 
+    What is known of the bias of the odometry is taken out.
     `motion` has the deviations of the odometry.
     """
     last, step = track.poses[-1], np.empty(3)
     if np.isfinite(odometry[0]) and np.isfinite(track.odometry[0]):
         relative_pose(odometry, track.odometry, step)
-        step[2] = wrapped(step[2])
+        length = np.hypot(step[0], step[1])
+        take_out_bias(track.odometry_noise.bias, options.odometry_noise.bias, step, length)
         along, about = motion_sigmas(step, motion)
     else:
         # The step to a lost scan is a guess, and tells no velocity by itself.
