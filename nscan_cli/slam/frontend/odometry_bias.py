@@ -25,12 +25,12 @@ class OdometryBiasOptions(NamedTuple):
     """Nothing is taken out before this number of pieces of the path. A larger number takes it out later."""
     smoothing: float = 0.1
     """Least weight of a new piece in the mean. A larger weight follows changes faster."""
-    sigmas: float = 4.0
+    sigmas: float = 8.0
     """A bias is certain if it exceeds this number of its standard deviations. A larger number takes it out
     later."""
     min_length: float = 0.05
     """Least share by which ways are too long or too short. A larger share leaves odometry as it is."""
-    min_turn: float = 0.02
+    min_turn: float = 0.03
     """Least turn along straight ways, rad/m. A larger one leaves odometry as it is."""
 
 
