@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -60,7 +61,7 @@ def find_contradictions(
     turns = evidence.turns
     is_doubtful = evidence.disagreement > options.clock.max_disagreement
     if turns is not None and (is_doubtful or not turns_agree(turns, options)):
-        found = _of_clocks(log, evidence.steps, reading, options)
+        found = _of_clocks(log, evidence.steps, reading, options, known)
         if found:
             return found
     changed = _of_change(log, evidence, reading, options)
@@ -101,23 +102,31 @@ def _evidence(
     """
     count, most = options.steps.count, min(int(0.5 * options.max_share * len(log)), options.more_steps)
     while True:
-        steps = no_steps()
-        first, last = telling_steps(log, options.steps, count)
-        for part in range(options.parts):
-            some = slice(part, None, options.parts)
-            part_of_all = measure_steps(log, (first[some], last[some]), options.steps, known=known)
-            steps = steps.with_others(part_of_all)
-            evidence = StepEvidence(odometry, steps, options)
+        for evidence in _growing(log, odometry, count, options, known):
             if agrees_clearly(evidence, log.mount, options):
                 return None
         if evidence.tells_enough or count >= most:
             break
         count = min(2 * count, most)
     if count < options.more_steps and _is_in_doubt(evidence, log.mount, options):
-        rows = telling_steps(log, options.steps, options.more_steps)
-        steps = measure_steps(log, rows, options.steps, known=known)
-        return StepEvidence(odometry, steps, options)
+        # What changes near the beginning or the end is seen in a few steps.
+        may_change = is_view_in_doubt(evidence, log.mount, options)
+        for evidence in _growing(log, odometry, options.more_steps, options, known):
+            is_settled = not may_change and evidence.tells_enough
+            if is_settled and not _is_in_doubt(evidence, log.mount, options):
+                break
     return evidence
+
+
+def _growing(
+    log: LaserLog, odometry: Array, count: int, options: FileCheckOptions, known: KnownSteps
+) -> Iterator[StepEvidence]:
+    """The evidence of one part of a sample of `count` steps, of two of them, and so on."""
+    steps, (first, last) = no_steps(), telling_steps(log, options.steps, count)
+    for part in range(options.parts):
+        some = slice(part, None, options.parts)
+        steps = steps.with_others(measure_steps(log, (first[some], last[some]), options.steps, known=known))
+        yield StepEvidence(odometry, steps, options)
 
 
 def _is_in_doubt(evidence: StepEvidence, mount: Array, options: FileCheckOptions) -> bool:
@@ -209,7 +218,7 @@ def _place(
 
 
 def _of_clocks(
-    log: LaserLog, steps: MeasuredSteps, reading: ReadingOptions, options: FileCheckOptions
+    log: LaserLog, steps: MeasuredSteps, reading: ReadingOptions, options: FileCheckOptions, known: KnownSteps
 ) -> list[Finding]:
     """Findings of the odometry's clock: the offset that explains why turns disagree, if there is one.
 
@@ -217,12 +226,17 @@ def _of_clocks(
     mirrored scans are compared, too.
     """
     tries = [(sign, clock_lag(log, steps, options.clock, sign)) for sign in (1.0, -1.0)]
-    signs = [sign for sign, lag in tries if lag and abs(lag.offset) >= options.clock.min_offset]
+    signs = [sign for sign, lag in tries if lag and _is_offset(lag, options.clock.first_gain, options)]
     if not signs:
         return []
-    steps = measure_steps(log, telling_steps(log, options.steps, options.more_steps), options.steps)
+    rows = telling_steps(log, options.steps, options.more_steps)
+    steps = measure_steps(log, rows, options.steps, known=known)
     lags = [(sign, clock_lag(log, steps, options.clock, sign)) for sign in signs]
-    told = [(lag.disagreement, sign, lag) for sign, lag in lags if lag and _is_offset(lag, options)]
+    told = [
+        (lag.disagreement, sign, lag)
+        for sign, lag in lags
+        if lag and _is_offset(lag, options.clock.gain, options)
+    ]
     if not told:
         return []
     _, sign, lag = min(told)
@@ -232,8 +246,8 @@ def _of_clocks(
     return [findings.two_clocks(lag, reading), findings.opposite_turns(evidence, reading, False, False)]
 
 
-def _is_offset(lag: ClockLag, options: FileCheckOptions) -> bool:
-    is_better = lag.disagreement < options.clock.gain * min(lag.as_stamped, lag.elsewhere)
+def _is_offset(lag: ClockLag, gain: float, options: FileCheckOptions) -> bool:
+    is_better = lag.disagreement < gain * min(lag.as_stamped, lag.elsewhere)
     return is_better and abs(lag.offset) >= options.clock.min_offset
 
 

@@ -43,16 +43,13 @@ def clock_lag(
     at, headings = log.times[known], np.unwrap(log.odometry[known, 2])
     begins, ends = log.times[steps.first], log.times[steps.last]
 
-    def differences(offset: float) -> float:
-        """The sum of the capped differences of all turns, rad."""
-        told = np.interp(ends, at + offset, headings) - np.interp(begins, at + offset, headings)
-        return float(np.minimum(np.abs(told - turns), options.max_difference).sum())
-
     resolution = options.resolution
     span = min(options.span, 0.5 * float(log.times[-1] - log.times[0]))
     count = int(np.ceil(span / resolution))
     offsets = resolution * np.arange(-count, count + 1, dtype=np.float64)
-    off = np.array([differences(by) for by in offsets.tolist()]) / whole
+    told = np.interp(ends - offsets[:, None], at, headings)
+    told -= np.interp(begins - offsets[:, None], at, headings)
+    off = np.minimum(np.abs(told - turns), options.max_difference).sum(axis=1) / whole
     best = int(np.argmin(off))
     is_inside = 0 < best < len(off) - 1
     offset = parabola_minimum(offsets, off) if is_inside else float(offsets[best])

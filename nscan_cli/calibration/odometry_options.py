@@ -20,6 +20,9 @@ class ClockOptions:
     """An offset is found if the turns disagree by less than this share of their disagreement without it, and
     of that anywhere else. With a larger share an offset is found more often, also where there is none.
     Mirrored turns are found in the same way."""
+    first_gain: float = 0.8
+    """More steps are measured where the share of the first few is less than this. A larger value takes
+    longer."""
     max_disagreement: float = 0.8
     """An offset is looked for, however well most turns agree, if turns as stamped disagree by more than this
     share. A larger value takes less time."""
