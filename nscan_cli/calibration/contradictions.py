@@ -102,7 +102,7 @@ def _evidence(
     """
     count, most = options.steps.count, min(int(0.5 * options.max_share * len(log)), options.more_steps)
     while True:
-        for evidence in _growing(log, odometry, count, options, known):
+        for evidence in _growing(log, odometry, count, options.parts, options, known):
             if agrees_clearly(evidence, log.mount, options):
                 return None
         if evidence.tells_enough or count >= most:
@@ -111,7 +111,7 @@ def _evidence(
     if count < options.more_steps and _is_in_doubt(evidence, log.mount, options):
         # What changes near the beginning or the end is seen in a few steps.
         may_change = is_view_in_doubt(evidence, log.mount, options)
-        for evidence in _growing(log, odometry, options.more_steps, options, known):
+        for evidence in _growing(log, odometry, options.more_steps, options.more_parts, options, known):
             is_settled = not may_change and evidence.tells_enough
             if is_settled and not _is_in_doubt(evidence, log.mount, options):
                 break
@@ -119,12 +119,12 @@ def _evidence(
 
 
 def _growing(
-    log: LaserLog, odometry: Array, count: int, options: FileCheckOptions, known: KnownSteps
+    log: LaserLog, odometry: Array, count: int, parts: int, options: FileCheckOptions, known: KnownSteps
 ) -> Iterator[StepEvidence]:
-    """The evidence of one part of a sample of `count` steps, of two of them, and so on."""
+    """The evidence of one of the parts of a sample of `count` steps, of two of them, and so on."""
     steps, (first, last) = no_steps(), telling_steps(log, options.steps, count)
-    for part in range(options.parts):
-        some = slice(part, None, options.parts)
+    for part in range(parts):
+        some = slice(part, None, parts)
         steps = steps.with_others(measure_steps(log, (first[some], last[some]), options.steps, known=known))
         yield StepEvidence(odometry, steps, options)
 

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from nscan_cli.calibration.robust_fit import RobustFit, robust_fit
+from nscan_cli.calibration.robust_fit import RobustFit, median, robust_fit
 from nscan_cli.poses import Array, Indices, compose, relative
 
 
@@ -60,7 +60,7 @@ def fit_turns(laser: Array, odometry: Array, min_turn: float) -> TurnFit | None:
         return None
     seen, told = laser[turning, 2], odometry[turning, 2]
     fit = robust_fit(seen[:, None, None], told[:, None])
-    spread = float(np.median(fit.residuals)) / float(np.median(np.abs(seen)))
+    spread = median(fit.residuals) / median(np.abs(seen))
     return TurnFit(float(fit.values[0]), spread, int(turning.sum()))
 
 
@@ -86,7 +86,7 @@ def fit_mount(
         return None
     motion = np.hypot(laser[:, 0], laser[:, 1]) + metres_per_radian * np.abs(laser[:, 2])
     residual, tail = (np.quantile(fit.residuals, (0.5, 0.75)) / size).tolist()
-    usual = float(np.median(motion))
+    usual = median(motion)
     return MountFit(
         1.0 / size,
         np.array([fit.values[2] / size, fit.values[3] / size, np.arctan2(fit.values[1], fit.values[0])]),

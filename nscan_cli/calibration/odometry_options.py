@@ -117,6 +117,13 @@ class UnsignedOdometryOptions:
     """Approximate number of beams of a scan that are compared, evenly spread. More take longer."""
     min_beams: int = 20
     """Least number of beams of a step that are compared. A larger value compares fewer steps."""
+    first_beams: int = 60
+    """Approximate number of beams of a scan that are compared first. More take longer."""
+    min_first_beams: int = 7
+    """Least number of these beams of a step. A larger value takes less time."""
+    first_error_ratio: float = 0.75
+    """All beams are compared if these are off by less than this share in the other direction, in `min_steps`
+    steps. A larger value takes longer."""
     max_error: float = 0.3
     """Largest difference between a range and its prediction that counts, m: beyond it another thing is seen.
     A larger value gives edges more weight."""

@@ -107,7 +107,7 @@ class CompanionOptions:
 
     scans: int = 100
     """Number of scans that are checked, evenly spread. More take longer."""
-    first_of: int = 3
+    first_of: int = 6
     """One in so many of these is checked first. A larger value takes less time."""
     clear_share: float = 0.1
     """The others are not checked if a smaller share of these has such readings. A smaller value takes
@@ -237,6 +237,9 @@ class FileCheckOptions:
     parts: int = 3
     """The sample is measured in so many parts, each of which is spread over the log; the others are not where
     one clearly agrees with the file. More take less time, and less evidence is then enough."""
+    more_parts: int = 6
+    """The larger sample of a log in doubt is measured in so many parts; the others are not where one settles
+    it. More take less time, and less evidence is then enough."""
     min_clear_steps: int = 8
     """Least number of steps with motion, and with a turn, that clearly agree. A larger value takes longer."""
     clear_share: float = 0.5

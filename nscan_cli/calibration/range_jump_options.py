@@ -22,6 +22,9 @@ class RangeJumpOptions:
     value matches more scans."""
     min_share: float = 0.3
     """Least share of the beams that have. A smaller value matches more scans."""
+    max_beside: float = 0.75
+    """The logarithms of the factors before and behind such a place are less than this share of its own:
+    elsewhere odometry is wrong, or the laser sees little. A larger value matches more scans."""
     max_candidates: int = 48
     """Largest number of places at which scans are matched, those with the largest shares. More take
     longer."""

@@ -73,9 +73,11 @@ def range_jumps(log: LaserLog, compared: ComparedRanges, options: FileCheckOptio
     jumps, logarithms, shares = options.jumps, compared.logarithms, compared.shares
     if len(log) < 4:
         return []
-    is_odd = (np.abs(logarithms) > math.log(jumps.min_factor)) & (shares >= jumps.min_share)
+    sizes = np.abs(np.nan_to_num(logarithms))
+    is_odd = (sizes > math.log(jumps.min_factor)) & (shares >= jumps.min_share)
     # Two scans before each place and two behind are matched.
-    places = np.flatnonzero(is_odd[1:-1]) + 1
+    is_alone = np.maximum(sizes[:-2], sizes[2:]) < jumps.max_beside * sizes[1:-1]
+    places = np.flatnonzero(is_odd[1:-1] & is_alone) + 1
     best = places[np.argsort(-shares[places], kind="stable")[: jumps.max_candidates]]
     found = []
     for place in np.sort(best).tolist():

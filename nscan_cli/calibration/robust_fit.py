@@ -56,7 +56,7 @@ def robust_fit(coefficients: Array, measured: Array, groups: Indices | None = No
         solution = np.linalg.lstsq(weighted @ rows, weighted @ wanted, rcond=None)
         values = np.asarray(solution[0], dtype=np.float64)
         residuals = np.sqrt(((rows @ values - wanted).reshape(n, d) ** 2).sum(axis=1))
-        sigma = max(TO_SIGMA * _median(residuals) / np.sqrt(d), LEAST_SIGMA)
+        sigma = max(TO_SIGMA * median(residuals) / np.sqrt(d), LEAST_SIGMA)
         if sweep > FIRST_SWEEPS and np.abs(values - before).max() <= SETTLED * np.abs(values).max():
             break
         before = values
@@ -68,7 +68,7 @@ def robust_fit(coefficients: Array, measured: Array, groups: Indices | None = No
     return RobustFit(values, _covariance(coefficients, off, CAUCHY * sigma, groups), residuals)
 
 
-def _median(values: Array) -> float:
+def median(values: Array) -> float:
     """The median of values (n,), faster than by np.median."""
     ordered = np.sort(values)
     return 0.5 * float(ordered[(len(values) - 1) // 2] + ordered[len(values) // 2])

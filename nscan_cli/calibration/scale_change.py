@@ -9,7 +9,7 @@ import numpy as np
 
 from nscan_cli.calibration.mount_fit import MountFit, robot_lengths
 from nscan_cli.calibration.odometry_options import ScaleChangeOptions
-from nscan_cli.calibration.robust_fit import TO_SIGMA
+from nscan_cli.calibration.robust_fit import TO_SIGMA, median
 from nscan_cli.poses import Array, Indices
 
 SIGMA_OF_MEDIAN = 1.2533
@@ -51,7 +51,7 @@ def scale_change(
     if not places:
         return None
     k = min(places, key=lambda place: _residual(values[:place]) + _residual(values[place:]))
-    before, behind = (float(np.median(some)) for some in (values[:k], values[k:]))
+    before, behind = (median(some) for some in (values[:k], values[k:]))
     sigma = sigma_of_change(values[:k] - before, values[k:] - behind)
     return ScaleChange(int(told[k]), float(np.exp(before)), float(np.exp(behind)), sigma)
 
@@ -61,8 +61,8 @@ def sigma_of_change(before: Array, behind: Array) -> float:
 
     That of each is at least what the residuals of both say: a few values may be alike by chance.
     """
-    own = [float(np.median(np.abs(some))) for some in (before, behind)]
-    both = float(np.median(np.abs(np.concatenate([before, behind]))))
+    own = [median(np.abs(some)) for some in (before, behind)]
+    both = median(np.abs(np.concatenate([before, behind])))
     sigmas = [
         SIGMA_OF_MEDIAN * TO_SIGMA * max(deviation, both) / np.sqrt(len(some))
         for deviation, some in zip(own, (before, behind), strict=True)
@@ -71,4 +71,6 @@ def sigma_of_change(before: Array, behind: Array) -> float:
 
 
 def _residual(values: Array) -> float:
-    return float(np.abs(values - np.median(values)).sum())
+    """The sum of the distances of values (n,) from their median."""
+    ordered, half = np.sort(values), len(values) // 2
+    return float(ordered[len(values) - half :].sum() - ordered[:half].sum())

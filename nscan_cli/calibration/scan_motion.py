@@ -65,10 +65,7 @@ class ScanMotion:
     def twist(self, row: int) -> Array | None:
         """(3,) velocity of the laser at a row, m/s and rad/s, by the scans on both sides; None in doubt."""
         both = self._on_both_sides(row)
-        if both is None:
-            return None
-        mean: Array = np.mean(both, axis=0)
-        return mean
+        return None if both is None else 0.5 * (both[0] + both[1])
 
     def is_steady(self, row: int, options: SweepTimeOptions) -> bool:
         """Whether the laser turns before and after a row at nearly the same rate."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -66,14 +67,11 @@ def reversed_stretches(log: LaserLog, options: UnsignedOdometryOptions) -> list[
     if log.odometry is None or len(log) < 2 or not _goes_one_way(log.odometry, options):
         return []
     first, last = _step_rows(log, options)
-    step = relative(log.odometry[last], log.odometry[first])
-    errors = np.empty((len(first), 2))
-    for column, robot in enumerate((step, step * REVERSED)):
-        errors[:, column] = _range_errors(
-            log.ranges, log.angle_min, log.angle_increment, first, last, _of_laser(robot, log.mount),
-            max(log.ranges.shape[1] // options.max_beams, 1), options.min_beams, options.max_error,
-        )  # fmt: skip
-    clear = np.full(len(first), False)
+    few = replace(options, max_beams=options.first_beams, min_beams=options.min_first_beams)
+    errors = _errors(log, first, last, few)
+    if np.count_nonzero(errors[:, 1] < options.first_error_ratio * errors[:, 0]) < options.min_steps:
+        return []
+    errors, clear = _errors(log, first, last, options), np.full(len(first), False)
     np.less(errors.min(axis=1), options.max_error_ratio * errors.max(axis=1), out=clear)
     first, last, backs = first[clear], last[clear], errors[clear, 1] < errors[clear, 0]
     if 2 * np.count_nonzero(backs) >= len(backs):
@@ -93,6 +91,21 @@ def reversed_stretches(log: LaserLog, options: UnsignedOdometryOptions) -> list[
         else:
             found.append(ReversedStretch(first[begin:end], last[begin:end], *stops))
     return found
+
+
+def _errors(log: LaserLog, first: Indices, last: Indices, options: UnsignedOdometryOptions) -> Array:
+    """(n, 2) mean differences, m, of the ranges of the last scans to what the first ones predict, if the
+    robot moves by odometry, and if it drives the other way; inf for few."""
+    assert log.odometry is not None
+    step = relative(log.odometry[last], log.odometry[first])
+    errors = [
+        _range_errors(
+            log.ranges, log.angle_min, log.angle_increment, first, last, _of_laser(robot, log.mount),
+            max(log.ranges.shape[1] // options.max_beams, 1), options.min_beams, options.max_error,
+        )
+        for robot in (step, step * REVERSED)
+    ]  # fmt: skip
+    return np.stack(errors, axis=1)
 
 
 def _goes_one_way(odometry: Array, options: UnsignedOdometryOptions) -> bool:

@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from nscan_cli.calibration.odometry_options import ViewChangeOptions
+from nscan_cli.calibration.robust_fit import median
 from nscan_cli.calibration.scale_change import sigma_of_change
 from nscan_cli.poses import Array, Indices, Mask, compose, relative, wrap
 
@@ -63,7 +64,7 @@ def turn_change(laser: Array, odometry: Array, least: int, options: ViewChangeOp
     sides = [signs[:place], signs[place:]]
     if min(abs(float(side.mean())) for side in sides) < options.min_agreement:
         return None
-    before, behind = (float(np.median(some)) for some in (ratios[:place], ratios[place:]))
+    before, behind = (median(some) for some in (ratios[:place], ratios[place:]))
     return TurnChange(int(told[place]), before, behind, len(told))
 
 
@@ -80,7 +81,7 @@ def direction_change(
     moves: Mask = (lengths[0] >= options.min_length) & (lengths[1] > 0.0)
     if not moves.any():
         return None
-    scale = float(np.median(lengths[0][moves] / lengths[1][moves]))
+    scale = median(lengths[0][moves] / lengths[1][moves])
     place = np.array([*mount[:2], 0.0])
     by_odometry = relative(compose(odometry * (scale, scale, 1.0), place), place)
     told: Indices = np.flatnonzero(moves & (np.hypot(*by_odometry[:, :2].T) >= options.min_length))
@@ -107,5 +108,5 @@ def _clearest_split(values: Array, least: int) -> int | None:
 
 def _usual_direction(angles: Array) -> float:
     """The median of directions (n,), rad."""
-    usual = float(np.arctan2(np.median(np.sin(angles)), np.median(np.cos(angles))))
-    return float(wrap(usual + np.median(wrap(angles - usual))))
+    usual = float(np.arctan2(median(np.sin(angles)), median(np.cos(angles))))
+    return float(wrap(usual + median(wrap(angles - usual))))
