@@ -61,7 +61,9 @@ def _agreeing(ratios: Array, options: FileCheckOptions) -> Array:
 
 def _are_within(ratios: Array, tolerance: float) -> Indices:
     """(n,) how many of ratios (n, B) have a logarithm that is smaller than this."""
-    return np.count_nonzero((ratios > math.exp(-tolerance)) & (ratios < math.exp(tolerance)), axis=1)
+    are_within = (ratios > math.exp(-tolerance)) & (ratios < math.exp(tolerance))
+    count: Indices = np.count_nonzero(are_within, axis=1)
+    return count
 
 
 def _ratios(log: LaserLog, first: Indices, options: RangeJumpOptions) -> tuple[Array, Array]:
