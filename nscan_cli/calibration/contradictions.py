@@ -2,26 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
 
 from nscan_cli.calibration import findings
 from nscan_cli.calibration.findings import Finding
-from nscan_cli.calibration.measured_steps import KnownSteps, MeasuredSteps, measure_steps, no_steps
+from nscan_cli.calibration.gathered_evidence import gathered_evidence
+from nscan_cli.calibration.measured_steps import KnownSteps, MeasuredSteps, measure_steps
 from nscan_cli.calibration.mount_fit import MountFit, TurnFit
 from nscan_cli.calibration.odometry_clock import ClockLag, clock_lag
 from nscan_cli.calibration.options import FileCheckOptions
 from nscan_cli.calibration.step_evidence import (
     StepEvidence,
-    agrees_clearly,
     are_of_one_size,
     explains,
     is_change,
     is_excluded,
     is_nearer,
-    is_view_in_doubt,
     is_wrong_scale,
     looks_like,
     turns_agree,
@@ -49,7 +47,7 @@ def find_contradictions(
         return []
     # A factor that is offered takes the place of the one that the readings were multiplied by.
     reading = replace(reading, range_scale=log.range_scale)
-    evidence = _evidence(log, log.odometry, options, known)
+    evidence = gathered_evidence(log, log.odometry, options, known)
     if evidence is None or evidence.moving < options.min_steps:
         return []
     is_still = _is_still(log.odometry, options.still)
@@ -87,58 +85,10 @@ def changed_view(
 ) -> Finding | None:
     """A change of the view within a log, the only one of its contradictions that is looked for; None if there
     is none. `known` is that of `find_contradictions`."""
-    evidence = None if log.odometry is None else _evidence(log, log.odometry, options, known)
+    evidence = None if log.odometry is None else gathered_evidence(log, log.odometry, options, known)
     if evidence is None or evidence.moving < options.min_steps:
         return None
     return _of_view(log, evidence, reading, options)
-
-
-def _evidence(
-    log: LaserLog, odometry: Array, options: FileCheckOptions, known: KnownSteps
-) -> StepEvidence | None:
-    """The steps of a sample, which is larger where scans tell few of them, as outdoors.
-
-    None if a part of it clearly agrees with the file already: the rest is not measured.
-    """
-    count, most = options.steps.count, min(int(0.5 * options.max_share * len(log)), options.more_steps)
-    while True:
-        for evidence in _growing(log, odometry, count, options.parts, options, known):
-            if agrees_clearly(evidence, log.mount, options):
-                return None
-        if evidence.tells_enough or count >= most:
-            break
-        count = min(2 * count, most)
-    if count < options.more_steps and _is_in_doubt(evidence, log.mount, options):
-        # What changes near the beginning or the end is seen in a few steps.
-        may_change = is_view_in_doubt(evidence, log.mount, options)
-        for evidence in _growing(log, odometry, options.more_steps, options.more_parts, options, known):
-            is_settled = not may_change and evidence.tells_enough
-            if is_settled and not _is_in_doubt(evidence, log.mount, options):
-                break
-    return evidence
-
-
-def _growing(
-    log: LaserLog, odometry: Array, count: int, parts: int, options: FileCheckOptions, known: KnownSteps
-) -> Iterator[StepEvidence]:
-    """The evidence of one of the parts of a sample of `count` steps, of two of them, and so on."""
-    steps, (first, last) = no_steps(), telling_steps(log, options.steps, count)
-    for part in range(parts):
-        some = slice(part, None, parts)
-        steps = steps.with_others(measure_steps(log, (first[some], last[some]), options.steps, known=known))
-        yield StepEvidence(odometry, steps, options)
-
-
-def _is_in_doubt(evidence: StepEvidence, mount: Array, options: FileCheckOptions) -> bool:
-    """Whether a few more steps may tell: the scale of odometry is wrong by no more than the wheels of some
-    robots are, or the laser, mounted at (3,), was perhaps turned."""
-    fit = evidence.fit
-    if is_view_in_doubt(evidence, mount, options):
-        return True
-    if fit is None:
-        return False
-    is_odd = is_wrong_scale(fit, options) and max(fit.scale, 1.0 / fit.scale) < options.clear_scale_factor
-    return is_odd or is_change(evidence.change, options, options.change.doubt_sigmas)
 
 
 def _is_still(odometry: Array, still: float) -> Mask:

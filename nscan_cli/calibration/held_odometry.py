@@ -10,7 +10,8 @@ from dataclasses import replace
 import numpy as np
 
 from nscan_cli.calibration.measured_steps import measure_steps
-from nscan_cli.calibration.options import HeldOdometryOptions, StepOptions
+from nscan_cli.calibration.odometry_options import HeldOdometryOptions
+from nscan_cli.calibration.options import StepOptions
 from nscan_cli.calibration.scan_turns import scan_turns
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.logs.mask_runs import mask_runs

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+
+from nscan_cli.calibration.sweep_options import ScanTurnOptions
 
 
 @dataclass(frozen=True)
@@ -140,3 +142,39 @@ class UnsignedOdometryOptions:
     finds more."""
     measured_steps: int = 5
     """Number of steps of such a stretch that are matched; most must agree. More take longer."""
+
+
+@dataclass(frozen=True)
+class HeldOdometryOptions:
+    """When odometry stands for a part of the log though the robot moves."""
+
+    still: float = 1e-6
+    """Odometry stands between two scans if no coordinate changes by more, m and rad. A larger value counts
+    slow motion as standing."""
+    min_duration: float = 3.0
+    """Shortest time that odometry has to stand, s. A smaller value finds more, and takes longer."""
+    min_heading_duration: float = 20.0
+    """Shortest time that the heading alone has to stand, s: it does on straight ways. A smaller value finds
+    more, and takes longer."""
+    scan_turns: ScanTurnOptions = field(default_factory=ScanTurnOptions)
+    """How a rough look tells that the robot hardly turns there."""
+    min_turn: float = 0.08
+    """Turn of a step that contradicts it, rad: on straight ways few turn by 0.03. More finds less."""
+    changed_range: float = 0.1
+    """A range has changed if it differs by more than this at both ends of that time, m. A larger value finds
+    less."""
+    min_changed_share: float = 0.2
+    """Least share of ranges that have changed. A smaller value also finds robots in bare corridors; more
+    steps are then measured where robots stand."""
+    steps: int = 7
+    """Number of steps that are measured, spread over that time. More tell more and take longer."""
+    more_steps: int = 28
+    """Number of steps where these tell too little, as outdoors or in stop and go. More take longer."""
+    min_measured: int = 3
+    """Least number of steps that the scans measure. A larger value finds less."""
+    standing_share: float = 0.3
+    """The robot stands if no more than this share of the first few steps have motion; where robots stand on
+    real logs it is 0.15 at most. A larger value takes less time."""
+    min_moving_share: float = 0.7
+    """Least share of the measured steps with motion. A larger value finds less; a small one takes people who
+    pass a standing robot for motion."""

@@ -21,6 +21,7 @@ from nscan_cli.logs.frame_names import DEFAULT_FRAMES, FrameNames
 from nscan_cli.logs.laser_defaults import mark_no_returns
 from nscan_cli.logs.laser_log import LaserLog, LogReport, beam_counts
 from nscan_cli.logs.lost_readings import lost_readings
+from nscan_cli.logs.noisy_odometry import without_noise
 from nscan_cli.logs.odometry_outliers import without_outliers
 from nscan_cli.logs.range_limits import RangeLimits, limits_in_force
 from nscan_cli.logs.range_unit import scaled, wrong_unit
@@ -179,17 +180,20 @@ def _odometry(
 
     ranges (S, B) are in file order.
     """
-    odometry, path = motion.odometry, motion.path
+    odometry, recorded = motion.odometry, motion.path
     if odometry is None:
-        return None, path, []
-    if path is not None:
-        poses, said = _credible(path.poses, path.times, None, options)
-        path = robot_path(path.times, scaled_odometry(poses, options.odometry_scale))
-    else:
+        return None, recorded, []
+    scale = options.odometry_scale
+    if recorded is None:
         odometry, said = _credible(odometry, times.times, (ranges, times.rows), options)
-    odometry = scaled_odometry(odometry, options.odometry_scale)
+        return scaled_odometry(odometry, scale), None, said
+    poses, said = _credible(recorded.poses, recorded.times, None, options)
+    path = robot_path(recorded.times, scaled_odometry(poses, scale))
+    odometry = scaled_odometry(odometry, scale)
     if said and path is not None:
-        odometry = np.where(are_known(odometry)[:, None], poses_at(path, times.times), odometry)
+        # Nothing is interpolated where poses are not used.
+        is_told = are_known(odometry) & (np.interp(times.times, recorded.times, are_known(poses)) == 1.0)
+        odometry = np.where(is_told[:, None], poses_at(path, times.times), np.nan)
     return odometry, path, said
 
 
@@ -206,9 +210,10 @@ def _credible(
     if options.as_recorded:
         return odometry, []
     odometry, both = of_one_source(odometry, times)
+    odometry, noise = without_noise(odometry, times)
     odometry, wrong = without_outliers(odometry, times)
     odometry, slow = without_repeats(odometry, times, scans)
-    return odometry, [text for text in (both, wrong, slow) if text]
+    return odometry, [text for text in (both, noise, wrong, slow) if text]
 
 
 def _sweep(raw: RawScans, increments: Array, times: ScanOrder, options: ReadingOptions) -> Sweep:

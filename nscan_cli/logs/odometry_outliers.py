@@ -13,6 +13,7 @@ from nscan_cli.files.text import counted
 from nscan_cli.logs.mask_runs import mask_runs
 from nscan_cli.logs.robot_path import steady_between
 from nscan_cli.logs.scan_order import usual_period
+from nscan_cli.logs.steady_way import Places, are_regular, farthest_by_force, new_poses, off_steady_way
 from nscan_cli.poses import Array, Mask, are_known, relative
 
 
@@ -35,6 +36,12 @@ class OdometryOutlierOptions:
     most_poses: int = 5
     """Largest number of successive wrong poses. A larger value finds longer stretches, and guesses more of
     the way."""
+    min_single: float = 0.3
+    """Where poses come regularly, a single one is found from this distance on, m and rad, if the two before
+    and the two behind lie on one steady way. A larger value finds fewer."""
+    max_beside: float = 0.4
+    """These four are off that way, or elsewhere apart, by less than this share of its distance. A larger
+    value finds more, also where odometry is coarse."""
     max_share: float = 0.34
     """With a larger share of wrong poses it is open which are right, and none is replaced. A larger value
     believes more."""
@@ -52,7 +59,7 @@ def without_outliers(
     """
     known = np.flatnonzero(are_known(odometry))
     poses, at = odometry[known], times[known]
-    stretches = _excursions(poses, at, options)
+    stretches = _with_others(_excursions(poses, at, options), _singles(poses, at, options))
     wrong = poses[_between(stretches, len(poses))]
     if not 0 < len(wrong) <= options.max_share * len(poses):
         return odometry, ""
@@ -74,6 +81,42 @@ def without_outliers(
         f"{said}; the first is {since:.1f} s after the beginning; the robot is taken to move steadily there; "
         "--as-recorded believes the log"
     )
+
+
+def _with_others(stretches: list[tuple[int, int]], others: list[tuple[int, int]]) -> list[tuple[int, int]]:
+    """Stretches, each by the rows before and behind it, and those others that overlap none of them."""
+    free = [each for each in others if all(each[1] <= a or b <= each[0] for a, b in stretches)]
+    return sorted([*stretches, *free])
+
+
+def _singles(poses: Array, times: Array, options: OdometryOutlierOptions) -> list[tuple[int, int]]:
+    """The rows before and behind each single wrong pose (n, 3), known at times (n,), s.
+
+    Where times are irregular poses may be in the wrong order, and only farther ones are found.
+    """
+    rows = new_poses(poses, times)
+    if len(rows) < 5:
+        return []
+    some, at = poses[rows], times[rows]
+    # Each third of five poses, and the second and the fourth without it.
+    around: list[tuple[Places, int]] = [((0, 1, 2), 1), ((0, 1, 3), 0), ((0, 2, 3), 1)]
+    regular = np.all([are_regular(at, at_places)[k : len(some) - 4 + k] for at_places, k in around], axis=0)
+    own, *others = (
+        _sizes(off_steady_way(some, at, at_places)[k : len(some) - 4 + k]) for at_places, k in around
+    )
+    steps = step_sizes(some[1:], some[:-1])
+    beside, forces = np.maximum(steps[:-3], steps[3:]), farthest_by_force(at[3:-1] - at[1:-3])
+    is_off = own > np.maximum(np.maximum(options.min_single, forces), beside)
+    is_off &= (np.maximum(*others) < options.max_beside * own) & regular[:, None]
+    away = np.minimum(steps[1:-2], steps[2:-1])
+    apart = beside + step_sizes(some[3:-1], some[1:-3])
+    is_off |= (away > np.maximum(options.min_distance, forces)) & (apart < options.max_beside * away)
+    return [(int(rows[k + 1]), int(rows[k + 3])) for k in np.flatnonzero(is_off.any(axis=1)).tolist()]
+
+
+def _sizes(off: Array) -> Array:
+    """(n, 2) length, m, and turn, rad, of differences (n, 3)."""
+    return np.stack([np.hypot(off[:, 0], off[:, 1]), np.abs(off[:, 2])], axis=1)
 
 
 def _between(stretches: list[tuple[int, int]], size: int) -> Mask:

@@ -10,6 +10,7 @@ from nscan_cli.logs.dead_beams import DeadBeamOptions
 from nscan_cli.logs.direction_changes import DirectionChangeOptions
 from nscan_cli.logs.floor_line import FloorLineOptions
 from nscan_cli.logs.heading_unit import HeadingUnitOptions
+from nscan_cli.logs.noisy_odometry import NoisyOdometryOptions
 from nscan_cli.logs.odometry_interpolation import OdometryGapOptions
 from nscan_cli.logs.odometry_outliers import OdometryOutlierOptions
 from nscan_cli.logs.range_limit_options import RangeLimitOptions
@@ -52,6 +53,7 @@ class ScanCheckOptions:
     odometry_gaps: OdometryGapOptions = field(default_factory=OdometryGapOptions)
     heading_unit: HeadingUnitOptions = field(default_factory=HeadingUnitOptions)
     two_odometries: TwoOdometriesOptions = field(default_factory=TwoOdometriesOptions)
+    noisy_odometry: NoisyOdometryOptions = field(default_factory=NoisyOdometryOptions)
     odometry_outliers: OdometryOutlierOptions = field(default_factory=OdometryOutlierOptions)
     slow_odometry: SlowOdometryOptions = field(default_factory=SlowOdometryOptions)
     robot_path: RobotPathOptions = field(default_factory=RobotPathOptions)

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from nscan_cli.logs.load import read_log
-from nscan_cli.logs.odometry_outliers import without_outliers
+from nscan_cli.logs.odometry_outliers import OdometryOutlierOptions, without_outliers
 from nscan_cli.logs.reading_options import ReadingOptions
 from nscan_cli.poses import Array
 from tests.data import data_file
@@ -53,6 +53,30 @@ def test_a_wrong_heading_is_found():
     assert np.abs(found - poses).max() < 0.01
     assert said.startswith("odometry has 1 single wrong value,")
     assert "5.0 s after the beginning" in said
+
+
+@pytest.mark.parametrize("wrong", [(0.4, 0.0, 0.0), (-0.2, 0.3, 0.0), (0.0, 0.0, 0.4)])
+def test_a_single_value_is_found_where_those_beside_it_lie_on_one_way(wrong):
+    """Also if it is off by less than a metre."""
+    poses, times = drive()
+    broken = poses.copy()
+    broken[[50, 90, 140]] += wrong
+    found, said = without_outliers(broken, times)
+    assert np.abs(found - poses).max() < 0.01
+    assert said.startswith("odometry has 3 single wrong values,")
+    options = OdometryOutlierOptions(min_single=1.0)
+    assert without_outliers(broken, times, options)[0] is broken
+
+
+def test_single_values_are_found_where_times_are_irregular():
+    """A match corrects the smaller ones; of the larger ones the poses beside tell enough."""
+    poses, times = drive()
+    uneven = np.sort(times + np.random.default_rng(1).uniform(0.0, 0.5, len(times)))
+    for off, said in ((1.3, "odometry has 2 single"), (0.4, "")):
+        broken = poses.copy()
+        broken[[50, 140], 0] += off
+        assert without_outliers(broken, uneven)[1].startswith(said)
+        assert bool(without_outliers(broken, uneven)[1]) == bool(said)
 
 
 def test_a_reset_and_a_short_stop_are_none():

@@ -1,0 +1,66 @@
+"""The steps of a log that tell what its file says wrongly: few where all is well, more where in doubt."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from nscan_cli.calibration.measured_steps import KnownSteps, measure_steps, no_steps
+from nscan_cli.calibration.options import FileCheckOptions
+from nscan_cli.calibration.step_evidence import (
+    StepEvidence,
+    agrees_clearly,
+    is_change,
+    is_view_in_doubt,
+    is_wrong_scale,
+)
+from nscan_cli.calibration.step_sampling import telling_steps
+from nscan_cli.logs.laser_log import LaserLog
+from nscan_cli.poses import Array
+
+
+def gathered_evidence(
+    log: LaserLog, odometry: Array, options: FileCheckOptions, known: KnownSteps
+) -> StepEvidence | None:
+    """The steps of a sample, which is larger where scans tell few of them, as outdoors.
+
+    None if a part of it clearly agrees with the file already: the rest is not measured.
+    """
+    count, most = options.steps.count, min(int(0.5 * options.max_share * len(log)), options.more_steps)
+    while True:
+        for evidence in _growing(log, odometry, count, options.parts, options, known):
+            if agrees_clearly(evidence, log.mount, options):
+                return None
+        if evidence.tells_enough or count >= most:
+            break
+        count = min(2 * count, most)
+    if count < options.more_steps and _is_in_doubt(evidence, log.mount, options):
+        # What changes near the beginning or the end is seen in a few steps.
+        may_change = is_view_in_doubt(evidence, log.mount, options)
+        for evidence in _growing(log, odometry, options.more_steps, options.more_parts, options, known):
+            is_settled = not may_change and evidence.tells_enough
+            if is_settled and not _is_in_doubt(evidence, log.mount, options):
+                break
+    return evidence
+
+
+def _growing(
+    log: LaserLog, odometry: Array, count: int, parts: int, options: FileCheckOptions, known: KnownSteps
+) -> Iterator[StepEvidence]:
+    """The evidence of one of the parts of a sample of `count` steps, of two of them, and so on."""
+    steps, (first, last) = no_steps(), telling_steps(log, options.steps, count)
+    for part in range(parts):
+        some = slice(part, None, parts)
+        steps = steps.with_others(measure_steps(log, (first[some], last[some]), options.steps, known=known))
+        yield StepEvidence(odometry, steps, options)
+
+
+def _is_in_doubt(evidence: StepEvidence, mount: Array, options: FileCheckOptions) -> bool:
+    """Whether a few more steps may tell: the scale of odometry is wrong by no more than the wheels of some
+    robots are, or the laser, mounted at (3,), was perhaps turned."""
+    fit = evidence.fit
+    if is_view_in_doubt(evidence, mount, options):
+        return True
+    if fit is None:
+        return False
+    is_odd = is_wrong_scale(fit, options) and max(fit.scale, 1.0 / fit.scale) < options.clear_scale_factor
+    return is_odd or is_change(evidence.change, options, options.change.doubt_sigmas)

@@ -1,0 +1,55 @@
+"""How far poses are off the steady way between others, and how far a robot may be off it."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from nscan_cli.logs.scan_order import usual_period
+from nscan_cli.poses import Array, Indices, Mask, wrap
+
+GREATEST_FORCES = np.array([5.0, 5.0])
+"""m/s², rad/s²; no robot with a laser is faster to speed up, to turn, or to brake."""
+REGULAR = 0.5, 2.0
+"""Poses whose times are apart by less or more than these multiples of the usual may be in the wrong order."""
+Places = tuple[int, int, int]
+"""Those of a pose before, of a pose, and of one behind, counted from each row on."""
+
+
+def new_poses(poses: Array, times: Array) -> Indices:
+    """(m,) the rows of poses (n, 3) at times (n,), s, that differ from the ones before and are later."""
+    is_new = (poses[1:] != poses[:-1]).any(axis=1) & (times[1:] > times[:-1])
+    return np.flatnonzero(np.append(True, is_new)[: len(poses)])
+
+
+def farthest_by_force(spans: Array) -> Array:
+    """(n, 2) how far, m and rad, a robot may be off a steady way that takes so long (n,), s."""
+    farthest: Array = 0.125 * spans[:, None] ** 2 * GREATEST_FORCES
+    return farthest
+
+
+def off_steady_way(poses: Array, times: Array, places: Places) -> Array:
+    """(n, 3) how far each of poses (P, 3) at times (P,), s, is off the steady way between two others, m, rad.
+
+    There are as many rows as have all three places.
+    """
+    before, at, behind = _slices(len(poses), places)
+    share = ((times[at] - times[before]) / (times[behind] - times[before]))[:, None]
+    way, step = poses[behind] - poses[before], poses[at] - poses[before]
+    way[:, 2], step[:, 2] = wrap(way[:, 2]), wrap(step[:, 2])
+    off: Array = step - share * way
+    return off
+
+
+def are_regular(times: Array, places: Places) -> Mask:
+    """(n,) whether the times (P,), s, of poses at such places are about as far apart as usual."""
+    before, at, behind = _slices(len(times), places)
+    periods = np.stack([times[at] - times[before], times[behind] - times[at]])
+    periods /= np.diff(places)[:, None] * (usual_period(times) or 1.0)
+    is_usual: Mask = (periods >= REGULAR[0]) & (periods <= REGULAR[1])
+    regular: Mask = np.all(is_usual, axis=0)
+    return regular
+
+
+def _slices(size: int, places: Places) -> list[slice]:
+    count = size - max(places)
+    return [slice(place, place + count) for place in places]
