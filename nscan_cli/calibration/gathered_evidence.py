@@ -34,8 +34,9 @@ def gathered_evidence(
             break
         count = min(2 * count, most)
     if count < options.more_steps and _is_in_doubt(evidence, log.mount, options):
-        # What changes near the beginning or the end is seen in a few steps.
-        may_change = is_view_in_doubt(evidence, log.mount, options)
+        # What changes within the log is seen in a few steps only.
+        may_change = is_change(evidence.change, options, options.change.doubt_sigmas)
+        may_change |= is_view_in_doubt(evidence, log.mount, options)
         for evidence in _growing(log, odometry, options.more_steps, options.more_parts, options, known):
             is_settled = not may_change and evidence.tells_enough
             if is_settled and not _is_in_doubt(evidence, log.mount, options):

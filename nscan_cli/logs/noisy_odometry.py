@@ -23,11 +23,12 @@ class NoisyOdometryOptions:
     min_distance: float = 0.25
     """Its poses are farther off the way between those before and behind, m. It is 0.17 at most on real logs,
     in the median of a window. A larger value finds less."""
-    min_turn: float = 0.25
+    min_turn: float = 0.2
     """Or they are turned by more against it, rad. It is 0.12 at most on real logs. A larger value finds
     less."""
     window: int = 9
-    """Number of successive poses of which most are so far off. A larger value finds only longer stretches."""
+    """Number of successive poses of which two thirds are so far off: a single wrong value makes three so. A
+    larger value finds only longer stretches."""
     beside: float = 0.5
     """Beside such a window, others count where most poses are farther off than this share of these bounds. A
     larger value leaves more of the noise."""
@@ -37,6 +38,9 @@ class NoisyOdometryOptions:
     min_of_steps: float = 0.7
     """And they are farther off than this share of the steps between them, as root mean squares: that of white
     noise is 0.87. It is 0.4 at most on real logs, in any unit of length. A larger value finds less."""
+    regular: float = 2.0
+    """Turns count only where times are apart as usual, within this factor. A larger value finds more, also
+    where poses come in the wrong order."""
     max_share: float = 0.5
     """With a larger share of such poses it is open what is noise, and all are used. A larger value believes
     less."""
@@ -57,7 +61,7 @@ def without_noise(
     is_noise, places = np.zeros(len(rows), dtype=np.bool_), (0, 1, 2)
     off = off_steady_way(poses, at, places)
     # A robot that turns on the spot turns fast: poses in the wrong order then go to and fro as well.
-    off[~are_regular(at, places), 2] = 0.0
+    off[~are_regular(at, places, options.regular), 2] = 0.0
     limits = farthest_by_force(at[2:] - at[:-2])
     steps = np.diff(poses, axis=0)[1:]
     steps[:, 2] = wrap(steps[:, 2])
@@ -92,7 +96,8 @@ def _goes_to_and_fro(off: Array, steps: Array, limits: Array, options: NoisyOdom
     is_so = _sums(sides, size - 1) < options.max_correlation * of_window
     is_so &= of_window > options.min_of_steps**2 * _sums((steps**2).sum(axis=1), size)
     cores, beside = (
-        (2 * _sums(squares > (share * limits) ** 2, size) > size) & is_so for share in (1.0, options.beside)
+        is_so & (_sums(squares > (share * limits) ** 2, size) >= least)
+        for share, least in ((1.0, 2 * size / 3), (options.beside, size / 2))
     )
     is_far, is_noise = squares > (options.beside * limits) ** 2, np.zeros(len(off), dtype=np.bool_)
     for first, end in mask_runs(beside):

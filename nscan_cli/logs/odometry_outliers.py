@@ -42,6 +42,9 @@ class OdometryOutlierOptions:
     max_beside: float = 0.4
     """These four are off that way, or elsewhere apart, by less than this share of its distance. A larger
     value finds more, also where odometry is coarse."""
+    regular: float = 1.6
+    """Poses come regularly where times are apart as usual, within this factor. A larger value finds more,
+    also where they come in the wrong order."""
     max_share: float = 0.34
     """With a larger share of wrong poses it is open which are right, and none is replaced. A larger value
     believes more."""
@@ -100,17 +103,22 @@ def _singles(poses: Array, times: Array, options: OdometryOutlierOptions) -> lis
     some, at = poses[rows], times[rows]
     # Each third of five poses, and the second and the fourth without it.
     around: list[tuple[Places, int]] = [((0, 1, 2), 1), ((0, 1, 3), 0), ((0, 2, 3), 1)]
-    regular = np.all([are_regular(at, at_places)[k : len(some) - 4 + k] for at_places, k in around], axis=0)
+    regular = np.all(
+        [are_regular(at, at_places, options.regular)[k : len(some) - 4 + k] for at_places, k in around],
+        axis=0,
+    )
     own, *others = (
         _sizes(off_steady_way(some, at, at_places)[k : len(some) - 4 + k]) for at_places, k in around
     )
-    steps = step_sizes(some[1:], some[:-1])
+    steps, longest = step_sizes(some[1:], some[:-1]), usual_longest_step(some, options)
     beside, forces = np.maximum(steps[:-3], steps[3:]), farthest_by_force(at[3:-1] - at[1:-3])
-    is_off = own > np.maximum(np.maximum(options.min_single, forces), beside)
+    is_off = own > np.maximum(np.maximum(options.min_single, forces), np.maximum(beside, longest))
     is_off &= (np.maximum(*others) < options.max_beside * own) & regular[:, None]
     away = np.minimum(steps[1:-2], steps[2:-1])
     apart = beside + step_sizes(some[3:-1], some[1:-3])
-    is_off |= (away > np.maximum(options.min_distance, forces)) & (apart < options.max_beside * away)
+    is_off |= (away > np.maximum(np.maximum(options.min_distance, forces), options.factor * longest)) & (
+        apart < options.max_beside * away
+    )
     return [(int(rows[k + 1]), int(rows[k + 3])) for k in np.flatnonzero(is_off.any(axis=1)).tolist()]
 
 

@@ -9,8 +9,6 @@ from nscan_cli.poses import Array, Indices, Mask, wrap
 
 GREATEST_FORCES = np.array([5.0, 5.0])
 """m/s², rad/s²; no robot with a laser is faster to speed up, to turn, or to brake."""
-REGULAR = 0.5, 2.0
-"""Poses whose times are apart by less or more than these multiples of the usual may be in the wrong order."""
 Places = tuple[int, int, int]
 """Those of a pose before, of a pose, and of one behind, counted from each row on."""
 
@@ -22,8 +20,12 @@ def new_poses(poses: Array, times: Array) -> Indices:
 
 
 def farthest_by_force(spans: Array) -> Array:
-    """(n, 2) how far, m and rad, a robot may be off a steady way that takes so long (n,), s."""
+    """(n, 2) how far, m and rad, a robot may be off a steady way that takes so long (n,), s.
+
+    Over a long time it may turn by more than half a circle, which looks like a turn the other way: inf.
+    """
     farthest: Array = 0.125 * spans[:, None] ** 2 * GREATEST_FORCES
+    farthest[farthest[:, 1] > 0.5 * np.pi, 1] = np.inf
     return farthest
 
 
@@ -40,12 +42,15 @@ def off_steady_way(poses: Array, times: Array, places: Places) -> Array:
     return off
 
 
-def are_regular(times: Array, places: Places) -> Mask:
-    """(n,) whether the times (P,), s, of poses at such places are about as far apart as usual."""
+def are_regular(times: Array, places: Places, most: float) -> Mask:
+    """(n,) whether the times (P,), s, of poses at such places are apart as usual, within a factor `most`.
+
+    Elsewhere poses may be in the wrong order.
+    """
     before, at, behind = _slices(len(times), places)
     periods = np.stack([times[at] - times[before], times[behind] - times[at]])
     periods /= np.diff(places)[:, None] * (usual_period(times) or 1.0)
-    is_usual: Mask = (periods >= REGULAR[0]) & (periods <= REGULAR[1])
+    is_usual: Mask = (periods >= 1.0 / most) & (periods <= most)
     regular: Mask = np.all(is_usual, axis=0)
     return regular
 

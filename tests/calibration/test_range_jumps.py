@@ -63,6 +63,16 @@ def test_odometry_tells_the_right_part_where_the_factor_is_large():
     assert said[0].startswith(f"the ranges of scans 0 to {len(log) // 4 - 1} are 0.66")
 
 
+def test_a_factor_beside_another_one_is_none():
+    log = drive()
+    scaled = faults.ranges_scaled(log, 1.1, slice(len(log) // 2, None))
+    compared = compare_ranges(scaled, OPTIONS)
+    assert range_jumps(scaled, compared, OPTIONS)
+    beside = compared.logarithms.copy()
+    beside[len(log) // 2] = -0.9 * np.log(1.1)
+    assert not range_jumps(scaled, compared._replace(logarithms=beside), OPTIONS)
+
+
 def test_a_wrong_step_of_odometry_is_no_change():
     log = drive()
     for jump in ((0.3, 0.0, 0.0), (0.0, -0.3, 0.1)):

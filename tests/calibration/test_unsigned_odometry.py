@@ -79,6 +79,12 @@ def test_missing_odometry_stays_missing() -> None:
     assert_allclose(odometry(corrected)[320:], odometry(whole)[320:], atol=1e-9)
 
 
+def test_all_beams_are_compared_where_a_few_show_a_reversal() -> None:
+    log = odometry_faults.unsigned(reversing())
+    assert len(reversed_stretches(log, OPTIONS)) == len(STRETCHES)
+    assert not reversed_stretches(log, replace(OPTIONS, first_error_ratio=1e-9))
+
+
 def test_odometry_that_reverses_is_left_alone() -> None:
     log, said = checked(reversing())
     assert not said

@@ -119,6 +119,27 @@ def spike(log: LaserLog, at: int, value: tuple[float, float, float]) -> LaserLog
     return replace(log, odometry=odometry)
 
 
+def noisy(log: LaserLog, distance: float, turn: float, times: int, seconds: float, seed: int = 1) -> LaserLog:
+    """White noise, of standard deviations in m and rad, for so many seconds, so many times."""
+    odometry, rng = _odometry(log).copy(), np.random.default_rng(seed)
+    since = (log.times - log.times[0]) / (log.times[-1] - log.times[0]) * times % 1.0
+    length = float(log.times[-1] - log.times[0]) / times
+    some = (since >= 0.5) & ((since - 0.5) * length < seconds)
+    odometry[some] += rng.normal(size=(np.count_nonzero(some), 3)) * (distance, distance, turn)
+    odometry[:, 2] = wrap(odometry[:, 2])
+    return replace(log, odometry=odometry, odometry_path=None)
+
+
+def astray(log: LaserLog, least: float, most: float, count: int, seed: int = 1) -> LaserLog:
+    """So many single poses, evenly over the log, are off by a distance between two (m), in any direction."""
+    odometry, rng = _odometry(log).copy(), np.random.default_rng(seed)
+    rows = np.linspace(0, len(log) - 1, count + 2).astype(np.int64)[1:-1]
+    away, towards = rng.uniform(least, most, count), rng.uniform(-np.pi, np.pi, count)
+    odometry[rows, 0] += away * np.cos(towards)
+    odometry[rows, 1] += away * np.sin(towards)
+    return replace(log, odometry=odometry, odometry_path=None)
+
+
 def zeros(log: LaserLog, every: int) -> LaserLog:
     """One value in so many is all zeros."""
     odometry = _odometry(log).copy()
