@@ -103,7 +103,8 @@ def test_what_a_truncated_file_still_has_can_be_measured(tmp_path: Path):
         with pytest.raises(InputDataError, match=r"the gzip data end too early; .*--salvage"):
             load_trajectory(path)
         notices: list[str] = []
-        found = load_trajectory(path, ReadingOptions(salvage=True), notices)
+        # The poses are random: now and then one looks like a single wrong value.
+        found = load_trajectory(path, ReadingOptions(salvage=True, as_recorded=True), notices)
         assert 100 < len(found) < 300
         np.testing.assert_allclose(found.poses[:, :2], poses[: len(found), :2], atol=1e-8)
         assert any("the gzip data end too early: the rest is lost" in notice for notice in notices)
