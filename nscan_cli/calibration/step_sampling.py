@@ -6,6 +6,7 @@ import numpy as np
 
 from nscan_cli.calibration.options import StepOptions
 from nscan_cli.logs.laser_log import LaserLog
+from nscan_cli.logs.repeated_rows import differ_from_last
 from nscan_cli.poses import Indices, relative
 
 
@@ -54,7 +55,7 @@ def possible_steps(log: LaserLog, options: StepOptions) -> tuple[Indices, Indice
     Scans that repeat the one before, bit by bit, are left out: they saw nothing at their own time.
     """
     some = log.ranges[:, :: max(log.ranges.shape[1] // options.compared_beams, 1)].view(np.int32)
-    rows = np.flatnonzero(np.append(True, (some[1:] != some[:-1]).any(axis=1)))
+    rows = np.flatnonzero(differ_from_last(some))
     times = log.times[rows]
     first = np.arange(len(rows))
     last = np.maximum(np.searchsorted(times, times + options.duration), first + 1)

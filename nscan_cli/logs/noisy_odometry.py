@@ -26,6 +26,9 @@ class NoisyOdometryOptions:
     min_turn: float = 0.2
     """Or they are turned by more against it, rad. It is 0.12 at most on real logs. A larger value finds
     less."""
+    max_acceleration: float = 5.0
+    """No robot with a laser speeds up, brakes, or begins to turn faster, m/s² and rad/s². A larger value
+    finds less."""
     window: int = 9
     """Number of successive poses of which two thirds are so far off: a single wrong value makes three so. A
     larger value finds only longer stretches."""
@@ -62,7 +65,7 @@ def without_noise(
     off = off_steady_way(poses, at, places)
     # A robot that turns on the spot turns fast: poses in the wrong order then go to and fro as well.
     off[~are_regular(at, places, options.regular), 2] = 0.0
-    limits = farthest_by_force(at[2:] - at[:-2])
+    limits = farthest_by_force(at[2:] - at[:-2], options.max_acceleration)
     steps = np.diff(poses, axis=0)[1:]
     steps[:, 2] = wrap(steps[:, 2])
     for columns, least, limit in (

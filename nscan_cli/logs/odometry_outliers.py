@@ -39,6 +39,9 @@ class OdometryOutlierOptions:
     min_single: float = 0.3
     """Where poses come regularly, a single one is found from this distance on, m and rad, if the two before
     and the two behind lie on one steady way. A larger value finds fewer."""
+    max_acceleration: float = 5.0
+    """No robot with a laser speeds up, brakes, or begins to turn faster, m/s² and rad/s². A larger value
+    finds less."""
     max_beside: float = 0.4
     """These four are off that way, or elsewhere apart, by less than this share of its distance. A larger
     value finds more, also where odometry is coarse."""
@@ -111,8 +114,9 @@ def _singles(poses: Array, times: Array, options: OdometryOutlierOptions) -> lis
         _sizes(off_steady_way(some, at, at_places)[k : len(some) - 4 + k]) for at_places, k in around
     )
     steps, longest = step_sizes(some[1:], some[:-1]), usual_longest_step(some, options)
-    beside, forces = np.maximum(steps[:-3], steps[3:]), farthest_by_force(at[3:-1] - at[1:-3])
-    is_off = own > np.maximum(np.maximum(options.min_single, forces), np.maximum(beside, longest))
+    beside = np.maximum(steps[:-3], steps[3:])
+    forces = farthest_by_force(at[3:-1] - at[1:-3], options.max_acceleration)
+    is_off = own > np.maximum.reduce(np.broadcast_arrays(options.min_single, forces, beside, longest))
     is_off &= (np.maximum(*others) < options.max_beside * own) & regular[:, None]
     away = np.minimum(steps[1:-2], steps[2:-1])
     apart = beside + step_sizes(some[3:-1], some[1:-3])
@@ -123,8 +127,8 @@ def _singles(poses: Array, times: Array, options: OdometryOutlierOptions) -> lis
 
 
 def _sizes(off: Array) -> Array:
-    """(n, 2) length, m, and turn, rad, of differences (n, 3)."""
-    return np.stack([np.hypot(off[:, 0], off[:, 1]), np.abs(off[:, 2])], axis=1)
+    """(…, 2) length, m, and turn, rad, of differences (…, 3)."""
+    return np.stack([np.hypot(off[..., 0], off[..., 1]), np.abs(off[..., 2])], axis=-1)
 
 
 def _between(stretches: list[tuple[int, int]], size: int) -> Mask:
@@ -169,5 +173,4 @@ def usual_longest_step(poses: Array, options: OdometryOutlierOptions = DEFAULT_O
 
 def step_sizes(poses: Array, others: Array) -> Array:
     """(…, 2) length, m, and turn, rad, of the steps to poses (…, 3) from others."""
-    steps = relative(poses, others)
-    return np.stack([np.hypot(steps[..., 0], steps[..., 1]), np.abs(steps[..., 2])], axis=-1)
+    return _sizes(relative(poses, others))

@@ -4,27 +4,29 @@ from __future__ import annotations
 
 import numpy as np
 
+from nscan_cli.logs.repeated_rows import differ_from_last
 from nscan_cli.logs.scan_order import usual_period
 from nscan_cli.poses import Array, Indices, Mask, wrap
 
-GREATEST_FORCES = np.array([5.0, 5.0])
-"""m/s², rad/s²; no robot with a laser is faster to speed up, to turn, or to brake."""
 Places = tuple[int, int, int]
 """Those of a pose before, of a pose, and of one behind, counted from each row on."""
 
 
 def new_poses(poses: Array, times: Array) -> Indices:
     """(m,) the rows of poses (n, 3) at times (n,), s, that differ from the ones before and are later."""
-    is_new = (poses[1:] != poses[:-1]).any(axis=1) & (times[1:] > times[:-1])
-    return np.flatnonzero(np.append(True, is_new)[: len(poses)])
+    is_new = differ_from_last(poses)
+    is_new[1:] &= times[1:] > times[:-1]
+    return np.flatnonzero(is_new)
 
 
-def farthest_by_force(spans: Array) -> Array:
+def farthest_by_force(spans: Array, acceleration: float) -> Array:
     """(n, 2) how far, m and rad, a robot may be off a steady way that takes so long (n,), s.
+
+    It has this greatest acceleration, m/s² and rad/s².
 
     Over a long time it may turn by more than half a circle, which looks like a turn the other way: inf.
     """
-    farthest: Array = 0.125 * spans[:, None] ** 2 * GREATEST_FORCES
+    farthest = np.repeat(0.125 * spans[:, None] ** 2 * acceleration, 2, axis=1)
     farthest[farthest[:, 1] > 0.5 * np.pi, 1] = np.inf
     return farthest
 

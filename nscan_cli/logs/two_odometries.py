@@ -13,6 +13,7 @@ import numpy as np
 from nscan_cli.files.text import counted
 from nscan_cli.logs.mask_runs import mask_runs
 from nscan_cli.logs.odometry_outliers import step_sizes, usual_longest_step
+from nscan_cli.logs.repeated_rows import differ_from_last
 from nscan_cli.logs.robot_path import steady_between
 from nscan_cli.poses import Array, Indices, are_known
 
@@ -49,7 +50,7 @@ def of_one_source(
     known = np.flatnonzero(are_known(odometry))
     recorded = odometry[known]
     # A pose that is repeated tells nothing new, and next to no step all others seem long.
-    is_new = np.append(True, (recorded[1:] != recorded[:-1]).any(axis=1))[: len(known)]
+    is_new = differ_from_last(recorded)
     poses = recorded[is_new]
     if len(poses) < options.min_poses:
         return odometry, ""
