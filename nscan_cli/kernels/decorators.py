@@ -175,21 +175,24 @@ class Kernel:
 
 
 def _import_numba() -> Any:
-    """numba, imported without Intel's vector library (SVML), if this is the first import.
+    """numba, imported without Intel's vector library (SVML) and colours, if this is the first import.
 
-    With SVML, sines round differently than on other machines, and cached code needs the library.
+    With SVML, sines round differently than on other machines, and cached code needs the library. With
+    colours (where colorama is installed) numba marks up messages that nobody sees: 2 % of a compilation.
     """
-    switch = "NUMBA_DISABLE_INTEL_SVML"
-    before, os.environ[switch] = os.environ.get(switch), "1"
+    switches = dict.fromkeys(("NUMBA_DISABLE_INTEL_SVML", "NUMBA_DISABLE_ERROR_MESSAGE_HIGHLIGHTING"), "1")
+    before = {name: os.environ.get(name) for name in switches}
+    os.environ.update(switches)
     try:
         import numba
 
         return numba
     finally:
-        if before is None:
-            del os.environ[switch]
-        else:
-            os.environ[switch] = before
+        for name, value in before.items():
+            if value is None:
+                del os.environ[name]
+            else:
+                os.environ[name] = value
 
 
 def _fingerprint(value: Any) -> object:

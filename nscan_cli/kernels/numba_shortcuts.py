@@ -27,6 +27,8 @@ def _shortcuts() -> list[tuple[Any, str, Callable[..., Any]]]:
     """Classes of numba, the names of their methods, and what takes their place."""
     try:
         from numba.core import ir
+        from numba.core.base import BaseContext
+        from numba.core.postproc import PostProcessor
         from numba.core.runtime.context import NRTContext
         from numba.core.types.functions import BaseFunction
     except ImportError:
@@ -35,6 +37,9 @@ def _shortcuts() -> list[tuple[Any, str, Callable[..., Any]]]:
         (NRTContext, "get_meminfos", _counted_parts),
         (ir.Inst, "_rec_list_vars", _listed_variables),
         (BaseFunction, "get_call_type", _remembered_signatures),
+        (PostProcessor, "run", _without_live_variables),
+        (BaseContext, "get_abi_sizeof", _remembered_sizes),
+        (BaseContext, "get_abi_alignment", _remembered_sizes),
     )
     return [(owner, name, make(vars(owner)[name])) for owner, name, make in made if name in vars(owner)]
 
@@ -106,3 +111,36 @@ def _remembered_signatures(own: Callable[..., Any]) -> Callable[..., Any]:
         return signatures[key]
 
     return get_call_type
+
+
+def _without_live_variables(own: Callable[..., Any]) -> Callable[..., Any]:
+    """What follows a pass over a function, without the variables that each block finds there.
+
+    numba lists them nine times for each function. Only generators and Python's objects need them.
+    """
+    from numba.core import transforms
+    from numba.core.postproc import VariableLifetime
+
+    def run(self: Any, emit_dels: bool = False, extend_lifetimes: bool = False) -> None:
+        function = self.func_ir
+        if emit_dels or function.is_generator:
+            own(self, emit_dels, extend_lifetimes)
+            return
+        function.blocks = transforms.canonicalize_cfg(function.blocks)
+        function.variable_lifetime = VariableLifetime(function.blocks)
+        function.generator_info = None
+
+    return run
+
+
+def _remembered_sizes(own: Callable[..., Any]) -> Callable[..., Any]:
+    """The size or alignment of a type, found once. numba has LLVM read a module for each question."""
+    sizes: dict[str, int] = {}
+
+    def size(self: Any, kind: Any) -> int:
+        text = str(kind)
+        if text not in sizes:
+            sizes[text] = own(self, kind)
+        return sizes[text]
+
+    return size
