@@ -22,10 +22,12 @@ FOR_ALL = (("track", "others"), ("refine",))
 def main(*parts: str) -> None:
     """Run some parts. A process started by `bootstrap.py` does so."""
     from nscan_cli.kernels.decorators import load_runtime
+    from nscan_cli.kernels.whole_kernels import rare_collections
 
     load_runtime()
-    for part in parts:
-        {"track": _track, "refine": _refine, "others": _others}[part]()
+    with rare_collections():
+        for part in parts:
+            {"track": _track, "refine": _refine, "others": _others}[part]()
 
 
 def _track() -> None:
