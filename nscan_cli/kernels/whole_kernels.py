@@ -16,8 +16,8 @@ from typing import Any, cast
 from nscan_cli.kernels.numba_shortcuts import numba_shortcuts
 
 COLLECTION_THRESHOLDS = 50_000, 20, 1_000_000
-"""New objects before a collection of garbage, such collections before one of older objects, and of these before
-a full one: more than there are in a process."""
+"""New objects before a collection of garbage, such collections before one of older objects, and of these
+before a full one: more than there are in a process."""
 
 
 def dispatcher_for_kernels(function: Any, options: dict[str, Any]) -> Any:
