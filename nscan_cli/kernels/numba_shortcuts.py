@@ -9,7 +9,7 @@ from __future__ import annotations
 import contextlib
 import functools
 from collections.abc import Callable, Iterator
-from typing import Any
+from typing import Any, cast
 
 
 @contextlib.contextmanager
@@ -118,16 +118,17 @@ def _without_live_variables(own: Callable[..., Any]) -> Callable[..., Any]:
 
     numba lists them nine times for each function. Only generators and Python's objects need them.
     """
-    from numba.core import transforms
-    from numba.core.postproc import VariableLifetime
+    from numba.core import postproc, transforms
+
+    canonical, lifetime = cast(Any, transforms).canonicalize_cfg, cast(Any, postproc).VariableLifetime
 
     def run(self: Any, emit_dels: bool = False, extend_lifetimes: bool = False) -> None:
         function = self.func_ir
         if emit_dels or function.is_generator:
             own(self, emit_dels, extend_lifetimes)
             return
-        function.blocks = transforms.canonicalize_cfg(function.blocks)
-        function.variable_lifetime = VariableLifetime(function.blocks)
+        function.blocks = canonical(function.blocks)
+        function.variable_lifetime = lifetime(function.blocks)
         function.generator_info = None
 
     return run
