@@ -17,8 +17,9 @@ from nscan_cli.logs.scan_checks import ScanCheckOptions
 from nscan_cli.slam.diagnostics.notices import notices
 from nscan_cli.slam.local_matching.options import NScanOptions
 from nscan_cli.slam.options import Relations, SlamOptions
-from nscan_cli.slam.pipeline import run_slam
+from nscan_cli.slam.pipeline import LoopProgress
 from nscan_cli.slam.state import SlamState
+from nscan_cli.slam.systematic_error import map_drive
 
 MappingProgress = Callable[[int, int, int], None]
 """Called with the scans done, the keyframes, and the loops that are accepted so far."""
@@ -68,24 +69,27 @@ def map_log(
     What the scans contradict of their file beyond doubt is put right first.
     """
     checked = checked_file(log, reading, options.file_check)
-    log = checked.log
-    state = SlamState.of_log(log, options, threads)
-    looked_at = accepted = 0
 
-    def tell(done: int, keyframes: int) -> None:
-        # Another thread may make the list longer meanwhile; only in the end is it looked through again.
-        nonlocal looked_at, accepted
-        new = state.loops[looked_at:]
-        looked_at += len(new)
-        accepted += sum(loop.accepted for loop in new)
-        report(done, keyframes, accepted)
+    def progress(state: SlamState) -> LoopProgress:
+        looked_at = accepted = 0
 
-    graph = run_slam(state, tell)
+        def tell(done: int, keyframes: int) -> None:
+            # Another thread may make the list longer meanwhile; only in the end is it looked through again.
+            nonlocal looked_at, accepted
+            new = state.loops[looked_at:]
+            looked_at += len(new)
+            accepted += sum(loop.accepted for loop in new)
+            report(done, keyframes, accepted)
+
+        return tell
+
+    drive = map_drive(checked.log, options, threads, progress, reading.as_recorded)
     parameters: dict[str, Any] = {
         "reading": dataclasses.asdict(checked.reading),
         "scan_checks": as_parameters(ScanCheckOptions()),
         "slam": as_parameters(options),
     }
-    said = [*log.report.notices(), *checked.messages, *notices(state, checked.followed)]
+    state, graph, said = drive.state, drive.graph, log.report.notices() + checked.messages + drive.messages
+    said += notices(state, checked.followed)
     graph.provenance = {**provenance_of([log.source], parameters), "notices": said}
     return state, graph

@@ -21,6 +21,7 @@ from nscan_cli.slam.frontend.options import TrackingOptions
 from nscan_cli.slam.keyframes.options import KeyframeOptions
 from nscan_cli.slam.local_matching.options import NScanOptions
 from nscan_cli.slam.loop_closure.options import LoopClosureOptions
+from nscan_cli.slam.systematic_error_options import SystematicErrorOptions
 
 Relations = Literal["pairwise", "nscan", "both"]
 """What the graph is made of; see SlamOptions."""
@@ -43,6 +44,7 @@ class SlamOptions:
     uneven_motion: UnevenMotionOptions = field(default_factory=UnevenMotionOptions)
     refinement: RefinementOptions = field(default_factory=RefinementOptions)
     degenerate_relations: DegenerateRelationOptions = field(default_factory=DegenerateRelationOptions)
+    systematic_error: SystematicErrorOptions = field(default_factory=SystematicErrorOptions)
     diagnostics: DiagnosticsOptions = field(default_factory=DiagnosticsOptions)
     relations: Relations = "both"
     """both: the chain of pairwise relations from tracking, and nScan relations of joint matches. nscan: of

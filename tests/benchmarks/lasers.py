@@ -23,8 +23,7 @@ from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.poses import Array, compose
 from nscan_cli.slam.diagnostics.notices import notices
 from nscan_cli.slam.options import SlamOptions
-from nscan_cli.slam.pipeline import run_slam
-from nscan_cli.slam.state import SlamState
+from nscan_cli.slam.systematic_error import map_drive
 from tests.benchmarks.robustness import false_loops
 from tests.experiments.output import table
 from tests.simulation.building import building, drive
@@ -160,10 +159,9 @@ def outcome(kind: Kind, seed: int, odometry: str) -> Outcome:
     log, truth = recorded(kind, seed, odometry)
     if odometry == NONE:
         log = dataclasses.replace(log, odometry=None, odometry_path=None)
-    state = SlamState.of_log(log, SlamOptions())
-    graph = run_slam(state, lambda scans, keyframes: None)
-    false = false_loops(graph, truth)
-    return Outcome(kind.name, odometry, rms(graph.poses, truth), false, bool(notices(state)))
+    drive = map_drive(log, SlamOptions())
+    poses, is_told = drive.graph.poses, bool(drive.messages or notices(drive.state))
+    return Outcome(kind.name, odometry, rms(poses, truth), false_loops(drive.graph, truth), is_told)
 
 
 def rms(poses: Array, truth: Array) -> float:

@@ -1,0 +1,156 @@
+"""The systematic error of odometry, by the map of a whole drive, and the drive mapped again without it.
+
+Wheels of another size than the file says make all ways too long or too short, and wheels of different sizes
+bend them. Tracking learns this where scans tell their place (frontend/odometry_bias.py). Along bare corridors
+they tell so little that the map lies between scans and odometry, all the way. Then each piece of the map is
+off odometry by about the same, and a map without that is off by less.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+
+from nscan_cli.graph.model import Graph
+from nscan_cli.logs.laser_log import LaserLog
+from nscan_cli.logs.robot_path import robot_path
+from nscan_cli.poses import Array, are_known, relative, wrap
+from nscan_cli.slam.options import SlamOptions
+from nscan_cli.slam.pipeline import LoopProgress, run_slam
+from nscan_cli.slam.state import SlamState
+from nscan_cli.slam.systematic_error_options import SystematicErrorOptions
+
+
+class SystematicError(NamedTuple):
+    """By how much odometry is off everywhere alike."""
+
+    length: float
+    """Length of a way by the map, as a multiple of that by odometry."""
+    turn: float
+    """Turn along a straight way by the map, less that by odometry, rad/m."""
+
+    def and_then(self, more: SystematicError) -> SystematicError:
+        """This one, and another one of the odometry without it."""
+        return SystematicError(self.length * more.length, self.turn + more.turn * self.length)
+
+
+@dataclass(frozen=True)
+class MappedDrive:
+    """What `map_drive` returns."""
+
+    state: SlamState
+    graph: Graph
+    messages: list[str]
+    """What was put right."""
+
+
+def map_drive(
+    log: LaserLog,
+    options: SlamOptions,
+    threads: int = 1,
+    progress: Callable[[SlamState], LoopProgress] = lambda _state: lambda *_counts: None,
+    as_recorded: bool = False,
+) -> MappedDrive:
+    """Run the loop, and again as long as its map shows a systematic error of the odometry.
+
+    `progress` makes what each run reports to. With `as_recorded` the odometry is believed.
+    """
+    limits, total, least = options.systematic_error, None, options.systematic_error.min_length
+    runs_left = 0 if as_recorded else limits.max_runs
+    while True:
+        state = SlamState.of_log(log, options, threads)
+        graph = run_slam(state, progress(state))
+        found = systematic_error(graph.poses, log.odometry, state.breaks, limits, least)
+        if found is None or not runs_left:
+            return MappedDrive(state, graph, [] if total is None else [_message(total)])
+        runs_left, least = runs_left - 1, limits.min_more_length
+        log = without_systematic_error(log, found)
+        total = found if total is None else total.and_then(found)
+
+
+def systematic_error(
+    poses: Array,
+    odometry: Array | None,
+    breaks: Sequence[int],
+    options: SystematicErrorOptions,
+    min_length: float,
+) -> SystematicError | None:
+    """The systematic error of odometry (S, 3) by the poses (S, 3) of a map; None if it is not certain, or if
+    lengths are off by a smaller share than `min_length`.
+
+    No piece of the path leads over the rows `breaks`, at which tracking broke.
+    """
+    pieces = None if odometry is None else _pieces(poses, odometry, breaks, options)
+    if pieces is None or len(pieces) < options.min_pieces:
+        return None
+    means, sigmas = pieces.mean(axis=0), pieces.std(axis=0, ddof=1) / np.sqrt(len(pieces))
+    certain = np.where(np.abs(means) > options.sigmas * sigmas, means, 0.0)
+    if abs(certain[0]) < min_length:
+        return None
+    return SystematicError(1.0 + float(certain[0]), float(certain[1]))
+
+
+def without_systematic_error(log: LaserLog, error: SystematicError) -> LaserLog:
+    """The log with its odometry corrected."""
+    path = log.odometry_path
+    assert log.odometry is not None
+    return replace(
+        log,
+        odometry=_corrected(log.odometry, error),
+        odometry_path=None if path is None else robot_path(path.times, _corrected(path.poses, error)),
+    )
+
+
+def _pieces(poses: Array, odometry: Array, breaks: Sequence[int], options: SystematicErrorOptions) -> Array:
+    """(n, 2) by how much each piece of the path is longer by the map, as a share, and by how much it turns
+    more, rad/m.
+
+    Pieces on which the robot turned around are left out: their ends tell no length.
+    """
+    known = np.flatnonzero(are_known(odometry))
+    steps = relative(odometry[known[1:]], odometry[known[:-1]])
+    along = np.append(0.0, np.cumsum(np.hypot(steps[:, 0], steps[:, 1])))
+    segments = np.searchsorted(np.asarray(breaks), known, side="right")
+    begins = np.flatnonzero(np.diff(segments, prepend=-1))
+    ends = []
+    for begin, end in zip(begins.tolist(), [*begins[1:].tolist(), len(known)], strict=True):
+        # Each piece begins where the one before ends.
+        at = begin
+        while (then := int(np.searchsorted(along[:end], along[at] + options.window))) < end:
+            ends.append((at, then))
+            at = then
+    first, last = known[np.array(ends, dtype=np.int64).reshape(-1, 2)].T
+    by_map, by_odometry = relative(poses[last], poses[first]), relative(odometry[last], odometry[first])
+    lengths, expected = (np.hypot(way[:, 0], way[:, 1]) for way in (by_map, by_odometry))
+    used = expected > options.min_straightness * options.window
+    turned = wrap(by_map[used, 2] - by_odometry[used, 2]) / options.window
+    return np.stack([lengths[used] / expected[used] - 1.0, turned], axis=1)
+
+
+def _corrected(poses: Array, error: SystematicError) -> Array:
+    """Poses (S, 3) by odometry without its systematic error; nan where it is unknown."""
+    known = np.flatnonzero(are_known(poses))
+    steps = relative(poses[known[1:]], poses[known[:-1]])
+    turned = error.turn * np.hypot(steps[:, 0], steps[:, 1])
+    # Over an arc, the chord turns by half as much.
+    headings = poses[known[0], 2] + np.append(0.0, np.cumsum(steps[:, 2] + turned))
+    directions = headings[:-1] + np.arctan2(steps[:, 1], steps[:, 0]) + 0.5 * turned
+    lengths = error.length * np.hypot(steps[:, 0], steps[:, 1])
+    corrected = poses.copy()
+    corrected[known[1:], 0] = poses[known[0], 0] + np.cumsum(lengths * np.cos(directions))
+    corrected[known[1:], 1] = poses[known[0], 1] + np.cumsum(lengths * np.sin(directions))
+    corrected[known, 2] = wrap(headings)
+    return corrected
+
+
+def _message(error: SystematicError) -> str:
+    longer = 1.0 / error.length - 1.0
+    veer = np.degrees(error.turn)
+    turns = f" and turns {abs(veer):.1f}° a metre too far {'right' if veer > 0 else 'left'}"
+    return (
+        f"odometry is {abs(longer):.1%} too {'long' if longer > 0 else 'short'}{turns if error.turn else ''} "
+        "everywhere, by the map: it is used without that; --as-recorded uses it as it is"
+    )
