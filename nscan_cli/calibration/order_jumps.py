@@ -6,20 +6,23 @@ mirror images of each other better than themselves.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
 from nscan_cli.calibration.compared_ranges import ComparedRanges
 from nscan_cli.calibration.measured_steps import measure_steps
 from nscan_cli.calibration.options import FileCheckOptions
+from nscan_cli.calibration.range_jump_options import OrderJumpOptions
 from nscan_cli.calibration.range_jumps import pairs_across, scans_to_match
 from nscan_cli.calibration.step_sampling import telling_steps
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.logs.mask_runs import mask_runs
 from nscan_cli.logs.stretch_names import stretch_names
-from nscan_cli.matching.scan_pairs import match_scans
-from nscan_cli.poses import Mask
+from nscan_cli.matching.scan_pairs import ScanPair, match_scans
+from nscan_cli.poses import MIRRORED, Array, Mask, compose, wrap
 
 
 def checked_order(
@@ -75,23 +78,66 @@ def order_jumps(log: LaserLog, compared: ComparedRanges, options: FileCheckOptio
 
 def _changes_at(log: LaserLog, row: int, options: FileCheckOptions) -> bool:
     """Whether scans before a row match the mirror images of those behind, and those of one side do not."""
-    gain = options.order.min_gain
-    return all(_mirror_gain(log, *rows, options) > gain for rows in pairs_across(row)) and all(
-        _mirror_gain(log, first, first + 1, options) < -gain for first in (row - 2, row)
-    )
+    gain, across = options.order.min_gain, []
+    for rows in pairs_across(row):
+        matched = _matched_both_ways(log, *rows, options)
+        if matched is None or _gain(matched) <= gain:
+            return False
+        across.append(matched.mirrored.pose)
+    sides = []
+    for first in (row - 2, row):
+        matched = _matched_both_ways(log, first, first + 1, options)
+        if matched is None or _gain(matched) >= -gain:
+            return False
+        sides.append(matched.as_read.pose)
+    return log.odometry is not None or _lead_one_way(across, sides, options.order)
 
 
-def _mirror_gain(log: LaserLog, first: int, last: int, options: FileCheckOptions) -> float:
-    """By how much the energy per point of two scans is lower with the later one mirrored; 0 for few."""
+class _Matched(NamedTuple):
+    """Two scans, matched as they are read and with the later one mirrored."""
+
+    as_read: ScanPair
+    mirrored: ScanPair
+    points: int
+
+
+def _gain(matched: _Matched) -> float:
+    """By how much the energy per point is lower with the later scan mirrored."""
+    return (matched.as_read.energy - matched.mirrored.energy) / matched.points
+
+
+def _matched_both_ways(log: LaserLog, first: int, last: int, options: FileCheckOptions) -> _Matched | None:
+    """The matches of two scans; None for too few points."""
     pair_of_scans = scans_to_match(log, first, last, options)
     if pair_of_scans is None:
-        return 0.0
+        return None
     before, behind, start = pair_of_scans
-    mirrored = behind * (1.0, -1.0)
     # Odometry itself may turn the wrong way.
     starts = (start, np.zeros(3))
-    energies = [
-        min(match_scans(before, points, each, options.steps.pair).energy for each in starts)
-        for points in (behind, mirrored)
-    ]
-    return (energies[0] - energies[1]) / len(behind)
+    as_read, mirrored = (
+        min((match_scans(before, points, each, options.steps.pair) for each in starts), key=_energy)
+        for points in (behind, behind * (1.0, -1.0))
+    )
+    return _Matched(as_read, mirrored, len(behind))
+
+
+def _energy(pair: ScanPair) -> float:
+    return pair.energy
+
+
+def _lead_one_way(across: Sequence[Array], sides: Sequence[Array], options: OrderJumpOptions) -> bool:
+    """Whether the four steps (3,) across the place agree with each other and with those of both sides.
+
+    Without odometry, two scans of a long room from before and after a turn may fit the mirror image better.
+    """
+    before, behind = sides[0], sides[1] * MIRRORED
+    between = across[0]
+    led = (
+        between,
+        compose(before, between),
+        compose(between, behind),
+        compose(before, compose(between, behind)),
+    )
+    off = np.stack(across) - np.stack(led)
+    is_near = np.hypot(off[:, 0], off[:, 1]) <= options.max_misfit
+    return bool((is_near & (np.abs(wrap(off[:, 2])) <= options.max_turn_misfit)).all())

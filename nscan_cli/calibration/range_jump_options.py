@@ -55,6 +55,10 @@ class OrderJumpOptions:
     min_gain: float = 0.3
     """The energy per point of four pairs of scans, one before the place and one behind, is lower by so much
     if one is mirrored, and that of two pairs on one side is higher. A larger value finds less."""
+    max_misfit: float = 0.8
+    """Without odometry, the steps by these pairs agree to so many metres. A larger value finds more."""
+    max_turn_misfit: float = 0.2
+    """The same of their turns, rad."""
 
 
 @dataclass(frozen=True)

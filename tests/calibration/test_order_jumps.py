@@ -13,6 +13,7 @@ from nscan_cli.calibration.options import FileCheckOptions
 from nscan_cli.calibration.order_jumps import checked_order, order_jumps
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.logs.load import read_log
+from nscan_cli.logs.reading_options import ReadingOptions
 from tests.data import data_file
 from tests.simulation import faults, odometry_faults
 from tests.slam.keyframe_drives import round_scene
@@ -76,3 +77,11 @@ def test_it_is_found_in_a_real_log(name):
     log = read_log(str(data_file(f"{name}.log.gz")))
     at = 4 * len(log) // 5
     assert jumps_of(faults.mirrored_in(log, slice(at, None))) == [at]
+
+
+@pytest.mark.parametrize("name", ["intel", "fr079", "mit-csail"])
+def test_large_turns_from_scan_to_scan_are_no_change_without_odometry(name):
+    """Every third scan of intel turns by up to 42°. In a long room, four matches of two turned scans prefer
+    the mirror image; their steps contradict each other."""
+    log = read_log(str(data_file(f"{name}.log.gz")), ReadingOptions(every=3, odometry=False))
+    assert jumps_of(log) == []
