@@ -78,8 +78,8 @@ def systematic_error(
     options: SystematicErrorOptions,
     min_length: float,
 ) -> SystematicError | None:
-    """The systematic error of odometry (S, 3) by the poses (S, 3) of a map; None if it is not certain, or if
-    lengths are off by a smaller share than `min_length`.
+    """The systematic error of odometry (S, 3) by the poses (S, 3) of a map; None if it is not certain, or not
+    there all the way, or if lengths are off by a smaller share than `min_length`.
 
     No piece of the path leads over the rows `breaks`, at which tracking broke.
     """
@@ -88,7 +88,8 @@ def systematic_error(
         return None
     means, sigmas = pieces.mean(axis=0), pieces.std(axis=0, ddof=1) / np.sqrt(len(pieces))
     certain = np.where(np.abs(means) > options.sigmas * sigmas, means, 0.0)
-    if abs(certain[0]) < min_length:
+    parts = np.array([part[:, 0].mean() for part in np.array_split(pieces, options.parts)])
+    if abs(certain[0]) < min_length or (parts / means[0] < options.min_part).any():
         return None
     return SystematicError(1.0 + float(certain[0]), float(certain[1]))
 

@@ -19,6 +19,11 @@ class SystematicErrorOptions:
     sigmas: float = 6.0
     """An error is certain if it exceeds this number of its standard deviations. A larger number leaves more
     odometry as it is."""
+    parts: int = 4
+    """Number of parts of the drive in each of which ways are off. More parts leave more odometry as it is."""
+    min_part: float = 0.5
+    """Least share of the mean by which they are off in each part. A larger share leaves more odometry as it
+    is."""
     min_length: float = 0.05
     """Least share by which ways are too long or too short. A larger share leaves more odometry as it is."""
     min_more_length: float = 0.02

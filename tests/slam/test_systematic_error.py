@@ -74,6 +74,9 @@ def test_errors_that_are_small_or_differ_along_the_way_are_none():
     # Half of the way is too long, and half of it too short by a little less.
     halves = [disturbed(poses[:1000], 1.3, 0.0), disturbed(poses[1000:], 0.8, 0.0)]
     assert systematic_error(poses, np.concatenate(halves), (), OPTIONS, LEAST) is None
+    # The ranges changed half-way.
+    halves = [disturbed(poses[:1000], 1.01, 0.0), disturbed(poses[1000:], 1.15, 0.0)]
+    assert systematic_error(poses, np.concatenate(halves), (), OPTIONS, LEAST) is None
 
 
 def test_too_few_pieces_tell_nothing_and_breaks_and_gaps_end_pieces():
