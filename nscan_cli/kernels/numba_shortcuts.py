@@ -31,6 +31,7 @@ def _shortcuts() -> list[tuple[Any, str, Callable[..., Any]]]:
         from numba.core.postproc import PostProcessor
         from numba.core.runtime.context import NRTContext
         from numba.core.types.functions import BaseFunction
+        from numba.core.typing.context import BaseContext as TypingContext
     except ImportError:
         return []
     made = (
@@ -38,6 +39,8 @@ def _shortcuts() -> list[tuple[Any, str, Callable[..., Any]]]:
         (ir.Inst, "_rec_list_vars", _listed_variables),
         (BaseFunction, "get_call_type", _remembered_signatures),
         (PostProcessor, "run", _without_live_variables),
+        (TypingContext, "refresh", _refreshed_if_new),
+        (BaseContext, "refresh", _refreshed_if_new),
         (BaseContext, "get_abi_sizeof", _remembered_sizes),
         (BaseContext, "get_abi_alignment", _remembered_sizes),
     )
@@ -145,3 +148,23 @@ def _remembered_sizes(own: Callable[..., Any]) -> Callable[..., Any]:
         return sizes[text]
 
     return size
+
+
+def _refreshed_if_new(own: Callable[..., Any]) -> Callable[..., Any]:
+    """A look for new functions in numba's registries, if there are any. numba imports and looks through them
+    a dozen times for each function."""
+    entries: dict[int, int] = {}
+
+    def refresh(self: Any) -> None:
+        registries, typing = self._registries, getattr(self, "typing_context", None)
+        if entries.get(id(registries)) != _entries(registries):
+            own(self)
+            entries[id(registries)] = _entries(registries)
+        elif typing is not None:
+            typing.refresh()
+
+    return refresh
+
+
+def _entries(registries: Any) -> int:
+    return sum(len(each) for one in registries for each in vars(one).values() if isinstance(each, list))
