@@ -75,8 +75,13 @@ def run_on_log(
     for warning in warnings:
         say(f"warning: {warning}", quiet)
     with progress("mapping", len(scans), quiet) as bar:
+        tracked = 0
 
         def report(done: int, keyframes: int, loops: int) -> None:
+            nonlocal tracked
+            if done <= tracked:
+                bar.begin("mapping again with corrected odometry", len(scans))
+            tracked = done
             bar.advance(done, f"{counted(keyframes, 'keyframe')}, {counted(loops, 'loop')}")
             if done == len(scans):
                 # Tracking is done; the final optimisation and refinement have no known length.
