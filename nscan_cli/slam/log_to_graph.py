@@ -83,7 +83,7 @@ def map_log(
 
         return tell
 
-    drive = map_drive(checked.log, options, threads, progress, reading.as_recorded)
+    drive = map_drive(checked.log, options, threads, progress, checked.reading)
     parameters: dict[str, Any] = {
         "reading": dataclasses.asdict(checked.reading),
         "scan_checks": as_parameters(ScanCheckOptions()),

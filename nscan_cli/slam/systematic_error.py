@@ -16,6 +16,7 @@ import numpy as np
 
 from nscan_cli.graph.model import Graph
 from nscan_cli.logs.laser_log import LaserLog
+from nscan_cli.logs.reading_options import ReadingOptions
 from nscan_cli.logs.robot_path import robot_path
 from nscan_cli.poses import Array, are_known, relative, wrap
 from nscan_cli.slam.options import SlamOptions
@@ -52,20 +53,21 @@ def map_drive(
     options: SlamOptions,
     threads: int = 1,
     progress: Callable[[SlamState], LoopProgress] = lambda _state: lambda *_counts: None,
-    as_recorded: bool = False,
+    reading: ReadingOptions = ReadingOptions(),
 ) -> MappedDrive:
     """Run the loop, and again as long as its map shows a systematic error of the odometry.
 
-    `progress` makes what each run reports to. With `as_recorded` the odometry is believed.
+    `progress` makes what each run reports to. The log was read with `reading`; as recorded, its odometry is
+    believed.
     """
     limits, total, least = options.systematic_error, None, options.systematic_error.min_length
-    runs_left = 0 if as_recorded else limits.max_runs
+    runs_left = 0 if reading.as_recorded else limits.max_runs
     while True:
         state = SlamState.of_log(log, options, threads)
         graph = run_slam(state, progress(state))
         found = systematic_error(graph.poses, log.odometry, state.breaks, limits, least)
         if found is None or not runs_left:
-            return MappedDrive(state, graph, [] if total is None else [_message(total)])
+            return MappedDrive(state, graph, [] if total is None else [_message(total, reading)])
         runs_left, least = runs_left - 1, limits.min_more_length
         log = without_systematic_error(log, found)
         total = found if total is None else total.and_then(found)
@@ -147,11 +149,11 @@ def _corrected(poses: Array, error: SystematicError) -> Array:
     return corrected
 
 
-def _message(error: SystematicError) -> str:
-    longer = 1.0 / error.length - 1.0
-    veer = np.degrees(error.turn)
+def _message(error: SystematicError, reading: ReadingOptions) -> str:
+    longer, veer = 1.0 / error.length - 1.0, np.degrees(error.turn)
     turns = f" and turns {abs(veer):.1f}° a metre too far {'right' if veer > 0 else 'left'}"
     return (
         f"odometry is {abs(longer):.1%} too {'long' if longer > 0 else 'short'}{turns if error.turn else ''} "
-        "everywhere, by the map: it is used without that; --as-recorded uses it as it is"
+        "everywhere, by the map: it is used without that; --as-recorded uses it as it is; if the ranges are "
+        f"wrong instead, --range-scale {(reading.range_scale or 1.0) / error.length:.3g} corrects them"
     )
