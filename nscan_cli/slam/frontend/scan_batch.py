@@ -67,7 +67,8 @@ class ScanBatch:
         order = np.arange(len(self))[::-1]
         points, ends = self.chosen(order)
         shares = np.concatenate([self.shares[self.ends[k] : self.ends[k + 1]] for k in order])
-        return ScanBatch(self.first, points, ends, -self.times[::-1], poses[::-1], -shares)
+        # A view in the other order is another type for kernels, which would be compiled again.
+        return ScanBatch(self.first, points, ends, -self.times[::-1], poses[::-1].copy(), -shares)
 
     def chosen(self, chosen: Indices) -> tuple[Array, Indices]:
         """A copy of the points (P, 2) of the scans with indices `chosen` (c,), and their `ends` (c + 1,)."""
