@@ -85,8 +85,10 @@ def systematic_error(
 
     No piece of the path leads over the rows `breaks`, at which tracking broke.
     """
-    pieces = None if odometry is None else _pieces(poses, odometry, breaks, options)
-    if pieces is None or len(pieces) < options.min_pieces:
+    if odometry is None or not are_known(odometry).any():
+        return None
+    pieces = _pieces(poses, odometry, breaks, options)
+    if len(pieces) < options.min_pieces:
         return None
     means, sigmas = pieces.mean(axis=0), pieces.std(axis=0, ddof=1) / np.sqrt(len(pieces))
     certain = np.where(np.abs(means) > options.sigmas * sigmas, means, 0.0)

@@ -72,6 +72,10 @@ def test_errors_that_are_small_or_differ_along_the_way_are_none():
     poses = winding()
     assert systematic_error(poses, disturbed(poses, 1.04, 0.1), (), OPTIONS, LEAST) is None
     assert systematic_error(poses, None, (), OPTIONS, LEAST) is None
+    for known in (0, 1):
+        missing = np.full_like(poses, np.nan)
+        missing[:known] = poses[:known]
+        assert systematic_error(poses, missing, (), OPTIONS, LEAST) is None
     # Half of the way is too long, and half of it too short by a little less.
     halves = [disturbed(poses[:1000], 1.3, 0.0), disturbed(poses[1000:], 0.8, 0.0)]
     assert systematic_error(poses, np.concatenate(halves), (), OPTIONS, LEAST) is None
