@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from operator import attrgetter
 from typing import NamedTuple
 
 import numpy as np
@@ -115,14 +116,13 @@ def _matched_both_ways(log: LaserLog, first: int, last: int, options: FileCheckO
     # Odometry itself may turn the wrong way.
     starts = (start, np.zeros(3))
     as_read, mirrored = (
-        min((match_scans(before, points, each, options.steps.pair) for each in starts), key=_energy)
+        min(
+            (match_scans(before, points, each, options.steps.pair) for each in starts),
+            key=attrgetter("energy"),
+        )
         for points in (behind, behind * (1.0, -1.0))
     )
     return _Matched(as_read, mirrored, len(behind))
-
-
-def _energy(pair: ScanPair) -> float:
-    return pair.energy
 
 
 def _lead_one_way(across: Sequence[Array], sides: Sequence[Array], options: OrderJumpOptions) -> bool:

@@ -180,9 +180,8 @@ def _import_numba() -> Any:
     With SVML, sines round differently than on other machines, and cached code needs the library. With
     colours (where colorama is installed) numba marks up messages that nobody sees: 2 % of a compilation.
     """
-    switches = dict.fromkeys(("NUMBA_DISABLE_INTEL_SVML", "NUMBA_DISABLE_ERROR_MESSAGE_HIGHLIGHTING"), "1")
-    before = {name: os.environ.get(name) for name in switches}
-    os.environ.update(switches)
+    before = {name: os.environ.get(name) for name in machine_code.IMPORT_SWITCHES}
+    os.environ.update(dict.fromkeys(before, "1"))
     try:
         import numba
 

@@ -31,12 +31,9 @@ from nscan_cli.files.outputs import write_once
 from nscan_cli.kernels.cache_folder import cache_folder
 from nscan_cli.kernels.whole_kernels import link_and_optimise
 
-HARMLESS_VARIABLES = {
-    "NUMBA_CACHE_DIR",
-    "NUMBA_NUM_THREADS",
-    "NUMBA_DISABLE_INTEL_SVML",
-    "NUMBA_DISABLE_ERROR_MESSAGE_HIGHLIGHTING",
-}
+IMPORT_SWITCHES = "NUMBA_DISABLE_INTEL_SVML", "NUMBA_DISABLE_ERROR_MESSAGE_HIGHLIGHTING"
+"""Settings that numba is imported with."""
+HARMLESS_VARIABLES = {"NUMBA_CACHE_DIR", "NUMBA_NUM_THREADS", *IMPORT_SWITCHES}
 """Settings of numba that do not change machine code."""
 NUMBA_CONFIG = ".numba_config.yaml"
 """The file in the current folder that numba reads settings from."""
