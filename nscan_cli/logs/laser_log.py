@@ -179,16 +179,16 @@ class LaserLog:
             return swept_points(self.ranges[rows], directions, laser, reach, times, beams, self.path)
         return _end_points(self.ranges[rows], np.cos(angles), np.sin(angles), self.mount, turn, reach)
 
-    def point_times(self, rows: slice, reach: float) -> Array:
-        """(m,) the times of the points of batch_points from the stamps of their scans, s."""
-        scans, beams = np.nonzero(np.isfinite(self.ranges[rows]))
-        points, _ = self.batch_points(rows, math.inf)
+    def timed_points(self, rows: slice, reach: float) -> tuple[Array, Indices, Array]:
+        """The points and ends of batch_points, and the times (m,) of the points from their stamps, s."""
+        points, ends = self.batch_points(rows, math.inf)
         near = np.hypot(points[:, 0], points[:, 1]) < reach
+        points, ends = points[near], np.append(0, np.cumsum(near))[ends]
         if self.beam_times is None:
-            return np.zeros(int(near.sum()))
+            return points, ends, np.zeros(len(points))
+        scans, beams = (each[near] for each in np.nonzero(np.isfinite(self.ranges[rows])))
         times = self.beam_times.of(rows)
-        found: Array = (times.first[scans] + times.step[scans] * beams)[near]
-        return found
+        return points, ends, times.first[scans] + times.step[scans] * beams
 
     def at_middle_of_turns(self) -> LaserLog:
         """The log with each scan at the time of its middle beam, and the odometry there, if the laser turns.

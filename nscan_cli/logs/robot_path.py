@@ -46,6 +46,8 @@ class RobotPath(NamedTuple):
     twists: Array
     """(P, 3) velocities from each pose to the next in the frame of the first, m/s and rad/s. The last one
     goes on as the one before."""
+    headings: Array
+    """(P, 2) cosine and sine of each heading."""
 
 
 def robot_path(
@@ -68,7 +70,7 @@ def robot_path(
     for row in np.flatnonzero(unknown).tolist():
         twists[row] = twists[row - 1] if row else 0.0
     twists[-1] = twists[-2]
-    return RobotPath(at, through, twists)
+    return RobotPath(at, through, twists, np.column_stack([np.cos(through[:, 2]), np.sin(through[:, 2])]))
 
 
 def bent_path(path: RobotPath, times: Array, poses: Array) -> RobotPath | None:
@@ -189,7 +191,7 @@ def seen_from(path: RobotPath, start: Array, time: float, j: int, out: Array) ->
         along, aside = sin / rate, (1.0 - cos) / rate
     x = along * path.twists[j, 0] - aside * path.twists[j, 1]
     y = aside * path.twists[j, 0] + along * path.twists[j, 1]
-    c, s = np.cos(path.poses[j, 2]), np.sin(path.poses[j, 2])
+    c, s = path.headings[j]
     dx, dy = path.poses[j, 0] + c * x - s * y - start[0], path.poses[j, 1] + s * x + c * y - start[1]
     cos, sin = c * cos - s * sin, s * cos + c * sin
     out[0], out[1] = start[2] * dx + start[3] * dy, start[2] * dy - start[3] * dx

@@ -58,7 +58,7 @@ class SweptRays(NamedTuple):
     def at_once(cls) -> SweptRays:
         """Those of a laser that sees all beams of a scan at once."""
         none, poses = np.zeros(0), np.zeros((0, 3))
-        return cls(RobotPath(none, poses, poses), none, BeamTimes(none, none), np.zeros(4))
+        return cls(RobotPath(none, poses, poses, np.empty((0, 2))), none, BeamTimes(none, none), np.zeros(4))
 
 
 class ScanRays(NamedTuple):

@@ -9,7 +9,9 @@ import numpy as np
 import pytest
 
 from nscan_cli.errors import WrongUsageError
+from nscan_cli.logs.beam_times import BeamTimes
 from nscan_cli.logs.laser_log import SCANS_AT_ONCE, LaserLog
+from nscan_cli.logs.log_excerpt import with_some_beams
 from tests.logs.lines import flaser, read
 
 SCANS, BEAMS = SCANS_AT_ONCE + 44, 6
@@ -72,3 +74,31 @@ def test_a_number_that_no_scan_has_is_wrong_usage(log):
             WrongUsageError, match=f"no scan {number}; scans read go from 0 to {2 * SCANS - 2}$"
         ):
             thinned.row(number)
+
+
+def test_some_beams_are_where_they_were_and_seen_when_they_were(log):
+    """Beams 0, 2 and 4 of 6; row 5 has 5 beams, and so three of these, row 6 has 4, and so two."""
+    beams = np.full(SCANS, BEAMS)
+    beams[5], beams[6] = 5, 4
+    times = BeamTimes(np.full(SCANS, -0.1), np.full(SCANS, 0.02))
+    log = dataclasses.replace(log, ranges=np.ones((SCANS, BEAMS), dtype=np.float32), beams=beams)
+    log.ranges[5, 5:] = log.ranges[6, 4:] = np.nan
+    thinned = with_some_beams(dataclasses.replace(log, beam_times=times), 2)
+    assert thinned.beam_counts()[4:8].tolist() == [3, 3, 2, 3]
+    for row in (4, 5, 6):
+        points, _, seen = thinned.timed_points(slice(row, row + 1), 40.0)
+        np.testing.assert_allclose(points, log.points(row)[::2], atol=1e-12)
+        np.testing.assert_allclose(seen, (-0.1 + 0.02 * np.arange(beams[row]))[::2], atol=1e-12)
+
+
+def test_the_times_are_those_of_the_points_within_reach(log):
+    times = BeamTimes(np.full(SCANS, -0.1), np.full(SCANS, 0.02))
+    timed = dataclasses.replace(log, beam_times=times)
+    points, ends, seen = timed.timed_points(slice(0, 9), 4.0)
+    expected, expected_ends = log.batch_points(slice(0, 9), 4.0)
+    np.testing.assert_array_equal(points, expected)
+    np.testing.assert_array_equal(ends, expected_ends)
+    usable = [np.flatnonzero(np.isfinite(log.ranges[row])) for row in range(9)]
+    near = [np.hypot(*log.points(row).T) < 4.0 for row in range(9)]
+    beams = np.concatenate([beam[kept] for beam, kept in zip(usable, near, strict=True)])
+    np.testing.assert_allclose(seen, -0.1 + 0.02 * beams, atol=1e-12)

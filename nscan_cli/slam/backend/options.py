@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from nscan_cli.graph.optimise.graph_solver import StopOptions
-from nscan_cli.matching.pairwise import PairOptions
 
 
 @dataclass(frozen=True)
@@ -48,7 +47,7 @@ class UnevenMotionOptions:
     min_change: float = 0.05
     """The motion is uneven if the way during one turn of the laser differs by more from that during the next,
     m. A larger value takes less time, and leaves the poses between two turns less certain."""
-    min_turn_change: float = 0.02
+    min_turn_change: float = 0.03
     """The motion is also uneven if the turns of the robot during two such turns differ by more, rad. A larger
     value takes less time, and leaves the headings less certain."""
     longest_step: float = 2.5
@@ -73,7 +72,7 @@ class UnevenMotionOptions:
     """Usual change of the turn rate from one part to the next, rad/s. With a larger value the headings are
     rougher where the beams tell little."""
     iterations: int = 8
-    """Largest number of Newton steps for each widening. A larger number lets slow matches converge."""
+    """Largest number of Newton steps in a stage. A larger number lets slow matches converge."""
     sigma: float = 0.05
     """Standard deviation of the known places at the middles of the turns, m: it keeps matches from sliding
     along walls. A larger value believes the beams more."""
@@ -91,11 +90,17 @@ class UnevenMotionOptions:
     max_beams: int = 300
     """Approximate number of beams of a scan that are matched, evenly spread. More tell more and take
     longer."""
-    pair: PairOptions = field(
-        default_factory=lambda: PairOptions(
-            widenings=(0.3, 1.0), scale=0.3, tolerance=5e-4, coarse_tolerance=3e-3
-        )
-    )
+    scale: float = 0.3
+    """Factor that makes a negative log likelihood of the energy of the beams. A larger value believes them
+    more."""
+    widenings: tuple[float, ...] = (0.3, 1.0)
+    """Factors of the information of the Gaussians in the stages of a match; the last one is 1. Smaller ones
+    find paths that are farther off."""
+    tolerance: float = 3e-3
+    """The last stage has ended when no pose moves by more, m and rad. A larger value is less exact and takes
+    less time."""
+    coarse_tolerance: float = 1e-2
+    """The same for the stages before."""
 
 
 @dataclass(frozen=True)

@@ -61,17 +61,21 @@ def _between_moved(relation: Pairwise, first: Array, second: Array) -> Pairwise:
 def add_keyframes_at(state: SlamState, found: TrackedScans, is_keyframe: Mask, breaks: set[int]) -> None:
     """Add keyframes with their Gaussians, from all scans (S,) where they were `found`."""
     keyframes = state.keyframes
+    begins = is_keyframe.copy()
+    begins[list(breaks)] = True
     for scans in state.scan_batches():
         those = found.part(scans.first, scans.first + len(scans))
-        for k, row in enumerate(range(scans.first, scans.first + len(scans))):
+        first = 0
+        for k in [*np.flatnonzero(begins[scans.first :][: len(scans)]).tolist(), len(scans)]:
+            keyframes.attach(scans, those, first, k)
+            first, row = k, scans.first + k
             if row in breaks:
                 keyframes.end_segment()
-            if is_keyframe[row]:
+            if k < len(scans) and is_keyframe[row]:
                 keyframes.add(row, scans.of(k), those.scan(k))
                 for whole in keyframes.list[-2:-1]:
                     whole.make_ndt()
-            else:
-                keyframes.attach(scans, those, k, k + 1)
+                first = k + 1
     keyframes.end_segment()
 
 

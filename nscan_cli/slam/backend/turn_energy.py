@@ -81,7 +81,7 @@ class TurnEnergy:
         self.pattern = _band_pattern(len(times))
         self._problem = TurnProblem(
             reference.grid, reference.half, seen.points, shares, ends, groups, seconds, start, options.parts,
-            options.pair.scale, sigmas,
+            options.scale, sigmas,
         )  # fmt: skip
 
     def evaluate(self, knots: Array, widening: float) -> System:

@@ -13,8 +13,10 @@ from dataclasses import replace
 
 import numpy as np
 
+from nscan_cli.graph.optimise.graph_energy import System
 from nscan_cli.graph.optimise.graph_solver import newton_step
 from nscan_cli.logs.laser_log import LaserLog
+from nscan_cli.logs.log_excerpt import with_some_beams
 from nscan_cli.logs.mask_runs import mask_runs
 from nscan_cli.logs.robot_path import RobotPath, RobotPathOptions, poses_at, robot_path
 from nscan_cli.matching.damped_newton import PAIRWISE_STEPS, is_accepted, is_last, next_damping
@@ -39,12 +41,13 @@ def path_of_turns(
         return path
     poses, times, found = poses.copy(), [log.times], list[Array]()
     outside = ~np.isin(path.times, log.times)
+    thinned = with_some_beams(log, max(log.ranges.shape[1] // uneven.max_beams, 1))
     known = _known_steps(log.times, breaks, uneven)
     for first, last in _runs(_is_uneven(log.times, poses, known, uneven), uneven.longest_run):
         # A scan more on each side: at the ends of what is matched nothing tells the motion beyond.
         before, after = first > 1 and known[first - 2], last < len(known) and known[last]
         around = first - 1 - int(before), last + int(after)
-        run = _Run(log, poses, path, (first - 1, last), around, options)
+        run = _Run(thinned, poses, path, (first - 1, last), around, options)
         if run.match():
             poses[run.rows] = run.knots[run.is_middle]
             times.append(run.times[~run.is_middle])
@@ -120,7 +123,7 @@ class _Run:
         self._knots[::parts] = poses[first : last + 1]
         self._knots[:, 2] = np.unwrap(self._knots[:, 2])
         near = np.arange(max(first - uneven.scans, 0), min(last + 1 + uneven.scans, len(log)))
-        self._near, self._is_other = near, (near < first) | (near > last)
+        self._sides = near[near < first], near[near > last]
         self._moving = replace(log, path=robot_path(log.times[near], poses[near]))
         self._inside = slice(parts * (rows[0] - first), parts * (rows[1] - first) + 1)
 
@@ -146,43 +149,46 @@ class _Run:
         """Find the path on which the beams fit best; whether they tell it."""
         uneven, start = self._options.uneven_motion, self._knots
         seen, turns = self._seen(), len(start) / uneven.parts
-        if self._is_other.sum() < uneven.scans or len(seen.points) < uneven.min_points * turns:
+        if sum(map(len, self._sides)) < uneven.scans or len(seen.points) < uneven.min_points * turns:
             return False
         energy = TurnEnergy(self._reference(), seen, self._times, start, uneven)
-        for widening in uneven.pair.widenings:
-            self._knots = _least(energy, self._knots, widening, uneven)
+        for widening in uneven.widenings:
+            self._knots, after = _least(energy, self._knots, widening, uneven)
+        before = energy.evaluate(start, 1.0)
         off = np.abs(self._knots - start)[:: uneven.parts]
         near = (off < uneven.max_sigmas * np.array([uneven.sigma, uneven.sigma, uneven.turn_sigma])).all()
-        fits = [energy.evaluate(knots, 1.0).terms[FIT] for knots in (start, self._knots)]
-        return bool(near) and fits[0] - fits[1] > uneven.min_gain * (len(start) - 1)
+        gain = before.terms[FIT] - after.terms[FIT]
+        return bool(near) and gain > uneven.min_gain * (len(start) - 1)
 
     def _reference(self) -> Ndt:
         """The Gaussians of the scans on both sides."""
         gaussians, reach = self._options.nscan.gaussians, self._options.tracking.max_range
-        near, others = self._near, self._is_other
-        points, ends = self._moving.batch_points(slice(int(near[0]), int(near[-1]) + 1), reach)
-        sizes = np.diff(ends)
+        sides = [
+            self._moving.batch_points(slice(rows[0], rows[-1] + 1), reach)
+            for rows in self._sides
+            if len(rows)
+        ]
+        points = np.concatenate([seen for seen, _ in sides])
+        ends = np.append(0, np.cumsum(np.concatenate([np.diff(ends) for _, ends in sides])))
         assert self._moving.path is not None
-        poses = poses_at(self._moving.path, self._log.times[near[others]])
-        ends = np.append(0, np.cumsum(sizes[others]))
-        return Ndt.of_scans(
-            points[np.repeat(others, sizes)], ends, poses, gaussians, neighbourhood=WALL_DIRECTION,
-        )  # fmt: skip
+        poses = poses_at(self._moving.path, self._log.times[np.concatenate(self._sides)])
+        return Ndt.of_scans(points, ends, poses, gaussians, neighbourhood=WALL_DIRECTION)
 
     def _seen(self) -> TimedPoints:
         """The points of the scans in the time of the path, in order of time."""
         rows, reach = slice(self._around[0], self._around[1] + 1), self._options.tracking.max_range
-        standing, every = replace(self._log, path=None), self._options.uneven_motion.max_beams
-        points, ends = standing.batch_points(rows, reach)
-        times = standing.point_times(rows, reach) + np.repeat(self._log.times[rows], np.diff(ends))
-        order = np.argsort(times, kind="stable")[:: max(self._log.ranges.shape[1] // every, 1)]
+        points, ends, times = replace(self._log, path=None).timed_points(rows, reach)
+        times += np.repeat(self._log.times[rows], np.diff(ends))
+        order = np.argsort(times, kind="stable")
         order = order[(times[order] >= self._times[0]) & (times[order] < self._times[-1])]
         return TimedPoints(points[order], times[order])
 
 
-def _least(energy: TurnEnergy, knots: Array, widening: float, options: UnevenMotionOptions) -> Array:
-    """The knots (K, 3) of least energy, from `knots` (K, 3) on."""
-    tolerance = options.pair.tolerance if widening == 1.0 else options.pair.coarse_tolerance
+def _least(
+    energy: TurnEnergy, knots: Array, widening: float, options: UnevenMotionOptions
+) -> tuple[Array, System]:
+    """The knots (K, 3) of least energy, from `knots` (K, 3) on, and the energy there."""
+    tolerance = options.tolerance if widening == 1.0 else options.coarse_tolerance
     here, damping = energy.evaluate(knots, widening), PAIRWISE_STEPS.first
     for _ in range(options.iterations):
         step = newton_step(energy.pattern, here, damping)
@@ -195,4 +201,4 @@ def _least(energy: TurnEnergy, knots: Array, widening: float, options: UnevenMot
             if is_last(float(np.abs(step).max()), tolerance, damping, PAIRWISE_STEPS):
                 break
         damping = next_damping(damping, accepted, PAIRWISE_STEPS)
-    return knots
+    return knots, here

@@ -100,17 +100,19 @@ def scan_batches(
     Scans in the `frozen` rows (H,) have no points.
     """
     # Along a path they are corrected already.
-    is_corrected = log.beam_times is not None and log.path is None and len(log) > 1
-    period, first = max(float(np.median(np.diff(log.times))), SHORTEST_PERIOD) if is_corrected else 1.0, 0
-    reach = options.max_range
-    for points, ends in log.point_batches(SCANS_PER_BATCH, reach):
-        end = first + len(ends) - 1
-        shares = log.point_times(slice(first, end), reach) / period if is_corrected else NONE
+    is_swept = log.beam_times is not None and log.path is None and len(log) > 1
+    period = max(float(np.median(np.diff(log.times))), SHORTEST_PERIOD) if is_swept else 1.0
+    for first in range(0, len(log), SCANS_PER_BATCH):
+        rows, shares = slice(first, min(first + SCANS_PER_BATCH, len(log))), NONE
+        if is_swept:
+            points, ends, times = log.timed_points(rows, options.max_range)
+            shares = times / period
+        else:
+            points, ends = log.batch_points(rows, options.max_range)
         kept = spaced_points(points, ends, options.point_spacing)
-        kept &= np.repeat(~np.isin(np.arange(first, end), frozen), np.diff(ends))
+        kept &= np.repeat(~np.isin(np.arange(first, rows.stop), frozen), np.diff(ends))
         if not kept.all():
-            points, shares = points[kept], shares[kept] if is_corrected else NONE
+            points, shares = points[kept], shares[kept] if is_swept else NONE
             ends = np.concatenate([[0], np.cumsum(kept)])[ends]
-        known = None if odometry is None else odometry[first:end]
-        yield ScanBatch(first, points, ends, log.times[first:end], known, shares)
-        first = end
+        known = None if odometry is None else odometry[rows]
+        yield ScanBatch(first, points, ends, log.times[rows], known, shares)
