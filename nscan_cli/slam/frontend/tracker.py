@@ -22,7 +22,7 @@ from nscan_cli.slam.frontend.scan_batch import ScanBatch
 from nscan_cli.slam.frontend.scan_to_map import match_and_count
 from nscan_cli.slam.frontend.track_state import KNOWN, NEXT, RESTARTS, TrackState
 from nscan_cli.slam.frontend.tracked_scans import TrackedScans
-from nscan_cli.slam.frontend.tracking_kernels import settle, track_scans
+from nscan_cli.slam.frontend.tracking_kernels import track_scans
 from nscan_cli.slam.frontend.tracking_problem import TrackingProblem
 from nscan_cli.slam.frontend.visible_points import points_in_view
 
@@ -75,7 +75,7 @@ class Tracker:
                 self._track, self.map.grid, self._settings, scans.points, ends, scans.shares, scans.times,
                 odometry, self._prior, found,
             )  # fmt: skip
-            begun, k = k, track_scans(problem, k, may_wait)
+            begun, k = k, track_scans(problem, k, may_wait, False)
             self.map.rows = int(self._track.map.counts[ROWS])
             if k > begun:
                 self._keep(found, begun)
@@ -93,7 +93,7 @@ class Tracker:
                 found.weakest_sigmas[k] = np.inf
                 if self._is_tried:
                     remove_newest(self._track.map, self.map.grid, self._settings)
-            settle(problem, k)
+            track_scans(problem, k, may_wait, True)
             self.map.rows = int(self._track.map.counts[ROWS])
             if is_lost:
                 self._leave_out(scans.of(k), found, k)

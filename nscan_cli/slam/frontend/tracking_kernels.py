@@ -32,7 +32,7 @@ from nscan_cli.slam.frontend.visible_points import points_in_view
 
 
 @kernel
-def settle(problem: TrackingProblem, k: int) -> None:
+def _settle(problem: TrackingProblem, k: int) -> None:
     """Take over the match of scan k into the state, then match the scans that wait for it.
 
     The scan joins the map if the robot has moved. Its pose, inliers and Hessian of the objective were written
@@ -140,8 +140,9 @@ def _pays_for_odometry(problem: TrackingProblem, trusted: Array, value: float, k
 
 
 @kernel
-def track_scans(problem: TrackingProblem, first: int, may_wait: bool) -> int:
-    """Track scans from the `first` on; returns the next one, which is not settled.
+def track_scans(problem: TrackingProblem, first: int, may_wait: bool, is_matched: bool) -> int:
+    """Track scans from the `first` on; returns the next one, which is not settled. If the first one
+    `is_matched` already, it alone is settled.
 
     A scan waits until the robot has moved; the last ones settle unless they `may_wait` for scans that are not
     here yet. A scan that is not settled is lost: its inliers in `found` are too few. Or the grid has no room:
@@ -156,7 +157,9 @@ def track_scans(problem: TrackingProblem, first: int, may_wait: bool) -> int:
         if track.map.counts[ROWS] + CELLS_PER_POINT * scan.shape[0] > grid.keys.shape[0]:
             found.inliers[k] = np.nan
             return k
-        if track.counts[KNOWN] == 0:
+        if is_matched:
+            pass
+        elif track.counts[KNOWN] == 0:
             prior.mean[:], prior.information[:, :] = 0.0, 0.0
             found.values[k], found.poses[k], found.hessians[k], found.inliers[k] = 0.0, 0.0, 0.0, 1.0
         else:
@@ -190,5 +193,7 @@ def track_scans(problem: TrackingProblem, first: int, may_wait: bool) -> int:
                 predict_steadily(track, options, problem.times[k], prior)
                 found.values[k] += prior_value(prior, found.poses[k])
                 keep_prediction(grid, settings, matched, prior, track.mean_square_deviation, found, k)
-        settle(problem, k)
+        _settle(problem, k)
+        if is_matched:
+            return k + 1
     return int(ends.shape[0]) - 1
