@@ -11,10 +11,12 @@ import dataclasses
 import numpy as np
 
 from nscan_cli.graph.model import Pairwise
+from nscan_cli.logs.log_excerpt import excerpt
 from nscan_cli.logs.robot_path import poses_at
 from nscan_cli.poses import Array, Mask, compose, inverse, relative
 from nscan_cli.slam.backend.scan_poses import between_keyframes
 from nscan_cli.slam.backend.uneven_motion import path_of_turns
+from nscan_cli.slam.frontend.scan_batch import scan_batches
 from nscan_cli.slam.frontend.tracked_scans import TrackedScans
 from nscan_cli.slam.keyframes.route import route_of
 from nscan_cli.slam.options import SlamOptions
@@ -61,21 +63,25 @@ def _between_moved(relation: Pairwise, first: Array, second: Array) -> Pairwise:
 def add_keyframes_at(state: SlamState, found: TrackedScans, is_keyframe: Mask, breaks: set[int]) -> None:
     """Add keyframes with their Gaussians, from all scans (S,) where they were `found`."""
     keyframes = state.keyframes
-    begins = is_keyframe.copy()
-    begins[list(breaks)] = True
-    for scans in state.scan_batches():
-        those = found.part(scans.first, scans.first + len(scans))
-        first = 0
-        for k in [*np.flatnonzero(begins[scans.first :][: len(scans)]).tolist(), len(scans)]:
+    # Points are computed only of the scans that make Gaussians.
+    used = np.flatnonzero(found.in_map | is_keyframe)
+    log, frozen = excerpt(state.log, used), np.flatnonzero(np.isin(used, state.frozen_scans))
+    begins = np.zeros(len(used) + 1, dtype=np.bool_)
+    begins[np.searchsorted(used, sorted(breaks))] = True
+    for scans in scan_batches(log, state.options.tracking, None, frozen):
+        rows = used[scans.first : scans.first + len(scans)]
+        those, first = found.of(rows), 0
+        ends_segment, is_own = begins[scans.first :], is_keyframe[rows]
+        for k in np.flatnonzero(ends_segment[: len(rows)] | is_own).tolist():
             keyframes.attach(scans, those, first, k)
-            first, row = k, scans.first + k
-            if row in breaks:
+            if ends_segment[k]:
                 keyframes.end_segment()
-            if k < len(scans) and is_keyframe[row]:
-                keyframes.add(row, scans.of(k), those.scan(k))
+            if is_own[k]:
+                keyframes.add(int(rows[k]), scans.of(k), those.scan(k))
                 for whole in keyframes.list[-2:-1]:
                     whole.make_ndt()
-                first = k + 1
+            first = k + int(is_own[k])
+        keyframes.attach(scans, those, first, len(rows))
     keyframes.end_segment()
 
 

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from nscan_cli.poses import Array
+from nscan_cli.poses import Array, Indices
 
 
 @dataclass(frozen=True)
@@ -76,6 +76,11 @@ class TrackedScans(NamedTuple):
     def part(self, first: int, end: int) -> TrackedScans:
         """What was found of the scans from the `first` on, before the `end`."""
         columns: Iterable[Any] = (column[first:end] for column in self)
+        return TrackedScans(*columns)
+
+    def of(self, rows: Indices) -> TrackedScans:
+        """What was found of the scans in some rows (R,)."""
+        columns: Iterable[Any] = (column[rows] for column in self)
         return TrackedScans(*columns)
 
     def scan(self, k: int) -> TrackedScan:
