@@ -152,20 +152,16 @@ class LaserLog:
 
     def points_by_scan(self) -> Iterator[Array]:
         """The `points` of each scan, in order of time."""
-        for points, ends in self.point_batches(SCANS_AT_ONCE):
+        for first in range(0, len(self), SCANS_AT_ONCE):
+            points, ends = self.batch_points(slice(first, first + SCANS_AT_ONCE), math.inf)
             for begin, end in itertools.pairwise(ends.tolist()):
                 yield points[begin:end]
 
-    def point_batches(self, size: int, reach: float = math.inf) -> Iterator[tuple[Array, Indices]]:
-        """The points (m, 2) of `size` scans at a time that are nearer to the robot than `reach` (m).
-
-        Scan k of a batch has points[ends[k] : ends[k + 1]], with ends (n + 1,).
-        """
-        for first in range(0, len(self), size):
-            yield self.batch_points(slice(first, first + size), reach)
-
     def batch_points(self, rows: slice, reach: float) -> tuple[Array, Indices]:
-        """One batch of point_batches, of R rows: points (m, 2) and ends (R + 1,)."""
+        """The points (m, 2) of R rows at once that are nearer to the robot than `reach` (m).
+
+        Scan k of them has points[ends[k] : ends[k + 1]], with ends (R + 1,).
+        """
         first, between = self.angle_min[rows], self.angle_increment[rows]
         if (first == first[0]).all() and (between == between[0]).all():
             # Mostly all scans have the same angles, and one row of cosines serves them all.

@@ -107,5 +107,5 @@ def test_short_sighted_scans_are_not_pulled_together_along_a_corridor():
 
 def scans(log: LaserLog) -> list[Array]:
     """The points of each scan, in its robot's frame."""
-    points, ends = next(iter(log.point_batches(len(log), 40.0)))
+    points, ends = log.batch_points(slice(len(log)), 40.0)
     return [points[a:b] for a, b in itertools.pairwise(ends)]

@@ -66,15 +66,15 @@ def add_keyframes_at(state: SlamState, found: TrackedScans, is_keyframe: Mask, b
     # Points are computed only of the scans that make Gaussians.
     used = np.flatnonzero(found.in_map | is_keyframe)
     log, frozen = excerpt(state.log, used), np.flatnonzero(np.isin(used, state.frozen_scans))
-    begins = np.zeros(len(used) + 1, dtype=np.bool_)
-    begins[np.searchsorted(used, sorted(breaks))] = True
+    after_break = np.zeros(len(used) + 1, dtype=np.bool_)
+    after_break[np.searchsorted(used, sorted(breaks))] = True
     for scans in scan_batches(log, state.options.tracking, None, frozen):
-        rows = used[scans.first : scans.first + len(scans)]
-        those, first = found.of(rows), 0
-        ends_segment, is_own = begins[scans.first :], is_keyframe[rows]
-        for k in np.flatnonzero(ends_segment[: len(rows)] | is_own).tolist():
+        batch = slice(scans.first, scans.first + len(scans))
+        rows, begins, first = used[batch], after_break[batch], 0
+        those, is_own = found.of(rows), is_keyframe[rows]
+        for k in np.flatnonzero(begins | is_own).tolist():
             keyframes.attach(scans, those, first, k)
-            if ends_segment[k]:
+            if begins[k]:
                 keyframes.end_segment()
             if is_own[k]:
                 keyframes.add(int(rows[k]), scans.of(k), those.scan(k))

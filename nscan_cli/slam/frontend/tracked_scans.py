@@ -75,11 +75,10 @@ class TrackedScans(NamedTuple):
 
     def part(self, first: int, end: int) -> TrackedScans:
         """What was found of the scans from the `first` on, before the `end`."""
-        columns: Iterable[Any] = (column[first:end] for column in self)
-        return TrackedScans(*columns)
+        return self.of(slice(first, end))
 
-    def of(self, rows: Indices) -> TrackedScans:
-        """What was found of the scans in some rows (R,)."""
+    def of(self, rows: slice | Indices) -> TrackedScans:
+        """What was found of the scans in some rows."""
         columns: Iterable[Any] = (column[rows] for column in self)
         return TrackedScans(*columns)
 
