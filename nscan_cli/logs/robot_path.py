@@ -178,6 +178,19 @@ def interval_at(times: Array, time: float, j: int) -> int:
 
 
 @llvm_inline_kernel
+def along_arc(rate: float, seconds: float, cos: float, sin: float) -> tuple[float, float]:
+    """How far (s) a velocity leads ahead and aside on an arc: one of 1 m/s as many metres.
+
+    `cos` and `sin` are those of the turn, `rate` (rad/s) times `seconds`.
+    """
+    if abs(rate * seconds) <= STRAIGHT:
+        return seconds, 0.0
+    # Of small turns, the difference of one and the cosine would be rounding.
+    versine = sin * sin / (1.0 + cos) if cos > 0.0 else 1.0 - cos
+    return sin / rate, versine / rate
+
+
+@llvm_inline_kernel
 def seen_from(path: RobotPath, start: Array, time: float, j: int, out: Array) -> None:
     """Write the robot's pose at a time (s), after place j of its path, as seen from `start`.
 
@@ -186,9 +199,7 @@ def seen_from(path: RobotPath, start: Array, time: float, j: int, out: Array) ->
     seconds, rate = time - path.times[j], path.twists[j, 2]
     turn = rate * seconds
     cos, sin = np.cos(turn), np.sin(turn)
-    along, aside = seconds, 0.0
-    if abs(turn) > STRAIGHT:
-        along, aside = sin / rate, (1.0 - cos) / rate
+    along, aside = along_arc(rate, seconds, cos, sin)
     x = along * path.twists[j, 0] - aside * path.twists[j, 1]
     y = aside * path.twists[j, 0] + along * path.twists[j, 1]
     c, s = path.headings[j]
@@ -208,9 +219,7 @@ def move_along_arc(points: Array, shares: Array, step: Array, back: bool) -> Non
     for k in range(points.shape[0]):
         turn = rate * shares[k]
         cos, sin = np.cos(turn), np.sin(turn)
-        along, aside = shares[k], 0.0
-        if abs(turn) > STRAIGHT:
-            along, aside = sin / rate, (1.0 - cos) / rate
+        along, aside = along_arc(rate, shares[k], cos, sin)
         x, y = along * ahead - aside * left, aside * ahead + along * left
         if back:
             dx, dy = points[k, 0] - x, points[k, 1] - y

@@ -78,7 +78,7 @@ class Refinement:
         """Match again about the keyframes whose neighbours have moved by more than `moved` (m, rad).
 
         `poses` (K, 3) are the global ones; returns how many were matched. Those that are chosen together
-        are matched side by side.
+        are matched side by side. A match that does not converge is not made again about other keyframes.
         """
         route, matched = self._route._replace(poses=poses), 0
         waiting = {
@@ -96,9 +96,19 @@ class Refinement:
                 self._covered.add(int(route.rows[centre]), route.rows[near.members].tolist(), local_match)
                 self._starts[centre] = near.members, poses[near.members]
                 self._found[centre] = local_match
-            waiting = {centre: near for centre, near in waiting.items() if centre not in chosen}
+                waiting.pop(centre, None)
+                for other in self._failing_too(local_match, near, waiting):
+                    self._starts[other], self._found[other] = self._starts[centre], None
+                    waiting.pop(other)
             matched += len(chosen)
         return matched
+
+    def _failing_too(
+        self, local_match: LocalMatch | None, near: Neighbours, waiting: Mapping[int, Neighbours]
+    ) -> list[int]:
+        """The waiting centres about which the same match would be made with the same neighbours, and fail."""
+        hopeless = () if local_match is None else local_match.hopeless & (waiting.keys() - self._wider)
+        return [k for k in hopeless if np.array_equal(waiting[k].members, near.members)]
 
     def _uncovered(self, route: Route, waiting: Mapping[int, Neighbours]) -> dict[int, Neighbours]:
         """The centres to match next among the waiting ones, with their neighbours.

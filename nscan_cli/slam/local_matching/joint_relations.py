@@ -38,6 +38,8 @@ class LocalMatch:
     """How far (m) the match moved a scan, seen from the centre."""
     whole: bool
     """Whether all scans that were tried are related."""
+    hopeless: frozenset[int] = frozenset()
+    """The keyframes of a joint match that did not converge: the same neighbours fail about each."""
 
     @property
     def relations(self) -> list[Pairwise | NScan]:
@@ -151,7 +153,7 @@ def _match_held(
             continue
         if not match.converged:
             loop = verdict(keyframes, members, from_other_visit, centre, False, "did not converge", score)
-            return LocalMatch((), None, loop, 0.0, False), False
+            return LocalMatch((), None, loop, 0.0, False, frozenset(related.tolist())), False
         closed = bool(from_other_visit[kept].any())
         origin = "loop" if closed else "nscan"
         relation = _relation(route.rows[related], at, problem, match, origin, score, options)

@@ -109,6 +109,22 @@ def test_after_one_keyframe_has_moved_only_those_matched_with_it_are_matched_aga
     assert recorded.centres() == sorted(again)
 
 
+def test_a_match_that_does_not_converge_is_made_once_of_the_same_keyframes():
+    """The one half fails for all its keyframes, the other for none but the centre: that is matched again."""
+    poses, half = unrefined().state.poses, len(unrefined().state.poses) // 2
+    made: list[tuple[int, bytes]] = []
+
+    def failing(visited: Route, centre: int, near: Neighbours, options: NScanOptions) -> LocalMatch:
+        made.append((centre, near.members.tobytes()))
+        members = frozenset(near.members.tolist())
+        return LocalMatch((), None, None, 0.0, False, members if centre < half else frozenset([centre]))
+
+    refinement(failing).sweep(poses, MOVED)
+    once, again = ([members for k, members in made if (k < half) is first] for first in (True, False))
+    assert len(once) == len(set(once)) > 5
+    assert len(again) > len(set(again))
+
+
 def test_about_a_closed_loop_a_match_is_made_whatever_others_cover_and_reaches_farther():
     state, recorded = unrefined().state, Recorded(match_neighbours)
     refinement(recorded).sweep(state.poses, MOVED)
