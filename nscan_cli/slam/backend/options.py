@@ -47,7 +47,7 @@ class UnevenMotionOptions:
     min_change: float = 0.05
     """The motion is uneven if the way during one turn of the laser differs by more from that during the next,
     m. A larger value takes less time, and leaves the poses between two turns less certain."""
-    min_turn_change: float = 0.03
+    min_turn_change: float = 0.04
     """The motion is also uneven if the turns of the robot during two such turns differ by more, rad. A larger
     value takes less time, and leaves the headings less certain."""
     longest_step: float = 2.5

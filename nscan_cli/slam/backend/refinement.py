@@ -78,7 +78,7 @@ class Refinement:
         """Match again about the keyframes whose neighbours have moved by more than `moved` (m, rad).
 
         `poses` (K, 3) are the global ones; returns how many were matched. Those that are chosen together
-        are matched side by side. A match that does not converge is not made again about other keyframes.
+        are matched side by side. No joint match is made twice: it would fail again, or count twice.
         """
         route, matched = self._route._replace(poses=poses), 0
         waiting = {
@@ -97,28 +97,30 @@ class Refinement:
                 self._starts[centre] = near.members, poses[near.members]
                 self._found[centre] = local_match
                 waiting.pop(centre, None)
-                for other in self._failing_too(local_match, near, waiting):
-                    self._starts[other], self._found[other] = self._starts[centre], None
+                for other in self._alike(local_match, near, waiting):
+                    self._starts[other] = self._found[other] = None
                     waiting.pop(other)
             matched += len(chosen)
         return matched
 
-    def _failing_too(
+    def _alike(
         self, local_match: LocalMatch | None, near: Neighbours, waiting: Mapping[int, Neighbours]
     ) -> list[int]:
-        """The waiting centres about which the same match would be made with the same neighbours, and fail."""
-        hopeless = () if local_match is None else local_match.hopeless & (waiting.keys() - self._wider)
-        return [k for k in hopeless if np.array_equal(waiting[k].members, near.members)]
+        """The waiting centres about which the same match would be made, with the same neighbours."""
+        alike = () if local_match is None else local_match.alike & (waiting.keys() - self._wider)
+        return [k for k in alike if np.array_equal(waiting[k].members, near.members)]
 
     def _uncovered(self, route: Route, waiting: Mapping[int, Neighbours]) -> dict[int, Neighbours]:
         """The centres to match next among the waiting ones, with their neighbours.
 
         Each match is assumed to relate all its members. If one does not, the next choice makes up for it.
         """
-        chosen, covered = {}, Coverage(beneath=self._covered)
+        chosen, covered, sets = dict[int, Neighbours](), Coverage(beneath=self._covered), set[bytes]()
         for centre, near in waiting.items():
             needed = self._starts[centre] is not None or centre in self._wider
-            if needed or covered.is_due(route, centre, near, self._options):
+            members = near.members.tobytes()
+            if members not in sets and (needed or covered.is_due(route, centre, near, self._options)):
+                sets.add(members)
                 chosen[centre] = near
                 covered.assume(route, centre, near)
         return chosen

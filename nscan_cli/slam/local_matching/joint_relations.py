@@ -38,8 +38,9 @@ class LocalMatch:
     """How far (m) the match moved a scan, seen from the centre."""
     whole: bool
     """Whether all scans that were tried are related."""
-    hopeless: frozenset[int] = frozenset()
-    """The keyframes of a joint match that did not converge: the same neighbours fail about each."""
+    alike: frozenset[int] = frozenset()
+    """The keyframes that were matched jointly at last: about each of them the same neighbours give the same
+    match."""
 
     @property
     def relations(self) -> list[Pairwise | NScan]:
@@ -161,9 +162,8 @@ def _match_held(
         reason = "" if whole else f"{counted(len(members) - len(kept), 'scan')} left out"
         used, before = (related, from_other_visit[kept]) if closed else (members, from_other_visit)
         loop = verdict(keyframes, used, before, centre, closed, reason, score)
-        return LocalMatch(
-            (), relation, loop, largest_motion(poses[related], match.poses, at)[0], whole
-        ), all_began
+        moved = largest_motion(poses[related], match.poses, at)[0]
+        return LocalMatch((), relation, loop, moved, whole, frozenset(related.tolist())), all_began
     reason = f"only {len(kept)} of {len(members)} scans match each other"
     loop = verdict(keyframes, members, from_other_visit, centre, False, reason, 0.0)
     return LocalMatch((), None, loop, 0.0, False), all_began

@@ -106,18 +106,18 @@ def test_after_one_keyframe_has_moved_only_those_matched_with_it_are_matched_aga
     again = [centre for centre in centres if last in near(centre)]
     assert 1 < len(again) < len(centres) / 2
     assert found.sweep(shifted, MOVED) == len(again)
-    assert recorded.centres() == sorted(again)
+    assert sorted(recorded.centres()) == sorted(again)
 
 
-def test_a_match_that_does_not_converge_is_made_once_of_the_same_keyframes():
-    """The one half fails for all its keyframes, the other for none but the centre: that is matched again."""
+def test_no_joint_match_is_made_twice():
+    """In the one half a match is alike for all its keyframes, in the other only for its centre."""
     poses, half = unrefined().state.poses, len(unrefined().state.poses) // 2
     made: list[tuple[int, bytes]] = []
 
     def failing(visited: Route, centre: int, near: Neighbours, options: NScanOptions) -> LocalMatch:
         made.append((centre, near.members.tobytes()))
-        members = frozenset(near.members.tolist())
-        return LocalMatch((), None, None, 0.0, False, members if centre < half else frozenset([centre]))
+        members = near.members.tolist() if centre < half else [centre]
+        return LocalMatch((), None, None, 0.0, False, frozenset(members))
 
     refinement(failing).sweep(poses, MOVED)
     once, again = ([members for k, members in made if (k < half) is first] for first in (True, False))

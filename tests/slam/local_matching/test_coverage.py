@@ -135,19 +135,25 @@ def centres(run: Mapped) -> set[int]:
 
 
 def test_keyframes_that_others_cover_are_no_centres():
-    """Along 30 m. A share that is never reached makes each the centre of a match, as there were no others."""
+    """Along 30 m. A share that is never reached makes each the centre of a match, as there were no others.
+
+    Of those with the same neighbours, some near its ends, one is.
+    """
     log, options = excerpt(office_log(), slice(0, 300)), SlamOptions()
     always = dataclasses.replace(options, nscan=NScanOptions(max_covered_share=1.1))
     sparse, dense = mapped(log, options), mapped(log, always)
     keyframes = dense.graph.keyframes
-    assert len(centres(dense)) >= 0.95 * len(keyframes)
+    assert len(centres(dense)) > 0.6 * len(keyframes)
     assert len(centres(sparse)) < 0.5 * len(keyframes)
     off = sparse.graph.poses - dense.graph.poses
     assert np.hypot(off[:, 0], off[:, 1]).max() < 0.03
 
 
 def test_yet_each_keyframe_is_a_centre_or_others_hold_its_pairs():
-    """From the final poses: what the last sweep left out was held by the relations that are in the graph."""
+    """From the final poses: what the last sweep left out was held by the relations that are in the graph.
+
+    A few had a match of the same keyframes as another, which is made once, and have moved since.
+    """
     office = mapped_office(True)
     keyframes, options = office.state.keyframes.list, office.state.options.nscan
     rows = [keyframe.row for keyframe in keyframes]
@@ -161,5 +167,5 @@ def test_yet_each_keyframe_is_a_centre_or_others_hold_its_pairs():
         shares[k] = covered.share(rows[k], [rows[other] for other in near])
     assert (shares > 0).all()
     held = (shares >= options.max_covered_share) | np.isin(rows, list(centres(office)))
-    assert held.mean() > 0.97
-    assert (shares[~held] > 0.5).all()
+    assert held.mean() > 0.96
+    assert (shares[~held] > 0.4).all()

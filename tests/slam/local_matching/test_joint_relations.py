@@ -178,7 +178,7 @@ def test_a_match_that_does_not_converge_is_refused_with_a_reason():
     assert found.nscan is None
     assert found.loop is not None
     assert (found.loop.accepted, found.loop.reason) == (False, "did not converge")
-    assert len(found.hopeless) == len(OLD) + len(NEW)
+    assert len(found.alike) == len(OLD) + len(NEW)
 
 
 def test_when_all_that_was_seen_before_is_left_out_no_loop_is_closed():
