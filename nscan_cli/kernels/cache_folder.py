@@ -36,8 +36,11 @@ FOLDER_NAME = re.compile(r"\d[\w.+]*-[0-9a-f]{16}")
 """The name of a cache folder: a version and a hash."""
 OWNER_FILE = ".package"
 """A file with the path of the package that the folder belongs to. Its time is that of the last use."""
+COMPILED_FILE, LOCK_FILE = "all", ".compiling"
+"""The first, with a build key in its name, exists once kernels are compiled. Who compiles locks the other."""
 CACHE_FILES = re.compile(
-    rf"{re.escape(OWNER_FILE)}|{re.escape(TEMPORARY_PREFIX)}.*|.*\.(code|left|lock|nbc|nbi)(\.tmp\..*)?"
+    rf"{re.escape(OWNER_FILE)}|{COMPILED_FILE}-([0-9a-f]{{16}}|None)|{re.escape(LOCK_FILE)}"
+    rf"|{re.escape(TEMPORARY_PREFIX)}.*|.*\.(code|left|lock|nbc|nbi)(\.tmp\..*)?"
 )
 """Names of the files that nscan-cli and numba write into the folder."""
 DAY = 86400.0

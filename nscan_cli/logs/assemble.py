@@ -102,9 +102,11 @@ def laser_log(
     if not options.as_recorded:
         seen = ScanTable(raw.ranges, limits, *written, times.rows, times.times)
         written, changed = as_before(seen, beams, -1 if options.flip else 1, DirectionChangeOptions())
-    directions, bent = checked_by_walls(raw, written, limits, options)
-    (angle_min, angle_increment), closed = in_whole_turns(raw, directions, limits, options)
-    contradictions += [*changed, *bent, *closed]
+    directions, told = in_whole_turns(raw, written, limits, options)
+    if not told:
+        directions, told = checked_by_walls(raw, written, limits, options)
+    angle_min, angle_increment = directions
+    contradictions += [*changed, *told]
     findings.used |= {"range_min": limits.low_from, "range_max": limits.high_from}
     table = ScanTable(raw.ranges, limits, angle_min, angle_increment, times.rows, times.times)
     sectors, masked = masked_sectors(table, options, RobotPartsOptions(), DeadBeamOptions())

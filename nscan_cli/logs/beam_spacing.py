@@ -1,23 +1,22 @@
 """The angle between beams, checked by walls: a wrong one bends them.
 
-Three readings of beams on one wall tell the angle between these (beam_angles.double_cosines). On a wall, two
-triples about one beam tell the same angle.
+Where the angle of the log is far off (15 %), it is enough that most beams on walls tell another one. Where it
+is nearly right, most parts of the log must tell about the same other one.
 """
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
-from nscan_cli.logs.beam_angles import BeamDirections, double_cosines
+from nscan_cli.logs.beam_angles import BeamDirections
 from nscan_cli.logs.laser_log import beam_counts
 from nscan_cli.logs.raw_scans import RawScans
 from nscan_cli.logs.reading_options import ReadingOptions
-from nscan_cli.poses import Array
+from nscan_cli.logs.wall_angles import SampledScans, beams_as_log, mode, sampled_scans, votes
 
 if TYPE_CHECKING:
     from nscan_cli.logs.range_limits import RangeLimits
@@ -51,6 +50,18 @@ class BeamSpacingOptions:
     logs."""
     min_difference: float = 0.15
     """Least difference from the angle of the log, as a share. A larger value contradicts fewer logs."""
+    min_small_difference: float = 0.06
+    """The same where most parts of the log tell it. A larger value contradicts fewer logs."""
+    widest_half_width: float = 0.6
+    """The angle from beam to beam by which small differences are told, rad: as `half_width`."""
+    small_agreement: float = 0.04
+    """Largest difference of what it and `half_width` tell then, as a share. A larger value contradicts more
+    logs."""
+    parts: int = 5
+    """Number of parts of the log, most of which must tell a small difference. More parts contradict fewer
+    logs."""
+    min_beams_of_part: int = 40
+    """Least number of beams on walls in a part. A larger value contradicts fewer logs."""
     max_factor: float = 2.5
     """Largest factor between the angle of the log and that of the walls. A larger value contradicts more
     logs."""
@@ -64,6 +75,8 @@ class BeamSpacingOptions:
     usual_view: float = 0.06
     """Largest difference of a field of view from a usual one that it is taken for, as a share. A larger value
     puts more logs right."""
+    usual_view_near: float = 0.02
+    """The same where the angle of the log is wrong by less than `min_difference`."""
     moved: float = 0.01
     """Least median change of the readings between two scans that are tested, as a share: a robot that stands
     sees one scene only. A larger value tests fewer scans."""
@@ -72,15 +85,6 @@ class BeamSpacingOptions:
     first_of: int = 4
     """One in this number of these is tested first; the others are not where walls agree with the log. A
     larger value takes less time."""
-
-
-class SampledScans(NamedTuple):
-    """N scans of a sample, none of which sees what the one before saw."""
-
-    ranges: Array
-    """(N, B) readings, m; nan for those without return."""
-    steps: Array
-    """(N,) angle from beam to beam, rad."""
 
 
 def checked_by_walls(
@@ -99,25 +103,30 @@ def checked_by_walls(
     # Walls mostly agree with the log, and a few scans show it.
     if _walls_agree(sampled_scans(raw, directions, limits, rows[:: spacing.first_of], spacing), spacing):
         return directions, []
-    factor = _factor_of_walls(sampled_scans(raw, directions, limits, rows, spacing), spacing)
+    scans = sampled_scans(raw, directions, limits, rows, spacing)
+    factor = _factor_of_walls(scans, spacing) or _factor_of_parts(scans, spacing)
     if factor is None or factor * widest > spacing.max_view:
         return directions, []
+    is_small = abs(math.log(factor)) < spacing.min_difference
     count = int(np.bincount(beams).argmax())
     of_count = beams == count
     first, step = (float(np.median(values[of_count])) for values in directions)
-    view, is_usual = _view(abs(step) * factor, count, spacing)
-    # The beams of a whole turn do not see its first direction twice.
-    between = count - 1 if view < 2 * math.pi or count % 2 else count
-    found = math.copysign(view / between, step)
-    centred = -found * between / 2
+    view, is_usual = _view(
+        abs(step) * factor * (count - 1), spacing.usual_view_near if is_small else spacing.usual_view, spacing
+    )
+    found = math.copysign(view / (count if _is_open(view, count) else count - 1), step)
+    centred = -math.copysign(view, step) / 2
     said = (
         f"walls are straight with {_degrees(abs(found))}° from beam to beam, {count} beams over "
         f"{_degrees(view)}°; with the {_degrees(abs(step))}° of "
         f"{'the convention for such logs' if raw.angles_assumed else 'the log'} they are bent"
     )
-    is_centred = raw.angles_assumed or abs(2 * first + step * (count - 1)) < spacing.max_off_centre * abs(
-        step
+    by_log, by_walls = (
+        abs(2 * first + angle * (count - 1)) < spacing.max_off_centre * abs(angle) for angle in (step, found)
     )
+    is_centred = raw.angles_assumed or by_log or by_walls
+    if by_walls:
+        centred = first
     if is_usual and is_centred and of_count.all() and options.angle_min is None:
         ones = np.ones(len(beams))
         return BeamDirections(centred * ones, found * ones), [
@@ -134,32 +143,26 @@ def _degrees(angle: float) -> str:
     return f"{math.degrees(angle):.4g}"
 
 
-def sampled_scans(
-    raw: RawScans,
-    directions: BeamDirections,
-    limits: RangeLimits,
-    rows: NDArray[np.int64],
-    options: BeamSpacingOptions,
-) -> SampledScans:
-    """The scans in some rows whose readings have changed since the one before."""
-    ranges = raw.ranges[rows].astype(np.float64)
-    with np.errstate(invalid="ignore"):
-        is_usable = (ranges > np.maximum(0.0, limits.low[rows, None])) & (ranges < limits.high[rows, None])
-    ranges[~is_usable] = np.nan
-    moved = [0]
-    for row in range(1, len(rows)):
-        last = ranges[moved[-1]]
-        change = np.abs(ranges[row] - last) / last
-        if 2 * np.count_nonzero(change > options.moved) > np.count_nonzero(change >= 0.0):
-            moved.append(row)
-    return SampledScans(ranges[moved], np.abs(directions.step[rows[moved]]))
+def _is_open(view: float, beams: int) -> bool:
+    """Whether the last beam is one step before the end of the field of view.
+
+    That is so where it would see the first direction of a turn again, or where the step is a round one else.
+    """
+    if beams % 2:
+        return False
+    quarters = 4 * math.degrees(view) / beams
+    return view >= 2 * math.pi or abs(quarters - round(quarters)) < 1e-6
 
 
 def _walls_agree(scans: SampledScans, options: BeamSpacingOptions) -> bool:
-    """Whether more beams on walls tell the angle of the log than any other that would contradict it."""
-    logs, centres, counts = _votes(scans, options.half_width, options)
-    others = counts[np.abs(centres) >= options.min_difference]
-    return _beams_as_log(logs, options) >= max(options.min_beams, int(others.max(initial=0)))
+    """Whether most beams on walls tell the angle of the log, or nearly that."""
+    _logs, centres, counts = votes(scans, options.widest_half_width, options)
+    best = int(counts.argmax()) if len(counts) else 0
+    return (
+        len(counts) > 0
+        and counts[best] >= options.min_beams
+        and abs(float(centres[best])) < options.min_small_difference
+    )
 
 
 def _factor_of_walls(scans: SampledScans, options: BeamSpacingOptions) -> float | None:
@@ -180,76 +183,59 @@ def _factor_of_walls(scans: SampledScans, options: BeamSpacingOptions) -> float 
     return None
 
 
+def _factor_of_parts(scans: SampledScans, options: BeamSpacingOptions) -> float | None:
+    """The factor that most beams on walls tell, if it differs from 1 in most parts of the log.
+
+    None if it does not, or if other angles to the beams compared tell another one.
+    """
+    factor = _settled_factor(scans, options.widest_half_width, options.min_beams, options)
+    if factor is None or abs(math.log(factor)) < options.min_small_difference:
+        return None
+    other = _settled_factor(scans, options.half_width, options.min_beams, options)
+    if other is None or abs(math.log(other / factor)) > options.small_agreement:
+        return None
+    agreeing = 0
+    for rows in np.array_split(np.arange(len(scans.ranges)), options.parts):
+        part = SampledScans(scans.ranges[rows], scans.steps[rows])
+        told = _settled_factor(part, options.widest_half_width, options.min_beams_of_part, options)
+        if told is not None and 0.5 < math.log(told) / math.log(factor) < 2.0:
+            agreeing += 1
+    return factor if 2 * agreeing > options.parts else None
+
+
+def _settled_factor(
+    scans: SampledScans, half_width: float, min_beams: int, options: BeamSpacingOptions
+) -> float | None:
+    """The factor that most beams on walls tell, compared over this angle (rad) by what is found itself."""
+    factor = 1.0
+    for _ in range(options.max_rounds):
+        logs, centres, counts = votes(scans, half_width / factor, options)
+        if counts.max(initial=0) < min_beams:
+            return None
+        found = mode(logs, centres, counts, options)
+        change, factor = abs(math.log(found / factor)), found
+        if change < options.settled:
+            return factor
+    return None
+
+
 def _told_factor(scans: SampledScans, half_width: float, options: BeamSpacingOptions) -> float | None:
     """What most beams on walls tell; None if no factor stands out or it is near 1.
 
     half_width: angle from a beam to those that it is compared with by the steps of the scans, rad.
     """
-    logs, centres, counts = _votes(scans, half_width, options)
+    logs, centres, counts = votes(scans, half_width, options)
     if len(centres) < options.min_beams:
         return None
     best = int(counts.argmax())
-    if counts[best] < max(options.min_beams, options.min_ratio * _beams_as_log(logs, options)):
+    if counts[best] < max(options.min_beams, options.min_ratio * beams_as_log(logs, options)):
         return None
-    factor = math.exp(float(np.median(logs[np.abs(logs - centres[best]) <= options.same_angle])))
+    factor = mode(logs, centres, counts, options)
     return factor if abs(math.log(factor)) >= options.min_difference else None
 
 
-def _votes(
-    scans: SampledScans, half_width: float, options: BeamSpacingOptions
-) -> tuple[Array, Array, NDArray[np.int64]]:
-    """Sorted logarithms (V,) of the factors that beams on walls tell, those (C,) within `max_factor`, and how
-    many (C,) are as these.
-    """
-    told, halves = [np.zeros(0)], np.zeros(len(scans.steps), dtype=np.int64)
-    some = scans.steps > 0.0
-    # No more than there are beams: a damaged log may have hardly any angle between them.
-    halves[some] = np.rint(np.minimum(half_width / scans.steps[some] / 2, scans.ranges.shape[1]))
-    for half in np.unique(halves[halves > 0]).tolist():
-        if 4 * half < scans.ranges.shape[1]:
-            those = halves == half
-            rows, steps = _told_steps(scans.ranges[those], half, options)
-            told.append(steps - np.log(scans.steps[those])[rows])
-    logs = np.sort(np.concatenate(told))
-    centres = logs[np.abs(logs) <= math.log(options.max_factor)]
-    return logs, centres, _within(logs, centres, options.same_angle)
-
-
-def _beams_as_log(logs: Array, options: BeamSpacingOptions) -> int:
-    """How many of some sorted logarithms of factors (V,) tell the angle of the log."""
-    return int(_within(logs, np.zeros(1), options.same_angle)[0])
-
-
-def _within(values: Array, centres: Array, width: float) -> NDArray[np.int64]:
-    """How many of some sorted values (N,) lie within a width of each centre (M,)."""
-    ends = np.searchsorted(values, centres + width, side="right")
-    found: NDArray[np.int64] = ends - np.searchsorted(values, centres - width)
-    return found
-
-
-def _told_steps(ranges: Array, half: int, options: BeamSpacingOptions) -> tuple[NDArray[np.int64], Array]:
-    """Rows (V,) of beams of scans (N, B) on walls, and logarithms (V,) of the angles that they tell."""
-    near = 1 / ranges
-    wide = _log_angles(near, 2 * half) - math.log(2 * half)
-    narrow = _log_angles(near, half)[:, half : ranges.shape[1] - 3 * half] - math.log(half)
-    with np.errstate(invalid="ignore"):
-        rows, beams = np.nonzero(np.abs(wide - narrow) < options.same_wall)
-    return rows, wide[rows, beams]
-
-
-def _log_angles(near: Array, between: int) -> Array:
-    """Logarithm of the angle u from each beam to those `between` places before and after it; nan where none.
-
-    near: 1 / r (N, B) in 1/m. The angle is that of beams on one wall; the result has B − 2 `between` places.
-    """
-    cosines = 0.5 * double_cosines(near, between)
-    with np.errstate(invalid="ignore", divide="ignore"):
-        return np.log(np.arccos(np.where(cosines < 1, np.maximum(cosines, -1.0), np.nan)))
-
-
-def _view(step: float, beams: int, options: BeamSpacingOptions) -> tuple[float, bool]:
-    """The field of view (rad) of a number of beams with such a step (rad): if near, a usual one."""
-    view = step * (beams - 1)
+def _view(view: float, near: float, options: BeamSpacingOptions) -> tuple[float, bool]:
+    """The field of view (rad), or a usual one nearer than a share `near`; and whether it is that."""
     usual = min(options.usual_views, key=lambda angle: abs(math.log(angle / view)))
-    is_usual = abs(math.log(usual / view)) <= options.usual_view
+    is_usual = abs(math.log(usual / view)) <= near
     return (usual if is_usual else view), is_usual

@@ -15,7 +15,7 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 from nscan_cli.kernels import machine_code
-from nscan_cli.kernels.cache_folder import cache_folder
+from nscan_cli.kernels.cache_folder import COMPILED_FILE, LOCK_FILE, cache_folder
 from nscan_cli.kernels.compile_lock import kernels_in_work
 from nscan_cli.nightly import bootstrap, kernel_exercises
 
@@ -23,8 +23,6 @@ CompileProgress = Callable[[int, Sequence[str]], None]
 """Called with the kernels that have been compiled since the start, and the names of those in work."""
 TRACKING_KERNEL = "track_scans"
 """The kernel (slam/frontend/tracking_kernels.py) without whose machine code all kernels are compiled anew."""
-COMPILED_FILE, LOCK_FILE = "all", ".compiling"
-"""Files of the cache folder. The first, with a build key in its name, exists once kernels are compiled."""
 LOOK_INTERVAL = 0.1
 """Time between two looks at what is compiled, s."""
 

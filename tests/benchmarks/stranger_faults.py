@@ -149,6 +149,10 @@ FAULTS: tuple[tuple[str, Fault, str], ...] = (
     ),
     ("beams closer by a third", lambda log: faults.beams_apart(log, 2 / 3), "1° from beam to beam"),
     ("beams wider by a half", lambda log: faults.beams_apart(log, 1.5), "1° from beam to beam"),
+    ("beams wider by 10 %",
+        lambda log: faults.beams_apart(log, 1.1),
+        "walls are straight|as if it were one turn",
+    ),
     ("beams wider by 1 %", lambda log: faults.beams_apart(log, 1.01), "as if it were one turn"),
     ("angles in degrees", faults.angles_in_degrees, "angles of the beams are in degrees"),
     ("looks 90° left", _looking(-90.0), "90° further to the left"),
@@ -192,6 +196,6 @@ FAULTS_OF_REAL_LOGS = (
     "odometry of two nodes in turn", "coordinates by odometry wrap round at 8 m",
     "two scans a stamp", "stamps in ms", "ranges × 1.1 from half-way on",
     "ranges × 1.05 from half-way on", "readings reversed", "readings reversed from half-way on",
-    "readings reversed in the last fifth", "looks 90° left in the middle third",
+    "readings reversed in the last fifth", "looks 90° left in the middle third", "beams wider by 10 %",
 )  # fmt: skip
 """Those that the real logs get: with all of them it takes an hour."""

@@ -100,7 +100,9 @@ def test_a_changed_kernel_file_changes_the_folder_and_no_other_file_does(places,
 def made_by(package: Path, folder: Path) -> Path:
     """A cache folder as the package at this place has left it."""
     (folder / "below_0a1b").mkdir(parents=True)
-    for name in ("a.b-01.code", "a.c-01.left", "below_0a1b/f-1.py311.nbi", "below_0a1b/f-1.py311.1.nbc"):
+    compiled = f"{folders.COMPILED_FILE}-0123456789abcdef"
+    below = ("below_0a1b/f-1.py311.nbi", "below_0a1b/f-1.py311.1.nbc")
+    for name in ("a.b-01.code", "a.c-01.left", compiled, folders.LOCK_FILE, *below):
         (folder / name).write_bytes(b"x")
     (folder / folders.OWNER_FILE).write_bytes(os.fsencode(package))
     return folder
@@ -130,12 +132,12 @@ def test_a_new_folder_takes_the_place_of_those_that_nobody_needs(places):
     assert folder is not None
     assert not any(path.exists() for path in (own, gone, old, unused))
     assert [path for path in mixed.rglob("*") if path.is_file()] == [mixed / "below_0a1b" / "notes.txt"]
-    assert [files(path) for path in (used, *strangers)] == [5, 5, 5]
+    assert [files(path) for path in (used, *strangers)] == [7, 7, 7]
     assert link.is_symlink()
     # The folder is there: whatever comes beside it is left alone.
     made_by(folders.PACKAGE, own)
     assert chosen() == folder
-    assert files(own) == 5
+    assert files(own) == 7
 
 
 def test_a_folder_that_is_used_says_so(places):

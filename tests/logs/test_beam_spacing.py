@@ -10,9 +10,11 @@ import pytest
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.logs.load import read_log
 from nscan_cli.logs.reading_options import ReadingOptions
+from tests.benchmarks.stranger_cases import with_own_angles
 from tests.data import data_file
 from tests.logs import lines
 from tests.logs.noisy_room import BEAMS, FIRST, STEP, Readings, carmen, readings, recording
+from tests.simulation.faults import beams_apart
 
 
 def of_view(degrees: float, beams: int) -> Readings:
@@ -94,9 +96,39 @@ def test_where_the_first_beam_or_the_view_is_unusual_options_are_named(read, fir
     assert cured.angle_min == pytest.approx(sign * first, abs=0.03 * abs(first))
 
 
-@pytest.mark.parametrize("scale", [0.9, 1.1])
+@pytest.mark.parametrize("scale", [0.97, 1.03])
 def test_a_step_that_is_nearly_right_is_believed(read, scale):
-    assert not told(read(recording(readings(), angle_min=scale * FIRST, step=scale * STEP)))
+    half = (FIRST / 2, 91)
+    ranges = readings(first=half[0], beams=half[1])
+    assert not told(read(recording(ranges, angle_min=scale * half[0], step=scale * STEP)))
+
+
+@pytest.mark.parametrize("flip", [False, True])
+@pytest.mark.parametrize("centred", [False, True])
+@pytest.mark.parametrize("factor", [0.9, 0.92, 1.08, 1.125])
+def test_a_step_that_is_a_tenth_off_is_put_right(read, factor, centred, flip):
+    """Whether the file has the right first direction or one that fits its step."""
+    # 180 beams, as a SICK: from 90° on the right to 89° on the left.
+    first, step, beams = -math.pi / 2, math.pi / 180, 180
+    ranges = readings(first=first, step=step, beams=beams)
+    start = -factor * step * (beams - 1) / 2 if centred else first
+    log = read(recording(ranges, angle_min=start, step=factor * step), flip=flip)
+    (said,) = told(log)
+    assert f"180 beams over 180°; with the {factor:.4g}° of the log they are bent: the 1° are used" in said
+    sign = -1 if flip else 1
+    assert log.angle_increment == pytest.approx(sign * step)
+    assert log.angle_min == pytest.approx(sign * math.radians(-90.0), abs=1.01 * step)
+
+
+def test_where_parts_of_a_log_tell_different_steps_none_is_believed(read):
+    """Readings of another step in the last two thirds, as if walls were bent there."""
+    first, beams = FIRST / 2, 91
+    parts = [readings(first=first, beams=beams)[:14]]
+    parts += [
+        readings(first=first * f, beams=beams, step=f * STEP)[k]
+        for k, f in ((slice(14, 27), 0.9), (slice(27, None), 1.1))
+    ]
+    assert not told(read(recording(np.concatenate(parts), angle_min=first, step=STEP)))
 
 
 def test_a_robot_that_stands_and_scans_without_walls_tell_nothing(read):
@@ -112,6 +144,25 @@ def test_noise_does_not_look_like_another_angle(read, sigma):
     assert not told(read(recording(np.maximum(readings() + noise, 0.1), range_max=20.0)))
 
 
-@pytest.mark.parametrize("name", ["mit-csail", "fr079", "intel", "fr-campus", "fr-clinic"])
+@pytest.mark.parametrize(
+    "name",
+    [
+        *("mit-csail.log.gz", "fr079.log.gz", "intel.log.gz", "mit-killian.log.gz", "fr-campus.log.gz"),
+        *("fr-clinic.log.gz", "field/mocap.bag", "field/old-index.bag", "field/urg-carried.bag"),
+        *("field/urg-corridor-1.bag", "field/rplidar-floor", "field/varying-beams.db3"),
+    ],
+)
 def test_walls_do_not_contradict_a_true_log(name):
-    assert not told(read_log(str(data_file(f"{name}.log.gz"))))
+    assert not told(read_log(str(data_file(name))))
+
+
+@pytest.mark.parametrize("factor", [0.9, 1.1])
+@pytest.mark.parametrize("name", ["mit-csail", "fr079", "mit-killian", "fr-campus"])
+def test_a_real_log_with_a_wrong_step_is_put_right(name, factor, tmp_path):
+    true = read_log(str(data_file(f"{name}.log.gz")))
+    file = tmp_path / "wrong.log"
+    file.write_bytes(with_own_angles(beams_apart(true, factor)))
+    log = read_log(str(file))
+    assert len(told(log)) == 1
+    # CARMEN says for some that 180 beams cover 180°, which one step cannot tell.
+    assert log.angle_increment == pytest.approx(true.angle_increment, rel=0.006)
