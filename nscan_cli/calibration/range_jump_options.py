@@ -20,7 +20,7 @@ class RangeJumpOptions:
     tolerance: float = math.log(1.02)
     """Ranges have changed by the usual factor if the logarithm of theirs differs by less than this. A larger
     value matches more scans."""
-    min_share: float = 0.3
+    min_share: float = 0.2
     """Least share of the beams that have. A smaller value matches more scans."""
     max_beside: float = 0.75
     """The logarithms of the factors before and behind such a place are less than this share of its own:

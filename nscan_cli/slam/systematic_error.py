@@ -81,7 +81,8 @@ def systematic_error(
     min_length: float,
 ) -> SystematicError | None:
     """The systematic error of odometry (S, 3) by the poses (S, 3) of a map; None if it is not certain, or not
-    there all the way, or if lengths are off by a smaller share than `min_length`.
+    there all the way, or if lengths are off by a smaller share than `min_length`, or a larger one than is
+    likely.
 
     No piece of the path leads over the rows `breaks`, at which tracking broke.
     """
@@ -93,7 +94,7 @@ def systematic_error(
     means, sigmas = pieces.mean(axis=0), pieces.std(axis=0, ddof=1) / np.sqrt(len(pieces))
     certain = np.where(np.abs(means) > options.sigmas * sigmas, means, 0.0)
     parts = np.array([part[:, 0].mean() for part in np.array_split(pieces, options.parts)])
-    if abs(certain[0]) < min_length or (parts / means[0] < options.min_part).any():
+    if not min_length <= abs(certain[0]) <= options.max_length or (parts / means[0] < options.min_part).any():
         return None
     return SystematicError(1.0 + float(certain[0]), float(certain[1]))
 

@@ -26,6 +26,9 @@ class SystematicErrorOptions:
     is."""
     min_length: float = 0.05
     """Least share by which ways are too long or too short. A larger share leaves more odometry as it is."""
+    max_length: float = 0.4
+    """Largest such share. Where ways are off by more, the scans may tell none, as with dust in front of the
+    laser. A larger share corrects more odometry."""
     min_more_length: float = 0.02
     """The same once the drive was mapped again. A larger share stops earlier."""
     max_runs: int = 3

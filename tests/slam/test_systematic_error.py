@@ -68,6 +68,13 @@ def test_the_error_is_found_from_a_map_without_it(length, turn):
     assert found.turn == pytest.approx(-turn / length, abs=0.002)
 
 
+def test_ways_of_which_the_map_has_a_small_part_are_no_error_of_odometry():
+    """As of scans that tell no way: then the map has hardly any."""
+    poses = winding()
+    assert systematic_error(poses, disturbed(poses, 2.0, 0.0), (), OPTIONS, LEAST) is None
+    assert systematic_error(poses, disturbed(poses, 1.5, 0.0), (), OPTIONS, LEAST) is not None
+
+
 def test_errors_that_are_small_or_differ_along_the_way_are_none():
     poses = winding()
     assert systematic_error(poses, disturbed(poses, 1.04, 0.1), (), OPTIONS, LEAST) is None
