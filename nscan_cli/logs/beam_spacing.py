@@ -110,7 +110,11 @@ def checked_by_walls(
     is_small = abs(math.log(factor)) < spacing.min_difference
     count = int(np.bincount(beams).argmax())
     of_count = beams == count
-    first, step = (float(np.median(values[of_count])) for values in directions)
+    # Readings of some scans may come in the other order.
+    orders = np.sign(directions.step)
+    first, step = (float(np.median((values * orders)[of_count])) for values in directions)
+    if np.median(orders) < 0:
+        first, step = -first, -step
     view, is_usual = _view(
         abs(step) * factor * (count - 1), spacing.usual_view_near if is_small else spacing.usual_view, spacing
     )
@@ -128,8 +132,8 @@ def checked_by_walls(
     if by_walls:
         centred = first
     if is_usual and is_centred and of_count.all() and options.angle_min is None:
-        ones = np.ones(len(beams))
-        return BeamDirections(centred * ones, found * ones), [
+        same = orders * np.sign(step)
+        return BeamDirections(centred * same, found * same), [
             f"{said}: the {_degrees(abs(found))}° are used; --as-recorded leaves the beams as they are, "
             "--angle-increment sets another angle"
         ]

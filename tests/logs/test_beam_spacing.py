@@ -11,10 +11,10 @@ from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.logs.load import read_log
 from nscan_cli.logs.reading_options import ReadingOptions
 from tests.benchmarks.stranger_cases import with_own_angles
-from tests.data import data_file
+from tests.data import OFFICE_LOG, data_file
 from tests.logs import lines
 from tests.logs.noisy_room import BEAMS, FIRST, STEP, Readings, carmen, readings, recording
-from tests.simulation.faults import beams_apart
+from tests.simulation.faults import beams_apart, mirrored_in
 
 
 def of_view(degrees: float, beams: int) -> Readings:
@@ -118,6 +118,18 @@ def test_a_step_that_is_a_tenth_off_is_put_right(read, factor, centred, flip):
     sign = -1 if flip else 1
     assert log.angle_increment == pytest.approx(sign * step)
     assert log.angle_min == pytest.approx(sign * math.radians(-90.0), abs=1.01 * step)
+
+
+def test_scans_in_the_other_order_keep_it(tmp_path):
+    log = read_log(OFFICE_LOG)
+    file = tmp_path / "wrong.log"
+    file.write_bytes(with_own_angles(beams_apart(mirrored_in(log, slice(len(log) // 2, None)), 1.1)))
+    wrong = read_log(str(file))
+    assert len(told(wrong)) == 1
+    signs = np.sign(wrong.angle_increment)
+    np.testing.assert_array_equal(signs, np.where(np.arange(len(log)) < len(log) // 2, 1, -1))
+    assert np.abs(wrong.angle_increment) == pytest.approx(math.radians(1.0))
+    assert wrong.angle_min * signs == pytest.approx(math.radians(-90.0), abs=math.radians(1.01))
 
 
 def test_where_parts_of_a_log_tell_different_steps_none_is_believed(read):
