@@ -27,6 +27,7 @@ from nscan_cli.logs.range_limits import RangeLimits, limits_in_force
 from nscan_cli.logs.range_unit import scaled, wrong_unit
 from nscan_cli.logs.raw_scans import RawScans
 from nscan_cli.logs.reading_options import ReadingOptions
+from nscan_cli.logs.repeated_reading import without_repeated_reading
 from nscan_cli.logs.robot_parts import RobotPartsOptions, ScanTable
 from nscan_cli.logs.robot_path import RobotPath, poses_at, robot_path
 from nscan_cli.logs.rounded_ranges import rounding_of_ranges
@@ -94,9 +95,14 @@ def laser_log(
     rows = times.rows[numbers]
     warnings = findings.warnings
     raw, limits, contradictions = _in_metres(raw, times, options, findings)
+    repeated = np.zeros(len(raw.ranges), dtype=np.int64)
     if not options.as_recorded:
         raw, converted = with_radians(raw)
         contradictions += converted
+    # With --max-range the user asks for all readings up to it.
+    if not options.as_recorded and options.max_range is None:
+        repeated, no_distances = without_repeated_reading(raw.ranges, limits)
+        contradictions += no_distances
     written = beam_directions(raw, options, warnings)
     beams, changed = beam_counts(raw.ranges, raw.beams), list[str]()
     if not options.as_recorded:
@@ -116,6 +122,9 @@ def laser_log(
     ranges = raw.ranges if np.array_equal(rows, np.arange(len(raw.stamps))) else raw.ranges[rows]
     beams, limits = beams[rows], limits.of(rows)
     lost = lost_readings(ranges, beams, limits, file)
+    if repeated[rows].any():
+        lost.counts["not a number"] -= int(repeated[rows].sum())
+        lost.counts["of one value"] = int(repeated[rows].sum())
     mark_no_returns(ranges, limits.low, limits.high)
     rounded = rounding_of_ranges(ranges)
     if rounded:

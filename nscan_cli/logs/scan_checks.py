@@ -18,6 +18,7 @@ from nscan_cli.logs.range_unit import RangeUnitOptions
 from nscan_cli.logs.recordings.alternating_lasers import TwoLaserOptions
 from nscan_cli.logs.recordings.mounting_options import MountingOptions
 from nscan_cli.logs.recordings.turn_segments import TurnSegmentOptions
+from nscan_cli.logs.repeated_reading import RepeatedReadingOptions
 from nscan_cli.logs.robot_parts import RobotPartsOptions
 from nscan_cli.logs.robot_path import RobotPathOptions
 from nscan_cli.logs.scan_order import ScanOrderOptions
@@ -37,6 +38,7 @@ class ScanCheckOptions:
     scan_order: ScanOrderOptions = field(default_factory=ScanOrderOptions)
     shared_stamps: SharedStampOptions = field(default_factory=SharedStampOptions)
     range_limits: RangeLimitOptions = field(default_factory=RangeLimitOptions)
+    repeated_reading: RepeatedReadingOptions = field(default_factory=RepeatedReadingOptions)
     range_unit: RangeUnitOptions = field(default_factory=RangeUnitOptions)
     unit_stretches: UnitStretchOptions = field(default_factory=UnitStretchOptions)
     beam_angles: BeamAngleOptions = field(default_factory=BeamAngleOptions)

@@ -175,7 +175,8 @@ FAULTS: tuple[tuple[str, Fault, str], ...] = (
         lambda log: faults.without_returns(log, slice(len(log) // 2, None)),
         "sees nothing",
     ),
-    ("15 % of the readings are dust", lambda log: faults.dust(log, 0.15, 0.1), ""),
+    ("15 % of the readings are dust", lambda log: faults.dust(log, 0.15, 0.1), "stands for no reading"),
+    ("20 % of the readings say 2 m", lambda log: faults.dust(log, 0.2, 2.0), "stands for no reading"),
     ("cart on a hinge", faults.cart, "goes along with the robot"),
 )  # fmt: skip
 """Name, fault, and what tells its cause."""
@@ -197,5 +198,6 @@ FAULTS_OF_REAL_LOGS = (
     "two scans a stamp", "stamps in ms", "ranges × 1.1 from half-way on",
     "ranges × 1.05 from half-way on", "readings reversed", "readings reversed from half-way on",
     "readings reversed in the last fifth", "looks 90° left in the middle third", "beams wider by 10 %",
+    "20 % of the readings say 2 m",
 )  # fmt: skip
 """Those that the real logs get: with all of them it takes an hour."""
