@@ -87,7 +87,7 @@ class UnevenMotionOptions:
     min_points: int = 50
     """Least mean number of points in a turn of the laser with which the path changes. With a smaller number
     blind lasers change it."""
-    max_beams: int = 300
+    max_beams: int = 240
     """Approximate number of beams of a scan that are matched, evenly spread. More tell more and take
     longer."""
     scale: float = 0.3
