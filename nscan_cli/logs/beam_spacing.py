@@ -77,6 +77,8 @@ class BeamSpacingOptions:
     puts more logs right."""
     usual_view_near: float = 0.02
     """The same where the angle of the log is wrong by less than `min_difference`."""
+    usual_view_round: float = 0.03
+    """The same where, moreover, the angle from beam to beam would be a multiple of a quarter of a degree."""
     moved: float = 0.01
     """Least median change of the readings between two scans that are tested, as a share: a robot that stands
     sees one scene only. A larger value tests fewer scans."""
@@ -107,7 +109,6 @@ def checked_by_walls(
     factor = _factor_of_walls(scans, spacing) or _factor_of_parts(scans, spacing)
     if factor is None or factor * widest > spacing.max_view:
         return directions, []
-    is_small = abs(math.log(factor)) < spacing.min_difference
     count = int(np.bincount(beams).argmax())
     of_count = beams == count
     # Readings of some scans may come in the other order.
@@ -115,10 +116,8 @@ def checked_by_walls(
     first, step = (float(np.median((values * orders)[of_count])) for values in directions)
     if np.median(orders) < 0:
         first, step = -first, -step
-    view, is_usual = _view(
-        abs(step) * factor * (count - 1), spacing.usual_view_near if is_small else spacing.usual_view, spacing
-    )
-    found = math.copysign(view / (count if _is_open(view, count) else count - 1), step)
+    view, is_usual = _view(abs(step) * factor * (count - 1), factor, count, spacing)
+    found = math.copysign(_between(view, count), step)
     centred = -math.copysign(view, step) / 2
     said = (
         f"walls are straight with {_degrees(abs(found))}° from beam to beam, {count} beams over "
@@ -147,15 +146,20 @@ def _degrees(angle: float) -> str:
     return f"{math.degrees(angle):.4g}"
 
 
-def _is_open(view: float, beams: int) -> bool:
-    """Whether the last beam is one step before the end of the field of view.
+def _between(view: float, beams: int) -> float:
+    """The angle (rad) from one of some beams to the next over a field of view.
 
-    That is so where it would see the first direction of a turn again, or where the step is a round one else.
+    The last beam is one step before its end where it would see the first direction of a turn again, or where
+    the step is a round one else.
     """
-    if beams % 2:
-        return False
-    quarters = 4 * math.degrees(view) / beams
-    return view >= 2 * math.pi or abs(quarters - round(quarters)) < 1e-6
+    is_open = beams % 2 == 0 and (view >= 2 * math.pi or _is_round(view / beams))
+    return view / (beams if is_open else beams - 1)
+
+
+def _is_round(step: float) -> bool:
+    """Whether an angle (rad) is a multiple of a quarter of a degree."""
+    quarters = 4 * math.degrees(step)
+    return abs(quarters - round(quarters)) < 1e-6
 
 
 def _walls_agree(scans: SampledScans, options: BeamSpacingOptions) -> bool:
@@ -238,8 +242,12 @@ def _told_factor(scans: SampledScans, half_width: float, options: BeamSpacingOpt
     return factor if abs(math.log(factor)) >= options.min_difference else None
 
 
-def _view(view: float, near: float, options: BeamSpacingOptions) -> tuple[float, bool]:
-    """The field of view (rad), or a usual one nearer than a share `near`; and whether it is that."""
+def _view(view: float, factor: float, beams: int, options: BeamSpacingOptions) -> tuple[float, bool]:
+    """The field of view (rad) of so many beams that walls tell, or a usual one near it; and whether it is
+    that. `factor` is that of the log's angle."""
     usual = min(options.usual_views, key=lambda angle: abs(math.log(angle / view)))
+    near = options.usual_view
+    if abs(math.log(factor)) < options.min_difference:
+        near = options.usual_view_round if _is_round(_between(usual, beams)) else options.usual_view_near
     is_usual = abs(math.log(usual / view)) <= near
     return (usual if is_usual else view), is_usual

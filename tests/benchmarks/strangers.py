@@ -70,8 +70,8 @@ def outcome(case: Case) -> Outcome:
 def _cures(said: Sequence[str], known: str) -> list[str]:
     """The first option of each message that says to try one; or the one that the owner knows to be right."""
     if known:
-        named = [re.search(known, message) for message in said]
-        return [option.group() for option in named if option]
+        named = (re.search(known, message) for message in said)
+        return [option.group() for option in named if option][:1]
     found = [CURES.search(message) for message in said]
     return [cure.group(1) or cure.group(2) for cure in found if cure]
 

@@ -169,7 +169,7 @@ def test_walls_do_not_contradict_a_true_log(name):
 
 
 @pytest.mark.parametrize("factor", [0.9, 1.1])
-@pytest.mark.parametrize("name", ["mit-csail", "fr079", "mit-killian", "fr-campus"])
+@pytest.mark.parametrize("name", ["mit-csail", "fr079", "intel", "mit-killian", "fr-campus"])
 def test_a_real_log_with_a_wrong_step_is_put_right(name, factor, tmp_path):
     true = read_log(str(data_file(f"{name}.log.gz")))
     file = tmp_path / "wrong.log"
