@@ -99,6 +99,8 @@ def _drive_graph() -> Graph:
 
 def _others() -> None:
     """What `slam` needs for a few logs only, and what other commands need."""
+    from dataclasses import replace
+
     import numpy as np
 
     from nscan_cli.api import match, nscan
@@ -122,10 +124,12 @@ def _others() -> None:
     # A drive of one lap may leave the robot open, but its kernels are compiled by then.
     with contextlib.suppress(InputDataError):
         calibrate(log, log.reading, CalibrationOptions())
-    # Without odometry, and as a turning laser.
+    # Without odometry, and as a turning laser whose motion counts as uneven everywhere.
+    options = slam_options()
+    options = replace(options, uneven_motion=replace(options.uneven_motion, min_change=0.0))
     for reading in (ReadingOptions(end=20.0, odometry=False), ReadingOptions(end=20.0, sweep=0.2)):
         log = log_from(drive, "warm-up.log", reading)
-        _, graph = map_log(log, reading, slam_options(), THREADS, lambda *_progress: None)
+        _, graph = map_log(log, reading, options, THREADS, lambda *_progress: None)
         occupancy_grid(log, np.arange(len(log)), graph.poses, threads=THREADS)
     # For the check of a turn that a file may tell wrongly, and for graphs of more than 500 keyframes.
     move_along_arc(np.zeros((1, 2)), np.zeros(1), np.zeros(3), False)

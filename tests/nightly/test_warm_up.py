@@ -30,6 +30,7 @@ from nscan_cli.nightly.regression_check import check_log
 from nscan_cli.nightly.task import Task
 from nscan_cli.slam.frontend import tracking_kernels
 from tests.cli.room_logs import room_log
+from tests.data import OFFICE_LOG, TURNING_LOG, find_data
 
 
 @pytest.fixture
@@ -121,6 +122,37 @@ def test_the_drive_has_what_a_night_can_have():
     assert log.source.bytes > 1 << 17
     assert log.odometry is not None
     assert np.hypot(*np.diff(log.odometry[:, :2], axis=0).T).sum() > 80
+
+
+NEEDED_LATER = """
+import sys
+from nscan_cli import build_graph, read_log
+from nscan_cli.kernels.decorators import Kernel
+from nscan_cli.nightly import kernel_exercises
+loaded, load = [], Kernel._load_or_compile
+def noted(kernel, types, arguments):
+    loaded.append(kernel.py_func.__qualname__)
+    return load(kernel, types, arguments)
+Kernel._load_or_compile = noted
+for parts in kernel_exercises.FOR_ALL:
+    kernel_exercises.main(*parts)
+exercised = len(loaded)
+for log in sys.argv[1:]:
+    build_graph(read_log(log))
+print(exercised, *loaded[exercised:])
+"""
+"""Prints how many kernels are compiled beforehand, and which others logs need."""
+
+
+def test_logs_need_no_kernel_that_is_not_compiled_beforehand():
+    names = ("urg-carried.bag", "rplidar-hallway.bag", "mocap.bag")
+    real = [path for path in (find_data(f"field/{name}") for name in names) if path is not None]
+    logs = [OFFICE_LOG, TURNING_LOG, *map(str, real)]
+    run = subprocess.run([sys.executable, "-c", NEEDED_LATER, *logs], capture_output=True, text=True)
+    assert run.returncode == 0, run.stderr
+    exercised, *later = run.stdout.split()
+    assert int(exercised) > 30
+    assert later == []
 
 
 @pytest.mark.parametrize("compiles", [False, True])
