@@ -122,9 +122,10 @@ def laser_log(
     ranges = raw.ranges if np.array_equal(rows, np.arange(len(raw.stamps))) else raw.ranges[rows]
     beams, limits = beams[rows], limits.of(rows)
     lost = lost_readings(ranges, beams, limits, file)
-    if repeated[rows].any():
-        lost.counts["not a number"] -= int(repeated[rows].sum())
-        lost.counts["of one value"] = int(repeated[rows].sum())
+    of_one_value = int(repeated[rows].sum())
+    if of_one_value:
+        others = lost.counts.pop("not a number") - of_one_value
+        lost.counts |= {"of one value": of_one_value} | ({"not a number": others} if others else {})
     mark_no_returns(ranges, limits.low, limits.high)
     rounded = rounding_of_ranges(ranges)
     if rounded:
