@@ -125,7 +125,7 @@ def laser_log(
     of_one_value = int(repeated[rows].sum())
     if of_one_value:
         others = lost.counts.pop("not a number") - of_one_value
-        lost.counts |= {"of one value": of_one_value} | ({"not a number": others} if others else {})
+        lost.counts.update({"not a number": others} if others else {}, **{"of one value": of_one_value})
     mark_no_returns(ranges, limits.low, limits.high)
     rounded = rounding_of_ranges(ranges)
     if rounded:
