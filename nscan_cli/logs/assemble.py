@@ -27,7 +27,7 @@ from nscan_cli.logs.range_limits import RangeLimits, limits_in_force
 from nscan_cli.logs.range_unit import scaled, wrong_unit
 from nscan_cli.logs.raw_scans import RawScans
 from nscan_cli.logs.reading_options import ReadingOptions
-from nscan_cli.logs.repeated_reading import without_repeated_reading
+from nscan_cli.logs.repeated_reading import without_repeated_readings
 from nscan_cli.logs.robot_parts import RobotPartsOptions, ScanTable
 from nscan_cli.logs.robot_path import RobotPath, poses_at, robot_path
 from nscan_cli.logs.rounded_ranges import rounding_of_ranges
@@ -101,7 +101,7 @@ def laser_log(
         contradictions += converted
     # With --max-range the user asks for all readings up to it.
     if not options.as_recorded and options.max_range is None:
-        repeated, no_distances = without_repeated_reading(raw.ranges, limits)
+        repeated, no_distances = without_repeated_readings(raw.ranges, limits)
         contradictions += no_distances
     written = beam_directions(raw, options, warnings)
     beams, changed = beam_counts(raw.ranges, raw.beams), list[str]()

@@ -1,4 +1,4 @@
-"""One reading that stands all over the scans: what a driver writes where the laser saw nothing.
+"""A reading that stands all over the scans: what a driver writes where the laser saw nothing.
 
 Readings of walls have many values, those beside each other about as often as each other.
 """
@@ -15,10 +15,15 @@ from nscan_cli.logs.range_limits import RangeLimits
 
 @dataclass(frozen=True)
 class RepeatedReadingOptions:
-    """When one reading is no distance."""
+    """When a reading that is repeated is no distance."""
 
     scans: int = 32
     """Number of scans that are looked at, evenly spread. More take longer."""
+    min_values: int = 100
+    """Least number of values of the readings: with fewer they are rounded. A larger number looks at fewer
+    logs."""
+    max_values: int = 3
+    """Largest number of such values. A larger number leaves out more."""
     min_readings: int = 100
     """Least number of usable readings in these. A larger number looks at fewer logs."""
     min_share: float = 0.01
@@ -40,15 +45,14 @@ class RepeatedReadingOptions:
     """Beams that have it in a larger share of the scans do not count: they are dead, or see the robot."""
 
 
-def repeated_reading(
+def repeated_readings(
     ranges: NDArray[np.float32],
     limits: RangeLimits,
     options: RepeatedReadingOptions = RepeatedReadingOptions(),
-) -> tuple[float, float] | None:
-    """The reading (m) among ranges (S, B) that is no distance, and its share of the usable ones; None if all
-    are distances."""
+) -> dict[float, float]:
+    """The readings (m) among ranges (S, B) that are no distances, with their shares of the usable ones."""
     if not len(ranges):
-        return None
+        return {}
     rows = np.unique(np.linspace(0, len(ranges) - 1, options.scans).astype(np.int64))
     some, of_rows = ranges[rows], limits.of(rows)
     low, high = (limit[:, None].astype(np.float32) for limit in (of_rows.low, of_rows.high))
@@ -56,36 +60,59 @@ def repeated_reading(
         is_usable = (some > low) & (some < high)
     values, counts = np.unique(some[is_usable], return_counts=True)
     total = int(counts.sum())
-    if total < options.min_readings:
-        return None
-    best = int(counts.argmax())
-    value, count = values[best], int(counts[best])
-    others = np.delete(counts, best)
-    beside = others[np.abs(np.delete(values, best) - value) <= options.near]
-    is_alone = count >= options.ratio_to_near * beside.max(initial=1)
-    is_alone &= count >= options.ratio_to_others * others.max(initial=1)
-    if not is_alone or not options.min_share <= count / total <= options.max_share:
-        return None
-    shares = (some == value).mean(axis=0)
+    if total < options.min_readings or len(values) < options.min_values:
+        return {}
+    order = np.argsort(-counts, kind="stable")
+    for number in range(min(options.max_values, len(order)), 0, -1):
+        those, others = order[:number], order[number:]
+        shares = counts[those] / total
+        if shares[-1] < options.min_share or shares.sum() > options.max_share:
+            continue
+        if all(_is_alone(k, others, values, counts, options) for k in those.tolist()) and all(
+            _is_all_over(some == values[k], options) for k in those.tolist()
+        ):
+            return dict(zip(values[those].tolist(), shares.tolist(), strict=True))
+    return {}
+
+
+def _is_alone(
+    k: int,
+    others: NDArray[np.int64],
+    values: NDArray[np.float32],
+    counts: NDArray[np.int64],
+    options: RepeatedReadingOptions,
+) -> bool:
+    """Whether a value is much more frequent than the others beside it, and more than any other."""
+    beside = others[np.abs(values[others] - values[k]) <= options.near]
+    near, any_other = (int(counts[some].max(initial=1)) for some in (beside, others))
+    return bool(counts[k] >= max(options.ratio_to_near * near, options.ratio_to_others * any_other))
+
+
+def _is_all_over(is_so: NDArray[np.bool_], options: RepeatedReadingOptions) -> bool:
+    """Whether many beams of scans (n, B) have a reading now and then."""
+    shares = is_so.mean(axis=0)
     sometimes = np.count_nonzero((shares > 0.0) & (shares <= options.always))
-    return (float(value), count / total) if sometimes >= options.min_beams * len(shares) else None
+    return bool(sometimes >= options.min_beams * len(shares))
 
 
-def without_repeated_reading(
+def without_repeated_readings(
     ranges: NDArray[np.float32], limits: RangeLimits
 ) -> tuple[NDArray[np.int64], list[str]]:
-    """Write nan for a reading among ranges (S, B) that is no distance, in place.
+    """Write nan for readings among ranges (S, B) that are no distances, in place.
 
     Returns how many readings of each scan (S,) were so, and what is said.
     """
-    found = repeated_reading(ranges, limits)
-    if found is None:
+    found = repeated_readings(ranges, limits)
+    if not found:
         return np.zeros(len(ranges), dtype=np.int64), []
-    value, share = found
-    is_so = ranges == np.float32(value)
+    is_so = np.isin(ranges, np.array(list(found), dtype=np.float32))
     counts = np.count_nonzero(is_so, axis=1).astype(np.int64)
     ranges[is_so] = np.nan
+    listed = ", ".join(
+        f"{share:.0%} of the readings are exactly {value:.4g} m" for value, share in found.items()
+    )
+    what = "it stands for no reading, and is" if len(found) == 1 else "they stand for no reading, and are"
     return counts, [
-        f"{share:.0%} of the readings are exactly {value:.4g} m, in all directions, and hardly any are about "
-        "it: it stands for no reading, and they are left out; --as-recorded uses them"
+        f"{listed}, in all directions, and hardly any are about that: {what} left out; --as-recorded uses "
+        "all readings"
     ]

@@ -175,8 +175,8 @@ FAULTS: tuple[tuple[str, Fault, str], ...] = (
         lambda log: faults.without_returns(log, slice(len(log) // 2, None)),
         "sees nothing",
     ),
-    ("15 % of the readings are dust", lambda log: faults.dust(log, 0.15, 0.1), "stands for no reading"),
-    ("20 % of the readings say 2 m", lambda log: faults.dust(log, 0.2, 2.0), "stands for no reading"),
+    ("15 % of the readings are dust", lambda log: faults.dust(log, 0.15, 0.1), "stands? for no reading"),
+    ("20 % of the readings say 2 m", lambda log: faults.dust(log, 0.2, 2.0), "stands? for no reading"),
     ("cart on a hinge", faults.cart, "goes along with the robot"),
 )  # fmt: skip
 """Name, fault, and what tells its cause."""
