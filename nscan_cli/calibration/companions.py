@@ -12,6 +12,7 @@ import numpy as np
 
 from nscan_cli.calibration.options import CompanionOptions
 from nscan_cli.logs.beam_mask import Bearings, mask_beams, mask_text
+from nscan_cli.logs.field_of_view import field_of_view
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.logs.reading_options import ReadingOptions
 from nscan_cli.poses import Array, Indices, Mask, are_known, compose, transform
@@ -78,7 +79,7 @@ def find_companion(log: LaserLog, poses: Array, options: CompanionOptions) -> Co
         if len(found) < options.clear_share * looked_at:
             return None
     share = len(found) / max(looked_at, 1)
-    if share < options.min_share or not _is_somewhere(found, options):
+    if share < options.min_share or not _is_somewhere(found, log, options):
         return None
     return Companion(share, _sectors(found, options))
 
@@ -119,11 +120,16 @@ def _is_on_path(places: Array, path: Array, radius: float) -> Mask:
     return near
 
 
-def _is_somewhere(seen: list[Indices], options: CompanionOptions) -> bool:
-    """Whether bins of bearings are mostly seen in the same quarter of them: dust and noise are everywhere."""
-    size = round(2 * np.pi / options.bin_width)
+def _is_somewhere(seen: list[Indices], log: LaserLog, options: CompanionOptions) -> bool:
+    """Whether bins of bearings are mostly seen in the same quarter of them: dust and noise are everywhere.
+
+    A laser that sees no more than half of a turn tells it by a third of what it sees.
+    """
+    first, last, _ = field_of_view(log)
+    size, view = round(2 * np.pi / options.bin_width), abs(last - first) / options.bin_width
     counts = np.sort(np.bincount(np.concatenate(seen), minlength=size))[::-1]
-    return bool(counts[: size // 4].sum() >= options.min_quarter_share * counts.sum())
+    most = min(size // 4, round(view / 3))
+    return bool(counts[:most].sum() >= options.min_quarter_share * counts.sum())
 
 
 def _sectors(seen: list[Indices], options: CompanionOptions) -> list[Bearings]:

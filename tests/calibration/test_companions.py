@@ -119,6 +119,17 @@ def test_dust_is_everywhere():
     assert find_companion(log, log.odometry, anywhere) is not None
 
 
+def test_walls_beside_a_heading_that_drifts_are_nobody():
+    """A laser of half a turn sees them in most of what it sees."""
+    log = read_log(str(data_file("mit-csail.log.gz")))
+    assert log.odometry is not None
+    odometry = log.odometry.copy()
+    odometry[:, 2] = wrap(odometry[:, 2] + np.radians(1.0) * (log.times - log.times[0]))
+    assert find_companion(log, odometry, CompanionOptions()) is None
+    anywhere = replace(CompanionOptions(), min_quarter_share=0.0)
+    assert find_companion(log, odometry, anywhere) is not None
+
+
 def test_a_robot_that_hardly_moves_has_no_path():
     log = faults.taken(faults.cart(drive()), slice(0, 10))
     assert log.odometry is not None
