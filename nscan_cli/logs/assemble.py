@@ -124,8 +124,11 @@ def laser_log(
     lost = lost_readings(ranges, beams, limits, file)
     of_one_value = int(repeated[rows].sum())
     if of_one_value:
+        # They were usable, and are counted as no number now.
         others = lost.counts.pop("not a number") - of_one_value
-        lost.counts.update({"not a number": others} if others else {}, **{"of one value": of_one_value})
+        if others:
+            lost.counts["not a number"] = others
+        lost.counts["of one value"] = of_one_value
     mark_no_returns(ranges, limits.low, limits.high)
     rounded = rounding_of_ranges(ranges)
     if rounded:

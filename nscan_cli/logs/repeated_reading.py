@@ -54,11 +54,8 @@ def repeated_readings(
     if not len(ranges):
         return {}
     rows = np.unique(np.linspace(0, len(ranges) - 1, options.scans).astype(np.int64))
-    some, of_rows = ranges[rows], limits.of(rows)
-    low, high = (limit[:, None].astype(np.float32) for limit in (of_rows.low, of_rows.high))
-    with np.errstate(invalid="ignore"):
-        is_usable = (some > low) & (some < high)
-    values, counts = np.unique(some[is_usable], return_counts=True)
+    some = ranges[rows]
+    values, counts = np.unique(some[_are_usable(some, limits.of(rows))], return_counts=True)
     total = int(counts.sum())
     if total < options.min_readings or len(values) < options.min_values:
         return {}
@@ -73,6 +70,14 @@ def repeated_readings(
         ):
             return dict(zip(values[those].tolist(), shares.tolist(), strict=True))
     return {}
+
+
+def _are_usable(ranges: NDArray[np.float32], limits: RangeLimits) -> NDArray[np.bool_]:
+    """(S, B) which readings are within the limits of their scans."""
+    low, high = (limit[:, None].astype(np.float32) for limit in (limits.low, limits.high))
+    with np.errstate(invalid="ignore"):
+        usable: NDArray[np.bool_] = (ranges > low) & (ranges < high)
+    return usable
 
 
 def _is_alone(
@@ -98,14 +103,14 @@ def _is_all_over(is_so: NDArray[np.bool_], options: RepeatedReadingOptions) -> b
 def without_repeated_readings(
     ranges: NDArray[np.float32], limits: RangeLimits
 ) -> tuple[NDArray[np.int64], list[str]]:
-    """Write nan for readings among ranges (S, B) that are no distances, in place.
+    """Write nan for usable readings among ranges (S, B) that are no distances, in place.
 
     Returns how many readings of each scan (S,) were so, and what is said.
     """
     found = repeated_readings(ranges, limits)
     if not found:
         return np.zeros(len(ranges), dtype=np.int64), []
-    is_so = np.isin(ranges, np.array(list(found), dtype=np.float32))
+    is_so = np.isin(ranges, np.array(list(found), dtype=np.float32)) & _are_usable(ranges, limits)
     counts = np.count_nonzero(is_so, axis=1).astype(np.int64)
     ranges[is_so] = np.nan
     listed = ", ".join(

@@ -75,6 +75,21 @@ def test_it_is_read_as_no_reading_and_said(read):
     assert not said(read(recording(ranges), as_recorded=True))
 
 
+def test_in_scans_whose_limits_leave_nothing_it_is_counted_with_the_others(read):
+    ranges = with_code(0.2, 2.0)
+    written = recording(ranges, range_max=20.0)
+    written[1::2] = [
+        one.with_scan(range_min=5.0, range_max=1.0) if k % 4 == 0 else one
+        for k, one in enumerate(written[1::2])
+    ]
+    log = read(written)
+    assert len(said(log)) == 1
+    is_crossed = np.arange(len(ranges)) % 4 == 0
+    counts = dict(log.report.lost)
+    assert counts.pop("of one value") == np.count_nonzero(ranges[~is_crossed] == 2.0)
+    assert list(counts.values()) == [ranges[is_crossed].size]
+
+
 def test_a_text_log_too(tmp_path):
     file = tmp_path / "dust.log"
     file.write_bytes("\n".join(carmen(with_code(0.1, 0.6))).encode() + b"\n")
