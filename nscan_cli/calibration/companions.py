@@ -123,7 +123,7 @@ def _is_on_path(places: Array, path: Array, radius: float) -> Mask:
 def _is_somewhere(seen: list[Indices], log: LaserLog, options: CompanionOptions) -> bool:
     """Whether bins of bearings are mostly seen in the same quarter of them: dust and noise are everywhere.
 
-    A laser that sees no more than half of a turn tells it by a third of what it sees.
+    For a laser that sees less than three quarters of a turn, the quarter is a third of what it sees.
     """
     first, last, _ = field_of_view(log)
     size, view = round(2 * np.pi / options.bin_width), abs(last - first) / options.bin_width

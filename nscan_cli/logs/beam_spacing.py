@@ -7,12 +7,13 @@ is nearly right, most parts of the log must tell about the same other one.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from nscan_cli.logs.beam_angles import BeamDirections
+from nscan_cli.logs.beam_spacing_options import BeamSpacingOptions
 from nscan_cli.logs.laser_log import beam_counts
 from nscan_cli.logs.raw_scans import RawScans
 from nscan_cli.logs.reading_options import ReadingOptions
@@ -20,73 +21,6 @@ from nscan_cli.logs.wall_angles import SampledScans, beams_as_log, mode, sampled
 
 if TYPE_CHECKING:
     from nscan_cli.logs.range_limits import RangeLimits
-
-
-@dataclass(frozen=True)
-class BeamSpacingOptions:
-    """When walls contradict the angle between beams."""
-
-    half_width: float = 0.45
-    """Angle from a beam to those that it is compared with, rad. A larger value needs wider walls and tells
-    angles more precisely."""
-    narrow_half_width: float = 0.3
-    """A narrower one that must tell the same, rad: noise looks like wider angles the narrower it is."""
-    agreement: float = 0.1
-    """Largest difference of what the two tell, as a share. A larger value contradicts more logs."""
-    settled: float = 0.02
-    """The angle is found once it changes by less than this share from one round to the next. A larger value
-    is faster and less exact."""
-    max_rounds: int = 5
-    """Largest number of rounds. A larger value contradicts more logs."""
-    same_wall: float = 0.15
-    """Largest difference of the angles that two triples about a beam tell, as a share. A larger value takes
-    more of what is no wall for one."""
-    same_angle: float = 0.06
-    """Largest difference of angles that count as one, as a share. A larger value gathers more beams."""
-    min_beams: int = 200
-    """Least number of beams on walls that tell another angle. A larger value contradicts fewer logs."""
-    min_ratio: float = 2.0
-    """Least ratio of these beams to those that tell the angle of the log. A larger value contradicts fewer
-    logs."""
-    min_difference: float = 0.15
-    """Least difference from the angle of the log, as a share. A larger value contradicts fewer logs."""
-    min_small_difference: float = 0.06
-    """The same where most parts of the log tell it. A larger value contradicts fewer logs."""
-    widest_half_width: float = 0.6
-    """The angle from beam to beam by which small differences are told, rad: as `half_width`."""
-    small_agreement: float = 0.04
-    """Largest difference of what it and `half_width` tell then, as a share. A larger value contradicts more
-    logs."""
-    parts: int = 5
-    """Number of parts of the log, most of which must tell a small difference. More parts contradict fewer
-    logs."""
-    min_beams_of_part: int = 40
-    """Least number of beams on walls in a part. A larger value contradicts fewer logs."""
-    max_factor: float = 2.5
-    """Largest factor between the angle of the log and that of the walls. A larger value contradicts more
-    logs."""
-    max_view: float = math.radians(380)
-    """Largest field of view that the angle found may give, rad. A larger value contradicts more logs."""
-    max_off_centre: float = 3.0
-    """A laser looks ahead if it has fewer beams more than this on one side. With a larger value the angles of
-    more logs are put right, and not only named."""
-    usual_views: tuple[float, ...] = tuple(map(math.radians, (100, 120, 180, 190, 240, 255, 270, 360)))
-    """Fields of view of lasers, rad. With more of them more logs are put right."""
-    usual_view: float = 0.06
-    """Largest difference of a field of view from a usual one that it is taken for, as a share. A larger value
-    puts more logs right."""
-    usual_view_near: float = 0.02
-    """The same where the angle of the log is wrong by less than `min_difference`."""
-    usual_view_round: float = 0.03
-    """The same where, moreover, the angle from beam to beam would be a multiple of a quarter of a degree."""
-    moved: float = 0.01
-    """Least median change of the readings between two scans that are tested, as a share: a robot that stands
-    sees one scene only. A larger value tests fewer scans."""
-    max_scans: int = 200
-    """Number of scans that are tested. A larger value takes longer."""
-    first_of: int = 4
-    """One in this number of these is tested first; the others are not where walls agree with the log. A
-    larger value takes less time."""
 
 
 def checked_by_walls(
@@ -174,21 +108,16 @@ def _walls_agree(scans: SampledScans, options: BeamSpacingOptions) -> bool:
 
 
 def _factor_of_walls(scans: SampledScans, options: BeamSpacingOptions) -> float | None:
-    """The factor from the steps of scans to the angle between beams that walls tell; None if they agree.
+    """The factor from the steps of scans to the angle between beams that walls tell; None if they agree."""
 
-    The angle from a beam to those that it is compared with is that of the factor found so far.
-    """
-    factor = 1.0
-    for _ in range(options.max_rounds):
-        found = _told_factor(scans, options.half_width / factor, options)
-        if found is None:
-            return None
-        change, factor = abs(math.log(found / factor)), found
-        if change < options.settled:
-            narrow = _told_factor(scans, options.narrow_half_width / factor, options)
-            agrees = narrow is not None and abs(math.log(narrow / factor)) <= options.agreement
-            return factor if agrees else None
-    return None
+    def told(half_width: float) -> float | None:
+        return _told_factor(scans, half_width, options)
+
+    factor = _settled(told, options.half_width, options)
+    narrow = None if factor is None else told(options.narrow_half_width / factor)
+    if factor is None or narrow is None or abs(math.log(narrow / factor)) > options.agreement:
+        return None
+    return factor
 
 
 def _factor_of_parts(scans: SampledScans, options: BeamSpacingOptions) -> float | None:
@@ -196,35 +125,49 @@ def _factor_of_parts(scans: SampledScans, options: BeamSpacingOptions) -> float 
 
     None if it does not, or if other angles to the beams compared tell another one.
     """
-    factor = _settled_factor(scans, options.widest_half_width, options.min_beams, options)
+
+    def told(some: SampledScans, half_width: float, min_beams: int) -> float | None:
+        return _settled(lambda width: _most_told(some, width, min_beams, options), half_width, options)
+
+    factor = told(scans, options.widest_half_width, options.min_beams)
     if factor is None or abs(math.log(factor)) < options.min_small_difference:
         return None
-    other = _settled_factor(scans, options.half_width, options.min_beams, options)
+    other = told(scans, options.half_width, options.min_beams)
     if other is None or abs(math.log(other / factor)) > options.small_agreement:
         return None
     agreeing = 0
     for rows in np.array_split(np.arange(len(scans.ranges)), options.parts):
         part = SampledScans(scans.ranges[rows], scans.steps[rows])
-        told = _settled_factor(part, options.widest_half_width, options.min_beams_of_part, options)
-        if told is not None and 0.5 < math.log(told) / math.log(factor) < 2.0:
+        of_part = told(part, options.widest_half_width, options.min_beams_of_part)
+        if of_part is not None and 0.5 < math.log(of_part) / math.log(factor) < 2.0:
             agreeing += 1
     return factor if 2 * agreeing > options.parts else None
 
 
-def _settled_factor(
-    scans: SampledScans, half_width: float, min_beams: int, options: BeamSpacingOptions
+def _settled(
+    told: Callable[[float], float | None], half_width: float, options: BeamSpacingOptions
 ) -> float | None:
-    """The factor that most beams on walls tell, compared over this angle (rad) by what is found itself."""
+    """The factor that is `told` once the angle (rad) to the beams compared is right by that factor itself.
+
+    None if none is told, or if it does not settle.
+    """
     factor = 1.0
     for _ in range(options.max_rounds):
-        logs, centres, counts = votes(scans, half_width / factor, options)
-        if counts.max(initial=0) < min_beams:
+        found = told(half_width / factor)
+        if found is None:
             return None
-        found = mode(logs, centres, counts, options)
         change, factor = abs(math.log(found / factor)), found
         if change < options.settled:
             return factor
     return None
+
+
+def _most_told(
+    scans: SampledScans, half_width: float, min_beams: int, options: BeamSpacingOptions
+) -> float | None:
+    """The factor that most beams on walls tell; None for too few. `half_width` as in `_told_factor`."""
+    logs, centres, counts = votes(scans, half_width, options)
+    return None if counts.max(initial=0) < min_beams else mode(logs, centres, counts, options)
 
 
 def _told_factor(scans: SampledScans, half_width: float, options: BeamSpacingOptions) -> float | None:

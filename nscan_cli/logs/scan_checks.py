@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from nscan_cli.logs.beam_angles import BeamAngleOptions
-from nscan_cli.logs.beam_spacing import BeamSpacingOptions
+from nscan_cli.logs.beam_spacing_options import BeamSpacingOptions
 from nscan_cli.logs.dead_beams import DeadBeamOptions
 from nscan_cli.logs.direction_changes import DirectionChangeOptions
 from nscan_cli.logs.floor_line import FloorLineOptions

@@ -12,11 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nscan_cli.logs.beam_angles import BeamDirections, double_cosines
+from nscan_cli.logs.beam_spacing_options import BeamSpacingOptions
 from nscan_cli.logs.raw_scans import RawScans
 from nscan_cli.poses import Array
 
 if TYPE_CHECKING:
-    from nscan_cli.logs.beam_spacing import BeamSpacingOptions
     from nscan_cli.logs.range_limits import RangeLimits
 
 

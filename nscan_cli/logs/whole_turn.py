@@ -14,7 +14,7 @@ import numpy as np
 
 from nscan_cli.files.text import counted
 from nscan_cli.logs.beam_angles import BeamDirections
-from nscan_cli.logs.beam_spacing import BeamSpacingOptions
+from nscan_cli.logs.beam_spacing_options import BeamSpacingOptions
 from nscan_cli.logs.laser_log import beam_counts
 from nscan_cli.logs.raw_scans import RawScans
 from nscan_cli.logs.reading_options import ReadingOptions
