@@ -41,7 +41,7 @@ def factorise(pattern: Pattern, blocks: Array) -> Factor:
     # Of one block it would be a view that cannot be written, and code of its own.
     diagonal = np.diagonal(blocks[pattern.starts[:-1]], axis1=1, axis2=2).copy()
     loose = np.zeros((len(pattern.place), 3), dtype=np.bool_)
-    return Factor(pattern, _factorise(pattern, blocks, diagonal, loose), loose, diagonal)
+    return Factor(pattern, factorise_blocks(pattern, blocks, diagonal, loose), loose, diagonal)
 
 
 def solve(factor: Factor, right: Array) -> Array:
@@ -50,8 +50,8 @@ def solve(factor: Factor, right: Array) -> Array:
     x = np.empty((len(place), 3))
     x[place] = right
     flat, gathered = x.reshape(-1), np.empty(x.size)
-    _solve_lower(factor.pattern, factor.panels, flat, gathered)
-    _solve_upper(factor.pattern, factor.panels, flat, gathered)
+    solve_lower(factor.pattern, factor.panels, flat, gathered)
+    solve_upper(factor.pattern, factor.panels, flat, gathered)
     return x[place]
 
 
@@ -68,7 +68,7 @@ def undetermined_nodes(factor: Factor, share: float = 1e-6) -> Mask:
     for row, component in np.argwhere(factor.loose | (pivots < SUSPICIOUS_PIVOT * factor.diagonal)):
         v = np.zeros((len(found), 3))
         v[row, component] = 1.0
-        _solve_upper(pattern, factor.panels, v.reshape(-1), np.empty(v.size))
+        solve_upper(pattern, factor.panels, v.reshape(-1), np.empty(v.size))
         v /= v[row, component]
         part = v**2 * np.where(factor.diagonal > 0, factor.diagonal, 1.0)
         if factor.loose[row, component] or pivots[row, component] < LEAST_CURVATURE * part.sum():
@@ -91,7 +91,7 @@ def rows_of(pattern: Pattern, supernode: int) -> Indices:
 
 
 @kernel
-def _factorise(pattern: Pattern, blocks: Array, diagonal: Array, loose: Mask) -> Array:
+def factorise_blocks(pattern: Pattern, blocks: Array, diagonal: Array, loose: Mask) -> Array:
     """Left-looking factorisation: from each panel, the products of the earlier panels are subtracted."""
     supernodes, starts = pattern.supernodes, pattern.starts
     count, nodes = supernodes.shape[0] - 1, starts.shape[0] - 1
@@ -212,7 +212,7 @@ def _substitute_pivot(panel: Array, rows: Indices, diagonal: Array, own: float, 
 
 
 @leaf_kernel
-def _solve_lower(pattern: Pattern, panels: Array, x: Array, gathered: Array) -> None:
+def solve_lower(pattern: Pattern, panels: Array, x: Array, gathered: Array) -> None:
     """Solve L y = x in place. x and the buffer `gathered` are (3 F,) by row."""
     for j in range(pattern.supernodes.shape[0] - 1):
         rows, panel = rows_of(pattern, j), panel_of(pattern, panels, j)
@@ -235,8 +235,8 @@ def _solve_lower(pattern: Pattern, panels: Array, x: Array, gathered: Array) -> 
 
 
 @leaf_kernel
-def _solve_upper(pattern: Pattern, panels: Array, x: Array, gathered: Array) -> None:
-    """Solve Lᵗ y = x in place, as _solve_lower."""
+def solve_upper(pattern: Pattern, panels: Array, x: Array, gathered: Array) -> None:
+    """Solve Lᵗ y = x in place, as solve_lower."""
     for j in range(pattern.supernodes.shape[0] - 2, -1, -1):
         rows, panel = rows_of(pattern, j), panel_of(pattern, panels, j)
         for p in range(rows.shape[0]):

@@ -12,9 +12,11 @@ from typing import NamedTuple
 
 import numpy as np
 
+from nscan_cli.graph.linalg.block_cholesky import factorise_blocks, solve_lower, solve_upper
 from nscan_cli.graph.linalg.factor_pattern import Pattern
-from nscan_cli.graph.optimise.graph_energy import System
+from nscan_cli.kernels.array_assignment import assign, assign_rows
 from nscan_cli.kernels.decorators import kernel, leaf_kernel
+from nscan_cli.matching.damped_newton import PAIRWISE_STEPS, is_accepted, is_last, next_damping
 from nscan_cli.ndt.association import association_buffers
 from nscan_cli.ndt.energy import ENERGY_NUMBERS, evaluate_energy
 from nscan_cli.ndt.hash_grid import Grid
@@ -62,8 +64,19 @@ class TurnProblem(NamedTuple):
     speed (m/s) and turn rate (rad/s)."""
 
 
+class TurnSystem(NamedTuple):
+    """The energy at some knots, and its derivatives."""
+
+    terms: Array
+    """(3,)"""
+    gradient: Array
+    """(K, 3)"""
+    hessian: Array
+    """(B, 3, 3) the semi-definite part, as the pattern has its blocks."""
+
+
 class TurnEnergy:
-    """Evaluates the energy of K ≥ 3 knots (x, y, φ), with φ that does not jump by 2π."""
+    """The energy of K ≥ 3 knots (x, y, φ), with φ that does not jump by 2π."""
 
     def __init__(
         self, reference: Ndt, seen: TimedPoints, times: Array, start: Array, options: UnevenMotionOptions
@@ -84,12 +97,19 @@ class TurnEnergy:
             options.scale, sigmas,
         )  # fmt: skip
 
-    def evaluate(self, knots: Array, widening: float) -> System:
-        """Energy, its terms, gradient and the semi-definite part of the Hessian at knots (K, 3)."""
-        terms, gradient = np.zeros(3), np.zeros((len(knots), 3))
-        hessian = np.zeros((len(self.pattern.rows), 3, 3))
-        _evaluate(self._problem, knots, widening, self.pattern.starts, terms, gradient, hessian)
-        return System(float(terms.sum()), terms, gradient, hessian)
+    def least(
+        self, knots: Array, widening: float, tolerance: float, iterations: int
+    ) -> tuple[Array, TurnSystem]:
+        """The knots (K, 3) of least energy, by damped Newton steps from `knots` (K, 3) on, and the energy
+        there.
+
+        It ends with a step that moves no knot by more than `tolerance` (m, rad). Without `iterations` it
+        evaluates the energy at `knots`.
+        """
+        knots = knots.copy()
+        system = TurnSystem(np.empty(3), np.empty((len(knots), 3)), np.empty((len(self.pattern.rows), 3, 3)))
+        _descend(self._problem, self.pattern, knots, widening, tolerance, iterations, system)
+        return knots, system
 
 
 def _band_pattern(nodes: int) -> Pattern:
@@ -102,19 +122,60 @@ def _band_pattern(nodes: int) -> Pattern:
 
 
 @kernel
-def _evaluate(
+def _descend(
     problem: TurnProblem,
+    pattern: Pattern,
     knots: Array,
     widening: float,
-    starts: Indices,
-    terms: Array,
-    gradient: Array,
-    hessian: Array,
+    tolerance: float,
+    iterations: int,
+    here: TurnSystem,
 ) -> None:
-    """Add the terms (3,), gradient (K, 3) and the blocks (B, 3, 3) of the Hessian, as the pattern has them.
+    """Minimise from the knots (K, 3), in place, after Levenberg and Marquardt. Writes the energy there.
 
-    `starts` (K + 1,) are those of its columns.
+    The pattern has the knots in order.
     """
+    there = TurnSystem(np.empty(3), np.empty_like(here.gradient), np.empty_like(here.hessian))
+    damped, diagonal = np.empty_like(here.hessian), np.empty_like(knots)
+    trial, damping = np.empty_like(knots), PAIRWISE_STEPS.first
+    step, gathered = np.empty(knots.size), np.empty(knots.size)
+    _evaluate(problem, pattern.starts, knots, widening, here)
+    for _ in range(iterations):
+        assign(damped.reshape(-1), here.hessian.reshape(-1))
+        for k in range(knots.shape[0]):
+            for a in range(3):
+                damped[pattern.starts[k], a, a] *= 1.0 + damping
+                diagonal[k, a] = damped[pattern.starts[k], a, a]
+        loose = np.zeros(knots.shape, dtype=np.bool_)
+        panels = factorise_blocks(pattern, damped, diagonal, loose)
+        accepted = False
+        if not loose.any():
+            assign(step, here.gradient.reshape(-1))
+            solve_lower(pattern, panels, step, gathered)
+            solve_upper(pattern, panels, step, gathered)
+            for k in range(knots.size):
+                trial.reshape(-1)[k] = knots.reshape(-1)[k] - step[k]
+            _evaluate(problem, pattern.starts, trial, widening, there)
+            accepted = is_accepted(here.terms.sum(), there.terms.sum(), PAIRWISE_STEPS)
+            if accepted:
+                assign_rows(knots, trial)
+                assign(here.terms, there.terms)
+                assign_rows(here.gradient, there.gradient)
+                assign(here.hessian.reshape(-1), there.hessian.reshape(-1))
+            if is_last(np.abs(step).max(), tolerance, damping, PAIRWISE_STEPS):
+                break
+        damping = next_damping(damping, accepted, PAIRWISE_STEPS)
+
+
+@kernel
+def _evaluate(
+    problem: TurnProblem, starts: Indices, knots: Array, widening: float, found: TurnSystem
+) -> None:
+    """Write the energy at the knots (K, 3). `starts` (K + 1,) are those of the pattern's columns."""
+    terms, gradient, hessian = found
+    terms[:] = 0.0
+    gradient[:] = 0.0
+    hessian[:] = 0.0
     moved, buffers = np.empty_like(problem.points), association_buffers(problem.points.shape[0], 1)
     pose, step, out, block = np.empty(3), np.empty(3), np.empty(ENERGY_NUMBERS), np.empty((3, 3))
     for group in range(problem.ends.shape[0] - 1):

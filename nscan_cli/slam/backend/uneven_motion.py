@@ -13,13 +13,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from nscan_cli.graph.optimise.graph_energy import System
-from nscan_cli.graph.optimise.graph_solver import newton_step
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.logs.log_excerpt import with_some_beams
 from nscan_cli.logs.mask_runs import mask_runs
 from nscan_cli.logs.robot_path import RobotPath, RobotPathOptions, poses_at, robot_path
-from nscan_cli.matching.damped_newton import PAIRWISE_STEPS, is_accepted, is_last, next_damping
 from nscan_cli.ndt.hash_grid import WALL_DIRECTION
 from nscan_cli.ndt.transform import Ndt
 from nscan_cli.poses import Array, Mask, relative, wrap
@@ -152,9 +149,10 @@ class _Run:
         if sum(map(len, self._sides)) < uneven.scans or len(seen.points) < uneven.min_points * turns:
             return False
         energy = TurnEnergy(self._reference(), seen, self._times, start, uneven)
+        _, before = energy.least(start, uneven.widenings[-1], uneven.tolerance, 0)
         for widening in uneven.widenings:
-            self._knots, after = _least(energy, self._knots, widening, uneven)
-        before = energy.evaluate(start, 1.0)
+            enough = uneven.tolerance if widening == uneven.widenings[-1] else uneven.coarse_tolerance
+            self._knots, after = energy.least(self._knots, widening, enough, uneven.iterations)
         off = np.abs(self._knots - start)[:: uneven.parts]
         near = (off < uneven.max_sigmas * np.array([uneven.sigma, uneven.sigma, uneven.turn_sigma])).all()
         gain = before.terms[FIT] - after.terms[FIT]
@@ -182,23 +180,3 @@ class _Run:
         order = np.argsort(times, kind="stable")
         order = order[(times[order] >= self._times[0]) & (times[order] < self._times[-1])]
         return TimedPoints(points[order], times[order])
-
-
-def _least(
-    energy: TurnEnergy, knots: Array, widening: float, options: UnevenMotionOptions
-) -> tuple[Array, System]:
-    """The knots (K, 3) of least energy, from `knots` (K, 3) on, and the energy there."""
-    tolerance = options.tolerance if widening == 1.0 else options.coarse_tolerance
-    here, damping = energy.evaluate(knots, widening), PAIRWISE_STEPS.first
-    for _ in range(options.iterations):
-        step = newton_step(energy.pattern, here, damping)
-        accepted = False
-        if step is not None:
-            there = energy.evaluate(knots + step, widening)
-            accepted = is_accepted(here.value, there.value, PAIRWISE_STEPS)
-            if accepted:
-                knots, here = knots + step, there
-            if is_last(float(np.abs(step).max()), tolerance, damping, PAIRWISE_STEPS):
-                break
-        damping = next_damping(damping, accepted, PAIRWISE_STEPS)
-    return knots, here
