@@ -7,6 +7,7 @@ poses on both sides of each turn, and more of them where the motion is uneven an
 from __future__ import annotations
 
 import dataclasses
+import math
 
 import numpy as np
 
@@ -90,13 +91,13 @@ def tracked_at(poses: Array, breaks: set[int], options: SlamOptions) -> TrackedS
     found, step, path = TrackedScans.room(len(poses)), options.tracking.scan.min_motion, 0.0
     found.poses[:], found.values[:], found.inliers[:] = poses, 0.0, 1.0
     found.hessians[:], found.prior_covariances[:], found.odometry_sigmas[:] = 0.0, 0.0, 0.0
-    joined_at = poses[0]
-    for row, pose in enumerate(poses):
-        moved = relative(pose, joined_at)
-        distance = float(np.hypot(moved[0], moved[1]))
-        found.in_map[row] = row == 0 or distance > step or abs(moved[2]) > step
+    joined = poses[0].tolist()
+    for row, pose in enumerate(poses.tolist()):
+        distance = math.hypot(pose[0] - joined[0], pose[1] - joined[1])
+        turn = abs(math.remainder(pose[2] - joined[2], math.tau))
+        found.in_map[row] = row == 0 or distance > step or turn > step
         if found.in_map[row]:
-            path, joined_at = path + distance, pose
+            path, joined = path + distance, pose
         if row in breaks:
             path += options.breaks.path
         found.paths[row] = path

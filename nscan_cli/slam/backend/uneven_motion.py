@@ -36,23 +36,28 @@ def path_of_turns(
     path, uneven = log.moving_along(poses).path, options.uneven_motion
     if path is None or _is_fine(log, uneven):
         return path
-    poses, times, found = poses.copy(), [log.times], list[Array]()
-    outside = ~np.isin(path.times, log.times)
-    thinned = with_some_beams(log, max(log.ranges.shape[1] // uneven.max_beams, 1))
-    known = _known_steps(log.times, breaks, uneven)
-    for first, last in _runs(_is_uneven(log.times, poses, known, uneven), uneven.longest_run):
+    parts, thinned = uneven.parts, with_some_beams(log, max(log.ranges.shape[1] // uneven.max_beams, 1))
+    moving, times = replace(thinned, path=path), _times_of_knots(log.times, parts)
+    knots, is_known = poses_at(path, times), np.arange(len(times)) % parts == 0
+    knots[is_known] = poses
+    outside, steps = ~np.isin(path.times, log.times), _known_steps(log.times, breaks, uneven)
+    for first, last in _runs(_is_uneven(log.times, poses, steps, uneven), uneven.longest_run):
         # A scan more on each side: at the ends of what is matched nothing tells the motion beyond.
-        before, after = first > 1 and known[first - 2], last < len(known) and known[last]
-        around = first - 1 - int(before), last + int(after)
-        run = _Run(thinned, poses, path, (first - 1, last), around, options)
+        before, after = first > 1 and steps[first - 2], last < len(steps) and steps[last]
+        run = _Run(moving, times, knots, (first - 1 - int(before), last + int(after)), options)
         if run.match():
-            poses[run.rows] = run.knots[run.is_middle]
-            times.append(run.times[~run.is_middle])
-            found.append(run.knots[~run.is_middle])
-            outside &= (path.times < run.times[0]) | (path.times > run.times[-1])
-    all_times = np.concatenate([*times, path.times[outside]])
+            inside = slice(parts * (first - 1), parts * last + 1)
+            knots[inside], is_known[inside] = run.found(inside), True
+            outside &= (path.times < times[inside.start]) | (path.times > times[inside.stop - 1])
+    all_times = np.concatenate([times[is_known], path.times[outside]])
     order = np.argsort(all_times, kind="stable")
-    return robot_path(all_times[order], np.concatenate([poses, *found, path.poses[outside]])[order])
+    return robot_path(all_times[order], np.concatenate([knots[is_known], path.poses[outside]])[order])
+
+
+def _times_of_knots(times: Array, parts: int) -> Array:
+    """Times (S,), s, and those that divide the time from each to the next into `parts`."""
+    between = times[:-1, None] + np.arange(parts) / parts * np.diff(times)[:, None]
+    return np.append(between.ravel(), times[-1])
 
 
 def _is_fine(log: LaserLog, options: UnevenMotionOptions) -> bool:
@@ -97,56 +102,36 @@ def _runs(marks: Mask, longest: int) -> Iterator[tuple[int, int]]:
 
 
 class _Run:
-    """Scans in uneven motion, and those about them that they are matched with."""
+    """Scans in uneven motion, and those on both sides that they are matched with."""
 
     def __init__(
-        self,
-        log: LaserLog,
-        poses: Array,
-        path: RobotPath,
-        rows: tuple[int, int],
-        around: tuple[int, int],
-        options: SlamOptions,
+        self, moving: LaserLog, times: Array, knots: Array, rows: tuple[int, int], options: SlamOptions
     ) -> None:
-        """Find the path between the first and last of `rows`, by matching those from the first to the last
-        `around` them. `poses` (S, 3) are those of all scans, `path` is theirs before any run was matched."""
-        self._log, self._options, self._around = log, options, around
-        uneven, parts, (first, last) = options.uneven_motion, options.uneven_motion.parts, around
-        self.rows = slice(rows[0], rows[1] + 1)
-        middles = log.times[first : last + 1]
-        between = middles[:-1, None] + np.arange(parts) / parts * np.diff(middles)[:, None]
-        self._times = np.append(between.ravel(), middles[-1])
-        self._knots = poses_at(path, self._times)
-        self._knots[::parts] = poses[first : last + 1]
+        """Find the path from the first to the last of `rows`, which is through `knots` (n, 3) so far.
+
+        They are those of all scans, at `times` (n,), s. `moving` are the scans, with the path before any run
+        was matched.
+        """
+        self._moving, self._rows, self._options = moving, rows, options
+        (first, last), uneven = rows, options.uneven_motion
+        around = slice(uneven.parts * first, uneven.parts * last + 1)
+        self._start, self._times, self._all_knots = around.start, times[around], knots
+        self._knots = knots[around].copy()
         self._knots[:, 2] = np.unwrap(self._knots[:, 2])
-        near = np.arange(max(first - uneven.scans, 0), min(last + 1 + uneven.scans, len(log)))
-        self._sides = near[near < first], near[near > last]
-        self._moving = replace(log, path=robot_path(log.times[near], poses[near]))
-        self._inside = slice(parts * (rows[0] - first), parts * (rows[1] - first) + 1)
+        self._near = slice(max(first - uneven.scans, 0), last + 1 + uneven.scans)
 
-    @property
-    def times(self) -> Array:
-        """(n,) times of the knots of the path that is found, s."""
-        return self._times[self._inside]
-
-    @property
-    def knots(self) -> Array:
-        """(n, 3) poses of the knots."""
-        found = self._knots[self._inside].copy()
+    def found(self, knots: slice) -> Array:
+        """The poses of `knots`, which are among those of the path that is found."""
+        found = self._knots[knots.start - self._start : knots.stop - self._start].copy()
         found[:, 2] = wrap(found[:, 2])
         return found
-
-    @property
-    def is_middle(self) -> Mask:
-        """(n,) whether they are at the middles of turns."""
-        middles: Mask = np.arange(len(self.times)) % self._options.uneven_motion.parts == 0
-        return middles
 
     def match(self) -> bool:
         """Find the path on which the beams fit best; whether they tell it."""
         uneven, start = self._options.uneven_motion, self._knots
         seen, turns = self._seen(), len(start) / uneven.parts
-        if sum(map(len, self._sides)) < uneven.scans or len(seen.points) < uneven.min_points * turns:
+        beside = len(self._moving.times[self._near]) - (self._rows[1] + 1 - self._rows[0])
+        if beside < uneven.scans or len(seen.points) < uneven.min_points * turns:
             return False
         energy = TurnEnergy(self._reference(), seen, self._times, start, uneven)
         _, before = energy.least(start, uneven.widenings[-1], uneven.tolerance, 0)
@@ -161,22 +146,19 @@ class _Run:
     def _reference(self) -> Ndt:
         """The Gaussians of the scans on both sides."""
         gaussians, reach = self._options.nscan.gaussians, self._options.tracking.max_range
-        sides = [
-            self._moving.batch_points(slice(rows[0], rows[-1] + 1), reach)
-            for rows in self._sides
-            if len(rows)
-        ]
-        points = np.concatenate([seen for seen, _ in sides])
-        ends = np.append(0, np.cumsum(np.concatenate([np.diff(ends) for _, ends in sides])))
-        assert self._moving.path is not None
-        poses = poses_at(self._moving.path, self._log.times[np.concatenate(self._sides)])
+        points, ends = self._moving.batch_points(self._near, reach)
+        first, end = (row - self._near.start for row in (self._rows[0], self._rows[1] + 1))
+        poses = self._all_knots[:: self._options.uneven_motion.parts][self._near]
+        points = np.concatenate([points[: ends[first]], points[ends[end] :]])
+        ends = np.concatenate([ends[:first], ends[end:] - (ends[end] - ends[first])])
+        poses = np.concatenate([poses[:first], poses[end:]])
         return Ndt.of_scans(points, ends, poses, gaussians, neighbourhood=WALL_DIRECTION)
 
     def _seen(self) -> TimedPoints:
         """The points of the scans in the time of the path, in order of time."""
-        rows, reach = slice(self._around[0], self._around[1] + 1), self._options.tracking.max_range
-        points, ends, times = replace(self._log, path=None).timed_points(rows, reach)
-        times += np.repeat(self._log.times[rows], np.diff(ends))
+        rows, reach = slice(self._rows[0], self._rows[1] + 1), self._options.tracking.max_range
+        points, ends, times = replace(self._moving, path=None).timed_points(rows, reach)
+        times += np.repeat(self._moving.times[rows], np.diff(ends))
         order = np.argsort(times, kind="stable")
         order = order[(times[order] >= self._times[0]) & (times[order] < self._times[-1])]
         return TimedPoints(points[order], times[order])
