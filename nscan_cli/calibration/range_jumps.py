@@ -131,6 +131,9 @@ def _matched_factor(log: LaserLog, row: int, factor: float, options: FileCheckOp
     best = int(np.argmin(total))
     if best in (0, len(near) - 1) or (of_all[:, best] > np.array(as_read) - jumps.min_gain).any():
         return None
+    elsewhere = [_energy_elsewhere(log, first, last, math.exp(near[best]), options) for first, last in pairs]
+    if (of_all[:, best] > np.array(elsewhere) - jumps.min_gain).any():
+        return None
     found = parabola_minimum(near, total)
     return math.exp(found) if abs(found) > math.log(jumps.min_factor) else None
 
@@ -146,6 +149,19 @@ def _energies(
     pair = options.steps.pair
     found = [match_scans(before, behind / scale, start, pair).energy for scale in scales]
     return np.array(found) / len(behind)
+
+
+def _energy_elsewhere(
+    log: LaserLog, first: int, last: int, scale: float, options: FileCheckOptions
+) -> float:
+    """The energy per point of two scans as they are, from where they match with the later one divided by a
+    scale: single things can shift as well as all ranges grow."""
+    pair_of_scans = scans_to_match(log, first, last, options)
+    assert pair_of_scans is not None
+    before, behind, start = pair_of_scans
+    pair = options.steps.pair
+    there = match_scans(before, behind / scale, start, pair).pose
+    return float(match_scans(before, behind, there, pair).energy / len(behind))
 
 
 def _right_scale(log: LaserLog, scales: Array, options: FileCheckOptions) -> float:
