@@ -91,7 +91,13 @@ def _changes_at(log: LaserLog, row: int, options: FileCheckOptions) -> bool:
         if matched is None or _gain(matched) >= -gain:
             return False
         sides.append(matched.as_read.pose)
-    return log.odometry is not None or _lead_one_way(across, sides, options.order)
+    if log.odometry is not None:
+        return True
+    # Nothing tells how far the robot turned from one scan to the next: as read they may match after a turn.
+    turned = (_matched_both_ways(log, *rows, options, options.order.turns) for rows in pairs_across(row))
+    return _lead_one_way(across, sides, options.order) and all(
+        matched is not None and _gain(matched) > gain for matched in turned
+    )
 
 
 class _Matched(NamedTuple):
@@ -107,14 +113,17 @@ def _gain(matched: _Matched) -> float:
     return (matched.as_read.energy - matched.mirrored.energy) / matched.points
 
 
-def _matched_both_ways(log: LaserLog, first: int, last: int, options: FileCheckOptions) -> _Matched | None:
-    """The matches of two scans; None for too few points."""
+def _matched_both_ways(
+    log: LaserLog, first: int, last: int, options: FileCheckOptions, turns: Sequence[float] = (0.0,)
+) -> _Matched | None:
+    """The matches of two scans, from where odometry leads or after one of these `turns` (rad); None for too
+    few points."""
     pair_of_scans = scans_to_match(log, first, last, options)
     if pair_of_scans is None:
         return None
     before, behind, start = pair_of_scans
     # Odometry itself may turn the wrong way.
-    starts = (start, np.zeros(3))
+    starts = [start, *(np.array([0.0, 0.0, turn]) for turn in turns)]
     as_read, mirrored = (
         min(
             (match_scans(before, points, each, options.steps.pair) for each in starts),
