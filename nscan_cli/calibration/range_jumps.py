@@ -151,9 +151,7 @@ def _energies(
     return np.array(found) / len(behind)
 
 
-def _energy_elsewhere(
-    log: LaserLog, first: int, last: int, scale: float, options: FileCheckOptions
-) -> float:
+def _energy_elsewhere(log: LaserLog, first: int, last: int, scale: float, options: FileCheckOptions) -> float:
     """The energy per point of two scans as they are, from where they match with the later one divided by a
     scale: single things can shift as well as all ranges grow."""
     pair_of_scans = scans_to_match(log, first, last, options)

@@ -67,6 +67,11 @@ class ScanMotion:
         both = self._on_both_sides(row)
         return None if both is None else 0.5 * (both[0] + both[1])
 
+    def change_of_turn(self, one: int, other: int) -> float:
+        """rad/s; by how much the laser turns faster at one row than at another, by matches; 0 in doubt."""
+        before, after = self.twist(one), self.twist(other)
+        return 0.0 if before is None or after is None else abs(float(after[2] - before[2]))
+
     def is_steady(self, row: int, options: SweepTimeOptions) -> bool:
         """Whether the laser turns before and after a row at nearly the same rate."""
         both = self._on_both_sides(row)

@@ -37,7 +37,7 @@ def checked_sweep(
     motion, said = ScanMotion.of_log(log, options.steps, options.sweep), list[str]()
     tried = (0.0, longest, -longest) if told else (0.0, longest, -longest, 0.5 * longest, -0.5 * longest)
     evidence = sweep_evidence(motion, tried, told, options.sweep)
-    if told and len(evidence.energies) < options.sweep.min_pairs:
+    if told and evidence.is_little:
         # If the time is short, the robot turns little in it, and the scans still tell.
         finer = replace(options.sweep, min_winding=options.sweep.least_winding)
         evidence = sweep_evidence(motion, tried, told, finer)

@@ -14,7 +14,7 @@ import numpy as np
 from nscan_cli.calibration.robust_fit import TO_SIGMA
 from nscan_cli.calibration.scan_motion import ScanMotion
 from nscan_cli.calibration.sweep_options import SweepCheckOptions
-from nscan_cli.poses import Array
+from nscan_cli.poses import Array, Indices
 
 
 @dataclass(frozen=True)
@@ -25,16 +25,28 @@ class SweepEvidence:
     """(T,) the times that were tried, s; negative: readings in the reverse order of time."""
     energies: Array
     """(P, T) energy of each of P pairs matched with each time, per point; smaller is sharper."""
+    first: Indices
+    """(P,) row of the first scan of each pair."""
     options: SweepCheckOptions
 
     def sigmas(self, better: float, worse: float) -> float:
-        """By how many standard deviations one of the times fits better than another; 0 with too few pairs."""
-        places = [int(np.argmin(np.abs(self.turns - turn))) for turn in (better, worse)]
-        if len(self.energies) < self.options.min_pairs:
+        """By how many standard deviations one of the times fits better than another.
+
+        Pairs that begin with one scan are wrong together, so their mean counts once. 0 with too few scans.
+        """
+        if self.is_little:
             return 0.0
+        places = [int(np.argmin(np.abs(self.turns - turn))) for turn in (better, worse)]
+        own = np.unique(self.first, return_inverse=True)[1]
         gains = self._clipped(self.energies[:, places[1]] - self.energies[:, places[0]])
+        gains = np.bincount(own, gains) / np.bincount(own)
         spread = float(gains.std(ddof=1)) / np.sqrt(len(gains))
         return float(gains.mean()) / max(float(spread), 1e-12)
+
+    @property
+    def is_little(self) -> bool:
+        """Whether too few scans were compared with others."""
+        return len(np.unique(self.first)) < self.options.min_pairs
 
     @property
     def sharpest(self) -> float:
@@ -60,11 +72,16 @@ def sweep_evidence(
     No more pairs are compared where `told`, one of those times, fits better than the others, or another far
     better than it. Times that fit clearly worse than it are left out.
     """
-    evidence = SweepEvidence(np.array(turns), np.empty((0, len(turns))), options)
-    for one, other in turning_pairs(motion, max(abs(turn) for turn in turns), options):
+    evidence = SweepEvidence(np.array(turns), np.empty((0, len(turns))), np.empty(0, np.int64), options)
+    longest = max(abs(turn) for turn in turns)
+    for one, other in turning_pairs(motion, longest, options):
+        if motion.change_of_turn(one, other) * longest <= options.min_winding:
+            # The estimate of single ranges was wrong.
+            continue
         energies = motion.energies(one, other, evidence.turns.tolist())
         if energies is not None:
-            evidence = replace(evidence, energies=np.vstack([evidence.energies, energies]))
+            energies, first = np.vstack([evidence.energies, energies]), np.append(evidence.first, one)
+            evidence = replace(evidence, energies=energies, first=first)
             if _is_settled(evidence, told, options) or len(evidence.energies) == options.pairs:
                 break
             evidence = _without_worse(evidence, told, options)

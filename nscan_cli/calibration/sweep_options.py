@@ -76,7 +76,8 @@ class SweepCheckOptions:
     """Most pairs of scans that are compared, those where the robot turns fastest. More tell more and take
     longer."""
     min_pairs: int = 5
-    """Least number of pairs whose spread tells how certain their mean is. A larger value finds less."""
+    """Least number of scans that pairs begin with, whose spread tells how certain their mean is. A larger
+    value finds less."""
     outlier_sigmas: float = 3.0
     """A pair that is farther from the median than this number of standard deviations counts as if it were so
     far: matches slip. A larger value gives such pairs more weight."""
