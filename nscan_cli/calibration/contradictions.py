@@ -198,6 +198,7 @@ def _of_clocks(
 
 def _is_offset(lag: ClockLag, gain: float, options: FileCheckOptions) -> bool:
     is_better = lag.disagreement < gain * min(lag.as_stamped, lag.elsewhere)
+    is_better &= lag.disagreement <= options.clock.max_left
     return is_better and abs(lag.offset) >= options.clock.min_offset
 
 

@@ -22,6 +22,9 @@ class ClockOptions:
     """An offset is found if the turns disagree by less than this share of their disagreement without it, and
     of that anywhere else. With a larger share an offset is found more often, also where there is none.
     Mirrored turns are found in the same way."""
+    max_left: float = 0.85
+    """Largest share by which turns disagree with an offset that is found. They disagree by 1 where odometry
+    does not turn. A larger share finds more where a robot hardly turns, also offsets that are none."""
     first_gain: float = 0.8
     """More steps are measured where the share of the first few is less than this. A larger value takes
     longer."""
