@@ -77,6 +77,12 @@ class ViewChangeOptions:
     less."""
     sigmas: float = 5.0
     """And it must exceed this number of standard deviations. A larger value warns less."""
+    part_weight: float = 0.8
+    """The standard deviation by parts of `min_steps` steps counts by this factor. Headings by odometry drift,
+    so steps beside each other are off by the same. A larger factor warns less."""
+    max_part_sigma: float = 0.03
+    """Largest such standard deviation that counts, rad: headings drift no farther. A larger value warns
+    less."""
     doubt_steps: int = 2
     """More steps are measured where so many steps before and behind show a change. A larger value takes less
     time, and misses what changes near the beginning or the end."""

@@ -91,7 +91,9 @@ def direction_change(
     if split is None:
         return None
     before, behind = (_usual_direction(some) for some in (angles[:split], angles[split:]))
-    sigma = sigma_of_change(wrap(angles[:split] - before), wrap(angles[split:] - behind))
+    sides = wrap(angles[:split] - before), wrap(angles[split:] - behind)
+    drift = options.part_weight * _sigma_of_parts(*sides, options.min_steps)
+    sigma = max(sigma_of_change(*sides), min(drift, options.max_part_sigma))
     return DirectionChange(int(told[split]), before, behind, sigma, len(told))
 
 
@@ -104,6 +106,23 @@ def _clearest_split(values: Array, least: int) -> int | None:
     before, behind = sums[places - 1], sums[-1] - sums[places - 1]
     gains = (before**2).sum(axis=1) / places + (behind**2).sum(axis=1) / (len(values) - places)
     return int(places[np.argmax(gains)])
+
+
+def _sigma_of_parts(before: Array, behind: Array, length: int) -> float:
+    """Standard deviation (rad) of a change, from how much parts of so many steps differ on either side of it.
+
+    `before` (n,) and `behind` (m,) are the residuals on both sides, in order. Where headings by odometry
+    drift, steps beside each other are off by the same.
+    """
+    parts = [
+        side[: len(side) // length * length].reshape(-1, length).mean(axis=1) for side in (before, behind)
+    ]
+    freedom = sum(map(len, parts)) - 2
+    if freedom < 1:
+        return 0.0
+    squares = sum(float(((side - side.mean()) ** 2).sum()) for side in parts if len(side))
+    counts = [len(side) / length for side in (before, behind)]
+    return float(np.sqrt(squares / freedom * (1.0 / counts[0] + 1.0 / counts[1])))
 
 
 def _usual_direction(angles: Array) -> float:
