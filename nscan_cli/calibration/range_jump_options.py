@@ -32,6 +32,9 @@ class RangeJumpOptions:
     """The energy per point of four pairs of scans, one before the place and one behind, is lower by so much
     with the factor than without it, and that of two pairs on one side is higher. At 5 % it is lower by 0.3 to
     2 mostly. A larger value finds less."""
+    max_misfit: float = 0.12
+    """With the factor, the step across the place is off that by odometry by at most so much more than the
+    steps beside it, m and rad. A larger value finds more."""
     refinement: float = math.log(1.01)
     """The factor is the minimum of a parabola through five energies this far apart, as a logarithm. A larger
     value finds more, and is less exact."""

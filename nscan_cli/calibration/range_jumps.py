@@ -131,8 +131,12 @@ def _matched_factor(log: LaserLog, row: int, factor: float, options: FileCheckOp
     best = int(np.argmin(total))
     if best in (0, len(near) - 1) or (of_all[:, best] > np.array(as_read) - jumps.min_gain).any():
         return None
-    elsewhere = [_energy_elsewhere(log, first, last, math.exp(near[best]), options) for first, last in pairs]
-    if (of_all[:, best] > np.array(elsewhere) - jumps.min_gain).any():
+    across = [_Across.at(log, *rows, math.exp(near[best]), options) for rows in pairs]
+    if any(each.gain <= jumps.min_gain for each in across):
+        return None
+    # A slope that comes into view lets all ranges grow as well, and the scans match after a wrong step.
+    beside = max(_Across.at(log, first, first + 1, 1.0, options).misfit for first in (row - 2, row))
+    if across[0].misfit > beside + jumps.max_misfit:
         return None
     found = parabola_minimum(near, total)
     return math.exp(found) if abs(found) > math.log(jumps.min_factor) else None
@@ -151,15 +155,25 @@ def _energies(
     return np.array(found) / len(behind)
 
 
-def _energy_elsewhere(log: LaserLog, first: int, last: int, scale: float, options: FileCheckOptions) -> float:
-    """The energy per point of two scans as they are, from where they match with the later one divided by a
-    scale: single things can shift as well as all ranges grow."""
-    pair_of_scans = scans_to_match(log, first, last, options)
-    assert pair_of_scans is not None
-    before, behind, start = pair_of_scans
-    pair = options.steps.pair
-    there = match_scans(before, behind / scale, start, pair).pose
-    return float(match_scans(before, behind, there, pair).energy / len(behind))
+class _Across(NamedTuple):
+    """Two scans, matched with the later one divided by a scale."""
+
+    gain: float
+    """By how much the energy per point is lower than that of the scans as they are, from that place on:
+    single things shift where all ranges seem to grow."""
+    misfit: float
+    """How far the step is off that by odometry, m and rad."""
+
+    @classmethod
+    def at(cls, log: LaserLog, first: int, last: int, scale: float, options: FileCheckOptions) -> _Across:
+        pair_of_scans = scans_to_match(log, first, last, options)
+        assert pair_of_scans is not None
+        before, behind, start = pair_of_scans
+        scaled = match_scans(before, behind / scale, start, options.steps.pair)
+        as_read = match_scans(before, behind, scaled.pose, options.steps.pair)
+        x, y, turn = (scaled.pose - start).tolist()
+        misfit = math.hypot(x, y) + abs(math.remainder(turn, math.tau))
+        return cls((as_read.energy - scaled.energy) / len(behind), misfit)
 
 
 def _right_scale(log: LaserLog, scales: Array, options: FileCheckOptions) -> float:
