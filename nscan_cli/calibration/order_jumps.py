@@ -16,14 +16,13 @@ import numpy as np
 from nscan_cli.calibration.compared_ranges import ComparedRanges
 from nscan_cli.calibration.measured_steps import measure_steps
 from nscan_cli.calibration.options import FileCheckOptions
-from nscan_cli.calibration.range_jump_options import OrderJumpOptions
-from nscan_cli.calibration.range_jumps import pairs_across, scans_to_match
+from nscan_cli.calibration.range_jumps import lead_one_way, pairs_across, scans_to_match
 from nscan_cli.calibration.step_sampling import telling_steps
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.logs.mask_runs import mask_runs
 from nscan_cli.logs.stretch_names import stretch_names
 from nscan_cli.matching.scan_pairs import ScanPair, match_scans
-from nscan_cli.poses import MIRRORED, Array, Mask, compose, wrap
+from nscan_cli.poses import MIRRORED, Mask
 
 
 def checked_order(
@@ -95,7 +94,10 @@ def _changes_at(log: LaserLog, row: int, options: FileCheckOptions) -> bool:
         return True
     # Nothing tells how far the robot turned from one scan to the next: as read they may match after a turn.
     turned = (_matched_both_ways(log, *rows, options, options.order.turns) for rows in pairs_across(row))
-    return _lead_one_way(across, sides, options.order) and all(
+    # Two scans of a long room from before and after a turn may fit the mirror image better.
+    before, behind = sides[0], sides[1] * MIRRORED
+    order = options.order
+    return lead_one_way(across, (before, behind), order.max_misfit, order.max_turn_misfit) and all(
         matched is not None and _gain(matched) > gain for matched in turned
     )
 
@@ -132,21 +134,3 @@ def _matched_both_ways(
         for points in (behind, behind * (1.0, -1.0))
     )
     return _Matched(as_read, mirrored, len(behind))
-
-
-def _lead_one_way(across: Sequence[Array], sides: Sequence[Array], options: OrderJumpOptions) -> bool:
-    """Whether the four steps (3,) across the place agree with each other and with those of both sides.
-
-    Without odometry, two scans of a long room from before and after a turn may fit the mirror image better.
-    """
-    before, behind = sides[0], sides[1] * MIRRORED
-    between = across[0]
-    led = (
-        between,
-        compose(before, between),
-        compose(between, behind),
-        compose(before, compose(between, behind)),
-    )
-    off = np.stack(across) - np.stack(led)
-    is_near = np.hypot(off[:, 0], off[:, 1]) <= options.max_misfit
-    return bool((is_near & (np.abs(wrap(off[:, 2])) <= options.max_turn_misfit)).all())

@@ -35,6 +35,11 @@ class RangeJumpOptions:
     max_misfit: float = 0.12
     """With the factor, the step across the place is off that by odometry by at most so much more than the
     steps beside it, m and rad. A larger value finds more."""
+    max_off: float = 0.3
+    """The four steps across the place agree with each other and with those beside it to so many metres. A
+    larger value finds more."""
+    max_turn_off: float = 0.1
+    """The turns of these steps agree to so many rad. A larger value finds more."""
     refinement: float = math.log(1.01)
     """The factor is the minimum of a parabola through five energies this far apart, as a logarithm. A larger
     value finds more, and is less exact."""

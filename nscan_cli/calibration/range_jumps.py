@@ -8,6 +8,7 @@ the scans match best as they are.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -23,7 +24,7 @@ from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.logs.mask_runs import mask_runs
 from nscan_cli.logs.stretch_names import stretch_names
 from nscan_cli.matching.scan_pairs import match_scans
-from nscan_cli.poses import Array
+from nscan_cli.poses import Array, compose, wrap
 
 
 class RangeJump(NamedTuple):
@@ -131,12 +132,16 @@ def _matched_factor(log: LaserLog, row: int, factor: float, options: FileCheckOp
     best = int(np.argmin(total))
     if best in (0, len(near) - 1) or (of_all[:, best] > np.array(as_read) - jumps.min_gain).any():
         return None
-    across = [_Across.at(log, *rows, math.exp(near[best]), options) for rows in pairs]
+    scale = math.exp(near[best])
+    across = [_Across.at(log, *rows, scale, options) for rows in pairs]
     if any(each.gain <= jumps.min_gain for each in across):
         return None
+    before, behind = (_Across.at(log, first, first + 1, 1.0, options) for first in (row - 2, row))
     # A slope that comes into view lets all ranges grow as well, and the scans match after a wrong step.
-    beside = max(_Across.at(log, first, first + 1, 1.0, options).misfit for first in (row - 2, row))
-    if across[0].misfit > beside + jumps.max_misfit:
+    if across[0].misfit > max(before.misfit, behind.misfit) + jumps.max_misfit:
+        return None
+    sides = before.step, behind.step / (scale, scale, 1.0)
+    if not lead_one_way([each.step for each in across], sides, jumps.max_off, jumps.max_turn_off):
         return None
     found = parabola_minimum(near, total)
     return math.exp(found) if abs(found) > math.log(jumps.min_factor) else None
@@ -161,6 +166,8 @@ class _Across(NamedTuple):
     gain: float
     """By how much the energy per point is lower than that of the scans as they are, from that place on:
     single things shift where all ranges seem to grow."""
+    step: Array
+    """(3,)"""
     misfit: float
     """How far the step is off that by odometry, m and rad."""
 
@@ -173,7 +180,27 @@ class _Across(NamedTuple):
         as_read = match_scans(before, behind, scaled.pose, options.steps.pair)
         x, y, turn = (scaled.pose - start).tolist()
         misfit = math.hypot(x, y) + abs(math.remainder(turn, math.tau))
-        return cls((as_read.energy - scaled.energy) / len(behind), misfit)
+        return cls((as_read.energy - scaled.energy) / len(behind), scaled.pose, misfit)
+
+
+def lead_one_way(
+    across: Sequence[Array], sides: tuple[Array, Array], max_off: float, max_turn_off: float
+) -> bool:
+    """Whether the four steps (3,) of `pairs_across` agree with each other and with those of both sides.
+
+    They are off by at most so much, m and rad.
+    """
+    before, behind = sides
+    between = across[0]
+    led = (
+        between,
+        compose(before, between),
+        compose(between, behind),
+        compose(before, compose(between, behind)),
+    )
+    off = np.stack(across) - np.stack(led)
+    is_near = np.hypot(off[:, 0], off[:, 1]) <= max_off
+    return bool((is_near & (np.abs(wrap(off[:, 2])) <= max_turn_off)).all())
 
 
 def _right_scale(log: LaserLog, scales: Array, options: FileCheckOptions) -> float:
