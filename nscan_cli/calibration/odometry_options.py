@@ -51,10 +51,11 @@ class ScaleChangeOptions:
     """Least factor between the scales before and behind. It is 1.08 at most in recordings of
     others. A larger value warns less."""
     sigmas: float = 5.0
-    """And it must exceed this number of standard deviations. It is 3 at most on real logs. A larger value
+    """Least size of the change, in its standard deviations. It is 3 at most on real logs. A larger value
     warns less."""
     doubt_sigmas: float = 2.0
-    """More steps are measured where it exceeds this number. A larger value takes less time."""
+    """More steps are measured where a change exceeds this number of its standard deviations. A larger value
+    takes less time."""
 
 
 @dataclass(frozen=True)
@@ -76,7 +77,7 @@ class ViewChangeOptions:
     """Least change of the direction of the laser, rad. It is 0.03 at most on real logs. A larger value warns
     less."""
     sigmas: float = 5.0
-    """And it must exceed this number of standard deviations. A larger value warns less."""
+    """Least change of that direction, in its standard deviations. A larger value warns less."""
     part_weight: float = 0.8
     """The standard deviation by parts of `min_steps` steps counts by this factor. Headings by odometry drift,
     so steps beside each other are off by the same. A larger factor warns less."""

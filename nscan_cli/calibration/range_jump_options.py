@@ -21,7 +21,7 @@ class RangeJumpOptions:
     """Ranges have changed by the usual factor if the logarithm of theirs differs by less than this. A larger
     value matches more scans."""
     min_share: float = 0.2
-    """Least share of the beams that have. A smaller value matches more scans."""
+    """Least share of beams whose range changed by the usual factor. A smaller value matches more scans."""
     max_beside: float = 0.75
     """The logarithms of the factors before and behind such a place are less than this share of its own:
     elsewhere odometry is wrong, or the laser sees little. A larger value matches more scans."""
@@ -69,7 +69,7 @@ class OrderJumpOptions:
     max_misfit: float = 0.8
     """Without odometry, the steps by these pairs agree to so many metres. A larger value finds more."""
     max_turn_misfit: float = 0.2
-    """The same of their turns, rad."""
+    """Without odometry, the turns by these pairs agree to so much, rad. A larger value finds more."""
 
 
 @dataclass(frozen=True)

@@ -110,8 +110,9 @@ class SweepCheckOptions:
     """Least turn of the robot during a turn of the laser, and least difference of two such turns, rad. A
     larger value tells more of each pair, and finds fewer."""
     least_winding: float = math.radians(1.0)
-    """The same where the file has times of beams and fewer than `min_pairs` turn so much, rad. A smaller
-    value finds shorter times that are wrong, and takes longer."""
+    """Least turn of the robot, and least difference of two, where the file has times of beams and fewer than
+    `min_pairs` turn by `min_winding`, rad. A smaller value finds shorter times that are wrong, and takes
+    longer."""
     min_view: float = math.radians(190.0)
     """Least field of view of a laser that is checked though its file has no times of beams, rad. A smaller
     value also checks lasers that look ahead, which takes time."""

@@ -14,7 +14,8 @@ class BeamSpacingOptions:
     """Angle from a beam to those that it is compared with, rad. A larger value needs wider walls and tells
     angles more precisely."""
     narrow_half_width: float = 0.3
-    """A narrower one that must tell the same, rad: noise looks like wider angles the narrower it is."""
+    """A narrower angle that must tell the same, rad: noise looks like wider angles between beams the narrower
+    it is. A larger value contradicts more logs."""
     agreement: float = 0.1
     """Largest difference of what the two tell, as a share. A larger value contradicts more logs."""
     settled: float = 0.02
@@ -35,12 +36,14 @@ class BeamSpacingOptions:
     min_difference: float = 0.15
     """Least difference from the angle of the log, as a share. A larger value contradicts fewer logs."""
     min_small_difference: float = 0.06
-    """The same where most parts of the log tell it. A larger value contradicts fewer logs."""
+    """Least difference from the angle of the log that most parts of it tell, as a share. A larger value
+    contradicts fewer logs."""
     widest_half_width: float = 0.6
-    """The angle from beam to beam by which small differences are told, rad: as `half_width`."""
+    """Angle from a beam to those that it is compared with for small differences, rad. A larger value needs
+    wider walls and tells angles more precisely."""
     small_agreement: float = 0.04
-    """Largest difference of what it and `half_width` tell then, as a share. A larger value contradicts more
-    logs."""
+    """Largest difference of what `widest_half_width` and `half_width` tell of a small difference, as a share.
+    A larger value contradicts more logs."""
     parts: int = 5
     """Number of parts of the log, most of which must tell a small difference. More parts contradict fewer
     logs."""
@@ -60,9 +63,11 @@ class BeamSpacingOptions:
     """Largest difference of a field of view from a usual one that it is taken for, as a share. A larger value
     puts more logs right."""
     usual_view_near: float = 0.02
-    """The same where the angle of the log is wrong by less than `min_difference`."""
+    """Largest difference from a usual view, as a share, where the angle of the log is wrong by less than
+    `min_difference`. A larger value puts more logs right."""
     usual_view_round: float = 0.03
-    """The same where, moreover, the angle from beam to beam would be a multiple of a quarter of a degree."""
+    """Largest difference from a usual view, as a share, where moreover the angle from beam to beam would be a
+    multiple of a quarter of a degree. A larger value puts more logs right."""
     moved: float = 0.01
     """Least median change of the readings between two scans that are tested, as a share: a robot that stands
     sees one scene only. A larger value tests fewer scans."""

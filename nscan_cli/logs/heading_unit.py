@@ -26,8 +26,8 @@ class HeadingUnitOptions:
     more on all logs in their own unit, and 0.33 at most in the other one. A larger value converts fewer
     logs."""
     min_gain: float = 0.3
-    """And it is larger by so much than with the headings in radians: a straight drive tells little. A larger
-    value converts fewer logs."""
+    """Least difference of this mean from that with the headings in radians: a straight drive tells little. A
+    larger value converts fewer logs."""
 
 
 def are_in_degrees(poses: Array, options: HeadingUnitOptions = HeadingUnitOptions()) -> bool:

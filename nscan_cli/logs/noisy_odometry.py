@@ -21,26 +21,26 @@ class NoisyOdometryOptions:
     """When odometry goes to and fro as no robot does."""
 
     min_distance: float = 0.25
-    """Its poses are farther off the way between those before and behind, m. It is 0.17 at most on real logs,
-    in the median of a window. A larger value finds less."""
+    """Noise moves poses farther than this off the way between those before and behind, m. It is 0.17 at most
+    on real logs, in the median of a window. A larger value finds less."""
     min_turn: float = 0.2
-    """Or they are turned by more against it, rad. It is 0.12 at most on real logs. A larger value finds
-    less."""
+    """Noise also turns poses by more than this against that way, rad. It is 0.12 at most on real logs. A
+    larger value finds less."""
     max_acceleration: float = 5.0
     """No robot with a laser speeds up, brakes, or begins to turn faster, m/s² and rad/s². A larger value
     finds less."""
     window: int = 9
-    """Number of successive poses of which two thirds are so far off: a single wrong value makes three so. A
+    """Number of successive poses of which noise moves two thirds so far: a single wrong value moves three. A
     larger value finds only longer stretches."""
     beside: float = 0.5
-    """Beside such a window, others count where most poses are farther off than this share of these bounds. A
-    larger value leaves more of the noise."""
+    """Beside a window of noise, others count where most poses are farther off than this share of the bounds
+    `min_distance` and `min_turn`. A larger value leaves more of the noise."""
     max_correlation: float = -0.4
-    """And from pose to pose they are off on opposite sides: the correlation is less than this. That of white
-    noise is −2/3, that of a robot that turns is positive. A larger value finds more."""
+    """Noisy poses are off on opposite sides in turn: the correlation from pose to pose is less than this.
+    That of white noise is −2/3, that of a robot that turns is positive. A larger value finds more."""
     min_of_steps: float = 0.7
-    """And they are farther off than this share of the steps between them, as root mean squares: that of white
-    noise is 0.87. It is 0.4 at most on real logs, in any unit of length. A larger value finds less."""
+    """Noisy poses are farther off than this share of the steps between them, as root mean squares: that of
+    white noise is 0.87. It is 0.4 at most on real logs, in any unit of length. A larger value finds less."""
     regular: float = 2.0
     """Turns count only where times are apart as usual, within this factor. A larger value finds more, also
     where poses come in the wrong order."""

@@ -22,11 +22,12 @@ class OdometryOutlierOptions:
     """When poses of the odometry are single wrong values."""
 
     factor: float = 5.0
-    """They are farther from the poses before and behind than this multiple of the usual longest step. A
+    """A wrong pose is farther from those before and behind than this multiple of the usual longest step. A
     larger value finds fewer."""
     min_distance: float = 1.0
-    """And farther than this, m and rad: a match corrects a smaller error by itself, and where messages come
-    in the wrong order poses go to and fro by up to 0.9 rad on real logs. A larger value finds fewer."""
+    """A wrong pose is farther from those before and behind than this, m and rad: a match corrects a smaller
+    error by itself, and where messages come in the wrong order poses go to and fro by up to 0.9 rad on real
+    logs. A larger value finds fewer."""
     quantile: float = 0.99
     """Quantile of the steps that is the usual longest one; of three poses the shortest step counts, so that
     single wrong values do not. A larger value finds fewer."""
@@ -43,8 +44,9 @@ class OdometryOutlierOptions:
     """No robot with a laser speeds up, brakes, or begins to turn faster, m/s² and rad/s². A larger value
     finds less."""
     max_beside: float = 0.4
-    """These four are off that way, or elsewhere apart, by less than this share of its distance. A larger
-    value finds more, also where odometry is coarse."""
+    """The two poses before a single wrong one and the two behind are off their steady way, or elsewhere
+    apart, by less than this share of its distance. A larger value finds more, also where odometry is
+    coarse."""
     regular: float = 1.6
     """Poses come regularly where times are apart as usual, within this factor. A larger value finds more,
     also where they come in the wrong order."""

@@ -26,7 +26,8 @@ class TwoOdometriesOptions:
     """A pose belongs to another source if it is farther from the last one than this multiple of the usual
     longest step. A larger value tells sources apart that differ more."""
     min_distance: float = 0.1
-    """And farther than this, m and rad. A larger value tells sources apart that differ more."""
+    """A pose of another source is farther from the last one than this, m and rad. A larger value tells
+    sources apart that differ more."""
     min_poses: int = 20
     """Least number of poses. A larger value leaves more short logs."""
     min_changes: float = 0.1

@@ -33,7 +33,8 @@ class WholeTurnOptions:
     """Largest difference of what the beams cover by the file from a turn, as a share. A larger value checks
     more lasers."""
     min_off: float = math.radians(0.4)
-    """Least difference, rad. A smaller value checks more lasers."""
+    """Least difference of what the beams cover by the file from a turn, rad. A smaller value checks more
+    lasers."""
     width: float = math.radians(12.0)
     """Beams so far before the last and behind the first are taken for one wall, rad. A larger value needs
     wider walls, and tells more."""
@@ -46,8 +47,8 @@ class WholeTurnOptions:
     """Readings are of one wall if it explains them to within this share (RMS). A larger value takes more for
     walls."""
     most: float = 0.03
-    """Largest such share that counts, so that no scan outweighs the others. A larger value gives scans that
-    fit badly more weight."""
+    """Misfits count up to this share of the range, so that no scan outweighs the others. A larger value gives
+    scans that fit badly more weight."""
     max_scans: int = 1000
     """Number of scans that are tested. A larger value takes longer."""
     min_gain: float = 2.0

@@ -26,13 +26,15 @@ class OccupancyOptions:
     """Decide how far beams are traced and which cells are occupied."""
 
     max_beam_length: float = 40.0
-    """Length up to which a beam is traced, m. Longer beams leave gaps between them, and an error of the
-    heading displaces their ends more."""
+    """Length up to which a beam is traced, m. A larger value shows more, with gaps between long beams, whose
+    ends an error of the heading displaces more."""
     min_occupied_ratio: float = 0.25
     """Least share of hits among the beams of an occupied cell. It is below one half, because beams along a
-    wall graze its cells, and a wall between two cells divides its hits. A person who walks by leaves less."""
+    wall graze its cells, and a wall between two cells divides its hits. A person who walks by leaves less. A
+    larger share makes fewer cells occupied."""
     min_hits: int = 2
-    """Least number of hits of an occupied cell. With 1, a single stray return makes a cell occupied."""
+    """Least number of hits of an occupied cell. With 1, a single stray return makes a cell occupied. A larger
+    number makes fewer cells occupied."""
 
 
 DEFAULT_CELL_SIZE = 0.05

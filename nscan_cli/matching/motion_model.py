@@ -52,22 +52,25 @@ def prior_value(prior: Prior, pose: Array) -> float:
 
 
 class MotionModel(NamedTuple):
-    """Standard deviations of a step of the odometry. Larger values weaken the prior.
+    """Standard deviations of a step of the odometry.
 
     They are large on purpose: wheels slip, and carts are pushed. A strong prior breaks maps where the
     odometry is wrong, and scans know better where it is right.
     """
 
     distance: float = 0.05
-    """Standard deviation of the position without any motion, m."""
+    """Standard deviation of the position without any motion, m. A larger value trusts the scans more."""
     distance_per_metre: float = 0.2
-    """Increase of the position's standard deviation with each metre travelled, m/m."""
+    """Increase of the position's standard deviation with each metre travelled, m/m. A larger value trusts the
+    scans more on long steps."""
     angle: float = 0.05
-    """Standard deviation of the angle without any motion, rad."""
+    """Standard deviation of the angle without any motion, rad. A larger value trusts the scans more."""
     angle_per_radian: float = 0.2
-    """Increase of the angle's standard deviation with each radian turned, rad/rad."""
+    """Increase of the angle's standard deviation with each radian turned, rad/rad. A larger value trusts the
+    scans more in turns."""
     angle_per_metre: float = 0.1
-    """Increase of the angle's standard deviation with each metre travelled, rad/m."""
+    """Increase of the angle's standard deviation with each metre travelled, rad/m. A larger value trusts the
+    scans more on long steps."""
 
 
 @kernel

@@ -17,15 +17,14 @@ SINGULAR = 1e-10
 
 @dataclass(frozen=True)
 class ConvergenceOptions:
-    """The Newton step that may be left at a minimum. One of the bounds has to hold.
-
-    With larger values more matches count as converged.
-    """
+    """The Newton step that may be left at a minimum. One of the bounds has to hold."""
 
     deviations: float = 0.5
-    """Greatest length of the step, in standard deviations."""
+    """Greatest length of the step, in standard deviations. With a larger value more matches count as
+    converged."""
     step: float = 0.01
-    """Greatest component of the step, m and rad: half of the least standard deviation of a Gaussian."""
+    """Greatest component of the step, m and rad: half of the least standard deviation of a Gaussian. With a
+    larger value more matches count as converged."""
 
 
 class Weakest(NamedTuple):

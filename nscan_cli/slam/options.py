@@ -37,15 +37,18 @@ class SlamOptions:
     breaks: BreakOptions = field(default_factory=BreakOptions)
     keyframes: KeyframeOptions = field(default_factory=KeyframeOptions)
     nscan: NScanOptions = field(default_factory=NScanOptions)
+    """How a keyframe is matched with its neighbours, jointly or with each alone."""
     loop_closure: LoopClosureOptions = field(default_factory=LoopClosureOptions)
     schedule: ScheduleOptions = field(default_factory=ScheduleOptions)
     optimisation: OptimisationOptions = field(default_factory=OptimisationOptions)
     rejection: RobustOptions = field(default_factory=RobustOptions)
+    """When a loop contradicts the rest of the graph."""
     uneven_motion: UnevenMotionOptions = field(default_factory=UnevenMotionOptions)
     refinement: RefinementOptions = field(default_factory=RefinementOptions)
     degenerate_relations: DegenerateRelationOptions = field(default_factory=DegenerateRelationOptions)
     systematic_error: SystematicErrorOptions = field(default_factory=SystematicErrorOptions)
     diagnostics: DiagnosticsOptions = field(default_factory=DiagnosticsOptions)
+    """When the finished map warns its user."""
     relations: Relations = "both"
     """both: the chain of pairwise relations from tracking, and nScan relations of joint matches. nscan: of
     the chain only what no nScan relation holds together. pairwise: the chain, and each scan near a keyframe

@@ -15,7 +15,7 @@ class SystematicErrorOptions:
     """Least distance between both ends of a piece, as a share of its length. A larger share leaves out more
     pieces with turns."""
     min_pieces: int = 8
-    """Nothing is certain from fewer pieces."""
+    """Least number of pieces that make an error certain. A larger number leaves more odometry as it is."""
     sigmas: float = 6.0
     """An error is certain if it exceeds this number of its standard deviations. A larger number leaves more
     odometry as it is."""
@@ -27,9 +27,10 @@ class SystematicErrorOptions:
     min_length: float = 0.05
     """Least share by which ways are too long or too short. A larger share leaves more odometry as it is."""
     max_length: float = 0.4
-    """Largest such share. Where ways are off by more, the scans may tell none, as with dust in front of the
-    laser. A larger share corrects more odometry."""
+    """Largest share by which ways are too long or too short. Where it is larger, the scans may tell none, as
+    with dust in front of the laser. A larger share corrects more odometry."""
     min_more_length: float = 0.02
-    """The same once the drive was mapped again. A larger share stops earlier."""
+    """Least share by which ways are too long or too short once the drive was mapped again. A larger share
+    stops earlier."""
     max_runs: int = 3
-    """Number of times that a drive is mapped again at most."""
+    """Largest number of times that a drive is mapped again. A larger number takes longer."""

@@ -23,7 +23,8 @@ class StopOptions:
     """The optimisation ends with a step below this, m and rad. A larger one ends it earlier."""
     exact_hessian_step: float = 0.1
     """The exact Hessian is used after a shorter step, m and rad. Near the minimum it takes fewer steps than
-    the Gauss–Newton part; farther away it takes more, and often is not positive definite."""
+    the Gauss–Newton part. With a larger value it is used farther away, where it takes more, and often is not
+    positive definite."""
     negligible_gain: float = 1e-7
     """Where relations leave a direction undetermined, a step that decreases 1 + energy by a smaller share is
     the last: it moves less than a thousandth of a standard deviation. A larger share ends earlier."""

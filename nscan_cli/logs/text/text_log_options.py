@@ -30,6 +30,7 @@ class TextLogOptions:
     """Bearings that begin beyond this and end near `last_bearing` are likely counted from the side, rad: a
     warning says so. A larger value warns less."""
     last_bearing: float = math.radians(180.0)
-    """Where bearings end that are counted from the side, rad."""
+    """Where bearings end that are counted from the side, rad. With a larger value the warning is for lasers
+    with a wider view."""
     last_bearing_tolerance: float = math.radians(30.0)
     """Largest distance of the last bearing from `last_bearing`, rad. A larger value warns more."""

@@ -29,9 +29,14 @@ class ScheduleOptions:
 class OptimisationOptions:
     """How exactly the graph is optimised."""
 
-    growing: StopOptions = field(default_factory=lambda: StopOptions(10, 1e-3))
-    after_large_loop: StopOptions = field(default_factory=lambda: StopOptions(100, 1e-4))
+    growing: StopOptions = field(default_factory=lambda: StopOptions(max_iterations=10, tolerance=1e-3))
+    """While keyframes are added: the next matches start from these poses, which need not be exact."""
+    after_large_loop: StopOptions = field(
+        default_factory=lambda: StopOptions(max_iterations=100, tolerance=1e-4)
+    )
+    """After a search has closed a loop, which moves much of the graph."""
     final: StopOptions = field(default_factory=StopOptions)
+    """Once all keyframes are added."""
     metres_per_radian: float = 0.3
     """A turn by 1 rad counts as this length of path where the scans between keyframes share a correction of
     the graph, m. A larger value puts more of the correction into turns."""
@@ -100,7 +105,8 @@ class UnevenMotionOptions:
     """The last stage has ended when no pose moves by more, m and rad. A larger value is less exact and takes
     less time."""
     coarse_tolerance: float = 1e-2
-    """The same for the stages before."""
+    """The stages before have ended when no pose moves by more, m and rad. A larger value is less exact and
+    takes less time."""
 
 
 @dataclass(frozen=True)

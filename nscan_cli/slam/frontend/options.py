@@ -141,6 +141,7 @@ class TrackingOptions:
     """Step 1: every scan is matched with the local map, the NDT of the last metres of the path."""
 
     gaussians: GaussianOptions = field(default_factory=lambda: GaussianOptions(floor=0.03))
+    """How points become the Gaussians of the local map."""
     max_range: float = 40.0
     """Longest beam that is matched, m. A larger value sees more and takes longer."""
     point_spacing: float = 0.04

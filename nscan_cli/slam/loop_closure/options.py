@@ -72,6 +72,7 @@ class LoopClosureOptions:
     search_interval: float = 3.0
     """Least length of path between two searches, m. A larger one searches less."""
     search: SearchOptions = field(default_factory=lambda: SearchOptions(beams=180))
+    """How a place is searched; its distance and turn follow from how far the keyframe may be off."""
     min_distance: float = 4.0
     """Least distance that is searched, m: a slip while all else is well known. A larger one is slower."""
     min_turn: float = 0.3
@@ -122,6 +123,7 @@ class LoopClosureOptions:
     slip_distance: float = 5.0
     """Largest distance by which tracking slips, m. A larger one accepts more."""
     free_space: FreeSpaceOptions = field(default_factory=FreeSpaceOptions)
+    """When visits of the finished map contradict each other."""
     contradicted_distance: float = 20.0
     """Where visits of a place contradict each other in the finished map, the search covers at least this
     distance, m. A larger one mends larger errors and is slower."""
