@@ -21,6 +21,9 @@ LENGTH, TURN = 0, 1
 class OdometryBiasOptions(NamedTuple):
     """When the bias of the odometry is taken out."""
 
+    min_straightness: float = 0.5
+    """Least distance between both ends of a piece, as a share of its length. A larger share leaves out more
+    pieces with turns."""
     min_pieces: int = 8
     """Nothing is taken out before this number of pieces of the path. A larger number takes it out later."""
     smoothing: float = 0.1
@@ -60,7 +63,7 @@ def learn_bias(
     Pieces on which the robot turned around are left out: their ends tell no length.
     """
     distance = np.hypot(by_odometry[0], by_odometry[1])
-    if distance < 0.5 * length:
+    if distance < options.min_straightness * length:
         return
     bias.pieces[0] += 1.0
     weight = max(1.0 / bias.pieces[0], options.smoothing)
