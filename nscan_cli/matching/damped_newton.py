@@ -1,6 +1,7 @@
 """Control of damped Newton steps, after Levenberg and Marquardt: damping, acceptance, and the last step.
 
-The solvers of pairwise matches, joint matches and graphs share it. Each adds damping · diag H to its Hessian.
+The solvers of pairwise matches, of joint matches, of graphs, and of paths in uneven motion share it. Each
+adds damping · diag H to its Hessian.
 """
 
 from __future__ import annotations
@@ -34,13 +35,41 @@ class StepControl(NamedTuple):
     """A step that increases the value by less than this share is accepted, since that is rounding."""
 
 
-PAIRWISE_STEPS = StepControl(1e-3, 1e-7, 1e-7, 0.0, 1e6, 1e-3, 0.1, 0.0)
+PAIRWISE_STEPS = StepControl(
+    first=1e-3,
+    least=1e-7,
+    least_divided=1e-7,
+    least_raised=0.0,
+    greatest=1e6,
+    trusted=1e-3,
+    damped_share=0.1,
+    rounding=0.0,
+)
 """Starts are rough, so steps are damped from the first on. One NDT is cheap to evaluate, so a damping up to
-1e6 allows long searches where the energy jumps at borders of cells."""
-JOINT_STEPS = StepControl(1e-3, 1e-8, 1e-8, 0.0, 1e4, np.inf, 0.0, 0.0)
+1e6 allows long searches where the energy jumps at borders of cells. Paths in uneven motion take these steps,
+too."""
+JOINT_STEPS = StepControl(
+    first=1e-3,
+    least=1e-8,
+    least_divided=1e-8,
+    least_raised=0.0,
+    greatest=1e4,
+    trusted=np.inf,
+    damped_share=0.0,
+    rounding=0.0,
+)
 """An evaluation costs n (n − 1) times as much. So the solver gives up earlier, and any step within the
 tolerance is the last one."""
-GRAPH_STEPS = StepControl(0.0, 0.0, 1e-9, 1e-6, 1e8, 1.0, 0.0, 1e-12)
+GRAPH_STEPS = StepControl(
+    first=0.0,
+    least=0.0,
+    least_divided=1e-9,
+    least_raised=1e-6,
+    greatest=1e8,
+    trusted=1.0,
+    damped_share=0.0,
+    rounding=1e-12,
+)
 """The energy is smooth and nearly quadratic, so steps are undamped unless they fail. Sums over thousands of
 relations carry rounding errors."""
 
