@@ -125,7 +125,7 @@ def _approach(
     poses, totals = start.copy(), np.zeros(3, dtype=np.int64)
     for part in [widenings] if pairs_at is None else [(widening,) for widening in widenings]:
         chosen = _with_pairs(problem, pairs_at, poses)
-        totals += approach(chosen, poses, np.array(part), neutral, options.of_approach)
+        totals += approach(chosen, poses, np.array(part), neutral, options.approach)
     return Approach(poses, *totals.tolist())
 
 

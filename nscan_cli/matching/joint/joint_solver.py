@@ -9,29 +9,27 @@ from nscan_cli.kernels.decorators import kernel
 from nscan_cli.matching.damped_newton import JOINT_STEPS, is_accepted, is_last, next_damping
 from nscan_cli.matching.joint.gauge import gauge_fixed_step
 from nscan_cli.matching.joint.joint_energy import JointProblem, evaluate_joint
+from nscan_cli.matching.joint.options import ApproachSettings
 from nscan_cli.poses import Array
-
-OfApproach = tuple[int, int, int, float, bool]
-"""What `JointOptions.of_approach` returns."""
 
 
 @kernel
 def approach(
-    problem: JointProblem, poses: Array, widenings: Array, neutral: bool, of_approach: OfApproach
+    problem: JointProblem, poses: Array, widenings: Array, neutral: bool, settings: ApproachSettings
 ) -> tuple[int, int, int]:
     """Approach the minimum from the poses (n, 3), in place, with a stage for each of `widenings`.
 
     Returns the numbers of iterations, of evaluations, and of stages that did not converge.
     """
-    stride, fixed, most, near, thorough = of_approach
     n = poses.shape[0]
     gradient, hessian = np.empty(3 * n), np.empty((3 * n, 3 * n))
     iterations = evaluations = unsettled = 0
     for widening in widenings:
-        enough = near if widening < 1.0 else 0.5 * near
+        near = settings.near if widening < 1.0 else 0.5 * settings.near
         _, steps, evaluated, converged = descend(
-            problem, poses, widening, False, neutral, stride, fixed, most, enough, thorough, gradient, hessian
-        )
+            problem, poses, widening, False, neutral, settings.stride, settings.fixed, settings.iterations,
+            near, settings.thorough, gradient, hessian,
+        )  # fmt: skip
         iterations += steps
         evaluations += evaluated
         unsettled += not converged

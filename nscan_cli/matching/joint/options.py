@@ -100,6 +100,17 @@ class AmbiguityOptions:
     certain."""
 
 
+class ApproachSettings(NamedTuple):
+    """The fields of JointOptions that the kernels of an approach take."""
+
+    stride: int
+    fixed: int
+    """As `gauge_of` returns it."""
+    iterations: int
+    near: float
+    thorough: bool
+
+
 @dataclass(frozen=True)
 class JointOptions:
     """How a joint match is minimised, and what its result has to satisfy."""
@@ -149,6 +160,7 @@ class JointOptions:
     """How the poses are fitted to walls after the match."""
 
     @property
-    def of_approach(self) -> tuple[int, int, int, float, bool]:
-        """What kernels take of these: stride, fixed scan, approach_iterations, near and thorough."""
-        return self.stride, gauge_of(self.fixed), self.approach_iterations, self.near, self.thorough
+    def approach(self) -> ApproachSettings:
+        """What kernels take of these."""
+        fixed = gauge_of(self.fixed)
+        return ApproachSettings(self.stride, fixed, self.approach_iterations, self.near, self.thorough)
