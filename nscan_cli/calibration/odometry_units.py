@@ -49,9 +49,9 @@ def checked_units(
 
 
 def _as_most(is_large: Mask, moves: Mask) -> Mask:
-    """(n,) which steps are large, each as the moving ones about it, so that single ones do not count.
+    """(n,) which steps are large: most of the five steps with motion about each of them are.
 
-    A large one beside others does.
+    So a single large step does not count. A large step beside such ones does.
     """
     at = np.flatnonzero(moves)
     most = _of_five(is_large[at]) >= 3

@@ -9,7 +9,7 @@ from nscan_cli.logs.scan_order import usual_period
 from nscan_cli.poses import Array, Indices, Mask, wrap
 
 Places = tuple[int, int, int]
-"""Those of a pose before, of a pose, and of one behind, counted from each row on."""
+"""How many rows behind a given one the pose before, the pose itself, and the pose behind are."""
 
 
 def new_poses(poses: Array, times: Array) -> Indices:

@@ -35,9 +35,9 @@ class DegenerateStretch(NamedTuple):
 def degenerate_stretches(
     poses: Array, times: Array, weakest_sigmas: Array, options: DegenerateStretchOptions
 ) -> list[DegenerateStretch]:
-    """The stretches that are or may be long, among scans at poses (S, 3) and times (S,) in s.
+    """The stretches of `options.path` or more, as mapped or at the robot's usual speed.
 
-    The scans tell their places to `weakest_sigmas` (S,) in m.
+    The scans are at poses (S, 3) and times (S,), s, and tell their places to `weakest_sigmas` (S,), m.
     """
     rows = np.flatnonzero(weakest_sigmas > options.sigma)
     if not len(rows):
