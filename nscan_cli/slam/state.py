@@ -116,7 +116,7 @@ class SlamState:
     @property
     def degenerate_scans(self) -> Indices:
         """Rows of the tracked scans that, without odometry, do not tell their places along the walls."""
-        sigma = self.options.diagnostics.degenerate_stretch.sigma
+        sigma = self.options.degenerate_relations.stretch.sigma
         return np.flatnonzero(np.concatenate(self.weakest_sigmas) > sigma)
 
     @property

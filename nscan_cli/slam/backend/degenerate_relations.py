@@ -17,8 +17,8 @@ import numpy as np
 from nscan_cli.graph.model import NScan, Pairwise
 from nscan_cli.graph.relations.base import Relation
 from nscan_cli.poses import Array, Indices
+from nscan_cli.slam.backend.degenerate_stretches import DegenerateStretch, degenerate_stretches
 from nscan_cli.slam.backend.options import DegenerateRelationOptions
-from nscan_cli.slam.diagnostics.degenerate_stretches import DegenerateStretch, degenerate_stretches
 from nscan_cli.slam.state import SlamState
 
 Between = list[tuple[int, int]]
@@ -34,10 +34,10 @@ def widened_relations(state: SlamState) -> tuple[list[Pairwise], list[NScan]]:
     # Scans after the last keyframe may be tracked by another thread at this moment.
     end = int(state.route.rows[-1]) + 1
     path, sigmas = np.concatenate(list(state.tracked))[:end], np.concatenate(list(state.weakest_sigmas))[:end]
-    times, stretch = state.log.times[:end], state.options.diagnostics.degenerate_stretch
+    times, rows, options = state.log.times[:end], state.route.rows, state.options.degenerate_relations
+    found = degenerate_stretches(path, times, sigmas, options.stretch)
     # A robot that seems to stand mostly does.
-    ways = [way for way in degenerate_stretches(path, times, sigmas, stretch) if way.is_long(stretch)]
-    options, rows = state.options.degenerate_relations, state.route.rows
+    ways = [way for way in found if way.is_long(options.stretch)]
     lost = [keyframe.guess_variances for keyframe in state.route.keyframes[1 : len(rows)]]
     variances = np.column_stack(
         [length_variances(rows, times, ways, options), np.array(lost).reshape(len(rows) - 1, 2)]

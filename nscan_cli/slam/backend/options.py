@@ -120,9 +120,28 @@ class RefinementOptions:
 
 
 @dataclass(frozen=True)
-class DegenerateRelationOptions:
-    """How certain the length of a way is that no scan tells, see diagnostics.degenerate_stretch."""
+class DegenerateStretchOptions:
+    """When a way without odometry is held by steady motion alone, since its walls look alike all along."""
 
+    sigma: float = 0.15
+    """Standard deviation beyond which a scan does not tell its place along the walls, m. A larger value finds
+    less."""
+    path: float = 2.0
+    """Least length of such a way, m: as mapped, or, for a warning, at the robot's usual speed. As mapped it
+    is 2.5 m and more in bare corridors, at most 0.7 m elsewhere. A larger value finds less."""
+    scans_between: int = 2
+    """Largest number of successive scans within it that seem to tell their place. A larger number joins more
+    ways."""
+    least_speed: float = 0.05
+    """A slower robot stands, m/s. A larger value makes the usual speed that of fast drives."""
+
+
+@dataclass(frozen=True)
+class DegenerateRelationOptions:
+    """How certain the length of a way is that no scan tells."""
+
+    stretch: DegenerateStretchOptions = field(default_factory=DegenerateStretchOptions)
+    """Which ways these are."""
     speed_share: float = 0.5
     """Standard deviation of the robot's speed there, as a share of its usual one: it may stand, or hurry. A
     larger share makes such ways less certain."""

@@ -14,7 +14,7 @@ from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.poses import relative
 from nscan_cli.slam.backend.contradicting_visits import worst_violation
 from nscan_cli.slam.backend.degenerate_relations import all_widened_relations
-from nscan_cli.slam.diagnostics.degenerate_stretches import degenerate_stretches
+from nscan_cli.slam.backend.degenerate_stretches import degenerate_stretches
 from nscan_cli.slam.diagnostics.odometry_disagreement import odometry_disagreements
 from nscan_cli.slam.diagnostics.view_mismatch import view_mismatches
 from nscan_cli.slam.frontend.odometry_checks import jumps_of, repeated_scans
@@ -134,9 +134,9 @@ def _degenerate_stretches(state: SlamState) -> list[str]:
     log, poses, sigmas = state.log, np.concatenate(state.tracked), state.weakest_sigmas
     if not sigmas:
         return []
-    options, told = state.options.diagnostics.degenerate_stretch, np.concatenate(sigmas)
+    options, told = state.options.degenerate_relations.stretch, np.concatenate(sigmas)
     lost = int(np.isinf(told).sum())
-    if lost > options.max_lost_share * len(told):
+    if lost > state.options.diagnostics.max_lost_share * len(told):
         return [
             f"no match for {counted(lost, 'scan')} of {len(told)}: nothing there was seen before, and "
             "without odometry nothing else tells how the robot moved; the laser sees too little, or the file "

@@ -29,32 +29,14 @@ class ViewMismatchOptions:
 
 
 @dataclass(frozen=True)
-class DegenerateStretchOptions:
-    """When a way without odometry is held by steady motion alone, since its walls look alike all along."""
-
-    sigma: float = 0.15
-    """Standard deviation beyond which a scan does not tell its place along the walls, m. A larger value warns
-    less."""
-    path: float = 2.0
-    """Least length of such a way that a warning names, m, as mapped or at the robot's usual speed. As mapped
-    it is 2.5 m and more in bare corridors, at most 0.7 m elsewhere. A larger value warns less."""
-    scans_between: int = 2
-    """Largest number of successive scans within it that seem to tell their place. A larger number joins more
-    ways."""
-    least_speed: float = 0.05
-    """A slower robot stands, m/s. A larger value makes the usual speed that of fast drives."""
-    max_lost_share: float = 0.5
-    """If more of the scans than this share fit nothing that was seen before, that is named in place of the
-    ways. A larger value names ways more often."""
-
-
-@dataclass(frozen=True)
 class DiagnosticsOptions:
     """From where on the notices of a graph warn."""
 
     odometry: OdometryDisagreementOptions = field(default_factory=OdometryDisagreementOptions)
     view: ViewMismatchOptions = field(default_factory=ViewMismatchOptions)
-    degenerate_stretch: DegenerateStretchOptions = field(default_factory=DegenerateStretchOptions)
+    max_lost_share: float = 0.5
+    """If more of the scans than this share fit nothing that was seen before, a warning says so in place of
+    the ways that no scan tells. A larger value names such ways more often."""
     gap_periods: float = 3.0
     """Scans are missing if the next one comes later than this multiple of the median period. A larger value
     warns less."""

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from nscan_cli.poses import Array, Mask, path_lengths
-from nscan_cli.slam.diagnostics.options import DegenerateStretchOptions
+from nscan_cli.slam.backend.options import DegenerateStretchOptions
 from nscan_cli.slam.frontend.odometry_checks import SHORTEST_PERIOD
 
 

@@ -12,9 +12,9 @@ from hypothesis import strategies as st
 
 from nscan_cli.logs.load import read_log
 from nscan_cli.logs.reading_options import ReadingOptions
-from nscan_cli.slam.diagnostics.degenerate_stretches import degenerate_stretches
+from nscan_cli.slam.backend.degenerate_stretches import degenerate_stretches
+from nscan_cli.slam.backend.options import DegenerateStretchOptions
 from nscan_cli.slam.diagnostics.notices import notices
-from nscan_cli.slam.diagnostics.options import DegenerateStretchOptions
 from tests.data import data_file
 from tests.slam.frontend.test_degeneracy import into_a_bare_corridor
 from tests.slam.frontend.test_lost_scans import across_a_yard
