@@ -20,7 +20,7 @@ from nscan_cli.slam.state import SlamState
 def mend_contradicting_visits(state: SlamState) -> None:
     """Search for loops again, and farther, in the stretch that contradicts earlier visits most.
 
-    What is found is kept if the contradiction goes by it. Changes what `refine` changes.
+    What is found is kept if the contradiction goes by it. Changes what `refine` changes, and judged.
     """
     options, before = state.options.loop_closure, worst_violation(state)
     if not state.options.nscan.loops or before is None or is_sound(before, options.free_space):

@@ -29,10 +29,10 @@ from nscan_cli.threads import map_in_threads
 
 
 def refine(state: SlamState, search: bool = True) -> None:
-    """Make the local matches again, until they move no member. Changes relations, loops, places, route.
+    """Make the local matches again, until they move no member.
 
     After the first sweep, keyframes that no loop relates to an earlier visit nearby are searched, unless
-    `search` is off.
+    `search` is off. Changes relations, energies, loops, places, route, schedule, detector.
     """
     options = state.options
     # The poses are right to centimetres: the last stage is all it takes.

@@ -16,7 +16,7 @@ CONTRADICTS = "contradicts the rest of the graph"
 
 
 def reject_contradicting_loops(state: SlamState) -> None:
-    """Remove the relations of loops that contradict the others. Changes relations, loops, route."""
+    """Remove the relations of loops that contradict the others. Changes relations, loops, route, schedule."""
     relations = state.relations
     # These are in the same order.
     energy = state.energies.of(state.route, all_widened_relations(state))

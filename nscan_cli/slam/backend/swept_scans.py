@@ -27,7 +27,7 @@ from nscan_cli.slam.state import SlamState
 def correct_swept_scans(state: SlamState) -> None:
     """Bring all scans to the times of their stamps, with the points that the path of the robot gives.
 
-    Changes log, keyframes, chain, tracked and route, if the laser turns.
+    Changes log, keyframes, chain, tracked, route and energies, if the laser turns.
     """
     if state.log.beam_times is None:
         return

@@ -15,7 +15,7 @@ def match_keyframe(
 ) -> LocalMatch | None:
     """Match keyframe `centre` with its neighbours, without other visits if its loop is doubted.
 
-    Changes coverage, relations, loops, schedule; begins matches of the next keyframes ahead.
+    Changes detector, coverage, relations, loops, schedule; begins matches of the next keyframes ahead.
     """
     route = state.route
     # The newest keyframe may still collect scans.

@@ -21,7 +21,7 @@ def close_loops_left_open(state: SlamState) -> list[Place]:
     """Search once more where no loop ties the path to an earlier visit nearby; returns the places found.
 
     It is called once the graph is optimised. While the graph grew, such a place may have been too far off, or
-    not yet seen by a second keyframe. Changes what `close_loops` changes.
+    not yet seen by a second keyframe. Lets the detector begin again, and changes what `close_loops` changes.
     """
     route, known = state.route, len(state.places)
     related = [row for relation in state.loop_relations() for row in relation.nodes]
@@ -41,7 +41,8 @@ def close_loops_between(state: SlamState, first: int, last: int) -> list[Place]:
     """Search once more for the keyframes in rows `first` to `last`; returns the places found.
 
     Earlier visits of these places contradict them: each is searched `contradicted_distance` away at least,
-    however certain it seems, and is no surprise there. Changes what `close_loops` changes.
+    however certain it seems, and is no surprise there. Lets the detector begin again, and changes what
+    `close_loops` changes.
     """
     route, known, options = state.route, len(state.places), state.options.loop_closure
     reach = options.contradicted_distance
@@ -63,7 +64,8 @@ def close_loops(
 ) -> None:
     """Search for keyframe `centre` among earlier visits that may be too far off for a joint match.
 
-    Changes route, relations, loops, places, and optimises the graph, if enough keyframes find the same place.
+    Changes detector. If enough keyframes find the same place, changes relations, loops and places, and
+    optimises the graph, which changes route and schedule.
     """
     loop = None if local_match is None else local_match.loop
     # At the border of an earlier visit a place well inside fits better than the right one, half of which
