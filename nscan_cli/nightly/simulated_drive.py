@@ -13,9 +13,9 @@ if TYPE_CHECKING:
 
 OUTER_WALL, INNER_WALL = 9.0, 6.0
 """Distance of the corridor's walls from its centre, m."""
-LAPS, SCAN_SPACING, BEAMS = 1.4, 0.3, 181
+LAPS, SCAN_SPACING, BEAMS_PER_SCAN = 1.4, 0.3, 181
 """Number of laps, distance between scans (m), and number of beams."""
-LASER_RANGE, NO_RETURN = 5.0, 81.91
+LASER_REACH, NO_RETURN = 5.0, 81.91
 ODOMETRY_DRIFT = 0.004
 """Error of the heading from scan to scan, rad."""
 
@@ -30,13 +30,13 @@ def simulated_carmen_log() -> bytes:
     moves = relative(poses[1:], poses[:-1])
     moves[:, 2] += ODOMETRY_DRIFT
     robot = np.zeros(3)
-    angles = np.radians(np.arange(BEAMS) - BEAMS // 2)
+    angles = np.radians(np.arange(BEAMS_PER_SCAN) - BEAMS_PER_SCAN // 2)
     lines = []
     for row, ranges in enumerate(_simulated_ranges(poses, angles)):
         robot = robot if row == 0 else compose(robot, moves[row - 1])
         pose = " ".join(f"{value:.6f}" for value in robot)
         values = " ".join(f"{value:.2f}" for value in ranges)
-        lines.append(f"FLASER {BEAMS} {values} {pose} {pose} {0.5 * row:.3f} warm-up 0\n")
+        lines.append(f"FLASER {BEAMS_PER_SCAN} {values} {pose} {pose} {0.5 * row:.3f} warm-up 0\n")
     return "".join(lines).encode()
 
 
@@ -81,7 +81,7 @@ def _simulated_ranges(poses: Array, angles: Array) -> Array:
             place = (along * y - left * x) / across
         meets = (length > 0.05) & (place >= 0) & (place <= 1)
         nearest = np.where(meets, np.minimum(nearest, length), nearest)
-    return np.where(nearest > LASER_RANGE, NO_RETURN, nearest)
+    return np.where(nearest > LASER_REACH, NO_RETURN, nearest)
 
 
 def _square_walls(half: float) -> list[tuple[tuple[float, float], tuple[float, float]]]:

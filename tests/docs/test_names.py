@@ -40,7 +40,9 @@ def defined(module: ast.Module) -> Iterator[str]:
             yield node.name
         elif isinstance(node, ast.Assign | ast.AnnAssign):
             targets = node.targets if isinstance(node, ast.Assign) else [node.target]
-            yield from (target.id for target in targets if isinstance(target, ast.Name))
+            # A target may be a tuple of names.
+            parts = (part for target in targets for part in ast.walk(target))
+            yield from (part.id for part in parts if isinstance(part, ast.Name))
 
 
 def several(places: dict[str, list[str]], allowed: dict[str, str]) -> dict[str, list[str]]:

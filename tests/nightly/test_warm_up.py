@@ -114,7 +114,7 @@ def test_before_the_first_log_begins(cache, monkeypatch, tmp_path):
 
 def test_the_drive_has_what_a_night_can_have():
     log = log_from(simulated_drive.simulated_carmen_log(), "warm-up.log")
-    assert (len(log), log.ranges.shape[1]) == (330, simulated_drive.BEAMS)
+    assert (len(log), log.ranges.shape[1]) == (330, simulated_drive.BEAMS_PER_SCAN)
     assert log.report.skipped == {}
     assert log.no_return == pytest.approx(simulated_drive.NO_RETURN)
     assert np.isfinite(log.ranges).mean() > 0.5

@@ -15,14 +15,14 @@ from nscan_cli.logs.compression import BZIP2, LZ4
 from nscan_cli.logs.recordings.container import DAMAGE_REMEDY, Channel, Recording
 from nscan_cli.logs.recordings.message_types import READ_TYPES, ros2_type_name
 from nscan_cli.logs.recordings.rosbag1_records import (
+    BAG_HEADER,
     BAG_MAGIC,
     CHUNK,
     CHUNK_INFO,
     CONNECTION,
-    HEADER,
     INDEX,
-    LONG,
     MESSAGE,
+    UINT64,
     BagRecord,
     DamagedBagError,
     after_index,
@@ -57,9 +57,9 @@ class _BagReader:
         """Read the whole file."""
         try:
             header = record_at(self.data, len(BAG_MAGIC), len(self.data))
-            if header.op != HEADER:
+            if header.op != BAG_HEADER:
                 raise DamagedBagError(header.at, "its header is missing")
-            index_at = header.number(b"index_pos", LONG)
+            index_at = header.number(b"index_pos", UINT64)
         except DamagedBagError as broken:
             raise self._damaged(broken) from broken
         if header.fields.get(b"encryptor"):
@@ -88,7 +88,7 @@ class _BagReader:
                     pairs = CHUNK_COUNT.iter_unpack(
                         self.data[record.begin : record.end][: 8 * record.number(b"count")]
                     )
-                    indexed[record.number(b"chunk_pos", LONG)] = dict(pairs)
+                    indexed[record.number(b"chunk_pos", UINT64)] = dict(pairs)
         except (DamagedBagError, struct.error):
             return None
         return indexed

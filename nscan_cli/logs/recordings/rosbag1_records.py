@@ -12,9 +12,9 @@ from typing import NamedTuple
 
 from nscan_cli.files.inputs import FileBytes
 
-LENGTH, LONG, TIME = struct.Struct("<I"), struct.Struct("<Q"), struct.Struct("<II")
+UINT32, UINT64, ROS_TIME = struct.Struct("<I"), struct.Struct("<Q"), struct.Struct("<II")
 BAG_MAGIC = b"#ROSBAG V2.0\n"
-MESSAGE, HEADER, INDEX, CHUNK, CHUNK_INFO, CONNECTION = 2, 3, 4, 5, 6, 7
+MESSAGE, BAG_HEADER, INDEX, CHUNK, CHUNK_INFO, CONNECTION = 2, 3, 4, 5, 6, 7
 """Types of records: the field op of their headers."""
 INDEX_ENTRY_SIZE = {INDEX: 12, CHUNK_INFO: 8}
 """Bytes of each entry in the two types of records that make up the index."""
@@ -42,13 +42,13 @@ class BagRecord(NamedTuple):
     begin: int
     end: int
 
-    def number(self, name: bytes, form: struct.Struct = LENGTH) -> int:
+    def number(self, name: bytes, form: struct.Struct = UINT32) -> int:
         """A field with a number. Raises DamagedBagError when it is missing or of another length."""
         return int(form.unpack(self._field(name, form.size))[0])
 
     def time(self) -> int:
         """The field time, ns. Raises DamagedBagError when it is missing or of another length."""
-        seconds, nanoseconds = TIME.unpack(self._field(b"time", TIME.size))
+        seconds, nanoseconds = ROS_TIME.unpack(self._field(b"time", ROS_TIME.size))
         return int(seconds) * 10**9 + int(nanoseconds)
 
     def text(self, name: bytes) -> str:
@@ -66,17 +66,17 @@ class BagRecord(NamedTuple):
 
 def record_at(data: FileBytes, at: int, end: int) -> BagRecord:
     """The record that begins at a byte and ends before `end`. Raises DamagedBagError when there is none."""
-    if at + LENGTH.size > end:
+    if at + UINT32.size > end:
         raise DamagedBagError(at, "it ends within a record's header")
-    (size,) = LENGTH.unpack_from(data, at)
-    first, begin = at + LENGTH.size, at + LENGTH.size + size
+    (size,) = UINT32.unpack_from(data, at)
+    first, begin = at + UINT32.size, at + UINT32.size + size
     if begin > end:
         raise DamagedBagError(at, "it ends within a record's header")
     fields = parse_fields(data, first, begin, at)
-    if begin + LENGTH.size > end:
+    if begin + UINT32.size > end:
         raise DamagedBagError(at, "it ends within a record")
-    (size,) = LENGTH.unpack_from(data, begin)
-    begin += LENGTH.size
+    (size,) = UINT32.unpack_from(data, begin)
+    begin += UINT32.size
     op_field = fields.get(b"op", b"")
     op = op_field[0] if len(op_field) == 1 else 0
     if not MESSAGE <= op <= CONNECTION:
@@ -99,10 +99,10 @@ def parse_fields(data: FileBytes, begin: int, stop: int, at: int) -> dict[bytes,
     """The fields in a range of bytes. Raises DamagedBagError, which names the byte `at`."""
     fields = {}
     while begin < stop:
-        if begin + LENGTH.size > stop:
+        if begin + UINT32.size > stop:
             raise DamagedBagError(at, "a field is longer than what holds it")
-        (size,) = LENGTH.unpack_from(data, begin)
-        begin += LENGTH.size
+        (size,) = UINT32.unpack_from(data, begin)
+        begin += UINT32.size
         if begin + size > stop:
             raise DamagedBagError(at, "a field is longer than what holds it")
         name, equals, value = data[begin : begin + size].partition(b"=")
@@ -129,9 +129,9 @@ def next_chunk(data: FileBytes, start: int) -> int | None:
     """The byte where the next whole chunk begins, from `start` on; None without one."""
     found = data.find(CHUNK_FIELD, start)
     while found >= 0:
-        for at in range(found - LENGTH.size, max(start, found - LONGEST_CHUNK_HEADER) - 1, -1):
-            (size,) = LENGTH.unpack_from(data, at)
-            if found + len(CHUNK_FIELD) - at - LENGTH.size <= size < LONGEST_CHUNK_HEADER and _is_record(
+        for at in range(found - UINT32.size, max(start, found - LONGEST_CHUNK_HEADER) - 1, -1):
+            (size,) = UINT32.unpack_from(data, at)
+            if found + len(CHUNK_FIELD) - at - UINT32.size <= size < LONGEST_CHUNK_HEADER and _is_record(
                 data, at
             ):
                 return at

@@ -16,7 +16,7 @@ from nscan_cli.mapping.viewer.viewer_data import viewer_data
 from nscan_cli.mapping.viewer.viewer_parts import viewer_parts
 from nscan_cli.poses import Indices
 
-MAX_PIXELS = 4096
+PAGE_PIXELS = 4096
 """Longest side of the picture of the map in a page of its own."""
 EMBEDDED_PIXELS = 1400
 """Longest side of the picture in a page with many maps: sharp on a screen, and some tens of kilobytes."""
@@ -29,7 +29,7 @@ def viewer_page(
     import jinja2
     from markupsafe import Markup
 
-    picture, bounds = map_picture(grid, MAX_PIXELS)
+    picture, bounds = map_picture(grid, PAGE_PIXELS)
     viewer = _element(title, picture, viewer_data(graph, bounds, (log, nodes, rows)), "")
     parts = viewer_parts()
     template = jinja2.Template(

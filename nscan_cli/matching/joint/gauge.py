@@ -9,13 +9,13 @@ from nscan_cli.kernels.decorators import kernel
 from nscan_cli.matching.small_matrices import solve_definite
 from nscan_cli.poses import Array
 
-FREE = -1
+FREE_GAUGE = -1
 """Stands for the index of the fixed scan where no scan is fixed."""
 
 
 def gauge_of(fixed: int | None) -> int:
     """The fixed scan as the kernels take it; None leaves the gauge free."""
-    return FREE if fixed is None else fixed
+    return FREE_GAUGE if fixed is None else fixed
 
 
 @kernel
@@ -24,8 +24,8 @@ def gauge_fixed_step(
 ) -> bool:
     """Write the step (n, 3) that solves (H + damping · diag H) Δp = −g, eq. (5), in the chosen gauge (III-D).
 
-    `fixed` is the index of the scan that stays. If it is FREE, the step is the shortest one, with no part
-    along the three null directions. Returns whether the matrix is positive definite.
+    `fixed` is the index of the scan that stays. If it is FREE_GAUGE, the step is the shortest one, with no
+    part along the three null directions. Returns whether the matrix is positive definite.
     """
     size = gradient.shape[0]
     matrix, right, solution = hessian.copy(), -gradient, np.empty(size)

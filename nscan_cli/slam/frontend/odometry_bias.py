@@ -14,7 +14,7 @@ from nscan_cli.kernels.decorators import kernel
 from nscan_cli.matching.pose_kernels import wrapped
 from nscan_cli.poses import Array
 
-LENGTH, TURN = 0, 1
+LENGTH_BIAS, TURN_BIAS = 0, 1
 """Places in the arrays of `OdometryBias`."""
 
 
@@ -38,8 +38,8 @@ class OdometryBiasOptions(NamedTuple):
 
 
 class OdometryBias(NamedTuple):
-    """What is learned, which the kernels change: of LENGTH, as a share of that by odometry, and of TURN,
-    rad a metre."""
+    """What is learned, which the kernels change: LENGTH_BIAS, a share of the length by odometry, and
+    TURN_BIAS, rad a metre."""
 
     means: Array
     """(2,) by how much the robot goes farther, and turns more, than by odometry."""
@@ -70,7 +70,7 @@ def learn_bias(
     longer = np.hypot(way[0], way[1]) / distance - 1.0
     turned = wrapped(way[2] - by_odometry[2]) / length
     for which in range(2):
-        off = (longer if which == LENGTH else turned) - bias.means[which]
+        off = (longer if which == LENGTH_BIAS else turned) - bias.means[which]
         bias.means[which] += weight * off
         bias.variances[which] += weight * ((1.0 - weight) * off * off - bias.variances[which])
 
@@ -78,8 +78,8 @@ def learn_bias(
 @kernel
 def take_out_bias(bias: OdometryBias, options: OdometryBiasOptions, step: Array, length: float) -> None:
     """Take what is certain of the bias out of a step (3,) by odometry, over a way of this length (m)."""
-    factor = 1.0 + _certain(bias, options, LENGTH, options.min_length)
-    turned = _certain(bias, options, TURN, options.min_turn) * length
+    factor = 1.0 + _certain(bias, options, LENGTH_BIAS, options.min_length)
+    turned = _certain(bias, options, TURN_BIAS, options.min_turn) * length
     # Over an arc, the chord turns by half as much.
     cos, sin = factor * np.cos(0.5 * turned), factor * np.sin(0.5 * turned)
     x, y = step[0], step[1]

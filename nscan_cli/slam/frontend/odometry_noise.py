@@ -24,7 +24,7 @@ from nscan_cli.slam.frontend.odometry_bias import (
     take_out_bias,
 )
 
-SAMPLES, PATH, TELLING = 0, 1, 2
+SAMPLES, PIECE_LENGTH, TELLING = 0, 1, 2
 """Places in `OdometryNoise.counts`: the pieces of the path that were compared, the length (m) of the present
 one, and whether all its scans told their place."""
 
@@ -59,7 +59,7 @@ class OdometryNoise(NamedTuple):
     variances: Array
     """(2,) mean square difference of both ways: of a coordinate, m² a metre; of the angle, rad² a metre."""
     counts: Array
-    """(3,) SAMPLES, PATH and TELLING."""
+    """(3,) SAMPLES, PIECE_LENGTH and TELLING."""
     bias: OdometryBias
     """What is the same in all pieces."""
 
@@ -88,25 +88,25 @@ def learn_noise(
     counts, way, by_odometry = noise.counts, np.empty(3), np.empty(3)
     if not np.isfinite(length):
         noise.odometry[0] = np.nan
-    counts[PATH] += length
+    counts[PIECE_LENGTH] += length
     if _weakest_information(hessian) < least_information:
         counts[TELLING] = 0.0
-    if np.isfinite(noise.odometry[0]) and counts[PATH] < options.window:
+    if np.isfinite(noise.odometry[0]) and counts[PIECE_LENGTH] < options.window:
         return
     if np.isfinite(noise.odometry[0]) and counts[TELLING] > 0.0:
         relative_pose(pose, noise.pose, way)
         relative_pose(odometry, noise.odometry, by_odometry)
-        learn_bias(noise.bias, options.bias, way, by_odometry, counts[PATH])
-        take_out_bias(noise.bias, options.bias, by_odometry, counts[PATH])
+        learn_bias(noise.bias, options.bias, way, by_odometry, counts[PIECE_LENGTH])
+        take_out_bias(noise.bias, options.bias, by_odometry, counts[PIECE_LENGTH])
         off, turned = way - by_odometry, wrapped(way[2] - by_odometry[2])
         counts[SAMPLES] += 1.0
         weight = max(1.0 / counts[SAMPLES], options.smoothing)
         square = 0.5 * (off[0] * off[0] + off[1] * off[1])
-        noise.variances[0] += weight * (square / counts[PATH] - noise.variances[0])
-        noise.variances[1] += weight * (turned * turned / counts[PATH] - noise.variances[1])
+        noise.variances[0] += weight * (square / counts[PIECE_LENGTH] - noise.variances[0])
+        noise.variances[1] += weight * (turned * turned / counts[PIECE_LENGTH] - noise.variances[1])
     assign(noise.pose, pose)
     assign(noise.odometry, odometry)
-    counts[PATH], counts[TELLING] = 0.0, 1.0
+    counts[PIECE_LENGTH], counts[TELLING] = 0.0, 1.0
 
 
 @kernel

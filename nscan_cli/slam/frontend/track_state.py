@@ -11,7 +11,7 @@ from nscan_cli.poses import Array
 from nscan_cli.slam.frontend.local_map import LocalMap
 from nscan_cli.slam.frontend.odometry_noise import OdometryNoise
 
-KNOWN, RESTARTS, NEXT, LEFT = 0, 1, 2, 3
+KNOWN, RESTARTS, NEXT, CONTRADICTIONS = 0, 1, 2, 3
 """Places in `TrackState.counts`: the number of the last poses that are known, how often matches were started
 from other angles, the first scan of a batch whose pose is not known, and how many of the last scans left the
 odometry."""
@@ -38,7 +38,7 @@ class TrackState(NamedTuple):
     last 1 to h − 1 steps, per scan and per second."""
     odometry_noise: OdometryNoise
     counts: NDArray[np.int64]
-    """(4,) KNOWN, RESTARTS, NEXT and LEFT"""
+    """(4,) KNOWN, RESTARTS, NEXT and CONTRADICTIONS"""
     map: LocalMap
 
     @classmethod

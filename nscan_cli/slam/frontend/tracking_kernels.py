@@ -26,7 +26,7 @@ from nscan_cli.slam.frontend.prediction_restart import match_near_prediction
 from nscan_cli.slam.frontend.scan_to_map import match_from_prediction
 from nscan_cli.slam.frontend.sector_of_view import match_again_in_sector, match_in_sector
 from nscan_cli.slam.frontend.sweep_correction import correct_by_last_step, correct_by_match
-from nscan_cli.slam.frontend.track_state import KNOWN, LEFT, NEXT
+from nscan_cli.slam.frontend.track_state import CONTRADICTIONS, KNOWN, NEXT
 from nscan_cli.slam.frontend.tracking_problem import TrackingProblem
 from nscan_cli.slam.frontend.visible_points import points_in_view
 
@@ -99,7 +99,7 @@ def match_with_doubt(problem: TrackingProblem, points: Array, threshold: float, 
     options, prior, found = problem.settings.options, problem.prior, problem.found
     is_contradiction = contradicts(prior, found.poses[k], options.contradiction_sigmas)
     if not is_contradiction and found.inliers[k] >= threshold:
-        problem.track.counts[LEFT] = 0
+        problem.track.counts[CONTRADICTIONS] = 0
         return
     trusted, inliers, value = prior.information.copy(), found.inliers[k], found.values[k]
     energy = value - prior_value(prior, found.poses[k])
@@ -118,7 +118,7 @@ def match_with_doubt(problem: TrackingProblem, points: Array, threshold: float, 
         assign_rows(found.hessians[k], hessian)
         assign_rows(prior.information, trusted)
     has_left = contradicts(Prior(prior.mean, trusted), found.poses[k], options.contradiction_sigmas)
-    problem.track.counts[LEFT] = problem.track.counts[LEFT] + 1 if has_left else 0
+    problem.track.counts[CONTRADICTIONS] = problem.track.counts[CONTRADICTIONS] + 1 if has_left else 0
 
 
 @kernel
@@ -132,7 +132,7 @@ def _pays_for_odometry(problem: TrackingProblem, trusted: Array, value: float, k
     options, prior = problem.settings.options, problem.prior
     pose, step = problem.found.poses[k], np.empty(3)
     relative_pose(problem.odometry[k], problem.track.odometry, step)
-    has_slipped = problem.track.counts[LEFT] > options.believed_contradictions
+    has_slipped = problem.track.counts[CONTRADICTIONS] > options.believed_contradictions
     if problem.settings.is_alone or has_slipped or np.hypot(step[0], step[1]) < options.min_motion:
         return True
     price = min(prior_value(Prior(prior.mean, trusted), pose), options.max_odometry_surprise)

@@ -5,7 +5,7 @@ import sys
 import numpy as np
 import pytest
 
-from nscan_cli.matching.joint.gauge import FREE, gauge_directions, gauge_fixed_step
+from nscan_cli.matching.joint.gauge import FREE_GAUGE, gauge_directions, gauge_fixed_step
 from nscan_cli.matching.joint.joint_energy import JointProblem, Priors, all_pairs, joint_energy, no_priors
 from nscan_cli.matching.joint.joint_match import match_jointly
 from nscan_cli.matching.joint.options import JointOptions
@@ -32,7 +32,7 @@ def test_the_free_step_is_the_smallest_that_solves(five):
     poses = near(five.truth, 1)
     here = joint_energy(five.joint(), poses, exact=False)
     step = np.empty((5, 3))
-    assert gauge_fixed_step(here.gradient, here.hessian, poses, 0.0, FREE, step)
+    assert gauge_fixed_step(here.gradient, here.hessian, poses, 0.0, FREE_GAUGE, step)
     values, vectors = np.linalg.eigh(here.hessian)
     assert values[2] < 1e-9 * values[-1] < values[3]
     inverse = np.where(np.arange(15) < 3, 0.0, 1 / values)
@@ -54,7 +54,7 @@ def test_a_fixed_step_solves_for_the_others(five):
 
 def test_there_is_no_step_where_the_hessian_is_not_positive():
     poses = np.arange(6.0).reshape(2, 3)
-    assert not gauge_fixed_step(np.ones(6), -np.eye(6), poses, 0.0, FREE, np.empty((2, 3)))
+    assert not gauge_fixed_step(np.ones(6), -np.eye(6), poses, 0.0, FREE_GAUGE, np.empty((2, 3)))
 
 
 @pytest.mark.parametrize("rows", [(2000, 2008, 2016, 2024, 2032), (2000, 2012, 2024, 2036)])
