@@ -84,7 +84,7 @@ class LoopDetector:
         bound, before = self._tightened(route, centre, loops)
         if not len(self._near(route, centre, bound)) and not len(left_out):
             return []
-        sigma = self._computed(route, centre, bound, before, loops)
+        sigma = self._computed(route, centre, before, loops)
         near = np.union1d(self._near(route, centre, sigma), left_out).astype(np.int64)
         if not len(near):
             return []
@@ -118,7 +118,7 @@ class LoopDetector:
         bound, before = self._tightened(route, centre, loops)
         if not self._may_be_off(bound, old):
             return None
-        sigma = self._computed(route, centre, bound, before, loops)
+        sigma = self._computed(route, centre, before, loops)
         if not self._may_be_off(sigma, old):
             return None
         if is_lost(sigma, self.options)[old]:
@@ -134,9 +134,7 @@ class LoopDetector:
         covariances, before = most_certain_paths(links, route.poses, centre, self.options.lever_arm)
         return self._uncertainty.tighten(centre, covariances), before
 
-    def _computed(
-        self, route: Route, centre: int, bound: RelativeSigma, before: Indices, loops: Loops
-    ) -> RelativeSigma:
+    def _computed(self, route: Route, centre: int, before: Indices, loops: Loops) -> RelativeSigma:
         """The uncertainty by the graph of the tracked path and all loops.
 
         Of a large graph, only the part nearest to the centre counts, and the paths to all keyframes that may
