@@ -19,7 +19,7 @@ MINIMUM, FLOOR, NEIGHBOURHOOD, FACES = 0, 1, 2, 3
 """Places in `Grid.settings`: the least number of points of a Gaussian, its least standard deviation (m), the
 use of its neighbourhood, and whether walls have two faces (0 or 1); see gaussians.py."""
 MAX_NEIGHBOUR, MIN_SPACING, MAX_SPACING, SIDE_SHARE, ELONGATION, COSINE, END_SHARE, END_RATIO = range(4, 12)
-"""The places behind these: the fields of WallOptions, in their order."""
+"""The places of the fields of WallOptions."""
 NO_NEIGHBOURS, WALL_DIRECTION, WALL_END = 0, 1, 2
 """Uses of the neighbourhood of a Gaussian, see neighbourhood.py. With NO_NEIGHBOURS there is none. With
 WALL_DIRECTION it tells the direction of a wall. With WALL_END it tells where walls end; an end holds nothing

@@ -10,12 +10,19 @@ from nscan_cli.kernels.array_assignment import assign
 from nscan_cli.kernels.decorators import kernel
 from nscan_cli.ndt.grid_growth import add_points, change_points, make_all_gaussians, with_capacity
 from nscan_cli.ndt.hash_grid import (
+    COSINE,
+    ELONGATION,
+    END_RATIO,
+    END_SHARE,
     FACES,
     FLOOR,
     MAX_NEIGHBOUR,
+    MAX_SPACING,
+    MIN_SPACING,
     MINIMUM,
     NEIGHBOURHOOD,
     NO_NEIGHBOURS,
+    SIDE_SHARE,
     Grid,
     empty_grid,
     rehash,
@@ -146,8 +153,12 @@ class Ndt:
 
 def grid_settings(options: GaussianOptions, neighbourhood: int, faces: bool) -> Array:
     """`Grid.settings` (12,); the arguments are those of `Ndt.empty`."""
-    settings = np.empty(12)
-    settings[[MINIMUM, FLOOR, NEIGHBOURHOOD, FACES]] = options.minimum, options.floor, neighbourhood, faces
-    # As `astuple`, which copies each value by itself: many grids are for one match of two scans.
-    settings[MAX_NEIGHBOUR:] = list(vars(options.walls).values())
+    # One by one, which is faster than many places at a time: many grids are for one match of two scans.
+    settings, walls = np.empty(12), options.walls
+    settings[MINIMUM], settings[FLOOR] = options.minimum, options.floor
+    settings[NEIGHBOURHOOD], settings[FACES] = neighbourhood, faces
+    settings[MAX_NEIGHBOUR], settings[SIDE_SHARE] = walls.max_neighbour, walls.min_side_share
+    settings[MIN_SPACING], settings[MAX_SPACING] = walls.min_spacing, walls.max_spacing
+    settings[ELONGATION], settings[COSINE] = walls.min_elongation, walls.min_cosine
+    settings[END_SHARE], settings[END_RATIO] = walls.end_share, walls.max_end_ratio
     return settings
