@@ -32,7 +32,7 @@ class CheckedFile:
     reading: ReadingOptions
     """The options that read the log as it is now."""
     messages: list[str]
-    followed: bool = False
+    companions_checked: bool = False
     """Whether what goes along with the robot was looked for at all scans, by their odometry, or cannot be:
     with a wrong mounting walls seem to be where the robot has been."""
 
@@ -84,9 +84,9 @@ def checked_file(log: LaserLog, reading: ReadingOptions, options: FileCheckOptio
         # Where the robot has been is in doubt.
         is_elsewhere = any(finding.is_of_mount or finding.is_of_view for finding in findings)
         return CheckedFile(log, reading, said, is_elsewhere)
-    is_followed = log.odometry is not None and bool(are_known(log.odometry).all())
+    is_checked = log.odometry is not None and bool(are_known(log.odometry).all())
     log, reading, along = checked_companion(log, reading, options.companion)
-    return CheckedFile(log, reading, said + along, is_followed)
+    return CheckedFile(log, reading, said + along, is_checked)
 
 
 def _as_read(log: LaserLog, reading: ReadingOptions, corrected: ReadingOptions) -> LaserLog:

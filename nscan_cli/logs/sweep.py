@@ -21,7 +21,7 @@ class SweepOptions:
     shortest: float = 1e-3
     """A laser whose turn takes less time than this sees at once, s. A larger value leaves more lasers
     uncorrected."""
-    fastest: float = 0.012
+    least_turn_time: float = 0.012
     """No laser turns in less time than this, s: those in use turn up to 80 times a second. A larger value
     believes fewer files."""
     jitter: float = 1.1
@@ -91,14 +91,14 @@ def sweep_of_file(
     period = usual_period(times)
     lasts = float(np.median(np.abs(per_beam) * np.maximum(beams - 1, 1)))
     too_long = period > 0.0 and lasts > options.jitter * period
-    if as_recorded or (usual_turn >= options.fastest and not too_long):
+    if as_recorded or (usual_turn >= options.least_turn_time and not too_long):
         return Sweep(turns, "time_increment of the messages")
     scan_time = told.scan_time[np.isfinite(told.scan_time) & (told.scan_time > 0.0)]
     likely = float(np.median(scan_time)) if len(scan_time) else period
     origin = "scan_time" if len(scan_time) else "the time between scans"
     if period > 0.0 and likely > options.jitter * period:
         likely, origin = period, "the time between scans"
-    if likely < options.fastest:
+    if likely < options.least_turn_time:
         return Sweep(none, "time_increment of the messages cannot be")
     why = (
         f"a scan would take {lasts:.3g} s, but the next comes after {period:.3g} s"

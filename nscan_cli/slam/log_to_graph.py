@@ -90,6 +90,6 @@ def map_log(
         "slam": as_parameters(options),
     }
     state, graph, said = drive.state, drive.graph, log.report.notices() + checked.messages + drive.messages
-    said += notices(state, checked.followed)
+    said += notices(state, checked.companions_checked)
     graph.provenance = {**provenance_of([log.source], parameters), "notices": said}
     return state, graph

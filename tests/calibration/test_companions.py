@@ -73,11 +73,11 @@ def test_without_odometry_the_option_is_named():
 def test_it_is_looked_for_once():
     """Before the log is mapped where odometry tells the path and is not in doubt, else afterwards."""
     log, options = drive(), FileCheckOptions()
-    assert checked_file(log, ReadingOptions(), options).followed
+    assert checked_file(log, ReadingOptions(), options).companions_checked
     without = odometry_faults.missing(log, slice(100, 110))
     for other in (without, faults.mirrored(log), replace(log, odometry=None, odometry_path=None)):
-        assert not checked_file(other, ReadingOptions(), options).followed
-    assert not checked_file(log, ReadingOptions(as_recorded=True), options).followed
+        assert not checked_file(other, ReadingOptions(), options).companions_checked
+    assert not checked_file(log, ReadingOptions(as_recorded=True), options).companions_checked
 
 
 def test_sectors_that_are_left_out_already_stay_so():
@@ -107,7 +107,7 @@ def test_odometry_is_not_blamed_for_somebody_who_leads():
     (message,) = checked.messages
     assert message.startswith("something goes along with the robot")
     assert checked.log.odometry is log.odometry
-    assert checked.followed
+    assert checked.companions_checked
 
 
 def test_dust_is_everywhere():

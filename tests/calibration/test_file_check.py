@@ -167,13 +167,13 @@ def test_a_robot_with_its_laser_in_the_middle_mostly_drives_forward():
 
 
 def test_what_goes_along_is_not_looked_for_with_a_wrong_mounting():
-    assert not checked_file(drive(), ReadingOptions(as_recorded=True), FileCheckOptions()).followed
+    assert not checked_file(drive(), ReadingOptions(as_recorded=True), FileCheckOptions()).companions_checked
     for make in (faults.mirrored, odometry_faults.behind):
         log = make(drive())
-        looked = checked_file(log, ReadingOptions(), FileCheckOptions()).followed
+        looked = checked_file(log, ReadingOptions(), FileCheckOptions()).companions_checked
         assert looked == (make is odometry_faults.behind)
     looks_back = faults.mounted_otherwise(drive(), np.pi)
-    assert checked_file(looks_back, ReadingOptions(), FileCheckOptions()).followed
+    assert checked_file(looks_back, ReadingOptions(), FileCheckOptions()).companions_checked
 
 
 def test_where_odometry_stands_it_says_nothing_of_the_mounting_elsewhere():

@@ -25,10 +25,10 @@ MOST_NAMED = 10
 """Scans or stretches that a notice names."""
 
 
-def notices(state: SlamState, followed: bool = False) -> list[str]:
+def notices(state: SlamState, companions_checked: bool = False) -> list[str]:
     """What went wrong, one sentence each.
 
-    `followed`: whether what goes along with the robot was looked for before the log was mapped.
+    `companions_checked`: whether what goes along with the robot was looked for before the log was mapped.
     """
     log, found = state.log, []
     if state.breaks:
@@ -52,7 +52,7 @@ def notices(state: SlamState, followed: bool = False) -> list[str]:
     return (
         found
         + _degenerate_stretches(state)
-        + ([] if followed else _companions(state))
+        + ([] if companions_checked else _companions(state))
         + _view_mismatches(state)
         + _contradictions(state)
         + _free_space_violations(state)
