@@ -13,10 +13,9 @@ from nscan_cli.logs.beam_angles import beam_directions
 from nscan_cli.logs.beam_mask import mask_beams, masked_sectors
 from nscan_cli.logs.beam_spacing import checked_by_walls
 from nscan_cli.logs.blind_scans import blind_scans
-from nscan_cli.logs.dead_beams import DeadBeamOptions
 from nscan_cli.logs.device_choice import Device
-from nscan_cli.logs.direction_changes import DirectionChangeOptions, as_before
-from nscan_cli.logs.floor_line import FloorLineOptions, floor_line, without_floor
+from nscan_cli.logs.direction_changes import as_before
+from nscan_cli.logs.floor_line import floor_line, without_floor
 from nscan_cli.logs.frame_names import DEFAULT_FRAMES, FrameNames
 from nscan_cli.logs.laser_defaults import mark_no_returns
 from nscan_cli.logs.laser_log import LaserLog, LogReport, beam_counts
@@ -28,9 +27,10 @@ from nscan_cli.logs.range_unit import scaled, wrong_unit
 from nscan_cli.logs.raw_scans import RawScans
 from nscan_cli.logs.reading_options import ReadingOptions
 from nscan_cli.logs.repeated_reading import without_repeated_readings
-from nscan_cli.logs.robot_parts import RobotPartsOptions, ScanTable
+from nscan_cli.logs.robot_parts import ScanTable
 from nscan_cli.logs.robot_path import RobotPath, poses_at, robot_path
 from nscan_cli.logs.rounded_ranges import rounding_of_ranges
+from nscan_cli.logs.scan_checks import SCAN_CHECKS, ScanCheckOptions
 from nscan_cli.logs.scan_order import ScanOrder, selected_numbers
 from nscan_cli.logs.skips import Skips
 from nscan_cli.logs.slow_odometry import without_repeats
@@ -86,6 +86,7 @@ def laser_log(
     findings: ReaderFindings,
     options: ReadingOptions,
     file: str,
+    checks: ScanCheckOptions = SCAN_CHECKS,
 ) -> LaserLog:
     """The selected scans in order of time, with no-returns marked. `raw.ranges` may be overwritten.
 
@@ -94,34 +95,33 @@ def laser_log(
     numbers = selected_numbers(times.times, options, file)
     rows = times.rows[numbers]
     warnings = findings.warnings
-    raw, limits, contradictions = _in_metres(raw, times, options, findings)
+    raw, limits, contradictions = _in_metres(raw, times, options, findings, checks)
     repeated = np.zeros(len(raw.ranges), dtype=np.int64)
     if not options.as_recorded:
-        raw, converted = with_radians(raw)
+        raw, converted = with_radians(raw, checks.angle_unit)
         contradictions += converted
     # With --max-range the user asks for all readings up to it.
     if not options.as_recorded and options.max_range is None:
-        repeated, no_distances = without_repeated_readings(raw.ranges, limits)
+        repeated, no_distances = without_repeated_readings(raw.ranges, limits, checks.repeated_reading)
         contradictions += no_distances
-    written = beam_directions(raw, options, warnings)
+    written = beam_directions(raw, options, warnings, checks.beam_angles)
     beams, changed = beam_counts(raw.ranges, raw.beams), list[str]()
     if not options.as_recorded:
         seen = ScanTable(raw.ranges, limits, *written, times.rows, times.times)
-        written, changed = as_before(seen, beams, -1 if options.flip else 1, DirectionChangeOptions())
-    directions, told = in_whole_turns(raw, written, limits, options)
+        written, changed = as_before(seen, beams, -1 if options.flip else 1, checks.direction_changes)
+    directions, told = in_whole_turns(raw, written, limits, options, checks.whole_turn, checks.beam_spacing)
     if not told:
-        directions, told = checked_by_walls(raw, written, limits, options)
+        directions, told = checked_by_walls(raw, written, limits, options, checks.beam_spacing)
     angle_min, angle_increment = directions
     contradictions += [*changed, *told]
     findings.used |= {"range_min": limits.low_from, "range_max": limits.high_from}
     table = ScanTable(raw.ranges, limits, angle_min, angle_increment, times.rows, times.times)
-    sectors, masked = masked_sectors(table, options, RobotPartsOptions(), DeadBeamOptions())
-    floor = (
-        None if options.as_recorded else floor_line(table, sectors, FloorLineOptions(), RobotPartsOptions())
-    )
+    parts = checks.robot_parts
+    sectors, masked = masked_sectors(table, options, parts, checks.dead_beams)
+    floor = None if options.as_recorded else floor_line(table, sectors, checks.floor_line, parts)
     ranges = raw.ranges if np.array_equal(rows, np.arange(len(raw.stamps))) else raw.ranges[rows]
     beams, limits = beams[rows], limits.of(rows)
-    lost = lost_readings(ranges, beams, limits, file)
+    lost = lost_readings(ranges, beams, limits, file, checks.range_limits)
     of_one_value = int(repeated[rows].sum())
     if of_one_value:
         # They were usable, and are counted as no number now.
@@ -130,22 +130,22 @@ def laser_log(
             lost.counts["not a number"] = others
         lost.counts["of one value"] = of_one_value
     mark_no_returns(ranges, limits.low, limits.high)
-    rounded = rounding_of_ranges(ranges)
+    rounded = rounding_of_ranges(ranges, checks.rounded_ranges)
     if rounded:
         warnings.append(rounded)
-    warnings += blind_scans(ranges, numbers)
+    warnings += blind_scans(ranges, numbers, checks.blind_scans)
     hidden = mask_beams(ranges, angle_min[rows], angle_increment[rows], sectors)
     if hidden:
         lost.counts["in masked sectors"] = hidden
     if floor is not None:
         bearings = angle_min[rows], angle_increment[rows]
-        lost.counts["of the floor"] = without_floor(ranges, *bearings, floor, FloorLineOptions())
+        lost.counts["of the floor"] = without_floor(ranges, *bearings, floor, checks.floor_line)
         masked.append(floor.said)
-    sweep = _sweep(raw, angle_increment, times, options)
+    sweep = _sweep(raw, angle_increment, times, options, checks)
     if sweep.origin:
         findings.used["turn"] = sweep.origin
     swept = beam_times(sweep.turns[numbers], angle_increment[rows], beams, options.stamp)
-    odometry, path, slow = _odometry(motion, times, raw.ranges, options)
+    odometry, path, slow = _odometry(motion, times, raw.ranges, options, checks)
     if odometry is not None:
         odometry = odometry[numbers]
     return LaserLog(
@@ -189,7 +189,11 @@ def laser_log(
 
 
 def _odometry(
-    motion: RecordedMotion, times: ScanOrder, ranges: NDArray[np.float32], options: ReadingOptions
+    motion: RecordedMotion,
+    times: ScanOrder,
+    ranges: NDArray[np.float32],
+    options: ReadingOptions,
+    checks: ScanCheckOptions,
 ) -> tuple[Array | None, RobotPath | None, list[str]]:
     """The odometry (S, 3) of all scans in order of time, its path, and what was put right.
 
@@ -200,10 +204,10 @@ def _odometry(
         return None, recorded, []
     scale = options.odometry_scale
     if recorded is None:
-        odometry, said = _credible(odometry, times.times, (ranges, times.rows), options)
+        odometry, said = _credible(odometry, times.times, (ranges, times.rows), options, checks)
         return scaled_odometry(odometry, scale), None, said
-    poses, said = _credible(recorded.poses, recorded.times, None, options)
-    path = robot_path(recorded.times, scaled_odometry(poses, scale))
+    poses, said = _credible(recorded.poses, recorded.times, None, options, checks)
+    path = robot_path(recorded.times, scaled_odometry(poses, scale), checks.robot_path)
     odometry = scaled_odometry(odometry, scale)
     if said and path is not None:
         # Nothing is interpolated where poses are not used.
@@ -217,6 +221,7 @@ def _credible(
     times: Array,
     scans: tuple[NDArray[np.float32], Indices] | None,
     options: ReadingOptions,
+    checks: ScanCheckOptions,
 ) -> tuple[Array, list[str]]:
     """Odometry (S, 3) at times (S,), s, of one source, without outliers and repeats; and what is said.
 
@@ -224,35 +229,42 @@ def _credible(
     """
     if options.as_recorded:
         return odometry, []
-    odometry, both = of_one_source(odometry, times)
-    odometry, noise = without_noise(odometry, times)
-    odometry, wrong = without_outliers(odometry, times)
-    odometry, slow = without_repeats(odometry, times, scans)
+    odometry, both = of_one_source(odometry, times, checks.two_odometries)
+    odometry, noise = without_noise(odometry, times, checks.noisy_odometry)
+    odometry, wrong = without_outliers(odometry, times, checks.odometry_outliers)
+    odometry, slow = without_repeats(odometry, times, scans, checks.slow_odometry)
     return odometry, [text for text in (both, noise, wrong, slow) if text]
 
 
-def _sweep(raw: RawScans, increments: Array, times: ScanOrder, options: ReadingOptions) -> Sweep:
+def _sweep(
+    raw: RawScans, increments: Array, times: ScanOrder, options: ReadingOptions, checks: ScanCheckOptions
+) -> Sweep:
     """The times of the laser's turns (S,), in order of time; `increments` (S,) are in file order, rad."""
     if options.sweep is not None:
         return Sweep(np.full(len(times.times), options.sweep), "--sweep")
     rows, beams = times.rows, beam_counts(raw.ranges, raw.beams)
     told = None if raw.recorded_sweep is None else raw.recorded_sweep.of(rows)
-    return sweep_of_file(told, increments[rows], beams[rows], times.times, options.as_recorded)
+    return sweep_of_file(told, increments[rows], beams[rows], times.times, options.as_recorded, checks.sweep)
 
 
 def _in_metres(
-    raw: RawScans, times: ScanOrder, options: ReadingOptions, findings: ReaderFindings
+    raw: RawScans,
+    times: ScanOrder,
+    options: ReadingOptions,
+    findings: ReaderFindings,
+    checks: ScanCheckOptions,
 ) -> tuple[RawScans, RangeLimits, list[str]]:
     """The scans in metres, their limits, and what is said if the scans contradict the unit of the log."""
     if options.range_scale is not None:
-        raw = scaled(raw, options.range_scale)
-        return raw, limits_in_force(raw, options, findings.warnings), []
-    raw, mixed = (raw, []) if options.as_recorded else in_one_unit(raw, times)
+        raw = scaled(raw, options.range_scale, checks.range_unit)
+        return raw, limits_in_force(raw, options, findings.warnings, checks.range_limits), []
+    raw, mixed = (raw, []) if options.as_recorded else in_one_unit(raw, times, checks.unit_stretches)
     said: list[str] = []
-    limits = limits_in_force(raw, options, said)
-    unit = None if options.as_recorded else wrong_unit(raw.ranges, limits)
+    limits = limits_in_force(raw, options, said, checks.range_limits)
+    unit = None if options.as_recorded else wrong_unit(raw.ranges, limits, checks.range_unit)
     if unit is None or not unit.is_certain:
         findings.warnings += said
         return raw, limits, mixed
-    raw, findings.used["range_scale"] = scaled(raw, unit.scale), f"{unit.scale:g}"
-    return raw, limits_in_force(raw, options, findings.warnings), [*mixed, unit.correction]
+    raw, findings.used["range_scale"] = scaled(raw, unit.scale, checks.range_unit), f"{unit.scale:g}"
+    limits = limits_in_force(raw, options, findings.warnings, checks.range_limits)
+    return raw, limits, [*mixed, unit.correction]

@@ -101,13 +101,15 @@ def _is_all_over(is_so: NDArray[np.bool_], options: RepeatedReadingOptions) -> b
 
 
 def without_repeated_readings(
-    ranges: NDArray[np.float32], limits: RangeLimits
+    ranges: NDArray[np.float32],
+    limits: RangeLimits,
+    options: RepeatedReadingOptions = RepeatedReadingOptions(),
 ) -> tuple[NDArray[np.int64], list[str]]:
     """Write nan for usable readings among ranges (S, B) that are no distances, in place.
 
     Returns how many readings of each scan (S,) were so, and what is said.
     """
-    found = repeated_readings(ranges, limits)
+    found = repeated_readings(ranges, limits, options)
     if not found:
         return np.zeros(len(ranges), dtype=np.int64), []
     is_so = np.isin(ranges, np.array(list(found), dtype=np.float32)) & _are_usable(ranges, limits)

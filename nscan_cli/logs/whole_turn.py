@@ -66,6 +66,7 @@ def in_whole_turns(
     limits: RangeLimits,
     options: ReadingOptions,
     checks: WholeTurnOptions = WholeTurnOptions(),
+    spacing: BeamSpacingOptions = BeamSpacingOptions(),
 ) -> tuple[BeamDirections, list[str]]:
     """The directions of beams over one turn if walls show that they cover one; and what is said of it."""
     beams = beam_counts(raw.ranges, raw.beams)
@@ -75,7 +76,6 @@ def in_whole_turns(
     is_set = options.as_recorded or options.angle_increment is not None
     if is_set or not is_near or (beams != count).any() or (directions.step != directions.step[0]).any():
         return directions, []
-    spacing = BeamSpacingOptions()
     rows = np.arange(0, len(beams), max(1, len(beams) // checks.max_scans))
     ranges = sampled_scans(raw, directions, limits, rows, spacing).ranges[:, :count]
     turn = math.copysign(2 * math.pi / count, step)

@@ -13,7 +13,7 @@ from nscan_cli.files.provenance import as_parameters, provenance_of
 from nscan_cli.graph.model import Graph
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.logs.reading_options import ReadingOptions
-from nscan_cli.logs.scan_checks import ScanCheckOptions
+from nscan_cli.logs.scan_checks import SCAN_CHECKS
 from nscan_cli.slam.diagnostics.notices import notices
 from nscan_cli.slam.local_matching.options import NScanOptions
 from nscan_cli.slam.options import Relations, SlamOptions
@@ -86,7 +86,7 @@ def map_log(
     drive = map_drive(checked.log, options, threads, progress, checked.reading)
     parameters: dict[str, Any] = {
         "reading": dataclasses.asdict(checked.reading),
-        "scan_checks": as_parameters(ScanCheckOptions()),
+        "scan_checks": as_parameters(SCAN_CHECKS),
         "slam": as_parameters(options),
     }
     state, graph, said = drive.state, drive.graph, log.report.notices() + checked.messages + drive.messages
