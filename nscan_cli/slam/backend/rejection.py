@@ -1,4 +1,4 @@
-"""Step 6: rejection of loops that contradict the graph, as graph/optimise/graduated_nonconvexity.py finds."""
+"""Step 5: rejection of loops that contradict the graph, as graph/optimise/graduated_nonconvexity.py finds."""
 
 from __future__ import annotations
 
