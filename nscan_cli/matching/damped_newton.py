@@ -36,40 +36,22 @@ class StepControl(NamedTuple):
 
 
 PAIRWISE_STEPS = StepControl(
-    first=1e-3,
-    least=1e-7,
-    least_divided=1e-7,
-    least_raised=0.0,
-    greatest=1e6,
-    trusted=1e-3,
-    damped_share=0.1,
-    rounding=0.0,
-)
+    first=1e-3, least=1e-7, least_divided=1e-7, least_raised=0.0,
+    greatest=1e6, trusted=1e-3, damped_share=0.1, rounding=0.0,
+)  # fmt: skip
 """Starts are rough, so steps are damped from the first on. One NDT is cheap to evaluate, so a damping up to
 1e6 allows long searches where the energy jumps at borders of cells. Paths in uneven motion take these steps,
 too."""
 JOINT_STEPS = StepControl(
-    first=1e-3,
-    least=1e-8,
-    least_divided=1e-8,
-    least_raised=0.0,
-    greatest=1e4,
-    trusted=np.inf,
-    damped_share=0.0,
-    rounding=0.0,
-)
+    first=1e-3, least=1e-8, least_divided=1e-8, least_raised=0.0,
+    greatest=1e4, trusted=np.inf, damped_share=0.0, rounding=0.0,
+)  # fmt: skip
 """An evaluation costs n (n − 1) times as much. So the solver gives up earlier, and any step within the
 tolerance is the last one."""
 GRAPH_STEPS = StepControl(
-    first=0.0,
-    least=0.0,
-    least_divided=1e-9,
-    least_raised=1e-6,
-    greatest=1e8,
-    trusted=1.0,
-    damped_share=0.0,
-    rounding=1e-12,
-)
+    first=0.0, least=0.0, least_divided=1e-9, least_raised=1e-6,
+    greatest=1e8, trusted=1.0, damped_share=0.0, rounding=1e-12,
+)  # fmt: skip
 """The energy is smooth and nearly quadratic, so steps are undamped unless they fail. Sums over thousands of
 relations carry rounding errors."""
 
