@@ -93,10 +93,11 @@ def _changes_at(log: LaserLog, row: int, options: FileCheckOptions) -> bool:
     if log.odometry is not None:
         return True
     # Nothing tells how far the robot turned from one scan to the next: as read they may match after a turn.
-    turned = (_matched_both_ways(log, *rows, options, options.order.turns) for rows in pairs_across(row))
+    order = options.order
+    turns = np.arange(-order.largest_turn, order.largest_turn + 0.5 * order.turn_step, order.turn_step)
+    turned = (_matched_both_ways(log, *rows, options, turns.tolist()) for rows in pairs_across(row))
     # Two scans of a long room from before and after a turn may fit the mirror image better.
     before, behind = sides[0], sides[1] * MIRRORED
-    order = options.order
     return lead_one_way(across, (before, behind), order.max_misfit, order.max_turn_misfit) and all(
         matched is not None and _gain(matched) > gain for matched in turned
     )

@@ -63,9 +63,11 @@ class OrderJumpOptions:
     min_gain: float = 0.3
     """The energy per point of four pairs of scans, one before the place and one behind, is lower by so much
     if one is mirrored, and that of two pairs on one side is higher. A larger value finds less."""
-    turns: tuple[float, ...] = (0.0, 0.4, -0.4, 0.8, -0.8, 1.2, -1.2)
-    """Without odometry, scans are also matched after turns of the robot by these angles, rad. Larger ones
-    keep scans of faster turns in their order."""
+    largest_turn: float = 1.2
+    """Without odometry, scans are also matched after turns of the robot up to this angle, rad. With a larger
+    one scans of faster turns keep their order."""
+    turn_step: float = 0.4
+    """Interval between these turns, rad. A smaller one takes longer."""
     max_misfit: float = 0.8
     """Without odometry, the steps by these pairs agree to so many metres. A larger value finds more."""
     max_turn_misfit: float = 0.2
