@@ -11,6 +11,7 @@ from nscan_cli.calibration.contradictions import changed_view, find_contradictio
 from nscan_cli.calibration.held_odometry import checked_held
 from nscan_cli.calibration.measured_steps import KnownSteps
 from nscan_cli.calibration.mirrored_odometry import with_mirrored_odometry
+from nscan_cli.calibration.odometry_lag import checked_lag
 from nscan_cli.calibration.odometry_units import checked_units
 from nscan_cli.calibration.options import FileCheckOptions
 from nscan_cli.calibration.order_jumps import checked_order
@@ -79,7 +80,12 @@ def checked_file(log: LaserLog, reading: ReadingOptions, options: FileCheckOptio
             if not reversing and "odometry_scale" in finding.corrected:
                 # In another unit the ranges did not change as odometry says.
                 log, reversing = checked_signs(log, options.unsigned, options.steps)
-    said += jitter + order + jumps + units + held + reversing + [finding.message for finding in findings]
+    late = list[str]()
+    if not findings:
+        log, reading, late = checked_lag(log, reading, known, options)
+    said += (
+        jitter + order + jumps + units + held + reversing + late + [finding.message for finding in findings]
+    )
     if any(not finding.corrected for finding in findings):
         # Where the robot has been is in doubt.
         is_elsewhere = any(finding.is_of_mount or finding.is_of_view for finding in findings)

@@ -16,6 +16,7 @@ from nscan_cli.calibration.sweep_options import SweepCheckOptions
 from nscan_cli.calibration.turn_of_file import usual_turn
 from nscan_cli.logs.beam_times import BeamTimes
 from nscan_cli.logs.laser_log import LaserLog
+from nscan_cli.logs.odometry_interpolation import interpolated_poses
 from nscan_cli.logs.robot_path import RobotPath, poses_at, robot_path
 from nscan_cli.poses import Array, Indices, are_known
 
@@ -80,10 +81,23 @@ def _turning(motion: ScanMotion, options: SweepCheckOptions) -> list[int]:
 def with_delay(log: LaserLog, delay: float) -> LaserLog:
     """The log with `delay` (s) added to the stamps of its odometry."""
     path, odometry = log.odometry_path, log.odometry
-    if path is None or odometry is None:
+    if odometry is None:
         return log
+    if path is None:
+        known, unsaid = are_known(odometry), list[str]()
+        moved = interpolated_poses(log.times, (log.times + delay)[known], odometry[known], "pose", unsaid)
+        return replace(log, odometry=moved)
     path = robot_path(path.times + delay, path.poses)
     if path is None:
         return log
     odometry = np.where(are_known(odometry)[:, None], poses_at(path, log.times), np.nan)
     return replace(log, odometry=odometry, odometry_path=path)
+
+
+def said_late(delay: float, offset: float, why: str) -> str:
+    """What is said of odometry that is stamped too early by `delay` (s): the option moves it by `offset`."""
+    side = "early" if delay > 0.0 else "late"
+    return (
+        f"odometry is stamped {abs(delay):.2g} s too {side}, by the turns of the scans; its stamps are "
+        f"moved, as with --clock-offset {offset:.2g}, {why}; --as-recorded believes the file"
+    )

@@ -37,6 +37,37 @@ class ClockOptions:
 
 
 @dataclass(frozen=True)
+class LagOptions:
+    """When the odometry of a laser that sees at once is late or early."""
+
+    longest: float = 1.5
+    """Longest lag that is looked for, s. A larger value takes longer."""
+    step: float = 0.02
+    """Interval between the lags that are tried, s. A smaller value takes longer."""
+    least: float = 0.2
+    """Smallest lag that is corrected, s. Tracking hardly notices a smaller one. A larger value leaves the
+    file as it is more often."""
+    min_turn: float = 0.05
+    """Least turn of a step that counts, rad. With a larger value fewer steps count, and each tells more."""
+    min_turns: int = 12
+    """Least number of steps with a turn. A larger value finds less in short drives."""
+    max_difference: float = 0.1
+    """Turns of a step that differ by more count as different by this, rad. A larger value gives slips and
+    failed matches more weight."""
+    max_left: float = 0.7
+    """A lag is found if turns disagree by at most this share of their disagreement without it. A larger value
+    finds lags more often, also where there is none."""
+    sigmas: float = 4.0
+    """Least mean gain of the turns with the lag, in its standard deviations. A larger value finds less."""
+    first_sigmas: float = 2.5
+    """More steps are measured where the first few gain so much. A larger value takes less time, and finds
+    less."""
+    fitted: int = 3
+    """Number of lags on each side of the best one that a parabola fits. With more the curve is less like a
+    parabola."""
+
+
+@dataclass(frozen=True)
 class ScaleChangeOptions:
     """When odometry, or the ranges, change their scale within a log."""
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from nscan_cli.calibration.odometry_options import (
     ClockOptions,
     HeldOdometryOptions,
+    LagOptions,
     OdometryUnitOptions,
     ScaleChangeOptions,
     UnsignedOdometryOptions,
@@ -129,6 +130,7 @@ class FileCheckOptions:
 
     steps: StepOptions = field(default_factory=StepOptions)
     clock: ClockOptions = field(default_factory=ClockOptions)
+    lag: LagOptions = field(default_factory=LagOptions)
     sweep: SweepCheckOptions = field(default_factory=SweepCheckOptions)
     held: HeldOdometryOptions = field(default_factory=HeldOdometryOptions)
     units: OdometryUnitOptions = field(default_factory=OdometryUnitOptions)

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from nscan_cli.calibration.calibrated_reading import DECIMALS
-from nscan_cli.calibration.odometry_delay import odometry_delay, with_delay
+from nscan_cli.calibration.odometry_delay import odometry_delay, said_late, with_delay
 from nscan_cli.calibration.options import FileCheckOptions
 from nscan_cli.calibration.scan_motion import ScanMotion
 from nscan_cli.calibration.sweep_evidence import SweepEvidence, sweep_evidence
@@ -73,7 +73,8 @@ def _without_delay(
     place = None if reading.clock_offset else stamp_place(log, reading.stamp, delay, options.sweep)
     if place is None:
         reading = replace(reading, clock_offset=reading.clock_offset + delay)
-        return with_delay(log, delay), reading, _said_late(delay, reading.clock_offset)
+        why = "because beams are corrected by odometry"
+        return with_delay(log, delay), reading, said_late(delay, reading.clock_offset, why)
     said = (
         f"scans are stamped at their {place} beam: if it were the {reading.stamp} one, they would turn "
         f"{abs(delay):.2g} s {'later' if delay > 0.0 else 'earlier'} than odometry; they are read that way, "
@@ -101,12 +102,3 @@ def _said(evidence: SweepEvidence, told: float, turn: float, certainty: float) -
     else:
         what = "the readings are in the reverse order of time"
     return f"{what}: {pairs}; they are read that way, as with --sweep {flag}; --as-recorded believes the file"
-
-
-def _said_late(delay: float, offset: float) -> str:
-    side = "early" if delay > 0.0 else "late"
-    return (
-        f"odometry is stamped {abs(delay):.2g} s too {side}, by the turns of the scans; its stamps are "
-        f"moved, as with --clock-offset {offset:.2g}, because beams are corrected by odometry; "
-        "--as-recorded believes the file"
-    )

@@ -1,0 +1,74 @@
+"""How late the odometry is against the scans of a laser that sees at once.
+
+The steps that the check of a file measures tell it: their turns by scans fit best to those by odometry some
+time before or after. A robot that is stamped late drives on in its odometry while it stands in its scans.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from nscan_cli.calibration.measured_steps import KnownSteps, measure_steps
+from nscan_cli.calibration.odometry_delay import said_late, with_delay
+from nscan_cli.calibration.odometry_options import LagOptions
+from nscan_cli.calibration.options import FileCheckOptions
+from nscan_cli.calibration.parabola import parabola_minimum
+from nscan_cli.calibration.step_sampling import telling_steps
+from nscan_cli.logs.laser_log import LaserLog
+from nscan_cli.logs.reading_options import ReadingOptions
+from nscan_cli.poses import Array, Indices
+
+
+def checked_lag(
+    log: LaserLog, reading: ReadingOptions, known: KnownSteps, options: FileCheckOptions
+) -> tuple[LaserLog, ReadingOptions, list[str]]:
+    """The log with the lag of its odometry put right, the options that read it so, and what is said.
+
+    More steps are measured only if those that are `known` show a lag.
+    """
+    if log.odometry is None or log.beam_times is not None or reading.clock_offset:
+        return log, reading, []
+    rows = np.array([pair for pair, step in known.items() if step is not None], dtype=np.int64).reshape(-1, 2)
+    turned = np.array([step[0][2] for step in known.values() if step is not None])
+    if not _lag(log, rows[:, 0], rows[:, 1], turned, options.lag, options.lag.first_sigmas):
+        return log, reading, []
+    steps = measure_steps(
+        log, telling_steps(log, options.steps, options.more_steps), options.steps, known=known
+    )
+    lag = _lag(log, steps.first, steps.last, steps.laser[:, 2], options.lag, options.lag.sigmas)
+    if not lag:
+        return log, reading, []
+    reading = replace(reading, clock_offset=lag)
+    return with_delay(log, lag), reading, [said_late(lag, lag, "because scans are matched by odometry")]
+
+
+def _lag(
+    log: LaserLog, first: Indices, last: Indices, turned: Array, options: LagOptions, sigmas: float
+) -> float:
+    """Seconds to add to the stamps of odometry, so that its turns fit those (n,) of the steps from rows to
+    rows (n,); 0 in doubt: with a mean gain of fewer standard deviations than `sigmas`."""
+    assert log.odometry is not None
+    at, headings = log.times, log.odometry[:, 2]
+    if log.odometry_path is not None:
+        at, headings = log.odometry_path.times, log.odometry_path.poses[:, 2]
+    is_known, turns = np.isfinite(headings), np.abs(turned) >= options.min_turn
+    if np.count_nonzero(turns) < options.min_turns or not is_known.any():
+        return 0.0
+    at, headings = at[is_known], np.unwrap(headings[is_known])
+    count = round(options.longest / options.step)
+    lags = options.step * np.arange(-count, count + 1, dtype=np.float64)[:, None]
+    by_odometry = np.interp(log.times[last[turns]] - lags, at, headings)
+    by_odometry -= np.interp(log.times[first[turns]] - lags, at, headings)
+    # A match that failed, or a wheel that slipped, counts for no more than another turn.
+    off = np.minimum(np.abs(by_odometry - turned[turns]), options.max_difference)
+    total = off.mean(axis=1)
+    best = int(np.argmin(total))
+    gains = off[count] - off[best]
+    sigma = float(gains.std(ddof=1)) / np.sqrt(len(gains))
+    is_clear = total[best] <= options.max_left * total[count] and gains.mean() >= sigmas * sigma
+    if best in (0, 2 * count) or not is_clear:
+        return 0.0
+    lag = round(parabola_minimum(lags[:, 0], total, options.fitted), 2)
+    return lag if abs(lag) >= options.least else 0.0
