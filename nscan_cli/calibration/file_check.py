@@ -55,6 +55,10 @@ def checked_file(log: LaserLog, reading: ReadingOptions, options: FileCheckOptio
     signed, reversing = checked_signs(log, options.unsigned, options.steps)
     known: KnownSteps = {}
     findings = find_contradictions(signed, reading, options, known)
+    log, reading, late = checked_lag(log, reading, known, options)
+    if late:
+        signed, reversing = checked_signs(log, options.unsigned, options.steps)
+        findings = find_contradictions(signed, reading, options, known)
     if any("odometry" in finding.corrected for finding in findings):
         # Steps by scans may be those of someone who goes along, and odometry is right without his beams.
         alone, masked, seen = checked_companion(signed, reading, options.companion)
@@ -80,9 +84,6 @@ def checked_file(log: LaserLog, reading: ReadingOptions, options: FileCheckOptio
             if not reversing and "odometry_scale" in finding.corrected:
                 # In another unit the ranges did not change as odometry says.
                 log, reversing = checked_signs(log, options.unsigned, options.steps)
-    late = list[str]()
-    if not findings:
-        log, reading, late = checked_lag(log, reading, known, options)
     said += (
         jitter + order + jumps + units + held + reversing + late + [finding.message for finding in findings]
     )

@@ -67,8 +67,9 @@ def _lag(
     best = int(np.argmin(total))
     gains = off[count] - off[best]
     sigma = float(gains.std(ddof=1)) / np.sqrt(len(gains))
-    is_clear = total[best] <= options.max_left * total[count] and gains.mean() >= sigmas * sigma
-    if best in (0, 2 * count) or not is_clear:
+    whole = float(np.minimum(np.abs(turned[turns]), options.max_difference).mean())
+    is_clear = total[best] <= min(options.max_left * total[count], options.max_disagreement * whole)
+    if best in (0, 2 * count) or not is_clear or gains.mean() < sigmas * sigma:
         return 0.0
     lag = round(parabola_minimum(lags[:, 0], total, options.fitted), 2)
     return lag if abs(lag) >= options.least else 0.0

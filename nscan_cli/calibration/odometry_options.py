@@ -57,6 +57,9 @@ class LagOptions:
     max_left: float = 0.7
     """A lag is found if turns disagree by at most this share of their disagreement without it. A larger value
     finds lags more often, also where there is none."""
+    max_disagreement: float = 0.5
+    """Largest disagreement of the turns with the lag, as a share of the turns by scans. Where odometry turns
+    the wrong way, they disagree less with any lag. A larger value finds more."""
     sigmas: float = 4.0
     """Least mean gain of the turns with the lag, in its standard deviations. A larger value finds less."""
     first_sigmas: float = 2.5

@@ -238,11 +238,14 @@ def test_a_real_log_tells_the_same(make):
 
 @pytest.mark.parametrize("name", REAL)
 def test_nothing_is_contradicted_on_real_logs(name):
-    """But for fr079's odometry, which never reverses though its robot does."""
+    """But for fr079's odometry, which never reverses though its robot does, and mit-killian's, whose turns
+    are those of its scans .64 s later."""
     said = found(read_log(str(data_file(f"{name}.log.gz"))))
-    assert [each.split(":")[0] for each in said] == (
-        ["odometry counts reversing as driving forward"] if name == "fr079" else []
-    )
+    known = {
+        "fr079": ["odometry counts reversing as driving forward"],
+        "mit-killian": ["odometry is stamped 0.64 s too early, by the turns of the scans"],
+    }
+    assert [each.partition(":")[0].partition(";")[0] for each in said] == known.get(name, [])
 
 
 OUTDOORS: dict[str, tuple[Fault, str]] = {
