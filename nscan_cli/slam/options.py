@@ -12,6 +12,7 @@ from nscan_cli.slam.backend.options import (
     OptimisationOptions,
     RefinementOptions,
     ScheduleOptions,
+    SingleScanOptions,
     UnevenMotionOptions,
 )
 from nscan_cli.slam.diagnostics.options import DiagnosticsOptions
@@ -41,6 +42,7 @@ class SlamOptions:
     loop_closure: LoopClosureOptions = field(default_factory=LoopClosureOptions)
     schedule: ScheduleOptions = field(default_factory=ScheduleOptions)
     optimisation: OptimisationOptions = field(default_factory=OptimisationOptions)
+    single_scans: SingleScanOptions = field(default_factory=SingleScanOptions)
     rejection: RobustOptions = field(default_factory=RobustOptions)
     """When a loop contradicts the rest of the graph."""
     uneven_motion: UnevenMotionOptions = field(default_factory=UnevenMotionOptions)

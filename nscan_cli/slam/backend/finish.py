@@ -8,6 +8,7 @@ from nscan_cli.graph.marginal_covariances import marginal_covariances
 from nscan_cli.graph.model import Graph
 from nscan_cli.slam.backend.degenerate_relations import widened_relations
 from nscan_cli.slam.backend.scan_poses import between_keyframes
+from nscan_cli.slam.backend.single_scans import with_even_steps
 from nscan_cli.slam.state import SlamState
 
 
@@ -18,10 +19,11 @@ def finish_graph(state: SlamState) -> Graph:
     anchors = rows[np.searchsorted(rows, np.arange(len(log)), side="right") - 1]
     turn = state.options.optimisation.metres_per_radian
     pairwise, nscan = widened_relations(state)
+    tracked = with_even_steps(np.concatenate(state.tracked), log.odometry, rows, state.options.single_scans)
     graph = Graph(
         scans=log.numbers,
         stamps=list(log.stamps),
-        poses=between_keyframes(np.concatenate(state.tracked), rows, state.poses, state.breaks, turn),
+        poses=between_keyframes(tracked, rows, state.poses, state.breaks, turn),
         odometry=log.odometry,
         anchors=anchors,
         pairwise=pairwise,

@@ -43,6 +43,26 @@ class OptimisationOptions:
 
 
 @dataclass(frozen=True)
+class SingleScanOptions:
+    """When a single scan is off its neighbours, while odometry goes on evenly."""
+
+    min_jump: float = 0.1
+    """Least difference of the step from it and that to it, m. A larger value leaves more scans where they
+    were matched."""
+    max_share: float = 0.25
+    """Largest share of this difference that odometry may have, too. A larger value believes odometry more
+    often."""
+    max_return: float = 0.5
+    """What both steps are off odometry adds up to at most this share of their difference. With a larger value
+    the scan may also part its neighbours."""
+    max_step: float = 0.1
+    """Longest step by odometry to such a scan and from it, m: over longer ones odometry tells less than the
+    match. A larger value believes odometry more often."""
+    metres_per_radian: float = 1.0
+    """A turn by 1 rad counts as this length, m. A larger value finds more scans that are turned."""
+
+
+@dataclass(frozen=True)
 class UnevenMotionOptions:
     """When and how the path of a robot is matched more finely, if its laser turns."""
 
