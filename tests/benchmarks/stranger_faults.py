@@ -160,7 +160,7 @@ FAULTS: tuple[tuple[str, Fault, str], ...] = (
     ("looks 30° left", _looking(-30.0), "(29|30|31)° further to the left"),
     ("odometry 30 s late", lambda log: odometry_faults.late(log, 30.0), "clock of odometry"),
     ("odometry 3 s early", lambda log: odometry_faults.late(log, -3.0), "clock of odometry"),
-    ("odometry 1 s late", lambda log: odometry_faults.late(log, 1.0), "clock of odometry"),
+    ("odometry 1 s late", lambda log: odometry_faults.late(log, 1.0), "odometry is stamped"),
     ("two posts of 20°", _posts((35.0, 55.0, 0.3), (-55.0, -35.0, 0.3)), "see the robot itself"),
     ("a wheel of 15° at 0.15 m", _posts((70.0, 85.0, 0.15)), "see the robot itself"),
     ("a sixth of the beams always says 5 m", lambda log: faults.dead_beams(log, 5.0), "exactly the same"),
