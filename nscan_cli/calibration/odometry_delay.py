@@ -14,7 +14,6 @@ from nscan_cli.calibration.parabola import parabola_minimum
 from nscan_cli.calibration.scan_motion import ScanMotion
 from nscan_cli.calibration.sweep_options import SweepCheckOptions
 from nscan_cli.calibration.turn_of_file import usual_turn
-from nscan_cli.logs.beam_times import BeamTimes
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.logs.odometry_interpolation import interpolated_poses
 from nscan_cli.logs.robot_path import RobotPath, poses_at, robot_path
@@ -36,7 +35,7 @@ def odometry_delay(log: LaserLog, motion: ScanMotion, options: SweepCheckOptions
         turns = np.array(list(measured.values()))
         count = np.count_nonzero(np.abs(turns) > options.min_winding)
         if count >= options.few_delay_turns:
-            delay, gain = _best_delay(log, path, log.beam_times, np.array(list(measured)), turns, options)
+            delay, gain = _best_delay(log, path, np.array(list(measured)), turns, options)
             if gain > options.no_delay_gain:
                 return 0.0
             if count < options.min_delay_turns and gain > options.few_delay_gain:
@@ -45,15 +44,14 @@ def odometry_delay(log: LaserLog, motion: ScanMotion, options: SweepCheckOptions
 
 
 def _best_delay(
-    log: LaserLog, path: RobotPath, beams: BeamTimes, rows: Indices, turned: Array, options: SweepCheckOptions
+    log: LaserLog, path: RobotPath, rows: Indices, turned: Array, options: SweepCheckOptions
 ) -> tuple[float, float]:
     """The delay (s) with which odometry disagrees least with the turns (n,) at rows (n,), 0 in doubt.
 
     Also returns the disagreement with it as a share of that without it.
     """
-    # What a scan tells is where the robot is at its middle beam.
-    middle = beams.first + 0.5 * (log.beam_counts() - 1) * beams.step
-    begin, end = (log.times + middle)[rows - 1], (log.times + middle)[rows + 1]
+    times = middle_times(log)
+    begin, end = times[rows - 1], times[rows + 1]
     heading = np.unwrap(path.poses[:, 2])
     count = round(options.longest_delay / options.delay_step)
     delays = options.delay_step * np.arange(-count, count + 1, dtype=np.float64)
@@ -67,6 +65,14 @@ def _best_delay(
         return 0.0, gain
     delay = round(parabola_minimum(delays, off, options.delays_fitted), 3)
     return (delay if abs(delay) >= options.least_delay else 0.0), gain
+
+
+def middle_times(log: LaserLog) -> Array:
+    """(S,) times of the middle beams, s: where the robot is then is what a scan tells."""
+    beams = log.beam_times
+    return (
+        log.times if beams is None else log.times + beams.first + 0.5 * (log.beam_counts() - 1) * beams.step
+    )
 
 
 def _turning(motion: ScanMotion, options: SweepCheckOptions) -> list[int]:

@@ -1,4 +1,4 @@
-"""How late the odometry is against the scans of a laser that sees at once.
+"""How late the odometry is against the scans, by a tenth of a second or more, with any laser.
 
 The steps that the check of a file measures tell it: their turns by scans fit best to those by odometry some
 time before or after. A robot that is stamped late drives on in its odometry while it stands in its scans.
@@ -11,7 +11,7 @@ from dataclasses import replace
 import numpy as np
 
 from nscan_cli.calibration.measured_steps import KnownSteps, measure_steps
-from nscan_cli.calibration.odometry_delay import said_late, with_delay
+from nscan_cli.calibration.odometry_delay import middle_times, said_late, with_delay
 from nscan_cli.calibration.odometry_options import LagOptions
 from nscan_cli.calibration.options import FileCheckOptions
 from nscan_cli.calibration.parabola import parabola_minimum
@@ -28,7 +28,7 @@ def checked_lag(
 
     More steps are measured only if those that are `known` show a lag.
     """
-    if log.odometry is None or log.beam_times is not None or reading.clock_offset:
+    if log.odometry is None or reading.clock_offset:
         return log, reading, []
     rows = np.array([pair for pair, step in known.items() if step is not None], dtype=np.int64).reshape(-1, 2)
     turned = np.array([step[0][2] for step in known.values() if step is not None])
@@ -59,8 +59,9 @@ def _lag(
     at, headings = at[is_known], np.unwrap(headings[is_known])
     count = round(options.longest / options.step)
     lags = options.step * np.arange(-count, count + 1, dtype=np.float64)[:, None]
-    by_odometry = np.interp(log.times[last[turns]] - lags, at, headings)
-    by_odometry -= np.interp(log.times[first[turns]] - lags, at, headings)
+    times = middle_times(log)
+    by_odometry = np.interp(times[last[turns]] - lags, at, headings)
+    by_odometry -= np.interp(times[first[turns]] - lags, at, headings)
     # A match that failed, or a wheel that slipped, counts for no more than another turn.
     off = np.minimum(np.abs(by_odometry - turned[turns]), options.max_difference)
     total = off.mean(axis=1)

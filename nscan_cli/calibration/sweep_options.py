@@ -124,7 +124,7 @@ class SweepCheckOptions:
     """How turns of the robot are found."""
     time: SweepTimeOptions = field(default_factory=SweepTimeOptions)
     """How the time of a turn is measured where the file has none, and by `calibrate`."""
-    longest_delay: float = 0.4
+    longest_delay: float = 1.0
     """Longest delay of odometry that is looked for, s. A larger value takes longer."""
     delay_step: float = 0.01
     """Interval between the delays that are tried, s. A smaller value takes longer."""

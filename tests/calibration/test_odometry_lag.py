@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from nscan_cli.calibration.file_check import CheckedFile, checked_file
+from nscan_cli.calibration.odometry_delay import with_delay
 from nscan_cli.calibration.odometry_options import LagOptions
 from nscan_cli.calibration.options import FileCheckOptions
 from nscan_cli.logs.laser_log import LaserLog
@@ -16,7 +17,7 @@ from nscan_cli.logs.load import read_log
 from nscan_cli.logs.reading_options import ReadingOptions
 from nscan_cli.slam.consistency.repeated_maps import mirrored
 from tests.calibration.test_file_check import drive
-from tests.data import data_file
+from tests.data import TURNING_LOG, data_file
 from tests.simulation import odometry_faults
 
 
@@ -60,3 +61,10 @@ def test_one_real_robot_is_early_also_in_the_mirrored_world():
     for world in (log, mirrored(log)):
         (said,) = (message for message in checked(world).messages if "stamped" in message)
         assert re.match(r"odometry is stamped 0\.6\d s too early", said)
+
+
+@pytest.mark.parametrize("seconds", [-1.2, -0.45, 0.45, 1.2])
+def test_the_lag_of_a_laser_that_turns_is_found_beyond_a_turn(seconds):
+    log = read_log(TURNING_LOG)
+    found = checked(with_delay(log, seconds))
+    assert found.reading.clock_offset == pytest.approx(-seconds, abs=0.05)
