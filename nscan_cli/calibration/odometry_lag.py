@@ -1,7 +1,7 @@
 """How late the odometry is against the scans, by a tenth of a second or more, with any laser.
 
 The steps that the check of a file measures tell it: their turns by scans fit best to those by odometry some
-time before or after. A robot that is stamped late drives on in its odometry while it stands in its scans.
+time before or after. Where odometry is late, the robot still drives in it when it stands in the scans.
 """
 
 from __future__ import annotations

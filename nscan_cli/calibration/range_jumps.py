@@ -132,19 +132,25 @@ def _matched_factor(log: LaserLog, row: int, factor: float, options: FileCheckOp
     best = int(np.argmin(total))
     if best in (0, len(near) - 1) or (of_all[:, best] > np.array(as_read) - jumps.min_gain).any():
         return None
-    scale = math.exp(near[best])
-    across = [_Across.at(log, *rows, scale, options) for rows in pairs]
-    if any(each.gain <= jumps.min_gain for each in across):
-        return None
-    before, behind = (_Across.at(log, first, first + 1, 1.0, options) for first in (row - 2, row))
-    # A slope that comes into view lets all ranges grow as well, and the scans match after a wrong step.
-    if across[0].misfit > max(before.misfit, behind.misfit) + jumps.max_misfit:
-        return None
-    sides = before.step, behind.step / (scale, scale, 1.0)
-    if not lead_one_way([each.step for each in across], sides, jumps.max_off, jumps.max_turn_off):
+    if not _agree(log, row, math.exp(near[best]), options):
         return None
     found = parabola_minimum(near, total)
     return math.exp(found) if abs(found) > math.log(jumps.min_factor) else None
+
+
+def _agree(log: LaserLog, row: int, scale: float, options: FileCheckOptions) -> bool:
+    """Whether the matches with the ranges from a row on divided by a scale agree with each other and with
+    odometry, and are better than those of the scans as they are."""
+    jumps = options.jumps
+    before, behind = (_ScaledMatch.of(log, first, first + 1, 1.0, options) for first in (row - 2, row))
+    across = [_ScaledMatch.of(log, *rows, scale, options) for rows in pairs_across(row)]
+    if any(each.gain <= jumps.min_gain for each in across):
+        return False
+    # A slope that comes into view lets all ranges grow as well, and the scans match after a wrong step.
+    if across[0].misfit > max(before.misfit, behind.misfit) + jumps.max_misfit:
+        return False
+    sides = before.step, behind.step / (scale, scale, 1.0)
+    return lead_one_way([each.step for each in across], sides, jumps.max_off, jumps.max_turn_off)
 
 
 def _energies(
@@ -160,19 +166,22 @@ def _energies(
     return np.array(found) / len(behind)
 
 
-class _Across(NamedTuple):
+class _ScaledMatch(NamedTuple):
     """Two scans, matched with the later one divided by a scale."""
 
     gain: float
-    """By how much the energy per point is lower than that of the scans as they are, from that place on:
+    """By how much the energy per point is lower than that of the scans as they are, matched from there on:
     single things shift where all ranges seem to grow."""
     step: Array
-    """(3,)"""
+    """(3,) of the laser, from the earlier scan to the later one."""
     misfit: float
     """How far the step is off that by odometry, m and rad."""
 
     @classmethod
-    def at(cls, log: LaserLog, first: int, last: int, scale: float, options: FileCheckOptions) -> _Across:
+    def of(
+        cls, log: LaserLog, first: int, last: int, scale: float, options: FileCheckOptions
+    ) -> _ScaledMatch:
+        """The match of two rows, both of which have enough points."""
         pair_of_scans = scans_to_match(log, first, last, options)
         assert pair_of_scans is not None
         before, behind, start = pair_of_scans
