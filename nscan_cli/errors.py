@@ -17,6 +17,10 @@ class NscanError(Exception):
             message = f"{message[: LONGEST_MESSAGE // 2]} … {message[-LONGEST_MESSAGE // 2 :]}"
         super().__init__(message)
 
+    def __reduce__(self) -> tuple[object, ...]:
+        """As it is, so that it comes back from another process. Its class may take other arguments."""
+        return Exception.__new__, (type(self), *self.args), self.__dict__
+
 
 class InputDataError(NscanError):
     """The content of an input is invalid: a damaged file, or one of another kind."""

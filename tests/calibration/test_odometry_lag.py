@@ -33,6 +33,7 @@ def test_a_lag_is_put_right_and_said(seconds):
     assert re.match(rf"odometry is stamped 0\.\d+ s too {'late' if seconds > 0 else 'early'}", said)
     assert found.reading.clock_offset == pytest.approx(-seconds, abs=0.06)
     assert found.log.odometry is not None
+    assert log.odometry is not None
     known = np.isfinite(found.log.odometry[:, 0])
     assert known.mean() > 0.95
     off = np.abs(found.log.odometry - log.odometry)[known]
