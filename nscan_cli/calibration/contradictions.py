@@ -47,7 +47,7 @@ def find_contradictions(
         return []
     # A factor that is offered takes the place of the one that the readings were multiplied by.
     reading = replace(reading, range_scale=log.range_scale)
-    evidence = gathered_evidence(log, log.odometry, options, known)
+    evidence = _evidence(log, options, known)
     if evidence is None or evidence.moving < options.min_steps:
         return []
     is_still = _is_still(log.odometry, options.still)
@@ -85,10 +85,16 @@ def changed_view(
 ) -> Finding | None:
     """A change of the view within a log, the only one of its contradictions that is looked for; None if there
     is none. `known` is that of `find_contradictions`."""
-    evidence = None if log.odometry is None else gathered_evidence(log, log.odometry, options, known)
+    evidence = _evidence(log, options, known)
     if evidence is None or evidence.moving < options.min_steps:
         return None
     return _of_view(log, evidence, reading, options)
+
+
+def _evidence(log: LaserLog, options: FileCheckOptions, known: KnownSteps) -> StepEvidence | None:
+    """The steps of a log and its odometry at the middle beams: that is where scans tell the robot is."""
+    odometry = log.at_middle_of_turns().odometry
+    return None if odometry is None else gathered_evidence(log, odometry, options, known)
 
 
 def _is_still(odometry: Array, still: float) -> Mask:
