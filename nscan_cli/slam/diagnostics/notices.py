@@ -175,7 +175,8 @@ def _view_mismatches(state: SlamState) -> list[str]:
     first, last = state.log.numbers[[worst.first, worst.last]].tolist()
     return [
         f"scans {first} to {last} do not see what the keyframes beside them see: they agree in only "
-        f"{worst.share:.0%} of all directions; someone walks along, or tracking slipped"
+        f"{worst.share:.0%} of all directions; someone walks along, the robot tilts on a slope, or tracking "
+        "slipped"
     ]
 
 
