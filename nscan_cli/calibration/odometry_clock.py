@@ -9,6 +9,7 @@ import numpy as np
 from nscan_cli.calibration.measured_steps import MeasuredSteps
 from nscan_cli.calibration.odometry_options import ClockOptions
 from nscan_cli.calibration.parabola import parabola_minimum
+from nscan_cli.calibration.turn_differences import turn_differences
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.poses import are_known
 
@@ -47,9 +48,8 @@ def clock_lag(
     span = min(options.span, 0.5 * float(log.times[-1] - log.times[0]))
     count = int(np.ceil(span / resolution))
     offsets = resolution * np.arange(-count, count + 1, dtype=np.float64)
-    told = np.interp(ends - offsets[:, None], at, headings)
-    told -= np.interp(begins - offsets[:, None], at, headings)
-    off = np.minimum(np.abs(told - turns), options.max_difference).sum(axis=1) / whole
+    differences = turn_differences((at, headings), (begins, ends), turns, offsets)
+    off = np.minimum(differences, options.max_difference).sum(axis=1) / whole
     best = int(np.argmin(off))
     is_inside = 0 < best < len(off) - 1
     offset = parabola_minimum(offsets, off) if is_inside else float(offsets[best])

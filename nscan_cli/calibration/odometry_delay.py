@@ -13,6 +13,7 @@ import numpy as np
 from nscan_cli.calibration.parabola import parabola_minimum
 from nscan_cli.calibration.scan_motion import ScanMotion
 from nscan_cli.calibration.sweep_options import SweepCheckOptions
+from nscan_cli.calibration.turn_differences import turn_differences
 from nscan_cli.calibration.turn_of_file import usual_turn
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.logs.odometry_interpolation import interpolated_poses
@@ -50,14 +51,11 @@ def _best_delay(
 
     Also returns the disagreement with it as a share of that without it.
     """
-    times = middle_times(log)
-    begin, end = times[rows - 1], times[rows + 1]
-    heading = np.unwrap(path.poses[:, 2])
+    times, headings = log.middle_times, np.unwrap(path.poses[:, 2])
     count = round(options.longest_delay / options.delay_step)
     delays = options.delay_step * np.arange(-count, count + 1, dtype=np.float64)
-    by_odometry = np.interp(end - delays[:, None], path.times, heading)
-    by_odometry -= np.interp(begin - delays[:, None], path.times, heading)
-    off = np.abs(turned - by_odometry).mean(axis=1)
+    steps = times[rows - 1], times[rows + 1]
+    off = turn_differences((path.times, headings), steps, turned, delays).mean(axis=1)
     best = int(np.argmin(off))
     gain = float(off[best] / off[count]) if off[count] > 0.0 else 1.0
     # At an end of the range the best one may lie beyond.
@@ -65,14 +63,6 @@ def _best_delay(
         return 0.0, gain
     delay = round(parabola_minimum(delays, off, options.delays_fitted), 3)
     return (delay if abs(delay) >= options.least_delay else 0.0), gain
-
-
-def middle_times(log: LaserLog) -> Array:
-    """(S,) times of the middle beams, s: where the robot is then is what a scan tells."""
-    beams = log.beam_times
-    return (
-        log.times if beams is None else log.times + beams.first + 0.5 * (log.beam_counts() - 1) * beams.step
-    )
 
 
 def _turning(motion: ScanMotion, options: SweepCheckOptions) -> list[int]:

@@ -11,11 +11,12 @@ from dataclasses import replace
 import numpy as np
 
 from nscan_cli.calibration.measured_steps import KnownSteps, measure_steps
-from nscan_cli.calibration.odometry_delay import middle_times, said_late, with_delay
+from nscan_cli.calibration.odometry_delay import said_late, with_delay
 from nscan_cli.calibration.odometry_options import LagOptions
 from nscan_cli.calibration.options import FileCheckOptions
 from nscan_cli.calibration.parabola import parabola_minimum
 from nscan_cli.calibration.step_sampling import telling_steps
+from nscan_cli.calibration.turn_differences import turn_differences
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.logs.reading_options import ReadingOptions
 from nscan_cli.poses import Array, Indices
@@ -56,21 +57,19 @@ def _lag(
     is_known, turns = np.isfinite(headings), np.abs(turned) >= options.min_turn
     if np.count_nonzero(turns) < options.min_turns or not is_known.any():
         return 0.0
-    at, headings = at[is_known], np.unwrap(headings[is_known])
+    known = at[is_known], np.unwrap(headings[is_known])
     count = round(options.longest / options.step)
-    lags = options.step * np.arange(-count, count + 1, dtype=np.float64)[:, None]
-    times = middle_times(log)
-    by_odometry = np.interp(times[last[turns]] - lags, at, headings)
-    by_odometry -= np.interp(times[first[turns]] - lags, at, headings)
+    lags = options.step * np.arange(-count, count + 1, dtype=np.float64)
+    steps, turned = (log.middle_times[first[turns]], log.middle_times[last[turns]]), turned[turns]
     # A match that failed, or a wheel that slipped, counts for no more than another turn.
-    off = np.minimum(np.abs(by_odometry - turned[turns]), options.max_difference)
+    off = np.minimum(turn_differences(known, steps, turned, lags), options.max_difference)
     total = off.mean(axis=1)
     best = int(np.argmin(total))
     gains = off[count] - off[best]
     sigma = float(gains.std(ddof=1)) / np.sqrt(len(gains))
-    whole = float(np.minimum(np.abs(turned[turns]), options.max_difference).mean())
+    whole = float(np.minimum(np.abs(turned), options.max_difference).mean())
     is_clear = total[best] <= min(options.max_left * total[count], options.max_disagreement * whole)
     if best in (0, 2 * count) or not is_clear or gains.mean() < sigmas * sigma:
         return 0.0
-    lag = round(parabola_minimum(lags[:, 0], total, options.fitted), 2)
+    lag = round(parabola_minimum(lags, total, options.fitted), 2)
     return lag if abs(lag) >= options.least else 0.0

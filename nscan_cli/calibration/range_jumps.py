@@ -142,10 +142,10 @@ def _agree(log: LaserLog, row: int, scale: float, options: FileCheckOptions) -> 
     """Whether the matches with the ranges from a row on divided by a scale agree with each other and with
     odometry, and are better than those of the scans as they are."""
     jumps = options.jumps
-    before, behind = (_ScaledMatch.of(log, first, first + 1, 1.0, options) for first in (row - 2, row))
     across = [_ScaledMatch.of(log, *rows, scale, options) for rows in pairs_across(row)]
     if any(each.gain <= jumps.min_gain for each in across):
         return False
+    before, behind = (_ScaledMatch.of(log, first, first + 1, 1.0, options) for first in (row - 2, row))
     # A slope that comes into view lets all ranges grow as well, and the scans match after a wrong step.
     if across[0].misfit > max(before.misfit, behind.misfit) + jumps.max_misfit:
         return False

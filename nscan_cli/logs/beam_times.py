@@ -24,6 +24,10 @@ class BeamTimes(NamedTuple):
         """The times of the beams of some scans."""
         return BeamTimes(self.first[rows], self.step[rows])
 
+    def middles(self, beams: NDArray[np.int64]) -> Array:
+        """(S,) times of the middle beams, s, of scans with so many `beams` (S,)."""
+        return self.first + 0.5 * (beams - 1) * self.step
+
 
 @kernel
 def swept_points(

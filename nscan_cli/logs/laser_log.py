@@ -186,6 +186,12 @@ class LaserLog:
         times = self.beam_times.of(rows)
         return points, ends, times.first[scans] + times.step[scans] * beams
 
+    @property
+    def middle_times(self) -> Array:
+        """(S,) times of the middle beams, s: what a scan tells is where the robot is then."""
+        beams = self.beam_times
+        return self.times if beams is None else self.times + beams.middles(self.beam_counts())
+
     def at_middle_of_turns(self) -> LaserLog:
         """The log with each scan at the time of its middle beam, and the odometry there, if the laser turns.
 
@@ -193,7 +199,7 @@ class LaserLog:
         """
         if self.beam_times is None:
             return self
-        middle = self.beam_times.first + 0.5 * (self.beam_counts() - 1) * self.beam_times.step
+        middle = self.beam_times.middles(self.beam_counts())
         times, odometry, path = self.times + middle, self.odometry, self.odometry_path
         if odometry is not None:
             path = path or robot_path(self.times, odometry)

@@ -8,7 +8,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from nscan_cli.poses import Array, Indices, compose, inverse, relative, wrap
+from nscan_cli.logs.robot_path import bent_between
+from nscan_cli.poses import Array, Indices, relative, wrap
 from nscan_cli.slam.backend.options import SingleScanOptions
 
 
@@ -30,13 +31,8 @@ def with_even_steps(
     is_near = np.maximum(lengths[1:], lengths[:-1]) < options.max_step
     is_off = is_near & (jump > options.min_jump) & (turn < options.max_share * jump) & returns
     rows = np.setdiff1d(np.flatnonzero(is_off) + 1, keyframes)
-    found = tracked.copy()
-    before = compose(tracked[rows - 1], by_odometry[rows - 1])
-    after = compose(tracked[rows + 1], inverse(by_odometry[rows]))
-    apart = after - before
-    apart[:, 2] = wrap(apart[:, 2])
-    found[rows] = before + 0.5 * apart
-    found[rows, 2] = wrap(found[rows, 2])
+    found, beside = tracked.copy(), (rows - 1, rows + 1)
+    found[rows] = bent_between(odometry[rows], odometry, tracked, beside, np.full(len(rows), 0.5))
     return found
 
 
