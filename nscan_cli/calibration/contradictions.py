@@ -22,17 +22,20 @@ from nscan_cli.calibration.step_evidence import (
     is_nearer,
     is_wrong_scale,
     looks_like,
+    never_changes,
     turns_agree,
 )
 from nscan_cli.calibration.step_sampling import telling_steps
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.logs.reading_options import ReadingOptions
-from nscan_cli.poses import MIRRORED, Array, Mask, are_known, relative, wrap
+from nscan_cli.poses import MIRRORED, Array, wrap
 
 BACKWARDS = np.array([-1.0, -1.0, 1.0])
 """Factors of a mounting: of a robot that counts forward as backward the laser seems to be there, turned."""
 ONE_AXIS_REVERSED = np.array([-1.0, 1.0, 1.0])
 """Factors of poses: with x and y it is the same, seen from behind; so it is with the sign of headings."""
+UNMEASURED = 0.01
+"""Turns by odometry below this share of those by scans are none: rounding."""
 
 
 def find_contradictions(
@@ -48,9 +51,14 @@ def find_contradictions(
     # A factor that is offered takes the place of the one that the readings were multiplied by.
     reading = replace(reading, range_scale=log.range_scale)
     evidence = _evidence(log, options, known)
-    if evidence is None or evidence.moving < options.min_steps:
+    if evidence is None:
         return []
-    is_still = _is_still(log.odometry, options.still)
+    unchanged, driven = evidence.unchanged
+    if unchanged >= max(options.min_steps, options.min_unchanged_share * driven):
+        return [findings.unchanging_scans(unchanged, driven)]
+    if evidence.moving < options.min_steps:
+        return []
+    is_still = never_changes(log.odometry, options.still)
     if is_still[:2].all():
         return [findings.frozen(evidence, "odometry" if is_still[2] else "the position by odometry")]
     view = _of_view(log, evidence, reading, options)
@@ -97,22 +105,17 @@ def _evidence(log: LaserLog, options: FileCheckOptions, known: KnownSteps) -> St
     return None if odometry is None else gathered_evidence(log, odometry, options, known)
 
 
-def _is_still(odometry: Array, still: float) -> Mask:
-    """(3,) which of the robot's coordinates never change, seen from its first pose."""
-    known = odometry[are_known(odometry)]
-    moves = np.abs(relative(known, known[0])).max(axis=0)
-    never: Mask = moves < still
-    return never
-
-
 def _are_told(turns: TurnFit, options: FileCheckOptions) -> bool:
     """Whether turns by odometry are a multiple of those by scans."""
-    return turns.steps >= options.min_steps and turns.spread <= options.max_spread
+    least = options.min_turns_unmeasured if abs(turns.ratio) < UNMEASURED else options.min_steps
+    return turns.steps >= least and turns.spread <= options.max_spread
 
 
 def _are_opposite(turns: TurnFit, evidence: StepEvidence, options: FileCheckOptions) -> bool:
     """Whether odometry turns the other way than the scans: in most steps, or by a clear multiple."""
-    is_most = turns.steps >= options.min_steps and evidence.opposite_share >= options.min_opposite_share
+    share = evidence.opposite_share
+    is_most = share >= options.min_opposite_share
+    is_most &= (2.0 * share - 1.0) * turns.steps >= options.min_opposite_excess
     return turns.ratio < 0.0 and (_are_told(turns, options) or is_most)
 
 

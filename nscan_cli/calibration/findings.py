@@ -19,6 +19,8 @@ from nscan_cli.logs.reading_options import ReadingOptions
 from nscan_cli.poses import Array, transform, wrap
 
 UNDONE = "--as-recorded uses it as it is"
+RANGE_UNITS = {"feet": 0.3048, "inches": 0.0254}
+"""Units in metres that ranges come in, and that no odometry is so much larger than."""
 
 
 @dataclass(frozen=True)
@@ -43,6 +45,15 @@ def frozen(evidence: StepEvidence, what: str) -> Finding:
     """Odometry, or the part of it that `what` names, never moves."""
     seen = f"{evidence.moving} of {counted(len(evidence.laser), 'step')}"
     return _unused(f"{what} never moves, but the scans do in {seen}")
+
+
+def unchanging_scans(unchanged: int, driven: int) -> Finding:
+    """What the laser sees goes along with the robot."""
+    return Finding(
+        f"the scans stay the same while the robot drives by odometry, in {unchanged} of "
+        f"{counted(driven, 'step')}: the laser likely is tilted and sees the floor, or is covered, or sees "
+        "mostly the robot itself; leave out such bearings with --mask, or the map is wrong"
+    )
 
 
 def excluded(evidence: StepEvidence) -> Finding:
@@ -124,6 +135,14 @@ def wrong_scale(fit: MountFit, reading: ReadingOptions, options: FileCheckOption
     is_decimal = abs(fit.scale / decimal - 1.0) <= options.decimal_tolerance
     scale = reading.odometry_scale * (decimal if is_decimal else float(f"{fit.scale:.3g}"))
     evidence = f"one metre by odometry is {fit.scale:.3g} m by scans, in {counted(fit.steps, 'step')}"
+    for unit, metres in RANGE_UNITS.items():
+        if abs(fit.scale * metres - 1.0) <= options.range_unit_tolerance:
+            return Finding(
+                f"the ranges are likely in {unit}: {evidence}; try --range-scale "
+                f"{(reading.range_scale or 1.0) * metres:g}; as it is, the map is in {unit}, and "
+                f"positions by odometry are multiplied, as by --odometry-scale {scale:g}; {UNDONE}",
+                {"odometry_scale": scale},
+            )
     ranges = f"{(reading.range_scale or 1.0) / fit.scale:.3g}"
     is_either = not is_decimal and max(fit.scale, 1.0 / fit.scale) <= options.max_range_factor
     other = (

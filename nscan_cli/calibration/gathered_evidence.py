@@ -12,6 +12,7 @@ from nscan_cli.calibration.step_evidence import (
     is_change,
     is_view_in_doubt,
     is_wrong_scale,
+    never_changes,
 )
 from nscan_cli.calibration.step_sampling import telling_steps
 from nscan_cli.logs.laser_log import LaserLog
@@ -57,10 +58,16 @@ def _growing(
 
 def _is_in_doubt(evidence: StepEvidence, mount: Array, options: FileCheckOptions) -> bool:
     """Whether a few more steps may tell: the scale of odometry is wrong by no more than the wheels of some
-    robots are, or the laser, mounted at (3,), was perhaps turned."""
-    fit = evidence.fit
+    robots are, or the laser, mounted at (3,), was perhaps turned, or the few turns are opposite."""
+    fit, turning = evidence.fit, evidence.turning
     if is_view_in_doubt(evidence, mount, options):
         return True
+    if turning < options.min_steps:
+        is_opposite = evidence.opposite_share >= options.min_opposite_share
+        if (is_opposite and turning >= options.view.doubt_steps) or (
+            never_changes(evidence.poses, options.still)[2]
+        ):
+            return True
     if fit is None:
         return False
     is_odd = is_wrong_scale(fit, options) and max(fit.scale, 1.0 / fit.scale) < options.clear_scale_factor

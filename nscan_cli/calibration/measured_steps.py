@@ -10,6 +10,7 @@ import numpy as np
 from nscan_cli.calibration.options import StepOptions
 from nscan_cli.calibration.thinned_scans import thinned_scan
 from nscan_cli.logs.laser_log import LaserLog
+from nscan_cli.matching.correlative_search import likelihood_field, search
 from nscan_cli.matching.scan_pairs import match_scans
 from nscan_cli.matching.uncertainty import covariance_of, why_no_minimum
 from nscan_cli.poses import Array, Indices, relative
@@ -101,8 +102,16 @@ def _measured(
     """
     if reference is None or points is None:
         return None
-    match = match_scans(reference, points, np.zeros(3), options.pair, options.probe)
-    if not match.converged or match.overlap < options.min_overlap or match.apart > options.agreement:
+    pair, probe, least = options.pair, options.probe, options.min_overlap
+    match = match_scans(reference, points, np.zeros(3), pair, probe)
+    if match.overlap < least:
+        # Outdoors, with few returns or at speed, the robot may have come too far for a match to find it.
+        field = likelihood_field(reference, options.search)
+        found = search(field, points, np.zeros(3), 0.0, options.search)
+        if found is None:
+            return None
+        match, least = match_scans(reference, points, found.pose, pair, probe), options.min_searched_overlap
+    if not match.converged or match.overlap < least or match.apart > options.agreement:
         return None
     covariance = covariance_of(match.information)
     if covariance is None or why_no_minimum(match.gradient, covariance, options.pair.convergence) is not None:

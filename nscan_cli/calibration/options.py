@@ -16,6 +16,7 @@ from nscan_cli.calibration.odometry_options import (
 )
 from nscan_cli.calibration.range_jump_options import BearingJitterOptions, OrderJumpOptions, RangeJumpOptions
 from nscan_cli.calibration.sweep_options import SweepCheckOptions
+from nscan_cli.matching.correlative_search import SearchOptions
 from nscan_cli.matching.pairwise import PairOptions
 
 
@@ -47,6 +48,12 @@ class StepOptions:
     most. With a larger value they come from more places, and turn less."""
     min_overlap: float = 0.6
     """Least share of a scan's points that lie on the other scan. A larger share accepts fewer steps."""
+    search: SearchOptions = field(default_factory=lambda: SearchOptions(distance=2.5, turn=0.8))
+    """The search for a step whose scans do not overlap so much. A wider one finds faster robots and takes
+    longer."""
+    min_searched_overlap: float = 0.5
+    """Least share of a scan's points that lie on the other scan where the search has found the step: outdoors
+    half of what a scan sees may be new. A larger share accepts fewer steps."""
     max_beams: int = 180
     """Approximate number of beams of a scan that are matched, evenly spread. More tell more and take
     longer."""
@@ -144,6 +151,11 @@ class FileCheckOptions:
     min_steps: int = 12
     """Least number of steps with motion, or with a turn, that a finding rests on. A larger value finds
     less."""
+    min_turns_unmeasured: int = 4
+    """Least number of steps with a turn by scans where odometry never turns. A larger value finds less."""
+    min_unchanged_share: float = 0.6
+    """Least share of the steps with motion by odometry in which the scans stay the same, where the laser
+    likely sees what goes along with the robot. A larger value finds less."""
     still: float = 1e-3
     """Odometry never moves if it stays this near to its first pose, m and rad. A larger value counts small
     motions as none."""
@@ -181,6 +193,9 @@ class FileCheckOptions:
     decimal_tolerance: float = 0.08
     """A scale this near to a power of ten (relative) is that power: the file is in millimetres or
     centimetres. A larger value rounds more scales."""
+    range_unit_tolerance: float = 0.1
+    """Ranges are likely in feet or inches if odometry and scans differ by that factor within this share: the
+    wheels of a robot may be off, too. A larger value says it more often."""
     max_range_factor: float = 10.0
     """A warning of a wrong scale says that the ranges may be wrong instead, up to this factor: with a larger
     one they are not those of a room, as a user sees. A larger value says it more often."""
@@ -189,6 +204,8 @@ class FileCheckOptions:
     min_opposite_share: float = 0.8
     """Odometry turns the other way if its turns are opposite to those by scans in this share of the steps,
     however much their sizes vary. A larger value finds less."""
+    min_opposite_excess: float = 7.0
+    """So many more steps must turn the other way than the same. A larger value finds less."""
     more_steps: int = 200
     """Number of steps of each half of the sample if turns disagree, to find the offset of the clocks; also
     the limit where scans tell little. More take longer."""

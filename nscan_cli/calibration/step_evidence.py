@@ -12,7 +12,10 @@ from nscan_cli.calibration.mount_fit import MountFit, TurnFit, fit_mount, fit_tu
 from nscan_cli.calibration.options import FileCheckOptions
 from nscan_cli.calibration.scale_change import ScaleChange, scale_change
 from nscan_cli.calibration.view_change import DirectionChange, TurnChange, direction_change, turn_change
-from nscan_cli.poses import MIRRORED, Array, are_known, transform, wrap
+from nscan_cli.poses import MIRRORED, Array, Mask, are_known, relative, transform, wrap
+
+CLEAR_MOTION = 2.0
+"""Motion of so many times the least one is clearly some."""
 
 
 class StepEvidence:
@@ -37,6 +40,16 @@ class StepEvidence:
     def turning(self) -> int:
         """The number of steps with a turn by scans."""
         return int(self._is_turning.sum())
+
+    @property
+    def unchanged(self) -> tuple[int, int]:
+        """The number of steps without motion by scans, and of all, among those that are clearly some by
+        odometry."""
+        least = CLEAR_MOTION * self.options.steps.min_motion
+        driven = (np.hypot(self.odometry[:, 0], self.odometry[:, 1]) >= least) | (
+            np.abs(self.odometry[:, 2]) >= least
+        )
+        return int((driven & ~self._is_moving).sum()), int(driven.sum())
 
     @property
     def opposite_share(self) -> float:
@@ -129,6 +142,15 @@ def _length_sigmas(laser: Array, covariances: Array) -> Array:
     along = laser[:, :2] / np.maximum(lengths, np.finfo(float).tiny)[:, None]
     sigmas: Array = np.sqrt(np.einsum("ni,nij,nj->n", along, covariances[:, :2, :2], along))
     return sigmas
+
+
+def never_changes(odometry: Array, still: float) -> Mask:
+    """(3,) which coordinates of the robot in poses (S, 3) stay within `still` (m, rad), seen from the first
+    one."""
+    known = odometry[are_known(odometry)]
+    moves = np.abs(relative(known, known[0])).max(axis=0)
+    never: Mask = moves < still
+    return never
 
 
 def explains(fit: MountFit | None, options: FileCheckOptions) -> bool:

@@ -94,12 +94,13 @@ def floor_line(
     never turns."""
     first, step = float(table.angle_min[table.rows[0]]), float(table.angle_increment[table.rows[0]])
     beams = table.ranges.shape[1]
-    every = int(np.clip(options.step / max(abs(step), 1e-12), 1, max(beams, 1)))
+    every = int(np.clip(np.round(options.step / max(abs(step), 1e-12)), 1, max(beams, 1)))
+    spacing = every * abs(step)
     bearings = np.sort(first + step * np.arange(0, beams, every))
     bearings = bearings[~in_sectors(bearings, sectors)]
     ranges = ranges_at(table, evenly(len(table.rows), options.scans), bearings)
-    line = _fitted(ranges, bearings, options)
-    if line is None or not _ends_views(line, ranges, bearings, options):
+    line = _fitted(ranges, bearings, spacing, options)
+    if line is None or not _ends_views(line, ranges, bearings, spacing, options):
         return None
     # Walls show the turns, and the floor none.
     without = table.ranges.copy()
@@ -110,11 +111,15 @@ def floor_line(
     if len(pairs) < parts.min_pairs:
         return None
     turning = np.unique(np.linspace(pairs[:, 0], pairs[:, 1], parts.scans_of_turn).astype(np.int64))
-    return line if _ends_views(line, ranges_at(table, turning, bearings), bearings, options) else None
+    seen = ranges_at(table, turning, bearings)
+    return line if _ends_views(line, seen, bearings, spacing, options) else None
 
 
-def _fitted(ranges: NDArray[np.float32], bearings: Array, options: FloorLineOptions) -> FloorLine | None:
-    """The line through the farthest readings of bearings (B,) in which many of the ranges (n, B) are."""
+def _fitted(
+    ranges: NDArray[np.float32], bearings: Array, spacing: float, options: FloorLineOptions
+) -> FloorLine | None:
+    """The line through the farthest readings of bearings (B,), `spacing` (rad) apart, in which many of the
+    ranges (n, B) are."""
     ordered = np.sort(np.where(np.isfinite(ranges), ranges, np.inf), axis=0)
     counts = np.isfinite(ordered).sum(axis=0)
     at = np.minimum((options.quantile * counts).astype(np.int64), len(ordered) - 1)
@@ -125,7 +130,7 @@ def _fitted(ranges: NDArray[np.float32], bearings: Array, options: FloorLineOpti
     rows = np.stack([np.cos(bearings), np.sin(bearings)], axis=1) * ends[:, None]
     line = None
     for _ in range(4):
-        if np.count_nonzero(used) * options.step < options.min_width:
+        if np.count_nonzero(used) * spacing < options.min_width:
             return None
         line = FloorLine(np.linalg.lstsq(rows[used], np.ones(np.count_nonzero(used)), rcond=None)[0])
         used &= np.abs(rows @ line.across - 1.0) <= options.tolerance
@@ -133,7 +138,11 @@ def _fitted(ranges: NDArray[np.float32], bearings: Array, options: FloorLineOpti
 
 
 def _ends_views(
-    line: FloorLine, ranges: NDArray[np.float32], bearings: Array, options: FloorLineOptions
+    line: FloorLine,
+    ranges: NDArray[np.float32],
+    bearings: Array,
+    spacing: float,
+    options: FloorLineOptions,
 ) -> bool:
     """Whether many of the ranges (n, B) are on a line, over a wide enough view, and hardly any beyond it."""
     if line.distance > options.max_distance:
@@ -148,7 +157,7 @@ def _ends_views(
     is_seen = on_line.sum(axis=0) >= options.min_share * np.maximum(known.sum(axis=0), 1)
     beyond = np.count_nonzero(known & (depths > 1.0 + options.tolerance))
     is_end = beyond <= options.max_beyond_share * np.count_nonzero(known)
-    return bool(is_end and np.count_nonzero(is_seen) * options.step >= options.min_width)
+    return bool(is_end and np.count_nonzero(is_seen) * spacing >= options.min_width)
 
 
 def without_floor(
