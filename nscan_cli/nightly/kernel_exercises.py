@@ -119,15 +119,20 @@ def _others() -> None:
     drive = simulated_carmen_log()
     log = log_from(drive, "warm-up.log")
     match(log, 0, 2)
+    nscan(log, [0, 1, 2])
     # From so far off, the scans are placed by search.
     nscan(log, [0, 4, 8, 12], np.array([(0, 0, 0), (1.4, -1.4, 0.5), (-1.4, 1.2, -0.5), (0, 1.4, 0.5)]))
     # A drive of one lap may leave the robot open, but its kernels are compiled by then.
     with contextlib.suppress(InputDataError):
         calibrate(log, log.reading, CalibrationOptions())
-    # Without odometry, and as a turning laser whose motion counts as uneven everywhere.
-    options = slam_options()
-    options = replace(options, uneven_motion=replace(options.uneven_motion, min_change=0.0))
-    for reading in (ReadingOptions(end=20.0, odometry=False), ReadingOptions(end=20.0, sweep=0.2)):
+    # Without odometry and joint matches, and as a turning laser whose motion counts as uneven everywhere.
+    usual = slam_options()
+    pairs = replace(usual, relations="pairwise")
+    uneven = replace(usual, uneven_motion=replace(usual.uneven_motion, min_change=0.0))
+    for options, reading in (
+        (pairs, ReadingOptions(end=20.0, odometry=False)),
+        (uneven, ReadingOptions(end=20.0, sweep=0.2)),
+    ):
         log = log_from(drive, "warm-up.log", reading)
         _, graph = map_log(log, reading, options, THREADS, lambda *_progress: None)
         occupancy_grid(log, np.arange(len(log)), graph.poses, threads=THREADS)

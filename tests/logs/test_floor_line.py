@@ -74,6 +74,8 @@ def test_real_lasers_that_are_level_and_tilted(name):
     assert line.distance == pytest.approx(3.05, abs=0.05)
 
 
-@pytest.mark.parametrize("name", ["field/urg-corridor-1.bag", "field/player-2.1.2.log", "fr-clinic.log.gz"])
+@pytest.mark.parametrize(
+    "name", ["field/urg-corridor-1.bag", "field/player-2.1.2.log", "fr-clinic.log.gz", "walker.mcap"]
+)
 def test_other_real_logs_have_none(name):
     assert "of the floor" not in read_log(str(data_file(name))).report.lost

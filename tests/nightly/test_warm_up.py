@@ -126,8 +126,10 @@ def test_the_drive_has_what_a_night_can_have():
 
 NEEDED_LATER = """
 import sys
-from nscan_cli import build_graph, read_log
+from nscan_cli import build_graph, nscan, read_log
 from nscan_cli.kernels.decorators import Kernel
+from nscan_cli.logs.reading_options import ReadingOptions
+from nscan_cli.slam.log_to_graph import map_log, slam_options
 from nscan_cli.nightly import kernel_exercises
 loaded, load = [], Kernel._load_or_compile
 def noted(kernel, types, arguments):
@@ -139,9 +141,12 @@ for parts in kernel_exercises.FOR_ALL:
 exercised = len(loaded)
 for log in sys.argv[1:]:
     build_graph(read_log(log))
+log = read_log(sys.argv[1])
+nscan(log, list(range(0, 30, 3)))
+map_log(log, ReadingOptions(), slam_options(relations="pairwise"), 1, lambda *_progress: None)
 print(exercised, *loaded[exercised:])
 """
-"""Prints how many kernels are compiled beforehand, and which others logs need."""
+"""Prints how many kernels are compiled beforehand, and which others logs need, and commands with one."""
 
 
 def test_logs_need_no_kernel_that_is_not_compiled_beforehand():
