@@ -23,12 +23,18 @@ from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.logs.load import read_log
 from nscan_cli.logs.text.corrected_poses import OWN_HOST
 from nscan_cli.poses import Array
-from tests.benchmarks.stranger_faults import FAULTS, FAULTS_OF_REAL_LOGS, KNOWN_CURES, Fault
+from tests.benchmarks.stranger_faults import (
+    FAULTS,
+    FAULTS_OF_REAL_LOGS,
+    FAULTS_OUTDOORS,
+    KNOWN_CURES,
+    Fault,
+)
 from tests.logs.excerpts import truth_of
 from tests.simulation.laser import Laser
 from tests.simulation.scenes import office
 
-SIMULATED, URG = "office, simulated", "urg-corridor-1"
+SIMULATED, CAMPUS, URG = "office, simulated", "fr-campus", "urg-corridor-1"
 OWN_REPEATABILITY = 0.02
 """m; RMSE between maps of all scans and of every third one of the drive whose truth is its own map."""
 WIDE = "office, 541 beams over 270°"
@@ -74,12 +80,12 @@ def _stranger(log: Path, truth: Path, folder: Path) -> tuple[Path, list[str]]:
 
 def siblings(data: Path) -> Iterator[Case]:
     """The faults on a simulated drive and on real logs."""
-    for drive in (SIMULATED, "mit-csail", "fr079", "intel", URG):
+    for drive in (SIMULATED, "mit-csail", "fr079", "intel", CAMPUS, URG):
         if drive != SIMULATED and not _recording(data, drive).exists():
             continue
         untouched = OWN_REPEATABILITY if drive == URG else None
         for fault, make, cause in FAULTS:
-            if drive == SIMULATED or fault in FAULTS_OF_REAL_LOGS:
+            if drive == SIMULATED or fault in (FAULTS_OUTDOORS if drive == CAMPUS else FAULTS_OF_REAL_LOGS):
                 files = partial(_sibling, data, drive, make)
                 yield Case(drive, fault, cause, files, untouched, KNOWN_CURES.get(fault, ""))
     for fault, form, cause in (
@@ -109,9 +115,12 @@ def _sibling(data: Path, drive: str, fault: Fault, folder: Path) -> tuple[Path, 
         log = (_with_own_map if drive == URG else _real)(_recording(data, drive))
     log, path = fault(log), folder / "sibling.log"
     path.write_bytes(with_own_angles(log))
-    if log.truth is None:
-        return path, ["--relations", str(data / f"{drive}.relations")]
-    return path, _reference(log, folder)
+    if log.truth is not None:
+        return path, _reference(log, folder)
+    relations = data / f"{drive}.relations"
+    if relations.exists():
+        return path, ["--relations", str(relations)]
+    return path, ["--reference", str(data / f"{drive}.reference.tum")]
 
 
 def _recording(data: Path, drive: str) -> Path:

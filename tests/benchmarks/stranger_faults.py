@@ -201,3 +201,8 @@ FAULTS_OF_REAL_LOGS = (
     "20 % of the readings say 2 m",
 )  # fmt: skip
 """Those that the real logs get: with all of them it takes an hour."""
+FAULTS_OUTDOORS = (
+    "", "odometry × 1000", "odometry × 2", "odometry turns × −1", "odometry heads 90° too far left",
+    "odometry backwards", "odometry frozen for a third", "readings reversed", "looks 90° left", "looks back",
+)  # fmt: skip
+"""Those that fr-campus gets: where its odometry is believed and wrong, places are searched for minutes."""
