@@ -11,7 +11,6 @@ import click
 from nscan_cli.cli.picture_names import MAP_SUFFIXES, check_suffix
 from nscan_cli.cli.progress import say
 from nscan_cli.cli.subcommand import option
-from nscan_cli.errors import WrongUsageError
 from nscan_cli.files.inputs import base_name
 from nscan_cli.files.outputs import check_writable, write_atomically
 from nscan_cli.files.text import path_of_name, printable
@@ -25,16 +24,14 @@ resolution_option = option(
 )  # fmt: skip
 
 
-def check_map_outputs(output: str, yaml: bool) -> None:
+def check_map_outputs(output: str, yaml: bool, written: Sequence[str] = MAP_SUFFIXES) -> None:
     """Check that a map, and its YAML, can be written.
 
-    Raises WrongUsageError and OutputError.
+    `written` are the suffixes that its name may have. Raises WrongUsageError and OutputError.
     """
-    check_suffix(output, output, MAP_SUFFIXES)
+    check_suffix(output, output, written)
     check_writable(output)
     if yaml:
-        if yaml_path(output) == output:
-            raise WrongUsageError(f"{output}: the map would have the name of its YAML; name it like MAP.png")
         check_writable(yaml_path(output))
 
 

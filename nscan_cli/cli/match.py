@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from nscan_cli.cli.compilation import Compiling
+from nscan_cli.cli.picture_names import check_document_name
 from nscan_cli.cli.plot_option import check_plot, plot_option, write_plot
 from nscan_cli.cli.progress import say
 from nscan_cli.cli.shared_options import PoseType, common_options, reading_options
@@ -85,6 +86,7 @@ def command(
     A direction that the scans do not determine, as along a corridor, shows as the weakest direction, most
     clearly with --prior none.
     """
+    check_document_name(output, "the result in JSON", "give --plot PICTURE.png for a picture")
     check_writable(output)
     from nscan_cli.logs.log_files import files_of
 

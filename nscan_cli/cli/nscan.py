@@ -11,6 +11,7 @@ import click
 
 from nscan_cli.cli.compilation import Compiling
 from nscan_cli.cli.match import match_document, weakest_record, with_defaults
+from nscan_cli.cli.picture_names import check_document_name
 from nscan_cli.cli.plot_option import check_plot, plot_option, write_plot
 from nscan_cli.cli.progress import say
 from nscan_cli.cli.shared_options import common_options, reading_options
@@ -119,6 +120,7 @@ def command(
         raise WrongUsageError(f"--fixed {fixed}: is not one of the scans to match; choose one of them")
     if "-" in log and "-" in (initial, prior):
         raise WrongUsageError("standard input (-) can be one input only; give the others by their path")
+    check_document_name(output, "the result in JSON", "give --plot PICTURE.png for a picture")
     check_writable(output)
     files = [path for path, words in ((initial, INITIAL_WORDS), (prior, PRIOR_WORDS)) if path not in words]
     from nscan_cli.logs.log_files import files_of

@@ -7,7 +7,7 @@ import click
 from nscan_cli.cli.map_comparison import draw_comparison
 from nscan_cli.cli.map_output import check_map_outputs, resolution_option, write_map, yaml_path
 from nscan_cli.cli.map_shape import MapShape, shape_options, shaped_map
-from nscan_cli.cli.picture_names import check_suffix, is_page
+from nscan_cli.cli.picture_names import MAP_OR_PAGE_SUFFIXES, check_suffix, is_page
 from nscan_cli.cli.plot_option import check_second_output, check_second_outputs
 from nscan_cli.cli.progress import say
 from nscan_cli.cli.result_over_log import load_result, log_of, over_log
@@ -26,7 +26,7 @@ from nscan_cli.logs.reading_options import ReadingOptions
     ("nscan-cli render robot.json robot.log.gz -o robot.png", "a map for robots, robot.png and robot.yaml"),
     ("nscan-cli render robot.json -o figure.png --style paper", "a figure; the log is beside the graph"),
     ("nscan-cli render robot.json -o graph.png --trajectory --graph", "the path and the graph over the map"),
-    ("nscan-cli render robot.json -o robot.png --align --clean --crop auto", "a map to hand over"),
+    ("nscan-cli render robot.json -o clean.png --align --clean --crop auto", "a map to hand over"),
     (
         "nscan-cli render robot.json other.tum robot.log.gz -o both.png --compare",
         "another mapper's result, too",
@@ -50,7 +50,8 @@ from nscan_cli.logs.reading_options import ReadingOptions
 @option("--style", type=click.Choice(["map_server", "paper"]), default="map_server", show_default=True,
         help="A map for robots (map_server), or points and path on white with axes (paper).")  # fmt: skip
 @option("--yaml/--no-yaml", default=None,
-        help="Write MAP.yaml for map_server and Nav2. Default: for plain maps only.")  # fmt: skip
+        help="Write MAP.yaml for map_server and Nav2; one that is there is replaced. Default: for plain maps "
+        "only.")  # fmt: skip
 @option("--mcap", type=PATH, metavar="OUT.mcap",
         help="Also write map, path, graph and scans for Foxglove and RViz.")  # fmt: skip
 @option("--poses", type=PATH, metavar="OUT.tum",
@@ -116,7 +117,7 @@ def command(
         check_suffix(output, output)
         check_writable(output)
     else:
-        check_map_outputs(output, yaml)
+        check_map_outputs(output, yaml, MAP_OR_PAGE_SUFFIXES)
     if in_file:
         check_second_output("-o", output, [graph_file, *log])
     seconds = {"--mcap": mcap, "--poses": poses, "--removed": shape.removed}
@@ -181,4 +182,5 @@ def command(
     elif output != "-":
         low_x, low_y, high_x, high_y = grid.bounds
         size = f"{high_x - low_x:.1f} m × {high_y - low_y:.1f} m"
-        say(f"{output}: {size} from {counted(len(rows), 'scan')}", quiet)
+        files = f"{output} and {yaml_path(output)}" if yaml else output
+        say(f"{files}: {size} from {counted(len(rows), 'scan')}", quiet)

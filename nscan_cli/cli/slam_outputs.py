@@ -9,6 +9,7 @@ from functools import partial
 from typing import TYPE_CHECKING
 
 from nscan_cli.cli.map_output import check_map_outputs, write_map, yaml_path
+from nscan_cli.cli.picture_names import check_document_name
 from nscan_cli.errors import InputDataError, WrongUsageError
 from nscan_cli.files.inputs import label
 from nscan_cli.files.limits import DISTANCE
@@ -55,6 +56,9 @@ class SlamOutputs:
             raise WrongUsageError(
                 "slam: only the graph (-o) can go to standard output; name files for the rest"
             )
+        check_document_name(
+            self.graph, "the graph in JSON", "give -o GRAPH.json, and --map MAP.png for the map"
+        )
         if self.map is not None:
             check_map_outputs(self.map, yaml=True)
         files = [os.path.realpath(path) for path in self.files()]

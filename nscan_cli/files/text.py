@@ -37,6 +37,11 @@ def shortened_list(names: Sequence[str], thing: str = "other", most: int = 5, se
     return separator.join(names[:most]) + more
 
 
+def listed(names: Sequence[str], last: str) -> str:
+    """All names of a list, with the word `last` before the last one: "a, b or c"."""
+    return f" {last} ".join(part for part in (", ".join(names[:-1]), *names[-1:]) if part)
+
+
 def name_of_path(path: str) -> str:
     """The name of a file in results: without its folder, and the same text on every machine."""
     return printable(os.fsencode(Path(path).name).decode("utf-8", "surrogateescape"))

@@ -207,6 +207,10 @@ def test_what_is_said(arguments, said, capsys):
     assert capsys.readouterr().err == f"nscan-cli: {name}: {said}; see nscan-cli {name} --help\n"
 
 
+FORMATS = {"render": "maps are PNG, PGM or HTML", "slam": "maps are PNG or PGM"}
+"""What is said of the names of maps; all others are pictures."""
+
+
 @pytest.mark.parametrize(
     "arguments",
     [
@@ -219,9 +223,21 @@ def test_what_is_said(arguments, said, capsys):
 def test_a_picture_needs_a_name_that_says_so(arguments, capsys):
     assert run(arguments) == 2
     err = capsys.readouterr().err
-    formats = "maps are PNG or PGM" if arguments[0] in ("render", "slam") else "pictures are PNG"
+    formats = FORMATS.get(arguments[0], "pictures are PNG")
     assert err.endswith(f": the name has no suffix; {formats}: name it map.png\n")
+    assert run([each if each != "map" else "map.xyz" for each in arguments]) == 2
+    assert capsys.readouterr().err.endswith(f"map.xyz: {formats}; name it like map.png\n")
     assert not list(Path().iterdir())
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [["match", "a.log", "--reference", "0", "--scan", "1"], ["nscan", "a.log", "--scans", "0,1"]],
+)
+def test_a_result_needs_a_name_that_is_not_that_of_a_picture(arguments, capsys):
+    assert run([*arguments, "-o", "out.png"]) == 2
+    said = "out.png: has the name of a picture, but is the result in JSON; give --plot PICTURE.png"
+    assert said in capsys.readouterr().err
 
 
 def test_standard_output_and_devices_need_none(capsys):

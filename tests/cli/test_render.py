@@ -86,7 +86,7 @@ def test_the_map_is_the_room(room, capsys):
     assert not (gray[10:-10, 10:-10] == 0).any()
     assert (gray[10:-10, 10:-10] == 254).mean() > 0.95
     assert (gray[[0, -1]] == 205).all()
-    assert "6.2 m × 4.2 m from 5 scans" in capsys.readouterr().err
+    assert "map.png and map.yaml: 6.2 m × 4.2 m from 5 scans" in capsys.readouterr().err
 
 
 def test_nav2_finds_the_walls_where_they_are(room):

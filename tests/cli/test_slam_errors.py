@@ -38,8 +38,14 @@ PNG = b"\x89PNG\r\n\x1a\n" + bytes(40)
         (["good.log", "--carmen", "good.log"], 2, "good.log is both an input and an output"),
         (["good.log", "--carmen", "out.json"], 2, "two outputs have the same name"),
         (["good.log", "--depfile", "none/out.d"], 73, "none/out.d: the folder none does not exist"),
-        (["good.log", "--map", "out.yaml"], 2, "out.yaml: the map would have the name of its YAML"),
+        (["good.log", "--map", "out.yaml"], 2, "out.yaml: maps are PNG or PGM; name it like out.png"),
         (["good.log", "--map", "out.JPG"], 2, "out.JPG: maps are PNG or PGM; name it like out.png"),
+        (
+            ["good.log", "-o", "q.png"],
+            2,
+            "q.png: has the name of a picture, but is the graph in JSON; give -o",
+        ),
+        (["good.log", "-o", "q.HTML"], 2, "q.HTML: has the name of a picture, but is the graph in JSON"),
         (["good.log", "--map", "-"], 2, "only the graph (-o) can go to standard output"),
         (["good.log", "--trajectory", "-"], 2, "only the graph (-o) can go to standard output"),
         (["good.log", "--config", "none.toml"], 66, "none.toml"),
@@ -70,7 +76,7 @@ def test_a_log_that_cannot_be_read_is_told_before_kernels_are_compiled(folder, c
     assert not compiled
     (folder / "good.log").write_text(room_log(5))
     assert run(["slam", "good.log", "-o", "out.json", "--threads", "2"]) == 0
-    assert capsys.readouterr().err.startswith("compiling the kernels")
+    assert capsys.readouterr().err.startswith("compiling ")
     assert compiled
 
 

@@ -12,7 +12,7 @@ import pytest
 
 from nscan_cli.errors import InputMissingError
 from nscan_cli.files.inputs import base_name
-from nscan_cli.files.text import counted, encode_fallback, json_bytes, path_of_name, printable
+from nscan_cli.files.text import counted, encode_fallback, json_bytes, listed, path_of_name, printable
 from tests.data import PACKAGE
 
 
@@ -68,6 +68,13 @@ def test_json_escapes_what_is_no_unicode():
 )
 def test_counted(count, thing, said):
     assert counted(count, thing) == said
+
+
+@pytest.mark.parametrize(
+    ("names", "said"), [([], ""), (["a"], "a"), (["a", "b"], "a or b"), (["a", "b", "c"], "a, b or c")]
+)
+def test_listed(names, said):
+    assert listed(names, "or") == said
 
 
 THINGS = re.compile(
