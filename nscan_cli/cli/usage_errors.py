@@ -6,6 +6,8 @@ from typing import Any
 
 import click
 
+from nscan_cli.files.text import listed
+
 SUBCOMMAND_OPTIONS = ("-q", "--quiet", "-v", "--verbose", "--config", "--dump-config")
 """Options that stand after the name of a command, not before it."""
 METAVAR_UNITS = {"M": "m", "DEG": "degrees", "T": "s", "SECONDS": "s"}
@@ -42,6 +44,13 @@ def _range_text(kind: Any) -> str:
     return " and ".join(bound for bound in (at_least, at_most) if bound)
 
 
+def _options_begun(error: click.NoSuchOption) -> list[str]:
+    """The options of the command that begin like the one that it does not have."""
+    params = [] if error.ctx is None else error.ctx.command.params
+    names = (name for param in params if isinstance(param, click.Option) for name in param.opts)
+    return [name for name in names if name.startswith(error.option_name)]
+
+
 def usage_problem(error: click.ClickException) -> str:
     """The message of click, without its full stop."""
     if isinstance(error, click.BadParameter) and not isinstance(error, click.MissingParameter):
@@ -49,4 +58,6 @@ def usage_problem(error: click.ClickException) -> str:
         return f"{place}: {error.message.rstrip('.')}".removeprefix(": ")
     if isinstance(error, click.NoSuchOption) and error.option_name in SUBCOMMAND_OPTIONS:
         return f"{error.option_name} stands after the command's name"
+    if isinstance(error, click.NoSuchOption) and (begun := _options_begun(error)):
+        return f"No such option {error.option_name!r}, but there is {listed(begun, 'and')}"
     return error.format_message().rstrip(".")

@@ -71,6 +71,11 @@ def test_help_and_version_import_nothing_heavy():
     [
         (["rendr"], "nscan-cli: No such command 'rendr'; see nscan-cli --help\n"),
         (["--nope"], "nscan-cli: No such option '--nope'; see nscan-cli --help\n"),
+        (
+            ["slam", "a.log", "--odo"],
+            "nscan-cli: slam: No such option '--odo', but there is --odom-topic and --odometry-scale; "
+            "see nscan-cli slam --help\n",
+        ),
         (["-q", "info", "a.log"], "nscan-cli: -q stands after the command's name; see nscan-cli --help\n"),
         (["-v", "info", "a.log"], "nscan-cli: -v stands after the command's name; see nscan-cli --help\n"),
         (["render"], "nscan-cli: render: Missing argument 'GRAPH.json'; see nscan-cli render --help\n"),
