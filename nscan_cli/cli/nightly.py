@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -14,6 +15,7 @@ from nscan_cli.cli.shared_options import common_options
 from nscan_cli.cli.subcommand import PATH, argument, option, subcommand
 from nscan_cli.errors import CheckFailedError, InputMissingError
 from nscan_cli.files.inputs import base_name
+from nscan_cli.files.text import listed
 
 if TYPE_CHECKING:
     from nscan_cli.nightly.manifest import ManifestEntry
@@ -71,18 +73,21 @@ def command(
     if all(entry.optional and not entry.is_there for entry in entries):
         for entry in entries:
             if "log" in entry.sources:
-                _say_absent(entry, quiet)
+                _say_absent(entry, [], quiet)
         first = entries[0].inputs["log"]
+        endings = _other_endings(entries[0])
+        others = f" (or {listed(endings, 'or')}; downloads keep their names)" if endings else ""
         raise InputMissingError(
-            f"{manifest}: none of its logs was found, such as {first}; put logs there, or give --data FOLDER"
+            f"{manifest}: none of its logs was found, such as {first}{others}; put logs there, or give "
+            "--data FOLDER"
         )
     with locked_folder(output) as folder:
         planned = make_plan(entries, folder, force)
         if len(planned.absent) > 1:
-            listed = ", ".join(entry.name for entry in planned.absent)
-            say(f"not found, skipped: {listed}; the report has their sources", quiet)
+            absent = ", ".join(entry.name for entry in planned.absent)
+            say(f"not found, skipped: {absent}; the report has their sources", quiet)
         for entry in planned.absent if len(planned.absent) == 1 else ():
-            _say_absent(entry, quiet)
+            _say_absent(entry, _other_endings(entry), quiet)
         for name, notes in planned.notes.items():
             for note in notes:
                 say(f"{name}: warning: {note}", quiet)
@@ -109,9 +114,22 @@ def command(
     say(f"{headline(verdicts)}: {report}", quiet)
 
 
-def _say_absent(entry: ManifestEntry, quiet: bool) -> None:
+def _say_absent(entry: ManifestEntry, endings: Sequence[str], quiet: bool) -> None:
+    """Say that a log is not there, nor under its other names, nor with these endings."""
+    nor = f", nor as {listed(entry.names[1:], 'or')}" if entry.names[1:] else ""
+    nor += f", nor with {listed(endings, 'or')}" if endings else ""
     remedy = f"; download from {' and '.join(entry.sources.values())}" if entry.sources else ""
-    say(f"{entry.name}: {entry.inputs['log']} was not found, skipped{remedy}", quiet)
+    say(f"{entry.name}: {entry.inputs['log']} was not found{nor}; skipped{remedy}", quiet)
+
+
+def _other_endings(entry: ManifestEntry) -> tuple[str, ...]:
+    """The endings that a log may have in place of that of its path; none if the manifest has the path."""
+    from nscan_cli.nightly.manifest import LOG_SUFFIXES
+
+    if not entry.names:
+        return ()
+    own = entry.inputs["log"].name.removeprefix(entry.names[0])
+    return tuple(ending for ending in LOG_SUFFIXES if ending not in (own, ""))
 
 
 def _engine(jobs: int | None, scheduler: str | None, timeout: float) -> Executor:

@@ -46,6 +46,8 @@ class ManifestEntry:
     """Role → SHA-256 of the file for which the bounds were measured."""
     optional: bool = False
     """Whether a missing log or reference is skipped; otherwise it is a failure."""
+    names: tuple[str, ...] = ()
+    """Names of the log's file without its ending; empty if the manifest has its path."""
     about: str = ""
     """A description for the report."""
     published_map: str = ""
@@ -73,7 +75,8 @@ def read_manifest(path: str, data: str | None) -> list[ManifestEntry]:
             )
     if data is not None:
         folder = Path(data)
-        if not folder.is_dir():
+        # Of the logs that come with the package it is said where to get them, as for an empty folder.
+        if not folder.is_dir() and (folder.exists() or file == path):
             raise InputMissingError(f"--data {data}: is not a folder; give the folder of the logs")
     document = read_toml(file, "mend it")
     unknown = [key for key in document if key != "log"]
@@ -127,6 +130,7 @@ def _manifest_entry(file: str, number: int, table: dict[str, Any], folder: Path)
     return ManifestEntry(
         name=name,
         inputs=inputs,
+        names=() if "path" in table else tuple(_file_stems(name, table)),
         published={method: float(error) for method, error in table.get("published", {}).items()},
         parameters=parameters_from(place, table.get("parameters", {})),
         sources={role: table[_origin_keys(role)[0]] for role in ROLES if _origin_keys(role)[0] in table},

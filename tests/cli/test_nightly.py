@@ -102,7 +102,8 @@ def test_failures_have_their_reasons_and_code_3(small, undisturbed, tmp_path, ca
     assert run(["nightly", str(logs / "small.toml"), "-o", str(folder)]) == 3
     lines = capsys.readouterr().err.splitlines()
     assert lines[0] == (
-        f"five: {logs}/five.log.gz was not found, skipped; download from https://example.org/five.log"
+        f"five: {logs}/five.log.gz was not found, nor with .log, .clf.gz, .clf, .script.gz, .script, .mcap, "
+        ".bag or .db3; skipped; download from https://example.org/five.log"
     )
     said = [line.partition(":")[0] for line in lines[1:]]
     assert sorted(said) == ["four", "nscan-cli", "nscan-cli", "nscan-cli", "nscan-cli", "one"]
@@ -144,9 +145,10 @@ def test_force(small, undisturbed, tmp_path, capsys):
     [
         (["none.toml", "-o", "out"], 66, "none.toml: no such file; check the path"),
         (["bad.toml", "-o", "out"], 65, "bad.toml, log 1 (a): has an unknown key 'pth'; known: name, path,"),
-        (["empty.toml", "-o", "out"], 66, "empty.toml: none of its logs was found, such as a.log.gz; put"),
+        (["empty.toml", "-o", "out"], 66, "empty.toml: none of its logs was found, such as a.log.gz (or"),
         (["kuemmerle", "-o", "out"], 2, "nightly: kuemmerle has no logs of its own; give their folder with"),
-        (["kuemmerle", "-o", "out", "--data", "nowhere"], 66, "--data nowhere: is not a folder; give"),
+        (["kuemmerle", "-o", "out", "--data", "fine.log"], 66, "--data fine.log: is not a folder; give"),
+        (["fine.toml", "-o", "out", "--data", "nowhere"], 66, "--data nowhere: is not a folder; give"),
         (["fine.toml", "-o", "no/out"], 73, "no/out: the folder no does not exist; create it first"),
         (["fine.toml", "-o", "fine.toml"], 73, "fine.toml: is not a folder; name another"),
         (["fine.toml", "-o", "out", "--scheduler", "x"], 2, "--scheduler x: is not an address of the form"),
@@ -177,15 +179,25 @@ def test_where_no_log_of_ones_own_is_there_the_night_has_failed_and_the_report_s
     assert [log["status"] for log in report(tmp_path / "nights")["logs"]] == ["failed", "absent"]
 
 
-def test_where_no_log_is_there_it_is_said_where_to_get_them(tmp_path, capsys):
-    assert run(["nightly", "kuemmerle", "--data", str(tmp_path), "-o", str(tmp_path / "nights")]) == 66
+@pytest.mark.parametrize("data", ["", "not_made_yet"])
+def test_where_no_log_is_there_it_is_said_where_to_get_them(tmp_path, capsys, data):
+    assert run(["nightly", "kuemmerle", "--data", str(tmp_path / data), "-o", str(tmp_path / "nights")]) == 66
     *lines, error = capsys.readouterr().err.splitlines()
     assert error.startswith("nscan-cli: kuemmerle: none of its logs was found")
+    assert (
+        "intel.log.gz (or .log, .clf.gz, .clf, .script.gz, .script, .mcap, .bag or .db3; downloads" in error
+    )
     assert [line.partition(":")[0] for line in lines][:4] == ["intel", "fr079", "mit-csail", "mit-killian"]
     assert len(lines) == 6
-    assert all("was not found, skipped; download from http" in line for line in lines)
+    assert all("was not found; skipped; download from http" in line for line in lines)
     assert all(line.endswith(".relations") for line in lines[:4])
     assert list(tmp_path.iterdir()) == []
+
+
+def test_other_names_of_a_log_that_is_not_there_are_said(tmp_path, capsys):
+    assert run(["nightly", "radish", "--data", str(tmp_path), "-o", str(tmp_path / "nights")]) == 66
+    first, *_ = capsys.readouterr().err.splitlines()
+    assert "intel_lab.log.gz was not found, nor as intel or intel-lab; skipped; download" in first
 
 
 def test_the_sample_logs_and_their_manifest(tmp_path):
