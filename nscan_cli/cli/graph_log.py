@@ -15,6 +15,7 @@ from nscan_cli.files.provenance import is_made_from
 from nscan_cli.files.text import counted, name_of_path, path_of_name
 from nscan_cli.logs.log_files import JOURNAL_SUFFIXES
 from nscan_cli.logs.reading_options import ReadingOptions, as_tuples
+from nscan_cli.logs.recordings.split_file_names import ROS2_SUFFIXES, parse_name
 
 if TYPE_CHECKING:
     from nscan_cli.files.provenance import Source
@@ -82,10 +83,19 @@ def find_log(graph_file: str, graph: Graph) -> tuple[str, ...]:
             if all(path.is_file() and path.stat().st_size == size for path, size in paths.items()):
                 return tuple(map(str, paths))
     more = f" and {counted(len(sizes) - 1, 'more file')}" if len(sizes) > 1 else ""
+    first = next(iter(sizes))
+    place = _folder_of_recorder(first)
+    remedy = "give its path as LOG" if place is None else f"give it, or its folder such as {place}/, as LOG"
     raise InputMissingError(
-        f"{graph_file}: its log {next(iter(sizes))}{more} is neither beside it nor in the current folder; "
-        "give its path as LOG"
+        f"{graph_file}: its log {first}{more} is neither beside it nor in the current folder; {remedy}"
     )
+
+
+def _folder_of_recorder(name: str) -> str | None:
+    """The folder into which `ros2 bag record` writes a file of this name; None if it writes no such file."""
+    part = parse_name(name)
+    folder, suffix = part.recording
+    return folder if part.number is not None and suffix in ROS2_SUFFIXES and folder else None
 
 
 def _file_named(name: str, folder: Path) -> Path | None:

@@ -94,7 +94,7 @@ def laser_log(
     """
     numbers = selected_numbers(times.times, options, file)
     rows = times.rows[numbers]
-    warnings = findings.warnings
+    warnings, of_file = findings.warnings, len(findings.warnings)
     raw, limits, contradictions = _in_metres(raw, times, options, findings, checks)
     repeated = np.zeros(len(raw.ranges), dtype=np.int64)
     if not options.as_recorded:
@@ -146,6 +146,9 @@ def laser_log(
         findings.used["turn"] = sweep.origin
     swept = beam_times(sweep.turns[numbers], angle_increment[rows], beams, options.stamp)
     odometry, path, slow = _odometry(motion, times, raw.ranges, options, checks)
+    # Of several lasers, each says its own.
+    of = f"{laser}: " if len(findings.lasers) > 1 else ""
+    of_laser = [f"{of}{said}" for said in (*warnings[of_file:], *lost.warnings)]
     if odometry is not None:
         odometry = odometry[numbers]
     return LaserLog(
@@ -167,7 +170,7 @@ def laser_log(
             skipped=findings.skips.reasons,
             skipped_place=findings.skips.place,
             backward_stamps=times.backward,
-            warnings=(*warnings, *lost.warnings),
+            warnings=(*warnings[:of_file], *of_laser),
             used=findings.used,
             lost=lost.counts,
             unusable=lost.unusable,
@@ -176,7 +179,12 @@ def laser_log(
             odometries=findings.odometries,
             corrected=findings.corrected,
             masked=tuple(sectors),
-            contradictions=(*findings.contradictions, *contradictions, *masked, *slow, *sweep.said),
+            contradictions=(
+                *findings.contradictions,
+                *(f"{of}{said}" for said in (*contradictions, *masked)),
+                *slow,
+                *(f"{of}{said}" for said in sweep.said),
+            ),
         ),
         beams=None if (beams == ranges.shape[1]).all() else beams,
         truth_times=motion.truth_times,

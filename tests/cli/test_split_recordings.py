@@ -75,7 +75,9 @@ def test_render_finds_the_log_in_a_folder_and_takes_it_in_either_way(here, capsy
     assert run(["render", "a.json", "-q", "-o", "b.png"]) == 0
     (here / "my_bag_1.mcap").unlink()
     assert run(["render", "a.json", "-q", "-o", "b.png"]) == 66
-    assert "its log my_bag_0.mcap and 2 more files is neither" in capsys.readouterr().err
+    said = capsys.readouterr().err
+    assert "its log my_bag_0.mcap and 2 more files is neither" in said
+    assert said.endswith("; give it, or its folder such as my_bag/, as LOG\n")
 
 
 def test_among_folders_with_equal_names_the_one_of_the_right_sizes_is_taken(here):

@@ -6,6 +6,7 @@ import dataclasses
 import functools
 import itertools
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -162,6 +163,14 @@ def test_a_log_is_read_without_them_and_says_so(tmp_path):
     some = read_log(path, ReadingOptions(start=20.0, end=30.0, every=5))
     assert some.report.contradictions == read.report.contradictions
     assert np.isnan(some.ranges[:, 129:152]).all()
+
+
+def test_of_several_lasers_it_is_said_which_one(tmp_path):
+    path = Path(as_carmen(tmp_path, faults.own_parts(office_log(Laser()), sectors((40, 60, 0.3)))))
+    other = [line.replace("FLASER", "RLASER") for line in path.read_text().splitlines() if "FLASER" in line]
+    path.write_text("\n".join([path.read_text(), *other]))
+    (said,) = read_log(str(path), ReadingOptions(laser="FLASER")).report.contradictions
+    assert said.startswith("FLASER: beams keep their range (0.30 m)")
 
 
 def test_the_options_decide(tmp_path):

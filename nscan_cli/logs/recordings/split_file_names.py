@@ -14,6 +14,8 @@ from nscan_cli.logs.compression import SUFFIXES
 
 RECORDING_SUFFIXES = (".mcap", ".db3", ".bag")
 """Endings of the names of recordings, before those of compression and of unfinished bags."""
+ROS2_SUFFIXES = (".mcap", ".db3")
+"""Those of `ros2 bag record`, which writes a folder with the name of the recording."""
 UNFINISHED_SUFFIX = ".active"
 """Suffix of a bag that is being recorded, or whose recorder was killed."""
 NUMBERED_STEM = re.compile(r"(?P<of>.*?)_?(?P<number>\d{1,9})")
