@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from nscan_cli.nightly.warm_up import CompileProgress
 
 COMPILING = "compiling the kernels, once for this version on this machine"
+COMPILING_MORE = "compiling kernels not needed before, once for this version on this machine"
 SLAM_KERNELS, ALL_KERNELS = 49, 66
 """About how many kernels `slam` compiles, and `warm-up`: for the bar alone."""
 
@@ -31,13 +32,17 @@ def announce_compiling(kernel: str, quiet: bool) -> None:
 class Compiling:
     """Prints a message when this process begins to compile kernels, and records that it did.
 
-    `takes` is the usual time in words.
+    `takes` is the usual time in words where most are not compiled. The rest takes seconds: no time is said.
     """
 
     def __init__(self, takes: str, quiet: bool) -> None:
         from nscan_cli.kernels.decorators import on_first_compile
+        from nscan_cli.kernels.machine_code import is_uncompiled
+        from nscan_cli.nightly.warm_up import TRACKING_KERNEL
 
         self.has_begun = False
+        # Not when it begins: the kernel that is compiled then has a file already, its lock.
+        self._are_most = is_uncompiled(TRACKING_KERNEL)
         self._takes, self._quiet = takes, quiet
         on_first_compile(self._begin)
         context = click.get_current_context(silent=True)
@@ -47,7 +52,7 @@ class Compiling:
     def _begin(self) -> None:
         if not self.has_begun:
             self.has_begun = True
-            say(f"{COMPILING}: {self._takes}", self._quiet)
+            say(f"{COMPILING}: {self._takes}" if self._are_most else COMPILING_MORE, self._quiet)
 
     def beforehand_for_slam(self) -> None:
         """Compile what `slam` needs in two processes; the cache folder has to be there."""

@@ -24,6 +24,11 @@ def add(a, b):
 @kernel
 def subtract(a, b):
     return a - doubled(b)
+
+# By this name it is known whether a log was mapped.
+@kernel
+def track_scans(a, b):
+    return a * doubled(b)
 """
 COMMAND = """
 import sys
@@ -42,6 +47,7 @@ command.main([], standalone_mode=False)
 some_kernels.add(1, 2)
 """
 TOLD = "compiling the kernels, once for this version on this machine: long\n"
+TOLD_OF_MORE = "compiling kernels not needed before, once for this version on this machine\n"
 
 
 def told(folder: Path, settings: dict[str, str], *names: str, quiet: bool = False) -> tuple[str, bool]:
@@ -66,3 +72,9 @@ def test_what_is_kept_is_not_announced(tmp_path: Path, settings: dict[str, str])
     assert told(tmp_path, settings, "add") == ("", False)
     assert told(tmp_path, settings, "add", "subtract", quiet=True) == ("", True)
     assert told(tmp_path, settings, "subtract", "add") == ("", False)
+
+
+@pytest.mark.parametrize("settings", [{}, {"NUMBA_OPT": "2"}], ids=["kept by us", "kept by numba"])
+def test_of_few_kernels_no_long_time_is_told(tmp_path: Path, settings: dict[str, str]):
+    assert told(tmp_path, settings, "track_scans") == (TOLD, True)
+    assert told(tmp_path, settings, "add", "track_scans") == (TOLD_OF_MORE, True)
