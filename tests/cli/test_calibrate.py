@@ -64,7 +64,7 @@ def test_a_table_for_people(capsys):
         "unknown",
         "options",
     ]
-    assert shown[-1] == "options   --odometry-scale 0.9869"
+    assert shown[-1] == "options   --odometry-scale 0.987"
 
 
 def test_the_turn_of_the_laser(tmp_path, capsys):
@@ -87,11 +87,11 @@ def test_the_turn_of_the_laser(tmp_path, capsys):
 def test_the_file_is_a_config_of_every_command(tmp_path, capsys):
     robot = tmp_path / "robot.toml"
     assert run(["calibrate", CORRIDOR_LOG, "-o", str(robot)]) == 0
-    assert tomllib.loads(robot.read_text()) == {"odometry-scale": 0.9869}
+    assert tomllib.loads(robot.read_text()) == {"odometry-scale": 0.987}
     graph = tmp_path / "graph.json"
     assert run(["slam", CORRIDOR_LOG, "--config", str(robot), "-o", str(graph), "-q"]) == 0
     assert run(["info", CORRIDOR_LOG, "--config", str(robot)]) == 0
-    assert load_graph(str(graph)).provenance["parameters"]["reading"]["odometry_scale"] == 0.9869
+    assert load_graph(str(graph)).provenance["parameters"]["reading"]["odometry_scale"] == 0.987
     capsys.readouterr()
 
 

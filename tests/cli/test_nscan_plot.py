@@ -73,7 +73,7 @@ def test_the_plot_marks_the_scans_that_were_left_out(tmp_path, capsys):
     [
         (["--plot", "-"], 2, "--plot -: only the result can go to standard output"),
         (["--plot", "nscan.svg"], 2, "pictures are PNG"),
-        (["-o", "nscan.png", "--plot", "nscan.png"], 2, "is another file of this command"),
+        (["-o", "nscan.png", "--plot", "nscan.png"], 2, "nscan.png: has the name of a picture"),
         (["--plot", OFFICE_LOG], 2, "is another file of this command"),
         (["--initial", "start.tum", "--plot", "start.tum"], 2, "is another file of this command"),
         (["--plot", "no/such.png"], 73, "the folder no does not exist"),

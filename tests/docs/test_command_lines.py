@@ -37,7 +37,8 @@ MANIFEST_LOGS = ("corridor_and_room.player", "corridor_and_room.mcap")
 NOT_EVERYWHERE = re.compile(r"refused|^ +\d+: |^office: |All \d|all \d")
 """Lines of what is shown that say for what loops were refused, and what of the smaller manifest."""
 NOT_OURS = ("pip ", "pipx ", "uv ", "curl ", "ros2 ", "docker ", "make", "eval ", "_NSCAN_CLI_COMPLETE",
-            "/tmp/audit/", "python -m venv ", "python3 -m venv ", "python -m pytest ", "NSCAN_TEST_KILLS=")  # fmt: skip
+            "/tmp/audit/", "python -m venv ", "python3 -m venv ", "python -m pytest ",
+            "NSCAN_TEST_KILLS=")  # fmt: skip
 OF_TESTS = re.compile(r"^python -m (tests[\w.]*)")
 MEASURED_ONCE = ("for i in 1 2 3", "/usr/bin/time ")
 """Lines of docs/soak.md that take minutes; their calls are looked at, and not run."""
