@@ -70,7 +70,7 @@ def command(
     from nscan_cli.kernels.decorators import load_runtime
 
     load_runtime()
-    Compiling("half a minute", quiet)
+    Compiling("up to half a minute", quiet)
     found = [
         _Calibrated.of(scans, own_reading) for own_reading, scans in _lasers(log, reading, output is None)
     ]

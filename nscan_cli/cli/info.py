@@ -38,7 +38,7 @@ def command(log: tuple[str, ...], as_json: bool, reading: ReadingOptions, **_com
     survey = survey_of(log, reading)
     facts = survey.without_unchosen(facts_of(survey.log, reading) | survey.facts(reading))
     if survey.refused is None and not survey.choices:
-        Compiling("half a minute", bool(_common["quiet"]))
+        Compiling("up to half a minute", bool(_common["quiet"]))
         facts["warnings"] += _contradictions(survey.log, reading)
     if as_json:
         print_json(facts)

@@ -95,7 +95,7 @@ def command(
     from nscan_cli.matching.motion_model import MotionModel, odometry_prior
     from nscan_cli.matching.pairwise import PairOptions, match_pair, matched_points, scan_ndt
 
-    Compiling("half a minute", quiet)
+    Compiling("up to half a minute", quiet)
     scans = read_log(log, reading).moving_along(None)
     rows = scans.row(reference), scans.row(scan)
     initial, prior = with_defaults(scans, rows, initial, prior, quiet)

@@ -135,7 +135,7 @@ def command(
     from nscan_cli.matching.motion_model import MotionModel
     from nscan_cli.matching.pairwise import PairOptions, matched_points
 
-    Compiling("half a minute", quiet)
+    Compiling("up to half a minute", quiet)
     scans = read_log(log, reading).moving_along(None)
     rows = [scans.row(number) for number in numbers]
     initial, prior = with_defaults(scans, rows, initial, prior, quiet)

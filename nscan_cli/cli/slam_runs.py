@@ -135,7 +135,7 @@ def run_on_graph(
     from nscan_cli.graph.marginal_covariances import marginal_covariances
     from nscan_cli.graph.optimise.whole_graph import optimise_graph
 
-    compiling = Compiling("half a minute", quiet)
+    compiling = Compiling("up to half a minute", quiet)
     notices: list[str] = []
     graph = load_graph(path, notices)
     for notice in notices:
