@@ -2,15 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
+from nscan_cli.calibration.agreeing_odometry import (
+    with_mirrored_odometry,
+    with_seen_mount,
+    with_seen_scale,
+)
 from nscan_cli.calibration.bearing_jitter import checked_bearings
 from nscan_cli.calibration.companions import checked_companion
 from nscan_cli.calibration.compared_ranges import compare_ranges
 from nscan_cli.calibration.contradictions import changed_view, find_contradictions
+from nscan_cli.calibration.findings import Finding
 from nscan_cli.calibration.held_odometry import checked_held
 from nscan_cli.calibration.measured_steps import KnownSteps
-from nscan_cli.calibration.mirrored_odometry import with_mirrored_odometry
 from nscan_cli.calibration.odometry_lag import checked_lag
 from nscan_cli.calibration.odometry_units import checked_units
 from nscan_cli.calibration.options import FileCheckOptions
@@ -77,6 +83,8 @@ def checked_file(log: LaserLog, reading: ReadingOptions, options: FileCheckOptio
     if held and any(finding.is_of_clocks for finding in findings):
         # A clock that is behind makes odometry begin late, as if it stood.
         log, units, held, reversing = recorded, [], [], []
+    if not any(finding.is_mirror_image for finding in findings):
+        log = _agreeing(log, findings)
     for finding in findings:
         if finding.corrected:
             corrected = replace(reading, **finding.corrected)
@@ -94,6 +102,16 @@ def checked_file(log: LaserLog, reading: ReadingOptions, options: FileCheckOptio
     is_checked = log.odometry is not None and bool(are_known(log.odometry).all())
     log, reading, along = checked_companion(log, reading, options.companion)
     return CheckedFile(log, reading, said + along, is_checked)
+
+
+def _agreeing(log: LaserLog, findings: Sequence[Finding]) -> LaserLog:
+    """The log whose odometry agrees with the scans, as findings see it that leave open what is wrong."""
+    for finding in findings:
+        if finding.seen_scale is not None:
+            log = with_seen_scale(log, finding.seen_scale)
+        if finding.seen_mount is not None:
+            log = with_seen_mount(log, finding.seen_mount)
+    return log
 
 
 def _as_read(log: LaserLog, reading: ReadingOptions, corrected: ReadingOptions) -> LaserLog:

@@ -19,6 +19,7 @@ from nscan_cli.logs.reading_options import ReadingOptions
 from nscan_cli.poses import Array, transform, wrap
 
 UNDONE = "--as-recorded uses it as it is"
+AGREES = "; meanwhile odometry is changed to agree with the scans"
 RANGE_UNITS = {"feet": 0.3048, "inches": 0.0254}
 """Units in metres that ranges come in, and that no odometry is so much larger than."""
 
@@ -31,6 +32,12 @@ class Finding:
     """For the user: the evidence, and what was done or what to do."""
     corrected: dict[str, Any] = field(default_factory=dict)
     """Reading options that put it right, where it is beyond doubt."""
+    seen_scale: float | None = None
+    """Metres by scans for one metre by odometry, if odometry is to agree with the scans until the cause is
+    known."""
+    seen_mount: Array | None = None
+    """(3,) the mounting of the laser that the steps show, if odometry is to agree with the scans until the
+    cause is known."""
     is_of_clocks: bool = False
     """Whether odometry and scans are compared at wrong times before it is put right."""
     is_of_mount: bool = False
@@ -155,8 +162,11 @@ def wrong_scale(fit: MountFit, reading: ReadingOptions, options: FileCheckOption
             f"{evidence}: its positions are multiplied, as by --odometry-scale {scale:g}{other}; {UNDONE}"
         )
         return Finding(message, {"odometry_scale": scale})
+    is_clear = max(fit.scale, 1.0 / fit.scale) > options.clear_scale_factor
     return Finding(
         f"the scale of odometry is likely wrong: {evidence}; try --odometry-scale {scale:g}{other}"
+        f"{AGREES if is_clear else ''}",
+        seen_scale=fit.scale if is_clear else None,
     )
 
 
@@ -250,13 +260,15 @@ def wrong_mounting(mount: Array, fit: MountFit, options: FileCheckOptions) -> Fi
     # Seen from a robot that is turned, the laser is elsewhere, too.
     turned = np.array([*transform(np.array([0.0, 0.0, turn]), mount[:2]), mount[2] + turn])
     headings = f"the headings of odometry are likely {degrees} too far to the {other}"
-    if is_nearer(fit, turned, mount, sigmas):
-        return Finding(f"{headings}; {agree}; try --no-odometry", is_of_mount=True)
+    is_heading = is_nearer(fit, turned, mount, sigmas)
+    seen = _seen_mount(fit, turned if is_heading else mount, options)
+    if is_heading:
+        return Finding(f"{headings}; {agree}; try --no-odometry{AGREES}", seen_mount=seen, is_of_mount=True)
     if not is_nearer(fit, mount, turned, sigmas):
         # Near the middle of the robot both look the same.
         cure += f", or --no-odometry if the headings of odometry are {degrees} too far to the {other}"
     what = f"the laser likely looks {degrees} further to the {side} than the file says"
-    return Finding(f"{what}; {agree}; {cure}", is_of_mount=True)
+    return Finding(f"{what}; {agree}; {cure}{AGREES}", seen_mount=seen, is_of_mount=True)
 
 
 def opposite(
@@ -281,7 +293,15 @@ def opposite(
         what = "the laser likely looks 180° further to the left than the file says"
         other, cures = "odometry counts forward as backward", (by_mount, by_scale)
     agree = f"then scans and odometry agree about {counted(fit.steps, 'step')}, and {evidence}"
-    return Finding(f"{what}; {agree}; try {cures[0]}, or {cures[1]} if {other}", is_of_mount=True)
+    seen = _seen_mount(fit, -mount if is_odometry else mount, options)
+    message = f"{what}; {agree}; try {cures[0]}, or {cures[1]} if {other}{AGREES}"
+    return Finding(message, seen_mount=seen, is_of_mount=True)
+
+
+def _seen_mount(fit: MountFit, place: Array, options: FileCheckOptions) -> Array:
+    """The mounting (3,) that the steps show; at a place (2,) or more, if they leave that open."""
+    is_told = float(fit.sigmas[1:3].max()) <= options.max_seen_sigma
+    return np.append(fit.mount[:2] if is_told else place[:2], fit.mount[2])
 
 
 def _round_angle(angle: float, options: FileCheckOptions) -> float:

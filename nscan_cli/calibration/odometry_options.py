@@ -102,6 +102,9 @@ class ViewChangeOptions:
     min_length: float = 0.05
     """Least length of a step whose direction counts, m. With a larger value fewer steps count, and each tells
     more."""
+    max_step_turn: float = 0.15
+    """Largest turn of a step whose direction counts, rad. With a larger value more steps count, and each
+    tells less where odometry is late."""
     min_steps: int = 8
     """Least number of such steps before a change, and behind. A larger value finds fewer changes."""
     min_agreement: float = 0.6

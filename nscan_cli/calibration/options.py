@@ -171,6 +171,9 @@ class FileCheckOptions:
     min_mount_move: float = 0.15
     """Least error of the laser's place in the file, along an axis, that a warning names, m. It is 0.1 at most
     on real logs; a late clock looks like some centimetres. A larger value warns less."""
+    max_seen_sigma: float = 0.03
+    """Odometry that is to agree with the scans has the laser where the steps show it if they tell that place
+    to this standard deviation, m; else where the file has it. A larger value believes the steps more."""
     mount_sigmas: float = 5.0
     """An error of the laser's direction, its place or the scale must also exceed this number of its standard
     deviations. A larger value warns less."""

@@ -79,6 +79,8 @@ def direction_change(
     # Odometry may be in another unit than the place of the laser.
     lengths = [np.hypot(steps[:, 0], steps[:, 1]) for steps in (laser, odometry)]
     moves: Mask = (lengths[0] >= options.min_length) & (lengths[1] > 0.0)
+    # Where odometry is late, it leads elsewhere in a turn.
+    moves &= np.abs(laser[:, 2]) <= options.max_step_turn
     if not moves.any():
         return None
     scale = median(lengths[0][moves] / lengths[1][moves])

@@ -16,7 +16,7 @@ from nscan_cli.calibration.options import FileCheckOptions
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.logs.load import read_log
 from nscan_cli.logs.reading_options import ReadingOptions
-from nscan_cli.poses import are_known, compose, relative
+from nscan_cli.poses import are_known, compose, relative, wrap
 from tests.benchmarks.lasers import HARD, recorded
 from tests.data import CORRIDOR_LOG, OFFICE_LOG, data_file
 from tests.logs.excerpts import excerpt
@@ -52,7 +52,7 @@ LIKELY: dict[str, tuple[Fault, str]] = {
     "looks to the left": (lambda log: faults.mounted_otherwise(log, -np.pi / 2), "90° further to the left"),
     "heads to the left": (
         lambda log: odometry_faults.heading_elsewhere(log, np.pi / 2),
-        "headings of odometry are likely 90° too far to the left;.*try --no-odometry$",
+        "headings of odometry are likely 90° too far to the left;.*try --no-odometry; meanwhile",
     ),
     "in the middle, and looks to the left": (
         lambda log: replace(log, mount=np.array([0.0, 0.0, -np.pi / 2])),
@@ -106,8 +106,39 @@ def test_what_is_likely_is_said_with_its_cure_and_left_alone(name):
     checked = checked_file(log, ReadingOptions(), FileCheckOptions())
     assert len(checked.messages) == 1
     assert re.search(words, checked.messages[0])
-    assert checked.log is log or "odometry is mirrored" in checked.messages[0]
+    is_changed = re.search("odometry is (mirrored as well|changed to agree)", checked.messages[0])
+    assert (checked.log is log) == (is_changed is None)
     assert checked.reading == ReadingOptions()
+
+
+@pytest.mark.parametrize("turn", [0.3, -np.pi / 2, np.pi])
+@pytest.mark.parametrize("make", [faults.mounted_otherwise, odometry_faults.heading_elsewhere])
+def test_odometry_of_a_laser_that_looks_elsewhere_agrees_with_the_scans(make, turn):
+    """The laser moves as it did, whatever is wrong; so no drive is mapped against its odometry."""
+    recorded = drive()
+    log = checked_file(make(recorded, turn), ReadingOptions(), FileCheckOptions()).log
+    assert recorded.odometry is not None
+    assert log.odometry is not None
+    assert found(log) == []
+    path, other = (each.laser_pose(odometry) for each, odometry in (
+        (recorded, recorded.odometry), (log, log.odometry)
+    ))  # fmt: skip
+    off = relative(path, path[0]) - relative(other, other[0])
+    assert np.abs(off[:, :2]).max() < 0.05
+    assert np.abs(wrap(off[:, 2])).max() < 0.01
+
+
+def test_the_length_of_odometry_agrees_where_it_is_clearly_another():
+    log = odometry_faults.scaled(drive(), 1.5)
+    checked = checked_file(log, ReadingOptions(), FileCheckOptions())
+    assert "meanwhile odometry is changed" in checked.messages[0]
+    recorded = drive().odometry
+    assert recorded is not None
+    assert checked.log.odometry is not None
+    np.testing.assert_allclose(checked.log.odometry, recorded, rtol=0.02, atol=1e-6)
+    assert found(checked.log) == []
+    slightly = odometry_faults.scaled(drive(), 0.9)
+    assert checked_file(slightly, ReadingOptions(), FileCheckOptions()).log is slightly
 
 
 SCALES = (1000.0, 10.0, 0.1, 300.0)

@@ -9,10 +9,10 @@ from nscan_cli.calibration import measured_steps
 from nscan_cli.calibration.contradictions import find_contradictions
 from nscan_cli.calibration.measured_steps import KnownSteps
 from nscan_cli.calibration.options import FileCheckOptions
+from nscan_cli.calibration.thinned_scans import ThinnedScan, thinned_scan
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.logs.load import read_log
 from nscan_cli.logs.reading_options import ReadingOptions
-from nscan_cli.matching.scan_pairs import ScanPair, match_scans
 from tests.data import data_file
 from tests.simulation import odometry_faults
 from tests.slam.keyframe_drives import round_scene
@@ -26,17 +26,17 @@ def measured(log: LaserLog, options: FileCheckOptions) -> KnownSteps:
 
 def test_steps_are_measured_once(monkeypatch):
     """Those in doubt, and those that tell the clock, are from a larger sample of the same log."""
-    matches = []
+    scans = []
 
-    def counted(*given: Any) -> ScanPair:
-        matches.append(given)
-        return match_scans(*given)
+    def counted(*given: Any) -> ThinnedScan | None:
+        scans.append(given)
+        return thinned_scan(*given)
 
-    monkeypatch.setattr(measured_steps, "match_scans", counted)
+    monkeypatch.setattr(measured_steps, "thinned_scan", counted)
     late = odometry_faults.late(round_scene().record(5).log(), 3.0)
     known = measured(late, FileCheckOptions())
     assert len(known) > 2 * FileCheckOptions().steps.count
-    assert 0 < len(matches) <= len(known)
+    assert 0 < len(scans) <= 2 * len(known)
 
 
 def test_an_offset_by_chance_is_not_followed():

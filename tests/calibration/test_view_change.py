@@ -28,7 +28,7 @@ MOUNT = np.array([0.3, -0.1, 0.7])
 def steps(seed: int, count: int = 60) -> tuple[Array, Array]:
     """Steps (n, 3) of laser and odometry with some noise."""
     rng = np.random.default_rng(seed)
-    robot = np.stack([rng.uniform(0.1, 0.3, count), np.zeros(count), rng.normal(0.0, 0.2, count)], axis=1)
+    robot = np.stack([rng.uniform(0.1, 0.3, count), np.zeros(count), rng.normal(0.0, 0.1, count)], axis=1)
     laser = relative(compose(robot, MOUNT), MOUNT) + rng.normal(0.0, 0.01, (count, 3))
     return laser, robot
 
