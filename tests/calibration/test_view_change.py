@@ -41,7 +41,7 @@ def test_the_place_and_both_directions_are_found(turn, at):
     found = direction_change(laser, odometry, MOUNT, OPTIONS.min_steps, OPTIONS)
     assert found is not None
     assert abs(found.step - at) <= 1
-    assert found.before == pytest.approx(MOUNT[2], abs=0.03)
+    assert found.before == pytest.approx(MOUNT[2], abs=OPTIONS.min_direction)
     assert np.cos(found.behind - found.before - turn) > 0.999
     assert found.exceeds(OPTIONS.min_direction, OPTIONS.sigmas)
 
