@@ -34,8 +34,6 @@ BACKWARDS = np.array([-1.0, -1.0, 1.0])
 """Factors of a mounting: of a robot that counts forward as backward the laser seems to be there, turned."""
 ONE_AXIS_REVERSED = np.array([-1.0, 1.0, 1.0])
 """Factors of poses: with x and y it is the same, seen from behind; so it is with the sign of headings."""
-UNMEASURED = 0.01
-"""Turns by odometry below this share of those by scans are none: rounding."""
 
 
 def find_contradictions(
@@ -83,8 +81,10 @@ def find_contradictions(
             return _of_opposite_turns(log.mount, turns, mirrored, evidence, reading, options)
         return [findings.wrong_turns(turns), *_of_positions(log.mount, fit, evidence, reading, options)]
     found = []
-    if turns is not None and _are_told(turns, options) and not turns_agree(turns, options):
-        found.append(findings.wrong_turns(turns))
+    if turns is not None and not turns_agree(turns, options):
+        never_turns = bool(is_still[2]) and turns.steps >= options.min_turns_unmeasured
+        if never_turns or _are_told(turns, options):
+            found.append(findings.wrong_turns(turns))
     return found + _of_positions(log.mount, fit, evidence, reading, options)
 
 
@@ -107,8 +107,7 @@ def _evidence(log: LaserLog, options: FileCheckOptions, known: KnownSteps) -> St
 
 def _are_told(turns: TurnFit, options: FileCheckOptions) -> bool:
     """Whether turns by odometry are a multiple of those by scans."""
-    least = options.min_turns_unmeasured if abs(turns.ratio) < UNMEASURED else options.min_steps
-    return turns.steps >= least and turns.spread <= options.max_spread
+    return turns.steps >= options.min_steps and turns.spread <= options.max_spread
 
 
 def _are_opposite(turns: TurnFit, evidence: StepEvidence, options: FileCheckOptions) -> bool:
@@ -125,7 +124,8 @@ def _unusable(evidence: StepEvidence, turns: TurnFit | None, options: FileCheckO
     if not is_explained and explains(evidence.fit_with_signs(ONE_AXIS_REVERSED), options):
         is_heading = turns is not None and turns.ratio < 0.0
         return findings.wrong_signs(evidence, "headings" if is_heading else "x or y")
-    if is_excluded(evidence.fit, options) and is_excluded(evidence.mirrored_fit, options):
+    excluded = is_excluded(evidence.fit, options) and is_excluded(evidence.mirrored_fit, options)
+    if excluded and not evidence.is_explained_without_place:
         return findings.excluded(evidence)
     if turns is not None and turns.steps >= options.min_steps and turns.spread > options.excluded_turn_spread:
         return findings.excluded_turns(turns)
@@ -249,7 +249,7 @@ def _of_positions(
         found.append(findings.wrong_scale(fit, reading, options))
     if abs(float(wrap(fit.mount[2] - mount[2]))) > np.pi - options.opposite_within:
         return [*found, _opposite(mount, fit, evidence, reading, options)]
-    mounting = findings.wrong_mounting(mount, fit, options)
+    mounting = findings.wrong_mounting(mount, fit, evidence.turning_both, options)
     return found if mounting is None else [*found, mounting]
 
 

@@ -65,12 +65,17 @@ def fit_turns(laser: Array, odometry: Array, min_turn: float) -> TurnFit | None:
 
 
 def fit_mount(
-    laser: Array, odometry: Array, metres_per_radian: float, groups: Indices | None = None
+    laser: Array,
+    odometry: Array,
+    metres_per_radian: float,
+    groups: Indices | None = None,
+    is_in_middle: bool = False,
 ) -> MountFit | None:
     """The fit for steps (n, 3) of laser and robot; None where there is no motion to fit.
 
     `groups` (g,) are the first of steps that follow each other: two have a scan in common, and its error.
-    A step's motion is its length, and `metres_per_radian` times its turn.
+    A step's motion is its length, and `metres_per_radian` times its turn. A laser that `is_in_middle` has no
+    place that is open.
     """
     if len(laser) < 3:
         return None
@@ -80,6 +85,8 @@ def fit_mount(
     rows[:, 1, :2] = np.stack([laser[:, 1], laser[:, 0]], axis=1)
     rows[:, 0, 2:] = np.stack([1.0 - c, s], axis=1)
     rows[:, 1, 2:] = np.stack([-s, 1.0 - c], axis=1)
+    if is_in_middle:
+        rows[:, :, 2:] = 0.0
     fit = robust_fit(rows, odometry[:, :2], groups)
     size = float(np.hypot(fit.values[0], fit.values[1]))
     if size <= 0.0:

@@ -42,6 +42,12 @@ class StepEvidence:
         return int(self._is_turning.sum())
 
     @property
+    def turning_both(self) -> int:
+        """The number of steps with a turn by scans in which odometry turns, too: by half as much, or more."""
+        seen, told = (np.abs(steps[self._is_turning, 2]) for steps in (self.laser, self.odometry))
+        return int((told >= 0.5 * seen).sum())
+
+    @property
     def unchanged(self) -> tuple[int, int]:
         """The number of steps without motion by scans, and of all, among those that are clearly some by
         odometry."""
@@ -92,6 +98,19 @@ class StepEvidence:
     def mirrored_fit(self) -> MountFit | None:
         """The mounting and the scale that explain the steps of mirrored scans."""
         return self._fit(self.laser * MIRRORED, self.odometry)
+
+    @functools.cached_property
+    def is_explained_without_place(self) -> bool:
+        """Whether a direction of the laser and a scale explain most of the steps with motion.
+
+        Matches that failed and turn where the robot does not would have the laser anywhere.
+        """
+        moving, arm = self._is_moving, self.options.steps.metres_per_radian
+        fits = (
+            fit_mount(laser[moving], self.odometry[moving], arm, is_in_middle=True)
+            for laser in (self.laser, self.laser * MIRRORED)
+        )
+        return any(fit is not None and fit.spread <= self.options.max_spread for fit in fits)
 
     @functools.cached_property
     def change(self) -> ScaleChange | None:

@@ -58,6 +58,14 @@ def test_ground_that_a_pitching_robot_sees_is_no_change_of_the_ranges():
     assert not checked_file(near, ReadingOptions(), FileCheckOptions()).messages
 
 
+@pytest.mark.parametrize(("seed", "part"), [(1, slice(None)), (3, slice(2430, 3650))])
+def test_matches_that_failed_where_the_robot_drives_straight_on(seed, part):
+    """They turn where the robot does not: the laser could be anywhere, and odometry useless."""
+    grounds = next(kind for kind in HARD if kind.name.startswith("grounds"))
+    log, _ = recorded(grounds, seed, "good")
+    assert not checked_file(excerpt(log, part), ReadingOptions(), FileCheckOptions()).messages
+
+
 def test_pairs_that_begin_with_one_scan_count_once():
     turns, gains = np.array([0.0, 0.1]), np.array([0.1, 0.11, 0.09, 0.1, 0.11, 0.1])
     energies = np.stack([-gains, np.zeros(6)], axis=1)
