@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from nscan_cli.calibration import findings
+from nscan_cli.calibration import findings, mount_findings
 from nscan_cli.calibration.findings import Finding
 from nscan_cli.calibration.gathered_evidence import gathered_evidence
 from nscan_cli.calibration.measured_steps import KnownSteps, MeasuredSteps, measure_steps
@@ -164,7 +164,9 @@ def _of_view(
         return None
     if not explains(evidence.fit_turned(turned), options):
         return None
-    return findings.changed_direction(turned, _place(log, evidence, turned.step, reading), log.mount, options)
+    return mount_findings.changed_direction(
+        turned, _place(log, evidence, turned.step, reading), log.mount, options
+    )
 
 
 def _place(
@@ -249,7 +251,7 @@ def _of_positions(
         found.append(findings.wrong_scale(fit, reading, options))
     if abs(float(wrap(fit.mount[2] - mount[2]))) > np.pi - options.opposite_within:
         return [*found, _opposite(mount, fit, evidence, reading, options)]
-    mounting = findings.wrong_mounting(mount, fit, evidence.turning_both, options)
+    mounting = mount_findings.wrong_mounting(mount, fit, evidence.turning_both, options)
     return found if mounting is None else [*found, mounting]
 
 
@@ -268,4 +270,4 @@ def _opposite(
     else:
         is_backward = forward < 0.5
         why = f"{forward:.0%} of the steps by odometry go forward"
-    return findings.opposite(mount, fit, why, is_backward, reading, options)
+    return mount_findings.opposite(mount, fit, why, is_backward, reading, options)
