@@ -26,7 +26,7 @@ def with_seen_mount(log: LaserLog, mount: Array) -> LaserLog:
     return _with_changed(log, lambda poses: compose(compose(poses, mount), inverse(log.mount)))
 
 
-def with_seen_scale(log: LaserLog, scale: float) -> LaserLog:
+def with_scaled_odometry(log: LaserLog, scale: float) -> LaserLog:
     """The log whose odometry is so many times as long."""
     return _with_changed(log, lambda poses: scaled_odometry(poses, scale))
 

@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 
 from nscan_cli.calibration.agreeing_odometry import (
     with_mirrored_odometry,
+    with_scaled_odometry,
     with_seen_mount,
-    with_seen_scale,
 )
 from nscan_cli.calibration.bearing_jitter import checked_bearings
 from nscan_cli.calibration.companions import checked_companion
@@ -24,10 +24,8 @@ from nscan_cli.calibration.order_jumps import checked_order
 from nscan_cli.calibration.range_jumps import checked_ranges
 from nscan_cli.calibration.sweep_check import checked_sweep
 from nscan_cli.calibration.unsigned_odometry import checked_signs
-from nscan_cli.logs.assemble import scaled_odometry
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.logs.reading_options import ReadingOptions
-from nscan_cli.logs.robot_path import robot_path
 from nscan_cli.poses import are_known
 
 
@@ -76,14 +74,15 @@ def checked_file(log: LaserLog, reading: ReadingOptions, options: FileCheckOptio
         # A laser that is turned within the log sees the robot go elsewhere, too. The steps by scans stay.
         turned = changed_view(log, reading, options, known)
         findings, signed, reversing = (findings, signed, reversing) if turned is None else ([turned], log, [])
-    if any(finding.is_mirror_image for finding in findings):
+    is_mirror_image = any(finding.is_mirror_image for finding in findings)
+    if is_mirror_image:
         # The ranges changed as its mirror image says.
         signed, reversing = checked_signs(with_mirrored_odometry(log), options.unsigned, options.steps)
     log = signed
     if held and any(finding.is_of_clocks for finding in findings):
         # A clock that is behind makes odometry begin late, as if it stood.
         log, units, held, reversing = recorded, [], [], []
-    if not any(finding.is_mirror_image for finding in findings):
+    if not is_mirror_image:
         log = _agreeing(log, findings)
     for finding in findings:
         if finding.corrected:
@@ -108,7 +107,7 @@ def _agreeing(log: LaserLog, findings: Sequence[Finding]) -> LaserLog:
     """The log whose odometry agrees with the scans, as findings see it that leave open what is wrong."""
     for finding in findings:
         if finding.seen_scale is not None:
-            log = with_seen_scale(log, finding.seen_scale)
+            log = with_scaled_odometry(log, finding.seen_scale)
         if finding.seen_mount is not None:
             log = with_seen_mount(log, finding.seen_mount)
     return log
@@ -116,10 +115,6 @@ def _agreeing(log: LaserLog, findings: Sequence[Finding]) -> LaserLog:
 
 def _as_read(log: LaserLog, reading: ReadingOptions, corrected: ReadingOptions) -> LaserLog:
     """The log with its odometry as other reading options give it."""
-    odometry, path = log.odometry, log.odometry_path
-    if odometry is None or not corrected.odometry:
+    if log.odometry is None or not corrected.odometry:
         return replace(log, odometry=None, odometry_path=None)
-    scale = corrected.odometry_scale / reading.odometry_scale
-    if path is not None:
-        path = robot_path(path.times, scaled_odometry(path.poses, scale))
-    return replace(log, odometry=scaled_odometry(odometry, scale), odometry_path=path)
+    return with_scaled_odometry(log, corrected.odometry_scale / reading.odometry_scale)

@@ -105,7 +105,8 @@ def opposite(
 
 
 def _seen_mount(fit: MountFit, place: Array, options: FileCheckOptions) -> Array:
-    """The mounting (3,) that the steps show; at a place (2,) or more, if they leave that open."""
+    """The mounting (3,) that the steps show; if they leave open where the laser is, it is at the `place` (3,)
+    of a mounting."""
     is_told = float(fit.sigmas[1:3].max()) <= options.max_seen_sigma
     return np.append(fit.mount[:2] if is_told else place[:2], fit.mount[2])
 

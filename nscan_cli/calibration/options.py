@@ -153,6 +153,12 @@ class FileCheckOptions:
     less."""
     min_turns_unmeasured: int = 4
     """Least number of steps with a turn by scans where odometry never turns. A larger value finds less."""
+    min_turn_share: float = 0.5
+    """A step turns by odometry, too, if that says at least this share of the turn by scans. Only such steps
+    tell the place of the laser. A larger value finds less."""
+    min_driven: float = 0.1
+    """A step clearly drives by odometry from this length (m) or turn (rad) on. A larger value finds fewer
+    scans that stay the same."""
     min_unchanged_share: float = 0.6
     """Least share of the steps with motion by odometry in which the scans stay the same, where the laser
     likely sees what goes along with the robot. A larger value finds less."""

@@ -14,9 +14,6 @@ from nscan_cli.calibration.scale_change import ScaleChange, scale_change
 from nscan_cli.calibration.view_change import DirectionChange, TurnChange, direction_change, turn_change
 from nscan_cli.poses import MIRRORED, Array, Mask, are_known, relative, transform, wrap
 
-CLEAR_MOTION = 2.0
-"""Motion of so many times the least one is clearly some."""
-
 
 class StepEvidence:
     """The steps by scans and by odometry, of those that have both."""
@@ -26,10 +23,10 @@ class StepEvidence:
         by_odometry = steps.odometry(odometry)
         self.steps, self.options, self.poses = steps, options, odometry
         self._known = are_known(by_odometry)
-        laser, self.odometry = steps.laser[self._known], by_odometry[self._known]
-        self.laser, least = laser, options.steps.min_motion
-        self._is_turning = np.abs(laser[:, 2]) >= least
-        self._is_moving = (np.hypot(laser[:, 0], laser[:, 1]) >= least) | self._is_turning
+        self.laser, self.odometry = steps.laser[self._known], by_odometry[self._known]
+        least = options.steps.min_motion
+        self._is_turning = np.abs(self.laser[:, 2]) >= least
+        self._is_moving = _moves(self.laser, least)
 
     @property
     def moving(self) -> int:
@@ -43,18 +40,15 @@ class StepEvidence:
 
     @property
     def turning_both(self) -> int:
-        """The number of steps with a turn by scans in which odometry turns, too: by half as much, or more."""
+        """The number of steps with a turn by scans in which odometry turns, too."""
         seen, told = (np.abs(steps[self._is_turning, 2]) for steps in (self.laser, self.odometry))
-        return int((told >= 0.5 * seen).sum())
+        return int((told >= self.options.min_turn_share * seen).sum())
 
     @property
     def unchanged(self) -> tuple[int, int]:
         """The number of steps without motion by scans, and of all, among those that are clearly some by
         odometry."""
-        least = CLEAR_MOTION * self.options.steps.min_motion
-        driven = (np.hypot(self.odometry[:, 0], self.odometry[:, 1]) >= least) | (
-            np.abs(self.odometry[:, 2]) >= least
-        )
+        driven = _moves(self.odometry, self.options.min_driven)
         return int((driven & ~self._is_moving).sum()), int(driven.sum())
 
     @property
@@ -105,11 +99,10 @@ class StepEvidence:
 
         Matches that failed and turn where the robot does not would have the laser anywhere.
         """
-        moving, arm = self._is_moving, self.options.steps.metres_per_radian
-        fits = (
-            fit_mount(laser[moving], self.odometry[moving], arm, is_in_middle=True)
+        fits = [
+            self._fit(laser, self.odometry, is_in_middle=True)
             for laser in (self.laser, self.laser * MIRRORED)
-        )
+        ]
         return any(fit is not None and fit.spread <= self.options.max_spread for fit in fits)
 
     @functools.cached_property
@@ -150,9 +143,15 @@ class StepEvidence:
         """The fit of odometry whose coordinates are multiplied by signs (3,)."""
         return self._fit(self.laser, self.steps.odometry(self.poses * signs)[self._known])
 
-    def _fit(self, laser: Array, odometry: Array) -> MountFit | None:
-        moving = self._is_moving
-        return fit_mount(laser[moving], odometry[moving], self.options.steps.metres_per_radian)
+    def _fit(self, laser: Array, odometry: Array, is_in_middle: bool = False) -> MountFit | None:
+        moving, arm = self._is_moving, self.options.steps.metres_per_radian
+        return fit_mount(laser[moving], odometry[moving], arm, is_in_middle=is_in_middle)
+
+
+def _moves(steps: Array, least: float) -> Mask:
+    """(n,) which steps (n, 3) go so far (m) or turn so much (rad)."""
+    moves: Mask = (np.hypot(steps[:, 0], steps[:, 1]) >= least) | (np.abs(steps[:, 2]) >= least)
+    return moves
 
 
 def _length_sigmas(laser: Array, covariances: Array) -> Array:

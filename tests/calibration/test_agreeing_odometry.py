@@ -1,4 +1,4 @@
-"""Readings in the wrong order, and odometry that turns the wrong way: mirror images of each other."""
+"""Odometry that is made to agree with the scans where it is open what is wrong."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from nscan_cli.calibration.options import FileCheckOptions
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.logs.load import read_log
 from nscan_cli.logs.reading_options import ReadingOptions
-from nscan_cli.poses import MIRRORED, compose, inverse, relative
+from nscan_cli.poses import MIRRORED, compose, inverse, relative, wrap
 from tests.calibration.test_file_check import central, drive, found
 from tests.data import data_file
 from tests.simulation import faults, odometry_faults
@@ -71,3 +71,33 @@ def test_opposite_turns_are_found_where_their_sizes_vary(make):
     log = read_log(str(data_file("field/urg-corridor-2.bag")))
     (said,) = found(make(replace(log, odometry_path=None)))
     assert re.search("in the wrong order, and the map is mirrored: .*try --flip", said)
+
+
+@pytest.mark.parametrize("turn", [0.3, -np.pi / 2, np.pi])
+@pytest.mark.parametrize("make", [faults.mounted_otherwise, odometry_faults.heading_elsewhere])
+def test_odometry_of_a_laser_that_looks_elsewhere_agrees_with_the_scans(make, turn):
+    """The laser moves as it did, whatever is wrong; so no drive is mapped against its odometry."""
+    recorded = drive()
+    log = checked_file(make(recorded, turn), ReadingOptions(), FileCheckOptions()).log
+    assert recorded.odometry is not None
+    assert log.odometry is not None
+    assert found(log) == []
+    path, other = (each.laser_pose(odometry) for each, odometry in (
+        (recorded, recorded.odometry), (log, log.odometry)
+    ))  # fmt: skip
+    off = relative(path, path[0]) - relative(other, other[0])
+    assert np.abs(off[:, :2]).max() < 0.05
+    assert np.abs(wrap(off[:, 2])).max() < 0.01
+
+
+def test_the_length_of_odometry_agrees_where_it_is_clearly_another():
+    log = odometry_faults.scaled(drive(), 1.5)
+    checked = checked_file(log, ReadingOptions(), FileCheckOptions())
+    assert "meanwhile odometry is changed" in checked.messages[0]
+    recorded = drive().odometry
+    assert recorded is not None
+    assert checked.log.odometry is not None
+    np.testing.assert_allclose(checked.log.odometry, recorded, rtol=0.02, atol=1e-6)
+    assert found(checked.log) == []
+    slightly = odometry_faults.scaled(drive(), 0.9)
+    assert checked_file(slightly, ReadingOptions(), FileCheckOptions()).log is slightly

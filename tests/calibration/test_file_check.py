@@ -11,15 +11,12 @@ import numpy as np
 import pytest
 
 from nscan_cli.calibration.file_check import checked_file
-from nscan_cli.calibration.measured_steps import measure_steps
 from nscan_cli.calibration.options import FileCheckOptions
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.logs.load import read_log
 from nscan_cli.logs.reading_options import ReadingOptions
-from nscan_cli.poses import are_known, compose, relative, wrap
-from tests.benchmarks.lasers import HARD, recorded
+from nscan_cli.poses import are_known, compose
 from tests.data import CORRIDOR_LOG, OFFICE_LOG, data_file
-from tests.logs.excerpts import excerpt
 from tests.simulation import faults, odometry_faults
 from tests.simulation.scenes import bare_corridor
 from tests.slam.keyframe_drives import round_scene
@@ -109,36 +106,6 @@ def test_what_is_likely_is_said_with_its_cure_and_left_alone(name):
     is_changed = re.search("odometry is (mirrored as well|changed to agree)", checked.messages[0])
     assert (checked.log is log) == (is_changed is None)
     assert checked.reading == ReadingOptions()
-
-
-@pytest.mark.parametrize("turn", [0.3, -np.pi / 2, np.pi])
-@pytest.mark.parametrize("make", [faults.mounted_otherwise, odometry_faults.heading_elsewhere])
-def test_odometry_of_a_laser_that_looks_elsewhere_agrees_with_the_scans(make, turn):
-    """The laser moves as it did, whatever is wrong; so no drive is mapped against its odometry."""
-    recorded = drive()
-    log = checked_file(make(recorded, turn), ReadingOptions(), FileCheckOptions()).log
-    assert recorded.odometry is not None
-    assert log.odometry is not None
-    assert found(log) == []
-    path, other = (each.laser_pose(odometry) for each, odometry in (
-        (recorded, recorded.odometry), (log, log.odometry)
-    ))  # fmt: skip
-    off = relative(path, path[0]) - relative(other, other[0])
-    assert np.abs(off[:, :2]).max() < 0.05
-    assert np.abs(wrap(off[:, 2])).max() < 0.01
-
-
-def test_the_length_of_odometry_agrees_where_it_is_clearly_another():
-    log = odometry_faults.scaled(drive(), 1.5)
-    checked = checked_file(log, ReadingOptions(), FileCheckOptions())
-    assert "meanwhile odometry is changed" in checked.messages[0]
-    recorded = drive().odometry
-    assert recorded is not None
-    assert checked.log.odometry is not None
-    np.testing.assert_allclose(checked.log.odometry, recorded, rtol=0.02, atol=1e-6)
-    assert found(checked.log) == []
-    slightly = odometry_faults.scaled(drive(), 0.9)
-    assert checked_file(slightly, ReadingOptions(), FileCheckOptions()).log is slightly
 
 
 SCALES = (1000.0, 10.0, 0.1, 300.0)
@@ -300,60 +267,6 @@ def test_scans_that_stay_the_same_while_the_robot_drives():
     checked = checked_file(replace(log, ranges=seen.astype(np.float32)), ReadingOptions(), FileCheckOptions())
     assert any("the scans stay the same while the robot drives" in each for each in checked.messages)
     assert checked.log.odometry is not None
-
-
-OUTDOORS: dict[str, tuple[Fault, str]] = {
-    "mirrored": (faults.mirrored, "in the wrong order.* try --flip"),
-    "looks 90° left": (lambda log: faults.mounted_otherwise(log, -np.pi / 2), "9[01]° further to the left"),
-    "millimetres": (lambda log: odometry_faults.scaled(log, 1000.0), "as by --odometry-scale 0.001"),
-    "a third too long": (lambda log: odometry_faults.scaled(log, 1.33), r"try --odometry-scale 0\.7"),
-    "x": (odometry_faults.x_reversed, "counts x or y the wrong way"),
-    "held": (
-        lambda log: odometry_faults.held(log, slice(3000, 5000), True),
-        "stands still while the scans move",
-    ),
-}
-
-
-@pytest.mark.parametrize("fault", OUTDOORS)
-def test_outdoors_where_scans_tell_few_steps_more_are_measured(fault):
-    make, words = OUTDOORS[fault]
-    said = found(make(read_log(str(data_file("fr-clinic.log.gz")))))
-    assert re.search(words, " ".join(said))
-
-
-@pytest.mark.parametrize("fault", [name for name in OUTDOORS if name != "held"])
-def test_scans_a_metre_apart_are_matched_by_a_search(fault):
-    """Of 116 steps of this log, 21 can be measured from where the robot was, and 54 with a search."""
-    make, words = OUTDOORS[fault]
-    log = read_log(str(data_file("fr-campus.log.gz")))
-    for some in (slice(None), slice(300, 900)):
-        assert re.search(words, " ".join(found(make(excerpt(log, some)))))
-
-
-def test_a_fast_robot_on_simulated_grounds():
-    """Its scans are a metre apart, and the steps that a search finds are right."""
-    grounds = next(kind for kind in HARD if kind.name.startswith("grounds"))
-    log, truth = recorded(grounds, 1, "good")
-    fast = slice(None, None, 5)
-    log, truth = excerpt(log, fast), truth[fast]
-    log = replace(log, times=log.times[0] + np.arange(len(log)))
-    rows = np.arange(0, len(log) - 1, 10)
-    options = FileCheckOptions().steps
-    without = replace(options, min_searched_overlap=1.0)
-    steps = measure_steps(log, (rows, rows + 1), options)
-    assert len(steps) > 1.5 * len(measure_steps(log, (rows, rows + 1), without))
-    true = relative(truth[steps.last], truth[steps.first])
-    off = np.hypot(*(steps.odometry(truth) - steps.laser)[:, :2].T)
-    assert (off < 0.1 + 0.1 * np.hypot(*true[:, :2].T)).mean() >= 0.9
-
-
-@pytest.mark.parametrize("fault", [faults.mirrored, lambda log: odometry_faults.turning(log, 0.0)])
-def test_a_drive_with_few_turns(fault):
-    """Where the few are all opposite, or odometry never turns, more are measured, and fewer are enough."""
-    log = excerpt(read_log(str(data_file("fr-clinic.log.gz"))), slice(600, 1700))
-    assert re.search("in the wrong order|likely turns wrongly", " ".join(found(fault(log))))
-    assert found(log) == []
 
 
 def test_nothing_is_contradicted_on_a_log_from_the_field():
