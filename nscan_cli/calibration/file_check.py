@@ -82,8 +82,6 @@ def checked_file(log: LaserLog, reading: ReadingOptions, options: FileCheckOptio
     if held and any(finding.is_of_clocks for finding in findings):
         # A clock that is behind makes odometry begin late, as if it stood.
         log, units, held, reversing = recorded, [], [], []
-    if not is_mirror_image:
-        log = _agreeing(log, findings)
     for finding in findings:
         if finding.corrected:
             corrected = replace(reading, **finding.corrected)
@@ -91,6 +89,9 @@ def checked_file(log: LaserLog, reading: ReadingOptions, options: FileCheckOptio
             if not reversing and "odometry_scale" in finding.corrected:
                 # In another unit the ranges did not change as odometry says.
                 log, reversing = checked_signs(log, options.unsigned, options.steps)
+    if not is_mirror_image:
+        # In the unit of the mounting.
+        log = _agreeing(log, findings)
     said += (
         jitter + order + jumps + units + held + reversing + late + [finding.message for finding in findings]
     )

@@ -101,3 +101,13 @@ def test_the_length_of_odometry_agrees_where_it_is_clearly_another():
     assert found(checked.log) == []
     slightly = odometry_faults.scaled(drive(), 0.9)
     assert checked_file(slightly, ReadingOptions(), FileCheckOptions()).log is slightly
+
+
+def test_odometry_in_another_unit_agrees_in_that_of_the_mounting():
+    """The laser is 0.1 m ahead of the middle, and 0.1 m by odometry is as nothing."""
+    log = faults.mounted_otherwise(odometry_faults.scaled(drive(), 1000.0), -np.pi / 2)
+    other = faults.mounted_otherwise(drive(), -np.pi / 2)
+    (one, two) = (checked_file(each, ReadingOptions(), FileCheckOptions()).log for each in (log, other))
+    assert one.odometry is not None
+    assert two.odometry is not None
+    np.testing.assert_allclose(one.odometry, two.odometry, atol=0.01)
