@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nscan_cli.kernels.decorators import kernel
-from nscan_cli.poses import Array
+from nscan_cli.poses import Array, Indices
 
 FIELD_LEVELS = 5
 """Levels of a field. Like the three constants below, it is a part of the layout of a field's arrays."""
@@ -110,7 +110,8 @@ class Search:
         steps = int(options.distance / options.cell)
         cells = _point_cells(field, chosen, centre, angles)
         self._centre = centre
-        self._lattice = field, cells, _tile_bounds(field.coarsest, cells, steps), centre, angles, steps
+        self._lattice = field, cells, centre, angles, steps
+        self._tile_bounds = _tile_bounds(field.coarsest, cells, steps) / cells.shape[1]
 
     def best(self, least: float, without: tuple[Array, float] | None = None) -> FoundPose | None:
         """The best pose that scores more than `least`; None if there is none.
@@ -119,7 +120,11 @@ class Search:
         """
         pose = np.empty(3)
         place, away = (self._centre, -1.0) if without is None else without
-        score = _branch_and_bound(*self._lattice, least, place, away, pose)
+        bounds = self._tile_bounds.ravel()
+        tiles = np.flatnonzero(bounds > least)
+        # Sorted here: numba takes a second to compile a sort.
+        tiles = tiles[np.argsort(-bounds[tiles], kind="stable")]
+        score = _branch_and_bound(*self._lattice, self._tile_bounds, tiles, least, place, away, pose)
         return FoundPose(score, pose) if score > least else None
 
 
@@ -183,7 +188,7 @@ def _point_cells(field: LikelihoodField, points: Array, centre: Array, angles: A
 
 @kernel
 def _tile_bounds(coarsest: NDArray[np.float32], cells: NDArray[np.int32], reach: int) -> Array:
-    """(a, t, t) upper bounds of the scores in each square of PAD × PAD shifts, from −`reach` cells on."""
+    """(a, t, t) upper bounds of the field's sums in squares of PAD × PAD shifts, from −`reach` cells on."""
     tiles = (2 * reach) // PAD + 1
     lanes = -(-tiles // LANES)
     width, height = coarsest.shape[1], coarsest.shape[2]
@@ -202,8 +207,7 @@ def _tile_bounds(coarsest: NDArray[np.float32], cells: NDArray[np.int32], reach:
                     total = bounds[a, i, lane * LANES : (lane + 1) * LANES]
                     for j in range(LANES):
                         total[j] += row[j]
-    mean: Array = bounds[:, :, :tiles] / cells.shape[1]
-    return mean
+    return bounds[:, :, :tiles]
 
 
 @kernel
@@ -233,10 +237,11 @@ def _quarter_bounds(
 def _branch_and_bound(
     field: LikelihoodField,
     cells: NDArray[np.int32],
-    tile_bounds: Array,
     centre: Array,
     angles: Array,
     reach: int,
+    tile_bounds: Array,
+    tiles: Indices,
     least: float,
     place: Array,
     away: float,
@@ -244,20 +249,19 @@ def _branch_and_bound(
 ) -> float:
     """Write the pose (3,) of the best score above `least`; returns that score, or `least`.
 
-    Poses within `away` (m) of `place` (3,) do not count.
+    `tiles` are the squares with greater bounds (a, t, t), from the greatest on. Poses within `away` (m) of
+    `place` (3,) do not count.
     """
-    tiles = tile_bounds.shape[1]
-    bounds = tile_bounds.ravel()
-    candidates = np.flatnonzero(bounds > least)
+    side = tile_bounds.shape[1]
     best = least
     stack, stack_bounds = np.empty((4 * FIELD_LEVELS, 3), dtype=np.int64), np.empty(4 * FIELD_LEVELS)
     quarters = np.empty(4)
-    for tile in candidates[np.argsort(-bounds[candidates], kind="mergesort")]:
-        if bounds[tile] <= best:
+    for tile in tiles:
+        a, i, j = tile // (side * side), (tile // side) % side, tile % side
+        if tile_bounds[a, i, j] <= best:
             break
-        a, i, j = tile // (tiles * tiles), (tile // tiles) % tiles, tile % tiles
         stack[0, 0], stack[0, 1], stack[0, 2] = i * PAD - reach, j * PAD - reach, FIELD_LEVELS - 1
-        stack_bounds[0] = bounds[tile]
+        stack_bounds[0] = tile_bounds[a, i, j]
         size = 1
         while size > 0:
             size -= 1

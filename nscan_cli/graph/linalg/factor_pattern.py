@@ -41,6 +41,9 @@ def find_pattern(edges: Indices, nodes: int) -> Pattern:
     indptr, indices, place = _fill_reducing_order(edges, nodes)
     starts, rows = _fill(indptr, indices, place, np.argsort(place))
     heights = np.diff(starts)
+    # Each column from its diagonal down; all at once, as numba takes long to compile a sort.
+    firsts = np.repeat(np.arange(nodes) * nodes, heights)
+    rows = np.sort(firsts + rows) - firsts
     # A column continues a supernode when it is the first row below the column before, which has one row more.
     next_row = rows[np.minimum(starts[:-1] + 1, len(rows) - 1)]
     continues = (heights[:-1] == heights[1:] + 1) & (next_row[:-1] == np.arange(1, nodes))
@@ -75,28 +78,25 @@ def _fill_reducing_order(edges: Indices, nodes: int) -> tuple[Indices, Indices, 
     return matrix.indptr.astype(np.int64), matrix.indices.astype(np.int64), order.astype(np.int64)
 
 
-@kernel
 def block_targets(edges: Indices, pattern: Pattern) -> Indices:
     """Where the block (row, column) of each edge (E, 2) is stored in the factor's lower triangle.
 
     2 × the index of the block, + 1 where its transpose is stored; −1 where a node is −1.
     """
-    targets = np.full(edges.shape[0], -1)
-    for e in range(edges.shape[0]):
-        if edges[e, 0] < 0 or edges[e, 1] < 0:
-            continue
-        row, column = pattern.place[edges[e, 0]], pattern.place[edges[e, 1]]
-        transposed = row < column
-        if transposed:
-            row, column = column, row
-        start, end = pattern.starts[column], pattern.starts[column + 1]
-        targets[e] = 2 * (start + np.searchsorted(pattern.rows[start:end], row)) + transposed
+    rows, columns = pattern.place[edges].T
+    nodes = len(pattern.place)
+    blocks = np.repeat(np.arange(nodes), np.diff(pattern.starts)) * nodes + pattern.rows
+    indices = np.searchsorted(blocks, np.minimum(rows, columns) * nodes + np.maximum(rows, columns))
+    targets: Indices = np.where((edges >= 0).all(axis=1), 2 * indices + (rows < columns), -1)
     return targets
 
 
 @kernel
 def _fill(indptr: Indices, indices: Indices, place: Indices, order: Indices) -> tuple[Indices, Indices]:
-    """(starts, rows) of the factor's columns. Each takes over the rows of its elimination tree's children."""
+    """(starts, rows) of the factor's columns, each from its diagonal on, but else in no order.
+
+    A column takes over the rows of its children in the elimination tree.
+    """
     nodes = order.shape[0]
     starts = np.zeros(nodes + 1, dtype=np.int64)
     rows = np.empty(4 * indices.shape[0] + 4 * nodes, dtype=np.int64)
@@ -131,7 +131,8 @@ def _fill(indptr: Indices, indices: Indices, place: Indices, order: Indices) -> 
             k = sibling[k]
         starts[j + 1] = end
         if end > start + 1:
-            rows[start + 1 : end].sort()
-            parent = rows[start + 1]
+            parent = nodes
+            for p in range(start + 1, end):
+                parent = min(parent, rows[p])
             sibling[j], child[parent] = child[parent], j
     return starts, rows[: starts[nodes]]

@@ -103,9 +103,11 @@ def _shares(
     """
     shares, pose = np.full(len(ends) - 1, np.nan), np.empty(3)
     own, other = np.empty(options.sectors), np.empty(options.sectors)
+    at = -1
     for k in range(len(shares)):
         row = first + k
-        at = np.searchsorted(views.rows, row, side="right") - 1
+        while at + 1 < len(views.rows) and views.rows[at + 1] <= row:
+            at += 1
         if at < 0 or views.rows[at] == row:
             continue
         relative_pose(views.poses[views.rows[at]], views.poses[row], pose)

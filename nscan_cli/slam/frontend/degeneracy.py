@@ -53,7 +53,7 @@ def keep_prediction(
         mean_square_deviation[0] += options.smoothing * (0.5 * (x * x + y * y) - mean_square_deviation[0])
         return
     places, values = profile(grid, settings, points, prior, pose, along)
-    best = np.argmin(values)
+    best = index_of_least(values)
     if values[best] < found.values[k] - options.rematch_gain:
         further, trial, hessian = places[best] - ahead(pose, prior, along), pose.copy(), np.empty((3, 3))
         trial[0] += further * along[0]
@@ -122,13 +122,23 @@ def measured_variance(places: Array, values: Array, prior: Prior, apart: float) 
     return 1 / max(told, NOTHING_TOLD**-2)
 
 
+@leaf_kernel
+def index_of_least(values: Array) -> int:
+    """The index of the least of some values (n,), the first of several."""
+    best = 0
+    for k in range(1, len(values)):
+        if values[k] < values[best]:
+            best = k
+    return best
+
+
 @kernel
 def entropy_power(values: Array, apart: float) -> float:
     """The variance (m²) of the Gaussian with the entropy of places `apart` (m), with likelihood exp(−value).
 
     That of a Gaussian is its variance; a little likelihood far away counts for little.
     """
-    weights = np.exp(values.min() - values)
+    weights = np.exp(values[index_of_least(values)] - values)
     weights /= weights.sum()
     entropy = np.log(apart) - (weights * np.log(np.maximum(weights, 1e-300))).sum()
     return float(np.exp(2 * entropy - 1) / (2 * np.pi))
