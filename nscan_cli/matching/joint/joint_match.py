@@ -9,9 +9,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from nscan_cli.matching.joint.gauge import gauge_of
 from nscan_cli.matching.joint.joint_energy import NEUTRAL, JointProblem, joint_energy
-from nscan_cli.matching.joint.joint_solver import approach, descend
+from nscan_cli.matching.joint.joint_solver import descend
 from nscan_cli.matching.joint.neutral_energy import neutral_energy
 from nscan_cli.matching.joint.options import JointOptions
 from nscan_cli.matching.joint.overlap import overlaps, weakest_link
@@ -125,17 +124,18 @@ def _approach(
     poses, totals = start.copy(), np.zeros(3, dtype=np.int64)
     for part in [widenings] if pairs_at is None else [(widening,) for widening in widenings]:
         chosen = _with_pairs(problem, pairs_at, poses)
-        totals += approach(chosen, poses, np.array(part), neutral, options.approach)
+        stages = np.array([(each, options.near if each < 1.0 else 0.5 * options.near) for each in part])
+        _, *counts = descend(chosen, poses, stages, False, neutral, options.approach, *_derivatives(poses))
+        totals += counts
     return Approach(poses, *totals.tolist())
 
 
 def _last_stage(problem: JointProblem, reached: Approach, options: JointOptions, neutral: bool) -> JointMatch:
     """The last stage after an approach, with the exact Hessian."""
-    poses, n = reached.poses, len(reached.poses)
-    gradient, hessian = np.empty(3 * n), np.empty((3 * n, 3 * n))
-    limits = gauge_of(options.fixed), options.max_iterations, options.tolerance, options.thorough
-    value, last, evaluations, converged = descend(
-        problem, poses, 1.0, True, neutral, 1, *limits, gradient, hessian
+    poses, (gradient, hessian) = reached.poses, _derivatives(reached.poses)
+    stages = np.array([(1.0, options.tolerance)])
+    value, last, evaluations, unsettled = descend(
+        problem, poses, stages, True, neutral, options.last_stage, gradient, hessian
     )
     if neutral:
         # The derivatives of both energies are the same.
@@ -151,8 +151,14 @@ def _last_stage(problem: JointProblem, reached: Approach, options: JointOptions,
         evaluations=reached.evaluations + evaluations,
         last_iterations=last,
         unsettled=reached.unsettled,
-        converged=converged,
+        converged=unsettled == 0,
     )
+
+
+def _derivatives(poses: Array) -> tuple[Array, Array]:
+    """Room for a gradient (3n,) and a Hessian (3n, 3n)."""
+    n = len(poses)
+    return np.empty(3 * n), np.empty((3 * n, 3 * n))
 
 
 def _with_pairs(problem: JointProblem, pairs_at: PairsAt | None, poses: Array) -> JointProblem:

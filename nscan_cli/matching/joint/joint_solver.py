@@ -9,59 +9,58 @@ from nscan_cli.kernels.decorators import kernel
 from nscan_cli.matching.damped_newton import JOINT_STEPS, is_accepted, is_last, next_damping
 from nscan_cli.matching.joint.gauge import gauge_fixed_step
 from nscan_cli.matching.joint.joint_energy import JointProblem, evaluate_joint
-from nscan_cli.matching.joint.options import ApproachSettings
+from nscan_cli.matching.joint.options import DescentSettings
 from nscan_cli.poses import Array
-
-
-@kernel
-def approach(
-    problem: JointProblem, poses: Array, widenings: Array, neutral: bool, settings: ApproachSettings
-) -> tuple[int, int, int]:
-    """Approach the minimum from the poses (n, 3), in place, with a stage for each of `widenings`.
-
-    Returns the numbers of iterations, of evaluations, and of stages that did not converge.
-    """
-    n = poses.shape[0]
-    gradient, hessian = np.empty(3 * n), np.empty((3 * n, 3 * n))
-    iterations = evaluations = unsettled = 0
-    for widening in widenings:
-        near = settings.near if widening < 1.0 else 0.5 * settings.near
-        _, steps, evaluated, converged = descend(
-            problem, poses, widening, False, neutral, settings.stride, settings.fixed, settings.iterations,
-            near, settings.thorough, gradient, hessian,
-        )  # fmt: skip
-        iterations += steps
-        evaluations += evaluated
-        unsettled += not converged
-    return iterations, evaluations, unsettled
 
 
 @kernel
 def descend(
     problem: JointProblem,
     poses: Array,
-    widening: float,
+    stages: Array,
     exact: bool,
     neutral: bool,
-    stride: int,
-    fixed: int,
-    max_iterations: int,
+    settings: DescentSettings,
+    gradient: Array,
+    hessian: Array,
+) -> tuple[float, int, int, int]:
+    """Descend from the poses (n, 3), in place, in `stages` (k, 2): the widening of each, and its tolerance.
+
+    Writes gradient (3n,) and Hessian (3n, 3n) of the last stage. Returns its value of the objective, and the
+    numbers of iterations, of evaluations, and of stages that did not converge.
+    """
+    value, iterations, evaluations, unsettled = np.inf, 0, 0, 0
+    for k in range(len(stages)):
+        value, steps, evaluated, converged = _stage(
+            problem, poses, stages[k, 0], stages[k, 1], exact, neutral, settings, gradient, hessian
+        )
+        iterations += steps
+        evaluations += evaluated
+        unsettled += not converged
+    return value, iterations, evaluations, unsettled
+
+
+@kernel
+def _stage(
+    problem: JointProblem,
+    poses: Array,
+    widening: float,
     tolerance: float,
-    thorough: bool,
+    exact: bool,
+    neutral: bool,
+    settings: DescentSettings,
     gradient: Array,
     hessian: Array,
 ) -> tuple[float, int, int, bool]:
-    """One stage, from the poses (n, 3), in place. Writes gradient (3n,) and Hessian (3n, 3n).
-
-    `thorough` is that of JointOptions. Returns the value of the objective, the numbers of iterations and of
-    evaluations, and whether the stage converged.
-    """
+    """One stage. Returns the value of the objective, the numbers of iterations and of evaluations, and
+    whether it converged: no pose moved by more than `tolerance` (m and rad)."""
+    fixed, stride = settings.fixed, settings.stride
     trial_gradient, trial_hessian = np.empty_like(gradient), np.empty_like(hessian)
     step, trial = np.empty_like(poses), np.empty_like(poses)
     curvature = 1.0 if exact else 0.0
     value = evaluate_joint(problem, poses, widening, curvature, neutral, stride, gradient, hessian)
     iterations, evaluations, damping, converged = 0, 1, JOINT_STEPS.first, False
-    for _ in range(max_iterations):
+    for _ in range(settings.iterations):
         solved = gauge_fixed_step(gradient, hessian, poses, damping, fixed, step)
         if not solved and exact:
             # The exact Hessian is not positive definite here.
@@ -78,7 +77,7 @@ def descend(
                 trial[i, a] = poses[i, a] + step[i, a]
                 longest = max(longest, abs(step[i, a]))
         converged = is_last(longest, tolerance, damping, JOINT_STEPS)
-        if converged and not thorough:
+        if converged and not settings.thorough:
             assign_rows(poses, trial)
             break
         there = evaluate_joint(

@@ -100,14 +100,14 @@ class AmbiguityOptions:
     certain."""
 
 
-class ApproachSettings(NamedTuple):
-    """The fields of JointOptions that the kernels of an approach take."""
+class DescentSettings(NamedTuple):
+    """The fields of JointOptions that the kernel of a descent takes."""
 
     stride: int
     fixed: int
     """As `gauge_of` returns it."""
     iterations: int
-    near: float
+    """Most iterations in a stage."""
     thorough: bool
 
 
@@ -160,7 +160,11 @@ class JointOptions:
     """How the poses are fitted to walls after the match."""
 
     @property
-    def approach(self) -> ApproachSettings:
-        """What kernels take of these."""
-        fixed = gauge_of(self.fixed)
-        return ApproachSettings(self.stride, fixed, self.approach_iterations, self.near, self.thorough)
+    def approach(self) -> DescentSettings:
+        """What the stages of an approach take of these."""
+        return DescentSettings(self.stride, gauge_of(self.fixed), self.approach_iterations, self.thorough)
+
+    @property
+    def last_stage(self) -> DescentSettings:
+        """What the last stage takes of these."""
+        return DescentSettings(1, gauge_of(self.fixed), self.max_iterations, self.thorough)
