@@ -123,7 +123,7 @@ def _code_generator() -> Any:
             ll_module.data_layout = self._codegen._data_layout
             for function in ll_module.functions:
                 if not function.is_declaration:
-                    manager, builder = self._codegen._function_pass_manager()
+                    manager, builder = self._codegen._function_pass_manager(opt=1)
                     manager.run(function, builder)
 
         def get_pointer_to_function(self, name: str) -> int:
