@@ -13,11 +13,12 @@ import click
 from nscan_cli.cli.progress import progress, say
 
 if TYPE_CHECKING:
+    from nscan_cli.logs.laser_log import LaserLog
     from nscan_cli.nightly.warm_up import CompileProgress
 
 COMPILING = "compiling the kernels, once for this version on this machine"
 COMPILING_MORE = "compiling kernels not needed before, once for this version on this machine"
-SLAM_KERNELS, ALL_KERNELS = 49, 66
+SLAM_KERNELS, ALL_KERNELS = 47, 69
 """About how many kernels `slam` compiles, and `warm-up`: for the bar alone."""
 
 
@@ -54,8 +55,8 @@ class Compiling:
             self.has_begun = True
             say(f"{COMPILING}: {self._takes}" if self._are_most else COMPILING_MORE, self._quiet)
 
-    def beforehand_for_slam(self) -> None:
-        """Compile what `slam` needs in two processes; the cache folder has to be there."""
+    def beforehand_for_slam(self, log: LaserLog) -> None:
+        """Compile what `slam` needs for a log in two processes; the cache folder has to be there."""
         from nscan_cli.kernels.cache_folder import cache_folder
         from nscan_cli.nightly import kernel_exercises, warm_up
 
@@ -63,7 +64,7 @@ class Compiling:
         assert folder is not None
         self._begin()
         with self._bar(SLAM_KERNELS) as report:
-            warm_up.compile_side_by_side(folder, kernel_exercises.FOR_SLAM, os.environ, report)
+            warm_up.compile_side_by_side(folder, kernel_exercises.for_slam(log), os.environ, report)
 
     def all(self, folder: Path) -> None:
         """Compile all kernels that the cache folder lacks, in two processes if it has none."""

@@ -64,7 +64,7 @@ def run_on_log(
     if threads > 1 and is_cold():
         # Whatever is wrong with the log is said at once, and not after the minute of compilation.
         early = read(reading)
-        compiling.beforehand_for_slam()
+        compiling.beforehand_for_slam(early)
     load_runtime()
     scans = early or read(reading)
     if calibrated:

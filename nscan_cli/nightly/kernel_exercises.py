@@ -7,16 +7,24 @@ what the other comes to last, and neither waits long.
 from __future__ import annotations
 
 import contextlib
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from nscan_cli.graph.model import Graph
+    from nscan_cli.logs.laser_log import LaserLog
+    from nscan_cli.logs.reading_options import ReadingOptions
 
 THREADS, SCANS_PER_KEYFRAME = 2, 5
-FOR_SLAM = (("track",), ("refine",))
-"""The parts with the kernels that `slam` needs for most logs, for two processes that take about as long."""
-FOR_ALL = (("track", "others"), ("refine",))
-"""The parts with all kernels."""
+FOR_ALL = (("track", "search", "others"), ("refine", "turn"))
+"""The parts with all kernels, for two processes that take about as long."""
+
+
+def for_slam(log: LaserLog) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """The parts with the kernels that `slam` needs for a log, but for rare ones, for two processes."""
+    return (
+        ("track",) if log.odometry is not None else ("track", "search"),
+        ("refine",) if log.beam_times is None else ("refine", "turn"),
+    )
 
 
 def main(*parts: str) -> None:
@@ -24,10 +32,11 @@ def main(*parts: str) -> None:
     from nscan_cli.kernels.decorators import load_runtime
     from nscan_cli.kernels.whole_kernels import rare_collections
 
+    exercises = {"track": _track, "refine": _refine, "search": _search, "turn": _turn, "others": _others}
     load_runtime()
     with rare_collections():
         for part in parts:
-            {"track": _track, "refine": _refine, "others": _others}[part]()
+            exercises[part]()
 
 
 def _track() -> None:
@@ -54,8 +63,10 @@ def _refine() -> None:
     from nscan_cli.slam.backend.refinement import refine
     from nscan_cli.slam.backend.rejection import reject_contradicting_loops
     from nscan_cli.slam.backend.resume import state_of_graph
+    from nscan_cli.slam.backend.subgraph import nearest_keyframes
     from nscan_cli.slam.diagnostics.notices import notices
     from nscan_cli.slam.log_to_graph import slam_options
+    from nscan_cli.slam.loop_closure.most_certain_paths import relations_on_paths
 
     graph = _drive_graph()
     optimise_graph(graph)
@@ -70,6 +81,8 @@ def _refine() -> None:
     refine(state)
     finish_graph(state)
     notices(state)
+    # For graphs of more than 500 keyframes.
+    relations_on_paths(np.zeros(1, dtype=np.int64), nearest_keyframes(np.zeros((1, 3)), 0, 1, 1))
 
 
 def _drive_graph() -> Graph:
@@ -97,10 +110,47 @@ def _drive_graph() -> Graph:
     return graph
 
 
-def _others() -> None:
-    """What `slam` needs for a few logs only, and what other commands need."""
+def _search() -> None:
+    """Map the beginning of the drive without odometry, which looks for lost scans."""
+    from nscan_cli.logs.reading_options import ReadingOptions
+
+    _map_beginning(ReadingOptions(odometry=False))
+
+
+def _turn() -> None:
+    """Map the beginning of the drive as that of a turning laser whose motion counts as uneven everywhere."""
     from dataclasses import replace
 
+    import numpy as np
+
+    from nscan_cli.logs.reading_options import ReadingOptions
+    from nscan_cli.logs.robot_path import move_along_arc
+    from nscan_cli.slam.log_to_graph import slam_options
+
+    move_along_arc(np.zeros((1, 2)), np.zeros(1), np.zeros(3), False)
+    uneven = replace(slam_options().uneven_motion, min_change=0.0)
+    _map_beginning(ReadingOptions(sweep=0.2), uneven_motion=uneven)
+
+
+def _map_beginning(reading: ReadingOptions, **changed: Any) -> None:
+    from dataclasses import replace
+
+    import numpy as np
+
+    from nscan_cli.logs.load import log_from
+    from nscan_cli.mapping.occupancy import occupancy_grid
+    from nscan_cli.nightly.simulated_drive import simulated_carmen_log
+    from nscan_cli.slam.log_to_graph import map_log, slam_options
+
+    reading = replace(reading, end=20.0)
+    log = log_from(simulated_carmen_log(), "warm-up.log", reading)
+    options = replace(slam_options(), **changed)
+    _, graph = map_log(log, reading, options, THREADS, lambda *_progress: None)
+    occupancy_grid(log, np.arange(len(log)), graph.poses, threads=THREADS)
+
+
+def _others() -> None:
+    """What `calibrate`, `match` and `nscan` need, and `slam` with a relation for each pair of scans."""
     import numpy as np
 
     from nscan_cli.api import match, nscan
@@ -109,15 +159,9 @@ def _others() -> None:
     from nscan_cli.errors import InputDataError
     from nscan_cli.logs.load import log_from
     from nscan_cli.logs.reading_options import ReadingOptions
-    from nscan_cli.logs.robot_path import move_along_arc
-    from nscan_cli.mapping.occupancy import occupancy_grid
     from nscan_cli.nightly.simulated_drive import simulated_carmen_log
-    from nscan_cli.slam.backend.subgraph import nearest_keyframes
-    from nscan_cli.slam.log_to_graph import map_log, slam_options
-    from nscan_cli.slam.loop_closure.most_certain_paths import relations_on_paths
 
-    drive = simulated_carmen_log()
-    log = log_from(drive, "warm-up.log")
+    log = log_from(simulated_carmen_log(), "warm-up.log")
     match(log, 0, 2)
     nscan(log, [0, 1, 2])
     # From so far off, the scans are placed by search.
@@ -125,17 +169,4 @@ def _others() -> None:
     # A drive of one lap may leave the robot open, but its kernels are compiled by then.
     with contextlib.suppress(InputDataError):
         calibrate(log, log.reading, CalibrationOptions())
-    # Without odometry and joint matches, and as a turning laser whose motion counts as uneven everywhere.
-    usual = slam_options()
-    pairs = replace(usual, relations="pairwise")
-    uneven = replace(usual, uneven_motion=replace(usual.uneven_motion, min_change=0.0))
-    for options, reading in (
-        (pairs, ReadingOptions(end=20.0, odometry=False)),
-        (uneven, ReadingOptions(end=20.0, sweep=0.2)),
-    ):
-        log = log_from(drive, "warm-up.log", reading)
-        _, graph = map_log(log, reading, options, THREADS, lambda *_progress: None)
-        occupancy_grid(log, np.arange(len(log)), graph.poses, threads=THREADS)
-    # For the check of a turn that a file may tell wrongly, and for graphs of more than 500 keyframes.
-    move_along_arc(np.zeros((1, 2)), np.zeros(1), np.zeros(3), False)
-    relations_on_paths(np.zeros(1, dtype=np.int64), nearest_keyframes(np.zeros((1, 3)), 0, 1, 1))
+    _map_beginning(ReadingOptions(), relations="pairwise")

@@ -30,7 +30,7 @@ from nscan_cli.nightly.regression_check import check_log
 from nscan_cli.nightly.task import Task
 from nscan_cli.slam.frontend import tracking_kernels
 from tests.cli.room_logs import room_log
-from tests.data import OFFICE_LOG, TURNING_LOG, find_data
+from tests.data import OFFICE_LOG, TURNING_LOG, data_file, find_data
 
 
 @pytest.fixture
@@ -60,8 +60,7 @@ def test_once_on_each_machine(cache, calls, monkeypatch):
     warm_up.compile_kernels({})
     warm_up.compile_kernels({})
     assert calls == [
-        bootstrap.worker_command("kernel_exercises", "track", "others"),
-        bootstrap.worker_command("kernel_exercises", "refine"),
+        bootstrap.worker_command("kernel_exercises", *parts) for parts in kernel_exercises.FOR_ALL
     ]
     # Somebody has cleared the folder.
     with monkeypatch.context() as patch:
@@ -79,7 +78,7 @@ def test_the_command_compiles_all_and_leaves_nothing_to_nightly(cache, calls, mo
     monkeypatch.setattr(kernel_exercises, "main", lambda *parts: made.extend(parts))
     monkeypatch.setattr(cache_folder, "cache_folder", lambda: cache)
     assert run(["warm-up"]) == 0
-    assert made == ["track", "others", "refine"]
+    assert made == [part for parts in kernel_exercises.FOR_ALL for part in parts]
     assert capsys.readouterr().err == f"nothing to compile: {cache}\n"
     warm_up.compile_kernels({})
     assert calls == []
@@ -154,6 +153,36 @@ def test_logs_need_no_kernel_that_is_not_compiled_beforehand():
     real = [path for path in (find_data(f"field/{name}") for name in names) if path is not None]
     logs = [OFFICE_LOG, TURNING_LOG, *map(str, real)]
     run = subprocess.run([sys.executable, "-c", NEEDED_LATER, *logs], capture_output=True, text=True)
+    assert run.returncode == 0, run.stderr
+    exercised, *later = run.stdout.split()
+    assert int(exercised) > 30
+    assert later == []
+
+
+NEEDED_BY_SLAM = """
+import sys
+from nscan_cli import build_graph, read_log
+from nscan_cli.kernels.decorators import Kernel
+from nscan_cli.nightly import kernel_exercises
+loaded, load = [], Kernel._load_or_compile
+def noted(kernel, types, arguments):
+    loaded.append(kernel.py_func.__qualname__)
+    return load(kernel, types, arguments)
+Kernel._load_or_compile = noted
+log = read_log(sys.argv[1])
+for parts in kernel_exercises.for_slam(log):
+    kernel_exercises.main(*parts)
+exercised = len(loaded)
+build_graph(log)
+print(exercised, *loaded[exercised:])
+"""
+"""Prints how many kernels `slam` compiles side by side for a log, and which others it needs."""
+
+
+@pytest.mark.parametrize("log", [OFFICE_LOG, TURNING_LOG, "field/rplidar-hallway.bag"])
+def test_slam_compiles_nothing_that_is_not_compiled_side_by_side(log):
+    path = log if Path(log).exists() else data_file(log)
+    run = subprocess.run([sys.executable, "-c", NEEDED_BY_SLAM, path], capture_output=True, text=True)
     assert run.returncode == 0, run.stderr
     exercised, *later = run.stdout.split()
     assert int(exercised) > 30
