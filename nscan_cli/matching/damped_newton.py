@@ -33,6 +33,10 @@ class StepControl(NamedTuple):
     """A step with more damping than `trusted` is the last one if it is within this share of the tolerance."""
     rounding: float
     """A step that increases the value by less than this share is accepted, since that is rounding."""
+    greatest_stretch: float = 1.0
+    """A step is made longer at most by this factor."""
+    unstretched: int = 0
+    """Number of iterations before any step is made longer."""
 
 
 PAIRWISE_STEPS = StepControl(
@@ -45,9 +49,11 @@ too."""
 JOINT_STEPS = StepControl(
     first=1e-3, least=1e-8, least_divided=1e-8, least_raised=0.0,
     greatest=1e4, trusted=np.inf, damped_share=0.0, rounding=0.0,
+    greatest_stretch=4.0, unstretched=5,
 )  # fmt: skip
 """An evaluation costs n (n − 1) times as much. So the solver gives up earlier, and any step within the
-tolerance is the last one."""
+tolerance is the last one. In bare corridors steps with the semi-definite part of the Hessian are several
+times too short again and again. Then they are made longer."""
 GRAPH_STEPS = StepControl(
     first=0.0, least=0.0, least_divided=1e-9, least_raised=1e-6,
     greatest=1e8, trusted=1.0, damped_share=0.0, rounding=1e-12,
@@ -68,6 +74,22 @@ def next_damping(damping: float, accepted: bool, control: StepControl) -> float:
     if not accepted:
         return max(10.0 * damping, control.least_raised)
     return max(0.1 * damping, control.least) if damping > control.least_divided else control.least
+
+
+@leaf_kernel
+def next_stretch(slope: float, stretch: float, gain: float, control: StepControl) -> float:
+    """The factor that makes the next step as long as the last one shows that it has to be; 1 or more.
+
+    The last step was made longer by `stretch`, and lowered the objective by `gain`; `slope` is −gᵗ Δp of the
+    step before that. The parabola with this slope and gain has its minimum where the factor is slope by
+    curvature. The Hessian of the step expected it at 1.
+    """
+    if gain <= 0.0:
+        return 1.0
+    curvature = 2.0 * (stretch * slope - gain) / (stretch * stretch)
+    if control.greatest_stretch * curvature <= slope:
+        return control.greatest_stretch
+    return max(1.0, slope / curvature)
 
 
 @leaf_kernel

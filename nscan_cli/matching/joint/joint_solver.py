@@ -6,7 +6,7 @@ import numpy as np
 
 from nscan_cli.kernels.array_assignment import assign, assign_rows
 from nscan_cli.kernels.decorators import kernel
-from nscan_cli.matching.damped_newton import JOINT_STEPS, is_accepted, is_last, next_damping
+from nscan_cli.matching.damped_newton import JOINT_STEPS, is_accepted, is_last, next_damping, next_stretch
 from nscan_cli.matching.joint.gauge import gauge_fixed_step
 from nscan_cli.matching.joint.joint_energy import JointProblem, evaluate_joint
 from nscan_cli.matching.joint.options import DescentSettings
@@ -59,9 +59,10 @@ def _stage(
     step, trial = np.empty_like(poses), np.empty_like(poses)
     curvature = 1.0 if exact else 0.0
     value = evaluate_joint(problem, poses, widening, curvature, neutral, stride, gradient, hessian)
-    iterations, evaluations, damping, converged = 0, 1, JOINT_STEPS.first, False
+    iterations, evaluations, damping, stretch, converged = 0, 1, JOINT_STEPS.first, 1.0, False
     for _ in range(settings.iterations):
         solved = gauge_fixed_step(gradient, hessian, poses, damping, fixed, step)
+        factor = 1.0 if exact and solved else stretch
         if not solved and exact:
             # The exact Hessian is not positive definite here.
             evaluate_joint(problem, poses, widening, 0.0, neutral, stride, trial_gradient, trial_hessian)
@@ -71,11 +72,13 @@ def _stage(
             damping = next_damping(damping, False, JOINT_STEPS)
             continue
         iterations += 1
-        longest = 0.0
+        longest = slope = 0.0
         for i in range(poses.shape[0]):
             for a in range(3):
-                trial[i, a] = poses[i, a] + step[i, a]
-                longest = max(longest, abs(step[i, a]))
+                slope -= gradient[3 * i + a] * step[i, a]
+                moved = factor * step[i, a]
+                trial[i, a] = poses[i, a] + moved
+                longest = max(longest, abs(moved))
         converged = is_last(longest, tolerance, damping, JOINT_STEPS)
         if converged and not settings.thorough:
             assign_rows(poses, trial)
@@ -84,13 +87,16 @@ def _stage(
             problem, trial, widening, curvature, neutral, stride, trial_gradient, trial_hessian
         )
         evaluations += 1
-        accepted = is_accepted(value, there, JOINT_STEPS)
+        gain, accepted = value - there, is_accepted(value, there, JOINT_STEPS)
         if accepted:
             value = there
             assign_rows(poses, trial)
             assign(gradient, trial_gradient)
             assign_rows(hessian, trial_hessian)
-        damping = next_damping(damping, accepted, JOINT_STEPS)
+        if accepted or factor == 1.0:
+            damping = next_damping(damping, accepted, JOINT_STEPS)
+        if iterations > JOINT_STEPS.unstretched:
+            stretch = next_stretch(slope, factor, gain, JOINT_STEPS)
         if converged or damping > JOINT_STEPS.greatest:
             break
     return value, iterations, evaluations, converged
