@@ -102,7 +102,7 @@ def test_reading_options_of_a_graph_are_checked(tmp_path, monkeypatch, capsys, r
         (("slam", "nscan", "widenings"), []),
         (("slam", "nscan", "widenings"), [0.1] * 1000),
         (("slam", "relations"), "none"),
-        (("slam", "refinement", "max_sweeps"), 10**30),
+        (("slam", "refinement", "max_passes"), 10**30),
     ],
 )
 def test_parameters_of_a_graph_are_checked(tmp_path, monkeypatch, capsys, place, value):

@@ -8,10 +8,10 @@ import numpy as np
 
 from nscan_cli.poses import Array, Indices
 
-SWEEPS, FIRST_SWEEPS = 30, 10
-"""Sweeps of reweighting, and how many of them minimise the sum of absolute values: it has one minimum."""
+ITERATIONS, FIRST_ITERATIONS = 30, 10
+"""Iterations of reweighting, and how many of them minimise the sum of absolute values: it has one minimum."""
 SETTLED = 1e-6
-"""Sweeps end where they change the solution by a smaller share."""
+"""Iterations end where they change the solution by a smaller share."""
 TO_SIGMA = 1.4826
 """Standard deviation of a Gaussian as a multiple of the median of its absolute value."""
 CAUCHY = 2.385
@@ -50,17 +50,17 @@ def robust_fit(coefficients: Array, measured: Array, groups: Indices | None = No
     residuals: Array = np.zeros(n)
     rows, wanted = coefficients.reshape(n * d, m), measured.ravel()
     before: Array = np.full(m, np.inf)
-    for sweep in range(SWEEPS):
+    for iteration in range(ITERATIONS):
         weighted = (coefficients * weights[:, None, None]).reshape(n * d, m).T
         # What the equations leave open is 0.
         solution = np.linalg.lstsq(weighted @ rows, weighted @ wanted, rcond=None)
         values = np.asarray(solution[0], dtype=np.float64)
         residuals = np.sqrt(((rows @ values - wanted).reshape(n, d) ** 2).sum(axis=1))
         sigma = max(TO_SIGMA * median(residuals) / np.sqrt(d), LEAST_SIGMA)
-        if sweep > FIRST_SWEEPS and np.abs(values - before).max() <= SETTLED * np.abs(values).max():
+        if iteration > FIRST_ITERATIONS and np.abs(values - before).max() <= SETTLED * np.abs(values).max():
             break
         before = values
-        if sweep < FIRST_SWEEPS:
+        if iteration < FIRST_ITERATIONS:
             weights = 1.0 / np.maximum(residuals, sigma / CAUCHY)
         else:
             weights = 1.0 / (1.0 + (residuals / (CAUCHY * sigma)) ** 2)

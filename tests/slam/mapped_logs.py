@@ -67,7 +67,7 @@ def mapped_office(odometry: bool, relations: Relations = "both", loops: bool = T
 @functools.cache
 def office_unrefined() -> Graph:
     """As the relations are found on the way: those of each keyframe with the ones before it."""
-    return mapped(office_log(), SlamOptions(refinement=RefinementOptions(max_sweeps=0))).graph
+    return mapped(office_log(), SlamOptions(refinement=RefinementOptions(max_passes=0))).graph
 
 
 @functools.cache

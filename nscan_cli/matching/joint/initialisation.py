@@ -109,7 +109,7 @@ class Initialisation:
     def _placed_again(self, poses: Array) -> Array:
         """Search every scan among all others, and take what lowers the energy."""
         energy = self._energy(poses)
-        for _ in range(self.joint.initialisation.sweeps):
+        for _ in range(self.joint.initialisation.passes):
             before = energy
             for scan in range(len(poses)):
                 others = [other for other in range(len(poses)) if other != scan]

@@ -36,8 +36,8 @@ class InitialisationOptions:
     lever: float = 2.0
     """When placed scans are aligned with their start, a radian of error weighs as much as this distance, m.
     With a larger value angles count more."""
-    sweeps: int = 3
-    """Most times that every scan is searched again among all others. More take longer."""
+    passes: int = 3
+    """Most passes in which every scan is searched again among all others. More take longer."""
     widenings: tuple[float, ...] = (0.3, 1.0)
     """The w of the energy in the stages of the match that refines a pose found by search. Such a pose is off
     by about 0.1 m. Smaller first values converge from farther away."""

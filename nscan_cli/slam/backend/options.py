@@ -133,8 +133,8 @@ class UnevenMotionOptions:
 class RefinementOptions:
     """The matches that are made again from the final poses."""
 
-    max_sweeps: int = 2
-    """Most sweeps over all keyframes. A larger number is slower."""
+    max_passes: int = 2
+    """Most passes over all keyframes. A larger number is slower."""
     min_motion: float = 0.02
     """A match is made again if a scan has moved by more since, m and rad. A larger one makes fewer again."""
 

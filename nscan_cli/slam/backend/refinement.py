@@ -31,22 +31,22 @@ from nscan_cli.threads import map_in_threads
 def refine(state: SlamState, search: bool = True) -> None:
     """Make the local matches again, until they move no member.
 
-    After the first sweep, keyframes that no loop relates to an earlier visit nearby are searched, unless
+    After the first pass, keyframes that no loop relates to an earlier visit nearby are searched, unless
     `search` is off. Changes relations, energies, loops, places, route, schedule, detector.
     """
     options = state.options
     # The poses are right to centimetres: the last stage is all it takes.
     last = replace(options.nscan, widenings=options.nscan.widenings[-1:])
     refinement = Refinement(state.route, last, state.match, state.places, state.threads)
-    for sweep in range(options.refinement.max_sweeps):
-        if not refinement.sweep(state.poses, options.refinement.min_motion):
+    for done in range(options.refinement.max_passes):
+        if not refinement.run_pass(state.poses, options.refinement.min_motion):
             break
         state.matched_pairs, state.nscan_relations = refinement.relations()
         state.energies.forget()
         state.loops = refinement.loops()
         optimise(state, options.optimisation.final)
         reject_contradicting_loops(state)
-        if sweep == 0 and search and options.nscan.loops:
+        if done == 0 and search and options.nscan.loops:
             refinement.match_at(close_loops_left_open(state))
 
 
@@ -69,12 +69,12 @@ class Refinement:
         self.match_at(places)
 
     def match_at(self, places: Sequence[Place]) -> None:
-        """Let the next sweep match about the centres of these places, as a search matched there."""
+        """Let the next pass match about the centres of these places, as a search matched there."""
         for place in places:
             self._wider[place.centre] = replace(place.options, widenings=self._options.widenings)
             self._starts[place.centre] = None
 
-    def sweep(self, poses: Array, moved: float) -> int:
+    def run_pass(self, poses: Array, moved: float) -> int:
         """Match again about the keyframes whose neighbours have moved by more than `moved` (m, rad).
 
         `poses` (K, 3) are the global ones; returns how many were matched. Those that are chosen together

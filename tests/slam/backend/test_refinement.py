@@ -30,7 +30,7 @@ BOTH_KINDS = pytest.mark.parametrize(
 @functools.cache
 def unrefined() -> Mapped:
     """80 m of the office."""
-    options = SlamOptions(refinement=RefinementOptions(max_sweeps=0))
+    options = SlamOptions(refinement=RefinementOptions(max_passes=0))
     return mapped(excerpt(office_log(), slice(0, 800)), options)
 
 
@@ -67,12 +67,12 @@ def near(centre: int) -> list[int]:
 
 
 @BOTH_KINDS
-def test_a_sweep_matches_what_is_not_covered_and_a_second_from_the_same_poses_none(match):
+def test_a_pass_matches_what_is_not_covered_and_a_second_from_the_same_poses_none(match):
     state = unrefined().state
     recorded = Recorded(match)
     found = refinement(recorded)
     assert found.relations() == ([], [])
-    matched = found.sweep(state.poses, MOVED)
+    matched = found.run_pass(state.poses, MOVED)
     centres = recorded.centres()
     assert matched == len(centres)
     assert len(set(centres)) == matched
@@ -81,9 +81,9 @@ def test_a_sweep_matches_what_is_not_covered_and_a_second_from_the_same_poses_no
     least, most = (0.1, 0.5) if match is match_neighbours else (0.6, 1.0)
     assert least < matched / len(state.keyframes) < most
     before = found.relations()
-    assert found.sweep(state.poses, MOVED) == 0
+    assert found.run_pass(state.poses, MOVED) == 0
     # A motion of all together moves nothing against its neighbours.
-    assert found.sweep(state.poses + np.array([3.0, -2.0, 0.0]), MOVED) == 0
+    assert found.run_pass(state.poses + np.array([3.0, -2.0, 0.0]), MOVED) == 0
     pairs, joint = found.relations()
     assert all(a is b for a, b in zip((*pairs, *joint), (*before[0], *before[1]), strict=True))
     assert bool(joint) is (match is match_neighbours)
@@ -95,17 +95,17 @@ def test_after_one_keyframe_has_moved_only_those_matched_with_it_are_matched_aga
     state = unrefined().state
     recorded = Recorded(match)
     found, poses = refinement(recorded), state.poses
-    found.sweep(poses, MOVED)
+    found.run_pass(poses, MOVED)
     centres = recorded.centres()
     last = max(range(len(poses)), key=lambda k: sum(k in near(centre) for centre in centres))
     shifted = poses.copy()
     shifted[last, 0] += 0.9 * MOVED
-    assert found.sweep(shifted, MOVED) == 0
+    assert found.run_pass(shifted, MOVED) == 0
     # Along an axis of whichever frame it is seen in, it is 1.4 times the bound then, or more.
     shifted[last, 0] = poses[last, 0] + 2 * MOVED
     again = [centre for centre in centres if last in near(centre)]
     assert 1 < len(again) < len(centres) / 2
-    assert found.sweep(shifted, MOVED) == len(again)
+    assert found.run_pass(shifted, MOVED) == len(again)
     assert sorted(recorded.centres()) == sorted(again)
 
 
@@ -119,7 +119,7 @@ def test_no_joint_match_is_made_twice():
         members = near.members.tolist() if centre < half else [centre]
         return LocalMatch((), None, None, 0.0, False, frozenset(members))
 
-    refinement(failing).sweep(poses, MOVED)
+    refinement(failing).run_pass(poses, MOVED)
     once, again = ([members for k, members in made if (k < half) is first] for first in (True, False))
     assert len(once) == len(set(once)) > 5
     assert len(again) > len(set(again))
@@ -127,30 +127,30 @@ def test_no_joint_match_is_made_twice():
 
 def test_about_a_closed_loop_a_match_is_made_whatever_others_cover_and_reaches_farther():
     state, recorded = unrefined().state, Recorded(match_neighbours)
-    refinement(recorded).sweep(state.poses, MOVED)
+    refinement(recorded).run_pass(state.poses, MOVED)
     covered = sorted(set(range(len(state.keyframes))) - set(recorded.centres()))[5]
     wider = dataclasses.replace(state.options.nscan, radius=6.5)
     place = Place(0, covered, np.zeros(3), wider, LocalMatch((), None, None, 0.0, True))
     found = refinement(recorded, [place])
-    found.sweep(state.poses, MOVED)
+    found.run_pass(state.poses, MOVED)
     radii = dict(recorded.made)
     assert radii.pop(covered) == 6.5
     assert set(radii.values()) == {state.options.nscan.radius}
-    assert found.sweep(state.poses, MOVED) == 0
+    assert found.run_pass(state.poses, MOVED) == 0
 
 
 def test_a_turn_alone_is_a_motion():
     state = unrefined().state
     found, turned = refinement(match_neighbours_pairwise), state.poses.copy()
-    found.sweep(state.poses, MOVED)
+    found.run_pass(state.poses, MOVED)
     turned[0, 2] += 2 * np.pi
-    assert found.sweep(turned, MOVED) == 0
+    assert found.run_pass(turned, MOVED) == 0
     turned[0, 2] += 1.5 * MOVED
-    assert found.sweep(turned, MOVED) > 0
+    assert found.run_pass(turned, MOVED) > 0
 
 
 # Measured: from 6.15 to 6.27 mm, and from 6.89 to 7.49 mm. On so true a map it gains nothing.
 @pytest.mark.parametrize(("relations", "most"), [("both", 1.05), ("pairwise", 1.2)])
 def test_refinement_leaves_the_office_about_as_it_is(relations: Relations, most: float):
-    options = SlamOptions(relations=relations, refinement=RefinementOptions(max_sweeps=0))
+    options = SlamOptions(relations=relations, refinement=RefinementOptions(max_passes=0))
     assert mapped_office(True, relations).rmse() <= most * mapped(office_log(), options).rmse()

@@ -150,7 +150,7 @@ def test_keyframes_that_others_cover_are_no_centres():
 
 
 def test_yet_each_keyframe_is_a_centre_or_others_hold_its_pairs():
-    """From the final poses: what the last sweep left out was held by the relations that are in the graph.
+    """From the final poses: what the last pass left out was held by the relations that are in the graph.
 
     A few had a match of the same keyframes as another, which is made once, and have moved since.
     """

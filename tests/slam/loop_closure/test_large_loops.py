@@ -51,7 +51,7 @@ def test_the_loop_mends_a_slip_that_no_scan_saw(slip):
     # All keyframes of the second visit, 12 m, lie in relations that close the loop, from where it was closed.
     joined = {node for relation in graph.nscan if relation.origin == "loop" for node in relation.nodes}
     first = min(place.centre for place in state.places)
-    # Also in the last sweep, in which other matches would cover them.
+    # Also in the last pass, in which other matches would cover them.
     centres = {relation.nodes[relation.fixed] for relation in graph.nscan}
     assert {state.keyframes.list[place.centre].row for place in state.places} <= centres
     assert {keyframe.row for keyframe in state.keyframes.list[first:]} <= joined
