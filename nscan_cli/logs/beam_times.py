@@ -1,4 +1,4 @@
-"""When the beams of a scan were measured, and where they end if the robot moved meanwhile."""
+"""When the beams of a scan were measured, and deskewing: where they end if the robot moved meanwhile."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ class BeamTimes(NamedTuple):
 
 
 @kernel
-def swept_points(
+def deskewed_points(
     ranges: NDArray[np.float32],
     directions: tuple[Array, Array],
     laser: Array,
@@ -39,7 +39,7 @@ def swept_points(
     beams: BeamTimes,
     path: RobotPath,
 ) -> tuple[Array, Indices]:
-    """Points (m, 2) of ranges (R, B) in the robot's frame at the stamp, each from where the robot was.
+    """Deskewed points (m, 2) of ranges (R, B) in the robot's frame at the stamp: each from where it was.
 
     `directions` are the cosines and the sines of the beams (1 or R, B). `laser` (4,) is its pose on the
     robot: x, y, cosine and sine. Scan k, stamped at stamps[k] (s), has points[ends[k] : ends[k + 1]], with

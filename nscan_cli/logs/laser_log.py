@@ -15,7 +15,7 @@ from nscan_cli.files.provenance import Source
 from nscan_cli.files.text import counted
 from nscan_cli.kernels.decorators import kernel
 from nscan_cli.logs.beam_mask import Bearings
-from nscan_cli.logs.beam_times import BeamTimes, swept_points
+from nscan_cli.logs.beam_times import BeamTimes, deskewed_points
 from nscan_cli.logs.device_choice import Device
 from nscan_cli.logs.frame_names import DEFAULT_FRAMES, FrameNames
 from nscan_cli.logs.reading_options import ReadingOptions
@@ -172,7 +172,7 @@ class LaserLog:
             laser = np.concatenate([self.mount[:2], turn])
             times, beams = self.times[rows], self.beam_times.of(rows)
             directions = np.cos(angles), np.sin(angles)
-            return swept_points(self.ranges[rows], directions, laser, reach, times, beams, self.path)
+            return deskewed_points(self.ranges[rows], directions, laser, reach, times, beams, self.path)
         return _end_points(self.ranges[rows], np.cos(angles), np.sin(angles), self.mount, turn, reach)
 
     def timed_points(self, rows: slice, reach: float) -> tuple[Array, Indices, Array]:

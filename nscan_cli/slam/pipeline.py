@@ -7,11 +7,11 @@ from functools import partial
 
 from nscan_cli.graph.model import Graph
 from nscan_cli.slam.backend.contradicting_visits import mend_contradicting_visits
+from nscan_cli.slam.backend.final_deskewing import deskew_by_final_path
 from nscan_cli.slam.backend.finish import finish_graph
 from nscan_cli.slam.backend.optimisation import optimise, optimise_if_due
 from nscan_cli.slam.backend.refinement import refine
 from nscan_cli.slam.backend.rejection import reject_contradicting_loops
-from nscan_cli.slam.backend.swept_scans import correct_swept_scans
 from nscan_cli.slam.frontend.scan_batch import ScanBatch
 from nscan_cli.slam.frontend.segment_tracker import SegmentTracker, tracker_of
 from nscan_cli.slam.frontend.tracked_batch import TrackedBatch
@@ -51,7 +51,7 @@ def run_slam(state: SlamState, report: LoopProgress) -> Graph:
         relate(state, ahead, centre)
     optimise(state, state.options.optimisation.final)
     reject_contradicting_loops(state)
-    correct_swept_scans(state)
+    deskew_by_final_path(state)
     refine(state)
     mend_contradicting_visits(state)
     return finish_graph(state)

@@ -84,8 +84,8 @@ class ScanTrackingOptions(NamedTuple):
     """With odometry a scan is matched when the robot has moved this far (m) or turned this much (rad) since
     the last one that was. The scans between follow. Larger values drift less and see less."""
     sweep_step_change: float = 0.02
-    """Without odometry a scan of a laser that turns is corrected and matched again if its step differs by
-    more than this (m, rad) from the one that it was corrected by. Larger values take less time, and blur the
+    """Without odometry a scan of a laser that turns is deskewed and matched again if its step differs by
+    more than this (m, rad) from the one that it was deskewed by. Larger values take less time, and blur the
     map where the robot begins to turn."""
     max_waiting: int = 100
     """Most scans between two that are matched: a robot may stand for hours. More take more memory."""

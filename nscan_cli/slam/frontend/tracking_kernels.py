@@ -14,6 +14,7 @@ from nscan_cli.slam.frontend.angle_restarts import match_from_other_angles, rest
 from nscan_cli.slam.frontend.between_scans import match_between, waits_for_motion
 from nscan_cli.slam.frontend.constant_velocity import learn_prediction
 from nscan_cli.slam.frontend.degeneracy import keep_prediction
+from nscan_cli.slam.frontend.deskewing import deskew_by_last_step, deskew_by_match
 from nscan_cli.slam.frontend.local_map import ROWS, insert_scan
 from nscan_cli.slam.frontend.odometry_noise import learn_noise
 from nscan_cli.slam.frontend.prediction import (
@@ -25,7 +26,6 @@ from nscan_cli.slam.frontend.prediction import (
 from nscan_cli.slam.frontend.prediction_restart import match_near_prediction
 from nscan_cli.slam.frontend.scan_to_map import match_from_prediction
 from nscan_cli.slam.frontend.sector_of_view import match_again_in_sector, match_in_sector
-from nscan_cli.slam.frontend.sweep_correction import correct_by_last_step, correct_by_match
 from nscan_cli.slam.frontend.track_state import CONTRADICTIONS, KNOWN, NEXT
 from nscan_cli.slam.frontend.tracking_problem import TrackingProblem
 from nscan_cli.slam.frontend.visible_points import points_in_view
@@ -151,7 +151,7 @@ def track_scans(problem: TrackingProblem, first: int, may_wait: bool, is_matched
     track, grid, settings = problem.track, problem.grid, problem.settings
     options = settings.options
     ends, odometry, prior, found = problem.ends, problem.odometry, problem.prior, problem.found
-    step, sweeps = np.empty(3), problem.shares.shape[0] > 0
+    step, is_swept = np.empty(3), problem.shares.shape[0] > 0
     for k in range(first, ends.shape[0] - 1):
         scan = problem.points[ends[k] : ends[k + 1]]
         if track.map.counts[ROWS] + CELLS_PER_POINT * scan.shape[0] > grid.keys.shape[0]:
@@ -166,12 +166,12 @@ def track_scans(problem: TrackingProblem, first: int, may_wait: bool, is_matched
             predict_by_trusted_odometry(track, options, problem.times[k], odometry[k], prior)
             has_odometry = np.isfinite(odometry[k, 0])
             shares = problem.shares[ends[k] : ends[k + 1]]
-            if sweeps:
-                correct_by_last_step(track, scan, shares, step)
+            if is_swept:
+                deskew_by_last_step(track, scan, shares, step)
             in_view = points_in_view(track, settings, scan, prior.mean)
             threshold = restart_threshold(track, options)
             matched = match_in_sector(problem, in_view, threshold, k)
-            if sweeps and correct_by_match(track, options, scan, shares, step, found.poses[k]):
+            if is_swept and deskew_by_match(track, options, scan, shares, step, found.poses[k]):
                 in_view = points_in_view(track, settings, scan, prior.mean)
                 matched = match_in_sector(problem, in_view, threshold, k)
             if has_odometry and np.isfinite(track.odometry[0]):

@@ -1,4 +1,4 @@
-"""Scans of a laser that turns, corrected once more: by the path of the robot after the last optimisation.
+"""Deskewing once more: scans of a turning laser are corrected by the path after the last optimisation.
 
 Tracking knows the motion during a turn from odometry, or from the scans before alone. The final path has
 poses on both sides of each turn, and more of them where the motion is uneven and odometry does not tell it.
@@ -24,8 +24,8 @@ from nscan_cli.slam.options import SlamOptions
 from nscan_cli.slam.state import SlamState
 
 
-def correct_swept_scans(state: SlamState) -> None:
-    """Bring all scans to the times of their stamps, with the points that the path of the robot gives.
+def deskew_by_final_path(state: SlamState) -> None:
+    """Bring all scans to the times of their stamps, deskewed by the path of the robot.
 
     Changes log, keyframes, chain, tracked, route and energies, if the laser turns.
     """

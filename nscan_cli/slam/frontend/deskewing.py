@@ -1,4 +1,4 @@
-"""Step 1 without odometry: the beams of a turning laser are corrected by the robot's last step.
+"""Deskewing while tracking without odometry: scans of a turning laser are corrected by the last step.
 
 Poses are those at the middle of each turn. During a turn the robot is assumed to go on as in the step between
 the last two: half a step before the middle, and half a step after it.
@@ -17,8 +17,8 @@ from nscan_cli.slam.frontend.track_state import KNOWN, TrackState
 
 
 @kernel
-def correct_by_last_step(track: TrackState, points: Array, shares: Array, step: Array) -> None:
-    """Write the last step to `step` (3,), and correct the points (m, 2) of the next scan by it, in place.
+def deskew_by_last_step(track: TrackState, points: Array, shares: Array, step: Array) -> None:
+    """Write the last step to `step` (3,), and deskew the points (m, 2) of the next scan by it, in place.
 
     `shares` (m,) are the times of the points from the middle of the turn, in periods of the scans. The step
     is zero before two poses are known.
@@ -31,12 +31,12 @@ def correct_by_last_step(track: TrackState, points: Array, shares: Array, step: 
 
 
 @kernel
-def correct_by_match(
+def deskew_by_match(
     track: TrackState, options: ScanTrackingOptions, points: Array, shares: Array, step: Array, pose: Array
 ) -> bool:
-    """Correct points anew, in place, if the scan's match at `pose` (3,) has another step than `step` (3,).
+    """Deskew points anew, in place, if the scan's match at `pose` (3,) has another step than `step` (3,).
 
-    Returns whether they have changed. They count as corrected from now on: `shares` (m,) become zero.
+    Returns whether they have changed. They count as deskewed from now on: `shares` (m,) become zero.
     """
     found = np.empty(3)
     relative_pose(pose, track.poses[-1], found)
