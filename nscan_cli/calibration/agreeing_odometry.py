@@ -27,7 +27,7 @@ def with_seen_mount(log: LaserLog, mount: Array) -> LaserLog:
 
 
 def with_scaled_odometry(log: LaserLog, scale: float) -> LaserLog:
-    """The log whose odometry is so many times as long."""
+    """The log with the lengths of its odometry multiplied by `scale`."""
     return _with_changed(log, lambda poses: scaled_odometry(poses, scale))
 
 

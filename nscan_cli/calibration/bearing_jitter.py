@@ -20,7 +20,7 @@ from nscan_cli.poses import are_known, wrap
 
 
 def checked_bearings(log: LaserLog, options: FileCheckOptions) -> tuple[LaserLog, list[str]]:
-    """The log with one first direction if the ones in the file are not so, and what is said of it."""
+    """The log with one first direction if those in the file differ by mistake, and the messages."""
     jitter = options.jitter
     if log.odometry is None or len(log) < 2:
         return log, []

@@ -43,7 +43,7 @@ class Companion:
 def checked_companion(
     log: LaserLog, reading: ReadingOptions, options: CompanionOptions
 ) -> tuple[LaserLog, ReadingOptions, list[str]]:
-    """The log without the beams that see what goes along by its odometry, how it is read, what is said."""
+    """The log without the beams that see what goes along by its odometry, how it is read, messages."""
     found = None if log.odometry is None else find_companion(log, log.odometry, options)
     if found is None:
         return log, reading, []

@@ -19,7 +19,7 @@ from nscan_cli.poses import Array
 UNDONE = "--as-recorded uses it as it is"
 AGREES = "; meanwhile odometry is changed to agree with the scans"
 RANGE_UNITS = {"feet": 0.3048, "inches": 0.0254}
-"""Units in metres that ranges come in, and that no odometry is so much larger than."""
+"""Units of ranges, in metres. Odometry is hardly ever wrong by such a factor: it must be the ranges."""
 
 
 @dataclass(frozen=True)

@@ -23,7 +23,7 @@ from nscan_cli.poses import Array, Indices, relative
 def checked_held(
     log: LaserLog, options: HeldOdometryOptions, steps: StepOptions
 ) -> tuple[LaserLog, list[str]]:
-    """The log without its odometry where that stands and the scans move, and what is said of it."""
+    """The log without its odometry where that stands and the scans move, and the messages."""
     held = held_stretches(log, options, steps)
     if not held:
         return log, []

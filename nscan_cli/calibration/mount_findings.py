@@ -1,4 +1,4 @@
-"""What is said of a laser that is, or seems to be, mounted otherwise than the file says."""
+"""Messages on a laser that is, or seems to be, mounted otherwise than the file says."""
 
 from __future__ import annotations
 

@@ -91,7 +91,7 @@ def with_delay(log: LaserLog, delay: float) -> LaserLog:
 
 
 def said_late(delay: float, offset: float, why: str) -> str:
-    """What is said of odometry that is stamped too early by `delay` (s): the option moves it by `offset`."""
+    """The message on odometry that is stamped too early by `delay` (s): the option moves it by `offset`."""
     side = "early" if delay > 0.0 else "late"
     return (
         f"odometry is stamped {abs(delay):.2g} s too {side}, by the turns of the scans; its stamps are "

@@ -25,7 +25,7 @@ from nscan_cli.poses import Array, Indices
 def checked_lag(
     log: LaserLog, reading: ReadingOptions, known: KnownSteps, options: FileCheckOptions
 ) -> tuple[LaserLog, ReadingOptions, list[str]]:
-    """The log with the lag of its odometry put right, the options that read it so, and what is said.
+    """The log with the lag of its odometry put right, the options that read it so, and messages.
 
     More steps are measured only if those that are `known` show a lag.
     """

@@ -24,7 +24,7 @@ class ClockOptions:
     Mirrored turns are found in the same way."""
     max_left: float = 0.85
     """Largest share by which turns disagree with an offset that is found. They disagree by 1 where odometry
-    does not turn. A larger share finds more where a robot hardly turns, also offsets that are none."""
+    does not turn. A larger share finds more where a robot hardly turns, also false ones."""
     first_gain: float = 0.8
     """More steps are measured where the share of the first few is less than this. A larger value takes
     longer."""

@@ -19,7 +19,7 @@ from nscan_cli.poses import Indices, Mask, relative
 def checked_units(
     log: LaserLog, options: OdometryUnitOptions, steps: StepOptions
 ) -> tuple[LaserLog, list[str]]:
-    """The log with all of its odometry in metres if a part is in another unit, and what is said of it."""
+    """The log with all of its odometry in metres if a part is in another unit, and the messages."""
     if log.odometry is None or len(log) < 2:
         return log, []
     lengths = np.hypot(*np.nan_to_num(relative(log.odometry[1:], log.odometry[:-1]))[:, :2].T)
@@ -49,7 +49,7 @@ def checked_units(
 
 
 def _as_most(is_large: Mask, moves: Mask) -> Mask:
-    """(n,) which steps are large: most of the five steps with motion about each of them are.
+    """(n,) the steps that count as large: of the five steps with motion about each of them, most are large.
 
     So a single large step does not count. A large step beside such ones does.
     """
@@ -69,12 +69,12 @@ def _of_five(mask: Mask) -> Indices:
 
 
 def metres_by_scans(
-    log: LaserLog, is_so: Mask, options: OdometryUnitOptions, steps: StepOptions
+    log: LaserLog, chosen: Mask, options: OdometryUnitOptions, steps: StepOptions
 ) -> float | None:
-    """Metres by scans for one metre by odometry, the median over steps that are so (n,); None for too few."""
+    """Metres by scans for one metre by odometry, in the median of `chosen` steps (n,); None for too few."""
     assert log.odometry is not None
     first, last = possible_steps(log, steps)
-    before = np.append(0, np.cumsum(is_so))
+    before = np.append(0, np.cumsum(chosen))
     whole = before[last] - before[first] == last - first
     first, last = first[whole], last[whole]
     if not len(first):

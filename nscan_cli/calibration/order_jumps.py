@@ -28,7 +28,7 @@ from nscan_cli.poses import MIRRORED, Mask
 def checked_order(
     log: LaserLog, compared: ComparedRanges, options: FileCheckOptions
 ) -> tuple[LaserLog, list[str]]:
-    """The log with all of its readings in one order, and what is said of it. `compared` are its scans.
+    """The log with all of its readings in one order, and the messages. `compared` are its scans.
 
     That is the order with which odometry turns as the scans do; without it, that of most scans.
     """

@@ -37,7 +37,7 @@ class RangeJump(NamedTuple):
 def checked_ranges(
     log: LaserLog, compared: ComparedRanges, options: FileCheckOptions
 ) -> tuple[LaserLog, list[str]]:
-    """The log with all of its ranges in one scale, and what is said of it. `compared` are its scans."""
+    """The log with all of its ranges in one scale, and the messages. `compared` are its scans."""
     jumps = range_jumps(log, compared, options)
     if not jumps:
         return log, []

@@ -22,7 +22,7 @@ from nscan_cli.logs.reading_options import ReadingOptions
 def checked_sweep(
     log: LaserLog, reading: ReadingOptions, options: FileCheckOptions
 ) -> tuple[LaserLog, ReadingOptions, list[str]]:
-    """The log with the times of beams that its scans show, the options that read it so, and what is said.
+    """The log with the times of beams that its scans show, the options that read it so, and messages.
 
     The file may have times for readings in the reverse order, or for a laser that sees at once. It may have
     none though the laser turns, for the whole time from scan to scan or for a part of it. If the scans do not

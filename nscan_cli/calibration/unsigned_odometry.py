@@ -37,7 +37,7 @@ class ReversedStretch(NamedTuple):
 def checked_signs(
     log: LaserLog, options: UnsignedOdometryOptions, steps: StepOptions
 ) -> tuple[LaserLog, list[str]]:
-    """The log with its odometry reversed where the robot drives the other way, and what is said of it."""
+    """The log with its odometry reversed where the robot drives the other way, and messages."""
     found = reversed_stretches(log, options)
     votes = [_votes(log, each, options, steps) for each in found]
     long = [len(each.first) >= options.min_steps for each in found]

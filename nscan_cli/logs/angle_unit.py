@@ -28,7 +28,7 @@ class AngleUnitOptions:
 
 
 def with_radians(raw: RawScans, options: AngleUnitOptions = AngleUnitOptions()) -> tuple[RawScans, list[str]]:
-    """The scans with all angles in radians, and what is said of it.
+    """The scans with all angles in radians, and the messages for the user.
 
     Directions and steps are told apart: some drivers convert one of them.
     """

@@ -231,7 +231,7 @@ def _credible(
     options: ReadingOptions,
     checks: ScanCheckOptions,
 ) -> tuple[Array, list[str]]:
-    """Odometry (S, 3) at times (S,), s, of one source, without outliers and repeats; and what is said.
+    """Odometry (S, 3) at times (S,), s, of one source, without outliers and repeats; and messages.
 
     `scans` are as `without_repeats` takes them.
     """
@@ -262,7 +262,7 @@ def _in_metres(
     findings: ReaderFindings,
     checks: ScanCheckOptions,
 ) -> tuple[RawScans, RangeLimits, list[str]]:
-    """The scans in metres, their limits, and what is said if the scans contradict the unit of the log."""
+    """The scans in metres, their limits, and messages if the scans contradict the unit of the log."""
     if options.range_scale is not None:
         raw = scaled(raw, options.range_scale, checks.range_unit)
         return raw, limits_in_force(raw, options, findings.warnings, checks.range_limits), []

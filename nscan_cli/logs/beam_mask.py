@@ -22,7 +22,7 @@ BEARING_ROUNDING = 1e-5
 def masked_sectors(
     table: ScanTable, options: ReadingOptions, parts: RobotPartsOptions, dead: DeadBeamOptions
 ) -> tuple[list[Bearings], list[str]]:
-    """The sectors that are not read, and what is said of them."""
+    """The sectors that are not read, and the messages for the user."""
     if options.mask is not None:
         return list(options.mask), []
     if options.as_recorded:

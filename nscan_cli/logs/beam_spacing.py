@@ -30,7 +30,7 @@ def checked_by_walls(
     options: ReadingOptions,
     spacing: BeamSpacingOptions = BeamSpacingOptions(),
 ) -> tuple[BeamDirections, list[str]]:
-    """The directions, put right if walls tell a usual laser; and what is said if walls contradict them."""
+    """The directions, put right if walls tell a usual laser; and messages if walls contradict them."""
     if options.as_recorded or options.angle_increment is not None:
         return directions, []
     beams = beam_counts(raw.ranges, raw.beams)

@@ -23,7 +23,7 @@ class BlindScanOptions:
 def blind_scans(
     ranges: NDArray[np.float32], numbers: Indices, options: BlindScanOptions = BlindScanOptions()
 ) -> list[str]:
-    """What is said of scans with ranges (S, B) and numbers (S,) that see nothing for long.
+    """The messages on scans with ranges (S, B) and numbers (S,) that see nothing for long.
 
     In an open field it is no fault, but nothing is mapped there, either.
     """

@@ -40,17 +40,18 @@ class DirectionChangeOptions:
     min_beams: int = 20
     """Least number of beams that are compared. A larger value finds less."""
     min_gain: float = 0.2
-    """Directions stay if so many more of the beams of the same number than of those in the same direction see
-    nearly the same, as a share; they change if it is the other way round. Between both it is only said. A
-    larger value puts less right, and says more."""
+    """Of two successive scans the share of beams is counted that see nearly the same as the beam of the same
+    number, and as the beam in the same direction. Directions stay if the first share is larger by this, and
+    change if the second one is. Between both the user gets a message alone. A larger value corrects less, and
+    gives more messages."""
 
 
 def as_before(
     table: ScanTable, counts: Indices, sign: int, options: DirectionChangeOptions
 ) -> tuple[BeamDirections, list[str]]:
-    """The directions of the scans of a log, in file order, put right where scans show that they stay.
+    """The directions of the scans of a log, in file order, put right where scans show no change.
 
-    Of several directions that are the same, those of most scans are used. Also returns what is said. `counts`
+    Of several directions that are the same, those of most scans are used. Also returns messages. `counts`
     (S,) are the numbers of beams, in file order; `sign` is −1 if options count angles the other way round.
     """
     found = BeamDirections(table.angle_min.copy(), table.angle_increment.copy())
@@ -108,8 +109,12 @@ def _named(first: float, step: float) -> str:
 
 
 def _gain_of_numbers(table: ScanTable, place: int, options: DirectionChangeOptions) -> float:
-    """By how much more of the beams from a place on see what those of the same number saw before it than what
-    those in the same direction saw, as a share; the least of three pairs of scans."""
+    """Whether scans go on by number or by direction from a place on: the difference of two shares of beams.
+
+    The first share is of beams that see what the beam of the same number saw in the scan before. The second
+    is of those that see what the beam in the same direction saw. Of the differences in three pairs of scans
+    the smallest is returned if it is above 0, else the largest.
+    """
     last, gains = len(table.rows) - 1, []
     for one, other in ((place - 1, place), (max(place - 2, 0), place), (place - 1, min(place + 1, last))):
         by_number, by_file = _directions_at(table, one), _directions_at(table, other)

@@ -32,10 +32,10 @@ class FloorLineOptions:
     """Least share of these scans in which a bearing has a reading. A larger value finds less outdoors."""
     quantile: float = 0.9
     """The floor is as far as this quantile of the readings of a bearing. A smaller value finds floors that
-    are seen more often than not, and walls."""
+    are seen in more than half of the scans, and also walls."""
     tolerance: float = 0.1
     """Readings are of the floor if they differ from its line by no more than this share. A larger value finds
-    rougher floors, and more that is none."""
+    rougher floors, and more things that are no floor."""
     min_share: float = 0.2
     """Least share of the readings of a bearing that are of the floor. A smaller value finds floors that are
     seldom seen, and takes longer."""
@@ -46,11 +46,11 @@ class FloorLineOptions:
     """The line is looked at up to this angle on both sides of its nearest point, rad: farther aside the floor
     is far away. A larger value finds less."""
     min_width: float = math.radians(24.0)
-    """Least width of all bearings that see the line, rad. A smaller value finds narrower views, and more that
-    is none."""
+    """Least width of all bearings that see the line, rad. A smaller value finds narrower views, and more
+    things that are no floor."""
     max_beyond_share: float = 0.02
     """Greatest share of readings beyond the line, in all scans and in those of turns. A larger value finds
-    more that is none."""
+    more things that are no floor."""
     max_distance: float = 10.0
     """Greatest distance of the line, m: farther away a tilt hides little. A larger value finds more."""
 

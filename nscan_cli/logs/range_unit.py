@@ -83,7 +83,7 @@ class WrongUnit(NamedTuple):
 
     @property
     def correction(self) -> str:
-        """What is said if the unit is put right."""
+        """The message if the unit is put right."""
         return (
             f"{self.seems}: the ranges are multiplied by {self.scale:g}; --as-recorded leaves them as they "
             "are, --range-scale sets another factor"

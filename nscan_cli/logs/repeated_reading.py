@@ -93,9 +93,9 @@ def _is_alone(
     return bool(counts[k] >= max(options.ratio_to_near * near, options.ratio_to_others * any_other))
 
 
-def _is_all_over(is_so: NDArray[np.bool_], options: RepeatedReadingOptions) -> bool:
-    """Whether many beams of scans (n, B) have a reading now and then."""
-    shares = is_so.mean(axis=0)
+def _is_all_over(has_reading: NDArray[np.bool_], options: RepeatedReadingOptions) -> bool:
+    """Whether many beams of scans (n, B) have a certain reading now and then."""
+    shares = has_reading.mean(axis=0)
     sometimes = np.count_nonzero((shares > 0.0) & (shares <= options.always))
     return bool(sometimes >= options.min_beams * len(shares))
 
@@ -107,14 +107,14 @@ def without_repeated_readings(
 ) -> tuple[NDArray[np.int64], list[str]]:
     """Write nan for usable readings among ranges (S, B) that are no distances, in place.
 
-    Returns how many readings of each scan (S,) were so, and what is said.
+    Returns the number of such readings of each scan (S,), and the messages for the user.
     """
     found = repeated_readings(ranges, limits, options)
     if not found:
         return np.zeros(len(ranges), dtype=np.int64), []
-    is_so = np.isin(ranges, np.array(list(found), dtype=np.float32)) & _are_usable(ranges, limits)
-    counts = np.count_nonzero(is_so, axis=1).astype(np.int64)
-    ranges[is_so] = np.nan
+    is_repeated = np.isin(ranges, np.array(list(found), dtype=np.float32)) & _are_usable(ranges, limits)
+    counts = np.count_nonzero(is_repeated, axis=1).astype(np.int64)
+    ranges[is_repeated] = np.nan
     listed = ", ".join(
         f"{share:.0%} of the readings are exactly {value:.4g} m" for value, share in found.items()
     )

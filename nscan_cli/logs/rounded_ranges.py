@@ -30,7 +30,7 @@ class RoundedRangeOptions:
 def rounding_of_ranges(
     ranges: NDArray[np.float32], options: RoundedRangeOptions = RoundedRangeOptions()
 ) -> str:
-    """What is said of ranges (S, B), m, that are multiples of a step; else empty. nan and inf are none."""
+    """The message if ranges (S, B), m, are multiples of a step; else empty. nan and inf do not count."""
     some = ranges[:: max(ranges.size // options.sample, 1)].astype(np.float64).ravel()
     some = some[np.isfinite(some)]
     if len(some) < options.min_returns:

@@ -50,7 +50,7 @@ class UnitStretchOptions:
 def in_one_unit(
     raw: RawScans, order: ScanOrder, options: UnitStretchOptions = UnitStretchOptions()
 ) -> tuple[RawScans, list[str]]:
-    """The scans in metres if those of some stretches are in metres and the others are not, and what is said.
+    """The scans in metres if those of some stretches are in metres and the others are not, and messages.
 
     `raw.ranges` may be overwritten.
     """
@@ -83,15 +83,15 @@ def in_one_unit(
     ]
 
 
-def _are_most(is_so: Mask, is_told: Mask, options: UnitStretchOptions) -> Mask:
-    """(S,) whether most told readings of a scan are so, and enough are told."""
+def _are_most(marked: Mask, is_told: Mask, options: UnitStretchOptions) -> Mask:
+    """(S,) the scans with enough readings that count, `is_told` (S, B), most of which are `marked` (S, B)."""
     count = np.count_nonzero(is_told, axis=1)
-    found: Mask = 2 * np.count_nonzero(is_so & is_told, axis=1) > np.maximum(count, options.min_readings)
+    found: Mask = 2 * np.count_nonzero(marked & is_told, axis=1) > np.maximum(count, options.min_readings)
     return found
 
 
 def _as_before(mask: Mask, is_told: Mask) -> Mask:
-    """A mask (S,) whose rows that tell nothing are as the last before that tells something."""
+    """A mask (S,); rows that tell nothing have the value of the last row before that tells something."""
     tells = np.where(is_told, np.arange(len(mask)), -1)
     last = np.maximum.accumulate(tells)
     found: Mask = mask[np.where(last < 0, int(np.argmax(is_told)), last)]
@@ -103,8 +103,8 @@ def _unit(
 ) -> tuple[str, float] | None:
     """Name and metres of the unit of those scans that are far, if it is beyond doubt.
 
-    Either most changes from one unit to the other show it, or the usual readings, `factor` times the others,
-    do so, as for a whole log.
+    Either most changes from one unit to the other show it. Or the usual readings, `factor` times the others,
+    show it as those of a whole log do.
     """
     at = np.flatnonzero(np.diff(is_far.astype(np.int8)))
     both = is_told[at] & is_told[at + 1]
@@ -138,7 +138,7 @@ def _scaled_rows(raw: RawScans, rows: Indices, scale: float) -> RawScans:
 def _sudden_factors(
     some: NDArray[np.float32], is_told: Mask, times: Array, options: UnitStretchOptions
 ) -> list[str]:
-    """What is said where all readings (S, B) change by one factor from one scan to the next."""
+    """The messages where all readings (S, B) change by one factor from one scan to the next."""
     both = is_told[1:] & is_told[:-1]
     with np.errstate(divide="ignore", invalid="ignore"):
         logs = np.diff(np.log(some), axis=0)

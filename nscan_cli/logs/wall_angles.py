@@ -53,8 +53,10 @@ def sampled_scans(
 def votes(
     scans: SampledScans, half_width: float, options: BeamSpacingOptions
 ) -> tuple[Array, Array, NDArray[np.int64]]:
-    """Sorted logarithms (V,) of the factors that beams on walls tell, those (C,) within `max_factor`, and how
-    many (C,) are as these.
+    """Factors by which walls say that the angle between beams is larger than in the log, as logarithms.
+
+    Returns all of them, sorted (V,); those within `max_factor` (C,); and for each of these the number of all
+    that differ from it by `same_angle` at most (C,).
     """
     told, halves = [np.zeros(0)], np.zeros(len(scans.steps), dtype=np.int64)
     some = scans.steps > 0.0
@@ -76,7 +78,7 @@ def beams_as_log(logs: Array, options: BeamSpacingOptions) -> int:
 
 
 def _within(values: Array, centres: Array, width: float) -> NDArray[np.int64]:
-    """How many of some sorted values (N,) lie within a width of each centre (M,)."""
+    """(M,) the number of sorted values (N,) within a width of each centre (M,)."""
     ends = np.searchsorted(values, centres + width, side="right")
     found: NDArray[np.int64] = ends - np.searchsorted(values, centres - width)
     return found
@@ -103,6 +105,6 @@ def _log_angles(near: Array, between: int) -> Array:
 
 
 def mode(logs: Array, centres: Array, counts: NDArray[np.int64], options: BeamSpacingOptions) -> float:
-    """The factor that most of some beams tell (what `votes` returns)."""
+    """The factor that most beams tell, from what `votes` returns."""
     best = centres[int(counts.argmax())]
     return math.exp(float(np.median(logs[np.abs(logs - best) <= options.same_angle])))

@@ -68,7 +68,7 @@ def in_whole_turns(
     checks: WholeTurnOptions = WholeTurnOptions(),
     spacing: BeamSpacingOptions = BeamSpacingOptions(),
 ) -> tuple[BeamDirections, list[str]]:
-    """The directions of beams over one turn if walls show that they cover one; and what is said of it."""
+    """The directions of beams over one turn if walls show that they cover one; and the messages."""
     beams = beam_counts(raw.ranges, raw.beams)
     count, step = int(beams[0]), float(np.median(directions.step))
     off = count * abs(step) - 2 * math.pi

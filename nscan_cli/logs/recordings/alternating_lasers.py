@@ -37,14 +37,14 @@ class TwoLaserOptions:
     """Greatest ratio of the difference between a scan and the second next to that between it and the next, if
     the second next is of the same laser. A larger value finds more lasers."""
     min_share: float = 0.9
-    """Least share of scans for which this is so. A robot that drives leaves nearly none; a larger value finds
-    fewer lasers."""
+    """Least share of scans with at most that ratio. One laser on a robot that drives has hardly any. A larger
+    value finds fewer lasers."""
 
 
 def first_of_two_lasers(
     messages: Sequence[TimedScan], options: TwoLaserOptions = TwoLaserOptions()
 ) -> tuple[list[TimedScan], str]:
-    """The scans of the first laser alone, and what is said of it; all scans if there is one laser."""
+    """The scans of the first laser alone, and the message for the user; all scans if there is one laser."""
     scans = [message.scan for message in messages]
     if not _alternate(scans, options):
         return list(messages), ""

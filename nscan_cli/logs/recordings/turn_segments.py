@@ -43,7 +43,7 @@ class TimedScan(NamedTuple):
 def joined_turns(
     messages: Sequence[TimedScan], options: TurnSegmentOptions = TurnSegmentOptions()
 ) -> tuple[list[TimedScan], str]:
-    """The scans with the segments of each turn put together, and what is said of it; as they are if none are.
+    """The scans with the segments of each turn put together, and the message; as they are if none are.
 
     A scan has the times of the segment in its middle. Beams of segments that are missing are nan.
     """

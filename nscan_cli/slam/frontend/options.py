@@ -151,7 +151,7 @@ class TrackingOptions:
     bridged_gap: float = 1.0
     """Without odometry, points of the first scan of a track, or of a lost scan that joins the map, get others
     between them if they are at most this far apart, m, and if fewer than `lost_inliers` of them lie on
-    Gaussians of their own: walls far away. A larger value bridges more gaps that are none."""
+    Gaussians of their own: walls far away. A larger value also fills more openings between walls."""
     scan: ScanTrackingOptions = field(default_factory=ScanTrackingOptions)
     """How each scan is matched with the local map, and joins it."""
     widenings: tuple[float, ...] = (0.05, 0.3, 1.0)
