@@ -46,8 +46,8 @@ class PairOptions(GaussianOptions):
     reach: float = 40.0
     """Longest beam that is matched, m. A larger value sees more and takes longer."""
     widenings: tuple[float, ...] = (0.05, 0.3, 1.0)
-    """The w of the energy in each stage; the last is 1, the energy itself. Smaller first values converge from
-    farther away."""
+    """The w of the energy in each stage of a match: it multiplies the information of the Gaussians, so that
+    w < 1 widens them. The last w is 1. With larger ones before, matches converge only from nearer."""
     scale: float = 0.6
     """Factor that makes a negative log likelihood of the energy. With this value matches of simulated scans
     with range noise of 1.5 cm are as far off as their covariances say. A larger value makes covariances

@@ -39,8 +39,9 @@ class InitialisationOptions:
     passes: int = 3
     """Most passes in which every scan is searched again among all others. More take longer."""
     widenings: tuple[float, ...] = (0.3, 1.0)
-    """The w of the energy in the stages of the match that refines a pose found by search. Such a pose is off
-    by about 0.1 m. Smaller first values converge from farther away."""
+    """The w of the energy in each stage of a match: it multiplies the information of the Gaussians, so that
+    w < 1 widens them. The last w is 1. With larger ones before, matches converge only from nearer. Here
+    the match starts from a pose found by search, which is off by about 0.1 m."""
 
 
 class WallFitOptions(NamedTuple):
@@ -116,8 +117,9 @@ class JointOptions:
     """How a joint match is minimised, and what its result has to satisfy."""
 
     widenings: tuple[float, ...] = (0.05, 0.3, 1.0)
-    """The w of the energy in each stage of the approach. The last steps are done with 1, the energy itself.
-    Smaller first values converge from farther away."""
+    """The w of the energy in each stage of a match: it multiplies the information of the Gaussians, so that
+    w < 1 widens them. The last w is 1. With larger ones before, matches converge only from nearer. Here
+    they are those of the approach; after it come steps with w = 1, too."""
     near: float = 0.01
     """A stage of the approach with w < 1 ends when no pose moves by more, m and rad. That with w = 1 ends at
     half of it. A larger value ends them earlier."""

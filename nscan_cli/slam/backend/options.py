@@ -119,8 +119,8 @@ class UnevenMotionOptions:
     """Factor that makes a negative log likelihood of the energy of the beams. A larger value believes them
     more."""
     widenings: tuple[float, ...] = (0.3, 1.0)
-    """Factors of the information of the Gaussians in the stages of a match; the last one is 1. Smaller ones
-    find paths that are farther off."""
+    """The w of the energy in each stage of a match: it multiplies the information of the Gaussians, so that
+    w < 1 widens them. The last w is 1. With larger ones before, matches converge only from nearer."""
     tolerance: float = 3e-3
     """The last stage has ended when no pose moves by more, m and rad. A larger value is less exact and takes
     less time."""

@@ -155,7 +155,8 @@ class TrackingOptions:
     scan: ScanTrackingOptions = field(default_factory=ScanTrackingOptions)
     """How each scan is matched with the local map, and joins it."""
     widenings: tuple[float, ...] = (0.05, 0.3, 1.0)
-    """Stages of a match: factors of the exponent of the energy. Smaller ones lead from farther off."""
+    """The w of the energy in each stage of a match: it multiplies the information of the Gaussians, so that
+    w < 1 widens them. The last w is 1. With larger ones before, matches converge only from nearer."""
     coarse_tolerance: float = 5e-3
     """With odometry, earlier stages end with a step below this, m and rad. A larger one ends them earlier."""
     restart_angles: tuple[tuple[float, ...], ...] = ((0.1, 0.2), (0.4, 0.7), (1.0, 1.3))

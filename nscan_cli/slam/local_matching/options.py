@@ -38,7 +38,8 @@ class NScanOptions:
     """Factor of the energy of scans with one point in each lattice cell: four Gaussians see each point. Of
     scans with n points in a cell, it is divided by n. A larger factor trusts matches more."""
     widenings: tuple[float, ...] = (0.05, 0.3, 1.0)
-    """Scales of the Gaussians' information, stage by stage. Smaller ones lead from farther off."""
+    """The w of the energy in each stage of a match: it multiplies the information of the Gaussians, so that
+    w < 1 widens them. The last w is 1. With larger ones before, matches converge only from nearer."""
     max_iterations: int = 30
     """Most iterations of a stage. A larger number lets slow matches converge."""
     wide_tolerance: float = 5e-3
