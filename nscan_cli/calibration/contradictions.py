@@ -16,12 +16,12 @@ from nscan_cli.calibration.options import FileCheckOptions
 from nscan_cli.calibration.step_evidence import (
     StepEvidence,
     are_of_one_size,
-    explains,
+    explains_positions,
     is_change,
     is_excluded,
     is_nearer,
+    is_nearer_in_direction,
     is_wrong_scale,
-    looks_like,
     never_changes,
     turns_agree,
 )
@@ -58,7 +58,7 @@ def find_contradictions(
         return []
     is_still = never_changes(log.odometry, options.still)
     if is_still[:2].all():
-        return [findings.frozen(evidence, "odometry" if is_still[2] else "the position by odometry")]
+        return [findings.frozen_odometry(evidence, "odometry" if is_still[2] else "the position by odometry")]
     view = _of_view(log, evidence, reading, options)
     if view is not None:
         return [view]
@@ -77,7 +77,7 @@ def find_contradictions(
         return [unusable]
     if turns is not None and _are_opposite(turns, evidence, options):
         mirrored = evidence.mirrored_fit
-        if are_of_one_size(turns, options) and mirrored is not None and explains(mirrored, options):
+        if are_of_one_size(turns, options) and mirrored is not None and explains_positions(mirrored, options):
             return _of_opposite_turns(log.mount, turns, mirrored, evidence, reading, options)
         return [findings.wrong_turns(turns), *_of_positions(log.mount, fit, evidence, reading, options)]
     found = []
@@ -120,15 +120,17 @@ def _are_opposite(turns: TurnFit, evidence: StepEvidence, options: FileCheckOpti
 
 def _unusable(evidence: StepEvidence, turns: TurnFit | None, options: FileCheckOptions) -> Finding | None:
     """Why odometry cannot be used at all; None if it can."""
-    is_explained = explains(evidence.fit, options) or explains(evidence.mirrored_fit, options)
-    if not is_explained and explains(evidence.fit_with_signs(ONE_AXIS_REVERSED), options):
+    is_explained = explains_positions(evidence.fit, options) or explains_positions(
+        evidence.mirrored_fit, options
+    )
+    if not is_explained and explains_positions(evidence.fit_with_signs(ONE_AXIS_REVERSED), options):
         is_heading = turns is not None and turns.ratio < 0.0
         return findings.wrong_signs(evidence, "headings" if is_heading else "x or y")
     excluded = is_excluded(evidence.fit, options) and is_excluded(evidence.mirrored_fit, options)
     if excluded and not evidence.is_explained_without_place:
-        return findings.excluded(evidence)
+        return findings.unexplained_positions(evidence)
     if turns is not None and turns.steps >= options.min_steps and turns.spread > options.excluded_turn_spread:
-        return findings.excluded_turns(turns)
+        return findings.unexplained_turns(turns)
     return None
 
 
@@ -140,7 +142,7 @@ def _of_change(
     if change is None or not is_change(change, options, options.change.sigmas):
         return None
     without = evidence.fit_without(change)
-    if not explains(without, options):
+    if not explains_positions(without, options):
         return None
     place = _place(log, evidence, change.step, reading)
     return findings.changed_scale(change, evidence.moving, place, reading)
@@ -160,9 +162,9 @@ def _of_view(
     if turned is None or not turned.exceeds(view.min_direction, view.sigmas):
         return None
     # With a wrong sign of x or y directions depend on where the robot heads.
-    if explains(evidence.fit_with_signs(ONE_AXIS_REVERSED), options):
+    if explains_positions(evidence.fit_with_signs(ONE_AXIS_REVERSED), options):
         return None
-    if not explains(evidence.fit_turned(turned), options):
+    if not explains_positions(evidence.fit_turned(turned), options):
         return None
     return mount_findings.changed_direction(
         turned, _place(log, evidence, turned.step, reading), log.mount, options
@@ -229,9 +231,13 @@ def _of_opposite_turns(
     other = mount * MIRRORED
     # Small steps aside, which may be of either sign, would pass for a place farther ahead or behind.
     options = replace(options, min_mount_move=np.inf)
-    if is_nearer(fit, other, mount, options.mount_sigmas) or looks_like(fit, other, mount, options):
+    if is_nearer(fit, other, mount, options.mount_sigmas) or is_nearer_in_direction(
+        fit, other, mount, options
+    ):
         return [findings.wrong_turns(turns), *_of_positions(other, fit, evidence, reading, options)]
-    is_certain = is_nearer(fit, mount, other, options.mount_sigmas) or looks_like(fit, mount, other, options)
+    is_certain = is_nearer(fit, mount, other, options.mount_sigmas) or is_nearer_in_direction(
+        fit, mount, other, options
+    )
     mirrored = findings.opposite_turns(findings.turns_of(turns), reading, is_certain, True)
     return [mirrored, *_of_positions(mount, fit, evidence, reading, options)]
 
@@ -244,7 +250,7 @@ def _of_positions(
     options: FileCheckOptions,
 ) -> list[Finding]:
     """What the positions by odometry say of its scale and of the mounting, which the file has at (3,)."""
-    if fit is None or not explains(fit, options):
+    if fit is None or not explains_positions(fit, options):
         return []
     found = []
     if is_wrong_scale(fit, options):
@@ -270,4 +276,4 @@ def _opposite(
     else:
         is_backward = forward < 0.5
         why = f"{forward:.0%} of the steps by odometry go forward"
-    return mount_findings.opposite(mount, fit, why, is_backward, reading, options)
+    return mount_findings.opposite_directions(mount, fit, why, is_backward, reading, options)

@@ -46,7 +46,7 @@ class Finding:
     """Whether the laser looks elsewhere, or its readings come in another order, in a part of the log."""
 
 
-def frozen(evidence: StepEvidence, what: str) -> Finding:
+def frozen_odometry(evidence: StepEvidence, what: str) -> Finding:
     """Odometry, or the part of it that `what` names, never moves."""
     seen = f"{evidence.moving} of {counted(len(evidence.laser), 'step')}"
     return _unused(f"{what} never moves, but the scans do in {seen}")
@@ -61,7 +61,7 @@ def unchanging_scans(unchanged: int, driven: int) -> Finding:
     )
 
 
-def excluded(evidence: StepEvidence) -> Finding:
+def unexplained_positions(evidence: StepEvidence) -> Finding:
     """Nothing explains the positions."""
     return _unused(
         "odometry contradicts the scans: no scale, mounting or clock explains its positions, "
@@ -69,7 +69,7 @@ def excluded(evidence: StepEvidence) -> Finding:
     )
 
 
-def excluded_turns(turns: TurnFit) -> Finding:
+def unexplained_turns(turns: TurnFit) -> Finding:
     """Nothing explains the turns."""
     return _unused(
         "odometry contradicts the scans: no scale and no clock explains its turns, "

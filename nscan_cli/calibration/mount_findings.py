@@ -77,7 +77,7 @@ def wrong_mounting(mount: Array, fit: MountFit, turning: int, options: FileCheck
     return Finding(f"{what}; {agree}; {cure}{AGREES}", seen_mount=seen, is_of_mount=True)
 
 
-def opposite(
+def opposite_directions(
     mount: Array,
     fit: MountFit,
     evidence: str,

@@ -171,7 +171,7 @@ def never_changes(odometry: Array, still: float) -> Mask:
     return never
 
 
-def explains(fit: MountFit | None, options: FileCheckOptions) -> bool:
+def explains_positions(fit: MountFit | None, options: FileCheckOptions) -> bool:
     """Whether a mounting and a scale explain the positions."""
     return fit is not None and fit.spread <= options.max_spread and fit.tail <= options.max_tail
 
@@ -250,8 +250,8 @@ def is_nearer(fit: MountFit, one: Array, other: Array, sigmas: float) -> bool:
     return from_other**2 - away**2 > 2.0 * apart * sigmas * float(fit.sigmas[1:3].max())
 
 
-def looks_like(fit: MountFit, one: Array, other: Array, options: FileCheckOptions) -> bool:
-    """Whether a laser clearly looks as on one mounting (3,), and not as on another."""
+def is_nearer_in_direction(fit: MountFit, one: Array, other: Array, options: FileCheckOptions) -> bool:
+    """Whether the direction of a laser is clearly that of one mounting (3,), and not that of another."""
     off, from_other = (abs(float(wrap(fit.mount[2] - mount[2]))) for mount in (one, other))
     bound = max(options.min_mount_turn, options.mount_sigmas * float(fit.sigmas[3]))
     return off <= bound < from_other - bound

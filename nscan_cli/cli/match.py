@@ -176,7 +176,7 @@ def weakest_record(weakest: Weakest) -> dict[str, Any]:
 def _document(
     log: LaserLog, numbers: tuple[int, int], start: Array, match: PairMatch, parameters: dict[str, Any]
 ) -> bytes:
-    from nscan_cli.graph.io.json_fields import pose_rows, six_digits, triangle
+    from nscan_cli.graph.io.json_fields import pose_rows, rounded_upper_triangle, six_digits
 
     return match_document(
         MATCH_FORMAT,
@@ -189,8 +189,8 @@ def _document(
             "energy": six_digits(match.energy),
             "gradient_norm": six_digits(match.gradient_norm),
             "decrement": None if match.decrement is None else six_digits(match.decrement),
-            "hessian": triangle(match.hessian),
-            "covariance": None if match.covariance is None else triangle(match.covariance),
+            "hessian": rounded_upper_triangle(match.hessian),
+            "covariance": None if match.covariance is None else rounded_upper_triangle(match.covariance),
             "eigenvalues": [six_digits(value) for value in match.eigenvalues.tolist()],
             "weakest": weakest_record(match.weakest),
             "overlap": six_digits(match.overlap),

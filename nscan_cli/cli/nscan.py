@@ -173,7 +173,7 @@ def command(
 
 def _fields(numbers: tuple[int, ...], match: NScanMatch, left_out: list[ExcludedScan]) -> dict[str, Any]:
     """The fields of the result."""
-    from nscan_cli.graph.io.json_fields import six_digits, triangle
+    from nscan_cli.graph.io.json_fields import rounded_upper_triangle, six_digits
     from nscan_cli.graph.model import NScan
     from nscan_cli.graph.relations.registry import relation_record
     from nscan_cli.graph.relations.semidefinite import WRITTEN_ROUNDING, as_information
@@ -186,7 +186,7 @@ def _fields(numbers: tuple[int, ...], match: NScanMatch, left_out: list[Excluded
     relation = NScan(tuple(kept), match.poses, information, match.fixed, "nscan", score)
     return {
         "relation": relation_record(relation, "scans"),
-        "covariance": None if match.covariance is None else triangle(match.covariance),
+        "covariance": None if match.covariance is None else rounded_upper_triangle(match.covariance),
         "energy": six_digits(match.energy),
         "gradient_norm": six_digits(joint.gradient_norm),
         "decrement": None if match.decrement is None else six_digits(match.decrement),

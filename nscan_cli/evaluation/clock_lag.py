@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from nscan_cli.evaluation.options import ClockLagOptions, EvaluationOptions, RemarkOptions
-from nscan_cli.evaluation.similarity import fit
+from nscan_cli.evaluation.similarity import fit_similarity
 from nscan_cli.graph.io.tum import Trajectory
 from nscan_cli.poses import Array, Mask, wrap
 
@@ -82,10 +82,10 @@ def lag_without_overlap(
         return None
     middle = float(reference.times[[0, -1]].mean() - result.times[[0, -1]].mean())
     clocks = Clocks.of(result.times + middle, result.poses, reference, options.clock_lag)
-    found = clocks.best(lambda poses, truth: fit(poses, truth).apart_scaled)
+    found = clocks.best(lambda poses, truth: fit_similarity(poses, truth).apart_scaled)
     if found is None:
         return None
-    there = fit(*clocks.at(found[0]))
+    there = fit_similarity(*clocks.at(found[0]))
     fits = there.spread > options.min_motion and there.apart_scaled < options.max_residual * there.spread
     return middle + found[0] if fits else None
 

@@ -15,7 +15,13 @@ import numpy as np
 from nscan_cli.evaluation.alignment import alignment
 from nscan_cli.evaluation.clock_lag import Clocks
 from nscan_cli.evaluation.options import EvaluationOptions, RemarkOptions
-from nscan_cli.evaluation.similarity import Fit, LeverArm, fit, heading_difference, lever_arm
+from nscan_cli.evaluation.similarity import (
+    LeverArm,
+    SimilarityFit,
+    fit_similarity,
+    heading_difference,
+    lever_arm,
+)
 from nscan_cli.evaluation.trajectory_errors import TrajectoryErrors
 from nscan_cli.files.text import counted
 from nscan_cli.graph.io.tum import Trajectory
@@ -94,9 +100,12 @@ def _misfits(
     result: Trajectory, reference: Trajectory, errors: TrajectoryErrors, options: RemarkOptions
 ) -> Iterator[str]:
     poses, truth = result.poses[errors.rows], reference.poses[errors.partners]
-    now = fit(poses, truth)
+    now = fit_similarity(poses, truth)
     # Either of them can be in a larger unit.
-    if errors.alignment.by == "headings" or max(now.spread, fit(truth, poses).spread) < options.min_motion:
+    if (
+        errors.alignment.by == "headings"
+        or max(now.spread, fit_similarity(truth, poses).spread) < options.min_motion
+    ):
         found = _certain_lever_arm(poses, truth, options)
         if found is not None:
             yield f"{OTHER_POINT}: {_point_text(found.point)} that of the result"
@@ -113,7 +122,7 @@ def _misfits(
         poses, truth = replace(clocks, times=result.times[errors.rows], poses=poses).at(lag)
     if found is not None and not either:
         poses = compose(poses, [*found.point, 0.0])
-    left = fit(poses, truth)
+    left = fit_similarity(poses, truth)
     if lag:
         clock = f"the clock of the reference is {'ahead of' if lag > 0 else 'behind'} that of the result"
         alone = f"stamps off by {abs(lag):.2f} s fit best"
@@ -126,7 +135,7 @@ def _misfits(
     if is_other_unit and _is_better(left.apart_scaled, left.apart, now, options):
         yield f"factor {_factor_text(factor, options.unit_tolerance)}"
         truth = truth / [factor, factor, 1.0]
-        left = fit(poses, truth)
+        left = fit_similarity(poses, truth)
     if left.apart < 2 * options.max_residual * left.spread:
         turn, spread = heading_difference(poses, truth)
         if abs(turn) > max(options.min_turn, options.min_sigmas * max(spread, left.apart / left.spread)):
@@ -140,14 +149,14 @@ def _misfits(
 
 
 def _lag_and_lever(
-    clocks: Clocks, found: LeverArm | None, now: Fit, options: RemarkOptions
+    clocks: Clocks, found: LeverArm | None, now: SimilarityFit, options: RemarkOptions
 ) -> tuple[float, LeverArm | None, bool]:
     """The lag (s; 0: none) and the lever arm that are certain, and whether only one of them is meant.
 
     On a straight path, a lag looks like a lever arm. Both together are reported only where neither alone
     fits nearly as well.
     """
-    alone = clocks.best(lambda poses, truth: fit(poses, truth).apart_scaled)
+    alone = clocks.best(lambda poses, truth: fit_similarity(poses, truth).apart_scaled)
     both = clocks.best(lambda poses, truth: getattr(lever_arm(poses, truth), "apart", math.inf))
     least = min(
         [now.apart_scaled, *(one[1] for one in (alone, both) if one)] + ([found.apart] if found else [])
@@ -174,13 +183,13 @@ def _certain_lever_arm(poses: Array, truth: Array, options: RemarkOptions) -> Le
     if found is None or np.hypot(*found.point) < max(options.min_lever, options.min_sigmas * found.sigma):
         return None
     aligned = alignment(poses, truth)
-    apart = fit(poses, truth).apart_scaled
+    apart = fit_similarity(poses, truth).apart_scaled
     if aligned.by == "headings":
         apart = float(np.sqrt(((compose(aligned.motion, poses) - truth)[:, :2] ** 2).sum() / len(poses)))
     return found if found.apart * options.lever_improvement < apart else None
 
 
-def _is_better(apart: float, before: float, now: Fit, options: RemarkOptions) -> bool:
+def _is_better(apart: float, before: float, now: SimilarityFit, options: RemarkOptions) -> bool:
     return apart * options.improvement < before and apart < options.max_residual * now.spread
 
 

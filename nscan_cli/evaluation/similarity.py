@@ -12,7 +12,7 @@ from nscan_cli.poses import Array, compose, wrap
 
 
 @dataclass(frozen=True)
-class Fit:
+class SimilarityFit:
     """Least-squares fits of positions a (N, 2) to b (N, 2); RMS lengths in the unit of b."""
 
     factor: float
@@ -27,7 +27,7 @@ class Fit:
     """Residual with the factor and a mirrored."""
 
 
-def fit(poses: Array, truth: Array) -> Fit:
+def fit_similarity(poses: Array, truth: Array) -> SimilarityFit:
     """The least-squares fits of positions in closed form, from sums about their means."""
     a, b = poses[:, :2] - poses[:, :2].mean(axis=0), truth[:, :2] - truth[:, :2].mean(axis=0)
     size_a, size_b = float((a**2).sum() / len(a)), float((b**2).sum() / len(b))
@@ -37,7 +37,7 @@ def fit(poses: Array, truth: Array) -> Fit:
     def left(shared: float) -> float:
         return math.sqrt(max(size_b - shared**2 / size_a, 0.0) if size_a > 0 else size_b)
 
-    return Fit(
+    return SimilarityFit(
         factor=common / size_a if size_a > 0 else 1.0,
         spread=size_b**0.5,
         apart=max(size_a + size_b - 2 * common, 0.0) ** 0.5,

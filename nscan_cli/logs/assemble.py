@@ -14,12 +14,11 @@ from nscan_cli.logs.beam_mask import mask_beams, masked_sectors
 from nscan_cli.logs.beam_spacing import checked_by_walls
 from nscan_cli.logs.blind_scans import blind_scans
 from nscan_cli.logs.device_choice import Device
-from nscan_cli.logs.direction_changes import as_before
+from nscan_cli.logs.direction_changes import corrected_directions
 from nscan_cli.logs.floor_line import floor_line, without_floor
 from nscan_cli.logs.frame_names import DEFAULT_FRAMES, FrameNames
 from nscan_cli.logs.laser_defaults import mark_no_returns
 from nscan_cli.logs.laser_log import LaserLog, LogReport, beam_counts
-from nscan_cli.logs.lost_readings import lost_readings
 from nscan_cli.logs.noisy_odometry import without_noise
 from nscan_cli.logs.odometry_outliers import without_outliers
 from nscan_cli.logs.range_limits import RangeLimits, limits_in_force
@@ -37,6 +36,7 @@ from nscan_cli.logs.slow_odometry import without_repeats
 from nscan_cli.logs.sweep import Sweep, beam_times, sweep_of_file
 from nscan_cli.logs.two_odometries import of_one_source
 from nscan_cli.logs.unit_stretches import in_one_unit
+from nscan_cli.logs.unusable_readings import unusable_readings
 from nscan_cli.logs.whole_turn import in_whole_turns
 from nscan_cli.poses import Array, Indices, are_known
 
@@ -108,7 +108,9 @@ def laser_log(
     beams, changed = beam_counts(raw.ranges, raw.beams), list[str]()
     if not options.as_recorded:
         seen = ScanTable(raw.ranges, limits, *written, times.rows, times.times)
-        written, changed = as_before(seen, beams, -1 if options.flip else 1, checks.direction_changes)
+        written, changed = corrected_directions(
+            seen, beams, -1 if options.flip else 1, checks.direction_changes
+        )
     directions, told = in_whole_turns(raw, written, limits, options, checks.whole_turn, checks.beam_spacing)
     if not told:
         directions, told = checked_by_walls(raw, written, limits, options, checks.beam_spacing)
@@ -121,7 +123,7 @@ def laser_log(
     floor = None if options.as_recorded else floor_line(table, sectors, checks.floor_line, parts)
     ranges = raw.ranges if np.array_equal(rows, np.arange(len(raw.stamps))) else raw.ranges[rows]
     beams, limits = beams[rows], limits.of(rows)
-    lost = lost_readings(ranges, beams, limits, file, checks.range_limits)
+    lost = unusable_readings(ranges, beams, limits, file, checks.range_limits)
     of_one_value = int(repeated[rows].sum())
     if of_one_value:
         # They were usable, and are counted as no number now.

@@ -17,7 +17,13 @@ from nscan_cli.logs.beam_spacing_options import BeamSpacingOptions
 from nscan_cli.logs.laser_log import beam_counts
 from nscan_cli.logs.raw_scans import RawScans
 from nscan_cli.logs.reading_options import ReadingOptions
-from nscan_cli.logs.wall_angles import SampledScans, beams_as_log, mode, sampled_scans, votes
+from nscan_cli.logs.wall_angles import (
+    SampledScans,
+    beams_as_log,
+    factors_by_walls,
+    most_told_factor,
+    sampled_scans,
+)
 
 if TYPE_CHECKING:
     from nscan_cli.logs.range_limits import RangeLimits
@@ -98,7 +104,7 @@ def _is_round(step: float) -> bool:
 
 def _walls_agree(scans: SampledScans, options: BeamSpacingOptions) -> bool:
     """Whether most beams on walls tell the angle of the log, or nearly that."""
-    _logs, centres, counts = votes(scans, options.widest_half_width, options)
+    _logs, centres, counts = factors_by_walls(scans, options.widest_half_width, options)
     best = int(counts.argmax()) if len(counts) else 0
     return (
         len(counts) > 0
@@ -166,8 +172,8 @@ def _most_told(
     scans: SampledScans, half_width: float, min_beams: int, options: BeamSpacingOptions
 ) -> float | None:
     """The factor that most beams on walls tell; None for too few. `half_width` as in `_told_factor`."""
-    logs, centres, counts = votes(scans, half_width, options)
-    return None if counts.max(initial=0) < min_beams else mode(logs, centres, counts, options)
+    logs, centres, counts = factors_by_walls(scans, half_width, options)
+    return None if counts.max(initial=0) < min_beams else most_told_factor(logs, centres, counts, options)
 
 
 def _told_factor(scans: SampledScans, half_width: float, options: BeamSpacingOptions) -> float | None:
@@ -175,13 +181,13 @@ def _told_factor(scans: SampledScans, half_width: float, options: BeamSpacingOpt
 
     half_width: angle from a beam to those that it is compared with by the steps of the scans, rad.
     """
-    logs, centres, counts = votes(scans, half_width, options)
+    logs, centres, counts = factors_by_walls(scans, half_width, options)
     if len(centres) < options.min_beams:
         return None
     best = int(counts.argmax())
     if counts[best] < max(options.min_beams, options.min_ratio * beams_as_log(logs, options)):
         return None
-    factor = mode(logs, centres, counts, options)
+    factor = most_told_factor(logs, centres, counts, options)
     return factor if abs(math.log(factor)) >= options.min_difference else None
 
 

@@ -46,7 +46,7 @@ class DirectionChangeOptions:
     gives more messages."""
 
 
-def as_before(
+def corrected_directions(
     table: ScanTable, counts: Indices, sign: int, options: DirectionChangeOptions
 ) -> tuple[BeamDirections, list[str]]:
     """The directions of the scans of a log, in file order, put right where scans show no change.

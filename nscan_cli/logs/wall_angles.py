@@ -50,7 +50,7 @@ def sampled_scans(
     return SampledScans(ranges[moved], np.abs(directions.step[rows[moved]]))
 
 
-def votes(
+def factors_by_walls(
     scans: SampledScans, half_width: float, options: BeamSpacingOptions
 ) -> tuple[Array, Array, NDArray[np.int64]]:
     """Factors by which walls say that the angle between beams is larger than in the log, as logarithms.
@@ -104,7 +104,9 @@ def _log_angles(near: Array, between: int) -> Array:
         return np.log(np.arccos(np.where(cosines < 1, np.maximum(cosines, -1.0), np.nan)))
 
 
-def mode(logs: Array, centres: Array, counts: NDArray[np.int64], options: BeamSpacingOptions) -> float:
-    """The factor that most beams tell, from what `votes` returns."""
+def most_told_factor(
+    logs: Array, centres: Array, counts: NDArray[np.int64], options: BeamSpacingOptions
+) -> float:
+    """The factor that most beams tell, from what `factors_by_walls` returns."""
     best = centres[int(counts.argmax())]
     return math.exp(float(np.median(logs[np.abs(logs - best) <= options.same_angle])))

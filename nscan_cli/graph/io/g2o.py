@@ -18,7 +18,7 @@ from nscan_cli.files.finite import check_finite
 from nscan_cli.files.inputs import base_name, label
 from nscan_cli.files.provenance import Source, provenance_of
 from nscan_cli.graph.io.g2o_lines import G2O_REMEDY, G2oLines, key_text, keys, read_lines, rows
-from nscan_cli.graph.io.g2o_tags import losses
+from nscan_cli.graph.io.g2o_tags import loss_messages
 from nscan_cli.graph.io.json_fields import LARGEST_INTEGER
 from nscan_cli.graph.io.symmetric_matrices import from_upper_triangle, upper_triangle
 from nscan_cli.graph.model import Graph, Pairwise
@@ -36,7 +36,7 @@ def parse_g2o(data: bytes, path: str) -> Graph:
     rows, and the keys are the graph's `vertices`. Edges between consecutive vertices have the origin
     odometry, the others loop. Without vertices, poses come from the fewest edges to the vertex of the
     smallest key, which is at the origin. FIX only chooses the frame, so it is checked and ignored; one vertex
-    may be fixed. provenance["skipped"] counts the skipped lines by tag; g2o_tags.losses explains them.
+    may be fixed. provenance["skipped"] counts the skipped lines by tag; g2o_tags.loss_messages explains them.
 
     Raises InputDataError on a malformed line.
     """
@@ -44,7 +44,7 @@ def parse_g2o(data: bytes, path: str) -> Graph:
     lines = read_lines(data, name)
     if not lines.vertices and not lines.edge_lines:
         others = {tag: n for tag, n in lines.skipped.items() if tag.startswith(("VERTEX", "EDGE"))}
-        problem = "; ".join(["no VERTEX_SE2 or EDGE_SE2 line", *losses(others)])
+        problem = "; ".join(["no VERTEX_SE2 or EDGE_SE2 line", *loss_messages(others)])
         raise InputDataError(name, problem, "give a 2D pose graph of g2o")
     graph = _graph_of_lines(lines, name)
     source = Source(base_name(path), hashlib.sha256(data).hexdigest(), len(data))

@@ -33,7 +33,7 @@ SHOWN_TAG_LENGTH = 40
 """Characters of a tag that are shown."""
 
 
-def losses(skipped: Mapping[str, int]) -> list[str]:
+def loss_messages(skipped: Mapping[str, int]) -> list[str]:
     """A sentence for each kind of loss, with the number of skipped lines by tag."""
     kinds: dict[str, list[str]] = {}
     for tag, count in skipped.items():

@@ -38,7 +38,7 @@ def pose_rows(poses: Array) -> list[list[float]]:
     ]
 
 
-def triangle(matrix: Array) -> list[float]:
+def rounded_upper_triangle(matrix: Array) -> list[float]:
     """The upper triangle of a symmetric matrix, row by row, with 6 significant digits."""
     return [six_digits(entry) for entry in upper_triangle(matrix).tolist()]
 

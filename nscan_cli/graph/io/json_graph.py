@@ -22,7 +22,13 @@ from nscan_cli.files.finite import check_finite
 from nscan_cli.files.limits import TIME
 from nscan_cli.files.provenance import provenance_of
 from nscan_cli.graph.io.g2o_lines import LARGEST_KEY
-from nscan_cli.graph.io.json_fields import JsonRecord, MalformedError, pose_rows, six_digits, triangle
+from nscan_cli.graph.io.json_fields import (
+    JsonRecord,
+    MalformedError,
+    pose_rows,
+    rounded_upper_triangle,
+    six_digits,
+)
 from nscan_cli.graph.model import Graph, Loop
 from nscan_cli.graph.relations.registry import relation_of, relation_record
 from nscan_cli.logs.compression import compression_of
@@ -68,7 +74,7 @@ def write_graph(graph: Graph) -> bytes:
         ),
         "loops": (_compact(_loop_record(loop)) for loop in graph.loops),
         "marginals": (
-            _compact({"node": node, "covariance": triangle(covariance)})
+            _compact({"node": node, "covariance": rounded_upper_triangle(covariance)})
             for node, covariance in sorted(graph.marginals.items())
         ),
     }

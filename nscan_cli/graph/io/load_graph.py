@@ -6,7 +6,7 @@ from nscan_cli.files.encoding import without_byte_order_mark
 from nscan_cli.files.inputs import label, read_bytes
 from nscan_cli.files.limits import GRAPH
 from nscan_cli.graph.io.g2o import parse_g2o
-from nscan_cli.graph.io.g2o_tags import losses
+from nscan_cli.graph.io.g2o_tags import loss_messages
 from nscan_cli.graph.io.json_graph import parse_graph
 from nscan_cli.graph.model import Graph
 
@@ -27,5 +27,5 @@ def graph_from(data: bytes, path: str, notices: list[str] | None = None) -> Grap
         return parse_graph(text, label(path))
     graph = parse_g2o(data, path)
     if notices is not None:
-        notices += [f"{label(path)}: {lost}" for lost in losses(graph.provenance["skipped"])]
+        notices += [f"{label(path)}: {lost}" for lost in loss_messages(graph.provenance["skipped"])]
     return graph

@@ -8,7 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any, ClassVar, Self
 
-from nscan_cli.graph.io.json_fields import JsonRecord, MalformedError, pose_rows, triangle
+from nscan_cli.graph.io.json_fields import JsonRecord, MalformedError, pose_rows, rounded_upper_triangle
 from nscan_cli.graph.relations.base import Term
 from nscan_cli.poses import Array
 
@@ -38,7 +38,7 @@ class NScan:
         """The local poses, H, and the node of pose c."""
         return {
             "poses": pose_rows(self.poses),
-            "hessian": triangle(self.hessian),
+            "hessian": rounded_upper_triangle(self.hessian),
             "fixed": self.nodes[self.fixed],
         }
 

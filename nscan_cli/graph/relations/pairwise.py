@@ -8,7 +8,7 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 
-from nscan_cli.graph.io.json_fields import JsonRecord, pose_rows, triangle
+from nscan_cli.graph.io.json_fields import JsonRecord, pose_rows, rounded_upper_triangle
 from nscan_cli.graph.relations.base import Term
 from nscan_cli.poses import Array
 
@@ -47,7 +47,7 @@ class Pairwise:
         """The measurement and its information."""
         return {
             "measurement": pose_rows(self.measurement[None])[0],
-            "information": triangle(self.information),
+            "information": rounded_upper_triangle(self.information),
         }
 
     @classmethod

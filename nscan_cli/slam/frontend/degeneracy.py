@@ -52,10 +52,14 @@ def keep_prediction(
         x, y = pose[0] - prior.mean[0], pose[1] - prior.mean[1]
         mean_square_deviation[0] += options.smoothing * (0.5 * (x * x + y * y) - mean_square_deviation[0])
         return
-    places, values = profile(grid, settings, points, prior, pose, along)
+    places, values = objective_profile(grid, settings, points, prior, pose, along)
     best = index_of_least(values)
     if values[best] < found.values[k] - options.rematch_gain:
-        further, trial, hessian = places[best] - ahead(pose, prior, along), pose.copy(), np.empty((3, 3))
+        further, trial, hessian = (
+            places[best] - distance_ahead(pose, prior, along),
+            pose.copy(),
+            np.empty((3, 3)),
+        )
         trial[0] += further * along[0]
         trial[1] += further * along[1]
         value, inliers = match_and_count(grid, settings, points, prior, trial, hessian)
@@ -63,7 +67,7 @@ def keep_prediction(
             found.values[k], found.inliers[k] = value, inliers
             assign(pose, trial)
             assign_rows(found.hessians[k], hessian)
-    off = ahead(pose, prior, along)
+    off = distance_ahead(pose, prior, along)
     variance = measured_variance(places, values, prior, options.profile_step)
     found.weakest_sigmas[k] = np.sqrt(variance)
     excess = max(variance - options.trusted_sigma**2, 0.0)
@@ -76,7 +80,7 @@ def keep_prediction(
 
 
 @leaf_kernel
-def ahead(pose: Array, prior: Prior, along: Array) -> float:
+def distance_ahead(pose: Array, prior: Prior, along: Array) -> float:
     """How far (m) a pose (3,) lies ahead of its prediction, in the direction `along` (2,)."""
     return float((pose[0] - prior.mean[0]) * along[0] + (pose[1] - prior.mean[1]) * along[1])
 
@@ -95,14 +99,14 @@ def weakest_direction(hessian: Array, along: Array) -> float:
 
 
 @kernel
-def profile(
+def objective_profile(
     grid: Grid, settings: TrackingParameters, points: Array, prior: Prior, pose: Array, along: Array
 ) -> tuple[Array, Array]:
     """The objective on the line `along` (2,) through `pose` (3,): places (n,), in m ahead of the prediction,
     and its values (n,)."""
     problem = PairProblem(grid, settings.half, begin_association(points), settings.options.scale, prior)
     out, gradient, hessian, there = np.empty(ENERGY_NUMBERS), np.empty(3), np.empty((3, 3)), pose.copy()
-    own, options = ahead(pose, prior, along), settings.options.degeneracy
+    own, options = distance_ahead(pose, prior, along), settings.options.degeneracy
     apart = options.profile_step
     farthest = int(np.ceil(options.profile_sigmas / np.sqrt(prior.information[0, 0]) / apart))
     places, values = np.empty(2 * farthest + 1), np.empty(2 * farthest + 1)

@@ -8,7 +8,7 @@ import pytest
 
 from nscan_cli.errors import InputDataError
 from nscan_cli.graph.io.g2o import parse_g2o
-from nscan_cli.graph.io.g2o_tags import losses
+from nscan_cli.graph.io.g2o_tags import loss_messages
 from nscan_cli.graph.io.load_graph import load_graph
 
 POSES = "VERTEX_SE2 0 0 0 0\nVERTEX_SE2 1 1 0 0\nEDGE_SE2 0 1 1 0 0 1 0 0 1 0 1\n"
@@ -84,5 +84,5 @@ def test_a_file_with_none_of_the_plane_says_what_it_has():
 
 
 def test_there_is_a_sentence_for_whatever_a_tag_is():
-    assert losses({"": 1}) != []
-    assert losses({}) == []
+    assert loss_messages({"": 1}) != []
+    assert loss_messages({}) == []

@@ -16,10 +16,10 @@ from nscan_cli.ndt.options import GaussianOptions
 from nscan_cli.ndt.transform import Ndt
 from nscan_cli.poses import Array, wrap
 from nscan_cli.slam.frontend.degeneracy import (
-    ahead,
+    distance_ahead,
     keep_prediction,
     measured_variance,
-    profile,
+    objective_profile,
     weakest_direction,
 )
 from nscan_cli.slam.frontend.options import TrackingOptions, TrackingParameters
@@ -93,12 +93,12 @@ def test_the_profile_is_the_objective_along_a_line(pose):
     ndt, points, pose = ndt_of(room(1)), room(2), np.array(pose)
     prior = EXPECTED._replace(mean=np.array([0.1, 0.05, -np.pi + 0.02]))
     along = np.array([np.cos(0.4), np.sin(0.4)])
-    places, values = profile(ndt.grid, SETTINGS, points, prior, pose, along)
+    places, values = objective_profile(ndt.grid, SETTINGS, points, prior, pose, along)
     np.testing.assert_allclose(places, PLACES, atol=1e-12)
     for place, value in zip(places, values, strict=True):
         there = pose.copy()
         there[:2] += (place - (pose - prior.mean)[:2] @ along) * along
-        assert ahead(there, prior, along) == pytest.approx(place, abs=1e-12)
+        assert distance_ahead(there, prior, along) == pytest.approx(place, abs=1e-12)
         off = there - prior.mean
         off[2] = wrap(off[2])
         expected = (

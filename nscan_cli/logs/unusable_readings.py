@@ -17,7 +17,7 @@ ROWS_AT_ONCE = 4096
 """Scans that are counted together, to save memory."""
 
 
-class LostReadings(NamedTuple):
+class UnusableReadings(NamedTuple):
     """The unusable readings of a log."""
 
     counts: dict[str, int]
@@ -27,14 +27,14 @@ class LostReadings(NamedTuple):
     """The error to raise if no reading is usable"""
 
 
-def lost_readings(
+def unusable_readings(
     ranges: NDArray[np.float32],
     beams: NDArray[np.int64],
     limits: RangeLimits,
     file: str,
     checks: RangeLimitOptions = RangeLimitOptions(),
-) -> LostReadings:
-    """The unusable ones among readings (S, B; m) as written, of which scans have `beams` (S,)."""
+) -> UnusableReadings:
+    """The number of unusable readings among those (S, B; m) as written, of which scans have `beams` (S,)."""
     wrong = limits.low >= limits.high
     low, high = _limit_texts(limits) if wrong.all() else _limit_texts(limits.of(np.flatnonzero(~wrong)))
     lower, upper = _limit_texts(limits.of(np.flatnonzero(wrong))) if wrong.any() else (low, high)
@@ -53,7 +53,7 @@ def lost_readings(
     unit, remedy = ("", "") if found_unit is None else (f"; {found_unit.seems}", found_unit.remedy)
     if lost <= checks.max_lost_share * total and not unit:
         told = f"{counts.get(crossed, 0):,} of {_readings(total)} are unusable: {crossed}"
-        return LostReadings(counts, [told] if crossed in counts else [], None)
+        return UnusableReadings(counts, [told] if crossed in counts else [], None)
     listed = ", ".join(f"{n:,} {'is' if n == 1 else 'are'} {why}" for why, n in counts.items()) + unit
     most = max(counts, key=lambda reason: counts[reason], default="")
     met_nothing = most == f"beyond {high}" and limits.no_return == limits.whole[1]
@@ -62,13 +62,13 @@ def lost_readings(
     if lost < total:
         few = "only " if lost > checks.max_lost_share * total else ""
         said = f"{few}{total - lost:,} of {_readings(total)} are usable" + (f": {listed}" if counts else unit)
-        return LostReadings(counts, [f"{said}; {remedy}" if remedy else said], None)
+        return UnusableReadings(counts, [f"{said}; {remedy}" if remedy else said], None)
     options = [option for option in ("--min-range", "--max-range") if f"({option})" in most]
     if options:
         remedy = f"choose another {' and '.join(options)}"
     problem = f"none of its {_readings(total)} is usable: {listed}"
     remedy = remedy or "give a log with valid readings"
-    return LostReadings(counts, [], InputDataError(file, problem, remedy))
+    return UnusableReadings(counts, [], InputDataError(file, problem, remedy))
 
 
 def _counts(ranges: NDArray[np.float32], beams: NDArray[np.int64], limits: RangeLimits) -> NDArray[np.int64]:
