@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from nscan_cli.calibration.options import CompanionOptions
+from nscan_cli.calibration.companion_options import CompanionOptions
 from nscan_cli.logs.beam_mask import Bearings, mask_beams, mask_text
 from nscan_cli.logs.field_of_view import field_of_view
 from nscan_cli.logs.laser_log import LaserLog

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 
+from nscan_cli.calibration.companion_options import CompanionOptions
 from nscan_cli.calibration.odometry_options import (
     ClockOptions,
     HeldOdometryOptions,
@@ -69,63 +70,7 @@ class StepOptions:
     metres_per_radian: float = 0.3
     """Motion that a turn of one radian counts as, m. With a larger value turns weigh more."""
     pair: PairOptions = field(default_factory=lambda: PairOptions(tolerance=1e-4, coarse_tolerance=3e-3))
-
-
-@dataclass(frozen=True)
-class CompanionOptions:
-    """When something goes along with the robot: readings that end where the robot itself has been or will be.
-
-    Such readings are in 72 to 98 % of the scans with a cart or a follower, in 8 % at most on real logs.
-    """
-
-    scans: int = 100
-    """Number of scans that are checked, evenly spread. More take longer."""
-    first_of: int = 6
-    """One in so many of these is checked first. A larger value takes less time."""
-    clear_share: float = 0.1
-    """The others are not checked if a smaller share of these has such readings. A smaller value takes
-    longer."""
-    max_beams: int = 180
-    """Approximate number of beams of a scan that are checked, evenly spread. More take longer."""
-    min_way: float = 5.0
-    """Shortest path of a drive that is checked, m. A larger value skips longer logs."""
-    longest_step: float = 1.0
-    """Longest step between two scans of one path, m: beyond it the robot was carried or lost. A larger value
-    joins more of such parts."""
-    nearest: float = 0.25
-    """Readings are compared with the path from this distance on, before and behind the robot, m. A larger
-    value misses what is near."""
-    farthest: float = 4.0
-    """Readings are compared with the path up to this distance along it, before and behind the robot, m. A
-    larger value finds more, also where drift of odometry has put a wall onto the path."""
-    path_step: float = 0.05
-    """Distance between the points of the path that are compared, m. A smaller value takes longer."""
-    clearance: float = 0.2
-    """Points of the path nearer to the robot than this are not compared, m: the robot is there now. A larger
-    value misses what is near."""
-    max_range: float = 1.5
-    """Longest reading that is compared, m. A larger value finds who follows farther away, where he does less
-    harm."""
-    radius: float = 0.12
-    """A reading is on the path within this distance of it, m: half the width of a small robot. A larger value
-    takes walls beside the path for something that goes along."""
-    min_beams: int = 2
-    """Least number of readings of a scan on the path. A larger value finds less."""
-    min_share: float = 0.3
-    """Least share of scans with such readings. A smaller value finds who goes along for a part of the way."""
-    max_gap: float = 0.2
-    """Largest distance between neighbouring readings of one thing, m. A larger value leaves out more."""
-    max_size: float = 0.5
-    """Largest distance of its readings from the middle of those on the path, m. A larger value leaves out
-    more."""
-    bin_width: float = math.radians(2.0)
-    """Bearings are left out in bins of this width, rad. A larger value leaves out more beside it."""
-    min_sector_share: float = 0.07
-    """Bearings are left out if it is seen there in more than this share of these scans. A larger value leaves
-    out less."""
-    min_quarter_share: float = 0.75
-    """Least share of what is seen that the best quarter of all bearings has: it is 0.94 or more for a
-    cart or a follower, and 0.57 at most for dust and noise. A larger value finds less."""
+    """How the two scans of a step are matched: more exactly than by default."""
 
 
 @dataclass(frozen=True)
@@ -136,18 +81,31 @@ class FileCheckOptions:
     """
 
     steps: StepOptions = field(default_factory=StepOptions)
+    """Which steps are measured, and which measurements count."""
     clock: ClockOptions = field(default_factory=ClockOptions)
+    """How the offset between the clocks of odometry and scans is looked for."""
     lag: LagOptions = field(default_factory=LagOptions)
+    """When the odometry of a laser that sees at once is late or early."""
     sweep: SweepCheckOptions = field(default_factory=SweepCheckOptions)
+    """How the time of a laser's turn is taken from its scans."""
     held: HeldOdometryOptions = field(default_factory=HeldOdometryOptions)
+    """When odometry stands though the robot moves."""
     units: OdometryUnitOptions = field(default_factory=OdometryUnitOptions)
+    """When a part of the odometry is in another unit."""
     jumps: RangeJumpOptions = field(default_factory=RangeJumpOptions)
+    """When all ranges change by one factor from a scan on."""
     order: OrderJumpOptions = field(default_factory=OrderJumpOptions)
+    """When readings come in the other order from a scan on."""
     jitter: BearingJitterOptions = field(default_factory=BearingJitterOptions)
+    """When first directions jitter in the file alone."""
     change: ScaleChangeOptions = field(default_factory=ScaleChangeOptions)
+    """When the scale of odometry or ranges changes within the log."""
     view: ViewChangeOptions = field(default_factory=ViewChangeOptions)
+    """When the laser looks elsewhere, or its readings come in another order, from a scan on."""
     unsigned: UnsignedOdometryOptions = field(default_factory=UnsignedOdometryOptions)
+    """When odometry counts reversing as driving forward."""
     companion: CompanionOptions = field(default_factory=CompanionOptions)
+    """When something goes along with the robot, whose beams are left out."""
     min_steps: int = 12
     """Least number of steps with motion, or with a turn, that a finding rests on. A larger value finds
     less."""
@@ -251,8 +209,11 @@ class CalibrationOptions:
     """How a robot is calibrated from a drive."""
 
     steps: StepOptions = field(default_factory=lambda: StepOptions(max_beams=1_000))
+    """Which steps are measured, with more beams than for the check of a file."""
     clock: ClockOptions = field(default_factory=ClockOptions)
+    """How the offset between the clocks of odometry and scans is looked for."""
     sweep: SweepCheckOptions = field(default_factory=SweepCheckOptions)
+    """How the time of the laser's turn is taken from its scans."""
     min_steps: int = 30
     """Least number of steps with motion. A larger value leaves more drives uncalibrated."""
     min_turns: int = 12
@@ -292,4 +253,4 @@ class CalibrationOptions:
     applies less certain ones."""
     max_sideways: float = 0.05
     """Odometry is that of two wheels if its steps go to the side by no more than this share, in the median.
-    It is 0.001 to 0.013 on real logs."""
+    It is 0.001 to 0.013 on real logs. A larger value takes more robots for ones with two wheels."""

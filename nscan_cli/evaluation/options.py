@@ -80,6 +80,7 @@ class RemarkOptions:
     repeated_distance: float = 0.05
     """Least distance between poses of the same stamp in two runs, m. A larger value remarks less."""
     clock_lag: ClockLagOptions = ClockLagOptions()
+    """When the clocks of result and reference differ."""
 
 
 @dataclass(frozen=True)
@@ -92,4 +93,6 @@ class EvaluationOptions:
     """Path in the reference between the two poses of a relative error, m. Over a larger value, errors
     grow."""
     alignment: AlignmentOptions = AlignmentOptions()
+    """When headings decide the alignment of result and reference."""
     remarks: RemarkOptions = RemarkOptions()
+    """When a difference is worth a remark."""

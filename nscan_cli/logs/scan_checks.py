@@ -45,36 +45,67 @@ class ScanCheckOptions:
     """
 
     stamp_unit: StampUnitOptions = field(default_factory=StampUnitOptions)
+    """Whether stamps are in seconds."""
     scan_order: ScanOrderOptions = field(default_factory=ScanOrderOptions)
+    """Whether stamps are usable, and the order of scans by them."""
     shared_stamps: SharedStampOptions = field(default_factory=SharedStampOptions)
+    """Scans that share a stamp."""
     range_limits: RangeLimitOptions = field(default_factory=RangeLimitOptions)
+    """The limits of the laser, and readings at them."""
     repeated_reading: RepeatedReadingOptions = field(default_factory=RepeatedReadingOptions)
+    """A reading that stands for none."""
     range_unit: RangeUnitOptions = field(default_factory=RangeUnitOptions)
+    """Whether all readings are in metres."""
     unit_stretches: UnitStretchOptions = field(default_factory=UnitStretchOptions)
+    """Whether some scans are in another unit than the others."""
     rounded_ranges: RoundedRangeOptions = field(default_factory=RoundedRangeOptions)
+    """Whether ranges were rounded."""
     blind_scans: BlindScanOptions = field(default_factory=BlindScanOptions)
+    """Scans that see nothing for long."""
     angle_unit: AngleUnitOptions = field(default_factory=AngleUnitOptions)
+    """Whether angles are in radians."""
     beam_angles: BeamAngleOptions = field(default_factory=BeamAngleOptions)
+    """Whether first and last direction fit the angle between beams."""
     direction_changes: DirectionChangeOptions = field(default_factory=DirectionChangeOptions)
+    """Whether directions change in the file alone."""
     beam_spacing: BeamSpacingOptions = field(default_factory=BeamSpacingOptions)
+    """Whether walls fit the angle between beams."""
     whole_turn: WholeTurnOptions = field(default_factory=WholeTurnOptions)
+    """Whether beams cover a whole turn."""
     text_logs: TextLogOptions = field(default_factory=TextLogOptions)
+    """What numbers in text logs may be."""
     interlaced: InterlacedOptions = field(default_factory=InterlacedOptions)
+    """Whether scans of a CARMEN log are interlaced."""
     turn_segments: TurnSegmentOptions = field(default_factory=TurnSegmentOptions)
+    """Whether messages are segments of turns."""
     two_lasers: TwoLaserOptions = field(default_factory=TwoLaserOptions)
+    """Whether a topic has the scans of two lasers."""
     robot_parts: RobotPartsOptions = field(default_factory=RobotPartsOptions)
+    """Beams that see the robot itself."""
     floor_line: FloorLineOptions = field(default_factory=FloorLineOptions)
+    """Beams that see the floor."""
     dead_beams: DeadBeamOptions = field(default_factory=DeadBeamOptions)
+    """Beams that always have the same reading."""
     mounting: MountingOptions = field(default_factory=MountingOptions)
+    """Whether the laser is level and at rest on the robot."""
     orientations: OrientationOptions = field(default_factory=OrientationOptions)
+    """Whether orientations are turns about the vertical."""
     odometry_gaps: OdometryGapOptions = field(default_factory=OdometryGapOptions)
+    """Gaps in the odometry over which nothing is interpolated."""
     heading_unit: HeadingUnitOptions = field(default_factory=HeadingUnitOptions)
+    """Whether headings are in radians."""
     two_odometries: TwoOdometriesOptions = field(default_factory=TwoOdometriesOptions)
+    """Whether poses come from two sources."""
     noisy_odometry: NoisyOdometryOptions = field(default_factory=NoisyOdometryOptions)
+    """Odometry that goes to and fro as no robot does."""
     odometry_outliers: OdometryOutlierOptions = field(default_factory=OdometryOutlierOptions)
+    """Single wrong poses of the odometry."""
     slow_odometry: SlowOdometryOptions = field(default_factory=SlowOdometryOptions)
+    """Poses that repeat each other since odometry is slow."""
     robot_path: RobotPathOptions = field(default_factory=RobotPathOptions)
+    """How the robot moves between two poses."""
     sweep: SweepOptions = field(default_factory=SweepOptions)
+    """Which times of a turn of the laser can be."""
 
 
 SCAN_CHECKS = ScanCheckOptions()

@@ -46,3 +46,4 @@ class GaussianOptions:
     floor: float = 0.02
     """Least standard deviation of a Gaussian, m. A larger value makes walls softer."""
     walls: WallOptions = field(default_factory=WallOptions)
+    """How the Gaussians of walls get their sides, directions and ends."""

@@ -22,14 +22,16 @@ ATTENTION: dict[Status, tuple[str, str]] = {
 
 @dataclass(frozen=True)
 class RegressionOptions:
-    """When the errors of a log are worse than those of the run before. Larger values call less worse."""
+    """When the errors of a log are worse than those of the run before."""
 
     relative_rise: float = 0.05
-    """Least rise of an error, as a share of the previous one."""
+    """Least rise of an error, as a share of the previous one. A larger value calls fewer logs worse."""
     translation_rise: float = 5e-4
-    """Least rise of a translational error, m: rounding alone can cause less."""
+    """Least rise of a translational error, m: rounding alone can cause less. A larger value calls fewer logs
+    worse."""
     rotation_rise: float = 0.01
-    """Least rise of a rotational error, degrees: rounding alone can cause less."""
+    """Least rise of a rotational error, degrees: rounding alone can cause less. A larger value calls fewer
+    logs worse."""
 
 
 @dataclass(frozen=True)

@@ -33,22 +33,35 @@ class SlamOptions:
     """The options of all steps."""
 
     file_check: FileCheckOptions = field(default_factory=FileCheckOptions)
+    """What scans contradict of their file, before step 1."""
     odometry_checks: OdometryCheckOptions = field(default_factory=OdometryCheckOptions)
+    """Which steps of the odometry are jumps."""
     tracking: TrackingOptions = field(default_factory=TrackingOptions)
+    """Step 1: how scans are matched with the local map."""
     breaks: BreakOptions = field(default_factory=BreakOptions)
+    """When the track is broken."""
     keyframes: KeyframeOptions = field(default_factory=KeyframeOptions)
+    """Step 2: which scans become keyframes."""
     nscan: NScanOptions = field(default_factory=NScanOptions)
     """How a keyframe is matched with its neighbours, jointly or with each alone."""
     loop_closure: LoopClosureOptions = field(default_factory=LoopClosureOptions)
+    """Step 4: how a place seen before is searched, and what its match has to stand."""
     schedule: ScheduleOptions = field(default_factory=ScheduleOptions)
+    """When the growing graph is optimised."""
     optimisation: OptimisationOptions = field(default_factory=OptimisationOptions)
+    """How exactly the graph is optimised."""
     single_scans: SingleScanOptions = field(default_factory=SingleScanOptions)
+    """When a single scan is off its neighbours."""
     rejection: RobustOptions = field(default_factory=RobustOptions)
     """When a loop contradicts the rest of the graph."""
     uneven_motion: UnevenMotionOptions = field(default_factory=UnevenMotionOptions)
+    """When and how the path of a turning laser is matched more finely."""
     refinement: RefinementOptions = field(default_factory=RefinementOptions)
+    """Step 6: which matches are made again from the final poses."""
     degenerate_relations: DegenerateRelationOptions = field(default_factory=DegenerateRelationOptions)
+    """How certain the length of a way is that no scan tells."""
     systematic_error: SystematicErrorOptions = field(default_factory=SystematicErrorOptions)
+    """When a drive is mapped again without a systematic error of its odometry."""
     diagnostics: DiagnosticsOptions = field(default_factory=DiagnosticsOptions)
     """When the finished map warns its user."""
     relations: Relations = "both"

@@ -9,9 +9,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from nscan_cli.calibration.companion_options import CompanionOptions
 from nscan_cli.calibration.companions import find_companion
 from nscan_cli.calibration.file_check import checked_file
-from nscan_cli.calibration.options import CompanionOptions, FileCheckOptions
+from nscan_cli.calibration.options import FileCheckOptions
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.logs.load import read_log
 from nscan_cli.logs.reading_options import ReadingOptions

@@ -105,11 +105,13 @@ class DescentSettings(NamedTuple):
     """The fields of JointOptions that the kernel of a descent takes."""
 
     stride: int
+    """One point of so many is matched. A larger value is faster and less exact."""
     fixed: int
     """As `gauge_of` returns it."""
     iterations: int
     """Most iterations in a stage."""
     thorough: bool
+    """Whether energy and derivatives are evaluated after the last step too, rather than before it."""
 
 
 @dataclass(frozen=True)

@@ -33,7 +33,9 @@ class DiagnosticsOptions:
     """From where on the notices of a graph warn."""
 
     odometry: OdometryDisagreementOptions = field(default_factory=OdometryDisagreementOptions)
+    """When odometry and scans disagree about distances."""
     view: ViewMismatchOptions = field(default_factory=ViewMismatchOptions)
+    """When scans see other things than the keyframe before them."""
     max_lost_share: float = 0.5
     """If more of the scans than this share fit nothing that was seen before, a warning says so in place of
     the ways that no scan tells. A larger value names such ways more often."""

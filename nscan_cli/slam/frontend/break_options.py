@@ -28,6 +28,7 @@ class BreakOptions:
     """A match with a smaller share of inliers is poor: its view is compared with that of the scan before. A
     larger value compares more."""
     view: ViewSimilarityOptions = field(default_factory=ViewSimilarityOptions)
+    """When the views of two scans are the same."""
     min_similarity: float = 0.7
     """A poor match is doubted if the two views are the same in a smaller share of sectors. A larger value
     breaks more often."""

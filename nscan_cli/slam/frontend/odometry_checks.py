@@ -38,6 +38,7 @@ class OdometryCheckOptions:
     """A jump is longer than this, m and rad: a match corrects a smaller one by itself. A larger value finds
     fewer jumps."""
     stalls: OdometryStallOptions = field(default_factory=OdometryStallOptions)
+    """When odometry stood still, and then made up for it in one step."""
 
 
 def without_jumps(

@@ -37,7 +37,7 @@ class OdometryNoiseOptions(NamedTuple):
     smoothing: float = 0.1
     """Least weight of a new piece in the mean square. A larger weight follows changes faster."""
     min_pieces: int = 4
-    """Nothing is learned from fewer pieces."""
+    """Nothing is learned from fewer pieces. A larger number learns later."""
     factor: float = 2.0
     """A prior has the standard deviation learned times this. A larger factor trusts the odometry less."""
     turn_arm: float = 1.0

@@ -126,8 +126,10 @@ class ScanTrackingOptions(NamedTuple):
     """If more successive scans than this contradict odometry, leaving it costs nothing. A larger value trusts
     the odometry longer."""
     degeneracy_poses: int = 3
-    """Number of known poses from which on `degeneracy` is checked: fewer give no velocity."""
+    """Number of known poses from which on `degeneracy` is checked: fewer give no velocity. A larger
+    number checks later."""
     degeneracy: DegeneracyOptions = DegeneracyOptions()
+    """When and how far a scan keeps to its prediction in a direction of which it tells little."""
     sector_margin: float = 0.1
     """Points this near (m) to the border of what the laser had in view are not matched there: walls end. A
     larger margin matches fewer points."""
@@ -199,7 +201,8 @@ class TrackingOptions:
     """Share of ranges that may exceed the range limit, as echoes. A larger one gives a shorter limit."""
     range_limit_share: float = 0.01
     """The range limit ends walls if this share of the ranges is in the last cell before it. Lasers of 12 m
-    and more have 0.001 to 0.004 there, those of 6 m and less 0.02 to 0.05."""
+    and more have 0.001 to 0.004 there, those of 6 m and less 0.02 to 0.05. With a larger share fewer lasers
+    have a range limit."""
     whole_turn_beams: int = 4
     """A laser sees all around if at most this many beams are missing to a whole turn. With a larger number
     fewer lasers are matched sector by sector."""

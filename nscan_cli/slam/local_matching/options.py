@@ -13,6 +13,7 @@ class NScanOptions:
     """The joint match of a keyframe with its neighbours, or the single matches in its place."""
 
     gaussians: GaussianOptions = field(default_factory=lambda: GaussianOptions(minimum=4))
+    """How the scans of a keyframe become Gaussians."""
     max_scans: int = 10
     """Largest number of keyframes in one match. A larger number relates more of them and takes longer."""
     min_scans: int = 3
