@@ -45,14 +45,14 @@ def held_stretches(log: LaserLog, options: HeldOdometryOptions, steps: StepOptio
         return []
     moves = np.abs(relative(log.odometry[1:], log.odometry[:-1]))
     is_held = np.zeros(len(log), dtype=np.bool_)
-    for change, least, is_so in (
+    for change, least, scans_do in (
         (moves[:, :2].max(axis=1), options.min_duration, _scans_move),
         (moves[:, 2], options.min_heading_duration, _scans_turn),
     ):
         # An unknown pose neither stands nor moves: it ends a stretch.
         for first, last in mask_runs(change <= options.still):
             is_long = log.times[last] - log.times[first] >= least and last - first < len(log) - 1
-            if is_long and is_so(log, first, last, options, steps):
+            if is_long and scans_do(log, first, last, options, steps):
                 is_held[first : last + 1] = True
     return [(first, end - 1) for first, end in mask_runs(is_held)]
 

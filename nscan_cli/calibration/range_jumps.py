@@ -223,8 +223,8 @@ def _right_scale(log: LaserLog, scales: Array, options: FileCheckOptions) -> flo
         return most
     agree = []
     for value in values.tolist():
-        is_so = (scales[1:] == value) & (scales[:-1] == value)
-        metres = metres_by_scans(log, is_so, options.units, options.steps)
+        at_scale = (scales[1:] == value) & (scales[:-1] == value)
+        metres = metres_by_scans(log, at_scale, options.units, options.steps)
         if metres is not None and abs(math.log(metres)) < math.log(options.min_scale_factor):
             agree.append(value)
     return agree[0] if len(agree) == 1 else most

@@ -96,10 +96,10 @@ def _goes_to_and_fro(off: Array, steps: Array, limits: Array, options: NoisyOdom
     size, sides = options.window, (off[1:] * off[:-1]).sum(axis=1)
     squares = (off**2).sum(axis=1)
     of_window = _sums(squares, size)
-    is_so = _sums(sides, size - 1) < options.max_correlation * of_window
-    is_so &= of_window > options.min_of_steps**2 * _sums((steps**2).sum(axis=1), size)
+    alternates = _sums(sides, size - 1) < options.max_correlation * of_window
+    alternates &= of_window > options.min_of_steps**2 * _sums((steps**2).sum(axis=1), size)
     cores, beside = (
-        is_so & (_sums(squares > (share * limits) ** 2, size) >= least)
+        alternates & (_sums(squares > (share * limits) ** 2, size) >= least)
         for share, least in ((1.0, 2 * size / 3), (options.beside, size / 2))
     )
     is_far, is_noise = squares > (options.beside * limits) ** 2, np.zeros(len(off), dtype=np.bool_)
