@@ -145,7 +145,8 @@ def _factor_of_parts(scans: SampledScans, options: BeamSpacingOptions) -> float 
     for rows in np.array_split(np.arange(len(scans.ranges)), options.parts):
         part = SampledScans(scans.ranges[rows], scans.steps[rows])
         of_part = told(part, options.widest_half_width, options.min_beams_of_part)
-        if of_part is not None and 0.5 < math.log(of_part) / math.log(factor) < 2.0:
+        share = 0.0 if of_part is None else math.log(of_part) / math.log(factor)
+        if 1.0 / options.part_agreement < share < options.part_agreement:
             agreeing += 1
     return factor if 2 * agreeing > options.parts else None
 

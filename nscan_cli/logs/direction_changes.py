@@ -32,6 +32,9 @@ class DirectionChangeOptions:
     max_turn: float = math.radians(15.0)
     """Largest turn of the robot between two scans that is tried, rad; it is less where directions change
     little. A larger value takes longer."""
+    max_turn_share: float = 0.4
+    """Where directions change little, the robot is tried to turn by no more than this share of the change. A
+    larger value takes longer, and may take a turn of the robot for the change."""
     turn_step: float = math.radians(1.0)
     """Interval between the turns that are tried, rad. A smaller value takes longer."""
     same_range: float = 0.1
@@ -120,7 +123,8 @@ def _gain_of_numbers(table: ScanTable, place: int, options: DirectionChangeOptio
         by_number, by_file = _directions_at(table, one), _directions_at(table, other)
         seen = ranges_at(table, np.array([other]), by_file)[0]
         # The robot may turn meanwhile, by less than what is to be told.
-        most = min(options.max_turn, 0.4 * float(np.abs(by_file - by_number)[[0, -1]].max()))
+        change = float(np.abs(by_file - by_number)[[0, -1]].max())
+        most = min(options.max_turn, options.max_turn_share * change)
         turns = np.arange(-most, most + 1e-9, options.turn_step).tolist()
         shares = [
             max(

@@ -21,8 +21,10 @@ class StampUnitOptions:
     """Latest time, s: larger stamps count smaller units since 1970. A larger value converts fewer logs."""
     min_scans: int = 50
     """Least number of scans that tell. A larger value converts fewer logs."""
+    steady_factor: float = 1.5
+    """A period is steady if it is within this factor of the median. A larger value converts more logs."""
     min_steady_share: float = 0.8
-    """Least share of periods within a factor of 1.5 of the median: a laser keeps its period, and a robot that
+    """Least share of periods that are steady: a laser keeps its period, and a robot that
     takes one scan at each stop does not. A larger value converts fewer logs."""
 
 
@@ -56,7 +58,8 @@ def stamp_unit(stamps: Array, options: StampUnitOptions = StampUnitOptions()) ->
     if len(periods) < options.min_scans - 1:
         return None
     period, least = float(np.median(periods)), options.shortest_period
-    is_steady = (1.5 * periods > period) & (periods < 1.5 * period)
+    factor = options.steady_factor
+    is_steady = (factor * periods > period) & (periods < factor * period)
     if is_steady.mean() < options.min_steady_share:
         return None
     return next((unit for unit in UNITS_OF_TIME if least <= period * unit.seconds < 1e3 * least), None)

@@ -13,6 +13,9 @@ from nscan_cli.files.limits import DISTANCE
 from nscan_cli.logs.recordings.decoded_messages import Pose3D
 from nscan_cli.poses import Array
 
+LEAST_LENGTH, GREATEST_LENGTH = 1e-3, 1e3
+"""Between these lies the length of a valid quaternion."""
+
 
 class TimedPoses(NamedTuple):
     """Poses over time."""
@@ -42,14 +45,15 @@ def as_matrices(poses: Sequence[Pose3D]) -> tuple[NDArray[np.bool_], Array]:
     """Which of n poses are valid (n,), and the m valid ones as matrices (m, 4, 4).
 
     A pose is valid when all its numbers are finite, none exceeds the limit of distances, and the length of
-    its quaternion lies between 1e-3 and 1e3.
+    its quaternion lies between LEAST_LENGTH and GREATEST_LENGTH.
     """
     translations = np.array([pose.translation for pose in poses], dtype=np.float64).reshape(-1, 3)
     rotations = np.array([pose.rotation for pose in poses], dtype=np.float64).reshape(-1, 4)
     with np.errstate(invalid="ignore", over="ignore"):
         x, y, z, w = rotations.T
         norm = np.sqrt(x * x + y * y + z * z + w * w)
-        valid = (norm > 1e-3) & (norm < 1e3) & (np.abs(translations) < DISTANCE.value).all(axis=1)
+        valid = (norm > LEAST_LENGTH) & (norm < GREATEST_LENGTH)
+        valid &= (np.abs(translations) < DISTANCE.value).all(axis=1)
     x, y, z, w = (rotations[valid] / norm[valid, None]).T
     found = np.zeros((len(x), 4, 4))
     rows = (
@@ -76,8 +80,9 @@ def inverse_transform(matrix: Array) -> Array:
 def heading(pose: Pose3D) -> float | None:
     """The rotation (rad) of a pose about the vertical; None when the pose is not valid (see as_matrices)."""
     x, y, z, w = pose.rotation
-    norm = x * x + y * y + z * z + w * w
-    if not 1e-6 < norm < 1e6 or not all(abs(part) < DISTANCE.value for part in pose.translation):
+    square = x * x + y * y + z * z + w * w
+    is_turn = LEAST_LENGTH**2 < square < GREATEST_LENGTH**2
+    if not is_turn or not all(abs(part) < DISTANCE.value for part in pose.translation):
         return None
     return math.atan2(2 * (w * z + x * y), w * w + x * x - y * y - z * z)
 

@@ -10,6 +10,8 @@ from nscan_cli.logs.text.carmen_records import CarmenScans
 
 OWN_HOST = b"nscan-cli"
 """The host in the records that this program writes. Their poses are corrected."""
+SHORT_DIGITS = 6
+"""Number of significant digits that %g prints."""
 
 
 def sign_of_correction(tags: Container[str], scans: CarmenScans) -> str:
@@ -41,4 +43,4 @@ def _is_six_digit_stamp(stamp: str) -> bool:
 
 
 def _lost_digits(stamp: str) -> bool:
-    return "e+" in stamp or len(stamp.replace(".", "").lstrip("-0")) >= 6
+    return "e+" in stamp or len(stamp.replace(".", "").lstrip("-0")) >= SHORT_DIGITS
