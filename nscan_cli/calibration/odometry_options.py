@@ -140,6 +140,11 @@ class OdometryUnitOptions:
     min_steps: int = 20
     """Least number of steps from scan to scan that are too fast, and of others with motion. A larger value
     finds less."""
+    beside: int = 2
+    """A step is judged together with so many steps with motion before it, and behind. A larger value finds
+    less."""
+    most_beside: int = 3
+    """Least number of large steps among these, about a step in the other unit. A larger value finds less."""
     measured_steps: int = 12
     """Number of steps of both kinds that are measured, spread over the log. More tell more and take
     longer."""

@@ -29,7 +29,7 @@ def checked_units(
         return log, []
     # A step from one frame to another may be of any length, and a slow robot is not too fast in centimetres.
     usual = [float(np.median(lengths[some])) for some in (moves & ~is_fast, is_fast)]
-    is_large = _as_most(lengths > np.sqrt(usual[0] * usual[1]), moves)
+    is_large = _as_most(lengths > np.sqrt(usual[0] * usual[1]), moves, options)
     parts = [metres_by_scans(log, some, options, steps) for some in (moves & ~is_large, moves & is_large)]
     for name, scale in UNITS:
         if all(
@@ -48,24 +48,25 @@ def checked_units(
     return log, []
 
 
-def _as_most(is_large: Mask, moves: Mask) -> Mask:
-    """(n,) the steps that count as large: of the five steps with motion about each of them, most are large.
+def _as_most(is_large: Mask, moves: Mask, options: OdometryUnitOptions) -> Mask:
+    """(n,) which steps are large: most of the steps with motion about each of them are.
 
     So a single large step does not count. A large step beside such ones does.
     """
     at = np.flatnonzero(moves)
-    most = _of_five(is_large[at]) >= 3
-    most |= is_large[at] & (_of_five(most) > 0)
+    most = _about_each(is_large[at], options.beside) >= options.most_beside
+    most |= is_large[at] & (_about_each(most, options.beside) > 0)
     found: Mask = most[np.clip(np.searchsorted(at, np.arange(len(moves))), 0, len(at) - 1)]
     return found
 
 
-def _of_five(mask: Mask) -> Indices:
-    """(n,) how many of each row and the two on both sides are marked in a mask (n,).
+def _about_each(mask: Mask, beside: int) -> Indices:
+    """(n,) how many of each row and those `beside` it, so many on both sides, are marked in a mask (n,).
 
     SciPy has filters for this, but importing these takes longer than all else that this check does.
     """
-    return np.convolve(np.pad(mask.astype(np.int64), 2, mode="edge"), np.ones(5, dtype=np.int64), "valid")
+    padded = np.pad(mask.astype(np.int64), beside, mode="edge")
+    return np.convolve(padded, np.ones(2 * beside + 1, dtype=np.int64), "valid")
 
 
 def metres_by_scans(

@@ -17,6 +17,9 @@ class RangeJumpOptions:
     min_factor: float = 1.03
     """Least factor between the ranges of two scans, or its inverse. A larger value finds less, and takes less
     time."""
+    wrong_share: float = 0.5
+    """Ranges are divided by their scale if its logarithm exceeds this share of that of `min_factor`. A larger
+    value leaves more scans as they are."""
     tolerance: float = math.log(1.02)
     """Ranges have changed by the usual factor if the logarithm of theirs differs by less than this. A larger
     value matches more scans."""

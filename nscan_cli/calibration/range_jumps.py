@@ -43,7 +43,7 @@ def checked_ranges(
         return log, []
     scales = _scales(len(log), jumps, options.jumps)
     scales /= _right_scale(log, scales, options)
-    is_wrong = np.abs(np.log(scales)) > 0.5 * math.log(options.jumps.min_factor)
+    is_wrong = np.abs(np.log(scales)) > options.jumps.wrong_share * math.log(options.jumps.min_factor)
     names = stretch_names(log.numbers[[first, end - 1]].tolist() for first, end in mask_runs(is_wrong))
     factors = sorted({f"{scale:.3g}" for scale in scales[is_wrong].tolist()})
     other = log.range_scale * float(scales[is_wrong][0])

@@ -50,8 +50,8 @@ class BeamSpacingOptions:
     min_beams_of_part: int = 40
     """Least number of beams on walls in a part. A larger value contradicts fewer logs."""
     part_agreement: float = 2.0
-    """A part tells the same difference if the logarithms of both are within this factor of each other. A larger
-    value contradicts more logs."""
+    """A part tells the same difference if the logarithms of both are within this factor of each other. A
+    larger value contradicts more logs."""
     max_factor: float = 2.5
     """Largest factor between the angle of the log and that of the walls. A larger value contradicts more
     logs."""

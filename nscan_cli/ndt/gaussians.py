@@ -17,7 +17,17 @@ from __future__ import annotations
 import numpy as np
 
 from nscan_cli.kernels.decorators import leaf_kernel, llvm_inline_kernel
-from nscan_cli.ndt.hash_grid import FACES, FLOOR, HALF_KEY, MINIMUM, SIDE_SHARE, Grid, find_row, unpack_key
+from nscan_cli.ndt.hash_grid import (
+    FACES,
+    FLOOR,
+    HALF_KEY,
+    LEAST_RATIO,
+    MINIMUM,
+    SIDE_SHARE,
+    Grid,
+    find_row,
+    unpack_key,
+)
 from nscan_cli.poses import Array
 
 Cells = tuple[int | np.int32, int, int, int]
@@ -29,8 +39,6 @@ Direction = tuple[float, float]
 """Cosine and sine of twice the angle of the long axis of a covariance."""
 NO_MOMENTS = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 """The moments of no points."""
-LEAST_EIGENVALUE_RATIO = 0.001
-"""Lower bound of the smaller eigenvalue of a covariance, as a share of the larger one ([19])."""
 
 
 @leaf_kernel
@@ -80,7 +88,7 @@ def eigenvalues(grid: Grid, moments: Moments) -> tuple[float, float]:
     _, _, _, xx, xy, yy, _, _ = moments
     middle, radius, floor = 0.5 * (xx + yy), eigenvalue_radius(xx, xy, yy), grid.settings[FLOOR]
     large = max(middle + radius, floor * floor)
-    return max(middle - radius, floor * floor, LEAST_EIGENVALUE_RATIO * large), large
+    return max(middle - radius, floor * floor, grid.settings[LEAST_RATIO] * large), large
 
 
 @llvm_inline_kernel

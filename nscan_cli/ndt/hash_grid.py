@@ -20,6 +20,8 @@ MINIMUM, FLOOR, NEIGHBOURHOOD, FACES = 0, 1, 2, 3
 use of its neighbourhood, and whether walls have two faces (0 or 1); see gaussians.py."""
 MAX_NEIGHBOUR, MIN_SPACING, MAX_SPACING, SIDE_SHARE, ELONGATION, COSINE, END_SHARE, END_RATIO = range(4, 12)
 """The places of the fields of WallOptions."""
+LEAST_RATIO = 12
+"""The place of the least ratio of the smaller to the larger eigenvalue of a covariance."""
 NO_NEIGHBOURS, WALL_DIRECTION, WALL_END = 0, 1, 2
 """Uses of the neighbourhood of a Gaussian, see neighbourhood.py. With NO_NEIGHBOURS there is none. With
 WALL_DIRECTION it tells the direction of a wall. With WALL_END it tells where walls end; an end holds nothing
@@ -50,7 +52,7 @@ class Grid(NamedTuple):
     """(G, 8) the mean (x, y); Σ⁻¹ as (xx, xy, yy), 0 if there are too few points; the normal (x, y) of the
     face that was seen, 0 if both were; and the row of the Gaussian of the other face, 0 if there is none."""
     settings: Array
-    """(12,) the options in the places above; (0,) in a compact grid."""
+    """(13,) the options in the places above; (0,) in a compact grid."""
 
 
 @leaf_kernel

@@ -45,5 +45,8 @@ class GaussianOptions:
     """Least number of points that make a Gaussian. A larger number leaves out thin and rarely hit things."""
     floor: float = 0.02
     """Least standard deviation of a Gaussian, m. A larger value makes walls softer."""
+    least_ratio: float = 0.001
+    """Least ratio of the smaller to the larger variance of a Gaussian ([19]). A larger value makes long walls
+    softer."""
     walls: WallOptions = field(default_factory=WallOptions)
     """How the Gaussians of walls get their sides, directions and ends."""

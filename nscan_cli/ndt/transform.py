@@ -16,6 +16,7 @@ from nscan_cli.ndt.hash_grid import (
     END_SHARE,
     FACES,
     FLOOR,
+    LEAST_RATIO,
     MAX_NEIGHBOUR,
     MAX_SPACING,
     MIN_SPACING,
@@ -152,11 +153,15 @@ class Ndt:
 
 
 def grid_settings(options: GaussianOptions, neighbourhood: int, faces: bool) -> Array:
-    """`Grid.settings` (12,); the arguments are those of `Ndt.empty`."""
+    """`Grid.settings` (13,); the arguments are those of `Ndt.empty`."""
     # One by one, which is faster than many places at a time: many grids are for one match of two scans.
-    settings, walls = np.empty(12), options.walls
+    settings, walls = np.empty(13), options.walls
     settings[MINIMUM], settings[FLOOR] = options.minimum, options.floor
-    settings[NEIGHBOURHOOD], settings[FACES] = neighbourhood, faces
+    settings[NEIGHBOURHOOD], settings[FACES], settings[LEAST_RATIO] = (
+        neighbourhood,
+        faces,
+        options.least_ratio,
+    )
     settings[MAX_NEIGHBOUR], settings[SIDE_SHARE] = walls.max_neighbour, walls.min_side_share
     settings[MIN_SPACING], settings[MAX_SPACING] = walls.min_spacing, walls.max_spacing
     settings[ELONGATION], settings[COSINE] = walls.min_elongation, walls.min_cosine

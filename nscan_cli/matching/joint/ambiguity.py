@@ -48,7 +48,7 @@ def _weakest_motions(poses: Array, hessian: Array, count: int) -> list[Array]:
 
 def _variance_along(problem: JointProblem, poses: Array, motion: Array, options: AmbiguityOptions) -> float:
     """Mean square (m²) of the distance along a motion (n, 3), weighed by how well the scans fit there."""
-    aside = options.distance * (np.arange(1, options.places + 1) / options.places) ** 1.5
+    aside = options.distance * (np.arange(1, options.places + 1) / options.places) ** options.spread
     distances = np.concatenate([-aside[::-1], [0.0], aside])
     trials = poses + distances[:, None, None] * motion
     energies = neutral_energies(problem, trials, NEUTRAL, options.stride)

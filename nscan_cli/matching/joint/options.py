@@ -94,6 +94,9 @@ class AmbiguityOptions:
     places: int = 10
     """Number of places to each side where the energy is compared. They are denser near the match. More take
     longer and are more exact."""
+    spread: float = 1.5
+    """Exponent by which the distances of these places grow. With a larger value they are denser near the
+    match, and sparser far from it."""
     stride: int = 4
     """One point of so many is compared. A larger value is faster and less exact."""
     correlation: float = 3.0

@@ -18,9 +18,6 @@ from nscan_cli.slam.frontend.track_state import NEXT, TrackState
 from nscan_cli.slam.frontend.tracking_problem import TrackingProblem
 from nscan_cli.slam.frontend.visible_points import points_in_view
 
-LEAST_STEP = 1e-4
-"""Each step counts as this long at least, m and rad, so that no covariance of a step is zero."""
-
 
 @kernel
 def waits_for_motion(
@@ -62,7 +59,7 @@ def match_between(problem: TrackingProblem, before: tuple[Array, Array], first: 
     lengths = np.empty(last - first + 1)
     for k in range(first, last + 1):
         relative_pose(odometry[k], odometry[k - 1] if k > first else odometry_before, step)
-        length += np.hypot(step[0], step[1]) + abs(wrapped(step[2])) + LEAST_STEP
+        length += np.hypot(step[0], step[1]) + abs(wrapped(step[2])) + settings.options.least_between_step
         lengths[k - first] = length
     relative_pose(odometry[last], odometry_before, step)
     path = found.paths[last] - (np.hypot(step[0], step[1]) if found.in_map[last] else 0.0)

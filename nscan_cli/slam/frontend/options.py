@@ -102,6 +102,9 @@ class ScanTrackingOptions(NamedTuple):
     between_sigma: float = 0.05
     """Standard deviation of a scan between two matched ones from its place by odometry, m and rad. A larger
     value trusts the odometry less."""
+    least_between_step: float = 1e-4
+    """Each step between two matched scans counts as this long at least, m and rad, so that no covariance of a
+    step is zero. A larger value spreads the error of odometry more evenly over the scans."""
     constant_velocity: MotionModel = MotionModel(distance=0.3, angle=0.3, distance_per_metre=0.3)
     """Standard deviations of a step without odometry, predicted by constant velocity. Larger ones trust the
     scans more."""
@@ -111,6 +114,9 @@ class ScanTrackingOptions(NamedTuple):
     prediction_smoothing: float = 0.02
     """Weight of a new scan in the mean errors of predictions by constant velocity. A larger weight follows
     changes of the motion faster."""
+    initial_prediction_error: float = 0.1
+    """Mean error of predictions before any is known, m and rad. A larger value trusts the first matches
+    more."""
     prediction_sigmas: float = 3.0
     """A poor match without odometry that is farther from its prediction than this, in mean errors of
     predictions, is repeated with a prior of this standard deviation. A larger value trusts matches more."""
@@ -150,6 +156,9 @@ class TrackingOptions:
     """Distance between neighbouring points of a scan that are matched, m; some are left out where they are
     closer. A larger one is faster, and blurs small things; with none a wall beside the robot outweighs all
     the rest."""
+    spacing_neighbours: int = 4
+    """Number of points on each side of a point between which the distance to the next one is measured. With a
+    larger number the noise of ranges decides less, and small things are blurred more."""
     bridged_gap: float = 1.0
     """Without odometry, points of the first scan of a track, or of a lost scan that joins the map, get others
     between them if they are at most this far apart, m, and if fewer than `lost_inliers` of them lie on

@@ -16,24 +16,21 @@ from nscan_cli.kernels.decorators import kernel
 from nscan_cli.ndt.options import GaussianOptions
 from nscan_cli.poses import Array, Indices, Mask
 
-NEIGHBOURS = 4
-"""Points on each side of a point between which the distance to the next one is measured."""
-
 
 @kernel
-def spaced_points(points: Array, ends: Indices, spacing: float) -> Mask:
+def spaced_points(points: Array, ends: Indices, spacing: float, neighbours: int) -> Mask:
     """(P,) which points (P, 2) are kept, so that those kept are about `spacing` (m) apart along their scan.
 
     Scan k has points[ends[k] : ends[k + 1]], in the order of the beams. The distance from a point to the next
-    one is measured between its neighbours on both sides. Its own noise must not decide whether it is kept. If
-    the first point that is far enough from the last one were kept, points ahead would lie too far on, and a
-    straight corridor would be mapped as a bend.
+    one is measured between its neighbours on both sides, so many (`neighbours`). Its own noise must not
+    decide whether it is kept. If the first point that is far enough from the last one were kept, points ahead
+    would lie too far on, and a straight corridor would be mapped as a bend.
     """
     kept = np.zeros(points.shape[0], dtype=np.bool_)
     for k in range(ends.shape[0] - 1):
         first, last, way = ends[k], ends[k + 1] - 1, 0.5
         for i in range(first, last + 1):
-            low, high = max(first, i - NEIGHBOURS), min(last, i + NEIGHBOURS)
+            low, high = max(first, i - neighbours), min(last, i + neighbours)
             x, y = points[high, 0] - points[low, 0], points[high, 1] - points[low, 1]
             reached = spacing * (high - low)
             way += 1.0 if x * x + y * y >= reached * reached else math.sqrt(x * x + y * y) / reached

@@ -109,7 +109,7 @@ def scan_batches(
             shares = times / period
         else:
             points, ends = log.batch_points(rows, options.max_range)
-        kept = spaced_points(points, ends, options.point_spacing)
+        kept = spaced_points(points, ends, options.point_spacing, options.spacing_neighbours)
         kept &= np.repeat(~np.isin(np.arange(first, rows.stop), frozen), np.diff(ends))
         if not kept.all():
             points, shares = points[kept], shares[kept] if is_swept else NONE

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from nscan_cli.poses import Array
 from nscan_cli.slam.frontend.local_map import LocalMap
 from nscan_cli.slam.frontend.odometry_noise import OdometryNoise
+from nscan_cli.slam.frontend.options import ScanTrackingOptions
 
 KNOWN, RESTARTS, NEXT, CONTRADICTIONS = 0, 1, 2, 3
 """Places in `TrackState.counts`: the number of the last poses that are known, how often matches were started
@@ -42,12 +43,13 @@ class TrackState(NamedTuple):
     map: LocalMap
 
     @classmethod
-    def begin(cls, size: int, initial_sigma: float) -> TrackState:
-        """The state before the first scan, with room for the last `size` poses; `initial_sigma` in m."""
+    def begin(cls, size: int, options: ScanTrackingOptions) -> TrackState:
+        """The state before the first scan, with room for the last `size` poses."""
         poses, odometry, inserted = np.zeros((size, 3)), np.full(3, np.nan), np.zeros(3)
         inliers = np.array([0.0, np.inf])
-        deviation, counts = np.array([initial_sigma**2]), np.zeros(4, dtype=np.int64)
-        noise, empty, errors = OdometryNoise.begin(), LocalMap.empty(), np.full((2, 2, size - 1), 0.1)
+        deviation, counts = np.array([options.degeneracy.initial_sigma**2]), np.zeros(4, dtype=np.int64)
+        noise, empty = OdometryNoise.begin(), LocalMap.empty()
+        errors = np.full((2, 2, size - 1), options.initial_prediction_error)
         return cls(
             poses, np.zeros(size), odometry, inserted, inliers, deviation, errors, noise, counts, empty
         )

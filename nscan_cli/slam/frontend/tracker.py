@@ -41,7 +41,7 @@ class Tracker:
         self.map = Ndt.empty(options.gaussians, capacity=1 << 14, faces=odometry)
         self.searches = 0
         self._settings = TrackingParameters.of(options, odometry, laser)
-        self._track = TrackState.begin(options.velocity_scans + 1, options.scan.degeneracy.initial_sigma)
+        self._track = TrackState.begin(options.velocity_scans + 1, options.scan)
         self._prior = no_prior()
         self._left_out: tuple[Array, Array] | None = None
         """Points (m, 2) and pose (3,) of the last scan if it was lost: it joins the map only if the next one,

@@ -21,7 +21,7 @@ OPTIONS = ScanTrackingOptions()
 
 def learned(times: Array, poses: Array) -> TrackState:
     """The state of tracking after scans at times (S,) and poses (S, 3)."""
-    track = TrackState.begin(6, 0.05)
+    track = TrackState.begin(6, OPTIONS)
     for time, pose in zip(times, poses, strict=True):
         learn_prediction(track, OPTIONS, time, pose)
         track.poses[:-1], track.times[:-1] = track.poses[1:].copy(), track.times[1:].copy()

@@ -33,15 +33,15 @@ def wall_beside(noise: float, seed: int = 0) -> tuple[np.ndarray, np.ndarray]:
 @given(st.floats(0.001, 0.3))
 def test_points_kept_along_a_wall_are_as_far_apart_as_asked_for(spacing):
     points, _ = wall_beside(0.0)
-    along, kept = points[:, 0], spaced_points(points, np.array([0, len(points)]), spacing)
+    along, kept = points[:, 0], spaced_points(points, np.array([0, len(points)]), spacing, 4)
     assert kept.sum() <= 1.02 * 8.0 / spacing + 2
     assert np.diff(along[kept]).max() < spacing + 2 * np.diff(along).max()
 
 
 def test_scans_are_looked_at_one_by_one():
     points, _ = wall_beside(0.0)
-    one = spaced_points(points, np.array([0, len(points)]), 0.03)
-    both = spaced_points(np.concatenate([points, points]), np.array([0, 0, 700, 1400]), 0.03)
+    one = spaced_points(points, np.array([0, len(points)]), 0.03, 4)
+    both = spaced_points(np.concatenate([points, points]), np.array([0, 0, 700, 1400]), 0.03, 4)
     assert 200 < one.sum() < 320
     assert np.array_equal(both, np.tile(one, 2))
 
@@ -54,14 +54,14 @@ def test_the_noise_of_a_point_does_not_decide_whether_it_is_kept():
     outward = []
     for seed in range(30):
         points, wrong = wall_beside(0.02, seed)
-        kept = spaced_points(points, np.array([0, len(points)]), 0.03)
+        kept = spaced_points(points, np.array([0, len(points)]), 0.03, 4)
         outward.append((wrong * np.sign(points[:, 0]))[kept].mean())
     assert abs(np.mean(outward)) < 0.001
 
 
 def test_without_a_spacing_all_points_are_kept():
     points = np.zeros((5, 2))
-    assert spaced_points(points, np.array([0, 2, 5]), 0.0).all()
+    assert spaced_points(points, np.array([0, 2, 5]), 0.0, 4).all()
 
 
 @pytest.mark.logs

@@ -43,7 +43,7 @@ def test_points_count_that_lie_in_the_sector_of_a_scan_of_the_map(seed, half):
     rng = np.random.default_rng(seed)
     points, pose, placed = rng.uniform(-6, 6, (40, 2)), rng.uniform(-2, 2, 3), rng.uniform(-6, 6, (3, 4))
     laser = LaserView(np.inf, rng.uniform(-1, 1, 3), half)
-    track = TrackState.begin(2, 0.05)
+    track = TrackState.begin(2, ScanTrackingOptions())
     track = track._replace(map=track.map._replace(placed=placed, counts=np.array([3, 0, 0])))
     there = compose(pose, np.column_stack([points, np.zeros(len(points))]))
     from_lasers = [relative(there, compose(scan, laser.middle)) for scan in placed[:, :3]]
@@ -55,7 +55,7 @@ def test_points_count_that_lie_in_the_sector_of_a_scan_of_the_map(seed, half):
 def test_points_near_the_border_of_the_sector_do_not_count():
     """Within the margin, to the inside; a laser that sees all around has no border."""
     points = np.array([[0.05, 3.0], [0.15, 3.0], [0.15, -3.0], [0.05, -3.0], [-1.0, 0.0]])
-    track = TrackState.begin(2, 0.05)
+    track = TrackState.begin(2, ScanTrackingOptions())
     track = track._replace(map=track.map._replace(placed=np.zeros((1, 4)), counts=np.array([1, 0, 0])))
     ahead = LaserView(np.inf, np.zeros(3), np.pi / 2)
     options = TrackingOptions(scan=ScanTrackingOptions(sector_margin=0.1))
