@@ -45,7 +45,7 @@ class Clocks:
     def best(self, cost: Cost) -> tuple[float, float] | None:
         """The lag (s) of the least cost, and the cost; None where another lag is nearly as good."""
         options, known = self.options, self.reference.times
-        least = max(10, options.kept_poses * int(self._within(0.0).sum()))
+        least = max(options.min_kept_poses, options.kept_poses * int(self._within(0.0).sum()))
         reach = min(options.max_lag, float(min(self.times[-1] - self.times[0], known[-1] - known[0])) / 2)
         if reach <= options.min_lag:
             return None
@@ -60,10 +60,11 @@ class Clocks:
         lags = np.linspace(-reach, reach, options.steps + 1)
         costs = np.array([at(lag) for lag in lags.tolist()])
         lag, step = float(lags[int(np.argmin(costs))]), float(lags[1] - lags[0])
-        others = costs[np.abs(lags - lag) > max(10 * step, options.other_lag)]
-        for _ in range(4):
-            lag = float(min(np.linspace(lag - step, lag + step, 21).tolist(), key=at))
-            step /= 10
+        others = costs[np.abs(lags - lag) > max(options.other_steps * step, options.other_lag)]
+        for _ in range(options.refinements):
+            tried = np.linspace(lag - step, lag + step, 2 * options.refined_steps + 1)
+            lag = float(min(tried.tolist(), key=at))
+            step /= options.refined_steps
         is_unique = not len(others) or at(lag) * options.cost_ratio < float(others.min())
         return (lag, at(lag)) if is_unique else None
 

@@ -36,8 +36,18 @@ class ClockLagOptions:
     """Least share of the overlapping poses that a lag must keep. A larger value finds less."""
     kept_motion: float = 0.5
     """Least share of the motion in the overlapping poses that a lag must keep. A larger value finds less."""
+    min_kept_poses: int = 10
+    """Least number of overlapping poses that a lag must keep. A larger value finds less."""
     other_lag: float = 1.0
     """Least difference of another lag, which must be worse, from the best, s. A larger value finds more."""
+    other_steps: float = 10.0
+    """Another lag is also at least so many steps of the first search from the best. A larger value finds
+    more."""
+    refinements: int = 4
+    """How often the best lag is refined. A larger number is more exact, and takes longer."""
+    refined_steps: int = 10
+    """Number of steps to both sides in each refinement; those of the next one are as many times smaller. A
+    larger number is more exact, and takes longer."""
     cost_ratio: float = 1.5
     """Least ratio of the cost of any other lag to that of the best. A larger value finds less."""
 
@@ -69,14 +79,26 @@ class RemarkOptions:
     """Least factor between two units, as a logarithm. A larger value remarks less."""
     unit_tolerance: float = 0.03
     """Largest relative error of a factor that is given the name of a unit. A larger value names more."""
+    max_side_turn: float = math.radians(170.0)
+    """Largest turn of the headings that is given a side, rad. A larger value gives more turns a side."""
+    max_condition: float = 1e8
+    """Largest condition number with which headings tell another point of the robot. A larger value remarks
+    more."""
     max_height: float = 0.2
     """Largest range of heights of a path in the plane, m. A larger value remarks less."""
     max_tilt: float = math.radians(5.0)
     """Largest tilt of a path in the plane, rad. A larger value remarks less."""
+    height_outliers: float = 1.0
+    """Share of the heights that are left out on both sides of that range, in percent. A larger value remarks
+    less."""
+    tilt_outliers: float = 5.0
+    """Share of the tilts that may be larger, in percent. A larger value remarks less."""
     path_ratio: float = 2.0
     """Least ratio of a path by time to that by the file, of two runs. A larger value remarks less."""
     repeated_share: float = 0.05
     """Least share of repeated stamps in a file of two runs. A larger value remarks less."""
+    min_repeated: int = 3
+    """Least number of repeated stamps in a file of two runs. A larger value remarks less."""
     repeated_distance: float = 0.05
     """Least distance between poses of the same stamp in two runs, m. A larger value remarks less."""
     clock_lag: ClockLagOptions = ClockLagOptions()

@@ -28,8 +28,6 @@ from nscan_cli.graph.io.tum import Trajectory
 from nscan_cli.poses import Array, compose
 
 UNIT_FACTORS = {1000.0: "millimetres", 100.0: "centimetres", 1 / 0.3048: "feet", 1 / 0.0254: "inches"}
-NO_SIDE = math.radians(170.0)
-"""rad; for larger rotations no side is given."""
 OTHER_POINT = "the reference is of another point of the robot"
 
 
@@ -69,7 +67,7 @@ def _two_runs(trajectory: Trajectory, options: RemarkOptions) -> str:
     firsts = places[np.append(True, ~same)]
     typical = float(np.median(np.hypot(*np.diff(firsts, axis=0).T))) if len(firsts) > 1 else 0.0
     apart = steps[same & (steps > max(options.repeated_distance, options.improvement * typical))]
-    if len(apart) >= max(3, options.repeated_share * len(times)):
+    if len(apart) >= max(options.min_repeated, options.repeated_share * len(times)):
         return f"{counted(len(apart), 'stamp')} twice, with poses up to {apart.max():.2f} m apart"
     return ""
 
@@ -80,9 +78,10 @@ def _out_of_plane_motion(trajectory: Trajectory, name: str, options: RemarkOptio
     heights, up = trajectory.spatial[:, 0], trajectory.spatial[:, 1:]
     upright = np.median(up, axis=0)
     upright /= max(float(np.linalg.norm(upright)), 1e-12)
-    low, high = np.percentile(heights, [1, 99])
+    low, high = np.percentile(heights, [options.height_outliers, 100.0 - options.height_outliers])
     tilts = np.arccos(np.clip(up @ upright, -1, 1))
-    tilt, lean = float(np.percentile(tilts, 95)), float(np.arccos(np.clip(upright[2], -1, 1)))
+    tilt = float(np.percentile(tilts, 100.0 - options.tilt_outliers))
+    lean = float(np.arccos(np.clip(upright[2], -1, 1)))
     moves = [f"z by {high - low:.2f} m"] if high - low > options.max_height else []
     moves += [f"roll and pitch by up to {math.degrees(tilts.max()):.1f}°"] if tilt > options.max_tilt else []
     if moves:
@@ -142,7 +141,7 @@ def _misfits(
             side = f", those of the reference to the {'left' if turn > 0 else 'right'}"
             yield (
                 f"the headings differ by {math.degrees(abs(turn)):.1f}° ± {math.degrees(spread):.1f}° "
-                f"throughout: frames turned{side if abs(turn) < NO_SIDE else ''}"
+                f"throughout: frames turned{side if abs(turn) < options.max_side_turn else ''}"
             )
     if found is not None and not either:
         yield f"{OTHER_POINT}: {_point_text(found.point)} that of the result"
@@ -157,7 +156,8 @@ def _lag_and_lever(
     fits nearly as well.
     """
     alone = clocks.best(lambda poses, truth: fit_similarity(poses, truth).apart_scaled)
-    both = clocks.best(lambda poses, truth: getattr(lever_arm(poses, truth), "apart", math.inf))
+    most = options.max_condition
+    both = clocks.best(lambda poses, truth: getattr(lever_arm(poses, truth, most), "apart", math.inf))
     least = min(
         [now.apart_scaled, *(one[1] for one in (alone, both) if one)] + ([found.apart] if found else [])
     )
@@ -179,7 +179,7 @@ def _lag_and_lever(
 
 def _certain_lever_arm(poses: Array, truth: Array, options: RemarkOptions) -> LeverArm | None:
     """The lever arm; None where it is not certain."""
-    found = lever_arm(poses, truth)
+    found = lever_arm(poses, truth, options.max_condition)
     if found is None or np.hypot(*found.point) < max(options.min_lever, options.min_sigmas * found.sigma):
         return None
     aligned = alignment(poses, truth)

@@ -58,8 +58,10 @@ class LeverArm:
     """Residual of the positions (RMS), in the unit of the reference."""
 
 
-def lever_arm(poses: Array, truth: Array) -> LeverArm | None:
+def lever_arm(poses: Array, truth: Array, max_condition: float) -> LeverArm | None:
     """The lever arm of poses (N, 3) to positions in truth (N, 3); None where the headings leave it open.
+
+    They do where the condition number of the system exceeds `max_condition`.
 
     b = t + k R(θ) a + k R(θ + φ) l by least squares, linear in t, in k (cos θ, sin θ), and in k R(θ) l.
     Where the headings decide the alignment (alignment.py), θ is theirs, and k is 1.
@@ -76,7 +78,7 @@ def lever_arm(poses: Array, truth: Array) -> LeverArm | None:
         rows = [[*rows[0], a[:, 0], -a[:, 1]], [*rows[1], a[:, 1], a[:, 0]]]
     design = np.vstack([np.column_stack(row) for row in rows])
     scatter = design.T @ design / len(a)
-    if np.linalg.cond(scatter) > 1e8:
+    if np.linalg.cond(scatter) > max_condition:
         return None
     wanted = np.concatenate([b[:, 0], b[:, 1]])
     found = np.linalg.solve(scatter, design.T @ wanted / len(a))

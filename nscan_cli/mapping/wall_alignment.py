@@ -30,6 +30,11 @@ class WallAlignmentOptions:
     fine_width: float = 0.05
     """Standard deviation of the lines in the search around the best turn, m. A larger value tells directions
     less. With less than a cell, the raster of the map attracts its walls."""
+    bins: int = 2
+    """Number of bins of the projections in a standard deviation of the lines. A larger number is more exact,
+    and takes longer."""
+    bell_bins: int = 6
+    """Lines reach so many bins to both sides. A larger number is more exact, and takes longer."""
 
 
 def wall_alignment(grid: OccupancyGrid, options: WallAlignmentOptions | None = None) -> float:
@@ -42,20 +47,21 @@ def wall_alignment(grid: OccupancyGrid, options: WallAlignmentOptions | None = N
     points -= points.mean(axis=0)
     steps = math.floor(math.pi / 4 / options.coarse_step)
     coarse: Array = options.coarse_step * np.arange(-steps, steps + 1, dtype=np.float64)
-    best = _best_turn(points, coarse, max(options.coarse_width, grid.resolution))
+    best = _best_turn(points, coarse, max(options.coarse_width, grid.resolution), options)
     around = math.ceil(options.coarse_step / options.fine_step)
     fine: Array = best + options.fine_step * np.arange(-around, around + 1, dtype=np.float64)
-    turn = _best_turn(points, fine, max(options.fine_width, grid.resolution))
+    turn = _best_turn(points, fine, max(options.fine_width, grid.resolution), options)
     return turn - math.pi / 2 * round(turn / (math.pi / 2))
 
 
-def _best_turn(points: Array, turns: Array, width: float) -> float:
+def _best_turn(points: Array, turns: Array, width: float, options: WallAlignmentOptions) -> float:
     """The turn after which the points (N, 2) gather most on lines of this width along the axes.
 
     Of equal ones it is the smallest.
     """
     reach = float(np.hypot(*points.T).max())
-    bin_size, bell = width / 2, np.exp(-0.5 * (np.arange(-6, 7) / 2) ** 2)
+    bin_size, places = width / options.bins, np.arange(-options.bell_bins, options.bell_bins + 1)
+    bell = np.exp(-0.5 * (places / options.bins) ** 2)
     count = math.ceil(2 * reach / bin_size) + 2
 
     def gathering(turn: float) -> float:
