@@ -12,7 +12,7 @@ from nscan_cli.logs import scan_order as order
 from nscan_cli.logs.assemble import ReaderFindings, RecordedMotion, laser_log
 from nscan_cli.logs.device_choice import Device, choose_device
 from nscan_cli.logs.formats import FIRST_LINE
-from nscan_cli.logs.heading_unit import HeadingUnitOptions, are_in_degrees
+from nscan_cli.logs.heading_unit import are_in_degrees
 from nscan_cli.logs.laser_log import LaserLog
 from nscan_cli.logs.reading_options import ReadingOptions
 from nscan_cli.logs.skips import Skips
@@ -26,8 +26,6 @@ from nscan_cli.logs.text.player_records import DeviceLines, PlayerScans, Version
 from nscan_cli.logs.text.text_log_options import TextLogOptions
 from nscan_cli.poses import Array, wrap
 
-BESIDE_DEGREES = HeadingUnitOptions(min_steps=2, min_along=0.0, min_gain=0.0)
-"""Where bearings are in degrees, headings likely are, too: any way that is rather along them tells it."""
 LINE_PATTERNS: tuple[tuple[Version, re.Pattern[bytes]], ...] = (
     (0, re.compile(rb"(laser|position(2d)?)[ \t]+\d+[ \t]+\d+(\.\d+)?(\s|$)")),
     (1, re.compile(rb"\d+\.\d+[ \t]+\S+[ \t]+\d+[ \t]+[a-z]\w*[ \t]+\d+[ \t]+\d+\.\d+(\s|$)")),
@@ -154,7 +152,7 @@ def _odometry(
     values, stamps = player_records.device_poses(found, findings.skips)
     recorded = order.by_time(stamps)
     poses, origin = values[recorded.rows], f"{device}, {why}, interpolated"
-    if scans.bearings == "degrees" and are_in_degrees(poses, BESIDE_DEGREES):
+    if scans.bearings == "degrees" and are_in_degrees(poses, TextLogOptions().beside_degrees):
         poses[:, 2] = np.radians(poses[:, 2])
         origin += ", headings in degrees"
     headings_in_radians([poses], np.arange(len(poses)), options, findings)

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+
+from nscan_cli.logs.heading_unit import HeadingUnitOptions
 
 
 @dataclass(frozen=True)
@@ -34,3 +36,8 @@ class TextLogOptions:
     with a wider view."""
     last_bearing_tolerance: float = math.radians(30.0)
     """Largest distance of the last bearing from `last_bearing`, rad. A larger value warns more."""
+    beside_degrees: HeadingUnitOptions = field(
+        default_factory=lambda: HeadingUnitOptions(min_steps=2, min_along=0.0, min_gain=0.0)
+    )
+    """When headings are in degrees where bearings are. They likely are, too: any way that is rather along
+    them tells it."""
