@@ -226,20 +226,19 @@ def _of_opposite_turns(
     """Readings in the wrong order, or odometry that turns the wrong way; `fit` is that of mirrored scans.
 
     The two are mirror images, except for the mounting: if the laser is beside the middle of the robot, or
-    looks aside, its side in the file is right in only one of the two cases.
+    looks aside, its side in the file is right in only one of the two cases. Small steps aside, which may be
+    of either sign, would pass for a place farther ahead or behind.
     """
     other = mount * MIRRORED
-    # Small steps aside, which may be of either sign, would pass for a place farther ahead or behind.
-    options = replace(options, min_mount_move=np.inf)
     if is_nearer(fit, other, mount, options.mount_sigmas) or is_nearer_in_direction(
         fit, other, mount, options
     ):
-        return [findings.wrong_turns(turns), *_of_positions(other, fit, evidence, reading, options)]
+        return [findings.wrong_turns(turns), *_of_positions(other, fit, evidence, reading, options, False)]
     is_certain = is_nearer(fit, mount, other, options.mount_sigmas) or is_nearer_in_direction(
         fit, mount, other, options
     )
     mirrored = findings.opposite_turns(findings.turns_of(turns), reading, is_certain, True)
-    return [mirrored, *_of_positions(mount, fit, evidence, reading, options)]
+    return [mirrored, *_of_positions(mount, fit, evidence, reading, options, False)]
 
 
 def _of_positions(
@@ -248,8 +247,12 @@ def _of_positions(
     evidence: StepEvidence,
     reading: ReadingOptions,
     options: FileCheckOptions,
+    tell_place: bool = True,
 ) -> list[Finding]:
-    """What the positions by odometry say of its scale and of the mounting, which the file has at (3,)."""
+    """What the positions by odometry say of its scale and of the mounting, which the file has at (3,).
+
+    Where they do not `tell_place`, only of its direction.
+    """
     if fit is None or not explains_positions(fit, options):
         return []
     found = []
@@ -257,7 +260,7 @@ def _of_positions(
         found.append(findings.wrong_scale(fit, reading, options))
     if abs(float(wrap(fit.mount[2] - mount[2]))) > np.pi - options.opposite_within:
         return [*found, _opposite(mount, fit, evidence, reading, options)]
-    mounting = mount_findings.wrong_mounting(mount, fit, evidence.turning_both, options)
+    mounting = mount_findings.wrong_mounting(mount, fit, evidence.turning_both, options, tell_place)
     return found if mounting is None else [*found, mounting]
 
 

@@ -38,10 +38,13 @@ def changed_direction(
     )
 
 
-def wrong_mounting(mount: Array, fit: MountFit, turning: int, options: FileCheckOptions) -> Finding | None:
+def wrong_mounting(
+    mount: Array, fit: MountFit, turning: int, options: FileCheckOptions, tell_place: bool = True
+) -> Finding | None:
     """The laser is elsewhere than in the file, at `mount` (3,), or looks elsewhere; None if it does not.
 
-    Of the steps, `turning` are some with a turn by scans and by odometry: only these tell its place.
+    Of the steps, `turning` are some with a turn by scans and by odometry: only these tell its place. Without
+    `tell_place` none do.
     """
     off, sigmas = fit.mount - mount, options.mount_sigmas
     turn = float(wrap(off[2]))
@@ -49,7 +52,7 @@ def wrong_mounting(mount: Array, fit: MountFit, turning: int, options: FileCheck
     is_moved = bool((np.abs(off[:2]) > np.maximum(options.min_mount_move, sigmas * fit.sigmas[1:3])).any())
     # Lengths tell nothing as long as it is open whose metre is wrong, nor do a few steps.
     is_moved &= fit.steps >= options.min_steps_to_exclude and not is_wrong_scale(fit, options)
-    is_moved &= turning >= options.min_steps
+    is_moved &= tell_place and turning >= options.min_steps
     if not is_turned and not is_moved:
         return None
     place = np.round(fit.mount[:2], 2) + 0.0 if is_moved else mount[:2]

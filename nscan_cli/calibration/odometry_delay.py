@@ -67,7 +67,7 @@ def _best_delay(
 
 def _turning(motion: ScanMotion, options: SweepCheckOptions) -> list[int]:
     """Rows of scans in turns, evenly among them."""
-    rows = motion.spread_rows(options)
+    rows = motion.spread_rows(options, options.scans)
     turned = np.abs(motion.rates(rows)) * (motion.log.times[rows + 1] - motion.log.times[rows - 1])
     rows = rows[turned > options.min_winding]
     used: list[int] = rows[:: max(-(-len(rows) // options.max_delay_turns), 1)].tolist()

@@ -48,19 +48,19 @@ class ScanMotion:
         self._rates.update(zip(new.tolist(), rates.tolist(), strict=True))
         return np.array([self._rates[row] for row in rows.tolist()])
 
-    def spread_rows(self, options: SweepCheckOptions) -> Indices:
-        """Rows (n,) of scans that are spread over the log, with a scan on both sides."""
-        count = min(options.scans, len(self.log) // options.scans_apart)
+    def spread_rows(self, options: SweepCheckOptions, scans: int) -> Indices:
+        """Rows (n,) of so many scans that are spread over the log, or fewer, with a scan on both sides."""
+        count = min(scans, len(self.log) // options.scans_apart)
         return np.unique(np.linspace(1, max(len(self.log) - 2, 1), count).astype(np.int64))
 
-    def turning_rows(self, turn: float, options: SweepCheckOptions) -> Indices:
+    def turning_rows(self, turn: float, options: SweepCheckOptions, scans: int, most: int) -> Indices:
         """Rows (n,) of scans in which the robot turns enough during a `turn` of the laser (s), the fastest
-        first."""
-        rows = self.spread_rows(options)
+        first: at most so many, of so many `scans`."""
+        rows = self.spread_rows(options, scans)
         rates = np.abs(self.rates(rows))
         order = np.argsort(-rates, kind="stable")
         fastest: Indices = rows[order[rates[order] * turn > options.min_winding]]
-        return fastest[: options.pairs]
+        return fastest[:most]
 
     def twist(self, row: int) -> Array | None:
         """(3,) velocity of the laser at a row, m/s and rad/s, by the scans on both sides; None in doubt."""

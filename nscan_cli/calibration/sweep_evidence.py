@@ -74,7 +74,7 @@ def sweep_evidence(
     """
     evidence = SweepEvidence(np.array(turns), np.empty((0, len(turns))), np.empty(0, np.int64), options)
     longest = max(abs(turn) for turn in turns)
-    for one, other in turning_pairs(motion, longest, options):
+    for one, other in turning_pairs(motion, longest, options, options.scans, options.pairs):
         if motion.change_of_turn(one, other) * longest <= options.min_winding:
             # The estimate of single ranges was wrong.
             continue
@@ -113,9 +113,14 @@ def _without_worse(evidence: SweepEvidence, told: float, options: SweepCheckOpti
     return replace(evidence, turns=evidence.turns[kept], energies=evidence.energies[:, kept])
 
 
-def turning_pairs(motion: ScanMotion, turn: float, options: SweepCheckOptions) -> Iterator[tuple[int, int]]:
-    """Rows of two scans each between which the motion has changed; no scan is first again before all were."""
-    fast, shifts = motion.turning_rows(turn, options), np.array(options.shifts)
+def turning_pairs(
+    motion: ScanMotion, turn: float, options: SweepCheckOptions, scans: int, most: int
+) -> Iterator[tuple[int, int]]:
+    """Rows of two scans each between which the motion has changed; no scan is first again before all were.
+
+    At most so many are first, of so many `scans`.
+    """
+    fast, shifts = motion.turning_rows(turn, options, scans, most), np.array(options.shifts)
     for begin in range(len(shifts)):
         # Each scan begins with another shift, and comes to all of them.
         others = fast + shifts[(begin + np.arange(len(fast))) % len(shifts)]

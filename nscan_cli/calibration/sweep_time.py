@@ -7,7 +7,7 @@ energies have a minimum at the true one.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -86,8 +86,7 @@ def _energies(motion: ScanMotion, longest: float, turns: Array, options: SweepCh
 
 
 def _pairs(motion: ScanMotion, longest: float, options: SweepCheckOptions) -> Iterator[tuple[int, int]]:
-    more = replace(options, scans=options.time.scans, pairs=options.time.most_rows)
-    return turning_pairs(motion, longest, more)
+    return turning_pairs(motion, longest, options, options.time.scans, options.time.most_rows)
 
 
 def _sharpest(turns: Array, energies: Array, options: SweepTimeOptions) -> float:
