@@ -21,7 +21,7 @@ class StepControl(NamedTuple):
     least: float
     """Lower bound of the damping."""
     least_divided: float
-    """After an accepted step, damping above this is divided by 10, and damping up to this becomes `least`."""
+    """After an accepted step, damping above this is lowered, and damping up to this becomes `least`."""
     least_raised: float
     """Lower bound of the damping after a rejected step."""
     greatest: float
@@ -37,29 +37,38 @@ class StepControl(NamedTuple):
     """A step is made longer at most by this factor."""
     unstretched: int = 0
     """Number of iterations before any step is made longer."""
+    raised: float = 10.0
+    """Factor of the damping after a rejected step. A larger value comes to short steps sooner."""
+    lowered: float = 0.1
+    """Factor of the damping after an accepted step. A larger value keeps steps damped for longer."""
+    floor: float = 0.0
+    """Added to the diagonal of the damped Hessian, for directions without information. A larger value makes
+    steps there shorter."""
+    floor_share: float = 0.0
+    """The same, as a share of the greatest element of the diagonal."""
 
 
 PAIRWISE_STEPS = StepControl(
     first=1e-3, least=1e-7, least_divided=1e-7, least_raised=0.0,
-    greatest=1e6, trusted=1e-3, damped_share=0.1, rounding=0.0,
+    greatest=1e6, trusted=1e-3, damped_share=0.1, rounding=0.0, floor=1e-12,
 )  # fmt: skip
 """Starts are rough, so steps are damped from the first on. One NDT is cheap to evaluate, so a damping up to
 1e6 allows long searches where the energy jumps at borders of cells. Paths in uneven motion take these steps,
-too."""
+too, without the floor."""
 JOINT_STEPS = StepControl(
     first=1e-3, least=1e-8, least_divided=1e-8, least_raised=0.0,
     greatest=1e4, trusted=np.inf, damped_share=0.0, rounding=0.0,
-    greatest_stretch=4.0, unstretched=5,
+    greatest_stretch=4.0, unstretched=5, floor=1e-12, floor_share=1e-9,
 )  # fmt: skip
 """An evaluation costs n (n − 1) times as much. So the solver gives up earlier, and any step within the
 tolerance is the last one. In bare corridors steps with the semi-definite part of the Hessian are several
 times too short again and again. Then they are made longer."""
 GRAPH_STEPS = StepControl(
     first=0.0, least=0.0, least_divided=1e-9, least_raised=1e-6,
-    greatest=1e8, trusted=1.0, damped_share=0.0, rounding=1e-12,
+    greatest=1e8, trusted=1.0, damped_share=0.0, rounding=1e-12, floor_share=1e-9,
 )  # fmt: skip
 """The energy is smooth and nearly quadratic, so steps are undamped unless they fail. Sums over thousands of
-relations carry rounding errors."""
+relations carry rounding errors. The floor of the diagonal is damped as the diagonal is."""
 
 
 @leaf_kernel
@@ -72,8 +81,8 @@ def is_accepted(value: float, trial: float, control: StepControl) -> bool:
 def next_damping(damping: float, accepted: bool, control: StepControl) -> float:
     """The damping after a step that was accepted or rejected."""
     if not accepted:
-        return max(10.0 * damping, control.least_raised)
-    return max(0.1 * damping, control.least) if damping > control.least_divided else control.least
+        return max(control.raised * damping, control.least_raised)
+    return max(control.lowered * damping, control.least) if damping > control.least_divided else control.least
 
 
 @leaf_kernel

@@ -112,7 +112,7 @@ def minimise_pairwise(
             last += 1
             assign_rows(damped, hessian)
             for a in range(3):
-                damped[a, a] += damping * hessian[a, a] + 1e-12
+                damped[a, a] += damping * hessian[a, a] + PAIRWISE_STEPS.floor
             if not solve_definite(damped, gradient, step):
                 break
             for a in range(3):

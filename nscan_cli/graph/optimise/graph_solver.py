@@ -91,8 +91,9 @@ def newton_step(pattern: Pattern, system: System, damping: float = 0.0) -> Array
         matrix = matrix.copy()
         block, component = pattern.starts[:-1, None], np.arange(3)
         diagonal = matrix[block, component, component]
-        # The second term is for directions without information.
-        matrix[block, component, component] += damping * (diagonal + 1e-9 * diagonal.max(initial=0.0))
+        # The second term is for directions without information; it is damped, too.
+        floor = GRAPH_STEPS.floor_share * diagonal.max(initial=0.0)
+        matrix[block, component, component] += damping * (diagonal + floor)
     factor = factorise(pattern, matrix)
     return None if factor.loose.any() else -solve(factor, system.gradient)
 

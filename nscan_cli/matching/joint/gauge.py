@@ -6,6 +6,7 @@ import numpy as np
 
 from nscan_cli.kernels.array_assignment import assign_rows
 from nscan_cli.kernels.decorators import kernel
+from nscan_cli.matching.damped_newton import JOINT_STEPS
 from nscan_cli.matching.small_matrices import solve_definite
 from nscan_cli.poses import Array
 
@@ -33,7 +34,7 @@ def gauge_fixed_step(
     for a in range(size):
         greatest = max(greatest, abs(hessian[a, a]))
     for a in range(size):
-        matrix[a, a] += damping * abs(hessian[a, a]) + 1e-9 * greatest + 1e-12
+        matrix[a, a] += damping * abs(hessian[a, a]) + JOINT_STEPS.floor_share * greatest + JOINT_STEPS.floor
     if fixed < 0:
         null = gauge_directions(poses)
         for a in range(size):

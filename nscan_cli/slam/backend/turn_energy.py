@@ -165,6 +165,8 @@ def _descend(
             if is_last(np.abs(step).max(), tolerance, damping, PAIRWISE_STEPS):
                 break
         damping = next_damping(damping, accepted, PAIRWISE_STEPS)
+        if damping > PAIRWISE_STEPS.greatest:
+            break
 
 
 @kernel
