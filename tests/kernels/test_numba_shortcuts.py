@@ -9,8 +9,9 @@ from tests.kernels.kernels_kept import KERNELS, RESULTS, files, process, report
 NUMBER = re.compile(rb"B\d+v\d+")
 """A function's number in its name."""
 WITHOUT = """
-import nscan_cli.kernels.numba_shortcuts as shortcuts
-shortcuts._shortcuts = lambda: []
+import contextlib
+from nscan_cli.kernels import whole_kernels
+whole_kernels.numba_shortcuts = contextlib.nullcontext
 """
 LEFT = """
 import numba

@@ -6,8 +6,9 @@ import importlib
 import os
 import subprocess
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -246,13 +247,13 @@ def test_what_a_process_compiles_is_told(tmp_path, monkeypatch):
 def test_an_interrupt_ends_the_processes(tmp_path, monkeypatch):
     monkeypatch.setattr(bootstrap, "worker_command", lambda *_call: ["sleep", "60"])
     begun = []
-    start = warm_up._started
+    start = subprocess.Popen
 
-    def begin(share: Sequence[str], environment: Mapping[str, str]) -> subprocess.Popen[bytes]:
-        begun.append(start(share, environment))
+    def begin(call: list[str], **how: Any) -> subprocess.Popen[bytes]:
+        begun.append(start(call, **how))
         return begun[-1]
 
-    monkeypatch.setattr(warm_up, "_started", begin)
+    monkeypatch.setattr(subprocess, "Popen", begin)
 
     def interrupted(*_progress: object) -> None:
         raise KeyboardInterrupt

@@ -6,7 +6,7 @@ threads.
 
 from __future__ import annotations
 
-from concurrent.futures import Future, ThreadPoolExecutor
+from concurrent.futures import Future, ThreadPoolExecutor, wait
 from functools import partial
 from types import TracebackType
 from typing import NamedTuple
@@ -61,6 +61,10 @@ class SpeculativeMatching:
                 made = completed_call(partial(self._match, route, keyframe, near, self._options))
                 self._begun[keyframe] = _Begun(route, near, made)
                 return
+
+    def settle(self) -> None:
+        """Wait until all matches that have been begun are made."""
+        wait([begun.match for begun in self._begun.values()])
 
     def begin(self, route: Route, whole: int, centre: int, near: Neighbours, covered: Coverage) -> None:
         """Begin the matches that follow the one of keyframe `centre`.

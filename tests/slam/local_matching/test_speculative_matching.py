@@ -66,12 +66,6 @@ def asked(ahead: SpeculativeMatching, route: Route, centre: int) -> LocalMatch |
     return ahead.match(route, centre, choose_neighbours(route.poses, route.paths, centre, OPTIONS))
 
 
-def let_finish(ahead: SpeculativeMatching) -> None:
-    """The pool has one thread: what comes last is done after all that was begun."""
-    assert ahead._pool is not None
-    ahead._pool.submit(int).result()
-
-
 def test_what_is_due_next_is_begun_as_if_every_match_related_all():
     """Around 6 all pairs of 4 to 8 are: keyframe 7 misses one of its four (with 9), 8 two (9 and 10)."""
     matches, route = Matches(), straight(10)
@@ -79,7 +73,7 @@ def test_what_is_due_next_is_begun_as_if_every_match_related_all():
         ahead.open()
         begin(ahead, route)
         begin(ahead, route)
-        let_finish(ahead)
+        ahead.settle()
     begun = [(centre, size) for _, centre, size in matches.made]
     # Each with the route as it will be at its turn, three keyframes further than the centre.
     assert begun == [(8, 12), (10, 14)]
@@ -91,7 +85,7 @@ def test_a_match_counts_if_the_graph_lies_as_it_was_assumed():
     with SpeculativeMatching(matches, OPTIONS, 2) as ahead:
         ahead.open()
         begin(ahead, route)
-        let_finish(ahead)
+        ahead.settle()
         longer = extended(route, 12)
         found = asked(ahead, longer, 8)
         assert found is not None
@@ -111,7 +105,7 @@ def test_what_the_graph_has_left_behind_is_begun_anew():
         begin(ahead, route)
         route.poses[9, 1] = 0.5
         begin(ahead, route)
-        let_finish(ahead)
+        ahead.settle()
     # As the graph lies now, whatever had been made before it moved.
     assert matches.aside[-2:] == [(8, 0.5), (10, 0.5)]
 
