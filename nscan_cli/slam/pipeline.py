@@ -30,7 +30,8 @@ LoopProgress = Callable[[int, int], None]
 def run_slam(state: SlamState, report: LoopProgress) -> Graph:
     """Map a whole log, from its state before the first scan; returns the graph.
 
-    Tracking needs nothing of the graph: with two threads the graph grows beside it.
+    Tracking needs nothing of the graph: with two threads the graph grows beside it. Changes what its steps
+    change, tracking_restarts and tracking_searches.
     """
     tracker, behind = tracker_of(state.log, state.options), state.options.nscan.centre_delay
     with (
@@ -64,7 +65,10 @@ def track(tracker: SegmentTracker, scans: ScanBatch, is_last: bool) -> list[Trac
 
 
 def grow(state: SlamState, ahead: SpeculativeMatching, size: int) -> None:
-    """Let the first `size` keyframes join the graph; relate those that have enough keyframes after them."""
+    """Let the first `size` keyframes join the graph; relate those that have enough keyframes after them.
+
+    Changes keyframes, route, detector, and what `relate` changes.
+    """
     for keyframe in state.keyframes.list[len(state.poses) : size]:
         keyframe.make_ndt()
         extend_route(state, keyframe)
@@ -72,7 +76,10 @@ def grow(state: SlamState, ahead: SpeculativeMatching, size: int) -> None:
 
 
 def relate(state: SlamState, ahead: SpeculativeMatching, centre: int) -> None:
-    """Steps 3 to 5 for one keyframe, unless the matches of others cover it: match, close loops, optimise."""
+    """Steps 3 to 5 for one keyframe, unless the matches of others cover it: match, close loops, optimise.
+
+    Changes what `match_keyframe`, `close_loops` and `optimise_if_due` change.
+    """
     if centre < 0:
         return
     route, options = state.route, state.options.nscan

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -103,6 +103,18 @@ class SlamState:
         route = route_of(keyframes.list, chain, np.zeros((0, 3)))
         frozen = frozen_scans(log, odometry, options.odometry_checks)
         return cls(log, recorded, options, threads, odometry, jumps, stalls, frozen, keyframes, route, chain)
+
+    def snapshot(self) -> Callable[[], None]:
+        """A function that makes route, matched relations, loops and places what they are now, once."""
+        route, pairs, joint = self.route, list(self.matched_pairs), list(self.nscan_relations)
+        loops, places = list(self.loops), list(self.places)
+
+        def restore() -> None:
+            self.route, self.matched_pairs, self.nscan_relations = route, pairs, joint
+            self.loops, self.places = loops, places
+            self.energies.forget()
+
+        return restore
 
     def scan_batches(self) -> Iterator[ScanBatch]:
         """The scans of the log as tracking takes them."""

@@ -25,9 +25,7 @@ def mend_contradicting_visits(state: SlamState) -> None:
     options, before = state.options.loop_closure, worst_violation(state)
     if not state.options.nscan.loops or before is None or is_sound(before, options.free_space):
         return
-    # The search adds to these lists.
-    pairs, joint = list(state.matched_pairs), list(state.nscan_relations)
-    kept = state.route, pairs, joint, list(state.loops), list(state.places)
+    restore = state.snapshot()
     if not close_loops_between(state, before.first, before.last):
         return
     refine(state)
@@ -35,8 +33,7 @@ def mend_contradicting_visits(state: SlamState) -> None:
     if after is None or is_sound(after, options.free_space):
         return
     if after.share > options.contradicted_share * before.share:
-        state.route, state.matched_pairs, state.nscan_relations, state.loops, state.places = kept
-        state.energies.forget()
+        restore()
 
 
 def worst_violation(state: SlamState) -> FreeSpaceViolation | None:
